@@ -1,0 +1,66 @@
+# Everything from a fresh clone: `make demo`, `make test`. PYTHON chooses the interpreter, VENV the environment.
+PYTHON ?= python3
+VENV ?= .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
+SCENE ?= slider-crank
+UNTIL ?= 5
+PYTEST := $(BIN)/python -m pytest
+CORES ?= 2
+
+# Threads of a linear-algebra library change the order of sums, and fight with the test workers.
+export OMP_NUM_THREADS := 1
+export OPENBLAS_NUM_THREADS := 1
+
+.DELETE_ON_ERROR:
+.PHONY: help demo test lint types docs bench fuzz clean
+
+help:
+	@echo 'make demo   simulate scenes/$(SCENE).toml and write out/$(SCENE)/report.html'
+	@echo 'make test   run the tests; make lint, make types: style and types; make fuzz: the laws, for long'
+	@echo 'make docs   build docs/_build/html; make bench: measure; make clean: remove what was built'
+
+# One stamp an extra: installing again is needed only when pyproject.toml has changed.
+$(BIN)/python:
+	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/.installed-%: pyproject.toml | $(BIN)/python
+	$(PIP) --editable '.[$*]'
+	@touch $@
+
+demo: $(VENV)/.installed-viz
+	$(BIN)/ephs run scenes/$(SCENE).toml --until $(UNTIL) --out out/$(SCENE)
+	@echo 'The report: out/$(SCENE)/report.html (open it in a browser; it needs no network)'
+
+test: $(VENV)/.installed-dev
+	$(PYTEST) -n $(CORES)
+
+lint: $(VENV)/.installed-dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+types: $(VENV)/.installed-dev
+	$(BIN)/basedpyright
+
+fuzz: $(VENV)/.installed-dev
+	$(PYTEST) -n $(CORES) --hypothesis-profile=fuzz
+
+bench: $(VENV)/.installed-dev
+	$(BIN)/python -m benchmarks
+
+# MathJax is fetched once and copied into the pages, which then need no network.
+MATHJAX := .build/static/mathjax/tex-svg-full.js
+
+$(MATHJAX):
+	@command -v npm >/dev/null || { echo 'make docs: npm was not found; it fetches MathJax 3, which sets the formulas. Install npm, then run make docs again.' >&2; exit 1; }
+	@mkdir -p $(@D) .build/npm
+	cd .build/npm && npm pack --silent mathjax@3 && tar -xzf mathjax-3*.tgz package/es5/tex-svg-full.js
+	mv .build/npm/package/es5/tex-svg-full.js $@
+
+docs: $(VENV)/.installed-docs $(MATHJAX)
+	$(BIN)/python -m sphinx -W --keep-going -b html docs docs/_build/html
+	@echo 'The pages: docs/_build/html/index.html'
+
+clean:
+	rm -rf out docs/_build .build .pytest_cache .hypothesis .ruff_cache .coverage dist
+	find ephs tests -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,379 @@
+"""The command line: parses, calls, prints.
+
+Exit codes: 0 done; 1 a law fails (``check``); 2 bad input; 3 the run failed part-way; 130 interrupted.
+"""
+
+import json
+import math
+import runpy
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from cyclopts import App, CycloptsError, Parameter
+
+if TYPE_CHECKING:
+    from ephs import Scene, Solution, System
+
+__all__ = ["main"]
+
+_NEXT = """\
+Exergetic port-Hamiltonian systems: compose physical models by pattern, simulate them, check both laws.
+
+  ephs run scenes/slider-crank.toml --until 5     simulate; writes out/slider-crank/report.html
+  ephs check scenes/slider-crank.toml             check the model: structure, laws, assembly, mobility
+  ephs draw scenes/slider-crank.toml -o a.svg     draw the interconnection pattern
+
+SCENE is a scene file (.toml), or FILE.py:NAME, a System or Scene of that name in a Python file of yours.
+ephs COMMAND --help explains a command."""
+
+_TEXTS = {
+    "suffix": "{found}: expected one of {expected}; choose the file name's ending accordingly",
+    "no-file": "{found}: no such file; expected a scene file (.toml) or FILE.py:NAME",
+    "no-name": "{file}: no {name} in it; found {found}. Give one as {file}:NAME",
+    "not-a-model": "{file}: {name} is a {found}, expected a System or a Scene",
+    "user-code": "{file}: line {line}: {found}; mend the file, then run again",
+    "extra": "{file}: the module {found} is not installed; python -m pip install 'ephs[{extra}]'",
+    "no-report": "report.html was not written: the module {found} is not installed; "
+    "python -m pip install 'ephs[{extra}]' and run again (the solution is saved)",
+    "out": "{file}: {found}; choose another folder or file",
+    "failed": "{file}: the run failed: {found}",
+    "interrupted": "{file}: interrupted{at}",
+}
+_EXTRAS = {"matplotlib": "viz", "pygraphviz": "viz", "viser": "viz", "mujoco": "models"}
+_PICTURES = (".svg", ".tex", ".png")
+_FIGURES = {
+    "steps": ("steps", "d"),
+    "rejected": ("rejected steps", "d"),
+    "mobility": ("mobility", "d"),
+    "redundant_constraints": ("redundant constraints", "d"),
+    "max_energy_error": ("energy defect, relative", ".1e"),
+    "max_constraint_error": ("joint gap, m or rad", ".1e"),
+    "min_entropy_production": ("least entropy production, J/K a step", ".1e"),
+    "heat": ("heat, J", ".4g"),
+    "work": ("work, J", ".4g"),
+    "integrate_s": ("time stepping, s", ".2f"),
+}
+
+
+class BadInput(Exception):
+    """Input that cannot be used; the text is for the user."""
+
+
+def _version() -> str:
+    from importlib.metadata import version
+
+    return version("ephs")
+
+
+app = App(
+    name="ephs",
+    help="Compose physical models by pattern, simulate them with both laws of thermodynamics exact.",
+    version=_version,
+    exit_on_error=False,
+    result_action="return_value",
+    suppress_keyboard_interrupt=False,
+)
+
+
+def _positive(_type: object, value: float | None) -> None:
+    if value is not None and not (value > 0 and math.isfinite(value)):
+        raise ValueError(f"found {value:g}, expected a positive finite number")
+
+
+Positive = Annotated[float | None, Parameter(validator=_positive)]
+Base = Literal["fixed", "free"]
+
+
+@app.default
+def _welcome() -> int:
+    """Say what one can do next."""
+    print(_NEXT)
+    return 0
+
+
+@app.command
+def run(
+    scene: str,
+    /,
+    *,
+    until: Annotated[float, Parameter(validator=_positive)],
+    method: str | None = None,
+    rtol: Positive = None,
+    atol: Positive = None,
+    step: Positive = None,
+    form: Literal["paper", "folded", "reduced"] | None = None,
+    out: Path | None = None,
+    base: Base = "fixed",
+    adjust: bool = False,
+) -> int:
+    """Simulate a scene and write its result folder.
+
+    Parameters
+    ----------
+    scene
+        A scene file (.toml), or FILE.py:NAME.
+    until
+        End of the simulated time, in seconds.
+    method
+        Integration method, for example natural.
+    rtol
+        Relative tolerance, for methods that choose their step.
+    atol
+        Absolute tolerance, for methods that choose their step.
+    step
+        Constant step size, in seconds.
+    form
+        Which form of the equations is integrated.
+    out
+        Result folder; out/NAME unless given.
+    base
+        How the root of an imported model meets the ground.
+    adjust
+        Assemble a scene that does not quite close.
+    """
+    import ephs
+
+    model = _load(scene, base=base, adjust=adjust)
+    name = model.name if isinstance(model, ephs.Scene) else scene.rpartition(":")[2]
+    folder = out or Path("out", name)
+    with _input(scene, folder):
+        folder.mkdir(parents=True, exist_ok=True)
+    given = {"method": method, "rtol": rtol, "atol": atol, "step": step, "form": form}
+    chosen: dict[str, Any] = {key: value for key, value in given.items() if value is not None}
+    try:
+        with _input(scene, folder), _progress(name) as progress:
+            solution = ephs.simulate(model, until, progress=progress, **chosen)
+    except ephs.SimulationError as error:
+        if error.partial is None:
+            raise BadInput(_naming(scene, str(error))) from error
+        stopped = isinstance(error, ephs.Interrupted)
+        if stopped:
+            _complain(_TEXTS["interrupted"].format(file=scene, at=f" at t = {error.partial.t[-1]:.6g} s"))
+        else:
+            _complain(_TEXTS["failed"].format(file=scene, found=error))
+        with _input(scene, folder):
+            _write(error.partial, folder)
+        _complain(f"saved what was computed: {folder}")
+        return 130 if stopped else 3
+    with _input(scene, folder):
+        _write(solution, folder)
+    return 0
+
+
+@app.command
+def check(scene: str, /, *, base: Base = "fixed", adjust: bool = False) -> int:
+    """Check the model, not the trajectory; exit code 1 if a law fails.
+
+    Parameters
+    ----------
+    scene
+        A scene file (.toml), or FILE.py:NAME.
+    base
+        How the root of an imported model meets the ground.
+    adjust
+        Assemble a scene that does not quite close.
+    """
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    model = _load(scene, base=base, adjust=adjust)
+    with _input(scene):
+        from ephs.mechanics.check import check_model
+
+        report = check_model(model)
+    table = Table("law", "", "detail", title=scene, title_justify="left", box=None, pad_edge=False)
+    for name, holds, detail in report.items:
+        verdict = Text("holds", "green") if holds else Text("FAILS", "bold red")
+        table.add_row(Text(name), verdict, Text(detail))
+    Console().print(table)
+    return 0 if report.ok else 1
+
+
+@app.command
+def draw(
+    scene: str,
+    /,
+    *,
+    output: Annotated[Path, Parameter(name=["--output", "-o"])],
+    flat: bool = False,
+    base: Base = "fixed",
+    adjust: bool = False,
+) -> int:
+    """Draw the interconnection pattern.
+
+    Parameters
+    ----------
+    scene
+        A scene file (.toml), or FILE.py:NAME.
+    output
+        The picture to write; its ending chooses SVG, TikZ or PNG: .svg, .tex, .png.
+    flat
+        Draw the flattened pattern instead of the outermost level.
+    base
+        How the root of an imported model meets the ground.
+    adjust
+        Assemble a scene that does not quite close.
+    """
+    import ephs
+
+    if output.suffix not in _PICTURES:
+        raise BadInput(_TEXTS["suffix"].format(found=output, expected=", ".join(_PICTURES)))
+    model = _load(scene, base=base, adjust=adjust)
+    with _input(scene, output):
+        from ephs.show import draw as draw_pattern
+
+        system = model.system() if isinstance(model, ephs.Scene) else model
+        output.parent.mkdir(parents=True, exist_ok=True)
+        draw_pattern(system.flatten() if flat else system).save(output)
+    print(output)
+    return 0
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line.
+
+    Parameters
+    ----------
+    arguments
+        The words after the program's name; those of the process unless given.
+
+    Returns
+    -------
+    int
+        The exit code, see the module.
+    """
+    from rich.console import Console
+
+    try:
+        return int(app(arguments, error_console=Console(stderr=True)) or 0)
+    except CycloptsError:
+        return 2
+    except BadInput as error:
+        _complain(str(error))
+        return 2
+    except KeyboardInterrupt:
+        _complain("interrupted")
+        return 130
+
+
+def _load(scene: str, *, base: Base, adjust: bool) -> "Scene | System":
+    import ephs
+
+    file, separator, name = scene.rpartition(":")
+    if separator and file.endswith(".py"):
+        return _load_from_python(Path(file), name)
+    if scene.endswith(".py"):
+        raise BadInput(_TEXTS["no-name"].format(file=scene, name="name was given", found=scene))
+    if not Path(scene).is_file():
+        raise BadInput(_TEXTS["no-file"].format(found=scene))
+    with _input(scene):
+        return ephs.load(scene, base=base, adjust=adjust)
+
+
+def _load_from_python(file: Path, name: str) -> "Scene | System":
+    import ephs
+
+    if not file.is_file():
+        raise BadInput(_TEXTS["no-file"].format(found=file))
+    sys.path.insert(0, str(file.parent.resolve()))  # as `python FILE.py` does, for modules beside the file
+    try:
+        names = runpy.run_path(str(file), run_name="__ephs__")
+    except (Exception, SystemExit) as error:
+        found = f"{type(error).__name__}: {error}"
+        raise BadInput(_TEXTS["user-code"].format(file=file, line=_line(error, file), found=found)) from error
+    finally:
+        sys.path.remove(str(file.parent.resolve()))
+    models = [key for key, value in names.items() if isinstance(value, (ephs.System, ephs.Scene))]
+    if name not in names:
+        found = ", ".join(models) or "no System and no Scene"
+        raise BadInput(_TEXTS["no-name"].format(file=file, name=name or "name was given", found=found))
+    if name not in models:
+        raise BadInput(_TEXTS["not-a-model"].format(file=file, name=name, found=type(names[name]).__name__))
+    return names[name]
+
+
+def _line(error: BaseException, file: Path) -> int | str:
+    """Return the deepest line of the user's own file that the error went through."""
+    if isinstance(error, SyntaxError) and error.filename == str(file) and error.lineno:
+        return error.lineno
+    line: int | str = "?"
+    trace = error.__traceback__
+    while trace is not None:
+        if trace.tb_frame.f_code.co_filename == str(file):
+            line = trace.tb_lineno
+        trace = trace.tb_next
+    return line
+
+
+@contextmanager
+def _input(scene: str, target: Path | None = None) -> Iterator[None]:
+    """Turn the errors that speak to the user into ``BadInput`` that names the file."""
+    import ephs
+
+    try:
+        yield
+    except (BadInput, ephs.SimulationError):
+        raise
+    except ModuleNotFoundError as error:
+        module = (error.name or "").partition(".")[0]
+        if module not in _EXTRAS:
+            raise
+        raise BadInput(_TEXTS["extra"].format(file=scene, found=module, extra=_EXTRAS[module])) from error
+    except OSError as error:
+        where = error.filename or target or scene
+        raise BadInput(_TEXTS["out"].format(file=where, found=error.strerror or error)) from error
+    except Exception as error:
+        # The exception classes of this package are addressed to the user; all others are defects.
+        if type(error).__module__.partition(".")[0] != "ephs":
+            raise
+        raise BadInput(_naming(scene, str(error))) from error
+
+
+def _naming(scene: str, message: str) -> str:
+    return message if str(Path(scene)) in message else f"{scene}: {message}"
+
+
+@contextmanager
+def _progress(name: str) -> Iterator[Callable[[float, float, Mapping[str, Any]], None]]:
+    """Show a bar with the time left, on a terminal only."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    console = Console(stderr=True)
+    note = TextColumn("{task.fields[note]}")
+    columns = (TextColumn("{task.description}"), BarColumn(), note, TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task(name, total=1.0, note="")
+
+        def progress(t: float, until: float, stats: Mapping[str, Any]) -> None:
+            steps = f", {stats['steps']} steps" if "steps" in stats else ""
+            bar.update(task, total=until, completed=t, note=f"t = {t:.3g} of {until:g} s{steps}")
+
+        yield progress
+
+
+def _write(solution: "Solution", folder: Path) -> None:
+    """Write the result folder, the data before the pictures, and say where it lies."""
+    summary = solution.summary()
+    solution.save(folder / "solution.nc")
+    (folder / "summary.json").write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
+    for key, (label, form) in _FIGURES.items():
+        if summary.get(key) is not None:
+            print(f"{label:38}{summary[key]:>12{form}}")
+    try:
+        from ephs.show.report import write_report
+
+        print(f"report: {write_report(solution, folder)}")
+    except ModuleNotFoundError as error:
+        module = (error.name or "").partition(".")[0]
+        if module not in _EXTRAS:
+            raise
+        _complain(_TEXTS["no-report"].format(found=module, extra=_EXTRAS[module]))
+
+
+def _complain(message: str) -> None:
+    print(message, file=sys.stderr)
