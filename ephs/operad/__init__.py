@@ -1,0 +1,28 @@
+"""Syntax: names, quantities, interconnection patterns, and the laws of the operad that patterns form."""
+
+from ephs.operad.directory import Directory
+from ephs.operad.errors import PatternError
+from ephs.operad.laws import LAWS, Equation, Law
+from ephs.operad.names import ROOT, Path
+from ephs.operad.pattern import Box, Junction, Pattern, Port, junction
+from ephs.operad.quantities import Interface, PortType, Quantity, Space, quantity
+
+__all__ = [
+    "LAWS",
+    "ROOT",
+    "Box",
+    "Directory",
+    "Equation",
+    "Interface",
+    "Junction",
+    "Law",
+    "Path",
+    "Pattern",
+    "PatternError",
+    "Port",
+    "PortType",
+    "Quantity",
+    "Space",
+    "junction",
+    "quantity",
+]

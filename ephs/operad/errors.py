@@ -1,0 +1,104 @@
+"""The error of the syntax layer, with all its texts in one table."""
+
+from typing import final
+
+__all__ = ["PatternError"]
+
+_TEXTS = {
+    "name": "the name {found!r} cannot stand in a path: {expected}; choose another name",
+    "path": "{found!r} is no path; expected {expected}",
+    "prefix": "{what}: the paths {found} clash, as one is a prefix of the other; {expected};"
+    " rename one of them",
+    "duplicate": "{what}: the path {found} is given twice; {expected}; rename one of them",
+    "p5": "box {box} and junction {junction} clash: one path is a prefix of the other, so that"
+    " substitution could name two junctions alike; rename one of them",
+    "root-box": "box .: a box at the root path clashes with the junctions of its own fillings; only"
+    " Pattern.identity(interface) has one; give the box a name (found the boxes {found})",
+    "root-rename": "box .: an identity pattern cannot be renamed, found new names for {found}; rename the"
+    " filling, or write the renaming pattern with a named box",
+    "root-junction": "junction .: a junction at the root path is a prefix of every box; give it a name",
+    "root-port": "box {box}, port {port}: a port at the root path could name no junction of a filling;"
+    " give it a name",
+    "junction-type": "junction {junction}: found {found}, expected {expected}",
+    "box-type": "box {box}: found {found}, expected {expected}",
+    "port-type": "box {box}, port {port}: found {found}, expected {expected}",
+    "unknown-junction": "box {box}, port {port}: there is no junction {junction}; the junctions are"
+    " {expected}",
+    "no-inner-port": "junction {junction} ({found}) has no inner port; expected at least one port of a box on"
+    " it. Connect a port or remove the junction. To pass an outer port through, or to hand it out twice, fork"
+    " outside: expose it once and connect both users where the pattern is used",
+    "link-junction": "link {found}: there is no junction {junction}; the junctions are {expected}",
+    "link-size": "link {found}: expected two junctions or more that share their state",
+    "link-quantity": "link between junctions {junction}: found the quantities {found}, expected one quantity;"
+    " only equal quantities can share a state",
+    "unknown-box": "box {box}: there is no such box; the boxes are {expected}",
+    "filling-type": "box {box}: the filling is {found}, expected {expected}",
+    "interface": "box {box}: the filling's interface does not match: {ports}. Found {found}, expected"
+    " {expected}; rename ports with Pattern.rename, nothing is matched by type alone",
+    "no-filling": "the boxes {expected} want fillings, found none; give each box a system or a primitive",
+    "rename": "cannot rename {what} {found}: there is none of this name; expected one of {expected}",
+    "pair": "the kind of relative pose is {found!r}, expected one of {expected}",
+    "pair-parameters": "relative pose {what}: found the parameters {found}, expected {expected}",
+    "parity": "quantity {what}: the parity is {found!r}, expected +1 (even under time reversal) or -1 (odd)",
+    "space": "space {what}: found dim {found}, expected whole numbers dim >= 0 and size >= dim",
+    "json": "no pattern can be read: found {found}, expected {expected}",
+}
+
+
+@final
+class PatternError(ValueError):
+    """A pattern, name, quantity or substitution that is not well-formed.
+
+    Parameters
+    ----------
+    kind
+        The key of the message.
+    box, port, junction
+        The dotted paths of what is at fault, ``None`` where it does not apply.
+    found, expected
+        What was given, and what would have been right.
+    **facts
+        Further words of the message.
+    """
+
+    def __init__(
+        self,
+        kind: str,
+        *,
+        box: object = None,
+        port: object = None,
+        junction: object = None,
+        found: object = None,
+        expected: object = None,
+        **facts: str,
+    ) -> None:
+        self.kind = kind
+        self.box = None if box is None else str(box)
+        self.port = None if port is None else str(port)
+        self.junction = None if junction is None else str(junction)
+        self.found = found
+        self.expected = expected
+        self.facts = facts
+        super().__init__(
+            _TEXTS[kind].format(
+                box=self.box, port=self.port, junction=self.junction, found=found, expected=expected, **facts
+            )
+        )
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return (
+            _rebuild,
+            (self.kind, self.box, self.port, self.junction, self.found, self.expected, self.facts),
+        )
+
+
+def _rebuild(
+    kind: str,
+    box: object,
+    port: object,
+    junction: object,
+    found: object,
+    expected: object,
+    facts: dict[str, str],
+) -> PatternError:
+    return PatternError(kind, box=box, port=port, junction=junction, found=found, expected=expected, **facts)

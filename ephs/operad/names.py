@@ -1,0 +1,107 @@
+"""Paths: how boxes, junctions and ports are named, across all levels of nesting."""
+
+from collections.abc import Iterable
+from typing import TypeAlias, final
+
+from ephs.operad.errors import PatternError
+
+__all__ = ["ROOT", "Path", "PathLike", "paths_text"]
+
+
+@final
+class Path(tuple[str, ...]):
+    """A finite sequence of names; the empty one is the root, and prints as ``.``.
+
+    Paths form the free monoid on names: ``a / b`` concatenates, ``ROOT`` is neutral. They are ordered like
+    tuples.
+
+    >>> Path.parse("osc.pe") / "q"
+    Path.parse('osc.pe.q')
+    >>> str(ROOT), ROOT / "a" == Path.parse("a")
+    ('.', True)
+
+    Raises
+    ------
+    PatternError
+        For a name that is empty, or has a dot, white space or a leading ``~``.
+    """
+
+    __slots__ = ()
+
+    def __new__(cls, names: Iterable[str] = ()) -> "Path":
+        if isinstance(names, Path):
+            return names
+        if isinstance(names, str):
+            raise PatternError(
+                "path", found=names, expected="a sequence of names; Path.parse reads dotted names"
+            )
+        parts = tuple(names)
+        for part in parts:
+            _check(part)
+        return _trusted(parts)
+
+    @staticmethod
+    def parse(text: str) -> "Path":
+        """Read a dotted path; ``"."`` is the root."""
+        return ROOT if text == "." else Path(text.split("."))
+
+    @staticmethod
+    def of(value: "PathLike") -> "Path":
+        """A path from a path, a dotted name or a sequence of names."""
+        if isinstance(value, Path):
+            return value
+        if isinstance(value, str):
+            return Path.parse(value)
+        if isinstance(value, Iterable):  # pyright: ignore[reportUnnecessaryIsInstance]  # user input
+            return Path(value)
+        raise PatternError("path", found=value, expected="a Path, a dotted name or a tuple of names")
+
+    def __truediv__(self, other: "PathLike") -> "Path":
+        return _trusted((*self, *Path.of(other)))
+
+    def __rtruediv__(self, other: "PathLike") -> "Path":
+        return Path.of(other) / self
+
+    def is_prefix_of(self, other: "Path") -> bool:
+        """Whether the other path is this one, or continues it."""
+        return other[: len(self)] == tuple(self)
+
+    def relative_to(self, prefix: "Path") -> "Path":
+        """What continues the prefix: ``prefix / path.relative_to(prefix) == path``."""
+        if not prefix.is_prefix_of(self):
+            raise PatternError("path", found=str(self), expected=f"a path that starts with {prefix}")
+        return _trusted(self[len(prefix) :])
+
+    def __str__(self) -> str:
+        return ".".join(self) if self else "."
+
+    def __repr__(self) -> str:
+        return f"Path.parse({str(self)!r})"
+
+    def __format__(self, spec: str) -> str:
+        return format(str(self), spec)
+
+
+PathLike: TypeAlias = "Path | str | tuple[str, ...]"
+"""A path, a dotted name, or a tuple of names."""
+
+
+def _trusted(parts: tuple[str, ...]) -> Path:
+    return tuple.__new__(Path, parts)  # pyright: ignore[reportUnknownMemberType]
+
+
+def _check(name: object) -> None:
+    if not isinstance(name, str):
+        raise PatternError("name", found=name, expected="a name is text")
+    if not name:
+        raise PatternError("name", found=name, expected="a name has at least one letter")
+    if "." in name or name.startswith("~") or any(letter.isspace() for letter in name):
+        raise PatternError("name", found=name, expected="a name has no dot, no white space and no leading ~")
+
+
+def paths_text(paths: Iterable[Path]) -> str:
+    """The paths of a message: sorted, dotted, ``none`` if there are none."""
+    return ", ".join(str(path) for path in sorted(paths)) or "none"
+
+
+ROOT = _trusted(())

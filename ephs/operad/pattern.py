@@ -1,0 +1,323 @@
+"""Interconnection patterns: which ports of which boxes meet at which junction.
+
+A pattern is an operation of an operad: its boxes are the inputs, its outer interface is the output. The
+definitions and the conditions P1 to P5 are those of Lohmayer, Capobianco, Leyendecker, "Exergetic
+Port-Hamiltonian Systems for Multibody Dynamics", with one addition: junctions may be linked, which means that
+they share a state but not a power balance. Without links, substitution would not commute with the semantics
+where a state port is exposed.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, cast, final
+
+from ephs.operad.directory import Directory, Entries
+from ephs.operad.errors import PatternError
+from ephs.operad.names import ROOT, Path, PathLike, paths_text
+from ephs.operad.normal import NormalForm, normal_form
+from ephs.operad.quantities import Interface, PortType, Quantity
+
+if TYPE_CHECKING:
+    from ephs.operad.lint import Diagnostic
+
+__all__ = ["Box", "Boxes", "Filling", "Junction", "Pattern", "Port", "junction"]
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Junction:
+    """A place where ports meet: they share the state; its power ports share the effort, and their flows
+    balance.
+
+    Parameters
+    ----------
+    quantity
+        What the ports exchange.
+    exposed
+        Whether there is an outer port of the junction's name.
+    power
+        Whether that outer port bears power; ``False`` makes it a state port. Without exposure it has no
+        meaning.
+    """
+
+    quantity: Quantity
+    exposed: bool = False
+    power: bool = True
+
+    def __str__(self) -> str:
+        role = "" if not self.exposed else ", exposed" if self.power else ", exposed as state"
+        return f"{self.quantity}{role}"
+
+    def __repr__(self) -> str:
+        exposed = ", exposed=True" if self.exposed else ""
+        return f"junction({self.quantity!r}{exposed}{'' if self.power else ', power=False'})"
+
+
+def junction(quantity: Quantity, exposed: bool = False, power: bool = True) -> Junction:
+    """Make a junction; parameters as of `Junction`."""
+    return Junction(quantity, exposed, power)
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Port:
+    """A port of an inner box: the junction on which it lies, and whether it bears power."""
+
+    junction: Path
+    power: bool
+
+    def __str__(self) -> str:
+        return f"{'' if self.power else '~'}{self.junction}"
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Box:
+    """An inner box: its ports, and the interface that they make, with the quantities of their junctions."""
+
+    ports: Directory[Port]
+    interface: Interface
+
+
+class Filling(Protocol):
+    """What can fill a box: it knows how to compose itself and its like along a pattern."""
+
+    def compose(self, pattern: "Pattern", fillings: Mapping[Path, object]) -> object:
+        """Fill the boxes of the pattern."""
+        ...
+
+
+Boxes: TypeAlias = Entries[Entries[str | Port] | Box]
+"""Box name -> port name -> junction name, ``"~name"`` for a state port; or box name -> `Box`."""
+
+
+@final
+@dataclass(frozen=True, slots=True, init=False, eq=False, repr=False)
+class Pattern:
+    """An interconnection pattern, as a value: immutable, equal up to order and up to names that do not
+    matter.
+
+    Parameters
+    ----------
+    junctions
+        Junction name -> `Junction`. Names are dotted paths.
+    boxes
+        Box name -> port name -> junction name; ``"~name"`` in place of ``"name"`` makes a state port.
+    links
+        Groups of junctions that share their state, and only that. The relation is closed transitively.
+
+    Attributes
+    ----------
+    junctions : Directory[Junction]
+    boxes : Directory[Box]
+    links : frozenset of frozensets of Path
+        The classes of two junctions or more.
+
+    Raises
+    ------
+    PatternError
+        If names clash (P5), a port lies on no junction (P2), a junction has no inner port (P4), or linked
+        junctions differ in quantity (P1). An outer port is named like its junction, so it has one at most
+        (P3).
+
+    Examples
+    --------
+    >>> from ephs.operad import quantity as Q
+    >>> osc = Pattern(
+    ...     junctions={"q": junction(Q.displacement), "p": junction(Q.momentum, exposed=True)},
+    ...     boxes={"pe": {"q": "q"}, "ke": {"p": "p"}, "pkc": {"q": "q", "p": "p"}},
+    ... )
+    >>> print(osc.interface)
+    p: momentum on real
+    """
+
+    junctions: Directory[Junction]
+    boxes: Directory[Box]
+    links: frozenset[frozenset[Path]]
+    _classes: Mapping[Path, frozenset[Path]]
+    _normal: NormalForm | None
+
+    def __init__(
+        self,
+        junctions: Entries[Junction],
+        boxes: "Boxes",
+        links: Iterable[Iterable[PathLike]] = (),
+    ) -> None:
+        from ephs.operad.wellformed import read_boxes, read_junctions, read_links, require_named_boxes
+
+        found = read_junctions(junctions)
+        wired = read_boxes(boxes, found)
+        require_named_boxes(wired)
+        self._set(found, wired, read_links(links, found))
+
+    def _set(
+        self, junctions: Directory[Junction], boxes: Directory[Box], links: Iterable[Iterable[Path]]
+    ) -> None:
+        from ephs.operad.wellformed import require_pattern
+
+        classes = require_pattern(junctions, boxes, links)
+        values = {
+            "junctions": junctions,
+            "boxes": boxes,
+            "links": frozenset(c for c in classes.values() if len(c) > 1),
+            "_classes": classes,
+            "_normal": None,
+        }
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
+    @staticmethod
+    def identity(interface: "Entries[PortType]") -> "Pattern":
+        """The neutral pattern of an interface: one box at the root path, its ports exposed as they are."""
+        ports = Directory(interface, what="interface")
+        junctions = Directory([(p, Junction(t.quantity, True, t.power)) for p, t in ports.items()])
+        box = Box(Directory([(p, Port(p, t.power)) for p, t in ports.items()]), ports)
+        pattern = object.__new__(Pattern)
+        pattern._set(junctions, Directory.unit(box), ())
+        return pattern
+
+    @property
+    def is_identity(self) -> bool:
+        """Whether this is the identity of its interface; only identities have a box at the root path."""
+        return ROOT in self.boxes
+
+    @property
+    def interface(self) -> Interface:
+        """The outer ports, each named like the junction that it exposes."""
+        exposed = [(path, j) for path, j in self.junctions.items() if j.exposed]
+        return Directory([(path, PortType(j.quantity, j.power)) for path, j in exposed])
+
+    def state_class(self, junction: PathLike) -> frozenset[Path]:
+        """The junctions that share their state with this one, itself included.
+
+        Raises
+        ------
+        KeyError
+            If there is no such junction.
+        """
+        return self._classes[Path.of(junction)]
+
+    @property
+    def normal_form(self) -> NormalForm:
+        """What decides equality; computed once."""
+        found = self._normal
+        if found is None:
+            found = normal_form(self)
+            object.__setattr__(self, "_normal", found)
+        return found
+
+    def __eq__(self, other: object) -> bool:
+        return self.normal_form == other.normal_form if isinstance(other, Pattern) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash(self.normal_form)
+
+    def substitute(
+        self,
+        mapping: "Mapping[Path, Pattern] | Mapping[str, Pattern] | None" = None,
+        /,
+        **fillings: "Pattern",
+    ) -> "Pattern":
+        """Put patterns into boxes: one, some or all of them.
+
+        Parameters
+        ----------
+        mapping, **fillings
+            Box name -> pattern whose outer interface is that of the box: names, quantities and kinds of
+            ports. Dotted names go through the mapping. The box of an identity is ``"."``.
+
+        Returns
+        -------
+        Pattern
+            Box b of the filling of box a is named a.b. A junction exposed as a power port is absorbed by the
+            junction on which that port lies; any other junction j is kept as a.j, and if it was exposed as a
+            state port it is linked to the junction on which that port lies.
+
+        Raises
+        ------
+        PatternError
+            For an unknown box, a filling that is no pattern, or an interface that differs.
+        """
+        from ephs.operad.substitution import substitute
+
+        return substitute(self, _boxes_to_fill(mapping, fillings))
+
+    def __call__(
+        self,
+        mapping: "Mapping[Path, Filling] | Mapping[str, Filling] | None" = None,
+        /,
+        **fillings: "Filling",
+    ) -> Any:
+        """Fill all boxes by systems or primitives, which gives a system; names as in `substitute`."""
+        given = _boxes_to_fill(mapping, fillings)
+        first = next(iter(given.values()), None)
+        if first is None:
+            raise PatternError("no-filling", found="none", expected=paths_text(self.boxes))
+        return first.compose(self, given)
+
+    def rename(
+        self,
+        *,
+        boxes: "Mapping[Path, PathLike] | Mapping[str, PathLike] | None" = None,
+        junctions: "Mapping[Path, PathLike] | Mapping[str, PathLike] | None" = None,
+        ports: "Mapping[Path, Mapping[Any, PathLike]] | Mapping[str, Mapping[Any, PathLike]] | None" = None,
+    ) -> "Pattern":
+        """Rename boxes, junctions (and with them outer ports) and ports of boxes, all at once.
+
+        Parameters
+        ----------
+        boxes, junctions
+            Old name -> new name; what is not mentioned keeps its name.
+        ports
+            Old box name -> old port name -> new port name.
+
+        Raises
+        ------
+        PatternError
+            For a name that does not exist, names that clash, or an identity pattern.
+        """
+        from ephs.operad.renaming import rename
+
+        return rename(self, boxes or {}, junctions or {}, ports or {})
+
+    def lint(self) -> "list[Diagnostic]":
+        """What is legitimate but hardly ever meant: open-circuit ports, linked power balances."""
+        from ephs.operad.lint import diagnose
+
+        return diagnose(self)
+
+    @property
+    def summary(self) -> str:
+        """The pattern in one line."""
+        from ephs.operad.printing import summary
+
+        return summary(self)
+
+    def __str__(self) -> str:
+        from ephs.operad.printing import tree
+
+        return tree(self)
+
+    def __repr__(self) -> str:
+        from ephs.operad.printing import expression
+
+        return expression(self)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        if self.is_identity:
+            return (Pattern.identity, (self.interface,))
+        boxes = self.boxes.map(lambda box: box.ports)
+        return (Pattern, (self.junctions, boxes, tuple(tuple(sorted(group)) for group in self.links)))
+
+
+def _boxes_to_fill(mapping: Mapping[Any, Any] | None, named: Mapping[str, Any]) -> dict[Path, Any]:
+    pairs = cast("list[tuple[PathLike, object]]", [*(mapping or {}).items(), *named.items()])
+    out: dict[Path, Any] = {}
+    for name, filling in pairs:
+        path = Path.of(name)
+        if path in out:
+            raise PatternError(
+                "duplicate", found=str(path), expected="expected each box once", what="fillings"
+            )
+        out[path] = filling
+    return out

@@ -1,0 +1,144 @@
+"""What makes data a pattern: reading what the user wrote, and the conditions P1 to P5."""
+
+from collections.abc import Iterable, Mapping
+from itertools import pairwise
+from typing import Any, cast
+
+from ephs.operad.directory import Directory, Entries
+from ephs.operad.errors import PatternError
+from ephs.operad.links import closure
+from ephs.operad.names import ROOT, Path, PathLike, paths_text
+from ephs.operad.pattern import Box, Boxes, Junction, Port
+from ephs.operad.quantities import PortType
+
+__all__ = ["read_boxes", "read_junctions", "read_links", "require_named_boxes", "require_pattern"]
+
+_PORTS = 'port name -> junction name, "~name" for a state port'
+
+
+def read_junctions(junctions: Entries[Junction]) -> Directory[Junction]:
+    """The junctions of a pattern."""
+    found = Directory(junctions, what="junctions")
+    for path, value in cast("Directory[object]", found).items():
+        if not isinstance(value, Junction):
+            expected = "a junction; write junction(quantity)"
+            raise PatternError("junction-type", junction=path, found=repr(value), expected=expected)
+    return found
+
+
+def read_boxes(boxes: Boxes, junctions: Mapping[Path, Junction]) -> Directory[Box]:
+    """The boxes of a pattern; each port lies on one junction, from which it has its quantity (P1, P2)."""
+    found = Directory(cast("Entries[object]", boxes), what="boxes")
+    return Directory([(path, _read_box(path, value, junctions)) for path, value in found.items()])
+
+
+def _read_box(box: Path, value: object, junctions: Mapping[Path, Junction]) -> Box:
+    if isinstance(value, Box):
+        value = value.ports
+    if not isinstance(value, Mapping):
+        raise PatternError("box-type", box=box, found=repr(value), expected=f"a mapping: {_PORTS}")
+    wires = Directory(cast("Mapping[Path, object]", value), what=f"ports of box {box}")
+    ports = Directory([(name, _read_port(box, name, wire)) for name, wire in wires.items()])
+    if ROOT in ports:
+        raise PatternError(
+            "root-port", box=box, port=ROOT, found="a port at the root path", expected="a name"
+        )
+    for name, port in ports.items():
+        if port.junction not in junctions:
+            expected = paths_text(junctions)
+            raise PatternError(
+                "unknown-junction", box=box, port=name, junction=port.junction, expected=expected
+            )
+    return box_of(ports, junctions)
+
+
+def _read_port(box: Path, name: Path, wire: object) -> Port:
+    if isinstance(wire, Port):
+        return wire
+    if not isinstance(wire, str | tuple):
+        raise PatternError("port-type", box=box, port=name, found=repr(wire), expected='"name" or "~name"')
+    name_of = cast("PathLike", wire)
+    if isinstance(name_of, str) and name_of.startswith("~"):
+        return Port(Path.of(name_of[1:]), False)
+    return Port(Path.of(name_of), True)
+
+
+def box_of(ports: Directory[Port], junctions: Mapping[Path, Junction]) -> Box:
+    """A box with its interface, which follows from its ports and their junctions."""
+    types = [(name, PortType(junctions[port.junction].quantity, port.power)) for name, port in ports.items()]
+    return Box(ports, Directory(types))
+
+
+def read_links(links: Iterable[Iterable[PathLike]], junctions: Mapping[Path, Junction]) -> list[list[Path]]:
+    """The groups of junctions that share their state."""
+    groups: list[list[Path]] = []
+    for link in cast("Iterable[Any]", links):
+        if isinstance(link, str | Path):
+            raise PatternError("link-size", found=repr(link))
+        group = list(dict.fromkeys(Path.of(name) for name in link))
+        for path in group:
+            if path not in junctions:
+                found, expected = " ~ ".join(map(str, group)), paths_text(junctions)
+                raise PatternError("link-junction", found=found, junction=path, expected=expected)
+        if len(group) < 2:
+            raise PatternError("link-size", found=" ~ ".join(map(str, group)) or "()")
+        groups.append(group)
+    return groups
+
+
+def require_named_boxes(boxes: Mapping[Path, Box]) -> None:
+    """Refuse a box at the root path: the identity alone has one."""
+    if ROOT in boxes:
+        raise PatternError("root-box", box=ROOT, found=paths_text(boxes), expected="named boxes")
+
+
+def require_pattern(
+    junctions: Directory[Junction], boxes: Directory[Box], links: Iterable[Iterable[Path]]
+) -> Mapping[Path, frozenset[Path]]:
+    """Check the conditions, and return the class of each junction under "same state"."""
+    if ROOT in junctions:
+        raise PatternError(
+            "root-junction", junction=ROOT, found="a junction at the root path", expected="a name"
+        )
+    if ROOT not in boxes:
+        _require_disjoint(junctions, boxes)
+    classes = closure(junctions, links)
+    _require_one_quantity(junctions, set(classes.values()))
+    _require_inner_ports(junctions, boxes, classes)
+    return classes
+
+
+def _require_disjoint(junctions: Mapping[Path, Junction], boxes: Mapping[Path, Box]) -> None:
+    """P5: no junction's path equals, starts or continues a box's path."""
+    if not junctions.keys().isdisjoint(boxes):
+        path = min(junctions.keys() & boxes.keys())
+        raise PatternError("p5", box=path, junction=path, found=str(path), expected="prefix-free paths")
+    for path, following in pairwise(sorted([*junctions, *boxes])):
+        if path.is_prefix_of(following):
+            box, other = (path, following) if path in boxes else (following, path)
+            raise PatternError(
+                "p5", box=box, junction=other, found=f"{path}, {following}", expected="prefix-free paths"
+            )
+
+
+def _require_one_quantity(junctions: Mapping[Path, Junction], classes: Iterable[frozenset[Path]]) -> None:
+    for members in classes:
+        paths = sorted(members)
+        quantities = [junctions[path].quantity for path in paths]
+        # Frames need not all be given, but those that are given must agree.
+        reference = next((q for q in quantities if q.frame is not None), quantities[0])
+        for path, quantity in zip(paths, quantities, strict=True):
+            if not quantity.matches(reference):
+                found = f"{quantity} at {path}, {reference} at {paths[quantities.index(reference)]}"
+                names = " and ".join(map(str, paths))
+                raise PatternError("link-quantity", junction=names, found=found, expected="one quantity")
+
+
+def _require_inner_ports(
+    junctions: Mapping[Path, Junction], boxes: Mapping[Path, Box], classes: Mapping[Path, frozenset[Path]]
+) -> None:
+    """P4; an exposed junction may instead be linked to one with an inner port, as substitution makes them."""
+    wired = {port.junction for box in boxes.values() for port in box.ports.values()}
+    for path, junction in junctions.items():
+        if path not in wired and not (junction.exposed and classes[path] & wired):
+            raise PatternError("no-inner-port", junction=path, found=str(junction), expected="an inner port")

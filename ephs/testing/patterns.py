@@ -1,0 +1,242 @@
+"""Strategies for names, quantities, interfaces, patterns and nestings of patterns."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import final
+
+from hypothesis import strategies as st
+from hypothesis.errors import InvalidArgument
+
+from ephs.operad import Directory, Interface, Junction, Path, Pattern, Port, PortType, Quantity, quantity
+
+__all__ = ["Nesting", "fresh_paths", "interfaces", "nestings", "paths", "patterns", "quantities"]
+
+_KNOWN = (
+    quantity.momentum,
+    quantity.displacement,
+    quantity.entropy,
+    quantity.angle,
+    quantity.angular_momentum,
+    quantity.charge,
+    quantity.flux_linkage,
+    quantity.volume,
+    quantity.pose,
+    quantity.body_momentum,
+    quantity.direct_pose,
+    quantity.direct_momentum,
+)
+_PAIRS = ("revolute", "prismatic", "cylindrical", "planar", "spherical", "fixed", "free")
+
+
+@st.composite
+def paths(draw: st.DrawFn, *, min_size: int = 1, max_size: int = 2) -> Path:
+    """Paths of short names, by default not the root."""
+    _require(
+        0 <= min_size <= max_size, f"min_size={min_size} and max_size={max_size}: expected 0 <= min <= max"
+    )
+    name = st.text("abpq", min_size=1, max_size=2)
+    return Path(draw(st.lists(name, min_size=min_size, max_size=max_size)))
+
+
+@st.composite
+def quantities(draw: st.DrawFn, *, frames: bool = True) -> Quantity:
+    """The quantities of this package, joint quantities of any kind, with or without a frame."""
+    found = draw(st.sampled_from(_KNOWN))
+    if draw(st.booleans()):
+        kind = draw(st.sampled_from(_PAIRS))
+        found = draw(st.sampled_from([quantity.relative_pose(kind), quantity.joint_momentum(kind)]))
+    if frames and draw(st.booleans()):
+        found = found.in_frame(draw(st.sampled_from(["B", "C1", "C2"])))
+    return found
+
+
+@st.composite
+def interfaces(
+    draw: st.DrawFn, *, min_ports: int = 0, max_ports: int = 4, state_ports: bool = True
+) -> Interface:
+    """Interfaces, the empty one included.
+
+    Parameters
+    ----------
+    state_ports
+        Whether ports may be state ports.
+    """
+    _require(
+        0 <= min_ports <= max_ports, f"min_ports={min_ports}, max_ports={max_ports}: expected 0 <= min <= max"
+    )
+    names = fresh_paths(draw, draw(st.integers(min_ports, max_ports)), ())
+    power = st.just(True) if not state_ports else st.booleans().map(lambda flag: not flag)
+    return Directory([(name, PortType(draw(quantities()), draw(power))) for name in names])
+
+
+@st.composite
+def patterns(
+    draw: st.DrawFn,
+    *,
+    interface: Interface | None = None,
+    min_boxes: int = 0,
+    max_boxes: int = 3,
+    max_inner_junctions: int = 3,
+    state_ports: bool = True,
+    links: bool = True,
+    identities: bool = True,
+) -> Pattern:
+    """Patterns of every well-formed shape.
+
+    Among them are patterns with two ports of one box on a junction, junctions with state ports only,
+    junctions with a single port, boxes without ports, exposed junctions whose ports are all on a linked one,
+    and identities.
+
+    Parameters
+    ----------
+    interface
+        The outer interface; any if it is not given.
+    min_boxes, max_boxes, max_inner_junctions
+        How many boxes and unexposed junctions there may be.
+    state_ports
+        Whether inner ports, and outer ones of an interface not given, may be state ports.
+    links
+        Whether junctions may be linked.
+    identities
+        Whether identities are among them; they have one box.
+
+    Raises
+    ------
+    hypothesis.errors.InvalidArgument
+        When drawn, if there is no such pattern.
+    """
+    _require(
+        0 <= min_boxes <= max_boxes, f"min_boxes={min_boxes}, max_boxes={max_boxes}: expected 0 <= min <= max"
+    )
+    _require(max_boxes > 0 or not interface, "an outer port needs an inner one: expected max_boxes >= 1")
+    most = 3 if max_boxes else 0
+    outer = draw(interfaces(max_ports=most, state_ports=state_ports)) if interface is None else interface
+    has_state = any(not port.power for port in outer.values())
+    unary = identities and min_boxes <= 1 <= max_boxes and (state_ports or not has_state)
+    # Behind the highest of a few numbers, so that shrinking leaves it.
+    if unary and draw(st.integers(0, 7)) == 7:
+        return Pattern.identity(outer)
+    count = draw(st.integers(max(min_boxes, 1 if outer else 0), max_boxes))
+    boxes = fresh_paths(draw, count, outer)
+    inner = draw(st.integers(0, max_inner_junctions)) if boxes else 0
+    junctions = {path: Junction(port.quantity, True, port.power) for path, port in outer.items()}
+    for path in fresh_paths(draw, inner, [*outer, *boxes]):
+        present = [junction.quantity for junction in junctions.values()]
+        # Half of them repeat a quantity, or few junctions could be linked.
+        again = bool(present) and draw(st.booleans())
+        junctions[path] = Junction(draw(st.sampled_from(present) if again else quantities()))
+    groups = _groups(draw, junctions) if links else []
+    wires = _wires(draw, junctions, boxes, groups, state_ports)
+    return Pattern(junctions, wires, groups)
+
+
+def _groups(draw: st.DrawFn, junctions: dict[Path, Junction]) -> list[list[Path]]:
+    alike: dict[Quantity, list[Path]] = {}
+    for path, junction in junctions.items():
+        alike.setdefault(junction.quantity, []).append(path)
+    return [
+        draw(st.lists(st.sampled_from(members), min_size=2, unique=True))
+        for members in alike.values()
+        if len(members) > 1 and draw(st.booleans())
+    ]
+
+
+def _wires(
+    draw: st.DrawFn,
+    junctions: dict[Path, Junction],
+    boxes: list[Path],
+    groups: list[list[Path]],
+    state_ports: bool,
+) -> list[tuple[Path, Directory[Port]]]:
+    ends: dict[Path, list[Port]] = {box: [] for box in boxes}
+    power = st.just(True) if not state_ports else st.booleans().map(lambda flag: not flag)
+    bare: set[Path] = set()
+    for path, junction in junctions.items():
+        partners = {other for group in groups if path in group for other in group}
+        # One of a group may do without inner ports, the others then have some.
+        if junction.exposed and partners and not partners & bare and draw(st.booleans()):
+            bare.add(path)
+            continue
+        for _ in range(draw(st.integers(1, 3))):
+            ends[draw(st.sampled_from(boxes))].append(Port(path, draw(power)))
+    return [
+        (box, Directory(list(zip(fresh_paths(draw, len(ports), ()), ports, strict=True))))
+        for box, ports in ends.items()
+    ]
+
+
+def fresh_paths(draw: st.DrawFn, count: int, taken: Iterable[Path]) -> list[Path]:
+    """Draw so many paths that clash neither with each other nor with those taken."""
+    found: list[Path] = []
+    known = list(taken)
+    for _ in range(count):
+        path = draw(paths())
+        number = 0
+        # Clashes are mended, not rejected: a new first name ends them.
+        while any(path.is_prefix_of(other) or other.is_prefix_of(path) for other in (*known, *found)):
+            path = Path((f"{path[0].rstrip('0123456789')}{number}", *path[1:]))
+            number += 1
+        found.append(path)
+    return found
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Nesting:
+    """A tree of patterns whose interfaces fit: a pattern, and for each box a nesting or nothing."""
+
+    pattern: Pattern
+    children: Directory["Nesting | None"]
+
+    @property
+    def filled(self) -> dict[Path, "Nesting"]:
+        """The boxes that have a nesting inside."""
+        return {box: child for box, child in self.children.items() if child is not None}
+
+    @property
+    def depth(self) -> int:
+        """How many levels there are."""
+        return 1 + max((child.depth for child in self.filled.values()), default=0)
+
+    def bottom_up(self) -> Pattern:
+        """Flatten the children first, then substitute them."""
+        return self.pattern.substitute({box: child.bottom_up() for box, child in self.filled.items()})
+
+    def top_down(self) -> Pattern:
+        """Substitute the children as they are, one after the other, then go on with theirs."""
+        result = self.pattern
+        pending = list(self.filled.items())
+        while pending:
+            box, child = pending.pop(0)
+            result = result.substitute({box: child.pattern})
+            pending += [(box / inner, grandchild) for inner, grandchild in child.filled.items()]
+        return result
+
+
+@st.composite
+def nestings(
+    draw: st.DrawFn, *, depth: int = 3, interface: Interface | None = None, max_boxes: int = 3
+) -> Nesting:
+    """Trees of patterns that fit into each other, of at most so many levels.
+
+    Parameters
+    ----------
+    interface
+        The outer interface; any if it is not given.
+    max_boxes
+        How many boxes a pattern may have.
+    """
+    _require(depth >= 1, f"depth={depth}: expected at least one level")
+    pattern = draw(patterns(interface=interface, max_boxes=max_boxes))
+    children: list[tuple[Path, Nesting | None]] = []
+    for box, content in pattern.boxes.items():
+        inside = None
+        if depth > 1 and draw(st.booleans()):
+            inside = draw(nestings(depth=depth - 1, interface=content.interface, max_boxes=max_boxes))
+        children.append((box, inside))
+    return Nesting(pattern, Directory(children))
+
+
+def _require(condition: bool, message: str) -> None:
+    if not condition:
+        raise InvalidArgument(message)

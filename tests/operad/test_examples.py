@@ -1,0 +1,27 @@
+"""The examples in docstrings run; names that are exported exist."""
+
+import doctest
+import importlib
+import pkgutil
+
+import pytest
+
+import ephs.operad
+
+MODULES = [f"ephs.operad.{found.name}" for found in pkgutil.iter_modules(ephs.operad.__path__)]
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_examples_in_docstrings(name):
+    module = importlib.import_module(name)
+    assert doctest.testmod(module).failed == 0
+    assert all(word in dir(module) for word in module.__all__)
+
+
+def test_there_are_examples():
+    tried = [doctest.testmod(importlib.import_module(name)).attempted for name in MODULES]
+    assert sum(tried) >= 5
+
+
+def test_what_is_exported_exists():
+    assert all(word in dir(ephs.operad) for word in ephs.operad.__all__)

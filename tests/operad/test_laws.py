@@ -1,0 +1,163 @@
+"""The laws of the operad, by equality of data, on drawn patterns."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ephs.operad import LAWS, ROOT, Equation, Path, Pattern, Port, Quantity, junction, quantity
+from ephs.testing import check_operad_laws, law_inputs, nestings, patterns
+
+ALL = [
+    "left unit",
+    "right unit",
+    "sequential associativity",
+    "parallel associativity",
+    "full substitution",
+    "equivariance in boxes",
+    "equivariance in junctions",
+    "equivariance in ports",
+    "interface",
+]
+
+
+def test_every_law_is_stated_once():
+    assert [law.name for law in LAWS] == ALL
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
+@settings(max_examples=4 * settings().max_examples)
+@given(data=st.data())
+def test_law(law, data):
+    equation = law(*data.draw(law_inputs(law)))
+    assert equation.holds, f"{law.statement}\n{equation}"
+
+
+@settings(max_examples=2 * settings().max_examples)
+@given(nestings(depth=3))
+def test_nestings_flatten_alike_from_above_and_from_below(nesting):
+    whole = nesting.bottom_up()
+    assert whole == nesting.top_down()
+    assert hash(whole) == hash(nesting.top_down())
+    assert whole.interface == nesting.pattern.interface
+
+
+@given(patterns(), st.data())
+def test_sizes_add_up(f, data):
+    box = data.draw(st.sampled_from([*f.boxes])) if f.boxes else None
+    if box is None or f.is_identity:
+        return
+    g = data.draw(patterns(interface=f.boxes[box].interface, identities=False))
+    whole = f.substitute({box: g})
+    assert set(whole.boxes) == ({*f.boxes} - {box}) | {box / inner for inner in g.boxes}
+    assert len(whole.boxes) == len(f.boxes) - 1 + len(g.boxes)
+    inner_ports = sum(len(b.ports) for b in g.boxes.values())
+    assert sum(len(b.ports) for b in whole.boxes.values()) == inner_ports + sum(
+        len(b.ports) for name, b in f.boxes.items() if name != box
+    )
+    powered = {junction.path for junction in whole.normal_form.junctions}
+    kept = {box / j.path for j in g.normal_form.junctions if j.path not in g.interface}
+    assert kept <= powered
+
+
+@given(patterns(), st.randoms(use_true_random=False))
+def test_patterns_are_equal_up_to_order(f, random):
+    if f.is_identity:
+        return
+    junctions, boxes, links = list(f.junctions.items()), list(f.boxes.items()), [sorted(g) for g in f.links]
+    for each in (junctions, boxes, links, *links):
+        random.shuffle(each)
+    # A chain of pairs generates the same relation as the group.
+    pairs = [pair for group in links for pair in pairwise(group)]
+    again = Pattern(junctions, boxes, pairs)
+    assert again == f and hash(again) == hash(f) and again.links == f.links
+
+
+@given(patterns(identities=False), st.data())
+def test_another_wire_makes_another_pattern(f, data):
+    """Equality is not too coarse: it sees a port moved to another junction, and a port's kind changed."""
+    places = [(b, p) for b, box in f.boxes.items() for p in box.ports]
+    if not places:
+        return
+    box, name = data.draw(st.sampled_from(places))
+    port = f.boxes[box].ports[name]
+    wires = {b: dict(content.ports) for b, content in f.boxes.items()}
+    # A new box keeps both junctions from being without ports.
+    new = Path.parse("new.junction")
+    wires[Path.parse("new.box")] = {
+        Path.parse(p): Port(j, True) for p, j in (("x", port.junction), ("y", new))
+    }
+    junctions = {**f.junctions, new: junction(f.junctions[port.junction].quantity)}
+
+    def rewired(wire):
+        return Pattern(junctions, {**wires, box: {**wires[box], name: wire}}, f.links)
+
+    assert rewired(port) != rewired(Port(new, port.power))
+    assert rewired(port) != rewired(Port(port.junction, not port.power))
+
+
+@given(patterns(identities=False), st.data())
+def test_another_exposure_or_quantity_makes_another_pattern(f, data):
+    if not f.junctions:
+        return
+    path = data.draw(st.sampled_from(list(f.junctions)))
+    old = f.junctions[path]
+    kinds = [junction(old.quantity), junction(old.quantity, True), junction(old.quantity, True, False)]
+    wires = {**f.boxes, "new.box": {"x": str(path)}}
+    assert len({Pattern({**f.junctions, path: kind}, wires, f.links) for kind in kinds}) == 3
+    other = Quantity("other", old.quantity.space, 1)
+    changed = {p: replace(f.junctions[p], quantity=other) for p in f.state_class(path)}
+    assert Pattern({**f.junctions, **changed}, f.boxes, f.links) != f
+
+
+@given(patterns(links=False, identities=False), st.data())
+def test_a_link_makes_another_pattern(f, data):
+    paths = [(a, b) for a in f.junctions for b in f.junctions if a < b]
+    paths = [(a, b) for a, b in paths if f.junctions[a].quantity == f.junctions[b].quantity]
+    if not paths:
+        return
+    linked = Pattern(f.junctions, f.boxes, [data.draw(st.sampled_from(paths))])
+    assert linked != f and Pattern(f.junctions, f.boxes) == f
+
+
+def test_an_anonymous_class_may_be_named_differently_by_history():
+    """The name of a class which nobody names outside depends on the order; equality and laws do not."""
+    q = quantity.displacement
+    h = Pattern({"k": junction(q, exposed=True, power=False)}, {"x": {"q": "~k"}})
+    g = Pattern({"l.o.n.g": junction(q, exposed=True, power=False)}, {"b": {"k": "~l.o.n.g"}})
+    f = Pattern({"w.i.d.e.r": junction(q)}, {"a": {"l.o.n.g": "~w.i.d.e.r"}})
+    left = f.substitute(a=g).substitute({"a.b": h})
+    right = f.substitute(a=g.substitute(b=h))
+    assert set(left.junctions) != set(right.junctions)
+    assert left == right and hash(left) == hash(right)
+
+
+def test_an_equation_shows_both_sides():
+    f = Pattern({"q": junction(quantity.displacement)}, {"a": {"q": "q"}})
+    good, bad = Equation(f, f), Equation(f, f.rename(boxes={"a": "b"}))
+    assert good.holds and not bad.holds
+    assert "a: q on q" in str(bad) and "b: q on q" in str(bad) and "≠" in str(bad) and "≠" not in str(good)
+
+
+def test_the_check_for_other_suites_finds_nothing():
+    check_operad_laws(max_examples=5)
+
+
+@given(patterns())
+def test_identities_are_strict(f):
+    assert Pattern.identity(f.interface).substitute({".": f}) is f
+    units = {box: Pattern.identity(content.interface) for box, content in f.boxes.items()}
+    assert f.substitute(units) == f and f.substitute(units).junctions == f.junctions
+    assert f.substitute() is f
+    assert (ROOT in f.boxes) == f.is_identity
+
+
+@settings(max_examples=20)
+@given(patterns(min_boxes=2, max_boxes=2))
+def test_the_boxes_interfaces_follow_from_their_junctions(f):
+    for content in f.boxes.values():
+        for name, port in content.ports.items():
+            found = content.interface[name]
+            assert (found.quantity, found.power) == (f.junctions[port.junction].quantity, port.power)

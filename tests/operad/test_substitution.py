@@ -1,0 +1,204 @@
+"""Substitution: the names it gives, what it absorbs, what it links, what it refuses."""
+
+import pytest
+from hypothesis import given
+
+from ephs.operad import Pattern, PatternError, PortType, junction, quantity
+from ephs.testing import patterns
+
+Q = quantity.displacement
+
+
+def names(paths):
+    return {str(path) for path in paths}
+
+
+def test_damped_oscillator(models):
+    flat = models.DAMPED.substitute(osc=models.OSCILLATOR)
+    assert names(flat.junctions) == {"p", "s", "osc.q"}
+    assert names(flat.boxes) == {"osc.pe", "osc.ke", "osc.pkc", "mf", "env"}
+    assert flat == Pattern(
+        {"p": junction(quantity.momentum), "s": junction(quantity.entropy), "osc.q": junction(Q)},
+        {
+            "osc.pe": {"q": "osc.q"},
+            "osc.ke": {"p": "p"},
+            "osc.pkc": {"q": "osc.q", "p": "p"},
+            "mf": {"p": "p", "s": "s"},
+            "env": {"s": "s"},
+        },
+    )
+    assert flat == models.DAMPED.substitute({"osc": models.OSCILLATOR})
+
+
+def test_two_bodies_on_a_joint(models):
+    flat = models.MBS.substitute(b1=models.BODY, b2=models.BODY, j=models.JOINT)
+    assert names(flat.junctions) == {"p1", "p2", "b1.q", "b2.q", "j.p_j1", "j.p_j2", "j.p_r", "j.q_r", "j.s"}
+    inner = ("pe", "pkc", "ke", "lp")
+    joint = ("hc", "o1", "o2", "pe", "pkc", "mf", "env")
+    assert names(flat.boxes) == {f"{b}.{x}" for b in ("b1", "b2") for x in inner} | {f"j.{x}" for x in joint}
+    assert (len(flat.junctions), len(flat.boxes)) == (9, 15)
+    assert {str(p): str(w) for p, w in flat.boxes["j.hc"].ports.items()} == {
+        "q_r": "~j.q_r",
+        "p_j1": "j.p_j1",
+        "p_j2": "j.p_j2",
+        "p_r": "j.p_r",
+    }
+    assert {
+        (str(b), str(p)) for b, box in flat.boxes.items() for p, w in box.ports.items() if str(w) == "p1"
+    } == {
+        ("b1.pkc", "p"),
+        ("b1.ke", "p"),
+        ("b1.lp", "p"),
+        ("j.o1", "p1"),
+    }
+    assert not flat.links and not flat.lint() and not flat.interface
+    with pytest.raises(KeyError):
+        flat.boxes["b1"]
+
+
+def absorbed(upper: Pattern, box: str, lower: Pattern) -> Pattern:
+    """The naive substitution: an outer state port is absorbed like an outer power port."""
+    powered = {p: junction(j.quantity, j.exposed) for p, j in lower.junctions.items()}
+    wires = {
+        b: {p: str(w).lstrip("~") if str(b) == box else str(w) for p, w in c.ports.items()}
+        for b, c in upper.boxes.items()
+    }
+    boxes = {b: {p: str(w) for p, w in c.ports.items()} for b, c in lower.boxes.items()}
+    return Pattern(upper.junctions, wires).substitute({box: Pattern(powered, boxes)})
+
+
+def test_a_state_port_does_not_merge_power_balances():
+    lower = Pattern({"l": junction(Q, exposed=True, power=False)}, {"a": {"x": "l"}, "b": {"x": "l"}})
+    upper = Pattern({"j": junction(Q)}, {"box": {"l": "~j"}, "c": {"x": "j"}, "d": {"x": "j"}})
+    whole, naive = upper.substitute(box=lower), absorbed(upper, "box", lower)
+    assert names(whole.junctions) == {"j", "box.l"} and names(naive.junctions) == {"j"}
+    assert [names(group) for group in whole.links] == [{"j", "box.l"}]
+    assert whole != naive
+    assert [(remark.kind, *map(str, remark.junctions)) for remark in whole.lint()] == [
+        ("linked-balances", "box.l", "j")
+    ]
+
+
+@pytest.mark.parametrize(
+    ("lower", "upper"),
+    [
+        ({"a": {"x": "l"}}, {"box": {"l": "~j"}, "c": {"x": "~j"}}),
+        ({"a": {"x": "~l"}}, {"box": {"l": "~j"}, "c": {"x": "j"}}),
+        ({"a": {"x": "~l"}}, {"box": {"l": "~j"}, "c": {"x": "~j"}}),
+    ],
+)
+def test_where_one_side_bears_no_power_a_single_junction_is_left(lower, upper):
+    inner = Pattern({"l": junction(Q, exposed=True, power=False)}, lower)
+    whole = Pattern({"j": junction(Q)}, upper).substitute(box=inner)
+    assert len(whole.junctions) == 1 and not whole.links and not whole.lint()
+
+
+def test_a_lower_class_exposed_twice_joins_two_upper_classes():
+    lower = Pattern(
+        {"l": junction(Q, True, False), "m": junction(Q, True, False)}, {"a": {"x": "l"}}, [("l", "m")]
+    )
+    upper = Pattern(
+        {"j": junction(Q), "k": junction(Q)},
+        {"box": {"l": "~j", "m": "~k"}, "c": {"x": "j"}, "d": {"x": "k"}},
+    )
+    whole = upper.substitute(box=lower)
+    assert not upper.links and [names(group) for group in whole.links] == [{"box.l", "j", "k"}]
+    # box.m was a mere handle, and is gone
+    assert names(whole.junctions) == {"box.l", "j", "k"}
+
+
+def test_links_of_absorbed_junctions_are_kept():
+    lower = Pattern({"l": junction(Q, True), "m": junction(Q)}, {"a": {"x": "l", "y": "m"}}, [("l", "m")])
+    upper = Pattern({"j": junction(Q)}, {"box": {"l": "j"}, "c": {"x": "j"}})
+    assert [names(group) for group in upper.substitute(box=lower).links] == [{"j", "box.m"}]
+
+
+def test_two_ports_of_a_box_on_one_junction_absorb_two_lower_junctions():
+    lower = Pattern({"l": junction(Q, True), "m": junction(Q, True)}, {"a": {"x": "l"}, "b": {"x": "m"}})
+    upper = Pattern({"j": junction(Q)}, {"box": {"l": "j", "m": "j"}})
+    assert upper.substitute(box=lower) == Pattern(
+        {"j": junction(Q)}, {"box.a": {"x": "j"}, "box.b": {"x": "j"}}
+    )
+
+
+@given(patterns(state_ports=False, links=False))
+def test_patterns_without_state_ports_substitute_without_links(f):
+    assert not f.links
+    assert all(port.power for box in f.boxes.values() for port in box.ports.values())
+    whole = f.substitute(
+        {
+            box: Pattern(
+                {p: junction(t.quantity, True) for p, t in c.interface.items()},
+                {"x": {p: str(p) for p in c.ports}},
+            )
+            for box, c in f.boxes.items()
+            if not any(str(p).split(".")[0] == "x" for p in c.ports)
+        }
+    )
+    assert not whole.links
+
+
+def test_frames_keep_wires_apart():
+    lower = Pattern({"q": junction(Q.in_frame("C"), exposed=True)}, {"a": {"q": "q"}})
+    for frame, fits in (("C", True), (None, True), ("B", False)):
+        upper = Pattern({"q": junction(Q.in_frame(frame))}, {"box": {"q": "q"}})
+        if fits:
+            assert upper.substitute(box=lower).junctions["q"].quantity == Q.in_frame(frame)
+            identity = Pattern.identity(upper.boxes["box"].interface)
+            assert identity.substitute({".": lower}).interface == identity.interface
+        else:
+            with pytest.raises(PatternError, match=r"in frame C.*in frame B"):
+                upper.substitute(box=lower)
+
+
+UPPER = Pattern(
+    {"q": junction(Q), "s": junction(quantity.entropy)}, {"a": {"q": "q", "s": "s"}, "b": {"s": "s"}}
+)
+
+
+def filling(**junctions) -> Pattern:
+    return Pattern(junctions, {"x": {name: name for name in junctions}})
+
+
+@pytest.mark.parametrize(
+    ("fillings", "facts", "words"),
+    [
+        ({"c": filling()}, {"kind": "unknown-box", "box": "c", "expected": "a, b"}, ["c", "a, b"]),
+        ({"a": "no pattern"}, {"kind": "filling-type", "box": "a", "found": "str"}, ["str", "a Pattern"]),
+        (
+            {"a": filling(q=junction(Q, True))},
+            {"kind": "interface", "box": "a", "port": "s"},
+            ["missing s", "entropy"],
+        ),
+        (
+            {"a": filling(q=junction(Q, True), s=junction(quantity.entropy, True), t=junction(Q, True))},
+            {"kind": "interface", "box": "a", "port": "t"},
+            ["extra t", "{q: displacement on real, s: entropy on real}"],
+        ),
+        (
+            {"a": filling(q=junction(quantity.momentum, True), s=junction(quantity.entropy, True))},
+            {"kind": "interface", "box": "a", "port": "q"},
+            ["differing q", "momentum", "displacement"],
+        ),
+        (
+            {"a": filling(q=junction(Q, True, False), s=junction(quantity.entropy, True))},
+            {"kind": "interface", "box": "a", "port": "q"},
+            ["differing q", "~displacement"],
+        ),
+        (
+            {"a": filling(r=junction(Q, True), s=junction(quantity.entropy, True))},
+            {"kind": "interface", "box": "a", "port": "q"},
+            ["missing q", "extra r", "Pattern.rename"],
+        ),
+    ],
+)
+def test_a_filling_that_does_not_fit_is_refused(fillings, facts, words):
+    with pytest.raises(PatternError) as caught:
+        UPPER.substitute(fillings)
+    assert {name: getattr(caught.value, name) for name in facts} == facts
+    assert all(word in str(caught.value) for word in words)
+
+
+def test_an_identity_refuses_what_does_not_fit():
+    with pytest.raises(PatternError, match="missing q"):
+        Pattern.identity({"q": PortType(Q, True)}).substitute({".": filling()})
