@@ -1,0 +1,133 @@
+"""Rotations in space: hat and vee, quaternions, exponential map and its coefficients, as matrices.
+
+Quaternions are stored [w, x, y, z], rotate body coordinates to world coordinates, and have unit length.
+"""
+
+from collections.abc import Callable
+from math import factorial, sin, tan
+
+import numpy as np
+
+from ephs.semantics.spaces.manifold import Array
+
+# Below this angle the closed forms lose digits by cancellation and power series take over.
+SMALL_ANGLE = 0.5
+_TERMS = 12
+
+
+def hat(v: Array) -> Array:
+    """The skew matrix with hat(v) w = v × w."""
+    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+
+
+def vee(m: Array) -> Array:
+    """The vector of a skew matrix, read from the entries (3, 2), (1, 3), (2, 1)."""
+    return np.array([m[2, 1], m[0, 2], m[1, 0]])
+
+
+def series(coefficient: Callable[[int], float], x: float) -> float:
+    """The power series Σ coefficient(k) xᵏ, cut after as many terms as double precision needs for |x| ≤ ¼."""
+    return sum(coefficient(k) * x**k for k in range(_TERMS))
+
+
+def alpha(angle: float) -> float:
+    """sin θ / θ."""
+    if abs(angle) < SMALL_ANGLE:
+        return series(lambda k: (-1) ** k / factorial(2 * k + 1), angle**2)
+    return sin(angle) / angle
+
+
+def beta(angle: float) -> float:
+    """(1 − cos θ) / θ²."""
+    if abs(angle) < SMALL_ANGLE:
+        return series(lambda k: (-1) ** k / factorial(2 * k + 2), angle**2)
+    return 2.0 * (sin(0.5 * angle) / angle) ** 2
+
+
+def gamma(angle: float) -> float:
+    """(θ − sin θ) / θ³."""
+    if abs(angle) < SMALL_ANGLE:
+        return series(lambda k: (-1) ** k / factorial(2 * k + 3), angle**2)
+    return (angle - sin(angle)) / angle**3
+
+
+def cotangent(angle: float) -> float:
+    """(1 − (θ/2) cot(θ/2)) / θ²."""
+    if abs(angle) < SMALL_ANGLE:
+        return series(lambda k: (-1) ** k * bernoulli_ratio(k + 1), angle**2)
+    return (1.0 - 0.5 * angle / tan(0.5 * angle)) / angle**2
+
+
+_NUMERATORS = (1, -1, 1, -1, 5, -691, 7, -3617, 43867, -174611, 854513, -236364091, 8553103)
+_DENOMINATORS = (6, 30, 42, 30, 66, 2730, 6, 510, 798, 330, 138, 2730, 6)
+
+
+def bernoulli_ratio(k: int) -> float:
+    """B₂ₖ / (2k)! with the Bernoulli numbers, for k = 1 … 13."""
+    return _NUMERATORS[k - 1] / (_DENOMINATORS[k - 1] * factorial(2 * k))
+
+
+def rotation_exp(w: Array) -> Array:
+    """Rotation matrix of a rotation vector: 1 + α ŵ + β ŵ²."""
+    angle, skew = float(np.linalg.norm(w)), hat(w)
+    return np.eye(3) + alpha(angle) * skew + beta(angle) * skew @ skew
+
+
+def rotation_dexp(w: Array) -> Array:
+    """Right-trivialised differential of `rotation_exp`, 1 + β ŵ + γ ŵ²: the V of exp on SE(3)."""
+    angle, skew = float(np.linalg.norm(w)), hat(w)
+    return np.eye(3) + beta(angle) * skew + gamma(angle) * skew @ skew
+
+
+def rotation_dexp_inv(w: Array) -> Array:
+    """Inverse of `rotation_dexp`, 1 − ½ ŵ + c ŵ² with c the `cotangent` coefficient."""
+    angle, skew = float(np.linalg.norm(w)), hat(w)
+    return np.eye(3) - 0.5 * skew + cotangent(angle) * skew @ skew
+
+
+def quaternion_to_matrix(q: Array) -> Array:
+    """Rotation matrix of a unit quaternion."""
+    w, v = q[0], q[1:]
+    skew = hat(v)
+    return np.eye(3) + 2.0 * w * skew + 2.0 * skew @ skew
+
+
+def matrix_to_quaternion(m: Array) -> Array:
+    """Unit quaternion of a rotation matrix with w ≥ 0, from the largest pivot (Shepperd)."""
+    pivots = np.array([np.trace(m), m[0, 0], m[1, 1], m[2, 2]])
+    i = int(np.argmax(pivots))
+    q = np.empty(4)
+    if i == 0:
+        q[0] = 1.0 + pivots[0]
+        q[1:] = vee(m - m.T)
+    else:
+        a, b, c = i - 1, i % 3, (i + 1) % 3
+        q[0] = m[c, b] - m[b, c]
+        q[1 + a] = 1.0 + m[a, a] - m[b, b] - m[c, c]
+        q[1 + b] = m[b, a] + m[a, b]
+        q[1 + c] = m[c, a] + m[a, c]
+    return normalised(q if q[0] >= 0.0 else -q)
+
+
+def normalised(q: Array) -> Array:
+    """The quaternion divided by its length."""
+    return q / np.sqrt(q @ q)
+
+
+def rotation_log(q: Array) -> Array:
+    """Principal rotation vector of a unit quaternion, of length ≤ π; well conditioned everywhere.
+
+    At exactly π the sign of the axis is arbitrary.
+    """
+    q = q if q[0] >= 0.0 else -q
+    v = q[1:]
+    length = float(np.linalg.norm(v))
+    if length < 1e-4:
+        x = (length / q[0]) ** 2
+        return v * (2.0 / q[0]) * (1.0 - x / 3.0 + x * x / 5.0)
+    return v * (2.0 * np.arctan2(length, q[0]) / length)
+
+
+def random_quaternion(rng: np.random.Generator) -> Array:
+    """A uniformly distributed rotation."""
+    return normalised(rng.standard_normal(4))

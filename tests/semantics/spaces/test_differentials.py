@@ -1,0 +1,243 @@
+"""Differentials of exponential maps, against power series in many digits, differences and other libraries."""
+
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ephs.semantics.spaces import SE2, SE3, SO3, SO3xR3
+from ephs.semantics.spaces import se3_kernels as kernels
+from ephs.semantics.spaces.rotations import quaternion_to_matrix
+
+GROUPS = [SO3, SE2, SE3, SO3xR3]
+ANGLES = [0.0, 1e-12, 1e-6, 1e-3, 0.1, 0.499, 0.501, 0.999, 1.001, 2.0, 3.1]
+EPS = np.finfo(float).eps
+# (ω, υ) here, (υ, ω) there.
+SWAP = [3, 4, 5, 0, 1, 2]
+
+groups = pytest.mark.parametrize("group", GROUPS, ids=lambda g: g.name)
+seeds = st.integers(0, 2**32 - 1)
+
+
+def series(matrix, shift):
+    """Σ Aᵏ / (k + shift)! with 40 digits: exp for 0, dexp for 1."""
+    with mpmath.workdps(40):
+        a = mpmath.matrix(matrix.tolist())
+        power = mpmath.eye(a.rows)
+        total = power / mpmath.factorial(shift)
+        for k in range(1, 60):
+            power = power * a
+            total += power / mpmath.factorial(k + shift)
+        return total
+
+
+def error(found, exact):
+    """Largest entry of found − exact, taken before rounding."""
+    with mpmath.workdps(40):
+        n, m = found.shape
+        return float(
+            max(abs(mpmath.mpf(float(found[i, j])) - exact[i, j]) for i in range(n) for j in range(m))
+        )
+
+
+def displacement(group, angle):
+    rng = np.random.default_rng(7)
+    v = rng.standard_normal(group.dim)
+    angular = 1 if group is SE2 else 3
+    v[:angular] *= angle / np.linalg.norm(v[:angular])
+    return v
+
+
+@groups
+@pytest.mark.parametrize("angle", ANGLES)
+def test_dexp_to_the_last_digits(group, angle):
+    v = displacement(group, angle)
+    exact = series(group.ad(v), 1)
+    with mpmath.workdps(40):
+        inverse = exact**-1
+    left, left_inv = np.empty((2, group.dim, group.dim))
+    kernels.dexp_left(group.code, -v, left)
+    kernels.dexp_left_inv(group.code, -v, left_inv)
+    size = 1.0 + np.abs(v).sum()
+    for found in (group.dexp(v), left):
+        assert error(found, exact) <= 4 * EPS * size
+    for found in (group.dexp_inv(v), left_inv):
+        assert error(found, inverse) <= 8 * EPS * size
+
+
+@pytest.mark.parametrize("angle", [4.0, 5.0, 6.0, 6.2])
+def test_dexp_inv_beyond_half_a_turn(angle):
+    v = displacement(SE3, angle)
+    found = np.empty((6, 6))
+    kernels.dexp_inv(v, found)
+    with mpmath.workdps(40):
+        exact = series(SE3.ad(v), 1) ** -1
+    # Condition grows like the inverse square of the distance to a full turn.
+    bound = 8 * EPS * float(mpmath.mnorm(exact, "f")) / (2 * np.pi - angle)
+    assert error(found, exact) <= bound
+    assert error(SE3.dexp_inv(v), exact) <= bound
+
+
+@pytest.mark.parametrize("angle", ANGLES)
+def test_exp_to_the_last_digits(angle):
+    v = displacement(SE3, angle)
+    matrix = np.zeros((4, 4))
+    matrix[:3, :3], matrix[:3, 3] = SO3.ad(v[:3]), v[3:]
+    exact = series(matrix, 0)
+    pose, rotation = np.empty(7), np.empty((3, 3))
+    kernels.pose_exp(v, pose)
+    kernels.quat_to_matrix(pose, rotation)
+    assert error(np.column_stack((rotation, pose[4:])), exact[:3, :]) <= 8 * EPS * (1 + np.abs(v).sum())
+    pose = SE3.exp(v)
+    found = np.column_stack((quaternion_to_matrix(pose[:4]), pose[4:]))
+    assert error(found, exact[:3, :]) <= 8 * EPS * (1 + np.abs(v).sum())
+
+
+@groups
+@given(seed=seeds)
+def test_differential_of_exp(group, seed):
+    rng = np.random.default_rng(seed)
+    v, w, h = rng.standard_normal(group.dim), rng.standard_normal(group.dim), 1e-5
+    ahead, behind = group.exp(v + h * w), group.exp(v - h * w)
+    difference = group.increment(behind, ahead) / (2 * h)
+    size = (1.0 + np.abs(v).sum()) ** 3 * (1.0 + np.abs(w).sum()) ** 3
+    assert np.abs(difference - group.dexp_left(v) @ w).max() <= 1e-9 * size
+    right = group.adjoint(group.exp(v)) @ difference
+    assert np.abs(right - group.dexp(v) @ w).max() <= 1e-8 * size
+
+
+@groups
+@given(seed=seeds)
+def test_relations_between_the_differentials(group, seed):
+    rng = np.random.default_rng(seed)
+    v = rng.standard_normal(group.dim)
+    eye, size = np.eye(group.dim), 100 * EPS * (1.0 + np.abs(v).sum()) ** 2
+    assert np.abs(group.dexp(v) - group.adjoint(group.exp(v)) @ group.dexp_left(v)).max() <= size
+    # Ad_exp(v) − 1 = ad_v dexp_v.
+    assert np.abs(group.adjoint(group.exp(v)) - eye - group.ad(v) @ group.dexp(v)).max() <= size
+    if np.linalg.norm(v[:3]) < 4.0:
+        assert np.abs(group.dexp(v) @ group.dexp_inv(v) - eye).max() <= 10 * size
+        assert np.abs(group.dexp_left_inv(v) @ group.dexp_left(v) - eye).max() <= 10 * size
+
+
+@groups
+@given(seed=seeds)
+def test_rates_along_a_motion(group, seed):
+    rng = np.random.default_rng(seed)
+    q, u, w, p = group.random(rng), *(rng.standard_normal(group.dim) for _ in range(3))
+    h = 1e-5
+    ahead, behind = group.retract(q, h * u), group.retract(q, -h * u)
+    inverse = group.adjoint(group.inverse(q))
+    rate = (group.adjoint(group.inverse(ahead)) - group.adjoint(group.inverse(behind))) / (2 * h)
+    size = (
+        1e-9
+        * (1.0 + np.abs(u).sum()) ** 3
+        * (1.0 + np.abs(q).sum())
+        * (1.0 + np.abs(p).sum() + np.abs(w).sum())
+    )
+    assert np.abs(rate + group.ad(u) @ inverse).max() <= size
+    # d/dt (Ad*_{q⁻¹} p) = Ad*_{q⁻¹} (ṗ − ad*_u p), here with ṗ = w.
+    after = group.coadjoint(group.inverse(ahead)) @ (p + h * w)
+    before = group.coadjoint(group.inverse(behind)) @ (p - h * w)
+    expected = group.coadjoint(group.inverse(q)) @ (w - group.ad(u).T @ p)
+    assert np.abs((after - before) / (2 * h) - expected).max() <= size
+
+
+@groups
+@given(seed=seeds)
+def test_variation_of_a_twist(group, seed):
+    """δu = η̇ + ad_u η for q(t, s) with twist u along t and η along s."""
+    rng = np.random.default_rng(seed)
+    q, a, b, c = group.random(rng), *(rng.standard_normal(group.dim) for _ in range(3))
+    h = 1e-4
+
+    def point(t, s):
+        return group.retract(group.retract(q, t * a + t * s * c), s * b)
+
+    def along_t(s):
+        return group.increment(point(-h, s), point(h, s)) / (2 * h)
+
+    def along_s(t):
+        return group.increment(point(t, -h), point(t, h)) / (2 * h)
+
+    left = (along_t(h) - along_t(-h)) / (2 * h)
+    rate = (along_s(h) - along_s(-h)) / (2 * h)
+    size = (1.0 + np.abs(a).sum() + np.abs(b).sum() + np.abs(c).sum()) ** 3
+    bracket = group.ad(along_t(0.0)) @ along_s(0.0)
+    assert np.abs(left - rate - bracket).max() <= 1e-6 * size
+
+
+@given(seed=seeds)
+def test_agrees_with_pinocchio(seed):
+    import pinocchio
+
+    rng = np.random.default_rng(seed)
+    v = rng.standard_normal(6)
+    v[:3] *= rng.uniform(1e-3, 3.0) / np.linalg.norm(v[:3])
+    motion = pinocchio.Motion(v[3:], v[:3])
+    placement, pose = pinocchio.exp6(motion), SE3.exp(v)
+    size = 1e-12 * (1 + np.abs(v).sum()) ** 2
+    assert np.abs(placement.rotation - quaternion_to_matrix(pose[:4])).max() <= size
+    assert np.abs(placement.translation - pose[4:]).max() <= size
+    assert np.abs(pinocchio.log6(placement).vector[SWAP] - SE3.log(pose)).max() <= size
+    assert np.abs(placement.action[np.ix_(SWAP, SWAP)] - SE3.adjoint(pose)).max() <= size
+    assert np.abs(motion.action[np.ix_(SWAP, SWAP)] - SE3.ad(v)).max() <= size
+    assert np.abs(pinocchio.Jexp6(motion)[np.ix_(SWAP, SWAP)] - SE3.dexp_left(v)).max() <= 1e2 * size
+    assert np.abs(pinocchio.Jlog6(placement)[np.ix_(SWAP, SWAP)] - SE3.dexp_left_inv(v)).max() <= 1e2 * size
+
+
+@given(seed=seeds)
+def test_agrees_with_scipy(seed):
+    from scipy.spatial.transform import RigidTransform
+
+    rng = np.random.default_rng(seed)
+    v = rng.standard_normal(6)
+    v[:3] *= rng.uniform(1e-6, 3.0) / np.linalg.norm(v[:3])
+    theirs, pose = RigidTransform.from_exp_coords(v), SE3.exp(v)
+    size = 1e-13 * (1 + np.abs(v).sum())
+    assert np.abs(theirs.rotation.as_matrix() - quaternion_to_matrix(pose[:4])).max() <= size
+    assert np.abs(theirs.translation - pose[4:]).max() <= size
+    assert np.abs(theirs.as_exp_coords() - SE3.log(pose)).max() <= 10 * size
+    other = SE3.random(rng)
+    product = theirs * RigidTransform.from_exp_coords(SE3.log(other))
+    assert np.abs(product.translation - SE3.compose(pose, other)[4:]).max() <= 100 * size
+
+
+@given(seed=seeds)
+def test_twist_in_another_body_frame(seed):
+    """A constant offset moves twists by Ad of its inverse: true in SE(3) only."""
+    rng = np.random.default_rng(seed)
+    body, offset, u, h = SE3.random(rng), SE3.random(rng), rng.standard_normal(6), 1e-5
+
+    def moved(t):
+        return SE3.compose(SE3.retract(body, t * u), offset)
+
+    size = 1e-9 * (1 + np.abs(u).sum()) ** 3 * (1 + np.abs(offset).sum() + np.abs(body).sum())
+    right = SE3.adjoint(SE3.inverse(offset)) @ u
+    assert np.abs(SE3.increment(moved(-h), moved(h)) / (2 * h) - right).max() <= size
+
+
+@given(seed=seeds)
+def test_twist_in_another_body_frame_of_the_direct_product(seed):
+    """There the map depends on the pose, and Ad of the offset is wrong."""
+    rng = np.random.default_rng(seed)
+    body, offset, u, h = SE3.random(rng), SE3.random(rng), rng.standard_normal(6), 1e-5
+    offset[4:] += 3.0
+
+    def moved(t):
+        return SE3.compose(SO3xR3.retract(body, t * u), offset)
+
+    found = SO3xR3.increment(moved(-h), moved(h)) / (2 * h)
+    turn, back = quaternion_to_matrix(body[:4]), quaternion_to_matrix(offset[:4]).T
+    right = np.concatenate((back @ u[:3], u[3:] + turn @ np.cross(u[:3], offset[4:])))
+    size = 1e-8 * (1 + np.abs(u).sum()) ** 3 * (1 + np.abs(offset).sum())
+    assert np.abs(found - right).max() <= size
+
+
+def test_the_offset_rule_fails_in_the_direct_product():
+    rng = np.random.default_rng(4)
+    body, offset, u, h = SE3.random(rng), SE3.random(rng), rng.standard_normal(6), 1e-5
+    ahead, behind = (SE3.compose(SO3xR3.retract(body, s * u), offset) for s in (h, -h))
+    wrong = SO3xR3.adjoint(SO3xR3.inverse(offset)) @ u
+    assert np.abs(SO3xR3.increment(behind, ahead) / (2 * h) - wrong).max() > 0.1

@@ -1,0 +1,152 @@
+"""The registry of manifolds, the material form, and what importing costs."""
+
+import pickle
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ephs.semantics.spaces import (
+    SE2,
+    SE3,
+    SO3,
+    SO3xR3,
+    SpaceError,
+    codes,
+    covector_of_gradient,
+    manifold,
+    material_covector,
+    material_velocity,
+    register_manifold,
+    twist_of_velocity,
+    vector_space,
+)
+
+EPS = np.finfo(float).eps
+seeds = st.integers(0, 2**32 - 1)
+
+
+@dataclass(frozen=True)
+class Space:
+    name: str
+    dim: int
+    size: int
+    parameters: tuple[tuple[str, float], ...] = ()
+
+
+@pytest.mark.parametrize(
+    ("space", "expected"),
+    [
+        (Space("real", 1, 1), codes.VECTOR),
+        (Space("se(3)*", 6, 6), codes.VECTOR),
+        (Space("so(3)xR3*", 6, 6), codes.VECTOR),
+        (Space("anything*", 4, 4), codes.VECTOR),
+        (Space("SE(3)", 6, 7), codes.SE3),
+        (Space("SO(3)xR3", 6, 7), codes.SO3xR3),
+        (Space("SO(3)", 3, 4), codes.SO3),
+        (Space("SE(2)", 3, 3), codes.SE2),
+        (Space("screw", 1, 1, (("pitch", 0.1),)), codes.VECTOR),
+        (Space("planar", 3, 3), codes.SE2),
+        (Space("spherical", 3, 4), codes.SO3),
+        (Space("free", 6, 7), codes.SE3),
+        (Space("fixed", 0, 0), codes.VECTOR),
+    ],
+)
+def test_spaces_by_name(space, expected):
+    found = manifold(space)
+    assert (found.dim, found.size, found.code) == (space.dim, space.size, expected)
+    assert found.identity().shape == (space.size,)
+    assert manifold(space) is found
+
+
+@pytest.mark.parametrize(
+    ("act", "words"),
+    [
+        (lambda: manifold(Space("SE(4)", 10, 14)), ["SE(4)", "SE(3)", "register_manifold"]),
+        (lambda: manifold(Space("SE(3)", 6, 6)), ["SE(3)", "(6, 6)", "(6, 7)"]),
+        (lambda: manifold(Space("real", 2, 3)), ["real", "(2, 3)", "(2, 2)"]),
+        (lambda: register_manifold("SE(3)", lambda space: SE3), ["SE(3)", "registered already"]),
+        (lambda: register_manifold("x*", lambda space: SE3), ["x*", "dual"]),
+        (lambda: material_velocity(SO3, SO3.identity(), np.zeros(3)), ["SO(3)", "SE(3)", "SO(3)xR3"]),
+    ],
+)
+def test_faults_say_what_to_do(act, words):
+    with pytest.raises(SpaceError) as caught:
+        act()
+    assert all(word in str(caught.value) for word in words)
+    assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
+
+
+def test_a_new_manifold_is_one_entry():
+    register_manifold("the line of this test", lambda space: vector_space(space.name, 1))
+    assert manifold(Space("the line of this test", 1, 1)).dim == 1
+
+
+@pytest.mark.parametrize("group", [SE3, SO3xR3], ids=lambda g: g.name)
+@given(seed=seeds)
+def test_material_form(group, seed):
+    rng = np.random.default_rng(seed)
+    pose, u, f, h = group.random(rng), rng.standard_normal(6), rng.standard_normal(6), 1e-5
+    gradient = rng.standard_normal((3, 3)), rng.standard_normal(3)
+    velocity = material_velocity(group, pose, u)
+    scale = 64 * EPS * (1.0 + np.abs(u).sum()) * (1.0 + np.abs(f).sum() + np.abs(gradient[0]).sum())
+    assert np.abs(twist_of_velocity(group, pose, velocity) - u).max() <= scale
+    assert np.abs(covector_of_gradient(group, pose, material_covector(group, pose, f)) - f).max() <= scale
+    # The two are dual: pairing on either side is the same number.
+    ambient = np.sum(gradient[0] * velocity[0]) + gradient[1] @ velocity[1]
+    terms = (
+        np.abs(gradient[0]).sum() * np.abs(velocity[0]).sum() + np.abs(gradient[1]).sum() * np.abs(u).sum()
+    )
+    assert abs(covector_of_gradient(group, pose, gradient) @ u - ambient) <= 64 * EPS * (1 + terms)
+    # The velocity is the one of the curve that the twist makes.
+    from ephs.semantics.spaces.rotations import quaternion_to_matrix
+
+    ahead, behind = group.retract(pose, h * u), group.retract(pose, -h * u)
+    rate = (quaternion_to_matrix(ahead[:4]) - quaternion_to_matrix(behind[:4])) / (2 * h)
+    size = 1e-9 * (1.0 + np.abs(u).sum()) ** 3
+    assert np.abs(rate - velocity[0]).max() <= size
+    assert np.abs((ahead[4:] - behind[4:]) / (2 * h) - velocity[1]).max() <= size
+
+
+@given(seed=seeds)
+def test_gravity_as_a_covector(seed):
+    """The potential m g·r has the left-trivialised gradient (0, m Rᵀ g)."""
+    from ephs.semantics.spaces.rotations import quaternion_to_matrix
+
+    pose = SE3.random(np.random.default_rng(seed))
+    weight = np.array([0.0, 0.0, 9.81])
+    found = covector_of_gradient(SE3, pose, (np.zeros((3, 3)), weight))
+    assert np.abs(found[:3]).max() == 0.0
+    assert np.abs(found[3:] - quaternion_to_matrix(pose[:4]).T @ weight).max() <= 64 * EPS * 9.81
+
+
+def test_the_plane_lies_in_space():
+    """SE(2) by its own formulas is the planar subgroup of SE(3)."""
+    rng = np.random.default_rng(2)
+    a, v = SE2.random(rng), rng.standard_normal(3)
+    rows = [2, 3, 4]
+    embedded = np.zeros(6)
+    embedded[rows] = v
+    pose = np.array([np.cos(a[0] / 2), 0, 0, np.sin(a[0] / 2), a[1], a[2], 0])
+    for small, large in (
+        (SE2.adjoint(a), SE3.adjoint(pose)),
+        (SE2.ad(v), SE3.ad(embedded)),
+        (SE2.dexp(v), SE3.dexp(embedded)),
+        (SE2.dexp_inv(v), SE3.dexp_inv(embedded)),
+    ):
+        assert np.abs(small - large[np.ix_(rows, rows)]).max() <= 64 * EPS
+
+
+def test_the_reference_needs_numpy_only():
+    code = (
+        "import sys, ephs.semantics.spaces\n"
+        "print([m for m in ('numba', 'scipy', 'sympy') if m in sys.modules])"
+    )
+    root = Path(__file__).resolve().parents[3]
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=root)
+    assert done.stdout.strip() == "[]"
