@@ -1,0 +1,18 @@
+"""Scenes: mechanisms as they stand in files, and in the state in which they start.
+
+The model of a scene is light; the reader, with its schema and assembly, lies in `ephs.mechanics.scene.load`
+and is imported where it is used.
+"""
+
+from ephs.mechanics.scene.errors import Fault as Fault
+from ephs.mechanics.scene.errors import SceneError as SceneError
+from ephs.mechanics.scene.errors import SceneWarning as SceneWarning
+from ephs.mechanics.scene.model import Adjustment as Adjustment
+from ephs.mechanics.scene.model import Body as Body
+from ephs.mechanics.scene.model import Conduction as Conduction
+from ephs.mechanics.scene.model import Displacement as Displacement
+from ephs.mechanics.scene.model import Joint as Joint
+from ephs.mechanics.scene.model import Scene as Scene
+from ephs.mechanics.scene.model import Spring as Spring
+from ephs.mechanics.scene.model import ThermalNode as ThermalNode
+from ephs.mechanics.scene.model import World as World

@@ -1,0 +1,125 @@
+"""The nearest consistent state: Gauss-Newton on the poses, then a projection of the velocities, both in the
+mass metric.
+
+The least change is meant as ``½ δᵀ M δ`` with M the bodies' inertias, so that heavy bodies move least.
+Redundant constraints, as every planar loop has in space, are met by least squares.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ephs.mechanics.scene.kinematics import TOLERANCE, Link, elements, largest_gap, largest_slip
+from ephs.semantics.spaces import SE3
+
+Array = NDArray[np.float64]
+
+ITERATIONS = 60
+# Singular values below this part of the largest are redundant constraints.
+RANK = 1e-9
+
+
+def mass_roots(masses: Array, inertias: Array) -> Array:
+    """The inverse square roots (n, 6, 6) of the bodies' inertias; what has none counts as very light."""
+    roots = np.zeros((masses.shape[0], 6, 6))
+    lightest = _least(masses)
+    least = _least(np.trace(inertias, axis1=1, axis2=2))
+    for root, mass, inertia in zip(roots, masses, inertias, strict=True):
+        moments, axes = np.linalg.eigh(inertia)
+        root[:3, :3] = axes @ np.diag(np.maximum(moments, least) ** -0.5) @ axes.T
+        root[3:, 3:] = max(mass, lightest) ** -0.5 * np.eye(3)
+    return roots
+
+
+def _least(values: Array) -> float:
+    return 1e-9 * (float(values.max(initial=0.0)) or 1.0)
+
+
+def close_loops(links: Sequence[Link], poses: Array, roots: Array, held: frozenset[str]) -> Array | None:
+    """The nearest poses that satisfy every joint, the joints ``held`` at their coordinates; None where none
+    is found."""
+    poses = poses.copy()
+    free = [_loose(link, held) for link in links]
+    for _ in range(ITERATIONS):
+        xs = elements(free, poses)
+        if largest_gap(free, poses, xs) < 0.01 * TOLERANCE:
+            break
+        matrix, errors = _constraints(free, poses, xs, roots, held)
+        steps = _steps(roots, _least_change(matrix, -errors))
+        # Far from a solution, a full step may go round too far.
+        steps /= max(1.0, float(np.abs(steps[:, :3]).max(initial=0.0)))
+        poses = np.array([SE3.retract(q, v) for q, v in zip(poses, steps, strict=True)])
+    return poses if largest_gap(free, poses, elements(free, poses)) < TOLERANCE else None
+
+
+def project_velocities(
+    links: Sequence[Link], poses: Array, twists: Array, roots: Array, held: frozenset[str]
+) -> Array | None:
+    """The nearest twists that satisfy every joint and every prescribed rate; None where they contradict
+    each other.
+
+    The joints ``held`` keep the rates that they were given.
+    """
+    xs = elements(links, poses)
+    blocks, wanted = [], []
+    for link, x in zip(links, xs, strict=True):
+        fixed = link.rate if link.name in held else None if link.motion is None else np.array([link.motion])
+        forbidden = _complement(link, x) if fixed is None else np.eye(6)
+        blocks.append(_row(link, x, forbidden, roots))
+        wanted.append(
+            forbidden.T @ (link.coupling.basis(x) @ fixed)
+            if fixed is not None
+            else np.zeros(forbidden.shape[1])
+        )
+    matrix, target = np.vstack(blocks), np.concatenate(wanted)
+    start = np.concatenate([np.linalg.solve(root, u) for root, u in zip(roots, twists, strict=True)])
+    change = _least_change(matrix, target - matrix @ start)
+    found = _steps(roots, (start + change).reshape(-1, 6))
+    return (
+        found if largest_slip(links, found, xs) < TOLERANCE * max(1.0, float(np.abs(found).max())) else None
+    )
+
+
+def _loose(link: Link, held: frozenset[str]) -> Link:
+    """The joint free to take other coordinates, unless it is held."""
+    if link.name in held or link.coordinates is None:
+        return link
+    return replace(link, coordinates=None, near=link.coupling.element(link.coordinates))
+
+
+def _constraints(
+    links: Sequence[Link], poses: Array, xs: Sequence[Array], roots: Array, held: frozenset[str]
+) -> tuple[Array, Array]:
+    blocks, errors = [], []
+    for link, x in zip(links, xs, strict=True):
+        forbidden = np.eye(6) if link.name in held else _complement(link, x)
+        blocks.append(_row(link, x, forbidden, roots))
+        errors.append(forbidden.T @ link.error(poses, x))
+    return np.vstack(blocks), np.concatenate(errors)
+
+
+def _complement(link: Link, x: Array) -> Array:
+    """An orthonormal basis (6, 6 − d) of what the joint does not allow."""
+    basis = link.coupling.basis(x)
+    return np.linalg.svd(basis, full_matrices=True)[0][:, basis.shape[1] :] if basis.shape[1] else np.eye(6)
+
+
+def _row(link: Link, x: Array, forbidden: Array, roots: Array) -> Array:
+    """The constraint's rows on all bodies, in coordinates where the mass metric is the identity."""
+    row = np.zeros((forbidden.shape[1], roots.shape[0], 6))
+    for body, matrix in zip((link.body1, link.body2), link.rows(x), strict=True):
+        if body >= 0:
+            row[:, body] += forbidden.T @ matrix @ roots[body]
+    return row.reshape(forbidden.shape[1], 6 * roots.shape[0])
+
+
+def _least_change(matrix: Array, target: Array) -> Array:
+    """The shortest of the solutions that are best by least squares."""
+    return np.asarray(np.linalg.lstsq(matrix, target, rcond=RANK)[0], dtype=np.float64)
+
+
+def _steps(roots: Array, change: Array) -> Array:
+    """From coordinates where the mass metric is the identity back to twists."""
+    return np.einsum("nij,nj->ni", roots, change.reshape(-1, 6))

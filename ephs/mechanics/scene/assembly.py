@@ -1,0 +1,194 @@
+"""Placement: bodies without a position or a velocity get them from their joints; then every joint is
+measured.
+
+A body without a position is placed by its first joint with frames in the bodies, at that joint's
+coordinate; a body without a velocity likewise, at its rate. What then remains open in a joint is a fault,
+unless the scene is adjusted.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ephs.mechanics.scene.errors import Fault, fault
+from ephs.mechanics.scene.geometry import body_twist
+from ephs.mechanics.scene.kinematics import TOLERANCE, Link, at
+from ephs.mechanics.scene.model import GROUND, IDENTITY_POSE, Body, Joint, Scene, frozen
+from ephs.mechanics.scene.resolve import BodyDraft, JointDraft
+from ephs.semantics.spaces import SE3
+
+Array = NDArray[np.float64]
+Bodies: TypeAlias = dict[str, Body]
+Joints: TypeAlias = dict[str, Joint]
+
+
+def assemble(
+    drafts: Sequence[BodyDraft], joints: Sequence[JointDraft], parts: Mapping[str, Scene]
+) -> tuple[Bodies, Joints, list[Fault]]:
+    """Bodies and joints in the initial state, and a fault for each joint that does not hold there.
+
+    The bodies of ``parts`` are where they are; joints may name them.
+    """
+    others = [(f"{part}.{name}", body) for part, scene in parts.items() for name, body in scene.all_bodies()]
+    names = [draft.name for draft in drafts] + [name for name, _ in others]
+    index = {name: i for i, name in enumerate(names)} | {GROUND: -1}
+    poses = _place(drafts, joints, index, [body.pose for _, body in others])
+    links = [_link(draft, index, poses) for draft in joints]
+    xs = [link.element(poses) for link in links]
+    twists = _move(drafts, joints, links, xs, poses, [body.twist for _, body in others])
+    bodies = {
+        d.name: Body(d.name, d.mass, frozen(d.inertia), frozen(poses[i]), frozen(twists[i]), d.shape)
+        for i, d in enumerate(drafts)
+    }
+    placed = {d.name: _joint(d, link, x, twists) for d, link, x in zip(joints, links, xs, strict=True)}
+    return bodies, placed, measure(links, xs, poses, twists, names)
+
+
+def measure(
+    links: Sequence[Link], xs: Sequence[Array], poses: Array, twists: Array, names: Sequence[str]
+) -> list[Fault]:
+    """A fault for each joint that has a gap, a velocity that it does not allow, or another rate than it was
+    given."""
+    faults: list[Fault] = []
+    for link, x in zip(links, xs, strict=True):
+        who = " and ".join(names[b] for b in (link.body1, link.body2) if b >= 0)
+        key = f"joints.{link.name}"
+        distance, angle = link.gap(poses, x)
+        if max(distance, angle) > TOLERANCE:
+            faults.append(fault("gap", key, f"a gap of {distance:.3g} m and {angle:.3g} rad", who=who))
+            continue
+        rate, residual = link.slip(twists, x)
+        spin, speed = float(np.linalg.norm(residual[:3])), float(np.linalg.norm(residual[3:]))
+        if max(spin, speed) > TOLERANCE:
+            text = f"velocities that open it by {speed:.3g} m/s and {spin:.3g} rad/s"
+            faults.append(fault("velocity", key, text, who=who))
+        elif link.motion is not None and abs(rate[0] - link.motion) > TOLERANCE:
+            text = f"a rate of {rate[0]:.9g}"
+            faults.append(
+                fault("motion differs", f"{key}.motion", text, motion=f"{link.motion:.9g}", who=who)
+            )
+        elif (
+            link.motion is None
+            and link.rate is not None
+            and np.abs(rate - link.rate).max(initial=0.0) > TOLERANCE
+        ):
+            actual = _text(rate)
+            faults.append(fault("rate differs", f"{key}.rate", _text(link.rate), actual=actual, who=who))
+    return faults
+
+
+def _place(
+    drafts: Sequence[BodyDraft], joints: Sequence[JointDraft], index: Mapping[str, int], rest: Sequence[Array]
+) -> Array:
+    poses = np.array([IDENTITY_POSE if d.pose is None else d.pose for d in drafts] + list(rest)).reshape(
+        -1, 7
+    )
+    links = {j.name: _link(j, index, poses) for j in joints if j.place.in_bodies}
+
+    def follow(body: int, name: str) -> None:
+        link, draft = links[name], next(j for j in joints if j.name == name)
+        x = (
+            link.coupling.identity()
+            if draft.coordinates is None
+            else link.coupling.element(draft.coordinates)
+        )
+        poses[body] = link.place_second(poses, x) if link.body2 == body else link.place_first(poses, x)
+
+    open_bodies = [i for i, d in enumerate(drafts) if d.pose is None]
+    _settle(open_bodies, list(links.values()), follow)
+    return poses
+
+
+def _move(
+    drafts: Sequence[BodyDraft],
+    joints: Sequence[JointDraft],
+    links: Sequence[Link],
+    xs: Sequence[Array],
+    poses: Array,
+    rest: Sequence[Array],
+) -> Array:
+    twists = np.zeros((len(poses), 6))
+    for i, d in enumerate(drafts):
+        if d.velocity is not None and d.angular_velocity is not None:
+            twists[i] = body_twist(poses[i], d.velocity, d.angular_velocity)
+    if rest:
+        twists[len(drafts) :] = rest
+    elements = {link.name: x for link, x in zip(links, xs, strict=True)}
+    by_name = {link.name: link for link in links}
+
+    def follow(body: int, name: str) -> None:
+        link, x = by_name[name], elements[name]
+        rate = np.zeros(link.coupling.dim) if link.rate is None else link.rate
+        twists[body] = (
+            link.move_second(twists, x, rate) if link.body2 == body else link.move_first(twists, x, rate)
+        )
+
+    # A joint given by `at` and `axis` moves a body only where its rate is written down.
+    leading = [
+        link
+        for j, link in zip(joints, links, strict=True)
+        if j.place.in_bodies or (j.rate is not None and j.rate.any())
+    ]
+    _settle([i for i, d in enumerate(drafts) if d.velocity is None], leading, follow)
+    return twists
+
+
+def _settle(open_bodies: list[int], links: Sequence[Link], follow: Callable[[int, str], None]) -> None:
+    """Let each open body follow its first link, once the body at the link's other end is settled.
+
+    Where all wait for each other, a body follows any of its links whose other end is settled, or stays
+    where it is.
+    """
+    of = {b: [link for link in links if b in (link.body1, link.body2)] for b in open_bodies}
+    waiting = [b for b in open_bodies if of[b]]
+    while waiting:
+        ready = [(b, link) for b in waiting for link in of[b][:1] if _other(link, b) not in waiting]
+        ready = ready or [(b, link) for b in waiting for link in of[b] if _other(link, b) not in waiting][:1]
+        for body, link in ready:
+            follow(body, link.name)
+        settled = {b for b, _ in ready} or {waiting[0]}
+        waiting = [b for b in waiting if b not in settled]
+
+
+def _other(link: Link, body: int) -> int:
+    return link.body1 if link.body2 == body else link.body2
+
+
+def _link(draft: JointDraft, index: Mapping[str, int], poses: Array) -> Link:
+    body1, body2, place = index[draft.body1], index[draft.body2], draft.place
+    frame1, frame2 = place.frame1, place.frame2
+    if not place.in_bodies:
+        frame1 = SE3.compose(SE3.inverse(at(poses, body1)), frame1)
+        frame2 = SE3.compose(SE3.inverse(at(poses, body2)), frame2)
+    # Where `at` and `axis` are given, the coordinates are 0 by definition.
+    coupling = draft.coupling()
+    coordinates = draft.coordinates if place.in_bodies else np.zeros(coupling.dim)
+    return Link(draft.name, body1, body2, frame1, frame2, coupling, coordinates, draft.rate, draft.motion)
+
+
+def _joint(draft: JointDraft, link: Link, x: Array, twists: Array) -> Joint:
+    rate, _ = link.slip(twists, x)
+    return Joint(
+        name=draft.name,
+        kind=draft.kind,
+        body1=draft.body1,
+        body2=draft.body2,
+        frame1=frozen(link.frame1),
+        frame2=frozen(link.frame2),
+        pitch=draft.pitch,
+        friction=frozen(draft.friction),
+        stiffness=frozen(draft.stiffness),
+        rest=frozen(draft.rest),
+        heat=draft.heat,
+        drive=frozen(draft.drive),
+        motion=draft.motion,
+        coordinate=frozen(x),
+        rate=frozen(rate),
+        middle=None if draft.place.middle is None else frozen(draft.place.middle),
+    )
+
+
+def _text(rate: Array) -> str:
+    return f"{rate[0]:.9g}" if rate.shape == (1,) else "[" + ", ".join(f"{entry:.9g}" for entry in rate) + "]"

@@ -1,0 +1,181 @@
+"""From the parsed text to validated tables, all faults collected.
+
+A table with a fault is still taken as far as it goes: the faulty keys fall back to a neutral value and are
+remembered as spoiled, so that the checks after this one can look at the rest of the table.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar, final
+
+from pydantic import ValidationError
+
+from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing
+from ephs.mechanics.scene.schema import (
+    SECTIONS,
+    AssemblyEntry,
+    Entry,
+    FrameEntry,
+    MotionEntry,
+    SceneFile,
+    ShapeEntry,
+    WorldEntry,
+)
+
+E = TypeVar("E", bound=Entry)
+
+# Neutral values for required keys that are missing or faulty.
+_NEUTRAL: dict[str, Any] = {
+    "mass": 1.0,
+    "inertia": [1.0, 1.0, 1.0],
+    "type": "free",
+    "bodies": ["ground", "ground"],
+    "at1": [0.0, 0.0, 0.0],
+    "at2": [0.0, 0.0, 0.0],
+    "capacity": 1.0,
+    "temperature": 1.0,
+    "between": ["environment", "environment"],
+    "conductance": 0.0,
+    "use": "?",
+}
+
+_NESTED: dict[str, type[Entry]] = {
+    "shape": ShapeEntry,
+    "frame1": FrameEntry,
+    "frame2": FrameEntry,
+    "motion": MotionEntry,
+}
+
+_EXPECTED: dict[str, Callable[[Mapping[str, Any]], tuple[str, str]]] = {
+    "float_type": lambda ctx: ("type", "a number"),
+    "int_type": lambda ctx: ("type", "a whole number"),
+    "string_type": lambda ctx: ("type", "a text in quotes"),
+    "string_too_short": lambda ctx: ("range", "a text that is not empty"),
+    "bool_type": lambda ctx: ("type", "true or false"),
+    "list_type": lambda ctx: ("type", "a list"),
+    "numbers": lambda ctx: ("type", "a number or a list of numbers"),
+    "inertia_length": lambda ctx: ("length", "3 or 6 numbers: xx yy zz [xy xz yz]"),
+    "too_short": lambda ctx: ("length", f"{ctx['min_length']} entries"),
+    "too_long": lambda ctx: ("length", f"{ctx['max_length']} entries"),
+    "greater_than": lambda ctx: ("range", f"a number above {ctx['gt']:g}"),
+    "greater_than_equal": lambda ctx: ("range", f"a number not below {ctx['ge']:g}"),
+    "literal_error": lambda ctx: ("range", str(ctx["expected"])),
+}
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Checked(Generic[E]):
+    """A validated table, and the keys in it that had faults."""
+
+    entry: E
+    spoiled: frozenset[str] = frozenset()
+
+    def sound(self, *keys: str) -> bool:
+        """Whether none of these keys had a fault."""
+        return self.spoiled.isdisjoint(keys)
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Document:
+    """A scene file's tables: ``sections[section][name]`` is a `Checked` table; ``world`` is None where the
+    file has none."""
+
+    name: str
+    world: WorldEntry | None
+    assembly: AssemblyEntry
+    sections: Mapping[str, Mapping[str, Checked[Any]]]
+
+
+def read_document(raw: Mapping[str, Any], default_name: str, faults: list[Fault]) -> Document:
+    """Validate a parsed file table by table; append the faults."""
+    known = list(SceneFile.model_fields)
+    for key in raw:
+        if key not in known:
+            faults.append(_unknown_key(key, key, known))
+    _check_format(raw, faults)
+    name = raw.get("name", default_name)
+    if not isinstance(name, str) or not name:
+        faults.append(fault("type", "name", shown(name), what="a text in quotes"))
+        name = default_name
+    world = validate(WorldEntry, raw["world"], "world", faults).entry if "world" in raw else None
+    assembly = validate(AssemblyEntry, raw.get("assembly", {}), "assembly", faults).entry
+    return Document(name, world, assembly, {key: _section(key, raw.get(key, {}), faults) for key in SECTIONS})
+
+
+def validate(model: type[E], raw: Any, key: str, faults: list[Fault]) -> Checked[E]:
+    """Validate one table; append its faults, and return what is sound of it."""
+    if not isinstance(raw, Mapping):
+        faults.append(fault("table", key, shown(raw)))
+        raw, spoiled = {}, set(model.model_fields)
+    else:
+        spoiled = set[str]()
+        try:
+            return Checked(model.model_validate(raw))
+        except ValidationError as error:
+            for item in error.errors(include_url=False):
+                faults.append(_translate(model, key, item))
+                spoiled.add(str(item["loc"][0]))
+    sound = {k: v for k, v in raw.items() if k not in spoiled}
+    required = {k for k, field in model.model_fields.items() if field.is_required()}
+    neutral = {k: _NEUTRAL[k] for k in spoiled & required}
+    return Checked(model.model_validate({**sound, **neutral}), frozenset(spoiled))
+
+
+def shown(value: Any) -> str:
+    """A value as it would stand in the file, shortened."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, Mapping):
+        return "a table"
+    if isinstance(value, str):
+        return f'"{value}"'
+    if isinstance(value, float):
+        return "nan" if math.isnan(value) else repr(value)
+    if isinstance(value, list):
+        text = "[" + ", ".join(shown(entry) for entry in value) + "]"
+        return text if len(text) <= 60 else f"{text[:57]}…]"
+    return str(value)
+
+
+def _check_format(raw: Mapping[str, Any], faults: list[Fault]) -> None:
+    found = raw.get("format")
+    if found is None or isinstance(found, bool) or found != 1:
+        faults.append(fault("format", "format", "nothing" if found is None else shown(found)))
+
+
+def _section(section: str, raw: Any, faults: list[Fault]) -> dict[str, Checked[Any]]:
+    if not isinstance(raw, Mapping):
+        faults.append(fault("table", f"{section}.NAME", shown(raw)))
+        return {}
+    return {
+        name: validate(SECTIONS[section], table, f"{section}.{name}", faults) for name, table in raw.items()
+    }
+
+
+def _translate(model: type[Entry], key: str, item: Any) -> Fault:
+    """One of pydantic's errors in this project's words."""
+    code, location, context = item["type"], item["loc"], item.get("ctx", {})
+    path = key + "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location)
+    owner = _NESTED.get(str(location[0]), model) if len(location) > 1 else model
+    if code == "extra_forbidden":
+        return _unknown_key(path, str(location[-1]), list(owner.model_fields))
+    if code == "missing":
+        what = owner.model_fields[str(location[-1])].description or "a value"
+        return fault("missing", path, "nothing", what=what)
+    found = shown(item["input"])
+    if code == "finite_number":
+        return fault("finite", path, found)
+    if code in ("model_type", "dict_type", "model_attributes_type"):
+        return fault("table", path, found)
+    if code in _EXPECTED:
+        text, what = _EXPECTED[code](context)
+        return fault(text, path, found, what=what)
+    return fault("type", path, found, what=item["msg"])
+
+
+def _unknown_key(path: str, key: str, known: list[str]) -> Fault:
+    hint = did_you_mean(key, known, "take it out")
+    return fault("unknown key", path, "an unknown key", known=listing(known, 30), hint=hint)

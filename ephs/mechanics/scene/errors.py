@@ -1,0 +1,176 @@
+"""Faults of scenes: one exception for the layer, every text in one table."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any, final
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """One fault of a scene.
+
+    Attributes
+    ----------
+    key : dotted path of the faulty key, as ``bodies.crank.mass`` or ``joints.pin.bodies[1]``; empty for the
+        file itself
+    found, expected : what is there, what should be
+    advice : what to do
+    """
+
+    key: str
+    found: str
+    expected: str
+    advice: str = ""
+
+    def __str__(self) -> str:
+        where = f"{self.key}: " if self.key else ""
+        return f"{where}found {self.found}, expected {self.expected}" + (
+            f"; {self.advice}" if self.advice else ""
+        )
+
+
+@final
+class SceneError(ValueError):
+    """A scene that cannot be used. Its message names the file, then each fault on a line.
+
+    Attributes
+    ----------
+    path : the file, or the scene's name where there is none
+    faults : every fault that was found
+    """
+
+    def __init__(self, path: str, faults: Iterable[Fault]) -> None:
+        self.path = str(path)
+        self.faults = tuple(faults)
+        super().__init__(self.path, self.faults)
+
+    def __str__(self) -> str:
+        count = "1 fault" if len(self.faults) == 1 else f"{len(self.faults)} faults"
+        return "\n".join([f"{self.path}: {count}", *(f"  {fault}" for fault in self.faults)])
+
+
+@final
+class SceneWarning(UserWarning):
+    """A scene that can be used, but hardly describes a real mechanism."""
+
+
+# code: (expected, advice); both may name the values given to `fault`.
+TEXTS: dict[str, tuple[str, str]] = {
+    # the file
+    "no file": ("a scene file", "check the path"),
+    "not readable": ("a readable file", "check what the path names, and its permissions"),
+    "suffix": ("a file that ends in .toml", "convert the model to a scene file first"),
+    "encoding": ("UTF-8 text", "save the file as UTF-8"),
+    "syntax": ("valid TOML", "mend the syntax at the place named"),
+    "base": ('"fixed" or "free"', "say how the root of an imported model meets the ground"),
+    "format": ("1", "write format = 1 as the first line"),
+    "cycle": ("a scene that is no part of itself", "take one of these uses out: {chain}"),
+    "world differs": (
+        "{wanted}, that of the scene that uses it",
+        "take [world] out of the part, or make it equal",
+    ),
+    # keys, types and names
+    "unknown key": ("one of {known}", "{hint}"),
+    "missing": ("{what}", "add this key"),
+    "table": ("a table", "write it as [{key}] with keys below"),
+    "type": ("{what}", "mend the value"),
+    "length": ("{what}", "give as many numbers as this"),
+    "one freedom": ("a number", "a pair with one freedom takes one number"),
+    "finite": ("a finite number", "nan and inf are not allowed"),
+    "range": ("{what}", "mend the value"),
+    "name": ("a name without dots and blanks", "rename it"),
+    "reserved": ("a name of your own", "{reserved} have a fixed meaning; rename it"),
+    "collision": ("a name that is not taken by {other}", "rename one of them"),
+    "unknown body": ('"ground" or a body', "{hint}"),
+    "unknown thermal": ('"environment" or a [thermal] name', "{hint}"),
+    "unknown type": ("one of {known}", "{hint}"),
+    "shape": ("one of box, sphere, cylinder, mesh", "a shape has exactly one of these keys"),
+    # bodies
+    "quaternion": ("a unit quaternion [w, x, y, z] to 1e-6", "divide it by its norm"),
+    "inertia indefinite": (
+        "no negative principal moment",
+        'mend the tensor, or set assembly.inertia = "warn"',
+    ),
+    "inertia triangle": (
+        "no principal moment above the sum of the two others",
+        'mend the tensor, or set assembly.inertia = "warn"',
+    ),
+    "massless": ("0 for a body of mass 0", "give it a mass, or inertia = [0, 0, 0]"),
+    # joints
+    "same body": ("two different bodies", "a joint connects two bodies, or a body and the ground"),
+    "both places": ("either at and axis, or frame1 and frame2", "take one of the two ways out"),
+    "no place": ("{what}", "say where the joint is: at and axis, or frame1 and frame2"),
+    "direction": ("a direction of non-zero length", "mend the vector"),
+    "xaxis": ("a direction that is not along axis", "take another xaxis, or none"),
+    "parallel": ("a direction that is not along {other}", "the two axes of a universal joint must differ"),
+    "only universal": ("no axis2 for a {kind} joint", "axis2 belongs to universal joints only"),
+    "only screw": ("no pitch for a {kind} joint", "pitch belongs to screw joints only"),
+    "xaxis with frames": ("no xaxis beside frame1 and frame2", "the frames say where the x axis is"),
+    "friction shape": ("a number, {d} numbers, or a symmetric {d} by {d} matrix", "mend the value"),
+    "friction sign": ("a symmetric, positive semidefinite matrix", "friction may not produce energy"),
+    "friction asymmetric": ("a symmetric matrix", "make entry [i][j] equal to entry [j][i]"),
+    "isotropic": ("the same stiffness about every axis of a rotation vector", "give equal numbers"),
+    "rest rotation": ("rest 0 on a rotation vector", "turn frame1 or frame2 instead"),
+    "motion freedoms": (
+        "a joint with one freedom",
+        "motion prescribes a single rate; this joint has {d} freedoms",
+    ),
+    "motion and drive": ("either motion or drive", "a prescribed rate leaves nothing for a drive to do"),
+    "motion rate": ("{motion}, the prescribed rate", "take rate out, or make it equal to motion.rate"),
+    "coordinate at": (
+        "0 where at and axis are given",
+        "give frame1 and frame2 to start at another coordinate",
+    ),
+    "same ends": ("two different points or nodes", "mend one of the two"),
+    # assembly
+    "gap": ("a gap below 1e-8", "mend {who}, or set assembly.adjust = true"),
+    "velocity": ("a residual below 1e-8", "mend the velocities of {who}, or set assembly.adjust = true"),
+    "rate differs": ("{actual}, that of the bodies", "take rate out, or mend the velocities of {who}"),
+    "motion differs": (
+        "{motion}, the prescribed rate",
+        "mend the velocities of {who}, or set assembly.adjust = true",
+    ),
+    "no assembly": (
+        "positions that close every loop",
+        "no consistent state is near; mend the positions of {who}",
+    ),
+    "no motion": (
+        "velocities that satisfy the joints",
+        "the prescribed rates contradict each other; mend them",
+    ),
+    # states
+    "unknown state": ("one of its {what}s", "{hint}"),
+    "state length": ("{what}", "give one number a freedom, in the order of the freedoms"),
+    "no time": (
+        "one of the solution's times, {first:g} to {last:g}",
+        "save the solution at this time (save_at)",
+    ),
+}
+
+
+def fault(code: str, key: str, found: object, **values: Any) -> Fault:
+    """The fault of this code, its texts filled with ``values``."""
+    expected, advice = TEXTS[code]
+    return Fault(key, str(found), expected.format(key=key, **values), advice.format(key=key, **values))
+
+
+def did_you_mean(name: str, known: Iterable[str], otherwise: str) -> str:
+    """A hint at the nearest known name, or ``otherwise``."""
+    from difflib import get_close_matches
+
+    near = get_close_matches(name, list(known), n=1, cutoff=0.6)
+    return f'did you mean "{near[0]}"?' if near else otherwise
+
+
+def listing(names: Iterable[str], limit: int = 12) -> str:
+    """The first names, for a message."""
+    known = sorted(names)
+    return ", ".join(known[:limit]) + (", …" if len(known) > limit else "") if known else "nothing"
+
+
+def unknown_name(what: str, name: str, known: Iterable[str], scene: str = "scene") -> SceneError:
+    """The error of asking a scene for a body or joint that it does not have."""
+    names = list(known)
+    hint = did_you_mean(name, names, f"there are: {listing(names)}")
+    return SceneError(scene, [fault("unknown state", "", f'{what} "{name}"', what=what, hint=hint)])

@@ -1,0 +1,141 @@
+"""Joints between bodies in a configuration: gaps, joint elements, joint rates.
+
+A configuration is the bodies' poses ``(n, 7)`` and body-frame twists ``(n, 6)``; index -1 is the ground.
+The joint relation is ``q1 o1 I(x) = q2 o2``, and of twists ``Ad(o2⁻¹) u2 = Ad(I⁻¹) Ad(o1⁻¹) u1 + B u_r``.
+
+Source: Lohmayer, Capobianco, Leyendecker, "Exergetic Port-Hamiltonian Systems for Multibody Dynamics".
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ephs.mechanics.scene.geometry import Coupling
+from ephs.mechanics.scene.model import IDENTITY_POSE
+from ephs.semantics.spaces import SE3
+
+Array = NDArray[np.float64]
+
+TOLERANCE = 1e-8
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Link:
+    """A joint as the assembly sees it: two bodies by index, the joint frame in each, and what the joint
+    allows.
+
+    ``coordinates`` (d,) and ``rate`` (d,) are those that the initial state must have, or None; ``motion`` a
+    prescribed rate. ``near`` (size,) is the element of the state before, so that whole turns are kept.
+    """
+
+    name: str
+    body1: int
+    body2: int
+    frame1: Array
+    frame2: Array
+    coupling: Coupling
+    coordinates: Array | None = None
+    rate: Array | None = None
+    motion: float | None = None
+    near: Array | None = None
+
+    def first(self, poses: Array) -> Array:
+        """The pose of C1 in the world."""
+        return SE3.compose(at(poses, self.body1), self.frame1)
+
+    def second(self, poses: Array) -> Array:
+        """The pose of C2 in the world."""
+        return SE3.compose(at(poses, self.body2), self.frame2)
+
+    def relative(self, poses: Array) -> Array:
+        """The pose of C2 in C1."""
+        return SE3.compose(SE3.inverse(self.first(poses)), self.second(poses))
+
+    def element(self, poses: Array) -> Array:
+        """The joint's element: of the coordinates where they are given, else the nearest to the bodies'
+        poses."""
+        if self.coordinates is not None:
+            return self.coupling.element(self.coordinates)
+        return self.coupling.fit(self.relative(poses), self.near)
+
+    def error(self, poses: Array, x: Array) -> Array:
+        """The logarithm (6,) of C2 in the frame where the joint's element puts it."""
+        return SE3.log(SE3.compose(SE3.inverse(self.coupling.include(x)), self.relative(poses)))
+
+    def gap(self, poses: Array, x: Array) -> tuple[float, float]:
+        """The gap of the joint: distance in m, angle in rad."""
+        gap = SE3.compose(SE3.inverse(self.coupling.include(x)), self.relative(poses))
+        return float(np.linalg.norm(gap[4:])), float(np.linalg.norm(SE3.log(gap)[:3]))
+
+    def rows(self, x: Array) -> tuple[Array, Array]:
+        """The matrices (6, 6) from the twists of body 1 and body 2 to the relative twist of C2 in C1, in
+        the axes of C2."""
+        to1 = SE3.compose(self.frame1, self.coupling.include(x))
+        return -SE3.adjoint(SE3.inverse(to1)), SE3.adjoint(SE3.inverse(self.frame2))
+
+    def slip(self, twists: Array, x: Array) -> tuple[Array, Array]:
+        """The joint's rate (d,) by least squares, and the part (6,) of the relative twist that the joint
+        does not allow."""
+        rows1, rows2 = self.rows(x)
+        relative = rows1 @ twist(twists, self.body1) + rows2 @ twist(twists, self.body2)
+        basis = self.coupling.basis(x)
+        rate = np.linalg.pinv(basis) @ relative
+        return rate, relative - basis @ rate
+
+    def place_second(self, poses: Array, x: Array) -> Array:
+        """Where body 2 is when body 1 stands and the joint has this element."""
+        return self._place(self.first(poses), self.coupling.include(x), self.frame2)
+
+    def place_first(self, poses: Array, x: Array) -> Array:
+        """Where body 1 is when body 2 stands and the joint has this element."""
+        return self._place(self.second(poses), SE3.inverse(self.coupling.include(x)), self.frame1)
+
+    def move_second(self, twists: Array, x: Array, rate: Array) -> Array:
+        """The twist of body 2 when body 1 moves so and the joint has this rate."""
+        rows1, _ = self.rows(x)
+        return SE3.adjoint(self.frame2) @ (self.coupling.basis(x) @ rate - rows1 @ twist(twists, self.body1))
+
+    def move_first(self, twists: Array, x: Array, rate: Array) -> Array:
+        """The twist of body 1 when body 2 moves so and the joint has this rate."""
+        _, rows2 = self.rows(x)
+        to1 = SE3.compose(self.frame1, self.coupling.include(x))
+        return SE3.adjoint(to1) @ (rows2 @ twist(twists, self.body2) - self.coupling.basis(x) @ rate)
+
+    @staticmethod
+    def _place(frame: Array, between: Array, offset: Array) -> Array:
+        return SE3.normalise(SE3.compose(SE3.compose(frame, between), SE3.inverse(offset)))
+
+
+def at(poses: Array, body: int) -> Array:
+    """A body's pose; the ground's is the identity."""
+    return IDENTITY_POSE if body < 0 else poses[body]
+
+
+def twist(twists: Array, body: int) -> Array:
+    """A body's twist; the ground's is 0."""
+    return np.zeros(6) if body < 0 else twists[body]
+
+
+def elements(links: Sequence[Link], poses: Array) -> list[Array]:
+    """Every joint's element in a configuration."""
+    return [link.element(poses) for link in links]
+
+
+def largest_gap(links: Sequence[Link], poses: Array, xs: Sequence[Array]) -> float:
+    """The largest gap of any joint, m or rad."""
+    return max((max(link.gap(poses, x)) for link, x in zip(links, xs, strict=True)), default=0.0)
+
+
+def largest_slip(links: Sequence[Link], twists: Array, xs: Sequence[Array]) -> float:
+    """The largest velocity residual of any joint, m/s or rad/s; prescribed rates count."""
+    found = 0.0
+    for link, x in zip(links, xs, strict=True):
+        rate, residual = link.slip(twists, x)
+        found = max(found, float(np.linalg.norm(residual[:3])), float(np.linalg.norm(residual[3:])))
+        if link.motion is not None:
+            found = max(found, abs(float(rate[0]) - link.motion))
+    return found

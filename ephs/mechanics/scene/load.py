@@ -1,0 +1,175 @@
+"""Scene files to scenes; every fault of a file and of the parts that it uses is reported at once."""
+
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import replace
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ephs.mechanics.scene import resolve, values
+from ephs.mechanics.scene.assembly import assemble
+from ephs.mechanics.scene.entries import Document, read_document, shown
+from ephs.mechanics.scene.errors import Fault, SceneError, fault
+from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Scene, World
+from ephs.mechanics.scene.moving import moved, spring_length
+from ephs.mechanics.scene.state import adjusted
+
+
+def load(path: str | PathLike[str], base: str = "fixed", adjust: bool = False) -> Scene:
+    """Read a scene file.
+
+    Parameters
+    ----------
+    path : a ``.toml`` scene file
+    base : ``"fixed"`` or ``"free"``, how the root of an imported model meets the ground; a scene file says
+        so itself
+    adjust : take the nearest consistent state where the initial state does not close; the scene's
+        ``adjusted`` reports it
+
+    Raises
+    ------
+    SceneError
+        With every fault that was found.
+    """
+    faults: list[Fault] = []
+    if base not in ("fixed", "free"):
+        faults.append(fault("base", "base", shown(base)))
+    scene = _read(Path(path), adjust, None, (), faults)
+    if scene is None or faults:
+        raise SceneError(str(path), faults)
+    return scene
+
+
+def _read(
+    path: Path, adjust: bool, world: World | None, stack: tuple[Path, ...], faults: list[Fault]
+) -> Scene | None:
+    """A scene from a file, in a given world if it is a part; None where there were faults."""
+    raw = _parse(path, faults)
+    if raw is None:
+        return None
+    document = read_document(raw, path.stem, faults)
+    adjust = adjust or document.assembly.adjust
+    world = _world(document, world, faults)
+    parts, lost = _parts(document, path, adjust, world, stack, faults)
+    _check_names(document, faults)
+    names = _names(document, parts, lost)
+    sections = document.sections
+    strict = document.assembly.inertia == "strict"
+    bodies = [resolve.resolve_body(n, t, strict, path.parent, faults) for n, t in sections["bodies"].items()]
+    joints = [resolve.resolve_joint(n, t, names, faults) for n, t in sections["joints"].items()]
+    springs = {n: resolve.resolve_spring(n, t, names, faults) for n, t in sections["springs"].items()}
+    conduction = resolve.resolve_conduction(document, names, faults)
+    if faults:
+        return None
+    placed, coupled, open_joints = assemble(bodies, [j for j in joints if j is not None], parts)
+    scene = Scene(
+        document.name,
+        world,
+        placed,
+        coupled,
+        springs,
+        resolve.resolve_thermal(document),
+        conduction,
+        parts,
+        str(path),
+    )
+    if adjust:
+        scene, open_joints = adjusted(scene)
+    faults += open_joints
+    if not faults:
+        faults += [
+            fault("same ends", f"springs.{name}", "both ends at the same point")
+            for name, spring in springs.items()
+            if spring_length(scene, spring) < 1e-12
+        ]
+    return None if faults else scene
+
+
+def _parse(path: Path, faults: list[Fault]) -> Mapping[str, Any] | None:
+    if path.suffix != ".toml":
+        faults.append(fault("suffix", "", shown(path.suffix) if path.suffix else "a file without suffix"))
+        return None
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except tomllib.TOMLDecodeError as error:
+        line = re.search(r"at line (\d+)", str(error))
+        faults.append(fault("syntax", f"line {line[1]}" if line else "end of file", str(error)))
+    except UnicodeDecodeError as error:
+        faults.append(fault("encoding", "", f"byte {error.start} that is none"))
+    except FileNotFoundError:
+        faults.append(fault("no file", "", "no file of this name"))
+    except OSError as error:
+        faults.append(fault("not readable", "", error.strerror or "an error of the system"))
+    return None
+
+
+def _world(document: Document, wanted: World | None, faults: list[Fault]) -> World:
+    own = resolve.resolve_world(document)
+    if wanted is None:
+        return own or World()
+    if own is not None and _described(own) != _described(wanted):
+        faults.append(fault("world differs", "world", _described(own), wanted=_described(wanted)))
+    return wanted
+
+
+def _described(world: World) -> str:
+    gravity = ", ".join(f"{entry:.15g}" for entry in world.gravity)
+    return f"gravity [{gravity}], {world.temperature:.15g} K, {world.pressure:.15g} Pa"
+
+
+def _parts(
+    document: Document, path: Path, adjust: bool, world: World, stack: tuple[Path, ...], faults: list[Fault]
+) -> tuple[dict[str, Scene], set[str]]:
+    """The parts, moved to their places, and the names of those that could not be read."""
+    stack = (*stack, path.resolve())
+    found: dict[str, Scene] = {}
+    for name, table in document.sections["parts"].items():
+        entry, key = table.entry, f"parts.{name}"
+        pose = values.pose(entry.position, entry.rotation, key, faults)
+        if not table.sound("use"):
+            continue
+        file = path.parent / entry.use
+        if file.resolve() in stack:
+            chain = " → ".join(p.name for p in (*stack[stack.index(file.resolve()) :], file))
+            faults.append(fault("cycle", f"{key}.use", shown(entry.use), chain=chain))
+            continue
+        below: list[Fault] = []
+        part = _read(file, adjust, world, stack, below)
+        faults += [_seen_from_outside(f, key, entry.use) for f in below]
+        if part is not None:
+            found[name] = moved(part, np.array(pose), world)
+    return found, set(document.sections["parts"]) - set(found)
+
+
+def _seen_from_outside(found: Fault, key: str, file: str) -> Fault:
+    inner = f"{key}.{found.key}" if found.key else f"{key}.use"
+    return replace(found, key=inner, found=f"{found.found} (in {file})")
+
+
+def _names(document: Document, parts: Mapping[str, Scene], lost: set[str]) -> resolve.Names:
+    bodies = {f"{part}.{name}" for part, scene in parts.items() for name, _ in scene.all_bodies()}
+    thermal = {f"{part}.{name}" for part, scene in parts.items() for name, _ in scene.all_thermal()}
+    sections = document.sections
+    return resolve.Names(bodies | set(sections["bodies"]), thermal | set(sections["thermal"]), lost)
+
+
+def _check_names(document: Document, faults: list[Fault]) -> None:
+    """Names are path components, and no path may mean two things."""
+    held = {name for table in document.sections["joints"].values() for name in table.entry.bodies}
+    for section, tables in document.sections.items():
+        for name in tables:
+            key = f"{section}.{name}"
+            if not name or "." in name or any(letter.isspace() for letter in name):
+                faults.append(fault("name", f'{section}."{name}"', shown(name)))
+            elif name in (GROUND, ENVIRONMENT):
+                faults.append(fault("reserved", key, shown(name), reserved=f'"{GROUND}" and "{ENVIRONMENT}"'))
+            elif section != "parts" and name in document.sections["parts"]:
+                faults.append(fault("collision", key, shown(name), other="a part"))
+            elif section == "joints" and name in document.sections["bodies"] and name not in held:
+                faults.append(
+                    fault("collision", key, shown(name), other="the free joint of the body of this name")
+                )

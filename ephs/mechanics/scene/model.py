@@ -1,0 +1,377 @@
+"""What is there: a scene with every default, frame and coordinate resolved to numbers.
+
+Poses are 7-vectors ``[w, x, y, z, rx, ry, rz]``; twists are 6-vectors (angular, linear) in the body's own
+frame. All arrays are read-only. Nothing here knows of files; `load` makes these values from a TOML file,
+other readers may make them in other ways.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, TypeVar, final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+if TYPE_CHECKING:
+    from ephs.semantics import System
+
+T = TypeVar("T")
+Array = NDArray[np.float64]
+
+GROUND = "ground"
+ENVIRONMENT = "environment"
+
+
+def frozen(values: ArrayLike) -> Array:
+    """A read-only float copy of ``values``."""
+    array = np.array(values, dtype=np.float64)
+    array.setflags(write=False)
+    return array
+
+
+IDENTITY_POSE = frozen([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class World:
+    """Gravity ``(3,)`` in m/s², and the reference environment: temperature in K, pressure in Pa."""
+
+    gravity: Array = field(default_factory=lambda: frozen([0.0, 0.0, -9.81]))
+    temperature: float = 293.15
+    pressure: float = 101325.0
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Body:
+    """A rigid body.
+
+    Attributes
+    ----------
+    mass : kg; 0 for a frame without kinetic energy
+    inertia : (3, 3) kg m², about the centre of mass, in body axes
+    pose : (7,) of the centre of mass and body axes in the world
+    twist : (6,) in the body frame: angular velocity, and the velocity of the centre of mass in body axes
+    shape : for pictures only, one of ``{"box": [x, y, z]}``, ``{"sphere": r}``, ``{"cylinder": [radius,
+        length]}``, ``{"mesh": file}``
+    """
+
+    name: str
+    mass: float
+    inertia: Array
+    pose: Array
+    twist: Array
+    shape: Mapping[str, Any] | None = None
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Joint:
+    """A joint of body 2 on body 1, through a lower pair or a universal joint.
+
+    Attributes
+    ----------
+    kind : name of the pair (a key of the registry of pairs), or ``"universal"``
+    body1, body2 : a body's name (dotted for a body of a part), or ``"ground"``
+    frame1 : (7,) pose of the joint frame C1 in the centre-of-mass frame of body 1 (in the world for ground)
+    frame2 : (7,) pose of the joint frame C2 in body 2, likewise
+    pitch : m/rad, of a screw
+    friction : (d, d) symmetric, positive semidefinite, on the joint twist u_r
+    stiffness, rest : (d,) of the potential ``½ k (coordinate − rest)²``
+    heat : where the friction heat goes, ``"environment"`` or the name of a thermal node
+    drive : (d,) constant generalised force on u_r
+    motion : the prescribed rate of a single freedom, or None
+    coordinate : (size,) initial element of the pair's group; the two angles of a universal joint
+    rate : (d,) initial u_r, the twist of C2 relative to C1 in the axes of C2 (the two angle rates of a
+        universal joint)
+    middle : (7,) universal only: constant pose from the frame that follows the first revolute (C1 turned by
+        angle 1) to the frame before the second, whose z axis is the second axis; None otherwise
+    """
+
+    name: str
+    kind: str
+    body1: str
+    body2: str
+    frame1: Array
+    frame2: Array
+    pitch: float
+    friction: Array
+    stiffness: Array
+    rest: Array
+    heat: str
+    drive: Array
+    motion: float | None
+    coordinate: Array
+    rate: Array
+    middle: Array | None = None
+
+    @property
+    def dim(self) -> int:
+        """The number of freedoms d."""
+        return int(self.rate.shape[0])
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Spring:
+    """A massless spring-damper between two points, ``½ k (distance − length)²``.
+
+    ``at1`` and ``at2`` ``(3,)`` are in the bodies' centre-of-mass frames (ground: world); stiffness N/m,
+    length m, damping N s/m.
+    """
+
+    name: str
+    body1: str
+    body2: str
+    at1: Array
+    at2: Array
+    stiffness: float
+    length: float
+    damping: float
+    heat: str = ENVIRONMENT
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class ThermalNode:
+    """A body of uniform temperature: capacity in J/K, initial temperature in K."""
+
+    name: str
+    capacity: float
+    temperature: float
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Conduction:
+    """Heat conduction between two thermal nodes, or one and the environment; conductance in W/K."""
+
+    name: str
+    between: tuple[str, str]
+    conductance: float
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Displacement:
+    """How far the assembly moved a body: m, rad, and the change of its velocity in m/s and rad/s."""
+
+    body: str
+    distance: float
+    angle: float
+    speed: float
+    spin: float
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Adjustment:
+    """What an adjusting assembly did: the gaps that it found and the bodies that it moved.
+
+    ``gap`` is the largest gap of a joint before (m or rad), ``slip`` the largest velocity residual (m/s or
+    rad/s).
+    """
+
+    gap: float
+    slip: float
+    moved: tuple[Displacement, ...]
+
+    def __str__(self) -> str:
+        lines = [f"adjusted: largest gap {self.gap:.3g}, largest velocity residual {self.slip:.3g}"]
+        for d in self.moved:
+            lines.append(
+                f"  {d.body}: moved {d.distance:.3g} m, {d.angle:.3g} rad; "
+                f"velocity changed {d.speed:.3g} m/s, {d.spin:.3g} rad/s"
+            )
+        return "\n".join(lines)
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """A mechanism in its world: bodies, joints, springs, thermal nodes, and parts, which are scenes
+    themselves.
+
+    A part is a scene whose numbers are already in this scene's world. Names inside a scene are local to it;
+    from outside, a part's names carry the part's name and a dot in front, at every level.
+
+    Attributes
+    ----------
+    source : the file that it came from, or None
+    adjusted : what an adjusting assembly moved, or None where everything closed
+    """
+
+    name: str
+    world: World
+    bodies: Mapping[str, Body]
+    joints: Mapping[str, Joint] = field(default_factory=dict)
+    springs: Mapping[str, Spring] = field(default_factory=dict)
+    thermal: Mapping[str, ThermalNode] = field(default_factory=dict)
+    conduction: Mapping[str, Conduction] = field(default_factory=dict)
+    parts: Mapping[str, "Scene"] = field(default_factory=dict)
+    source: str | None = None
+    adjusted: Adjustment | None = None
+
+    def system(self) -> "System":
+        """The scene as a hierarchical exergetic port-Hamiltonian system."""
+        from ephs.mechanics.build import scene_system
+
+        return scene_system(self)
+
+    def with_state(
+        self,
+        coordinates: Mapping[str, ArrayLike] | None = None,
+        rates: Mapping[str, ArrayLike] | None = None,
+        *,
+        adjust: bool = False,
+    ) -> "Scene":
+        """The scene in another initial state.
+
+        Parameters
+        ----------
+        coordinates : joint name to its coordinates, a number or ``(d,)``; rotation vectors in the axes of
+            C1. Joints that are not named keep theirs, unless they close a loop. A body without a joint has
+            an implicit free joint of its name.
+        rates : joint name to its u_r, a number or ``(d,)``.
+        adjust : take the nearest state that closes the loops, the named joints held.
+
+        Raises
+        ------
+        SceneError
+            A name is unknown, a value has the wrong length, or a loop does not close to 1e-8.
+        """
+        from ephs.mechanics.scene.state import with_state
+
+        return with_state(self, coordinates or {}, rates or {}, adjust)
+
+    def at(self, solution: Any, time: float) -> "Scene":
+        """The scene in the state of a solution at one of its times, temperatures included."""
+        from ephs.mechanics.scene.state import at_solution
+
+        return at_solution(self, solution, time)
+
+    def body(self, name: str) -> Body:
+        """The body of this (dotted) name, its names seen from here."""
+        return _find(dict(self.all_bodies()), name, "body")
+
+    def joint(self, name: str) -> Joint:
+        """The joint of this (dotted) name, its names seen from here; the implicit free joint of a body
+        without a joint too."""
+        return _find(dict(self.all_joints()) | dict(self.implicit_joints()), name, "joint")
+
+    def all_bodies(self) -> Iterator[tuple[str, Body]]:
+        """Every body with its dotted name, parts included."""
+        for path, scene in self._scenes():
+            for body in scene.bodies.values():
+                yield path + body.name, replace(body, name=path + body.name)
+
+    def all_joints(self) -> Iterator[tuple[str, Joint]]:
+        """Every joint with its dotted name; the bodies and heat sink that it names are dotted too."""
+        for path, scene in self._scenes():
+            for j in scene.joints.values():
+                seen = replace(
+                    j,
+                    name=path + j.name,
+                    body1=_seen(path, j.body1),
+                    body2=_seen(path, j.body2),
+                    heat=_seen(path, j.heat),
+                )
+                yield seen.name, seen
+
+    def all_springs(self) -> Iterator[tuple[str, Spring]]:
+        """Every spring with its dotted name, as `all_joints`."""
+        for path, scene in self._scenes():
+            for s in scene.springs.values():
+                seen = replace(
+                    s,
+                    name=path + s.name,
+                    body1=_seen(path, s.body1),
+                    body2=_seen(path, s.body2),
+                    heat=_seen(path, s.heat),
+                )
+                yield seen.name, seen
+
+    def all_thermal(self) -> Iterator[tuple[str, ThermalNode]]:
+        """Every thermal node with its dotted name."""
+        for path, scene in self._scenes():
+            for node in scene.thermal.values():
+                yield path + node.name, replace(node, name=path + node.name)
+
+    def all_conduction(self) -> Iterator[tuple[str, Conduction]]:
+        """Every conduction with its dotted name, as `all_joints`."""
+        for path, scene in self._scenes():
+            for c in scene.conduction.values():
+                between = (_seen(path, c.between[0]), _seen(path, c.between[1]))
+                yield path + c.name, replace(c, name=path + c.name, between=between)
+
+    def implicit_joints(self) -> Iterator[tuple[str, Joint]]:
+        """The free joints of the bodies that no joint holds; each has its body's name, both frames are the
+        identity."""
+        held = {name for _, j in self.all_joints() for name in (j.body1, j.body2)}
+        for name, body in self.all_bodies():
+            if name not in held:
+                yield name, free_joint(body)
+
+    def __str__(self) -> str:
+        lines = [f"scene {self.name}" + (f" ({self.source})" if self.source else "")]
+        g, w = self.world.gravity, self.world
+        lines.append(
+            f"  world: gravity [{g[0]:g}, {g[1]:g}, {g[2]:g}] m/s², {w.temperature:g} K, {w.pressure:g} Pa"
+        )
+        lines += [f"  body {name}: {body.mass:g} kg" for name, body in self.all_bodies()]
+        lines += [f"  joint {name}: {j.kind}, {j.body1} – {j.body2}" for name, j in self.all_joints()]
+        lines += [
+            f"  spring {name}: {s.body1} – {s.body2}, {s.stiffness:g} N/m" for name, s in self.all_springs()
+        ]
+        lines += [
+            f"  thermal {name}: {n.capacity:g} J/K at {n.temperature:g} K" for name, n in self.all_thermal()
+        ]
+        lines += [
+            f"  conduction {name}: {' – '.join(c.between)}, {c.conductance:g} W/K"
+            for name, c in self.all_conduction()
+        ]
+        if self.adjusted is not None:
+            lines += ["  " + line for line in str(self.adjusted).splitlines()]
+        return "\n".join(lines)
+
+    def _scenes(self, path: str = "") -> Iterator[tuple[str, "Scene"]]:
+        yield path, self
+        for name, part in self.parts.items():
+            yield from part._scenes(f"{path}{name}.")
+
+
+def free_joint(body: Body) -> Joint:
+    """The implicit free joint of a body that no joint holds: of the ground and the body, both frames the
+    identity."""
+    zero = frozen(np.zeros(6))
+    return Joint(
+        name=body.name,
+        kind="free",
+        body1=GROUND,
+        body2=body.name,
+        frame1=IDENTITY_POSE,
+        frame2=IDENTITY_POSE,
+        pitch=0.0,
+        friction=frozen(np.zeros((6, 6))),
+        stiffness=zero,
+        rest=zero,
+        heat=ENVIRONMENT,
+        drive=zero,
+        motion=None,
+        coordinate=body.pose,
+        rate=body.twist,
+    )
+
+
+def _seen(path: str, name: str) -> str:
+    """A local name as seen from outside; the ground and the environment are the same everywhere."""
+    return name if name in (GROUND, ENVIRONMENT) else path + name
+
+
+def _find(values: Mapping[str, T], name: str, what: str) -> T:
+    if name in values:
+        return values[name]
+    from ephs.mechanics.scene.errors import unknown_name
+
+    raise unknown_name(what, name, values)

@@ -1,0 +1,56 @@
+"""A scene moved as a whole: how a part comes into the world of the scene that uses it."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ephs.mechanics.scene.model import GROUND, Body, Joint, Scene, Spring, World, frozen
+from ephs.semantics.spaces import SE3
+from ephs.semantics.spaces import rotations as so3
+
+Array = NDArray[np.float64]
+
+
+def moved(scene: Scene, pose: Array, world: World) -> Scene:
+    """The scene with its ground moved by a pose (7,), in another world.
+
+    Body-frame twists stay, so velocities turn with it; what is fixed to the ground moves along.
+    """
+
+    def frame(body: str, offset: Array) -> Array:
+        return frozen(SE3.compose(pose, offset)) if body == GROUND else offset
+
+    def point(body: str, position: Array) -> Array:
+        return (
+            frozen(so3.quaternion_to_matrix(pose[:4]) @ position + pose[4:]) if body == GROUND else position
+        )
+
+    def body(b: Body) -> Body:
+        return replace(b, pose=frozen(SE3.normalise(SE3.compose(pose, b.pose))))
+
+    def joint(j: Joint) -> Joint:
+        return replace(j, frame1=frame(j.body1, j.frame1), frame2=frame(j.body2, j.frame2))
+
+    def spring(s: Spring) -> Spring:
+        return replace(s, at1=point(s.body1, s.at1), at2=point(s.body2, s.at2))
+
+    return replace(
+        scene,
+        world=world,
+        bodies={name: body(b) for name, b in scene.bodies.items()},
+        joints={name: joint(j) for name, j in scene.joints.items()},
+        springs={name: spring(s) for name, s in scene.springs.items()},
+        parts={name: moved(part, pose, world) for name, part in scene.parts.items()},
+    )
+
+
+def spring_length(scene: Scene, spring: Spring) -> float:
+    """The distance of a spring's two points."""
+    ends = [
+        at
+        if name == GROUND
+        else SE3.compose(scene.body(name).pose, np.concatenate(([1.0, 0.0, 0.0, 0.0], at)))[4:]
+        for name, at in ((spring.body1, spring.at1), (spring.body2, spring.at2))
+    ]
+    return float(np.linalg.norm(ends[0] - ends[1]))

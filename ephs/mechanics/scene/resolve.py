@@ -1,0 +1,256 @@
+"""From validated tables to drafts: every value in its full shape, frames not yet placed.
+
+All semantic faults of a file but those of assembly are found here.
+"""
+
+from collections.abc import Mapping, Set
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ephs.mechanics.scene import values
+from ephs.mechanics.scene.entries import Checked, Document, shown
+from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing
+from ephs.mechanics.scene.geometry import Coupling, coupling, joint_types
+from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Conduction, Spring, ThermalNode, World, frozen
+from ephs.mechanics.scene.placing import Place, resolve_place
+from ephs.mechanics.scene.schema import BodyEntry, JointEntry, SpringEntry
+
+Array = NDArray[np.float64]
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class BodyDraft:
+    """A body whose pose (7,) and velocity may still come from a joint: then they are None.
+
+    ``velocity`` is in the world basis, ``angular_velocity`` in body axes; None both, or neither.
+    """
+
+    name: str
+    mass: float
+    inertia: Array
+    pose: Array | None
+    velocity: Array | None
+    angular_velocity: Array | None
+    shape: Mapping[str, Any] | None
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class JointDraft:
+    """A joint whose frames in the bodies may still depend on their poses; coordinates and rates are None
+    where not given."""
+
+    name: str
+    kind: str
+    body1: str
+    body2: str
+    place: Place
+    pitch: float
+    friction: Array
+    stiffness: Array
+    rest: Array
+    heat: str
+    drive: Array
+    motion: float | None
+    coordinates: Array | None
+    rate: Array | None
+
+    def coupling(self) -> Coupling:
+        """What the joint allows."""
+        return coupling(self.kind, self.pitch, self.place.middle)
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Names:
+    """The names that references may use; ``unknown_parts`` are parts that could not be read, of which
+    nothing is known."""
+
+    bodies: Set[str]
+    thermal: Set[str]
+    unknown_parts: Set[str]
+
+    def check(self, name: str, key: str, what: str, faults: list[Fault]) -> None:
+        """Append a fault where a reference leads nowhere; ``what`` is body or thermal."""
+        fixed, known = (GROUND, self.bodies) if what == "body" else (ENVIRONMENT, self.thermal)
+        if name == fixed or name in known or name.split(".")[0] in self.unknown_parts:
+            return
+        hint = did_you_mean(name, [*known, fixed], f"there are: {listing(known)}")
+        faults.append(fault(f"unknown {what}", key, f'"{name}"', hint=hint))
+
+
+def resolve_world(document: Document) -> World | None:
+    """The world of a file, or None where it has no [world]."""
+    w = document.world
+    return None if w is None else World(frozen(w.gravity), w.temperature, w.pressure)
+
+
+def resolve_body(
+    name: str, table: Checked[BodyEntry], strict: bool, folder: Path, faults: list[Fault]
+) -> BodyDraft:
+    """A body with its inertia checked."""
+    entry, key = table.entry, f"bodies.{name}"
+    tensor = np.eye(3)
+    if table.sound("inertia"):  # a faulty mass stands as 1 here
+        tensor = values.inertia(entry, f"{key}.inertia", strict, faults)
+    placed = entry.position is not None or entry.rotation is not None
+    moving = entry.velocity is not None or entry.angular_velocity is not None
+    return BodyDraft(
+        name=name,
+        mass=entry.mass,
+        inertia=tensor,
+        pose=values.pose(entry.position, entry.rotation, key, faults) if placed else None,
+        velocity=np.array(entry.velocity or [0.0, 0.0, 0.0]) if moving else None,
+        angular_velocity=np.array(entry.angular_velocity or [0.0, 0.0, 0.0]) if moving else None,
+        shape=_shape(entry, key, folder, faults) if table.sound("shape") else None,
+    )
+
+
+def resolve_joint(
+    name: str, table: Checked[JointEntry], names: Names, faults: list[Fault]
+) -> JointDraft | None:
+    """A joint with everything checked but its closure; None where its type or place is not usable."""
+    entry, key = table.entry, f"joints.{name}"
+    _check_ends(table, key, names, faults)
+    if table.sound("heat"):
+        names.check(entry.heat, f"{key}.heat", "thermal", faults)
+    if not table.sound("type"):
+        return None
+    if entry.type not in joint_types():
+        hint = did_you_mean(entry.type, joint_types(), "take one of these types")
+        faults.append(
+            fault("unknown type", f"{key}.type", shown(entry.type), known=", ".join(joint_types()), hint=hint)
+        )
+        return None
+    place = resolve_place(table, key, faults)
+    _check_pitch(entry, key, faults)
+    allowed = coupling(entry.type, entry.pitch or 0.0, None if place is None else place.middle)
+    d = allowed.dim
+    stiffness = values.freedoms(entry.stiffness, d, f"{key}.stiffness", faults, spread=True)
+    rest = values.freedoms(entry.rest, d, f"{key}.rest", faults, spread=True)
+    _check_turning(allowed, stiffness, rest, entry, key, faults)
+    drive = values.freedoms(entry.drive, d, f"{key}.drive", faults)
+    _check_motion(entry, d, drive, key, faults)
+    coordinates = None
+    if entry.coordinate is not None:
+        coordinates = values.freedoms(entry.coordinate, d, f"{key}.coordinate", faults)
+        if (entry.at or entry.axis) and coordinates.any():
+            faults.append(fault("coordinate at", f"{key}.coordinate", shown(entry.coordinate)))
+    rate = None
+    if entry.motion is not None:
+        rate = np.full(d, entry.motion.rate)
+    elif entry.rate is not None:
+        rate = values.freedoms(entry.rate, d, f"{key}.rate", faults)
+    friction = values.friction(entry.friction, d, f"{key}.friction", faults)
+    if place is None:
+        return None
+    return JointDraft(
+        name=name,
+        kind=entry.type,
+        body1=entry.bodies[0],
+        body2=entry.bodies[1],
+        place=place,
+        pitch=entry.pitch or 0.0,
+        friction=friction,
+        stiffness=stiffness,
+        rest=rest,
+        heat=entry.heat,
+        drive=drive,
+        motion=None if entry.motion is None else entry.motion.rate,
+        coordinates=coordinates,
+        rate=rate,
+    )
+
+
+def resolve_spring(name: str, table: Checked[SpringEntry], names: Names, faults: list[Fault]) -> Spring:
+    """A spring."""
+    entry, key = table.entry, f"springs.{name}"
+    _check_ends(table, key, names, faults)
+    if table.sound("heat"):
+        names.check(entry.heat, f"{key}.heat", "thermal", faults)
+    return Spring(
+        name,
+        entry.bodies[0],
+        entry.bodies[1],
+        frozen(entry.at1),
+        frozen(entry.at2),
+        entry.stiffness,
+        entry.length,
+        entry.damping,
+        entry.heat,
+    )
+
+
+def resolve_thermal(document: Document) -> dict[str, ThermalNode]:
+    """The thermal nodes."""
+    tables = document.sections["thermal"]
+    return {name: ThermalNode(name, t.entry.capacity, t.entry.temperature) for name, t in tables.items()}
+
+
+def resolve_conduction(document: Document, names: Names, faults: list[Fault]) -> dict[str, Conduction]:
+    """The conductions, their ends checked."""
+    found: dict[str, Conduction] = {}
+    for name, table in document.sections["conduction"].items():
+        entry, key = table.entry, f"conduction.{name}.between"
+        if table.sound("between"):
+            for i, end in enumerate(entry.between):
+                names.check(end, f"{key}[{i}]", "thermal", faults)
+            if entry.between[0] == entry.between[1]:
+                faults.append(fault("same ends", key, f'"{entry.between[0]}" twice'))
+        found[name] = Conduction(name, (entry.between[0], entry.between[1]), entry.conductance)
+    return found
+
+
+def _check_ends(table: Checked[Any], key: str, names: Names, faults: list[Fault]) -> None:
+    if not table.sound("bodies"):
+        return
+    first, second = table.entry.bodies
+    for i, name in enumerate((first, second)):
+        names.check(name, f"{key}.bodies[{i}]", "body", faults)
+    if first == second:
+        faults.append(fault("same body", f"{key}.bodies", f'"{first}" twice'))
+
+
+def _check_pitch(entry: JointEntry, key: str, faults: list[Fault]) -> None:
+    if entry.pitch and entry.type != "screw":
+        faults.append(fault("only screw", f"{key}.pitch", shown(entry.pitch), kind=entry.type))
+
+
+def _check_turning(
+    allowed: Coupling, stiffness: Array, rest: Array, entry: JointEntry, key: str, faults: list[Fault]
+) -> None:
+    """A rotation vector's potential must not depend on the choice of axes."""
+    turning = list(allowed.turning)
+    if turning and np.ptp(stiffness[turning]) > values.TOLERANCE * np.abs(stiffness[turning]).max():
+        faults.append(fault("isotropic", f"{key}.stiffness", shown(entry.stiffness)))
+    if rest[turning].any():
+        faults.append(fault("rest rotation", f"{key}.rest", shown(entry.rest)))
+
+
+def _check_motion(entry: JointEntry, d: int, drive: Array, key: str, faults: list[Fault]) -> None:
+    if entry.motion is None:
+        return
+    rate = entry.motion.rate
+    if d != 1:
+        faults.append(fault("motion freedoms", f"{key}.motion", f"a motion of a {entry.type} joint", d=d))
+    elif entry.rate is not None and np.asarray(entry.rate).ravel().tolist() not in ([rate], [0.0]):
+        faults.append(fault("motion rate", f"{key}.rate", shown(entry.rate), motion=shown(rate)))
+    if drive.any():
+        faults.append(fault("motion and drive", key, "motion and drive"))
+
+
+def _shape(entry: BodyEntry, key: str, folder: Path, faults: list[Fault]) -> Mapping[str, Any] | None:
+    if entry.shape is None:
+        return None
+    given = {name: value for name, value in entry.shape.model_dump().items() if value is not None}
+    if len(given) != 1:
+        faults.append(fault("shape", f"{key}.shape", " and ".join(given) or "an empty table"))
+        return None
+    if "mesh" in given:
+        return {"mesh": str(folder / given["mesh"])}
+    return given

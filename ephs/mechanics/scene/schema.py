@@ -1,0 +1,230 @@
+"""The scene file's tables as pydantic models: the keys, their types, units and defaults.
+
+One model a table. Values whose form depends on another key (a number, or one a freedom) are taken as
+numbers or lists here and brought to shape by `resolve`.
+"""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema, WrapValidator
+from pydantic_core import PydanticCustomError
+
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+NonNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.0)]
+Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0.0)]
+Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
+Quaternion = Annotated[list[Number], Field(min_length=4, max_length=4)]
+Text = Annotated[str, Field(strict=True, min_length=1)]
+Flag = Annotated[bool, Field(strict=True)]
+Pair = Annotated[list[Text], Field(min_length=2, max_length=2)]
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _finite(value: Any) -> bool:
+    return abs(float(value)) < float("inf")
+
+
+def _numbers(value: Any, handler: Any) -> Any:
+    """A number or a list of numbers, with one message instead of one for each alternative."""
+    entries = value if isinstance(value, list) else [value]
+    if not all(_is_number(entry) for entry in entries):
+        raise PydanticCustomError("numbers", "a number or a list of numbers")
+    if not all(_finite(entry) for entry in entries):
+        raise PydanticCustomError("finite_number", "a finite number")
+    return handler(value)
+
+
+def _matrix(value: Any, handler: Any) -> Any:
+    """A number, a list of numbers or a list of rows."""
+    if not isinstance(value, list) or not value or not all(isinstance(row, list) for row in value):
+        return _numbers(value, handler)
+    entries = [entry for row in value for entry in row]
+    if not all(_is_number(entry) for entry in entries):
+        raise PydanticCustomError("numbers", "a number, a list of numbers or a symmetric matrix")
+    if not all(_finite(entry) for entry in entries):
+        raise PydanticCustomError("finite_number", "a finite number")
+    return handler(value)
+
+
+def _inertia(value: Any, handler: Any) -> Any:
+    """Three or six numbers."""
+    if isinstance(value, list) and len(value) not in (3, 6):
+        raise PydanticCustomError("inertia_length", "3 or 6 numbers")
+    return handler(value)
+
+
+_NUMBER_SCHEMA: dict[str, Any] = {"type": "number"}
+_LIST_SCHEMA: dict[str, Any] = {"type": "array", "items": {"type": "number"}}
+_ROWS_SCHEMA: dict[str, Any] = {"type": "array", "items": _LIST_SCHEMA}
+
+Numbers = Annotated[
+    float | list[float], WrapValidator(_numbers), WithJsonSchema({"anyOf": [_NUMBER_SCHEMA, _LIST_SCHEMA]})
+]
+Matrix = Annotated[
+    float | list[float] | list[list[float]],
+    WrapValidator(_matrix),
+    WithJsonSchema({"anyOf": [_NUMBER_SCHEMA, _LIST_SCHEMA, _ROWS_SCHEMA]}),
+]
+Inertia = Annotated[
+    list[Number], WrapValidator(_inertia), WithJsonSchema(_LIST_SCHEMA | {"minItems": 3, "maxItems": 6})
+]
+
+
+class Entry(BaseModel):
+    """What every table has in common: unknown keys are faults."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class WorldEntry(Entry):
+    """``[world]``"""
+
+    gravity: Vector = Field(default=[0.0, 0.0, -9.81], description="gravity in the world, m/s²")
+    temperature: Positive = Field(default=293.15, description="of the reference environment, K")
+    pressure: Positive = Field(default=101325.0, description="of the reference environment, Pa")
+
+
+class AssemblyEntry(Entry):
+    """``[assembly]``"""
+
+    adjust: Flag = Field(default=False, description="take the nearest consistent state, and report it")
+    inertia: Literal["strict", "warn"] = Field(
+        default="strict", description='"warn" accepts a physically impossible inertia'
+    )
+
+
+class ShapeEntry(Entry):
+    """``shape``, for pictures only: one of four."""
+
+    box: Annotated[list[Positive], Field(min_length=3, max_length=3)] | None = Field(
+        default=None, description="edge lengths, m"
+    )
+    sphere: Positive | None = Field(default=None, description="radius, m")
+    cylinder: Annotated[list[Positive], Field(min_length=2, max_length=2)] | None = Field(
+        default=None, description="radius and length along z, m"
+    )
+    mesh: Text | None = Field(default=None, description="a mesh file, beside the scene file")
+
+
+class BodyEntry(Entry):
+    """``[bodies.NAME]``"""
+
+    mass: NonNegative = Field(description="kg; 0 needs inertia 0")
+    inertia: Inertia = Field(description="about the centre of mass, body axes: xx yy zz [xy xz yz], kg m²")
+    position: Vector | None = Field(default=None, description="centre of mass in the world, m")
+    rotation: Quaternion | None = Field(
+        default=None, description="body to world, unit quaternion [w, x, y, z]"
+    )
+    velocity: Vector | None = Field(default=None, description="of the centre of mass, world basis, m/s")
+    angular_velocity: Vector | None = Field(default=None, description="body basis, rad/s")
+    shape: ShapeEntry | None = Field(default=None, description="for pictures only")
+
+
+class FrameEntry(Entry):
+    """A pose in a body's centre-of-mass frame."""
+
+    position: Vector = Field(default=[0.0, 0.0, 0.0], description="m")
+    rotation: Quaternion = Field(default=[1.0, 0.0, 0.0, 0.0], description="unit quaternion [w, x, y, z]")
+
+
+class MotionEntry(Entry):
+    """A prescribed motion."""
+
+    rate: Number = Field(description="of the single freedom, rad/s or m/s")
+
+
+class JointEntry(Entry):
+    """``[joints.NAME]``"""
+
+    type: Text = Field(description="the lower pair, or universal")
+    bodies: Pair = Field(description='body 1 and body 2; "ground" is the inertial frame')
+    at: Vector | None = Field(
+        default=None, description="joint origin, world coordinates in the initial configuration, m"
+    )
+    axis: Vector | None = Field(default=None, description="world direction of the joint frame's z axis")
+    xaxis: Vector | None = Field(default=None, description="world direction of its x axis, made normal to z")
+    axis2: Vector | None = Field(default=None, description="universal only: the axis fixed in body 2")
+    frame1: FrameEntry | None = Field(default=None, description="the joint frame in body 1 (ground: world)")
+    frame2: FrameEntry | None = Field(default=None, description="the joint frame in body 2 (ground: world)")
+    coordinate: Numbers | None = Field(
+        default=None, description="initial coordinates, with frame1 and frame2; rad, m"
+    )
+    rate: Numbers | None = Field(default=None, description="initial joint twist u_r; rad/s, m/s")
+    pitch: Number | None = Field(default=None, description="screw only, m/rad")
+    friction: Matrix = Field(
+        default=0.0, description="on the joint twist: a number, one a freedom, or a matrix; N m s, N s/m"
+    )
+    stiffness: Numbers = Field(
+        default=0.0, description="of the potential ½ k (coordinate − rest)²; N m/rad, N/m"
+    )
+    rest: Numbers = Field(default=0.0, description="coordinates without force; rad, m")
+    heat: Text = Field(default="environment", description="where the friction heat goes: a thermal name")
+    drive: Numbers = Field(default=0.0, description="constant generalised force on u_r; N m, N")
+    motion: MotionEntry | None = Field(default=None, description="the freedom's rate is prescribed")
+
+
+class SpringEntry(Entry):
+    """``[springs.NAME]``"""
+
+    bodies: Pair = Field(description="body 1 and body 2")
+    at1: Vector = Field(description="in body 1's centre-of-mass frame (ground: world), m")
+    at2: Vector = Field(description="in body 2's, m")
+    stiffness: Number = Field(default=0.0, description="N/m")
+    length: NonNegative = Field(default=0.0, description="without force, m")
+    damping: NonNegative = Field(default=0.0, description="N s/m")
+    heat: Text = Field(default="environment", description="where the heat goes: a thermal name")
+
+
+class ThermalEntry(Entry):
+    """``[thermal.NAME]``"""
+
+    capacity: Positive = Field(description="J/K")
+    temperature: Positive = Field(description="at t = 0, K")
+
+
+class ConductionEntry(Entry):
+    """``[conduction.NAME]``"""
+
+    between: Pair = Field(description='two thermal names, or one and "environment"')
+    conductance: NonNegative = Field(description="W/K")
+
+
+class PartEntry(Entry):
+    """``[parts.NAME]``"""
+
+    use: Text = Field(description="another scene file, beside this one")
+    position: Vector = Field(default=[0.0, 0.0, 0.0], description="of the part's ground in this world, m")
+    rotation: Quaternion = Field(default=[1.0, 0.0, 0.0, 0.0], description="unit quaternion [w, x, y, z]")
+
+
+class SceneFile(Entry):
+    """A scene file."""
+
+    format: Literal[1] = Field(description="of this file, always 1")
+    name: Text | None = Field(default=None, description="of the scene; default: the file's name")
+    world: WorldEntry | None = Field(default=None, description="gravity and the reference environment")
+    assembly: AssemblyEntry = Field(default=AssemblyEntry(), description="how the initial state is found")
+    bodies: dict[str, BodyEntry] = Field(default_factory=dict)
+    joints: dict[str, JointEntry] = Field(default_factory=dict)
+    springs: dict[str, SpringEntry] = Field(default_factory=dict)
+    thermal: dict[str, ThermalEntry] = Field(default_factory=dict)
+    conduction: dict[str, ConductionEntry] = Field(default_factory=dict)
+    parts: dict[str, PartEntry] = Field(default_factory=dict)
+
+
+SECTIONS: dict[str, type[Entry]] = {
+    "bodies": BodyEntry,
+    "joints": JointEntry,
+    "springs": SpringEntry,
+    "thermal": ThermalEntry,
+    "conduction": ConductionEntry,
+    "parts": PartEntry,
+}
+
+
+def json_schema() -> dict[str, Any]:
+    """The JSON schema of a scene file, for editors."""
+    return SceneFile.model_json_schema()

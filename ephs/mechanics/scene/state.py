@@ -1,0 +1,255 @@
+"""A scene in another state: along its joint coordinates, adjusted to close, or taken from a solution."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ephs.mechanics.scene.adjust import close_loops, mass_roots, project_velocities
+from ephs.mechanics.scene.assembly import measure
+from ephs.mechanics.scene.errors import Fault, SceneError, fault, unknown_name
+from ephs.mechanics.scene.geometry import body_twist, coupling_of
+from ephs.mechanics.scene.kinematics import TOLERANCE, Link, elements, largest_gap, largest_slip
+from ephs.mechanics.scene.model import GROUND, Adjustment, Body, Displacement, Joint, Scene, frozen
+from ephs.mechanics.scene.tree import spanning_hops
+from ephs.semantics.spaces import SE3
+from ephs.semantics.spaces import rotations as so3
+
+Array = NDArray[np.float64]
+
+# How far joints go at a time where loops have to be closed on the way, rad or m.
+STRIDE = 0.2
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Snapshot:
+    """A scene's bodies as arrays, parts included, and its joints between them; the implicit free joints
+    come last."""
+
+    names: tuple[str, ...]
+    bodies: tuple[Body, ...]
+    joints: tuple[Joint, ...]
+    links: tuple[Link, ...]
+    poses: Array
+    twists: Array
+
+    @staticmethod
+    def of(scene: Scene) -> "Snapshot":
+        """The snapshot of a scene."""
+        pairs = list(scene.all_bodies())
+        index = {name: i for i, (name, _) in enumerate(pairs)} | {GROUND: -1}
+        joints = [j for _, j in scene.all_joints()] + [j for _, j in scene.implicit_joints()]
+        bodies = tuple(body for _, body in pairs)
+        return Snapshot(
+            tuple(name for name, _ in pairs),
+            bodies,
+            tuple(joints),
+            tuple(
+                Link(
+                    j.name,
+                    index[j.body1],
+                    index[j.body2],
+                    j.frame1,
+                    j.frame2,
+                    coupling_of(j),
+                    None,
+                    None,
+                    j.motion,
+                    np.array(j.coordinate),
+                )
+                for j in joints
+            ),
+            np.array([body.pose for body in bodies]).reshape(-1, 7),
+            np.array([body.twist for body in bodies]).reshape(-1, 6),
+        )
+
+    def roots(self) -> Array:
+        """The bodies' inverse root inertias, the metric of every adjustment."""
+        n = len(self.bodies)
+        inertias = np.array([body.inertia for body in self.bodies]).reshape(n, 3, 3)
+        return mass_roots(np.array([body.mass for body in self.bodies]), inertias)
+
+
+def with_state(
+    scene: Scene, coordinates: Mapping[str, ArrayLike], rates: Mapping[str, ArrayLike], adjust: bool
+) -> Scene:
+    """See `Scene.with_state`."""
+    now, where = Snapshot.of(scene), scene.source or scene.name
+    wanted = _given(now, coordinates, "coordinates", where)
+    speeds = _given(now, rates, "rates", where)
+    links = [replace(k, coordinates=wanted.get(k.name), rate=speeds.get(k.name)) for k in now.links]
+
+    before = [np.asarray(j.coordinate) for j in now.joints]
+    poses, xs = _carry(links, now.poses, before)
+    if adjust and largest_gap(links, poses, xs) > TOLERANCE:
+        poses, xs = _carry_closed(links, now, before) or (poses, xs)
+
+    twists = now.twists.copy()
+    for hop in spanning_hops(links, len(poses), speeds):
+        rate = speeds.get(hop.name, now.joints[hop.link].rate)
+        link, x = links[hop.link], xs[hop.link]
+        twists[hop.body] = (
+            link.move_second(twists, x, rate) if hop.forward else link.move_first(twists, x, rate)
+        )
+    if adjust and largest_slip(links, twists, xs) > TOLERANCE:
+        moved = project_velocities(links, poses, twists, now.roots(), frozenset(speeds))
+        twists = twists if moved is None else moved
+
+    faults = measure(links, xs, poses, twists, now.names)
+    if faults:
+        raise SceneError(where, faults)
+    return rebuilt(scene, now, poses, twists, xs)
+
+
+def adjusted(scene: Scene) -> tuple[Scene, list[Fault]]:
+    """The nearest consistent state of a scene, with a report of what moved, if anything had to."""
+    now = Snapshot.of(scene)
+    xs = elements(now.links, now.poses)
+    gap, slip = largest_gap(now.links, now.poses, xs), largest_slip(now.links, now.twists, xs)
+    if max(gap, slip) <= TOLERANCE:
+        # Coordinates that were asked for give way to those of the bodies.
+        return rebuilt(scene, now, now.poses, now.twists, xs), []
+    poses: Array | None = now.poses
+    if gap > TOLERANCE:
+        poses = close_loops(now.links, now.poses, now.roots(), frozenset())
+    if poses is None:
+        worst = max(zip(now.links, xs, strict=True), key=lambda pair: max(pair[0].gap(now.poses, pair[1])))[0]
+        who = " and ".join(now.names[b] for b in (worst.body1, worst.body2) if b >= 0)
+        return scene, [fault("no assembly", f"joints.{worst.name}", f"a largest gap of {gap:.3g}", who=who)]
+    given = np.array([_carried(u, q0, q1) for u, q0, q1 in zip(now.twists, now.poses, poses, strict=True)])
+    twists: Array | None = given
+    if largest_slip(now.links, given, elements(now.links, poses)) > TOLERANCE:
+        twists = project_velocities(now.links, poses, given, now.roots(), frozenset())
+    if twists is None:
+        return scene, [fault("no motion", "joints", f"a velocity residual of {slip:.3g}")]
+    moved = tuple(_displacements(now, poses, given, twists))
+    return replace(
+        rebuilt(scene, now, poses, twists, elements(now.links, poses)), adjusted=Adjustment(gap, slip, moved)
+    ), []
+
+
+def rebuilt(scene: Scene, now: Snapshot, poses: Array, twists: Array, xs: Sequence[Array]) -> Scene:
+    """The scene with its bodies in another configuration, its joints at these elements, rates to match."""
+    bodies = {n: (frozen(q), frozen(u)) for n, q, u in zip(now.names, poses, twists, strict=True)}
+    joints = {
+        link.name: (frozen(x), frozen(link.slip(twists, x)[0])) for link, x in zip(now.links, xs, strict=True)
+    }
+    return _put(scene, "", bodies, joints)
+
+
+def at_solution(scene: Scene, solution: Any, time: float) -> Scene:
+    """See `Scene.at`."""
+    times = np.asarray(solution.t)
+    k = int(np.argmin(np.abs(times - time)))
+    if abs(times[k] - time) > 1e-9 * max(1.0, abs(time)):
+        raise SceneError(scene.name, [fault("no time", "time", time, first=times[0], last=times[-1])])
+    now = Snapshot.of(scene)
+    poses, twists = now.poses.copy(), now.twists.copy()
+    for i, name in enumerate(now.names):
+        body = solution.body(name)
+        poses[i] = np.concatenate((body.quaternion[k], body.position[k]))
+        twists[i] = body_twist(poses[i], body.velocity[k], body.angular_velocity[k])
+    heat = {name: float(solution.thermal(name).temperature[k]) for name, _ in scene.all_thermal()}
+    return _warmed(rebuilt(scene, now, poses, twists, elements(now.links, poses)), "", heat)
+
+
+def _given(now: Snapshot, values: Mapping[str, ArrayLike], what: str, where: str) -> dict[str, Array]:
+    """The values by joint, each (d,) and finite."""
+    dims = {link.name: link.coupling.dim for link in now.links}
+    found: dict[str, Array] = {}
+    faults: list[Fault] = []
+    for name, value in values.items():
+        if name not in dims:
+            faults += unknown_name("joint", name, dims).faults
+            continue
+        array = np.atleast_1d(np.asarray(value, dtype=np.float64))
+        if array.shape != (dims[name],):
+            text = f"{dims[name]} numbers" if dims[name] != 1 else "a number"
+            faults.append(fault("state length", f"{what}.{name}", f"shape {array.shape}", what=text))
+        elif not np.isfinite(array).all():
+            faults.append(fault("finite", f"{what}.{name}", array.tolist()))
+        found[name] = array
+    if faults:
+        raise SceneError(where, faults)
+    return found
+
+
+def _carry(links: Sequence[Link], poses: Array, before: Sequence[Array]) -> tuple[Array, list[Array]]:
+    """Poses and joint elements when the tree's joints go to their coordinates, or stay where they were."""
+    poses = poses.copy()
+    named = {link.name for link in links if link.coordinates is not None}
+    for hop in spanning_hops(links, len(poses), named):
+        link = links[hop.link]
+        x = before[hop.link] if link.coordinates is None else link.coupling.element(link.coordinates)
+        poses[hop.body] = link.place_second(poses, x) if hop.forward else link.place_first(poses, x)
+    return poses, elements(links, poses)
+
+
+def _carry_closed(
+    links: Sequence[Link], now: Snapshot, before: Sequence[Array]
+) -> tuple[Array, list[Array]] | None:
+    """The same with every loop closed, in small steps so that the mechanism keeps its way of assembly."""
+    held = frozenset(link.name for link in links if link.coordinates is not None)
+    starts = [link.coupling.coordinates(x) for link, x in zip(links, before, strict=True)]
+    ends = [start if k.coordinates is None else k.coordinates for k, start in zip(links, starts, strict=True)]
+    far = max((float(np.abs(b - a).max(initial=0.0)) for a, b in zip(starts, ends, strict=True)), default=0.0)
+    steps = max(1, int(np.ceil(far / STRIDE)))
+    roots, poses, xs = now.roots(), now.poses, list(before)
+    for step in range(1, steps + 1):
+        here = [
+            replace(k, near=x, coordinates=None if k.coordinates is None else a + (b - a) * (step / steps))
+            for k, x, a, b in zip(links, xs, starts, ends, strict=True)
+        ]
+        closed = close_loops(here, _carry(here, poses, xs)[0], roots, held)
+        if closed is None:
+            return None
+        poses, xs = closed, elements(here, closed)
+    return poses, xs
+
+
+def _carried(twist: Array, before: Array, after: Array) -> Array:
+    """The twist whose velocity is the same in the world after the body was turned."""
+    velocity = so3.quaternion_to_matrix(before[:4]) @ twist[3:]
+    return body_twist(after, velocity, twist[:3])
+
+
+def _displacements(now: Snapshot, poses: Array, given: Array, twists: Array) -> Iterable[Displacement]:
+    for i, name in enumerate(now.names):
+        turn = SE3.log(SE3.compose(SE3.inverse(now.poses[i]), poses[i]))[:3]
+        spin, speed = twists[i, :3] - given[i, :3], twists[i, 3:] - given[i, 3:]
+        sizes = [float(np.linalg.norm(v)) for v in (poses[i, 4:] - now.poses[i, 4:], turn, speed, spin)]
+        if max(sizes) > 1e-12:
+            yield Displacement(name, *sizes)
+
+
+def _put(
+    scene: Scene,
+    path: str,
+    bodies: Mapping[str, tuple[Array, Array]],
+    joints: Mapping[str, tuple[Array, Array]],
+) -> Scene:
+    def body(b: Body) -> Body:
+        pose, twist = bodies[path + b.name]
+        return replace(b, pose=pose, twist=twist)
+
+    def joint(j: Joint) -> Joint:
+        coordinate, rate = joints[path + j.name]
+        return replace(j, coordinate=coordinate, rate=rate)
+
+    return replace(
+        scene,
+        bodies={name: body(b) for name, b in scene.bodies.items()},
+        joints={name: joint(j) for name, j in scene.joints.items()},
+        parts={name: _put(part, f"{path}{name}.", bodies, joints) for name, part in scene.parts.items()},
+    )
+
+
+def _warmed(scene: Scene, path: str, heat: Mapping[str, float]) -> Scene:
+    return replace(
+        scene,
+        thermal={name: replace(node, temperature=heat[path + name]) for name, node in scene.thermal.items()},
+        parts={name: _warmed(part, f"{path}{name}.", heat) for name, part in scene.parts.items()},
+    )

@@ -1,0 +1,62 @@
+"""A spanning forest of the bodies, from the ground outwards, preferring the joints that someone named."""
+
+from collections import deque
+from collections.abc import Container, Sequence
+from dataclasses import dataclass
+from typing import final
+
+from ephs.mechanics.scene.kinematics import Link
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Hop:
+    """One step outwards: through link number ``link`` (of this name) to ``body``; forward where that is its
+    body 2."""
+
+    link: int
+    name: str
+    body: int
+    forward: bool
+
+
+def spanning_hops(links: Sequence[Link], count: int, preferred: Container[str]) -> list[Hop]:
+    """The steps that reach each of ``count`` bodies once, each from a body reached before.
+
+    Named links come into the tree before others, then those in front. A group of bodies without a way to
+    the ground is reached from its first body, which no step leads to.
+    """
+    leader = list(range(-1, count))
+
+    def find(body: int) -> int:
+        while leader[body + 1] != body:
+            body = leader[body + 1]
+        return body
+
+    neighbours: dict[int, list[int]] = {body: [] for body in range(-1, count)}
+    for number in sorted(range(len(links)), key=lambda i: links[i].name not in preferred):
+        first, second = find(links[number].body1), find(links[number].body2)
+        if first != second:
+            # The smaller number leads, so that the ground, or an island's first body, is the root.
+            leader[max(first, second) + 1] = min(first, second)
+            neighbours[links[number].body1].append(number)
+            neighbours[links[number].body2].append(number)
+
+    hops: list[Hop] = []
+    reached: set[int] = set()
+    for root in range(-1, count):
+        if root in reached:
+            continue
+        reached.add(root)
+        queue = deque([root])
+        while queue:
+            here = queue.popleft()
+            for number in neighbours[here]:
+                link = links[number]
+                forward = link.body1 == here
+                there = link.body2 if forward else link.body1
+                if there not in reached:
+                    reached.add(there)
+                    queue.append(there)
+                    hops.append(Hop(number, link.name, there, forward))
+    return hops

@@ -1,0 +1,107 @@
+"""Numbers brought to their full shape, with the faults that only show in the numbers themselves."""
+
+import warnings
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ephs.mechanics.scene.entries import shown
+from ephs.mechanics.scene.errors import Fault, SceneWarning, fault
+from ephs.mechanics.scene.schema import BodyEntry
+
+Array = NDArray[np.float64]
+
+TOLERANCE = 1e-9
+QUATERNION_TOLERANCE = 1e-6
+
+
+def quaternion(values: list[float] | None, key: str, faults: list[Fault]) -> Array:
+    """A unit quaternion; None is the identity. Up to 1e-6 off it is normalised, beyond it is a fault."""
+    if values is None:
+        return np.array([1.0, 0.0, 0.0, 0.0])
+    q = np.array(values, dtype=np.float64)
+    size = float(np.linalg.norm(q))
+    if abs(size - 1.0) > QUATERNION_TOLERANCE:
+        faults.append(fault("quaternion", key, f"{shown(values)} of norm {size:.9g}"))
+        return np.array([1.0, 0.0, 0.0, 0.0])
+    return q / size
+
+
+def pose(position: list[float] | None, rotation: list[float] | None, key: str, faults: list[Fault]) -> Array:
+    """The pose (7,) of a position and a rotation; what is None is 0 or the identity."""
+    return np.concatenate((quaternion(rotation, f"{key}.rotation", faults), position or [0.0, 0.0, 0.0]))
+
+
+def inertia(entry: BodyEntry, key: str, strict: bool, faults: list[Fault]) -> Array:
+    """The inertia tensor (3, 3); faults, or warnings, where no mass distribution has it."""
+    xx, yy, zz, xy, xz, yz = (*entry.inertia, 0.0, 0.0, 0.0)[:6]
+    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    moments = np.linalg.eigvalsh(tensor)
+    slack = TOLERANCE * float(np.abs(moments).max())
+    text = "principal moments " + ", ".join(f"{moment:.6g}" for moment in moments)
+    if entry.mass == 0.0 and tensor.any():
+        faults.append(fault("massless", key, shown(entry.inertia)))
+    elif moments[0] < -slack:
+        _impossible(fault("inertia indefinite", key, text), strict, faults)
+    elif moments[2] > moments[0] + moments[1] + slack:
+        _impossible(fault("inertia triangle", key, text), strict, faults)
+    return tensor
+
+
+def freedoms(
+    value: Any, d: int, key: str, faults: list[Fault], *, spread: bool = False, default: float = 0.0
+) -> Array:
+    """One number a freedom, from a number or a list.
+
+    A number stands for each freedom where ``spread`` is set; else only for a single one, apart from 0.
+    """
+    if value is None:
+        return np.full(d, default)
+    if isinstance(value, list):
+        if len(value) != d:
+            faults.append(fault("length", key, shown(value), what=_one_a_freedom(d)))
+            return np.zeros(d)
+        return np.array(value, dtype=np.float64)
+    if d != 1 and not spread and value != 0.0:
+        faults.append(fault("length", key, shown(value), what=_one_a_freedom(d)))
+    return np.full(d, float(value))
+
+
+def friction(value: Any, d: int, key: str, faults: list[Fault]) -> Array:
+    """The friction matrix (d, d), from a number, one a freedom, or a symmetric matrix."""
+    array = (
+        np.zeros(0) if value == [] else np.zeros(0) if _ragged(value) else np.array(value, dtype=np.float64)
+    )
+    if array.ndim == 0:
+        matrix = float(array) * np.eye(d)
+    elif array.shape == (d,):
+        matrix = np.diag(array)
+    elif array.shape == (d, d):
+        matrix = array
+    else:
+        faults.append(fault("friction shape", key, shown(value), d=d))
+        return np.zeros((d, d))
+    scale = float(np.abs(matrix).max(initial=0.0))
+    if scale and np.abs(matrix - matrix.T).max() > TOLERANCE * scale:
+        faults.append(fault("friction asymmetric", key, shown(value)))
+    elif scale and np.linalg.eigvalsh(matrix)[0] < -TOLERANCE * scale:
+        faults.append(fault("friction sign", key, shown(value)))
+    return 0.5 * (matrix + matrix.T)
+
+
+def _ragged(value: Any) -> bool:
+    return isinstance(value, list) and len({len(row) if isinstance(row, list) else -1 for row in value}) > 1
+
+
+def _one_a_freedom(d: int) -> str:
+    return {0: "no number: this joint has no freedom", 1: "1 number"}.get(
+        d, f"a list of {d} numbers, one a freedom"
+    )
+
+
+def _impossible(found: Fault, strict: bool, faults: list[Fault]) -> None:
+    if strict:
+        faults.append(found)
+    else:
+        warnings.warn(str(found), SceneWarning, stacklevel=2)
