@@ -1,0 +1,90 @@
+"""Exergetic port-Hamiltonian systems: physical models composed by pattern, with both laws of thermodynamics exact.
+
+Names are imported where they are first used, so that ``import ephs`` is fast.
+"""
+
+from importlib import import_module
+from importlib.metadata import PackageNotFoundError, version
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ephs.mechanics.check import check_model as check_model
+    from ephs.mechanics.scene import Scene as Scene
+    from ephs.mechanics.scene import SceneError as SceneError
+    from ephs.mechanics.scene.load import load as load
+    from ephs.mechanics.simulate import load_solution as load_solution
+    from ephs.mechanics.simulate import simulate as simulate
+    from ephs.mechanics.solve.errors import Interrupted as Interrupted
+    from ephs.mechanics.solve.errors import SimulationError as SimulationError
+    from ephs.mechanics.solve.solution import Solution as Solution
+    from ephs.operad import Directory as Directory
+    from ephs.operad import Path as Path
+    from ephs.operad import Pattern as Pattern
+    from ephs.operad import PatternError as PatternError
+    from ephs.operad import Quantity as Quantity
+    from ephs.operad import Space as Space
+    from ephs.operad import junction as junction
+    from ephs.operad import quantity as quantity
+    from ephs.semantics import AssemblyError as AssemblyError
+    from ephs.semantics import Reference as Reference
+    from ephs.semantics import Relation as Relation
+    from ephs.semantics import SemanticsError as SemanticsError
+    from ephs.semantics import StructureError as StructureError
+    from ephs.semantics import System as System
+    from ephs.semantics import library as library
+    from ephs.semantics.constructors import constraint as constraint
+    from ephs.semantics.constructors import gyrator as gyrator
+    from ephs.semantics.constructors import irreversible as irreversible
+    from ephs.semantics.constructors import storage as storage
+    from ephs.semantics.constructors import transformer as transformer
+
+_HOMES = {
+    "ephs.operad": (
+        "Directory",
+        "Path",
+        "Pattern",
+        "PatternError",
+        "Quantity",
+        "Space",
+        "junction",
+        "quantity",
+    ),
+    "ephs.semantics": (
+        "AssemblyError",
+        "Reference",
+        "Relation",
+        "SemanticsError",
+        "StructureError",
+        "System",
+        "library",
+    ),
+    "ephs.semantics.constructors": ("constraint", "gyrator", "irreversible", "storage", "transformer"),
+    "ephs.mechanics.scene": ("Scene", "SceneError"),
+    "ephs.mechanics.scene.load": ("load",),
+    "ephs.mechanics.check": ("check_model",),
+    "ephs.mechanics.simulate": ("load_solution", "simulate"),
+    "ephs.mechanics.solve.errors": ("Interrupted", "SimulationError"),
+    "ephs.mechanics.solve.solution": ("Solution",),
+}
+_HOME = {name: home for home, names in _HOMES.items() for name in names}
+_PACKAGES = ("mechanics", "operad", "semantics", "show", "testing")
+
+__all__ = sorted([*_HOME, *_PACKAGES])
+
+try:
+    __version__ = version("ephs")
+except PackageNotFoundError:  # a source tree that was never installed
+    __version__ = "0"
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOME:
+        home = import_module(_HOME[name])
+        return import_module(f"{_HOME[name]}.{name}") if name == "library" else getattr(home, name)
+    if name in _PACKAGES:
+        return import_module(f"ephs.{name}")
+    raise AttributeError(f"module 'ephs' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted([*__all__, "__version__"])

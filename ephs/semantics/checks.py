@@ -1,0 +1,183 @@
+"""The conditions under which a primitive is thermodynamically consistent, checked when it is made.
+
+Base points are drawn with a fixed seed, so that a wrong primitive is refused every time with the same witness.
+Conditions: Lohmayer, Capobianco, Leyendecker, section 2, with time-reversal parity as a further one.
+"""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ephs.operad import Path
+from ephs.semantics.bundle import Array, Bundle, Reference
+from ephs.semantics.errors import StructureError
+from ephs.semantics.spaces import manifold
+from ephs.semantics.subspace import Subspace
+
+if TYPE_CHECKING:
+    from ephs.semantics.primitives import Irreversible, Point, Reversible, Storage
+
+__all__ = [
+    "check_irreversible",
+    "check_reversible",
+    "check_storage",
+    "dirac",
+    "random_efforts",
+    "random_point",
+]
+
+SAMPLES = 3
+TOLERANCE = (
+    1e-12  # of the largest entry; evaluations of structure are a few hundred roundings deep at the most
+)
+
+
+def random_point(interface: "Bundle", ports: tuple[Path, ...], rng: np.random.Generator) -> dict[Path, Array]:
+    """Random states for the named ports; volumes and amounts positive."""
+    out: dict[Path, Array] = {}
+    for port in ports:
+        quantity = interface.interface[port].quantity
+        x = manifold(quantity.space).random(rng)
+        out[port] = np.exp(0.3 * x) if quantity.kind in ("volume", "amount") else x
+    return out
+
+
+def random_efforts(bundle: Bundle, rng: np.random.Generator) -> Array:
+    """Random efforts; on entropy ports within 50 K of the reference temperature."""
+    e = rng.standard_normal(bundle.size)
+    return np.where(bundle.indicator("entropy") == 1.0, np.clip(20.0 * e, -50.0, 50.0), e)
+
+
+def _reversed(primitive_bundle: Bundle, x: "Point") -> dict[Path, Array]:
+    """Time reversal of a state: quantities of odd parity change their sign."""
+    return {
+        p: primitive_bundle.interface[p].quantity.parity * v if _odd(primitive_bundle, p) else v
+        for p, v in x.items()
+    }
+
+
+def _odd(bundle: Bundle, port: Path) -> bool:
+    return bundle.interface[port].quantity.parity < 0
+
+
+def _show(x: "Point") -> str:
+    return ", ".join(f"{p}={np.array2string(v, precision=3)}" for p, v in x.items()) or "none is read"
+
+
+def _worst(defect: Array) -> tuple[int, ...]:
+    return tuple(int(i) for i in np.unravel_index(int(np.argmax(np.abs(defect))), defect.shape))
+
+
+def check_storage(storage: "Storage") -> None:
+    """E smooth and even under time reversal, its gradient the differential, θ = ∂E/∂s > 0."""
+    rng = np.random.default_rng(20)
+    bundle = storage.bundle
+    if storage.environment:
+        return
+    reference = Reference()
+    for _ in range(SAMPLES):
+        x = random_point(bundle, bundle.ports, rng)
+        energy, mirrored = float(storage.energy(x)), float(storage.energy(_reversed(bundle, x)))
+        if not abs(energy - mirrored) <= TOLERANCE * max(1.0, abs(energy)):
+            raise StructureError("even", storage.name, found=mirrored, expected=energy, witness=_show(x))
+        gradient = storage.energy_gradient(x)
+        _check_gradient(storage, x, gradient, energy)
+        for _, where, quantity in bundle.items():
+            if quantity.kind == "entropy" and not gradient[where][0] > 0.0:
+                raise StructureError("temperature", storage.name, found=float(gradient[where][0]))
+        del reference
+        reference = Reference()
+
+
+def _check_gradient(storage: "Storage", x: "Point", gradient: Array, energy: float) -> None:
+    """One random direction tells a wrong gradient; a central difference certifies about 1e-7 and no more."""
+    if storage.gradient is None:
+        return
+    rng = np.random.default_rng(21)
+    step = 1e-4 * rng.standard_normal(storage.bundle.size)
+    there, back = (float(storage.energy(storage.retract(x, k * step))) for k in (1.0, -1.0))
+    scale = abs(energy) * 1e-8 + float(np.abs(gradient) @ np.abs(step))
+    expected, found = 0.5 * (there - back), float(gradient @ step)
+    if not abs(expected - found) <= 1e-4 * scale + 1e-13:
+        entry = "(along a random direction)"
+        raise StructureError(
+            "gradient", storage.name, entry=entry, found=found, expected=expected, witness=_show(x)
+        )
+
+
+def dirac(skew: Array, constraint: Array) -> Subspace:
+    """The subspace {(f, e): f = L e + Cᵀ λ, 0 = C e} of ℝ²ⁿ."""
+    n, k = skew.shape[0], constraint.shape[0]
+    kernel = np.block([[-np.eye(n), skew, constraint.T], [np.zeros((k, n)), constraint, np.zeros((k, k))]])
+    return Subspace.from_kernel(kernel).project(range(2 * n))
+
+
+def check_reversible(reversible: "Reversible") -> None:
+    """Isotropic and of full dimension, conserving each environment quantity, invariant under time reversal."""
+    rng = np.random.default_rng(22)
+    bundle, name = reversible.bundle, reversible.name
+    n, k, parity = bundle.size, reversible.multipliers, bundle.parity()
+    for _ in range(SAMPLES):
+        x = random_point(bundle, reversible.reads, rng)
+        skew, constraint = reversible.structure(x)
+        if skew.shape != (n, n):
+            raise StructureError("gyrator-shape", name, found=skew.shape, expected=(n, n))
+        if constraint.shape != (k, n):
+            raise StructureError("constraint-shape", name, found=constraint.shape, expected=(k, n))
+        scale = max(1.0, float(np.abs(skew).max(initial=0.0)), float(np.abs(constraint).max(initial=0.0)))
+        defect = skew + skew.T
+        if np.abs(defect).max(initial=0.0) > TOLERANCE * scale:
+            entry = _worst(defect)
+            raise StructureError("isotropy", name, entry=entry, found=float(defect[entry]), witness=_show(x))
+        for kind in bundle.environment_kinds():
+            one = bundle.indicator(kind)
+            defect = np.concatenate([skew @ one, constraint @ one])
+            if np.abs(defect).max(initial=0.0) > TOLERANCE * scale:
+                entry = _worst(defect)
+                found = float(defect[entry])
+                raise StructureError(
+                    "conservation", name, quantity=kind, entry=entry, found=found, witness=_show(x)
+                )
+        # (f, e) ∈ D(x) ⇔ (−ϵf, ϵe) ∈ D(ϵx)
+        here = dirac(skew, constraint)
+        there = dirac(*reversible.structure(_reversed(bundle, x)))
+        mirror = np.diag(np.concatenate([-parity, parity]))
+        found = here.image(mirror).distance(there)
+        if found > 1e-9:
+            raise StructureError("parity", name, found=found, witness=_show(x))
+
+
+def check_irreversible(irreversible: "Irreversible") -> None:
+    """Onsager symmetric, non-negative, conserving energy and each environment quantity but entropy, of even parity."""
+    rng = np.random.default_rng(23)
+    bundle, name, reference = irreversible.bundle, irreversible.name, Reference()
+    parity = bundle.parity()
+    for _ in range(SAMPLES):
+        x, e = random_point(bundle, irreversible.reads, rng), random_efforts(bundle, rng)
+        matrix = irreversible.matrix(x, e, reference)
+        scale = max(1e-300, float(np.abs(matrix).max(initial=0.0)))
+        defect = matrix - matrix.T
+        if np.abs(defect).max(initial=0.0) > TOLERANCE * scale:
+            entry = _worst(defect)
+            raise StructureError("symmetry", name, entry=entry, found=float(defect[entry]), witness=_show(x))
+        least = float(np.linalg.eigvalsh(matrix).min(initial=0.0))
+        if least < -TOLERANCE * scale:
+            raise StructureError("definite", name, found=least, witness=_show(x))
+        energy_effort = e + bundle.intensive(reference)
+        terms = np.abs(matrix) @ np.abs(energy_effort)
+        defect = matrix @ energy_effort
+        if np.any(np.abs(defect) > TOLERANCE * np.maximum(terms, 1e-300)):
+            entry = _worst(defect)
+            raise StructureError("energy", name, entry=entry, found=float(defect[entry]), witness=_show(x))
+        for kind in bundle.environment_kinds():
+            defect = matrix @ bundle.indicator(kind)
+            if kind != "entropy" and np.abs(defect).max(initial=0.0) > TOLERANCE * scale:
+                entry = _worst(defect)
+                found = float(defect[entry])
+                raise StructureError(
+                    "conservation", name, quantity=kind, entry=entry, found=found, witness=_show(x)
+                )
+        mirrored = irreversible.matrix(_reversed(bundle, x), parity * e, reference)
+        found = float(np.abs(mirrored - parity[:, None] * matrix * parity[None, :]).max(initial=0.0))
+        if found > TOLERANCE * scale:
+            raise StructureError("parity", name, found=found, witness=_show(x))

@@ -1,0 +1,72 @@
+"""Errors of the semantics, with their texts in one table."""
+
+from typing import final
+
+__all__ = ["AssemblyError", "SemanticsError", "StructureError"]
+
+_TEXTS = {
+    "fillings": "{path}: the boxes to fill are {expected}, the fillings given are {found}; fill each box once",
+    "interface": "{path}: the filling's interface is {found}, the box wants {expected}; rename the filling's ports",
+    "isotropy": "{path}: not reversible: entry ({entry}) of L + Lᵀ is {found}, expected 0 (witness state {witness})",
+    "gyrator-shape": "{path}: the matrix L is {found}, its ports want {expected}",
+    "constraint-shape": "{path}: the matrix C is {found}, its ports want {expected}",
+    "conservation": "{path}: {quantity} is not conserved: entry {entry} is {found}, expected 0 (witness state {witness})",
+    "parity": "{path}: not invariant under time reversal: defect {found}, expected 0 (witness state {witness})",
+    "symmetry": "{path}: not Onsager symmetric: entry ({entry}) of M − Mᵀ is {found}, expected 0 (witness state {witness})",
+    "definite": "{path}: M has the negative eigenvalue {found}; the second law expects none (witness state {witness})",
+    "energy": "{path}: energy is not conserved: entry {entry} of M·eᴱ is {found}, expected 0 (witness state {witness})",
+    "even": "{path}: the energy is not even under time reversal: {found} against {expected} (witness state {witness})",
+    "gradient": "{path}: the gradient's entry {entry} is {found}, differences of the energy say {expected} (witness state {witness})",
+    "temperature": "{path}: the absolute temperature is {found} K, expected > 0; check the state or the energy function",
+    "rotation": "{path}: a rotation of π or more in one step; take a smaller step",
+    "storage-ports": "{path}: the storage has the state port {found}; a storage owns its states, expected power ports only",
+    "parameter": "{path}: parameter {key} is {found}, expected {expected}",
+    "two-storages": "{path}: the state of junction {junction} is stored twice, by {found}; expected one storage for a state. "
+    "Join the two by a constraint component instead",
+    "unread-state": "{path}: port {port} reads the state of junction {junction}, which no storage provides; "
+    "connect a storage there, or expose the junction as a power port to one",
+    "state": "{path}: the initial value has shape {found}, expected {expected} ({quantity})",
+    "unknown-state": "{path}: no such state; the states are {expected}",
+    "missing-input": "{path}: the outer port is open: give inputs={{'{path}': {{'flow': …}}}} or {{'effort': …}}",
+    "unknown-input": "{path}: no such outer power port; the open ports are {expected}",
+    "input": "{path}: the input is {found}, expected {expected}",
+}
+
+
+class SemanticsError(ValueError):
+    """A system or a primitive that cannot mean anything.
+
+    Parameters
+    ----------
+    kind
+        The key of the message.
+    path
+        The component's or the port's dotted path.
+    **facts
+        What the message names: found, expected, entry, witness, …
+    """
+
+    kind: str
+    path: str
+    facts: dict[str, object]
+
+    def __init__(self, kind: str, path: object, **facts: object) -> None:
+        self.kind, self.path, self.facts = kind, str(path), facts
+        super().__init__(_TEXTS[kind].format(path=path, **facts))
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return (_rebuild, (type(self), self.kind, self.path, self.facts))
+
+
+def _rebuild(cls: type[SemanticsError], kind: str, path: str, facts: dict[str, object]) -> SemanticsError:
+    return cls(kind, path, **facts)
+
+
+@final
+class StructureError(SemanticsError):
+    """A primitive whose data are not the structure that they claim to be."""
+
+
+@final
+class AssemblyError(SemanticsError):
+    """A system that has a relation but no square system of equations."""

@@ -1,0 +1,168 @@
+"""From a primitive to the address of a compiled function over its discrete relation.
+
+All such functions have one signature, so that a driver calls any of them through a table of addresses and is itself
+compiled once. Primitives that name a kernel have it compiled; the others (a user's own Python functions) are called
+back in Python through the same signature, with a differenced Jacobian.
+"""
+
+import ctypes
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from typing import Any, final
+
+import numpy as np
+
+from ephs.semantics.behaviour import Natural, Storing
+from ephs.semantics.bundle import Array, Reference
+from ephs.semantics.primitives import Kernel, Primitive, Reversible, Storage
+from ephs.semantics.spaces import manifold
+
+__all__ = ["DOMAIN", "OK", "SIGNATURE", "TEMPERATURE", "Callback", "address_of", "prototype"]
+
+OK, DOMAIN, TEMPERATURE, RAISED = 0, 1, 2, 3
+"""What a kernel returns: done; outside the method's domain; θ ≤ 0; a Python function raised."""
+
+SIGNATURE = (
+    "int64(CPointer(int64), CPointer(float64), CPointer(float64), CPointer(float64), CPointer(float64), "
+    "CPointer(float64), CPointer(float64), CPointer(float64), CPointer(float64), CPointer(float64), CPointer(float64))"
+)
+"""(dims, (h, θ₀, π₀), parameters, x⁰, v, e, λ, f, c, J, work); dims = n, k, dim of v, size of x⁰."""
+
+_POINTER = ctypes.POINTER(ctypes.c_double)
+_PROTOTYPE = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.POINTER(ctypes.c_int64), *[_POINTER] * 10)
+
+
+def prototype(address: int) -> Any:
+    """A kernel at an address, to be called from Python with pointers."""
+    return _PROTOTYPE(address)
+
+
+@cache
+def _compiled(module: str, name: str) -> Any:
+    from ephs.semantics.spaces.jit import cfunc_kernel
+
+    return cfunc_kernel(SIGNATURE)(getattr(import_module(module), name))
+
+
+@final
+@dataclass(slots=True)
+class Callback:
+    """A Python primitive behind the kernels' signature; keeps the function alive and the exception that it raised."""
+
+    function: Any
+    raised: BaseException | None = None
+
+    @property
+    def address(self) -> int:
+        """Address of the C function."""
+        address = ctypes.cast(self.function, ctypes.c_void_p).value
+        return address or 0
+
+
+def address_of(primitive: Primitive) -> tuple[int, tuple[float, ...], Callback | None]:
+    """(address, parameters, callback or None) of a primitive's discrete relation."""
+    kernel: Kernel | None = primitive.kernel
+    if kernel is not None:
+        return int(_compiled(kernel.module, kernel.name).address), kernel.parameters, None
+    callback = _callback(primitive)
+    return callback.address, (), callback
+
+
+def _callback(primitive: Primitive) -> Callback:
+    sizes = [manifold(primitive.interface[p].quantity.space).size for p in primitive.reads]
+    dims = [manifold(primitive.interface[p].quantity.space).dim for p in primitive.reads]
+    evaluate = _storage(primitive) if isinstance(primitive, Storage) else _relation(primitive)
+
+    def call(counts: Any, *pointers: Any) -> int:
+        n, k, m, size = (int(counts[i]) for i in range(4))
+        try:
+            scal = _view(pointers[0], 3)
+            point = (
+                dict(
+                    zip(
+                        primitive.reads,
+                        np.split(_view(pointers[2], size).copy(), np.cumsum(sizes)[:-1]),
+                        strict=True,
+                    )
+                )
+                if sizes
+                else {}
+            )
+            evaluate(
+                scal,
+                point,
+                dims,
+                [_view(p, s) for p, s in zip(pointers[3:9], _lengths(primitive, n, k, m), strict=True)],
+            )
+        except BaseException as error:
+            holder.raised = error
+            return RAISED
+        return OK
+
+    holder = Callback(None)
+    holder.function = _PROTOTYPE(call)
+    return holder
+
+
+def _lengths(primitive: Primitive, n: int, k: int, m: int) -> tuple[int, ...]:
+    if isinstance(primitive, Storage):
+        return (n, n, 0, n * n, 1, 0)
+    return (m, n, k, n, k, (n + k) * (n + k + m))
+
+
+def _view(pointer: Any, size: int) -> Array:
+    return np.ctypeslib.as_array(pointer, (size,)) if size else np.zeros(0)
+
+
+_Evaluate = Callable[[Array, dict[Any, Array], list[int], list[Array]], None]
+
+
+def _storage(storage: Storage) -> _Evaluate:
+    def evaluate(scal: Array, point: dict[Any, Array], _dims: list[int], views: list[Array]) -> None:
+        v, effort, _, slope, energy, _ = views
+        reference = Reference(float(scal[1]), float(scal[2]))
+
+        def at(step: Array) -> Array:
+            return storage.discrete_effort(point, step, reference)
+
+        step = v.copy()
+        effort[:] = at(step)
+        slope[:] = _differenced(at, step).ravel()
+        energy[0] = storage.energy(storage.retract(point, step))
+
+    return evaluate
+
+
+def _relation(primitive: Primitive) -> _Evaluate:
+    k = primitive.multipliers if isinstance(primitive, Reversible) else 0
+    n = primitive.bundle.size
+
+    def evaluate(scal: Array, point: dict[Any, Array], dims: list[int], views: list[Array]) -> None:
+        v, e, lam, flow, condition, jacobian = views
+        h = float(scal[0])
+        local = Natural(Reference(float(scal[1]), float(scal[2])), h).behaviour(primitive, point)
+        if isinstance(local, Storing):
+            raise TypeError("a storage is not a relation")
+
+        def at(z: Array) -> Array:
+            rates = np.split(z[n + k :] / h, np.cumsum(dims)[:-1]) if dims else []
+            read = dict(zip(primitive.reads, rates, strict=True))
+            return np.concatenate(local.relate(z[:n], z[n : n + k], read))
+
+        z = np.concatenate([e, lam, v])
+        out = at(z)
+        flow[:], condition[:] = out[:n], out[n:]
+        jacobian[:] = _differenced(at, z).ravel()
+
+    return evaluate
+
+
+def _differenced(function: Callable[[Array], Array], z: Array) -> Array:
+    columns: list[Array] = []
+    for i in range(z.size):
+        delta = np.zeros(z.size)
+        delta[i] = 1e-6 * max(1.0, abs(float(z[i])))
+        columns.append((function(z + delta) - function(z - delta)) / (2.0 * delta[i]))
+    return np.array(columns).T if columns else np.zeros((0, 0))

@@ -1,0 +1,224 @@
+"""One step of the natural discretisation in plain NumPy, by two routes: flat, and level by level.
+
+Each primitive is discretised on its own; the pattern glues the discrete relations exactly as it glues the continuous
+ones. So discretise-then-compose equals flatten-then-discretise. These functions are the oracle of the compiled
+solver, and small enough to be read as its definition.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from ephs.operad import Path, Pattern
+from ephs.semantics.behaviour import Continuous, Natural, Relating, Storing
+from ephs.semantics.bundle import Array, Bundle, Reference
+from ephs.semantics.descriptor import Input
+from ephs.semantics.primitives import Primitive, Reversible
+from ephs.semantics.relation import Sources, fold, read_point
+from ephs.semantics.spaces import manifold
+from ephs.semantics.system import System
+
+__all__ = ["Solved", "solve_flat", "solve_nested", "step"]
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Solved:
+    """Rates of the states, multipliers by component, and outer (flow, effort) pairs that solve a relation."""
+
+    rates: Mapping[Path, Array]
+    multipliers: Mapping[Path, Array]
+    outer: Mapping[Path, tuple[Array, Array]]
+    residual: float
+
+
+def solve_flat(
+    system: System, state: Mapping[Path, Array], behaviour: Continuous | Natural, inputs: Mapping[Path, Input]
+) -> Solved:
+    """Solve the descriptor form of the flattened system for its unknowns, of least norm where they are not unique."""
+    d = system.descriptor()
+    x = d.pack(state)
+    given = d.complete_inputs(inputs)
+    z, residual = newton(lambda z: d.residual(behaviour, x, given, z), np.zeros(d.unknowns(given)))
+    rates, rest = z[: d.rate_size], z[d.rate_size :]
+    efforts, lam = rest[: d.effort_size], rest[d.effort_size : d.effort_size + d.multiplier_size]
+    flows = rest[d.effort_size + d.multiplier_size :]
+    outer: dict[Path, tuple[Array, Array]] = {}
+    at = 0
+    for slot in d.outer:
+        flow = given[slot.path].value
+        if given[slot.path].effort:
+            flow, at = flows[at : at + slot.quantity.space.dim], at + slot.quantity.space.dim
+        outer[slot.path] = (flow, efforts[slot.efforts])
+    return Solved(
+        {slot.path: rates[slot.rates] for slot in d.states},
+        {s.path: lam[s.multiplier : s.multiplier + s.multipliers] for s in d.components if s.multipliers},
+        outer,
+        residual,
+    )
+
+
+@dataclass(slots=True)
+class _Unknowns:
+    """Hands out places in one long vector of unknowns."""
+
+    size: int = 0
+
+    def take(self, n: int) -> slice:
+        self.size += n
+        return slice(self.size - n, self.size)
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class _Part:
+    """A subsystem's residual as a closure over the one vector, and where its port variables lie."""
+
+    ports: Mapping[Path, tuple[slice, slice]]
+    equations: Callable[[Array], list[Array]]
+    rates: Mapping[Path, slice]
+    multipliers: Mapping[Path, slice]
+
+
+def solve_nested(
+    system: System, state: Mapping[Path, Array], behaviour: Continuous | Natural, inputs: Mapping[Path, Input]
+) -> Solved:
+    """Solve the hierarchical system as it stands: every box port of every level has its own flow and effort."""
+    unknowns = _Unknowns()
+    all_rates: dict[Path, slice] = {}  # read by closures, filled leaf by leaf
+
+    def leaf(path: Path, primitive: Primitive, sources: Sources) -> _Part:
+        local = behaviour.behaviour(primitive, read_point(primitive, sources, state))
+        return _leaf(path, primitive, local, sources, unknowns, all_rates)
+
+    part = fold(system, leaf, lambda pattern, parts: _glue(pattern, parts, unknowns))
+
+    def residual(z: Array) -> Array:
+        rows = part.equations(z)
+        for port, (flow, effort) in part.ports.items():
+            given = inputs[port]
+            rows.append((z[effort] if given.effort else z[flow]) - given.value)
+        return np.concatenate(rows) if rows else np.zeros(0)
+
+    z, error = newton(residual, np.zeros(unknowns.size))
+    return Solved(
+        {path: z[where] for path, where in part.rates.items()},
+        {path: z[where] for path, where in part.multipliers.items()},
+        {port: (z[flow], z[effort]) for port, (flow, effort) in part.ports.items()},
+        error,
+    )
+
+
+def _leaf(
+    path: Path,
+    primitive: Primitive,
+    local: Storing | Relating,
+    sources: Sources,
+    unknowns: _Unknowns,
+    all_rates: dict[Path, slice],
+) -> _Part:
+    bundle = primitive.bundle
+    flow, effort = unknowns.take(bundle.size), unknowns.take(bundle.size)
+    ports = {p: (_within(flow, where), _within(effort, where)) for p, where, _ in bundle.items()}
+    if isinstance(local, Storing):
+        storing = local
+        rates = {p: ports[p][0] for p in bundle.ports}
+        all_rates.update({path / p: where for p, where in rates.items()})
+        return _Part(ports, lambda z: [z[effort] - storing.effort(z[flow])], rates, {})
+    relating = local
+    lam = unknowns.take(primitive.multipliers if isinstance(primitive, Reversible) else 0)
+    dims = {p: manifold(primitive.interface[p].quantity.space).dim for p in primitive.reads}
+
+    def equations(z: Array) -> list[Array]:
+        read: dict[Path, Array] = {}
+        for port in primitive.reads:
+            source = sources[port]
+            read[port] = z[all_rates[source]] if source is not None else np.zeros(dims[port])
+        f, conditions = relating.relate(z[effort], z[lam], read)
+        return [z[flow] - f, conditions]
+
+    return _Part(ports, equations, {}, {Path(()): lam} if lam.stop > lam.start else {})
+
+
+def _glue(pattern: Pattern, parts: Mapping[Path, _Part], unknowns: _Unknowns) -> _Part:
+    outer = Bundle.of(pattern.interface)
+    flow, effort = unknowns.take(outer.size), unknowns.take(outer.size)
+    ports = {p: (_within(flow, where), _within(effort, where)) for p, where, _ in outer.items()}
+    on: dict[Path, list[tuple[slice, slice]]] = {}
+    for box, b in pattern.boxes.items():
+        for port, where in b.ports.items():
+            if where.power:
+                on.setdefault(where.junction, []).append(parts[box].ports[port])
+
+    def equations(z: Array) -> list[Array]:
+        rows = [row for part in parts.values() for row in part.equations(z)]
+        for junction, inner in on.items():
+            net = sum((z[f] for f, _ in inner[1:]), z[inner[0][0]])
+            first, others = inner[0][1], [e for _, e in inner[1:]]
+            if junction in ports:
+                net = net - z[ports[junction][0]]
+                others.append(ports[junction][1])
+            rows.append(net)
+            rows.extend(z[first] - z[other] for other in others)
+        rows.extend(z[f] for junction, (f, _) in ports.items() if junction not in on)
+        return rows
+
+    return _Part(
+        ports,
+        equations,
+        {box / path: where for box, part in parts.items() for path, where in part.rates.items()},
+        {box / path: where for box, part in parts.items() for path, where in part.multipliers.items()},
+    )
+
+
+def _within(outer: slice, inner: slice) -> slice:
+    return slice(outer.start + inner.start, outer.start + inner.stop)
+
+
+def step(
+    system: System,
+    state: Mapping[Path, Array],
+    h: float,
+    reference: Reference,
+    inputs: Mapping[Path, Input] | None = None,
+    *,
+    nested: bool = False,
+) -> tuple[dict[Path, Array], Solved]:
+    """One natural step of h seconds: the new state, and what solved it (midpoint values)."""
+    solve = solve_nested if nested else solve_flat
+    solved = solve(system, state, Natural(reference, h), inputs or {})
+    states = system.states
+    new = {
+        path: manifold(quantity.space).retract(state[path], h * solved.rates[path])
+        for path, quantity in states.items()
+    }
+    return new, solved
+
+
+def newton(residual: Callable[[Array], Array], z: Array, *, iterations: int = 30) -> tuple[Array, float]:
+    """Newton's method with differenced Jacobian and least-norm steps, run to stagnation.
+
+    Returns the best point and the largest entry of its residual. The Jacobian's error slows the last digits by a
+    factor of about 1e-7 a step and limits nothing.
+    """
+    r = residual(z)
+    best = float(np.abs(r).max(initial=0.0))
+    for _ in range(iterations):
+        jacobian = np.empty((r.size, z.size))
+        for i in range(z.size):
+            delta = 1e-6 * max(1.0, abs(float(z[i])))
+            up, down = z.copy(), z.copy()
+            up[i] += delta
+            down[i] -= delta
+            jacobian[:, i] = (residual(up) - residual(down)) / (2.0 * delta)
+        new = z - np.linalg.lstsq(jacobian, r, rcond=1e-9)[0]
+        r_new = residual(new)
+        error = float(np.abs(r_new).max(initial=0.0))
+        if not error < best:
+            return (z, best)
+        z, r, progress, best = new, r_new, error / best, error
+        if error == 0.0 or (progress > 0.5 and error < 1e-12):
+            break
+    return z, best

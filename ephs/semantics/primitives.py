@@ -1,0 +1,277 @@
+"""The kinds of primitive system: storage, environment, reversible, irreversible.
+
+A primitive *is* its structure as data (an energy, a Dirac structure, an Onsager structure). Flows, efforts,
+checks, the discrete relation and the compiled kernel all derive from that one object.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Literal, final
+
+import numpy as np
+
+from ephs.operad import Directory, Interface, Path, Pattern, PortType, Quantity
+from ephs.semantics.bundle import Array, Bundle, Reference
+from ephs.semantics.errors import StructureError
+from ephs.semantics.spaces import manifold
+
+__all__ = ["Irreversible", "Kernel", "Point", "Primitive", "Reversible", "Storage"]
+
+Point = Mapping[Path, Array]
+"""States of the ports that a primitive reads: port -> (size,)."""
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Kernel:
+    """Names the compiled counterpart of a primitive's discrete relation: a function in a module, and its numbers."""
+
+    module: str
+    name: str
+    parameters: tuple[float, ...] = ()
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Storage:
+    """Storage of energy: x = ξ, f = ξ̇, e = dH(ξ) with the exergy H = E − θ₀ Σs + π₀ Σv.
+
+    Parameters
+    ----------
+    name
+        The type's name, e.g. ``"spring"``.
+    interface
+        Power ports only; the states live at them.
+    energy
+        E(x) in J, from the ports' states, up to a constant.
+    gradient
+        dE(x), left-trivialised, (n,) in the ports' order; by differences of the energy where None.
+    discrete_gradient
+        ∇̄E(x⁰, v) with ⟨∇̄E|v⟩ = E(x⁰·exp v) − E(x⁰) exactly, symmetric in the two states, (n,). Where None:
+        the gradient at the midpoint, corrected along v (Gonzalez).
+    parameters
+        Names and numbers, for printing and comparison.
+    environment
+        True for the reference environment: H ≡ 0 and e = 0; the state still integrates the flow.
+    """
+
+    name: str
+    interface: Interface
+    energy: Callable[[Point], float] = field(compare=False)
+    gradient: Callable[[Point], Array] | None = field(default=None, compare=False)
+    discrete_gradient: Callable[[Point, Array], Array] | None = field(default=None, compare=False)
+    parameters: tuple[tuple[str, object], ...] = ()
+    environment: bool = False
+    kernel: Kernel | None = field(default=None, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        for port, port_type in self.interface.items():
+            if not port_type.power:
+                raise StructureError("storage-ports", self.name, found=str(port))
+        from ephs.semantics.checks import check_storage
+
+        check_storage(self)
+
+    @property
+    def kind(self) -> Literal["storage", "environment"]:
+        """Which of the kinds of primitive this is."""
+        return "environment" if self.environment else "storage"
+
+    @property
+    def bundle(self) -> Bundle:
+        """The layout of the fibre."""
+        return Bundle.of(self.interface)
+
+    @property
+    def reads(self) -> tuple[Path, ...]:
+        """The ports whose states enter: a storage's own."""
+        return self.bundle.ports
+
+    def retract(self, x: Point, v: Array) -> dict[Path, Array]:
+        """The state x·exp(v), port by port; v (n,) in the fibre's layout."""
+        return {p: manifold(q.space).retract(x[p], v[where]) for p, where, q in self.bundle.items()}
+
+    def energy_gradient(self, x: Point) -> Array:
+        """dE(x), left-trivialised, (n,)."""
+        if self.gradient is not None:
+            return np.asarray(self.gradient(x), dtype=float)
+        return _differences(self, x)
+
+    def effort(self, x: Point, reference: Reference) -> Array:
+        """e = dH(x), (n,); zero for the environment."""
+        if self.environment:
+            return np.zeros(self.bundle.size)
+        return self.energy_gradient(x) - self.bundle.intensive(reference)
+
+    def discrete_effort(self, x0: Point, v: Array, reference: Reference) -> Array:
+        """∇̄H(x⁰, v), (n,): the effort of the natural discretisation over the increment v."""
+        if self.environment:
+            return np.zeros(self.bundle.size)
+        if self.discrete_gradient is not None:
+            gradient = np.asarray(self.discrete_gradient(x0, v), dtype=float)
+        else:
+            gradient = self._gonzalez(x0, v)
+        return gradient - self.bundle.intensive(reference)
+
+    def exergy(self, x: Point, reference: Reference) -> float:
+        """H(x) in J, up to the constant of the energy."""
+        if self.environment:
+            return 0.0
+        states = [float(x[p][0]) * reference.intensive(q) for p, _, q in self.bundle.items() if q.environment]
+        return float(self.energy(x)) - sum(states)
+
+    def total_energy(self, x: Point, reference: Reference) -> float:
+        """E(x) in J; of the environment θ₀ s − π₀ v."""
+        if self.environment:
+            return sum(
+                float(x[p][0]) * reference.intensive(q) for p, _, q in self.bundle.items() if q.environment
+            )
+        return float(self.energy(x))
+
+    def _gonzalez(self, x0: Point, v: Array) -> Array:
+        gradient = self.energy_gradient(self.retract(x0, 0.5 * v))
+        square = float(v @ v)
+        if square < 1e-12:  # the correction is O(|v|²) and its numerator is all rounding
+            return gradient
+        defect = float(self.energy(self.retract(x0, v))) - float(self.energy(x0)) - float(gradient @ v)
+        return gradient + (defect / square) * v
+
+    def compose(self, pattern: Pattern, fillings: "Mapping[Path, object]") -> object:
+        """Fill the boxes of a pattern: gives a System."""
+        from ephs.semantics.system import System
+
+        return System.fill(pattern, fillings)
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Reversible:
+    """Reversible exchange of energy: the Dirac structure f = L(x) e + C(x)ᵀ λ, 0 = C(x) e.
+
+    A gyrator has no C, a constraint no L, a transformer is the constraint C = [−g(x), 1] (its λ is f₂).
+
+    Parameters
+    ----------
+    structure
+        (L (n, n), C (k, n)) from the states of the ports in ``reads``.
+    discrete
+        (C_h (k, n), F (k,)) from (h, x⁰, increments of the read states, e): the discrete constraint, with
+        C_h e = F, used in place of C at the midpoint.
+    """
+
+    name: str
+    interface: Interface
+    structure: Callable[[Point], tuple[Array, Array]] = field(compare=False)
+    reads: tuple[Path, ...] = ()
+    discrete: Callable[[float, Point, Point, Array], tuple[Array, Array]] | None = field(
+        default=None, compare=False
+    )
+    parameters: tuple[tuple[str, object], ...] = ()
+    multipliers: int = 0
+    kernel: Kernel | None = field(default=None, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        from ephs.semantics.checks import check_reversible
+
+        check_reversible(self)
+
+    @property
+    def kind(self) -> Literal["reversible"]:
+        """Which of the kinds of primitive this is."""
+        return "reversible"
+
+    @property
+    def bundle(self) -> Bundle:
+        """The layout of the fibre."""
+        return Bundle.of(self.interface)
+
+    def compose(self, pattern: Pattern, fillings: "Mapping[Path, object]") -> object:
+        """Fill the boxes of a pattern: gives a System."""
+        from ephs.semantics.system import System
+
+        return System.fill(pattern, fillings)
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Irreversible:
+    """Irreversible process: f = M(x, e) e / θ₀ with M symmetric, non-negative and M eᴱ = 0.
+
+    Parameters
+    ----------
+    matrix
+        M (n, n) in the units of θ₀·f/e, from (states of ``reads``, e (n,), reference).
+    """
+
+    name: str
+    interface: Interface
+    matrix: Callable[[Point, Array, Reference], Array] = field(compare=False)
+    reads: tuple[Path, ...] = ()
+    parameters: tuple[tuple[str, object], ...] = ()
+    kernel: Kernel | None = field(default=None, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        from ephs.semantics.checks import check_irreversible
+
+        check_irreversible(self)
+
+    @property
+    def kind(self) -> Literal["irreversible"]:
+        """Which of the kinds of primitive this is."""
+        return "irreversible"
+
+    @property
+    def bundle(self) -> Bundle:
+        """The layout of the fibre."""
+        return Bundle.of(self.interface)
+
+    def flow(self, x: Point, e: Array, reference: Reference) -> Array:
+        """f = M(x, e) e / θ₀, (n,)."""
+        self.require_temperature(e, reference)
+        return self.matrix(x, e, reference) @ e / reference.temperature
+
+    def require_temperature(self, e: Array, reference: Reference) -> None:
+        """Refuse an absolute temperature θ₀ + e_s that is not positive."""
+        for _, where, quantity in self.bundle.items():
+            if quantity.kind == "entropy" and not reference.temperature + e[where][0] > 0.0:
+                raise StructureError(
+                    "temperature", self.name, found=float(reference.temperature + e[where][0])
+                )
+
+    def compose(self, pattern: Pattern, fillings: "Mapping[Path, object]") -> object:
+        """Fill the boxes of a pattern: gives a System."""
+        from ephs.semantics.system import System
+
+        return System.fill(pattern, fillings)
+
+
+Primitive = Storage | Reversible | Irreversible
+
+
+def power_ports(**ports: Quantity) -> Interface:
+    """An interface of power ports only."""
+    return Directory({name: PortType(quantity, True) for name, quantity in ports.items()})
+
+
+def midpoint(primitive: Primitive, x0: Point, v: Point) -> dict[Path, Array]:
+    """The states x⁰·exp(v/2) of the ports that a primitive reads."""
+    return {
+        port: manifold(primitive.interface[port].quantity.space).retract(x0[port], 0.5 * v[port])
+        for port in primitive.reads
+    }
+
+
+def _differences(storage: Storage, x: Point) -> Array:
+    """dE by central differences of fourth order, in the trivialised directions: good to about 1e-12 of E's scale."""
+    bundle = storage.bundle
+    out = np.zeros(bundle.size)
+    for i in range(bundle.size):
+        step = np.zeros(bundle.size)
+        step[i] = 1e-3
+        near, far = (
+            float(storage.energy(storage.retract(x, k * step)))
+            - float(storage.energy(storage.retract(x, -k * step)))
+            for k in (1.0, 2.0)
+        )
+        out[i] = (8.0 * near - far) / 12e-3
+    return out

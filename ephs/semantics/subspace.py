@@ -1,0 +1,96 @@
+"""Linear subspaces of ℝⁿ with the operations that relations need, by orthonormal bases.
+
+Rank is decided relative to the largest singular value, after each row of a kernel was brought to unit length:
+this suits an oracle that compares relations, not an integrator.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from ephs.semantics.bundle import Array
+
+__all__ = ["RANK_TOLERANCE", "Subspace"]
+
+RANK_TOLERANCE = 1e-10
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Subspace:
+    """A subspace of ℝⁿ.
+
+    Parameters
+    ----------
+    basis
+        (n, r), orthonormal columns.
+    """
+
+    basis: Array
+
+    @staticmethod
+    def from_kernel(matrix: Array) -> "Subspace":
+        """{z : matrix z = 0}; matrix (m, n)."""
+        n = matrix.shape[1]
+        norms = np.linalg.norm(matrix, axis=1) if matrix.size else np.zeros(0)
+        rows = matrix[norms > 0.0] / norms[norms > 0.0, None] if matrix.size else matrix[:0]
+        if not rows.size:
+            return Subspace(np.eye(n))
+        _, sigma, vt = np.linalg.svd(rows, full_matrices=True)
+        rank = int(np.sum(sigma > RANK_TOLERANCE * sigma[0]))
+        return Subspace(np.ascontiguousarray(vt[rank:].T))
+
+    @staticmethod
+    def from_span(vectors: Array) -> "Subspace":
+        """The span of the columns of vectors (n, r)."""
+        if not vectors.size:
+            return Subspace(np.zeros((vectors.shape[0], 0)))
+        u, sigma, _ = np.linalg.svd(vectors, full_matrices=False)
+        rank = int(np.sum(sigma > RANK_TOLERANCE * max(sigma[0], 1e-300)))
+        return Subspace(np.ascontiguousarray(u[:, :rank]))
+
+    @property
+    def ambient(self) -> int:
+        """n, the dimension of the space around."""
+        return int(self.basis.shape[0])
+
+    @property
+    def dimension(self) -> int:
+        """r, the dimension of the subspace."""
+        return int(self.basis.shape[1])
+
+    @property
+    def projector(self) -> Array:
+        """The orthogonal projector, (n, n)."""
+        return self.basis @ self.basis.T
+
+    def project(self, kept: Iterable[int]) -> "Subspace":
+        """Keep some coordinates: ∃ the others. The rank is decided on an orthonormal basis, so it is well scaled."""
+        return Subspace.from_span(self.basis[list(kept), :])
+
+    def restrict(self, matrix: Array) -> "Subspace":
+        """The vectors of this subspace which also satisfy matrix z = 0."""
+        coefficients = Subspace.from_kernel(matrix @ self.basis)
+        return Subspace(self.basis @ coefficients.basis)
+
+    def image(self, matrix: Array) -> "Subspace":
+        """The image under a linear map, (m, n)."""
+        return Subspace.from_span(matrix @ self.basis)
+
+    def direct_sum(self, other: "Subspace") -> "Subspace":
+        """Side by side in ℝⁿ⁺ᵐ."""
+        (n, r), (m, s) = self.basis.shape, other.basis.shape
+        return Subspace(np.block([[self.basis, np.zeros((n, s))], [np.zeros((m, r)), other.basis]]))
+
+    def distance(self, other: "Subspace") -> float:
+        """Largest entry of the difference of the orthogonal projectors: 0 if equal, of order 1 if not."""
+        if self.ambient != other.ambient:
+            raise ValueError(f"subspaces of ℝ^{self.ambient} and ℝ^{other.ambient} cannot be compared")
+        return float(np.abs(self.projector - other.projector).max(initial=0.0))
+
+    def contains(self, vector: Array) -> float:
+        """Distance of a vector from the subspace, relative to its length."""
+        off = vector - self.basis @ (self.basis.T @ vector)
+        return float(np.linalg.norm(off) / max(np.linalg.norm(vector), 1e-300))

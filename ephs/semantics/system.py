@@ -1,0 +1,213 @@
+"""Systems: patterns whose boxes are filled, down to primitives.
+
+A system carries its states: isolated composites have no ports, and equality of relations on ports would be vacuous.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, final
+
+import numpy as np
+
+from ephs.operad import ROOT, Directory, Interface, Path, Pattern, Quantity
+from ephs.semantics.bundle import Array, Reference
+from ephs.semantics.errors import AssemblyError, SemanticsError
+from ephs.semantics.primitives import Irreversible, Primitive, Reversible, Storage
+from ephs.semantics.spaces import manifold
+
+if TYPE_CHECKING:
+    from ephs.semantics.descriptor import Descriptor
+    from ephs.semantics.relation import Relation
+
+__all__ = ["Filling", "System"]
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class System:
+    """A composite system: a pattern with every box filled by a system or a primitive of the box' interface.
+
+    Parameters
+    ----------
+    pattern
+        How the subsystems are interconnected.
+    fillings
+        Box path -> subsystem.
+
+    Raises
+    ------
+    SemanticsError
+        A box without filling, a filling without box, or an interface that does not match.
+    """
+
+    pattern: Pattern
+    fillings: Directory["Filling"]
+
+    def __post_init__(self) -> None:
+        boxes, given = set(self.pattern.boxes), set(self.fillings)
+        if boxes != given:
+            raise SemanticsError("fillings", ROOT, expected=_names(boxes), found=_names(given))
+        for box, filling in self.fillings.items():
+            wanted = self.pattern.boxes[box].interface
+            if not _same_interface(wanted, filling.interface):
+                found, expected = _describe(filling.interface), _describe(wanted)
+                raise SemanticsError("interface", box, found=found, expected=expected)
+
+    @staticmethod
+    def fill(pattern: Pattern, fillings: Mapping[Path, object]) -> "System":
+        """Fill the boxes of a pattern."""
+        kinds = (System, Storage, Reversible, Irreversible)
+        checked: dict[Path, Filling] = {}
+        for box, filling in fillings.items():
+            if not isinstance(filling, kinds):
+                raise TypeError(
+                    f"{box}: a filling is a System or a primitive, found {type(filling).__name__}"
+                )
+            checked[box] = filling
+        return System(pattern, Directory(checked))
+
+    @staticmethod
+    def of(pattern: Pattern, fillings: Mapping[str, "Filling"] | Mapping[Path, "Filling"]) -> "System":
+        """Fill the boxes of a pattern, given by path or dotted name."""
+        return System(pattern, Directory({Path.of(box): filling for box, filling in fillings.items()}))
+
+    def compose(self, pattern: Pattern, fillings: Mapping[Path, object]) -> "System":
+        """Fill the boxes of a pattern: gives a System."""
+        return System.fill(pattern, fillings)
+
+    @property
+    def kind(self) -> Literal["composite"]:
+        """Which kind of filling this is."""
+        return "composite"
+
+    @property
+    def interface(self) -> Interface:
+        """The ports of the system, named like the exposed junctions."""
+        return self.pattern.interface
+
+    @property
+    def is_flat(self) -> bool:
+        """Whether every box is filled by a primitive."""
+        return not any(isinstance(filling, System) for filling in self.fillings.values())
+
+    def flatten(self) -> "System":
+        """The same system on one level: patterns substituted, primitives under the paths of their boxes."""
+        inner = {box: f.flatten() for box, f in self.fillings.items() if isinstance(f, System)}
+        if not inner:
+            return self
+        leaves: dict[Path, Filling] = {}
+        for box, filling in self.fillings.items():
+            if isinstance(filling, System):
+                leaves.update({box / name: leaf for name, leaf in inner[box].fillings.items()})
+            else:
+                leaves[box] = filling
+        pattern = self.pattern.substitute({box: system.pattern for box, system in inner.items()})
+        return System(pattern, Directory(leaves))
+
+    def leaves(self) -> Iterator[tuple[Path, Primitive]]:
+        """The primitives with their full paths, depth first."""
+        for box, filling in self.fillings.items():
+            if isinstance(filling, System):
+                for path, primitive in filling.leaves():
+                    yield box / path, primitive
+            else:
+                yield box, filling
+
+    @property
+    def states(self) -> Directory[Quantity]:
+        """The states of the storages: path of the component, then its port -> quantity."""
+        return Directory(
+            {
+                path / port: primitive.interface[port].quantity
+                for path, primitive in self.leaves()
+                if isinstance(primitive, Storage)
+                for port in primitive.bundle.ports
+            }
+        )
+
+    def state(self, values: Mapping[str, object] | None = None) -> dict[Path, Array]:
+        """Initial values by path, the others at the identity of their space.
+
+        Raises
+        ------
+        AssemblyError
+            An unknown path, a wrong shape, or a number that is not finite.
+        """
+        states = self.states
+        out = {path: manifold(quantity.space).identity() for path, quantity in states.items()}
+        for name, value in (values or {}).items():
+            path = Path.of(name)
+            if path not in states:
+                raise AssemblyError("unknown-state", name, expected=_names(set(states)))
+            space = states[path].space
+            array = np.atleast_1d(np.asarray(value, dtype=float))
+            if array.shape != (space.size,):
+                raise AssemblyError(
+                    "state", name, found=array.shape, expected=(space.size,), quantity=states[path].kind
+                )
+            if not np.all(np.isfinite(array)):
+                raise AssemblyError(
+                    "state", name, found=array, expected="finite numbers", quantity=states[path].kind
+                )
+            out[path] = manifold(space).normalise(array)
+        return out
+
+    def relation(
+        self, reference: Reference | None = None, *, route: Literal["flat", "nested"] = "flat"
+    ) -> "Relation":
+        """The system's meaning: a relation between the rates of its states and its outer flows and efforts.
+
+        Parameters
+        ----------
+        route
+            ``"flat"`` flattens and assembles one square system of equations; ``"nested"`` composes the relations
+            of the subsystems level by level. They agree: this is what functoriality says.
+        """
+        from ephs.semantics.relation import relation_of
+
+        return relation_of(self, reference or Reference(), route)
+
+    def descriptor(self) -> "Descriptor":
+        """The square descriptor form of the flattened system, assembled without choosing causality."""
+        from ephs.semantics.descriptor import assemble
+
+        return assemble(self.flatten())
+
+    def _repr_svg_(self) -> str:
+        from ephs.show import draw
+
+        return draw(self).svg
+
+    def __str__(self) -> str:
+        lines = [f"System with ports {_describe(self.interface)}"]
+        for box, filling in self.fillings.items():
+            if isinstance(filling, System):
+                lines.append(f"  {box}: " + str(filling).replace("\n", "\n  "))
+            else:
+                values = ", ".join(f"{key}={value}" for key, value in filling.parameters)
+                lines.append(f"  {box}: {filling.name}({values})  [{filling.kind}]")
+        return "\n".join(lines)
+
+
+Filling = System | Storage | Reversible | Irreversible
+
+
+def _same_interface(wanted: Interface, found: Interface) -> bool:
+    if set(wanted) != set(found):
+        return False
+    return all(
+        found[port].power == port_type.power and found[port].quantity.matches(port_type.quantity)
+        for port, port_type in wanted.items()
+    )
+
+
+def _describe(interface: Interface) -> str:
+    ports = (
+        f"{'' if t.power else '~'}{p}: {t.quantity.kind} on {t.quantity.space.name}"
+        for p, t in interface.items()
+    )
+    return "{" + ", ".join(sorted(ports)) + "}"
+
+
+def _names(paths: set[Path]) -> str:
+    return ", ".join(sorted(map(str, paths))) or "none"
