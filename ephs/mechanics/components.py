@@ -1,0 +1,382 @@
+"""The primitives of rigid-body mechanics: what the boxes of bodies, joints and springs are filled with.
+
+Each function makes one primitive, in the plain form that is checked and shown, and names its compiled kernel. Fibres
+are left-trivialised; 6-vectors are (angular, linear). Equations of Lohmayer, Capobianco, Leyendecker, sections 4 and 5.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ephs.operad import Directory, Path, PortType, Quantity, quantity
+from ephs.semantics import library
+from ephs.semantics.bundle import Array
+from ephs.semantics.errors import StructureError
+from ephs.semantics.primitives import Irreversible, Kernel, Point, Reversible, Storage, power_ports
+from ephs.semantics.spaces import SE3, SO3, Pair, codes, manifold, pair
+from ephs.semantics.spaces.rotations import quaternion_to_matrix, rotation_dexp
+
+__all__ = [
+    "frame_change",
+    "gravity",
+    "ground",
+    "holonomic",
+    "joint_friction",
+    "kinematic_coupling",
+    "kinetic",
+    "lie_poisson",
+    "no_potential",
+    "pair_spring",
+    "point_damper",
+    "point_spring",
+    "potential",
+    "thermal_node",
+]
+
+KERNELS = "ephs.mechanics.kernels"
+HOLONOMIC = "ephs.mechanics.holonomic_kernels"
+SPRINGS = "ephs.mechanics.spring_kernels"
+POSES = {"SE3": quantity.pose, "SO3xR3": quantity.direct_pose}
+MOMENTA = {"SE3": quantity.body_momentum, "SO3xR3": quantity.direct_momentum}
+
+
+def kinetic(mass: float, inertia: Array, group: str = "SE3") -> Storage:
+    """Kinetic energy ½⟨p|𝕀⁻¹p⟩ of a rigid body about its centre of mass; port p, its effort is the twist.
+
+    Parameters
+    ----------
+    mass, inertia
+        In kg; (3, 3) in kg m².
+    """
+    whole = np.zeros((6, 6))
+    whole[:3, :3] = inertia
+    whole[3:, 3:] = mass * np.eye(3)
+    inverse = np.linalg.inv(whole)
+    inverse = 0.5 * (inverse + inverse.T)
+    entries = (("mass", float(mass)), ("inertia", tuple(np.asarray(inertia, dtype=float).ravel().tolist())))
+    return library.quadratic("kinetic", power_ports(p=MOMENTA[group]), inverse, entries)
+
+
+def gravity(weight: Array, group: str = "SE3") -> Storage:
+    """Potential ⟨w|r⟩ of a constant force −w on the centre of mass; port q.
+
+    Its discrete gradient (0, (R⁰ V(v_ω))ᵀ w) is exact for r¹ = r⁰ + R⁰ V(v_ω) v_υ.
+
+    Parameters
+    ----------
+    weight
+        (3,) −m g in N, in world axes.
+    """
+    w = np.array(weight, dtype=float)
+    q = Path.of("q")
+    turning = group == "SE3"
+
+    def gradient(x: Point) -> Array:
+        force = quaternion_to_matrix(x[q][:4]).T @ w if turning else w
+        return np.concatenate([np.zeros(3), force])
+
+    def discrete_gradient(x0: Point, v: Array) -> Array:
+        force = rotation_dexp(v[:3]).T @ (quaternion_to_matrix(x0[q][:4]).T @ w) if turning else w
+        return np.concatenate([np.zeros(3), force])
+
+    return Storage(
+        "gravity",
+        power_ports(q=POSES[group]),
+        energy=lambda x: float(w @ x[q][4:]),
+        gradient=gradient,
+        discrete_gradient=discrete_gradient,
+        parameters=(("weight", tuple(w.tolist())),),
+        kernel=Kernel(KERNELS, "gravity" if turning else "direct_gravity", tuple(w.tolist())),
+    )
+
+
+def potential(of: Quantity, port: str, energy: Callable[[Array], float], name: str = "potential") -> Storage:
+    """Any potential, from a Python function of the coordinates: of a pose the 7-vector, of a joint its coordinates."""
+    at = Path.of(port)
+    read = Pair.from_space(of.space).coordinates if of.kind == "relative_pose" else np.array
+    return Storage(
+        name,
+        power_ports(**{port: of}),
+        energy=lambda x: float(energy(read(x[at]))),
+        parameters=(("energy", getattr(energy, "__name__", "function")),),
+    )
+
+
+def no_potential(of: Quantity, port: str) -> Storage:
+    """No energy, yet the state is kept; port as named."""
+    n = of.space.dim
+    return Storage(
+        "no_potential",
+        power_ports(**{port: of}),
+        energy=lambda _x: 0.0,
+        gradient=lambda _x: np.zeros(n),
+        discrete_gradient=lambda _x, _v: np.zeros(n),
+        kernel=Kernel(library.KERNELS, "no_effort"),
+    )
+
+
+def pair_spring(of: Pair, stiffness: Array, rest: Array) -> Storage:
+    """Springs ½ k (coordinate − rest)² on the freedoms of a joint; port q_r.
+
+    Raises
+    ------
+    StructureError
+        A rotation vector whose stiffness is not isotropic, or whose rest is not zero.
+    """
+    k, zero = np.array(stiffness, dtype=float), np.array(rest, dtype=float)
+    at = Path.of("q_r")
+    if of.code in (codes.SO3, codes.SE3):
+        if np.ptp(k[:3]):
+            raise StructureError(
+                "parameter", of.name, key="stiffness", found=k.tolist(), expected="equal for rotations"
+            )
+        if np.any(zero[:3]):
+            raise StructureError(
+                "parameter", of.name, key="rest", found=zero.tolist(), expected="0 for rotations"
+            )
+
+    def energy(x: Point) -> float:
+        off = of.coordinates(x[at]) - zero
+        return 0.5 * float(k @ (off * off))
+
+    turning = 3 if of.code in (codes.SO3, codes.SE3) else 1 if of.code == codes.SE2 else of.dim
+
+    def gradient(x: Point) -> Array:
+        return discrete_gradient(x, np.zeros(of.dim))
+
+    def discrete_gradient(x0: Point, v: Array) -> Array:
+        start, end = x0[at], of.manifold.retract(x0[at], v)
+        mean = 0.5 * (of.coordinates(start) + of.coordinates(end)) - zero
+        pull = k * mean
+        if of.code in (codes.SO3, codes.SE3):
+            pull[:3] = k[0] * _rotation_mean(start[:4], v[:3])
+        pull[turning:] = _mean_turn(of, start, v).T @ pull[turning:]
+        return pull
+
+    return Storage(
+        "pair_spring",
+        power_ports(q_r=_relative(of)),
+        energy,
+        gradient,
+        discrete_gradient,
+        (("stiffness", tuple(k.tolist())), ("rest", tuple(zero.tolist()))),
+        kernel=Kernel(SPRINGS, "coordinate_spring", (float(of.code), *k.tolist(), *zero.tolist())),
+    )
+
+
+def _mean_turn(of: Pair, start: Array, v: Array) -> Array:
+    """The mean over a step of the rotation by which distances are trivialised: displacement = mean · v."""
+    if of.code == codes.SE3:
+        return quaternion_to_matrix(start[:4]) @ rotation_dexp(v[:3])
+    if of.code == codes.SE2:
+        half = 0.5 * float(v[0])
+        c, s, mean = np.cos(start[0] + half), np.sin(start[0] + half), np.sinc(half / np.pi)
+        return mean * np.array([[c, -s], [s, c]])
+    return np.zeros((0, 0))
+
+
+def _rotation_mean(start: Array, v: Array) -> Array:
+    """The discrete gradient of ½ θ² of a rotation: ω at the middle, corrected along v without cancellation."""
+    middle = SO3.retract(start, 0.5 * v)
+    omega = SO3.log(middle)
+    square = float(v @ v)
+    if square == 0.0:
+        return omega
+    cos, change = (
+        np.cos(0.25 * np.sqrt(square)),
+        float(middle[1:] @ v) * 0.25 * np.sinc(0.25 * np.sqrt(square) / np.pi),
+    )
+    last, first = (
+        2.0 * np.arctan2(np.sqrt(max(0.0, 1.0 - w * w)), w)
+        for w in (cos * middle[0] - change, cos * middle[0] + change)
+    )
+    between = np.sin(0.25 * (first + last))
+    rise = 4.0 * np.arcsin(np.clip(change / between, -1.0, 1.0)) if between > 0.0 else 0.0
+    return omega + (0.5 * (first + last) * rise - float(omega @ v)) / square * v
+
+
+def kinematic_coupling(q: Quantity, p: Quantity, q_port: str, p_port: str) -> Reversible:
+    """q.f = −p.e, p.f = q.e, trivialised; ports as named."""
+    return library.coupling("pkc", power_ports(**{q_port: q, p_port: p}))
+
+
+def lie_poisson(group: str = "SE3") -> Reversible:
+    """Gyroscopic forces p.f = −ad*_{p.e} p.x; port p, whose state it reads."""
+    p = Path.of("p")
+    space = manifold(POSES[group].space)
+
+    def structure(x: Point) -> tuple[Array, Array]:
+        columns = [-space.ad(unit).T @ x[p] for unit in np.eye(6)]
+        return np.array(columns).T, np.zeros((0, 6))
+
+    name = "lie_poisson" if group == "SE3" else "direct_lie_poisson"
+    return Reversible(
+        "lie_poisson", power_ports(p=MOMENTA[group]), structure, reads=(p,), kernel=Kernel(KERNELS, name)
+    )
+
+
+def frame_change(offset: Array, inner: str, outer: str) -> Reversible:
+    """Momentum carried from a body's frame (port ``outer``) to a joint frame (port ``inner``) at a constant offset o.
+
+    inner.e = Ad_{o⁻¹} outer.e, outer.f = −Ad*_{o⁻¹} inner.f.
+    """
+    carried = SE3.adjoint(SE3.inverse(np.asarray(offset, dtype=float)))
+    interface = power_ports(**{outer: quantity.body_momentum, inner: quantity.body_momentum})
+    parameters = (("offset", tuple(np.asarray(offset, dtype=float).tolist())),)
+    constraint = np.hstack([-carried, np.eye(6)])
+    return library.constant_structure("frame_change", interface, np.zeros((12, 12)), constraint, parameters)
+
+
+def holonomic(of: Pair) -> Reversible:
+    """The joint's relation: f = C*λ, 0 = C e, C = [Ad_{I(q_r)⁻¹}, −1, B]; ports p_j1, p_j2, p_r, state port q_r.
+
+    λ is the wrench of body 1 on body 2 in the frame C2, p_r.e the twist of C2 relative to C1 in the axes of C2. Over a
+    step it holds on the group: q_1 o_1 I(q_r) = q_2 o_2 stays true exactly.
+    """
+    q_r = Path.of("q_r")
+    n, d = 12 + of.dim, of.dim
+    interface = Directory(
+        {
+            "p_j1": PortType(quantity.body_momentum, True),
+            "p_j2": PortType(quantity.body_momentum, True),
+            "p_r": PortType(_joint_momentum(of), True),
+            "q_r": PortType(_relative(of), False),
+        }
+    )
+
+    def constraint(pose: Array) -> Array:
+        return np.hstack([SE3.adjoint(SE3.inverse(pose)), -np.eye(6), of.basis])
+
+    def structure(x: Point) -> tuple[Array, Array]:
+        return np.zeros((n, n)), constraint(of.include(x[q_r]))
+
+    def discrete(h: float, x0: Point, v: Point, e: Array) -> tuple[Array, Array]:
+        middle = constraint(of.include(of.manifold.retract(x0[q_r], 0.5 * v[q_r])))
+        along = [-0.5 * h * e[6:12], 0.5 * h * of.basis @ e[12:], h * middle[:, :6] @ e[:6]]
+        if any(w[:3] @ w[:3] >= np.pi**2 for w in along):
+            raise StructureError("rotation", of.name)
+        side, half, inner = (SE3.exp(w) for w in along)
+        around = side
+        for factor in (half, inner, half, side):
+            around = SE3.compose(around, factor)
+        residual = SE3.log(around) / h
+        square = float(e @ e)
+        if square <= 1e-280:  # only to keep the quotient from overflowing
+            return middle, residual
+        return middle + np.outer(residual - middle @ e, e) / square, residual
+
+    kernel = Kernel(HOLONOMIC, "holonomic", (float(of.code), *of.basis.reshape(6, d).ravel().tolist()))
+    parameters = (("pair", of.name), *of.parameters)
+    return Reversible("holonomic", interface, structure, (q_r,), discrete, parameters, 6, kernel)
+
+
+def joint_friction(
+    of: Pair, mu: Array | Callable[[Array, Array, float], Array], name: str = "joint_friction"
+) -> Irreversible:
+    """Friction p_r.f = μ u_r of a joint, s.f = −μ(u_r, u_r)/θ; ports p_r, s.
+
+    Parameters
+    ----------
+    mu
+        (d, d) symmetric and non-negative, or a Python function of (coordinates, u_r, θ), which reads q_r.
+    """
+    ports = {"p_r": PortType(_joint_momentum(of), True), "s": PortType(quantity.entropy, True)}
+    if not callable(mu):
+        matrix = np.array(mu, dtype=float).reshape(of.dim, of.dim)
+        entries = (("mu", tuple(matrix.ravel().tolist())),)
+        return library.dissipation(name, Directory(ports), matrix, parameters=entries)
+    q_r = Path.of("q_r")
+    resistance = mu
+    ports["q_r"] = PortType(_relative(of), False)
+    return library.dissipation(
+        name,
+        Directory(ports),
+        lambda x, u, theta: np.asarray(resistance(of.coordinates(x[q_r]), u, theta), dtype=float).reshape(
+            of.dim, of.dim
+        ),
+        reads=(q_r,),
+        parameters=(("mu", getattr(mu, "__name__", "function")),),
+    )
+
+
+def point_spring(stiffness: float, length: float) -> Storage:
+    """½ k (|r| − L)² between the origins of two frames; port q_r of the free pair, k in N/m, L in m.
+
+    The discrete gradient is that of k/2 (|r| − L)² as a function of |r|², along the chord of r.
+    """
+    q_r = Path.of("q_r")
+
+    def energy(x: Point) -> float:
+        return 0.5 * stiffness * (float(np.linalg.norm(x[q_r][4:])) - length) ** 2
+
+    def pull(rotation: Array, mean: Array, lengths: float) -> Array:
+        if not lengths > 0.0:
+            raise StructureError("parameter", "point_spring", key="distance", found=0.0, expected="> 0")
+        return rotation.T @ (stiffness * (1.0 - 2.0 * length / lengths) * mean)
+
+    def gradient(x: Point) -> Array:
+        r = x[q_r][4:]
+        force = pull(quaternion_to_matrix(x[q_r][:4]), r, 2.0 * float(np.linalg.norm(r)))
+        return np.concatenate([np.zeros(3), force])
+
+    def discrete_gradient(x0: Point, v: Array) -> Array:
+        r0, r1 = x0[q_r][4:], SE3.retract(x0[q_r], v)[4:]
+        rotation = quaternion_to_matrix(x0[q_r][:4]) @ rotation_dexp(v[:3])
+        lengths = float(np.linalg.norm(r0) + np.linalg.norm(r1))
+        return np.concatenate([np.zeros(3), pull(rotation, 0.5 * (r0 + r1), lengths)])
+
+    return Storage(
+        "point_spring",
+        power_ports(q_r=_relative(pair("free"))),
+        energy,
+        gradient,
+        discrete_gradient,
+        (("stiffness", stiffness), ("length", length)),
+        kernel=Kernel(SPRINGS, "point_spring", (stiffness, length)),
+    )
+
+
+def point_damper(damping: float) -> Irreversible:
+    """Damping of the distance of two points, μ(q_r) = c n nᵀ with n = (0, Rᵀ r/|r|); ports p_r, s, reads q_r.
+
+    c in N s/m.
+    """
+    free = pair("free")
+    q_r = Path.of("q_r")
+    ports = {
+        "p_r": PortType(_joint_momentum(free), True),
+        "s": PortType(quantity.entropy, True),
+        "q_r": PortType(_relative(free), False),
+    }
+
+    def resistance(x: Point, _u: Array, _theta: float) -> Array:
+        r = x[q_r][4:]
+        axis = quaternion_to_matrix(x[q_r][:4]).T @ (r / np.linalg.norm(r))
+        n = np.concatenate([np.zeros(3), axis])
+        return damping * np.outer(n, n)
+
+    kernel = Kernel(SPRINGS, "point_damper", (damping,))
+    entries = (("damping", damping),)
+    return library.dissipation(
+        "point_damper", Directory(ports), resistance, reads=(q_r,), kernel=kernel, parameters=entries
+    )
+
+
+def ground(of: Quantity = quantity.body_momentum) -> Reversible:
+    """A frame that stands still: e = 0, f = λ; port p."""
+    n = of.space.dim
+    return library.constant_structure("ground", power_ports(p=of), np.zeros((n, n)), np.eye(n))
+
+
+def thermal_node(capacity: float, temperature: float) -> Storage:
+    """Heat capacity C from temperature T₀ at s = 0: E = C T₀ (exp(s/C) − 1); port s. C in J/K, T₀ in K."""
+    entries = (("capacity", float(capacity)), ("temperature", float(temperature)))
+    return library.exponential("thermal_node", capacity * temperature, capacity, entries)
+
+
+def _relative(of: Pair) -> Quantity:
+    return quantity.relative_pose(of.name, **dict(of.parameters))
+
+
+def _joint_momentum(of: Pair) -> Quantity:
+    return quantity.joint_momentum(of.name, **dict(of.parameters))

@@ -1,0 +1,423 @@
+"""How a solution reads as mechanics: poses, velocities and joints of a scene, for all instants at once.
+
+Velocities are those of the continuous relations: the stored momenta projected on the joints in the mass metric.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, final
+
+import numpy as np
+
+from ephs.mechanics.build import component_path
+from ephs.mechanics.scene.geometry import Coupling, coupling_of
+from ephs.mechanics.scene.model import GROUND, Joint, Scene
+from ephs.mechanics.solve.instant import instant, mobility
+from ephs.operad import Path
+from ephs.semantics.bundle import Array
+from ephs.semantics.spaces import SE3, Pair
+
+if TYPE_CHECKING:
+    from ephs.mechanics.solve.solution import Solution
+
+__all__ = ["BodyMotion", "JointMotion", "SceneMotion", "ThermalMotion"]
+
+RANK = 1e-9
+"""Singular values of the joint equations in the mass metric below this fraction of the largest count as zero."""
+CHUNK = 512
+"""Instants that are projected together; bounds the memory."""
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class ThermalMotion:
+    """A thermal node: temperature in K, entropy in J/K since the start; (n,) each."""
+
+    temperature: Array
+    entropy: Array
+
+
+@final
+class BodyMotion:
+    """The motion of a body.
+
+    Attributes
+    ----------
+    position
+        (n, 3) centre of mass in the world, in m.
+    quaternion, rotation
+        (n, 4) and (n, 3, 3), body to world.
+    velocity
+        (n, 3) of the centre of mass in the world basis, in m/s.
+    angular_velocity
+        (n, 3) in the body basis, in rad/s.
+    """
+
+    def __init__(self, motion: "SceneMotion", name: str) -> None:
+        self._motion, self._name = motion, name
+        pose = motion.poses(name)
+        self.quaternion, self.position = pose[:, :4], pose[:, 4:]
+
+    @cached_property
+    def rotation(self) -> Array:
+        """(n, 3, 3), body to world."""
+        return rotations(self.quaternion)
+
+    @cached_property
+    def twist(self) -> Array:
+        """(n, 6) angular and linear velocity in the body frame."""
+        return self._motion.twists[self._name]
+
+    @property
+    def velocity(self) -> Array:
+        """(n, 3) of the centre of mass in the world basis, in m/s."""
+        return np.einsum("nij,nj->ni", self.rotation, self.twist[:, 3:])
+
+    @property
+    def angular_velocity(self) -> Array:
+        """(n, 3) in the body basis, in rad/s."""
+        return self.twist[:, :3]
+
+
+@final
+class JointMotion:
+    """The motion of a joint.
+
+    Attributes
+    ----------
+    coordinate, rate
+        (n, d) coordinates of C2 in C1, and the twist u_r; m, rad, seconds.
+    wrench
+        (n, 6) λ on body 2 in the joint frame C2 (moment, force), NaN where statically indeterminate.
+    """
+
+    def __init__(self, motion: "SceneMotion", name: str, coordinate: Array) -> None:
+        self._motion, self._name, self.coordinate = motion, name, coordinate
+
+    @property
+    def rate(self) -> Array:
+        """(n, d) the twist u_r, in the axes of C2."""
+        return self._motion.rates[self._name]
+
+    @cached_property
+    def wrench(self) -> Array:
+        """(n, 6) λ on body 2 in the joint frame C2 (moment, force), NaN where statically indeterminate."""
+        return self._motion.wrench(self._name)
+
+
+@final
+class SceneMotion:
+    """The motion of a scene, read from a solution."""
+
+    def __init__(self, scene: Scene, solution: "Solution") -> None:
+        self._scene, self._solution = scene, solution
+        self._bodies = dict(scene.all_bodies())
+        self._joints = dict(scene.all_joints())
+        self._implicit = dict(scene.implicit_joints())
+        problem = solution.problem
+        self._quantities = {} if problem is None else {s.path: s.quantity for s in problem.descriptor.states}
+        self._couplings = {name: coupling_of(joint) for name, joint in self._joints.items()}
+
+    # ---- reading -----------------------------------------------------------------------------------------------
+
+    def body(self, name: str) -> BodyMotion:
+        """The motion of a body."""
+        self._scene.body(name)
+        return BodyMotion(self, name)
+
+    def joint(self, name: str) -> JointMotion:
+        """The motion of a joint, or of a body's implicit free joint."""
+        joint = self._scene.joint(name)
+        if name in self._implicit:
+            pair = coupling_of(joint).pair
+            coordinate = np.array([pair.coordinates(row) for row in self.poses(name)]).reshape(-1, pair.dim)
+            return JointMotion(self, name, coordinate)
+        return JointMotion(self, name, self._coordinates(name))
+
+    def thermal(self, name: str) -> ThermalMotion:
+        """The temperature of a thermal node."""
+        nodes = dict(self._scene.all_thermal())
+        if name not in nodes:
+            raise KeyError(f"{name}: no such thermal node; the nodes are {', '.join(nodes) or 'none'}")
+        node = nodes[name]
+        s = self._solution[component_path("thermal", name) / "s"]
+        return ThermalMotion(node.temperature * np.exp(s / node.capacity), s)
+
+    def poses(self, name: str) -> Array:
+        """(n, 7) of a body, or of the ground."""
+        if name == GROUND:
+            return np.tile(SE3.identity(), (len(self._solution), 1))
+        return self._solution[component_path("bodies", name) / "pe" / "q"]
+
+    def _coordinates(self, name: str) -> Array:
+        at = component_path("joints", name)
+        if self._joints[name].middle is not None:
+            parts = [self._solution[at / part / "pe" / "q_r"] for part in ("first", "second")]
+            return np.column_stack(parts)
+        return self._solution[at / "pe" / "q_r"].reshape(len(self._solution), self._couplings[name].dim)
+
+    # ---- residuals ---------------------------------------------------------------------------------------------
+
+    def constraint_error(self) -> Array:
+        """(n,) largest distance or angle between where a joint's coordinates and its bodies put the frame C2."""
+        worst = np.zeros(len(self._solution))
+        for name, joint in self._joints.items():
+            first = compose(self._frame(joint.body1, joint.frame1), self._inclusion(name))
+            gap = compose(inverse(self._frame(joint.body2, joint.frame2)), first)
+            angle = 2.0 * np.linalg.norm(gap[:, 1:4], axis=1)  # small angles; half turns still show
+            worst = np.maximum(worst, np.maximum(angle, np.linalg.norm(gap[:, 4:], axis=1)))
+        return worst
+
+    def velocity_error(self) -> Array:
+        """(n,) largest component of any joint's velocity residual."""
+        worst = np.zeros(len(self._solution))
+        for at, name, first, second, basis in self._rows():
+            joint = self._joints[name]
+            residual = np.zeros((first.shape[0], 6))
+            for body, rows in ((joint.body1, first), (joint.body2, second)):
+                if body != GROUND:
+                    residual += np.einsum("nij,nj->ni", rows, self.twists[body][at])
+            residual += np.einsum("nij,nj->ni", basis, self.rates[name][at])
+            worst[at] = np.maximum(worst[at], np.abs(residual).max(axis=1))
+        return worst
+
+    # ---- velocities --------------------------------------------------------------------------------------------
+
+    @property
+    def twists(self) -> dict[str, Array]:
+        """(n, 6) by body."""
+        return self._projected[0]
+
+    @property
+    def rates(self) -> dict[str, Array]:
+        """(n, d) by joint, implicit free joints included."""
+        return self._projected[1]
+
+    @cached_property
+    def _projected(self) -> tuple[dict[str, Array], dict[str, Array]]:
+        """Twists nearest to the stored momenta in the mass metric that satisfy the joints, and the joints' rates."""
+        n = len(self._solution)
+        heavy = [name for name, body in self._bodies.items() if body.mass > 0.0]
+        light = [name for name, body in self._bodies.items() if not body.mass > 0.0]
+        twists = {name: np.zeros((n, 6)) for name in self._bodies}
+        rates = {name: np.zeros((n, c.dim)) for name, c in self._couplings.items()}
+        root: dict[str, Array] = {}
+        for name in heavy:
+            body = self._bodies[name]
+            p = self._solution[component_path("bodies", name) / "ke" / "p"]
+            twists[name] = np.column_stack(
+                [np.linalg.solve(body.inertia, p[:, :3].T).T, p[:, 3:] / body.mass]
+            )
+            sigma, vectors = np.linalg.eigh(body.inertia)
+            half = np.zeros((6, 6))
+            half[:3, :3] = (vectors / np.sqrt(sigma)) @ vectors.T
+            half[3:, 3:] = np.eye(3) / np.sqrt(body.mass)
+            root[name] = half
+        columns = {name: 6 * i for i, name in enumerate(heavy)}
+        free: dict[str, int] = {}
+        width = 0
+        for name in [*light, *rates]:
+            free[name], width = width, width + (6 if name in light else self._couplings[name].dim)
+        for at in self._chunks():
+            size = at.stop - at.start
+            rows = 6 * len(self._joints) + sum(j.motion is not None for j in self._joints.values())
+            known, unknown = np.zeros((size, rows, 6 * len(heavy))), np.zeros((size, rows, width))
+            right = np.zeros((size, rows))
+            row = 0
+            for name, first, second, basis in self._joint_rows(at):
+                joint = self._joints[name]
+                for body, block in ((joint.body1, first), (joint.body2, second)):
+                    if body in columns:
+                        known[:, row : row + 6, columns[body] : columns[body] + 6] += block
+                    elif body != GROUND:
+                        unknown[:, row : row + 6, free[body] : free[body] + 6] += block
+                unknown[:, row : row + 6, free[name] : free[name] + self._couplings[name].dim] = basis
+                row += 6
+                if joint.motion is not None:
+                    unknown[:, row, free[name]] = 1.0
+                    right[:, row] = joint.motion
+                    row += 1
+            stacked = np.column_stack([twists[name][at] for name in heavy]) if heavy else np.zeros((size, 0))
+            u, rest = _project(known, unknown, right, stacked, [root[name] for name in heavy])
+            for name in heavy:
+                twists[name][at] = u[:, columns[name] : columns[name] + 6]
+            for name in light:
+                twists[name][at] = rest[:, free[name] : free[name] + 6]
+            for name in rates:
+                rates[name][at] = rest[:, free[name] : free[name] + self._couplings[name].dim]
+        for name in self._implicit:
+            rates[name] = twists[name]
+        return twists, rates
+
+    def wrench(self, name: str) -> Array:
+        """(n, 6) of a joint; see `JointMotion`."""
+        if name in self._implicit:
+            return np.zeros((len(self._solution), 6))
+        problem = self._solution.problem
+        assert problem is not None  # a motion is made for a problem
+        d = problem.descriptor
+        at = component_path("joints", name)
+        # of a universal joint, the second revolute is the one whose frame C2 lies in body 2
+        box = at / "second" / "hc" if self._joints[name].middle is not None else at / "hc"
+        out = np.empty((len(self._solution), 6))
+        for i in range(len(self._solution)):
+            state = {slot.path: self._raw(slot.path, i) for slot in d.states}
+            for body in self._bodies:
+                if self._bodies[body].mass > 0.0:
+                    state[component_path("bodies", body) / "ke" / "p"] = self._momentum(body, i)
+            inputs = problem.inputs(float(self._solution.t[i]), state)
+            out[i] = instant(d, problem.reference, d.pack(state), inputs).multiplier(box)
+        return out
+
+    def _momentum(self, body: str, i: int) -> Array:
+        u, b = self.twists[body][i], self._bodies[body]
+        return np.concatenate([b.inertia @ u[:3], b.mass * u[3:]])
+
+    def _raw(self, path: Path, i: int) -> Array:
+        value = np.atleast_1d(self._solution[path][i])
+        quantity = self._quantities[path]
+        return Pair.from_space(quantity.space).element(value) if quantity.kind == "relative_pose" else value
+
+    def _rows(self) -> Iterator[tuple[slice, str, Array, Array, Array]]:
+        for at in self._chunks():
+            for name, first, second, basis in self._joint_rows(at):
+                yield at, name, first, second, basis
+
+    def _joint_rows(self, at: slice) -> Iterator[tuple[str, Array, Array, Array]]:
+        """Per joint: Ad_{I⁻¹}Ad_{o₁⁻¹}, −Ad_{o₂⁻¹}, B, each (size, 6, ·), at some instants."""
+        for name, joint in self._joints.items():
+            coupling = self._couplings[name]
+            relative = self._inclusion(name)[at]
+            first = adjoint_inverse(compose(np.broadcast_to(joint.frame1, relative.shape), relative))
+            second = -np.broadcast_to(SE3.adjoint(SE3.inverse(joint.frame2)), first.shape)
+            yield name, first, second, self._basis(joint, coupling, name, at)
+
+    def _basis(self, joint: Joint, coupling: Coupling, name: str, at: slice) -> Array:
+        x = self._coordinates(name)[at]
+        if joint.middle is None:
+            return np.broadcast_to(coupling.basis(coupling.identity()), (x.shape[0], 6, coupling.dim))
+        return np.array([coupling.basis(row) for row in x])
+
+    def _inclusion(self, name: str) -> Array:
+        """(n, 7) poses of C2 in C1 by the joint's coordinates."""
+        return self._inclusions[name]
+
+    @cached_property
+    def _inclusions(self) -> dict[str, Array]:
+        out: dict[str, Array] = {}
+        for name, coupling in self._couplings.items():
+            rows = [coupling.include(coupling.element(row)) for row in self._coordinates(name)]
+            out[name] = np.array(rows).reshape(len(self._solution), 7)
+        return out
+
+    def _frame(self, body: str, offset: Array) -> Array:
+        poses = self.poses(body)
+        return compose(poses, np.broadcast_to(offset, poses.shape))
+
+    def _chunks(self) -> Iterator[slice]:
+        n = len(self._solution)
+        for start in range(0, n, CHUNK):
+            yield slice(start, min(n, start + CHUNK))
+
+    # ---- summary -----------------------------------------------------------------------------------------------
+
+    def summary(self) -> dict[str, Any]:
+        """Values at the end, mobility, and the number of redundant constraints."""
+        problem = self._solution.problem
+        out: dict[str, Any] = {}
+        if problem is not None:
+            found = mobility(problem.descriptor, problem.descriptor.pack(problem.initial), problem.prescribed)
+            out |= {"mobility": found.mobility, "redundant_constraints": found.redundant}
+        if not len(self._solution):
+            return out | {"bodies": {}, "joints": {}, "thermal": {}}
+        bodies = {name: self.body(name) for name in self._bodies}
+        joints = {name: self.joint(name) for name in [*self._joints, *self._implicit]}
+        return out | {
+            "bodies": {
+                name: {
+                    "position": body.position[-1].tolist(),
+                    "quaternion": body.quaternion[-1].tolist(),
+                    "velocity": body.velocity[-1].tolist(),
+                    "angular_velocity": body.angular_velocity[-1].tolist(),
+                }
+                for name, body in bodies.items()
+            },
+            "joints": {
+                name: {"coordinate": joint.coordinate[-1].tolist(), "rate": joint.rate[-1].tolist()}
+                for name, joint in joints.items()
+            },
+            "thermal": {
+                name: {"temperature": float(self.thermal(name).temperature[-1])}
+                for name, _ in self._scene.all_thermal()
+            },
+        }
+
+
+def _project(
+    known: Array, unknown: Array, right: Array, twists: Array, roots: list[Array]
+) -> tuple[Array, Array]:
+    """Twists nearest to the given ones in the mass metric with known·u + unknown·r = right, and such r."""
+    inverse_of_unknown = (
+        np.linalg.pinv(unknown, rcond=RANK) if unknown.shape[2] else np.zeros(unknown.shape).mT
+    )
+    whitened = np.zeros_like(known)
+    for i, root in enumerate(roots):
+        where = slice(6 * i, 6 * i + 6)
+        whitened[:, :, where] = known[:, :, where] @ root
+    defect = np.einsum("nij,nj->ni", known, twists) - right
+    rest = defect - np.einsum("nij,nj->ni", unknown @ inverse_of_unknown, defect)
+    kept = whitened - unknown @ (inverse_of_unknown @ whitened)
+    out = twists.copy()
+    if roots:
+        shift = np.einsum("nij,nj->ni", np.linalg.pinv(kept, rcond=RANK), rest)
+        for i, root in enumerate(roots):
+            where = slice(6 * i, 6 * i + 6)
+            out[:, where] -= shift[:, where] @ root
+    r = -np.einsum("nij,nj->ni", inverse_of_unknown, np.einsum("nij,nj->ni", known, out) - right)
+    return out, r
+
+
+def rotations(q: Array) -> Array:
+    """(n, 3, 3) of unit quaternions (n, 4)."""
+    w, x, y, z = q.T
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    ).transpose(2, 0, 1)
+
+
+def compose(a: Array, b: Array) -> Array:
+    """(n, 7) products of poses."""
+    aw, av, bw, bv = a[:, :1], a[:, 1:4], b[:, :1], b[:, 1:4]
+    w = aw * bw - np.sum(av * bv, axis=1, keepdims=True)
+    v = aw * bv + bw * av + np.cross(av, bv)
+    return np.concatenate([w, v, a[:, 4:] + turned(a, b[:, 4:])], axis=1)
+
+
+def inverse(a: Array) -> Array:
+    """(n, 7) inverse poses."""
+    turned_back = a * np.array([1.0, -1.0, -1.0, -1.0, 0.0, 0.0, 0.0])
+    turned_back[:, 4:] = -turned(turned_back, a[:, 4:])
+    return turned_back
+
+
+def turned(a: Array, v: Array) -> Array:
+    """(n, 3) vectors turned by poses."""
+    twice = 2.0 * np.cross(a[:, 1:4], v)
+    return v + a[:, :1] * twice + np.cross(a[:, 1:4], twice)
+
+
+def adjoint_inverse(a: Array) -> Array:
+    """(n, 6, 6) Ad of the inverse poses."""
+    back = inverse(a)
+    r = rotations(back[:, :4])
+    out = np.zeros((a.shape[0], 6, 6))
+    out[:, :3, :3] = out[:, 3:, 3:] = r
+    x, y, z = back[:, 4:].T
+    o = np.zeros_like(x)
+    out[:, 3:, :3] = np.array([[o, -z, y], [z, o, -x], [-y, x, o]]).transpose(2, 0, 1) @ r
+    return out

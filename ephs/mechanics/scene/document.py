@@ -1,0 +1,88 @@
+"""Scenes as JSON text: every number resolved, exact in a round trip. Solution files carry them."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+import numpy as np
+
+from ephs.mechanics.scene.model import (
+    Adjustment,
+    Body,
+    Conduction,
+    Displacement,
+    Joint,
+    Scene,
+    Spring,
+    ThermalNode,
+    World,
+    frozen,
+)
+
+__all__ = ["scene_from_text", "scene_to_text"]
+
+_ARRAYS = {
+    World: {"gravity"},
+    Body: {"inertia", "pose", "twist"},
+    Joint: {"frame1", "frame2", "friction", "stiffness", "rest", "drive", "coordinate", "rate", "middle"},
+    Spring: {"at1", "at2"},
+}
+_PARTS = {
+    "bodies": Body,
+    "joints": Joint,
+    "springs": Spring,
+    "thermal": ThermalNode,
+    "conduction": Conduction,
+    "parts": Scene,
+}
+
+
+def scene_to_text(scene: Scene) -> str:
+    """The scene as JSON."""
+    return json.dumps(_plain(scene))
+
+
+def scene_from_text(text: str) -> Scene:
+    """The scene of `scene_to_text`."""
+    return _scene(json.loads(text))
+
+
+def _plain(value: Any) -> Any:
+    if is_dataclass(value):
+        return {field.name: _plain(getattr(value, field.name)) for field in fields(value)}
+    if isinstance(value, np.ndarray):
+        return {
+            "shape": value.shape,
+            "values": value.ravel().tolist(),
+        }  # (0, 0) would be lost in nested lists
+    if isinstance(value, Mapping):
+        return {key: _plain(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(entry) for entry in value]
+    return value
+
+
+def _array(value: Any) -> Any:
+    return None if value is None else frozen(np.array(value["values"], dtype=float).reshape(value["shape"]))
+
+
+def _value(cls: Any, data: dict[str, Any]) -> Any:
+    arrays = _ARRAYS.get(cls, set())
+    return cls(**{key: _array(value) if key in arrays else value for key, value in data.items()})
+
+
+def _scene(data: dict[str, Any]) -> Scene:
+    given = dict(data)
+    for key, cls in _PARTS.items():
+        entries: dict[str, Any] = given[key]
+        if cls is Conduction:
+            entries = {name: entry | {"between": tuple(entry["between"])} for name, entry in entries.items()}
+        make = _scene if cls is Scene else lambda entry, cls=cls: _value(cls, entry)
+        given[key] = {name: make(entry) for name, entry in entries.items()}
+    given["world"] = _value(World, given["world"])
+    adjusted = given["adjusted"]
+    if adjusted is not None:
+        moved = tuple(Displacement(**entry) for entry in adjusted["moved"])
+        given["adjusted"] = Adjustment(adjusted["gap"], adjusted["slip"], moved)
+    return Scene(**given)

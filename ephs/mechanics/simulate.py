@@ -1,0 +1,258 @@
+"""`simulate`: from a system or a scene to its motion."""
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path as File
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ephs.mechanics.build import drive_ports, initial_state, scene_inputs, scene_system, wrench_port
+from ephs.mechanics.motion import SceneMotion
+from ephs.mechanics.scene.document import scene_from_text, scene_to_text
+from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.solve.integrate import METHODS, Grid, integrate
+from ephs.mechanics.solve.problem import Problem, Signal
+from ephs.mechanics.solve.solution import Solution
+from ephs.operad import Path
+from ephs.semantics.bundle import Array, Reference
+from ephs.semantics.errors import AssemblyError
+from ephs.semantics.system import System
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+__all__ = ["load_solution", "problem_of_scene", "problem_of_system", "simulate"]
+
+STEPS = 1000
+"""Number of steps where neither a step nor anything else says how many."""
+FORMS = ("paper", "folded", "reduced")
+
+InputFunction = Callable[..., "ArrayLike"]
+
+
+def simulate(
+    model: System | Scene,
+    until: float,
+    *,
+    t0: float = 0.0,
+    initial: Mapping[str, "ArrayLike"] | None = None,
+    method: str = "auto",
+    rtol: float = 1e-6,
+    atol: float = 1e-9,
+    step: float | None = None,
+    max_step: float | None = None,
+    min_step: float | None = None,
+    max_steps: int | None = None,
+    save_at: "ArrayLike | None" = None,
+    form: str = "reduced",
+    inputs: Mapping[str, Any] | None = None,
+    events: Sequence[Any] | None = None,
+    options: Mapping[str, Any] | None = None,
+    reference: Reference | None = None,
+    progress: Callable[[float, float, Mapping[str, Any]], None] | None = None,
+) -> Solution:
+    """Simulate a system or a scene.
+
+    Parameters
+    ----------
+    until, t0
+        End and start in s.
+    initial
+        Values of states by path; a system's others at the identity, a scene's as it says.
+    method
+        ``"natural"``, which ``"auto"`` chooses too.
+    step
+        The grid is t₀ + k·step, the last step shortened to end on ``until``. Without it (until − t₀)/1000, or
+        ``max_step`` where that is smaller. The natural method's steps are constant: rtol, atol and min_step steer
+        adaptive methods only.
+    save_at
+        Times to keep, met by dense output; every step where None.
+    form
+        Equations as flattened, ``"paper"``, are what the natural method solves; ``"reduced"``, the default, is the
+        least that a method can use.
+    inputs
+        ``{port: {"effort": f}}`` or ``{"flow": f}`` at outer ports; of a scene also ``{"joints.pin": f}``, a
+        generalised force on u_r, and ``{"bodies.crank": f}``, a wrench in the body frame; f a constant, f(t), or
+        f(t, state).
+    reference
+        The reference environment of a system; a scene's world gives its own.
+    progress
+        Called as progress(t, until, stats) a few times a second.
+
+    Raises
+    ------
+    SimulationError
+        The run failed part-way; ``.partial`` is the solution up to there.
+    SemanticsError
+        The model has no square system of equations, a state or an input does not fit.
+    ValueError
+        An option is not known, or not possible with the method.
+    """
+    chosen = _method(method)
+    if form not in FORMS:
+        raise ValueError(f"form is {form!r}, expected one of {', '.join(FORMS)}")
+    if form == "folded":
+        raise ValueError(
+            f"form is 'folded', which the method {chosen} does not solve; expected paper or reduced"
+        )
+    for name, value in (("events", events), ("options", options)):
+        if value:
+            raise ValueError(f"{name} is {value!r}: the method {chosen} takes none")
+    if isinstance(model, Scene):
+        if reference is not None:
+            raise ValueError("reference is given, but the scene's [world] has its own; change that instead")
+        problem = problem_of_scene(model, initial, inputs)
+    else:
+        problem = problem_of_system(model, initial, inputs, reference)
+    span = float(until) - float(t0)
+    h = (
+        float(step)
+        if step is not None
+        else min(span / STEPS, float(max_step) if max_step is not None else np.inf)
+    )
+    return integrate(
+        problem,
+        Grid(float(t0), float(until), h),
+        method=chosen,
+        save_at=_times(save_at, t0, until),
+        max_steps=max_steps,
+        progress=progress,
+    )
+
+
+def problem_of_system(
+    system: System,
+    initial: Mapping[str, "ArrayLike"] | None = None,
+    inputs: Mapping[str, Any] | None = None,
+    reference: Reference | None = None,
+    *,
+    name: str = "system",
+) -> Problem:
+    """The initial value problem of a system."""
+    descriptor = system.descriptor()
+    signals: dict[Path, Signal] = {}
+    for port, given in (inputs or {}).items():
+        if not isinstance(given, Mapping) or len(given) != 1 or not set(given) <= {"effort", "flow"}:
+            raise AssemblyError("input", port, found=given, expected="{'effort': f} or {'flow': f}")
+        ((side, value),) = given.items()
+        signals[Path.of(port)] = signal(value, effort=side == "effort")
+    return Problem(name, system, descriptor, system.state(initial), signals, reference or Reference())
+
+
+def problem_of_scene(
+    scene: Scene, initial: Mapping[str, "ArrayLike"] | None = None, inputs: Mapping[str, Any] | None = None
+) -> Problem:
+    """The initial value problem of a scene."""
+    forces, wrenches = _scene_inputs(scene, inputs or {})
+    system = scene_system(scene, driven=frozenset(forces), wrenches=frozenset(wrenches))
+    state = initial_state(scene)
+    if initial:
+        changed = system.state(initial)
+        state |= {Path.of(path): changed[Path.of(path)] for path in initial}
+    signals = {path: Signal(given.value, given.effort) for path, given in scene_inputs(scene).items()}
+    for name, force in forces.items():
+        for port, where in drive_ports(scene.joint(name)):
+            extra = _part(force, where)
+            if port in signals and signals[port].effort:
+                raise AssemblyError(
+                    "input", f"joints.{name}", found="a force", expected="none: its motion is prescribed"
+                )
+            signals[port] = _sum(signals[port], extra) if port in signals else extra
+    signals |= {wrench_port(body): wrench for body, wrench in wrenches.items()}
+    world = scene.world
+    return Problem(
+        scene.name,
+        system,
+        system.descriptor(),
+        state,
+        signals,
+        Reference(world.temperature, world.pressure),
+        motion=lambda solution: SceneMotion(scene, solution),
+        scene=scene,
+        document=scene_to_text(scene),
+    )
+
+
+def load_solution(path: str | File) -> Solution:
+    """Read a solution that `Solution.save` wrote; of a scene with everything that reads its motion.
+
+    Raises
+    ------
+    FileNotFoundError, ValueError
+        There is no such file, or it is not a solution.
+    """
+    from ephs.mechanics.solve.file import load
+
+    return load(path, lambda text: problem_of_scene(scene_from_text(text)))
+
+
+def signal(value: Any, *, effort: bool) -> Signal:
+    """A signal from a constant, f(t), or f(t, state)."""
+    if not callable(value):
+        return Signal(np.atleast_1d(np.asarray(value, dtype=float)), effort)
+    if _takes_state(value):
+        return Signal(value, effort)
+    return Signal(lambda t, _state: value(t), effort)
+
+
+def _takes_state(function: Callable[..., Any]) -> bool:
+    import inspect
+
+    try:
+        inspect.signature(function).bind(0.0, {})
+    except TypeError:
+        return False
+    except ValueError:  # some functions in C tell no signature; those that mathematics has take one argument
+        return False
+    return True
+
+
+def _part(whole: Signal, where: slice) -> Signal:
+    if whole.constant:
+        return Signal(whole.at(0.0, {})[where])
+    return Signal(lambda t, state: whole.at(t, state)[where])
+
+
+def _sum(one: Signal, other: Signal) -> Signal:
+    if one.constant and other.constant:
+        return Signal(one.at(0.0, {}) + other.at(0.0, {}))
+    return Signal(lambda t, state: one.at(t, state) + other.at(t, state))
+
+
+def _scene_inputs(scene: Scene, inputs: Mapping[str, Any]) -> tuple[dict[str, Signal], dict[str, Signal]]:
+    forces: dict[str, Signal] = {}
+    wrenches: dict[str, Signal] = {}
+    for key, value in inputs.items():
+        kind, _, name = key.partition(".")
+        if kind == "joints" and name in dict(scene.all_joints()):
+            forces[name] = signal(value, effort=False)
+        elif kind == "bodies" and name in dict(scene.all_bodies()):
+            wrenches[name] = signal(value, effort=False)
+        else:
+            joints, bodies = (
+                ", ".join(f"{k}.{n}" for n, _ in entries)
+                for k, entries in (("joints", scene.all_joints()), ("bodies", scene.all_bodies()))
+            )
+            raise AssemblyError("unknown-input", key, expected=", ".join(filter(None, (joints, bodies))))
+    return forces, wrenches
+
+
+def _method(name: str) -> str:
+    if name == "auto":
+        return "natural"
+    if name not in METHODS:
+        raise ValueError(f"method is {name!r}, expected one of auto, {', '.join(METHODS)}")
+    return name
+
+
+def _times(save_at: "ArrayLike | None", t0: float, until: float) -> Array | None:
+    if save_at is None:
+        return None
+    times = np.atleast_1d(np.asarray(save_at, dtype=float))
+    if times.ndim != 1 or not np.all(np.isfinite(times)) or np.any(np.diff(times) <= 0.0):
+        raise ValueError(f"save_at is {save_at!r}, expected ascending times in s")
+    if times.size and not (t0 <= times[0] and times[-1] <= until):
+        raise ValueError(
+            f"save_at goes from {times[0]!r} to {times[-1]!r} s, expected times in [{t0!r}, {until!r}]"
+        )
+    return times

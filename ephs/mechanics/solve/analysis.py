@@ -1,0 +1,153 @@
+"""Rank of the constraints and order of the elimination, decided once and again where a matrix turns singular.
+
+Rank is decided on the constraint matrix, its columns scaled by the square root of the compliance that the storages
+show over a step, (mass/h)^(−1/2); never on the saddle-point matrix, whose pivots are squares of singular values.
+"""
+
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+from scipy import linalg
+
+from ephs.mechanics.solve.errors import SolveError
+from ephs.mechanics.solve.lu_kernels import factorise
+from ephs.mechanics.solve.model import Model, evaluate_at
+from ephs.mechanics.solve.natural_kernels import Order
+from ephs.mechanics.solve.sparse import order
+from ephs.semantics.bundle import Array
+
+__all__ = ["RANK", "Analysis", "analyse"]
+
+RANK = 1e-12
+"""Singular values below this fraction of the largest count as zero in an implicit step."""
+SHRUNK = 1e-6
+DEFECT = 1e-11
+"""What a dropped equation may be violated by, relative to its terms; more asks for another rank decision."""
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Analysis:
+    """A pivot order for the present values, and the dependent equations that it leaves out.
+
+    Parameters
+    ----------
+    dropped
+        (rows,) 1 where an equation depends on others and is replaced by "this multiplier does not change".
+    redundant
+        The equations left out, in words.
+    """
+
+    order: Order
+    dropped: Array
+    redundant: tuple[str, ...]
+    fill: int
+
+
+def analyse(model: Model, x: Array, z: Array, h: float) -> Analysis:
+    """Decide rank and order at a state and unknowns.
+
+    The pivots that it finds set the order's floor: a pivot that has shrunk to a millionth asks for another order.
+
+    Raises
+    ------
+    SolveError
+        The motion is not determined: some junction's effort or some state's rate has no equation.
+    """
+    t = model.tables
+    size = model.unknowns
+    status, component, memory = evaluate_at(model, x, z, h)
+    if status:
+        raise SolveError.of_component(status, model, component)
+    values = memory.data
+    dropped = dependent_rows(model, values)
+    diagonal = np.arange(size) + t.row.size - size
+    active = np.ones(t.row.size, dtype=bool)
+    active[diagonal] = dropped == 1
+    active &= ~((dropped[t.row] == 1) & (np.arange(t.row.size) < t.row.size - size))
+    data = values.copy()
+    data[diagonal] = 1.0
+    chosen = np.flatnonzero(active)
+    entries = np.where(data[chosen] == 0.0, 1e-300, data[chosen])  # a place that is zero now may fill later
+    try:
+        elimination = order(size, t.row[chosen], t.column[chosen], entries)
+    except RuntimeError as error:
+        raise SolveError.undetermined(model, _null_unknown(model, chosen, data)) from error
+    place = np.full(t.row.size, -1, dtype=np.int64)
+    place[chosen] = elimination.place
+    compiled = Order(
+        rows=elimination.rows,
+        columns=elimination.columns,
+        start=elimination.start,
+        entry=elimination.column,
+        diagonal=elimination.diagonal,
+        place=place,
+        dropped=dropped,
+        floor=np.zeros(size),
+        tolerance=np.array([DEFECT]),
+    )
+    c, ratio = compiled, np.zeros(size)
+    factors, scratch = np.zeros(elimination.fill), np.zeros(size)
+    if not factorise(c.place, c.start, c.entry, c.diagonal, data, factors, scratch, c.floor, ratio):
+        raise SolveError.undetermined(model, _null_unknown(model, chosen, data))
+    compiled = compiled._replace(floor=SHRUNK * ratio)
+    redundant = tuple(model.row_name(int(row)) for row in np.flatnonzero(dropped))
+    return Analysis(compiled, dropped, redundant, elimination.fill)
+
+
+def dependent_rows(model: Model, values: Array) -> Array:
+    """Marks constraint equations that depend on the others: (rows,) of 0 and 1."""
+    t = model.tables
+    n_rate, n_effort, size = int(t.counts[0]), int(t.counts[1]), model.unknowns
+    out = np.zeros(size, dtype=np.int64)
+    rows = model.constraint_rows
+    if not rows.size:
+        return out
+    matrix = np.zeros((rows.size, n_effort))
+    of = np.full(size, -1)
+    of[rows] = np.arange(rows.size)
+    inside = (of[t.row] >= 0) & (t.column >= n_rate) & (t.column < n_rate + n_effort)
+    matrix[of[t.row[inside]], t.column[inside] - n_rate] += values[inside]
+    matrix = matrix @ _compliance(model, values)
+    norms = np.linalg.norm(matrix, axis=1)
+    matrix /= np.where(norms > 0.0, norms, 1.0)[:, None]
+    triangle, pivots = linalg.qr(matrix.T, mode="r", pivoting=True)
+    sizes = np.zeros(rows.size)
+    sizes[: min(triangle.shape)] = np.abs(np.diag(triangle))
+    rank = int(np.sum(sizes > RANK * sizes[0])) if sizes[0] > 0.0 else 0
+    out[rows[pivots[rank:]]] = 1
+    return out
+
+
+def _compliance(model: Model, values: Array) -> Array:
+    """Block-diagonal square root of ∂e/∂w at storages, the identity at efforts that no storage gives."""
+    t = model.tables
+    scale = np.eye(int(t.counts[1]))
+    for slot in model.descriptor.components:
+        if slot.primitive.kind != "storage":
+            continue
+        rates = np.array([i for s in slot.reads for i in range(s.rates.start, s.rates.stop)], dtype=int)
+        block = np.zeros((rates.size, rates.size))
+        local = {int(r): i for i, r in enumerate(rates)}
+        mask = (
+            np.isin(t.row, rates)
+            & np.isin(t.column, rates)
+            & (np.arange(t.row.size) < t.row.size - model.unknowns)
+        )
+        for k in np.flatnonzero(mask):
+            block[local[int(t.row[k])], local[int(t.column[k])]] -= values[k]
+        sigma, vectors = np.linalg.eigh(0.5 * (block + block.T))
+        if sigma.size and sigma[-1] > 0.0 and sigma[0] > 1e-14 * sigma[-1]:
+            index = np.array(slot.efforts, dtype=int)
+            scale[np.ix_(index, index)] = (vectors * np.sqrt(sigma)) @ vectors.T
+    return scale
+
+
+def _null_unknown(model: Model, chosen: Array, data: Array) -> int:
+    """The unknown that a null vector of the matrix moves most."""
+    t, size = model.tables, model.unknowns
+    matrix = np.zeros((size, size))
+    np.add.at(matrix, (t.row[chosen], t.column[chosen]), data[chosen])
+    matrix /= np.maximum(np.abs(matrix).max(axis=1, initial=0.0), 1e-300)[:, None]
+    return int(np.argmax(np.abs(np.linalg.svd(matrix)[2][-1])))

@@ -1,0 +1,87 @@
+"""How a run can fail: named outcomes with time, component, equation, advice, and what was computed so far."""
+
+from enum import StrEnum
+from typing import TYPE_CHECKING, final
+
+if TYPE_CHECKING:
+    from ephs.mechanics.solve.model import Model
+    from ephs.mechanics.solve.solution import Solution
+
+__all__ = ["Interrupted", "Outcome", "SimulationError", "SolveError"]
+
+
+class Outcome(StrEnum):
+    """What ended a run."""
+
+    DIVERGED = "the step's equations have no solution near by"
+    SINGULAR = "the step's equations stay singular"
+    CONTRADICTION = "a constraint contradicts the others"
+    TURN = "a rotation of π or more in one step"
+    TEMPERATURE = "an absolute temperature that is not positive"
+    PYTHON = "a Python function of the model raised an exception"
+    UNDETERMINED = "the motion is not determined"
+    INTERRUPTED = "interrupted"
+
+
+_ADVICE = {
+    Outcome.DIVERGED: "take a smaller step",
+    Outcome.SINGULAR: "take a smaller step, or start away from the singular configuration",
+    Outcome.CONTRADICTION: "check prescribed motions and initial values, or take a smaller step",
+    Outcome.TURN: "take a smaller step: h·|ω| must stay below π",
+    Outcome.TEMPERATURE: "check initial temperatures and heat capacities, or take a smaller step",
+    Outcome.PYTHON: "see the exception above this one",
+    Outcome.UNDETERMINED: "add what gives the effort there: a storage, friction, or a constraint",
+    Outcome.INTERRUPTED: "what was computed is in .partial",
+}
+_OF_KERNEL = {1: Outcome.TURN, 2: Outcome.TEMPERATURE, 3: Outcome.PYTHON}
+
+
+class SimulationError(RuntimeError):
+    """A run that failed part-way.
+
+    Attributes
+    ----------
+    outcome, time, path, equation, advice
+        What happened, at which time in s, in which component and equation, and what to do.
+    partial
+        The Solution up to there, or None where not even the first step was set up.
+    """
+
+    def __init__(
+        self, outcome: Outcome, time: float, path: str, equation: str, partial: "Solution | None"
+    ) -> None:
+        self.outcome, self.time, self.path, self.equation = outcome, time, path, equation
+        self.advice = _ADVICE[outcome]
+        self.partial = partial
+        where = f" at {path}" if path else ""
+        what = f" ({equation})" if equation else ""
+        super().__init__(f"t = {time:.9g} s{where}: {outcome.value}{what}; {self.advice}")
+
+
+@final
+class Interrupted(SimulationError):
+    """A run that the user stopped."""
+
+
+@final
+class SolveError(Exception):
+    """A failed step inside the solver, before time and partial solution are known."""
+
+    def __init__(
+        self, outcome: Outcome, path: str, equation: str, cause: BaseException | None = None
+    ) -> None:
+        super().__init__(outcome.value, path, equation)
+        self.outcome, self.path, self.equation, self.cause = outcome, path, equation, cause
+
+    @classmethod
+    def of_component(cls, status: int, model: "Model", component: int) -> "SolveError":
+        """What a component's kernel reported."""
+        callback = model.callbacks.get(component)
+        cause = callback.raised if callback else None
+        outcome = _OF_KERNEL.get(status % 10, Outcome.DIVERGED)
+        return cls(outcome, str(model.path_of(component)), "", cause)
+
+    @classmethod
+    def undetermined(cls, model: "Model", unknown: int) -> "SolveError":
+        """An unknown without equation."""
+        return cls(Outcome.UNDETERMINED, "", model.unknown_name(unknown))

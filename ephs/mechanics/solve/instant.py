@@ -1,0 +1,251 @@
+"""The continuous equations at one instant: constraints differentiated once and solved with least-norm multipliers.
+
+Dense and plain: an oracle for integrators, and what reports forces. Constraints have differentiation index 2, so that
+their rate C ė + Ċ e = 0 determines multipliers and rates (Lohmayer, Capobianco, Leyendecker, section 5).
+"""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from ephs.operad import Path
+from ephs.semantics.bundle import Array, Reference
+from ephs.semantics.descriptor import ComponentSlot, Descriptor, Input
+from ephs.semantics.primitives import Irreversible, Reversible, Storage
+
+__all__ = ["Instant", "Mobility", "instant", "mobility"]
+
+RANK = 1e-9
+"""Singular values below this fraction of the largest count as zero."""
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Mobility:
+    """Number of independent motions, and of constraint equations that depend on others, at a configuration."""
+
+    mobility: int
+    redundant: int
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Instant:
+    """Rates, efforts and multipliers at an instant.
+
+    Parameters
+    ----------
+    rates
+        State path -> (dim,) left-trivialised rate.
+    efforts
+        (effort_size,).
+    multipliers
+        (multiplier_size,) of least norm.
+    determined
+        (multiplier_size,) whether each is the only one possible.
+    """
+
+    descriptor: Descriptor
+    rates: Mapping[Path, Array]
+    efforts: Array
+    multipliers: Array
+    determined: Array
+
+    def multiplier(self, component: Path) -> Array:
+        """The multipliers of a component, NaN where they are not determined."""
+        slot = next(s for s in self.descriptor.components if s.path == component)
+        where = slice(slot.multiplier, slot.multiplier + slot.multipliers)
+        return np.where(self.determined[where], self.multipliers[where], np.nan)
+
+
+def mobility(descriptor: Descriptor, x: Array, prescribed: Collection[Path] = ()) -> Mobility:
+    """Count motions and redundant constraints at a state.
+
+    Motions are efforts of odd quantities (velocities, currents) that satisfy all constraints and vanish at ports whose
+    effort is prescribed.
+    """
+    rows = [_constraints(descriptor, x)]
+    for slot in descriptor.outer:
+        if slot.path in prescribed:
+            rows.append(np.eye(descriptor.effort_size)[slot.efforts])
+    odd = np.zeros(descriptor.effort_size, dtype=bool)
+    for slot in descriptor.junctions:
+        odd[slot.efforts] = slot.quantity.parity < 0
+    matrix = np.vstack(rows)
+    matrix = matrix[np.abs(matrix[:, odd]).max(axis=1, initial=0.0) > 0.0][:, odd]
+    rank = _rank(matrix)
+    return Mobility(int(odd.sum()) - rank, matrix.shape[0] - rank)
+
+
+def instant(
+    descriptor: Descriptor, reference: Reference, x: Array, inputs: Mapping[Path, Input] | None = None
+) -> Instant:
+    """Solve the equations at the states x; prescribed efforts count as constant in time."""
+    d = descriptor
+    given = d.complete_inputs(inputs)
+    stored = _stored_efforts(d, reference, x)
+    constraint = _constraints(d, x)
+    efforts = _all_efforts(d, constraint, stored, given)
+    flows = _flows(d, reference, x, efforts)
+    n_w, n_e, n_l = d.rate_size, d.effort_size, d.multiplier_size
+    driven = [slot for slot in d.outer if given[slot.path].effort]
+    n_o = sum(slot.quantity.space.dim for slot in driven)
+    size = n_w + n_l + n_e + n_o  # unknowns: rates, multipliers, rates of efforts, outer flows
+    w, lam, rise = slice(0, n_w), slice(n_w, n_w + n_l), slice(n_w + n_l, n_w + n_l + n_e)
+    balance, right = np.zeros((n_e, size)), -flows
+    balance[:, lam] = constraint.T
+    growth = np.zeros((n_w, size))
+    for slot in d.components:
+        if isinstance(slot.primitive, Storage):
+            rates = np.array([i for s in slot.reads for i in range(s.rates.start, s.rates.stop)], dtype=int)
+            balance[list(slot.efforts), rates] += 1.0
+            growth[np.ix_(rates, rates)] -= _compliance(slot, d, x, reference)
+            growth[rates, [rise.start + i for i in slot.efforts]] += 1.0
+    for slot in d.outer:
+        if not given[slot.path].effort:
+            right[slot.efforts] += given[slot.path].value
+    held, at = np.zeros((n_o, size)), n_w + n_l + n_e
+    row = 0
+    for slot in driven:
+        dim = slot.quantity.space.dim
+        balance[slot.efforts, at + row : at + row + dim] -= np.eye(dim)
+        held[row : row + dim, rise][:, slot.efforts] = np.eye(dim)
+        row += dim
+    differentiated = np.zeros((n_l, size))
+    differentiated[:, rise] = constraint
+    turning = -_turned_constraints(d, x, _known_rates(d, constraint, flows)) @ efforts
+    matrix = np.vstack([balance, growth, differentiated, held])
+    scale = np.maximum(np.abs(matrix).max(axis=1, initial=0.0), 1e-300)
+    everything = np.concatenate([right, np.zeros(n_w), turning, np.zeros(n_o)])
+    solution, free = _least_norm(matrix / scale[:, None], everything / scale)
+    return Instant(
+        d,
+        {slot.path: solution[slot.rates] for slot in d.states},
+        efforts,
+        solution[lam],
+        np.abs(free[lam]).max(axis=1, initial=0.0) < 1e-7,
+    )
+
+
+def _least_norm(matrix: Array, right: Array) -> tuple[Array, Array]:
+    """The solution of least norm, and a basis (n, k) of what may be added to it."""
+    u, sigma, vt = np.linalg.svd(matrix, full_matrices=True)
+    rank = int(np.sum(sigma > 1e-12 * sigma[0])) if sigma.size else 0
+    return vt[:rank].T @ ((u[:, :rank].T @ right) / sigma[:rank]), vt[rank:].T
+
+
+def _constraints(d: Descriptor, x: Array) -> Array:
+    """All constraints as one matrix on the efforts, (multiplier_size, effort_size)."""
+    out = np.zeros((d.multiplier_size, d.effort_size))
+    for slot in d.components:
+        if slot.multipliers and isinstance(slot.primitive, Reversible):
+            _, constraint = slot.primitive.structure(d.point(slot, x))
+            _place(out, slot, constraint)
+    return out
+
+
+def _place(out: Array, slot: ComponentSlot, constraint: Array) -> None:
+    rows = np.arange(slot.multiplier, slot.multiplier + slot.multipliers)
+    np.add.at(out, (rows[:, None], np.array(slot.efforts, dtype=int)[None, :]), constraint)
+
+
+def _stored_efforts(d: Descriptor, reference: Reference, x: Array) -> dict[int, float]:
+    out: dict[int, float] = {}
+    for slot in d.components:
+        if isinstance(slot.primitive, Storage):
+            values = slot.primitive.effort(d.point(slot, x), reference)
+            out |= dict(zip(slot.efforts, values.tolist(), strict=True))
+    return out
+
+
+def _all_efforts(
+    d: Descriptor, constraint: Array, stored: dict[int, float], given: Mapping[Path, Input]
+) -> Array:
+    """Efforts that storages give or inputs prescribe, and the others from the constraints."""
+    known = dict(stored)
+    for slot in d.outer:
+        if given[slot.path].effort:
+            known |= dict(
+                zip(range(slot.at, slot.at + slot.quantity.space.dim), given[slot.path].value, strict=True)
+            )
+    out = np.zeros(d.effort_size)
+    places = np.array(sorted(known), dtype=int)
+    out[places] = [known[int(i)] for i in places]
+    others = np.setdiff1d(np.arange(d.effort_size), places)
+    if others.size and constraint.size:
+        out[others] = np.linalg.lstsq(
+            constraint[:, others], -constraint[:, places] @ out[places], rcond=1e-10
+        )[0]
+    return out
+
+
+def _flows(d: Descriptor, reference: Reference, x: Array, efforts: Array) -> Array:
+    """Sum at each junction of the flows that efforts alone determine, (effort_size,)."""
+    out = np.zeros(d.effort_size)
+    for slot in d.components:
+        e = efforts[list(slot.efforts)]
+        point = d.point(slot, x)
+        if isinstance(slot.primitive, Irreversible):
+            np.add.at(out, list(slot.efforts), slot.primitive.flow(point, e, reference))
+        elif isinstance(slot.primitive, Reversible):
+            np.add.at(out, list(slot.efforts), slot.primitive.structure(point)[0] @ e)
+    return out
+
+
+def _compliance(slot: ComponentSlot, d: Descriptor, x: Array, reference: Reference) -> Array:
+    """∂(effort)/∂(state) of a storage, left-trivialised, by differences of fourth order."""
+    storage = slot.primitive
+    assert isinstance(storage, Storage)
+    n = storage.bundle.size
+    if storage.kernel is not None and storage.kernel.name == "quadratic":
+        return np.array(storage.kernel.parameters).reshape(n, n)
+    point = d.point(slot, x)
+    out = np.zeros((n, n))
+    for i, unit in enumerate(np.eye(n)):
+
+        def effort(step: float, along: Array = unit) -> Array:
+            return storage.effort(storage.retract(point, step * along), reference)
+
+        out[:, i] = (8.0 * (effort(1e-3) - effort(-1e-3)) - (effort(2e-3) - effort(-2e-3))) / 12e-3
+    return out
+
+
+def _known_rates(d: Descriptor, constraint: Array, flows: Array) -> Array:
+    """Rates of the states at junctions without constraints: those are all that constraints may read."""
+    touched = np.abs(constraint).max(axis=0, initial=0.0) > 0.0
+    out = np.zeros(d.rate_size)
+    for slot in d.components:
+        if isinstance(slot.primitive, Storage):
+            rates = [i for s in slot.reads for i in range(s.rates.start, s.rates.stop)]
+            for rate, effort in zip(rates, slot.efforts, strict=True):
+                out[rate] = 0.0 if touched[effort] else -flows[effort]
+    return out
+
+
+def _turned_constraints(d: Descriptor, x: Array, rates: Array) -> Array:
+    """dC/dt along known rates, (multiplier_size, effort_size), by differences of fourth order."""
+    out = np.zeros((d.multiplier_size, d.effort_size))
+    for slot in d.components:
+        primitive = slot.primitive
+        if not (slot.multipliers and primitive.reads and isinstance(primitive, Reversible)):
+            continue
+        fastest = max((float(np.abs(rates[s.rates]).max(initial=0.0)) for s in slot.reads), default=0.0)
+        if fastest == 0.0:
+            continue
+        h = 1e-3 / fastest
+
+        def at(step: float, slot: ComponentSlot = slot, primitive: Reversible = primitive) -> Array:
+            return primitive.structure(d.point(slot, d.advance(x, step * rates)))[1]
+
+        _place(out, slot, (8.0 * (at(h) - at(-h)) - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h))
+    return out
+
+
+def _rank(matrix: Array) -> int:
+    if not matrix.size:
+        return 0
+    norms = np.linalg.norm(matrix, axis=1)
+    sigma = np.linalg.svd(matrix / norms[:, None], compute_uv=False)
+    return int(np.sum(sigma > RANK * sigma[0]))

@@ -1,0 +1,202 @@
+"""The time loop: compiled steps in chunks, and between chunks progress, interruption and what is kept."""
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, final
+
+import numpy as np
+
+from ephs.mechanics.solve.errors import Interrupted, Outcome, SimulationError, SolveError
+from ephs.mechanics.solve.ledger import ledgers
+from ephs.mechanics.solve.model import Model, compile_model
+from ephs.mechanics.solve.natural import Chunk, Natural, NaturalState
+from ephs.mechanics.solve.problem import Problem
+from ephs.mechanics.solve.record import Recorder
+from ephs.mechanics.solve.solution import Solution
+from ephs.operad import Quantity
+from ephs.semantics.bundle import Array
+from ephs.semantics.spaces import Pair
+
+__all__ = ["METHODS", "Grid", "integrate"]
+
+METHODS: dict[str, Callable[[Model], Natural]] = {"natural": Natural}
+"""Method name -> what makes it for a compiled model."""
+RESPONSE = 0.1
+"""Wanted seconds between two looks at progress and Ctrl-C."""
+LARGEST_CHUNK = 4096
+
+Progress = Callable[[float, float, Mapping[str, Any]], None]
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """The times t₀ + k·h, the last step shortened to end on ``until``."""
+
+    t0: float
+    until: float
+    h: float
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.h) and self.h > 0.0):
+            raise ValueError(f"step is {self.h!r}, expected a number of seconds > 0")
+        if not (np.isfinite(self.until) and self.until > self.t0):
+            raise ValueError(f"until is {self.until!r}, expected a time after t0 = {self.t0!r} s")
+
+    @property
+    def whole(self) -> int:
+        """Number of steps of full length."""
+        count = (self.until - self.t0) / self.h
+        nearest = round(count)  # h that divides the time up to rounding makes no extra sliver of a step
+        return int(nearest) if abs(count - nearest) <= 1e-9 * max(1.0, count) else int(count)
+
+    @property
+    def last(self) -> float:
+        """Length of the shortened last step, 0 where there is none."""
+        rest = self.until - self.time(self.whole)
+        return rest if rest > 1e-9 * self.h else 0.0
+
+    def time(self, k: int) -> float:
+        """The time after k full steps."""
+        return self.t0 + k * self.h
+
+
+def integrate(
+    problem: Problem,
+    grid: Grid,
+    *,
+    method: str,
+    form: str = "paper",
+    save_at: Array | None = None,
+    max_steps: int | None = None,
+    progress: Progress | None = None,
+) -> Solution:
+    """Solve an initial value problem on a grid.
+
+    Raises
+    ------
+    SimulationError
+        The run failed part-way; ``.partial`` holds the solution up to there. `Interrupted` where the user stopped it.
+    """
+    begin = time.perf_counter()
+    d = problem.descriptor
+    x0 = d.pack(problem.initial)
+    model = compile_model(d, problem.reference, problem.inputs(grid.t0, problem.initial))
+    stepper = METHODS[method](model)
+    run = _Run(problem, grid, stepper, Recorder(d, grid.t0, x0, save_at), form, begin, progress)
+    try:
+        run.recorder.start(stepper.energies(x0))
+        run.state = stepper.init(x0)
+        run.setup = time.perf_counter() - begin
+        run.full_steps(max_steps)
+        if grid.last:
+            run.take(grid.last, 1, grid.until)
+    except SolveError as error:
+        failed = Interrupted if isinstance(error.cause, KeyboardInterrupt) else SimulationError
+        raise failed(error.outcome, run.t, error.path, error.equation, run.solution()) from error.cause
+    except KeyboardInterrupt as error:
+        raise Interrupted(Outcome.INTERRUPTED, run.t, "", "", run.solution()) from error
+    return run.solution()
+
+
+class _Run:
+    """One run in progress: where it stands, and what was kept."""
+
+    state: NaturalState
+
+    def __init__(
+        self,
+        problem: Problem,
+        grid: Grid,
+        stepper: Natural,
+        recorder: Recorder,
+        form: str,
+        begin: float,
+        progress: Progress | None,
+    ) -> None:
+        self.problem, self.grid, self.stepper, self.recorder = problem, grid, stepper, recorder
+        self.form, self.begin, self.progress = form, begin, progress
+        self.t, self.setup, self.steps, self.iterations = grid.t0, 0.0, 0, 0
+
+    def full_steps(self, max_steps: int | None) -> None:
+        """All steps of full length, in chunks that adapt to the time that they take."""
+        whole = self.grid.whole
+        if max_steps is not None and whole + bool(self.grid.last) > max_steps:
+            raise ValueError(
+                f"max_steps is {max_steps}, the grid of {self.grid.h:g} s has {whole + bool(self.grid.last)} steps"
+            )
+        size = 16 if self.problem.constant else 1
+        while self.steps < whole:
+            count = min(size, whole - self.steps)
+            before = time.perf_counter()
+            done = self.steps + count
+            self.take(self.grid.h, count, self.grid.until if done == whole and not self.grid.last else None)
+            spent = time.perf_counter() - before
+            if self.problem.constant:
+                size = int(np.clip(size * np.clip(RESPONSE / max(spent, 1e-9), 0.5, 4.0), 1, LARGEST_CHUNK))
+
+    def take(self, h: float, count: int, end: float | None) -> None:
+        """Some steps of one length; ``end`` is their exact end where the grid would round it."""
+        inputs = None if self.problem.constant else self._inputs(h)
+        self.state, chunk = self.stepper.advance(self.state, h, count, inputs)
+        self.iterations += chunk.iterations
+        times = np.array([self.grid.time(self.steps + k + 1) for k in range(chunk.steps)])
+        if h != self.grid.h:
+            times = times - self.grid.h + h
+        if end is not None and chunk.steps == count:
+            times[-1] = end
+        self._record(times, chunk)
+        if chunk.failure is not None:
+            raise chunk.failure
+        if self.progress is not None:
+            self.progress(self.t, self.grid.until, self.stats())
+
+    def _record(self, times: Array, chunk: Chunk) -> None:
+        if chunk.steps:
+            self.recorder.add(times, chunk)
+            self.steps += chunk.steps
+            self.t = float(times[-1])
+
+    def _inputs(self, h: float) -> Array:
+        """Inputs at the middle of the step, the states there guessed from the last rates."""
+        d, state = self.problem.descriptor, self.state
+        w = state.z[: d.rate_size] if self.steps else np.zeros(d.rate_size)
+        middle = d.advance(state.x, 0.5 * h * w)
+        given = self.problem.inputs(self.t + 0.5 * h, d.unpack(middle))
+        return np.concatenate([*(given[slot.path].value for slot in d.outer), np.zeros(1)])
+
+    def stats(self) -> dict[str, Any]:
+        """What the run did so far."""
+        analysis = self.stepper.analysis
+        return {
+            "method": self.stepper.name,
+            "form": self.form,
+            "steps": self.steps,
+            "rejected": 0,
+            "iterations": self.iterations,
+            "orders": self.stepper.changes,
+            "dependent_equations": len(analysis.redundant) if analysis is not None else 0,
+            "unknowns": self.stepper.model.unknowns,
+            "setup_s": self.setup,
+            "integrate_s": time.perf_counter() - self.begin - self.setup,
+            "step": self.grid.h,
+            "least_production": self.recorder.least,
+        }
+
+    def solution(self) -> Solution:
+        """The solution so far."""
+        problem, record = self.problem, self.recorder.result()
+        states = {
+            slot.path: coordinates(slot.quantity, record.x[:, slot.point])
+            for slot in problem.descriptor.states
+        }
+        return Solution(problem.name, record.t, states, ledgers(problem, record), self.stats(), problem)
+
+
+def coordinates(quantity: Quantity, x: Array) -> Array:
+    """States (n, size) as users read them: scalars (n,), relative poses as the pair's coordinates (n, d)."""
+    if quantity.kind == "relative_pose":
+        pair = Pair.from_space(quantity.space)
+        return np.array([pair.coordinates(row) for row in x]).reshape(x.shape[0], pair.dim)
+    return x[:, 0] if x.shape[1] == 1 else x

@@ -1,0 +1,125 @@
+"""Ledgers of a motion: where the energy is, what was supplied, what became heat, how much entropy was made."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from ephs.mechanics.solve.problem import Problem
+from ephs.mechanics.solve.record import Record
+from ephs.operad import Path
+from ephs.semantics.bundle import Array
+from ephs.semantics.primitives import Irreversible, Storage
+
+__all__ = ["Ledgers", "ledgers"]
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Ledgers:
+    """Books of a motion, all (n,).
+
+    Parameters
+    ----------
+    kinetic, potential, thermal
+        Energies in J of storages with momenta, with entropies or volumes, and of the others.
+    environment
+        θ₀ s − π₀ v of the reference environment, in J.
+    exergy
+        Σ H over the storages, in J.
+    entropy
+        Sum of all entropies, the environment's included, in J/K.
+    heat, work, supplied
+        What friction turned into heat; energy and exergy supplied through outer ports: J since the start.
+    made, least
+        Entropy made since the start; least production of a component in the step before: J/K.
+    storages, makers
+        Energy of each storage in J, entropy made by each irreversible component in J/K, by path.
+    entropies
+        Entropy of each storage that has one, in J/K, by path.
+    """
+
+    kinetic: Array
+    potential: Array
+    thermal: Array
+    environment: Array
+    exergy: Array
+    entropy: Array
+    heat: Array
+    work: Array
+    supplied: Array
+    made: Array
+    least: Array
+    storages: Mapping[Path, Array]
+    makers: Mapping[Path, Array]
+    entropies: Mapping[Path, Array]
+
+    @property
+    def energy(self) -> Array:
+        """Energy of everything, in J."""
+        return self.kinetic + self.potential + self.thermal + self.environment
+
+    @property
+    def scale(self) -> float:
+        """Largest K + |V − V₀| + |heat| + |work| over the run; of thermal energies where nothing moves; in J."""
+        v, q = self.potential, self.thermal
+        if not v.size:
+            return 1.0
+        moved = float(np.max(self.kinetic + np.abs(v - v[0]) + np.abs(self.heat) + np.abs(self.work)))
+        return moved or float(np.abs(q - q[0]).max()) or 1.0
+
+    def defect(self, mechanical: bool) -> Array:
+        """Relative defect of the energy balance, (n,); ``mechanical``: of K + V + heat − work as well."""
+        if not self.heat.size:
+            return np.zeros(0)
+        defects = [self._change(self.kinetic, self.potential, self.thermal, self.environment) - self.work]
+        if mechanical:
+            defects.append(self._change(self.kinetic, self.potential) + self.heat - self.work)
+        return np.max(np.abs(defects), axis=0) / self.scale
+
+    @staticmethod
+    def _change(*energies: Array) -> Array:
+        return np.sum(
+            [e - e[0] for e in energies], axis=0
+        )  # differences first: a sum of large energies would round
+
+
+def ledgers(problem: Problem, record: Record) -> Ledgers:
+    """The books of what a run kept."""
+    n = record.t.size
+    reference = problem.reference
+    kinetic, potential, thermal, environment, exergy, entropy = (np.zeros(n) for _ in range(6))
+    storages: dict[Path, Array] = {}
+    makers: dict[Path, Array] = {}
+    entropies: dict[Path, Array] = {}
+    for number, slot in enumerate(problem.descriptor.components):
+        primitive = slot.primitive
+        if isinstance(primitive, Irreversible):
+            makers[slot.path] = record.energies[:, number]
+        if not isinstance(primitive, Storage):
+            continue
+        exchanged = np.zeros(n)
+        for state in slot.reads:
+            if state.quantity.environment:
+                exchanged = exchanged + reference.intensive(state.quantity) * record.x[:, state.point][:, 0]
+            if state.quantity.kind == "entropy":
+                entropies[slot.path] = record.x[:, state.point][:, 0]
+                entropy = entropy + entropies[slot.path]
+        if primitive.environment:
+            environment = environment + exchanged
+            storages[slot.path] = exchanged
+            continue
+        energy = storages[slot.path] = record.energies[:, number]
+        exergy = exergy + energy - exchanged
+        if any(state.quantity.environment for state in slot.reads):
+            thermal = thermal + energy
+        elif any(state.quantity.parity < 0 for state in slot.reads):
+            kinetic = kinetic + energy
+        else:
+            potential = potential + energy
+    heat, work, supplied, made, least = record.ledgers.T
+    return Ledgers(
+        kinetic, potential, thermal, environment, exergy, entropy, heat, work, supplied, made, least,
+        storages, makers, entropies,
+    )  # fmt: skip

@@ -1,0 +1,61 @@
+"""Sparse LU in a fixed order: numbers only, no search, no allocation. See `sparse.Elimination`."""
+
+from ephs.semantics.spaces import jit
+
+kernel = jit.kernel
+
+
+@kernel
+def factorise(place, start, column, diagonal, data, value, row, floor, ratio):
+    """Factors of the matrix with entries ``data`` into ``value``; False where a pivot is zero or below its floor.
+
+    ``ratio`` (n,) receives |pivot|/|largest of its row|, ``floor`` (n,) is what this may come down to. Entries whose
+    place is negative do not take part. ``row`` (n,) is scratch.
+    """
+    n = diagonal.shape[0]
+    value[:] = 0.0
+    for k in range(place.shape[0]):
+        if place[k] >= 0:
+            value[place[k]] += data[k]
+    for i in range(n):
+        first, last, middle = start[i], start[i + 1], diagonal[i]
+        largest = 0.0
+        for p in range(first, last):
+            row[column[p]] = value[p]
+            largest = max(largest, abs(value[p]))
+        for p in range(first, middle):
+            k = column[p]
+            factor = row[k]
+            if factor != 0.0:
+                factor *= value[diagonal[k]]  # holds the reciprocal pivot
+                row[k] = factor
+                for q in range(diagonal[k] + 1, start[k + 1]):
+                    row[column[q]] -= factor * value[q]
+        for p in range(first, last):
+            value[p] = row[column[p]]
+        pivot = value[middle]
+        if not abs(pivot) > 0.0:
+            return False
+        ratio[i] = abs(pivot) / largest
+        if ratio[i] < floor[i]:
+            return False
+        value[middle] = 1.0 / pivot
+    return True
+
+
+@kernel
+def solve(rows, columns, start, column, diagonal, value, right, x, row):
+    """x with A x = right, from the factors. ``row`` (n,) is scratch; right and x may be the same array."""
+    n = diagonal.shape[0]
+    for i in range(n):
+        total = right[rows[i]]
+        for p in range(start[i], diagonal[i]):
+            total -= value[p] * row[column[p]]
+        row[i] = total
+    for i in range(n - 1, -1, -1):
+        total = row[i]
+        for p in range(diagonal[i] + 1, start[i + 1]):
+            total -= value[p] * row[column[p]]
+        row[i] = total * value[diagonal[i]]
+    for i in range(n):
+        x[columns[i]] = row[i]

@@ -1,0 +1,197 @@
+"""The natural method: every component discretised on its own, order 2, energy and holonomic relations exact.
+
+The state of the method is a value; advancing it is compiled, and gives one row of results a step.
+"""
+
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from ephs.mechanics.solve.analysis import Analysis, analyse
+from ephs.mechanics.solve.errors import Outcome, SolveError
+from ephs.mechanics.solve.model import Model, evaluate_at
+from ephs.mechanics.solve.natural_kernels import (
+    COMPONENT,
+    DIVERGED,
+    DONE,
+    INCONSISTENT,
+    PIVOT,
+    Memory,
+    advance,
+)
+from ephs.semantics.bundle import Array
+
+__all__ = ["Chunk", "Natural", "NaturalState"]
+
+SETTLING = 16
+"""Steps after a change of order until the next: the values at the change itself may be exceptional."""
+_OUTCOMES = {DIVERGED: Outcome.DIVERGED, PIVOT: Outcome.SINGULAR, INCONSISTENT: Outcome.CONTRADICTION}
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class NaturalState:
+    """Where the method stands.
+
+    Parameters
+    ----------
+    x
+        (point_size,) the states.
+    z, previous
+        (unknowns,) the unknowns of the last two steps, from which the next are guessed.
+    sums
+        (4 + components,): heat, energy supplied, exergy supplied, entropy made; entropy made by each component.
+    """
+
+    x: Array
+    z: Array
+    previous: Array
+    sums: Array
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Chunk:
+    """Results of some steps, one row each, and what stopped them early.
+
+    Parameters
+    ----------
+    x
+        (steps, point_size).
+    energies
+        (steps, components): energy of each storage in J, entropy made so far by each irreversible component in J/K.
+    ledgers
+        (steps, 5): heat, energy supplied, exergy supplied, entropy made, least entropy production in the step.
+    """
+
+    x: Array
+    energies: Array
+    ledgers: Array
+    iterations: int
+    failure: SolveError | None
+
+    @property
+    def steps(self) -> int:
+        """Number of steps taken."""
+        return int(self.x.shape[0])
+
+
+@final
+class Natural:
+    """The natural method for one model.
+
+    Parameters
+    ----------
+    model
+        The compiled model. The method keeps scratch memory: use one for each thread.
+
+    Attributes
+    ----------
+    analysis
+        The present order of elimination, None before the first step.
+    changes
+        How often the order was decided anew.
+    """
+
+    name = "natural"
+    order = 2
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        self.analysis: Analysis | None = None
+        self.changes = 0
+        self._memory: Memory = model.memory()
+        self._unsettled = 0
+
+    def init(self, x: Array) -> NaturalState:
+        """The state of the method at the states x; unknowns are guessed from the efforts there."""
+        d, n_rate = self.model.descriptor, int(self.model.tables.counts[0])
+        z = np.zeros(self.model.unknowns)
+        for slot in d.components:
+            if slot.primitive.kind == "storage":
+                z[[n_rate + i for i in slot.efforts]] = slot.primitive.effort(
+                    d.point(slot, x), self.model.reference
+                )
+        return NaturalState(x.copy(), z, z.copy(), np.zeros(4 + len(d.components)))
+
+    def energies(self, x: Array) -> Array:
+        """(components,): energy of each storage at the states x, zero elsewhere."""
+        status, component, memory = evaluate_at(self.model, x, self.init(x).z, 1.0)
+        if status:
+            raise SolveError.of_component(status, self.model, component)
+        return memory.energy
+
+    def step(self, state: NaturalState, h: float, inputs: Array | None = None) -> NaturalState:
+        """One step of h seconds.
+
+        Raises
+        ------
+        SolveError
+            The step has no solution, or lies outside the method's domain.
+        """
+        after, chunk = self.advance(state, h, 1, inputs)
+        if chunk.failure is not None:
+            raise chunk.failure
+        return after
+
+    def advance(
+        self, state: NaturalState, h: float, steps: int, inputs: Array | None = None
+    ) -> tuple[NaturalState, Chunk]:
+        """Up to ``steps`` steps of h seconds; the chunk says what stopped them early.
+
+        Parameters
+        ----------
+        inputs
+            Values at the outer ports during these steps, the model's own where None.
+        """
+        model, t = self.model, self.model.tables
+        given = model.input_values() if inputs is None else inputs
+        x, z, previous, sums = (a.copy() for a in (state.x, state.z, state.previous, state.sums))
+        rows = np.empty((steps, x.size))
+        energies, ledgers = np.empty((steps, t.kind.size)), np.empty((steps, 5))
+        scal = model.scal(h)
+        done = iterations = 0
+        failure: SolveError | None = None
+        fresh = False
+        while done < steps and failure is None:
+            try:
+                analysis = self._order(x, z, h)
+            except SolveError as error:
+                failure = error
+                break
+            order = analysis.order
+            wanted = steps - done
+            if fresh:  # nothing better is to be had: take this one step with whatever pivots there are
+                order, wanted = order._replace(floor=np.zeros_like(order.floor)), 1
+            elif self._unsettled:
+                wanted = min(wanted, self._unsettled)
+            status, component, taken, spent = advance(
+                t, order, x, z, previous, scal, given, self._memory, sums, wanted,
+                rows[done:], energies[done:], ledgers[done:],
+            )  # fmt: skip
+            done, iterations = done + taken, iterations + spent
+            if status == DONE:
+                fresh = False
+                self._settle(taken)
+            elif status >= COMPONENT:
+                failure = SolveError.of_component(status, model, component)
+            elif fresh and not taken:
+                failure = SolveError(_OUTCOMES[status], "", "")
+            else:
+                self.analysis, fresh, self._unsettled = None, True, SETTLING
+        after = NaturalState(x, z, previous, sums)
+        return after, Chunk(rows[:done], energies[:done], ledgers[:done], int(iterations), failure)
+
+    def _order(self, x: Array, z: Array, h: float) -> Analysis:
+        if self.analysis is None:
+            self.analysis = analyse(self.model, x, z, h)
+            self.changes += 1
+            self._memory = self._memory._replace(factors=np.zeros(self.analysis.fill))
+        return self.analysis
+
+    def _settle(self, taken: int) -> None:
+        if self._unsettled:
+            self._unsettled = max(0, self._unsettled - taken)
+            if not self._unsettled:
+                self.analysis = None

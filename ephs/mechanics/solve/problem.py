@@ -1,0 +1,120 @@
+"""What a solver is given: a system, its initial states, what is prescribed at its outer ports, and its surroundings."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol, final
+
+import numpy as np
+
+from ephs.operad import Path
+from ephs.semantics.bundle import Array, Reference
+from ephs.semantics.descriptor import Descriptor, Input
+from ephs.semantics.system import System
+
+if TYPE_CHECKING:
+    from ephs.mechanics.solve.solution import Solution
+
+__all__ = ["Motion", "Problem", "Signal"]
+
+State = Mapping[Path, Array]
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Signal:
+    """A prescribed flow (into the system) or effort at an outer port.
+
+    Parameters
+    ----------
+    value
+        (dim,), or a function of the time in s and the states by path that gives it.
+    effort
+        True where the effort is prescribed.
+    """
+
+    value: Array | Callable[[float, State], Array]
+    effort: bool = False
+
+    @property
+    def constant(self) -> bool:
+        """Whether the value never changes."""
+        return not callable(self.value)
+
+    def at(self, t: float, state: State) -> Array:
+        """The value at a time and state, (dim,)."""
+        value = self.value(t, state) if callable(self.value) else self.value
+        return np.atleast_1d(np.asarray(value, dtype=float))
+
+
+class Motion(Protocol):
+    """A motion in the terms of its field: the solver itself knows states, efforts and flows only."""
+
+    def body(self, name: str) -> Any:
+        """The motion of a body."""
+        ...
+
+    def joint(self, name: str) -> Any:
+        """The motion of a joint."""
+        ...
+
+    def thermal(self, name: str) -> Any:
+        """The temperature of a thermal node."""
+        ...
+
+    def constraint_error(self) -> Array:
+        """(n,) largest position residual of any joint, in m or rad."""
+        ...
+
+    def velocity_error(self) -> Array:
+        """(n,) largest residual of the reported velocities, in m/s or rad/s."""
+        ...
+
+    def summary(self) -> dict[str, Any]:
+        """What it adds to the summary."""
+        ...
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Problem:
+    """A system with everything that determines its motion.
+
+    Parameters
+    ----------
+    name
+        For files and titles.
+    initial
+        Values of all states by path.
+    signals
+        What is prescribed at the outer ports; each has one.
+    motion
+        Makes of a solution the motion in the terms of its field; None for a system that is not a scene.
+    scene
+        The scene that the system was built from, or None.
+    document
+        The scene as text, for solution files.
+    """
+
+    name: str
+    system: System
+    descriptor: Descriptor
+    initial: State
+    signals: Mapping[Path, Signal]
+    reference: Reference
+    motion: Callable[["Solution"], Motion] | None = None
+    scene: Any = None
+    document: str = ""
+
+    def inputs(self, t: float, state: State) -> dict[Path, Input]:
+        """The inputs of the descriptor form at a time."""
+        return {path: Input(signal.at(t, state), signal.effort) for path, signal in self.signals.items()}
+
+    @property
+    def prescribed(self) -> frozenset[Path]:
+        """The outer ports whose effort is prescribed."""
+        return frozenset(path for path, signal in self.signals.items() if signal.effort)
+
+    @property
+    def constant(self) -> bool:
+        """Whether no input depends on time or state."""
+        return all(signal.constant for signal in self.signals.values())

@@ -1,0 +1,107 @@
+"""What a run keeps: every step, or dense output at the times asked for."""
+
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from ephs.mechanics.solve.natural import Chunk
+from ephs.semantics.bundle import Array
+from ephs.semantics.descriptor import Descriptor
+from ephs.semantics.spaces import manifold
+
+__all__ = ["Record", "Recorder"]
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Record:
+    """The kept rows of a run.
+
+    Parameters
+    ----------
+    t
+        (n,) in s.
+    x
+        (n, point_size) the states.
+    energies
+        (n, components): energy of each storage in J, entropy made by each irreversible component in J/K.
+    ledgers
+        (n, 5): heat, energy supplied, exergy supplied in J, entropy made in J/K, and the least entropy production of
+        a component in the step that ended there.
+    """
+
+    t: Array
+    x: Array
+    energies: Array
+    ledgers: Array
+
+
+class Recorder:
+    """Collects chunks of steps.
+
+    Parameters
+    ----------
+    save_at
+        Times to keep, ascending, or None for every step. States between steps lie on the geodesic of the step, whose
+        error is of the method's order; ledgers are linear in between.
+    """
+
+    def __init__(self, descriptor: Descriptor, t0: float, x0: Array, save_at: Array | None) -> None:
+        self._d, self._t0, self._x0 = descriptor, t0, x0
+        self._save_at = None if save_at is None else np.asarray(save_at, dtype=float)
+        self._next = 0
+        self._rows: list[tuple[Array, Array, Array, Array]] = []
+        self._least = np.inf
+
+    def start(self, energies: Array) -> None:
+        """The row at t₀."""
+        self._last = (np.array([self._t0]), self._x0[None, :], energies[None, :], np.zeros((1, 5)))
+        if self._save_at is None or (self._save_at.size and self._save_at[0] == self._t0):
+            self._rows.append(self._last)
+            self._next = 1
+
+    def add(self, t: Array, chunk: Chunk) -> None:
+        """Rows of some steps that follow."""
+        self._least = min(self._least, float(chunk.ledgers[:, 4].min(initial=np.inf)))
+        fresh = (t, chunk.x, chunk.energies, chunk.ledgers)
+        if self._save_at is None:
+            self._rows.append(fresh)
+        else:
+            first = self._next
+            self._next = int(np.searchsorted(self._save_at, t[-1], side="right"))
+            wanted = self._save_at[first : self._next]
+            if wanted.size:
+                whole = tuple(np.concatenate([a, b]) for a, b in zip(self._last, fresh, strict=True))
+                self._rows.append(self._between(wanted, *whole))
+        self._last = tuple(a[-1:] for a in fresh)
+
+    def result(self) -> Record:
+        """Everything kept so far."""
+        rows = self._rows or [
+            (np.zeros(0), self._x0[None, :][:0], np.zeros((0, len(self._d.components))), np.zeros((0, 5)))
+        ]
+        t, x, energies, ledgers = (np.concatenate(column) for column in zip(*rows, strict=True))
+        return Record(t, x, energies, ledgers)
+
+    @property
+    def least(self) -> float:
+        """The least entropy production over all steps, kept or not, in J/K."""
+        return float(self._least) if np.isfinite(self._least) else 0.0
+
+    def _between(
+        self, wanted: Array, t: Array, x: Array, energies: Array, ledgers: Array
+    ) -> tuple[Array, Array, Array, Array]:
+        i = np.clip(np.searchsorted(t, wanted, side="left") - 1, 0, t.size - 2)
+        part = (wanted - t[i]) / (t[i + 1] - t[i])
+        states = np.empty((wanted.size, x.shape[1]))
+        for slot in self._d.states:
+            space = manifold(slot.quantity.space)
+            for row, (k, s) in enumerate(zip(i, part, strict=True)):
+                a, b = x[k, slot.point], x[k + 1, slot.point]
+                states[row, slot.point] = b if s == 1.0 else space.retract(a, s * space.increment(a, b))
+
+        def linear(values: Array) -> Array:
+            return values[i] + part[:, None] * (values[i + 1] - values[i])
+
+        return wanted, states, linear(energies), np.column_stack([linear(ledgers[:, :4]), ledgers[i + 1, 4]])

@@ -1,0 +1,255 @@
+"""Solutions: the motion of a system with its ledgers."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path as File
+from typing import TYPE_CHECKING, Any, final
+
+import numpy as np
+
+from ephs.mechanics.solve.ledger import Ledgers
+from ephs.mechanics.solve.problem import Motion, Problem
+from ephs.operad import Path
+from ephs.semantics.bundle import Array
+from ephs.semantics.system import System
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+__all__ = ["Entry", "Solution"]
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Entry:
+    """The ledger of a component or subsystem: energy in J, entropy and entropy made in J/K; (n,) each."""
+
+    energy: Array
+    entropy: Array
+    made: Array
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """The motion of a system.
+
+    Parameters
+    ----------
+    name
+        The system's or scene's name.
+    t
+        (n,) times in s.
+    states
+        Path of each storage port -> (n,) of scalars, (n, 7) of poses (quaternion, position), (n, 6) of body momenta,
+        (n, d) coordinates of relative poses.
+    ledgers
+        Energies, heat, work and entropies.
+    stats
+        Counts and times of the run.
+    problem
+        What was solved; None where a file could not hold it.
+    """
+
+    name: str
+    t: Array
+    states: Mapping[Path, Array]
+    ledgers: Ledgers
+    stats: Mapping[str, Any]
+    problem: Problem | None
+
+    def __getitem__(self, path: str | Path) -> Array:
+        """The state at a port of a storage component.
+
+        Raises
+        ------
+        KeyError
+            No such state; the message lists those that there are.
+        """
+        key = Path.of(path)
+        if key not in self.states:
+            raise KeyError(f"{path}: no such state; the states are {', '.join(map(str, self.states))}")
+        return self.states[key]
+
+    def __len__(self) -> int:
+        return int(self.t.size)
+
+    def __iter__(self) -> Iterator[Path]:
+        return iter(self.states)
+
+    def __repr__(self) -> str:
+        span = f"{self.t[0]:g} … {self.t[-1]:g} s, {len(self)} instants" if len(self) else "empty"
+        return f"Solution of {self.name}: {span}, {len(self.states)} states"
+
+    @property
+    def energy(self) -> Array:
+        """(n,) energy of the whole system in J, environment included."""
+        return self.ledgers.energy
+
+    @property
+    def exergy(self) -> Array:
+        """(n,) exergy of the storages in J."""
+        return self.ledgers.exergy
+
+    @property
+    def entropy(self) -> Array:
+        """(n,) entropy of the whole system in J/K, environment included."""
+        return self.ledgers.entropy
+
+    @property
+    def heat(self) -> Array:
+        """(n,) what friction and damping turned into heat since the start, in J."""
+        return self.ledgers.heat
+
+    @property
+    def work(self) -> Array:
+        """(n,) energy supplied through outer ports since the start, in J."""
+        return self.ledgers.work
+
+    @property
+    def kinetic(self) -> Array:
+        """(n,) energy in J of the storages that hold momenta (or fluxes)."""
+        return self.ledgers.kinetic
+
+    @property
+    def potential(self) -> Array:
+        """(n,) energy in J of the storages that hold neither momenta nor entropies."""
+        return self.ledgers.potential
+
+    @cached_property
+    def energy_error(self) -> Array:
+        """(n,) defect of the energy balance, relative to the largest K + |V − V₀| + |heat| + |work| of the run."""
+        return self.ledgers.defect(mechanical=self.scene is not None)
+
+    @property
+    def entropy_production(self) -> Array:
+        """(n,) least entropy production of an irreversible component in the step before, in J/K."""
+        return self.ledgers.least
+
+    @cached_property
+    def constraint_error(self) -> Array:
+        """(n,) largest position residual of any joint, in m or rad; zero for systems without joints."""
+        return np.zeros(len(self)) if self.motion is None else self.motion.constraint_error()
+
+    @cached_property
+    def velocity_error(self) -> Array:
+        """(n,) largest residual of the reported velocities, in m/s or rad/s; zero for systems without joints."""
+        return np.zeros(len(self)) if self.motion is None else self.motion.velocity_error()
+
+    @property
+    def system(self) -> System | None:
+        """The system, None where a file could not hold it."""
+        return None if self.problem is None else self.problem.system
+
+    @property
+    def scene(self) -> Any:
+        """The scene, None for a system that is not one."""
+        return None if self.problem is None else self.problem.scene
+
+    @cached_property
+    def motion(self) -> Motion | None:
+        """The motion in the terms of mechanics, None for a system that is not a scene."""
+        return None if self.problem is None or self.problem.motion is None else self.problem.motion(self)
+
+    def body(self, name: str) -> Any:
+        """The motion of a body: position, quaternion, rotation, velocity, angular_velocity.
+
+        Raises
+        ------
+        TypeError
+            The solution is not of a scene.
+        """
+        return self._moving("bodies").body(name)
+
+    def joint(self, name: str) -> Any:
+        """The motion of a joint: coordinate, rate, wrench."""
+        return self._moving("joints").joint(name)
+
+    def thermal(self, name: str) -> Any:
+        """The temperature of a thermal node."""
+        return self._moving("thermal nodes").thermal(name)
+
+    def point(self, body: str, xyz: "ArrayLike") -> Array:
+        """(n, 3) world position of a point that is given in the body's frame."""
+        motion = self.body(body)
+        return motion.position + motion.rotation @ np.asarray(xyz, dtype=float)
+
+    def ledger(self, path: str | Path) -> Entry:
+        """The ledger of a component, or of all components of a subsystem.
+
+        Raises
+        ------
+        KeyError
+            No storage and no irreversible component lies there.
+        """
+        at = Path.of(path)
+        books = self.ledgers
+        parts = [
+            [values for key, values in book.items() if at.is_prefix_of(key)]
+            for book in (books.storages, books.entropies, books.makers)
+        ]
+        if not any(parts):
+            known = ", ".join(map(str, {**books.storages, **books.makers}))
+            raise KeyError(
+                f"{path}: no storage and no irreversible component there; those that keep books are {known}"
+            )
+        energy, entropy, made = (np.sum(p, axis=0) if p else np.zeros(len(self)) for p in parts)
+        return Entry(energy, entropy, made)
+
+    def summary(self) -> dict[str, Any]:
+        """The values of ``summary.json``."""
+        last = -1 if len(self) else slice(0)
+        out: dict[str, Any] = {
+            "scene": self.name,
+            "method": self.stats["method"],
+            "form": self.stats["form"],
+            "t_end": float(self.t[-1]) if len(self) else None,
+            "steps": self.stats["steps"],
+            "rejected": self.stats["rejected"],
+            "setup_s": self.stats["setup_s"],
+            "integrate_s": self.stats["integrate_s"],
+            "unknowns": {"paper": self.stats["unknowns"], "used": self.stats["unknowns"]},
+            "max_energy_error": float(self.energy_error.max(initial=0.0)),
+            "max_constraint_error": float(self.constraint_error.max(initial=0.0)),
+            "max_velocity_error": float(self.velocity_error.max(initial=0.0)),
+            "min_entropy_production": float(self.stats["least_production"]),
+            "heat": float(np.sum(self.heat[last])),
+            "work": float(np.sum(self.work[last])),
+        }
+        if self.motion is not None:
+            out |= self.motion.summary()
+        else:
+            out["states"] = {
+                str(path): values[-1].tolist() for path, values in self.states.items() if len(self)
+            }
+        return out
+
+    def to_xarray(self) -> Any:
+        """States and ledgers as an `xarray.Dataset` over ``t``, with units."""
+        from ephs.mechanics.solve.file import dataset
+
+        return dataset(self)
+
+    def save(self, path: str | File) -> None:
+        """Write a netCDF file that `load_solution` reads back."""
+        from ephs.mechanics.solve.file import save
+
+        save(self, File(path))
+
+    def plot(self) -> Any:
+        """The motion as a matplotlib figure; `ephs.show` has figures of energy, exergy, entropy and residuals."""
+        from ephs.show import plot_motion
+
+        return plot_motion(self)
+
+    def animate(self, path: str | File | None = None) -> str:
+        """One self-contained HTML page with the moving mechanism; written to a file where a path is given."""
+        from ephs.show import animate
+
+        return animate(self, path)
+
+    def _moving(self, what: str) -> Motion:
+        if self.motion is None:
+            raise TypeError(f"{self.name} is not a scene, it has no {what}; states are read as sol['path']")
+        return self.motion
