@@ -293,6 +293,11 @@ class Pattern:
 
         return summary(self)
 
+    def _repr_svg_(self) -> str:
+        from ephs.show import draw
+
+        return draw(self).svg
+
     def __str__(self) -> str:
         from ephs.operad.printing import tree
 

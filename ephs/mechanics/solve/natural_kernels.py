@@ -6,6 +6,7 @@ from ephs.mechanics.solve.calling import call_kernel
 from ephs.mechanics.solve.lu_kernels import factorise, solve
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import jit
+from ephs.semantics.spaces.codes import SE3, SO3, SO3xR3
 from ephs.semantics.spaces.se3_kernels import retract
 
 kernel = jit.kernel
@@ -213,7 +214,7 @@ def newton(t, o, x, z, scal, inputs, m):
         ratio = measure(t, z, o.dropped, m)
         if ratio != ratio:
             return 1, 0, iteration
-        if ratio <= 4e-16 or (ratio < 1e-11 and ratio > 0.2 * before):
+        if ratio <= 4e-16 or (ratio < 1e-11 and ratio > 0.7 * before):
             return (3 if m.defect[0] > o.tolerance[0] else 0), 0, iteration
         if iteration > 12 and ratio > 0.9 * before:
             return 1, 0, iteration
@@ -261,6 +262,14 @@ def account(t, z, scal, inputs, m, sums):
 
 
 @kernel
+def tighten(q):
+    """Bring a quaternion that is off by rounding back to unit length."""
+    factor = 1.5 - 0.5 * (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    for i in range(4):
+        q[i] *= factor
+
+
+@kernel
 def advance(t, o, x, z, previous, scal, inputs, m, sums, steps, states, energies, ledgers):
     """Take ``steps`` steps of h = scal[0]; fill one row a step; returns (status, component, steps done, iterations).
 
@@ -287,6 +296,8 @@ def advance(t, o, x, z, previous, scal, inputs, m, sums, steps, states, energies
             for j in range(dim):
                 m.v[j] = scal[0] * z[rate + j]
             retract(code, x[at : at + size], m.v[:dim], x[at : at + size])
+            if code in (SO3, SE3, SO3xR3):
+                tighten(x[at : at + 4])
         least = account(t, z, scal, inputs, m, sums)
         states[step, :] = x
         energies[step, :] = m.energy
