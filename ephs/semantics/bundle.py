@@ -17,6 +17,8 @@ from ephs.operad import Interface, Path, PortType, Quantity
 __all__ = ["Array", "Bundle", "Reference"]
 
 Array = NDArray[np.float64]
+Span = slice
+"""A range of indices: `slice`, whose own name a method of `Bundle` bears."""
 
 
 @final
@@ -57,16 +59,16 @@ class Bundle:
             tuple(interface.items())
         )  # equal interfaces may differ in order, and the order counts here
 
-    def slice(self, port: Path) -> slice:
+    def slice(self, port: Path) -> Span:
         """Where the port's flow and effort lie in the fibre vectors."""
         i = self.ports.index(port)
-        return slice(self.offsets[i], self.offsets[i] + self.quantity(port).space.dim)
+        return Span(self.offsets[i], self.offsets[i] + self.quantity(port).space.dim)
 
     def quantity(self, port: Path) -> Quantity:
         """The quantity of a port."""
         return self.interface[port].quantity
 
-    def items(self) -> Iterator[tuple[Path, slice, Quantity]]:
+    def items(self) -> Iterator[tuple[Path, Span, Quantity]]:
         """Iterate over power ports with their slices and quantities."""
         for port in self.ports:
             yield port, self.slice(port), self.quantity(port)

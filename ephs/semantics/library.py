@@ -46,6 +46,12 @@ def _positive(path: str, **parameters: float) -> None:
             raise StructureError("parameter", path, key=key, found=value, expected="a number > 0")
 
 
+def _finite(path: str, **parameters: float) -> None:
+    for key, value in parameters.items():
+        if not math.isfinite(value):
+            raise StructureError("parameter", path, key=key, found=value, expected="a finite number")
+
+
 def _non_negative(path: str, **parameters: float) -> None:
     for key, value in parameters.items():
         if not (math.isfinite(value) and value >= 0.0):
@@ -151,9 +157,22 @@ def ideal_gas(*, c1: float, c2: float, v0: float, c: float) -> Storage:
         e = energy(x)
         return np.array([e / c2, -e / (c * float(x[v][0]))])
 
+    def discrete_gradient(x0: Point, step: Array) -> Array:
+        """E = a(s) b(v): the difference quotient of one factor times the mean of the other."""
+        volume = float(x0[v][0])
+        heat, growth = float(step[0]) / c2, float(step[1]) / volume
+        if not growth > -1.0:  # an iterate of a solver may lie where no gas is
+            return np.full(2, math.nan)
+        a = c1 * math.exp(float(x0[s][0]) / c2)
+        b = (v0 / volume) ** (1.0 / c)
+        rise, fall = math.expm1(heat), math.expm1(-math.log1p(growth) / c)
+        by_s = a / c2 * (rise / heat if heat != 0.0 else 1.0)
+        by_v = b / volume * (fall / growth if growth != 0.0 else -1.0 / c)
+        return np.array([by_s * b * (1.0 + 0.5 * fall), by_v * a * (1.0 + 0.5 * rise)])
+
     parameters = (("c1", c1), ("c2", c2), ("v0", v0), ("c", c))
     interface = power_ports(s=quantity.entropy, v=quantity.volume)
-    return Storage("ideal_gas", interface, energy, gradient, parameters=parameters)
+    return Storage("ideal_gas", interface, energy, gradient, discrete_gradient, parameters=parameters)
 
 
 def environment() -> Storage:
@@ -233,6 +252,7 @@ def mkc() -> Reversible:
 
 def lever(*, r: float) -> Reversible:
     """Lever of ratio r; ports q1, q2: q1.f = −r·q2.f, q2.e = r·q1.e."""
+    _finite("lever", r=r)
     interface = power_ports(q1=quantity.displacement, q2=quantity.displacement)
     return constant_structure("lever", interface, np.zeros((2, 2)), np.array([[-r, 1.0]]), (("r", r),))
 

@@ -11,7 +11,7 @@ from typing import final
 
 import numpy as np
 
-from ephs.operad import Path, Pattern
+from ephs.operad import ROOT, Path, Pattern
 from ephs.semantics.behaviour import Continuous, Natural, Relating, Storing
 from ephs.semantics.bundle import Array, Bundle, Reference
 from ephs.semantics.descriptor import Input
@@ -26,11 +26,24 @@ __all__ = ["Solved", "solve_flat", "solve_nested", "step"]
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Solved:
-    """Rates of the states, multipliers by component, and outer (flow, effort) pairs that solve a relation."""
+    """What solves a relation.
+
+    Parameters
+    ----------
+    rates, multipliers
+        By state and by component.
+    outer
+        Outer port -> (flow, effort).
+    efforts
+        Efforts (n,) at the ports of each irreversible component, by its path.
+    residual
+        Largest entry of the residual that Newton's method left.
+    """
 
     rates: Mapping[Path, Array]
     multipliers: Mapping[Path, Array]
     outer: Mapping[Path, tuple[Array, Array]]
+    efforts: Mapping[Path, Array]
     residual: float
 
 
@@ -56,6 +69,7 @@ def solve_flat(
         {slot.path: rates[slot.rates] for slot in d.states},
         {s.path: lam[s.multiplier : s.multiplier + s.multipliers] for s in d.components if s.multipliers},
         outer,
+        {s.path: efforts[list(s.efforts)] for s in d.components if s.primitive.kind == "irreversible"},
         residual,
     )
 
@@ -80,6 +94,7 @@ class _Part:
     equations: Callable[[Array], list[Array]]
     rates: Mapping[Path, slice]
     multipliers: Mapping[Path, slice]
+    efforts: Mapping[Path, slice]
 
 
 def solve_nested(
@@ -107,6 +122,7 @@ def solve_nested(
         {path: z[where] for path, where in part.rates.items()},
         {path: z[where] for path, where in part.multipliers.items()},
         {port: (z[flow], z[effort]) for port, (flow, effort) in part.ports.items()},
+        {path: z[where] for path, where in part.efforts.items()},
         error,
     )
 
@@ -126,7 +142,7 @@ def _leaf(
         storing = local
         rates = {p: ports[p][0] for p in bundle.ports}
         all_rates.update({path / p: where for p, where in rates.items()})
-        return _Part(ports, lambda z: [z[effort] - storing.effort(z[flow])], rates, {})
+        return _Part(ports, lambda z: [z[effort] - storing.effort(z[flow])], rates, {}, {})
     relating = local
     lam = unknowns.take(primitive.multipliers if isinstance(primitive, Reversible) else 0)
     dims = {p: manifold(primitive.interface[p].quantity.space).dim for p in primitive.reads}
@@ -139,7 +155,8 @@ def _leaf(
         f, conditions = relating.relate(z[effort], z[lam], read)
         return [z[flow] - f, conditions]
 
-    return _Part(ports, equations, {}, {Path(()): lam} if lam.stop > lam.start else {})
+    own = {ROOT: effort} if primitive.kind == "irreversible" else {}
+    return _Part(ports, equations, {}, {ROOT: lam} if lam.stop > lam.start else {}, own)
 
 
 def _glue(pattern: Pattern, parts: Mapping[Path, _Part], unknowns: _Unknowns) -> _Part:
@@ -165,11 +182,11 @@ def _glue(pattern: Pattern, parts: Mapping[Path, _Part], unknowns: _Unknowns) ->
         rows.extend(z[f] for junction, (f, _) in ports.items() if junction not in on)
         return rows
 
+    def below(of: Callable[[_Part], Mapping[Path, slice]]) -> dict[Path, slice]:
+        return {box / path: where for box, part in parts.items() for path, where in of(part).items()}
+
     return _Part(
-        ports,
-        equations,
-        {box / path: where for box, part in parts.items() for path, where in part.rates.items()},
-        {box / path: where for box, part in parts.items() for path, where in part.multipliers.items()},
+        ports, equations, below(lambda p: p.rates), below(lambda p: p.multipliers), below(lambda p: p.efforts)
     )
 
 

@@ -19,6 +19,9 @@ __all__ = ["Irreversible", "Kernel", "Point", "Primitive", "Reversible", "Storag
 
 Point = Mapping[Path, Array]
 """States of the ports that a primitive reads: port -> (size,)."""
+ROUNDING = 4.0 * float(np.finfo(float).eps)
+POSITIVE = ("volume", "amount")
+"""Kinds of quantity whose states are positive, so that steps are relative to them."""
 
 
 @final
@@ -48,7 +51,7 @@ class Storage:
         dE(x), left-trivialised, (n,) in the ports' order; by differences of the energy where None.
     discrete_gradient
         ∇̄E(x⁰, v) with ⟨∇̄E|v⟩ = E(x⁰·exp v) − E(x⁰) exactly, symmetric in the two states, (n,). Where None:
-        the gradient at the midpoint, corrected along v (Gonzalez).
+        port by port the gradient at the midpoint, corrected along the increment (Gonzalez).
     parameters
         Names and numbers, for printing and comparison.
     environment
@@ -110,7 +113,7 @@ class Storage:
         if self.discrete_gradient is not None:
             gradient = np.asarray(self.discrete_gradient(x0, v), dtype=float)
         else:
-            gradient = self._gonzalez(x0, v)
+            gradient = self._increments(x0, v)
         return gradient - self.bundle.intensive(reference)
 
     def exergy(self, x: Point, reference: Reference) -> float:
@@ -128,13 +131,34 @@ class Storage:
             )
         return float(self.energy(x))
 
-    def _gonzalez(self, x0: Point, v: Array) -> Array:
-        gradient = self.energy_gradient(self.retract(x0, 0.5 * v))
-        square = float(v @ v)
-        if square < 1e-12:  # the correction is O(|v|²) and its numerator is all rounding
+    def _increments(self, x0: Point, v: Array) -> Array:
+        """The mean of the discrete gradients that move port after port, in the order of ports and in its reverse.
+
+        So quantities of unlike units are never compared, and the two states may be exchanged.
+        """
+        out = np.zeros(self.bundle.size)
+        spans = [where for _, where, _ in self.bundle.items()]
+        orders = (spans, spans[::-1]) if len(spans) > 1 else (spans,)
+        for order in orders:
+            done = np.zeros(self.bundle.size)
+            for where in order:
+                step = np.zeros(self.bundle.size)
+                step[where] = v[where]
+                out[where] += self._gonzalez(self.retract(x0, done), step, where) / len(orders)
+                done = done + step
+        return out
+
+    def _gonzalez(self, x0: Point, v: Array, where: slice) -> Array:
+        """The gradient at the midpoint, corrected along the increment v of one port."""
+        gradient = self.energy_gradient(self.retract(x0, 0.5 * v))[where]
+        start, end = float(self.energy(x0)), float(self.energy(self.retract(x0, v)))
+        step = v[where]
+        along = float(gradient @ step)
+        defect = end - start - along
+        # below the rounding of the energies the correction is noise, of any size once divided by |v|²
+        if abs(defect) <= ROUNDING * (abs(start) + abs(end) + abs(along)):
             return gradient
-        defect = float(self.energy(self.retract(x0, v))) - float(self.energy(x0)) - float(gradient @ v)
-        return gradient + (defect / square) * v
+        return gradient + (defect / float(step @ step)) * step
 
     def compose(self, pattern: Pattern, fillings: "Mapping[Path, object]") -> object:
         """Fill the boxes of a pattern: gives a System."""
@@ -265,13 +289,15 @@ def _differences(storage: Storage, x: Point) -> Array:
     """dE by central differences of fourth order, in the trivialised directions: good to about 1e-12 of E's scale."""
     bundle = storage.bundle
     out = np.zeros(bundle.size)
-    for i in range(bundle.size):
-        step = np.zeros(bundle.size)
-        step[i] = 1e-3
-        near, far = (
-            float(storage.energy(storage.retract(x, k * step)))
-            - float(storage.energy(storage.retract(x, -k * step)))
-            for k in (1.0, 2.0)
-        )
-        out[i] = (8.0 * near - far) / 12e-3
+    for port, where, quantity in bundle.items():
+        size = 1e-3 * (float(np.abs(x[port]).max()) if quantity.kind in POSITIVE else 1.0)
+        for i in range(where.start, where.stop):
+            step = np.zeros(bundle.size)
+            step[i] = size
+            near, far = (
+                float(storage.energy(storage.retract(x, k * step)))
+                - float(storage.energy(storage.retract(x, -k * step)))
+                for k in (1.0, 2.0)
+            )
+            out[i] = (8.0 * near - far) / (12.0 * size)
     return out

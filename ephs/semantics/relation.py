@@ -41,17 +41,21 @@ Sources = Mapping[Path, Path | None]
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class LinearRelation:
-    """A relation at a base point, as a subspace of (rates, outer flows, outer efforts, 1).
+    """A relation at a base point, as a subspace of (rates, outer flows, outer efforts, unit).
 
     Parameters
     ----------
     rates, ports
         Names and dimensions, sorted by name, in the order in which they lie in the subspace.
+    unit
+        The value of the last coordinate on the relation proper: of the size of the efforts, so that projectors do not
+        lose the small ones beside a pressure.
     """
 
     rates: Coordinates
     ports: Coordinates
     subspace: Subspace
+    unit: float
 
     @property
     def projector(self) -> Array:
@@ -63,12 +67,19 @@ class LinearRelation:
         """Dimension of the subspace, the constant coordinate included."""
         return self.subspace.dimension
 
+    @property
+    def empty(self) -> bool:
+        """Whether no rates, flows and efforts are possible at all: a state that violates a constraint."""
+        return float(np.abs(self.subspace.basis[-1]).max(initial=0.0)) < 1e-8
+
     def distance(self, other: "LinearRelation") -> float:
-        """Largest entry of the difference of projectors; the names must agree."""
-        if (self.rates, self.ports) != (other.rates, other.ports):
+        """Largest entry of the difference of projectors; 0 for two empty relations. The names must agree."""
+        if (self.rates, self.ports, self.unit) != (other.rates, other.ports, other.unit):
             raise ValueError(
                 f"relations on {self.rates}, {self.ports} and {other.rates}, {other.ports} differ in kind"
             )
+        if self.empty and other.empty:
+            return 0.0
         return self.subspace.distance(other.subspace)
 
 
@@ -100,9 +111,10 @@ class Relation:
         system = as_system(self.system)
         point = system.state(state)
         frozen = dict(efforts or {})
+        unit = _unit(system, point, self.reference)
         if self.route == "flat":
-            return _flat(system, point, frozen, self.reference)
-        return _nested(system, point, frozen, self.reference)
+            return _flat(system, point, frozen, self.reference, unit)
+        return _nested(system, point, frozen, self.reference, unit)
 
 
 def relation_of(
@@ -134,11 +146,25 @@ def linear_parts(
     return primitive.matrix(x, at, reference) / reference.temperature, np.zeros((0, n)), np.zeros(n)
 
 
+def _unit(system: System, state: Mapping[Path, Array], reference: Reference) -> float:
+    """The size of the largest effort that a storage gives, at least 1."""
+    largest = 1.0
+    for path, primitive in system.leaves():
+        if isinstance(primitive, Storage):
+            point = {port: state[path / port] for port in primitive.reads}
+            largest = max(largest, float(np.abs(primitive.effort(point, reference)).max(initial=0.0)))
+    return largest
+
+
 # ---- route one: flatten, assemble, eliminate -------------------------------------------------------------------
 
 
 def _flat(
-    system: System, state: Mapping[Path, Array], frozen: Mapping[Path, Array], reference: Reference
+    system: System,
+    state: Mapping[Path, Array],
+    frozen: Mapping[Path, Array],
+    reference: Reference,
+    unit: float,
 ) -> LinearRelation:
     descriptor = system.descriptor()
     x = descriptor.pack(state)
@@ -157,7 +183,7 @@ def _flat(
         if isinstance(slot.primitive, Storage):
             rates = [i for s in slot.reads for i in range(s.rates.start, s.rates.stop)]
             storage_rows[rates, columns] = 1.0
-            storage_rows[rates, -1] = -effort
+            storage_rows[rates, -1] = -effort / unit
             balance[index, rates] += 1.0
             continue
         # two ports of one component may lie on one junction: add, do not assign
@@ -184,6 +210,7 @@ def _flat(
         tuple((s.path, s.quantity.space.dim) for s in rates),
         tuple((s.path, s.quantity.space.dim) for s in sorted(outer, key=lambda s: s.path)),
         solution.project([*kept, size - 1]),
+        unit,
     )
 
 
@@ -191,10 +218,14 @@ def _flat(
 
 
 def _nested(
-    system: System, state: Mapping[Path, Array], frozen: Mapping[Path, Array], reference: Reference
+    system: System,
+    state: Mapping[Path, Array],
+    frozen: Mapping[Path, Array],
+    reference: Reference,
+    unit: float,
 ) -> LinearRelation:
     def leaf(path: Path, primitive: Primitive, sources: Sources) -> LinearRelation:
-        return _primitive(primitive, read_point(primitive, sources, state), frozen.get(path), reference)
+        return _primitive(primitive, read_point(primitive, sources, state), frozen.get(path), reference, unit)
 
     return fold(system, leaf, compose_linear)
 
@@ -263,7 +294,9 @@ def read_point(primitive: Primitive, sources: Sources, state: Mapping[Path, Arra
     }
 
 
-def _primitive(primitive: Primitive, x: Point, e: Array | None, reference: Reference) -> LinearRelation:
+def _primitive(
+    primitive: Primitive, x: Point, e: Array | None, reference: Reference, unit: float
+) -> LinearRelation:
     bundle = primitive.bundle
     n = bundle.size
     dynamic, constraint, effort = linear_parts(primitive, x, e, reference)
@@ -274,9 +307,11 @@ def _primitive(primitive: Primitive, x: Point, e: Array | None, reference: Refer
     eye = np.eye(n)
     if isinstance(primitive, Storage):
         # coordinates (rates, f, e, 1)
-        kernel = np.block([[eye, -eye, np.zeros((n, n + 1))], [np.zeros((n, 2 * n)), eye, -effort[:, None]]])
+        kernel = np.block(
+            [[eye, -eye, np.zeros((n, n + 1))], [np.zeros((n, 2 * n)), eye, -effort[:, None] / unit]]
+        )
         kept = [*order, *(n + i for i in order), *(2 * n + i for i in order), 3 * n]
-        return LinearRelation(named, named, Subspace.from_kernel(kernel).project(kept))
+        return LinearRelation(named, named, Subspace.from_kernel(kernel).project(kept), unit)
     # coordinates (f, e, λ, 1)
     kernel = np.block(
         [
@@ -285,11 +320,12 @@ def _primitive(primitive: Primitive, x: Point, e: Array | None, reference: Refer
         ]
     )
     kept = [*order, *(n + i for i in order), 2 * n + k]
-    return LinearRelation((), named, Subspace.from_kernel(kernel).project(kept))
+    return LinearRelation((), named, Subspace.from_kernel(kernel).project(kept), unit)
 
 
 def compose_linear(pattern: Pattern, parts: Mapping[Path, LinearRelation]) -> LinearRelation:
     """Glue the relations of the boxes along a pattern: shared effort, net flow; then forget the inner ports."""
+    unit = next((part.unit for part in parts.values()), 1.0)
     inner = Subspace(np.zeros((0, 0)))
     places: dict[tuple[Path, Path], tuple[int, int]] = {}  # (box, port) -> (first flow, first effort)
     rates: list[tuple[Path, int, int]] = []
@@ -338,7 +374,10 @@ def compose_linear(pattern: Pattern, parts: Mapping[Path, LinearRelation]) -> Li
     rates.sort()
     kept = [i for _, dim, at in rates for i in range(at, at + dim)] + list(range(start, whole.ambient))
     return LinearRelation(
-        tuple((name, dim) for name, dim, _ in rates), tuple(outer), whole.restrict(matrix).project(kept)
+        tuple((name, dim) for name, dim, _ in rates),
+        tuple(outer),
+        whole.restrict(matrix).project(kept),
+        unit,
     )
 
 

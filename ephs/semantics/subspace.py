@@ -72,7 +72,10 @@ class Subspace:
 
     def restrict(self, matrix: Array) -> "Subspace":
         """The vectors of this subspace which also satisfy matrix z = 0."""
-        coefficients = Subspace.from_kernel(matrix @ self.basis)
+        product = matrix @ self.basis
+        # a row that holds already leaves rounding, which must not be taken for an equation
+        left = np.linalg.norm(product, axis=1) > RANK_TOLERANCE * np.linalg.norm(matrix, axis=1)
+        coefficients = Subspace.from_kernel(product[left].reshape(-1, self.dimension))
         return Subspace(self.basis @ coefficients.basis)
 
     def image(self, matrix: Array) -> "Subspace":

@@ -2,26 +2,46 @@
 
 from ephs.testing.laws import check_operad_laws, law_inputs
 from ephs.testing.patterns import Nesting, interfaces, nestings, paths, patterns, quantities
+from ephs.testing.primitives import irreversibles, reversibles, storages
+from ephs.testing.systems import (
+    check_entropy_production,
+    check_functoriality,
+    check_natural,
+    check_power_balance,
+    fillings,
+    systems,
+)
 
 __all__ = [
     "Nesting",
+    "check_entropy_production",
+    "check_functoriality",
+    "check_natural",
     "check_operad_laws",
+    "check_power_balance",
+    "fillings",
     "interfaces",
+    "irreversibles",
     "law_inputs",
     "nestings",
     "paths",
     "patterns",
     "quantities",
     "register",
+    "reversibles",
+    "storages",
+    "systems",
 ]
 
 
 def register() -> None:
-    """Tell Hypothesis how to make paths, quantities and patterns; it calls this when it is imported."""
+    """Tell Hypothesis how to make paths, quantities, patterns and systems; it calls this when it is imported."""
     from hypothesis import strategies as st
 
     from ephs.operad import Path, Pattern, Quantity
+    from ephs.semantics import System
 
     st.register_type_strategy(Path, paths())
     st.register_type_strategy(Quantity, quantities())
     st.register_type_strategy(Pattern, patterns())
+    st.register_type_strategy(System, systems())

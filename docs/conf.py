@@ -1,0 +1,39 @@
+"""Configuration of the documentation: pages are executed, and load nothing from a network."""
+
+from importlib.metadata import version as installed_version
+from pathlib import Path
+
+project = "ephs"
+author = "The ephs developers"
+version = release = installed_version("ephs")
+
+extensions = [
+    "myst_nb",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx.ext.mathjax",
+    "sphinxcontrib.bibtex",
+]
+exclude_patterns = ["_build", ".jupyter_cache", "jupyter_execute"]
+
+html_theme = "furo"
+html_title = "ephs"
+html_show_copyright = False
+html_static_path = ["_static", "../.build/static"]
+
+# MathJax 3 with everything in one file; `make docs` puts it into .build/static.
+mathjax_path = "mathjax/tex-svg-full.js"
+mathjax_options = {"defer": "defer"}
+if not Path(__file__).parent.joinpath("../.build/static", mathjax_path).is_file():
+    raise FileNotFoundError("MathJax is missing, build the pages with `make docs`")
+
+bibtex_bibfiles = ["references.bib"]
+myst_enable_extensions = ["dollarmath", "deflist"]
+myst_heading_anchors = 3
+
+nb_execution_mode = "cache"
+nb_execution_cache_path = str(Path(__file__).parent / "_build" / ".jupyter_cache")
+nb_execution_raise_on_error = True
+nb_execution_timeout = 300
+nb_merge_streams = True
+nb_ipywidgets_js = {}  # its default comes from a network

@@ -1,0 +1,32 @@
+"""Pictures: of patterns, of motions, of ledgers. Knows all other rooms, and none of them knows it.
+
+matplotlib, drawsvg, Graphviz and viser are imported where they are used, not here.
+"""
+
+from ephs.show.animation import animate as animate
+from ephs.show.drawing import Drawing as Drawing
+from ephs.show.drawing import draw as draw
+from ephs.show.errors import ShowError as ShowError
+from ephs.show.geometry import Placement as Placement
+from ephs.show.layout import place as place
+from ephs.show.plots import plot_constraints as plot_constraints
+from ephs.show.plots import plot_energy as plot_energy
+from ephs.show.plots import plot_entropy as plot_entropy
+from ephs.show.plots import plot_exergy as plot_exergy
+from ephs.show.plots import plot_motion as plot_motion
+from ephs.show.report import write_report as write_report
+
+__all__ = [
+    "Drawing",
+    "Placement",
+    "ShowError",
+    "animate",
+    "draw",
+    "place",
+    "plot_constraints",
+    "plot_energy",
+    "plot_entropy",
+    "plot_exergy",
+    "plot_motion",
+    "write_report",
+]

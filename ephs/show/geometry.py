@@ -1,0 +1,171 @@
+"""The placed picture of a pattern: what all three writers draw, and the little plane geometry it needs.
+
+Lengths are in points (1/72 inch), x to the right, y **down**.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Point = tuple[float, float]
+Points = NDArray[np.float64]
+
+KINDS = ("storage", "environment", "reversible", "irreversible", "composite", "unknown")
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Text:
+    """A short name at a place: `base` with `sub` set as a subscript.
+
+    `at` is the centre of the lettering, `size` the height of its type, `width` what it is reckoned to take.
+    """
+
+    base: str
+    sub: str
+    at: Point
+    size: float
+    width: float
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """Left, top, right and bottom of the room that the lettering takes."""
+        x, y = self.at
+        return (x - self.width / 2, y - 0.55 * self.size, x + self.width / 2, y + 0.55 * self.size)
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class PlacedBox:
+    """An inner box: a disc with its name; `hatching` are chords across it (environments only)."""
+
+    path: str
+    kind: str
+    at: Point
+    radius: float
+    lines: tuple[Text, ...]
+    hatching: tuple[tuple[Point, Point], ...]
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class PlacedJunction:
+    """A junction: a dot, with its name beside it."""
+
+    path: str
+    at: Point
+    radius: float
+    label: Text
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Wire:
+    """A line of the picture, from one node to another or to the outer rectangle.
+
+    Attributes
+    ----------
+    title : str
+        What the line stands for, in words.
+    ends : tuple of str
+        Paths of the nodes that it is attached to (one path for an outer port).
+    role : str
+        ``"port"``, ``"outer"`` (a port of the pattern itself) or ``"link"`` (two junctions that share their state).
+    power : bool
+        False: only information; drawn dashed.
+    points : tuple of Point
+        The line, as a polyline; the label, if any, is the port's name where the junction does not say it.
+    """
+
+    title: str
+    ends: tuple[str, ...]
+    role: str
+    power: bool
+    points: tuple[Point, ...]
+    label: Text | None
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Placement:
+    """A pattern, placed in the plane; `rectangle` is left, top, width, height of the outer box."""
+
+    boxes: tuple[PlacedBox, ...]
+    junctions: tuple[PlacedJunction, ...]
+    wires: tuple[Wire, ...]
+    rectangle: tuple[float, float, float, float]
+    corner: float
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Width and height of the whole picture, margins included."""
+        left, top, width, height = self.rectangle
+        return (width + 2 * left, height + 2 * top)
+
+    def nodes(self) -> dict[str, tuple[Point, float]]:
+        """Centre and radius of every box and junction, by path."""
+        boxes = {box.path: (box.at, box.radius) for box in self.boxes}
+        return boxes | {junction.path: (junction.at, junction.radius) for junction in self.junctions}
+
+
+def distances(point: Points, starts: Points, ends: Points) -> Points:
+    """Distance of one point (2,), or of points (n, 2), to segments from `starts` to `ends`, (n, 2) each."""
+    along = ends - starts
+    length2 = np.maximum((along * along).sum(axis=-1), 1e-18)
+    part = np.clip((((point - starts) * along).sum(axis=-1)) / length2, 0.0, 1.0)
+    return np.linalg.norm(point - starts - part[..., None] * along, axis=-1)
+
+
+def gap(point: Point, line: tuple[Point, ...]) -> float:
+    """Distance of a point to a polyline."""
+    vertices = np.asarray(line, dtype=float)
+    return float(distances(np.asarray(point, dtype=float), vertices[:-1], vertices[1:]).min())
+
+
+def trespasses(placement: Placement) -> list[tuple[str, str]]:
+    """Every (wire, node) such that the wire runs through a box or junction that it is not attached to."""
+    nodes = placement.nodes()
+    return [
+        (wire.title, path)
+        for wire in placement.wires
+        for path, (centre, radius) in nodes.items()
+        if path not in wire.ends and gap(centre, wire.points) < radius
+    ]
+
+
+def crossings(placement: Placement) -> int:
+    """How many pairs of wires cross each other away from a common end."""
+    count = 0
+    for index, first in enumerate(placement.wires):
+        for second in placement.wires[index + 1 :]:
+            if not set(first.ends) & set(second.ends):
+                count += _cross(first.points, second.points)
+    return count
+
+
+def _cross(first: tuple[Point, ...], second: tuple[Point, ...]) -> bool:
+    def side(a: Point, b: Point, c: Point) -> float:
+        return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
+    return any(
+        side(a, b, c) * side(a, b, d) < 0 and side(c, d, a) * side(c, d, b) < 0
+        for a, b in zip(first, first[1:], strict=False)
+        for c, d in zip(second, second[1:], strict=False)
+    )
+
+
+def hatching(centre: Point, radius: float, step: float = 5.0) -> tuple[tuple[Point, Point], ...]:
+    """Chords at 45 degrees across a disc, `step` apart."""
+    count = int(radius // step)
+    chords: list[tuple[Point, Point]] = []
+    for index in range(-count, count + 1):
+        offset = index * step
+        half = math.sqrt(max(radius**2 - offset**2, 0.0))
+        if half > 1.0:
+            middle = (centre[0] + offset * math.sqrt(0.5), centre[1] + offset * math.sqrt(0.5))
+            reach = half * math.sqrt(0.5)
+            chords.append(((middle[0] - reach, middle[1] + reach), (middle[0] + reach, middle[1] - reach)))
+    return tuple(chords)

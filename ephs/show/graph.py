@@ -1,0 +1,153 @@
+"""What a picture of a pattern is about: nodes with sizes and edges, before anything has a place."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, final
+
+from ephs.operad import Pattern
+from ephs.show.errors import ShowError
+from ephs.show.geometry import KINDS
+
+if TYPE_CHECKING:
+    from ephs.semantics import System
+
+DOT = 3.0
+TYPE = 11.0
+SMALLEST, LARGEST = 20.0, 31.0
+_WIDE = frozenset("mwMW")
+_NARROW = frozenset("ijltfr.'|")
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Disc:
+    """A box to be: its path, its kind, the lines of its name, the size of their type and its radius."""
+
+    path: str
+    kind: str
+    lines: tuple[tuple[str, str], ...]
+    type_size: float
+    radius: float
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Edge:
+    """A line to be: `ends` are node paths; an outer port has one."""
+
+    title: str
+    ends: tuple[str, ...]
+    role: str
+    power: bool
+    port: str
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Graph:
+    """Boxes, junctions (path and name) and edges, in the pattern's order."""
+
+    discs: tuple[Disc, ...]
+    dots: tuple[tuple[str, tuple[str, str]], ...]
+    edges: tuple[Edge, ...]
+
+    def radii(self) -> dict[str, float]:
+        """Radius of every node, by path."""
+        return {disc.path: disc.radius for disc in self.discs} | {path: DOT for path, _ in self.dots}
+
+
+def width_of(base: str, sub: str, size: float) -> float:
+    """Width that lettering of this size takes, reckoned on the safe side."""
+
+    def reckon(text: str) -> float:
+        return sum(0.86 if letter in _WIDE else 0.36 if letter in _NARROW else 0.6 for letter in text)
+
+    return size * (reckon(base) + 0.72 * reckon(sub))
+
+
+def subscripted(name: str) -> tuple[str, str]:
+    """Split a short symbol such as ``q_r`` or ``b1.p_j1`` into its letter and its subscript."""
+    base, _, sub = name.rpartition("_")
+    symbol = base.rpartition(".")[2]
+    return (base, sub) if 0 < len(symbol) <= 2 and 0 < len(sub) <= 3 else (name, "")
+
+
+def short_names(paths: list[str]) -> dict[str, str]:
+    """The shortest suffix of each dotted path that no other path ends in.
+
+    >>> short_names(["b1.pe", "b2.pe", "env"])
+    {'b1.pe': 'b1.pe', 'b2.pe': 'b2.pe', 'env': 'env'}
+    """
+    counts: dict[str, int] = {}
+    suffixes = {path: _suffixes(path) for path in paths}
+    for each in suffixes.values():
+        for suffix in each:
+            counts[suffix] = counts.get(suffix, 0) + 1
+    return {path: next((s for s in each if counts[s] == 1), path) for path, each in suffixes.items()}
+
+
+def _suffixes(path: str) -> list[str]:
+    parts = path.split(".") if path != "." else [path]
+    return [".".join(parts[-count:]) for count in range(1, len(parts) + 1)]
+
+
+def read(source: "Pattern | System", kinds: Mapping[str, str] | None = None) -> Graph:
+    """Read a pattern, or a system with the kinds of its fillings, as a graph.
+
+    Raises
+    ------
+    ShowError
+        If a kind is not one of storage, environment, reversible, irreversible, composite, unknown.
+    """
+    if isinstance(source, Pattern):
+        pattern, found = source, {}
+    else:
+        pattern = source.pattern
+        found = {str(path): str(filling.kind) for path, filling in source.fillings.items()}
+    found |= {str(path): str(kind) for path, kind in (kinds or {}).items()}
+
+    boxes = short_names([str(path) for path in pattern.boxes])
+    dots = short_names([str(path) for path in pattern.junctions])
+    edges: list[Edge] = []
+    for box, content in pattern.boxes.items():
+        for name, port in content.ports.items():
+            here, there = str(name), str(port.junction)
+            said = here.rpartition(".")[2] == there.rpartition(".")[2]
+            title = f"port {_joined(str(box), here)} on junction {there}"
+            edges.append(Edge(title, (str(box), there), "port", port.power, "" if said else here))
+    for name, junction in pattern.junctions.items():
+        if junction.exposed:
+            edges.append(Edge(f"outer port {name}", (str(name),), "outer", junction.power, ""))
+    for group in sorted(sorted(str(path) for path in members) for members in pattern.links):
+        for first, second in zip(group, group[1:], strict=False):
+            edges.append(Edge(f"{first} and {second} share their state", (first, second), "link", False, ""))
+    return Graph(
+        tuple(_disc(path, name, found.get(path, "unknown")) for path, name in boxes.items()),
+        tuple((path, subscripted(name)) for path, name in dots.items()),
+        tuple(edges),
+    )
+
+
+def _joined(box: str, port: str) -> str:
+    return port if box == "." else f"{box}.{port}"
+
+
+def _disc(path: str, name: str, kind: str) -> Disc:
+    if kind not in KINDS:
+        raise ShowError("kind", path=path, found=kind, expected=", ".join(KINDS))
+    # A name that had to be qualified is set smaller, and broken at its last dot where that makes it larger.
+    size = TYPE if "." not in name or name == "." else 0.86 * TYPE
+    choices = [(subscripted(name),)]
+    if "." in name and name != ".":
+        head, _, tail = name.rpartition(".")
+        choices.append((subscripted(head + "."), subscripted(tail)))
+
+    def fitting(lines: tuple[tuple[str, str], ...]) -> float:
+        room = 2 * LARGEST * (0.84 if len(lines) == 1 else 0.74)
+        return min(1.0, room / max(width_of(*line, size) for line in lines))
+
+    lines = max(choices, key=fitting)
+    scale = fitting(lines)
+    widest = scale * max(width_of(*line, size) for line in lines)
+    radius = min(LARGEST, max(SMALLEST, widest / (1.68 if len(lines) == 1 else 1.48)))
+    return Disc(path, kind, lines, size * scale, radius)

@@ -1,0 +1,242 @@
+"""From a pattern to its placed picture.
+
+Boxes and junctions get places, wires are led round what they are not attached to, outer ports run to the outer rectangle,
+and names are set where nothing else is. All of it is deterministic: the same pattern gives the same picture.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ephs.operad import Pattern
+from ephs.show import positions as places
+from ephs.show.geometry import (
+    PlacedBox,
+    PlacedJunction,
+    Placement,
+    Point,
+    Points,
+    Text,
+    Wire,
+    crossings,
+    hatching,
+    trespasses,
+)
+from ephs.show.graph import DOT, TYPE, Disc, Edge, Graph, read, width_of
+from ephs.show.lettering import Sheet, around, beside
+from ephs.show.routing import bulged, route, straight, trimmed
+
+if TYPE_CHECKING:
+    from ephs.semantics import System
+
+MARGIN = 10.0
+PORT_TYPE = 8.0
+Rectangle = tuple[float, float, float, float]
+
+
+def place(
+    source: "Pattern | System",
+    *,
+    kinds: Mapping[str, str] | None = None,
+    positions: Mapping[str, tuple[float, float]] | None = None,
+) -> Placement:
+    """Place a pattern or system in the plane.
+
+    Parameters
+    ----------
+    source : Pattern or System
+        What to draw. A system knows the kinds of its boxes.
+    kinds : mapping of str to str, optional
+        Kind of each box, by path: storage, environment, reversible, irreversible, composite or unknown.
+    positions : mapping of str to (float, float), optional
+        Points for the boxes, and for junctions if wanted, in steps of a grid, y upwards. By default they are found.
+
+    Raises
+    ------
+    ShowError
+        For an unknown kind, or positions that do not fit the pattern.
+    """
+    graph = read(source, kinds)
+    if positions is not None:
+        return _picture(graph, places.given(graph, positions))
+    best: Placement | None = None
+    least = math.inf
+    for points in places.proposals(graph):
+        now = _picture(graph, points)
+        width, height = now.size
+        bends = sum(len(wire.points) > 2 for wire in now.wires)
+        cost = 1000.0 * len(trespasses(now)) + 12.0 * crossings(now) + 4.0 * bends + (width + height) / 60.0
+        if cost < least - 1e-6:
+            best, least = now, cost
+    return best if best is not None else _picture(graph, np.zeros((0, 2)))
+
+
+def _picture(graph: Graph, points: Points) -> Placement:
+    radii = graph.radii()
+    paths = list(radii)
+    at = {path: (float(x), float(y)) for path, (x, y) in zip(paths, points, strict=True)}
+    wires = [_wire(edge, line, None) for edge, line in _inner_lines(graph, at, radii)]
+    # Once without the outer ports, to learn how large the rectangle must be, and once with them.
+    sheet = _sheet(at, radii, wires, None)
+    labels = [_label(path, name, at, sheet).bounds for path, name in graph.dots]
+    rectangle = _bounds(at, radii, wires, labels)
+    wires += _outer_wires(graph, at, radii, wires, rectangle)
+    sheet = _sheet(at, radii, wires, rectangle)
+    named = [(path, _label(path, name, at, sheet)) for path, name in graph.dots]
+    ports = {edge.title: edge.port for edge in graph.edges}
+    wires = [_with_label(wire, ports[wire.title], sheet) for wire in wires]
+    shift = (MARGIN - rectangle[0], MARGIN - rectangle[1])
+    return Placement(
+        tuple(_box(disc, _moved(at[disc.path], shift)) for disc in graph.discs),
+        tuple(
+            PlacedJunction(path, _moved(at[path], shift), DOT, _shifted(text, shift)) for path, text in named
+        ),
+        tuple(_moved_wire(wire, shift) for wire in wires),
+        (MARGIN, MARGIN, rectangle[2] - rectangle[0], rectangle[3] - rectangle[1]),
+        14.0,
+    )
+
+
+def _obstacles(at: Mapping[str, Point], radii: Mapping[str, float], ends: tuple[str, ...]) -> Points:
+    rows = [(*at[path], radii[path]) for path in at if path not in ends]
+    return np.array(rows, dtype=float).reshape(-1, 3)
+
+
+def _inner_lines(
+    graph: Graph, at: Mapping[str, Point], radii: Mapping[str, float]
+) -> list[tuple[Edge, tuple[Point, ...]]]:
+    groups: dict[tuple[str, ...], list[Edge]] = {}
+    for edge in graph.edges:
+        if edge.role != "outer":
+            groups.setdefault(edge.ends, []).append(edge)
+    lines: list[tuple[Edge, tuple[Point, ...]]] = []
+    for ends, edges in groups.items():
+        start, end = at[ends[0]], at[ends[1]]
+        obstacles = _obstacles(at, radii, ends)
+        for index, edge in enumerate(edges):
+            amount = 16.0 * (index - (len(edges) - 1) / 2)
+            line = bulged(start, end, amount) if amount else (start, end)
+            clear = all(straight(a, b, obstacles) for a, b in zip(line, line[1:], strict=False))
+            line = line if clear else route(start, end, obstacles)
+            lines.append((edge, trimmed(line, radii[ends[0]])))
+    return lines
+
+
+def _outer_wires(
+    graph: Graph, at: Mapping[str, Point], radii: Mapping[str, float], wires: list[Wire], rectangle: Rectangle
+) -> list[Wire]:
+    found: list[Wire] = []
+    left, top, right, bottom = rectangle
+    taken: list[Point] = []
+    for edge in graph.edges:
+        if edge.role != "outer":
+            continue
+        (path,) = edge.ends
+        x, y = at[path]
+        obstacles = _obstacles(at, radii, edge.ends)
+        inset = 16.0
+        ends = [(left, y), (right, y), (x, top), (x, bottom)]
+        ends += [
+            (side, v) for side in (left, right) for v in np.linspace(top + inset, bottom - inset, 9).tolist()
+        ]
+        ends += [
+            (v, side) for side in (top, bottom) for v in np.linspace(left + inset, right - inset, 9).tolist()
+        ]
+        best: Wire | None = None
+        least = math.inf
+        for rank, end in enumerate(ends):
+            crowd = sum(max(0.0, 18.0 - math.dist(end, other)) for other in taken)
+            if straight((x, y), end, obstacles):
+                line: tuple[Point, ...] = ((x, y), end)
+                bent = 0.0
+            elif rank < 4:
+                line, bent = route((x, y), end, obstacles), 60.0
+            else:
+                continue
+            wire = _wire(edge, line, None)
+            over = sum(_meet(wire, other) for other in (*wires, *found))
+            length = sum(math.dist(a, b) for a, b in zip(line, line[1:], strict=False))
+            cost = length + bent + 80.0 * over + 10.0 * crowd + (25.0 if rank >= 4 else 0.0)
+            if cost < least - 1e-6:
+                best, least = wire, cost
+        if best is not None:
+            taken.append(best.points[-1])
+            found.append(best)
+    return found
+
+
+def _meet(first: Wire, second: Wire) -> int:
+    return crossings(Placement((), (), (first, second), (0.0, 0.0, 0.0, 0.0), 0.0))
+
+
+def _sheet(
+    at: Mapping[str, Point], radii: Mapping[str, float], wires: list[Wire], bounds: Rectangle | None
+) -> Sheet:
+    pieces = [piece for wire in wires for piece in zip(wire.points, wire.points[1:], strict=False)]
+    return Sheet(_obstacles(at, radii, ()), np.array(pieces, dtype=float).reshape(-1, 2, 2), bounds)
+
+
+def _label(path: str, name: tuple[str, str], at: Mapping[str, Point], sheet: Sheet) -> Text:
+    size = TYPE if "." not in name[0] else 0.86 * TYPE
+    return sheet.write(name, size, around(at[path], DOT, name, size))
+
+
+def _bounds(
+    at: Mapping[str, Point], radii: Mapping[str, float], wires: list[Wire], labels: list[Rectangle]
+) -> Rectangle:
+    air = 18.0
+    lefts = [
+        (x - radii[path], y - radii[path], x + radii[path], y + radii[path]) for path, (x, y) in at.items()
+    ]
+    dots = [(x, y, x, y) for wire in wires for x, y in wire.points]
+    every = np.array([*lefts, *dots, *labels, *([] if lefts else [(0.0, 0.0, 60.0, 30.0)])])
+    return (
+        float(every[:, 0].min()) - air,
+        float(every[:, 1].min()) - air,
+        float(every[:, 2].max()) + air,
+        float(every[:, 3].max()) + air,
+    )
+
+
+def _wire(edge: Edge, line: tuple[Point, ...], label: Text | None) -> Wire:
+    return Wire(edge.title, edge.ends, edge.role, edge.power, line, label)
+
+
+def _with_label(wire: Wire, port: str, sheet: Sheet) -> Wire:
+    if not port:
+        return wire
+    text = sheet.write((port, ""), PORT_TYPE, beside(wire.points, (port, ""), PORT_TYPE))
+    return Wire(wire.title, wire.ends, wire.role, wire.power, wire.points, text)
+
+
+def _moved(point: Point, shift: Point) -> Point:
+    return (point[0] + shift[0], point[1] + shift[1])
+
+
+def _shifted(text: Text, shift: Point) -> Text:
+    return Text(text.base, text.sub, _moved(text.at, shift), text.size, text.width)
+
+
+def _moved_wire(wire: Wire, shift: Point) -> Wire:
+    label = _shifted(wire.label, shift) if wire.label is not None else None
+    return Wire(
+        wire.title,
+        wire.ends,
+        wire.role,
+        wire.power,
+        tuple(_moved(point, shift) for point in wire.points),
+        label,
+    )
+
+
+def _box(disc: Disc, centre: Point) -> PlacedBox:
+    pitch = 1.15 * disc.type_size
+    first = centre[1] - pitch * (len(disc.lines) - 1) / 2
+    lines = tuple(
+        Text(base, sub, (centre[0], first + pitch * row), disc.type_size, width_of(base, sub, disc.type_size))
+        for row, (base, sub) in enumerate(disc.lines)
+    )
+    marks = hatching(centre, disc.radius) if disc.kind == "environment" else ()
+    return PlacedBox(disc.path, disc.kind, centre, disc.radius, lines, marks)

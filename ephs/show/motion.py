@@ -1,0 +1,164 @@
+"""What moves, as plain arrays: poses of bodies at the frames of a film, extents, a place for the camera."""
+
+import math
+from dataclasses import dataclass
+from typing import Any, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Film:
+    """Frames of a motion.
+
+    Attributes
+    ----------
+    times : (n,)
+        Model time of each frame, s.
+    pause : float
+        Time from frame to frame when played, s.
+    poses : dict of str to (n, 7)
+        Pose of each body at each frame: unit quaternion, then position of the centre of mass, m.
+    """
+
+    times: Array
+    pause: float
+    poses: dict[str, Array]
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class View:
+    """A camera: where it is, what it looks at, m, and its vertical field of view, rad."""
+
+    position: tuple[float, float, float]
+    target: tuple[float, float, float]
+    field: float
+
+
+def film(sol: Any, names: list[str], fps: float, duration: float | None, most: int = 3000) -> Film:
+    """Sample a solution at even times.
+
+    Parameters
+    ----------
+    sol : Solution
+        Of a scene.
+    names : list of str
+        The bodies to follow.
+    fps : float
+        Frames a second when played; fewer where the film would have more than `most` frames.
+    duration : float, optional
+        Playing time, s; by default that of the model, so that it is seen in real time.
+    """
+    t = np.asarray(sol.t, dtype=float)
+    span = float(t[-1] - t[0])
+    playing = span if duration is None else float(duration)
+    count = max(2, min(most, round(playing * fps) + 1))
+    times = np.linspace(t[0], t[-1], count) if span > 0 else t[:1]
+    poses = {name: _sampled(t, sol.body(name), times) for name in names}
+    return Film(times, float(playing / max(1, count - 1)), poses)
+
+
+def _sampled(t: Array, body: Any, times: Array) -> Array:
+    turns = np.asarray(body.quaternion, dtype=float).copy()
+    # q and -q are one rotation: keep to one side, so that blending takes the short way.
+    flips = np.where((turns[1:] * turns[:-1]).sum(axis=1) < 0, -1.0, 1.0)
+    turns[1:] *= np.cumprod(flips)[:, None]
+    places = np.asarray(body.position, dtype=float)
+    columns = [np.interp(times, t, column) for column in (*turns.T, *places.T)]
+    poses = np.stack(columns, axis=1)
+    poses[:, :4] /= np.linalg.norm(poses[:, :4], axis=1, keepdims=True)
+    return poses
+
+
+def rotate(quaternion: Array, vector: Array) -> Array:
+    """Turn vectors (..., 3) by unit quaternions (..., 4)."""
+    axis = quaternion[..., 1:]
+    across = 2.0 * np.cross(axis, vector)
+    return vector + quaternion[..., :1] * across + np.cross(axis, across)
+
+
+def point_of(pose: Array, local: Array) -> Array:
+    """World place (..., 3) of a body's point under poses (..., 7)."""
+    return pose[..., 4:] + rotate(pose[..., :4], np.broadcast_to(local, (*pose.shape[:-1], 3)))
+
+
+def matrix_to_quaternion(matrix: Array) -> Array:
+    """Unit quaternion (4,) of a rotation matrix (3, 3)."""
+    outer = np.array(
+        [
+            [1 + matrix[0, 0] + matrix[1, 1] + matrix[2, 2], 0, 0, 0],
+            [matrix[2, 1] - matrix[1, 2], 1 + matrix[0, 0] - matrix[1, 1] - matrix[2, 2], 0, 0],
+            [
+                matrix[0, 2] - matrix[2, 0],
+                matrix[1, 0] + matrix[0, 1],
+                1 - matrix[0, 0] + matrix[1, 1] - matrix[2, 2],
+                0,
+            ],
+            [
+                matrix[1, 0] - matrix[0, 1],
+                matrix[2, 0] + matrix[0, 2],
+                matrix[2, 1] + matrix[1, 2],
+                1 - matrix[0, 0] - matrix[1, 1] + matrix[2, 2],
+            ],
+        ]
+    )
+    outer = outer + np.tril(outer, -1).T  # four times q qᵀ: take its longest column
+    column = outer[:, int(np.argmax(np.diag(outer)))]
+    return column / np.linalg.norm(column)
+
+
+def between(first: Array, second: Array) -> tuple[Array, float]:
+    """Unit quaternion turning z to the way from one point to another, and their distance."""
+    way = second - first
+    length = float(np.linalg.norm(way))
+    if length < 1e-12:
+        return np.array([1.0, 0.0, 0.0, 0.0]), 0.0
+    z = way / length
+    if z[2] < -1.0 + 1e-9:
+        return np.array([0.0, 1.0, 0.0, 0.0]), length
+    turn = np.array([1.0 + z[2], -z[1], z[0], 0.0])
+    return turn / np.linalg.norm(turn), length
+
+
+def equivalent_box(mass: float, inertia: Array) -> tuple[Array, Array]:
+    """Sides (3,) m and orientation (4,) of the solid box with this mass, kg, and inertia (3, 3), kg m²."""
+    moments, axes = np.linalg.eigh(np.asarray(inertia, dtype=float))
+    if np.linalg.det(axes) < 0:
+        axes[:, 2] *= -1.0
+    squares = 6.0 / mass * (moments.sum() - 2.0 * moments) if mass > 0 else np.zeros(3)
+    sides = np.sqrt(np.clip(squares, 0.0, None))
+    longest = float(sides.max())
+    # A rod's box would be too thin to be seen.
+    return np.maximum(sides, 0.06 * longest if longest > 0 else 0.0), matrix_to_quaternion(axes)
+
+
+def frame_all(points: Array, reach: float, field: float = math.radians(40.0)) -> View:
+    """A camera that sees all points (n, 3), `reach` m about each, from where the motion is seen best."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    target = 0.5 * (low + high)
+    radius = float(np.linalg.norm(points - target, axis=1).max()) + reach
+    scatter = points - points.mean(axis=0)
+    _, spread, axes = np.linalg.svd(scatter.T @ scatter)
+    if spread[1] > 1e-12 * max(spread[0], 1e-30) and spread[2] < 0.05 * spread[0]:
+        normal = axes[2] * (1.0 if axes[2] @ np.array([1.0, -1.2, 0.8]) >= 0 else -1.0)
+        side = np.cross(normal, np.array([0.0, 0.0, 1.0]))
+        length = float(np.linalg.norm(side))
+        # Flat motions are seen from the front, a little from above and from the side.
+        way = (
+            normal
+            + 0.3 * np.array([0.0, 0.0, 1.0])
+            - 0.35 * (side / length if length > 0.1 else np.array([0, 1.0, 0]))
+        )
+    else:
+        way = np.array([1.0, -1.2, 0.7])
+    place = target + way / np.linalg.norm(way) * (0.92 * max(radius, 1e-3) / math.sin(field / 2))
+    return View(
+        (float(place[0]), float(place[1]), float(place[2])),
+        (float(target[0]), float(target[1]), float(target[2])),
+        field,
+    )

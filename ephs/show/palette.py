@@ -1,0 +1,26 @@
+"""Colours, one meaning each, told apart by colour-blind eyes as well (after Okabe and Ito)."""
+
+INK = "#1a1a1a"
+GREY = "#6b7280"
+PAPER = "#ffffff"
+
+FILLS = {
+    "storage": "#a9cff0",
+    "environment": "#a9cff0",
+    "reversible": "#b5e0b0",
+    "irreversible": "#f4a9a0",
+    "composite": "#fbe79a",
+    "unknown": "#ffffff",
+}
+RIMS = {
+    "storage": "#1f5f99",
+    "environment": "#1f5f99",
+    "reversible": "#2f7d32",
+    "irreversible": "#b3261e",
+    "composite": "#a07700",
+    "unknown": "#444444",
+}
+
+BLUE, ORANGE, GREEN, RED = "#0072b2", "#e69f00", "#009e73", "#d55e00"
+PURPLE, SKY, BLACK = "#cc79a7", "#56b4e9", "#000000"
+CYCLE = (BLUE, RED, GREEN, PURPLE, ORANGE, SKY, BLACK)

@@ -1,0 +1,111 @@
+"""Wires as polylines that keep clear of every box and junction that they are not attached to."""
+
+import heapq
+import math
+
+import numpy as np
+
+from ephs.show.geometry import Point, Points, distances
+
+CLEAR = 3.5
+
+
+def straight(start: Point, end: Point, obstacles: Points) -> bool:
+    """Whether the segment keeps clear of all obstacles, rows (x, y, radius)."""
+    if not len(obstacles):
+        return True
+    first, last = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
+    between = distances(obstacles[:, :2], np.broadcast_to(first, (len(obstacles), 2)), last[None, :])
+    return bool((between >= obstacles[:, 2] + CLEAR).all())
+
+
+def route(start: Point, end: Point, obstacles: Points) -> tuple[Point, ...]:
+    """The shortest line of straight pieces from `start` to `end` round all obstacles.
+
+    The line bends at corners of octagons about the obstacles (a visibility graph, searched best first). Where there is no
+    way through, which takes touching obstacles all round, it is the straight line.
+    """
+    if straight(start, end, obstacles):
+        return (start, end)
+    corners = [start, end]
+    for x, y, radius in obstacles:
+        reach = (radius + CLEAR + 1.5) / math.cos(math.pi / 8)
+        ring = [
+            (x + reach * math.cos(k * math.pi / 4), y + reach * math.sin(k * math.pi / 4)) for k in range(8)
+        ]
+        corners += [corner for corner in ring if straight(corner, corner, obstacles)]
+    best = {0: 0.0}
+    before: dict[int, int] = {}
+    queue: list[tuple[float, int]] = [(math.dist(start, end), 0)]
+    done: set[int] = set()
+    while queue:
+        _, here = heapq.heappop(queue)
+        if here == 1:
+            return _smooth(_way(corners, before), obstacles)
+        if here in done:
+            continue
+        done.add(here)
+        for there, corner in enumerate(corners):
+            # Each bend costs a little, so that a line with fewer of them wins.
+            length = best[here] + math.dist(corners[here], corner) + 6.0
+            if (
+                there in done
+                or length >= best.get(there, math.inf)
+                or not straight(corners[here], corner, obstacles)
+            ):
+                continue
+            best[there], before[there] = length, here
+            heapq.heappush(queue, (length + math.dist(corner, end), there))
+    return (start, end)
+
+
+def _way(corners: list[Point], before: dict[int, int]) -> tuple[Point, ...]:
+    way = [1]
+    while way[-1] != 0:
+        way.append(before[way[-1]])
+    return tuple(corners[index] for index in reversed(way))
+
+
+def _smooth(line: tuple[Point, ...], obstacles: Points) -> tuple[Point, ...]:
+    """Cut the corners thrice, as long as the line stays clear."""
+    for _ in range(3):
+        cut = [line[0]]
+        for a, b in zip(line, line[1:], strict=False):
+            cut.append((0.75 * a[0] + 0.25 * b[0], 0.75 * a[1] + 0.25 * b[1]))
+            cut.append((0.25 * a[0] + 0.75 * b[0], 0.25 * a[1] + 0.75 * b[1]))
+        cut.append(line[-1])
+        if not all(straight(a, b, obstacles) for a, b in zip(cut, cut[1:], strict=False)):
+            return line
+        line = tuple(cut)
+    return line
+
+
+def bulged(start: Point, end: Point, amount: float) -> tuple[Point, ...]:
+    """A bow from `start` to `end`, `amount` off the straight line at its middle: for parallel wires."""
+    along = (end[0] - start[0], end[1] - start[1])
+    length = max(math.hypot(*along), 1e-9)
+    normal = (-along[1] / length, along[0] / length)
+    steps = [k / 12 for k in range(13)]
+    return tuple(
+        (
+            start[0] + t * along[0] + 4 * t * (1 - t) * amount * normal[0],
+            start[1] + t * along[1] + 4 * t * (1 - t) * amount * normal[1],
+        )
+        for t in steps
+    )
+
+
+def trimmed(line: tuple[Point, ...], radius: float) -> tuple[Point, ...]:
+    """The line without what lies in the disc of this radius about its first point."""
+    centre = line[0]
+    for index in range(1, len(line)):
+        a, b = line[index - 1], line[index]
+        if math.dist(b, centre) <= radius:
+            continue
+        low, high = 0.0, 1.0
+        for _ in range(40):
+            part = 0.5 * (low + high)
+            inside = math.dist((a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1])), centre) <= radius
+            low, high = (part, high) if inside else (low, part)
+        return ((a[0] + high * (b[0] - a[0]), a[1] + high * (b[1] - a[1])), *line[index:])
+    return line

@@ -1,0 +1,148 @@
+"""Strategies for primitives of a given interface: random structures that satisfy all conditions on them."""
+
+from typing import Any
+
+import numpy as np
+from hypothesis import strategies as st
+
+from ephs.mechanics import components
+from ephs.operad import Interface, Path
+from ephs.semantics import Irreversible, Reference, Reversible, Storage, library
+from ephs.semantics.bundle import Array, Bundle
+from ephs.semantics.primitives import Point
+from ephs.semantics.spaces import Pair
+
+__all__ = ["generators", "irreversibles", "reversibles", "storages"]
+
+
+def generators() -> st.SearchStrategy[np.random.Generator]:
+    """Sources of the random numbers in matrices: numbers do not shrink to anything simpler than others."""
+    return st.integers(0, 2**20).map(np.random.default_rng)
+
+
+@st.composite
+def storages(draw: st.DrawFn, interface: Interface) -> Storage:
+    """Storages at power ports: quadratic, thermal, gravity for a pose, a spring for a relative pose.
+
+    The interface has one port, or vector spaces without environment quantities only.
+    """
+    rng = draw(generators())
+    bundle = Bundle.of(interface)
+    kinds = [quantity for _, _, quantity in bundle.items()]
+    if len(kinds) == 1:
+        (port,), quantity = bundle.ports, kinds[0]
+        if quantity.kind == "entropy":
+            if draw(st.booleans()):
+                return _renamed(library.environment(), interface)
+            return _renamed(components.thermal_node(rng.uniform(5.0, 50.0), rng.uniform(250.0, 350.0)), interface)
+        if quantity.kind == "pose":
+            group = "SE3" if quantity.space.name == "SE(3)" else "SO3xR3"
+            return _renamed(components.gravity(rng.standard_normal(3), group), interface)
+        if quantity.kind == "relative_pose":
+            pair = Pair.from_space(quantity.space)
+            return _renamed(components.pair_spring(pair, np.full(pair.dim, 1.5), np.zeros(pair.dim)), interface)
+    parity = bundle.parity()
+    factor = rng.standard_normal((bundle.size, bundle.size))
+    matrix = factor @ factor.T + np.eye(bundle.size)
+    return library.quadratic("random storage", interface, _even(matrix, parity), ())
+
+
+@st.composite
+def reversibles(
+    draw: st.DrawFn,
+    interface: Interface,
+    *,
+    reads: tuple[Path, ...] = (),
+    constrained: tuple[int, ...] = (-1, 1),
+) -> Reversible:
+    """Random Dirac structures f = L(x) e + C(x)* λ, 0 = C(x) e over the power ports of an interface.
+
+    Parameters
+    ----------
+    reads
+        State ports that may modulate L.
+    constrained
+        Parities of the efforts that constraints may hold.
+    """
+    rng = draw(generators())
+    bundle = Bundle.of(interface)
+    n, parity = bundle.size, bundle.parity()
+    keep = _kept(bundle)
+    skew = rng.standard_normal((n, n))
+    skew = keep @ _odd(skew - skew.T, parity) @ keep
+    rows = draw(st.integers(0, 1 if n > 1 and draw(st.booleans()) else 0))
+    side = float(draw(st.sampled_from(constrained)))
+    constraint = rng.standard_normal((rows, n)) * (parity == side) @ keep
+    constraint = constraint[np.linalg.norm(constraint, axis=1) > 0.1]
+    used = reads if reads and draw(st.booleans()) else ()
+    if not used:
+        return library.constant_structure("random Dirac structure", interface, skew, constraint)
+
+    def structure(x: Point) -> tuple[Array, Array]:
+        return (1.0 + 0.5 * np.cos(sum(float(v @ v) for v in x.values()))) * skew, constraint
+
+    return Reversible("random Dirac structure", interface, structure, used, multipliers=constraint.shape[0])
+
+
+@st.composite
+def irreversibles(draw: st.DrawFn, interface: Interface, *, reads: tuple[Path, ...] = ()) -> Irreversible:
+    """Random Onsager structures: M = Σ s n nᵀ over pairs of coordinates, n = eⱼ uᵢ − eᵢ uⱼ with energy efforts e."""
+    rng = draw(generators())
+    bundle = Bundle.of(interface)
+    strength = np.abs(rng.standard_normal((bundle.size, bundle.size)))
+    fixed = sum((bundle.indicator(kind) for kind in bundle.environment_kinds() if kind != "entropy"), np.zeros(1))
+    moving = np.flatnonzero(np.broadcast_to(fixed, bundle.size) == 0.0)
+    used = reads if reads and draw(st.booleans()) else ()
+
+    def matrix(x: Point, e: Array, reference: Reference) -> Array:
+        energy = e + bundle.intensive(reference)
+        scale = 1.0 + 0.5 * np.cos(sum(float(v @ v) for v in x.values()))
+        out = np.zeros((bundle.size, bundle.size))
+        for i in moving:
+            for j in moving[moving > i]:
+                normal = np.zeros(bundle.size)
+                normal[i], normal[j] = energy[j], -energy[i]
+                out += scale * strength[i, j] / (1.0 + abs(energy[i]) + abs(energy[j])) * np.outer(normal, normal)
+        return out
+
+    return Irreversible("random Onsager structure", interface, matrix, used)
+
+
+def _kept(bundle: Bundle) -> Array:
+    """The projector off the environment quantities, which reversible structures conserve."""
+    out = np.eye(bundle.size)
+    for kind in bundle.environment_kinds():
+        one = bundle.indicator(kind)
+        out = out - np.outer(one, one) / one.sum()
+    return out
+
+
+def _even(matrix: Array, parity: Array) -> Array:
+    return np.where(np.outer(parity, parity) > 0.0, matrix, 0.0)
+
+
+def _odd(matrix: Array, parity: Array) -> Array:
+    return np.where(np.outer(parity, parity) < 0.0, matrix, 0.0)
+
+
+def _renamed(storage: Storage, interface: Interface) -> Storage:
+    """The storage with its one port named as in the interface."""
+    (old,), (new,) = storage.bundle.ports, tuple(interface)
+    if old == new:
+        return storage
+
+    def back(x: Point) -> dict[Path, Array]:
+        return {old: x[new]}
+
+    discrete: Any = storage.discrete_gradient
+    gradient: Any = storage.gradient
+    return Storage(
+        storage.name,
+        interface,
+        energy=lambda x: storage.energy(back(x)),
+        gradient=None if gradient is None else lambda x: gradient(back(x)),
+        discrete_gradient=None if discrete is None else lambda x, v: discrete(back(x), v),
+        parameters=storage.parameters,
+        environment=storage.environment,
+        kernel=storage.kernel,
+    )

@@ -1,0 +1,185 @@
+"""Strategies for systems, and checks of their laws."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from hypothesis import strategies as st
+from hypothesis.errors import InvalidArgument
+
+from ephs.operad import Directory, Path, Pattern, PortType, Quantity, junction, quantity
+from ephs.semantics import Irreversible, Reference, Reversible, Storage, System
+from ephs.semantics.laws import Probe, random_probe, system_law
+from ephs.semantics.system import Filling
+from ephs.testing.patterns import Nesting
+from ephs.testing.primitives import irreversibles, reversibles, storages
+
+__all__ = [
+    "check_entropy_production",
+    "check_functoriality",
+    "check_natural",
+    "check_power_balance",
+    "fillings",
+    "systems",
+]
+
+SCALARS = (
+    quantity.momentum,
+    quantity.displacement,
+    quantity.entropy,
+    quantity.angular_momentum,
+    quantity.charge,
+    quantity.flux_linkage,
+    quantity.volume,
+)
+GROUPS = (
+    quantity.body_momentum,
+    quantity.pose,
+    quantity.direct_pose,
+    quantity.relative_pose("spherical"),
+    quantity.joint_momentum("planar"),
+)
+Ports = Mapping[str, PortType]
+
+
+@st.composite
+def systems(
+    draw: st.DrawFn,
+    *,
+    max_depth: int = 3,
+    max_junctions: int = 3,
+    isolated: bool | None = None,
+    groups: bool = True,
+) -> System:
+    """Hierarchical systems that have a motion: each state has one storage, at the level where its junction is inside.
+
+    Parameters
+    ----------
+    max_depth
+        How many levels.
+    max_junctions
+        How many junctions a level adds.
+    isolated
+        Whether there are no outer ports; either where None.
+    groups
+        Whether states on Lie groups occur beside real ones.
+
+    Raises
+    ------
+    InvalidArgument
+        A bound is less than 1.
+    """
+    for name, value in (("max_depth", max_depth), ("max_junctions", max_junctions)):
+        if value < 1:
+            raise InvalidArgument(f"{name}={value}: expected at least 1")
+    pool = SCALARS + GROUPS if groups else SCALARS
+    alone = draw(st.booleans()) if isolated is None else isolated
+    return draw(_levels(depth=max_depth, most=max_junctions, pool=pool, ports={}, open_count=0 if alone else 1))
+
+
+@st.composite
+def _levels(
+    draw: st.DrawFn, *, depth: int, most: int, pool: tuple[Quantity, ...], ports: Ports, open_count: int
+) -> System:
+    """One level with the given outer ports; it stores the states of the junctions that it adds."""
+    junctions: dict[str, Any] = {
+        name: junction(port.quantity, exposed=True, power=port.power) for name, port in ports.items()
+    }
+    boxes: dict[str, dict[str, str]] = {}
+    parts: dict[str, Filling] = {}
+    own = [f"j{i}" for i in range(draw(st.integers(1, most)))]
+    for i, name in enumerate(own):
+        drawn = draw(st.sampled_from(pool))
+        junctions[name] = junction(drawn, exposed=i < open_count)
+        interface = Directory({"x": PortType(drawn)})
+        boxes[f"store{i}"], parts[f"store{i}"] = {"x": name}, draw(storages(interface))
+    powers = [name for name, j in junctions.items() if j.power]
+    waiting = list(ports)
+    for i in range(max(draw(st.integers(1, 2)), 1)):
+        # every outer port needs something on it inside: the first box takes them all
+        names = waiting + draw(st.lists(st.sampled_from(powers), min_size=1, max_size=2)) if powers else waiting
+        waiting = []
+        read = draw(st.lists(st.sampled_from(sorted(junctions)), max_size=1))
+        wires: dict[str, str] = {}
+        content: dict[str, PortType] = {}
+        for k, name in enumerate([*names, *read]):
+            power = junctions[name].power and k < len(names)
+            wires[f"p{k}"] = name if power else f"~{name}"
+            content[f"p{k}"] = PortType(junctions[name].quantity, power)
+        box = f"box{i}"
+        boxes[box], parts[box] = wires, draw(_process(depth, most, pool, content))
+    return System.of(Pattern(junctions=junctions, boxes=boxes), parts)
+
+
+def _process(depth: int, most: int, pool: tuple[Quantity, ...], content: Ports) -> st.SearchStrategy[Filling]:
+    interface = Directory(dict(content))
+    reads = tuple(port for port, port_type in interface.items() if not port_type.power)
+    choices: list[st.SearchStrategy[Filling]] = [
+        # velocities only: a constraint on temperatures that an environment gives anyway leaves its flow undetermined
+        reversibles(interface, reads=reads, constrained=(-1,)),
+        irreversibles(interface, reads=reads),
+    ]
+    if depth > 1:
+        choices.append(_levels(depth=depth - 1, most=most, pool=pool, ports=content, open_count=0))
+    return st.one_of(choices)
+
+
+@st.composite
+def fillings(draw: st.DrawFn, nesting: Nesting) -> System:
+    """Systems on a drawn nesting of patterns, well-posed or not: they have a relation, if not always a motion."""
+    flat = nesting.top_down()
+    stored: set[frozenset[Path]] = set()
+    leaves: dict[Path, Storage | Reversible | Irreversible] = {}
+    for box, content in flat.boxes.items():
+        interface = content.interface
+        classes = [flat.state_class(port.junction) for port in content.ports.values()]
+        single = len(classes) == 1 and all(port.power for port in content.ports.values())
+        if single and classes[0] not in stored and draw(st.booleans()):
+            stored.add(classes[0])
+            leaves[box] = draw(storages(interface))
+        else:
+            leaves[box] = draw(st.one_of(reversibles(interface), irreversibles(interface)))
+    return _filled(nesting, leaves, Path())
+
+
+def _filled(nesting: Nesting, leaves: Mapping[Path, Filling], path: Path) -> System:
+    inner = nesting.filled
+    parts: dict[Path, Filling] = {
+        box: _filled(inner[box], leaves, path / box) if box in inner else leaves[path / box]
+        for box in nesting.pattern.boxes
+    }
+    return System.of(nesting.pattern, parts)
+
+
+def check_functoriality(system: System, *, seed: int = 0, reference: Reference | None = None) -> None:
+    """Check that flattening before filling means the same as filling before composing, at a random state.
+
+    Raises
+    ------
+    AssertionError
+        With how far the two relations are apart.
+    """
+    _check("functoriality", random_probe(system, seed, reference=reference))
+    _check("Tellegen", random_probe(system, seed, reference=reference))
+
+
+def check_power_balance(system: System, *, seed: int = 0, reference: Reference | None = None) -> None:
+    """Check that over a step from a random state the energy changes by what outer ports supply."""
+    _check("power balance", random_probe(system, seed, reference=reference))
+
+
+def check_entropy_production(system: System, *, seed: int = 0, reference: Reference | None = None) -> None:
+    """Check that over a step from a random state no component destroys entropy, and that entropy is balanced."""
+    _check("entropy production", random_probe(system, seed, reference=reference))
+    _check("entropy balance", random_probe(system, seed, reference=reference))
+
+
+def check_natural(system: System, *, seed: int = 0, reference: Reference | None = None) -> None:
+    """Check that a step of the nested system is the step of the flat one."""
+    _check("naturality", random_probe(system, seed, reference=reference))
+
+
+def _check(name: str, probe: Probe) -> None:
+    law = system_law(name)
+    verdict = law(probe)
+    if not verdict.holds:
+        raise AssertionError(f"{law.name}: {law.statement}\n{verdict.detail}; expected ≤ {verdict.tolerance:.1e}\n{probe.system}")

@@ -1,0 +1,217 @@
+"""The time loop: its grid, what it keeps, how it fails, and that it is the method and nothing else."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import ephs
+from ephs import library as lib
+from ephs.mechanics.solve.integrate import Grid
+from ephs.mechanics.solve.model import compile_model
+from ephs.mechanics.solve.natural import Natural
+from ephs.semantics import Reference
+from ephs.semantics.natural import step as oracle_step
+
+START = {"osc.pe.q": 1.0}
+
+
+@given(st.floats(-10.0, 10.0), st.floats(1e-3, 20.0), st.floats(1e-3, 30.0))
+def test_the_grid_ends_on_until_and_its_steps_are_no_longer_than_the_step(t0, span, h):
+    grid = Grid(t0, t0 + span, h)
+    assert grid.whole * h <= span * (1.0 + 1e-8)
+    assert grid.last <= h * (1.0 + 1e-8)
+    assert grid.time(grid.whole) + grid.last == pytest.approx(t0 + span, rel=1e-8, abs=1e-8)
+
+
+@pytest.mark.parametrize(("until", "h"), [(1.0, 0.0), (1.0, -1.0), (1.0, np.nan), (0.0, 0.1), (np.inf, 0.1)])
+def test_a_grid_that_is_none_is_refused(until, h):
+    with pytest.raises(ValueError, match="expected"):
+        Grid(0.0, until, h)
+
+
+def test_times_are_multiples_of_the_step_and_the_end(damped):
+    sol = ephs.simulate(damped, 1.005, initial=START, step=0.01)
+    assert sol.t[-1] == 1.005
+    assert np.array_equal(sol.t[:-1], 0.01 * np.arange(101))
+
+
+def test_closed_form_of_the_damped_oscillator_at_order_two(damped):
+    k, d = 1.5, 0.1
+    w = np.sqrt(k - d * d / 4.0)
+
+    def exact(t):
+        return np.exp(-d * t / 2.0) * (np.cos(w * t) + d / (2.0 * w) * np.sin(w * t))
+
+    errors = []
+    for h in (0.04, 0.02, 0.01):
+        sol = ephs.simulate(damped, 8.0, initial=START, step=h)
+        errors.append(np.abs(sol["osc.pe.q"] - exact(sol.t)).max())
+    assert np.allclose(np.log2(np.array(errors[:-1]) / errors[1:]), 2.0, atol=0.02)
+
+
+def test_the_compiled_loop_takes_the_steps_of_the_plain_method(damped):
+    flat = damped.flatten()
+    state = flat.state(START)
+    for _ in range(5):
+        state, _ = oracle_step(flat, state, 0.05, Reference())
+    sol = ephs.simulate(damped, 0.25, initial=START, step=0.05)
+    for path, value in state.items():
+        assert np.allclose(sol[path][-1], value, rtol=1e-12, atol=1e-15)
+
+
+def test_a_step_is_pure_and_a_chunk_is_so_many_steps(damped):
+    descriptor = damped.descriptor()
+    method = Natural(compile_model(descriptor, Reference(), {}))
+    start = method.init(descriptor.pack(damped.state(START)))
+    once, again = method.step(start, 0.1), method.step(start, 0.1)
+    assert np.array_equal(once.x, again.x)
+    many, chunk = method.advance(start, 0.1, 3)
+    single = method.step(method.step(once, 0.1), 0.1)
+    assert np.array_equal(many.x, single.x)
+    assert np.array_equal(chunk.x[-1], many.x)
+    assert np.array_equal(start.x, descriptor.pack(damped.state(START)))
+
+
+def test_a_step_back_undoes_a_step():
+    """The method is symmetric, without friction also in time."""
+    pattern = ephs.Pattern(
+        junctions={
+            "q": ephs.junction(ephs.quantity.displacement),
+            "p": ephs.junction(ephs.quantity.momentum),
+        },
+        boxes={"pe": {"q": "q"}, "ke": {"p": "p"}, "pkc": {"q": "q", "p": "p"}},
+    )
+    hard = ephs.storage({"q": ephs.quantity.displacement}, lambda q: 0.25 * q**4)
+    system = pattern(pe=hard, ke=lib.point_mass(m=1.0), pkc=lib.pkc())
+    descriptor = system.descriptor()
+    method = Natural(compile_model(descriptor, Reference(), {}))
+    x0 = descriptor.pack(system.state({"pe.q": 1.0, "ke.p": 0.3}))
+    there = method.step(method.init(x0), 0.1)
+    back = method.step(method.init(there.x), -0.1)
+    assert np.allclose(back.x, x0, rtol=0.0, atol=1e-13)
+
+
+def test_dense_output_meets_the_times_asked_for(damped):
+    every = ephs.simulate(damped, 1.0, initial=START, step=0.01)
+    some = ephs.simulate(damped, 1.0, initial=START, step=0.01, save_at=[0.0, 0.25, 0.5, 0.503, 1.0])
+    assert np.array_equal(some.t, [0.0, 0.25, 0.5, 0.503, 1.0])
+    assert np.array_equal(some["osc.pe.q"][[0, 1, 2, 4]], every["osc.pe.q"][[0, 25, 50, 100]])
+    assert some["osc.pe.q"][3] == pytest.approx(
+        every["osc.pe.q"][50] * 0.7 + every["osc.pe.q"][51] * 0.3, abs=1e-12
+    )
+    assert some.stats["steps"] == every.stats["steps"] == 100
+
+
+@pytest.mark.parametrize(
+    ("options", "names"),
+    [
+        ({"method": "euler"}, ("euler", "natural")),
+        ({"form": "shiny"}, ("shiny", "reduced")),
+        ({"form": "folded"}, ("folded", "paper")),
+        ({"step": -0.1}, ("step", "> 0")),
+        ({"max_steps": 3, "step": 0.1}, ("max_steps", "10 steps")),
+        ({"save_at": [0.5, 0.2]}, ("save_at", "ascending")),
+        ({"save_at": [0.5, 2.0]}, ("save_at", "2.0")),
+        ({"events": [1]}, ("events",)),
+        ({"initial": {"osc.pe.x": 1.0}}, ("osc.pe.x", "osc.pe.q")),
+        ({"initial": {"osc.pe.q": [1.0, 2.0]}}, ("osc.pe.q", "(1,)")),
+        ({"initial": {"osc.pe.q": np.nan}}, ("osc.pe.q", "finite")),
+        ({"inputs": {"nothing": {"flow": 1.0}}}, ("nothing",)),
+    ],
+)
+def test_bad_options_are_named(damped, options, names):
+    with pytest.raises(ValueError, match=".*".join(names[:1])) as caught:
+        ephs.simulate(damped, 1.0, **{"initial": START, **options})
+    assert all(name in str(caught.value) for name in names)
+
+
+@pytest.mark.parametrize(
+    ("inputs", "names"),
+    [(None, ("p", "open")), ({"p": 1.0}, ("p", "flow")), ({"p": {"force": 1.0}}, ("p", "effort")),
+     ({"p": {"flow": [1.0, 2.0]}}, ("p", "1 numbers"))],
+)  # fmt: skip
+def test_open_ports_want_their_inputs(driven, inputs, names):
+    with pytest.raises(ephs.AssemblyError) as caught:
+        ephs.simulate(driven, 1.0, inputs=inputs)
+    assert all(name in str(caught.value) for name in names)
+
+
+@pytest.mark.parametrize(
+    "force", [0.7, lambda t: 0.7, lambda t, state: 0.7], ids=["constant", "of t", "of t and state"]
+)
+def test_a_force_works_and_its_work_is_in_the_balance(driven, force):
+    """From rest under a constant force: q = F/k (1 − cos ωt)."""
+    sol = ephs.simulate(driven, 2.0, step=0.01, inputs={"p": {"flow": force}})
+    exact = 0.7 / 1.5 * (1.0 - np.cos(np.sqrt(1.5) * sol.t))
+    assert np.abs(sol["pe.q"] - exact).max() < 1e-4
+    assert np.allclose(sol.work, 0.7 * sol["pe.q"], rtol=0.0, atol=1e-13)
+    assert sol.energy_error.max() < 1e-13
+
+
+def test_inputs_of_time_enter_at_order_two(driven):
+    """Resonance-free forcing: q = F/(k − Ω²) (cos Ωt − cos ωt)."""
+    k, forced = 1.5, 2.0
+
+    def exact(t):
+        return (np.cos(forced * t) - np.cos(np.sqrt(k) * t)) / (k - forced**2)
+
+    errors = []
+    for h in (0.04, 0.02, 0.01):
+        sol = ephs.simulate(driven, 4.0, step=h, inputs={"p": {"flow": lambda t: np.cos(forced * t)}})
+        errors.append(np.abs(sol["pe.q"] - exact(sol.t)).max())
+    assert np.allclose(np.log2(np.array(errors[:-1]) / errors[1:]), 2.0, atol=0.05)
+
+
+def test_a_prescribed_effort_holds_and_its_work_is_in_the_balance(driven):
+    sol = ephs.simulate(driven, 1.0, step=0.01, initial={"ke.p": 0.5}, inputs={"p": {"effort": 0.5}})
+    assert np.allclose(sol["pe.q"], 0.5 * sol.t, rtol=0.0, atol=1e-13)
+    assert np.allclose(sol.work, 0.75 * sol["pe.q"] ** 2, rtol=0.0, atol=1e-13)
+
+
+def test_a_python_function_that_raises_stops_the_run_and_loses_nothing():
+    pattern = ephs.Pattern(
+        junctions={
+            "q": ephs.junction(ephs.quantity.displacement),
+            "p": ephs.junction(ephs.quantity.momentum),
+        },
+        boxes={"pe": {"q": "q"}, "ke": {"p": "p"}, "pkc": {"q": "q", "p": "p"}},
+    )
+
+    def energy(q):
+        if q > 10.0:
+            raise ZeroDivisionError("off the table")
+        return 0.0
+
+    wall = ephs.storage({"q": ephs.quantity.displacement}, energy)
+    system = pattern(pe=wall, ke=lib.point_mass(m=1.0), pkc=lib.pkc())
+    with pytest.raises(ephs.SimulationError, match=r"pe") as caught:
+        ephs.simulate(system, 100.0, initial={"ke.p": 1.0}, step=0.5)
+    assert isinstance(caught.value.__cause__, ZeroDivisionError)
+    partial = caught.value.partial
+    assert 9.0 < partial.t[-1] == caught.value.time < 10.5
+    assert partial["pe.q"][-1] == pytest.approx(partial.t[-1])
+
+
+def test_a_run_that_is_interrupted_keeps_what_it_has(damped):
+    def stop(t, _until, _stats):
+        if t > 0.5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(ephs.Interrupted) as caught:
+        ephs.simulate(damped, 1e6, initial=START, step=0.01, progress=stop)
+    whole = ephs.simulate(damped, float(caught.value.partial.t[-1]), initial=START, step=0.01)
+    assert np.array_equal(caught.value.partial["osc.pe.q"], whole["osc.pe.q"])
+
+
+def test_progress_is_told_and_the_times_ascend(damped):
+    seen = []
+    ephs.simulate(
+        damped,
+        2.0,
+        initial=START,
+        step=0.001,
+        progress=lambda t, until, stats: seen.append((t, until, stats["steps"])),
+    )
+    assert seen[-1][:2] == (2.0, 2.0)
+    assert [t for t, _, _ in seen] == sorted(t for t, _, _ in seen)

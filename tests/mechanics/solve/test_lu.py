@@ -1,0 +1,76 @@
+"""The fixed-order factorisation solves what a dense solver solves, and watches its pivots."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ephs.mechanics.solve.lu_kernels import factorise, solve
+from ephs.mechanics.solve.sparse import order
+
+
+@st.composite
+def matrices(draw):
+    """Sparse invertible matrices with a zero-free diagonal in a hidden order: rows and columns are shuffled."""
+    n = draw(st.integers(1, 12))
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    dense = np.where(rng.random((n, n)) < 0.3, rng.standard_normal((n, n)), 0.0)
+    dense += np.diag(rng.choice([-4.0, 4.0], n) * np.exp(rng.standard_normal(n)))
+    return dense[rng.permutation(n)][:, rng.permutation(n)]
+
+
+def factors(dense, values=None):
+    n = dense.shape[0]
+    row, column = np.nonzero(dense)
+    plan = order(n, row, column, dense[row, column])
+    value, scratch, ratio = np.zeros(plan.fill), np.zeros(n), np.zeros(n)
+    data = dense[row, column] if values is None else values[row, column]
+    good = factorise(
+        plan.place, plan.start, plan.column, plan.diagonal, data, value, scratch, np.zeros(n), ratio
+    )
+    return plan, value, good, ratio
+
+
+@given(matrices(), st.integers(0, 2**32 - 1))
+def test_solves_as_a_dense_solver(dense, seed):
+    n = dense.shape[0]
+    right = np.random.default_rng(seed).standard_normal(n)
+    plan, value, good, _ = factors(dense)
+    x = np.empty(n)
+    solve(plan.rows, plan.columns, plan.start, plan.column, plan.diagonal, value, right, x, np.zeros(n))
+    assert good
+    scale = np.abs(dense) @ np.abs(x) + np.abs(right)
+    assert np.all(np.abs(dense @ x - right) <= 1e-11 * scale.max())
+
+
+@given(matrices(), st.floats(0.5, 2.0))
+def test_the_order_serves_other_numbers_in_the_same_places(dense, factor):
+    n = dense.shape[0]
+    changed = dense * factor ** np.sign(dense)
+    plan, value, good, _ = factors(dense, changed)
+    x, right = np.empty(n), np.ones(n)
+    solve(plan.rows, plan.columns, plan.start, plan.column, plan.diagonal, value, right, x, np.zeros(n))
+    if good and np.linalg.cond(changed) < 1e6:
+        assert np.abs(changed @ x - right).max() <= 1e-7 * (np.abs(changed) @ np.abs(x)).max()
+
+
+def test_a_singular_matrix_is_refused():
+    dense = np.array([[1.0, 2.0], [3.0, 4.0]])
+    _, _, good, _ = factors(dense, np.array([[1.0, 2.0], [2.0, 4.0]]))
+    assert not good
+
+
+def test_a_pivot_below_its_floor_is_refused():
+    dense = np.array([[1.0, 2.0], [3.0, 4.0]])
+    row, column = np.nonzero(dense)
+    plan = order(2, row, column, dense[row, column])
+    floor, ratio = np.full(2, 0.9), np.zeros(2)
+    data = np.array([1.0, 2.0, 2.0, 4.1])
+    arrays = (plan.place, plan.start, plan.column, plan.diagonal)
+    assert not factorise(*arrays, data, np.zeros(plan.fill), np.zeros(2), floor, ratio)
+    assert factorise(*arrays, data, np.zeros(plan.fill), np.zeros(2), 0.0 * floor, ratio)
+
+
+def test_an_exactly_singular_sample_has_no_order():
+    with pytest.raises(RuntimeError):
+        order(2, np.array([0, 0]), np.array([0, 1]), np.array([1.0, 1.0]))

@@ -1,0 +1,70 @@
+"""Solutions: their ledgers, their summary, and their files."""
+
+import json
+
+import numpy as np
+import pytest
+
+import ephs
+
+START = {"osc.pe.q": 1.0}
+
+
+@pytest.fixture
+def solution(damped):
+    return ephs.simulate(damped, 2.0, initial=START, step=0.01)
+
+
+def test_the_ledgers_balance(solution):
+    assert np.abs(solution.energy - solution.energy[0]).max() < 1e-14
+    assert np.all(np.diff(solution.entropy) > 0.0)
+    assert np.allclose(solution.heat, 293.15 * solution["env.s"], rtol=1e-12, atol=0.0)
+    destroyed = solution.exergy[0] - solution.exergy
+    assert np.allclose(destroyed, 293.15 * solution.ledgers.made, rtol=0.0, atol=1e-14)
+
+
+def test_a_ledger_of_a_part_and_of_a_subsystem(solution):
+    q, p = solution["osc.pe.q"], solution["osc.ke.p"]
+    assert np.allclose(solution.ledger("osc.pe").energy, 0.75 * q**2, rtol=1e-14)
+    assert np.allclose(solution.ledger("osc").energy, 0.75 * q**2 + 0.5 * p**2, rtol=1e-14)
+    assert np.allclose(solution.ledger("mf").made, solution["env.s"], rtol=1e-12)
+    with pytest.raises(KeyError, match=r"nowhere.*osc\.pe"):
+        solution.ledger("nowhere")
+
+
+def test_what_is_not_there_is_named(solution):
+    with pytest.raises(KeyError, match=r"osc\.q.*osc\.pe\.q"):
+        solution["osc.q"]
+    with pytest.raises(TypeError, match="not a scene"):
+        solution.body("crank")
+
+
+def test_a_file_gives_back_what_was_saved(solution, tmp_path):
+    file = tmp_path / "deep" / "motion.nc"
+    solution.save(file)
+    again = ephs.load_solution(file)
+    assert np.array_equal(again.t, solution.t)
+    assert all(np.array_equal(again[path], solution[path]) for path in solution)
+    assert np.array_equal(again.energy, solution.energy)
+    assert again.summary() == solution.summary()
+    assert [f.name for f in file.parent.iterdir()] == ["motion.nc"]
+    json.dumps(again.summary(), allow_nan=False)
+
+
+def test_a_file_that_is_no_solution_is_refused(tmp_path):
+    with pytest.raises(FileNotFoundError, match=r"nothing\.nc"):
+        ephs.load_solution(tmp_path / "nothing.nc")
+    other = tmp_path / "other.nc"
+    other.write_text("text")
+    with pytest.raises(ValueError, match=r"other\.nc"):
+        ephs.load_solution(other)
+
+
+def test_the_dataset_has_units_and_coordinates(solution):
+    data = solution.to_xarray()
+    assert data["t"].attrs["units"] == "s"
+    assert data["heat"].attrs["units"] == "J"
+    assert data["state:osc.pe.q"].dims == ("t",)
+    assert float(data["state:osc.pe.q"].sel(t=0.5, method="nearest")) == pytest.approx(
+        solution["osc.pe.q"][50]
+    )

@@ -1,0 +1,133 @@
+"""What composites inherit from their parts, on generated systems: the functor, the balances, naturality."""
+
+import numpy as np
+from hypothesis import HealthCheck, find, given, settings
+from hypothesis import strategies as st
+
+from ephs.operad import Path, Pattern, junction, quantity
+from ephs.semantics import Reference, System, library
+from ephs.semantics.laws import SYSTEM_LAWS, isotropy, power_form, random_probe, system_law
+from ephs.semantics.relation import pattern_relation
+from ephs.testing import (
+    check_entropy_production,
+    check_functoriality,
+    check_natural,
+    check_power_balance,
+    fillings,
+    nestings,
+    patterns,
+    systems,
+)
+
+# A system holds many draws; what is slow is the plain solver, which is the point.
+patient = settings(suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large], deadline=None)
+few = settings(patient, max_examples=25)
+seeds = st.integers(0, 2**16)
+
+
+@patient
+@given(systems(), seeds)
+def test_flatten_then_fill_is_fill_then_compose(system, seed):
+    check_functoriality(system, seed=seed)
+
+
+@patient
+@given(st.data(), seeds)
+def test_also_where_there_is_no_motion(data, seed):
+    """Any filling of any nesting of patterns has a relation, and both routes lead to it."""
+    check_functoriality(data.draw(fillings(data.draw(nestings(depth=3)))), seed=seed)
+
+
+@patient
+@given(systems(isolated=True), seeds)
+def test_isolated_systems_are_told_apart_by_their_rates(system, seed):
+    probe = random_probe(system, seed)
+    relation = system.relation(probe.reference).at({str(p): v for p, v in probe.state.items()}, probe.efforts)
+    assert relation.ports == ()
+    assert [path for path, _ in relation.rates] == sorted(system.states)
+
+
+@given(patterns())
+def test_a_pattern_conserves_power_and_has_half_dimension(pattern):
+    subspace = pattern_relation(pattern)
+    assert 2 * subspace.dimension == subspace.ambient
+    assert isotropy(subspace, power_form(pattern)) <= 1e-13
+
+
+@few
+@given(systems(max_junctions=2), seeds)
+def test_energy_is_balanced_over_a_step(system, seed):
+    check_power_balance(system, seed=seed)
+
+
+@few
+@given(systems(max_junctions=2), seeds)
+def test_entropy_is_balanced_and_never_destroyed(system, seed):
+    check_entropy_production(system, seed=seed)
+
+
+@few
+@given(systems(max_junctions=2), seeds)
+def test_a_step_of_the_nested_system_is_the_step_of_the_flat_one(system, seed):
+    check_natural(system, seed=seed)
+
+
+@few
+@given(systems(isolated=True, max_depth=2), seeds)
+def test_names_of_boxes_mean_nothing(system, seed):
+    """A system whose boxes are renamed has the same relation on the renamed states."""
+    names = {box: f"z_{box}" for box in system.fillings}  # the order of names stays
+    renamed = System.of(
+        system.pattern.rename(boxes=names), {names[box]: filling for box, filling in system.fillings.items()}
+    )
+    probe = random_probe(system, seed)
+    one = system.relation(probe.reference).at({str(p): v for p, v in probe.state.items()}, probe.efforts)
+    two = renamed.relation(probe.reference).at(
+        {f"z_{p}": v for p, v in probe.state.items()}, {Path.parse(f"z_{p}"): e for p, e in probe.efforts.items()}
+    )
+    assert [f"z_{path}" for path, _ in one.rates] == [str(path) for path, _ in two.rates]
+    assert np.abs(one.projector - two.projector).max() <= 1e-12 or (one.empty and two.empty)
+
+
+def test_systems_of_depth_three_open_and_closed_with_groups_are_generated():
+    quick = settings(max_examples=2000, database=None, suppress_health_check=list(HealthCheck))
+
+    def depth(system):
+        return 1 + max((depth(f) for f in system.fillings.values() if isinstance(f, System)), default=0)
+
+    def reads(system):
+        return any(p.kind == "irreversible" and p.reads for _, p in system.leaves())
+
+    find(systems(), lambda s: depth(s) == 3, settings=quick)
+    find(systems(), lambda s: bool(s.interface), settings=quick)
+    find(systems(), lambda s: not s.interface and depth(s) == 2, settings=quick)
+    find(systems(), lambda s: any(q.kind == "relative_pose" for q in s.states.values()), settings=quick)
+    find(systems(), reads, settings=quick)
+
+
+def test_most_drawn_systems_have_a_step():
+    """The laws of steps would be empty words if few systems could take one."""
+    taken = []
+
+    @settings(patient, max_examples=40, derandomize=True, database=None)
+    @given(systems(max_junctions=2), seeds)
+    def collect(system, seed):
+        taken.append("vacuous" not in system_law("power balance")(random_probe(system, seed)).detail)
+
+    collect()
+    assert np.mean(taken) > 0.8
+
+
+def test_every_law_holds_of_the_damped_oscillator_and_says_so():
+    osc = Pattern(
+        junctions={"q": junction(quantity.displacement), "p": junction(quantity.momentum), "s": junction(quantity.entropy)},
+        boxes={"pe": {"q": "q"}, "ke": {"p": "p"}, "pkc": {"q": "q", "p": "p"}, "mf": {"p": "p", "s": "s"}, "env": {"s": "s"}},
+    )
+    system = osc(
+        pe=library.spring(k=1.5), ke=library.point_mass(m=1.0), pkc=library.pkc(), mf=library.friction(d=0.1),
+        env=library.environment(),
+    )  # fmt: skip
+    for law in SYSTEM_LAWS:
+        verdict = law(random_probe(system, reference=Reference(300.0)))
+        assert verdict.holds, (law.name, verdict)
+        assert verdict.detail

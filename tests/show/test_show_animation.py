@@ -1,0 +1,123 @@
+"""The film: poses between samples are poses, all is in the picture, the page is whole and made in silence."""
+
+import math
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ephs.show import ShowError, animate
+from ephs.show.motion import (
+    between,
+    equivalent_box,
+    film,
+    frame_all,
+    matrix_to_quaternion,
+    point_of,
+    rotate,
+)
+
+UNIT = st.floats(-1.0, 1.0)
+VECTORS = st.tuples(UNIT, UNIT, UNIT).map(np.array)
+QUATERNIONS = (
+    st.tuples(UNIT, UNIT, UNIT, UNIT)
+    .map(np.array)
+    .filter(lambda q: np.linalg.norm(q) > 1e-3)
+    .map(lambda q: q / np.linalg.norm(q))
+)
+
+
+def matrix_of(quaternion):
+    return np.stack([rotate(quaternion, each) for each in np.eye(3)], axis=1)
+
+
+@given(QUATERNIONS)
+def test_matrix_and_quaternion_agree(quaternion):
+    matrix = matrix_of(quaternion)
+    assert np.abs(matrix @ matrix.T - np.eye(3)).max() < 1e-14
+    again = matrix_to_quaternion(matrix)
+    assert min(np.abs(again - quaternion).max(), np.abs(again + quaternion).max()) < 1e-7
+
+
+@given(VECTORS, VECTORS)
+def test_springs_reach_from_end_to_end(first, second):
+    turn, length = between(first, second)
+    assert np.linalg.norm(turn) == pytest.approx(1.0, abs=1e-14)
+    assert np.abs(first + rotate(turn, np.array([0.0, 0.0, length])) - second).max() < 1e-6
+
+
+@given(st.tuples(*[st.floats(0.1, 1.0)] * 3).map(np.array), st.floats(0.1, 10.0), QUATERNIONS)
+def test_a_stand_in_has_the_inertia_of_its_body(sides, mass, turn):
+    moments = mass / 12.0 * (np.sum(sides**2) - sides**2)
+    rotation = matrix_of(turn)
+    inertia = rotation @ np.diag(moments) @ rotation.T
+    found, placed = equivalent_box(mass, inertia)
+    axes = matrix_of(placed)
+    again = axes @ np.diag(mass / 12.0 * (np.sum(found**2) - found**2)) @ axes.T
+    assert np.abs(again - inertia).max() < 1e-9 * np.abs(inertia).max()
+
+
+@given(st.lists(VECTORS, min_size=1, max_size=8), st.floats(0.01, 1.0))
+def test_the_camera_sees_every_point(points, reach):
+    cloud = np.array(points)
+    view = frame_all(cloud, reach)
+    place, target = np.array(view.position), np.array(view.target)
+    ahead = (target - place) / np.linalg.norm(target - place)
+    for point in cloud:
+        way = point - place
+        assert way @ ahead > 0
+        angle = math.acos(np.clip(way @ ahead / np.linalg.norm(way), -1.0, 1.0))
+        assert angle <= view.field / 2
+
+
+def test_frames_are_poses_on_the_way(pendulum):
+    frames = film(pendulum, ["rod"], 30.0, None)
+    poses = frames.poses["rod"]
+    assert len(frames.times) == 121 and frames.pause == pytest.approx(4.0 / 120)
+    assert np.abs(np.linalg.norm(poses[:, :4], axis=1) - 1.0).max() < 1e-14
+    # The upper end of the rod hangs on its pin in every frame.
+    pin = point_of(poses, np.array([0.0, 0.0, 0.25]))
+    assert np.abs(pin - np.array([0.0, 0.0, 1.0])).max() < 1e-3
+
+
+def test_a_quaternion_that_changes_its_sign_makes_no_jump(pendulum):
+    body = pendulum.body("rod")
+    signs = np.where(np.arange(len(pendulum.t)) % 3 == 0, -1.0, 1.0)[:, None]
+    flipped = type(body)(body.fields | {"quaternion": body.quaternion * signs})
+    other = type(pendulum)(
+        *[getattr(pendulum, n) for n in ("name", "t", "scene", "system", "ledgers", "states")],
+        {"rod": flipped},
+    )
+    turns = film(other, ["rod"], 30.0, None).poses["rod"][:, :4]
+    straight = film(pendulum, ["rod"], 30.0, None).poses["rod"][:, :4]
+    assert np.abs(np.abs((turns * straight).sum(axis=1)) - 1.0).max() < 1e-12
+
+
+def test_duration_stretches_the_film(pendulum):
+    frames = film(pendulum, ["rod"], 10.0, 2.0)
+    assert len(frames.times) == 21 and frames.pause * 20 == pytest.approx(2.0)
+    assert frames.times[-1] == pendulum.t[-1]
+
+
+def test_the_page_is_whole_and_made_in_silence(pendulum, tmp_path, capfd):
+    page = animate(pendulum, tmp_path / "film.html", fps=10.0)
+    assert capfd.readouterr() == ("", "")
+    assert (tmp_path / "film.html").read_text(encoding="utf-8") == page
+    assert "__VISER_EMBED_DATA__" in page and "<title>pendulum</title>" in page
+    assert not re.findall(r"<(?:script|link|img|iframe)[^>]+(?:src|href)=\"?https?://", page)
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [({"fps": 0.0}, "fps = 0.0"), ({"duration": -1.0}, "duration = -1.0")],
+)
+def test_impossible_films_are_refused(pendulum, asked, words):
+    with pytest.raises(ShowError, match=words):
+        animate(pendulum, **asked)
+
+
+def test_a_system_without_scene_cannot_be_animated(circuit):
+    with pytest.raises(ShowError, match="damped oscillator: found no scene"):
+        animate(circuit)

@@ -1,0 +1,232 @@
+"""Laws of the pictures: nothing overlaps, wires keep off what they do not join, the same pattern gives the same picture."""
+
+import math
+import re
+import xml.etree.ElementTree as Xml
+from itertools import combinations
+
+import pytest
+
+from ephs.operad import Pattern, junction, quantity
+from ephs.show import ShowError, draw, place
+from ephs.show.geometry import Placement, Wire, crossings, gap, trespasses
+from ephs.show.graph import short_names, subscripted
+from ephs.show.palette import FILLS
+from ephs.show.positions import _networkx, _spread
+from pictures_of_patterns import KINDS, PICTURES, flat, joint, kinds_of
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+@pytest.fixture(scope="module", params=list(PICTURES))
+def drawn(request):
+    pattern = PICTURES[request.param]()
+    return pattern, draw(pattern, kinds=kinds_of(pattern))
+
+
+def test_no_node_touches_another(drawn):
+    _, drawing = drawn
+    for (first, r1), (second, r2) in combinations(drawing.placement.nodes().values(), 2):
+        assert math.dist(first, second) > r1 + r2 + 1.0
+
+
+def test_no_wire_runs_through_a_foreign_node(drawn):
+    _, drawing = drawn
+    assert trespasses(drawing.placement) == []
+
+
+def test_every_port_has_its_wire(drawn):
+    pattern, drawing = drawn
+    ports = {
+        (str(b), str(p.junction), p.power) for b, box in pattern.boxes.items() for p in box.ports.values()
+    }
+    wires = drawing.placement.wires
+    assert {(*w.ends, w.power) for w in wires if w.role == "port"} == ports
+    assert sum(w.role == "port" for w in wires) == sum(len(box.ports) for box in pattern.boxes.values())
+    exposed = {(str(name), j.power) for name, j in pattern.junctions.items() if j.exposed}
+    assert {(w.ends[0], w.power) for w in wires if w.role == "outer"} == exposed
+
+
+def test_wires_end_where_they_belong(drawn):
+    _, drawing = drawn
+    picture = drawing.placement
+    nodes = picture.nodes()
+    left, top, width, height = picture.rectangle
+    for wire in picture.wires:
+        if wire.role == "outer":
+            assert wire.points[0] == nodes[wire.ends[0]][0]
+            x, y = wire.points[-1]
+            assert min(abs(x - left), abs(x - left - width), abs(y - top), abs(y - top - height)) < 1e-6
+            continue
+        centre, radius = nodes[wire.ends[0]]
+        assert math.dist(wire.points[0], centre) == pytest.approx(radius, abs=1e-6)
+        assert math.dist(wire.points[-1], nodes[wire.ends[1]][0]) < 1e-6
+
+
+def test_everything_lies_in_the_rectangle(drawn):
+    _, drawing = drawn
+    picture = drawing.placement
+    left, top, width, height = picture.rectangle
+    for (x, y), radius in picture.nodes().values():
+        assert left < x - radius and x + radius < left + width
+        assert top < y - radius and y + radius < top + height
+    for text in (j.label for j in picture.junctions):
+        a, b, c, d = text.bounds
+        assert left < a and top < b and c < left + width and d < top + height
+
+
+def test_names_of_junctions_do_not_run_into_each_other_or_into_boxes(drawn):
+    _, drawing = drawn
+    labels = [j.label.bounds for j in drawing.placement.junctions]
+    for one, two in combinations(labels, 2):
+        assert one[2] <= two[0] or two[2] <= one[0] or one[3] <= two[1] or two[3] <= one[1]
+    for box in drawing.placement.boxes:
+        for left, top, right, bottom in labels:
+            nearest = (min(max(box.at[0], left), right), min(max(box.at[1], top), bottom))
+            assert math.dist(nearest, box.at) > box.radius - 1.0
+
+
+def test_names_fit_their_boxes(drawn):
+    _, drawing = drawn
+    for box in drawing.placement.boxes:
+        assert all(text.width <= 2 * box.radius for text in box.lines)
+
+
+def test_same_pattern_same_files(drawn):
+    pattern, drawing = drawn
+    again = draw(PICTURES["flat"](), kinds=kinds_of(PICTURES["flat"]())) if len(pattern.boxes) == 15 else None
+    again = again or draw(pattern, kinds=kinds_of(pattern))
+    assert (again.svg, again.tikz, again.png) == (drawing.svg, drawing.tikz, drawing.png)
+
+
+def test_two_ports_on_one_junction_are_two_lines():
+    wires = [w for w in place(PICTURES["awkward"]()).wires if w.ends == ("two_ports", "a")]
+    assert len(wires) == 2
+    assert wires[0].points[len(wires[0].points) // 2] != wires[1].points[len(wires[1].points) // 2]
+
+
+def test_kinds_are_coloured():
+    pattern = joint()
+    root = Xml.fromstring(draw(pattern, kinds=kinds_of(pattern)).svg)
+    for group in root.iter(f"{SVG}g"):
+        if group.get("class", "").startswith("box"):
+            name = (group.findtext(f"{SVG}title") or "").partition(" ")[0]
+            circle = group.find(f"{SVG}circle")
+            assert circle is not None and circle.get("fill") == FILLS[KINDS[name]]
+            assert bool(group.findall(f"{SVG}line")) == (KINDS[name] == "environment")
+    assert {FILLS[kind] for kind in ("storage", "reversible", "irreversible", "composite", "unknown")} == set(
+        FILLS.values()
+    )
+
+
+def test_only_state_ports_and_links_are_dashed():
+    pattern = PICTURES["awkward"]()
+    root = Xml.fromstring(draw(pattern).svg)
+    paths = list(root.iter(f"{SVG}path"))
+    assert {path.get("stroke-dasharray") is not None for path in paths} == {True, False}
+    for path in paths:
+        assert ("state" in str(path.get("class"))) == (path.get("stroke-dasharray") is not None)
+
+
+def test_full_names_stand_in_the_titles():
+    pattern = flat()
+    svg = draw(pattern).svg
+    assert all(f"<title>{box}</title>" in svg for box in pattern.boxes)
+
+
+def test_a_port_is_named_at_its_box_only_if_its_junction_does_not_say_it():
+    named = {w.title: w.label for w in place(PICTURES["mbs"]()).wires}
+    assert named["port b1.p on junction p_1"].base == "p"
+    assert named["port j.p_1 on junction p_1"] is None
+
+
+def test_short_names_are_the_shortest_that_differ():
+    paths = ["a.b.x", "c.b.x", "b.y", "y.z", "w"]
+    assert short_names(paths) == {"a.b.x": "a.b.x", "c.b.x": "c.b.x", "b.y": "y", "y.z": "z", "w": "w"}
+    assert len(set(short_names(["x", "a.x", "b.a.x"]).values())) == 3
+
+
+def test_symbols_have_subscripts_and_words_have_none():
+    assert subscripted("q_r") == ("q", "r")
+    assert subscripted("b1.p_j1") == ("b1.p", "j1")
+    assert subscripted("left_hip") == ("left_hip", "")
+
+
+def test_given_positions_are_kept():
+    points = {"pe": (0, 0), "pkc": (2, 0), "ke": (4, 1), "lp": (4, -1), "q": (1, 0), "p": (3, 0)}
+    nodes = place(PICTURES["body"](), positions=points).nodes()
+    origin = nodes["pe"][0]
+    unit = (nodes["q"][0][0] - origin[0]) / 1.0
+    for name, (x, y) in points.items():
+        assert nodes[name][0] == pytest.approx((origin[0] + unit * x, origin[1] - unit * y))
+
+
+def test_wires_between_given_positions_are_led_round_what_is_in_the_way():
+    pattern = Pattern(
+        {"p": junction(quantity.momentum)}, {"a": {"p": "p"}, "b": {"p": "p"}, "c": {"p": "p"}, "between": {}}
+    )
+    points = {"a": (0, 0), "between": (1, 0), "p": (2, 0), "b": (3, 0), "c": (2, 1)}
+    picture = place(pattern, positions=points)
+    assert trespasses(picture) == []
+    assert len(next(w for w in picture.wires if w.ends[0] == "a").points) > 2
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        ({"positions": {"nobody": (0, 0)}}, "'nobody'"),
+        ({"positions": {"pe": (0, 0)}}, "box pkc has none"),
+        (
+            {"positions": {"pe": (0, 0), "pkc": (0, 0), "ke": (1, 1), "lp": (2, 2), "q": (5, 5)}},
+            "pe and pkc are at the same",
+        ),
+        ({"kinds": {"pe": "motor"}}, "found kind 'motor'"),
+    ],
+)
+def test_faults_are_named(asked, words):
+    with pytest.raises(ShowError, match=words):
+        draw(PICTURES["body"](), **asked)
+
+
+def test_files_are_written_by_their_names(tmp_path):
+    drawing = draw(joint(), tmp_path / "joint.svg")
+    assert (tmp_path / "joint.svg").read_text(encoding="utf-8") == drawing.svg == drawing._repr_svg_()
+    assert drawing.save(tmp_path / "joint.png").read_bytes().startswith(b"\x89PNG")
+    assert drawing.save(tmp_path / "joint.tex").read_text(encoding="utf-8") == drawing.tikz
+    with pytest.raises(ShowError, match=r"joint\.gif"):
+        drawing.save(tmp_path / "joint.gif")
+
+
+def test_tikz_names_all_and_escapes_what_tex_would_read(drawn):
+    pattern, drawing = drawn
+    text = drawing.tikz
+    assert text.count("\\begin{") == text.count("\\end{") and r"\documentclass{article}" in text
+    assert text.count(r"\filldraw") == len(pattern.boxes)
+    body = re.sub(r"%.*", "", text.partition(r"\begin{tikzpicture}")[2])
+    assert not re.search(r"(?<!\\)[_&#$]", body)
+    assert body.count("{") == body.count("}")
+
+
+def test_layout_without_graphviz_keeps_nodes_apart():
+    from ephs.show.graph import read
+
+    graph = read(flat())
+    points = _spread(graph, _networkx(graph, 1), wires=True)
+    radii = list(graph.radii().values())
+    for i, j in combinations(range(len(radii)), 2):
+        assert math.dist(points[i], points[j]) > radii[i] + radii[j]
+
+
+def test_the_checks_see_a_bad_picture():
+    good = place(PICTURES["body"]())
+    nodes = good.nodes()
+    across = Wire("bad", ("pe", "p"), "port", True, (nodes["pe"][0], nodes["p"][0]), None)
+    assert gap(nodes["p"][0], across.points) == 0.0
+    through = Wire("bad", (), "port", True, (nodes["pe"][0], nodes["pkc"][0]), None)
+    bad = Placement(good.boxes, good.junctions, (through,), good.rectangle, good.corner)
+    assert {path for _, path in trespasses(bad)} >= {"pe", "pkc"}
+    cross = (
+        Wire("x", ("1",), "port", True, ((0, 0), (2, 2)), None),
+        Wire("y", ("2",), "port", True, ((0, 2), (2, 0)), None),
+    )
+    assert crossings(Placement((), (), cross, good.rectangle, 0.0)) == 1

@@ -1,0 +1,135 @@
+"""Plots and reports: every axis has its unit, names stand beside the data, a page needs no network."""
+
+import html
+import re
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from ephs.show import (
+    plot_constraints,
+    plot_energy,
+    plot_entropy,
+    plot_exergy,
+    plot_motion,
+    report,
+    write_report,
+)
+from ephs.show.series import thinned
+
+PLOTS = (plot_motion, plot_energy, plot_exergy, plot_entropy, plot_constraints)
+
+
+@pytest.fixture(params=["pendulum", "circuit"])
+def solution(request):
+    return request.getfixturevalue(request.param)
+
+
+@pytest.mark.parametrize("plot", PLOTS)
+def test_every_axis_has_a_name_and_a_unit(plot, solution):
+    figure = plot(solution)
+    assert figure.axes[-1].get_xlabel() == "time [s]"
+    for axes in figure.axes:
+        assert re.fullmatch(r"[\w ()]+ \[[^\]]+\]", axes.get_ylabel()), axes.get_ylabel()
+        assert "SI unit" not in axes.get_ylabel()
+
+
+@pytest.mark.parametrize("plot", PLOTS)
+def test_legends_are_not_over_the_data(plot, solution):
+    figure = plot(solution)
+    figure.canvas.draw()
+    for axes in figure.axes:
+        legend = axes.get_legend()
+        if legend is not None:
+            assert legend.get_window_extent().x0 >= axes.get_window_extent().x1 - 1
+            assert legend.get_window_extent().x1 <= figure.bbox.x1 + 1
+
+
+@pytest.mark.parametrize("plot", PLOTS)
+def test_plots_open_no_window_and_leave_the_settings_alone(plot, solution):
+    import matplotlib
+
+    before = dict(matplotlib.rcParams)
+    plot(solution)
+    assert dict(matplotlib.rcParams) == before
+
+
+def test_the_sum_of_the_energy_ledger_is_flat(pendulum):
+    lines = {line.get_label(): line for line in plot_energy(pendulum).axes[0].get_lines()}
+    total = np.asarray(lines["sum less work"].get_ydata())
+    scale = max(np.abs(line.get_ydata()).max() for line in lines.values())
+    assert np.ptp(total) <= 1e-12 * scale
+
+
+def test_negative_entropy_production_is_marked(circuit):
+    bad = circuit.entropy_production.copy()
+    bad[100] = -1e-6
+    books = circuit.ledgers | {"entropy_production": bad}
+    wrong = type(circuit)(circuit.name, circuit.t, None, circuit.system, books, circuit.states)
+    labels = [line.get_label() for line in plot_entropy(wrong).axes[1].get_lines()]
+    assert "negative" in labels
+    assert "negative" not in [line.get_label() for line in plot_entropy(circuit).axes[1].get_lines()]
+
+
+def test_thinning_keeps_ends_and_extremes():
+    t = np.linspace(0.0, 1.0, 100_001)
+    values = np.sin(7.0 * t)
+    values[31_337] = 5.0
+    values[77_777] = -5.0
+    few_t, few = thinned(t, values)
+    assert len(few) <= 2002 and len(few_t) == len(few)
+    assert (few.max(), few.min(), few_t[0], few_t[-1]) == (5.0, -5.0, 0.0, 1.0)
+    assert np.all(np.diff(few_t) > 0)
+
+
+def outside_frames(page: str) -> str:
+    return re.sub(r'srcdoc="[^"]*"', "", page)
+
+
+def test_the_report_loads_nothing(solution, tmp_path):
+    page = write_report(solution, tmp_path / "new" / "folder").read_text(encoding="utf-8")
+    own = re.sub(r'xmlns(:\w+)?="[^"]*"', "", outside_frames(page))
+    assert not re.findall(r"https?://", own)
+    assert not re.findall(r"@import|<script|<link (?!rel=\"icon\" href=\"data:)", own)
+    ids = re.findall(r'href="(#[^"]+)"', own)
+    assert {f'id="{each[1:]}"' in own for each in ids} <= {True}
+
+
+def test_the_report_says_what_there_is(pendulum, tmp_path):
+    path = write_report(pendulum, tmp_path)
+    page = path.read_text(encoding="utf-8")
+    assert path == tmp_path / "report.html"
+    for words in (
+        "<title>pendulum</title>",
+        "natural",
+        "Heat from friction",
+        "0.3459 J",
+        "arm.weight",
+        "housing",
+    ):
+        assert words in page
+    assert outside_frames(page).count("<svg") == 6
+    assert page.count("<iframe") == 1
+    frame = html.unescape(re.findall(r'srcdoc="([^"]*)"', page)[0])
+    assert "__VISER_EMBED_DATA__" in frame
+    for picture in re.findall(r"<svg.*?</svg>", outside_frames(page), flags=re.DOTALL):
+        ElementTree.fromstring(picture)
+
+
+def test_a_system_without_scene_has_no_animation(circuit, tmp_path):
+    page = write_report(circuit, tmp_path).read_text(encoding="utf-8")
+    assert "iframe" not in page.partition("<body>")[2] and "Animation" not in page
+    assert write_report(circuit, tmp_path).read_text(encoding="utf-8") == page
+
+
+def test_without_viser_the_page_says_so(pendulum, tmp_path, monkeypatch):
+    monkeypatch.setattr(report, "find_spec", lambda name: None)
+    page = write_report(pendulum, tmp_path).read_text(encoding="utf-8")
+    assert "viser is not installed" in page and page.count("<iframe") == 0
+
+
+def test_names_cannot_break_the_page(circuit, tmp_path):
+    books, states = circuit.ledgers, circuit.states
+    rude = type(circuit)("<b>&", circuit.t, None, circuit.system, books, states)
+    assert "<title>&lt;b&gt;&amp;</title>" in write_report(rude, tmp_path).read_text(encoding="utf-8")
