@@ -35,6 +35,7 @@ _TEXTS = {
     "filling-type": "box {box}: the filling is {found}, expected {expected}",
     "interface": "box {box}: the filling's interface does not match: {ports}. Found {found}, expected"
     " {expected}; rename ports with Pattern.rename, nothing is matched by type alone",
+    "not-a-filling": "box {what}: found a {found}, expected a System or a primitive",
     "no-filling": "the boxes {expected} want fillings, found none; give each box a system or a primitive",
     "rename": "cannot rename {what} {found}: there is none of this name; expected one of {expected}",
     "pair": "the kind of relative pose is {found!r}, expected one of {expected}",

@@ -253,6 +253,9 @@ class Pattern:
         first = next(iter(given.values()), None)
         if first is None:
             raise PatternError("no-filling", found="none", expected=paths_text(self.boxes))
+        for box, filling in given.items():
+            if not callable(getattr(filling, "compose", None)):
+                raise PatternError("not-a-filling", what=str(box), found=type(filling).__name__)
         return first.compose(self, given)
 
     def rename(

@@ -14,11 +14,13 @@ from numpy.typing import NDArray
 
 from ephs.operad import Interface, Path, PortType, Quantity
 
-__all__ = ["Array", "Bundle", "Reference"]
+__all__ = ["POSITIVE", "Array", "Bundle", "Reference"]
 
 Array = NDArray[np.float64]
 Span = slice
 """A range of indices: `slice`, whose own name a method of `Bundle` bears."""
+POSITIVE = ("volume", "amount")
+"""Kinds of quantity whose states are positive, so that steps are relative to them."""
 
 
 @final

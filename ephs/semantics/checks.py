@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ephs.operad import Path
-from ephs.semantics.bundle import Array, Bundle, Reference
+from ephs.semantics.bundle import POSITIVE, Array, Bundle, Reference
 from ephs.semantics.errors import StructureError
 from ephs.semantics.spaces import manifold
 from ephs.semantics.subspace import Subspace
@@ -27,18 +27,23 @@ __all__ = [
 ]
 
 SAMPLES = 3
-TOLERANCE = (
-    1e-12  # of the largest entry; evaluations of structure are a few hundred roundings deep at the most
-)
+# of the largest entry; evaluations of structure are a few hundred roundings deep at the most
+TOLERANCE = 1e-12
+EVENNESS = 1e-9  # of the energy, in which large terms may cancel
 
 
-def random_point(interface: "Bundle", ports: tuple[Path, ...], rng: np.random.Generator) -> dict[Path, Array]:
-    """Random states for the named ports; volumes and amounts positive."""
+def random_point(
+    bundle: Bundle, ports: tuple[Path, ...], rng: np.random.Generator, size: float = 1.0
+) -> dict[Path, Array]:
+    """Random states for the named ports, of a size around the identity; volumes and amounts positive."""
     out: dict[Path, Array] = {}
     for port in ports:
-        quantity = interface.interface[port].quantity
-        x = manifold(quantity.space).random(rng)
-        out[port] = np.exp(0.3 * x) if quantity.kind in ("volume", "amount") else x
+        quantity = bundle.interface[port].quantity
+        space = manifold(quantity.space)
+        x = space.random(rng)
+        if size != 1.0:
+            x = space.retract(space.identity(), size * rng.standard_normal(space.dim))
+        out[port] = np.exp(0.3 * x) if quantity.kind in POSITIVE else x
     return out
 
 
@@ -69,24 +74,48 @@ def _worst(defect: Array) -> tuple[int, ...]:
 
 
 def check_storage(storage: "Storage") -> None:
-    """E smooth and even under time reversal, its gradient the differential, θ = ∂E/∂s > 0."""
-    rng = np.random.default_rng(20)
-    bundle = storage.bundle
+    """E finite and even under time reversal, its gradient the differential, θ = ∂E/∂s > 0."""
     if storage.environment:
         return
-    reference = Reference()
+    rng = np.random.default_rng(20)
+    bundle, name = storage.bundle, storage.name
     for _ in range(SAMPLES):
-        x = random_point(bundle, bundle.ports, rng)
-        energy, mirrored = float(storage.energy(x)), float(storage.energy(_reversed(bundle, x)))
-        if not abs(energy - mirrored) <= TOLERANCE * max(1.0, abs(energy)):
-            raise StructureError("even", storage.name, found=mirrored, expected=energy, witness=_show(x))
-        gradient = storage.energy_gradient(x)
+        x, energy, gradient = _inside(storage, rng)
+        if gradient.shape != (bundle.size,):
+            raise StructureError("gradient-shape", name, found=gradient.shape, expected=(bundle.size,))
+        _require_finite(name, "the energy", np.array(energy), x)
+        _require_finite(name, "the gradient", gradient, x)
+        mirrored = float(storage.energy(_reversed(bundle, x)))
+        if not abs(energy - mirrored) <= EVENNESS * (abs(energy) + abs(mirrored)):
+            raise StructureError("even", name, found=mirrored, expected=energy, witness=_show(x))
         _check_gradient(storage, x, gradient, energy)
         for _, where, quantity in bundle.items():
             if quantity.kind == "entropy" and not gradient[where][0] > 0.0:
-                raise StructureError("temperature", storage.name, found=float(gradient[where][0]))
-        del reference
-        reference = Reference()
+                raise StructureError("temperature", name, found=float(gradient[where][0]))
+
+
+def _inside(storage: "Storage", rng: np.random.Generator) -> tuple[dict[Path, Array], float, Array]:
+    """A state where the energy neither overflows nor underflows: random, if need be near the identity."""
+    hot = storage.bundle.indicator("entropy") == 1.0
+    found: tuple[dict[Path, Array], float, Array] | None = None
+    x: dict[Path, Array] = {}
+    for size in (1.0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-9, 0.0):
+        x = random_point(storage.bundle, storage.bundle.ports, rng, size)
+        try:
+            energy, gradient = float(storage.energy(x)), storage.energy_gradient(x)
+        except (OverflowError, ZeroDivisionError):
+            continue
+        found = found or (x, energy, gradient)
+        if gradient.shape != hot.shape:
+            return found
+        if np.isfinite(energy) and np.all(np.isfinite(gradient)) and np.all(gradient[hot] != 0.0):
+            return x, energy, gradient
+    return found or (x, np.inf, np.zeros(hot.shape))
+
+
+def _require_finite(name: str, what: str, matrix: Array, x: "Point") -> None:
+    if not np.all(np.isfinite(matrix)):
+        raise StructureError("finite", name, what=what, found=matrix.tolist(), witness=_show(x))
 
 
 def _check_gradient(storage: "Storage", x: "Point", gradient: Array, energy: float) -> None:
@@ -94,11 +123,20 @@ def _check_gradient(storage: "Storage", x: "Point", gradient: Array, energy: flo
     if storage.gradient is None:
         return
     rng = np.random.default_rng(21)
-    step = 1e-4 * rng.standard_normal(storage.bundle.size)
-    there, back = (float(storage.energy(storage.retract(x, k * step))) for k in (1.0, -1.0))
-    scale = abs(energy) * 1e-8 + float(np.abs(gradient) @ np.abs(step))
-    expected, found = 0.5 * (there - back), float(gradient @ step)
-    if not abs(expected - found) <= 1e-4 * scale + 1e-13:
+    direction = rng.standard_normal(storage.bundle.size)
+    best = (np.inf, 0.0, 0.0)  # of several lengths of the step: the energy may vary slowly, or fast
+    for length in (1e-2, 1e-4, 1e-6, 1e-8):
+        step = length * direction
+        try:
+            there, back = (float(storage.energy(storage.retract(x, k * step))) for k in (1.0, -1.0))
+        except (OverflowError, ZeroDivisionError):
+            continue
+        expected, found = 0.5 * (there - back), float(gradient @ step)
+        scale = 1e-4 * float(np.abs(gradient) @ np.abs(step)) + 1e-14 * (abs(there) + abs(back) + abs(energy))
+        if np.isfinite(expected):
+            best = min(best, (abs(expected - found) / max(scale, 1e-300), found, expected))
+    if not best[0] <= 1.0:
+        _, found, expected = best
         entry = "(along a random direction)"
         raise StructureError(
             "gradient", storage.name, entry=entry, found=found, expected=expected, witness=_show(x)
@@ -124,16 +162,19 @@ def check_reversible(reversible: "Reversible") -> None:
             raise StructureError("gyrator-shape", name, found=skew.shape, expected=(n, n))
         if constraint.shape != (k, n):
             raise StructureError("constraint-shape", name, found=constraint.shape, expected=(k, n))
-        scale = max(1.0, float(np.abs(skew).max(initial=0.0)), float(np.abs(constraint).max(initial=0.0)))
+        _require_finite(name, "the matrix L", skew, x)
+        _require_finite(name, "the matrix C", constraint, x)
+        scale = float(np.abs(skew).max(initial=0.0))
         defect = skew + skew.T
-        if np.abs(defect).max(initial=0.0) > TOLERANCE * scale:
+        if not np.abs(defect).max(initial=0.0) <= TOLERANCE * scale:
             entry = _worst(defect)
             raise StructureError("isotropy", name, entry=entry, found=float(defect[entry]), witness=_show(x))
         for kind in bundle.environment_kinds():
             one = bundle.indicator(kind)
             defect = np.concatenate([skew @ one, constraint @ one])
-            if np.abs(defect).max(initial=0.0) > TOLERANCE * scale:
-                entry = _worst(defect)
+            terms = np.concatenate([np.full(n, scale), np.abs(constraint).sum(axis=1)])
+            if not np.all(np.abs(defect) <= TOLERANCE * terms):
+                entry = _worst(defect / np.maximum(terms, 1e-300))
                 found = float(defect[entry])
                 raise StructureError(
                     "conservation", name, quantity=kind, entry=entry, found=found, witness=_show(x)
@@ -143,7 +184,7 @@ def check_reversible(reversible: "Reversible") -> None:
         there = dirac(*reversible.structure(_reversed(bundle, x)))
         mirror = np.diag(np.concatenate([-parity, parity]))
         found = here.image(mirror).distance(there)
-        if found > 1e-9:
+        if not found <= 1e-9:
             raise StructureError("parity", name, found=found, witness=_show(x))
 
 
@@ -155,23 +196,27 @@ def check_irreversible(irreversible: "Irreversible") -> None:
     for _ in range(SAMPLES):
         x, e = random_point(bundle, irreversible.reads, rng), random_efforts(bundle, rng)
         matrix = irreversible.matrix(x, e, reference)
-        scale = max(1e-300, float(np.abs(matrix).max(initial=0.0)))
+        if matrix.shape != (bundle.size, bundle.size):
+            expected = (bundle.size, bundle.size)
+            raise StructureError("onsager-shape", name, found=matrix.shape, expected=expected)
+        _require_finite(name, "the matrix M", matrix, x)
+        scale = float(np.abs(matrix).max(initial=0.0))
         defect = matrix - matrix.T
-        if np.abs(defect).max(initial=0.0) > TOLERANCE * scale:
+        if not np.abs(defect).max(initial=0.0) <= TOLERANCE * scale:
             entry = _worst(defect)
             raise StructureError("symmetry", name, entry=entry, found=float(defect[entry]), witness=_show(x))
         least = float(np.linalg.eigvalsh(matrix).min(initial=0.0))
-        if least < -TOLERANCE * scale:
+        if not least >= -TOLERANCE * scale:
             raise StructureError("definite", name, found=least, witness=_show(x))
         energy_effort = e + bundle.intensive(reference)
         terms = np.abs(matrix) @ np.abs(energy_effort)
         defect = matrix @ energy_effort
-        if np.any(np.abs(defect) > TOLERANCE * np.maximum(terms, 1e-300)):
-            entry = _worst(defect)
+        if not np.all(np.abs(defect) <= TOLERANCE * terms):
+            entry = _worst(defect / np.maximum(terms, 1e-300))
             raise StructureError("energy", name, entry=entry, found=float(defect[entry]), witness=_show(x))
         for kind in bundle.environment_kinds():
             defect = matrix @ bundle.indicator(kind)
-            if kind != "entropy" and np.abs(defect).max(initial=0.0) > TOLERANCE * scale:
+            if kind != "entropy" and not np.abs(defect).max(initial=0.0) <= TOLERANCE * scale:
                 entry = _worst(defect)
                 found = float(defect[entry])
                 raise StructureError(
@@ -179,5 +224,5 @@ def check_irreversible(irreversible: "Irreversible") -> None:
                 )
         mirrored = irreversible.matrix(_reversed(bundle, x), parity * e, reference)
         found = float(np.abs(mirrored - parity[:, None] * matrix * parity[None, :]).max(initial=0.0))
-        if found > TOLERANCE * scale:
+        if not found <= TOLERANCE * scale:
             raise StructureError("parity", name, found=found, witness=_show(x))

@@ -1,28 +1,32 @@
-"""Primitives of one's own, from plain Python functions of the port variables; their structure is checked when made."""
+"""Primitives of one's own, from plain Python functions of the port variables.
 
+Their structure is checked when they are made.
+"""
+
+import inspect
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ephs.operad import Directory, Interface, Path, PortType, Quantity
 from ephs.semantics import library
 from ephs.semantics.bundle import Array, Bundle, Reference
+from ephs.semantics.checks import random_point
 from ephs.semantics.errors import StructureError
 from ephs.semantics.primitives import Irreversible, Point, Reversible, Storage
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
 
 __all__ = ["constraint", "gyrator", "irreversible", "storage", "transformer"]
 
 Ports = Mapping[str, Quantity]
+Matrix = ArrayLike | Callable[..., ArrayLike]
 
 
 def storage(
     ports: Ports,
     energy: Callable[..., float],
-    gradient: "Callable[..., Any] | None" = None,
+    gradient: Callable[..., Any] | None = None,
     *,
     name: str = "storage",
 ) -> Storage:
@@ -40,7 +44,8 @@ def storage(
     Raises
     ------
     StructureError
-        The energy is not even under time reversal, the gradient is not its differential, a temperature is negative.
+        The energy is not even under time reversal, the gradient is not its differential, a temperature is not
+        positive, or a function does not take the ports' names.
 
     Examples
     --------
@@ -48,19 +53,22 @@ def storage(
     >>> storage({"q": Q.displacement}, lambda q: 0.25 * q**4, lambda q: [q**3]).kind
     'storage'
     """
-    interface = _interface(ports)
+    interface = _interface(name, ports)
     n = Bundle.of(interface).size
+    _takes(name, "energy", energy, tuple(interface))
+    if gradient is not None:
+        _takes(name, "gradient", gradient, tuple(interface))
     given = gradient
     return Storage(
         name,
         interface,
-        energy=lambda x: float(energy(**_named(interface, x))),
-        gradient=None if given is None else lambda x: _flat(given(**_named(interface, x)), n),
+        energy=lambda x: float(energy(**_named(x))),
+        gradient=None if given is None else lambda x: _flat(name, given(**_named(x)), n),
         parameters=(("energy", _name(energy)),),
     )
 
 
-def gyrator(ports: Ports, matrix: Any, *, name: str = "gyrator") -> Reversible:
+def gyrator(ports: Ports, matrix: Matrix, *, name: str = "gyrator") -> Reversible:
     """Reversible f = L(x) e with L skew.
 
     Parameters
@@ -75,17 +83,17 @@ def gyrator(ports: Ports, matrix: Any, *, name: str = "gyrator") -> Reversible:
     StructureError
         L is not skew, does not conserve an environment quantity, or is not invariant under time reversal.
     """
-    interface = _interface(ports)
+    interface = _interface(name, ports)
     n = Bundle.of(interface).size
     if not callable(matrix):
         return library.constant_structure(name, interface, _matrix(name, matrix, n, n), np.zeros((0, n)))
-    read = _reader(interface, matrix)
+    read = _reader(name, interface, matrix)
     return Reversible(
         name, interface, lambda x: (_matrix(name, read(x), n, n), np.zeros((0, n))), reads=_reads(interface)
     )
 
 
-def transformer(ports: Ports, matrix: Any, *, name: str = "transformer") -> Reversible:
+def transformer(ports: Ports, matrix: Matrix, *, name: str = "transformer") -> Reversible:
     """Reversible e₂ = g(x) e₁, f₁ = −g(x)* f₂ from the first power port to the others.
 
     Parameters
@@ -95,8 +103,11 @@ def transformer(ports: Ports, matrix: Any, *, name: str = "transformer") -> Reve
     matrix
         g (n₂, n₁); or a function of the read states, by name, that gives it.
     """
-    interface = _interface(ports)
+    interface = _interface(name, ports)
     bundle = Bundle.of(interface)
+    if len(bundle.ports) < 2:
+        found = ", ".join(map(str, bundle.ports)) or "none"
+        raise StructureError("parameter", name, key="ports", found=found, expected="two power ports or more")
     first = bundle.quantity(bundle.ports[0]).space.dim
     k = bundle.size - first
 
@@ -106,7 +117,7 @@ def transformer(ports: Ports, matrix: Any, *, name: str = "transformer") -> Reve
     if not callable(matrix):
         zero = np.zeros((bundle.size, bundle.size))
         return library.constant_structure(name, interface, zero, whole(_matrix(name, matrix, k, first)))
-    read = _reader(interface, matrix)
+    read = _reader(name, interface, matrix)
     return Reversible(
         name,
         interface,
@@ -117,7 +128,7 @@ def transformer(ports: Ports, matrix: Any, *, name: str = "transformer") -> Reve
 
 
 def constraint(
-    ports: Ports, matrix: Any, *, multipliers: int | None = None, name: str = "constraint"
+    ports: Ports, matrix: Matrix, *, multipliers: int | None = None, name: str = "constraint"
 ) -> Reversible:
     """Reversible f = C(x)* λ, 0 = C(x) e.
 
@@ -128,19 +139,17 @@ def constraint(
     matrix
         C (k, n) over the power ports in their order; or a function of the read states, by name, that gives it.
     multipliers
-        k, needed where the matrix is a function.
+        k; where None and the matrix is a function, its rows are counted at a random state.
     """
-    interface = _interface(ports)
+    interface = _interface(name, ports)
     n = Bundle.of(interface).size
     zero = np.zeros((n, n))
     if not callable(matrix):
-        given = np.atleast_2d(np.asarray(matrix, dtype=float))
-        return library.constant_structure(name, interface, zero, _matrix(name, given, given.shape[0], n))
-    if multipliers is None:
-        raise StructureError(
-            "parameter", name, key="multipliers", found=None, expected="the number of rows of C"
-        )
-    k, read = multipliers, _reader(interface, matrix)
+        rows: Any = matrix
+        k = len(rows) if np.ndim(rows) == 2 else 1
+        return library.constant_structure(name, interface, zero, _matrix(name, np.atleast_2d(rows), k, n))
+    read = _reader(name, interface, matrix)
+    k = _rows(interface, read) if multipliers is None else multipliers
     return Reversible(
         name,
         interface,
@@ -172,58 +181,85 @@ def irreversible(ports: Ports, matrix: Callable[..., Any], *, name: str = "irrev
     ... ).kind
     'irreversible'
     """
-    interface = _interface(ports)
+    interface = _interface(name, ports)
     bundle = Bundle.of(interface)
+    _takes(name, "matrix", matrix, tuple(interface))
 
     def evaluate(x: Point, e: Array, reference: Reference) -> Array:
         energy = bundle.split(e + bundle.intensive(reference))
-        return _matrix(name, matrix(**_named(interface, {**energy, **x})), bundle.size, bundle.size)
+        return _matrix(name, matrix(**_named({**energy, **x})), bundle.size, bundle.size)
 
     return Irreversible(name, interface, evaluate, _reads(interface))
 
 
-def _interface(ports: Ports) -> Interface:
-    return Directory(
-        {
-            port.removeprefix("~"): PortType(quantity, not port.startswith("~"))
-            for port, quantity in ports.items()
-        }
-    )
+def _interface(name: str, ports: Ports) -> Interface:
+    found: dict[str, PortType] = {}
+    for port, quantity in ports.items():
+        plain = port.removeprefix("~")
+        if plain in found:
+            expected = "one entry for a port, with or without ~"
+            raise StructureError("parameter", name, key="ports", found=f"{plain} twice", expected=expected)
+        found[plain] = PortType(quantity, power=plain == port)
+    if not any(port.power for port in found.values()):
+        given = ", ".join(ports) or "none"
+        raise StructureError("parameter", name, key="ports", found=given, expected="a power port at least")
+    return Directory(found)
 
 
 def _reads(interface: Interface) -> tuple[Path, ...]:
     return tuple(port for port, port_type in interface.items() if not port_type.power)
 
 
-def _reader(interface: Interface, matrix: Callable[..., Any]) -> Callable[[Point], Any]:
-    return lambda x: matrix(**_named(interface, x))
+def _takes(name: str, key: str, function: object, ports: tuple[Path, ...]) -> None:
+    """Refuse what cannot be called with the ports' names."""
+    expected = f"a function of ({', '.join(map(str, ports))})"
+    if not callable(function):
+        raise StructureError("parameter", name, key=key, found=function, expected=expected)
+    try:
+        signature = inspect.signature(function)
+    except ValueError:  # builtin functions have none
+        return
+    try:
+        signature.bind(**{str(port): None for port in ports})
+    except TypeError:
+        found = f"a function of {signature}"
+        raise StructureError("parameter", name, key=key, found=found, expected=expected) from None
 
 
-def _named(interface: Interface, values: Mapping[Path, Array]) -> dict[str, Any]:
-    return {str(port): float(v[0]) if v.size == 1 else v for port, v in values.items() if port in interface}
+def _reader(
+    name: str, interface: Interface, matrix: Callable[..., ArrayLike]
+) -> Callable[[Point], ArrayLike]:
+    _takes(name, "matrix", matrix, _reads(interface))
+    return lambda x: matrix(**_named(x))
 
 
-def _flat(value: Any, n: int) -> Array:
-    entries = value if isinstance(value, list | tuple) else [value]
-    parts = [np.atleast_1d(np.asarray(entry, dtype=float)) for entry in entries]
-    out = np.concatenate(parts) if parts else np.zeros(0)
+def _rows(interface: Interface, read: Callable[[Point], ArrayLike]) -> int:
+    x = random_point(Bundle.of(interface), _reads(interface), np.random.default_rng(24))
+    return len(np.atleast_2d(np.asarray(read(x), dtype=float)))
+
+
+def _named(values: Mapping[Path, Array]) -> dict[str, Any]:
+    return {str(port): float(v[0]) if v.size == 1 else v for port, v in values.items()}
+
+
+def _flat(name: str, value: Any, n: int) -> Array:
+    entries: list[Any] = list(value) if isinstance(value, list | tuple) else [value]  # pyright: ignore[reportUnknownArgumentType]
+    out = np.concatenate([np.atleast_1d(np.asarray(entry, dtype=float)) for entry in entries])
     if out.shape != (n,):
-        raise StructureError("parameter", "storage", key="gradient", found=out.shape, expected=(n,))
+        raise StructureError("gradient-shape", name, found=out.shape, expected=(n,))
     return out
 
 
-def _matrix(name: str, value: Any, rows: int, columns: int) -> Array:
-    out = np.asarray(value, dtype=float)
+def _matrix(name: str, value: ArrayLike, rows: int, columns: int) -> Array:
+    try:
+        out = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        out = np.array(np.nan)
     if out.shape != (rows, columns) or not np.all(np.isfinite(out)):
-        raise StructureError(
-            "parameter",
-            name,
-            key="matrix",
-            found=out.tolist(),
-            expected=f"finite numbers of shape ({rows}, {columns})",
-        )
+        expected = f"finite numbers of shape ({rows}, {columns})"
+        raise StructureError("parameter", name, key="matrix", found=value, expected=expected)
     return out
 
 
 def _name(function: Callable[..., Any]) -> str:
-    return getattr(function, "__name__", type(function).__name__)
+    return str(getattr(function, "__name__", type(function).__name__))

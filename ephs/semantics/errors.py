@@ -5,29 +5,66 @@ from typing import final
 __all__ = ["AssemblyError", "SemanticsError", "StructureError"]
 
 _TEXTS = {
-    "fillings": "{path}: the boxes to fill are {expected}, the fillings given are {found}; fill each box once",
-    "interface": "{path}: the filling's interface is {found}, the box wants {expected}; rename the filling's ports",
-    "isotropy": "{path}: not reversible: entry ({entry}) of L + Lᵀ is {found}, expected 0 (witness state {witness})",
+    "fillings": (
+        "{path}: the boxes to fill are {expected}, the fillings given are {found}; fill each box once"
+    ),
+    "interface": (
+        "{path}: the filling's interface is {found}, the box wants {expected}; rename the filling's ports"
+    ),
+    "finite": "{path}: {what} is {found}, expected finite numbers (witness state {witness})",
+    "isotropy": (
+        "{path}: not reversible: entry {entry} of L + Lᵀ is {found}, expected 0 (witness state {witness})"
+    ),
     "gyrator-shape": "{path}: the matrix L is {found}, its ports want {expected}",
     "constraint-shape": "{path}: the matrix C is {found}, its ports want {expected}",
-    "conservation": "{path}: {quantity} is not conserved: entry {entry} is {found}, expected 0 (witness state {witness})",
-    "parity": "{path}: not invariant under time reversal: defect {found}, expected 0 (witness state {witness})",
-    "symmetry": "{path}: not Onsager symmetric: entry ({entry}) of M − Mᵀ is {found}, expected 0 (witness state {witness})",
-    "definite": "{path}: M has the negative eigenvalue {found}; the second law expects none (witness state {witness})",
-    "energy": "{path}: energy is not conserved: entry {entry} of M·eᴱ is {found}, expected 0 (witness state {witness})",
-    "even": "{path}: the energy is not even under time reversal: {found} against {expected} (witness state {witness})",
-    "gradient": "{path}: the gradient's entry {entry} is {found}, differences of the energy say {expected} (witness state {witness})",
-    "temperature": "{path}: the absolute temperature is {found} K, expected > 0; check the state or the energy function",
+    "conservation": (
+        "{path}: {quantity} is not conserved: entry {entry} is {found}, expected 0 (witness state {witness})"
+    ),
+    "parity": (
+        "{path}: not invariant under time reversal: defect {found}, expected 0 (witness state {witness})"
+    ),
+    "onsager-shape": "{path}: the matrix M is {found}, its ports want {expected}",
+    "symmetry": (
+        "{path}: not Onsager symmetric: entry {entry} of M − Mᵀ is {found}, expected 0 (witness state "
+        "{witness})"
+    ),
+    "definite": (
+        "{path}: M has the negative eigenvalue {found}; the second law expects none (witness state {witness})"
+    ),
+    "energy": (
+        "{path}: energy is not conserved: entry {entry} of M·eᴱ is {found}, expected 0 (witness state "
+        "{witness})"
+    ),
+    "even": (
+        "{path}: the energy is not even under time reversal: {found} against {expected} (witness state "
+        "{witness})"
+    ),
+    "gradient-shape": "{path}: the gradient is {found}, its ports want {expected}",
+    "gradient": (
+        "{path}: the gradient's entry {entry} is {found}, differences of the energy say {expected} (witness "
+        "state {witness})"
+    ),
+    "temperature": (
+        "{path}: the absolute temperature is {found} K, expected > 0; check the state or the energy function"
+    ),
     "rotation": "{path}: a rotation of π or more in one step; take a smaller step",
-    "storage-ports": "{path}: the storage has the state port {found}; a storage owns its states, expected power ports only",
+    "storage-ports": (
+        "{path}: the storage has the state port {found}; a storage owns its states, expected power ports only"
+    ),
     "parameter": "{path}: parameter {key} is {found}, expected {expected}",
-    "two-storages": "{path}: the state of junction {junction} is stored twice, by {found}; expected one storage for a state. "
-    "Join the two by a constraint component instead",
-    "unread-state": "{path}: port {port} reads the state of junction {junction}, which no storage provides; "
-    "connect a storage there, or expose the junction as a power port to one",
+    "two-storages": (
+        "{path}: the state of junction {junction} is stored twice, by {found}; expected one storage for a "
+        "state. Join the two by a constraint component instead"
+    ),
+    "unread-state": (
+        "{path}: port {port} reads the state of junction {junction}, which no storage provides; connect a "
+        "storage there, or expose the junction as a power port to one"
+    ),
     "state": "{path}: the initial value has shape {found}, expected {expected} ({quantity})",
     "unknown-state": "{path}: no such state; the states are {expected}",
-    "missing-input": "{path}: the outer port is open: give inputs={{'{path}': {{'flow': …}}}} or {{'effort': …}}",
+    "missing-input": (
+        "{path}: the outer port is open: give inputs={{'{path}': {{'flow': …}}}} or {{'effort': …}}"
+    ),
     "unknown-input": "{path}: no such outer power port; the open ports are {expected}",
     "input": "{path}: the input is {found}, expected {expected}",
 }

@@ -46,6 +46,15 @@ def _positive(path: str, **parameters: float) -> None:
             raise StructureError("parameter", path, key=key, found=value, expected="a number > 0")
 
 
+def _exp(x: float) -> float:
+    """The exponential, infinite where it overflows: iterates of a solver may go there."""
+    return math.exp(x) if x < 709.0 else math.inf
+
+
+def _expm1(x: float) -> float:
+    return math.expm1(x) if x < 709.0 else math.inf
+
+
 def _finite(path: str, **parameters: float) -> None:
     for key, value in parameters.items():
         if not math.isfinite(value):
@@ -127,17 +136,17 @@ def exponential(name: str, c1: float, c2: float, parameters: tuple[tuple[str, ob
     port = Path.of("s")
 
     def gradient(x: Point) -> Array:
-        return np.array([c1 / c2 * math.exp(float(x[port][0]) / c2)])
+        return np.array([c1 / c2 * _exp(float(x[port][0]) / c2)])
 
     def discrete_gradient(x0: Point, v: Array) -> Array:
         rise = float(v[0]) / c2
-        mean = math.expm1(rise) / rise if rise != 0.0 else 1.0
+        mean = _expm1(rise) / rise if rise != 0.0 else 1.0
         return gradient(x0) * mean
 
     return Storage(
         name,
         power_ports(s=quantity.entropy),
-        energy=lambda x: c1 * math.expm1(float(x[port][0]) / c2),
+        energy=lambda x: c1 * _expm1(float(x[port][0]) / c2),
         gradient=gradient,
         discrete_gradient=discrete_gradient,
         parameters=parameters,
@@ -151,7 +160,8 @@ def ideal_gas(*, c1: float, c2: float, v0: float, c: float) -> Storage:
     s, v = Path.of("s"), Path.of("v")
 
     def energy(x: Point) -> float:
-        return c1 * math.exp(float(x[s][0]) / c2) * (v0 / float(x[v][0])) ** (1.0 / c)
+        volume = float(x[v][0])
+        return c1 * _exp(float(x[s][0]) / c2) * (v0 / volume) ** (1.0 / c) if volume > 0.0 else math.nan
 
     def gradient(x: Point) -> Array:
         e = energy(x)
@@ -161,11 +171,11 @@ def ideal_gas(*, c1: float, c2: float, v0: float, c: float) -> Storage:
         """E = a(s) b(v): the difference quotient of one factor times the mean of the other."""
         volume = float(x0[v][0])
         heat, growth = float(step[0]) / c2, float(step[1]) / volume
-        if not growth > -1.0:  # an iterate of a solver may lie where no gas is
+        if not (volume > 0.0 and growth > -1.0):  # an iterate of a solver may lie where no gas is
             return np.full(2, math.nan)
-        a = c1 * math.exp(float(x0[s][0]) / c2)
+        a = c1 * _exp(float(x0[s][0]) / c2)
         b = (v0 / volume) ** (1.0 / c)
-        rise, fall = math.expm1(heat), math.expm1(-math.log1p(growth) / c)
+        rise, fall = _expm1(heat), _expm1(-math.log1p(growth) / c)
         by_s = a / c2 * (rise / heat if heat != 0.0 else 1.0)
         by_v = b / volume * (fall / growth if growth != 0.0 else -1.0 / c)
         return np.array([by_s * b * (1.0 + 0.5 * fall), by_v * a * (1.0 + 0.5 * rise)])

@@ -11,7 +11,7 @@ from typing import Literal, final
 import numpy as np
 
 from ephs.operad import Directory, Interface, Path, Pattern, PortType, Quantity
-from ephs.semantics.bundle import Array, Bundle, Reference
+from ephs.semantics.bundle import POSITIVE, Array, Bundle, Reference
 from ephs.semantics.errors import StructureError
 from ephs.semantics.spaces import manifold
 
@@ -20,8 +20,7 @@ __all__ = ["Irreversible", "Kernel", "Point", "Primitive", "Reversible", "Storag
 Point = Mapping[Path, Array]
 """States of the ports that a primitive reads: port -> (size,)."""
 ROUNDING = 4.0 * float(np.finfo(float).eps)
-POSITIVE = ("volume", "amount")
-"""Kinds of quantity whose states are positive, so that steps are relative to them."""
+"""What differences of energies are uncertain by, relative to them."""
 
 
 @final

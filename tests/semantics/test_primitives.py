@@ -1,0 +1,252 @@
+"""Primitives are the structure that they claim to be, or are refused with the condition that fails."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import ephs
+from ephs.operad import Path
+from ephs.operad import quantity as Q
+from ephs.semantics import Reference, StructureError, library
+from ephs.semantics.bundle import Bundle
+from ephs.semantics.checks import dirac, random_efforts, random_point
+from ephs.semantics.laws import isotropy
+from ephs.testing import interfaces, irreversibles, reversibles, storages
+
+ARGUMENTS = {
+    "capacitor": {"c": 0.3}, "emc": {}, "environment": {}, "friction": {"d": 0.2}, "heat_transfer": {"h": 3.0},
+    "ideal_gas": {"c1": 2.0, "c2": 1.5, "v0": 1.0, "c": 1.5}, "inductor": {"l": 0.4}, "lever": {"r": 2.5}, "mkc": {},
+    "piston": {"a": 0.02}, "pkc": {}, "point_mass": {"m": 2.0}, "resistor": {"r": 5.0}, "rigid_link": {},
+    "rotational_friction": {"d": 0.3}, "rotor": {"j": 0.1}, "series_springs": {}, "spring": {"k": 1.5},
+    "thermal_capacity": {"c1": 3e4, "c2": 100.0},
+}  # fmt: skip
+seeds = st.integers(0, 2**20)
+
+
+def made(name):
+    return getattr(library, name)(**ARGUMENTS[name])
+
+
+def test_every_primitive_of_the_library_is_tested():
+    assert set(ARGUMENTS) == set(library.__all__)
+
+
+@pytest.mark.parametrize("name", library.__all__)
+@given(seed=seeds)
+def test_the_conditions_hold_of_the_library(name, seed):
+    _conditions(made(name), np.random.default_rng(seed))
+
+
+@given(st.data(), seeds)
+def test_the_conditions_hold_of_what_is_drawn(data, seed):
+    interface = data.draw(interfaces(min_ports=1, max_ports=3))
+    kind = data.draw(st.sampled_from([reversibles, irreversibles]))
+    _conditions(data.draw(kind(interface)), np.random.default_rng(seed))
+
+
+def _conditions(primitive, rng):
+    """Dirac and conserving, or Onsager and conserving; measured against the sums of absolute terms."""
+    bundle, reference = primitive.bundle, Reference()
+    x, e = random_point(bundle, primitive.reads, rng), random_efforts(bundle, rng)
+    intensive = bundle.intensive(reference)
+    if primitive.kind == "reversible":
+        skew, constraint = primitive.structure(x)
+        lam = rng.standard_normal(constraint.shape[0])
+        e = e - np.linalg.pinv(constraint) @ (constraint @ e) if constraint.size else e
+        f = skew @ e + constraint.T @ lam
+        scale = np.abs(e) @ (np.abs(skew) @ np.abs(e) + np.abs(constraint.T) @ np.abs(lam))
+        assert abs(e @ f) <= 1e-14 * max(scale, 1e-300) * 10
+        n = bundle.size
+        form = np.block([[np.zeros((n, n)), np.eye(n)], [np.eye(n), np.zeros((n, n))]])
+        subspace = dirac(skew, constraint)
+        assert subspace.dimension == n
+        assert isotropy(subspace, form) <= 1e-13
+        for kind in bundle.environment_kinds():
+            terms = np.abs(skew) @ np.abs(e) + np.abs(constraint.T) @ np.abs(lam)
+            assert abs(bundle.indicator(kind) @ f) <= 1e-13 * max(float(terms.sum()), 1e-300)
+    elif primitive.kind == "irreversible":
+        f = primitive.flow(x, e, reference)
+        terms = np.abs(primitive.matrix(x, e, reference)) @ np.abs(e) / reference.temperature
+        assert e @ f >= -1e-13 * (np.abs(e) @ terms)
+        assert abs((e + intensive) @ f) <= 1e-12 * max(np.abs(e + intensive) @ terms, 1e-300)
+        produced = -bundle.indicator("entropy") @ f
+        assert produced >= -1e-13 * terms.sum()
+        # Gouy and Stodola: the exergy destroyed is θ₀ times the entropy produced, less π₀ times the volume made
+        destroyed = reference.temperature * produced
+        assert abs(e @ f - destroyed) <= 1e-12 * (np.abs(e) @ terms + abs(destroyed) + (np.abs(intensive) @ terms))
+    else:
+        v = 0.1 * rng.standard_normal(bundle.size)
+        gradient = primitive.discrete_effort(x, v, reference) + (0.0 if primitive.environment else intensive)
+        rise = primitive.energy(primitive.retract(x, v)) - primitive.energy(x)
+        scale = abs(primitive.energy(x)) + (np.abs(gradient) + np.abs(intensive)) @ np.abs(v)
+        assert abs(rise - gradient @ v) <= 1e-13 * max(scale, 1e-300)
+        back = primitive.discrete_effort(primitive.retract(x, v), -v, reference)
+        here = primitive.discrete_effort(x, v, reference)
+        assert np.abs(here - back).max() <= 1e-9 * max(1.0, np.abs(here).max())
+
+
+@given(st.sampled_from(["momentum", "displacement", "entropy", "pose", "direct_pose", "body_momentum"]), st.data(), seeds)
+def test_the_conditions_hold_of_drawn_storages(kind, data, seed):
+    interface = library.power_ports(x=getattr(Q, kind))
+    _conditions(data.draw(storages(interface)), np.random.default_rng(seed))
+
+
+@given(seeds, st.sampled_from([0.0, 1e-12, 1e-9, 1e-7, 1e-5, 1e-3, 0.3]))
+def test_a_discrete_gradient_is_exact_for_any_increment(seed, size):
+    """⟨∇̄E|v⟩ = E(x¹) − E(x⁰), down to increments where a naive quotient would be all rounding."""
+    rng = np.random.default_rng(seed)
+    storage = ephs.storage({"q": Q.displacement, "v": Q.volume}, lambda q, v: np.cosh(q) * (1.0 + v**4))
+    bundle = storage.bundle
+    x = {p: rng.standard_normal(1) for p in bundle.ports}
+    v = size * rng.standard_normal(2)
+    gradient = storage.discrete_effort(x, v, Reference()) + bundle.intensive(Reference())
+    exact = storage.energy_gradient(storage.retract(x, 0.5 * v))
+    rise = storage.energy(storage.retract(x, v)) - storage.energy(x)
+    terms = (np.abs(gradient) + np.abs(bundle.intensive(Reference()))) @ np.abs(v)
+    # where the correction is left out, what is missing is of third order
+    assert abs(gradient @ v - rise) <= 8e-16 * (abs(storage.energy(x)) + terms) + 1e-18
+    assert np.abs(gradient - exact).max() <= 1e-8 + 10.0 * size**2 * np.abs(exact).max() * 10
+
+
+# ---- the relations that the contract prints --------------------------------------------------------------------
+
+
+def flows(name, **efforts):
+    """Flows by port at given efforts, of a gyrator or an irreversible process."""
+    primitive = made(name)
+    bundle = primitive.bundle
+    e = np.array([efforts[str(port)] for port in bundle.ports], dtype=float)
+    x = {port: np.array([0.7]) for port in primitive.reads}
+    f = primitive.flow(x, e, Reference()) if primitive.kind == "irreversible" else primitive.structure(x)[0] @ e
+    return {str(port): float(f[where][0]) for port, where, _ in bundle.items()}
+
+
+def test_signs_of_the_gyrators():
+    assert flows("pkc", q=2.0, p=3.0) == {"q": -3.0, "p": 2.0}
+    assert flows("emc", q=2.0, b=3.0) == {"q": 3.0, "b": -2.0}
+    assert flows("mkc", b=2.0, p=3.0) == pytest.approx({"b": 0.7 * 3.0, "p": -0.7 * 2.0})
+    assert flows("piston", v1=5.0, v2=2.0, p=3.0) == pytest.approx({"v1": -0.06, "v2": 0.06, "p": 0.06})
+
+
+def test_signs_of_the_irreversible_processes():
+    theta = 293.15 + 10.0
+    assert flows("friction", p=3.0, s=10.0) == pytest.approx({"p": 0.6, "s": -1.8 / theta})
+    assert flows("rotational_friction", p=3.0, s=10.0) == pytest.approx({"p": 0.9, "s": -2.7 / theta})
+    assert flows("resistor", b=3.0, s=10.0) == pytest.approx({"b": 15.0, "s": -45.0 / theta})
+    hot, cold = 293.15 + 20.0, 293.15 - 5.0
+    assert flows("heat_transfer", s1=20.0, s2=-5.0) == pytest.approx(
+        {"s1": -3.0 * (cold - hot) / hot, "s2": -3.0 * (hot - cold) / cold}
+    )
+
+
+@pytest.mark.parametrize(("name", "row"), [("lever", [-2.5, 1.0]), ("series_springs", [1.0, -1.0]), ("rigid_link", [1.0, -1.0])])
+def test_signs_of_the_constraints(name, row):
+    skew, constraint = made(name).structure({})
+    assert not skew.any()
+    assert np.array_equal(constraint, [row])
+
+
+@pytest.mark.parametrize(("name", "state", "energy", "effort"), [
+    ("spring", 2.0, 3.0, 3.0), ("point_mass", 2.0, 1.0, 1.0), ("rotor", 2.0, 20.0, 20.0),
+    ("capacitor", 0.3, 0.15, 1.0), ("inductor", 0.4, 0.2, 1.0), ("thermal_capacity", 0.0, 0.0, 300.0 - 293.15),
+])  # fmt: skip
+def test_energies_of_the_storages(name, state, energy, effort):
+    storage = made(name)
+    x = {port: np.array([state]) for port in storage.bundle.ports}
+    assert storage.energy(x) == pytest.approx(energy)
+    assert storage.effort(x, Reference())[0] == pytest.approx(effort)
+
+
+# ---- what is refused -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "key"),
+    [("spring", {"k": 0.0}, "k"), ("spring", {"k": np.nan}, "k"), ("point_mass", {"m": -1.0}, "m"),
+     ("friction", {"d": -0.1}, "d"), ("capacitor", {"c": np.inf}, "c"), ("piston", {"a": 0.0}, "a"),
+     ("thermal_capacity", {"c1": -1.0, "c2": 1.0}, "c1"), ("heat_transfer", {"h": -1.0}, "h")],
+)  # fmt: skip
+def test_parameters_out_of_range_are_named(name, arguments, key):
+    with pytest.raises(StructureError, match=f"{name}: parameter {key} is"):
+        getattr(library, name)(**arguments)
+
+
+QP = {"q": Q.displacement, "p": Q.momentum}
+PS = {"p": Q.momentum, "s": Q.entropy}
+BAD = {
+    "not skew": (lambda: ephs.gyrator(QP, [[0.0, 1.0], [1.0, 0.0]]), "isotropy"),
+    "not finite": (lambda: ephs.gyrator(QP, [[0.0, np.nan], [1.0, 0.0]]), "parameter"),
+    "wrong shape": (lambda: ephs.gyrator(QP, [[0.0]]), "parameter"),
+    "creates entropy": (lambda: ephs.gyrator(PS, [[0.0, 1.0], [-1.0, 0.0]]), "conservation"),
+    "odd gyrator": (lambda: ephs.gyrator({"p": Q.momentum, "b": Q.flux_linkage}, [[0.0, 1.0], [-1.0, 0.0]]), "parity"),
+    "constraint on entropy": (lambda: ephs.constraint(PS, [[0.0, 1.0]]), "conservation"),
+    "mixed constraint": (lambda: ephs.constraint(QP, [[1.0, 1.0]]), "parity"),
+    "odd energy": (lambda: ephs.storage({"p": Q.momentum}, lambda p: p), "even"),
+    "wrong gradient": (lambda: ephs.storage({"q": Q.displacement}, lambda q: q**2, lambda q: [q]), "gradient"),
+    "negative temperature": (lambda: ephs.storage({"s": Q.entropy}, lambda s: -np.exp(s)), "temperature"),
+    "state port": (lambda: ephs.storage({"q": Q.displacement, "~p": Q.momentum}, lambda q: q**2), "storage-ports"),
+    "not symmetric": (lambda: ephs.irreversible(PS, lambda p, s: [[s, -p], [0.0, p * p / s]]), "symmetry"),
+    "negative": (lambda: ephs.irreversible(PS, lambda p, s: [[-s, p], [p, -p * p / s]]), "definite"),
+    "loses energy": (lambda: ephs.irreversible(PS, lambda p, s: [[s, 0.0], [0.0, 0.0]]), "energy"),
+    "time's arrow": (
+        lambda: ephs.irreversible(
+            {"p": Q.momentum, "q": Q.displacement, "s": Q.entropy},
+            lambda p, q, s: np.outer([s, s, -p - q], [s, s, -p - q]),
+        ),
+        "parity",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_what_is_not_its_structure_is_refused(case):
+    make, kind = BAD[case]
+    with pytest.raises(StructureError) as caught:
+        make()
+    assert caught.value.kind == kind
+    assert caught.value.path in str(caught.value)
+
+
+def test_errors_survive_being_sent_to_another_process():
+    import pickle
+
+    with pytest.raises(StructureError) as caught:
+        library.spring(k=-1.0)
+    again = pickle.loads(pickle.dumps(caught.value))
+    assert (str(again), again.kind, again.path) == (str(caught.value), caught.value.kind, caught.value.path)
+
+
+def test_what_one_makes_oneself_is_what_the_library_makes():
+    mine = {
+        "spring": ephs.storage({"q": Q.displacement}, lambda q: 0.75 * q * q, lambda q: [1.5 * q]),
+        "pkc": ephs.gyrator(QP, [[0.0, -1.0], [1.0, 0.0]]),
+        "lever": ephs.transformer({"q1": Q.displacement, "q2": Q.displacement}, [[2.5]]),
+        "rigid_link": ephs.constraint({"p": Q.momentum, "p2": Q.momentum}, [[1.0, -1.0]]),
+        "friction": ephs.irreversible(PS, lambda p, s: 0.2 * np.array([[s, -p], [-p, p * p / s]])),
+    }
+    for name, primitive in mine.items():
+        state = {str(port): 0.4 for port in primitive.reads}
+        from ephs.semantics.relation import as_system
+
+        ours = as_system(made(name)).relation().at(state)
+        theirs = as_system(primitive).relation().at(state)
+        assert ours.distance(theirs) <= 1e-12, name
+
+
+def test_structures_that_read_states():
+    crank = ephs.transformer({"p": Q.angular_momentum, "p2": Q.momentum, "~q": Q.angle}, lambda q: [[np.sin(q)]])
+    _, constraint = crank.structure({Path.of("q"): np.array([0.3])})
+    assert np.allclose(constraint, [[-np.sin(0.3), 1.0]])
+    spool = ephs.constraint({"p": Q.momentum, "p2": Q.momentum, "~q": Q.displacement}, lambda q: [[1.0, q]], multipliers=1)
+    assert np.allclose(spool.structure({Path.of("q"): np.array([0.3])})[1], [[1.0, 0.3]])
+    with pytest.raises(StructureError, match="multipliers"):
+        ephs.constraint({"p": Q.momentum, "~q": Q.displacement}, lambda q: [[q]])
+
+
+@given(interfaces(max_ports=4))
+def test_a_bundle_lays_its_ports_side_by_side(interface):
+    bundle = Bundle.of(interface)
+    places = [i for _, where, _ in bundle.items() for i in range(where.start, where.stop)]
+    assert places == list(range(bundle.size))
+    assert {port for port, _, _ in bundle.items()} == {port for port, t in interface.items() if t.power}
