@@ -1,0 +1,146 @@
+"""Checks of a model, not of a trajectory: types, structure, assembly, laws, mobility."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple, final
+
+import numpy as np
+
+from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.simulate import problem_of_scene, problem_of_system
+from ephs.mechanics.solve.errors import SolveError
+from ephs.mechanics.solve.instant import mobility
+from ephs.mechanics.solve.integrate import Grid, integrate
+from ephs.mechanics.solve.problem import Problem
+from ephs.semantics.checks import check_irreversible, check_reversible, check_storage
+from ephs.semantics.errors import SemanticsError
+from ephs.semantics.laws import Probe, system_law
+from ephs.semantics.primitives import Irreversible, Storage
+from ephs.semantics.system import System
+
+__all__ = ["CheckItem", "CheckReport", "check_model"]
+
+LARGEST = 600
+"""Rows of the largest relation that is composed by both routes; the work grows with the third power."""
+STEP = 1e-3
+"""Seconds of the one step over which balances are measured."""
+
+
+class CheckItem(NamedTuple):
+    """A check: its name, whether it holds, and what was found."""
+
+    name: str
+    ok: bool
+    detail: str
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class CheckReport:
+    """All checks of a model."""
+
+    items: tuple[CheckItem, ...]
+
+    @property
+    def ok(self) -> bool:
+        """Whether all hold."""
+        return all(item.ok for item in self.items)
+
+    def __str__(self) -> str:
+        return "\n".join(f"{'holds' if ok else 'FAILS'}  {name}: {detail}" for name, ok, detail in self.items)
+
+
+def check_model(model: System | Scene) -> CheckReport:
+    """Check a system or a scene in its initial state.
+
+    A system's open ports are held at zero flow.
+    """
+    return CheckReport(tuple(_items(model)))
+
+
+def _items(model: System | Scene) -> Iterator[CheckItem]:
+    try:
+        problem = problem_of_scene(model) if isinstance(model, Scene) else _closed(model)
+    except SemanticsError as error:
+        yield CheckItem("assembly", False, str(error))
+        return
+    system, d = problem.system, problem.descriptor
+    flat = d.system.pattern
+    remarks = "; ".join(map(str, flat.lint()))
+    boxes, junctions = len(flat.boxes), len(flat.junctions)
+    yield CheckItem("types", True, f"{boxes} boxes at {junctions} junctions" + (f"; {remarks}" if remarks else ""))
+    yield _structure(system)
+    unknowns = d.unknowns(problem.inputs(0.0, problem.initial))
+    yield CheckItem("assembly", True, f"{len(d.states)} states, {unknowns} equations for as many unknowns")
+    probe = Probe(system, problem.initial, reference=problem.reference)
+    yield _law("Tellegen", probe)
+    if d.rate_size + d.effort_size + d.multiplier_size <= LARGEST:
+        yield _law("functoriality", probe)
+    else:
+        yield from _parts(problem)
+    yield from _motion(problem)
+
+
+def _closed(system: System) -> Problem:
+    ports = [port for port, t in system.interface.items() if t.power]
+    inputs = {str(port): {"flow": np.zeros(system.interface[port].quantity.space.dim)} for port in ports}
+    return problem_of_system(system, inputs=inputs)
+
+
+def _structure(system: System) -> CheckItem:
+    count = 0
+    for path, primitive in system.leaves():
+        count += 1
+        try:
+            if isinstance(primitive, Storage):
+                check_storage(primitive)
+            elif isinstance(primitive, Irreversible):
+                check_irreversible(primitive)
+            else:
+                check_reversible(primitive)
+        except SemanticsError as error:
+            return CheckItem("structure", False, f"{path}: {error}")
+    return CheckItem("structure", True, f"{count} components are the structures that they claim to be")
+
+
+def _law(name: str, probe: Probe) -> CheckItem:
+    law = system_law(name)
+    verdict = law(probe)
+    return CheckItem(f"{name}: {law.statement}", verdict.holds, verdict.detail)
+
+
+def _parts(problem: Problem) -> Iterator[CheckItem]:
+    """Functoriality of each subsystem by itself, where the whole is large."""
+    law = system_law("functoriality")
+    worst, count = 0.0, 0
+    for box, part in problem.system.fillings.items():
+        if isinstance(part, System) and all(t.power for t in part.interface.values()):
+            state = {p.relative_to(box): v for p, v in problem.initial.items() if box.is_prefix_of(p)}
+            verdict = law(Probe(part, state, reference=problem.reference))
+            worst, count = max(worst, verdict.defect), count + 1
+            if not verdict.holds:
+                yield CheckItem(f"functoriality: {law.statement}", False, f"{box}: {verdict.detail}")
+    detail = f"each of {count} subsystems by itself: projectors differ by {worst:.1e}; the whole is large"
+    yield CheckItem(f"functoriality: {law.statement}", True, detail)
+
+
+def _motion(problem: Problem) -> Iterator[CheckItem]:
+    """Mobility, redundancy, closure, and the balances over one step."""
+    found = mobility(problem.descriptor, problem.descriptor.pack(problem.initial), problem.prescribed)
+    yield CheckItem("mobility", True, f"{found.mobility} independent motions in this configuration")
+    detail = f"{found.redundant} of the constraint equations depend on others"
+    if found.redundant:
+        detail += "; the motion is unique, their multipliers are not"
+    yield CheckItem("redundant constraints", True, detail)
+    try:
+        step = integrate(problem, Grid(0.0, STEP, STEP), method="natural")
+    except (SolveError, RuntimeError) as error:
+        yield CheckItem("motion", False, str(error))
+        return
+    gap, slip = float(step.constraint_error[0]), float(step.velocity_error[0])
+    if problem.scene is not None:
+        yield CheckItem("closure", gap < 1e-8, f"joints are closed to {gap:.1e} m or rad, velocities fit to {slip:.1e}")
+    error = float(step.energy_error.max())
+    yield CheckItem("power balance", error < 1e-10, f"energy over a step of {STEP:g} s is balanced to {error:.1e}")
+    least = float(step.stats["least_production"])
+    yield CheckItem("entropy production", least >= 0.0, f"the least of a component in that step is {least:.1e} J/K")
