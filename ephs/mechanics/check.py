@@ -68,7 +68,9 @@ def _items(model: System | Scene) -> Iterator[CheckItem]:
     flat = d.system.pattern
     remarks = "; ".join(map(str, flat.lint()))
     boxes, junctions = len(flat.boxes), len(flat.junctions)
-    yield CheckItem("types", True, f"{boxes} boxes at {junctions} junctions" + (f"; {remarks}" if remarks else ""))
+    yield CheckItem(
+        "types", True, f"{boxes} boxes at {junctions} junctions" + (f"; {remarks}" if remarks else "")
+    )
     yield _structure(system)
     unknowns = d.unknowns(problem.inputs(0.0, problem.initial))
     yield CheckItem("assembly", True, f"{len(d.states)} states, {unknowns} equations for as many unknowns")
@@ -139,8 +141,14 @@ def _motion(problem: Problem) -> Iterator[CheckItem]:
         return
     gap, slip = float(step.constraint_error[0]), float(step.velocity_error[0])
     if problem.scene is not None:
-        yield CheckItem("closure", gap < 1e-8, f"joints are closed to {gap:.1e} m or rad, velocities fit to {slip:.1e}")
+        yield CheckItem(
+            "closure", gap < 1e-8, f"joints are closed to {gap:.1e} m or rad, velocities fit to {slip:.1e}"
+        )
     error = float(step.energy_error.max())
-    yield CheckItem("power balance", error < 1e-10, f"energy over a step of {STEP:g} s is balanced to {error:.1e}")
+    yield CheckItem(
+        "power balance", error < 1e-10, f"energy over a step of {STEP:g} s is balanced to {error:.1e}"
+    )
     least = float(step.stats["least_production"])
-    yield CheckItem("entropy production", least >= 0.0, f"the least of a component in that step is {least:.1e} J/K")
+    yield CheckItem(
+        "entropy production", least >= 0.0, f"the least of a component in that step is {least:.1e} J/K"
+    )

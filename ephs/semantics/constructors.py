@@ -55,6 +55,8 @@ def storage(
     """
     interface = _interface(name, ports)
     n = Bundle.of(interface).size
+    for port in _reads(interface):
+        raise StructureError("storage-ports", name, found=str(port))
     _takes(name, "energy", energy, tuple(interface))
     if gradient is not None:
         _takes(name, "gradient", gradient, tuple(interface))

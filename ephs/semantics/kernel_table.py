@@ -47,12 +47,17 @@ def _compiled(module: str, name: str) -> Any:
 
 
 @final
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Callback:
-    """A Python primitive behind the kernels' signature; keeps the function alive and the exception that it raised."""
+    """A Python primitive behind the kernels' signature: keeps the function alive, and what it raised."""
 
     function: Any
-    raised: BaseException | None = None
+    errors: list[BaseException]
+
+    @property
+    def raised(self) -> BaseException | None:
+        """The last exception that the function raised."""
+        return self.errors[-1] if self.errors else None
 
     @property
     def address(self) -> int:
@@ -74,6 +79,8 @@ def _callback(primitive: Primitive) -> Callback:
     sizes = [manifold(primitive.interface[p].quantity.space).size for p in primitive.reads]
     dims = [manifold(primitive.interface[p].quantity.space).dim for p in primitive.reads]
     evaluate = _storage(primitive) if isinstance(primitive, Storage) else _relation(primitive)
+
+    errors: list[BaseException] = []
 
     def call(counts: Any, *pointers: Any) -> int:
         n, k, m, size = (int(counts[i]) for i in range(4))
@@ -97,13 +104,11 @@ def _callback(primitive: Primitive) -> Callback:
                 [_view(p, s) for p, s in zip(pointers[3:9], _lengths(primitive, n, k, m), strict=True)],
             )
         except BaseException as error:
-            holder.raised = error
+            errors.append(error)
             return RAISED
         return OK
 
-    holder = Callback(None)
-    holder.function = _PROTOTYPE(call)
-    return holder
+    return Callback(_PROTOTYPE(call), errors)
 
 
 def _lengths(primitive: Primitive, n: int, k: int, m: int) -> tuple[int, ...]:

@@ -16,7 +16,7 @@ from ephs.semantics.checks import random_point
 from ephs.semantics.descriptor import Input
 from ephs.semantics.natural import Solved, solve_flat, solve_nested
 from ephs.semantics.primitives import Irreversible, Storage
-from ephs.semantics.relation import pattern_relation
+from ephs.semantics.pattern_relation import pattern_relation
 from ephs.semantics.spaces import manifold
 from ephs.semantics.subspace import Subspace
 from ephs.semantics.system import System
@@ -160,7 +160,9 @@ def _solved(probe: Probe) -> Solved:
 
 
 def _vacuous() -> Verdict:
-    return Verdict(0.0, 0.0, "vacuous: no step was found, a constraint contradicts the state or h is too large")
+    return Verdict(
+        0.0, 0.0, "vacuous: no step was found, a constraint contradicts the state or h is too large"
+    )
 
 
 def _after(probe: Probe, solved: Solved) -> dict[Path, Array]:

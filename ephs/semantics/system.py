@@ -18,6 +18,7 @@ from ephs.semantics.spaces import manifold
 if TYPE_CHECKING:
     from ephs.semantics.descriptor import Descriptor
     from ephs.semantics.relation import Relation
+    from ephs.semantics.report import CheckReport
 
 __all__ = ["Filling", "System"]
 
@@ -173,7 +174,21 @@ class System:
 
         return assemble(self.flatten())
 
-    def _repr_svg_(self) -> str:
+    def check(
+        self, reference: Reference | None = None, *, state: Mapping[str, object] | None = None
+    ) -> "CheckReport":
+        """Check the structure of the components, that there are equations, and the laws.
+
+        Parameters
+        ----------
+        state
+            Where the laws are measured, missing values at the identity; at random states where None.
+        """
+        from ephs.semantics.report import check_system
+
+        return check_system(self, reference, state=state)
+
+    def _repr_svg_(self) -> str:  # pyright: ignore[reportUnusedFunction] - notebooks call it
         from ephs.show import draw
 
         return draw(self).svg

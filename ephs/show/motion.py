@@ -156,7 +156,7 @@ def frame_all(points: Array, reach: float, field: float = math.radians(40.0)) ->
         )
     else:
         way = np.array([1.0, -1.2, 0.7])
-    place = target + way / np.linalg.norm(way) * (0.92 * max(radius, 1e-3) / math.sin(field / 2))
+    place = target + way / np.linalg.norm(way) * (max(radius, 1e-3) / math.sin(field / 2))
     return View(
         (float(place[0]), float(place[1]), float(place[2])),
         (float(target[0]), float(target[1]), float(target[2])),

@@ -111,7 +111,7 @@ def plot_entropy(sol: Any) -> "Figure":
     if negative.any():
         axes[1].plot(t[negative], production[negative], "x", color=RED, markersize=4, label="negative")
         _legend(axes[1])
-    axes[1].set_ylabel("produced [J/K a step]")
+    axes[1].set_ylabel("least produced [J/K a step]")
     return figure
 
 

@@ -34,13 +34,17 @@ def storages(draw: st.DrawFn, interface: Interface) -> Storage:
         if quantity.kind == "entropy":
             if draw(st.booleans()):
                 return _renamed(library.environment(), interface)
-            return _renamed(components.thermal_node(rng.uniform(5.0, 50.0), rng.uniform(250.0, 350.0)), interface)
+            return _renamed(
+                components.thermal_node(rng.uniform(5.0, 50.0), rng.uniform(250.0, 350.0)), interface
+            )
         if quantity.kind == "pose":
             group = "SE3" if quantity.space.name == "SE(3)" else "SO3xR3"
             return _renamed(components.gravity(rng.standard_normal(3), group), interface)
         if quantity.kind == "relative_pose":
             pair = Pair.from_space(quantity.space)
-            return _renamed(components.pair_spring(pair, np.full(pair.dim, 1.5), np.zeros(pair.dim)), interface)
+            return _renamed(
+                components.pair_spring(pair, np.full(pair.dim, 1.5), np.zeros(pair.dim)), interface
+            )
     parity = bundle.parity()
     factor = rng.standard_normal((bundle.size, bundle.size))
     matrix = factor @ factor.T + np.eye(bundle.size)
@@ -90,7 +94,9 @@ def irreversibles(draw: st.DrawFn, interface: Interface, *, reads: tuple[Path, .
     rng = draw(generators())
     bundle = Bundle.of(interface)
     strength = np.abs(rng.standard_normal((bundle.size, bundle.size)))
-    fixed = sum((bundle.indicator(kind) for kind in bundle.environment_kinds() if kind != "entropy"), np.zeros(1))
+    fixed = sum(
+        (bundle.indicator(kind) for kind in bundle.environment_kinds() if kind != "entropy"), np.zeros(1)
+    )
     moving = np.flatnonzero(np.broadcast_to(fixed, bundle.size) == 0.0)
     used = reads if reads and draw(st.booleans()) else ()
 
@@ -102,7 +108,12 @@ def irreversibles(draw: st.DrawFn, interface: Interface, *, reads: tuple[Path, .
             for j in moving[moving > i]:
                 normal = np.zeros(bundle.size)
                 normal[i], normal[j] = energy[j], -energy[i]
-                out += scale * strength[i, j] / (1.0 + abs(energy[i]) + abs(energy[j])) * np.outer(normal, normal)
+                out += (
+                    scale
+                    * strength[i, j]
+                    / (1.0 + abs(energy[i]) + abs(energy[j]))
+                    * np.outer(normal, normal)
+                )
         return out
 
     return Irreversible("random Onsager structure", interface, matrix, used)

@@ -73,7 +73,9 @@ def systems(
             raise InvalidArgument(f"{name}={value}: expected at least 1")
     pool = SCALARS + GROUPS if groups else SCALARS
     alone = draw(st.booleans()) if isolated is None else isolated
-    return draw(_levels(depth=max_depth, most=max_junctions, pool=pool, ports={}, open_count=0 if alone else 1))
+    return draw(
+        _levels(depth=max_depth, most=max_junctions, pool=pool, ports={}, open_count=0 if alone else 1)
+    )
 
 
 @st.composite
@@ -96,7 +98,9 @@ def _levels(
     waiting = list(ports)
     for i in range(max(draw(st.integers(1, 2)), 1)):
         # every outer port needs something on it inside: the first box takes them all
-        names = waiting + draw(st.lists(st.sampled_from(powers), min_size=1, max_size=2)) if powers else waiting
+        names = (
+            waiting + draw(st.lists(st.sampled_from(powers), min_size=1, max_size=2)) if powers else waiting
+        )
         waiting = []
         read = draw(st.lists(st.sampled_from(sorted(junctions)), max_size=1))
         wires: dict[str, str] = {}
@@ -182,4 +186,6 @@ def _check(name: str, probe: Probe) -> None:
     law = system_law(name)
     verdict = law(probe)
     if not verdict.holds:
-        raise AssertionError(f"{law.name}: {law.statement}\n{verdict.detail}; expected ≤ {verdict.tolerance:.1e}\n{probe.system}")
+        raise AssertionError(
+            f"{law.name}: {law.statement}\n{verdict.detail}; expected ≤ {verdict.tolerance:.1e}\n{probe.system}"
+        )

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from ephs.operad import Path, Pattern, junction, quantity
 from ephs.semantics import Reference, System, library
 from ephs.semantics.laws import SYSTEM_LAWS, isotropy, power_form, random_probe, system_law
-from ephs.semantics.relation import pattern_relation
+from ephs.semantics.pattern_relation import pattern_relation
 from ephs.testing import (
     check_entropy_production,
     check_functoriality,
@@ -83,7 +83,8 @@ def test_names_of_boxes_mean_nothing(system, seed):
     probe = random_probe(system, seed)
     one = system.relation(probe.reference).at({str(p): v for p, v in probe.state.items()}, probe.efforts)
     two = renamed.relation(probe.reference).at(
-        {f"z_{p}": v for p, v in probe.state.items()}, {Path.parse(f"z_{p}"): e for p, e in probe.efforts.items()}
+        {f"z_{p}": v for p, v in probe.state.items()},
+        {Path.parse(f"z_{p}"): e for p, e in probe.efforts.items()},
     )
     assert [f"z_{path}" for path, _ in one.rates] == [str(path) for path, _ in two.rates]
     assert np.abs(one.projector - two.projector).max() <= 1e-12 or (one.empty and two.empty)
@@ -120,8 +121,18 @@ def test_most_drawn_systems_have_a_step():
 
 def test_every_law_holds_of_the_damped_oscillator_and_says_so():
     osc = Pattern(
-        junctions={"q": junction(quantity.displacement), "p": junction(quantity.momentum), "s": junction(quantity.entropy)},
-        boxes={"pe": {"q": "q"}, "ke": {"p": "p"}, "pkc": {"q": "q", "p": "p"}, "mf": {"p": "p", "s": "s"}, "env": {"s": "s"}},
+        junctions={
+            "q": junction(quantity.displacement),
+            "p": junction(quantity.momentum),
+            "s": junction(quantity.entropy),
+        },
+        boxes={
+            "pe": {"q": "q"},
+            "ke": {"p": "p"},
+            "pkc": {"q": "q", "p": "p"},
+            "mf": {"p": "p", "s": "s"},
+            "env": {"s": "s"},
+        },
     )
     system = osc(
         pe=library.spring(k=1.5), ke=library.point_mass(m=1.0), pkc=library.pkc(), mf=library.friction(d=0.1),

@@ -74,7 +74,9 @@ def _conditions(primitive, rng):
         assert produced >= -1e-13 * terms.sum()
         # Gouy and Stodola: the exergy destroyed is θ₀ times the entropy produced, less π₀ times the volume made
         destroyed = reference.temperature * produced
-        assert abs(e @ f - destroyed) <= 1e-12 * (np.abs(e) @ terms + abs(destroyed) + (np.abs(intensive) @ terms))
+        assert abs(e @ f - destroyed) <= 1e-12 * (
+            np.abs(e) @ terms + abs(destroyed) + (np.abs(intensive) @ terms)
+        )
     else:
         v = 0.1 * rng.standard_normal(bundle.size)
         gradient = primitive.discrete_effort(x, v, reference) + (0.0 if primitive.environment else intensive)
@@ -86,7 +88,11 @@ def _conditions(primitive, rng):
         assert np.abs(here - back).max() <= 1e-9 * max(1.0, np.abs(here).max())
 
 
-@given(st.sampled_from(["momentum", "displacement", "entropy", "pose", "direct_pose", "body_momentum"]), st.data(), seeds)
+@given(
+    st.sampled_from(["momentum", "displacement", "entropy", "pose", "direct_pose", "body_momentum"]),
+    st.data(),
+    seeds,
+)
 def test_the_conditions_hold_of_drawn_storages(kind, data, seed):
     interface = library.power_ports(x=getattr(Q, kind))
     _conditions(data.draw(storages(interface)), np.random.default_rng(seed))
@@ -118,7 +124,11 @@ def flows(name, **efforts):
     bundle = primitive.bundle
     e = np.array([efforts[str(port)] for port in bundle.ports], dtype=float)
     x = {port: np.array([0.7]) for port in primitive.reads}
-    f = primitive.flow(x, e, Reference()) if primitive.kind == "irreversible" else primitive.structure(x)[0] @ e
+    f = (
+        primitive.flow(x, e, Reference())
+        if primitive.kind == "irreversible"
+        else primitive.structure(x)[0] @ e
+    )
     return {str(port): float(f[where][0]) for port, where, _ in bundle.items()}
 
 
@@ -140,7 +150,9 @@ def test_signs_of_the_irreversible_processes():
     )
 
 
-@pytest.mark.parametrize(("name", "row"), [("lever", [-2.5, 1.0]), ("series_springs", [1.0, -1.0]), ("rigid_link", [1.0, -1.0])])
+@pytest.mark.parametrize(
+    ("name", "row"), [("lever", [-2.5, 1.0]), ("series_springs", [1.0, -1.0]), ("rigid_link", [1.0, -1.0])]
+)
 def test_signs_of_the_constraints(name, row):
     skew, constraint = made(name).structure({})
     assert not skew.any()
@@ -235,10 +247,14 @@ def test_what_one_makes_oneself_is_what_the_library_makes():
 
 
 def test_structures_that_read_states():
-    crank = ephs.transformer({"p": Q.angular_momentum, "p2": Q.momentum, "~q": Q.angle}, lambda q: [[np.sin(q)]])
+    crank = ephs.transformer(
+        {"p": Q.angular_momentum, "p2": Q.momentum, "~q": Q.angle}, lambda q: [[np.sin(q)]]
+    )
     _, constraint = crank.structure({Path.of("q"): np.array([0.3])})
     assert np.allclose(constraint, [[-np.sin(0.3), 1.0]])
-    spool = ephs.constraint({"p": Q.momentum, "p2": Q.momentum, "~q": Q.displacement}, lambda q: [[1.0, q]], multipliers=1)
+    spool = ephs.constraint(
+        {"p": Q.momentum, "p2": Q.momentum, "~q": Q.displacement}, lambda q: [[1.0, q]], multipliers=1
+    )
     assert np.allclose(spool.structure({Path.of("q"): np.array([0.3])})[1], [[1.0, 0.3]])
     with pytest.raises(StructureError, match="multipliers"):
         ephs.constraint({"p": Q.momentum, "~q": Q.displacement}, lambda q: [[q]])

@@ -5,7 +5,8 @@ import pytest
 
 from ephs.operad import Pattern, PatternError, junction, quantity
 from ephs.semantics import AssemblyError, Reference, SemanticsError, System, library
-from ephs.semantics.relation import compose_linear, pattern_relation
+from ephs.semantics.pattern_relation import pattern_relation
+from ephs.semantics.relation import compose_linear
 
 Q = quantity
 
@@ -31,9 +32,7 @@ def test_naive_absorption_of_a_state_port_is_not_functorial():
         boxes={"low.a": {"p": "j"}, "low.b": {"p": "j"}, "c": {"p": "j"}, "d": {"p": "j"}},
     )
     order = [str(box) for box in flat.boxes]
-    permuted = Pattern(
-        junctions={"j": junction(Q.momentum)}, boxes={box: {"p": "j"} for box in order}
-    )
+    permuted = Pattern(junctions={"j": junction(Q.momentum)}, boxes={box: {"p": "j"} for box in order})
     ours, naive = pattern_relation(flat), pattern_relation(permuted)
     assert merged == permuted
     assert ours.dimension == naive.dimension == 4
@@ -72,7 +71,13 @@ def test_a_state_is_shared_through_three_levels():
         state = {"stator.b": flux, "coil.b": 0.4, "machine.rotor.p": 0.3}
         flat, nested = (system.relation(route=route).at(state) for route in ("flat", "nested"))
         assert flat.distance(nested) <= 1e-13
-        rates = dict(zip([str(path) for path, _ in flat.rates], flat.subspace.basis[:-1, 0] / flat.subspace.basis[-1, 0] * flat.unit, strict=True))
+        rates = dict(
+            zip(
+                [str(path) for path, _ in flat.rates],
+                flat.subspace.basis[:-1, 0] / flat.subspace.basis[-1, 0] * flat.unit,
+                strict=True,
+            )
+        )
         assert rates["coil.b"] == pytest.approx(-flux * 0.3 / 2.0)
         assert rates["machine.rotor.p"] == pytest.approx(flux * 0.4 / 0.5)
 
@@ -94,7 +99,10 @@ def test_an_outer_power_port_over_state_ports_is_an_open_circuit():
 
 
 def test_a_closed_port_has_no_flow():
-    lone = Pattern(junctions={"p": junction(Q.momentum), "q": junction(Q.displacement)}, boxes={"x": {"q": "q", "p": "p"}, "m": {"p": "p"}})
+    lone = Pattern(
+        junctions={"p": junction(Q.momentum), "q": junction(Q.displacement)},
+        boxes={"x": {"q": "q", "p": "p"}, "m": {"p": "p"}},
+    )
     system = lone(x=library.pkc(), m=library.point_mass(m=2.0))
     flat, nested = (system.relation(route=route).at({"m.p": 1.0}) for route in ("flat", "nested"))
     assert flat.distance(nested) <= 1e-14
@@ -110,7 +118,11 @@ def test_two_storages_of_one_state_have_no_equations():
 
 def test_a_state_that_is_read_and_stored_nowhere_has_no_equations():
     reading = Pattern(
-        junctions={"b": junction(Q.flux_linkage), "p": junction(Q.angular_momentum), "bs": junction(Q.flux_linkage)},
+        junctions={
+            "b": junction(Q.flux_linkage),
+            "p": junction(Q.angular_momentum),
+            "bs": junction(Q.flux_linkage),
+        },
         boxes={"mkc": {"b": "b", "p": "p", "bs": "~bs"}, "coil": {"b": "b"}, "rotor": {"p": "p"}},
     )
     system = reading(mkc=library.mkc(), coil=library.inductor(l=1.0), rotor=library.rotor(j=1.0))
@@ -122,13 +134,29 @@ def test_a_junction_that_no_storage_gives_its_effort_is_accepted():
     """Two resistors' worth of friction between two bodies: the effort at the joint is an unknown of its own."""
     link = Pattern(
         junctions={"p": junction(Q.momentum), "j": junction(Q.momentum), "s": junction(Q.entropy)},
-        boxes={"m": {"p": "p"}, "link": {"p": "p", "p2": "j"}, "drag": {"p": "j", "s": "s"}, "env": {"s": "s"}},
+        boxes={
+            "m": {"p": "p"},
+            "link": {"p": "p", "p2": "j"},
+            "drag": {"p": "j", "s": "s"},
+            "env": {"s": "s"},
+        },
     )
     system = link(
-        m=library.point_mass(m=2.0), link=library.rigid_link(), drag=library.friction(d=0.5), env=library.environment()
+        m=library.point_mass(m=2.0),
+        link=library.rigid_link(),
+        drag=library.friction(d=0.5),
+        env=library.environment(),
     )
-    relation = system.relation().at({"m.p": 1.0}, {next(p for p, _ in system.leaves() if str(p) == "drag"): np.array([0.5, 0.0])})
-    rate = dict(zip([str(p) for p, _ in relation.rates], relation.subspace.basis[:-1, 0] / relation.subspace.basis[-1, 0], strict=True))
+    relation = system.relation().at(
+        {"m.p": 1.0}, {next(p for p, _ in system.leaves() if str(p) == "drag"): np.array([0.5, 0.0])}
+    )
+    rate = dict(
+        zip(
+            [str(p) for p, _ in relation.rates],
+            relation.subspace.basis[:-1, 0] / relation.subspace.basis[-1, 0],
+            strict=True,
+        )
+    )
     assert rate["m.p"] * relation.unit == pytest.approx(-0.25)
 
 
@@ -182,5 +210,7 @@ def test_composition_of_relations_forgets_the_inner_ports():
     lone = Pattern(junctions={"p": junction(Q.momentum, exposed=True)}, boxes={"m": {"p": "p"}})
     inner = System.of(lone, {"m": library.point_mass(m=2.0)})
     part = inner.relation(route="nested").at({"m.p": 1.0})
-    again = compose_linear(Pattern.identity(inner.interface), {next(iter(Pattern.identity(inner.interface).boxes)): part})
+    again = compose_linear(
+        Pattern.identity(inner.interface), {next(iter(Pattern.identity(inner.interface).boxes)): part}
+    )
     assert again.subspace.distance(part.subspace) <= 1e-15

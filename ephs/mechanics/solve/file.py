@@ -2,7 +2,6 @@
 
 import json
 import os
-import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 from pathlib import Path as File
@@ -50,14 +49,12 @@ def dataset(solution: Solution) -> xr.Dataset:
 def save(solution: Solution, path: File) -> None:
     """Write a solution; an older file of that name stays whole until the new one is."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(suffix=".nc", prefix=f".{path.name}.", dir=path.parent)
-    os.close(handle)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         dataset(solution).to_netcdf(temporary, engine="h5netcdf")
         os.replace(temporary, path)
-    except BaseException:
-        os.unlink(temporary)
-        raise
+    finally:
+        temporary.unlink(missing_ok=True)
 
 
 def load(path: str | File, problem_of: Callable[[str], Problem]) -> Solution:

@@ -31,7 +31,6 @@ class Entry:
 
 
 @final
-@dataclass(frozen=True, eq=False)
 class Solution:
     """The motion of a system.
 
@@ -52,12 +51,17 @@ class Solution:
         What was solved; None where a file could not hold it.
     """
 
-    name: str
-    t: Array
-    states: Mapping[Path, Array]
-    ledgers: Ledgers
-    stats: Mapping[str, Any]
-    problem: Problem | None
+    def __init__(
+        self,
+        name: str,
+        t: Array,
+        states: Mapping[Path, Array],
+        ledgers: Ledgers,
+        stats: Mapping[str, Any],
+        problem: Problem | None,
+    ) -> None:
+        self.name, self.t, self.states, self.ledgers = name, t, states, ledgers
+        self.stats, self.problem = stats, problem
 
     def __getitem__(self, path: str | Path) -> Array:
         """The state at a port of a storage component.

@@ -1,0 +1,132 @@
+"""What checking a system finds: its structure, whether it has equations, and the laws at random states."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple, final
+
+from ephs.operad import Path
+from ephs.semantics.bundle import Array, Reference
+from ephs.semantics.checks import check_irreversible, check_reversible, check_storage
+from ephs.semantics.errors import SemanticsError
+from ephs.semantics.laws import SYSTEM_LAWS, Probe, SystemLaw, random_probe
+from ephs.semantics.primitives import Irreversible, Primitive, Storage
+from ephs.semantics.system import System
+
+__all__ = ["CheckItem", "CheckReport", "check_structure", "check_system"]
+
+
+@final
+class CheckItem(NamedTuple):
+    """A check: its name, whether it holds, and what was found."""
+
+    name: str
+    ok: bool
+    detail: str
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class CheckReport:
+    """All checks of a model; as text, a line for each."""
+
+    items: tuple[CheckItem, ...]
+
+    @property
+    def ok(self) -> bool:
+        """Whether all hold."""
+        return all(item.ok for item in self.items)
+
+    def __str__(self) -> str:
+        return "\n".join(f"{'holds' if ok else 'FAILS'}  {name}: {detail}" for name, ok, detail in self.items)
+
+
+def check_system(
+    system: System,
+    reference: Reference | None = None,
+    *,
+    state: Mapping[str, object] | None = None,
+    probes: int = 3,
+    h: float = 1e-3,
+) -> CheckReport:
+    """Check the structure of the components, that there are equations, and the laws.
+
+    Parameters
+    ----------
+    state
+        Where the laws are measured; at random states where None. Outer ports have random flows.
+    probes
+        How many states, or how many flows at the one state.
+    h
+        The step in s over which balances are measured.
+    """
+    return CheckReport(tuple(_items(system, reference or Reference(), state, probes, h)))
+
+
+def check_structure(system: System) -> CheckItem:
+    """Check the conditions on every component once more."""
+    count = 0
+    for path, primitive in system.leaves():
+        count += 1
+        try:
+            _conditions(primitive)
+        except SemanticsError as error:
+            return CheckItem("structure", False, f"{path}: {error}")
+    return CheckItem("structure", True, f"{count} components are the structures that they claim to be")
+
+
+def _conditions(primitive: Primitive) -> None:
+    if isinstance(primitive, Storage):
+        check_storage(primitive)
+    elif isinstance(primitive, Irreversible):
+        check_irreversible(primitive)
+    else:
+        check_reversible(primitive)
+
+
+def _items(
+    system: System, reference: Reference, state: Mapping[str, object] | None, probes: int, h: float
+) -> Iterator[CheckItem]:
+    flat = system.flatten().pattern
+    remarks = "".join(f"; {remark}" for remark in flat.lint())
+    yield CheckItem("types", True, f"{len(flat.boxes)} boxes at {len(flat.junctions)} junctions{remarks}")
+    yield check_structure(system)
+    try:
+        d = system.descriptor()
+        found = [_at(random_probe(system, seed, reference=reference, h=h), state) for seed in range(probes)]
+    except SemanticsError as error:
+        yield CheckItem("assembly", False, str(error))
+        return
+    unknowns = d.unknowns(found[0].inputs)
+    yield CheckItem("assembly", True, f"{len(d.states)} states, {unknowns} equations for as many unknowns")
+    for law in SYSTEM_LAWS:
+        yield _worst(law, found)
+
+
+def _at(probe: Probe, state: Mapping[str, object] | None) -> Probe:
+    if state is None:
+        return probe
+    values: dict[Path, Array] = probe.system.state(state)
+    return Probe(probe.system, values, probe.inputs, probe.efforts, probe.reference, probe.h)
+
+
+def _worst(law: SystemLaw, probes: list[Probe]) -> CheckItem:
+    name = f"{law.name}: {law.statement}"
+    verdict = max(map(_guarded(law), probes), key=lambda found: (not found[0], found[1]), default=None)
+    return (
+        CheckItem(name, True, "measured nowhere")
+        if verdict is None
+        else CheckItem(name, verdict[0], verdict[2])
+    )
+
+
+def _guarded(law: SystemLaw) -> Callable[[Probe], tuple[bool, float, str]]:
+    """The law's verdict; a state outside a component's domain is a finding, too."""
+
+    def measure(probe: Probe) -> tuple[bool, float, str]:
+        try:
+            verdict = law(probe)
+        except SemanticsError as error:
+            return False, 0.0, str(error)
+        return verdict.holds, verdict.defect, verdict.detail
+
+    return measure
