@@ -1,0 +1,255 @@
+"""The mechanical primitives, and that the compiled kernels compute what their plain definitions say."""
+
+import ctypes
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ephs.mechanics import components
+from ephs.operad import quantity as Q
+from ephs.semantics import Reference, Storage, StructureError, library
+from ephs.semantics.behaviour import Natural
+from ephs.semantics.checks import dirac, random_efforts, random_point
+from ephs.semantics.kernel_table import DOMAIN, OK, TEMPERATURE, address_of, prototype
+from ephs.semantics.laws import isotropy
+from ephs.semantics.spaces import PAIRS, SE3, pair
+
+REFERENCE = Reference()
+SIZES = [0.0, 1e-10, 1e-7, 1e-4, 0.02, 0.3]
+seeds = st.integers(0, 2**20)
+POINTER = ctypes.POINTER(ctypes.c_double)
+
+
+def pairs():
+    return {name: pair(name, **dict.fromkeys(entry.parameters, 0.3)) for name, entry in PAIRS.items()}
+
+
+def primitives():
+    """Every primitive that names a kernel, by an id."""
+    out = {}
+    for group in ("SE3", "SO3xR3"):
+        out[f"kinetic {group}"] = components.kinetic(2.0, np.array([[1.0, 0.1, 0.0], [0.1, 2.0, 0.2], [0.0, 0.2, 2.5]]), group)
+        out[f"gravity {group}"] = components.gravity(np.array([1.0, -2.0, 3.0]), group)
+        out[f"lie_poisson {group}"] = components.lie_poisson(group)
+    for name, of in pairs().items():
+        stiffness = np.arange(1.0, of.dim + 1.0)
+        if name in ("spherical", "free"):
+            stiffness[:3] = 2.0
+        factor = np.arange(1.0, of.dim**2 + 1.0).reshape(of.dim, of.dim) / 10.0
+        out[f"pair_spring {name}"] = components.pair_spring(of, stiffness, np.zeros(of.dim))
+        out[f"holonomic {name}"] = components.holonomic(of)
+        out[f"joint_friction {name}"] = components.joint_friction(of, factor @ factor.T)
+    out["pkc"] = components.kinematic_coupling(Q.pose, Q.body_momentum, "q", "p")
+    out["no_potential"] = components.no_potential(Q.pose, "q")
+    out["frame_change"] = components.frame_change(SE3.exp(np.array([0.3, -0.2, 0.5, 1.0, 2.0, -1.0])), "p_j1", "p1")
+    out["point_spring"] = components.point_spring(2.0, 1.0)
+    out["point_damper"] = components.point_damper(3.0)
+    out["ground"] = components.ground()
+    out["thermal_node"] = components.thermal_node(50.0, 300.0)
+    out["heat_transfer"] = library.heat_transfer(h=2.0)
+    out["environment"] = library.environment()
+    return out
+
+
+PRIMITIVES = primitives()
+
+
+class Draw:
+    """Random arguments of a discrete relation."""
+
+    def __init__(self, primitive, seed, size):
+        rng = np.random.default_rng(seed)
+        self.primitive, self.h = primitive, 10.0 ** rng.uniform(-4.0, -1.0)
+        self.n = primitive.bundle.size
+        self.k = getattr(primitive, "multipliers", 0)
+        dims = [primitive.interface[p].quantity.space.dim for p in primitive.reads]
+        self.x = random_point(primitive.bundle, primitive.reads, rng)
+        for value in self.x.values():  # rotations of half a turn have two logarithms: keep off
+            if value.size in (4, 7) and abs(value[0]) < 0.3:
+                value[0] = 1.0
+                value[:4] /= np.linalg.norm(value[:4])
+        self.v = size * rng.standard_normal(sum(dims))
+        self.e, self.lam = random_efforts(primitive.bundle, rng), rng.standard_normal(self.k)
+        self.splits = np.cumsum(dims)[:-1]
+
+    def steps(self, v):
+        return dict(zip(self.primitive.reads, np.split(v, self.splits), strict=True)) if self.primitive.reads else {}
+
+    def plain(self, z):
+        """The oracle at z = (e, λ, v), or at v for a storage."""
+        if isinstance(self.primitive, Storage):
+            return self.primitive.discrete_effort(self.x, z, REFERENCE)
+        local = Natural(REFERENCE, self.h).behaviour(self.primitive, self.x)
+        rates = {p: v / self.h for p, v in self.steps(z[self.n + self.k :]).items()}
+        return np.concatenate(local.relate(z[: self.n], z[self.n : self.n + self.k], rates))
+
+    @property
+    def z(self):
+        return self.v if isinstance(self.primitive, Storage) else np.concatenate([self.e, self.lam, self.v])
+
+    def compiled(self):
+        """Status, values, Jacobian, and a storage's energy, of the kernel."""
+        address, numbers, _ = address_of(self.primitive)
+        n, k, m = self.n, self.k, self.v.size
+        x = np.concatenate([*(self.x[p] for p in self.primitive.reads), [0.0]])
+        dims = np.array([n, k, m, x.size - 1], dtype=np.int64)
+        scal = np.array([self.h, REFERENCE.temperature, REFERENCE.pressure])
+        arrays = [scal, np.array([*numbers, 0.0]), x, np.append(self.v, 0.0), np.append(self.e, 0.0)]
+        arrays += [np.append(self.lam, 0.0), np.zeros(n * n + n + 1), np.zeros(k + 2), np.zeros((n + k) * (n + k + m) + 1), np.zeros(2048)]
+        status = prototype(address)(
+            dims.ctypes.data_as(ctypes.POINTER(ctypes.c_int64)), *[a.ctypes.data_as(POINTER) for a in arrays]
+        )
+        if isinstance(self.primitive, Storage):
+            return status, arrays[4][:n], arrays[6][: n * n].reshape(n, n), arrays[7][0]
+        width = n + k + m
+        values = np.concatenate([arrays[6][:n], arrays[7][:k]])
+        return status, values, arrays[8][: (n + k) * width].reshape(n + k, width), 0.0
+
+
+@pytest.mark.parametrize("name", PRIMITIVES)
+@settings(max_examples=15)
+@given(seed=seeds, size=st.sampled_from(SIZES))
+def test_a_kernel_is_its_plain_definition(name, seed, size):
+    draw = Draw(PRIMITIVES[name], seed, size)
+    expected = draw.plain(draw.z)
+    status, values, jacobian, energy = draw.compiled()
+    assert status == OK
+    scale = max(1.0, np.abs(expected).max(initial=0.0))
+    assert np.abs(values - expected).max(initial=0.0) <= 2e-13 * scale
+    columns = [
+        (draw.plain(draw.z + step) - draw.plain(draw.z - step)) / 2e-5 for step in 1e-5 * np.eye(draw.z.size)
+    ]
+    differences = np.array(columns).T.reshape(jacobian.shape)
+    # differences, and the differenced slopes of springs, are good to about eight digits
+    assert np.abs(jacobian - differences).max(initial=0.0) <= 3e-6 * max(1.0, np.abs(differences).max(initial=0.0))
+    if isinstance(draw.primitive, Storage) and not draw.primitive.environment:
+        there = draw.primitive.energy(draw.primitive.retract(draw.x, draw.v))
+        assert abs(energy - there) <= 4e-15 * max(1.0, abs(there))
+
+
+@pytest.mark.parametrize("name", [n for n, p in PRIMITIVES.items() if isinstance(p, Storage) and not p.environment])
+@given(seed=seeds, size=st.sampled_from(SIZES))
+def test_a_discrete_gradient_gives_the_rise_and_is_symmetric(name, seed, size):
+    draw = Draw(PRIMITIVES[name], seed, 0.5 * size)
+    storage, x, v = draw.primitive, draw.x, draw.v
+    intensive = storage.bundle.intensive(REFERENCE)
+    effort = storage.discrete_effort(x, v, REFERENCE)
+    x1 = storage.retract(x, v)
+    rise = storage.energy(x1) - storage.energy(x)
+    scale = abs(storage.energy(x)) + abs(storage.energy(x1)) + (np.abs(effort) + np.abs(intensive)) @ np.abs(v)
+    assert abs(rise - (effort + intensive) @ v) <= 2e-14 * max(scale, 1e-300)
+    back = storage.discrete_effort(x1, -v, REFERENCE)
+    assert np.abs(back - effort).max(initial=0.0) <= 1e-12 * max(1.0, np.abs(effort).max(initial=0.0))
+
+
+# ---- the joint relation ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", PAIRS)
+@given(seed=seeds)
+def test_the_discrete_joint_relation_is_a_dirac_structure(kind, seed):
+    """C_h e = F, so that ⟨e|C_h*λ⟩ = ⟨λ|F⟩ = 0 on it; isotropic, and of full dimension."""
+    primitive = components.holonomic(pairs()[kind])
+    draw = Draw(primitive, seed, 0.1)
+    discrete, residual = primitive.discrete(draw.h, draw.x, draw.steps(draw.v), draw.e)
+    assert np.abs(discrete @ draw.e - residual).max() <= 1e-13 * (np.abs(discrete) @ np.abs(draw.e)).max()
+    n = draw.n
+    form = np.block([[np.zeros((n, n)), np.eye(n)], [np.eye(n), np.zeros((n, n))]])
+    subspace = dirac(np.zeros((n, n)), discrete)
+    assert subspace.dimension == n
+    assert isotropy(subspace, form) <= 1e-13
+
+
+@pytest.mark.parametrize("kind", PAIRS)
+@given(seed=seeds)
+def test_the_discrete_joint_relation_keeps_the_joint_closed(kind, seed):
+    """Frames that fit at the start fit at the end: q_1 o_1 I(q_r) = q_2 o_2, exactly."""
+    of = pairs()[kind]
+    rng = np.random.default_rng(seed)
+    h, u1, u_r = 0.05, rng.standard_normal(6), rng.standard_normal(of.dim)
+    x0 = of.manifold.random(rng)
+    carried = SE3.compose(SE3.exp(h * SE3.adjoint(SE3.inverse(of.include(x0))) @ u1), SE3.exp(h * of.basis @ u_r))
+    e = np.concatenate([u1, SE3.log(carried) / h, u_r])  # the third frame's twist, from the group relation
+    primitive = components.holonomic(of)
+    (port,) = primitive.reads
+    _, residual = primitive.discrete(h, {port: x0}, {port: h * u_r}, e)
+    assert np.abs(residual).max() <= 1e-13 / h * 0.1 * max(1.0, np.abs(e).max())
+    first = SE3.random(rng)
+    second = SE3.compose(first, of.include(x0))
+    ended = SE3.compose(SE3.retract(first, h * u1), of.include(of.manifold.retract(x0, h * u_r)))
+    gap = SE3.log(SE3.compose(SE3.inverse(ended), SE3.retract(second, h * e[6:12])))
+    assert np.abs(gap).max() <= 2e-15 * max(1.0, np.abs(ended).max()) * 4
+
+
+@pytest.mark.parametrize("kind", PAIRS)
+def test_the_discrete_joint_relation_is_of_second_order(kind):
+    """On the relation C e = 0 in the middle, F is of order h², so it falls by four when h is halved."""
+    of = pairs()[kind]
+    rng = np.random.default_rng(3)
+    primitive = components.holonomic(of)
+    (port,) = primitive.reads
+    x0, e, rate = of.manifold.random(rng), rng.standard_normal(12 + of.dim), rng.standard_normal(of.dim)
+    off = []
+    for h in (0.04, 0.02, 0.01):
+        v = {port: h * rate}
+        middle = of.manifold.retract(x0, 0.5 * h * rate)
+        _, constraint = primitive.structure({port: middle})
+        _, residual = primitive.discrete(h, {port: x0}, v, e)
+        off.append(np.abs(residual - constraint @ e).max())
+    if off[0] > 1e-9:
+        assert np.allclose(np.array(off[:-1]) / off[1:], 4.0, rtol=0.1)
+
+
+@pytest.mark.parametrize("kind", PAIRS)
+@given(seed=seeds)
+def test_lambda_is_the_wrench_of_body_1_on_body_2(kind, seed):
+    """Flows are wrenches drawn from the bodies: −Ad* λ at C1's frame, +λ at C2's; what u_r feels is Bᵀλ."""
+    of = pairs()[kind]
+    rng = np.random.default_rng(seed)
+    x, lam = of.manifold.random(rng), rng.standard_normal(6)
+    (port,) = components.holonomic(of).reads
+    _, constraint = components.holonomic(of).structure({port: x})
+    flow = constraint.T @ lam
+    assert np.allclose(flow[:6], SE3.adjoint(SE3.inverse(of.include(x))).T @ lam)
+    assert np.array_equal(flow[6:12], -lam)
+    assert np.allclose(flow[12:], of.basis.T @ lam)
+
+
+# ---- domains ---------------------------------------------------------------------------------------------------
+
+
+def test_a_rotation_of_half_a_turn_in_a_step_is_refused():
+    draw = Draw(components.holonomic(pairs()["spherical"]), 0, 0.01)
+    draw.h, draw.e = 1.0, 4.0 * np.ones_like(draw.e)
+    assert draw.compiled()[0] == DOMAIN
+    with pytest.raises(StructureError, match="rotation of π"):
+        draw.plain(draw.z)
+
+
+@pytest.mark.parametrize("name", ["joint_friction revolute", "point_damper", "heat_transfer"])
+def test_a_temperature_below_zero_is_refused(name):
+    draw = Draw(PRIMITIVES[name], 0, 0.01)
+    hot = draw.primitive.bundle.indicator("entropy") == 1.0
+    draw.e = np.where(hot, -400.0, draw.e)
+    assert draw.compiled()[0] == TEMPERATURE
+    with pytest.raises(StructureError, match="temperature"):
+        draw.plain(draw.z)
+
+
+def test_a_spring_without_length_has_no_direction():
+    draw = Draw(PRIMITIVES["point_spring"], 0, 0.0)
+    for value in draw.x.values():
+        value[4:] = 0.0
+    assert draw.compiled()[0] == DOMAIN
+    with pytest.raises(StructureError, match="distance"):
+        draw.plain(draw.z)
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "rest", "key"), [([1.0, 2.0, 1.0], np.zeros(3), "stiffness"), (np.ones(3), [0.1, 0.0, 0.0], "rest")]
+)
+def test_springs_on_rotation_vectors_are_isotropic_about_zero(stiffness, rest, key):
+    with pytest.raises(StructureError, match=key):
+        components.pair_spring(pair("spherical"), np.array(stiffness), np.array(rest))
