@@ -149,6 +149,8 @@ def holonomic(dims, scal, p, x0, v, e, lam, f, c, jac, work):
     square = 0.0
     for i in range(n):
         square += effort[i] * effort[i]
+    # F − C e is of third order: for slow motions its slope is all rounding, and Newton's method does without
+    steering = square * h * h > 1e-8
     s = 0.0
     if square > 1e-280:
         for i in range(6):
@@ -164,7 +166,7 @@ def holonomic(dims, scal, p, x0, v, e, lam, f, c, jac, work):
             else:
                 ck = basis[k, i - 12]
             entry += (rows[k, i] - ck) * force[k]
-        extra[i] = (entry - 2.0 * s * effort[i]) / square if square > 1e-280 else 0.0
+        extra[i] = (entry - 2.0 * s * effort[i]) / square if steering else 0.0
     slope[:, :] = 0.0
     for i in range(n):
         value = s * effort[i]
@@ -182,7 +184,8 @@ def holonomic(dims, scal, p, x0, v, e, lam, f, c, jac, work):
         flow[i] = value
         for j in range(n):
             slope[i, j] = effort[i] * extra[j]
-        slope[i, i] += s
+        if steering:
+            slope[i, i] += s
     for k in range(6):
         for j in range(n):
             slope[n + k, j] = rows[k, j]
@@ -199,7 +202,7 @@ def holonomic(dims, scal, p, x0, v, e, lam, f, c, jac, work):
                 entry += m1[k, i] * force[k]
             zeta_force[i] = entry
         ds = 0.0
-        if square > 1e-280:
+        if steering:
             for k in range(6):
                 ds += (reads[k, j] - turned[k, j]) * force[k]
             ds /= square

@@ -3,104 +3,31 @@
 Each law is stated once, here. Tests, `System.check`, `ephs check` and `ephs.testing` run the same objects.
 """
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
-from typing import final
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
 from ephs.operad import ROOT, Path, Pattern
-from ephs.semantics.behaviour import Natural
-from ephs.semantics.bundle import Array, Bundle, Reference
-from ephs.semantics.checks import random_point
-from ephs.semantics.descriptor import Input
-from ephs.semantics.natural import Solved, solve_flat, solve_nested
-from ephs.semantics.primitives import Irreversible, Storage
+from ephs.semantics import balances
+from ephs.semantics.bundle import Array, Bundle
+from ephs.semantics.checks import dirac
 from ephs.semantics.pattern_relation import pattern_relation
-from ephs.semantics.spaces import manifold
+from ephs.semantics.primitives import Point, Primitive, Reversible
+from ephs.semantics.probe import Probe, SystemLaw, Verdict, random_probe
+from ephs.semantics.relation import LinearRelation, Sources, fold, read_point
 from ephs.semantics.subspace import Subspace
 from ephs.semantics.system import System
 
-__all__ = ["SYSTEM_LAWS", "Probe", "SystemLaw", "Verdict", "random_probe", "system_law"]
-
-
-UNSOLVED = 1e-6
-"""A step whose residual stays above this has no solution near by; the laws of steps are vacuous there."""
-
-
-@final
-@dataclass(frozen=True, slots=True, eq=False)
-class Probe:
-    """Where laws are measured: a system at a state, over a step of h seconds.
-
-    Parameters
-    ----------
-    inputs
-        What is prescribed at the outer power ports.
-    efforts
-        Arguments of the Onsager matrices by component, where a relation is taken at an instant.
-    """
-
-    system: System
-    state: Mapping[Path, Array]
-    inputs: Mapping[Path, Input] = field(default_factory=dict[Path, Input])
-    efforts: Mapping[Path, Array] = field(default_factory=dict[Path, Array])
-    reference: Reference = field(default_factory=Reference)
-    h: float = 1e-2
-
-
-@final
-@dataclass(frozen=True, slots=True)
-class Verdict:
-    """How far a law is from holding, and how far rounding may put it."""
-
-    defect: float
-    tolerance: float
-    detail: str
-
-    @property
-    def holds(self) -> bool:
-        """Whether the defect is explained by rounding."""
-        return self.defect <= self.tolerance
-
-
-@final
-@dataclass(frozen=True, slots=True)
-class SystemLaw:
-    """A law of systems: its name, what it says, and how to measure its defect."""
-
-    name: str
-    statement: str
-    measure: Callable[[Probe], Verdict]
-
-    def __call__(self, probe: Probe) -> Verdict:
-        """Measure the law at a probe."""
-        return self.measure(probe)
-
-
-def random_probe(
-    system: System, seed: int = 0, *, reference: Reference | None = None, h: float = 1e-2
-) -> Probe:
-    """A probe at random states with random flows at the outer ports."""
-    rng = np.random.default_rng(seed)
-    state: dict[Path, Array] = {}
-    efforts: dict[Path, Array] = {}
-    for path, primitive in system.leaves():
-        if isinstance(primitive, Storage):
-            point = random_point(primitive.bundle, primitive.bundle.ports, rng)
-            state |= {path / port: value for port, value in point.items()}
-        elif isinstance(primitive, Irreversible):
-            size = primitive.bundle.size
-            hot = primitive.bundle.indicator("entropy") == 1.0
-            efforts[path] = np.where(hot, rng.uniform(-30.0, 30.0, size), rng.standard_normal(size))
-    inputs = {
-        port: Input(0.1 * rng.standard_normal(quantity.space.dim), False)
-        for port, _, quantity in Bundle.of(system.interface).items()
-    }
-    return Probe(system, state, inputs, efforts, reference or Reference(), h)
-
-
-# ---- relations -------------------------------------------------------------------------------------------------
+__all__ = [
+    "SYSTEM_LAWS",
+    "Probe",
+    "SystemLaw",
+    "Verdict",
+    "isotropy",
+    "power_form",
+    "random_probe",
+    "system_law",
+]
 
 
 def _functoriality(probe: Probe) -> Verdict:
@@ -135,7 +62,7 @@ def _tellegen(probe: Probe) -> Verdict:
 
 
 def power_form(pattern: Pattern) -> Array:
-    """The symmetric form ⟨e|f⟩ summed over inner ports less outer ports, on the coordinates of `pattern_relation`."""
+    """The form ⟨e|f⟩ summed over inner ports less outer ports, on the coordinates of `pattern_relation`."""
     blocks = [(Bundle.of(box.interface).size, 1.0) for box in pattern.boxes.values()]
     blocks.append((Bundle.of(pattern.interface).size, -1.0))
     size = 2 * sum(n for n, _ in blocks)
@@ -152,130 +79,109 @@ def isotropy(subspace: Subspace, form: Array) -> float:
     return float(np.abs(subspace.basis.T @ form @ subspace.basis).max(initial=0.0))
 
 
-# ---- balances over a step --------------------------------------------------------------------------------------
+def _points(probe: Probe) -> dict[Path, Point]:
+    """What each component reads, also where nobody stores it."""
+    found: dict[Path, Point] = {}
+
+    def leaf(path: Path, primitive: Primitive, sources: Sources) -> None:
+        found[path] = read_point(primitive, sources, probe.state)
+
+    def compose(_pattern: Pattern, _parts: Mapping[Path, None]) -> None:
+        return None
+
+    fold(probe.system, leaf, compose)
+    return found
 
 
-def _solved(probe: Probe) -> Solved:
-    return solve_flat(probe.system, probe.state, Natural(probe.reference, probe.h), probe.inputs)
-
-
-def _vacuous() -> Verdict:
+def _dirac(probe: Probe) -> Verdict:
+    """The pattern with all reversible components: a Dirac structure on outer ports and those of the others."""
+    flat, points = probe.system.flatten(), _points(probe)
+    whole, form = pattern_relation(flat.pattern), power_form(flat.pattern)
+    kept: list[int] = []
+    rows: list[Array] = []
+    at = 0
+    for box, content in flat.pattern.boxes.items():
+        layout, primitive = Bundle.of(content.interface), flat.fillings[box]
+        n = layout.size
+        if isinstance(primitive, Reversible):
+            # the box may list its ports in another order than the primitive
+            order = [
+                at + i
+                for port in primitive.bundle.ports
+                for i in range(layout.slice(port).start, layout.slice(port).stop)
+            ]
+            annihilator = Subspace.from_kernel(dirac(*primitive.structure(points[box])).basis.T).basis.T
+            conditions = np.zeros((n, whole.ambient))
+            conditions[:, [*order, *(n + i for i in order)]] = annihilator
+            rows.append(conditions)
+        else:
+            kept += range(at, at + 2 * n)
+        at += 2 * n
+    kept += range(at, whole.ambient)
+    found = whole.restrict(np.vstack(rows)) if rows else whole
+    found = found.project(kept)
+    if 2 * found.dimension != len(kept):
+        return Verdict(np.inf, 0.0, f"dimension {found.dimension}, expected {len(kept) // 2}")
+    worst = isotropy(found, form[np.ix_(kept, kept)])
     return Verdict(
-        0.0, 0.0, "vacuous: no step was found, a constraint contradicts the state or h is too large"
+        worst,
+        1e-12,
+        f"dimension {found.dimension} on {len(kept)} flows and efforts, isotropic to {worst:.1e}",
     )
 
 
-def _after(probe: Probe, solved: Solved) -> dict[Path, Array]:
-    return {
-        path: manifold(quantity.space).retract(probe.state[path], probe.h * solved.rates[path])
-        for path, quantity in probe.system.states.items()
-    }
+def _renaming(probe: Probe) -> Verdict:
+    """Boxes renamed so that they sort in the opposite order."""
+    system = probe.system
+    boxes = sorted(system.fillings)
+    if ROOT in boxes:
+        return Verdict(0.0, 0.0, "an identity, whose box has no name")
+    prefix = "box"
+    while any(path[0].startswith(prefix) for path in system.pattern.junctions):
+        prefix += "_"
+    names = {box: Path((f"{prefix}{len(boxes) - i:06d}",)) for i, box in enumerate(boxes)}
+    pattern = system.pattern.rename(boxes=names)
+    renamed = System.of(pattern, {names[box]: filling for box, filling in system.fillings.items()})
 
+    def new(path: Path) -> Path:
+        return next(names[box] / path.relative_to(box) for box in boxes if box.is_prefix_of(path))
 
-def _power_balance(probe: Probe) -> Verdict:
-    """Energy of all storages changes by what outer ports supply, Σ⟨e^E|f⟩ h."""
-    solved = _solved(probe)
-    if solved.residual > UNSOLVED:
-        return _vacuous()
-    after, terms = _after(probe, solved), [0.0]
-    for path, primitive in probe.system.leaves():
-        if isinstance(primitive, Storage):
-            here, there = (
-                {port: values[path / port] for port in primitive.bundle.ports}
-                for values in (probe.state, after)
-            )
-            gain = primitive.total_energy(there, probe.reference) - primitive.total_energy(
-                here, probe.reference
-            )
-            terms.append(gain)
-            # the change is a difference of energies: their rounding enters
-            terms += [s * 1e-3 * primitive.total_energy(here, probe.reference) for s in (1.0, -1.0)]
-    for port, (flow, effort) in solved.outer.items():
-        intensive = probe.reference.intensive(probe.system.interface[port].quantity)
-        terms.append(-probe.h * float((effort + intensive) @ flow))
-    return _balance(terms, "energy", "J")
-
-
-def _entropy_balance(probe: Probe) -> Verdict:
-    """The entropy of all storages changes by what outer ports supply and what irreversible components make."""
-    solved = _solved(probe)
-    if solved.residual > UNSOLVED:
-        return _vacuous()
-    terms = [0.0]
-    for path, quantity in probe.system.states.items():
-        if quantity.kind == "entropy":
-            terms.append(probe.h * float(solved.rates[path][0]))
-    for port, (flow, _) in solved.outer.items():
-        if probe.system.interface[port].quantity.kind == "entropy":
-            terms.append(-probe.h * float(flow[0]))
-    productions = _productions(probe, solved)
-    terms += [-probe.h * made for made, _ in productions]
-    terms += [s * probe.h * scale for _, scale in productions for s in (1.0, -1.0)]
-    return _balance(terms, "entropy", "J/K")
-
-
-def _entropy_production(probe: Probe) -> Verdict:
-    """σ ≥ 0 at each irreversible component."""
-    solved = _solved(probe)
-    if solved.residual > UNSOLVED:
-        return _vacuous()
-    made = _productions(probe, solved)
-    if not made:
-        return Verdict(0.0, 0.0, "no irreversible component")
-    worst = max(-value / max(scale, 1e-8) for value, scale in made)
-    least = min(value for value, _ in made)
-    return Verdict(
-        max(0.0, worst), 1e-12, f"{len(made)} irreversible components, the least makes {least:.1e} W/K"
+    one = system.relation(probe.reference).at({str(p): v for p, v in probe.state.items()}, probe.efforts)
+    two = renamed.relation(probe.reference).at(
+        {str(new(p)): v for p, v in probe.state.items()}, {new(p): e for p, e in probe.efforts.items()}
     )
+    if one.empty and two.empty:
+        return Verdict(0.0, 0.0, "both relations are empty")
+    where = _places(two)
+    order = [i for path, _ in one.rates for i in where[new(path)]]
+    order += range(len(order), two.subspace.ambient)
+    distance = float(np.abs(one.projector - two.projector[np.ix_(order, order)]).max(initial=0.0))
+    return Verdict(distance, 1e-12, f"{len(boxes)} boxes renamed, projectors differ by {distance:.1e}")
 
 
-def _productions(probe: Probe, solved: Solved) -> list[tuple[float, float]]:
-    """Entropy made by each irreversible component and the sum of its absolute terms."""
-    after = _after(probe, solved)
-    flat = probe.system.descriptor()
-    out: list[tuple[float, float]] = []
-    for slot in flat.components:
-        primitive = slot.primitive
-        if isinstance(primitive, Irreversible):
-            middle = {
-                port: manifold(s.quantity.space).midpoint(probe.state[s.path], after[s.path])
-                for port, s in zip(primitive.reads, slot.reads, strict=True)
-            }
-            flows = primitive.flow(middle, solved.efforts[slot.path], probe.reference)
-            entropy = flows[primitive.bundle.indicator("entropy") == 1.0]
-            out.append((-float(entropy.sum()), float(np.abs(entropy).sum())))
+def _places(relation: LinearRelation) -> dict[Path, range]:
+    """Where the rates lie."""
+    out: dict[Path, range] = {}
+    at = 0
+    for path, dim in relation.rates:
+        out[path] = range(at, at + dim)
+        at += dim
     return out
-
-
-def _balance(terms: list[float], what: str, unit: str) -> Verdict:
-    scale = sum(map(abs, terms))
-    defect = abs(sum(terms)) / max(scale, 1e-8)  # below that, all terms are what Newton's method left
-    # a step solved by Newton's method with a differenced Jacobian leaves residuals of a few roundings times condition
-    return Verdict(defect, 1e-9, f"{what} is balanced to {defect:.1e} of {scale:.2e} {unit}")
-
-
-def _naturality(probe: Probe) -> Verdict:
-    """Discretise, then compose = flatten, then discretise."""
-    behaviour = Natural(probe.reference, probe.h)
-    flat = solve_flat(probe.system, probe.state, behaviour, probe.inputs)
-    nested = solve_nested(probe.system, probe.state, behaviour, probe.inputs)
-    if min(flat.residual, nested.residual) > UNSOLVED:
-        return _vacuous()
-    scale = max([1.0, *(float(np.abs(w).max(initial=0.0)) for w in flat.rates.values())])
-    worst = max(
-        (float(np.abs(flat.rates[path] - nested.rates[path]).max(initial=0.0)) for path in flat.rates),
-        default=0.0,
-    )
-    return Verdict(worst / scale, 1e-9, f"rates of {len(flat.rates)} states agree to {worst / scale:.1e}")
 
 
 SYSTEM_LAWS: tuple[SystemLaw, ...] = (
     SystemLaw("functoriality", "flatten, then fill = fill, then compose", _functoriality),
     SystemLaw("Tellegen", "a pattern's relation is Lagrangian: power in = power out", _tellegen),
-    SystemLaw("power balance", "the energy changes by what outer ports supply", _power_balance),
-    SystemLaw("entropy balance", "the entropy changes by supply and production", _entropy_balance),
-    SystemLaw("entropy production", "no irreversible component destroys entropy", _entropy_production),
-    SystemLaw("naturality", "discretise, then compose = flatten, then discretise", _naturality),
+    SystemLaw("Dirac", "a pattern filled with Dirac structures is a Dirac structure", _dirac),
+    SystemLaw("renaming", "names of boxes mean nothing", _renaming),
+    SystemLaw("power balance", "the energy changes by what outer ports supply", balances.energy_balance),
+    SystemLaw("exergy balance", "the exergy changes by supply and destruction", balances.exergy_balance),
+    SystemLaw("entropy balance", "the entropy changes by supply and production", balances.entropy_balance),
+    SystemLaw("conservation", "volumes and amounts change by supply alone", balances.conservation),
+    SystemLaw(
+        "entropy production", "no irreversible component destroys entropy", balances.entropy_production
+    ),
+    SystemLaw("naturality", "discretise, then compose = flatten, then discretise", balances.naturality),
 )
 
 

@@ -1,6 +1,6 @@
 """What checking a system finds: its structure, whether it has equations, and the laws at random states."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple, final
 
@@ -98,8 +98,11 @@ def _items(
         return
     unknowns = d.unknowns(found[0].inputs)
     yield CheckItem("assembly", True, f"{len(d.states)} states, {unknowns} equations for as many unknowns")
-    for law in SYSTEM_LAWS:
-        yield _worst(law, found)
+    # probe after probe, as one step serves all its laws
+    verdicts = [[_verdict(law, probe) for law in SYSTEM_LAWS] for probe in found]
+    for law, measured in zip(SYSTEM_LAWS, zip(*verdicts, strict=True), strict=False):
+        holds, _, detail = max(measured, key=lambda verdict: (not verdict[0], verdict[1]))
+        yield CheckItem(f"{law.name}: {law.statement}", holds, detail)
 
 
 def _at(probe: Probe, state: Mapping[str, object] | None) -> Probe:
@@ -109,24 +112,10 @@ def _at(probe: Probe, state: Mapping[str, object] | None) -> Probe:
     return Probe(probe.system, values, probe.inputs, probe.efforts, probe.reference, probe.h)
 
 
-def _worst(law: SystemLaw, probes: list[Probe]) -> CheckItem:
-    name = f"{law.name}: {law.statement}"
-    verdict = max(map(_guarded(law), probes), key=lambda found: (not found[0], found[1]), default=None)
-    return (
-        CheckItem(name, True, "measured nowhere")
-        if verdict is None
-        else CheckItem(name, verdict[0], verdict[2])
-    )
-
-
-def _guarded(law: SystemLaw) -> Callable[[Probe], tuple[bool, float, str]]:
-    """The law's verdict; a state outside a component's domain is a finding, too."""
-
-    def measure(probe: Probe) -> tuple[bool, float, str]:
-        try:
-            verdict = law(probe)
-        except SemanticsError as error:
-            return False, 0.0, str(error)
-        return verdict.holds, verdict.defect, verdict.detail
-
-    return measure
+def _verdict(law: SystemLaw, probe: Probe) -> tuple[bool, float, str]:
+    """Whether the law holds, its defect, what was found; a state outside a component's domain is a finding, too."""
+    try:
+        verdict = law(probe)
+    except SemanticsError as error:
+        return False, 0.0, str(error)
+    return verdict.holds, verdict.defect, verdict.detail

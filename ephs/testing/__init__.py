@@ -1,6 +1,7 @@
 """Hypothesis strategies and checks for suites that build on this package."""
 
 from ephs.testing.laws import check_operad_laws, law_inputs
+from ephs.testing.mechanisms import mechanisms
 from ephs.testing.patterns import Nesting, interfaces, nestings, paths, patterns, quantities
 from ephs.testing.primitives import irreversibles, reversibles, storages
 from ephs.testing.systems import (
@@ -23,6 +24,7 @@ __all__ = [
     "interfaces",
     "irreversibles",
     "law_inputs",
+    "mechanisms",
     "nestings",
     "paths",
     "patterns",
@@ -35,13 +37,15 @@ __all__ = [
 
 
 def register() -> None:
-    """Tell Hypothesis how to make paths, quantities, patterns and systems; it calls this when it is imported."""
+    """Tell Hypothesis how to make paths, quantities, patterns, systems and scenes; it calls this when it is imported."""
     from hypothesis import strategies as st
 
     from ephs.operad import Path, Pattern, Quantity
+    from ephs.mechanics.scene import Scene
     from ephs.semantics import System
 
     st.register_type_strategy(Path, paths())
     st.register_type_strategy(Quantity, quantities())
     st.register_type_strategy(Pattern, patterns())
     st.register_type_strategy(System, systems())
+    st.register_type_strategy(Scene, mechanisms())

@@ -30,7 +30,9 @@ def primitives():
     """Every primitive that names a kernel, by an id."""
     out = {}
     for group in ("SE3", "SO3xR3"):
-        out[f"kinetic {group}"] = components.kinetic(2.0, np.array([[1.0, 0.1, 0.0], [0.1, 2.0, 0.2], [0.0, 0.2, 2.5]]), group)
+        out[f"kinetic {group}"] = components.kinetic(
+            2.0, np.array([[1.0, 0.1, 0.0], [0.1, 2.0, 0.2], [0.0, 0.2, 2.5]]), group
+        )
         out[f"gravity {group}"] = components.gravity(np.array([1.0, -2.0, 3.0]), group)
         out[f"lie_poisson {group}"] = components.lie_poisson(group)
     for name, of in pairs().items():
@@ -43,7 +45,9 @@ def primitives():
         out[f"joint_friction {name}"] = components.joint_friction(of, factor @ factor.T)
     out["pkc"] = components.kinematic_coupling(Q.pose, Q.body_momentum, "q", "p")
     out["no_potential"] = components.no_potential(Q.pose, "q")
-    out["frame_change"] = components.frame_change(SE3.exp(np.array([0.3, -0.2, 0.5, 1.0, 2.0, -1.0])), "p_j1", "p1")
+    out["frame_change"] = components.frame_change(
+        SE3.exp(np.array([0.3, -0.2, 0.5, 1.0, 2.0, -1.0])), "p_j1", "p1"
+    )
     out["point_spring"] = components.point_spring(2.0, 1.0)
     out["point_damper"] = components.point_damper(3.0)
     out["ground"] = components.ground()
@@ -75,7 +79,11 @@ class Draw:
         self.splits = np.cumsum(dims)[:-1]
 
     def steps(self, v):
-        return dict(zip(self.primitive.reads, np.split(v, self.splits), strict=True)) if self.primitive.reads else {}
+        return (
+            dict(zip(self.primitive.reads, np.split(v, self.splits), strict=True))
+            if self.primitive.reads
+            else {}
+        )
 
     def plain(self, z):
         """The oracle at z = (e, λ, v), or at v for a storage."""
@@ -97,7 +105,13 @@ class Draw:
         dims = np.array([n, k, m, x.size - 1], dtype=np.int64)
         scal = np.array([self.h, REFERENCE.temperature, REFERENCE.pressure])
         arrays = [scal, np.array([*numbers, 0.0]), x, np.append(self.v, 0.0), np.append(self.e, 0.0)]
-        arrays += [np.append(self.lam, 0.0), np.zeros(n * n + n + 1), np.zeros(k + 2), np.zeros((n + k) * (n + k + m) + 1), np.zeros(2048)]
+        arrays += [
+            np.append(self.lam, 0.0),
+            np.zeros(n * n + n + 1),
+            np.zeros(k + 2),
+            np.zeros((n + k) * (n + k + m) + 1),
+            np.zeros(2048),
+        ]
         status = prototype(address)(
             dims.ctypes.data_as(ctypes.POINTER(ctypes.c_int64)), *[a.ctypes.data_as(POINTER) for a in arrays]
         )
@@ -123,13 +137,17 @@ def test_a_kernel_is_its_plain_definition(name, seed, size):
     ]
     differences = np.array(columns).T.reshape(jacobian.shape)
     # differences, and the differenced slopes of springs, are good to about eight digits
-    assert np.abs(jacobian - differences).max(initial=0.0) <= 3e-6 * max(1.0, np.abs(differences).max(initial=0.0))
+    assert np.abs(jacobian - differences).max(initial=0.0) <= 3e-6 * max(
+        1.0, np.abs(differences).max(initial=0.0)
+    )
     if isinstance(draw.primitive, Storage) and not draw.primitive.environment:
         there = draw.primitive.energy(draw.primitive.retract(draw.x, draw.v))
         assert abs(energy - there) <= 4e-15 * max(1.0, abs(there))
 
 
-@pytest.mark.parametrize("name", [n for n, p in PRIMITIVES.items() if isinstance(p, Storage) and not p.environment])
+@pytest.mark.parametrize(
+    "name", [n for n, p in PRIMITIVES.items() if isinstance(p, Storage) and not p.environment]
+)
 @given(seed=seeds, size=st.sampled_from(SIZES))
 def test_a_discrete_gradient_gives_the_rise_and_is_symmetric(name, seed, size):
     draw = Draw(PRIMITIVES[name], seed, 0.5 * size)
@@ -138,7 +156,9 @@ def test_a_discrete_gradient_gives_the_rise_and_is_symmetric(name, seed, size):
     effort = storage.discrete_effort(x, v, REFERENCE)
     x1 = storage.retract(x, v)
     rise = storage.energy(x1) - storage.energy(x)
-    scale = abs(storage.energy(x)) + abs(storage.energy(x1)) + (np.abs(effort) + np.abs(intensive)) @ np.abs(v)
+    scale = (
+        abs(storage.energy(x)) + abs(storage.energy(x1)) + (np.abs(effort) + np.abs(intensive)) @ np.abs(v)
+    )
     assert abs(rise - (effort + intensive) @ v) <= 2e-14 * max(scale, 1e-300)
     back = storage.discrete_effort(x1, -v, REFERENCE)
     assert np.abs(back - effort).max(initial=0.0) <= 1e-12 * max(1.0, np.abs(effort).max(initial=0.0))
@@ -170,7 +190,9 @@ def test_the_discrete_joint_relation_keeps_the_joint_closed(kind, seed):
     rng = np.random.default_rng(seed)
     h, u1, u_r = 0.05, rng.standard_normal(6), rng.standard_normal(of.dim)
     x0 = of.manifold.random(rng)
-    carried = SE3.compose(SE3.exp(h * SE3.adjoint(SE3.inverse(of.include(x0))) @ u1), SE3.exp(h * of.basis @ u_r))
+    carried = SE3.compose(
+        SE3.exp(h * SE3.adjoint(SE3.inverse(of.include(x0))) @ u1), SE3.exp(h * of.basis @ u_r)
+    )
     e = np.concatenate([u1, SE3.log(carried) / h, u_r])  # the third frame's twist, from the group relation
     primitive = components.holonomic(of)
     (port,) = primitive.reads
@@ -248,7 +270,8 @@ def test_a_spring_without_length_has_no_direction():
 
 
 @pytest.mark.parametrize(
-    ("stiffness", "rest", "key"), [([1.0, 2.0, 1.0], np.zeros(3), "stiffness"), (np.ones(3), [0.1, 0.0, 0.0], "rest")]
+    ("stiffness", "rest", "key"),
+    [([1.0, 2.0, 1.0], np.zeros(3), "stiffness"), (np.ones(3), [0.1, 0.0, 0.0], "rest")],
 )
 def test_springs_on_rotation_vectors_are_isotropic_about_zero(stiffness, rest, key):
     with pytest.raises(StructureError, match=key):

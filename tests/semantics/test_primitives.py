@@ -177,7 +177,7 @@ def test_energies_of_the_storages(name, state, energy, effort):
     ("name", "arguments", "key"),
     [("spring", {"k": 0.0}, "k"), ("spring", {"k": np.nan}, "k"), ("point_mass", {"m": -1.0}, "m"),
      ("friction", {"d": -0.1}, "d"), ("capacitor", {"c": np.inf}, "c"), ("piston", {"a": 0.0}, "a"),
-     ("thermal_capacity", {"c1": -1.0, "c2": 1.0}, "c1"), ("heat_transfer", {"h": -1.0}, "h")],
+     ("thermal_capacity", {"c1": -1.0, "c2": 1.0}, "c1"), ("lever", {"r": np.nan}, "r"), ("heat_transfer", {"h": -1.0}, "h")],
 )  # fmt: skip
 def test_parameters_out_of_range_are_named(name, arguments, key):
     with pytest.raises(StructureError, match=f"{name}: parameter {key} is"):
@@ -252,12 +252,55 @@ def test_structures_that_read_states():
     )
     _, constraint = crank.structure({Path.of("q"): np.array([0.3])})
     assert np.allclose(constraint, [[-np.sin(0.3), 1.0]])
-    spool = ephs.constraint(
-        {"p": Q.momentum, "p2": Q.momentum, "~q": Q.displacement}, lambda q: [[1.0, q]], multipliers=1
-    )
+    spool = ephs.constraint({"p": Q.momentum, "p2": Q.momentum, "~q": Q.displacement}, lambda q: [[1.0, q]])
+    assert spool.multipliers == 1  # counted at a random state
     assert np.allclose(spool.structure({Path.of("q"): np.array([0.3])})[1], [[1.0, 0.3]])
-    with pytest.raises(StructureError, match="multipliers"):
-        ephs.constraint({"p": Q.momentum, "~q": Q.displacement}, lambda q: [[q]])
+    with pytest.raises(StructureError, match="is \\(1, 2\\)|shape \\(2, 2\\)"):
+        ephs.constraint(
+            {"p": Q.momentum, "p2": Q.momentum, "~q": Q.displacement}, lambda q: [[1.0, q]], multipliers=2
+        )
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (
+            lambda: ephs.storage({"q": Q.displacement}, lambda x: x**2),
+            r"energy is a function of \(x\).*of \(q\)",
+        ),
+        (lambda: ephs.storage({"q": Q.displacement}, 3.0), "energy is 3.0, expected a function"),
+        (
+            lambda: ephs.storage({"q": Q.displacement}, lambda q: q**2, lambda q: [q, q]),
+            r"gradient is \(2,\)",
+        ),
+        (lambda: ephs.storage({"q": Q.displacement}, lambda q: float("nan")), "energy is nan.*finite"),
+        (lambda: ephs.gyrator({"~q": Q.displacement}, [[0.0]]), "ports is ~q, expected a power port"),
+        (lambda: ephs.gyrator({"q": Q.displacement, "~q": Q.displacement}, [[0.0]]), "q twice"),
+        (lambda: ephs.transformer({"q": Q.displacement}, [[1.0]]), "two power ports"),
+        (lambda: ephs.constraint({"p": Q.momentum}, [1.0, 2.0]), r"shape \(1, 1\)"),
+        (lambda: ephs.constraint({"p": Q.momentum}, "abc"), "matrix is"),
+        (lambda: ephs.irreversible({"p": Q.momentum, "s": Q.entropy}, [[1.0]]), "expected a function"),
+    ],
+)
+def test_functions_and_ports_that_do_not_fit_are_named(make, message):
+    with pytest.raises(StructureError, match=message):
+        make()
+
+
+def test_scales_far_from_one_are_accepted():
+    """Capacities, volumes and charges of a microscopic device."""
+    library.thermal_capacity(c1=1.0, c2=1e-4)
+    gas = library.ideal_gas(c1=1e-3, c2=1e-5, v0=1e-9, c=1.5)
+    x, v = {Path.of("s"): np.array([0.0]), Path.of("v"): np.array([1e-9])}, np.array([1e-7, 2e-12])
+    gradient = gas.discrete_effort(x, v, Reference()) + gas.bundle.intensive(Reference())
+    rise = gas.energy(gas.retract(x, v)) - gas.energy(x)
+    assert abs(gradient @ v - rise) <= 1e-14 * gas.energy(x)
+    # also where increments are so small that their squares vanish beside one
+    mine = ephs.storage({"v": Q.volume}, lambda v: 1e-9 / v)
+    x, v = {Path.of("v"): np.array([1e-9])}, np.array([1e-11])
+    gradient = mine.discrete_effort(x, v, Reference()) + mine.bundle.intensive(Reference())
+    rise = mine.energy(mine.retract(x, v)) - mine.energy(x)
+    assert abs(gradient @ v - rise) <= 1e-14
 
 
 @given(interfaces(max_ports=4))

@@ -360,12 +360,12 @@ def _blocks(d: Descriptor, given: Mapping[Path, Input], size: int) -> tuple[Arra
         if slot.multipliers:
             first = next(iter(slot.primitive.bundle.items()))[2]
             at = lam + slot.multiplier
-            blocks.append((at, at + slot.multipliers, ("constraint", first.kind)))
+            blocks.append((at, at + slot.multipliers, ("effort", first.kind)))
     at = lam + d.multiplier_size
     for junction in d.outer:
         if given[junction.path].effort:
             dim = junction.quantity.space.dim
-            blocks.append((at, at + dim, ("constraint", junction.quantity.kind)))
+            blocks.append((at, at + dim, ("effort", junction.quantity.kind)))
             at += dim
     kinds = list(dict.fromkeys(kind for _, _, kind in blocks))
     block = np.zeros(size, dtype=np.int64)

@@ -172,6 +172,17 @@ def evaluate(t, x, z, scal, inputs, m):
                 m.scale[unknown + j] = abs(z[row]) + abs(given)
             m.residual[row] -= flow
             m.scale[row] += abs(flow)
+    # at rest no effort has a size of its own: what the flows change it by in a step is one
+    for i in range(t.kind.shape[0]):
+        if t.kind[i] == 0:
+            n, e_at, w_at, j_at = t.dims[i, 0], t.e_at[i], t.read_w_at[i], t.jacobian_at[i]
+            for j in range(n):
+                row = t.read_w[w_at + j]
+                for l in range(n):
+                    place = t.jacobian[j_at + j * n + l]
+                    if place >= 0:
+                        flow = m.scale[n_rate + t.e_index[e_at + l]]
+                        m.scale[row] = max(m.scale[row], abs(m.data[place]) * flow)
     return 0, 0
 
 

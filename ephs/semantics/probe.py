@@ -1,0 +1,88 @@
+"""Where laws of systems are measured, and what a measurement says."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import final
+
+import numpy as np
+
+from ephs.operad import Path
+from ephs.semantics.bundle import Array, Bundle, Reference
+from ephs.semantics.checks import random_point
+from ephs.semantics.descriptor import Input
+from ephs.semantics.primitives import Irreversible, Storage
+from ephs.semantics.system import System
+
+__all__ = ["Probe", "SystemLaw", "Verdict", "random_probe"]
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Probe:
+    """Where laws are measured: a system at a state, over a step of h seconds.
+
+    Parameters
+    ----------
+    inputs
+        What is prescribed at the outer power ports.
+    efforts
+        Arguments of the Onsager matrices by component, where a relation is taken at an instant.
+    """
+
+    system: System
+    state: Mapping[Path, Array]
+    inputs: Mapping[Path, Input] = field(default_factory=dict[Path, Input])
+    efforts: Mapping[Path, Array] = field(default_factory=dict[Path, Array])
+    reference: Reference = field(default_factory=Reference)
+    h: float = 1e-2
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """How far a law is from holding, and how far rounding may put it."""
+
+    defect: float
+    tolerance: float
+    detail: str
+
+    @property
+    def holds(self) -> bool:
+        """Whether the defect is explained by rounding."""
+        return self.defect <= self.tolerance
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class SystemLaw:
+    """A law of systems: its name, what it says, and how to measure its defect."""
+
+    name: str
+    statement: str
+    measure: Callable[[Probe], Verdict]
+
+    def __call__(self, probe: Probe) -> Verdict:
+        """Measure the law at a probe."""
+        return self.measure(probe)
+
+
+def random_probe(
+    system: System, seed: int = 0, *, reference: Reference | None = None, h: float = 1e-2
+) -> Probe:
+    """A probe at random states with random flows at the outer ports."""
+    rng = np.random.default_rng(seed)
+    state: dict[Path, Array] = {}
+    efforts: dict[Path, Array] = {}
+    for path, primitive in system.leaves():
+        if isinstance(primitive, Storage):
+            point = random_point(primitive.bundle, primitive.bundle.ports, rng)
+            state |= {path / port: value for port, value in point.items()}
+        elif isinstance(primitive, Irreversible):
+            size = primitive.bundle.size
+            hot = primitive.bundle.indicator("entropy") == 1.0
+            efforts[path] = np.where(hot, rng.uniform(-30.0, 30.0, size), rng.standard_normal(size))
+    inputs = {
+        port: Input(0.1 * rng.standard_normal(quantity.space.dim), False)
+        for port, _, quantity in Bundle.of(system.interface).items()
+    }
+    return Probe(system, state, inputs, efforts, reference or Reference(), h)

@@ -1,0 +1,293 @@
+"""Bodies, joints and their composition: the patterns, and that they mean the equations of the literature."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ephs.mechanics import (
+    body_pattern,
+    joint,
+    joint_pattern,
+    mbs_pattern,
+    rigid_body,
+    spring_damper,
+    universal_joint,
+)
+from ephs.operad import Path
+from ephs.semantics import Reference, StructureError, System
+from ephs.semantics.relation import as_system
+from ephs.semantics.spaces import PAIRS, SE3, SO3xR3, pair
+from ephs.semantics.spaces.rotations import quaternion_to_matrix
+from ephs.semantics.subspace import Subspace
+from tests.mechanics.mechanisms import TwoBodies, kinds
+
+seeds = st.integers(0, 2**20)
+few = settings(max_examples=10)
+THETA = Reference().temperature
+
+
+# ---- patterns --------------------------------------------------------------------------------------------------
+
+
+def test_a_body_has_four_boxes_and_a_joint_seven():
+    assert sorted(map(str, body_pattern().boxes)) == ["ke", "lp", "pe", "pkc"]
+    assert sorted(map(str, body_pattern().junctions)) == ["p", "q"]
+    for name in PAIRS:
+        pattern = joint_pattern(pair(name, **dict.fromkeys(PAIRS[name].parameters, 0.1)))
+        assert sorted(map(str, pattern.boxes)) == ["env", "hc", "mf", "o1", "o2", "pe", "pkc"]
+        assert sorted(map(str, pattern.junctions)) == ["p1", "p2", "p_j1", "p_j2", "p_r", "q_r", "s"]
+        assert sorted(map(str, pattern.interface)) == ["p1", "p2"]
+
+
+def test_the_flat_multibody_system_has_nine_junctions_and_fifteen_boxes():
+    system = TwoBodies.draw("revolute", 1).system.flatten()
+    names = (
+        {f"body{i}.q" for i in (1, 2)}
+        | {f"joint.{j}" for j in ("p_j1", "p_j2", "p_r", "q_r", "s")}
+        | {"p1", "p2"}
+    )
+    assert set(map(str, system.pattern.junctions)) == names
+    assert len(system.pattern.boxes) == 15
+    body = body_pattern()
+    joints = joint_pattern(pair("revolute"))
+    assert system.pattern == mbs_pattern().substitute(body1=body, body2=body, joint=joints)
+
+
+# ---- bodies ----------------------------------------------------------------------------------------------------
+
+
+@few
+@given(seeds)
+def test_a_body_means_newton_and_euler(seed):
+    """q̇ = u, ṗ = ad*_u p − T*L dV + p.f, p.e = u, for both groups."""
+    two = TwoBodies.draw("revolute", seed)
+    rng = np.random.default_rng(seed)
+    for group, space in (("SE3", SE3), ("SO3xR3", SO3xR3)):
+        metric, u, f = two.metric[0], two.u1, rng.standard_normal(6)
+        body = rigid_body(two.masses[0], two.inertias[0], (0.3, -0.2, -9.81), group=group)
+        relation = body.relation().at({"pe.q": two.q1, "ke.p": metric @ u})
+        force = -two.masses[0] * np.array([0.3, -0.2, -9.81])
+        turned = quaternion_to_matrix(two.q1[:4]).T @ force if group == "SE3" else force
+        rates = {"ke.p": space.ad(u).T @ (metric @ u) - np.concatenate([np.zeros(3), turned]) + f, "pe.q": u}
+        point = np.concatenate([*(rates[str(path)] for path, _ in relation.rates), f, u, [relation.unit]])
+        assert relation.subspace.contains(point / relation.unit * 1.0) <= 1e-13
+        assert relation.dimension == 7
+
+
+def test_in_the_direct_product_a_twist_has_the_velocity_of_the_world():
+    p = np.array([0.1, 0.2, 0.3, 1.0, 2.0, 3.0])
+    body = rigid_body(2.0, [1.0, 2.0, 2.5], (0.0, 0.0, 0.0), group="SO3xR3")
+    system = as_system(body)
+    closed = system.relation(route="nested").at({"ke.p": p, "pe.q": SE3.exp(np.ones(6))})
+    rates = closed.subspace
+    assert rates.ambient == 6 + 6 + 6 + 6 + 1
+    free = np.concatenate(
+        [
+            [*np.cross(p[:3], p[:3] / [1.0, 2.0, 2.5]), 0.0, 0.0, 0.0],
+            p / [1, 2, 2.5, 2, 2, 2],
+            np.zeros(6),
+            p / [1, 2, 2.5, 2, 2, 2],
+            [closed.unit],
+        ]
+    )
+    assert rates.contains(free) <= 1e-14
+
+
+def test_a_massless_frame_has_no_kinetic_energy():
+    frame = rigid_body(0.0, [0.0, 0.0, 0.0])
+    assert sorted(map(str, frame.pattern.boxes)) == ["pe", "pkc"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "key"),
+    [
+        ({"mass": -1.0}, "mass"), ({"mass": np.nan}, "mass"), ({"inertia": [1.0, 1.0, 3.0]}, "inertia"),
+        ({"inertia": [1.0, -1.0, 1.0]}, "inertia"), ({"inertia": [1.0]}, "inertia"),
+        ({"inertia": [[1.0, 0.5, 0], [0, 1, 0], [0, 0, 1]]}, "inertia"), ({"gravity": [0.0]}, "gravity"),
+        ({"group": "SO3"}, "group"), ({"mass": 0.0}, "inertia"),
+    ],
+)  # fmt: skip
+def test_impossible_bodies_are_refused(arguments, key):
+    with pytest.raises(StructureError, match=f"parameter {key} is"):
+        rigid_body(**{"mass": 1.0, "inertia": [1.0, 1.0, 1.0], **arguments})
+
+
+# ---- joints ----------------------------------------------------------------------------------------------------
+
+
+def joint_by_hand(two, *, first=None):
+    """The interconnected joint as a relation on (u_r, ṡ; p₁.f, p₂.f; p₁.e, p₂.e; unit) with λ eliminated."""
+    d, to1, to2 = two.of.dim, two.to_c1 if first is None else first, two.to_c2
+    basis, mu, unit = two.of.basis, two.mu, 1.0
+    # unknowns: u_r, ṡ, f₁, f₂, e₁, e₂, λ, 1
+    at = np.cumsum([0, d, 1, 6, 6, 6, 6, 6, 1])
+    u_r, s, f1, f2, e1, e2, lam, one = (slice(a, b) for a, b in zip(at[:-1], at[1:], strict=True))
+    rows = []
+
+    def row(*terms):
+        block = np.zeros((next(m.shape[0] for _, m in terms), at[-1]))
+        for where, m in terms:
+            block[:, where] += m
+        rows.append(block)
+
+    row((one, two.spring[:, None] / unit), (lam, basis.T), (u_r, mu))
+    row((e1, to1), (e2, -to2), (u_r, basis))
+    row((f1, np.eye(6)), (lam, -two.to_c1.T))
+    row((f2, np.eye(6)), (lam, to2.T))
+    drag = two.mu @ two.u_r
+    row((s, np.eye(1)), (u_r, -drag[None, :] / THETA))  # at the base point's M
+    whole = Subspace.from_kernel(np.vstack(rows))
+    return whole.project([*range(at[6]), at[7]])
+
+
+@pytest.mark.parametrize("kind", PAIRS)
+@few
+@given(seed=seeds)
+def test_a_joint_means_its_equations(kind, seed):
+    two = TwoBodies.draw(kind, seed)
+    system = two.system.fillings[Path.of("joint")]
+    for route in ("flat", "nested"):
+        relation = system.relation(route=route).at(
+            {"pe.q_r": two.x}, {Path.parse("mf"): np.append(two.u_r, 0.0)}
+        )
+        assert relation.dimension - 1 == 12
+        ours = _scaled(relation, two.of.dim)
+        assert ours.distance(joint_by_hand(two)) <= 1e-12
+
+
+def _scaled(relation, d):
+    """Coordinates (u_r, ṡ, f₁, f₂, e₁, e₂, 1) of a joint's relation, whose rates are sorted env.s, pe.q_r."""
+    n = 1 + d
+    order = [*range(1, n), 0, *range(n, n + 24)]
+    size = n + 25
+    move = np.zeros((size, size))
+    for i, j in enumerate(order):
+        move[i, j] = 1.0
+    move[-1, -1] = 1.0 / relation.unit
+    return relation.subspace.image(move)
+
+
+@pytest.mark.parametrize("kind", kinds())
+@few
+@given(seed=seeds)
+def test_the_constraint_row_as_it_is_printed_is_another_relation(kind, seed):
+    """With Ad_{o₁}, Ad_{o₂} in place of their inverses the joint would take power from nowhere."""
+    two = TwoBodies.draw(kind, seed)
+    back = SE3.adjoint(SE3.inverse(two.of.include(two.x)))
+    printed = np.hstack([back @ SE3.adjoint(two.offsets[0]), -SE3.adjoint(two.offsets[1]), two.of.basis])
+    # the rows as kernels on the efforts (u₁, u₂, u_r)
+    right, wrong = Subspace.from_kernel(two.rows), Subspace.from_kernel(printed)
+    assert right.distance(wrong) > 0.05
+    # flows from the correct row, efforts from the printed one: ⟨e|f⟩ does not vanish
+    lam = np.random.default_rng(seed).standard_normal(6)
+    worst = {
+        name: np.abs(space.basis.T @ (two.rows.T @ lam)).max()
+        for name, space in (("right", right), ("wrong", wrong))
+    }
+    assert worst["right"] <= 1e-13
+    assert worst["wrong"] > 0.05
+    # and the velocities of two bodies that move together do not satisfy it
+    moving = np.concatenate([two.twists, two.u_r])
+    assert np.abs(two.rows @ moving).max() <= 1e-13
+    assert np.abs(printed @ moving).max() > 0.05
+
+
+@pytest.mark.parametrize("kind", kinds())
+@few
+@given(seed=seeds)
+def test_the_flat_system_means_its_equations(kind, seed):
+    """q̇ᵢ = uᵢ, ṗ₁ = ad*p₁ − dV₁ − Ad*Ad*λ, ṗ₂ = ad*p₂ − dV₂ + Ad*λ, q̇_r = u_r, ṡ = μ(u_r, u_r)/θ₀."""
+    two = TwoBodies.draw(kind, seed)
+    relation = two.system.relation().at(two.state, two.efforts)
+    d = two.of.dim
+    # λ is free up to Bᵀλ = −dV_r − μ u_r: 6 − d of it remain, beside the constant
+    assert relation.dimension == 6 - d + 1
+    rng = np.random.default_rng(seed)
+    lam = -np.linalg.pinv(two.of.basis.T) @ (two.spring + two.mu @ two.u_r)
+    lam += (np.eye(6) - np.linalg.pinv(two.of.basis.T) @ two.of.basis.T) @ rng.standard_normal(6)
+    rates = {
+        "body1.pe.q": two.u1, "body2.pe.q": two.u2, "joint.pe.q_r": two.u_r,
+        "body1.ke.p": two.gyroscopic[0] - two.weight(0) - two.to_c1.T @ lam,
+        "body2.ke.p": two.gyroscopic[1] - two.weight(1) + two.to_c2.T @ lam,
+        "joint.env.s": [two.u_r @ two.mu @ two.u_r / THETA],
+    }  # fmt: skip
+    point = np.concatenate(
+        [*(np.atleast_1d(rates[str(path)]) for path, _ in relation.rates), [relation.unit]]
+    )
+    assert relation.subspace.contains(point) <= 1e-12
+    nested = two.system.relation(route="nested").at(two.state, two.efforts)
+    assert relation.distance(nested) <= 1e-12
+
+
+def test_a_universal_joint_is_two_revolutes_and_its_frame_is_massless():
+    cross = universal_joint(None, SE3.exp(np.array([np.pi / 2, 0, 0, 0, 0, 0])), None, [0.1, 0.2])
+    assert sorted(map(str, cross.pattern.boxes)) == ["first", "second"]
+    assert len(cross.flatten().pattern.boxes) == 14
+    flat, nested = (cross.relation(route=route).at() for route in ("flat", "nested"))
+    assert flat.distance(nested) <= 1e-13
+    with pytest.raises(StructureError, match="coupling"):
+        universal_joint(None, None, None, [[0.1, 0.1], [0.1, 0.2]])
+
+
+def test_a_spring_pulls_along_the_line_of_its_points():
+    spring = spring_damper([0.0, 0.0, 0.0], [0.0, 0.0, 0.0], 10.0, 0.5)
+    relation = spring.relation().at({"pe.q_r": [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 2.0]})
+    names = [str(path) for path, _ in relation.ports]
+    flows = relation.subspace.basis[7 : 7 + 12]
+    constant = (
+        flows @ relation.subspace.basis[-1] / (relation.subspace.basis[-1] @ relation.subspace.basis[-1])
+    )
+    pulls = dict(zip(names, np.split(constant * relation.unit, 2), strict=True))
+    # drawn from body 1 a wrench that pulls it to body 2 (z up), and the other way round; the frames are 2 m apart
+    assert np.allclose(pulls["p1"], [0, 0, 0, 0, 0, -15.0], atol=1e-10)
+    assert np.allclose(pulls["p2"], [0, 0, 0, 0, 0, 15.0], atol=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "key"),
+    [
+        ({"kind": "hinge"}, "kind"), ({"frame1": [1.0, 0, 0]}, "frame"), ({"frame2": {"at": [0, 0, 0]}}, "frame"),
+        ({"frame1": [2.0, 0, 0, 0, 0, 0, 0]}, "frame"), ({"stiffness": [1.0, 2.0]}, "stiffness"),
+        ({"friction": [[1.0, 0.0], [0.0, 1.0]]}, "friction"),
+    ],
+)  # fmt: skip
+def test_impossible_joints_are_refused(arguments, key):
+    with pytest.raises(StructureError, match=f"parameter {key} is"):
+        joint(**{"kind": "revolute", **arguments})
+
+
+def test_friction_that_is_no_friction_is_refused():
+    with pytest.raises(StructureError, match="negative eigenvalue"):
+        joint("revolute", friction=-0.1)
+    with pytest.raises(StructureError, match="Onsager symmetric"):
+        joint("cylindrical", friction=[[1.0, 0.5], [0.0, 1.0]])
+
+
+@few
+@given(seeds)
+def test_functions_of_the_user_mean_what_the_built_in_parts_mean(seed):
+    """A potential and a friction from Python functions, against the spring and the constant they equal."""
+    two = TwoBodies.draw("cylindrical", seed)
+    own = System.of(
+        mbs_pattern(),
+        {
+            "body1": rigid_body(two.masses[0], two.inertias[0], (0, 0, 0), potential=lambda q: float(-two.masses[0] * np.array([0.3, -0.2, -9.81]) @ q[4:])),
+            "body2": two.system.fillings[Path.of("body2")],
+            "joint": joint("cylindrical", *two.offsets, friction=lambda _x, _u, _theta: two.mu, potential=lambda x: 0.85 * float(x @ x)),
+        },
+    )  # fmt: skip
+    ours, theirs = (s.relation().at(two.state, two.efforts) for s in (own, two.system))
+    assert ours.unit == pytest.approx(theirs.unit, rel=1e-9)
+    scale = np.diag([*np.ones(ours.subspace.ambient - 1), ours.unit / theirs.unit])
+    assert ours.subspace.distance(theirs.subspace.image(scale)) <= 1e-9
+
+
+def test_friction_may_depend_on_the_temperature():
+    """μ(θ) = 0.1 θ is taken at the local temperature θ₀ + s.e."""
+    friction = joint("revolute", friction=lambda x, u, theta: [[0.1 * theta]], heat=True).fillings[
+        Path.of("mf")
+    ]
+    flow = friction.flow({Path.of("q_r"): np.zeros(1)}, np.array([2.0, 10.0]), Reference())
+    theta = THETA + 10.0
+    assert flow == pytest.approx([0.2 * theta, -0.4])

@@ -1,0 +1,233 @@
+"""Motions of mechanisms: the laws of every step, by the compiled natural method."""
+
+from dataclasses import replace
+from pathlib import Path as File
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, find, given, settings
+from hypothesis import strategies as st
+
+import ephs
+from benchmarks.cases import CASES
+from ephs.mechanics.build import initial_state, scene_system
+from ephs.mechanics.scene.model import frozen
+from ephs.mechanics.solve.integrate import METHODS
+from ephs.semantics import Reference
+from ephs.semantics.laws import Probe, system_law
+from ephs.semantics.natural import step
+from ephs.semantics.spaces import PAIRS
+from ephs.semantics.spaces.rotations import quaternion_to_matrix
+from ephs.testing import mechanisms
+
+SCENES = sorted((File(__file__).parents[2] / "scenes").glob("*.toml"))
+# what is slow is compiled once: the first example
+calm = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
+
+
+@settings(calm, max_examples=60)
+@given(mechanisms())
+def test_energy_positions_and_entropy_of_any_mechanism(scene):
+    """Energy to rounding, joints closed to rounding, no entropy destroyed, in each of some steps."""
+    sol = ephs.simulate(scene, 0.2, step=0.005)
+    assert sol.energy_error.max() <= 1e-12
+    assert sol.constraint_error.max() <= 1e-12
+    assert sol.stats["least_production"] >= 0.0
+    assert np.all(np.diff(sol.entropy) >= -1e-15 * np.abs(sol.entropy).max())
+
+
+@settings(calm, max_examples=25)
+@given(mechanisms(max_bodies=2))
+def test_both_routes_lead_to_the_relation_of_a_mechanism(scene):
+    system, world = scene_system(scene), scene.world
+    probe = Probe(system, initial_state(scene), reference=Reference(world.temperature, world.pressure))
+    for name in ("functoriality", "Tellegen"):
+        verdict = system_law(name)(probe)
+        assert verdict.holds, verdict
+
+
+@settings(calm, max_examples=5)
+@given(mechanisms(max_bodies=1, loops=False))
+def test_the_compiled_step_is_the_plain_step(scene):
+    system, world = scene_system(scene), scene.world
+    state = initial_state(scene)
+    reference = Reference(world.temperature, world.pressure)
+    plain, solved = step(system.flatten(), state, 0.01, reference)
+    compiled = ephs.simulate(scene, 0.01, step=0.01)
+    assert solved.residual < 1e-7
+    for name, _ in scene.all_bodies():
+        pose = plain[next(p for p in plain if str(p) == f"bodies.{name}.pe.q")]
+        sign = np.sign(pose[:4] @ compiled.body(name).quaternion[-1])
+        assert np.abs(sign * pose[:4] - compiled.body(name).quaternion[-1]).max() <= 1e-9
+        assert np.abs(pose[4:] - compiled.body(name).position[-1]).max() <= 1e-9
+
+
+def test_loops_and_all_pairs_and_heat_are_generated():
+    quick = settings(max_examples=3000, database=None, suppress_health_check=list(HealthCheck))
+    find(mechanisms(), lambda s: len(s.bodies) == 3 and "bar0" in s.bodies, settings=quick)
+    find(
+        mechanisms(),
+        lambda s: bool(s.thermal) and any(np.any(j.friction) for j in s.joints.values()),
+        settings=quick,
+    )
+    for kind in [*PAIRS, "universal"]:
+        find(
+            mechanisms(), lambda s, kind=kind: any(j.kind == kind for j in s.joints.values()), settings=quick
+        )
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("kind", [*PAIRS, "universal"])
+def test_every_pair_with_every_method(kind, method):
+    """One body on another on the ground, rubbing, heating a node: balances, closure, and order two."""
+    scenes = mechanisms(max_bodies=2, kinds=(kind,), loops=False)
+    quick = settings(
+        max_examples=500, database=None, derandomize=True, suppress_health_check=list(HealthCheck)
+    )
+    scene = find(
+        scenes, lambda s: len(s.bodies) == 2 and bool(s.thermal) and np.any(s.springs), settings=quick
+    )
+    ends = []
+    for h in (0.01, 0.005, 0.0025):
+        sol = ephs.simulate(scene, 0.2, method=method, step=h)
+        assert sol.energy_error.max() <= 1e-12
+        assert sol.constraint_error.max() <= 1e-12
+        assert sol.velocity_error.max() <= 1e-11
+        assert sol.stats["least_production"] >= 0.0
+        ends.append(np.concatenate([sol.body(name).position[-1] for name in scene.bodies]))
+    if kind == "fixed":  # nothing moves
+        assert np.abs(ends[0] - ends[2]).max() <= 1e-15
+        return
+    change = np.linalg.norm(ends[0] - ends[1]) / np.linalg.norm(ends[1] - ends[2])
+    assert np.log2(change) == pytest.approx(METHODS[method].order, abs=0.25)
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+def test_motions_converge_to_independent_references(case):
+    """Against states that two other programs agree upon: second order."""
+    errors = [
+        case.error(ephs.simulate(case.scene(), case.time, step=case.step / 2**k, save_at=[case.time]))
+        for k in (1, 2)
+    ]
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.1)
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+def test_balances_hold_over_a_thousand_steps_with_friction(case):
+    sol = ephs.simulate(case.with_friction(), 1000 * case.step, step=case.step)
+    assert sol.energy_error.max() <= 1e-11
+    assert sol.constraint_error.max() <= 1e-12
+    assert sol.stats["least_production"] >= 0.0
+
+
+def test_a_four_bar_passes_its_singular_configuration():
+    """All links in line, three equations dependent anyway: the exact motion goes on, and so does the computed one."""
+    case = next(c for c in CASES if c.name == "four-bar-windows-1")
+    sol = ephs.simulate(case.scene(), 5.0, step=0.005)
+    height = sol.body("coupler0").position[:, 1]
+    assert height.min() < 0.0 < height.max()
+    assert sol.energy_error.max() <= 1e-13
+    assert sol.constraint_error.max() <= 1e-12
+    assert case.error(sol) < 1e-3
+    assert sol.summary()["redundant_constraints"] == 3
+    assert sol.summary()["mobility"] == 1
+
+
+@pytest.mark.parametrize("file", SCENES, ids=lambda file: file.stem)
+def test_the_shipped_scenes_move(file):
+    sol = ephs.simulate(ephs.load(file), 0.5, step=1e-3)
+    assert sol.energy_error.max() <= 1e-12
+    assert sol.constraint_error.max() <= 1e-12
+    assert sol.stats["least_production"] >= 0.0
+
+
+# ---- reading motions -------------------------------------------------------------------------------------------
+
+
+@settings(calm, max_examples=15)
+@given(mechanisms())
+def test_reported_velocities_are_those_of_the_start(scene):
+    """Nothing is projected away where the state is consistent; rates and twists are what the scene gave."""
+    sol = ephs.simulate(scene, 0.01, step=0.01)
+    for name, body in scene.all_bodies():
+        assert np.abs(sol.body(name).twist[0] - body.twist).max() <= 1e-10 * max(
+            1.0, np.abs(body.twist).max()
+        )
+    for name, j in scene.all_joints():
+        assert np.abs(sol.joint(name).rate[0] - j.rate).max(initial=0.0) <= 1e-9 * max(
+            1.0, np.abs(j.rate).max(initial=0.0)
+        )
+    assert sol.velocity_error.max() <= 1e-11
+
+
+def test_wrenches_are_what_accelerates_the_bodies():
+    """Σ m (a − g) of a chain let go is the force of its first joint; an over-determined loop tells not all of its."""
+    scene = next(c for c in CASES if c.name == "spherical-chain-2").scene()
+    h = 1e-4
+    sol = ephs.simulate(scene, h, step=h)
+    first, second = scene.joints
+    total = np.zeros(3)
+    for name, body in reversed(scene.bodies.items()):
+        position = sol.body(name).position
+        total = total + body.mass * (2.0 * (position[1] - position[0]) / h**2 - scene.world.gravity)
+        of = second if name == list(scene.bodies)[-1] else first
+        axes = sol.body(name).rotation[0] @ quaternion_to_matrix(scene.joints[of].frame2[:4])
+        assert np.abs(axes @ sol.joint(of).wrench[0][3:] - total).max() < 1e-4
+        assert np.abs(sol.joint(of).wrench[0][:3]).max() < 1e-12
+    loop = ephs.simulate(next(c for c in CASES if c.name == "four-bar-windows-1").scene(), 0.01, step=0.01)
+    wrench = loop.joint("j0").wrench[0]
+    assert np.isnan(wrench).any()
+    assert np.isfinite(wrench[3:5]).all()
+
+
+def test_a_solution_gives_a_scene_to_start_from_again(tmp_path):
+    case = next(c for c in CASES if c.name == "revolute-chain-4")
+    scene = case.scene()
+    whole = ephs.simulate(scene, 0.4, step=0.002)
+    whole.save(tmp_path / "chain.nc")
+    again = ephs.load_solution(tmp_path / "chain.nc")
+    for name in scene.bodies:
+        assert np.array_equal(again.body(name).position, whole.body(name).position)
+        assert np.allclose(again.body(name).velocity, whole.body(name).velocity, rtol=0.0, atol=1e-13)
+    assert again.summary()["bodies"] == whole.summary()["bodies"]
+    second = ephs.simulate(scene.at(again, 0.2), 0.2, step=0.002)
+    # restarting projects the momenta, which moves them within the error of the method
+    assert np.abs(second.body("rod3").position[-1] - whole.body("rod3").position[-1]).max() < 1e-4
+
+
+def test_a_drive_accelerates_its_freedom_and_its_work_is_in_the_balance():
+    case = next(c for c in CASES if c.name == "revolute-chain-4")
+    scene = replace(case.scene(), world=replace(case.scene().world, gravity=frozen(np.zeros(3))))
+    name = next(iter(scene.joints))
+    for force in (0.5, lambda t: 0.5, lambda t, state: 0.5):
+        sol = ephs.simulate(scene, 0.05, step=0.001, inputs={f"joints.{name}": force})
+        assert sol.joint(name).rate[-1, 0] > 0.0
+        assert sol.work[-1] > 0.0
+        assert sol.energy_error.max() <= 1e-12
+        assert sol.work[-1] == pytest.approx(
+            0.5 * sol.joint(name).coordinate[-1, 0] - 0.5 * sol.joint(name).coordinate[0, 0], rel=1e-6
+        )
+
+
+def test_a_wrench_accelerates_its_body():
+    case = next(c for c in CASES if c.name == "tumbling-body")
+    scene = replace(
+        case.scene(), bodies={"body": replace(case.scene().bodies["body"], twist=frozen(np.zeros(6)))}
+    )
+    sol = ephs.simulate(scene, 1.0, step=0.01, inputs={"bodies.body": [0.0, 0.0, 0.0, 2.0, 0.0, 0.0]})
+    assert sol.body("body").position[-1] == pytest.approx([1.0, 0.0, 0.0], abs=1e-12)
+    assert sol.work[-1] == pytest.approx(2.0, abs=1e-12)
+
+
+def test_unknown_inputs_are_named():
+    case = next(c for c in CASES if c.name == "heavy-top")
+    with pytest.raises(ephs.AssemblyError, match=r"joints\.pin.*joints\.j0"):
+        ephs.simulate(case.scene(), 1.0, inputs={"joints.pin": 1.0})
+
+
+def test_too_large_a_step_is_refused_by_name():
+    """150 rad/s and 30 ms are more than half a turn."""
+    case = next(c for c in CASES if c.name == "heavy-top")
+    with pytest.raises(ephs.SimulationError, match=r"joints\.j0\.hc.*rotation of π.*below π") as caught:
+        ephs.simulate(case.scene(), 1.0, step=0.03)
+    assert caught.value.partial.t[-1] == caught.value.time < 1.0

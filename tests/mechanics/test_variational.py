@@ -1,0 +1,244 @@
+"""The variational formulation as an oracle: the same motion from an action, without patterns, ports or adjoints."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ephs.mechanics import rigid_body
+from ephs.mechanics.solve.instant import instant
+from ephs.operad import Path
+from ephs.semantics import Reference
+from ephs.semantics.descriptor import Input
+from ephs.semantics.spaces import SE3, SO3xR3
+from ephs.semantics.spaces.rotations import rotation_log
+from tests.mechanics.mechanisms import GRAVITY, TwoBodies, kinds
+
+seeds = st.integers(0, 2**20)
+few = settings(max_examples=10)
+
+
+def solved(two):
+    """Rates and multipliers of the composed system at its state."""
+    descriptor = two.system.descriptor()
+    state = two.system.state(two.state)
+    return instant(descriptor, Reference(), descriptor.pack(state))
+
+
+@pytest.mark.parametrize("kind", kinds())
+@few
+@given(seed=seeds)
+def test_the_weak_form_holds(kind, seed):
+    """Lagrange–d'Alembert–Pontryagin on the variations that the joint allows; no multiplier in it."""
+    two = TwoBodies.draw(kind, seed)
+    now = solved(two)
+    rates = {str(path): rate for path, rate in now.rates.items()}
+    gyroscopic = two.gyroscopic
+    residual = np.concatenate(
+        [
+            rates["body1.ke.p"] - gyroscopic[0] + two.weight(0),
+            rates["body2.ke.p"] - gyroscopic[1] + two.weight(1),
+            two.spring + two.mu @ two.u_r,
+        ]
+    )
+    terms = np.concatenate(
+        [
+            np.abs(rates["body1.ke.p"]) + np.abs(gyroscopic[0]),
+            np.abs(rates["body2.ke.p"]) + np.abs(gyroscopic[1]),
+            np.abs(two.spring),
+        ]
+    )
+    _, _, vt = np.linalg.svd(two.rows)
+    variations = vt[np.linalg.matrix_rank(two.rows) :]
+    assert variations.shape[0] == 6 + two.of.dim
+    assert np.abs(variations @ residual).max() <= 1e-11 * max(1.0, terms.max())
+
+
+@pytest.mark.parametrize("kind", kinds())
+@few
+@given(seed=seeds)
+def test_velocities_stay_on_the_constraint(kind, seed):
+    """C u̇ + Ċ u = 0, with Ċ from differences of the poses' own rows."""
+    two = TwoBodies.draw(kind, seed)
+    now = solved(two)
+    rates = {str(path): rate for path, rate in now.rates.items()}
+    accelerations = [np.linalg.solve(m, rates[f"body{i + 1}.ke.p"]) for i, m in enumerate(two.metric)]
+    h = 1e-4
+
+    def slack(t):
+        x = two.of.manifold.retract(two.x, t * two.u_r)
+        first = SE3.adjoint(SE3.inverse(SE3.compose(two.offsets[0], two.of.include(x))))
+        moved = first @ (two.u1 + t * accelerations[0]) - two.to_c2 @ (two.u2 + t * accelerations[1])
+        outside = np.eye(6) - two.of.basis @ np.linalg.pinv(two.of.basis)
+        return outside @ moved
+
+    change = (8.0 * (slack(h) - slack(-h)) - (slack(2 * h) - slack(-2 * h))) / (12.0 * h)
+    assert np.abs(change).max() <= 1e-8 * max(1.0, *(np.abs(a).max() for a in accelerations))
+
+
+@pytest.mark.parametrize("kind", kinds())
+@pytest.mark.parametrize("seed", [1, 2])
+def test_an_independent_lagrangian_gives_the_same_accelerations(kind, seed):
+    """L(z, ż) = T − V from poses alone, in minimal coordinates; Euler and Lagrange by differences.
+
+    Neither ad nor C occurs in it: signs in gyroscopic forces, offsets and constraints are all caught at once.
+    """
+    two = TwoBodies.draw(kind, seed)
+    now = solved(two)
+    acceleration = np.linalg.solve(
+        two.metric[0], dict((str(p), r) for p, r in now.rates.items())["body1.ke.p"]
+    )
+    n = 6 + two.of.dim
+    rate = np.concatenate([two.u1, two.u_r])
+
+    def poses(z):
+        q1, q2, x = two.coordinates_from(z[:6], z[6:])
+        return (q1, q2), x
+
+    def lagrangian(z, w):
+        """Kinetic energy from the change of the poses along w, potential energies from the poses."""
+        h = 2e-3
+        value = 0.0
+        ahead, behind = poses(z + h * w)[0], poses(z - h * w)[0]
+        further, before = poses(z + 2 * h * w)[0], poses(z - 2 * h * w)[0]
+        here, x = poses(z)
+        for i in range(2):
+            # twist = d/dt log(q(0)⁻¹ q(t)) at 0, by differences of sixth order in effect through oddness
+            near = 0.5 * (_increment(here[i], ahead[i]) - _increment(here[i], behind[i]))
+            far = 0.5 * (_increment(here[i], further[i]) - _increment(here[i], before[i]))
+            u = (8.0 * near - far) / (6.0 * h)
+            value += 0.5 * u @ two.metric[i] @ u + two.masses[i] * GRAVITY @ here[i][4:]
+        return value - 0.5 * float(two.stiffness @ _square(two, x))
+
+    d = 4e-3
+    eye = np.eye(n)
+
+    def gradient(f):
+        """∂f at 0, fourth order."""
+        return np.array(
+            [(8.0 * (f(d * e) - f(-d * e)) - (f(2 * d * e) - f(-2 * d * e))) / (12.0 * d) for e in eye]
+        )
+
+    # L is quadratic in ż up to the rounding of differences: second differences in ż are exact
+    zero = np.zeros(n)
+    mass = np.array(
+        [
+            [
+                lagrangian(zero, a + b) - lagrangian(zero, a) - lagrangian(zero, b) + lagrangian(zero, zero)
+                for b in eye
+            ]
+            for a in eye
+        ]
+    )
+
+    def momentum(z):
+        return np.array([0.5 * (lagrangian(z, rate + e) - lagrangian(z, rate - e)) for e in eye])
+
+    # ṗ along ż less ∂L/∂z plus friction = 0
+    drift = (
+        8.0 * (momentum(d * rate) - momentum(-d * rate)) - (momentum(2 * d * rate) - momentum(-2 * d * rate))
+    ) / (12.0 * d)
+    force = gradient(lambda z: lagrangian(z, rate))
+    friction = np.concatenate([np.zeros(6), two.mu @ two.u_r])
+    found = np.linalg.solve(mass, force - drift - friction)
+    # at the origin of exponential coordinates u̇ = z̈
+    assert np.abs(found[:6] - acceleration).max() <= 2e-5 * max(1.0, np.abs(acceleration).max())
+
+
+def _increment(here, there):
+    return SE3.log(SE3.compose(SE3.inverse(here), there))
+
+
+def _square(two, x):
+    if two.of.name == "spherical":
+        return rotation_log(x) ** 2
+    return x * x
+
+
+@few
+@given(seeds)
+def test_variations_of_velocities(seed):
+    """δu = η̇ + ad_u η on a surface of poses q(t, s), for both groups."""
+    rng = np.random.default_rng(seed)
+    for space in (SE3, SO3xR3):
+        a, b, c, q0 = (
+            rng.standard_normal(6),
+            rng.standard_normal(6),
+            rng.standard_normal(6),
+            space.random(rng),
+        )
+
+        def pose(t, s, space=space, a=a, b=b, c=c, q0=q0):
+            return space.compose(
+                space.compose(q0, space.exp(t * a + s * b)), space.exp(t * s * c + t * t * b)
+            )
+
+        h = 1e-3
+
+        def twist(t, s, space=space, pose=pose):
+            return (
+                space.increment(pose(t, s), pose(t + h, s)) - space.increment(pose(t, s), pose(t - h, s))
+            ) / (2 * h)
+
+        def variation(t, s, space=space, pose=pose):
+            return (
+                space.increment(pose(t, s), pose(t, s + h)) - space.increment(pose(t, s), pose(t, s - h))
+            ) / (2 * h)
+
+        t, s = 0.2, -0.1
+        change = (twist(t, s + h) - twist(t, s - h)) / (2 * h)
+        expected = (variation(t + h, s) - variation(t - h, s)) / (2 * h) + space.ad(twist(t, s)) @ variation(
+            t, s
+        )
+        assert np.abs(change - expected).max() <= 2e-4 * max(1.0, np.abs(expected).max())
+
+
+@few
+@given(seeds)
+def test_the_thermodynamic_constraint(seed):
+    """∂L/∂s = −θ₀, so that θ₀ ṡ = μ(u_r, u_r)."""
+    two = TwoBodies.draw("cylindrical", seed)
+    rates = {str(path): rate for path, rate in solved(two).rates.items()}
+    assert Reference().temperature * rates["joint.env.s"][0] == pytest.approx(
+        two.u_r @ two.mu @ two.u_r, rel=1e-10
+    )
+
+
+@pytest.mark.parametrize("kind", kinds())
+@few
+@given(seed=seeds)
+def test_joint_forces_act_and_react(kind, seed):
+    """The composite moves as its bodies would alone under the wrenches −Ad*Ad*λ and Ad*λ of the joint."""
+    two = TwoBodies.draw(kind, seed)
+    now = solved(two)
+    lam = now.multiplier(Path.parse("joint.hc"))
+    assert np.all(np.isfinite(lam))
+    for i, wrench in enumerate((-two.to_c1.T @ lam, two.to_c2.T @ lam)):
+        body = rigid_body(two.masses[i], two.inertias[i], GRAVITY)
+        descriptor = body.descriptor()
+        own = {
+            name.removeprefix(f"body{i + 1}."): value
+            for name, value in two.state.items()
+            if name.startswith(f"body{i + 1}")
+        }
+        alone = instant(
+            descriptor, Reference(), descriptor.pack(body.state(own)), {Path.of("p"): Input(wrench, False)}
+        )
+        here, there = alone.rates[Path.parse("ke.p")], now.rates[Path.parse(f"body{i + 1}.ke.p")]
+        assert np.abs(here - there).max() <= 1e-10 * max(1.0, np.abs(there).max(), np.abs(lam).max())
+
+
+@few
+@given(seeds)
+def test_momentum_of_the_whole_changes_by_gravity_alone(seed):
+    """Σ Ad*_{q⁻¹} p: joint wrenches cancel where the joint is closed."""
+    two = TwoBodies.draw("spherical", seed)
+    rates = {str(path): rate for path, rate in solved(two).rates.items()}
+    total, expected, size = np.zeros(6), np.zeros(6), 0.0
+    for i, (q, u) in enumerate(((two.q1, two.u1), (two.q2, two.u2))):
+        back = SE3.adjoint(SE3.inverse(q)).T
+        term = rates[f"body{i + 1}.ke.p"] - SE3.ad(u).T @ (two.metric[i] @ u)
+        total += back @ term
+        expected -= back @ two.weight(i)
+        size += np.abs(back).sum() * np.abs(term).max()
+    assert np.abs(total - expected).max() <= 1e-12 * size
