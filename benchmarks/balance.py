@@ -9,7 +9,7 @@ STEPS = 10_000
 def table() -> str:
     """The measurement as a table."""
     lines = [
-        "| scene | friction | steps | h [s] | energy error | position residual | least entropy production [J/K] | µs/step |",
+        "| scene | friction | steps | h [s] | energy error | position residual | least entropy made [J/K] | µs/step |",
         "| --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for case in CASES:

@@ -69,7 +69,7 @@ _HOMES = {
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 _PACKAGES = ("mechanics", "operad", "semantics", "show", "testing")
 
-__all__ = sorted([*_HOME, *_PACKAGES])
+__all__ = sorted([*_HOME, *_PACKAGES])  # pyright: ignore[reportUnsupportedDunderAll] - the names above
 
 try:
     __version__ = version("ephs")

@@ -310,6 +310,4 @@ def test_help_needs_neither_numpy_nor_the_rooms_below(command):
 @pytest.mark.parametrize("command", [cli.run, cli.check, cli.draw])
 def test_every_option_is_explained(command):
     documented = re.findall(r"^ {4}(\w+)$", command.__doc__, flags=re.MULTILINE)
-    assert [name for name in documented if name != "Parameters"] == list(
-        inspect.signature(command).parameters
-    )
+    assert [name for name in documented if name != "Parameters"] == list(inspect.signature(command).parameters)

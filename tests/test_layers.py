@@ -131,16 +131,11 @@ def test_an_import_downwards_is_allowed(module, source):
 
 def test_the_syntax_needs_no_numpy():
     for file in (ROOT / "ephs" / "operad").rglob("*.py"):
-        names = [
-            name
-            for _, name in imported(ast.parse(file.read_text(encoding="utf-8")), module_name(file), False)
-        ]
+        names = [name for _, name in imported(ast.parse(file.read_text(encoding="utf-8")), module_name(file), False)]
         assert not [name for name in names if within(name, "numpy")], file
 
 
 def test_import_loads_nothing_heavy():
     script = f"import sys, ephs; print(*[name for name in {HEAVY!r} if name in sys.modules])"
-    done = subprocess.run(
-        [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True
-    )
+    done = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True)
     assert done.stdout.split() == []

@@ -75,9 +75,7 @@ def dataclass_faults(node: ast.ClassDef) -> list[str]:
             continue
         keywords = decorator.keywords if isinstance(decorator, ast.Call) else []
         switched_on = {k.arg for k in keywords if isinstance(k.value, ast.Constant) and k.value.value is True}
-        wanted = (
-            {"slots"} if node.name.startswith("_") else {"frozen", "slots"}
-        )  # a private one may accumulate
+        wanted = {"slots"} if node.name.startswith("_") else {"frozen", "slots"}  # a private one may accumulate
         if missing := wanted - switched_on:
             return [f"dataclass without {', '.join(sorted(missing))}"]
     return []

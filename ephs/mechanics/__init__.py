@@ -25,7 +25,7 @@ _HOME = {
     "universal_joint": "ephs.mechanics.joints",
 }
 
-__all__ = sorted(_HOME)
+__all__ = sorted(_HOME)  # pyright: ignore[reportUnsupportedDunderAll] - the names above
 
 
 def __getattr__(name: str) -> Any:

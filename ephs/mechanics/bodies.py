@@ -66,9 +66,7 @@ def rigid_body(
             "parameter", "rigid_body", key="group", found=group, expected=" or ".join(components.POSES)
         )
     if weight.shape != (3,) or not np.all(np.isfinite(weight)):
-        raise StructureError(
-            "parameter", "rigid_body", key="gravity", found=gravity, expected="3 finite numbers"
-        )
+        raise StructureError("parameter", "rigid_body", key="gravity", found=gravity, expected="3 finite numbers")
     q, p = components.POSES[group], components.MOMENTA[group]
     if potential is not None:
         given = potential
@@ -104,9 +102,7 @@ def _inertia(mass: float, inertia: "ArrayLike") -> Array:
     if not least > 0.0:
         raise _bad("inertia", tensor.tolist(), f"positive principal moments; the least is {least:.6g}")
     if most > (least + middle) * (1.0 + 1e-9):
-        raise _bad(
-            "inertia", tensor.tolist(), f"principal moments with {most:.6g} ≤ {least:.6g} + {middle:.6g}"
-        )
+        raise _bad("inertia", tensor.tolist(), f"principal moments with {most:.6g} ≤ {least:.6g} + {middle:.6g}")
     return tensor
 
 

@@ -2,7 +2,8 @@
 
 Boxes are ``bodies.NAME``, ``joints.NAME``, ``springs.NAME``, ``thermal.NAME``, ``conduction.NAME``, ``parts.NAME``,
 ``ground`` and ``environment``; they meet at the junctions ``momenta.BODY`` and ``entropies.NODE``. A driven joint's
-momentum is the outer port ``drives.JOINT``. What a part exposes is joined at ``part_momenta.PART.BODY`` and so on.
+momentum is the outer port ``drives.JOINT``. What a part exposes is joined at ``momenta.PART.BODY`` and so on; a part's
+name is not taken by anything else of its level, so these never clash.
 """
 
 from collections.abc import Iterable, Mapping
@@ -78,9 +79,7 @@ def initial_state(scene: Scene) -> dict[Path, Array]:
         at = component_path("joints", name)
         halves = [(at, np.array(j.coordinate))]
         if j.middle is not None:
-            halves = [
-                (at / part, j.coordinate[i : i + 1].copy()) for i, part in enumerate(("first", "second"))
-            ]
+            halves = [(at / part, j.coordinate[i : i + 1].copy()) for i, part in enumerate(("first", "second"))]
         for place, value in halves:
             out[place / "pe" / "q_r"] = value
             if j.heat == ENVIRONMENT:
@@ -118,7 +117,7 @@ def _is_driven(j: Joint) -> bool:
 
 
 def _at(group: str, name: str) -> Path:
-    return Path([group, name] if "." not in name else ["part_" + group, *name.split(".")])
+    return Path([group, *name.split(".")])
 
 
 def _levels(scene: Scene, prefix: Path = Path()) -> Iterable[tuple[Path, Scene]]:  # noqa: B008 - a frozen value
@@ -227,13 +226,12 @@ def _joined(b: _Builder, part: str, port: Path, of: Quantity) -> str:
     group, *rest = tuple(port)
     if rest == [GROUND]:
         return b.momentum(GROUND)
-    group = group.removeprefix("part_")
     name = ".".join([part, *rest])
     if group == "momenta":
         return b.momentum(name)
     if group == "entropies":
         return b.entropy(name)
-    return b.drive(Path(["part_drives", part, *rest]), of)
+    return b.drive(Path(["drives", part, *rest]), of)
 
 
 def _demands_on_parts(scene: Scene, demands: _Demands) -> _Demands:
@@ -256,12 +254,8 @@ def _body(body: Body, gravity: Array) -> System:
 def _joint(j: Joint, *, driven: bool) -> System:
     heat = j.heat != ENVIRONMENT
     if j.middle is not None:
-        return universal_joint(
-            j.frame1, j.middle, j.frame2, j.friction, j.stiffness, j.rest, heat=heat, driven=driven
-        )
-    return joint(
-        j.kind, j.frame1, j.frame2, j.friction, j.stiffness, j.rest, pitch=j.pitch, heat=heat, driven=driven
-    )
+        return universal_joint(j.frame1, j.middle, j.frame2, j.friction, j.stiffness, j.rest, heat=heat, driven=driven)
+    return joint(j.kind, j.frame1, j.frame2, j.friction, j.stiffness, j.rest, pitch=j.pitch, heat=heat, driven=driven)
 
 
 def _spring(s: Spring) -> System:

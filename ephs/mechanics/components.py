@@ -131,9 +131,7 @@ def pair_spring(of: Pair, stiffness: Array, rest: Array) -> Storage:
                 "parameter", of.name, key="stiffness", found=k.tolist(), expected="equal for rotations"
             )
         if np.any(zero[:3]):
-            raise StructureError(
-                "parameter", of.name, key="rest", found=zero.tolist(), expected="0 for rotations"
-            )
+            raise StructureError("parameter", of.name, key="rest", found=zero.tolist(), expected="0 for rotations")
 
     def energy(x: Point) -> float:
         off = of.coordinates(x[at]) - zero
@@ -210,9 +208,7 @@ def lie_poisson(group: str = "SE3") -> Reversible:
         return np.array(columns).T, np.zeros((0, 6))
 
     name = "lie_poisson" if group == "SE3" else "direct_lie_poisson"
-    return Reversible(
-        "lie_poisson", power_ports(p=MOMENTA[group]), structure, reads=(p,), kernel=Kernel(KERNELS, name)
-    )
+    return Reversible("lie_poisson", power_ports(p=MOMENTA[group]), structure, reads=(p,), kernel=Kernel(KERNELS, name))
 
 
 def frame_change(offset: Array, inner: str, outer: str) -> Reversible:

@@ -3,6 +3,9 @@
 Signature and layout as in `ephs.semantics.kernel_table`. Scratch memory comes from the caller.
 """
 
+# numba infers the types of these functions, and exports what it does not list.
+# pyright: basic, reportPrivateImportUsage=false
+
 import numba as nb
 
 from ephs.semantics.spaces import jit

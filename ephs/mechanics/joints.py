@@ -147,9 +147,7 @@ def spring_damper(
     """
     free = pair("free")
     spring = components.point_spring(stiffness, length)
-    damper = (
-        components.point_damper(damping) if damping else components.joint_friction(free, np.zeros((6, 6)))
-    )
+    damper = components.point_damper(damping) if damping else components.joint_friction(free, np.zeros((6, 6)))
     frames = [np.concatenate([[1.0, 0.0, 0.0, 0.0], np.asarray(at, dtype=float)]) for at in (at1, at2)]
     return _joint(free, frames[0], frames[1], spring, damper, heat, False)
 
@@ -269,9 +267,7 @@ def _vector(of: Pair, key: str, given: "ArrayLike") -> Array:
     value = np.asarray(given, dtype=float)
     if value.shape not in ((), (of.dim,)) or not np.all(np.isfinite(value)):
         expected = f"a number or {of.dim} numbers"
-        raise StructureError(
-            "parameter", f"joint {of.name}", key=key, found=value.tolist(), expected=expected
-        )
+        raise StructureError("parameter", f"joint {of.name}", key=key, found=value.tolist(), expected=expected)
     return np.broadcast_to(value, (of.dim,))
 
 

@@ -3,6 +3,9 @@
 Signature and layout as in `ephs.semantics.kernel_table`. Scratch memory comes from the caller.
 """
 
+# numba infers the types of these functions, and exports what it does not list.
+# pyright: basic, reportPrivateImportUsage=false
+
 import math
 
 import numba as nb
@@ -17,9 +20,7 @@ kernel = jit.kernel
 def rotation_coefficients(square):
     """β, γ and their derivatives divided by θ, of θ²: V(ω) = 1 + β ω̃ + γ ω̃²."""
     if square < 0.04:
-        beta = 0.5 - square * (
-            1.0 / 24.0 - square * (1.0 / 720.0 - square * (1.0 / 40320.0 - square / 3628800.0))
-        )
+        beta = 0.5 - square * (1.0 / 24.0 - square * (1.0 / 720.0 - square * (1.0 / 40320.0 - square / 3628800.0)))
         gamma = 1.0 / 6.0 - square * (
             1.0 / 120.0 - square * (1.0 / 5040.0 - square * (1.0 / 362880.0 - square / 39916800.0))
         )
@@ -56,10 +57,7 @@ def transposed_jacobian(omega, a, out, slope):
             if i == k:
                 double += dot
             slope[i, k] = (
-                -beta * turn
-                + gamma * double
-                - beta_slope * omega[k] * first[i]
-                + gamma_slope * omega[k] * second[i]
+                -beta * turn + gamma * double - beta_slope * omega[k] * first[i] + gamma_slope * omega[k] * second[i]
             )
 
 

@@ -207,9 +207,7 @@ class SceneMotion:
         for name in heavy:
             body = self._bodies[name]
             p = self._solution[component_path("bodies", name) / "ke" / "p"]
-            twists[name] = np.column_stack(
-                [np.linalg.solve(body.inertia, p[:, :3].T).T, p[:, 3:] / body.mass]
-            )
+            twists[name][:] = np.column_stack([np.linalg.solve(body.inertia, p[:, :3].T).T, p[:, 3:] / body.mass])
             sigma, vectors = np.linalg.eigh(body.inertia)
             half = np.zeros((6, 6))
             half[:3, :3] = (vectors / np.sqrt(sigma)) @ vectors.T
@@ -355,13 +353,9 @@ class SceneMotion:
         }
 
 
-def _project(
-    known: Array, unknown: Array, right: Array, twists: Array, roots: list[Array]
-) -> tuple[Array, Array]:
+def _project(known: Array, unknown: Array, right: Array, twists: Array, roots: list[Array]) -> tuple[Array, Array]:
     """Twists nearest to the given ones in the mass metric with known·u + unknown·r = right, and such r."""
-    inverse_of_unknown = (
-        np.linalg.pinv(unknown, rcond=RANK) if unknown.shape[2] else np.zeros(unknown.shape).mT
-    )
+    inverse_of_unknown = np.linalg.pinv(unknown, rcond=RANK) if unknown.shape[2] else np.zeros(unknown.shape).mT
     whitened = np.zeros_like(known)
     for i, root in enumerate(roots):
         where = slice(6 * i, 6 * i + 6)

@@ -27,8 +27,6 @@ STEPS = 1000
 """Number of steps where neither a step nor anything else says how many."""
 FORMS = ("paper", "folded", "reduced")
 
-InputFunction = Callable[..., "ArrayLike"]
-
 
 def simulate(
     model: System | Scene,
@@ -92,9 +90,7 @@ def simulate(
     if form not in FORMS:
         raise ValueError(f"form is {form!r}, expected one of {', '.join(FORMS)}")
     if form == "folded":
-        raise ValueError(
-            f"form is 'folded', which the method {chosen} does not solve; expected paper or reduced"
-        )
+        raise ValueError(f"form is 'folded', which the method {chosen} does not solve; expected paper or reduced")
     for name, value in (("events", events), ("options", options)):
         if value:
             raise ValueError(f"{name} is {value!r}: the method {chosen} takes none")
@@ -105,11 +101,7 @@ def simulate(
     else:
         problem = problem_of_system(model, initial, inputs, reference)
     span = float(until) - float(t0)
-    h = (
-        float(step)
-        if step is not None
-        else min(span / STEPS, float(max_step) if max_step is not None else np.inf)
-    )
+    h = float(step) if step is not None else min(span / STEPS, float(max_step) if max_step is not None else np.inf)
     return integrate(
         problem,
         Grid(float(t0), float(until), h),
@@ -190,9 +182,10 @@ def signal(value: Any, *, effort: bool) -> Signal:
     """A signal from a constant, f(t), or f(t, state)."""
     if not callable(value):
         return Signal(np.atleast_1d(np.asarray(value, dtype=float)), effort)
-    if _takes_state(value):
-        return Signal(value, effort)
-    return Signal(lambda t, _state: value(t), effort)
+    function: Any = value
+    if _takes_state(function):
+        return Signal(function, effort)
+    return Signal(lambda t, _state: function(t), effort)
 
 
 def _takes_state(function: Callable[..., Any]) -> bool:
@@ -252,7 +245,5 @@ def _times(save_at: "ArrayLike | None", t0: float, until: float) -> Array | None
     if times.ndim != 1 or not np.all(np.isfinite(times)) or np.any(np.diff(times) <= 0.0):
         raise ValueError(f"save_at is {save_at!r}, expected ascending times in s")
     if times.size and not (t0 <= times[0] and times[-1] <= until):
-        raise ValueError(
-            f"save_at goes from {times[0]!r} to {times[-1]!r} s, expected times in [{t0!r}, {until!r}]"
-        )
+        raise ValueError(f"save_at goes from {times[0]!r} to {times[-1]!r} s, expected times in [{t0!r}, {until!r}]")
     return times

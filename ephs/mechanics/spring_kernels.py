@@ -3,6 +3,9 @@
 Signature and layout as in `ephs.semantics.kernel_table`. Their slopes only steer Newton's method: differences do.
 """
 
+# numba infers the types of these functions, and exports what it does not list.
+# pyright: basic, reportPrivateImportUsage=false
+
 import math
 
 import numba as nb
@@ -55,7 +58,7 @@ def _coordinate_spring(code, stiffness, rest, x, step, effort, work):
         effort[0] = stiffness[0] * (0.5 * (x[0] + end[0]) - rest[0])
         effort[1] = sine * (cos * pull[0] + sin * pull[1])
         effort[2] = sine * (cos * pull[1] - sin * pull[0])
-    elif code == SO3 or code == SE3:
+    elif code in (SO3, SE3):
         energy = _rotation_spring(stiffness[0], x, step, effort)
         if code == SE3:
             for i in range(3):

@@ -49,16 +49,12 @@ class Directory(Mapping[Path, T_co]):
     _items: dict[Path, T_co]
 
     def __init__(self, entries: "Entries[T_co]" = (), *, what: str = "directory") -> None:
-        pairs = cast(
-            "Iterable[tuple[PathLike, T_co]]", entries.items() if isinstance(entries, Mapping) else entries
-        )
+        pairs = cast("Iterable[tuple[PathLike, T_co]]", entries.items() if isinstance(entries, Mapping) else entries)
         items: dict[Path, T_co] = {}
         for key, value in pairs:
             path = Path.of(key)
             if path in items:
-                raise PatternError(
-                    "duplicate", found=str(path), expected="expected each path once", what=what
-                )
+                raise PatternError("duplicate", found=str(path), expected="expected each path once", what=what)
             items[path] = value
         # In the order of tuples the continuations of a path follow it at once.
         for path, following in pairwise(sorted(items)):
@@ -90,9 +86,7 @@ class Directory(Mapping[Path, T_co]):
 
     def __eq__(self, other: object) -> bool:
         return (
-            self._items == cast("Directory[object]", other)._items
-            if isinstance(other, Directory)
-            else NotImplemented
+            self._items == cast("Directory[object]", other)._items if isinstance(other, Directory) else NotImplemented
         )
 
     def __hash__(self) -> int:
@@ -125,9 +119,7 @@ class Directory(Mapping[Path, T_co]):
     def below(self, prefix: PathLike) -> "Directory[T_co]":
         """The entries at or below a path, named relative to it; empty if there are none."""
         top = Path.of(prefix)
-        return Directory(
-            [(path.relative_to(top), value) for path, value in self.items() if top.is_prefix_of(path)]
-        )
+        return Directory([(path.relative_to(top), value) for path, value in self.items() if top.is_prefix_of(path)])
 
     def merge(self, other: "Directory[S]") -> "Directory[T_co | S]":
         """The entries of both, which must not clash."""

@@ -7,8 +7,7 @@ __all__ = ["PatternError"]
 _TEXTS = {
     "name": "the name {found!r} cannot stand in a path: {expected}; choose another name",
     "path": "{found!r} is no path; expected {expected}",
-    "prefix": "{what}: the paths {found} clash, as one is a prefix of the other; {expected};"
-    " rename one of them",
+    "prefix": "{what}: the paths {found} clash, as one is a prefix of the other; {expected}; rename one of them",
     "duplicate": "{what}: the path {found} is given twice; {expected}; rename one of them",
     "p5": "box {box} and junction {junction} clash: one path is a prefix of the other, so that"
     " substitution could name two junctions alike; rename one of them",
@@ -17,13 +16,11 @@ _TEXTS = {
     "root-rename": "box .: an identity pattern cannot be renamed, found new names for {found}; rename the"
     " filling, or write the renaming pattern with a named box",
     "root-junction": "junction .: a junction at the root path is a prefix of every box; give it a name",
-    "root-port": "box {box}, port {port}: a port at the root path could name no junction of a filling;"
-    " give it a name",
+    "root-port": "box {box}, port {port}: a port at the root path could name no junction of a filling; give it a name",
     "junction-type": "junction {junction}: found {found}, expected {expected}",
     "box-type": "box {box}: found {found}, expected {expected}",
     "port-type": "box {box}, port {port}: found {found}, expected {expected}",
-    "unknown-junction": "box {box}, port {port}: there is no junction {junction}; the junctions are"
-    " {expected}",
+    "unknown-junction": "box {box}, port {port}: there is no junction {junction}; the junctions are {expected}",
     "no-inner-port": "junction {junction} ({found}) has no inner port; expected at least one port of a box on"
     " it. Connect a port or remove the junction. To pass an outer port through, or to hand it out twice, fork"
     " outside: expose it once and connect both users where the pattern is used",

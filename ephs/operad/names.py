@@ -32,9 +32,7 @@ class Path(tuple[str, ...]):
         if isinstance(names, Path):
             return names
         if isinstance(names, str):
-            raise PatternError(
-                "path", found=names, expected="a sequence of names; Path.parse reads dotted names"
-            )
+            raise PatternError("path", found=names, expected="a sequence of names; Path.parse reads dotted names")
         parts = tuple(names)
         for part in parts:
             _check(part)

@@ -150,9 +150,7 @@ class Pattern:
         require_named_boxes(wired)
         self._set(found, wired, read_links(links, found))
 
-    def _set(
-        self, junctions: Directory[Junction], boxes: Directory[Box], links: Iterable[Iterable[Path]]
-    ) -> None:
+    def _set(self, junctions: Directory[Junction], boxes: Directory[Box], links: Iterable[Iterable[Path]]) -> None:
         from ephs.operad.wellformed import require_pattern
 
         classes = require_pattern(junctions, boxes, links)
@@ -296,7 +294,7 @@ class Pattern:
 
         return summary(self)
 
-    def _repr_svg_(self) -> str:
+    def _repr_svg_(self) -> str:  # pyright: ignore[reportUnusedFunction] - notebooks call it
         from ephs.show import draw
 
         return draw(self).svg
@@ -324,8 +322,6 @@ def _boxes_to_fill(mapping: Mapping[Any, Any] | None, named: Mapping[str, Any]) 
     for name, filling in pairs:
         path = Path.of(name)
         if path in out:
-            raise PatternError(
-                "duplicate", found=str(path), expected="expected each box once", what="fillings"
-            )
+            raise PatternError("duplicate", found=str(path), expected="expected each box once", what="fillings")
         out[path] = filling
     return out

@@ -202,9 +202,5 @@ def _pair(kind: str, parameters: dict[str, float]) -> tuple[int, int, tuple[tupl
 
 quantity = Quantities()
 _WORDS: MappingProxyType[Quantity, str] = MappingProxyType(
-    {
-        value: word
-        for word in Quantities.__dataclass_fields__
-        if isinstance(value := getattr(quantity, word), Quantity)
-    }
+    {value: word for word in Quantities.__dataclass_fields__ if isinstance(value := getattr(quantity, word), Quantity)}
 )

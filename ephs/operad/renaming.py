@@ -34,9 +34,7 @@ def rename(
         wired.append((new_box[box], Directory(moved, what=f"ports of box {new_box[box]}")))
     # Pairs, not dictionaries: two names that become one must be seen.
     return Pattern(
-        Directory(
-            [(new_junction[path], value) for path, value in pattern.junctions.items()], what="junctions"
-        ),
+        Directory([(new_junction[path], value) for path, value in pattern.junctions.items()], what="junctions"),
         Directory(wired, what="boxes"),
         [[new_junction[path] for path in group] for group in pattern.links],
     )

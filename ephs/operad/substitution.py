@@ -76,9 +76,7 @@ def _tidied(junctions: Mapping[Path, Junction], wires: Wires, links: Iterable[tu
     return _checked(kept, {box: box_of(ports, kept) for box, ports in redirected}, remaining)
 
 
-def _representative(
-    members: frozenset[Path], bearing: frozenset[Path], junctions: Mapping[Path, Junction]
-) -> Path:
+def _representative(members: frozenset[Path], bearing: frozenset[Path], junctions: Mapping[Path, Junction]) -> Path:
     if power := members & bearing:
         return min(power)
     if exposed := [path for path in members if junctions[path].exposed]:
@@ -87,9 +85,7 @@ def _representative(
 
 
 def _redirect(ports: Mapping[Path, Port], moved: Mapping[Path, Path]) -> Directory[Port]:
-    return Directory(
-        [(p, Port(moved.get(port.junction, port.junction), port.power)) for p, port in ports.items()]
-    )
+    return Directory([(p, Port(moved.get(port.junction, port.junction), port.power)) for p, port in ports.items()])
 
 
 def _checked(
@@ -107,9 +103,7 @@ def _adopt(filling: Pattern, interface: Interface) -> Pattern:
         (path, replace(inner, quantity=interface[path].quantity) if inner.exposed else inner)
         for path, inner in filling.junctions.items()
     ]
-    return (
-        Pattern.identity(interface) if filling.is_identity else Pattern(pairs, filling.boxes, filling.links)
-    )
+    return Pattern.identity(interface) if filling.is_identity else Pattern(pairs, filling.boxes, filling.links)
 
 
 def _require_filling(pattern: Pattern, box: Path, filling: object) -> Pattern:
@@ -122,9 +116,7 @@ def _require_filling(pattern: Pattern, box: Path, filling: object) -> Pattern:
     if faults := _differences(wanted, given):
         found, expected = interface_text(given), interface_text(wanted)
         first = min(wanted.keys() ^ given.keys() or _differing(wanted, given))
-        raise PatternError(
-            "interface", box=box, port=first, found=found, expected=expected, ports="; ".join(faults)
-        )
+        raise PatternError("interface", box=box, port=first, found=found, expected=expected, ports="; ".join(faults))
     return filling
 
 

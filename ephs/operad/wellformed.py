@@ -40,15 +40,11 @@ def _read_box(box: Path, value: object, junctions: Mapping[Path, Junction]) -> B
     wires = Directory(cast("Mapping[Path, object]", value), what=f"ports of box {box}")
     ports = Directory([(name, _read_port(box, name, wire)) for name, wire in wires.items()])
     if ROOT in ports:
-        raise PatternError(
-            "root-port", box=box, port=ROOT, found="a port at the root path", expected="a name"
-        )
+        raise PatternError("root-port", box=box, port=ROOT, found="a port at the root path", expected="a name")
     for name, port in ports.items():
         if port.junction not in junctions:
             expected = paths_text(junctions)
-            raise PatternError(
-                "unknown-junction", box=box, port=name, junction=port.junction, expected=expected
-            )
+            raise PatternError("unknown-junction", box=box, port=name, junction=port.junction, expected=expected)
     return box_of(ports, junctions)
 
 
@@ -97,9 +93,7 @@ def require_pattern(
 ) -> Mapping[Path, frozenset[Path]]:
     """Check the conditions, and return the class of each junction under "same state"."""
     if ROOT in junctions:
-        raise PatternError(
-            "root-junction", junction=ROOT, found="a junction at the root path", expected="a name"
-        )
+        raise PatternError("root-junction", junction=ROOT, found="a junction at the root path", expected="a name")
     if ROOT not in boxes:
         _require_disjoint(junctions, boxes)
     classes = closure(junctions, links)

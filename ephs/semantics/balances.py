@@ -30,9 +30,7 @@ UNSOLVED = 1e-6
 ROUNDING = float(np.finfo(float).eps)
 EVALUATION = 1e-12
 """Rounding relative to the sum of absolute terms: a step's relations are some hundred roundings deep."""
-VACUOUS = Verdict(
-    0.0, 0.0, "vacuous: no step was found, a constraint contradicts the state or h is too large"
-)
+VACUOUS = Verdict(0.0, 0.0, "vacuous: no step was found, a constraint contradicts the state or h is too large")
 
 
 @lru_cache(maxsize=1)  # all laws of a step at one probe; probes are told apart by identity
@@ -53,15 +51,17 @@ def _energies(probe: Probe, solved: Solved, *, exergy: bool) -> Iterator[tuple[f
     for path, primitive in probe.system.leaves():
         if isinstance(primitive, Storage):
             of = primitive.exergy if exergy else primitive.total_energy
-            yield tuple(
-                of({port: values[path / port] for port in primitive.bundle.ports}, probe.reference)
-                for values in (probe.state, after)
+            here, there = (
+                {port: values[path / port] for port in primitive.bundle.ports} for values in (probe.state, after)
             )
+            yield of(here, probe.reference), of(there, probe.reference)
 
 
 def energy_balance(probe: Probe) -> Verdict:
     """The energy of all storages changes by what outer ports supply, h Σ⟨eᴱ|f⟩."""
     solved = _solved(probe)
+    if solved.residual > UNSOLVED:
+        return VACUOUS
     terms = [there - here for here, there in _energies(probe, solved, exergy=False)]
     sizes = [abs(here) + abs(there) for here, there in _energies(probe, solved, exergy=False)]
     for port, (flow, effort) in solved.outer.items():
@@ -103,9 +103,7 @@ def conservation(probe: Probe) -> Verdict:
     kinds = {q.kind for q in probe.system.states.values() if q.environment and q.kind != "entropy"}
     if not kinds:
         return Verdict(0.0, 0.0, "no such state")
-    found = [
-        _balance(probe, solved, _amounts(probe, solved, kind), [], kind, "in all") for kind in sorted(kinds)
-    ]
+    found = [_balance(probe, solved, _amounts(probe, solved, kind), [], kind, "in all") for kind in sorted(kinds)]
     return max(found, key=lambda verdict: verdict.defect - verdict.tolerance)
 
 
@@ -131,9 +129,7 @@ def entropy_production(probe: Probe) -> Verdict:
         return Verdict(0.0, 0.0, "no irreversible component")
     path, made, size = max(found, key=lambda entry: -entry[1] / max(entry[2], 1e-300))
     defect = max(0.0, -made / max(size, 1e-300))
-    return Verdict(
-        defect, EVALUATION, f"{len(found)} irreversible components, {path} makes the least: {made:.1e} W/K"
-    )
+    return Verdict(defect, EVALUATION, f"{len(found)} irreversible components, {path} makes the least: {made:.1e} W/K")
 
 
 def _productions(probe: Probe, solved: Solved) -> Iterator[tuple[Path, float, float]]:
@@ -153,9 +149,7 @@ def _productions(probe: Probe, solved: Solved) -> Iterator[tuple[Path, float, fl
             yield slot.path, made, float(hot @ terms) / probe.reference.temperature
 
 
-def _balance(
-    probe: Probe, solved: Solved, terms: list[float], sizes: list[float], what: str, unit: str
-) -> Verdict:
+def _balance(probe: Probe, solved: Solved, terms: list[float], sizes: list[float], what: str, unit: str) -> Verdict:
     """Terms that add up to nothing, with the sizes of what they are differences of."""
     if solved.residual > UNSOLVED:
         return VACUOUS
@@ -184,4 +178,5 @@ def naturality(probe: Probe) -> Verdict:
         default=0.0,
     )
     worst /= scale
-    return Verdict(worst, EVALUATION, f"rates of {len(flat.rates)} states agree to {worst:.1e}")
+    # two Newton iterations in different unknowns: condition 10⁴ times the rounding of an evaluation
+    return Verdict(worst, 1e4 * 8.0 * ROUNDING, f"rates of {len(flat.rates)} states agree to {worst:.1e}")

@@ -80,9 +80,7 @@ def _scaled(h: float, rates: Mapping[Path, Array]) -> dict[Path, Array]:
     return {port: h * rate for port, rate in rates.items()}
 
 
-def _reversible_step(
-    primitive: Reversible, h: float, x0: Point, v: Point, e: Array, lam: Array
-) -> tuple[Array, Array]:
+def _reversible_step(primitive: Reversible, h: float, x0: Point, v: Point, e: Array, lam: Array) -> tuple[Array, Array]:
     skew, constraint = primitive.structure(midpoint(primitive, x0, v))
     if primitive.discrete is None:
         return skew @ e + constraint.T @ lam, constraint @ e

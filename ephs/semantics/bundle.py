@@ -57,9 +57,7 @@ class Bundle:
     @staticmethod
     def of(interface: Interface) -> "Bundle":
         """Lay the power ports of an interface side by side, in the interface's order."""
-        return _bundle(
-            tuple(interface.items())
-        )  # equal interfaces may differ in order, and the order counts here
+        return _bundle(tuple(interface.items()))  # equal interfaces may differ in order, and the order counts here
 
     def slice(self, port: Path) -> Span:
         """Where the port's flow and effort lie in the fibre vectors."""

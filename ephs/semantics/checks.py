@@ -56,8 +56,7 @@ def random_efforts(bundle: Bundle, rng: np.random.Generator) -> Array:
 def _reversed(primitive_bundle: Bundle, x: "Point") -> dict[Path, Array]:
     """Time reversal of a state: quantities of odd parity change their sign."""
     return {
-        p: primitive_bundle.interface[p].quantity.parity * v if _odd(primitive_bundle, p) else v
-        for p, v in x.items()
+        p: primitive_bundle.interface[p].quantity.parity * v if _odd(primitive_bundle, p) else v for p, v in x.items()
     }
 
 
@@ -138,9 +137,7 @@ def _check_gradient(storage: "Storage", x: "Point", gradient: Array, energy: flo
     if not best[0] <= 1.0:
         _, found, expected = best
         entry = "(along a random direction)"
-        raise StructureError(
-            "gradient", storage.name, entry=entry, found=found, expected=expected, witness=_show(x)
-        )
+        raise StructureError("gradient", storage.name, entry=entry, found=found, expected=expected, witness=_show(x))
 
 
 def dirac(skew: Array, constraint: Array) -> Subspace:
@@ -176,9 +173,7 @@ def check_reversible(reversible: "Reversible") -> None:
             if not np.all(np.abs(defect) <= TOLERANCE * terms):
                 entry = _worst(defect / np.maximum(terms, 1e-300))
                 found = float(defect[entry])
-                raise StructureError(
-                    "conservation", name, quantity=kind, entry=entry, found=found, witness=_show(x)
-                )
+                raise StructureError("conservation", name, quantity=kind, entry=entry, found=found, witness=_show(x))
         # (f, e) ∈ D(x) ⇔ (−ϵf, ϵe) ∈ D(ϵx)
         here = dirac(skew, constraint)
         there = dirac(*reversible.structure(_reversed(bundle, x)))
@@ -219,9 +214,7 @@ def check_irreversible(irreversible: "Irreversible") -> None:
             if kind != "entropy" and not np.abs(defect).max(initial=0.0) <= TOLERANCE * scale:
                 entry = _worst(defect)
                 found = float(defect[entry])
-                raise StructureError(
-                    "conservation", name, quantity=kind, entry=entry, found=found, witness=_show(x)
-                )
+                raise StructureError("conservation", name, quantity=kind, entry=entry, found=found, witness=_show(x))
         mirrored = irreversible.matrix(_reversed(bundle, x), parity * e, reference)
         found = float(np.abs(mirrored - parity[:, None] * matrix * parity[None, :]).max(initial=0.0))
         if not found <= TOLERANCE * scale:

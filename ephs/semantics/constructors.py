@@ -129,9 +129,7 @@ def transformer(ports: Ports, matrix: Matrix, *, name: str = "transformer") -> R
     )
 
 
-def constraint(
-    ports: Ports, matrix: Matrix, *, multipliers: int | None = None, name: str = "constraint"
-) -> Reversible:
+def constraint(ports: Ports, matrix: Matrix, *, multipliers: int | None = None, name: str = "constraint") -> Reversible:
     """Reversible f = C(x)* λ, 0 = C(x) e.
 
     Parameters
@@ -228,9 +226,7 @@ def _takes(name: str, key: str, function: object, ports: tuple[Path, ...]) -> No
         raise StructureError("parameter", name, key=key, found=found, expected=expected) from None
 
 
-def _reader(
-    name: str, interface: Interface, matrix: Callable[..., ArrayLike]
-) -> Callable[[Point], ArrayLike]:
+def _reader(name: str, interface: Interface, matrix: Callable[..., ArrayLike]) -> Callable[[Point], ArrayLike]:
     _takes(name, "matrix", matrix, _reads(interface))
     return lambda x: matrix(**_named(x))
 

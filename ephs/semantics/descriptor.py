@@ -163,9 +163,7 @@ class Descriptor:
                 raise AssemblyError("input", path, found=given[path].value, expected=f"{dim} numbers")
         return given
 
-    def residual(
-        self, behaviour: Continuous | Natural, x: Array, inputs: Mapping[Path, Input], z: Array
-    ) -> Array:
+    def residual(self, behaviour: Continuous | Natural, x: Array, inputs: Mapping[Path, Input], z: Array) -> Array:
         """All equations at the unknowns z = (rates, efforts, multipliers, outer flows).
 
         The slow, obvious evaluation: every compiled path is held against it.
@@ -179,9 +177,7 @@ class Descriptor:
             index = list(slot.efforts)
             local = behaviour.behaviour(slot.primitive, self.point(slot, x))
             if isinstance(local, Storing):
-                where = np.concatenate(
-                    [np.arange(s.rates.start, s.rates.stop) for s in slot.reads] or [[]]
-                ).astype(int)
+                where = [i for s in slot.reads for i in range(s.rates.start, s.rates.stop)]
                 storage_rows[where] = efforts[index] - local.effort(rates[where])
                 np.add.at(balance, index, rates[where])
             else:
@@ -189,7 +185,7 @@ class Descriptor:
                 read = {p: rates[s.rates] for p, s in zip(slot.primitive.reads, slot.reads, strict=True)}
                 flow, conditions[mine] = _related(local, efforts[index], lam[mine], read)
                 np.add.at(balance, index, flow)
-        at, prescribed = 0, []
+        at, prescribed = 0, list[Array]()
         for slot in self.outer:
             given = inputs[slot.path]
             if given.effort:

@@ -5,39 +5,28 @@ from typing import final
 __all__ = ["AssemblyError", "SemanticsError", "StructureError"]
 
 _TEXTS = {
-    "fillings": (
-        "{path}: the boxes to fill are {expected}, the fillings given are {found}; fill each box once"
-    ),
-    "interface": (
-        "{path}: the filling's interface is {found}, the box wants {expected}; rename the filling's ports"
-    ),
+    "fillings": ("{path}: the boxes to fill are {expected}, the fillings given are {found}; fill each box once"),
+    "interface": ("{path}: the filling's interface is {found}, the box wants {expected}; rename the filling's ports"),
     "finite": "{path}: {what} is {found}, expected finite numbers (witness state {witness})",
-    "isotropy": (
-        "{path}: not reversible: entry {entry} of L + Lᵀ is {found}, expected 0 (witness state {witness})"
-    ),
+    "isotropy": ("{path}: not reversible: entry {entry} of L + Lᵀ is {found}, expected 0 (witness state {witness})"),
     "gyrator-shape": "{path}: the matrix L is {found}, its ports want {expected}",
     "constraint-shape": "{path}: the matrix C is {found}, its ports want {expected}",
     "conservation": (
         "{path}: {quantity} is not conserved: entry {entry} is {found}, expected 0 (witness state {witness})"
     ),
-    "parity": (
-        "{path}: not invariant under time reversal: defect {found}, expected 0 (witness state {witness})"
-    ),
+    "parity": ("{path}: not invariant under time reversal: defect {found}, expected 0 (witness state {witness})"),
     "onsager-shape": "{path}: the matrix M is {found}, its ports want {expected}",
     "symmetry": (
-        "{path}: not Onsager symmetric: entry {entry} of M − Mᵀ is {found}, expected 0 (witness state "
-        "{witness})"
+        "{path}: not Onsager symmetric: entry {entry} of M − Mᵀ is {found}, expected 0 (witness state {witness})"
     ),
     "definite": (
         "{path}: M has the negative eigenvalue {found}; the second law expects none (witness state {witness})"
     ),
     "energy": (
-        "{path}: energy is not conserved: entry {entry} of M·eᴱ is {found}, expected 0 (witness state "
-        "{witness})"
+        "{path}: energy is not conserved: entry {entry} of M·eᴱ is {found}, expected 0 (witness state {witness})"
     ),
     "even": (
-        "{path}: the energy is not even under time reversal: {found} against {expected} (witness state "
-        "{witness})"
+        "{path}: the energy is not even under time reversal: {found} against {expected} (witness state {witness})"
     ),
     "gradient-shape": "{path}: the gradient is {found}, its ports want {expected}",
     "gradient": (
@@ -62,9 +51,7 @@ _TEXTS = {
     ),
     "state": "{path}: the initial value has shape {found}, expected {expected} ({quantity})",
     "unknown-state": "{path}: no such state; the states are {expected}",
-    "missing-input": (
-        "{path}: the outer port is open: give inputs={{'{path}': {{'flow': …}}}} or {{'effort': …}}"
-    ),
+    "missing-input": ("{path}: the outer port is open: give inputs={{'{path}': {{'flow': …}}}} or {{'effort': …}}"),
     "unknown-input": "{path}: no such outer power port; the open ports are {expected}",
     "input": "{path}: the input is {found}, expected {expected}",
 }

@@ -5,6 +5,9 @@ the conditions c (k,) and the Jacobian J of (f, c) by (e, λ, v), (n+k, n+k+m). 
 effort e (n,), ∂e/∂v (n, n) in the place of f, and the energy at x⁰·exp v in the place of c.
 """
 
+# numba infers the types of these functions, and exports what it does not list.
+# pyright: basic, reportPrivateImportUsage=false
+
 import math
 
 import numba as nb

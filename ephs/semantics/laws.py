@@ -15,7 +15,7 @@ from ephs.semantics.pattern_relation import pattern_relation
 from ephs.semantics.primitives import Point, Primitive, Reversible
 from ephs.semantics.probe import Probe, SystemLaw, Verdict, random_probe
 from ephs.semantics.relation import LinearRelation, Sources, fold, read_point
-from ephs.semantics.subspace import Subspace
+from ephs.semantics.subspace import RANK_TOLERANCE, Subspace
 from ephs.semantics.system import System
 
 __all__ = [
@@ -118,16 +118,25 @@ def _dirac(probe: Probe) -> Verdict:
             kept += range(at, at + 2 * n)
         at += 2 * n
     kept += range(at, whole.ambient)
-    found = whole.restrict(np.vstack(rows)) if rows else whole
-    found = found.project(kept)
+    matrix = np.vstack([np.zeros((0, whole.ambient)), *rows])
+    filled = whole.restrict(matrix)
+    found = filled.project(kept)
     if 2 * found.dimension != len(kept):
         return Verdict(np.inf, 0.0, f"dimension {found.dimension}, expected {len(kept) // 2}")
     worst = isotropy(found, form[np.ix_(kept, kept)])
-    return Verdict(
-        worst,
-        1e-12,
-        f"dimension {found.dimension} on {len(kept)} flows and efforts, isotropic to {worst:.1e}",
-    )
+    # two steps of elimination, each as uncertain as the least singular value that it keeps
+    condition = max(_condition(matrix @ whole.basis), _condition(filled.basis[kept]))
+    detail = f"dimension {found.dimension} on {len(kept)} flows and efforts, isotropic to {worst:.1e}"
+    return Verdict(worst, 1e-13 * condition, detail)
+
+
+def _condition(matrix: Array) -> float:
+    """The largest singular value over the least that counts, at least 1."""
+    if not matrix.size:
+        return 1.0
+    sigma = np.linalg.svd(matrix, compute_uv=False)
+    counting = sigma[sigma > RANK_TOLERANCE * max(float(sigma[0]), 1e-300)]
+    return float(sigma[0] / counting[-1]) if counting.size else 1.0
 
 
 def _renaming(probe: Probe) -> Verdict:
@@ -178,9 +187,7 @@ SYSTEM_LAWS: tuple[SystemLaw, ...] = (
     SystemLaw("exergy balance", "the exergy changes by supply and destruction", balances.exergy_balance),
     SystemLaw("entropy balance", "the entropy changes by supply and production", balances.entropy_balance),
     SystemLaw("conservation", "volumes and amounts change by supply alone", balances.conservation),
-    SystemLaw(
-        "entropy production", "no irreversible component destroys entropy", balances.entropy_production
-    ),
+    SystemLaw("entropy production", "no irreversible component destroys entropy", balances.entropy_production),
     SystemLaw("naturality", "discretise, then compose = flatten, then discretise", balances.naturality),
 )
 

@@ -70,9 +70,7 @@ def _non_negative(path: str, **parameters: float) -> None:
 # ---- storage ---------------------------------------------------------------------------------------------------
 
 
-def quadratic(
-    name: str, interface: Interface, matrix: Array, parameters: tuple[tuple[str, object], ...]
-) -> Storage:
+def quadratic(name: str, interface: Interface, matrix: Array, parameters: tuple[tuple[str, object], ...]) -> Storage:
     """E = ½ xᵀ Q x on vector spaces; Q (n, n) symmetric. Its discrete gradient Q (x⁰ + v/2) is exact."""
 
     def vector(x: Point) -> Array:
@@ -218,9 +216,7 @@ def constant_structure(
     )
 
 
-def _gyrator(
-    name: str, interface: Interface, matrix: Sequence[Sequence[float]], **parameters: float
-) -> Reversible:
+def _gyrator(name: str, interface: Interface, matrix: Sequence[Sequence[float]], **parameters: float) -> Reversible:
     skew = np.array(matrix, dtype=float)
     return constant_structure(name, interface, skew, np.zeros((0, skew.shape[0])), tuple(parameters.items()))
 
@@ -243,7 +239,7 @@ def emc() -> Reversible:
 
 
 def mkc() -> Reversible:
-    """Magneto-kinetic coupling of a DC shunt motor; ports b, p and the state port bs: b.f = bs.x·p.e, p.f = −bs.x·b.e."""
+    """Magneto-kinetic coupling of a DC shunt motor; ports b, p, state port bs: b.f = bs.x·p.e, p.f = −bs.x·b.e."""
     stator = Path.of("bs")
     interface = Directory(
         {
@@ -359,6 +355,4 @@ def heat_transfer(*, h: float) -> Irreversible:
         return h * np.array([[second / first, -1.0], [-1.0, first / second]])
 
     ports = power_ports(s1=quantity.entropy, s2=quantity.entropy)
-    return Irreversible(
-        "heat_transfer", ports, matrix, (), (("h", h),), Kernel(KERNELS, "heat_transfer", (h,))
-    )
+    return Irreversible("heat_transfer", ports, matrix, (), (("h", h),), Kernel(KERNELS, "heat_transfer", (h,)))

@@ -185,9 +185,7 @@ def _glue(pattern: Pattern, parts: Mapping[Path, _Part], unknowns: _Unknowns) ->
     def below(of: Callable[[_Part], Mapping[Path, slice]]) -> dict[Path, slice]:
         return {box / path: where for box, part in parts.items() for path, where in of(part).items()}
 
-    return _Part(
-        ports, equations, below(lambda p: p.rates), below(lambda p: p.multipliers), below(lambda p: p.efforts)
-    )
+    return _Part(ports, equations, below(lambda p: p.rates), below(lambda p: p.multipliers), below(lambda p: p.efforts))
 
 
 def _within(outer: slice, inner: slice) -> slice:
@@ -208,8 +206,7 @@ def step(
     solved = solve(system, state, Natural(reference, h), inputs or {})
     states = system.states
     new = {
-        path: manifold(quantity.space).retract(state[path], h * solved.rates[path])
-        for path, quantity in states.items()
+        path: manifold(quantity.space).retract(state[path], h * solved.rates[path]) for path, quantity in states.items()
     }
     return new, solved
 

@@ -19,23 +19,22 @@ def pattern_relation(pattern: Pattern) -> Subspace:
     n_in = sum(bundle.size for _, bundle in parts)
     outer = Bundle.of(pattern.interface)
     size = 2 * (n_in + outer.size)
-    flows: dict[Path, list[tuple[Array, float]]] = {}
+    flows: dict[Path, list[tuple[list[int], float]]] = {}
     equations: list[Array] = []
     efforts: dict[Path, list[int]] = {}
     at = 0
     for box, bundle in [*parts, (None, outer)]:
         for port, where, _ in bundle.items():
             junction = port if box is None else pattern.boxes[box].ports[port].junction
-            flows.setdefault(junction, []).append(
-                (np.arange(at + where.start, at + where.stop), 1.0 if box is not None else -1.0)
-            )
+            places = list(range(at + where.start, at + where.stop))
+            flows.setdefault(junction, []).append((places, 1.0 if box is not None else -1.0))
             efforts.setdefault(junction, []).append(at + bundle.size + where.start)
         at += 2 * bundle.size
     for junction, terms in flows.items():
         for i in range(pattern.junctions[junction].quantity.space.dim):
             balance = np.zeros(size)
             for where, sign in terms:
-                balance[int(where[i])] += sign
+                balance[where[i]] += sign
             equations.append(balance)
             first, *others = efforts[junction]
             for other in others:

@@ -125,9 +125,7 @@ class Storage:
     def total_energy(self, x: Point, reference: Reference) -> float:
         """E(x) in J; of the environment θ₀ s − π₀ v."""
         if self.environment:
-            return sum(
-                float(x[p][0]) * reference.intensive(q) for p, _, q in self.bundle.items() if q.environment
-            )
+            return sum(float(x[p][0]) * reference.intensive(q) for p, _, q in self.bundle.items() if q.environment)
         return float(self.energy(x))
 
     def _increments(self, x0: Point, v: Array) -> Array:
@@ -186,9 +184,7 @@ class Reversible:
     interface: Interface
     structure: Callable[[Point], tuple[Array, Array]] = field(compare=False)
     reads: tuple[Path, ...] = ()
-    discrete: Callable[[float, Point, Point, Array], tuple[Array, Array]] | None = field(
-        default=None, compare=False
-    )
+    discrete: Callable[[float, Point, Point, Array], tuple[Array, Array]] | None = field(default=None, compare=False)
     parameters: tuple[tuple[str, object], ...] = ()
     multipliers: int = 0
     kernel: Kernel | None = field(default=None, compare=False, repr=False)
@@ -257,9 +253,7 @@ class Irreversible:
         """Refuse an absolute temperature θ₀ + e_s that is not positive."""
         for _, where, quantity in self.bundle.items():
             if quantity.kind == "entropy" and not reference.temperature + e[where][0] > 0.0:
-                raise StructureError(
-                    "temperature", self.name, found=float(reference.temperature + e[where][0])
-                )
+                raise StructureError("temperature", self.name, found=float(reference.temperature + e[where][0]))
 
     def compose(self, pattern: Pattern, fillings: "Mapping[Path, object]") -> object:
         """Fill the boxes of a pattern: gives a System."""

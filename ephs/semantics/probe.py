@@ -66,10 +66,11 @@ class SystemLaw:
         return self.measure(probe)
 
 
-def random_probe(
-    system: System, seed: int = 0, *, reference: Reference | None = None, h: float = 1e-2
-) -> Probe:
-    """A probe at random states with random flows at the outer ports."""
+def random_probe(system: System, seed: int = 0, *, reference: Reference | None = None, h: float = 1e-2) -> Probe:
+    """A probe at random states with random flows at the outer ports.
+
+    The default reference has a pressure of the size of the temperature: beside 10⁵ Pa the velocities would be rounding.
+    """
     rng = np.random.default_rng(seed)
     state: dict[Path, Array] = {}
     efforts: dict[Path, Array] = {}
@@ -85,4 +86,4 @@ def random_probe(
         port: Input(0.1 * rng.standard_normal(quantity.space.dim), False)
         for port, _, quantity in Bundle.of(system.interface).items()
     }
-    return Probe(system, state, inputs, efforts, reference or Reference(), h)
+    return Probe(system, state, inputs, efforts, reference or Reference(293.15, 300.0), h)

@@ -15,7 +15,7 @@ from typing import Literal, TypeVar, final
 import numpy as np
 
 from ephs.operad import ROOT, Path, Pattern
-from ephs.semantics.bundle import Array, Bundle, Reference
+from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.primitives import Point, Primitive, Reversible, Storage
 from ephs.semantics.spaces import manifold
 from ephs.semantics.subspace import Subspace
@@ -74,9 +74,7 @@ class LinearRelation:
     def distance(self, other: "LinearRelation") -> float:
         """Largest entry of the difference of projectors; 0 for two empty relations. The names must agree."""
         if (self.rates, self.ports, self.unit) != (other.rates, other.ports, other.unit):
-            raise ValueError(
-                f"relations on {self.rates}, {self.ports} and {other.rates}, {other.ports} differ in kind"
-            )
+            raise ValueError(f"relations on {self.rates}, {self.ports} and {other.rates}, {other.ports} differ in kind")
         if self.empty and other.empty:
             return 0.0
         return self.subspace.distance(other.subspace)
@@ -116,9 +114,7 @@ class Relation:
         return _nested(system, point, frozen, self.reference, unit)
 
 
-def relation_of(
-    system: System | Primitive, reference: Reference, route: Literal["flat", "nested"]
-) -> Relation:
+def relation_of(system: System | Primitive, reference: Reference, route: Literal["flat", "nested"]) -> Relation:
     """The relation of a system or primitive."""
     return Relation(system, reference, route)
 
@@ -130,9 +126,7 @@ def as_system(filling: Filling) -> System:
     return System.fill(Pattern.identity(filling.interface), {ROOT: filling})
 
 
-def linear_parts(
-    primitive: Primitive, x: Point, e: Array | None, reference: Reference
-) -> tuple[Array, Array, Array]:
+def linear_parts(primitive: Primitive, x: Point, e: Array | None, reference: Reference) -> tuple[Array, Array, Array]:
     """(A, C, g): f = A e + Cᵀ λ, 0 = C e for a process; e = g for a storage (A, C empty). M is taken at e."""
     n = primitive.bundle.size
     if isinstance(primitive, Storage):
@@ -186,9 +180,7 @@ def _flat(
             balance[index, rates] += 1.0
             continue
         # two ports of one component may lie on one junction: add, do not assign
-        np.add.at(
-            balance, (np.array(index, dtype=int)[:, None], np.array(columns, dtype=int)[None, :]), dynamic
-        )
+        np.add.at(balance, (np.array(index, dtype=int)[:, None], np.array(columns, dtype=int)[None, :]), dynamic)
         mine = np.arange(slot.multiplier, slot.multiplier + slot.multipliers)
         lam = n_rate + n_effort + mine
         np.add.at(balance, (np.array(index, dtype=int)[:, None], lam[None, :]), constraint.T)
@@ -286,16 +278,12 @@ def _sources(path: Path, primitive: Primitive, offered: Mapping[Path, Path]) -> 
 def read_point(primitive: Primitive, sources: Sources, state: Mapping[Path, Array]) -> Point:
     """The states that a primitive reads; one that nobody stores is free, and the identity stands for it."""
     return {
-        port: manifold(primitive.interface[port].quantity.space).identity()
-        if source is None
-        else state[source]
+        port: manifold(primitive.interface[port].quantity.space).identity() if source is None else state[source]
         for port, source in sources.items()
     }
 
 
-def _primitive(
-    primitive: Primitive, x: Point, e: Array | None, reference: Reference, unit: float
-) -> LinearRelation:
+def _primitive(primitive: Primitive, x: Point, e: Array | None, reference: Reference, unit: float) -> LinearRelation:
     bundle = primitive.bundle
     n = bundle.size
     dynamic, constraint, effort = linear_parts(primitive, x, e, reference)
@@ -306,9 +294,7 @@ def _primitive(
     eye = np.eye(n)
     if isinstance(primitive, Storage):
         # coordinates (rates, f, e, 1)
-        kernel = np.block(
-            [[eye, -eye, np.zeros((n, n + 1))], [np.zeros((n, 2 * n)), eye, -effort[:, None] / unit]]
-        )
+        kernel = np.block([[eye, -eye, np.zeros((n, n + 1))], [np.zeros((n, 2 * n)), eye, -effort[:, None] / unit]])
         kept = [*order, *(n + i for i in order), *(2 * n + i for i in order), 3 * n]
         return LinearRelation(named, named, Subspace.from_kernel(kernel).project(kept), unit)
     # coordinates (f, e, λ, 1)

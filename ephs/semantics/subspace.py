@@ -75,7 +75,7 @@ class Subspace:
         product = matrix @ self.basis
         # a row that holds already leaves rounding, which must not be taken for an equation
         left = np.linalg.norm(product, axis=1) > RANK_TOLERANCE * np.linalg.norm(matrix, axis=1)
-        coefficients = Subspace.from_kernel(product[left].reshape(-1, self.dimension))
+        coefficients = Subspace.from_kernel(product[left])
         return Subspace(self.basis @ coefficients.basis)
 
     def image(self, matrix: Array) -> "Subspace":

@@ -61,9 +61,7 @@ class System:
         checked: dict[Path, Filling] = {}
         for box, filling in fillings.items():
             if not isinstance(filling, kinds):
-                raise TypeError(
-                    f"{box}: a filling is a System or a primitive, found {type(filling).__name__}"
-                )
+                raise TypeError(f"{box}: a filling is a System or a primitive, found {type(filling).__name__}")
             checked[box] = filling
         return System(pattern, Directory(checked))
 
@@ -147,15 +145,11 @@ class System:
                     "state", name, found=array.shape, expected=(space.size,), quantity=states[path].kind
                 )
             if not np.all(np.isfinite(array)):
-                raise AssemblyError(
-                    "state", name, found=array, expected="finite numbers", quantity=states[path].kind
-                )
+                raise AssemblyError("state", name, found=array, expected="finite numbers", quantity=states[path].kind)
             out[path] = manifold(space).normalise(array)
         return out
 
-    def relation(
-        self, reference: Reference | None = None, *, route: Literal["flat", "nested"] = "flat"
-    ) -> "Relation":
+    def relation(self, reference: Reference | None = None, *, route: Literal["flat", "nested"] = "flat") -> "Relation":
         """The system's meaning: a relation between the rates of its states and its outer flows and efforts.
 
         Parameters
@@ -174,9 +168,7 @@ class System:
 
         return assemble(self.flatten())
 
-    def check(
-        self, reference: Reference | None = None, *, state: Mapping[str, object] | None = None
-    ) -> "CheckReport":
+    def check(self, reference: Reference | None = None, *, state: Mapping[str, object] | None = None) -> "CheckReport":
         """Check the structure of the components, that there are equations, and the laws.
 
         Parameters
@@ -217,10 +209,7 @@ def _same_interface(wanted: Interface, found: Interface) -> bool:
 
 
 def _describe(interface: Interface) -> str:
-    ports = (
-        f"{'' if t.power else '~'}{p}: {t.quantity.kind} on {t.quantity.space.name}"
-        for p, t in interface.items()
-    )
+    ports = (f"{'' if t.power else '~'}{p}: {t.quantity.kind} on {t.quantity.space.name}" for p, t in interface.items())
     return "{" + ", ".join(sorted(ports)) + "}"
 
 

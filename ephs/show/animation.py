@@ -27,8 +27,8 @@ def animate(
 ) -> str:
     """Make a page that plays a solution of a scene, with play, pause, speed, time bar and free view.
 
-    Bodies are drawn by their shape, or as the muted box of the same mass and inertia where they have none; each joint by
-    the symbol of its kind, with its axis; springs as coils; the ground as a grid.
+    Bodies are drawn by their shape, or as the muted box of the same mass and inertia where they have none; each joint
+    by the symbol of its kind, with its axis; springs as coils; the ground as a grid.
 
     Parameters
     ----------
@@ -132,9 +132,7 @@ def _spring_ends(spring: Any, frames: Film, index: int) -> tuple[Array, Array]:
 def _places(frames: Film, joints: dict[str, Any], springs: dict[str, Any]) -> Array:
     """Every point (n, 3) that the camera must see: bodies, joints and spring ends, at all times."""
     found = [pose[:, 4:] for pose in frames.poses.values()]
-    found += [
-        point_of(_pose_of(j.body1, frames), np.asarray(j.frame1, dtype=float)[4:]) for j in joints.values()
-    ]
+    found += [point_of(_pose_of(j.body1, frames), np.asarray(j.frame1, dtype=float)[4:]) for j in joints.values()]
     for s in springs.values():
         found.append(point_of(_pose_of(s.body1, frames), np.asarray(s.at1, dtype=float)))
         found.append(point_of(_pose_of(s.body2, frames), np.asarray(s.at2, dtype=float)))

@@ -52,7 +52,5 @@ def _write(axes, text: Text, colour: str, *, halo: str) -> None:  # type: ignore
     plain = text.base.replace("$", r"\$")
     words = plain if not text.sub else rf"{plain}$_{{\mathregular{{{text.sub}}}}}$"
     x, y = text.at
-    drawn = axes.text(
-        x, y, words, fontsize=text.size, color=colour, ha="center", va="center_baseline", zorder=6
-    )
+    drawn = axes.text(x, y, words, fontsize=text.size, color=colour, ha="center", va="center_baseline", zorder=6)
     drawn.set_path_effects([withStroke(linewidth=2.5, foreground=halo)])

@@ -47,13 +47,9 @@ def to_svg(placement: Placement) -> str:
         group.append_title(f"{box.path} ({box.kind})" if box.kind != "unknown" else box.path)
         x, y = _rounded(box.at)
         rim = RIMS[box.kind]
-        group.append(
-            svg.Circle(x, y, round(box.radius, 2), fill=FILLS[box.kind], stroke=rim, stroke_width=1.3)
-        )
+        group.append(svg.Circle(x, y, round(box.radius, 2), fill=FILLS[box.kind], stroke=rim, stroke_width=1.3))
         for start, end in box.hatching:
-            group.append(
-                svg.Line(*_rounded(start), *_rounded(end), stroke=rim, stroke_width=0.6, opacity=0.55)
-            )
+            group.append(svg.Line(*_rounded(start), *_rounded(end), stroke=rim, stroke_width=0.6, opacity=0.55))
         for text in box.lines:
             group.append(_text(text, INK, halo=FILLS[box.kind] if box.hatching else ""))
         drawing.append(group)
@@ -84,11 +80,7 @@ def _text(text: Text, colour: str, *, halo: str = ""):  # type: ignore[no-untype
     import drawsvg as svg
 
     x, y = text.at
-    style = (
-        {"stroke": halo, "stroke_width": 2.5, "stroke_linejoin": "round", "paint_order": "stroke"}
-        if halo
-        else {}
-    )
+    style = {"stroke": halo, "stroke_width": 2.5, "stroke_linejoin": "round", "paint_order": "stroke"} if halo else {}
     # A shift by a third of the type size stands for a central baseline, which not all programs know.
     drawn = svg.Text(
         text.base if not text.sub else "",

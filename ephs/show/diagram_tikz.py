@@ -43,21 +43,15 @@ def to_tikz(placement: Placement) -> str:
     ]
     for wire in placement.wires:
         dash = "" if wire.power else "[dotted]" if wire.role == "link" else "[dashed]"
-        body.append(
-            rf"\draw{dash} {' -- '.join(_at(point) for point in wire.points)}; % {_comment(wire.title)}"
-        )
+        body.append(rf"\draw{dash} {' -- '.join(_at(point) for point in wire.points)}; % {_comment(wire.title)}")
     for box in placement.boxes:
         style = f"fill=ephs{box.kind},draw=ephs{box.kind}rim"
-        body.append(
-            rf"\filldraw[{style}] {_at(box.at)} circle[radius={box.radius:.2f}bp]; % {_comment(box.path)}"
-        )
+        body.append(rf"\filldraw[{style}] {_at(box.at)} circle[radius={box.radius:.2f}bp]; % {_comment(box.path)}")
         body += [rf"\draw[ephs{box.kind}rim,line width=.4bp] {_at(a)} -- {_at(b)};" for a, b in box.hatching]
         back = f"fill=ephs{box.kind},inner sep=.5bp," if box.hatching else ""
         body += [_node(text, back) for text in box.lines]
     for junction in placement.junctions:
-        body.append(
-            rf"\fill {_at(junction.at)} circle[radius={junction.radius:.2f}bp]; % {_comment(junction.path)}"
-        )
+        body.append(rf"\fill {_at(junction.at)} circle[radius={junction.radius:.2f}bp]; % {_comment(junction.path)}")
         body.append(_node(junction.label, ""))
     body += [_node(wire.label, "text=gray,") for wire in placement.wires if wire.label is not None]
     body.append(r"\end{tikzpicture}")

@@ -76,10 +76,10 @@ def draw(
 ) -> Drawing:
     """Draw a pattern or a system as a syntactic picture.
 
-    Round boxes coloured by kind (storage blue, environment blue and hatched, reversible green, irreversible red, composite
-    yellow, unknown white), black dots for junctions, dashed lines for state ports, dotted lines between junctions that
-    share their state, and a rounded rectangle for the outer box, to which the outer ports run. A port is named at its
-    junction; where its name differs from the junction's, at its box too.
+    Round boxes coloured by kind (storage blue, environment blue and hatched, reversible green, irreversible red,
+    composite yellow, unknown white), black dots for junctions, dashed lines for state ports, dotted lines between
+    junctions that share their state, and a rounded rectangle for the outer box, to which the outer ports run. A port is
+    named at its junction; where its name differs from the junction's, at its box too.
 
     Parameters
     ----------

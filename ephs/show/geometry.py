@@ -3,6 +3,7 @@
 Lengths are in points (1/72 inch), x to the right, y **down**.
 """
 
+import itertools
 import math
 from dataclasses import dataclass
 from typing import final
@@ -152,8 +153,8 @@ def _cross(first: tuple[Point, ...], second: tuple[Point, ...]) -> bool:
 
     return any(
         side(a, b, c) * side(a, b, d) < 0 and side(c, d, a) * side(c, d, b) < 0
-        for a, b in zip(first, first[1:], strict=False)
-        for c, d in zip(second, second[1:], strict=False)
+        for a, b in itertools.pairwise(first)
+        for c, d in itertools.pairwise(second)
     )
 
 

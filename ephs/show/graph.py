@@ -1,5 +1,6 @@
 """What a picture of a pattern is about: nodes with sizes and edges, before anything has a place."""
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, final
@@ -119,7 +120,7 @@ def read(source: "Pattern | System", kinds: Mapping[str, str] | None = None) -> 
         if junction.exposed:
             edges.append(Edge(f"outer port {name}", (str(name),), "outer", junction.power, ""))
     for group in sorted(sorted(str(path) for path in members) for members in pattern.links):
-        for first, second in zip(group, group[1:], strict=False):
+        for first, second in itertools.pairwise(group):
             edges.append(Edge(f"{first} and {second} share their state", (first, second), "link", False, ""))
     return Graph(
         tuple(_disc(path, name, found.get(path, "unknown")) for path, name in boxes.items()),
@@ -137,7 +138,7 @@ def _disc(path: str, name: str, kind: str) -> Disc:
         raise ShowError("kind", path=path, found=kind, expected=", ".join(KINDS))
     # A name that had to be qualified is set smaller, and broken at its last dot where that makes it larger.
     size = TYPE if "." not in name or name == "." else 0.86 * TYPE
-    choices = [(subscripted(name),)]
+    choices: list[tuple[tuple[str, str], ...]] = [(subscripted(name),)]
     if "." in name and name != ".":
         head, _, tail = name.rpartition(".")
         choices.append((subscripted(head + "."), subscripted(tail)))

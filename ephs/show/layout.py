@@ -1,9 +1,11 @@
 """From a pattern to its placed picture.
 
-Boxes and junctions get places, wires are led round what they are not attached to, outer ports run to the outer rectangle,
-and names are set where nothing else is. All of it is deterministic: the same pattern gives the same picture.
+Boxes and junctions get places, wires are led round what they are not attached to, outer ports run to the
+outer rectangle, and names are set where nothing else is. All of it is deterministic: the same pattern gives the same
+picture.
 """
 
+import itertools
 import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
@@ -90,9 +92,7 @@ def _picture(graph: Graph, points: Points) -> Placement:
     shift = (MARGIN - rectangle[0], MARGIN - rectangle[1])
     return Placement(
         tuple(_box(disc, _moved(at[disc.path], shift)) for disc in graph.discs),
-        tuple(
-            PlacedJunction(path, _moved(at[path], shift), DOT, _shifted(text, shift)) for path, text in named
-        ),
+        tuple(PlacedJunction(path, _moved(at[path], shift), DOT, _shifted(text, shift)) for path, text in named),
         tuple(_moved_wire(wire, shift) for wire in wires),
         (MARGIN, MARGIN, rectangle[2] - rectangle[0], rectangle[3] - rectangle[1]),
         14.0,
@@ -118,7 +118,7 @@ def _inner_lines(
         for index, edge in enumerate(edges):
             amount = 16.0 * (index - (len(edges) - 1) / 2)
             line = bulged(start, end, amount) if amount else (start, end)
-            clear = all(straight(a, b, obstacles) for a, b in zip(line, line[1:], strict=False))
+            clear = all(straight(a, b, obstacles) for a, b in itertools.pairwise(line))
             line = line if clear else route(start, end, obstacles)
             lines.append((edge, trimmed(line, radii[ends[0]])))
     return lines
@@ -138,12 +138,8 @@ def _outer_wires(
         obstacles = _obstacles(at, radii, edge.ends)
         inset = 16.0
         ends = [(left, y), (right, y), (x, top), (x, bottom)]
-        ends += [
-            (side, v) for side in (left, right) for v in np.linspace(top + inset, bottom - inset, 9).tolist()
-        ]
-        ends += [
-            (v, side) for side in (top, bottom) for v in np.linspace(left + inset, right - inset, 9).tolist()
-        ]
+        ends += [(side, v) for side in (left, right) for v in np.linspace(top + inset, bottom - inset, 9).tolist()]
+        ends += [(v, side) for side in (top, bottom) for v in np.linspace(left + inset, right - inset, 9).tolist()]
         best: Wire | None = None
         least = math.inf
         for rank, end in enumerate(ends):
@@ -157,7 +153,7 @@ def _outer_wires(
                 continue
             wire = _wire(edge, line, None)
             over = sum(_meet(wire, other) for other in (*wires, *found))
-            length = sum(math.dist(a, b) for a, b in zip(line, line[1:], strict=False))
+            length = sum(math.dist(a, b) for a, b in itertools.pairwise(line))
             cost = length + bent + 80.0 * over + 10.0 * crowd + (25.0 if rank >= 4 else 0.0)
             if cost < least - 1e-6:
                 best, least = wire, cost
@@ -171,9 +167,7 @@ def _meet(first: Wire, second: Wire) -> int:
     return crossings(Placement((), (), (first, second), (0.0, 0.0, 0.0, 0.0), 0.0))
 
 
-def _sheet(
-    at: Mapping[str, Point], radii: Mapping[str, float], wires: list[Wire], bounds: Rectangle | None
-) -> Sheet:
+def _sheet(at: Mapping[str, Point], radii: Mapping[str, float], wires: list[Wire], bounds: Rectangle | None) -> Sheet:
     pieces = [piece for wire in wires for piece in zip(wire.points, wire.points[1:], strict=False)]
     return Sheet(_obstacles(at, radii, ()), np.array(pieces, dtype=float).reshape(-1, 2, 2), bounds)
 
@@ -187,9 +181,7 @@ def _bounds(
     at: Mapping[str, Point], radii: Mapping[str, float], wires: list[Wire], labels: list[Rectangle]
 ) -> Rectangle:
     air = 18.0
-    lefts = [
-        (x - radii[path], y - radii[path], x + radii[path], y + radii[path]) for path, (x, y) in at.items()
-    ]
+    lefts = [(x - radii[path], y - radii[path], x + radii[path], y + radii[path]) for path, (x, y) in at.items()]
     dots = [(x, y, x, y) for wire in wires for x, y in wire.points]
     every = np.array([*lefts, *dots, *labels, *([] if lefts else [(0.0, 0.0, 60.0, 30.0)])])
     return (

@@ -1,5 +1,6 @@
 """Where names go: beside their dot or wire, on nothing else."""
 
+import itertools
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -48,9 +49,7 @@ class Sheet:
             away = distances(marks[:, None, :], self.pieces[None, :, 0], self.pieces[None, :, 1]).min(axis=0)
             trouble += float(np.clip(_AIR - away, 0.0, None).sum()) * 4.0
         if len(self.discs):
-            away = (
-                np.linalg.norm(marks[:, None, :] - self.discs[None, :, :2], axis=-1) - self.discs[None, :, 2]
-            )
+            away = np.linalg.norm(marks[:, None, :] - self.discs[None, :, :2], axis=-1) - self.discs[None, :, 2]
             trouble += float(np.clip(_AIR - away, 0.0, None).sum()) * 2.0
         left, top, right, bottom = x - width / 2 - 1, y - size / 2 - 1, x + width / 2 + 1, y + size / 2 + 1
         for other in self.written:
@@ -100,7 +99,7 @@ def beside(line: tuple[Point, ...], name: tuple[str, str], size: float) -> list[
 
 def _at(line: tuple[Point, ...], along: float) -> tuple[Point, Point]:
     """Point and unit direction at an arc length."""
-    for a, b in zip(line, line[1:], strict=False):
+    for a, b in itertools.pairwise(line):
         length = math.dist(a, b)
         if along <= length and length > 0:
             direction = ((b[0] - a[0]) / length, (b[1] - a[1]) / length)

@@ -150,9 +150,7 @@ def frame_all(points: Array, reach: float, field: float = math.radians(40.0)) ->
         length = float(np.linalg.norm(side))
         # Flat motions are seen from the front, a little from above and from the side.
         way = (
-            normal
-            + 0.3 * np.array([0.0, 0.0, 1.0])
-            - 0.35 * (side / length if length > 0.1 else np.array([0, 1.0, 0]))
+            normal + 0.3 * np.array([0.0, 0.0, 1.0]) - 0.35 * (side / length if length > 0.1 else np.array([0, 1.0, 0]))
         )
     else:
         way = np.array([1.0, -1.2, 0.7])

@@ -1,7 +1,7 @@
 """Plots of a solution, fit to print as they are.
 
-Every function returns a matplotlib ``Figure`` that is bound to no window, and takes solutions of scenes and of any other
-system alike.
+Every function returns a matplotlib ``Figure`` that is bound to no window, and takes solutions of scenes and of any
+other system alike.
 """
 
 from typing import TYPE_CHECKING, Any
@@ -132,12 +132,11 @@ def _panels(sol: Any, what: str, heights: list[float]) -> "tuple[Figure, list[Ax
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    with rc_context(_STYLE):
+    style: Any = _STYLE
+    with rc_context(style):
         figure = Figure(figsize=(_WIDTH, 0.7 + _ROW * sum(heights)), layout="constrained", facecolor="white")
         FigureCanvasAgg(figure)
-        grid = figure.subplots(
-            len(heights), 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": heights}
-        )
+        grid = figure.subplots(len(heights), 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": heights})
         axes: list[Axes] = list(grid[:, 0])
         axes[0].set_title(f"{sol.name}: {what}", loc="left")
         axes[-1].set_xlabel("time [s]")
@@ -200,6 +199,4 @@ def _legend(axes: "Axes") -> None:
     """Names to the right of the panel, where no line can run under them."""
     handles, _ = axes.get_legend_handles_labels()
     if handles:
-        axes.legend(
-            loc="upper left", bbox_to_anchor=(1.0, 1.02), frameon=False, borderaxespad=0.4, fontsize=8.0
-        )
+        axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.02), frameon=False, borderaxespad=0.4, fontsize=8.0)

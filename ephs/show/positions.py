@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping
 from importlib.util import find_spec
+from typing import Any
 
 import numpy as np
 
@@ -71,9 +72,7 @@ def _neato(graph: Graph, start: int) -> Points:
     radii = graph.radii()
     names = {path: f"n{index}" for index, path in enumerate(radii)}
     names |= {end: f"o{index}" for index, (_, end) in enumerate(_edges(graph)) if end.startswith(_OUTER)}
-    net = pygraphviz.AGraph(
-        strict=True, directed=False, mode="KK", overlap="false", start=str(start), sep="+8"
-    )
+    net = pygraphviz.AGraph(strict=True, directed=False, mode="KK", overlap="false", start=str(start), sep="+8")
     for path, name in names.items():
         side = 2 * radii.get(path, 2.0) / 72
         net.add_node(name, shape="circle", fixedsize="true", label="", width=side, height=side)
@@ -81,7 +80,8 @@ def _neato(graph: Graph, start: int) -> Points:
         length = (radii.get(first, 2.0) + radii.get(second, 2.0) + GAP) / 72
         net.add_edge(names[first], names[second], len=length)
     net.layout(prog="neato")
-    places = [str(net.get_node(names[path]).attr["pos"]).split(",") for path in radii]
+    found: Any = net
+    places = [str(found.get_node(names[path]).attr["pos"]).split(",") for path in radii]
     return np.array([(float(x), -float(y)) for x, y in places]).reshape(-1, 2)
 
 

@@ -137,11 +137,16 @@ def _final(summary: dict[str, Any]) -> str:
         fields = [(key, words) for kind, key, words in _FINAL if kind == group]
         head = "".join(f"<th>{words}</th>" for _, words in fields)
         rows = "".join(
-            f"<tr><th>{html.escape(name)}</th>{''.join(f'<td>{_number(entry.get(key))}</td>' for key, _ in fields)}</tr>"
+            "<tr><th>"
+            + html.escape(name)
+            + "</th>"
+            + "".join(f"<td>{_number(entry.get(key))}</td>" for key, _ in fields)
+            + "</tr>"
             for name, entry in entries.items()
         )
         tables.append(
-            f'<div class="wide"><table><thead><tr><th>{group}</th>{head}</tr></thead><tbody>{rows}</tbody></table></div>'
+            f'<div class="wide"><table><thead><tr><th>{group}</th>{head}</tr></thead>'
+            f"<tbody>{rows}</tbody></table></div>"
         )
     return f"<h2>At the end</h2>{'<p></p>'.join(tables)}" if tables else ""
 

@@ -1,6 +1,7 @@
 """Wires as polylines that keep clear of every box and junction that they are not attached to."""
 
 import heapq
+import itertools
 import math
 
 import numpy as np
@@ -22,17 +23,15 @@ def straight(start: Point, end: Point, obstacles: Points) -> bool:
 def route(start: Point, end: Point, obstacles: Points) -> tuple[Point, ...]:
     """The shortest line of straight pieces from `start` to `end` round all obstacles.
 
-    The line bends at corners of octagons about the obstacles (a visibility graph, searched best first). Where there is no
-    way through, which takes touching obstacles all round, it is the straight line.
+    The line bends at corners of octagons about the obstacles (a visibility graph, searched best first). Where there is
+    no     way through, which takes touching obstacles all round, it is the straight line.
     """
     if straight(start, end, obstacles):
         return (start, end)
     corners = [start, end]
     for x, y, radius in obstacles:
         reach = (radius + CLEAR + 1.5) / math.cos(math.pi / 8)
-        ring = [
-            (x + reach * math.cos(k * math.pi / 4), y + reach * math.sin(k * math.pi / 4)) for k in range(8)
-        ]
+        ring = [(x + reach * math.cos(k * math.pi / 4), y + reach * math.sin(k * math.pi / 4)) for k in range(8)]
         corners += [corner for corner in ring if straight(corner, corner, obstacles)]
     best = {0: 0.0}
     before: dict[int, int] = {}
@@ -48,11 +47,7 @@ def route(start: Point, end: Point, obstacles: Points) -> tuple[Point, ...]:
         for there, corner in enumerate(corners):
             # Each bend costs a little, so that a line with fewer of them wins.
             length = best[here] + math.dist(corners[here], corner) + 6.0
-            if (
-                there in done
-                or length >= best.get(there, math.inf)
-                or not straight(corners[here], corner, obstacles)
-            ):
+            if there in done or length >= best.get(there, math.inf) or not straight(corners[here], corner, obstacles):
                 continue
             best[there], before[there] = length, here
             heapq.heappush(queue, (length + math.dist(corner, end), there))
@@ -70,11 +65,11 @@ def _smooth(line: tuple[Point, ...], obstacles: Points) -> tuple[Point, ...]:
     """Cut the corners thrice, as long as the line stays clear."""
     for _ in range(3):
         cut = [line[0]]
-        for a, b in zip(line, line[1:], strict=False):
+        for a, b in itertools.pairwise(line):
             cut.append((0.75 * a[0] + 0.25 * b[0], 0.75 * a[1] + 0.25 * b[1]))
             cut.append((0.25 * a[0] + 0.75 * b[0], 0.25 * a[1] + 0.75 * b[1]))
         cut.append(line[-1])
-        if not all(straight(a, b, obstacles) for a, b in zip(cut, cut[1:], strict=False)):
+        if not all(straight(a, b, obstacles) for a, b in itertools.pairwise(cut)):
             return line
         line = tuple(cut)
     return line

@@ -1,5 +1,6 @@
 """Lines of a plot, made ready: units, thinning, few enough names."""
 
+import itertools
 from typing import Any
 
 import numpy as np
@@ -48,7 +49,7 @@ def thinned(t: Array, values: Array, most: int = 2000) -> tuple[Array, Array]:
         return t, values
     edges = np.linspace(0, len(t), most // 2 + 1).astype(int)
     kept: list[int] = [0]
-    for first, last in zip(edges[:-1], edges[1:], strict=True):
+    for first, last in itertools.pairwise(edges):
         piece = np.nan_to_num(values[first:last])
         kept += sorted({first + int(piece.argmin()), first + int(piece.argmax())})
     kept.append(len(t) - 1)
@@ -106,18 +107,10 @@ def scene_panels(sol: Any) -> dict[str, list[tuple[str, Array]]]:
         for axis, column in zip("xyz", np.asarray(sol.body(name).position, dtype=float).T, strict=True):
             panels.setdefault(f"position {axis} [m]", []).append((name, column))
     for name, _ in scene.all_thermal():
-        panels.setdefault("temperature [K]", []).append(
-            (name, np.asarray(sol.thermal(name).temperature, dtype=float))
-        )
+        panels.setdefault("temperature [K]", []).append((name, np.asarray(sol.thermal(name).temperature, dtype=float)))
     # A direction in which nothing moves is no news.
-    return {
-        title: lines for title, lines in panels.items() if not title.startswith("position") or _moves(lines)
-    }
+    return {title: lines for title, lines in panels.items() if not title.startswith("position") or _moves(lines)}
 
 
 def _moves(lines: list[tuple[str, Array]]) -> bool:
-    return any(
-        float(np.ptp(values)) > 1e-9 * (1.0 + float(np.abs(values).max()))
-        for _, values in lines
-        if len(values)
-    )
+    return any(float(np.ptp(values)) > 1e-9 * (1.0 + float(np.abs(values).max())) for _, values in lines if len(values))

@@ -77,9 +77,7 @@ def _add_mesh(scene: Any, node: str, file: Any, colour: Colour, name: str) -> No
         mesh = trimesh.load_mesh(str(file))
     except (OSError, ValueError) as fault:
         raise ShowError("shape", path=name, found=f"a mesh that cannot be read ({fault})") from fault
-    scene.add_mesh_simple(
-        node, vertices=np.asarray(mesh.vertices), faces=np.asarray(mesh.faces), color=colour
-    )
+    scene.add_mesh_simple(node, vertices=np.asarray(mesh.vertices), faces=np.asarray(mesh.faces), color=colour)
 
 
 def add_joint(server: Any, node: str, joint: Any, size: float) -> None:
@@ -113,9 +111,7 @@ def add_joint(server: Any, node: str, joint: Any, size: float) -> None:
             scene.add_box(f"{node}/carriage", color=_METAL, dimensions=(1.6 * size, 1.6 * size, 2.0 * size))
             _axis(scene, node, size, half=5.0)
         case "planar":
-            scene.add_box(
-                f"{node}/plate", color=_METAL, dimensions=(5.0 * size, 5.0 * size, 0.2 * size), opacity=0.6
-            )
+            scene.add_box(f"{node}/plate", color=_METAL, dimensions=(5.0 * size, 5.0 * size, 0.2 * size), opacity=0.6)
             _axis(scene, node, size)
         case "spherical":
             scene.add_icosphere(f"{node}/ball", radius=1.1 * size, color=_METAL, subdivisions=3)
@@ -152,10 +148,6 @@ def _axis(scene: Any, node: str, size: float, half: float = 3.6) -> None:
     _polyline(scene, f"{node}/axis", ends, _AXIS, 2.0, units="screen")
 
 
-def _polyline(
-    scene: Any, node: str, line: Array, colour: Colour, thickness: float, units: str = "world"
-) -> Any:
+def _polyline(scene: Any, node: str, line: Array, colour: Colour, thickness: float, units: str = "world") -> Any:
     pieces = np.stack([line[:-1], line[1:]], axis=1)
-    return scene.add_line_segments(
-        node, points=pieces, colors=colour, thickness=thickness, thickness_units=units
-    )
+    return scene.add_line_segments(node, points=pieces, colors=colour, thickness=thickness, thickness_units=units)

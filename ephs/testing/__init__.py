@@ -37,11 +37,11 @@ __all__ = [
 
 
 def register() -> None:
-    """Tell Hypothesis how to make paths, quantities, patterns, systems and scenes; it calls this when it is imported."""
+    """Tell Hypothesis how to make paths, quantities, patterns, systems and scenes; called when it is imported."""
     from hypothesis import strategies as st
 
-    from ephs.operad import Path, Pattern, Quantity
     from ephs.mechanics.scene import Scene
+    from ephs.operad import Path, Pattern, Quantity
     from ephs.semantics import System
 
     st.register_type_strategy(Path, paths())

@@ -96,9 +96,7 @@ class _Maker:
         """A body on a parent, at random offsets, coordinates and rates."""
         rng = self.rng
         pitch = float(rng.uniform(0.05, 0.5)) if kind == "screw" else 0.0
-        middle = (
-            frozen(SE3.exp(np.array([np.pi / 2, 0.2, 0.1, 0.0, 0.0, 0.0]))) if kind == "universal" else None
-        )
+        middle = frozen(SE3.exp(np.array([np.pi / 2, 0.2, 0.1, 0.0, 0.0, 0.0]))) if kind == "universal" else None
         of = coupling(kind, pitch, middle)
         frame1, frame2 = SE3.exp(0.5 * rng.standard_normal(6)), SE3.exp(0.5 * rng.standard_normal(6))
         x = of.element(0.5 * rng.standard_normal(of.dim))
@@ -107,9 +105,7 @@ class _Maker:
         carried = SE3.adjoint(SE3.inverse(SE3.compose(frame1, of.include(x)))) @ twist + of.basis(x) @ rate
         there = SE3.compose(SE3.compose(SE3.compose(pose, frame1), of.include(x)), SE3.inverse(frame2))
         self._body(name, there, SE3.adjoint(frame2) @ carried)
-        self._joint(
-            f"joint{len(self.joints)}", kind, (parent, name), (frame1, frame2), x, rate, pitch, middle
-        )
+        self._joint(f"joint{len(self.joints)}", kind, (parent, name), (frame1, frame2), x, rate, pitch, middle)
 
     def loop(self, kinds: tuple[str, str, str, str]) -> None:
         """Three bars and the ground, joined at the corners of a quadrangle in a tilted plane; at rest.
@@ -131,9 +127,7 @@ class _Maker:
             of = coupling(kind)
             frames = tuple(SE3.compose(SE3.inverse(self._motion(name)[0]), at) for name in names[i : i + 2])
             pair = (names[i], names[i + 1])
-            self._joint(
-                f"joint{i}", kind, pair, (frames[0], frames[1]), of.identity(), np.zeros(of.dim), 0.0, None
-            )
+            self._joint(f"joint{i}", kind, pair, (frames[0], frames[1]), of.identity(), np.zeros(of.dim), 0.0, None)
 
     def scene(self) -> Scene:
         """The collected scene."""

@@ -31,9 +31,7 @@ _PAIRS = ("revolute", "prismatic", "cylindrical", "planar", "spherical", "fixed"
 @st.composite
 def paths(draw: st.DrawFn, *, min_size: int = 1, max_size: int = 2) -> Path:
     """Paths of short names, by default not the root."""
-    _require(
-        0 <= min_size <= max_size, f"min_size={min_size} and max_size={max_size}: expected 0 <= min <= max"
-    )
+    _require(0 <= min_size <= max_size, f"min_size={min_size} and max_size={max_size}: expected 0 <= min <= max")
     name = st.text("abpq", min_size=1, max_size=2)
     return Path(draw(st.lists(name, min_size=min_size, max_size=max_size)))
 
@@ -51,9 +49,7 @@ def quantities(draw: st.DrawFn, *, frames: bool = True) -> Quantity:
 
 
 @st.composite
-def interfaces(
-    draw: st.DrawFn, *, min_ports: int = 0, max_ports: int = 4, state_ports: bool = True
-) -> Interface:
+def interfaces(draw: st.DrawFn, *, min_ports: int = 0, max_ports: int = 4, state_ports: bool = True) -> Interface:
     """Interfaces, the empty one included.
 
     Parameters
@@ -61,9 +57,7 @@ def interfaces(
     state_ports
         Whether ports may be state ports.
     """
-    _require(
-        0 <= min_ports <= max_ports, f"min_ports={min_ports}, max_ports={max_ports}: expected 0 <= min <= max"
-    )
+    _require(0 <= min_ports <= max_ports, f"min_ports={min_ports}, max_ports={max_ports}: expected 0 <= min <= max")
     names = fresh_paths(draw, draw(st.integers(min_ports, max_ports)), ())
     power = st.just(True) if not state_ports else st.booleans().map(lambda flag: not flag)
     return Directory([(name, PortType(draw(quantities()), draw(power))) for name in names])
@@ -105,9 +99,7 @@ def patterns(
     hypothesis.errors.InvalidArgument
         When drawn, if there is no such pattern.
     """
-    _require(
-        0 <= min_boxes <= max_boxes, f"min_boxes={min_boxes}, max_boxes={max_boxes}: expected 0 <= min <= max"
-    )
+    _require(0 <= min_boxes <= max_boxes, f"min_boxes={min_boxes}, max_boxes={max_boxes}: expected 0 <= min <= max")
     _require(max_boxes > 0 or not interface, "an outer port needs an inner one: expected max_boxes >= 1")
     most = 3 if max_boxes else 0
     outer = draw(interfaces(max_ports=most, state_ports=state_ports)) if interface is None else interface
@@ -214,9 +206,7 @@ class Nesting:
 
 
 @st.composite
-def nestings(
-    draw: st.DrawFn, *, depth: int = 3, interface: Interface | None = None, max_boxes: int = 3
-) -> Nesting:
+def nestings(draw: st.DrawFn, *, depth: int = 3, interface: Interface | None = None, max_boxes: int = 3) -> Nesting:
     """Trees of patterns that fit into each other, of at most so many levels.
 
     Parameters

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from ephs.mechanics import components
 from ephs.operad import Interface, Path
+from ephs.operad import quantity as quantities
 from ephs.semantics import Irreversible, Reference, Reversible, Storage, library
 from ephs.semantics.bundle import Array, Bundle
 from ephs.semantics.primitives import Point
@@ -30,21 +31,19 @@ def storages(draw: st.DrawFn, interface: Interface) -> Storage:
     bundle = Bundle.of(interface)
     kinds = [quantity for _, _, quantity in bundle.items()]
     if len(kinds) == 1:
-        (port,), quantity = bundle.ports, kinds[0]
+        (_port,), quantity = bundle.ports, kinds[0]
         if quantity.kind == "entropy":
             if draw(st.booleans()):
                 return _renamed(library.environment(), interface)
-            return _renamed(
-                components.thermal_node(rng.uniform(5.0, 50.0), rng.uniform(250.0, 350.0)), interface
-            )
+            return _renamed(components.thermal_node(rng.uniform(5.0, 50.0), rng.uniform(250.0, 350.0)), interface)
         if quantity.kind == "pose":
             group = "SE3" if quantity.space.name == "SE(3)" else "SO3xR3"
             return _renamed(components.gravity(rng.standard_normal(3), group), interface)
+        if quantity == quantities.relative_pose("spherical"):
+            return _turning(interface, rng.uniform(0.5, 3.0))
         if quantity.kind == "relative_pose":
             pair = Pair.from_space(quantity.space)
-            return _renamed(
-                components.pair_spring(pair, np.full(pair.dim, 1.5), np.zeros(pair.dim)), interface
-            )
+            return _renamed(components.pair_spring(pair, np.full(pair.dim, 1.5), np.zeros(pair.dim)), interface)
     parity = bundle.parity()
     factor = rng.standard_normal((bundle.size, bundle.size))
     matrix = factor @ factor.T + np.eye(bundle.size)
@@ -94,9 +93,7 @@ def irreversibles(draw: st.DrawFn, interface: Interface, *, reads: tuple[Path, .
     rng = draw(generators())
     bundle = Bundle.of(interface)
     strength = np.abs(rng.standard_normal((bundle.size, bundle.size)))
-    fixed = sum(
-        (bundle.indicator(kind) for kind in bundle.environment_kinds() if kind != "entropy"), np.zeros(1)
-    )
+    fixed = sum((bundle.indicator(kind) for kind in bundle.environment_kinds() if kind != "entropy"), np.zeros(1))
     moving = np.flatnonzero(np.broadcast_to(fixed, bundle.size) == 0.0)
     used = reads if reads and draw(st.booleans()) else ()
 
@@ -108,15 +105,23 @@ def irreversibles(draw: st.DrawFn, interface: Interface, *, reads: tuple[Path, .
             for j in moving[moving > i]:
                 normal = np.zeros(bundle.size)
                 normal[i], normal[j] = energy[j], -energy[i]
-                out += (
-                    scale
-                    * strength[i, j]
-                    / (1.0 + abs(energy[i]) + abs(energy[j]))
-                    * np.outer(normal, normal)
-                )
+                out += scale * strength[i, j] / (1.0 + abs(energy[i]) + abs(energy[j])) * np.outer(normal, normal)
         return out
 
     return Irreversible("random Onsager structure", interface, matrix, used)
+
+
+def _turning(interface: Interface, stiffness: float) -> Storage:
+    """E = 2 k |sin(φ/2)|², smooth on all rotations; its discrete gradient is the one of storages that have none."""
+    (port,) = interface
+
+    def energy(x: Point) -> float:
+        return 2.0 * stiffness * float(x[port][1:] @ x[port][1:])
+
+    def gradient(x: Point) -> Array:
+        return 2.0 * stiffness * x[port][0] * x[port][1:]
+
+    return Storage("turning spring", interface, energy, gradient, parameters=(("k", stiffness),))
 
 
 def _kept(bundle: Bundle) -> Array:

@@ -58,9 +58,7 @@ class TwoBodies:
     def system(self) -> System:
         parts = {f"body{i + 1}": rigid_body(self.masses[i], self.inertias[i], GRAVITY) for i in range(2)}
         pitch = dict(self.of.parameters).get("pitch", 0.0)
-        parts["joint"] = joint(
-            self.of.name, self.offsets[0], self.offsets[1], self.mu, self.stiffness, pitch=pitch
-        )
+        parts["joint"] = joint(self.of.name, self.offsets[0], self.offsets[1], self.mu, self.stiffness, pitch=pitch)
         return System.of(mbs_pattern(), parts)
 
     @property

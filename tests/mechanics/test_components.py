@@ -45,9 +45,7 @@ def primitives():
         out[f"joint_friction {name}"] = components.joint_friction(of, factor @ factor.T)
     out["pkc"] = components.kinematic_coupling(Q.pose, Q.body_momentum, "q", "p")
     out["no_potential"] = components.no_potential(Q.pose, "q")
-    out["frame_change"] = components.frame_change(
-        SE3.exp(np.array([0.3, -0.2, 0.5, 1.0, 2.0, -1.0])), "p_j1", "p1"
-    )
+    out["frame_change"] = components.frame_change(SE3.exp(np.array([0.3, -0.2, 0.5, 1.0, 2.0, -1.0])), "p_j1", "p1")
     out["point_spring"] = components.point_spring(2.0, 1.0)
     out["point_damper"] = components.point_damper(3.0)
     out["ground"] = components.ground()
@@ -79,11 +77,7 @@ class Draw:
         self.splits = np.cumsum(dims)[:-1]
 
     def steps(self, v):
-        return (
-            dict(zip(self.primitive.reads, np.split(v, self.splits), strict=True))
-            if self.primitive.reads
-            else {}
-        )
+        return dict(zip(self.primitive.reads, np.split(v, self.splits), strict=True)) if self.primitive.reads else {}
 
     def plain(self, z):
         """The oracle at z = (e, λ, v), or at v for a storage."""
@@ -132,22 +126,16 @@ def test_a_kernel_is_its_plain_definition(name, seed, size):
     assert status == OK
     scale = max(1.0, np.abs(expected).max(initial=0.0))
     assert np.abs(values - expected).max(initial=0.0) <= 2e-13 * scale
-    columns = [
-        (draw.plain(draw.z + step) - draw.plain(draw.z - step)) / 2e-5 for step in 1e-5 * np.eye(draw.z.size)
-    ]
+    columns = [(draw.plain(draw.z + step) - draw.plain(draw.z - step)) / 2e-5 for step in 1e-5 * np.eye(draw.z.size)]
     differences = np.array(columns).T.reshape(jacobian.shape)
     # differences, and the differenced slopes of springs, are good to about eight digits
-    assert np.abs(jacobian - differences).max(initial=0.0) <= 3e-6 * max(
-        1.0, np.abs(differences).max(initial=0.0)
-    )
+    assert np.abs(jacobian - differences).max(initial=0.0) <= 3e-6 * max(1.0, np.abs(differences).max(initial=0.0))
     if isinstance(draw.primitive, Storage) and not draw.primitive.environment:
         there = draw.primitive.energy(draw.primitive.retract(draw.x, draw.v))
         assert abs(energy - there) <= 4e-15 * max(1.0, abs(there))
 
 
-@pytest.mark.parametrize(
-    "name", [n for n, p in PRIMITIVES.items() if isinstance(p, Storage) and not p.environment]
-)
+@pytest.mark.parametrize("name", [n for n, p in PRIMITIVES.items() if isinstance(p, Storage) and not p.environment])
 @given(seed=seeds, size=st.sampled_from(SIZES))
 def test_a_discrete_gradient_gives_the_rise_and_is_symmetric(name, seed, size):
     draw = Draw(PRIMITIVES[name], seed, 0.5 * size)
@@ -156,9 +144,7 @@ def test_a_discrete_gradient_gives_the_rise_and_is_symmetric(name, seed, size):
     effort = storage.discrete_effort(x, v, REFERENCE)
     x1 = storage.retract(x, v)
     rise = storage.energy(x1) - storage.energy(x)
-    scale = (
-        abs(storage.energy(x)) + abs(storage.energy(x1)) + (np.abs(effort) + np.abs(intensive)) @ np.abs(v)
-    )
+    scale = abs(storage.energy(x)) + abs(storage.energy(x1)) + (np.abs(effort) + np.abs(intensive)) @ np.abs(v)
     assert abs(rise - (effort + intensive) @ v) <= 2e-14 * max(scale, 1e-300)
     back = storage.discrete_effort(x1, -v, REFERENCE)
     assert np.abs(back - effort).max(initial=0.0) <= 1e-12 * max(1.0, np.abs(effort).max(initial=0.0))
@@ -190,9 +176,7 @@ def test_the_discrete_joint_relation_keeps_the_joint_closed(kind, seed):
     rng = np.random.default_rng(seed)
     h, u1, u_r = 0.05, rng.standard_normal(6), rng.standard_normal(of.dim)
     x0 = of.manifold.random(rng)
-    carried = SE3.compose(
-        SE3.exp(h * SE3.adjoint(SE3.inverse(of.include(x0))) @ u1), SE3.exp(h * of.basis @ u_r)
-    )
+    carried = SE3.compose(SE3.exp(h * SE3.adjoint(SE3.inverse(of.include(x0))) @ u1), SE3.exp(h * of.basis @ u_r))
     e = np.concatenate([u1, SE3.log(carried) / h, u_r])  # the third frame's twist, from the group relation
     primitive = components.holonomic(of)
     (port,) = primitive.reads

@@ -1,5 +1,7 @@
 """Bodies, joints and their composition: the patterns, and that they mean the equations of the literature."""
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -20,7 +22,7 @@ from ephs.semantics.relation import as_system
 from ephs.semantics.spaces import PAIRS, SE3, SO3xR3, pair
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.semantics.subspace import Subspace
-from tests.mechanics.mechanisms import TwoBodies, kinds
+from tests.mechanics.mechanisms import GRAVITY, TwoBodies, kinds
 
 seeds = st.integers(0, 2**20)
 few = settings(max_examples=10)
@@ -42,11 +44,7 @@ def test_a_body_has_four_boxes_and_a_joint_seven():
 
 def test_the_flat_multibody_system_has_nine_junctions_and_fifteen_boxes():
     system = TwoBodies.draw("revolute", 1).system.flatten()
-    names = (
-        {f"body{i}.q" for i in (1, 2)}
-        | {f"joint.{j}" for j in ("p_j1", "p_j2", "p_r", "q_r", "s")}
-        | {"p1", "p2"}
-    )
+    names = {f"body{i}.q" for i in (1, 2)} | {f"joint.{j}" for j in ("p_j1", "p_j2", "p_r", "q_r", "s")} | {"p1", "p2"}
     assert set(map(str, system.pattern.junctions)) == names
     assert len(system.pattern.boxes) == 15
     body = body_pattern()
@@ -122,7 +120,7 @@ def joint_by_hand(two, *, first=None):
     basis, mu, unit = two.of.basis, two.mu, 1.0
     # unknowns: u_r, ṡ, f₁, f₂, e₁, e₂, λ, 1
     at = np.cumsum([0, d, 1, 6, 6, 6, 6, 6, 1])
-    u_r, s, f1, f2, e1, e2, lam, one = (slice(a, b) for a, b in zip(at[:-1], at[1:], strict=True))
+    u_r, s, f1, f2, e1, e2, lam, one = (slice(a, b) for a, b in itertools.pairwise(at))
     rows = []
 
     def row(*terms):
@@ -148,9 +146,7 @@ def test_a_joint_means_its_equations(kind, seed):
     two = TwoBodies.draw(kind, seed)
     system = two.system.fillings[Path.of("joint")]
     for route in ("flat", "nested"):
-        relation = system.relation(route=route).at(
-            {"pe.q_r": two.x}, {Path.parse("mf"): np.append(two.u_r, 0.0)}
-        )
+        relation = system.relation(route=route).at({"pe.q_r": two.x}, {Path.parse("mf"): np.append(two.u_r, 0.0)})
         assert relation.dimension - 1 == 12
         ours = _scaled(relation, two.of.dim)
         assert ours.distance(joint_by_hand(two)) <= 1e-12
@@ -182,8 +178,7 @@ def test_the_constraint_row_as_it_is_printed_is_another_relation(kind, seed):
     # flows from the correct row, efforts from the printed one: ⟨e|f⟩ does not vanish
     lam = np.random.default_rng(seed).standard_normal(6)
     worst = {
-        name: np.abs(space.basis.T @ (two.rows.T @ lam)).max()
-        for name, space in (("right", right), ("wrong", wrong))
+        name: np.abs(space.basis.T @ (two.rows.T @ lam)).max() for name, space in (("right", right), ("wrong", wrong))
     }
     assert worst["right"] <= 1e-13
     assert worst["wrong"] > 0.05
@@ -212,9 +207,7 @@ def test_the_flat_system_means_its_equations(kind, seed):
         "body2.ke.p": two.gyroscopic[1] - two.weight(1) + two.to_c2.T @ lam,
         "joint.env.s": [two.u_r @ two.mu @ two.u_r / THETA],
     }  # fmt: skip
-    point = np.concatenate(
-        [*(np.atleast_1d(rates[str(path)]) for path, _ in relation.rates), [relation.unit]]
-    )
+    point = np.concatenate([*(np.atleast_1d(rates[str(path)]) for path, _ in relation.rates), [relation.unit]])
     assert relation.subspace.contains(point) <= 1e-12
     nested = two.system.relation(route="nested").at(two.state, two.efforts)
     assert relation.distance(nested) <= 1e-12
@@ -235,9 +228,7 @@ def test_a_spring_pulls_along_the_line_of_its_points():
     relation = spring.relation().at({"pe.q_r": [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 2.0]})
     names = [str(path) for path, _ in relation.ports]
     flows = relation.subspace.basis[7 : 7 + 12]
-    constant = (
-        flows @ relation.subspace.basis[-1] / (relation.subspace.basis[-1] @ relation.subspace.basis[-1])
-    )
+    constant = flows @ relation.subspace.basis[-1] / (relation.subspace.basis[-1] @ relation.subspace.basis[-1])
     pulls = dict(zip(names, np.split(constant * relation.unit, 2), strict=True))
     # drawn from body 1 a wrench that pulls it to body 2 (z up), and the other way round; the frames are 2 m apart
     assert np.allclose(pulls["p1"], [0, 0, 0, 0, 0, -15.0], atol=1e-10)
@@ -272,9 +263,14 @@ def test_functions_of_the_user_mean_what_the_built_in_parts_mean(seed):
     own = System.of(
         mbs_pattern(),
         {
-            "body1": rigid_body(two.masses[0], two.inertias[0], (0, 0, 0), potential=lambda q: float(-two.masses[0] * np.array([0.3, -0.2, -9.81]) @ q[4:])),
+            "body1": rigid_body(
+                two.masses[0], two.inertias[0], (0, 0, 0), potential=lambda q: float(-two.masses[0] * GRAVITY @ q[4:])
+            ),
             "body2": two.system.fillings[Path.of("body2")],
-            "joint": joint("cylindrical", *two.offsets, friction=lambda _x, _u, _theta: two.mu, potential=lambda x: 0.85 * float(x @ x)),
+            "joint": joint(
+                "cylindrical", *two.offsets,
+                friction=lambda _x, _u, _theta: two.mu, potential=lambda x: 0.85 * float(x @ x),
+            ),
         },
     )  # fmt: skip
     ours, theirs = (s.relation().at(two.state, two.efforts) for s in (own, two.system))
@@ -285,9 +281,7 @@ def test_functions_of_the_user_mean_what_the_built_in_parts_mean(seed):
 
 def test_friction_may_depend_on_the_temperature():
     """μ(θ) = 0.1 θ is taken at the local temperature θ₀ + s.e."""
-    friction = joint("revolute", friction=lambda x, u, theta: [[0.1 * theta]], heat=True).fillings[
-        Path.of("mf")
-    ]
+    friction = joint("revolute", friction=lambda x, u, theta: [[0.1 * theta]], heat=True).fillings[Path.of("mf")]
     flow = friction.flow({Path.of("q_r"): np.zeros(1)}, np.array([2.0, 10.0]), Reference())
     theta = THETA + 10.0
     assert flow == pytest.approx([0.2 * theta, -0.4])

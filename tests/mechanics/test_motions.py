@@ -6,7 +6,6 @@ from pathlib import Path as File
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, find, given, settings
-from hypothesis import strategies as st
 
 import ephs
 from benchmarks.cases import CASES
@@ -71,9 +70,7 @@ def test_loops_and_all_pairs_and_heat_are_generated():
         settings=quick,
     )
     for kind in [*PAIRS, "universal"]:
-        find(
-            mechanisms(), lambda s, kind=kind: any(j.kind == kind for j in s.joints.values()), settings=quick
-        )
+        find(mechanisms(), lambda s, kind=kind: any(j.kind == kind for j in s.joints.values()), settings=quick)
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -81,12 +78,8 @@ def test_loops_and_all_pairs_and_heat_are_generated():
 def test_every_pair_with_every_method(kind, method):
     """One body on another on the ground, rubbing, heating a node: balances, closure, and order two."""
     scenes = mechanisms(max_bodies=2, kinds=(kind,), loops=False)
-    quick = settings(
-        max_examples=500, database=None, derandomize=True, suppress_health_check=list(HealthCheck)
-    )
-    scene = find(
-        scenes, lambda s: len(s.bodies) == 2 and bool(s.thermal) and np.any(s.springs), settings=quick
-    )
+    quick = settings(max_examples=500, database=None, derandomize=True, suppress_health_check=list(HealthCheck))
+    scene = find(scenes, lambda s: len(s.bodies) == 2 and bool(s.thermal) and np.any(s.springs), settings=quick)
     ends = []
     for h in (0.01, 0.005, 0.0025):
         sol = ephs.simulate(scene, 0.2, method=method, step=h)
@@ -106,8 +99,7 @@ def test_every_pair_with_every_method(kind, method):
 def test_motions_converge_to_independent_references(case):
     """Against states that two other programs agree upon: second order."""
     errors = [
-        case.error(ephs.simulate(case.scene(), case.time, step=case.step / 2**k, save_at=[case.time]))
-        for k in (1, 2)
+        case.error(ephs.simulate(case.scene(), case.time, step=case.step / 2**k, save_at=[case.time])) for k in (1, 2)
     ]
     assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.1)
 
@@ -150,9 +142,7 @@ def test_reported_velocities_are_those_of_the_start(scene):
     """Nothing is projected away where the state is consistent; rates and twists are what the scene gave."""
     sol = ephs.simulate(scene, 0.01, step=0.01)
     for name, body in scene.all_bodies():
-        assert np.abs(sol.body(name).twist[0] - body.twist).max() <= 1e-10 * max(
-            1.0, np.abs(body.twist).max()
-        )
+        assert np.abs(sol.body(name).twist[0] - body.twist).max() <= 1e-10 * max(1.0, np.abs(body.twist).max())
     for name, j in scene.all_joints():
         assert np.abs(sol.joint(name).rate[0] - j.rate).max(initial=0.0) <= 1e-9 * max(
             1.0, np.abs(j.rate).max(initial=0.0)
@@ -211,9 +201,7 @@ def test_a_drive_accelerates_its_freedom_and_its_work_is_in_the_balance():
 
 def test_a_wrench_accelerates_its_body():
     case = next(c for c in CASES if c.name == "tumbling-body")
-    scene = replace(
-        case.scene(), bodies={"body": replace(case.scene().bodies["body"], twist=frozen(np.zeros(6)))}
-    )
+    scene = replace(case.scene(), bodies={"body": replace(case.scene().bodies["body"], twist=frozen(np.zeros(6)))})
     sol = ephs.simulate(scene, 1.0, step=0.01, inputs={"bodies.body": [0.0, 0.0, 0.0, 2.0, 0.0, 0.0]})
     assert sol.body("body").position[-1] == pytest.approx([1.0, 0.0, 0.0], abs=1e-12)
     assert sol.work[-1] == pytest.approx(2.0, abs=1e-12)

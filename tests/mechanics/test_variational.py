@@ -85,9 +85,7 @@ def test_an_independent_lagrangian_gives_the_same_accelerations(kind, seed):
     """
     two = TwoBodies.draw(kind, seed)
     now = solved(two)
-    acceleration = np.linalg.solve(
-        two.metric[0], dict((str(p), r) for p, r in now.rates.items())["body1.ke.p"]
-    )
+    acceleration = np.linalg.solve(two.metric[0], dict((str(p), r) for p, r in now.rates.items())["body1.ke.p"])
     n = 6 + two.of.dim
     rate = np.concatenate([two.u1, two.u_r])
 
@@ -115,18 +113,13 @@ def test_an_independent_lagrangian_gives_the_same_accelerations(kind, seed):
 
     def gradient(f):
         """∂f at 0, fourth order."""
-        return np.array(
-            [(8.0 * (f(d * e) - f(-d * e)) - (f(2 * d * e) - f(-2 * d * e))) / (12.0 * d) for e in eye]
-        )
+        return np.array([(8.0 * (f(d * e) - f(-d * e)) - (f(2 * d * e) - f(-2 * d * e))) / (12.0 * d) for e in eye])
 
     # L is quadratic in ż up to the rounding of differences: second differences in ż are exact
     zero = np.zeros(n)
     mass = np.array(
         [
-            [
-                lagrangian(zero, a + b) - lagrangian(zero, a) - lagrangian(zero, b) + lagrangian(zero, zero)
-                for b in eye
-            ]
+            [lagrangian(zero, a + b) - lagrangian(zero, a) - lagrangian(zero, b) + lagrangian(zero, zero) for b in eye]
             for a in eye
         ]
     )
@@ -135,9 +128,9 @@ def test_an_independent_lagrangian_gives_the_same_accelerations(kind, seed):
         return np.array([0.5 * (lagrangian(z, rate + e) - lagrangian(z, rate - e)) for e in eye])
 
     # ṗ along ż less ∂L/∂z plus friction = 0
-    drift = (
-        8.0 * (momentum(d * rate) - momentum(-d * rate)) - (momentum(2 * d * rate) - momentum(-2 * d * rate))
-    ) / (12.0 * d)
+    drift = (8.0 * (momentum(d * rate) - momentum(-d * rate)) - (momentum(2 * d * rate) - momentum(-2 * d * rate))) / (
+        12.0 * d
+    )
     force = gradient(lambda z: lagrangian(z, rate))
     friction = np.concatenate([np.zeros(6), two.mu @ two.u_r])
     found = np.linalg.solve(mass, force - drift - friction)
@@ -160,6 +153,7 @@ def _square(two, x):
 def test_variations_of_velocities(seed):
     """δu = η̇ + ad_u η on a surface of poses q(t, s), for both groups."""
     rng = np.random.default_rng(seed)
+    h = 1e-3
     for space in (SE3, SO3xR3):
         a, b, c, q0 = (
             rng.standard_normal(6),
@@ -169,27 +163,17 @@ def test_variations_of_velocities(seed):
         )
 
         def pose(t, s, space=space, a=a, b=b, c=c, q0=q0):
-            return space.compose(
-                space.compose(q0, space.exp(t * a + s * b)), space.exp(t * s * c + t * t * b)
-            )
-
-        h = 1e-3
+            return space.compose(space.compose(q0, space.exp(t * a + s * b)), space.exp(t * s * c + t * t * b))
 
         def twist(t, s, space=space, pose=pose):
-            return (
-                space.increment(pose(t, s), pose(t + h, s)) - space.increment(pose(t, s), pose(t - h, s))
-            ) / (2 * h)
+            return (space.increment(pose(t, s), pose(t + h, s)) - space.increment(pose(t, s), pose(t - h, s))) / (2 * h)
 
         def variation(t, s, space=space, pose=pose):
-            return (
-                space.increment(pose(t, s), pose(t, s + h)) - space.increment(pose(t, s), pose(t, s - h))
-            ) / (2 * h)
+            return (space.increment(pose(t, s), pose(t, s + h)) - space.increment(pose(t, s), pose(t, s - h))) / (2 * h)
 
         t, s = 0.2, -0.1
         change = (twist(t, s + h) - twist(t, s - h)) / (2 * h)
-        expected = (variation(t + h, s) - variation(t - h, s)) / (2 * h) + space.ad(twist(t, s)) @ variation(
-            t, s
-        )
+        expected = (variation(t + h, s) - variation(t - h, s)) / (2 * h) + space.ad(twist(t, s)) @ variation(t, s)
         assert np.abs(change - expected).max() <= 2e-4 * max(1.0, np.abs(expected).max())
 
 
@@ -199,9 +183,7 @@ def test_the_thermodynamic_constraint(seed):
     """∂L/∂s = −θ₀, so that θ₀ ṡ = μ(u_r, u_r)."""
     two = TwoBodies.draw("cylindrical", seed)
     rates = {str(path): rate for path, rate in solved(two).rates.items()}
-    assert Reference().temperature * rates["joint.env.s"][0] == pytest.approx(
-        two.u_r @ two.mu @ two.u_r, rel=1e-10
-    )
+    assert Reference().temperature * rates["joint.env.s"][0] == pytest.approx(two.u_r @ two.mu @ two.u_r, rel=1e-10)
 
 
 @pytest.mark.parametrize("kind", kinds())
@@ -221,9 +203,7 @@ def test_joint_forces_act_and_react(kind, seed):
             for name, value in two.state.items()
             if name.startswith(f"body{i + 1}")
         }
-        alone = instant(
-            descriptor, Reference(), descriptor.pack(body.state(own)), {Path.of("p"): Input(wrench, False)}
-        )
+        alone = instant(descriptor, Reference(), descriptor.pack(body.state(own)), {Path.of("p"): Input(wrench, False)})
         here, there = alone.rates[Path.parse("ke.p")], now.rates[Path.parse(f"body{i + 1}.ke.p")]
         assert np.abs(here - there).max() <= 1e-10 * max(1.0, np.abs(there).max(), np.abs(lam).max())
 

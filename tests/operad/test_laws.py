@@ -86,9 +86,7 @@ def test_another_wire_makes_another_pattern(f, data):
     wires = {b: dict(content.ports) for b, content in f.boxes.items()}
     # A new box keeps both junctions from being without ports.
     new = Path.parse("new.junction")
-    wires[Path.parse("new.box")] = {
-        Path.parse(p): Port(j, True) for p, j in (("x", port.junction), ("y", new))
-    }
+    wires[Path.parse("new.box")] = {Path.parse(p): Port(j, True) for p, j in (("x", port.junction), ("y", new))}
     junctions = {**f.junctions, new: junction(f.junctions[port.junction].quantity)}
 
     def rewired(wire):

@@ -314,8 +314,6 @@ def test_boxes_are_called_with_fillings_that_compose_themselves():
 
 def test_names_may_be_swapped():
     f = Pattern({"q": junction(Q), "r": junction(P)}, {"a": {"x": "q", "y": "r"}, "b": {"x": "q"}})
-    g = f.rename(
-        boxes={"a": "b", "b": "a"}, junctions={"q": "r", "r": "q"}, ports={"a": {"x": "y", "y": "x"}}
-    )
+    g = f.rename(boxes={"a": "b", "b": "a"}, junctions={"q": "r", "r": "q"}, ports={"a": {"x": "y", "y": "x"}})
     assert g == Pattern({"r": junction(Q), "q": junction(P)}, {"b": {"y": "r", "x": "q"}, "a": {"x": "r"}})
     assert f.rename() is f and ROOT not in g.boxes

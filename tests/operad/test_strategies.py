@@ -38,8 +38,7 @@ PATTERNS = {
         {p.junction for _, p in ports_of(f) if p.power} & {p.junction for _, p in ports_of(f) if not p.power}
     ),
     "closed port": lambda f: any(
-        not j.exposed and sum(port.junction == path for _, port in ports_of(f)) == 1
-        for path, j in f.junctions.items()
+        not j.exposed and sum(port.junction == path for _, port in ports_of(f)) == 1 for path, j in f.junctions.items()
     ),
     "open-circuit port": lambda f: any(remark.kind == "open-circuit" for remark in f.lint()),
     "linked balances": lambda f: any(remark.kind == "linked-balances" for remark in f.lint()),
@@ -49,9 +48,7 @@ PATTERNS = {
     ),
     "exposed without inner port": lambda f: {*f.junctions} - {port.junction for _, port in ports_of(f)},
     "class of three": lambda f: any(len(group) >= 3 for group in f.links),
-    "dotted names": lambda f: (
-        any(len(path) > 1 for path in f.boxes) and any(len(path) > 1 for path in f.junctions)
-    ),
+    "dotted names": lambda f: any(len(path) > 1 for path in f.boxes) and any(len(path) > 1 for path in f.junctions),
     "frame": lambda f: any(j.quantity.frame for j in f.junctions.values()),
 }
 NESTINGS = {

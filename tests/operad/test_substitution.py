@@ -43,9 +43,7 @@ def test_two_bodies_on_a_joint(models):
         "p_j2": "j.p_j2",
         "p_r": "j.p_r",
     }
-    assert {
-        (str(b), str(p)) for b, box in flat.boxes.items() for p, w in box.ports.items() if str(w) == "p1"
-    } == {
+    assert {(str(b), str(p)) for b, box in flat.boxes.items() for p, w in box.ports.items() if str(w) == "p1"} == {
         ("b1.pkc", "p"),
         ("b1.ke", "p"),
         ("b1.lp", "p"),
@@ -94,9 +92,7 @@ def test_where_one_side_bears_no_power_a_single_junction_is_left(lower, upper):
 
 
 def test_a_lower_class_exposed_twice_joins_two_upper_classes():
-    lower = Pattern(
-        {"l": junction(Q, True, False), "m": junction(Q, True, False)}, {"a": {"x": "l"}}, [("l", "m")]
-    )
+    lower = Pattern({"l": junction(Q, True, False), "m": junction(Q, True, False)}, {"a": {"x": "l"}}, [("l", "m")])
     upper = Pattern(
         {"j": junction(Q), "k": junction(Q)},
         {"box": {"l": "~j", "m": "~k"}, "c": {"x": "j"}, "d": {"x": "k"}},
@@ -116,9 +112,7 @@ def test_links_of_absorbed_junctions_are_kept():
 def test_two_ports_of_a_box_on_one_junction_absorb_two_lower_junctions():
     lower = Pattern({"l": junction(Q, True), "m": junction(Q, True)}, {"a": {"x": "l"}, "b": {"x": "m"}})
     upper = Pattern({"j": junction(Q)}, {"box": {"l": "j", "m": "j"}})
-    assert upper.substitute(box=lower) == Pattern(
-        {"j": junction(Q)}, {"box.a": {"x": "j"}, "box.b": {"x": "j"}}
-    )
+    assert upper.substitute(box=lower) == Pattern({"j": junction(Q)}, {"box.a": {"x": "j"}, "box.b": {"x": "j"}})
 
 
 @given(patterns(state_ports=False, links=False))
@@ -151,9 +145,7 @@ def test_frames_keep_wires_apart():
                 upper.substitute(box=lower)
 
 
-UPPER = Pattern(
-    {"q": junction(Q), "s": junction(quantity.entropy)}, {"a": {"q": "q", "s": "s"}, "b": {"s": "s"}}
-)
+UPPER = Pattern({"q": junction(Q), "s": junction(quantity.entropy)}, {"a": {"q": "q", "s": "s"}, "b": {"s": "s"}})
 
 
 def filling(**junctions) -> Pattern:

@@ -52,18 +52,19 @@ def _conditions(primitive, rng):
     intensive = bundle.intensive(reference)
     if primitive.kind == "reversible":
         skew, constraint = primitive.structure(x)
-        lam = rng.standard_normal(constraint.shape[0])
+        lam, drawn = rng.standard_normal(constraint.shape[0]), np.abs(e)
         e = e - np.linalg.pinv(constraint) @ (constraint @ e) if constraint.size else e
         f = skew @ e + constraint.T @ lam
-        scale = np.abs(e) @ (np.abs(skew) @ np.abs(e) + np.abs(constraint.T) @ np.abs(lam))
-        assert abs(e @ f) <= 1e-14 * max(scale, 1e-300) * 10
+        # e is what a projection left of what was drawn
+        scale = drawn @ (np.abs(skew) @ drawn + np.abs(constraint.T) @ np.abs(lam))
+        assert abs(e @ f) <= 1e-14 * float(scale)
         n = bundle.size
         form = np.block([[np.zeros((n, n)), np.eye(n)], [np.eye(n), np.zeros((n, n))]])
         subspace = dirac(skew, constraint)
         assert subspace.dimension == n
         assert isotropy(subspace, form) <= 1e-13
         for kind in bundle.environment_kinds():
-            terms = np.abs(skew) @ np.abs(e) + np.abs(constraint.T) @ np.abs(lam)
+            terms = np.abs(skew) @ drawn + np.abs(constraint.T) @ np.abs(lam)
             assert abs(bundle.indicator(kind) @ f) <= 1e-13 * max(float(terms.sum()), 1e-300)
     elif primitive.kind == "irreversible":
         f = primitive.flow(x, e, reference)
@@ -74,9 +75,7 @@ def _conditions(primitive, rng):
         assert produced >= -1e-13 * terms.sum()
         # Gouy and Stodola: the exergy destroyed is θ₀ times the entropy produced, less π₀ times the volume made
         destroyed = reference.temperature * produced
-        assert abs(e @ f - destroyed) <= 1e-12 * (
-            np.abs(e) @ terms + abs(destroyed) + (np.abs(intensive) @ terms)
-        )
+        assert abs(e @ f - destroyed) <= 1e-12 * (np.abs(e) @ terms + abs(destroyed) + (np.abs(intensive) @ terms))
     else:
         v = 0.1 * rng.standard_normal(bundle.size)
         gradient = primitive.discrete_effort(x, v, reference) + (0.0 if primitive.environment else intensive)
@@ -104,14 +103,14 @@ def test_a_discrete_gradient_is_exact_for_any_increment(seed, size):
     rng = np.random.default_rng(seed)
     storage = ephs.storage({"q": Q.displacement, "v": Q.volume}, lambda q, v: np.cosh(q) * (1.0 + v**4))
     bundle = storage.bundle
-    x = {p: rng.standard_normal(1) for p in bundle.ports}
+    x = {p: np.exp(0.3 * rng.standard_normal(1)) for p in bundle.ports}
     v = size * rng.standard_normal(2)
     gradient = storage.discrete_effort(x, v, Reference()) + bundle.intensive(Reference())
     exact = storage.energy_gradient(storage.retract(x, 0.5 * v))
     rise = storage.energy(storage.retract(x, v)) - storage.energy(x)
     terms = (np.abs(gradient) + np.abs(bundle.intensive(Reference()))) @ np.abs(v)
     # where the correction is left out, what is missing is of third order
-    assert abs(gradient @ v - rise) <= 8e-16 * (abs(storage.energy(x)) + terms) + 1e-18
+    assert abs(gradient @ v - rise) <= 7e-15 * (abs(storage.energy(x)) + terms)
     assert np.abs(gradient - exact).max() <= 1e-8 + 10.0 * size**2 * np.abs(exact).max() * 10
 
 
@@ -124,11 +123,7 @@ def flows(name, **efforts):
     bundle = primitive.bundle
     e = np.array([efforts[str(port)] for port in bundle.ports], dtype=float)
     x = {port: np.array([0.7]) for port in primitive.reads}
-    f = (
-        primitive.flow(x, e, Reference())
-        if primitive.kind == "irreversible"
-        else primitive.structure(x)[0] @ e
-    )
+    f = primitive.flow(x, e, Reference()) if primitive.kind == "irreversible" else primitive.structure(x)[0] @ e
     return {str(port): float(f[where][0]) for port, where, _ in bundle.items()}
 
 
@@ -177,7 +172,8 @@ def test_energies_of_the_storages(name, state, energy, effort):
     ("name", "arguments", "key"),
     [("spring", {"k": 0.0}, "k"), ("spring", {"k": np.nan}, "k"), ("point_mass", {"m": -1.0}, "m"),
      ("friction", {"d": -0.1}, "d"), ("capacitor", {"c": np.inf}, "c"), ("piston", {"a": 0.0}, "a"),
-     ("thermal_capacity", {"c1": -1.0, "c2": 1.0}, "c1"), ("lever", {"r": np.nan}, "r"), ("heat_transfer", {"h": -1.0}, "h")],
+     ("thermal_capacity", {"c1": -1.0, "c2": 1.0}, "c1"), ("lever", {"r": np.nan}, "r"),
+     ("heat_transfer", {"h": -1.0}, "h")],
 )  # fmt: skip
 def test_parameters_out_of_range_are_named(name, arguments, key):
     with pytest.raises(StructureError, match=f"{name}: parameter {key} is"):
@@ -247,18 +243,14 @@ def test_what_one_makes_oneself_is_what_the_library_makes():
 
 
 def test_structures_that_read_states():
-    crank = ephs.transformer(
-        {"p": Q.angular_momentum, "p2": Q.momentum, "~q": Q.angle}, lambda q: [[np.sin(q)]]
-    )
+    crank = ephs.transformer({"p": Q.angular_momentum, "p2": Q.momentum, "~q": Q.angle}, lambda q: [[np.sin(q)]])
     _, constraint = crank.structure({Path.of("q"): np.array([0.3])})
     assert np.allclose(constraint, [[-np.sin(0.3), 1.0]])
     spool = ephs.constraint({"p": Q.momentum, "p2": Q.momentum, "~q": Q.displacement}, lambda q: [[1.0, q]])
     assert spool.multipliers == 1  # counted at a random state
     assert np.allclose(spool.structure({Path.of("q"): np.array([0.3])})[1], [[1.0, 0.3]])
-    with pytest.raises(StructureError, match="is \\(1, 2\\)|shape \\(2, 2\\)"):
-        ephs.constraint(
-            {"p": Q.momentum, "p2": Q.momentum, "~q": Q.displacement}, lambda q: [[1.0, q]], multipliers=2
-        )
+    with pytest.raises(StructureError, match=r"is \(1, 2\)|shape \(2, 2\)"):
+        ephs.constraint({"p": Q.momentum, "p2": Q.momentum, "~q": Q.displacement}, lambda q: [[1.0, q]], multipliers=2)
 
 
 @pytest.mark.parametrize(

@@ -19,9 +19,7 @@ def state_exposing_lower():
 
 
 def upper():
-    return Pattern(
-        junctions={"j": junction(Q.momentum)}, boxes={"low": {"l": "~j"}, "c": {"p": "j"}, "d": {"p": "j"}}
-    )
+    return Pattern(junctions={"j": junction(Q.momentum)}, boxes={"low": {"l": "~j"}, "c": {"p": "j"}, "d": {"p": "j"}})
 
 
 def test_naive_absorption_of_a_state_port_is_not_functorial():
@@ -194,7 +192,7 @@ def test_a_filling_with_another_interface_is_refused_with_both_sides():
     with pytest.raises(SemanticsError, match=r"pe.*momentum.*displacement") as caught:
         lone(pe=library.point_mass(m=1.0))
     assert "pe" in str(caught.value)
-    with pytest.raises(PatternError, match="pe.*float.*System or a primitive"):
+    with pytest.raises(PatternError, match=r"pe.*float.*System or a primitive"):
         lone(pe=3.0)
 
 

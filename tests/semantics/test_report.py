@@ -46,9 +46,7 @@ def forged(sign):
     return made
 
 
-@pytest.mark.parametrize(
-    ("factor", "law"), [(-1.0, "entropy production"), (0.5, "power balance"), (0.5, "exergy")]
-)
+@pytest.mark.parametrize(("factor", "law"), [(-1.0, "entropy production"), (0.5, "power balance"), (0.5, "exergy")])
 def test_a_component_that_breaks_a_law_is_found(factor, law):
     report = system(forged(factor)).check()
     failed = [item.name for item in report.items if not item.ok]
@@ -58,9 +56,7 @@ def test_a_component_that_breaks_a_law_is_found(factor, law):
 
 
 def test_a_system_without_equations_is_reported():
-    twice = Pattern(
-        junctions={"q": junction(quantity.displacement)}, boxes={"a": {"q": "q"}, "b": {"q": "q"}}
-    )
+    twice = Pattern(junctions={"q": junction(quantity.displacement)}, boxes={"a": {"q": "q"}, "b": {"q": "q"}})
     report = twice(a=library.spring(k=1.0), b=library.spring(k=2.0)).check()
     assert not report.ok
     assert report.items[-1].name == "assembly"

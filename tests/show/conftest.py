@@ -100,9 +100,7 @@ class FakeSolution:
                 name: {"coordinate": list(joint.coordinate[-1]), "rate": list(joint.rate[-1])}
                 for name, joint in self.joint_records.items()
             },
-            "thermal": {
-                name: {"temperature": float(r.temperature[-1])} for name, r in self.thermal_records.items()
-            },
+            "thermal": {name: {"temperature": float(r.temperature[-1])} for name, r in self.thermal_records.items()},
         }
 
 

@@ -62,9 +62,7 @@ def flat() -> Pattern:
     boxes: dict[str, dict[str, str]] = {}
     for k in "12":
         there = {"q": f"b{k}.q", "p": f"p_{k}"}
-        boxes |= {
-            f"b{k}.{box}": {port: there[j] for port, j in ports.items()} for box, ports in BODY_BOXES.items()
-        }
+        boxes |= {f"b{k}.{box}": {port: there[j] for port, j in ports.items()} for box, ports in BODY_BOXES.items()}
     for box, ports in JOINT_BOXES.items():
         boxes[f"j.{box}"] = {port: _inside(name) for port, name in ports.items()}
     return Pattern(junctions, boxes)

@@ -1,4 +1,4 @@
-"""Laws of the pictures: nothing overlaps, wires keep off what they do not join, the same pattern gives the same picture."""
+"""Laws of the pictures: nothing overlaps, wires keep off what they do not join, same pattern, same picture."""
 
 import math
 import re
@@ -37,9 +37,7 @@ def test_no_wire_runs_through_a_foreign_node(drawn):
 
 def test_every_port_has_its_wire(drawn):
     pattern, drawing = drawn
-    ports = {
-        (str(b), str(p.junction), p.power) for b, box in pattern.boxes.items() for p in box.ports.values()
-    }
+    ports = {(str(b), str(p.junction), p.power) for b, box in pattern.boxes.items() for p in box.ports.values()}
     wires = drawing.placement.wires
     assert {(*w.ends, w.power) for w in wires if w.role == "port"} == ports
     assert sum(w.role == "port" for w in wires) == sum(len(box.ports) for box in pattern.boxes.values())

@@ -69,17 +69,13 @@ def project_velocities(
         forbidden = _complement(link, x) if fixed is None else np.eye(6)
         blocks.append(_row(link, x, forbidden, roots))
         wanted.append(
-            forbidden.T @ (link.coupling.basis(x) @ fixed)
-            if fixed is not None
-            else np.zeros(forbidden.shape[1])
+            forbidden.T @ (link.coupling.basis(x) @ fixed) if fixed is not None else np.zeros(forbidden.shape[1])
         )
     matrix, target = np.vstack(blocks), np.concatenate(wanted)
     start = np.concatenate([np.linalg.solve(root, u) for root, u in zip(roots, twists, strict=True)])
     change = _least_change(matrix, target - matrix @ start)
     found = _steps(roots, (start + change).reshape(-1, 6))
-    return (
-        found if largest_slip(links, found, xs) < TOLERANCE * max(1.0, float(np.abs(found).max())) else None
-    )
+    return found if largest_slip(links, found, xs) < TOLERANCE * max(1.0, float(np.abs(found).max())) else None
 
 
 def _loose(link: Link, held: frozenset[str]) -> Link:

@@ -66,14 +66,8 @@ def measure(
             faults.append(fault("velocity", key, text, who=who))
         elif link.motion is not None and abs(rate[0] - link.motion) > TOLERANCE:
             text = f"a rate of {rate[0]:.9g}"
-            faults.append(
-                fault("motion differs", f"{key}.motion", text, motion=f"{link.motion:.9g}", who=who)
-            )
-        elif (
-            link.motion is None
-            and link.rate is not None
-            and np.abs(rate - link.rate).max(initial=0.0) > TOLERANCE
-        ):
+            faults.append(fault("motion differs", f"{key}.motion", text, motion=f"{link.motion:.9g}", who=who))
+        elif link.motion is None and link.rate is not None and np.abs(rate - link.rate).max(initial=0.0) > TOLERANCE:
             actual = _text(rate)
             faults.append(fault("rate differs", f"{key}.rate", _text(link.rate), actual=actual, who=who))
     return faults
@@ -82,18 +76,12 @@ def measure(
 def _place(
     drafts: Sequence[BodyDraft], joints: Sequence[JointDraft], index: Mapping[str, int], rest: Sequence[Array]
 ) -> Array:
-    poses = np.array([IDENTITY_POSE if d.pose is None else d.pose for d in drafts] + list(rest)).reshape(
-        -1, 7
-    )
+    poses = np.array([IDENTITY_POSE if d.pose is None else d.pose for d in drafts] + list(rest)).reshape(-1, 7)
     links = {j.name: _link(j, index, poses) for j in joints if j.place.in_bodies}
 
     def follow(body: int, name: str) -> None:
         link, draft = links[name], next(j for j in joints if j.name == name)
-        x = (
-            link.coupling.identity()
-            if draft.coordinates is None
-            else link.coupling.element(draft.coordinates)
-        )
+        x = link.coupling.identity() if draft.coordinates is None else link.coupling.element(draft.coordinates)
         poses[body] = link.place_second(poses, x) if link.body2 == body else link.place_first(poses, x)
 
     open_bodies = [i for i, d in enumerate(drafts) if d.pose is None]
@@ -121,9 +109,7 @@ def _move(
     def follow(body: int, name: str) -> None:
         link, x = by_name[name], elements[name]
         rate = np.zeros(link.coupling.dim) if link.rate is None else link.rate
-        twists[body] = (
-            link.move_second(twists, x, rate) if link.body2 == body else link.move_first(twists, x, rate)
-        )
+        twists[body] = link.move_second(twists, x, rate) if link.body2 == body else link.move_first(twists, x, rate)
 
     # A joint given by `at` and `axis` moves a body only where its rate is written down.
     leading = [

@@ -150,9 +150,7 @@ def _section(section: str, raw: Any, faults: list[Fault]) -> dict[str, Checked[A
     if not isinstance(raw, Mapping):
         faults.append(fault("table", f"{section}.NAME", shown(raw)))
         return {}
-    return {
-        name: validate(SECTIONS[section], table, f"{section}.{name}", faults) for name, table in raw.items()
-    }
+    return {name: validate(SECTIONS[section], table, f"{section}.{name}", faults) for name, table in raw.items()}
 
 
 def _translate(model: type[Entry], key: str, item: Any) -> Fault:

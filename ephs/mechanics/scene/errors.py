@@ -25,9 +25,7 @@ class Fault:
 
     def __str__(self) -> str:
         where = f"{self.key}: " if self.key else ""
-        return f"{where}found {self.found}, expected {self.expected}" + (
-            f"; {self.advice}" if self.advice else ""
-        )
+        return f"{where}found {self.found}, expected {self.expected}" + (f"; {self.advice}" if self.advice else "")
 
 
 @final

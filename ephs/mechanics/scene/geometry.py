@@ -65,9 +65,7 @@ class Coupling:
         if self.middle is None:
             return self.pair.basis
         after = SE3.compose(self.middle, self.pair.include(x[1:]))
-        return np.column_stack(
-            (SE3.adjoint(SE3.inverse(after)) @ self.pair.basis[:, 0], self.pair.basis[:, 0])
-        )
+        return np.column_stack((SE3.adjoint(SE3.inverse(after)) @ self.pair.basis[:, 0], self.pair.basis[:, 0]))
 
     def coordinates(self, x: Array) -> Array:
         """The coordinates (d,) of an element."""
@@ -135,9 +133,7 @@ def frame_rotation(z: Array, x: Array | None = None) -> Array | None:
     The default x is the world's, or the world's y where the z axis is nearly along the world's x. None
     where ``x`` is along z.
     """
-    hint = (
-        x if x is not None else np.array([1.0, 0.0, 0.0]) if abs(z[0]) <= 0.9 else np.array([0.0, 1.0, 0.0])
-    )
+    hint = x if x is not None else np.array([1.0, 0.0, 0.0]) if abs(z[0]) <= 0.9 else np.array([0.0, 1.0, 0.0])
     normal = unit(hint)
     if normal is None:
         return None

@@ -44,9 +44,7 @@ def load(path: str | PathLike[str], base: str = "fixed", adjust: bool = False) -
     return scene
 
 
-def _read(
-    path: Path, adjust: bool, world: World | None, stack: tuple[Path, ...], faults: list[Fault]
-) -> Scene | None:
+def _read(path: Path, adjust: bool, world: World | None, stack: tuple[Path, ...], faults: list[Fault]) -> Scene | None:
     """A scene from a file, in a given world if it is a part; None where there were faults."""
     raw = _parse(path, faults)
     if raw is None:
@@ -170,6 +168,4 @@ def _check_names(document: Document, faults: list[Fault]) -> None:
             elif section != "parts" and name in document.sections["parts"]:
                 faults.append(fault("collision", key, shown(name), other="a part"))
             elif section == "joints" and name in document.sections["bodies"] and name not in held:
-                faults.append(
-                    fault("collision", key, shown(name), other="the free joint of the body of this name")
-                )
+                faults.append(fault("collision", key, shown(name), other="the free joint of the body of this name"))

@@ -22,9 +22,7 @@ def moved(scene: Scene, pose: Array, world: World) -> Scene:
         return frozen(SE3.compose(pose, offset)) if body == GROUND else offset
 
     def point(body: str, position: Array) -> Array:
-        return (
-            frozen(so3.quaternion_to_matrix(pose[:4]) @ position + pose[4:]) if body == GROUND else position
-        )
+        return frozen(so3.quaternion_to_matrix(pose[:4]) @ position + pose[4:]) if body == GROUND else position
 
     def body(b: Body) -> Body:
         return replace(b, pose=frozen(SE3.normalise(SE3.compose(pose, b.pose))))
@@ -48,9 +46,7 @@ def moved(scene: Scene, pose: Array, world: World) -> Scene:
 def spring_length(scene: Scene, spring: Spring) -> float:
     """The distance of a spring's two points."""
     ends = [
-        at
-        if name == GROUND
-        else SE3.compose(scene.body(name).pose, np.concatenate(([1.0, 0.0, 0.0, 0.0], at)))[4:]
+        at if name == GROUND else SE3.compose(scene.body(name).pose, np.concatenate(([1.0, 0.0, 0.0, 0.0], at)))[4:]
         for name, at in ((spring.body1, spring.at1), (spring.body2, spring.at2))
     ]
     return float(np.linalg.norm(ends[0] - ends[1]))

@@ -68,9 +68,7 @@ def _in_world(entry: JointEntry, key: str, faults: list[Fault]) -> Place | None:
         return Place(world1, world1, in_bodies=False)
     if entry.axis2 is None:
         faults.append(
-            fault(
-                "missing", f"{key}.axis2", "nothing", what="the world direction of the axis fixed in body 2"
-            )
+            fault("missing", f"{key}.axis2", "nothing", what="the world direction of the axis fixed in body 2")
         )
         return None
     rotation2 = _second(z, entry.axis2, f"{key}.axis2", faults)

@@ -90,9 +90,7 @@ def resolve_world(document: Document) -> World | None:
     return None if w is None else World(frozen(w.gravity), w.temperature, w.pressure)
 
 
-def resolve_body(
-    name: str, table: Checked[BodyEntry], strict: bool, folder: Path, faults: list[Fault]
-) -> BodyDraft:
+def resolve_body(name: str, table: Checked[BodyEntry], strict: bool, folder: Path, faults: list[Fault]) -> BodyDraft:
     """A body with its inertia checked."""
     entry, key = table.entry, f"bodies.{name}"
     tensor = np.eye(3)
@@ -111,9 +109,7 @@ def resolve_body(
     )
 
 
-def resolve_joint(
-    name: str, table: Checked[JointEntry], names: Names, faults: list[Fault]
-) -> JointDraft | None:
+def resolve_joint(name: str, table: Checked[JointEntry], names: Names, faults: list[Fault]) -> JointDraft | None:
     """A joint with everything checked but its closure; None where its type or place is not usable."""
     entry, key = table.entry, f"joints.{name}"
     _check_ends(table, key, names, faults)

@@ -115,9 +115,7 @@ class BodyEntry(Entry):
     mass: NonNegative = Field(description="kg; 0 needs inertia 0")
     inertia: Inertia = Field(description="about the centre of mass, body axes: xx yy zz [xy xz yz], kg m²")
     position: Vector | None = Field(default=None, description="centre of mass in the world, m")
-    rotation: Quaternion | None = Field(
-        default=None, description="body to world, unit quaternion [w, x, y, z]"
-    )
+    rotation: Quaternion | None = Field(default=None, description="body to world, unit quaternion [w, x, y, z]")
     velocity: Vector | None = Field(default=None, description="of the centre of mass, world basis, m/s")
     angular_velocity: Vector | None = Field(default=None, description="body basis, rad/s")
     shape: ShapeEntry | None = Field(default=None, description="for pictures only")
@@ -149,17 +147,13 @@ class JointEntry(Entry):
     axis2: Vector | None = Field(default=None, description="universal only: the axis fixed in body 2")
     frame1: FrameEntry | None = Field(default=None, description="the joint frame in body 1 (ground: world)")
     frame2: FrameEntry | None = Field(default=None, description="the joint frame in body 2 (ground: world)")
-    coordinate: Numbers | None = Field(
-        default=None, description="initial coordinates, with frame1 and frame2; rad, m"
-    )
+    coordinate: Numbers | None = Field(default=None, description="initial coordinates, with frame1 and frame2; rad, m")
     rate: Numbers | None = Field(default=None, description="initial joint twist u_r; rad/s, m/s")
     pitch: Number | None = Field(default=None, description="screw only, m/rad")
     friction: Matrix = Field(
         default=0.0, description="on the joint twist: a number, one a freedom, or a matrix; N m s, N s/m"
     )
-    stiffness: Numbers = Field(
-        default=0.0, description="of the potential ½ k (coordinate − rest)²; N m/rad, N/m"
-    )
+    stiffness: Numbers = Field(default=0.0, description="of the potential ½ k (coordinate − rest)²; N m/rad, N/m")
     rest: Numbers = Field(default=0.0, description="coordinates without force; rad, m")
     heat: Text = Field(default="environment", description="where the friction heat goes: a thermal name")
     drive: Numbers = Field(default=0.0, description="constant generalised force on u_r; N m, N")

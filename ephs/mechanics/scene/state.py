@@ -91,9 +91,7 @@ def with_state(
     for hop in spanning_hops(links, len(poses), speeds):
         rate = speeds.get(hop.name, now.joints[hop.link].rate)
         link, x = links[hop.link], xs[hop.link]
-        twists[hop.body] = (
-            link.move_second(twists, x, rate) if hop.forward else link.move_first(twists, x, rate)
-        )
+        twists[hop.body] = link.move_second(twists, x, rate) if hop.forward else link.move_first(twists, x, rate)
     if adjust and largest_slip(links, twists, xs) > TOLERANCE:
         moved = project_velocities(links, poses, twists, now.roots(), frozenset(speeds))
         twists = twists if moved is None else moved
@@ -134,9 +132,7 @@ def adjusted(scene: Scene) -> tuple[Scene, list[Fault]]:
 def rebuilt(scene: Scene, now: Snapshot, poses: Array, twists: Array, xs: Sequence[Array]) -> Scene:
     """The scene with its bodies in another configuration, its joints at these elements, rates to match."""
     bodies = {n: (frozen(q), frozen(u)) for n, q, u in zip(now.names, poses, twists, strict=True)}
-    joints = {
-        link.name: (frozen(x), frozen(link.slip(twists, x)[0])) for link, x in zip(now.links, xs, strict=True)
-    }
+    joints = {link.name: (frozen(x), frozen(link.slip(twists, x)[0])) for link, x in zip(now.links, xs, strict=True)}
     return _put(scene, "", bodies, joints)
 
 
@@ -188,9 +184,7 @@ def _carry(links: Sequence[Link], poses: Array, before: Sequence[Array]) -> tupl
     return poses, elements(links, poses)
 
 
-def _carry_closed(
-    links: Sequence[Link], now: Snapshot, before: Sequence[Array]
-) -> tuple[Array, list[Array]] | None:
+def _carry_closed(links: Sequence[Link], now: Snapshot, before: Sequence[Array]) -> tuple[Array, list[Array]] | None:
     """The same with every loop closed, in small steps so that the mechanism keeps its way of assembly."""
     held = frozenset(link.name for link in links if link.coordinates is not None)
     starts = [link.coupling.coordinates(x) for link, x in zip(links, before, strict=True)]

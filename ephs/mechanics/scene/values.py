@@ -49,9 +49,7 @@ def inertia(entry: BodyEntry, key: str, strict: bool, faults: list[Fault]) -> Ar
     return tensor
 
 
-def freedoms(
-    value: Any, d: int, key: str, faults: list[Fault], *, spread: bool = False, default: float = 0.0
-) -> Array:
+def freedoms(value: Any, d: int, key: str, faults: list[Fault], *, spread: bool = False, default: float = 0.0) -> Array:
     """One number a freedom, from a number or a list.
 
     A number stands for each freedom where ``spread`` is set; else only for a single one, apart from 0.
@@ -70,9 +68,7 @@ def freedoms(
 
 def friction(value: Any, d: int, key: str, faults: list[Fault]) -> Array:
     """The friction matrix (d, d), from a number, one a freedom, or a symmetric matrix."""
-    array = (
-        np.zeros(0) if value == [] else np.zeros(0) if _ragged(value) else np.array(value, dtype=np.float64)
-    )
+    array = np.zeros(0) if value == [] else np.zeros(0) if _ragged(value) else np.array(value, dtype=np.float64)
     if array.ndim == 0:
         matrix = float(array) * np.eye(d)
     elif array.shape == (d,):
@@ -95,9 +91,7 @@ def _ragged(value: Any) -> bool:
 
 
 def _one_a_freedom(d: int) -> str:
-    return {0: "no number: this joint has no freedom", 1: "1 number"}.get(
-        d, f"a list of {d} numbers, one a freedom"
-    )
+    return {0: "no number: this joint has no freedom", 1: "1 number"}.get(d, f"a list of {d} numbers, one a freedom")
 
 
 def _impossible(found: Fault, strict: bool, faults: list[Fault]) -> None:

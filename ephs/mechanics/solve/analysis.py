@@ -5,7 +5,7 @@ show over a step, (mass/h)^(−1/2); never on the saddle-point matrix, whose piv
 """
 
 from dataclasses import dataclass
-from typing import final
+from typing import Any, final
 
 import numpy as np
 from scipy import linalg
@@ -14,7 +14,7 @@ from ephs.mechanics.solve.errors import SolveError
 from ephs.mechanics.solve.lu_kernels import factorise
 from ephs.mechanics.solve.model import Model, evaluate_at
 from ephs.mechanics.solve.natural_kernels import Order
-from ephs.mechanics.solve.sparse import order
+from ephs.mechanics.solve.sparse import Index, order
 from ephs.semantics.bundle import Array
 
 __all__ = ["RANK", "Analysis", "analyse"]
@@ -40,7 +40,7 @@ class Analysis:
     """
 
     order: Order
-    dropped: Array
+    dropped: Index
     redundant: tuple[str, ...]
     fill: int
 
@@ -96,7 +96,7 @@ def analyse(model: Model, x: Array, z: Array, h: float) -> Analysis:
     return Analysis(compiled, dropped, redundant, elimination.fill)
 
 
-def dependent_rows(model: Model, values: Array) -> Array:
+def dependent_rows(model: Model, values: Array) -> Index:
     """Marks constraint equations that depend on the others: (rows,) of 0 and 1."""
     t = model.tables
     n_rate, n_effort, size = int(t.counts[0]), int(t.counts[1]), model.unknowns
@@ -112,7 +112,8 @@ def dependent_rows(model: Model, values: Array) -> Array:
     matrix = matrix @ _compliance(model, values)
     norms = np.linalg.norm(matrix, axis=1)
     matrix /= np.where(norms > 0.0, norms, 1.0)[:, None]
-    triangle, pivots = linalg.qr(matrix.T, mode="r", pivoting=True)
+    factors: Any = linalg.qr(matrix.T, mode="r", pivoting=True)
+    triangle, pivots = factors
     sizes = np.zeros(rows.size)
     sizes[: min(triangle.shape)] = np.abs(np.diag(triangle))
     rank = int(np.sum(sizes > RANK * sizes[0])) if sizes[0] > 0.0 else 0
@@ -130,11 +131,7 @@ def _compliance(model: Model, values: Array) -> Array:
         rates = np.array([i for s in slot.reads for i in range(s.rates.start, s.rates.stop)], dtype=int)
         block = np.zeros((rates.size, rates.size))
         local = {int(r): i for i, r in enumerate(rates)}
-        mask = (
-            np.isin(t.row, rates)
-            & np.isin(t.column, rates)
-            & (np.arange(t.row.size) < t.row.size - model.unknowns)
-        )
+        mask = np.isin(t.row, rates) & np.isin(t.column, rates) & (np.arange(t.row.size) < t.row.size - model.unknowns)
         for k in np.flatnonzero(mask):
             block[local[int(t.row[k])], local[int(t.column[k])]] -= values[k]
         sigma, vectors = np.linalg.eigh(0.5 * (block + block.T))
@@ -144,7 +141,7 @@ def _compliance(model: Model, values: Array) -> Array:
     return scale
 
 
-def _null_unknown(model: Model, chosen: Array, data: Array) -> int:
+def _null_unknown(model: Model, chosen: Index, data: Array) -> int:
     """The unknown that a null vector of the matrix moves most."""
     t, size = model.tables, model.unknowns
     matrix = np.zeros((size, size))

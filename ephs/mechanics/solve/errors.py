@@ -47,9 +47,7 @@ class SimulationError(RuntimeError):
         The Solution up to there, or None where not even the first step was set up.
     """
 
-    def __init__(
-        self, outcome: Outcome, time: float, path: str, equation: str, partial: "Solution | None"
-    ) -> None:
+    def __init__(self, outcome: Outcome, time: float, path: str, equation: str, partial: "Solution | None") -> None:
         self.outcome, self.time, self.path, self.equation = outcome, time, path, equation
         self.advice = _ADVICE[outcome]
         self.partial = partial
@@ -67,9 +65,7 @@ class Interrupted(SimulationError):
 class SolveError(Exception):
     """A failed step inside the solver, before time and partial solution are known."""
 
-    def __init__(
-        self, outcome: Outcome, path: str, equation: str, cause: BaseException | None = None
-    ) -> None:
+    def __init__(self, outcome: Outcome, path: str, equation: str, cause: BaseException | None = None) -> None:
         super().__init__(outcome.value, path, equation)
         self.outcome, self.path, self.equation, self.cause = outcome, path, equation, cause
 

@@ -77,9 +77,9 @@ def load(path: str | File, problem_of: Callable[[str], Problem]) -> Solution:
         raise ValueError(f"{file}: not a netCDF file ({error})") from error
     if data.attrs.get("ephs_format") != FORMAT:
         raise ValueError(f"{file}: ephs_format is {data.attrs.get('ephs_format')!r}, expected {FORMAT}")
-    books: dict[str, dict[Path, Array]] = {name: {} for name in _BOOKS}
+    books: dict[str, Any] = {name: {} for name in _BOOKS}
     states: dict[Path, Array] = {}
-    plain: dict[str, Array] = {}
+    plain: dict[str, Any] = {}
     for key, variable in data.data_vars.items():
         group, _, rest = str(key).partition(":")
         if group == "state":

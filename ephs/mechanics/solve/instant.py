@@ -93,7 +93,7 @@ def instant(
     driven = [slot for slot in d.outer if given[slot.path].effort]
     n_o = sum(slot.quantity.space.dim for slot in driven)
     size = n_w + n_l + n_e + n_o  # unknowns: rates, multipliers, rates of efforts, outer flows
-    w, lam, rise = slice(0, n_w), slice(n_w, n_w + n_l), slice(n_w + n_l, n_w + n_l + n_e)
+    _w, lam, rise = slice(0, n_w), slice(n_w, n_w + n_l), slice(n_w + n_l, n_w + n_l + n_e)
     balance, right = np.zeros((n_e, size)), -flows
     balance[:, lam] = constraint.T
     growth = np.zeros((n_w, size))
@@ -160,24 +160,18 @@ def _stored_efforts(d: Descriptor, reference: Reference, x: Array) -> dict[int, 
     return out
 
 
-def _all_efforts(
-    d: Descriptor, constraint: Array, stored: dict[int, float], given: Mapping[Path, Input]
-) -> Array:
+def _all_efforts(d: Descriptor, constraint: Array, stored: dict[int, float], given: Mapping[Path, Input]) -> Array:
     """Efforts that storages give or inputs prescribe, and the others from the constraints."""
     known = dict(stored)
     for slot in d.outer:
         if given[slot.path].effort:
-            known |= dict(
-                zip(range(slot.at, slot.at + slot.quantity.space.dim), given[slot.path].value, strict=True)
-            )
+            known |= dict(zip(range(slot.at, slot.at + slot.quantity.space.dim), given[slot.path].value, strict=True))
     out = np.zeros(d.effort_size)
     places = np.array(sorted(known), dtype=int)
     out[places] = [known[int(i)] for i in places]
     others = np.setdiff1d(np.arange(d.effort_size), places)
     if others.size and constraint.size:
-        out[others] = np.linalg.lstsq(
-            constraint[:, others], -constraint[:, places] @ out[places], rcond=1e-10
-        )[0]
+        out[others] = np.linalg.lstsq(constraint[:, others], -constraint[:, places] @ out[places], rcond=1e-10)[0]
     return out
 
 

@@ -187,10 +187,7 @@ class _Run:
     def solution(self) -> Solution:
         """The solution so far."""
         problem, record = self.problem, self.recorder.result()
-        states = {
-            slot.path: coordinates(slot.quantity, record.x[:, slot.point])
-            for slot in problem.descriptor.states
-        }
+        states = {slot.path: coordinates(slot.quantity, record.x[:, slot.point]) for slot in problem.descriptor.states}
         return Solution(problem.name, record.t, states, ledgers(problem, record), self.stats(), problem)
 
 

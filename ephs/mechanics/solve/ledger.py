@@ -84,9 +84,7 @@ class Ledgers:
 
     @staticmethod
     def _change(*energies: Array) -> Array:
-        return np.sum(
-            [e - e[0] for e in energies], axis=0
-        )  # differences first: a sum of large energies would round
+        return np.sum([e - e[0] for e in energies], axis=0)  # differences first: a sum of large energies would round
 
 
 def ledgers(problem: Problem, record: Record) -> Ledgers:

@@ -1,5 +1,8 @@
 """Sparse LU in a fixed order: numbers only, no search, no allocation. See `sparse.Elimination`."""
 
+# numba infers the types of these functions, and exports what it does not list.
+# pyright: basic, reportPrivateImportUsage=false
+
 from ephs.semantics.spaces import jit
 
 kernel = jit.kernel

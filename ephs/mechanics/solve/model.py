@@ -14,6 +14,7 @@ from ephs.mechanics.solve.natural_kernels import (
     Tables,
     evaluate,
 )
+from ephs.mechanics.solve.sparse import Index
 from ephs.operad import Path
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.checks import random_efforts
@@ -49,7 +50,7 @@ class Model:
     inputs: Mapping[Path, Input]
     tables: Tables
     callbacks: Mapping[int, Callback]
-    constraint_rows: Array
+    constraint_rows: Index
 
     @property
     def unknowns(self) -> int:
@@ -101,7 +102,9 @@ class Model:
         """An unknown, in words."""
         n_rate, n_effort = int(self.tables.counts[0]), int(self.tables.counts[1])
         if column < n_rate:
-            return f"the rate of {next(s for s in self.descriptor.states if s.rates.start <= column < s.rates.stop).path}"
+            return (
+                f"the rate of {next(s for s in self.descriptor.states if s.rates.start <= column < s.rates.stop).path}"
+            )
         if column < n_rate + n_effort:
             at = column - n_rate
             junctions = self.descriptor.junctions
@@ -146,9 +149,7 @@ def compile_model(descriptor: Descriptor, reference: Reference, inputs: Mapping[
         if callback is not None:
             callbacks[number] = callback
         is_storage = isinstance(primitive, Storage)
-        kinds.append(
-            STORING if is_storage else IRREVERSIBLE if isinstance(primitive, Irreversible) else REVERSIBLE
-        )
+        kinds.append(STORING if is_storage else IRREVERSIBLE if isinstance(primitive, Irreversible) else REVERSIBLE)
         addresses.append(address)
         parameters.append(list(numbers))
         reads_x = [i for s in slot.reads for i in range(s.point.start, s.point.stop)]
@@ -172,8 +173,7 @@ def compile_model(descriptor: Descriptor, reference: Reference, inputs: Mapping[
         at += dim
         unknown += dim if prescribed else 0
     states = [
-        [manifold(s.quantity.space).code, s.at, s.quantity.space.size, s.rate, s.quantity.space.dim]
-        for s in d.states
+        [manifold(s.quantity.space).code, s.at, s.quantity.space.size, s.rate, s.quantity.space.dim] for s in d.states
     ]
     block, group = _blocks(d, given, size)
     entries = _Entries()
@@ -251,11 +251,9 @@ class _Entries:
         self.place_list.append((row, column))
 
 
-def _flatten(rows: list[list[Any]], kind: type = int) -> tuple[Array, Array]:
+def _flatten(rows: list[list[Any]], kind: type = int) -> tuple[Any, Index]:
     at = np.cumsum([0, *map(len, rows)])[:-1].astype(np.int64)
-    flat = np.array(
-        [value for row in rows for value in row] + [0], dtype=np.float64 if kind is float else np.int64
-    )
+    flat = np.array([value for row in rows for value in row] + [0], dtype=np.float64 if kind is float else np.int64)
     return flat, at
 
 
@@ -345,7 +343,7 @@ def _sample_pattern(slot: ComponentSlot, reference: Reference, shape: tuple[int,
     return found
 
 
-def _blocks(d: Descriptor, given: Mapping[Path, Input], size: int) -> tuple[Array, Array]:
+def _blocks(d: Descriptor, given: Mapping[Path, Input], size: int) -> tuple[Index, Index]:
     """Rows whose residuals share one scale, those of one storage port, junction, component, outer port; and blocks of
     one kind: the same quantity in the same sort of equation."""
     n_rate = d.rate_size

@@ -110,9 +110,7 @@ class Natural:
         z = np.zeros(self.model.unknowns)
         for slot in d.components:
             if slot.primitive.kind == "storage":
-                z[[n_rate + i for i in slot.efforts]] = slot.primitive.effort(
-                    d.point(slot, x), self.model.reference
-                )
+                z[[n_rate + i for i in slot.efforts]] = slot.primitive.effort(d.point(slot, x), self.model.reference)
         return NaturalState(x.copy(), z, z.copy(), np.zeros(4 + len(d.components)))
 
     def energies(self, x: Array) -> Array:

@@ -1,9 +1,13 @@
 """The compiled time loop of the natural discretisation: evaluate, Newton, advance."""
 
+# numba infers the types of these functions, and exports what it does not list.
+# pyright: basic, reportPrivateImportUsage=false
+
 from typing import NamedTuple
 
 from ephs.mechanics.solve.calling import call_kernel
 from ephs.mechanics.solve.lu_kernels import factorise, solve
+from ephs.mechanics.solve.sparse import Index
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import jit
 from ephs.semantics.spaces.codes import SE3, SO3, SO3xR3
@@ -22,43 +26,43 @@ SPREAD = 1e-3
 class Tables(NamedTuple):
     """The model as arrays. Unknowns: rates, efforts, multipliers, outer flows; rows in the same order."""
 
-    counts: Array  # rates, efforts, multipliers, unknowns
-    kind: Array  # of each component
-    address: Array
-    dims: Array  # (components, 4): n, k, dim of read states, size of read states
+    counts: Index  # rates, efforts, multipliers, unknowns
+    kind: Index  # of each component
+    address: Index
+    dims: Index  # (components, 4): n, k, dim of read states, size of read states
     parameters: Array
-    parameter_at: Array
-    e_index: Array  # effort of each local effort; same offsets for flows
-    e_at: Array
-    multiplier_at: Array
-    read_x: Array  # state entry of each local x⁰
-    read_x_at: Array
-    read_w: Array  # rate of each local v
-    read_w_at: Array
-    jacobian: Array  # place in data of each local Jacobian entry, −1: structurally zero
-    jacobian_at: Array
-    states: Array  # (states, 5): code, at, size, rate, dim
+    parameter_at: Index
+    e_index: Index  # effort of each local effort; same offsets for flows
+    e_at: Index
+    multiplier_at: Index
+    read_x: Index  # state entry of each local x⁰
+    read_x_at: Index
+    read_w: Index  # rate of each local v
+    read_w_at: Index
+    jacobian: Index  # place in data of each local Jacobian entry, −1: structurally zero
+    jacobian_at: Index
+    states: Index  # (states, 5): code, at, size, rate, dim
     intensive: Array  # (efforts,): what turns an exergetic effort into the energy effort
     entropy: Array  # (efforts,): 1 on entropy
-    row: Array  # of each entry of data
-    column: Array
+    row: Index  # of each entry of data
+    column: Index
     template: Array  # constant part of data
-    block: Array  # (rows,): residuals are measured block by block
-    group: Array  # (blocks,): blocks of one kind, whose scales do not differ beyond reason
-    outer: Array  # (outer ports, 4): effort at, dim, 1 if the effort is prescribed, flow unknown at
-    input_at: Array
+    block: Index  # (rows,): residuals are measured block by block
+    group: Index  # (blocks,): blocks of one kind, whose scales do not differ beyond reason
+    outer: Index  # (outer ports, 4): effort at, dim, 1 if the effort is prescribed, flow unknown at
+    input_at: Index
 
 
 class Order(NamedTuple):
     """`sparse.Elimination` as arrays, and which constraint rows are left out."""
 
-    rows: Array
-    columns: Array
-    start: Array
-    entry: Array
-    diagonal: Array
-    place: Array
-    dropped: Array  # (rows,) 1 where the equation is replaced by "this multiplier is zero"
+    rows: Index
+    columns: Index
+    start: Index
+    entry: Index
+    diagonal: Index
+    place: Index
+    dropped: Index  # (rows,) 1 where the equation is replaced by "this multiplier is zero"
     floor: Array  # (rows,): the least |pivot|/|largest of its row| that this order accepts
     tolerance: Array  # [0]: the relative residual that dropped equations may keep
 
@@ -109,7 +113,7 @@ def evaluate(t, x, z, scal, inputs, m):
             m.v[j] = h * z[t.read_w[w_at + j]]
         for j in range(nx):
             m.x[j] = x[t.read_x[x_at + j]]
-        status = call_kernel(
+        status = call_kernel(  # pyright: ignore[reportCallIssue] - the typing context is numba's
             t.address[i],
             t.dims[i].ctypes.data,
             scal.ctypes.data,
@@ -133,18 +137,18 @@ def evaluate(t, x, z, scal, inputs, m):
                 m.scale[rate] = abs(z[n_rate + effort]) + abs(m.e[j])
                 m.residual[n_rate + effort] += z[rate]
                 m.scale[n_rate + effort] += abs(z[rate])
-                for l in range(n):
-                    place = t.jacobian[j_at + j * n + l]
+                for q in range(n):
+                    place = t.jacobian[j_at + j * n + q]
                     if place >= 0:
-                        m.data[place] -= h * m.f[j * n + l]
+                        m.data[place] -= h * m.f[j * n + q]
             continue
         width = n + k + nv
         for j in range(n + k):
-            for l in range(width):
-                place = t.jacobian[j_at + j * width + l]
+            for q in range(width):
+                place = t.jacobian[j_at + j * width + q]
                 if place >= 0:
-                    entry = m.jac[j * width + l]
-                    m.data[place] += entry if l < n + k else h * entry
+                    entry = m.jac[j * width + q]
+                    m.data[place] += entry if q < n + k else h * entry
         force = 0.0
         for j in range(k):
             force = max(force, abs(m.lam[j]))
@@ -153,13 +157,13 @@ def evaluate(t, x, z, scal, inputs, m):
             m.residual[row] += m.f[j]
             # a balance of one term, Bᵀλ = 0, would be measured by itself: the largest multiplier counts
             m.scale[row] += abs(m.f[j])
-            for l in range(k):
-                m.scale[row] = max(m.scale[row], abs(m.jac[j * width + n + l]) * force)
+            for q in range(k):
+                m.scale[row] = max(m.scale[row], abs(m.jac[j * width + n + q]) * force)
             m.flows[e_at + j] = m.f[j]
         for j in range(k):
             m.residual[first + j] += m.c[j]
-            for l in range(n):
-                m.scale[first + j] += abs(m.jac[(n + j) * width + l] * m.e[l])
+            for q in range(n):
+                m.scale[first + j] += abs(m.jac[(n + j) * width + q] * m.e[q])
     for i in range(t.outer.shape[0]):
         at, dim, prescribed, unknown = t.outer[i, 0], t.outer[i, 1], t.outer[i, 2], t.outer[i, 3]
         for j in range(dim):
@@ -178,10 +182,10 @@ def evaluate(t, x, z, scal, inputs, m):
             n, e_at, w_at, j_at = t.dims[i, 0], t.e_at[i], t.read_w_at[i], t.jacobian_at[i]
             for j in range(n):
                 row = t.read_w[w_at + j]
-                for l in range(n):
-                    place = t.jacobian[j_at + j * n + l]
+                for q in range(n):
+                    place = t.jacobian[j_at + j * n + q]
                     if place >= 0:
-                        flow = m.scale[n_rate + t.e_index[e_at + l]]
+                        flow = m.scale[n_rate + t.e_index[e_at + q]]
                         m.scale[row] = max(m.scale[row], abs(m.data[place]) * flow)
     return 0, 0
 

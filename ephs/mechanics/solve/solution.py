@@ -195,9 +195,7 @@ class Solution:
         ]
         if not any(parts):
             known = ", ".join(map(str, {**books.storages, **books.makers}))
-            raise KeyError(
-                f"{path}: no storage and no irreversible component there; those that keep books are {known}"
-            )
+            raise KeyError(f"{path}: no storage and no irreversible component there; those that keep books are {known}")
         energy, entropy, made = (np.sum(p, axis=0) if p else np.zeros(len(self)) for p in parts)
         return Entry(energy, entropy, made)
 
@@ -224,9 +222,7 @@ class Solution:
         if self.motion is not None:
             out |= self.motion.summary()
         else:
-            out["states"] = {
-                str(path): values[-1].tolist() for path, values in self.states.items() if len(self)
-            }
+            out["states"] = {str(path): values[-1].tolist() for path, values in self.states.items() if len(self)}
         return out
 
     def to_xarray(self) -> Any:

@@ -58,9 +58,7 @@ def order(n: int, row: Index, column: Index, value: Array) -> Elimination:
     pattern = sparse.csc_matrix((scaled, (row, column)), shape=(n, n))
     best: tuple[int, Index, Index, list[list[int]]] | None = None
     for choice in ("COLAMD", "MMD_AT_PLUS_A"):
-        factor = splu(
-            pattern, permc_spec=choice, diag_pivot_thresh=0.1, options={"SymmetricMode": choice != "COLAMD"}
-        )
+        factor = splu(pattern, permc_spec=choice, diag_pivot_thresh=0.1, options={"SymmetricMode": choice != "COLAMD"})
         rows, columns = np.argsort(factor.perm_r).astype(np.int64), np.argsort(factor.perm_c).astype(np.int64)
         filled = _fill(n, row, column, rows, columns)
         size = sum(map(len, filled))
@@ -87,14 +85,10 @@ def _equilibrate(n: int, row: Index, column: Index, value: Array) -> tuple[Array
     for _ in range(2):
         largest = np.zeros(n)
         np.maximum.at(largest, row, magnitude * scale_r[row] * scale_c[column])
-        scale_r /= np.where(
-            largest > 0.0, np.exp2(np.round(np.log2(np.where(largest > 0.0, largest, 1.0)))), 1.0
-        )
+        scale_r /= np.where(largest > 0.0, np.exp2(np.round(np.log2(np.where(largest > 0.0, largest, 1.0)))), 1.0)
         largest = np.zeros(n)
         np.maximum.at(largest, column, magnitude * scale_r[row] * scale_c[column])
-        scale_c /= np.where(
-            largest > 0.0, np.exp2(np.round(np.log2(np.where(largest > 0.0, largest, 1.0)))), 1.0
-        )
+        scale_c /= np.where(largest > 0.0, np.exp2(np.round(np.log2(np.where(largest > 0.0, largest, 1.0)))), 1.0)
     return scale_r, scale_c
 
 

@@ -9,8 +9,7 @@ TEXTS: Final = {
     "{expected}. Correct the space, or register the manifold under another name.",
     "manifold taken": "a manifold named '{name}' is registered already. Choose another name.",
     "dual name": "'{name}' cannot be registered: names ending in '*' are the dual vector spaces.",
-    "unknown pair": "joint kind '{name}' is not known; known are {known}. "
-    "Register others with register_pair(entry).",
+    "unknown pair": "joint kind '{name}' is not known; known are {known}. Register others with register_pair(entry).",
     "pair taken": "a pair named '{name}' is registered already. Choose another name.",
     "pair parameters": "pair '{name}' takes the parameters {expected}, found {found}.",
     "pair basis": "pair '{name}': found a basis of shape {found}, expected {expected} "

@@ -182,9 +182,7 @@ class RigidMotions(Manifold):
         return np.concatenate((a[:4] * np.array([1.0, -1.0, -1.0, -1.0]), -rotation.T @ a[4:]))
 
     def exp(self, v: Array) -> Array:
-        return np.concatenate(
-            (so3.matrix_to_quaternion(so3.rotation_exp(v[:3])), so3.rotation_dexp(v[:3]) @ v[3:])
-        )
+        return np.concatenate((so3.matrix_to_quaternion(so3.rotation_exp(v[:3])), so3.rotation_dexp(v[:3]) @ v[3:]))
 
     def log(self, x: Array) -> Array:
         rotation = so3.rotation_log(x[:4])

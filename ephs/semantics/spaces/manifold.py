@@ -165,9 +165,7 @@ def manifold(space: "Space") -> Manifold:
     """
     factory = _FACTORIES.get(_DUAL if space.name.endswith(_DUAL) else space.name)
     if factory is None:
-        raise SpaceError(
-            "unknown space", name=space.name, known=", ".join(sorted(_FACTORIES.keys() - {_DUAL}))
-        )
+        raise SpaceError("unknown space", name=space.name, known=", ".join(sorted(_FACTORIES.keys() - {_DUAL})))
     found = factory(space)
     if (found.dim, found.size) != (space.dim, space.size):
         raise SpaceError(

@@ -182,9 +182,7 @@ def pair(kind: str, **parameters: float) -> Pair:
     if entry is None:
         raise SpaceError("unknown pair", name=kind, known=", ".join(_ENTRIES))
     if sorted(parameters) != sorted(entry.parameters):
-        raise SpaceError(
-            "pair parameters", name=kind, found=sorted(parameters), expected=sorted(entry.parameters)
-        )
+        raise SpaceError("pair parameters", name=kind, found=sorted(parameters), expected=sorted(entry.parameters))
     basis = np.array(entry.basis(**parameters), dtype=np.float64)
     columns = entry.group.dim if entry.group is not None else basis.shape[-1]
     if basis.shape != (6, columns):

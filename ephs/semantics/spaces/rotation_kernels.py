@@ -58,9 +58,7 @@ def log_quaternion(w: float, x: float, y: float, z: float) -> Three:
 
 
 @kernel
-def polynomial(
-    a: float, b: float, c: float, first: float, second: float, u: float, v: float, w: float
-) -> Three:
+def polynomial(a: float, b: float, c: float, first: float, second: float, u: float, v: float, w: float) -> Three:
     """(1 + first ω̂ + second ω̂²) (u, v, w) with ω = (a, b, c): V and its inverse applied to a vector."""
     d, e, f = b * w - c * v, c * u - a * w, a * v - b * u
     g, h, k = b * f - c * e, c * d - a * f, a * e - b * d
@@ -118,9 +116,7 @@ def so3_log_quat(q: Array, out: Array) -> None:
 
 
 @kernel
-def write_block(
-    out: Array, row: int, column: int, diagonal: float, skew: Three, outer: float, a: Three
-) -> None:
+def write_block(out: Array, row: int, column: int, diagonal: float, skew: Three, outer: float, a: Three) -> None:
     """Write diagonal·1 + hat(skew) + outer·a aᵀ into the 3×3 block that starts at (row, column)."""
     for i in range(3):
         for j in range(3):

@@ -24,9 +24,7 @@ _GAMMA: Final = tuple((-1) ** k / factorial(2 * k + 3) for k in range(9, -1, -1)
 _BETA1: Final = tuple(2 * k * (-1) ** k / factorial(2 * k + 2) for k in range(10, 0, -1))
 _GAMMA1: Final = tuple(2 * k * (-1) ** k / factorial(2 * k + 3) for k in range(10, 0, -1))
 _COT: Final = tuple(_NUMERATORS[k] / (_DENOMINATORS[k] * factorial(2 * k + 2)) for k in range(11, -1, -1))
-_COT1: Final = tuple(
-    2 * k * _NUMERATORS[k] / (_DENOMINATORS[k] * factorial(2 * k + 2)) for k in range(11, 0, -1)
-)
+_COT1: Final = tuple(2 * k * _NUMERATORS[k] / (_DENOMINATORS[k] * factorial(2 * k + 2)) for k in range(11, 0, -1))
 
 
 @kernel

@@ -80,9 +80,7 @@ def residuals(scene):
 
         gap = SE3.increment(allowed.include(j.coordinate), relative(0.0))
         twist = SE3.increment(relative(-h), relative(h)) / (2 * h)
-        found.append(
-            (np.abs(gap).max(), np.abs(twist - allowed.basis(j.coordinate) @ j.rate).max(initial=0.0))
-        )
+        found.append((np.abs(gap).max(), np.abs(twist - allowed.basis(j.coordinate) @ j.rate).max(initial=0.0)))
     return np.array(found).reshape(-1, 2).max(axis=0, initial=0.0)
 
 

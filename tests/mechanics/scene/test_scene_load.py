@@ -151,9 +151,7 @@ def test_friction_forms(kind, friction, expected, scene):
 
 def test_spherical_and_free_need_no_axis(scene):
     for kind in ("spherical", "free", "fixed"):
-        loaded = scene(
-            BODY + f"[joints.j]\ntype = '{kind}'\nbodies = ['ground', 'a']\nat = [0.0, 1.0, 0.0]\n"
-        )
+        loaded = scene(BODY + f"[joints.j]\ntype = '{kind}'\nbodies = ['ground', 'a']\nat = [0.0, 1.0, 0.0]\n")
         assert loaded.joint("j").frame2.tolist() == [1.0, 0, 0, 0, 0, 1.0, 0]
 
 

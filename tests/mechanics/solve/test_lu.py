@@ -25,9 +25,7 @@ def factors(dense, values=None):
     plan = order(n, row, column, dense[row, column])
     value, scratch, ratio = np.zeros(plan.fill), np.zeros(n), np.zeros(n)
     data = dense[row, column] if values is None else values[row, column]
-    good = factorise(
-        plan.place, plan.start, plan.column, plan.diagonal, data, value, scratch, np.zeros(n), ratio
-    )
+    good = factorise(plan.place, plan.start, plan.column, plan.diagonal, data, value, scratch, np.zeros(n), ratio)
     return plan, value, good, ratio
 
 

@@ -65,6 +65,4 @@ def test_the_dataset_has_units_and_coordinates(solution):
     assert data["t"].attrs["units"] == "s"
     assert data["heat"].attrs["units"] == "J"
     assert data["state:osc.pe.q"].dims == ("t",)
-    assert float(data["state:osc.pe.q"].sel(t=0.5, method="nearest")) == pytest.approx(
-        solution["osc.pe.q"][50]
-    )
+    assert float(data["state:osc.pe.q"].sel(t=0.5, method="nearest")) == pytest.approx(solution["osc.pe.q"][50])

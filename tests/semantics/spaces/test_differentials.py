@@ -36,9 +36,7 @@ def error(found, exact):
     """Largest entry of found − exact, taken before rounding."""
     with mpmath.workdps(40):
         n, m = found.shape
-        return float(
-            max(abs(mpmath.mpf(float(found[i, j])) - exact[i, j]) for i in range(n) for j in range(m))
-        )
+        return float(max(abs(mpmath.mpf(float(found[i, j])) - exact[i, j]) for i in range(n) for j in range(m)))
 
 
 def displacement(group, angle):
@@ -130,12 +128,7 @@ def test_rates_along_a_motion(group, seed):
     ahead, behind = group.retract(q, h * u), group.retract(q, -h * u)
     inverse = group.adjoint(group.inverse(q))
     rate = (group.adjoint(group.inverse(ahead)) - group.adjoint(group.inverse(behind))) / (2 * h)
-    size = (
-        1e-9
-        * (1.0 + np.abs(u).sum()) ** 3
-        * (1.0 + np.abs(q).sum())
-        * (1.0 + np.abs(p).sum() + np.abs(w).sum())
-    )
+    size = 1e-9 * (1.0 + np.abs(u).sum()) ** 3 * (1.0 + np.abs(q).sum()) * (1.0 + np.abs(p).sum() + np.abs(w).sum())
     assert np.abs(rate + group.ad(u) @ inverse).max() <= size
     # d/dt (Ad*_{q⁻¹} p) = Ad*_{q⁻¹} (ṗ − ad*_u p), here with ṗ = w.
     after = group.coadjoint(group.inverse(ahead)) @ (p + h * w)

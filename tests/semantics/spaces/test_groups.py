@@ -21,9 +21,7 @@ EPS = np.finfo(float).eps
 groups = pytest.mark.parametrize("group", GROUPS, ids=lambda g: f"{g.name}{g.dim}")
 seeds = st.integers(0, 2**32 - 1)
 # Logarithms are principal below π, so displacements stay within; zero and the tiny ones test the series.
-lengths = st.sampled_from(
-    [0.0, 1e-300, 1e-12, 1e-8, 1e-5, 1e-3, 0.1, 0.499, 0.501, 0.999, 1.001, 2.0, 3.0, 3.1415]
-)
+lengths = st.sampled_from([0.0, 1e-300, 1e-12, 1e-8, 1e-5, 1e-3, 0.1, 0.499, 0.501, 0.999, 1.001, 2.0, 3.0, 3.1415])
 
 
 def close(a, b, scale=1.0):

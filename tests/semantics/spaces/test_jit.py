@@ -45,6 +45,8 @@ def package(tmp_path):
     """A package named ephs with this decorator and two kernels in two files."""
     room = tmp_path / "ephs" / "semantics" / "spaces"
     room.mkdir(parents=True)
+    for folder in (room, room.parent, room.parent.parent):  # a package of its own, before the one that is installed
+        (folder / "__init__.py").touch()
     (room / "jit.py").write_bytes((ROOT / "ephs/semantics/spaces/jit.py").read_bytes())
     (room / "helper_kernels.py").write_text(HELPER.format(number=1.0))
     (room / "caller_kernels.py").write_text(CALLER)
@@ -119,9 +121,7 @@ def test_every_file_that_makes_kernels_counts():
     makers = {
         path
         for path in (ROOT / "ephs").rglob("*.py")
-        if any(
-            line.startswith(("@kernel", "@cfunc_kernel", "@jit.")) for line in path.read_text().splitlines()
-        )
+        if any(line.startswith(("@kernel", "@cfunc_kernel", "@jit.")) for line in path.read_text().splitlines())
     }
     assert makers
     assert makers <= sources

@@ -45,9 +45,7 @@ def test_subgroup_closure(kind, seed, pitch):
     group = joint.manifold
     x, y, v = group.random(rng), group.random(rng), rng.standard_normal(joint.dim)
     scale = 10.0 * (1.0 + np.abs(x).sum()) * (1.0 + np.abs(y).sum() + np.abs(v).sum())
-    assert same_pose(
-        joint.include(group.retract(x, v)), SE3.retract(joint.include(x), joint.basis @ v), scale
-    )
+    assert same_pose(joint.include(group.retract(x, v)), SE3.retract(joint.include(x), joint.basis @ v), scale)
     product = SE3.compose(joint.include(x), joint.include(y))
     assert same_pose(joint.include(group.compose(x, y)), product, scale)
     assert same_pose(joint.include(group.inverse(x)), SE3.inverse(joint.include(x)), scale)

@@ -99,9 +99,7 @@ def test_material_form(group, seed):
     assert np.abs(covector_of_gradient(group, pose, material_covector(group, pose, f)) - f).max() <= scale
     # The two are dual: pairing on either side is the same number.
     ambient = np.sum(gradient[0] * velocity[0]) + gradient[1] @ velocity[1]
-    terms = (
-        np.abs(gradient[0]).sum() * np.abs(velocity[0]).sum() + np.abs(gradient[1]).sum() * np.abs(u).sum()
-    )
+    terms = np.abs(gradient[0]).sum() * np.abs(velocity[0]).sum() + np.abs(gradient[1]).sum() * np.abs(u).sum()
     assert abs(covector_of_gradient(group, pose, gradient) @ u - ambient) <= 64 * EPS * (1 + terms)
     # The velocity is the one of the curve that the twist makes.
     from ephs.semantics.spaces.rotations import quaternion_to_matrix
@@ -143,10 +141,7 @@ def test_the_plane_lies_in_space():
 
 
 def test_the_reference_needs_numpy_only():
-    code = (
-        "import sys, ephs.semantics.spaces\n"
-        "print([m for m in ('numba', 'scipy', 'sympy') if m in sys.modules])"
-    )
+    code = "import sys, ephs.semantics.spaces\nprint([m for m in ('numba', 'scipy', 'sympy') if m in sys.modules])"
     root = Path(__file__).resolve().parents[3]
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=root)
     assert done.stdout.strip() == "[]"
