@@ -26,7 +26,7 @@ def outline(body: ephs.Solution, shape: dict, k: int) -> np.ndarray:
         radius, length = shape["cylinder"]
         turns = np.linspace(0.0, 2.0 * np.pi, 24)
         ring = radius * np.column_stack([np.cos(turns), np.sin(turns), 0.0 * turns])
-        points = np.vstack([ring + [0.0, 0.0, s * length / 2] for s in (-1, 1)])
+        points = np.vstack([ring + np.array([0.0, 0.0, s * length / 2]) for s in (-1, 1)])
     there = points @ body.rotation[k].T + body.position[k]
     flat = there[:, [0, 2]]
     return flat[ConvexHull(flat).vertices]

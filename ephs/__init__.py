@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from ephs.mechanics.simulate import load_solution as load_solution
     from ephs.mechanics.simulate import simulate as simulate
     from ephs.mechanics.solve.errors import Interrupted as Interrupted
+    from ephs.mechanics.solve.errors import OptionError as OptionError
     from ephs.mechanics.solve.errors import SimulationError as SimulationError
     from ephs.mechanics.solve.solution import Solution as Solution
     from ephs.operad import Directory as Directory
@@ -63,7 +64,7 @@ _HOMES = {
     "ephs.mechanics.scene.load": ("load",),
     "ephs.mechanics.check": ("check_model",),
     "ephs.mechanics.simulate": ("load_solution", "simulate"),
-    "ephs.mechanics.solve.errors": ("Interrupted", "SimulationError"),
+    "ephs.mechanics.solve.errors": ("Interrupted", "OptionError", "SimulationError"),
     "ephs.mechanics.solve.solution": ("Solution",),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}

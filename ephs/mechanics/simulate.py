@@ -10,6 +10,7 @@ from ephs.mechanics.build import drive_ports, initial_state, scene_inputs, scene
 from ephs.mechanics.motion import SceneMotion
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.solve.errors import OptionError
 from ephs.mechanics.solve.integrate import METHODS, Grid, integrate
 from ephs.mechanics.solve.problem import Problem, Signal
 from ephs.mechanics.solve.solution import Solution
@@ -83,20 +84,20 @@ def simulate(
         The run failed part-way; ``.partial`` is the solution up to there.
     SemanticsError
         The model has no square system of equations, a state or an input does not fit.
-    ValueError
-        An option is not known, or not possible with the method.
+    OptionError
+        An option is not known, or not possible with the method; a ValueError.
     """
     chosen = _method(method)
     if form not in FORMS:
-        raise ValueError(f"form is {form!r}, expected one of {', '.join(FORMS)}")
+        raise OptionError("form", form, f"one of {', '.join(FORMS)}")
     if form == "folded":
-        raise ValueError(f"form is 'folded', which the method {chosen} does not solve; expected paper or reduced")
+        raise OptionError("form", form, f"paper or reduced, which the method {chosen} solves")
     for name, value in (("events", events), ("options", options)):
         if value:
-            raise ValueError(f"{name} is {value!r}: the method {chosen} takes none")
+            raise OptionError(name, value, f"none: the method {chosen} takes no {name}")
     if isinstance(model, Scene):
         if reference is not None:
-            raise ValueError("reference is given, but the scene's [world] has its own; change that instead")
+            raise OptionError("reference", reference, "none: a scene's [world] has its own")
         problem = problem_of_scene(model, initial, inputs)
     else:
         problem = problem_of_system(model, initial, inputs, reference)
@@ -234,7 +235,7 @@ def _method(name: str) -> str:
     if name == "auto":
         return "natural"
     if name not in METHODS:
-        raise ValueError(f"method is {name!r}, expected one of auto, {', '.join(METHODS)}")
+        raise OptionError("method", name, f"one of auto, {', '.join(METHODS)}")
     return name
 
 
@@ -243,7 +244,7 @@ def _times(save_at: "ArrayLike | None", t0: float, until: float) -> Array | None
         return None
     times = np.atleast_1d(np.asarray(save_at, dtype=float))
     if times.ndim != 1 or not np.all(np.isfinite(times)) or np.any(np.diff(times) <= 0.0):
-        raise ValueError(f"save_at is {save_at!r}, expected ascending times in s")
+        raise OptionError("save_at", save_at, "ascending times in s")
     if times.size and not (t0 <= times[0] and times[-1] <= until):
-        raise ValueError(f"save_at goes from {times[0]!r} to {times[-1]!r} s, expected times in [{t0!r}, {until!r}]")
+        raise OptionError("save_at", save_at, f"times in [{t0!r}, {until!r}] s")
     return times

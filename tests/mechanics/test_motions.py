@@ -219,3 +219,26 @@ def test_too_large_a_step_is_refused_by_name():
     with pytest.raises(ephs.SimulationError, match=r"joints\.j0\.hc.*rotation of π.*below π") as caught:
         ephs.simulate(case.scene(), 1.0, step=0.03)
     assert caught.value.partial.t[-1] == caught.value.time < 1.0
+
+
+def test_a_motion_that_nothing_determines_is_refused_by_name(tmp_path):
+    """A massless frame that turns freely: no equation gives its rate."""
+    file = tmp_path / "frame.toml"
+    file.write_text(
+        "format = 1\n[bodies.frame]\nmass = 0.0\ninertia = [0.0, 0.0, 0.0]\n"
+        '[joints.pin]\ntype = "revolute"\nbodies = ["ground", "frame"]\nat = [0.0, 0.0, 0.0]\naxis = [0.0, 0.0, 1.0]\n'
+    )
+    with pytest.raises(ephs.SimulationError, match=r"the motion is not determined.*(frame|pin)") as caught:
+        ephs.simulate(ephs.load(file), 1.0)
+    assert caught.value.partial.t.tolist() == [0.0]
+
+
+def test_contradictory_motions_are_refused():
+    """A four-bar of one freedom whose two cranks are told to turn at different rates."""
+    case = next(c for c in CASES if c.name == "four-bar-windows-1")
+    scene = case.scene()
+    rates = {"j0": -1.0, "j1": -1.5}
+    told = {name: replace(scene.joints[name], motion=rate) for name, rate in rates.items()}
+    with pytest.raises(ephs.SimulationError) as caught:
+        ephs.simulate(replace(scene, joints={**scene.joints, **told}), 1.0, step=0.01)
+    assert "check prescribed motions" in str(caught.value) or "no solution" in str(caught.value)

@@ -7,7 +7,7 @@ if TYPE_CHECKING:
     from ephs.mechanics.solve.model import Model
     from ephs.mechanics.solve.solution import Solution
 
-__all__ = ["Interrupted", "Outcome", "SimulationError", "SolveError"]
+__all__ = ["Interrupted", "OptionError", "Outcome", "SimulationError", "SolveError"]
 
 
 class Outcome(StrEnum):
@@ -34,6 +34,18 @@ _ADVICE = {
     Outcome.INTERRUPTED: "what was computed is in .partial",
 }
 _OF_KERNEL = {1: Outcome.TURN, 2: Outcome.TEMPERATURE, 3: Outcome.PYTHON}
+
+
+@final
+class OptionError(ValueError):
+    """An option that a run cannot have: which, what was found, what is expected."""
+
+    def __init__(self, key: str, found: object, expected: str) -> None:
+        super().__init__(f"{key} is {found!r}, expected {expected}")
+        self.key, self.found, self.expected = key, found, expected
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return (OptionError, (self.key, self.found, self.expected))
 
 
 class SimulationError(RuntimeError):

@@ -7,7 +7,7 @@ from typing import Any, final
 
 import numpy as np
 
-from ephs.mechanics.solve.errors import Interrupted, Outcome, SimulationError, SolveError
+from ephs.mechanics.solve.errors import Interrupted, OptionError, Outcome, SimulationError, SolveError
 from ephs.mechanics.solve.ledger import ledgers
 from ephs.mechanics.solve.model import Model, compile_model
 from ephs.mechanics.solve.natural import Chunk, Natural, NaturalState
@@ -40,9 +40,9 @@ class Grid:
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.h) and self.h > 0.0):
-            raise ValueError(f"step is {self.h!r}, expected a number of seconds > 0")
+            raise OptionError("step", self.h, "a number of seconds > 0")
         if not (np.isfinite(self.until) and self.until > self.t0):
-            raise ValueError(f"until is {self.until!r}, expected a time after t0 = {self.t0!r} s")
+            raise OptionError("until", self.until, f"a time after t0 = {self.t0!r} s")
 
     @property
     def whole(self) -> int:
@@ -88,6 +88,7 @@ def integrate(
     try:
         run.recorder.start(stepper.energies(x0))
         run.state = stepper.init(x0)
+        stepper.prepare(run.state, grid.h)
         run.setup = time.perf_counter() - begin
         run.full_steps(max_steps)
         if grid.last:
@@ -123,9 +124,7 @@ class _Run:
         """All steps of full length, in chunks that adapt to the time that they take."""
         whole = self.grid.whole
         if max_steps is not None and whole + bool(self.grid.last) > max_steps:
-            raise ValueError(
-                f"max_steps is {max_steps}, the grid of {self.grid.h:g} s has {whole + bool(self.grid.last)} steps"
-            )
+            raise OptionError("max_steps", max_steps, f"at least the grid's {whole + bool(self.grid.last)} steps")
         size = 16 if self.problem.constant else 1
         while self.steps < whole:
             count = min(size, whole - self.steps)

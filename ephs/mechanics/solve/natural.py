@@ -120,6 +120,17 @@ class Natural:
             raise SolveError.of_component(status, self.model, component)
         return memory.energy
 
+    def prepare(self, state: NaturalState, h: float) -> None:
+        """Decide the order of elimination and compile what is not in the cache, before time counts."""
+        model = self.model
+        x, z, previous, sums = (a.copy() for a in (state.x, state.z, state.previous, state.sums))
+        order, rows = self._order(x, z, h).order, np.empty((0, x.size))
+        energies, ledgers = np.empty((0, model.tables.kind.size)), np.empty((0, 5))
+        advance(
+            model.tables, order, x, z, previous, model.scal(h), model.input_values(), self._memory, sums, 0,
+            rows, energies, ledgers,
+        )  # fmt: skip
+
     def step(self, state: NaturalState, h: float, inputs: Array | None = None) -> NaturalState:
         """One step of h seconds.
 

@@ -1,0 +1,92 @@
+"""The commands on real models, from the file to the result folder."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+import ephs
+from ephs.cli import main
+
+ROOT = Path(__file__).resolve().parents[1]
+SPINNING = """format = 1
+[bodies.top]
+mass = 1.0
+inertia = [1.0, 1.0, 1.0]
+position = [0.0, 0.0, 1.0]
+velocity = [100.0, 0.0, 0.0]
+angular_velocity = [0.0, 100.0, 0.0]
+[joints.ball]
+type = "spherical"
+bodies = ["ground", "top"]
+at = [0.0, 0.0, 0.0]
+"""
+
+
+def test_run_writes_the_result_folder(tmp_path, capsys):
+    assert main(["run", str(ROOT / "scenes/slider-crank.toml"), "--until", "0.2", "--out", str(tmp_path)]) == 0
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["scene"] == "slider-crank"
+    assert summary["method"] == "natural"
+    assert summary["t_end"] == 0.2
+    assert summary["mobility"] == 1
+    assert set(summary["bodies"]) == {"crank", "rod", "slider"}
+    assert summary["thermal"]["housing"]["temperature"] > 293.15
+    for key in ("max_energy_error", "max_constraint_error", "max_velocity_error"):
+        assert summary[key] < 1e-12
+    solution = ephs.load_solution(tmp_path / "solution.nc")
+    assert solution.body("rod").position[-1].tolist() == summary["bodies"]["rod"]["position"]
+    page = (tmp_path / "report.html").read_text()
+    assert "slider-crank" in page
+    assert str(tmp_path / "report.html") in capsys.readouterr().out
+
+
+def test_run_takes_a_system_of_ones_own(tmp_path):
+    name = f"{ROOT / 'examples/oscillator.py'}:system"
+    assert main(["run", name, "--until", "1", "--step", "0.01", "--out", str(tmp_path)]) == 0
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["steps"] == 100
+    assert set(summary["states"]) == {"osc.pe.q", "osc.ke.p", "env.s"}
+
+
+@pytest.mark.parametrize("scene", sorted((ROOT / "scenes").glob("*.toml")), ids=lambda path: path.stem)
+def test_check_holds_of_the_shipped_scenes(scene, capsys):
+    assert main(["check", str(scene)]) == 0
+    said = capsys.readouterr().out
+    assert "FAILS" not in said
+    assert "mobility" in said
+
+
+@pytest.mark.parametrize("suffix", [".svg", ".tex", ".png"])
+def test_draw_writes_the_pattern(tmp_path, suffix):
+    file = tmp_path / f"pattern{suffix}"
+    assert main(["draw", str(ROOT / "scenes/mbs.toml"), "--flat", "-o", str(file)]) == 0
+    assert file.stat().st_size > 1000
+
+
+def test_a_run_that_fails_saves_what_it_has(tmp_path, capsys):
+    scene = tmp_path / "top.toml"
+    scene.write_text(SPINNING)
+    out = tmp_path / "out"
+    assert main(["run", str(scene), "--until", "1", "--step", "0.1", "--out", str(out)]) == 3
+    said = capsys.readouterr().err
+    assert "joints.ball.hc" in said
+    assert "half" not in said
+    assert str(out) in said
+    assert json.loads((out / "summary.json").read_text())["t_end"] == 0.0
+    assert len(ephs.load_solution(out / "solution.nc")) == 1
+
+
+def test_bad_scenes_are_told_all_their_faults(tmp_path, capsys):
+    scene = tmp_path / "bad.toml"
+    scene.write_text(SPINNING.replace("mass = 1.0", "mass = -1.0\nmas = 2.0").replace('"ground"', '"sky"'))
+    assert main(["run", str(scene), "--until", "1"]) == 2
+    said = capsys.readouterr().err
+    assert "Traceback" not in said
+    assert all(word in said for word in (str(scene), "bodies.top.mass", "bodies.top.mas", "sky"))
+
+
+def test_options_that_the_method_has_not_are_told(tmp_path, capsys):
+    scene = str(ROOT / "scenes/mbs.toml")
+    assert main(["run", scene, "--until", "1", "--method", "euler", "--out", str(tmp_path)]) == 2
+    assert "euler" in capsys.readouterr().err
