@@ -13,11 +13,11 @@ export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
 .DELETE_ON_ERROR:
-.PHONY: help demo test lint types docs bench fuzz clean
+.PHONY: help demo test lint types docs bench fuzz mutate clean
 
 help:
 	@echo 'make demo   simulate scenes/$(SCENE).toml and write out/$(SCENE)/report.html'
-	@echo 'make test   run the tests; make lint, make types: style and types; make fuzz: the laws, for long'
+	@echo 'make test   run the tests; make lint, make types: style and types; make fuzz: the laws, for long; make mutate: what goes red when the code is broken'
 	@echo 'make docs   build docs/_build/html; make bench: measure; make clean: remove what was built'
 
 # One stamp an extra: installing again is needed only when pyproject.toml has changed.
@@ -44,6 +44,9 @@ types: $(VENV)/.installed-dev
 
 fuzz: $(VENV)/.installed-dev
 	$(PYTEST) -n $(CORES) --hypothesis-profile=fuzz
+
+mutate: $(VENV)/.installed-dev
+	$(BIN)/python -m tests.mutate
 
 bench: $(VENV)/.installed-dev
 	$(BIN)/python -m benchmarks

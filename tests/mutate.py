@@ -1,0 +1,127 @@
+"""Break one thing at a time and see which tests go red: ``python -m tests.mutate [NAME...]``.
+
+Works on a copy of the tree. A mutation that no test notices is an error.
+"""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+MECHANICS = ("tests/mechanics/test_components.py", "tests/mechanics/test_models.py",
+             "tests/mechanics/test_variational.py",
+             "tests/mechanics/test_motions.py", "tests/mechanics/test_build.py")  # fmt: skip
+SEMANTICS = ("tests/semantics/test_primitives.py", "tests/semantics/test_laws.py", "tests/semantics/test_relations.py")
+OPERAD = ("tests/operad",)
+
+
+@dataclass(frozen=True)
+class Mutation:
+    """One edit: in a file, some text becomes another; and the tests that ought to see it."""
+
+    file: str
+    old: str
+    new: str
+    tests: tuple[str, ...]
+
+
+MUTATIONS = {
+    "lp": Mutation("ephs/mechanics/components.py", "[-space.ad(unit).T @ x[p]", "[space.ad(unit).T @ x[p]", MECHANICS),
+    "lp, compiled": Mutation(
+        "ephs/mechanics/kernels.py",
+        "flow[3 + i] = u[j] * mean[3 + k] - u[k] * mean[3 + j]",
+        "flow[3 + i] = u[k] * mean[3 + j] - u[j] * mean[3 + k]",
+        MECHANICS,
+    ),
+    "o1": Mutation("ephs/mechanics/components.py", "np.hstack([-carried,", "np.hstack([carried,", MECHANICS),
+    "o1, not inverted": Mutation(
+        "ephs/mechanics/components.py",
+        "carried = SE3.adjoint(SE3.inverse(np.asarray(offset, dtype=float)))",
+        "carried = SE3.adjoint(np.asarray(offset, dtype=float))",
+        MECHANICS,
+    ),
+    "hc": Mutation(
+        "ephs/mechanics/components.py",
+        "np.hstack([SE3.adjoint(SE3.inverse(pose)), -np.eye(6), of.basis])",
+        "np.hstack([SE3.adjoint(SE3.inverse(pose)), np.eye(6), of.basis])",
+        MECHANICS,
+    ),
+    "hc, compiled": Mutation(
+        "ephs/mechanics/holonomic_kernels.py",
+        "side[i], mid[i], inner[i] = -0.5 * h * effort[6 + i], 0.5 * h * bi, h * ai",
+        "side[i], mid[i], inner[i] = 0.5 * h * effort[6 + i], 0.5 * h * bi, h * ai",
+        MECHANICS,
+    ),
+    "mf": Mutation(
+        "ephs/semantics/library.py",
+        "out[:d, d] = out[d, :d] = -drag",
+        "out[:d, d] = out[d, :d] = drag",
+        SEMANTICS + MECHANICS,
+    ),
+    "mf, compiled": Mutation(
+        "ephs/semantics/kernels.py", "flow[d] = -power / theta", "flow[d] = power / theta", MECHANICS
+    ),
+    "substitution": Mutation(
+        "ephs/operad/substitution.py",
+        "        target[path] = box / path\n",
+        "        target[path] = path\n",
+        OPERAD + SEMANTICS,
+    ),
+    "substitution, absorbed elsewhere": Mutation(
+        "ephs/operad/substitution.py",
+        "target[path] = content.ports[path].junction  # absorbed",
+        "target[path] = min(content.ports.values(), key=lambda p: p.junction).junction",
+        OPERAD + SEMANTICS,
+    ),
+    "gluing": Mutation(
+        "ephs/semantics/relation.py", "outer_at[path] + i, -1.0))", "outer_at[path] + i, 1.0))", SEMANTICS
+    ),
+}
+
+
+def red(mutation: Mutation) -> list[str]:
+    """The tests that fail when the mutation is made."""
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder) / "tree"
+        shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(".*", "out", "__pycache__", "_build"))
+        file = copy / mutation.file
+        text = file.read_text(encoding="utf-8")
+        if text.count(mutation.old) != 1:
+            raise SystemExit(
+                f"{mutation.file}: {mutation.old!r} occurs {text.count(mutation.old)} times, expected once"
+            )
+        file.write_text(text.replace(mutation.old, mutation.new), encoding="utf-8")
+        command = [
+            sys.executable,
+            "-m",
+            "pytest",
+            "-q",
+            "-n",
+            "2",
+            "-p",
+            "no:cacheprovider",
+            "--no-header",
+            *mutation.tests,
+        ]
+        environment = os.environ | {"CI": "1", "PYTHONPATH": str(copy)}
+        done = subprocess.run(command, cwd=copy, capture_output=True, text=True, env=environment)
+        return sorted(set(re.findall(r"^(?:FAILED|ERROR) (\S+)", done.stdout, re.MULTILINE)))
+
+
+def main(names: list[str]) -> int:
+    """Make the named mutations, or all."""
+    survived = 0
+    for name in names or MUTATIONS:
+        failures = red(MUTATIONS[name])
+        print(f"\n{name}: {len(failures)} red", *failures, sep="\n  ", flush=True)
+        survived += not failures
+    return 1 if survived else 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main(sys.argv[1:]))
