@@ -30,6 +30,7 @@ SCENE is a scene file (.toml), or FILE.py:NAME, a System or Scene of that name i
 ephs COMMAND --help explains a command."""
 
 _TEXTS = {
+    "initial": "--initial {found}: expected PATH=NUMBER or PATH=NUMBER,NUMBER,..., as in osc.pe.q=1.0",
     "suffix": "{found}: expected one of {expected}; choose the file name's ending accordingly",
     "no-file": "{found}: no such file; expected a scene file (.toml) or FILE.py:NAME",
     "no-name": "{file}: no {name} in it; found {found}. Give one as {file}:NAME",
@@ -105,6 +106,7 @@ def run(
     atol: Positive = None,
     step: Positive = None,
     form: Literal["paper", "folded", "reduced"] | None = None,
+    initial: list[str] | None = None,
     out: Path | None = None,
     base: Base = "fixed",
     adjust: bool = False,
@@ -127,6 +129,8 @@ def run(
         Constant step size, in seconds.
     form
         Which form of the equations is integrated.
+    initial
+        Initial value of a state, PATH=NUMBER or PATH=NUMBER,NUMBER,...; may be given several times.
     out
         Result folder; out/NAME unless given.
     base
@@ -141,7 +145,14 @@ def run(
     folder = out or Path("out", name)
     with _input(scene, folder):
         folder.mkdir(parents=True, exist_ok=True)
-    given = {"method": method, "rtol": rtol, "atol": atol, "step": step, "form": form}
+    given = {
+        "initial": _initial(initial or []),
+        "method": method,
+        "rtol": rtol,
+        "atol": atol,
+        "step": step,
+        "form": form,
+    }
     chosen: dict[str, Any] = {key: value for key, value in given.items() if value is not None}
     try:
         with _input(scene, folder), _progress(name) as progress:
@@ -234,17 +245,9 @@ def draw(
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line.
+    """Run the command line on the words after the program's name, those of the process unless given.
 
-    Parameters
-    ----------
-    arguments
-        The words after the program's name; those of the process unless given.
-
-    Returns
-    -------
-    int
-        The exit code, see the module.
+    Returns the exit code, see the module.
     """
     from rich.console import Console
 
@@ -258,6 +261,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         _complain("interrupted")
         return 130
+
+
+def _initial(entries: Sequence[str]) -> dict[str, list[float]] | None:
+    values: dict[str, list[float]] = {}
+    for entry in entries:
+        path, _, numbers = entry.partition("=")
+        try:
+            values[path] = [float(number) for number in numbers.split(",")]
+        except ValueError as error:
+            raise BadInput(_TEXTS["initial"].format(found=entry)) from error
+    return values or None
 
 
 def _load(scene: str, *, base: Base, adjust: bool) -> "Scene | System":

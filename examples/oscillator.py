@@ -1,7 +1,10 @@
-"""A damped oscillator, nested: an oscillator without loss is one box of the pattern that adds friction.
+"""An oscillator, and a damped one, nested: the oscillator without loss is one box of the pattern that adds friction.
 
-Run it with ``python examples/oscillator.py``; draw it with
-``ephs draw examples/oscillator.py:system -o oscillator.svg``.
+Run it with ``python examples/oscillator.py``, or by the command line:
+
+    ephs run examples/oscillator.py:damped_oscillator --until 10 --step 0.01 --initial osc.pe.q=1.0
+    ephs run examples/oscillator.py:free_oscillator --until 10 --step 0.01 --initial osc.pe.q=1.0
+    ephs draw examples/oscillator.py:damped_oscillator -o oscillator.svg
 """
 
 import ephs
@@ -21,7 +24,11 @@ damped = Pattern(
     boxes={"osc": {"p": "p"}, "mf": {"p": "p", "s": "s"}, "env": {"s": "s"}},
 )
 
-system = damped(
+# Without friction nothing else meets the momentum.
+closed = Pattern(junctions={"p": junction(Q.momentum)}, boxes={"osc": {"p": "p"}})
+
+free_oscillator = closed(osc=oscillator(pe=lib.spring(k=1.5), ke=lib.point_mass(m=1.0), pkc=lib.pkc()))
+damped_oscillator = damped(
     osc=oscillator(pe=lib.spring(k=1.5), ke=lib.point_mass(m=1.0), pkc=lib.pkc()),
     mf=lib.friction(d=0.1),
     env=lib.environment(),
@@ -29,8 +36,8 @@ system = damped(
 
 if __name__ == "__main__":
     # Filling and flattening commute: the flat system's pattern is the patterns' substitution.
-    same = system.flatten().pattern == damped.substitute(osc=oscillator)
-    solution = ephs.simulate(system, until=10.0, initial={"osc.pe.q": 1.0, "osc.ke.p": 0.0}, step=0.01)
+    same = damped_oscillator.flatten().pattern == damped.substitute(osc=oscillator)
+    solution = ephs.simulate(damped_oscillator, until=10.0, initial={"osc.pe.q": 1.0, "osc.ke.p": 0.0}, step=0.01)
     energy, exergy, entropy = solution.energy, solution.exergy, solution.entropy
     print(f"flattening is substitution: {same}")
     print(f"displacement at {solution.t[-1]:g} s: {solution['osc.pe.q'][-1]:.6f} m")

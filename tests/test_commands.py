@@ -41,12 +41,26 @@ def test_run_writes_the_result_folder(tmp_path, capsys):
     assert str(tmp_path / "report.html") in capsys.readouterr().out
 
 
-def test_run_takes_a_system_of_ones_own(tmp_path):
-    name = f"{ROOT / 'examples/oscillator.py'}:system"
-    assert main(["run", name, "--until", "1", "--step", "0.01", "--out", str(tmp_path)]) == 0
+@pytest.mark.parametrize("name", ["free_oscillator", "damped_oscillator"])
+def test_run_takes_a_system_of_ones_own(tmp_path, name):
+    model = f"{ROOT / 'examples/oscillator.py'}:{name}"
+    options = ["--until", "1", "--step", "0.01", "--initial", "osc.pe.q=1.0", "--initial", "osc.ke.p=0.5"]
+    assert main(["run", model, *options, "--out", str(tmp_path)]) == 0
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert summary["steps"] == 100
-    assert set(summary["states"]) == {"osc.pe.q", "osc.ke.p", "env.s"}
+    assert {"osc.pe.q", "osc.ke.p"} <= set(summary["states"])
+    assert (summary["heat"] > 0.0) == (name == "damped_oscillator")
+    solution = ephs.load_solution(tmp_path / "solution.nc")
+    assert (solution["osc.pe.q"][0], solution["osc.ke.p"][0]) == (1.0, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("initial", "words"), [("osc.pe.q", "PATH=NUMBER"), ("osc.q=1", "osc.pe.q"), ("osc.pe.q=1,2", "(1,)")]
+)
+def test_bad_initial_values_are_told(tmp_path, capsys, initial, words):
+    model = f"{ROOT / 'examples/oscillator.py'}:free_oscillator"
+    assert main(["run", model, "--until", "1", "--initial", initial, "--out", str(tmp_path)]) == 2
+    assert words in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("scene", sorted((ROOT / "scenes").glob("*.toml")), ids=lambda path: path.stem)

@@ -1,8 +1,6 @@
 """Checks of a model, not of a trajectory: types, structure, assembly, laws, mobility."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import NamedTuple, final
 
 import numpy as np
 
@@ -12,10 +10,9 @@ from ephs.mechanics.solve.errors import SolveError
 from ephs.mechanics.solve.instant import mobility
 from ephs.mechanics.solve.integrate import Grid, integrate
 from ephs.mechanics.solve.problem import Problem
-from ephs.semantics.checks import check_irreversible, check_reversible, check_storage
 from ephs.semantics.errors import SemanticsError
 from ephs.semantics.laws import Probe, system_law
-from ephs.semantics.primitives import Irreversible, Storage
+from ephs.semantics.report import CheckItem, CheckReport, check_structure
 from ephs.semantics.system import System
 
 __all__ = ["CheckItem", "CheckReport", "check_model"]
@@ -24,30 +21,6 @@ LARGEST = 600
 """Rows of the largest relation that is composed by both routes; the work grows with the third power."""
 STEP, STEPS = 1e-3, 100
 """Seconds and number of the steps over which balances are measured: in the first ones little may have moved yet."""
-
-
-class CheckItem(NamedTuple):
-    """A check: its name, whether it holds, and what was found."""
-
-    name: str
-    ok: bool
-    detail: str
-
-
-@final
-@dataclass(frozen=True, slots=True)
-class CheckReport:
-    """All checks of a model."""
-
-    items: tuple[CheckItem, ...]
-
-    @property
-    def ok(self) -> bool:
-        """Whether all hold."""
-        return all(item.ok for item in self.items)
-
-    def __str__(self) -> str:
-        return "\n".join(f"{'holds' if ok else 'FAILS'}  {name}: {detail}" for name, ok, detail in self.items)
 
 
 def check_model(model: System | Scene) -> CheckReport:
@@ -69,7 +42,7 @@ def _items(model: System | Scene) -> Iterator[CheckItem]:
     remarks = "; ".join(map(str, flat.lint()))
     boxes, junctions = len(flat.boxes), len(flat.junctions)
     yield CheckItem("types", True, f"{boxes} boxes at {junctions} junctions" + (f"; {remarks}" if remarks else ""))
-    yield _structure(system)
+    yield check_structure(system)
     unknowns = d.unknowns(problem.inputs(0.0, problem.initial))
     yield CheckItem("assembly", True, f"{len(d.states)} states, {unknowns} equations for as many unknowns")
     probe = Probe(system, problem.initial, reference=problem.reference)
@@ -85,22 +58,6 @@ def _closed(system: System) -> Problem:
     ports = [port for port, t in system.interface.items() if t.power]
     inputs = {str(port): {"flow": np.zeros(system.interface[port].quantity.space.dim)} for port in ports}
     return problem_of_system(system, inputs=inputs)
-
-
-def _structure(system: System) -> CheckItem:
-    count = 0
-    for path, primitive in system.leaves():
-        count += 1
-        try:
-            if isinstance(primitive, Storage):
-                check_storage(primitive)
-            elif isinstance(primitive, Irreversible):
-                check_irreversible(primitive)
-            else:
-                check_reversible(primitive)
-        except SemanticsError as error:
-            return CheckItem("structure", False, f"{path}: {error}")
-    return CheckItem("structure", True, f"{count} components are the structures that they claim to be")
 
 
 def _law(name: str, probe: Probe) -> CheckItem:

@@ -15,6 +15,7 @@ from ephs.operad import ROOT, Path, Pattern
 from ephs.semantics.behaviour import Continuous, Natural, Relating, Storing
 from ephs.semantics.bundle import Array, Bundle, Reference
 from ephs.semantics.descriptor import Input
+from ephs.semantics.errors import SemanticsError
 from ephs.semantics.primitives import Primitive, Reversible
 from ephs.semantics.relation import Sources, fold, read_point
 from ephs.semantics.spaces import manifold
@@ -227,12 +228,25 @@ def newton(residual: Callable[[Array], Array], z: Array, *, iterations: int = 30
             up[i] += delta
             down[i] -= delta
             jacobian[:, i] = (residual(up) - residual(down)) / (2.0 * delta)
-        new = z - np.linalg.lstsq(jacobian, r, rcond=1e-9)[0]
-        r_new = residual(new)
-        error = float(np.abs(r_new).max(initial=0.0))
+        step = np.linalg.lstsq(jacobian, r, rcond=1e-9)[0]
+        share = 1.0
+        new, r_new, error = _tried(residual, z - step)
+        # far from the solution a whole step may lead away from it; near by rounding is all that is left
+        while not error < best and best > 1e-9 and share > 1e-3:
+            share *= 0.5
+            new, r_new, error = _tried(residual, z - share * step)
         if not error < best:
-            return (z, best)
+            break
         z, r, progress, best = new, r_new, error / best, error
         if error == 0.0 or (progress > 0.5 and error < 1e-12):
             break
     return z, best
+
+
+def _tried(residual: Callable[[Array], Array], z: Array) -> tuple[Array, Array, float]:
+    """A point, its residual and the largest entry of that, infinite outside the domain of a component."""
+    try:
+        r = residual(z)
+    except SemanticsError:
+        return z, z, np.inf
+    return z, r, float(np.abs(r).max(initial=0.0))

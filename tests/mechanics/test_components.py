@@ -145,7 +145,8 @@ def test_a_discrete_gradient_gives_the_rise_and_is_symmetric(name, seed, size):
     x1 = storage.retract(x, v)
     rise = storage.energy(x1) - storage.energy(x)
     scale = abs(storage.energy(x)) + abs(storage.energy(x1)) + (np.abs(effort) + np.abs(intensive)) @ np.abs(v)
-    assert abs(rise - (effort + intensive) @ v) <= 2e-14 * max(scale, 1e-300)
+    # the energy of a spring near its natural length is a small difference: lengths are rounded, not energies
+    assert abs(rise - (effort + intensive) @ v) <= 2e-14 * scale + 8e-16 * np.abs(v).sum()
     back = storage.discrete_effort(x1, -v, REFERENCE)
     assert np.abs(back - effort).max(initial=0.0) <= 1e-12 * max(1.0, np.abs(effort).max(initial=0.0))
 

@@ -9,9 +9,11 @@ from hypothesis import HealthCheck, find, given, settings
 
 import ephs
 from benchmarks.cases import CASES
+from ephs.mechanics import components, joint, rigid_body
 from ephs.mechanics.build import initial_state, scene_system
 from ephs.mechanics.scene.model import frozen
 from ephs.mechanics.solve.integrate import METHODS
+from ephs.operad import quantity as Q
 from ephs.semantics import Reference
 from ephs.semantics.laws import Probe, system_law
 from ephs.semantics.natural import step
@@ -242,3 +244,45 @@ def test_contradictory_motions_are_refused():
     with pytest.raises(ephs.SimulationError) as caught:
         ephs.simulate(replace(scene, joints={**scene.joints, **told}), 1.0, step=0.01)
     assert "check prescribed motions" in str(caught.value) or "no solution" in str(caught.value)
+
+
+def test_functions_of_the_user_move_with_the_same_balances():
+    """A pendulum with a Python potential and a friction that grows with speed and falls with temperature."""
+    ground = ephs.Pattern(
+        junctions={"p1": ephs.junction(Q.body_momentum), "p2": ephs.junction(Q.body_momentum)},
+        boxes={"ground": {"p": "p1"}, "joint": {"p1": "p1", "p2": "p2"}, "body": {"p": "p2"}},
+    )
+    system = ground(
+        ground=components.ground(),
+        joint=joint(
+            "revolute",
+            frame2={"position": [0.0, 0.5, 0.0]},
+            friction=lambda x, u, theta: [[0.1 * (1.0 + u[0] ** 2) * 300.0 / theta]],
+            potential=lambda x: 2.0 * float(np.sin(x[0])) ** 2,
+        ),
+        body=rigid_body(1.0, [0.1, 0.05, 0.1], potential=lambda pose: 0.5 * float(pose[4:] @ pose[4:])),
+    )
+    start = {
+        "joint.pe.q_r": 0.3,
+        "body.pe.q": [np.cos(0.15), 0, 0, np.sin(0.15), 0.5 * np.sin(0.3), -0.5 * np.cos(0.3), 0],
+    }
+    sol = ephs.simulate(system, 1.0, step=0.01, initial=start)
+    assert sol.energy_error.max() <= 1e-11
+    assert sol.stats["least_production"] >= 0.0
+    assert np.ptp(sol["joint.pe.q_r"]) > 0.1
+    gap = sol["body.pe.q"][:, 4] - 0.5 * np.sin(sol["joint.pe.q_r"][:, 0])
+    assert np.abs(gap).max() <= 1e-12
+
+
+@pytest.mark.parametrize("group", ["SE3", "SO3xR3"])
+def test_a_free_body_falls_and_tumbles_in_both_groups(group):
+    body = rigid_body(2.0, [1.0, 2.0, 2.5], (0.0, 0.0, -9.81), group=group)
+    closed = ephs.Pattern(junctions={"p": ephs.junction(components.MOMENTA[group])}, boxes={"body": {"p": "p"}})(
+        body=body
+    )
+    sol = ephs.simulate(closed, 1.0, step=0.01, initial={"body.ke.p": [0.5, 4.0, 0.3, 1.0, 0.0, 0.0]})
+    assert sol.energy_error.max() <= 1e-13
+    turned = sol["body.ke.p"][:, :3]
+    assert np.allclose(np.linalg.norm(turned, axis=1), np.linalg.norm(turned[0]), rtol=1e-13, atol=0.0)
+    exact = np.array([0.5, 0.0, -0.5 * 9.81])
+    assert np.abs(sol["body.pe.q"][-1, 4:] - exact).max() <= (1e-13 if group == "SO3xR3" else 1e-2)
