@@ -180,16 +180,15 @@ def _rotation_mean(start: Array, v: Array) -> Array:
     square = float(v @ v)
     if square == 0.0:
         return omega
-    cos, change = (
-        np.cos(0.25 * np.sqrt(square)),
-        float(middle[1:] @ v) * 0.25 * np.sinc(0.25 * np.sqrt(square) / np.pi),
-    )
-    last, first = (
-        2.0 * np.arctan2(np.sqrt(max(0.0, 1.0 - w * w)), w)
-        for w in (cos * middle[0] - change, cos * middle[0] + change)
-    )
-    between = np.sin(0.25 * (first + last))
-    rise = 4.0 * np.arcsin(np.clip(change / between, -1.0, 1.0)) if between > 0.0 else 0.0
+    change = float(middle[1:] @ v) * 0.25 * np.sinc(0.25 * np.sqrt(square) / np.pi)  # half that of cos(θ/2)
+    ends = [q if q @ middle >= 0.0 else -q for q in (start, SO3.retract(start, v))]  # on the sheet of the middle
+    first, last = (2.0 * np.arctan2(np.linalg.norm(q[1:]), q[0]) for q in ends)
+    if max(first, last) > np.pi:  # past half a turn it is shorter the other way
+        first, last = min(first, 2.0 * np.pi - first), min(last, 2.0 * np.pi - last)
+        rise = last - first
+    else:
+        between = np.sin(0.25 * (first + last))
+        rise = 4.0 * np.arcsin(np.clip(change / between, -1.0, 1.0)) if between > 0.0 else 0.0
     return omega + (0.5 * (first + last) * rise - float(omega @ v)) / square * v
 
 

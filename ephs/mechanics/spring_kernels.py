@@ -109,8 +109,12 @@ def _rotation_spring(stiffness, x, step, effort):
         ),
     )
     if square > 0.0:
-        between = math.sin(0.25 * (first + last))
-        rise = 4.0 * math.asin(min(1.0, max(-1.0, change / between))) if between > 0.0 else 0.0
+        if max(first, last) > math.pi:  # past half a turn it is shorter the other way
+            first, last = min(first, 2.0 * math.pi - first), min(last, 2.0 * math.pi - last)
+            rise = last - first
+        else:
+            between = math.sin(0.25 * (first + last))
+            rise = 4.0 * math.asin(min(1.0, max(-1.0, change / between))) if between > 0.0 else 0.0
         along = effort[0] * step[0] + effort[1] * step[1] + effort[2] * step[2]
         defect = (0.5 * stiffness * (first + last) * rise - along) / square
         effort[0] += defect * step[0]

@@ -151,6 +151,26 @@ def test_a_discrete_gradient_gives_the_rise_and_is_symmetric(name, seed, size):
     assert np.abs(back - effort).max(initial=0.0) <= 1e-12 * max(1.0, np.abs(effort).max(initial=0.0))
 
 
+@given(seed=seeds, size=st.sampled_from([1e-6, 1e-3, 0.1]))
+def test_a_spring_is_exact_where_its_rotation_vector_jumps(seed, size):
+    """Past half a turn the principal rotation vector changes its sign: the energy has an edge there, and no jump."""
+    rng = np.random.default_rng(seed)
+    of = pair("spherical")
+    axis = rng.standard_normal(3)
+    axis /= np.linalg.norm(axis)
+    storage = components.pair_spring(of, np.full(3, 2.0), np.zeros(3))
+    (port,) = storage.reads
+    draw = Draw(storage, seed, size)
+    draw.x = {port: of.manifold.exp((np.pi - 0.3 * size) * axis)}
+    draw.v = size * (axis + 0.3 * rng.standard_normal(3))
+    rise = storage.energy(storage.retract(draw.x, draw.v)) - storage.energy(draw.x)
+    status, effort, _, energy = draw.compiled()
+    assert status == OK
+    assert abs(effort @ draw.v - rise) <= 1e-14 * storage.energy(draw.x)
+    assert abs(draw.plain(draw.v) @ draw.v - rise) <= 1e-14 * storage.energy(draw.x)
+    assert abs(energy - storage.energy(storage.retract(draw.x, draw.v))) <= 1e-14 * energy
+
+
 # ---- the joint relation ----------------------------------------------------------------------------------------
 
 
