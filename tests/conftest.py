@@ -1,4 +1,4 @@
-"""Hypothesis profiles: ci repeats exactly, dev explores, fuzz explores for long."""
+"""Hypothesis profiles: ci repeats exactly, dev explores, fuzz explores for long, mutate looks for one failure."""
 
 import os
 
@@ -6,9 +6,13 @@ import os
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")
 
-from hypothesis import settings  # noqa: E402
+from hypothesis import Phase, settings  # noqa: E402
 
 settings.register_profile("ci", derandomize=True, deadline=None, max_examples=50, print_blob=True)
 settings.register_profile("dev", deadline=None, max_examples=50)
+# A broken law is enough; which of its counterexamples is smallest does not matter.
+settings.register_profile(
+    "mutate", derandomize=True, deadline=None, max_examples=20, database=None, phases=[Phase.explicit, Phase.generate]
+)
 settings.register_profile("fuzz", deadline=None, max_examples=5000)
 settings.load_profile("ci" if os.environ.get("CI") else "dev")

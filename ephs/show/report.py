@@ -115,6 +115,13 @@ def _number(value: Any) -> str:
     return f"{float(value):.4g}".replace("e-0", "e-").replace("-", "−")
 
 
+def _settled(value: Any) -> Any:
+    """Rounding that stands where nothing moves, in m, rad and their rates, is shown as what it is."""
+    if isinstance(value, list | tuple):
+        return [_settled(each) for each in value]
+    return 0 if isinstance(value, float) and abs(value) < 1e-12 else value
+
+
 def _summary(summary: dict[str, Any]) -> str:
     rows = [
         f"<tr><th>{words}</th><td>{_number(summary[key])}{f' {unit}' if unit else ''}</td></tr>"
@@ -140,7 +147,7 @@ def _final(summary: dict[str, Any]) -> str:
             "<tr><th>"
             + html.escape(name)
             + "</th>"
-            + "".join(f"<td>{_number(entry.get(key))}</td>" for key, _ in fields)
+            + "".join(f"<td>{_number(_settled(entry.get(key)))}</td>" for key, _ in fields)
             + "</tr>"
             for name, entry in entries.items()
         )
