@@ -29,23 +29,7 @@ __all__ = [
     "paths",
     "patterns",
     "quantities",
-    "register",
     "reversibles",
     "storages",
     "systems",
 ]
-
-
-def register() -> None:
-    """Tell Hypothesis how to make paths, quantities, patterns, systems and scenes; called when it is imported."""
-    from hypothesis import strategies as st
-
-    from ephs.mechanics.scene import Scene
-    from ephs.operad import Path, Pattern, Quantity
-    from ephs.semantics import System
-
-    st.register_type_strategy(Path, paths())
-    st.register_type_strategy(Quantity, quantities())
-    st.register_type_strategy(Pattern, patterns())
-    st.register_type_strategy(System, systems())
-    st.register_type_strategy(Scene, mechanisms())

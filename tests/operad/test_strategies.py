@@ -1,12 +1,19 @@
 """What the strategies reach, so that the laws are tested where they could fail."""
 
+import subprocess
+import sys
+from pathlib import Path as File
+
 import pytest
 from hypothesis import Phase, find, given, settings
 from hypothesis import strategies as st
 from hypothesis.errors import InvalidArgument
 
 import ephs.testing
+from ephs.mechanics.scene import Scene
 from ephs.operad import LAWS, Path, Pattern, Quantity
+from ephs.plugin import register
+from ephs.semantics import System
 from ephs.testing import interfaces, law_inputs, nestings, paths, patterns, quantities
 
 # To reach something is enough, it need not be small.
@@ -124,9 +131,9 @@ def test_impossible_bounds_are_an_error_when_drawn(strategy):
         find(made, lambda _: True)
 
 
-@pytest.mark.parametrize("kind", [Path, Quantity, Pattern])
+@pytest.mark.parametrize("kind", [Path, Quantity, Pattern, System, Scene])
 def test_registered_types_can_be_drawn(kind):
-    ephs.testing.register()
+    register()
     assert isinstance(find(st.from_type(kind), lambda _: True), kind)
 
 
@@ -139,3 +146,13 @@ def test_strategies_shrink_to_small_patterns():
 
 def test_what_is_exported_exists():
     assert all(name in dir(ephs.testing) for name in ephs.testing.__all__)
+
+
+def test_the_package_may_be_imported_before_hypothesis():
+    """Hypothesis calls the package's plugin while it is itself being imported, by the package."""
+    code = (
+        "import ephs.testing, ephs\n"
+        "from hypothesis import find, strategies as st\n"
+        "assert find(st.from_type(ephs.Pattern), lambda p: len(p.boxes) > 1)\n"
+    )
+    subprocess.run([sys.executable, "-W", "error", "-c", code], check=True, cwd=File(__file__).parents[2])
