@@ -155,7 +155,7 @@ def _point_spring(par, pose, step, effort, pull, local, end, turn):
     before = math.sqrt(pose[4] ** 2 + pose[5] ** 2 + pose[6] ** 2)
     after = math.sqrt(end[4] ** 2 + end[5] ** 2 + end[6] ** 2)
     if not before + after > 0.0:
-        return 0.0, 1
+        return 0.0, 4
     factor = par[0] * (1.0 - 2.0 * par[1] / (before + after))
     for i in range(3):
         pull[i] = 0.5 * factor * (pose[4 + i] + end[4 + i])
@@ -176,7 +176,7 @@ def point_damper(dims, scal, p, x0, v, e, lam, f, c, jac, work):
     slope[:, :] = 0.0
     status = _damper(par[0], theta, pose, step, effort, flow, half, middle, axis)
     if status != 0 or not theta > 0.0:
-        return 1 if status != 0 else 2
+        return status if status != 0 else 2
     rate = axis[0] * effort[3] + axis[1] * effort[4] + axis[2] * effort[5]
     for i in range(3):
         for j in range(3):
@@ -202,7 +202,7 @@ def _damper(damping, theta, pose, step, effort, flow, half, middle, axis):
     retract(3, pose, half, middle)
     length = math.sqrt(middle[4] ** 2 + middle[5] ** 2 + middle[6] ** 2)
     if not length > 0.0:
-        return 1
+        return 4
     quat_rotate_back(middle[:4], middle[4:], axis)
     rate = 0.0
     for i in range(3):

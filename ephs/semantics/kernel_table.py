@@ -19,10 +19,10 @@ from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.primitives import Kernel, Primitive, Reversible, Storage
 from ephs.semantics.spaces import manifold
 
-__all__ = ["DOMAIN", "OK", "SIGNATURE", "TEMPERATURE", "Callback", "address_of", "prototype"]
+__all__ = ["EXTENT", "OK", "SIGNATURE", "TEMPERATURE", "TURN", "Callback", "address_of", "prototype"]
 
-OK, DOMAIN, TEMPERATURE, RAISED = 0, 1, 2, 3
-"""What a kernel returns: done; outside the method's domain; θ ≤ 0; a Python function raised."""
+OK, TURN, TEMPERATURE, RAISED, EXTENT = 0, 1, 2, 3, 4
+"""What a kernel returns: done; half a turn in a step; θ ≤ 0; a Python function raised; a length or volume ≤ 0."""
 
 SIGNATURE = (
     "int64(CPointer(int64), CPointer(float64), CPointer(float64), CPointer(float64), CPointer(float64), "

@@ -61,6 +61,36 @@ def exponential(dims, scal, p, x0, v, e, lam, f, c, jac, work):
     return 0
 
 
+def ideal_gas(dims, scal, p, x0, v, e, lam, f, c, jac, work):
+    """E = c1 exp(s/c2) (v0/v)^(1/c): each factor's difference quotient times the other's mean; p = c1, c2, v0, c."""
+    par, reference = nb.carray(p, 4), nb.carray(scal, 3)
+    effort, slope, energy = nb.carray(e, 2), nb.carray(f, 4), nb.carray(c, 1)
+    state, step = nb.carray(x0, 2), nb.carray(v, 2)
+    c2, k, volume = par[1], 1.0 / par[3], state[1]
+    heat, growth = step[0] / c2, step[1] / volume
+    if not (volume > 0.0 and growth > -1.0):
+        return 4
+    a, b = par[0] * math.exp(state[0] / c2), (par[2] / volume) ** k
+    rise, fall = math.expm1(heat), math.expm1(-k * math.log1p(growth))
+    fall_slope = -k * (1.0 + fall) / (1.0 + growth)
+    first = rise / heat if heat != 0.0 else 1.0
+    second = fall / growth if growth != 0.0 else -k
+    first_slope = 0.5 + heat / 3.0 if abs(heat) < 1e-3 else (1.0 + rise - first) / heat
+    if abs(growth) < 1e-3:
+        second_slope = k * (k + 1.0) * (0.5 - (k + 2.0) * growth / 3.0)
+    else:
+        second_slope = (fall_slope - second) / growth
+    by_s, by_v = a / c2 * first, b / volume * second
+    effort[0] = by_s * b * (1.0 + 0.5 * fall) - reference[1]
+    effort[1] = by_v * a * (1.0 + 0.5 * rise) + reference[2]
+    slope[0] = a / (c2 * c2) * first_slope * b * (1.0 + 0.5 * fall)
+    slope[1] = by_s * b * 0.5 * fall_slope / volume
+    slope[2] = by_v * a * 0.5 * (1.0 + rise) / c2
+    slope[3] = b / (volume * volume) * second_slope * a * (1.0 + 0.5 * rise)
+    energy[0] = a * (1.0 + rise) * b * (1.0 + fall)
+    return 0
+
+
 def constant_structure(dims, scal, p, x0, v, e, lam, f, c, jac, work):
     """f = L e + Cᵀ λ, 0 = C e; p = L (n, n), C (k, n)."""
     n, k, m = dims[0], dims[1], dims[2]

@@ -180,7 +180,8 @@ def ideal_gas(*, c1: float, c2: float, v0: float, c: float) -> Storage:
 
     parameters = (("c1", c1), ("c2", c2), ("v0", v0), ("c", c))
     interface = power_ports(s=quantity.entropy, v=quantity.volume)
-    return Storage("ideal_gas", interface, energy, gradient, discrete_gradient, parameters=parameters)
+    kernel = Kernel(KERNELS, "ideal_gas", (c1, c2, v0, c))
+    return Storage("ideal_gas", interface, energy, gradient, discrete_gradient, parameters=parameters, kernel=kernel)
 
 
 def environment() -> Storage:

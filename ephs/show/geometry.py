@@ -22,7 +22,8 @@ KINDS = ("storage", "environment", "reversible", "irreversible", "composite", "u
 class Text:
     """A short name at a place: `base` with `sub` set as a subscript.
 
-    `at` is the centre of the lettering, `size` the height of its type, `width` what it is reckoned to take.
+    `at` is the centre of the lettering, `size` the height of its type, `width` what it is reckoned to take. `anchor`,
+    ``"start"``, ``"middle"`` or ``"end"``, says which point of it stays where it is in a font of another width.
     """
 
     base: str
@@ -30,6 +31,13 @@ class Text:
     at: Point
     size: float
     width: float
+    anchor: str = "middle"
+
+    @property
+    def start(self) -> Point:
+        """The anchor's point on the base line, a third of the type's size below the centre."""
+        shift = {"start": -0.5, "middle": 0.0, "end": 0.5}[self.anchor]
+        return (self.at[0] + shift * self.width, self.at[1] + 0.35 * self.size)
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:
@@ -135,6 +143,43 @@ def trespasses(placement: Placement) -> list[tuple[str, str]]:
         for path, (centre, radius) in nodes.items()
         if path not in wire.ends and gap(centre, wire.points) < radius
     ]
+
+
+def inside(bounds: tuple[float, float, float, float], starts: Points, ends: Points) -> Points:
+    """Length of each segment, from `starts` to `ends`, (n, 2) each, that lies in a rectangle."""
+    along = ends - starts
+    still = np.abs(along) < 1e-12
+    step = np.where(still, 1.0, along)
+    first = (np.array(bounds[:2]) - starts) / step
+    last = (np.array(bounds[2:]) - starts) / step
+    outside = still & ((starts < np.array(bounds[:2])) | (starts > np.array(bounds[2:])))
+    enter = np.where(still, -np.inf, np.minimum(first, last)).max(axis=1).clip(0.0, 1.0)
+    leave = np.where(still, np.inf, np.maximum(first, last)).min(axis=1).clip(0.0, 1.0)
+    part = np.where(outside.any(axis=1), 0.0, np.clip(leave - enter, 0.0, None))
+    return part * np.linalg.norm(along, axis=1)
+
+
+def blots(placement: Placement) -> list[str]:
+    """Every name beside a junction or wire that lies on a wire, a box, a junction or another such name."""
+    texts = [junction.label for junction in placement.junctions]
+    texts += [wire.label for wire in placement.wires if wire.label is not None]
+    pieces = [piece for wire in placement.wires for piece in itertools.pairwise(wire.points)]
+    lines = np.array(pieces, dtype=float).reshape(-1, 2, 2)
+    found: list[str] = []
+    for index, text in enumerate(texts):
+        left, top, right, bottom = text.bounds
+        on_wire = bool((inside(text.bounds, lines[:, 0], lines[:, 1]) > 0).any())
+        on_node = any(
+            math.dist(centre, (min(max(centre[0], left), right), min(max(centre[1], top), bottom))) < radius
+            for centre, radius in placement.nodes().values()
+        )
+        on_text = any(
+            min(right, other[2]) > max(left, other[0]) and min(bottom, other[3]) > max(top, other[1])
+            for other in (each.bounds for each in texts[:index])
+        )
+        if on_wire or on_node or on_text:
+            found.append(text.base + text.sub)
+    return found
 
 
 def crossings(placement: Placement) -> int:

@@ -8,10 +8,11 @@ from typing import final
 
 import numpy as np
 
-from ephs.show.geometry import Point, Points, Text, distances
+from ephs.show.geometry import Point, Points, Text, inside
 from ephs.show.graph import width_of
 
-_AIR = 2.0
+_AIR = 1.5
+Place = tuple[Point, str, float]
 
 
 @final
@@ -27,73 +28,71 @@ class Sheet:
     bounds: tuple[float, float, float, float] | None = None
     written: list[tuple[float, float, float, float]] = field(default_factory=list)
 
-    def write(self, name: tuple[str, str], size: float, places: Iterable[tuple[Point, float]]) -> Text:
-        """Set a name at the best of some places, (centre, how little it is liked), and remember it."""
+    def write(self, name: tuple[str, str], size: float, places: Iterable[Place]) -> Text:
+        """Set a name at the best of some places, (centre, anchor, how little it is liked), and remember it."""
         width = width_of(*name, size)
-        best, cost = (0.0, 0.0), math.inf
-        for place, dislike in places:
-            now = dislike + self._trouble(place, width, size)
+        best, cost = Text(*name, (0.0, 0.0), size, width), math.inf
+        for centre, anchor, dislike in places:
+            if dislike >= cost:
+                continue
+            text = Text(*name, centre, size, width, anchor)
+            now = dislike + self._trouble(text)
             if now < cost - 1e-9:
-                best, cost = place, now
-        text = Text(name[0], name[1], best, size, width)
-        self.written.append(text.bounds)
-        return text
+                best, cost = text, now
+        self.written.append(best.bounds)
+        return best
 
-    def _trouble(self, centre: Point, width: float, size: float) -> float:
-        x, y = centre
-        across = x + width * np.linspace(-0.5, 0.5, max(3, int(width / 4)))
-        down = y + size * np.linspace(-0.5, 0.5, 4)
-        marks = np.stack(np.meshgrid(across, down), axis=-1).reshape(-1, 2)
+    def _trouble(self, text: Text) -> float:
+        left, top, right, bottom = text.bounds
+        left, top, right, bottom = left - _AIR, top - _AIR, right + _AIR, bottom + _AIR
         trouble = 0.0
         if len(self.pieces):
-            away = distances(marks[:, None, :], self.pieces[None, :, 0], self.pieces[None, :, 1]).min(axis=0)
-            trouble += float(np.clip(_AIR - away, 0.0, None).sum()) * 4.0
+            under = inside((left, top, right, bottom), self.pieces[:, 0], self.pieces[:, 1])
+            trouble += 6.0 * float(np.count_nonzero(under)) + float(under.sum())
         if len(self.discs):
-            away = np.linalg.norm(marks[:, None, :] - self.discs[None, :, :2], axis=-1) - self.discs[None, :, 2]
-            trouble += float(np.clip(_AIR - away, 0.0, None).sum()) * 2.0
-        left, top, right, bottom = x - width / 2 - 1, y - size / 2 - 1, x + width / 2 + 1, y + size / 2 + 1
+            nearest = np.clip(self.discs[:, :2], (left, top), (right, bottom))
+            depth = self.discs[:, 2] - np.linalg.norm(nearest - self.discs[:, :2], axis=1)
+            trouble += 4.0 * float(np.count_nonzero(depth > 0)) + 3.0 * float(np.clip(depth, 0.0, None).sum())
         for other in self.written:
-            over = min(right, other[2]) - max(left, other[0])
-            under = min(bottom, other[3]) - max(top, other[1])
-            if over > 0 and under > 0:
-                trouble += 10.0 + 2.0 * over * under
+            across = min(right, other[2]) - max(left, other[0])
+            down = min(bottom, other[3]) - max(top, other[1])
+            if across > 0 and down > 0:
+                trouble += 10.0 + 2.0 * across * down
         if self.bounds is not None:
-            limits = (
-                self.bounds[0] - left,
-                self.bounds[1] - top,
-                right - self.bounds[2],
-                bottom - self.bounds[3],
-            )
+            limits = (self.bounds[0] - left, self.bounds[1] - top, right - self.bounds[2], bottom - self.bounds[3])
             trouble += 20.0 * sum(max(0.0, limit + 3.0) for limit in limits)
         return trouble
 
 
-def around(centre: Point, radius: float, name: tuple[str, str], size: float) -> list[tuple[Point, float]]:
+def around(centre: Point, radius: float, name: tuple[str, str], size: float) -> list[Place]:
     """Places round a dot: right above first, then the others, near before far."""
     half = width_of(*name, size) / 2
-    places: list[tuple[Point, float]] = []
-    for far in range(3):
+    places: list[Place] = []
+    for far in range(6):
         for step in range(16):
             angle = -math.pi / 4 + step * math.pi / 8
             cosine, sine = math.cos(angle), math.sin(angle)
-            reach = radius + 3.0 + 6.0 * far
+            reach = radius + 2.5 + 2.5 * far
             # The lettering's nearest edge, not its centre, is at the reach.
             x = centre[0] + cosine * (reach + half)
-            y = centre[1] + sine * (reach + 0.5 * size)
-            places.append(((x, y), 0.12 * min(step, 16 - step) + 3.0 * far))
-    return places
+            y = centre[1] + sine * (reach + 0.45 * size)
+            anchor = "start" if cosine > 0.3 else "end" if cosine < -0.3 else "middle"
+            places.append(((x, y), anchor, 0.12 * min(step, 16 - step) + 1.2 * far))
+    return sorted(places, key=lambda place: place[2])
 
 
-def beside(line: tuple[Point, ...], name: tuple[str, str], size: float) -> list[tuple[Point, float]]:
+def beside(line: tuple[Point, ...], name: tuple[str, str], size: float) -> list[Place]:
     """Places at either side of a wire, near its first end."""
     half = width_of(*name, size) / 2
-    places: list[tuple[Point, float]] = []
-    for along in (5.0, 9.0, 14.0, 20.0):
+    places: list[Place] = []
+    for along in (5.0, 7.0, 9.0, 11.5, 14.0, 17.0, 20.0, 24.0):
         (x, y), (dx, dy) = _at(line, along)
         for side in (1.0, -1.0):
             nx, ny = -dy * side, dx * side
-            off = 2.5 + abs(nx) * half + abs(ny) * 0.5 * size
-            places.append(((x + off * nx, y + off * ny), 0.05 * along))
+            # The rectangle's corner that is nearest to the wire keeps off it.
+            off = _AIR + 1.0 + abs(nx) * half + abs(ny) * 0.55 * size
+            anchor = "start" if nx > 0.3 else "end" if nx < -0.3 else "middle"
+            places.append(((x + off * nx, y + off * ny), anchor, 0.05 * along))
     return places
 
 

@@ -5,6 +5,7 @@ import itertools
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ephs.show.geometry import Point, Points, distances
 
@@ -13,52 +14,60 @@ CLEAR = 3.5
 
 def straight(start: Point, end: Point, obstacles: Points) -> bool:
     """Whether the segment keeps clear of all obstacles, rows (x, y, radius)."""
+    return bool(visible(start, np.array([end], dtype=float), obstacles)[0])
+
+
+def visible(start: Point, ends: Points, obstacles: Points) -> NDArray[np.bool_]:
+    """Which of the points `ends` (n, 2) can be reached straight, clear of all obstacles, rows (x, y, radius)."""
     if not len(obstacles):
-        return True
-    first, last = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
-    between = distances(obstacles[:, :2], np.broadcast_to(first, (len(obstacles), 2)), last[None, :])
-    return bool((between >= obstacles[:, 2] + CLEAR).all())
+        return np.ones(len(ends), dtype=bool)
+    between = distances(obstacles[None, :, :2], np.array(start, dtype=float), ends[:, None, :])
+    return (between >= obstacles[:, 2] + CLEAR).all(axis=1)
 
 
 def route(start: Point, end: Point, obstacles: Points) -> tuple[Point, ...]:
     """The shortest line of straight pieces from `start` to `end` round all obstacles.
 
     The line bends at corners of octagons about the obstacles (a visibility graph, searched best first). Where there is
-    no     way through, which takes touching obstacles all round, it is the straight line.
+    no way through, which takes touching obstacles all round, it is the straight line.
     """
     if straight(start, end, obstacles):
         return (start, end)
-    corners = [start, end]
-    for x, y, radius in obstacles:
-        reach = (radius + CLEAR + 1.5) / math.cos(math.pi / 8)
-        ring = [(x + reach * math.cos(k * math.pi / 4), y + reach * math.sin(k * math.pi / 4)) for k in range(8)]
-        corners += [corner for corner in ring if straight(corner, corner, obstacles)]
-    best = {0: 0.0}
-    before: dict[int, int] = {}
-    queue: list[tuple[float, int]] = [(math.dist(start, end), 0)]
-    done: set[int] = set()
+    turns = np.arange(8) * math.pi / 4
+    reach = (obstacles[:, 2] + CLEAR + 1.5) / math.cos(math.pi / 8)
+    rings = obstacles[:, None, :2] + reach[:, None, None] * np.stack([np.cos(turns), np.sin(turns)], axis=1)
+    around = rings.reshape(-1, 2)
+    away = np.linalg.norm(around[:, None, :] - obstacles[None, :, :2], axis=-1)
+    free = around[(away >= obstacles[:, 2] + CLEAR).all(axis=1)]
+    corners = np.concatenate([np.array([start, end], dtype=float), free])
+    ahead = np.linalg.norm(corners - corners[1], axis=1)
+    best = np.full(len(corners), math.inf)
+    best[0] = 0.0
+    before = np.zeros(len(corners), dtype=int)
+    done = np.zeros(len(corners), dtype=bool)
+    queue: list[tuple[float, int]] = [(float(ahead[0]), 0)]
     while queue:
         _, here = heapq.heappop(queue)
         if here == 1:
             return _smooth(_way(corners, before), obstacles)
-        if here in done:
+        if done[here]:
             continue
-        done.add(here)
-        for there, corner in enumerate(corners):
-            # Each bend costs a little, so that a line with fewer of them wins.
-            length = best[here] + math.dist(corners[here], corner) + 6.0
-            if there in done or length >= best.get(there, math.inf) or not straight(corners[here], corner, obstacles):
-                continue
-            best[there], before[there] = length, here
-            heapq.heappush(queue, (length + math.dist(corner, end), there))
+        done[here] = True
+        # Each bend costs a little, so that a line with fewer of them wins.
+        length = best[here] + np.linalg.norm(corners - corners[here], axis=1) + 6.0
+        nearer = np.flatnonzero(~done & (length < best))
+        centre = (float(corners[here, 0]), float(corners[here, 1]))
+        for there in nearer[visible(centre, corners[nearer], obstacles)]:
+            best[there], before[there] = length[there], here
+            heapq.heappush(queue, (float(length[there] + ahead[there]), int(there)))
     return (start, end)
 
 
-def _way(corners: list[Point], before: dict[int, int]) -> tuple[Point, ...]:
+def _way(corners: Points, before: NDArray[np.int_]) -> tuple[Point, ...]:
     way = [1]
     while way[-1] != 0:
-        way.append(before[way[-1]])
-    return tuple(corners[index] for index in reversed(way))
+        way.append(int(before[way[-1]]))
+    return tuple((float(corners[index, 0]), float(corners[index, 1])) for index in reversed(way))
 
 
 def _smooth(line: tuple[Point, ...], obstacles: Points) -> tuple[Point, ...]:

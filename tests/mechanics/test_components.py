@@ -12,7 +12,7 @@ from ephs.operad import quantity as Q
 from ephs.semantics import Reference, Storage, StructureError, library
 from ephs.semantics.behaviour import Natural
 from ephs.semantics.checks import dirac, random_efforts, random_point
-from ephs.semantics.kernel_table import DOMAIN, OK, TEMPERATURE, address_of, prototype
+from ephs.semantics.kernel_table import EXTENT, OK, TEMPERATURE, TURN, address_of, prototype
 from ephs.semantics.laws import isotropy
 from ephs.semantics.spaces import PAIRS, SE3, pair
 
@@ -50,6 +50,7 @@ def primitives():
     out["point_damper"] = components.point_damper(3.0)
     out["ground"] = components.ground()
     out["thermal_node"] = components.thermal_node(50.0, 300.0)
+    out["ideal_gas"] = library.ideal_gas(c1=2.0, c2=1.5, v0=1.0, c=1.5)
     out["heat_transfer"] = library.heat_transfer(h=2.0)
     out["environment"] = library.environment()
     return out
@@ -250,7 +251,7 @@ def test_lambda_is_the_wrench_of_body_1_on_body_2(kind, seed):
 def test_a_rotation_of_half_a_turn_in_a_step_is_refused():
     draw = Draw(components.holonomic(pairs()["spherical"]), 0, 0.01)
     draw.h, draw.e = 1.0, 4.0 * np.ones_like(draw.e)
-    assert draw.compiled()[0] == DOMAIN
+    assert draw.compiled()[0] == TURN
     with pytest.raises(StructureError, match="rotation of π"):
         draw.plain(draw.z)
 
@@ -269,7 +270,7 @@ def test_a_spring_without_length_has_no_direction():
     draw = Draw(PRIMITIVES["point_spring"], 0, 0.0)
     for value in draw.x.values():
         value[4:] = 0.0
-    assert draw.compiled()[0] == DOMAIN
+    assert draw.compiled()[0] == EXTENT
     with pytest.raises(StructureError, match="distance"):
         draw.plain(draw.z)
 

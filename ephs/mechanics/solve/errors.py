@@ -18,6 +18,7 @@ class Outcome(StrEnum):
     CONTRADICTION = "a constraint contradicts the others"
     TURN = "a rotation of π or more in one step"
     TEMPERATURE = "an absolute temperature that is not positive"
+    EXTENT = "a length or a volume that is not positive"
     PYTHON = "a Python function of the model raised an exception"
     UNDETERMINED = "the motion is not determined"
     INTERRUPTED = "interrupted"
@@ -29,11 +30,12 @@ _ADVICE = {
     Outcome.CONTRADICTION: "check prescribed motions and initial values, or take a smaller step",
     Outcome.TURN: "take a smaller step: h·|ω| must stay below π",
     Outcome.TEMPERATURE: "check initial temperatures and heat capacities, or take a smaller step",
+    Outcome.EXTENT: "check initial values, or take a smaller step",
     Outcome.PYTHON: "see the exception above this one",
     Outcome.UNDETERMINED: "add what gives the effort there: a storage, friction, or a constraint",
     Outcome.INTERRUPTED: "what was computed is in .partial",
 }
-_OF_KERNEL = {1: Outcome.TURN, 2: Outcome.TEMPERATURE, 3: Outcome.PYTHON}
+_OF_KERNEL = {1: Outcome.TURN, 2: Outcome.TEMPERATURE, 3: Outcome.PYTHON, 4: Outcome.EXTENT}
 
 
 @final

@@ -213,3 +213,30 @@ def test_progress_is_told_and_the_times_ascend(damped):
     )
     assert seen[-1][:2] == (2.0, 2.0)
     assert [t for t, _, _ in seen] == sorted(t for t, _, _ in seen)
+
+
+def test_a_piston_swings_between_two_gases():
+    """Gas on both sides of a piston with friction: energy and volume are kept, entropy grows, until it stands still."""
+    q = ephs.quantity
+    cylinder = ephs.Pattern(
+        junctions={
+            "v1": ephs.junction(q.volume), "v2": ephs.junction(q.volume), "p": ephs.junction(q.momentum),
+            "s1": ephs.junction(q.entropy), "s2": ephs.junction(q.entropy),
+        },
+        boxes={
+            "left": {"s": "s1", "v": "v1"}, "right": {"s": "s2", "v": "v2"}, "mass": {"p": "p"},
+            "piston": {"v1": "v1", "v2": "v2", "p": "p"}, "friction": {"p": "p", "s": "s1"},
+        },
+    )  # fmt: skip
+    gas = {"c1": 2.5e3 * 0.1, "c2": 1.25, "v0": 1e-3, "c": 2.5}
+    system = cylinder(
+        left=lib.ideal_gas(**gas), right=lib.ideal_gas(**gas), mass=lib.point_mass(m=2.0), piston=lib.piston(a=0.01),
+        friction=lib.friction(d=50.0),
+    )  # fmt: skip
+    start = {"left.v": 0.8e-3, "right.v": 1.2e-3}
+    sol = ephs.simulate(system, 1.0, step=1e-3, initial=start)
+    assert sol.energy_error.max() <= 1e-12
+    assert np.abs(sol["left.v"] + sol["right.v"] - 2e-3).max() <= 1e-17
+    assert np.all(np.diff(sol.entropy) >= 0.0)
+    assert sol.ledger("friction").made[-1] > 0.0
+    assert np.abs(sol["mass.p"][-1]) < 0.01 * np.abs(sol["mass.p"]).max()
