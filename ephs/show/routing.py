@@ -22,7 +22,7 @@ def visible(start: Point, ends: Points, obstacles: Points) -> NDArray[np.bool_]:
     if not len(obstacles):
         return np.ones(len(ends), dtype=bool)
     between = distances(obstacles[None, :, :2], np.array(start, dtype=float), ends[:, None, :])
-    return (between >= obstacles[:, 2] + CLEAR).all(axis=1)
+    return np.all(between >= obstacles[:, 2] + CLEAR, axis=1)
 
 
 def route(start: Point, end: Point, obstacles: Points) -> tuple[Point, ...]:
