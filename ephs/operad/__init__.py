@@ -4,6 +4,7 @@ from ephs.operad.directory import Directory
 from ephs.operad.errors import PatternError
 from ephs.operad.laws import LAWS, Equation, Law
 from ephs.operad.names import ROOT, Path
+from ephs.operad.nesting import Nesting
 from ephs.operad.pattern import Box, Junction, Pattern, Port, junction
 from ephs.operad.quantities import Interface, PortType, Quantity, Space, quantity
 
@@ -16,6 +17,7 @@ __all__ = [
     "Interface",
     "Junction",
     "Law",
+    "Nesting",
     "Path",
     "Pattern",
     "PatternError",

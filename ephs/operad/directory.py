@@ -1,13 +1,12 @@
 """Directories: prefix-free maps from paths to values, the monad by which names nest."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from itertools import pairwise
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from typing import TypeAlias, TypeVar, cast, final
 
 from ephs.operad.errors import PatternError
 from ephs.operad.names import ROOT, Path, PathLike
 
-__all__ = ["Directory", "Entries"]
+__all__ = ["Directory", "Entries", "first_clash"]
 
 T = TypeVar("T")
 T_co = TypeVar("T_co", covariant=True)
@@ -56,12 +55,17 @@ class Directory(Mapping[Path, T_co]):
             if path in items:
                 raise PatternError("duplicate", found=str(path), expected="expected each path once", what=what)
             items[path] = value
-        # In the order of tuples the continuations of a path follow it at once.
-        for path, following in pairwise(sorted(items)):
-            if path.is_prefix_of(following):
-                clash = f"{path} and {following}"
-                raise PatternError("prefix", found=clash, expected="expected prefix-free paths", what=what)
+        if clash := first_clash(items, items):
+            found = f"{clash[0]} and {clash[1]}"
+            raise PatternError("prefix", found=found, expected="expected prefix-free paths", what=what)
         object.__setattr__(self, "_items", items)
+
+    @staticmethod
+    def trusted(items: "dict[Path, S]") -> "Directory[S]":
+        """The directory of these items, of which one knows that they are prefix-free; they are not copied."""
+        directory = cast("Directory[S]", object.__new__(Directory))
+        object.__setattr__(directory, "_items", items)
+        return directory
 
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(f"a directory cannot be changed: {name}")
@@ -85,6 +89,8 @@ class Directory(Mapping[Path, T_co]):
         return len(self._items)
 
     def __eq__(self, other: object) -> bool:
+        if self is other:
+            return True
         return (
             self._items == cast("Directory[object]", other)._items if isinstance(other, Directory) else NotImplemented
         )
@@ -144,6 +150,22 @@ class Directory(Mapping[Path, T_co]):
 
     def __str__(self) -> str:
         return "\n".join(_tree(self.to_nested())) or "(empty)"
+
+
+def first_clash(paths: Collection[Path], others: Collection[Path]) -> tuple[Path, Path] | None:
+    """The least pair (path, continuation) of one of the paths and a proper continuation among the others."""
+    prefixes: set[tuple[str, ...]] = set()
+    for other in others:
+        # Upwards until a prefix is known: each is met once, so the work is linear.
+        for length in range(len(other) - 1, -1, -1):
+            if (prefix := other[:length]) in prefixes:
+                break
+            prefixes.add(prefix)
+    clashing = [path for path in paths if path in prefixes]
+    if not clashing:
+        return None
+    path = min(clashing)
+    return path, min(other for other in others if len(other) > len(path) and path.is_prefix_of(other))
 
 
 def _tree(nested: Mapping[str, object], indent: str = "") -> Iterator[str]:

@@ -10,6 +10,7 @@ from typing import Any, final
 
 from ephs.operad.directory import Directory
 from ephs.operad.names import ROOT, Path
+from ephs.operad.nesting import Nesting
 from ephs.operad.pattern import Pattern
 
 __all__ = ["LAWS", "Equation", "Law", "law"]
@@ -120,6 +121,14 @@ def _interface(f: Pattern, fillings: Mapping[Path, Pattern]) -> Equation:
     return Equation(f.substitute(fillings).interface, f.interface)
 
 
+def _nested(nesting: Nesting) -> Equation:
+    return Equation(nesting.flatten(), nesting.bottom_up())
+
+
+def _from_above(nesting: Nesting) -> Equation:
+    return Equation(nesting.flatten(), nesting.top_down())
+
+
 LAWS: tuple[Law, ...] = (
     Law("left unit", "id ∘. g = g", ("g",), _left_unit),
     Law("right unit", "f ∘ₐ id = f", ("f", "a"), _right_unit),
@@ -149,6 +158,8 @@ LAWS: tuple[Law, ...] = (
         ("f", "a", "g", "ports"),
         _port_names,
     ),
+    Law("flattening from below", "all levels at once = innermost patterns first", ("nesting",), _nested),
+    Law("flattening from above", "all levels at once = outermost patterns first", ("nesting",), _from_above),
     Law("interface", "f ∘ (g) has the interface of f", ("f", "fillings"), _interface),
 )
 

@@ -7,12 +7,12 @@ from ephs.operad.names import Path
 __all__ = ["closure"]
 
 
-def closure(junctions: Iterable[Path], groups: Iterable[Iterable[Path]]) -> Mapping[Path, frozenset[Path]]:
-    """The class of each junction under the least equivalence that joins the members of each group."""
-    parent = {path: path for path in junctions}
+def closure(groups: Iterable[Iterable[Path]]) -> Mapping[Path, frozenset[Path]]:
+    """The least equivalence that joins the members of each group: the classes of two members or more, by member."""
+    parent: dict[Path, Path] = {}
 
     def find(path: Path) -> Path:
-        while parent[path] != path:
+        while parent.setdefault(path, path) != path:
             parent[path] = parent[parent[path]]
             path = parent[path]
         return path
@@ -24,5 +24,5 @@ def closure(junctions: Iterable[Path], groups: Iterable[Iterable[Path]]) -> Mapp
     members: dict[Path, list[Path]] = {}
     for path in parent:
         members.setdefault(find(path), []).append(path)
-    classes = {root: frozenset(paths) for root, paths in members.items()}
-    return {path: classes[find(path)] for path in parent}
+    classes = {root: frozenset(paths) for root, paths in members.items() if len(paths) > 1}
+    return {path: classes[root] for path in parent if (root := find(path)) in classes}

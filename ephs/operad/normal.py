@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, final
 
+from ephs.operad.directory import Directory
 from ephs.operad.names import Path
 from ephs.operad.quantities import Quantity
 
@@ -25,9 +26,8 @@ __all__ = ["NormalForm", "PowerJunction", "StateClass", "normal_form", "powered"
 @final
 @dataclass(frozen=True, slots=True)
 class PowerJunction:
-    """A junction that bears power: name, quantity, whether exposed as a power port, inner power ports."""
+    """A junction that bears power: its quantity, whether exposed as a power port, its power ports (box, port)."""
 
-    path: Path
     quantity: Quantity
     exposed: bool
     ports: frozenset[tuple[Path, Path]]
@@ -36,21 +36,28 @@ class PowerJunction:
 @final
 @dataclass(frozen=True, slots=True)
 class StateClass:
-    """Junctions of one state: power-bearing members, outer state ports, inner state ports (box, port)."""
+    """Junctions of one state: power-bearing members, outer state ports, inner state ports (box, port).
+
+    The quantity is that of all of them, without frame; outer ports are given with theirs.
+    """
 
     quantity: Quantity
     members: frozenset[Path]
-    outer: frozenset[Path]
+    outer: frozenset[tuple[Path, Quantity]]
     ports: frozenset[tuple[Path, Path]]
 
 
 @final
 @dataclass(frozen=True, slots=True)
 class NormalForm:
-    """A pattern without names that do not matter, and without order."""
+    """A pattern without names that do not matter, and without order.
+
+    Only classes that say something are among the classes: a power junction whose state nobody reads, shares or
+    exposes needs none.
+    """
 
     boxes: frozenset[Path]
-    junctions: frozenset[PowerJunction]
+    junctions: Directory[PowerJunction]
     classes: frozenset[StateClass]
 
 
@@ -62,31 +69,29 @@ def powered(junctions: "Mapping[Path, Junction]", boxes: "Mapping[Path, Box]") -
 
 
 def normal_form(pattern: "Pattern") -> NormalForm:
-    """Compute the normal form of a pattern."""
-    bearing = powered(pattern.junctions, pattern.boxes)
-    power_ports: dict[Path, list[tuple[Path, Path]]] = {path: [] for path in bearing}
-    state_ports: dict[Path, list[tuple[Path, Path]]] = {path: [] for path in pattern.junctions}
+    """Compute the normal form of a pattern, linear in its ports."""
+    power_ports: dict[Path, list[tuple[Path, Path]]] = {}
+    state_ports: dict[Path, list[tuple[Path, Path]]] = {}
     for box, content in pattern.boxes.items():
         for name, port in content.ports.items():
-            (power_ports if port.power else state_ports)[port.junction].append((box, name))
-    junctions = frozenset(
-        PowerJunction(
-            path,
-            pattern.junctions[path].quantity,
-            pattern.junctions[path].exposed and pattern.junctions[path].power,
-            frozenset(power_ports[path]),
-        )
-        for path in bearing
-    )
+            (power_ports if port.power else state_ports).setdefault(port.junction, []).append((box, name))
+    junctions: dict[Path, PowerJunction] = {}
+    stateful = set(state_ports)
+    for path, junction in pattern.junctions.items():
+        exposed = junction.exposed and junction.power
+        if exposed or path in power_ports:
+            junctions[path] = PowerJunction(junction.quantity, exposed, frozenset(power_ports.get(path, ())))
+        if junction.exposed and not junction.power:
+            stateful.add(path)
     classes: set[StateClass] = set()
-    for members in {pattern.state_class(path) for path in pattern.junctions}:
-        outer = {p for p in members if pattern.junctions[p].exposed and not pattern.junctions[p].power}
-        ports = frozenset(port for path in members for port in state_ports[path])
-        classes.add(StateClass(_common(pattern, members), members & bearing, frozenset(outer), ports))
-    return NormalForm(frozenset(pattern.boxes), junctions, frozenset(classes))
-
-
-def _common(pattern: "Pattern", members: frozenset[Path]) -> Quantity:
-    """The quantity of a class: in the frame of those members that carry one, they agree."""
-    quantities = [pattern.junctions[path].quantity for path in members]
-    return next((q for q in quantities if q.frame is not None), quantities[0])
+    for members in {pattern.state_class(path) for path in stateful} | pattern.links:
+        first = next(iter(members))
+        found = StateClass(
+            pattern.junctions[first].quantity.in_frame(None),
+            frozenset(path for path in members if path in junctions),
+            frozenset((p, j.quantity) for p in members if (j := pattern.junctions[p]).exposed and not j.power),
+            frozenset(port for path in members for port in state_ports.get(path, ())),
+        )
+        if found.outer or found.ports or len(found.members) > 1:
+            classes.add(found)
+    return NormalForm(frozenset(pattern.boxes), Directory.trusted(junctions), frozenset(classes))

@@ -153,16 +153,32 @@ class Pattern:
     def _set(self, junctions: Directory[Junction], boxes: Directory[Box], links: Iterable[Iterable[Path]]) -> None:
         from ephs.operad.wellformed import require_pattern
 
-        classes = require_pattern(junctions, boxes, links)
+        self._assign(junctions, boxes, require_pattern(junctions, boxes, links))
+
+    def _assign(
+        self, junctions: Directory[Junction], boxes: Directory[Box], classes: Mapping[Path, frozenset[Path]]
+    ) -> None:
         values = {
             "junctions": junctions,
             "boxes": boxes,
-            "links": frozenset(c for c in classes.values() if len(c) > 1),
+            "links": frozenset(classes.values()),
             "_classes": classes,
             "_normal": None,
         }
         for name, value in values.items():
             object.__setattr__(self, name, value)
+
+    @staticmethod
+    def trusted(
+        junctions: Directory[Junction], boxes: Directory[Box], classes: Mapping[Path, frozenset[Path]]
+    ) -> "Pattern":
+        """The pattern of parts that one knows to be well-formed, as substitution makes them of well-formed ones.
+
+        `classes` gives each linked junction its class.
+        """
+        pattern = object.__new__(Pattern)
+        pattern._assign(junctions, boxes, classes)
+        return pattern
 
     @staticmethod
     def identity(interface: "Entries[PortType]") -> "Pattern":
@@ -193,7 +209,10 @@ class Pattern:
         KeyError
             If there is no such junction.
         """
-        return self._classes[Path.of(junction)]
+        path = Path.of(junction)
+        if path not in self.junctions:
+            raise KeyError(junction)
+        return self._classes.get(path) or frozenset((path,))
 
     @property
     def normal_form(self) -> NormalForm:

@@ -1,79 +1,133 @@
 """Substitution: patterns into boxes of a pattern. This is the one place where names of levels are joined."""
 
-from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import final
 
 from ephs.operad.directory import Directory
 from ephs.operad.errors import PatternError
 from ephs.operad.links import closure
-from ephs.operad.names import Path, PathLike, paths_text
+from ephs.operad.names import ROOT, Path, PathLike, paths_text
+from ephs.operad.nesting import Nesting
 from ephs.operad.normal import powered
 from ephs.operad.pattern import Box, Junction, Pattern, Port
 from ephs.operad.quantities import Interface, interface_text
-from ephs.operad.wellformed import box_of
+from ephs.operad.wellformed import box_of, require_one_quantity
 
-__all__ = ["substitute"]
-
-Wires = dict[Path, dict[Path, Port]]
-Links = list[tuple[Path, ...]]
+__all__ = ["flatten", "substitute"]
 
 
 def substitute(pattern: Pattern, fillings: Mapping[Path, object]) -> Pattern:
     """Put patterns into boxes; see `Pattern.substitute`."""
-    inner = {box: _require_filling(pattern, box, filling) for box, filling in fillings.items()}
-    if pattern.is_identity:
-        return next((_adopt(filling, pattern.interface) for filling in inner.values()), pattern)
-    # An identity changes nothing: its box at the root path keeps the box' name.
-    inner = {box: filling for box, filling in inner.items() if not filling.is_identity}
-    if not inner:
-        return pattern
-    junctions: dict[Path, Junction] = dict(pattern.junctions)
-    wires: Wires = {}
-    links: Links = [tuple(group) for group in pattern.links]
-    for box, content in pattern.boxes.items():
-        filling = inner.get(box)
-        if filling is None:
-            wires[box] = dict(content.ports)
+    inner = {box: Nesting(_require_pattern(pattern, box, filling)) for box, filling in fillings.items()}
+    return flatten(Nesting(pattern, inner))
+
+
+def flatten(nesting: Nesting) -> Pattern:
+    """Substitute the patterns of all levels in one pass; see `Nesting.flatten`."""
+    while nesting.pattern.is_identity and nesting.children:
+        nesting = _through_identity(ROOT, nesting)
+    if not nesting.children:
+        return nesting.pattern
+    whole = _Whole(dict(nesting.pattern.junctions), {}, [tuple(group) for group in nesting.pattern.links])
+    # Each level knows what its junctions are called in the whole. A list, as recursion would bound the depth;
+    # of iterators, as boxes keep their order.
+    top = _Level(ROOT, nesting, {path: path for path in nesting.pattern.junctions})
+    changed = False
+    pending = [(top, iter(nesting.pattern.boxes.items()))]
+    while pending:
+        level, boxes = pending[-1]
+        for box, content in boxes:
+            path = level.path / box if level.path else box
+            child = level.nesting.children.get(box)
+            if child is not None:
+                _require_interface(path, content.interface, child.pattern.interface)
+                while child.pattern.is_identity and child.children:
+                    child = _through_identity(path, child)
+            if child is None or child.pattern.is_identity:  # an identity changes nothing: its box keeps the name
+                whole.boxes[path] = _moved(content, level, whole.junctions)
+                continue
+            changed = True
+            pending.append((_opened(path, content, child, level, whole), iter(child.pattern.boxes.items())))
+            break
         else:
-            _insert(box, content, filling, junctions, wires, links)
-    return _tidied(junctions, wires, links)
+            pending.pop()
+    return _tidied(whole) if changed else nesting.pattern
 
 
-def _insert(
-    box: Path, content: Box, filling: Pattern, junctions: dict[Path, Junction], wires: Wires, links: Links
-) -> None:
-    """Add the filling's junctions, boxes and links, renamed."""
+@final
+@dataclass(frozen=True, slots=True)
+class _Whole:
+    """What the flattened pattern is made of, as it grows."""
+
+    junctions: dict[Path, Junction]
+    boxes: dict[Path, Box]
+    links: list[tuple[Path, ...]]
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class _Level:
+    """A nesting on its way into the whole: where it is, and what its junctions are called there."""
+
+    path: Path
+    nesting: Nesting
+    target: Mapping[Path, Path]
+
+
+def _opened(box: Path, content: Box, child: Nesting, outer: _Level, whole: _Whole) -> _Level:
+    """Add the child's own junctions and links to the whole."""
+    filling = child.pattern
     target: dict[Path, Path] = {}
     for path, inner in filling.junctions.items():
         if inner.exposed and inner.power:
-            target[path] = content.ports[path].junction  # absorbed
+            target[path] = outer.target[content.ports[path].junction]  # absorbed
             continue
-        target[path] = box / path
-        junctions[box / path] = Junction(inner.quantity)
+        target[path] = kept = box / path
+        whole.junctions[kept] = Junction(inner.quantity) if inner.exposed else inner
         if inner.exposed:
             # Its power balance stays its own; only the state is shared.
-            links.append((box / path, content.ports[path].junction))
-    links += [tuple(target[path] for path in group) for group in filling.links]
-    for name, lower in filling.boxes.items():
-        wires[box / name] = {p: Port(target[port.junction], port.power) for p, port in lower.ports.items()}
+            whole.links.append((kept, outer.target[content.ports[path].junction]))
+    whole.links.extend(tuple(target[path] for path in group) for group in filling.links)
+    return _Level(box, child, target)
 
 
-def _tidied(junctions: Mapping[Path, Junction], wires: Wires, links: Iterable[tuple[Path, ...]]) -> Pattern:
-    """Drop the junctions that are mere handles on a state which another junction of their class has, too."""
-    boxes = {box: box_of(Directory(ports), junctions) for box, ports in wires.items()}
-    bearing = powered(junctions, boxes)
+def _moved(content: Box, level: _Level, new: Mapping[Path, Junction]) -> Box:
+    """The box with its ports on the junctions of the whole."""
+    target, old = level.target, level.nesting.pattern.junctions
+    ports: dict[Path, Port] = {}
+    same = True
+    for name, port in content.ports.items():
+        junction = target[port.junction]
+        ports[name] = port if junction is port.junction else Port(junction, port.power)
+        # Where no frame was gained or lost the interface stays the same object.
+        same = same and new[junction].quantity is old[port.junction].quantity
+    found = Directory.trusted(ports)
+    return Box(found, content.interface) if same else box_of(found, new)
+
+
+def _tidied(whole: _Whole) -> Pattern:
+    """The pattern, without the junctions that are mere handles on a state which another of their class has, too."""
+    junctions = Directory.trusted(whole.junctions)
+    if not whole.links:
+        return Pattern.trusted(junctions, Directory.trusted(whole.boxes), {})
+    bearing = powered(whole.junctions, whole.boxes)
+    classes = closure(whole.links)
+    require_one_quantity(junctions, classes)
     moved: dict[Path, Path] = {}
-    for members in set(closure(junctions, links).values()):
+    for members in set(classes.values()):
         handles = {path for path in members if path not in bearing and not junctions[path].exposed}
-        if len(members) > 1 and handles:
+        if handles:
             first = _representative(members, bearing, junctions)
             moved.update({path: first for path in handles if path != first})
-    if not moved:
-        return _checked(junctions, boxes, links)
-    kept = {path: junction for path, junction in junctions.items() if path not in moved}
-    redirected = [(box, _redirect(ports, moved)) for box, ports in wires.items()]
-    remaining = [tuple(moved.get(path, path) for path in group) for group in links]
-    return _checked(kept, {box: box_of(ports, kept) for box, ports in redirected}, remaining)
+    if moved:
+        junctions = Directory.trusted({path: value for path, value in junctions.items() if path not in moved})
+        classes = closure([path for path in group if path not in moved] for group in set(classes.values()))
+    boxes = whole.boxes
+    for box, content in boxes.items():
+        if not moved.keys().isdisjoint(port.junction for port in content.ports.values()):
+            boxes[box] = box_of(_redirected(content.ports, moved), junctions)
+    return Pattern.trusted(junctions, Directory.trusted(boxes), classes)
 
 
 def _representative(members: frozenset[Path], bearing: frozenset[Path], junctions: Mapping[Path, Junction]) -> Path:
@@ -84,19 +138,21 @@ def _representative(members: frozenset[Path], bearing: frozenset[Path], junction
     return min(members, key=lambda path: (len(path), path))
 
 
-def _redirect(ports: Mapping[Path, Port], moved: Mapping[Path, Path]) -> Directory[Port]:
-    return Directory([(p, Port(moved.get(port.junction, port.junction), port.power)) for p, port in ports.items()])
+def _redirected(ports: Mapping[Path, Port], moved: Mapping[Path, Path]) -> Directory[Port]:
+    return Directory.trusted(
+        {name: Port(moved.get(port.junction, port.junction), port.power) for name, port in ports.items()}
+    )
 
 
-def _checked(
-    junctions: Mapping[Path, Junction], boxes: Mapping[Path, Box], links: Iterable[tuple[Path, ...]]
-) -> Pattern:
-    groups = [group for group in links if len(set(group)) > 1]
-    return Pattern(junctions, boxes, groups)
+def _through_identity(box: Path, nesting: Nesting) -> Nesting:
+    """What fills an identity's box, in the frames of the identity's interface."""
+    (child,) = nesting.children.values()
+    interface = nesting.pattern.interface
+    _require_interface(box, interface, child.pattern.interface)
+    return Nesting(_adopted(child.pattern, interface), child.children)
 
 
-def _adopt(filling: Pattern, interface: Interface) -> Pattern:
-    """The filling of an identity's box: the filling itself, in the frames of the outer interface."""
+def _adopted(filling: Pattern, interface: Interface) -> Pattern:
     if filling.interface == interface:
         return filling
     pairs: list[tuple[PathLike, Junction]] = [
@@ -106,18 +162,22 @@ def _adopt(filling: Pattern, interface: Interface) -> Pattern:
     return Pattern.identity(interface) if filling.is_identity else Pattern(pairs, filling.boxes, filling.links)
 
 
-def _require_filling(pattern: Pattern, box: Path, filling: object) -> Pattern:
+def _require_pattern(pattern: Pattern, box: Path, filling: object) -> Pattern:
     if box not in pattern.boxes:
         raise PatternError("unknown-box", box=box, found=str(box), expected=paths_text(pattern.boxes))
     if not isinstance(filling, Pattern):
         expected = "a Pattern; call the pattern to fill boxes with systems or primitives"
         raise PatternError("filling-type", box=box, found=type(filling).__name__, expected=expected)
-    wanted, given = pattern.boxes[box].interface, filling.interface
+    return filling
+
+
+def _require_interface(box: Path, wanted: Interface, given: Interface) -> None:
+    if wanted == given:
+        return
     if faults := _differences(wanted, given):
         found, expected = interface_text(given), interface_text(wanted)
         first = min(wanted.keys() ^ given.keys() or _differing(wanted, given))
         raise PatternError("interface", box=box, port=first, found=found, expected=expected, ports="; ".join(faults))
-    return filling
 
 
 def _differing(wanted: Interface, given: Interface) -> list[Path]:

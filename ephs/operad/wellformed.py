@@ -1,17 +1,23 @@
 """What makes data a pattern: reading what the user wrote, and the conditions P1 to P5."""
 
 from collections.abc import Iterable, Mapping
-from itertools import pairwise
 from typing import Any, cast
 
-from ephs.operad.directory import Directory, Entries
+from ephs.operad.directory import Directory, Entries, first_clash
 from ephs.operad.errors import PatternError
 from ephs.operad.links import closure
 from ephs.operad.names import ROOT, Path, PathLike, paths_text
 from ephs.operad.pattern import Box, Boxes, Junction, Port
 from ephs.operad.quantities import PortType
 
-__all__ = ["read_boxes", "read_junctions", "read_links", "require_named_boxes", "require_pattern"]
+__all__ = [
+    "read_boxes",
+    "read_junctions",
+    "read_links",
+    "require_named_boxes",
+    "require_one_quantity",
+    "require_pattern",
+]
 
 _PORTS = 'port name -> junction name, "~name" for a state port'
 
@@ -91,13 +97,13 @@ def require_named_boxes(boxes: Mapping[Path, Box]) -> None:
 def require_pattern(
     junctions: Directory[Junction], boxes: Directory[Box], links: Iterable[Iterable[Path]]
 ) -> Mapping[Path, frozenset[Path]]:
-    """Check the conditions, and return the class of each junction under "same state"."""
+    """Check the conditions, and return the classes under "same state", by each junction that is linked."""
     if ROOT in junctions:
         raise PatternError("root-junction", junction=ROOT, found="a junction at the root path", expected="a name")
     if ROOT not in boxes:
         _require_disjoint(junctions, boxes)
-    classes = closure(junctions, links)
-    _require_one_quantity(junctions, set(classes.values()))
+    classes = closure(links)
+    require_one_quantity(junctions, classes)
     _require_inner_ports(junctions, boxes, classes)
     return classes
 
@@ -107,16 +113,16 @@ def _require_disjoint(junctions: Mapping[Path, Junction], boxes: Mapping[Path, B
     if not junctions.keys().isdisjoint(boxes):
         path = min(junctions.keys() & boxes.keys())
         raise PatternError("p5", box=path, junction=path, found=str(path), expected="prefix-free paths")
-    for path, following in pairwise(sorted([*junctions, *boxes])):
-        if path.is_prefix_of(following):
-            box, other = (path, following) if path in boxes else (following, path)
-            raise PatternError(
-                "p5", box=box, junction=other, found=f"{path}, {following}", expected="prefix-free paths"
-            )
+    for paths, others in ((boxes, junctions), (junctions, boxes)):
+        if clash := first_clash(paths, others):
+            box, other = clash if paths is boxes else reversed(clash)
+            found = f"{clash[0]}, {clash[1]}"
+            raise PatternError("p5", box=box, junction=other, found=found, expected="prefix-free paths")
 
 
-def _require_one_quantity(junctions: Mapping[Path, Junction], classes: Iterable[frozenset[Path]]) -> None:
-    for members in classes:
+def require_one_quantity(junctions: Mapping[Path, Junction], classes: Mapping[Path, frozenset[Path]]) -> None:
+    """P1 for linked junctions: they share a state, so they have one quantity."""
+    for members in sorted(set(classes.values()), key=min):
         paths = sorted(members)
         quantities = [junctions[path].quantity for path in paths]
         # Frames need not all be given, but those that are given must agree.
@@ -134,5 +140,5 @@ def _require_inner_ports(
     """P4; an exposed junction may instead be linked to one with an inner port, as substitution makes them."""
     wired = {port.junction for box in boxes.values() for port in box.ports.values()}
     for path, junction in junctions.items():
-        if path not in wired and not (junction.exposed and classes[path] & wired):
+        if path not in wired and not (junction.exposed and classes.get(path, frozenset()) & wired):
             raise PatternError("no-inner-port", junction=path, found=str(junction), expected="an inner port")

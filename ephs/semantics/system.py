@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal, final
 
 import numpy as np
 
-from ephs.operad import ROOT, Directory, Interface, Path, Pattern, Quantity
+from ephs.operad import ROOT, Directory, Interface, Nesting, Path, Pattern, Quantity
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.errors import AssemblyError, SemanticsError
 from ephs.semantics.primitives import Irreversible, Primitive, Reversible, Storage
@@ -91,17 +91,15 @@ class System:
 
     def flatten(self) -> "System":
         """The same system on one level: patterns substituted, primitives under the paths of their boxes."""
-        inner = {box: f.flatten() for box, f in self.fillings.items() if isinstance(f, System)}
-        if not inner:
+        if self.is_flat:
             return self
-        leaves: dict[Path, Filling] = {}
-        for box, filling in self.fillings.items():
-            if isinstance(filling, System):
-                leaves.update({box / name: leaf for name, leaf in inner[box].fillings.items()})
-            else:
-                leaves[box] = filling
-        pattern = self.pattern.substitute({box: system.pattern for box, system in inner.items()})
-        return System(pattern, Directory(leaves))
+        return System(self.nesting.flatten(), Directory.trusted(dict(self.leaves())))
+
+    @property
+    def nesting(self) -> Nesting:
+        """The patterns of all levels, without what fills the innermost boxes."""
+        inner = {box: filling.nesting for box, filling in self.fillings.items() if isinstance(filling, System)}
+        return Nesting(self.pattern, inner)
 
     def leaves(self) -> Iterator[tuple[Path, Primitive]]:
         """The primitives with their full paths, depth first."""

@@ -2,7 +2,7 @@
 
 from ephs.testing.laws import check_operad_laws, law_inputs
 from ephs.testing.mechanisms import mechanisms
-from ephs.testing.patterns import Nesting, interfaces, nestings, paths, patterns, quantities
+from ephs.testing.patterns import interfaces, nestings, paths, patterns, quantities
 from ephs.testing.primitives import irreversibles, reversibles, storages
 from ephs.testing.systems import (
     check_entropy_production,
@@ -14,7 +14,6 @@ from ephs.testing.systems import (
 )
 
 __all__ = [
-    "Nesting",
     "check_entropy_production",
     "check_functoriality",
     "check_natural",

@@ -1,15 +1,13 @@
 """Strategies for names, quantities, interfaces, patterns and nestings of patterns."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import final
 
 from hypothesis import strategies as st
 from hypothesis.errors import InvalidArgument
 
-from ephs.operad import Directory, Interface, Junction, Path, Pattern, Port, PortType, Quantity, quantity
+from ephs.operad import Directory, Interface, Junction, Nesting, Path, Pattern, Port, PortType, Quantity, quantity
 
-__all__ = ["Nesting", "fresh_paths", "interfaces", "nestings", "paths", "patterns", "quantities"]
+__all__ = ["fresh_paths", "interfaces", "nestings", "paths", "patterns", "quantities"]
 
 _KNOWN = (
     quantity.momentum,
@@ -172,39 +170,6 @@ def fresh_paths(draw: st.DrawFn, count: int, taken: Iterable[Path]) -> list[Path
     return found
 
 
-@final
-@dataclass(frozen=True, slots=True)
-class Nesting:
-    """A tree of patterns whose interfaces fit: a pattern, and for each box a nesting or nothing."""
-
-    pattern: Pattern
-    children: Directory["Nesting | None"]
-
-    @property
-    def filled(self) -> dict[Path, "Nesting"]:
-        """The boxes that have a nesting inside."""
-        return {box: child for box, child in self.children.items() if child is not None}
-
-    @property
-    def depth(self) -> int:
-        """How many levels there are."""
-        return 1 + max((child.depth for child in self.filled.values()), default=0)
-
-    def bottom_up(self) -> Pattern:
-        """Flatten the children first, then substitute them."""
-        return self.pattern.substitute({box: child.bottom_up() for box, child in self.filled.items()})
-
-    def top_down(self) -> Pattern:
-        """Substitute the children as they are, one after the other, then go on with theirs."""
-        result = self.pattern
-        pending = list(self.filled.items())
-        while pending:
-            box, child = pending.pop(0)
-            result = result.substitute({box: child.pattern})
-            pending += [(box / inner, grandchild) for inner, grandchild in child.filled.items()]
-        return result
-
-
 @st.composite
 def nestings(draw: st.DrawFn, *, depth: int = 3, interface: Interface | None = None, max_boxes: int = 3) -> Nesting:
     """Trees of patterns that fit into each other, of at most so many levels.
@@ -218,13 +183,11 @@ def nestings(draw: st.DrawFn, *, depth: int = 3, interface: Interface | None = N
     """
     _require(depth >= 1, f"depth={depth}: expected at least one level")
     pattern = draw(patterns(interface=interface, max_boxes=max_boxes))
-    children: list[tuple[Path, Nesting | None]] = []
+    children: dict[Path, Nesting] = {}
     for box, content in pattern.boxes.items():
-        inside = None
         if depth > 1 and draw(st.booleans()):
-            inside = draw(nestings(depth=depth - 1, interface=content.interface, max_boxes=max_boxes))
-        children.append((box, inside))
-    return Nesting(pattern, Directory(children))
+            children[box] = draw(nestings(depth=depth - 1, interface=content.interface, max_boxes=max_boxes))
+    return Nesting(pattern, children)
 
 
 def _require(condition: bool, message: str) -> None:

@@ -6,11 +6,10 @@ from typing import Any
 from hypothesis import strategies as st
 from hypothesis.errors import InvalidArgument
 
-from ephs.operad import Directory, Path, Pattern, PortType, Quantity, junction, quantity
+from ephs.operad import Directory, Nesting, Path, Pattern, PortType, Quantity, junction, quantity
 from ephs.semantics import Irreversible, Reference, Reversible, Storage, System
 from ephs.semantics.laws import Probe, random_probe, system_law
 from ephs.semantics.system import Filling
-from ephs.testing.patterns import Nesting
 from ephs.testing.primitives import irreversibles, reversibles, storages
 
 __all__ = [
@@ -144,7 +143,7 @@ def fillings(draw: st.DrawFn, nesting: Nesting) -> System:
 
 
 def _filled(nesting: Nesting, leaves: Mapping[Path, Filling], path: Path) -> System:
-    inner = nesting.filled
+    inner = nesting.children
     parts: dict[Path, Filling] = {
         box: _filled(inner[box], leaves, path / box) if box in inner else leaves[path / box]
         for box in nesting.pattern.boxes

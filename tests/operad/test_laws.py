@@ -19,6 +19,8 @@ ALL = [
     "equivariance in boxes",
     "equivariance in junctions",
     "equivariance in ports",
+    "flattening from below",
+    "flattening from above",
     "interface",
 ]
 
@@ -38,9 +40,15 @@ def test_law(law, data):
 @settings(max_examples=2 * settings().max_examples)
 @given(nestings(depth=3))
 def test_nestings_flatten_alike_from_above_and_from_below(nesting):
-    whole = nesting.bottom_up()
-    assert whole == nesting.top_down()
-    assert hash(whole) == hash(nesting.top_down())
+    whole = nesting.flatten()
+    assert whole == nesting.bottom_up() == nesting.top_down()
+    assert hash(whole) == hash(nesting.bottom_up()) == hash(nesting.top_down())
+    assert list(whole.boxes) == list(nesting.bottom_up().boxes)
+    # What is made without checks would pass them.
+    if not whole.is_identity:
+        again = Pattern(whole.junctions, whole.boxes, whole.links)
+        assert again == whole and again.boxes == whole.boxes and again.links == whole.links
+    assert len(whole.boxes) == nesting.size
     assert whole.interface == nesting.pattern.interface
 
 
@@ -57,8 +65,8 @@ def test_sizes_add_up(f, data):
     assert sum(len(b.ports) for b in whole.boxes.values()) == inner_ports + sum(
         len(b.ports) for name, b in f.boxes.items() if name != box
     )
-    powered = {junction.path for junction in whole.normal_form.junctions}
-    kept = {box / j.path for j in g.normal_form.junctions if j.path not in g.interface}
+    powered = set(whole.normal_form.junctions)
+    kept = {box / path for path in g.normal_form.junctions if path not in g.interface}
     assert kept <= powered
 
 

@@ -60,16 +60,16 @@ PATTERNS = {
 }
 NESTINGS = {
     "three levels": lambda n: n.depth == 3,
-    "filled by an identity": lambda n: any(c.pattern.is_identity for c in n.filled.values()),
+    "filled by an identity": lambda n: any(c.pattern.is_identity for c in n.children.values()),
     "identity around another": lambda n: n.pattern.is_identity and n.depth == 2,
-    "two boxes filled": lambda n: len(n.filled) >= 2,
+    "two boxes filled": lambda n: len(n.children) >= 2,
     "link made by substitution": lambda n: not n.pattern.links and n.bottom_up().links,
     "states linked across levels": lambda n: n.depth == 3 and deep_link(n.bottom_up()),
     "a handle is dropped": lambda n: any(
         not child.pattern.is_identity
         and any(not port.power for port in child.pattern.interface.values())
         and not any(box / path in n.bottom_up().junctions for path in child.pattern.interface)
-        for box, child in n.filled.items()
+        for box, child in n.children.items()
     ),
 }
 
@@ -111,7 +111,7 @@ def test_patterns_keep_to_their_bounds(data):
 @given(nestings(depth=2, max_boxes=2))
 def test_nestings_fit(nesting):
     assert nesting.depth <= 2
-    for box, child in nesting.filled.items():
+    for box, child in nesting.children.items():
         assert child.pattern.interface == nesting.pattern.boxes[box].interface
 
 

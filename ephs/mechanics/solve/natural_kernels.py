@@ -159,6 +159,12 @@ def evaluate(t, x, z, scal, inputs, m):
             m.scale[row] += abs(m.f[j])
             for q in range(k):
                 m.scale[row] = max(m.scale[row], abs(m.jac[j * width + n + q]) * force)
+            if t.kind[i] == 2:
+                # near equilibrium a flow is a difference of large terms: temperatures, not their differences
+                for q in range(n):
+                    effort = t.e_index[e_at + q]
+                    whole = abs(z[n_rate + effort] + t.intensive[effort])
+                    m.scale[row] = max(m.scale[row], abs(m.jac[j * width + q]) * whole)
             m.flows[e_at + j] = m.f[j]
         for j in range(k):
             m.residual[first + j] += m.c[j]
@@ -178,6 +184,18 @@ def evaluate(t, x, z, scal, inputs, m):
             m.scale[row] += abs(flow)
     # at rest no effort has a size of its own: what the flows change it by in a step is one
     for i in range(t.kind.shape[0]):
+        if t.kind[i] == 2:
+            # nor has entropy production, the square of a rate which is all rounding: what the forces there could make
+            n, e_at, power = t.dims[i, 0], t.e_at[i], 0.0
+            for j in range(n):
+                effort = t.e_index[e_at + j]
+                if t.entropy[effort] == 0.0:
+                    power += m.scale[n_rate + effort] * abs(z[n_rate + effort])
+            for j in range(n):
+                effort = t.e_index[e_at + j]
+                if t.entropy[effort] == 1.0 and power > 0.0:
+                    row = n_rate + effort
+                    m.scale[row] = max(m.scale[row], power / abs(z[row] + t.intensive[effort]))
         if t.kind[i] == 0:
             n, e_at, w_at, j_at = t.dims[i, 0], t.e_at[i], t.read_w_at[i], t.jacobian_at[i]
             for j in range(n):
