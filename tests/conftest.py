@@ -8,6 +8,9 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 from hypothesis import Phase, settings  # noqa: E402
 
+# The suite of somebody else's package: test_downstream.py runs it, in a process of its own.
+collect_ignore = ["downstream"]
+
 settings.register_profile("ci", derandomize=True, deadline=None, max_examples=50, print_blob=True)
 settings.register_profile("dev", deadline=None, max_examples=50)
 # A broken law is enough; which of its counterexamples is smallest does not matter.

@@ -2,10 +2,12 @@
 
 from ephs.operad.directory import Directory
 from ephs.operad.errors import PatternError
-from ephs.operad.laws import LAWS, Equation, Law
+from ephs.operad.isomorphism import Renaming
+from ephs.operad.laws import LAWS, Equation, Law, law
 from ephs.operad.names import ROOT, Path
 from ephs.operad.nesting import Nesting
-from ephs.operad.pattern import Box, Junction, Pattern, Port, junction
+from ephs.operad.parts import Box, Junction, Port, junction
+from ephs.operad.pattern import Pattern
 from ephs.operad.quantities import Interface, PortType, Quantity, Space, quantity
 
 __all__ = [
@@ -24,7 +26,9 @@ __all__ = [
     "Port",
     "PortType",
     "Quantity",
+    "Renaming",
     "Space",
     "junction",
+    "law",
     "quantity",
 ]

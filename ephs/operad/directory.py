@@ -4,7 +4,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from typing import TypeAlias, TypeVar, cast, final
 
 from ephs.operad.errors import PatternError
-from ephs.operad.names import ROOT, Path, PathLike
+from ephs.operad.names import ROOT, Path, PathLike, paths_text
 
 __all__ = ["Directory", "Entries", "first_clash"]
 
@@ -112,11 +112,11 @@ class Directory(Mapping[Path, T_co]):
 
     def map(self, f: Callable[[T_co], S]) -> "Directory[S]":
         """Apply a function to every value."""
-        return Directory([(path, f(value)) for path, value in self.items()])
+        return Directory.trusted({path: f(value) for path, value in self.items()})
 
     def filter(self, f: Callable[[T_co], bool]) -> "Directory[T_co]":
         """Keep the entries whose value fulfils the condition."""
-        return Directory([(path, value) for path, value in self.items() if f(value)])
+        return Directory.trusted({path: value for path, value in self.items() if f(value)})
 
     def prefixed(self, prefix: PathLike) -> "Directory[T_co]":
         """Move all entries below a path."""
@@ -126,6 +126,20 @@ class Directory(Mapping[Path, T_co]):
         """The entries at or below a path, named relative to it; empty if there are none."""
         top = Path.of(prefix)
         return Directory([(path.relative_to(top), value) for path, value in self.items() if top.is_prefix_of(path)])
+
+    def zip(self, other: "Directory[S]") -> "Directory[tuple[T_co, S]]":
+        """Pairs of the values of both, which must have the same paths.
+
+        Raises
+        ------
+        PatternError
+            If a path is in one of them only.
+        """
+        if apart := sorted(self.keys() ^ other.keys()):
+            which = "second" if apart[0] in self else "first"
+            expected = "expected the same paths in both"
+            raise PatternError("apart", found=paths_text(apart), expected=expected, what=which)
+        return Directory.trusted({path: (value, other[path]) for path, value in self.items()})
 
     def merge(self, other: "Directory[S]") -> "Directory[T_co | S]":
         """The entries of both, which must not clash."""

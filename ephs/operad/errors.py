@@ -9,12 +9,13 @@ _TEXTS = {
     "path": "{found!r} is no path; expected {expected}",
     "prefix": "{what}: the paths {found} clash, as one is a prefix of the other; {expected}; rename one of them",
     "duplicate": "{what}: the path {found} is given twice; {expected}; rename one of them",
+    "apart": "the {what} directory lacks {found}; {expected}",
     "p5": "box {box} and junction {junction} clash: one path is a prefix of the other, so that"
     " substitution could name two junctions alike; rename one of them",
     "root-box": "box .: a box at the root path clashes with the junctions of its own fillings; only"
     " Pattern.identity(interface) has one; give the box a name (found the boxes {found})",
-    "root-rename": "box .: an identity pattern cannot be renamed, found new names for {found}; rename the"
-    " filling, or write the renaming pattern with a named box",
+    "root-rename": "box .: an identity's box cannot be renamed, and its ports are named alike inside and outside;"
+    " found new names for {found}, expected {expected}; write the renaming pattern with a named box",
     "root-junction": "junction .: a junction at the root path is a prefix of every box; give it a name",
     "root-port": "box {box}, port {port}: a port at the root path could name no junction of a filling; give it a name",
     "junction-type": "junction {junction}: found {found}, expected {expected}",
@@ -39,8 +40,12 @@ _TEXTS = {
     "pair-parameters": "relative pose {what}: found the parameters {found}, expected {expected}",
     "parity": "quantity {what}: the parity is {found!r}, expected +1 (even under time reversal) or -1 (odd)",
     "space": "space {what}: found dim {found}, expected whole numbers dim >= 0 and size >= dim",
-    "json": "no pattern can be read: found {found}, expected {expected}",
+    "json": "no pattern can be read: {where}: found {found}, expected {expected}",
+    "text": "no pattern can be read: line {where}: found {found}, expected {expected}",
+    "parameter": "space {what}: the parameter {found} is not finite; expected a finite number",
 }
+
+_LONGEST = 2000
 
 
 @final
@@ -77,17 +82,22 @@ class PatternError(ValueError):
         self.found = found
         self.expected = expected
         self.facts = facts
-        super().__init__(
-            _TEXTS[kind].format(
-                box=self.box, port=self.port, junction=self.junction, found=found, expected=expected, **facts
-            )
-        )
+        words = {"box": self.box, "port": self.port, "junction": self.junction, "found": found, "expected": expected}
+        super().__init__(_TEXTS[kind].format(**{key: _brief(word) for key, word in (words | facts).items()}))
 
     def __reduce__(self) -> tuple[object, ...]:
         return (
             _rebuild,
             (self.kind, self.box, self.port, self.junction, self.found, self.expected, self.facts),
         )
+
+
+def _brief(word: object) -> object:
+    """The word of a message, its middle left out where it is long; what is no text, as text."""
+    text = word if isinstance(word, str) else repr(word)
+    if len(text) <= _LONGEST:
+        return word
+    return f"{text[:120]}… ({len(text)} characters) …{text[-40:]}"
 
 
 def _rebuild(

@@ -5,7 +5,7 @@ data, not up to isomorphism, because paths concatenate associatively and boxes a
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, final
 
 from ephs.operad.directory import Directory
@@ -21,19 +21,30 @@ Names = Mapping[Path, Path]
 @final
 @dataclass(frozen=True, slots=True)
 class Equation:
-    """Two sides that a law says are equal."""
+    """Two sides that a law says are equal, and where they come from.
+
+    Printed, it shows both sides as trees; where they differ also the expression that makes it anew.
+    """
 
     left: Any
     right: Any
+    law: str = ""
+    inputs: tuple[object, ...] = ()
 
     @property
     def holds(self) -> bool:
         """Whether the sides are equal."""
         return bool(self.left == self.right)
 
+    @property
+    def replay(self) -> str:
+        """A Python expression that forms the equation again, given ``from ephs.operad import *``."""
+        return f"law({self.law!r})({', '.join(map(repr, self.inputs))})"
+
     def __str__(self) -> str:
         left, right = (str(side).replace("\n", "\n  ") for side in (self.left, self.right))
-        return f"left\n  {left}\n{'=' if self.holds else '≠'} right\n  {right}"
+        text = f"left\n  {left}\n{'=' if self.holds else '≠'} right\n  {right}"
+        return text if self.holds or not self.law else f"{self.law}\n{text}\nagain by\n  {self.replay}"
 
 
 @final
@@ -60,7 +71,7 @@ class Law:
 
     def __call__(self, *inputs: object) -> Equation:
         """Form both sides."""
-        return self.equation(*inputs)
+        return replace(self.equation(*inputs), law=self.name, inputs=inputs)
 
 
 def _left_unit(g: Pattern) -> Equation:

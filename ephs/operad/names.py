@@ -7,6 +7,9 @@ from ephs.operad.errors import PatternError
 
 __all__ = ["ROOT", "Path", "PathLike", "paths_text"]
 
+LONGEST_NAME = 200
+MOST_NAMES = 500
+
 
 @final
 class Path(tuple[str, ...]):
@@ -23,7 +26,8 @@ class Path(tuple[str, ...]):
     Raises
     ------
     PatternError
-        For a name that is empty, or has a dot, white space or a leading ``~``.
+        For a name that is empty, longer than 200 letters, or has a dot, white space, something unprintable or a
+        leading ``~``; for a path of more than 500 names.
     """
 
     __slots__ = ()
@@ -34,6 +38,9 @@ class Path(tuple[str, ...]):
         if isinstance(names, str):
             raise PatternError("path", found=names, expected="a sequence of names; Path.parse reads dotted names")
         parts = tuple(names)
+        if len(parts) > MOST_NAMES:
+            start = ".".join(str(part)[:40] for part in parts[:3])
+            raise PatternError("path", found=f"{start}…", expected=f"at most {MOST_NAMES} names, not {len(parts)}")
         for part in parts:
             _check(part)
         return _trusted(parts)
@@ -93,8 +100,12 @@ def _check(name: object) -> None:
         raise PatternError("name", found=name, expected="a name is text")
     if not name:
         raise PatternError("name", found=name, expected="a name has at least one letter")
-    if "." in name or name.startswith("~") or any(letter.isspace() for letter in name):
-        raise PatternError("name", found=name, expected="a name has no dot, no white space and no leading ~")
+    if len(name) > LONGEST_NAME:
+        short = f"{name[:40]}…"
+        raise PatternError("name", found=short, expected=f"a name has at most {LONGEST_NAME} letters, not {len(name)}")
+    if "." in name or name.startswith("~") or " " in name or not name.isprintable():
+        expected = "a name has no dot, no white space, nothing unprintable and no leading ~"
+        raise PatternError("name", found=name, expected=expected)
 
 
 def paths_text(paths: Iterable[Path]) -> str:

@@ -15,10 +15,11 @@ from typing import TYPE_CHECKING, final
 
 from ephs.operad.directory import Directory
 from ephs.operad.names import Path
+from ephs.operad.parts import Box, Junction
 from ephs.operad.quantities import Quantity
 
 if TYPE_CHECKING:
-    from ephs.operad.pattern import Box, Junction, Pattern
+    from ephs.operad.pattern import Pattern
 
 __all__ = ["NormalForm", "PowerJunction", "StateClass", "normal_form", "powered"]
 
@@ -61,7 +62,7 @@ class NormalForm:
     classes: frozenset[StateClass]
 
 
-def powered(junctions: "Mapping[Path, Junction]", boxes: "Mapping[Path, Box]") -> frozenset[Path]:
+def powered(junctions: Mapping[Path, Junction], boxes: Mapping[Path, Box]) -> frozenset[Path]:
     """The junctions that bear power: those with an inner power port or exposed as a power port."""
     inner = {port.junction for box in boxes.values() for port in box.ports.values() if port.power}
     outer = {path for path, junction in junctions.items() if junction.exposed and junction.power}

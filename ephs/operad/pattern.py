@@ -9,74 +9,22 @@ where a state port is exposed.
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, cast, final
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, final
 
 from ephs.operad.directory import Directory, Entries
 from ephs.operad.errors import PatternError
 from ephs.operad.names import ROOT, Path, PathLike, paths_text
 from ephs.operad.normal import NormalForm, normal_form
-from ephs.operad.quantities import Interface, PortType, Quantity
+from ephs.operad.parts import Box, Junction, Port
+from ephs.operad.quantities import Interface, PortType
 
 if TYPE_CHECKING:
+    import networkx as nx
+
+    from ephs.operad.isomorphism import Renaming
     from ephs.operad.lint import Diagnostic
 
-__all__ = ["Box", "Boxes", "Filling", "Junction", "Pattern", "Port", "junction"]
-
-
-@final
-@dataclass(frozen=True, slots=True)
-class Junction:
-    """A place where ports meet: they share the state; its power ports share the effort, and their flows
-    balance.
-
-    Parameters
-    ----------
-    quantity
-        What the ports exchange.
-    exposed
-        Whether there is an outer port of the junction's name.
-    power
-        Whether that outer port bears power; ``False`` makes it a state port. Without exposure it has no
-        meaning.
-    """
-
-    quantity: Quantity
-    exposed: bool = False
-    power: bool = True
-
-    def __str__(self) -> str:
-        role = "" if not self.exposed else ", exposed" if self.power else ", exposed as state"
-        return f"{self.quantity}{role}"
-
-    def __repr__(self) -> str:
-        exposed = ", exposed=True" if self.exposed else ""
-        return f"junction({self.quantity!r}{exposed}{'' if self.power else ', power=False'})"
-
-
-def junction(quantity: Quantity, exposed: bool = False, power: bool = True) -> Junction:
-    """Make a junction; parameters as of `Junction`."""
-    return Junction(quantity, exposed, power)
-
-
-@final
-@dataclass(frozen=True, slots=True)
-class Port:
-    """A port of an inner box: the junction on which it lies, and whether it bears power."""
-
-    junction: Path
-    power: bool
-
-    def __str__(self) -> str:
-        return f"{'' if self.power else '~'}{self.junction}"
-
-
-@final
-@dataclass(frozen=True, slots=True)
-class Box:
-    """An inner box: its ports, and the interface that they make, with the quantities of their junctions."""
-
-    ports: Directory[Port]
-    interface: Interface
+__all__ = ["Boxes", "Filling", "Pattern"]
 
 
 class Filling(Protocol):
@@ -122,7 +70,7 @@ class Pattern:
 
     Examples
     --------
-    >>> from ephs.operad import quantity as Q
+    >>> from ephs.operad import junction, quantity as Q
     >>> osc = Pattern(
     ...     junctions={"q": junction(Q.displacement), "p": junction(Q.momentum, exposed=True)},
     ...     boxes={"pe": {"q": "q"}, "ke": {"p": "p"}, "pkc": {"q": "q", "p": "p"}},
@@ -256,8 +204,9 @@ class Pattern:
             For an unknown box, a filling that is no pattern, or an interface that differs.
         """
         from ephs.operad.substitution import substitute
+        from ephs.operad.wellformed import read_fillings
 
-        return substitute(self, _boxes_to_fill(mapping, fillings))
+        return substitute(self, read_fillings(mapping, fillings))
 
     def __call__(
         self,
@@ -266,7 +215,9 @@ class Pattern:
         **fillings: "Filling",
     ) -> Any:
         """Fill all boxes by systems or primitives, which gives a system; names as in `substitute`."""
-        given = _boxes_to_fill(mapping, fillings)
+        from ephs.operad.wellformed import read_fillings
+
+        given = read_fillings(mapping, fillings)
         first = next(iter(given.values()), None)
         if first is None:
             raise PatternError("no-filling", found="none", expected=paths_text(self.boxes))
@@ -294,11 +245,119 @@ class Pattern:
         Raises
         ------
         PatternError
-            For a name that does not exist, names that clash, or an identity pattern.
+            For a name that does not exist, names that clash, or an identity whose ports would be named differently
+            inside and outside.
         """
         from ephs.operad.renaming import rename
 
         return rename(self, boxes or {}, junctions or {}, ports or {})
+
+    def isomorphic(self, other: "Pattern", *, fix_interface: bool = False) -> "Renaming | None":
+        """Whether the pattern is the other one up to names: a renaming that makes it so, or None.
+
+        Parameters
+        ----------
+        fix_interface
+            Whether outer ports must keep their names.
+
+        Returns
+        -------
+        Renaming or None
+            ``renaming(self) == other``.
+        """
+        from ephs.operad.isomorphism import isomorphism
+
+        return isomorphism(self, other, fix_interface=fix_interface)
+
+    def automorphisms(self, *, fix_interface: bool = False) -> int:
+        """The number of renamings of boxes, junctions and ports that leave the pattern as it is; 1 if it is rigid."""
+        from ephs.operad.isomorphism import automorphisms
+
+        return automorphisms(self, fix_interface=fix_interface)
+
+    def canonical_hash(self) -> str:
+        """A digest that isomorphic patterns share, the same in every process.
+
+        Patterns with different digests are not isomorphic. The converse holds but for patterns so regular that
+        colour refinement does not tell them apart.
+        """
+        from ephs.operad.isomorphism import canonical_hash
+
+        return canonical_hash(self)
+
+    def to_networkx(self) -> "nx.MultiGraph[Any]":
+        """The bipartite graph of boxes and junctions, an edge for each port.
+
+        Nodes are ``("box", path)`` and ``("junction", path)``, the latter with the attributes `quantity`, `exposed`
+        (None, ``"power"`` or ``"state"``), `power` (whether it bears power) and `state_class` (the junctions of its
+        state). Edges have the port's path as their key, and the attribute `power`.
+        """
+        from ephs.operad.isomorphism import to_networkx
+
+        return to_networkx(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The pattern as nested dictionaries of text and numbers; equal patterns have equal documents."""
+        from ephs.operad.documents import to_dict
+
+        return to_dict(self)
+
+    @staticmethod
+    def from_dict(document: Mapping[str, object]) -> "Pattern":
+        """Read a document made by `to_dict`, or by hand.
+
+        Raises
+        ------
+        PatternError
+            For what is no document, or no pattern; the message says at which key.
+        """
+        from ephs.operad.documents import from_dict
+
+        return from_dict(document)
+
+    def to_json(self) -> str:
+        """The document as JSON text, by the schema ``ephs/operad/pattern.schema.json``; equal patterns, equal texts."""
+        from ephs.operad.documents import to_json
+
+        return to_json(self)
+
+    @staticmethod
+    def from_json(text: str | bytes) -> "Pattern":
+        """Read JSON text; errors as of `from_dict`."""
+        from ephs.operad.documents import from_json
+
+        return from_json(text)
+
+    def to_text(self) -> str:
+        """The pattern in a compact form, to read and to write by hand; its order is kept.
+
+        >>> from ephs.operad import junction, quantity as Q
+        >>> f = Pattern({"q": junction(Q.displacement, exposed=True)}, {"pe": {"q": "q"}, "see": {"x": "~q"}})
+        >>> print(f.to_text(), end="")
+        q: displacement, exposed
+        pe(q)
+        see(x=~q)
+        """
+        from ephs.operad.text import to_text
+
+        return to_text(self)
+
+    @staticmethod
+    def from_text(text: str) -> "Pattern":
+        """Read the compact form of `to_text`.
+
+        One statement a line, or several with ``;`` between: a junction ``p: momentum, exposed`` (or ``exposed as
+        state``), a box ``hc(q_r=~q_r, p=p_r)``, where ``~`` makes a state port and a port named like its junction is
+        written once, a link ``q ~ r``. ``#`` starts a comment.
+
+        Raises
+        ------
+        PatternError
+            For what is no statement, with its line, or no pattern.
+        """
+        from ephs.operad.text import from_text
+
+        return from_text(text)
 
     def lint(self) -> "list[Diagnostic]":
         """What is legitimate but hardly ever meant: open-circuit ports, linked power balances."""
@@ -318,6 +377,9 @@ class Pattern:
 
         return draw(self).svg
 
+    def _repr_pretty_(self, printer: Any, cycle: bool) -> None:  # pyright: ignore[reportUnusedFunction] - IPython, Hypothesis
+        printer.text(repr(self))
+
     def __str__(self) -> str:
         from ephs.operad.printing import tree
 
@@ -333,14 +395,3 @@ class Pattern:
             return (Pattern.identity, (self.interface,))
         boxes = self.boxes.map(lambda box: box.ports)
         return (Pattern, (self.junctions, boxes, tuple(tuple(sorted(group)) for group in self.links)))
-
-
-def _boxes_to_fill(mapping: Mapping[Any, Any] | None, named: Mapping[str, Any]) -> dict[Path, Any]:
-    pairs = cast("list[tuple[PathLike, object]]", [*(mapping or {}).items(), *named.items()])
-    out: dict[Path, Any] = {}
-    for name, filling in pairs:
-        path = Path.of(name)
-        if path in out:
-            raise PatternError("duplicate", found=str(path), expected="expected each box once", what="fillings")
-        out[path] = filling
-    return out

@@ -4,7 +4,8 @@ from collections.abc import Iterator, Mapping
 from typing import cast
 
 from ephs.operad.names import Path
-from ephs.operad.pattern import Pattern, Port
+from ephs.operad.parts import Port
+from ephs.operad.pattern import Pattern
 
 __all__ = ["expression", "summary", "tree"]
 

@@ -1,13 +1,24 @@
 """Quantities: what is exchanged at a port, as values; and the kinds of ports."""
 
 from dataclasses import dataclass, replace
+from math import isfinite
 from types import MappingProxyType
 from typing import TypeAlias, final
 
 from ephs.operad.directory import Directory
 from ephs.operad.errors import PatternError
 
-__all__ = ["Interface", "PortType", "Quantities", "Quantity", "Space", "interface_text", "quantity"]
+__all__ = [
+    "Interface",
+    "PortType",
+    "Quantities",
+    "Quantity",
+    "Space",
+    "interface_text",
+    "known_quantity",
+    "quantity",
+    "quantity_word",
+]
 
 # Kind of pair: dimension of its subgroup of SE(3), numbers stored for an element, names of its parameters.
 _PAIRS: MappingProxyType[str, tuple[int, int, tuple[str, ...]]] = MappingProxyType(
@@ -50,6 +61,9 @@ class Space:
     def __post_init__(self) -> None:
         if self.dim < 0 or self.size < self.dim:
             raise PatternError("space", found=f"{self.dim} and size {self.size}", what=self.name)
+        for name, value in self.parameters:
+            if not isfinite(value):
+                raise PatternError("parameter", found=f"{name}={value}", what=self.name)
 
     def __str__(self) -> str:
         values = ", ".join(f"{name}={value:g}" for name, value in self.parameters)
@@ -198,6 +212,36 @@ def _pair(kind: str, parameters: dict[str, float]) -> tuple[int, int, tuple[tupl
         found, expected = ", ".join(sorted(parameters)) or "none", ", ".join(names) or "none"
         raise PatternError("pair-parameters", found=found, expected=expected, what=kind)
     return dim, size, tuple((name, float(parameters[name])) for name in names)
+
+
+def quantity_word(value: Quantity) -> tuple[str, tuple[str, ...], dict[str, float]] | None:
+    """The name by which the package knows the quantity, frame aside, with arguments; None for a user's own."""
+    plain = value.in_frame(None)
+    if plain in _WORDS:
+        return _WORDS[plain], (), {}
+    space, pair = plain.space, plain.space.name.rstrip("*")
+    values = dict(space.parameters)
+    if pair not in _PAIRS or set(values) != set(_PAIRS[pair][2]):
+        return None
+    for word, make in (("relative_pose", quantity.relative_pose), ("joint_momentum", quantity.joint_momentum)):
+        if make(pair, **values) == plain:
+            return word, (pair,), values
+    return None
+
+
+def known_quantity(word: str, arguments: tuple[str, ...] = (), **parameters: float) -> Quantity | None:
+    """The package's quantity of this name, or None; the inverse of `quantity_word`.
+
+    Raises
+    ------
+    PatternError
+        For an unknown kind of pair, or parameters that it does not have.
+    """
+    if word in ("relative_pose", "joint_momentum") and len(arguments) == 1:
+        return getattr(quantity, word)(arguments[0], **parameters)
+    if arguments or parameters:
+        return None
+    return next((value for value, known in _WORDS.items() if known == word), None)
 
 
 quantity = Quantities()

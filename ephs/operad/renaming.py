@@ -5,8 +5,9 @@ from typing import Any
 
 from ephs.operad.directory import Directory
 from ephs.operad.errors import PatternError
-from ephs.operad.names import Path, paths_text
-from ephs.operad.pattern import Pattern, Port
+from ephs.operad.names import ROOT, Path, paths_text
+from ephs.operad.parts import Port
+from ephs.operad.pattern import Pattern
 
 __all__ = ["rename"]
 
@@ -21,8 +22,7 @@ def rename(
     if not (boxes or junctions or ports):
         return pattern
     if pattern.is_identity:
-        found = ", ".join(str(name) for name in (*boxes, *junctions, *ports))
-        raise PatternError("root-rename", box=".", found=found, expected="no new names")
+        return _renamed_identity(pattern, boxes, junctions, ports)
     new_box = _read("box", boxes, pattern.boxes)
     new_junction = _read("junction", junctions, pattern.junctions)
     old_ports = {Path.of(box): names for box, names in ports.items()}
@@ -38,6 +38,19 @@ def rename(
         Directory(wired, what="boxes"),
         [[new_junction[path] for path in group] for group in pattern.links],
     )
+
+
+def _renamed_identity(
+    pattern: Pattern, boxes: Mapping[Any, Any], junctions: Mapping[Any, Any], ports: Mapping[Any, Mapping[Any, Any]]
+) -> Pattern:
+    """An identity stays one: inner and outer ports get the same names, which need be said once only."""
+    inner: Mapping[Any, Any] = next((names for box, names in ports.items() if Path.of(box) == ROOT), junctions)
+    new = _read("junction", junctions, pattern.junctions)
+    same = _read("port of box .", inner, pattern.junctions) == new
+    if not same or any(Path.of(box) != ROOT or Path.of(to) != ROOT for box, to in boxes.items()):
+        found = ", ".join(str(name) for name in (*boxes, *junctions, *ports))
+        raise PatternError("root-rename", box=".", found=found, expected="the same new names inside and outside")
+    return Pattern.identity([(new[path], kind) for path, kind in pattern.interface.items()])
 
 
 def _read(what: str, names: Mapping[Any, Any], known: Iterable[Path]) -> dict[Path, Path]:

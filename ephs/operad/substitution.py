@@ -10,7 +10,8 @@ from ephs.operad.links import closure
 from ephs.operad.names import ROOT, Path, PathLike, paths_text
 from ephs.operad.nesting import Nesting
 from ephs.operad.normal import powered
-from ephs.operad.pattern import Box, Junction, Pattern, Port
+from ephs.operad.parts import Box, Junction, Port
+from ephs.operad.pattern import Pattern
 from ephs.operad.quantities import Interface, interface_text
 from ephs.operad.wellformed import box_of, require_one_quantity
 
@@ -189,11 +190,8 @@ def _differing(wanted: Interface, given: Interface) -> list[Path]:
 
 
 def _differences(wanted: Interface, given: Interface) -> list[str]:
-    faults: list[str] = []
-    if missing := wanted.keys() - given.keys():
-        faults.append(f"missing {paths_text(missing)}")
-    if extra := given.keys() - wanted.keys():
-        faults.append(f"extra {paths_text(extra)}")
-    if differing := _differing(wanted, given):
-        faults.append(f"differing {paths_text(differing)}")
-    return faults
+    """The difference of two interfaces, port by port."""
+    faults = [f"missing {port}: {wanted[port]}" for port in sorted(wanted.keys() - given.keys())]
+    faults += [f"extra {port}: {given[port]}" for port in sorted(given.keys() - wanted.keys())]
+    changed = _differing(wanted, given)
+    return faults + [f"differing {port}: found {given[port]}, expected {wanted[port]}" for port in changed]

@@ -7,11 +7,13 @@ from ephs.operad.directory import Directory, Entries, first_clash
 from ephs.operad.errors import PatternError
 from ephs.operad.links import closure
 from ephs.operad.names import ROOT, Path, PathLike, paths_text
-from ephs.operad.pattern import Box, Boxes, Junction, Port
+from ephs.operad.parts import Box, Junction, Port
+from ephs.operad.pattern import Boxes
 from ephs.operad.quantities import PortType
 
 __all__ = [
     "read_boxes",
+    "read_fillings",
     "read_junctions",
     "read_links",
     "require_named_boxes",
@@ -86,6 +88,18 @@ def read_links(links: Iterable[Iterable[PathLike]], junctions: Mapping[Path, Jun
             raise PatternError("link-size", found=" ~ ".join(map(str, group)) or "()")
         groups.append(group)
     return groups
+
+
+def read_fillings(mapping: Mapping[Any, Any] | None, named: Mapping[str, Any]) -> dict[Path, Any]:
+    """What is put into boxes, by path: a mapping, and keywords for names without dots."""
+    pairs = cast("list[tuple[PathLike, object]]", [*(mapping or {}).items(), *named.items()])
+    out: dict[Path, Any] = {}
+    for name, filling in pairs:
+        path = Path.of(name)
+        if path in out:
+            raise PatternError("duplicate", found=str(path), expected="expected each box once", what="fillings")
+        out[path] = filling
+    return out
 
 
 def require_named_boxes(boxes: Mapping[Path, Box]) -> None:

@@ -2,7 +2,7 @@
 
 from ephs.testing.laws import check_operad_laws, law_inputs
 from ephs.testing.mechanisms import mechanisms
-from ephs.testing.patterns import interfaces, nestings, paths, patterns, quantities
+from ephs.testing.patterns import fresh_names, interfaces, nestings, paths, patterns, quantities
 from ephs.testing.primitives import irreversibles, reversibles, storages
 from ephs.testing.systems import (
     check_entropy_production,
@@ -20,6 +20,7 @@ __all__ = [
     "check_operad_laws",
     "check_power_balance",
     "fillings",
+    "fresh_names",
     "interfaces",
     "irreversibles",
     "law_inputs",

@@ -7,7 +7,7 @@ from hypothesis.errors import InvalidArgument
 
 from ephs.operad import Directory, Interface, Junction, Nesting, Path, Pattern, Port, PortType, Quantity, quantity
 
-__all__ = ["fresh_paths", "interfaces", "nestings", "paths", "patterns", "quantities"]
+__all__ = ["fresh_names", "fresh_paths", "interfaces", "nestings", "paths", "patterns", "quantities"]
 
 _KNOWN = (
     quantity.momentum,
@@ -171,7 +171,7 @@ def fresh_paths(draw: st.DrawFn, count: int, taken: Iterable[Path]) -> list[Path
 
 
 @st.composite
-def nestings(draw: st.DrawFn, *, depth: int = 3, interface: Interface | None = None, max_boxes: int = 3) -> Nesting:
+def nestings(draw: st.DrawFn, *, max_depth: int = 3, interface: Interface | None = None, max_boxes: int = 3) -> Nesting:
     """Trees of patterns that fit into each other, of at most so many levels.
 
     Parameters
@@ -181,13 +181,22 @@ def nestings(draw: st.DrawFn, *, depth: int = 3, interface: Interface | None = N
     max_boxes
         How many boxes a pattern may have.
     """
-    _require(depth >= 1, f"depth={depth}: expected at least one level")
+    _require(max_depth >= 1, f"max_depth={max_depth}: expected at least one level")
     pattern = draw(patterns(interface=interface, max_boxes=max_boxes))
     children: dict[Path, Nesting] = {}
     for box, content in pattern.boxes.items():
-        if depth > 1 and draw(st.booleans()):
-            children[box] = draw(nestings(depth=depth - 1, interface=content.interface, max_boxes=max_boxes))
+        if max_depth > 1 and draw(st.booleans()):
+            children[box] = draw(nestings(max_depth=max_depth - 1, interface=content.interface, max_boxes=max_boxes))
     return Nesting(pattern, children)
+
+
+@st.composite
+def fresh_names(draw: st.DrawFn, old: Iterable[Path]) -> dict[Path, Path]:
+    """A renaming of all these paths: some swapped among themselves, the others new; none clash."""
+    paths = list(old)
+    if draw(st.booleans()):
+        return dict(zip(paths, draw(st.permutations(paths)), strict=True))
+    return dict(zip(paths, fresh_paths(draw, len(paths), ()), strict=True))
 
 
 def _require(condition: bool, message: str) -> None:

@@ -73,6 +73,10 @@ def test_the_compiled_step_is_the_plain_step(scene):
 def test_loops_and_all_pairs_and_heat_are_generated():
     quick = settings(max_examples=3000, database=None, suppress_health_check=list(HealthCheck))
     find(mechanisms(), lambda s: len(s.bodies) == 3 and "bar0" in s.bodies, settings=quick)
+    mixed = find(
+        mechanisms(), lambda s: "bar0" in s.bodies and len({j.kind for j in s.joints.values()}) > 1, settings=quick
+    )
+    assert len(mixed.joints) > len(mixed.bodies)  # a closed loop
     find(
         mechanisms(),
         lambda s: bool(s.thermal) and any(np.any(j.friction) for j in s.joints.values()),

@@ -38,7 +38,7 @@ def test_law(law, data):
 
 
 @settings(max_examples=2 * settings().max_examples)
-@given(nestings(depth=3))
+@given(nestings(max_depth=3))
 def test_nestings_flatten_alike_from_above_and_from_below(nesting):
     whole = nesting.flatten()
     assert whole == nesting.bottom_up() == nesting.top_down()

@@ -185,9 +185,9 @@ REFUSED = {
         lambda: Pattern.identity({"q": PortType(Q, True)}).rename(boxes={".": "a"}),
         {"kind": "root-rename", "box": "."},
     ),
-    "identity's junction renamed": (
-        lambda: Pattern.identity({"q": PortType(Q, True)}).rename(junctions={"q": "r"}),
-        {"kind": "root-rename", "found": "q"},
+    "identity renamed differently inside and outside": (
+        lambda: Pattern.identity({"q": PortType(Q, True)}).rename(junctions={"q": "r"}, ports={".": {"q": "s"}}),
+        {"kind": "root-rename", "found": "q, ."},
     ),
     "renaming of nothing": (
         lambda: Pattern({"q": junction(Q)}, {"a": {"q": "q"}}).rename(boxes={"b": "c"}),

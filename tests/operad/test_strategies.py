@@ -28,9 +28,16 @@ def two_ports_on_one_junction(f):
     return any(len({p.junction for p in c.ports.values()}) < len(c.ports) for c in f.boxes.values())
 
 
-def deep_link(f):
-    """A class with members of three levels."""
-    return any(len({len(path) for path in group}) >= 2 and len(group) >= 3 for group in f.links)
+def state_of_three_levels(n):
+    """A class with members of the outermost pattern, of one in a box of it, and of one in a box of that."""
+    for box, child in n.children.items():
+        for inner in child.children:
+            for group in n.flatten().links:
+                deep = {path for path in group if (box / inner).is_prefix_of(path)}
+                middle = {path for path in group if box.is_prefix_of(path)} - deep
+                if deep and middle and group - deep - middle:
+                    return True
+    return False
 
 
 PATTERNS = {
@@ -59,12 +66,24 @@ PATTERNS = {
     "frame": lambda f: any(j.quantity.frame for j in f.junctions.values()),
 }
 NESTINGS = {
-    "three levels": lambda n: n.depth == 3,
+    "four levels": lambda n: n.depth == 4,
     "filled by an identity": lambda n: any(c.pattern.is_identity for c in n.children.values()),
     "identity around another": lambda n: n.pattern.is_identity and n.depth == 2,
     "two boxes filled": lambda n: len(n.children) >= 2,
     "link made by substitution": lambda n: not n.pattern.links and n.bottom_up().links,
-    "states linked across levels": lambda n: n.depth == 3 and deep_link(n.bottom_up()),
+    "a state of three levels": state_of_three_levels,
+    "no outer port at any level": lambda n: (
+        n.depth >= 2 and not n.pattern.interface and any(not c.pattern.interface for c in n.children.values())
+    ),
+    "a pass-through attempt: a child's two outer ports are one state, the boxes' ports two": lambda n: any(
+        len({n.pattern.state_class(n.pattern.boxes[box].ports[p].junction) for p in group}) >= 2
+        for box, child in n.children.items()
+        for group in (
+            [p for p in members if p in child.pattern.interface and not child.pattern.interface[p].power]
+            for members in child.pattern.links
+        )
+        if not child.pattern.is_identity
+    ),
     "a handle is dropped": lambda n: any(
         not child.pattern.is_identity
         and any(not port.power for port in child.pattern.interface.values())
@@ -81,7 +100,7 @@ def test_patterns_reach(what):
 
 @pytest.mark.parametrize("what", NESTINGS)
 def test_nestings_reach(what):
-    assert NESTINGS[what](find(nestings(depth=3), NESTINGS[what], settings=SEARCH))
+    assert NESTINGS[what](find(nestings(max_depth=4, max_boxes=2), NESTINGS[what], settings=SEARCH))
 
 
 @pytest.mark.parametrize(
@@ -108,7 +127,7 @@ def test_patterns_keep_to_their_bounds(data):
     assert all(port.power for port in data.draw(interfaces(state_ports=False)).values())
 
 
-@given(nestings(depth=2, max_boxes=2))
+@given(nestings(max_depth=2, max_boxes=2))
 def test_nestings_fit(nesting):
     assert nesting.depth <= 2
     for box, child in nesting.children.items():
@@ -121,7 +140,7 @@ def test_nestings_fit(nesting):
         lambda: patterns(min_boxes=2, max_boxes=1),
         lambda: patterns(interface=find(interfaces(), len), max_boxes=0),
         lambda: interfaces(min_ports=3, max_ports=2),
-        lambda: nestings(depth=0),
+        lambda: nestings(max_depth=0),
         lambda: paths(min_size=2, max_size=1),
     ],
 )

@@ -36,7 +36,7 @@ def test_flatten_then_fill_is_fill_then_compose(system, seed):
 @given(st.data(), seeds)
 def test_also_where_there_is_no_motion(data, seed):
     """Any filling of any nesting of patterns has a relation, and both routes lead to it."""
-    check_functoriality(data.draw(fillings(data.draw(nestings(depth=3)))), seed=seed)
+    check_functoriality(data.draw(fillings(data.draw(nestings(max_depth=3)))), seed=seed)
 
 
 @patient

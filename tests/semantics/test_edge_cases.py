@@ -1,0 +1,111 @@
+"""The edge cases of interconnection, each with its decision: what is a pattern, what it means, what is refused."""
+
+import numpy as np
+import pytest
+
+from ephs.operad import Pattern, PatternError
+from ephs.semantics import AssemblyError, library
+from ephs.semantics.pattern_relation import pattern_relation
+
+ALLOWED = {
+    # case: (pattern, remarks, zero flows of ports in the layout of the pattern's relation)
+    "outer power port over state ports only": ("q: displacement, exposed; a(~q); b(~q)", ["open-circuit"], [0]),
+    "outer state port over power ports": ("q: displacement, exposed as state; a(q); b(q)", [], []),
+    "outer ports of two boxes meet one junction": ("q: displacement; a(q); b(q)", [], []),
+    "two ports of one box on one junction": ("q: displacement; a(x=q, y=q)", [], []),
+    "one inner power port, not exposed": ("q: displacement; a(q)", [], [0]),
+    "one inner state port, not exposed": ("q: displacement; a(~q)", [], []),
+    "a box without ports": ("a()", [], []),
+    "no box and no junction": ("", [], []),
+    "a state that is read and stored nowhere": ("q: displacement; a(~q)", [], []),
+    "two power balances of one state": (
+        "q: displacement; r: displacement; a(q); b(r); q ~ r",
+        ["linked-balances"],
+        [0],
+    ),
+}
+
+
+@pytest.mark.parametrize("case", ALLOWED)
+def test_what_is_allowed_means_a_dirac_structure(case):
+    text, remarks, still = ALLOWED[case]
+    f = Pattern.from_text(text)
+    assert [remark.kind for remark in f.lint()] == remarks
+    relation = pattern_relation(f)
+    assert 2 * relation.dimension == relation.ambient
+    for row in still:
+        assert np.abs(relation.basis[row]).max() <= 1e-15
+
+
+REFUSED = {
+    "pass-through: two outer ports on one junction": (
+        lambda: Pattern.from_text("l: displacement, exposed; r: displacement, exposed; a(l)"),
+        ["junction r", "fork outside: expose it once"],
+    ),
+    "exposed without inner port": (
+        lambda: Pattern.from_text("q: displacement, exposed; a()"),
+        ["junction q", "no inner port"],
+    ),
+    "without any port": (lambda: Pattern.from_text("q: displacement; a()"), ["junction q", "no inner port"]),
+    "junctions but no box": (lambda: Pattern.from_text("q: displacement"), ["junction q", "no inner port"]),
+    "a name twice among junctions": (
+        lambda: Pattern.from_text("q: displacement; q: momentum; a(q)"),
+        ["junctions", "q is given twice"],
+    ),
+    "a box below a junction": (
+        lambda: Pattern.from_text("q: displacement; q.a(x=q)"),
+        ["box q.a and junction q clash", "substitution could name two junctions alike"],
+    ),
+    "a junction below a box": (
+        lambda: Pattern.from_text("a.q: displacement; a(x=a.q)"),
+        ["box a and junction a.q clash"],
+    ),
+    "a filling whose ports have other names": (
+        lambda: Pattern.from_text("q: displacement; a(q)").substitute(
+            a=Pattern.from_text("r: displacement, exposed; b(r)")
+        ),
+        ["box a", "missing q: displacement", "extra r: displacement", "rename ports with Pattern.rename"],
+    ),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_is_refused_is_named(case):
+    make, words = REFUSED[case]
+    with pytest.raises(PatternError) as caught:
+        make()
+    assert all(word in str(caught.value) for word in words), caught.value
+
+
+NOT_ASSEMBLED = {
+    "two storages on one junction": (
+        "q: displacement; a(q); b(q)",
+        {"a": library.spring(k=1.0), "b": library.spring(k=2.0)},
+        ["a.q and b.q", "constraint component"],
+    ),
+    "a state that is read and stored nowhere": (
+        "b: flux_linkage; p: angular_momentum; bs: flux_linkage; mkc(b, p, ~bs); coil(b); rotor(p)",
+        {"mkc": library.mkc(), "coil": library.inductor(l=1.0), "rotor": library.rotor(j=1.0)},
+        ["mkc", "bs"],
+    ),
+}
+
+
+@pytest.mark.parametrize("case", NOT_ASSEMBLED)
+def test_what_means_something_but_cannot_be_simulated_is_refused_by_the_assembler(case):
+    text, fillings, words = NOT_ASSEMBLED[case]
+    system = Pattern.from_text(text)(fillings)
+    with pytest.raises(AssemblyError) as caught:
+        system.descriptor()
+    assert all(word in str(caught.value) for word in words), caught.value
+    state = {str(path): 1.0 for path in system.states}
+    assert system.relation(route="nested").at(state).subspace.dimension >= 0
+
+
+def test_an_effort_that_nobody_provides_is_an_unknown():
+    f = Pattern.from_text("p: momentum; j: momentum; s: entropy; m(p); link(p, p2=j); drag(p=j, s); env(s)")
+    system = f(
+        m=library.point_mass(m=2.0), link=library.rigid_link(), drag=library.friction(d=0.5), env=library.environment()
+    )
+    both = [system.relation(route=route).at({"m.p": 1.0}) for route in ("flat", "nested")]
+    assert both[0].distance(both[1]) <= 1e-13 and len(both[0].rates) == 2
