@@ -211,6 +211,7 @@ def draw(
     *,
     output: Annotated[Path, Parameter(name=["--output", "-o"])],
     flat: bool = False,
+    opened: bool = False,
     base: Base = "fixed",
     adjust: bool = False,
 ) -> int:
@@ -224,6 +225,8 @@ def draw(
         The picture to write; its ending chooses SVG, TikZ or PNG: .svg, .tex, .png.
     flat
         Draw the flattened pattern instead of the outermost level.
+    opened
+        Draw what is inside the composites of the outermost level.
     base
         How the root of an imported model meets the ground.
     adjust
@@ -239,8 +242,10 @@ def draw(
 
         system = model.system() if isinstance(model, ephs.Scene) else model
         output.parent.mkdir(parents=True, exist_ok=True)
-        draw_pattern(system.flatten() if flat else system).save(output)
+        drawing = draw_pattern(system.flatten() if flat else system, output, opened=opened)
     print(output)
+    if drawing.faults:
+        print(f"{len(drawing.faults)} names or wires lie on something else, as there is no room")
     return 0
 
 

@@ -95,6 +95,15 @@ class System:
             return self
         return System(self.nesting.flatten(), Directory.trusted(dict(self.leaves())))
 
+    def flatten_once(self) -> "System":
+        """The same system with its subsystems opened by one level."""
+        inner = {box: filling for box, filling in self.fillings.items() if isinstance(filling, System)}
+        fillings: dict[Path, Filling] = {}
+        for box, filling in self.fillings.items():
+            parts = filling.fillings.items() if isinstance(filling, System) else [(ROOT, filling)]
+            fillings |= {box / path: part for path, part in parts}
+        return System(self.pattern.substitute({box: f.pattern for box, f in inner.items()}), Directory(fillings))
+
     @property
     def nesting(self) -> Nesting:
         """The patterns of all levels, without what fills the innermost boxes."""

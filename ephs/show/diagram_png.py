@@ -24,6 +24,10 @@ def to_png(placement: Placement, *, dpi: int = 192) -> bytes:
     style = f"round,pad=0,rounding_size={placement.corner}"
     outer = FancyBboxPatch((left, top), across, down, boxstyle=style, fc=PAPER, ec=INK, lw=1.4)
     axes.add_patch(outer)
+    for region in placement.regions:
+        rim = RIMS["composite"]
+        axes.add_patch(Circle(region.at, region.radius, fc=FILLS["composite"] + "59", ec=rim, lw=1.3, zorder=1))
+        _write(axes, region.label, rim, halo=PAPER)
     for wire in placement.wires:
         across_points, down_points = zip(*wire.points, strict=True)
         dashes = "-" if wire.power else (0, (1.2, 2.2)) if wire.role == "link" else (0, (3.3, 2.5))

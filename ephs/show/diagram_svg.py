@@ -29,6 +29,14 @@ def to_svg(placement: Placement) -> str:
             class_="outer",
         )
     )
+    for region in placement.regions:
+        group = svg.Group(class_="box composite opened")
+        group.append_title(f"{region.path} (composite)")
+        fill, rim = FILLS["composite"], RIMS["composite"]
+        style = {"fill": fill, "fill_opacity": 0.35, "stroke": rim, "stroke_width": 1.3}
+        group.append(svg.Circle(*_rounded(region.at), round(region.radius, 2), **style))
+        group.append(_text(region.label, rim))
+        drawing.append(group)
     for wire in placement.wires:
         line = svg.Path(
             d=_path(wire.points),

@@ -15,6 +15,11 @@ _ESCAPES = {
     "~": r"\textasciitilde{}",
     "^": r"\textasciicircum{}",
 }
+_GREEK_NAMES = (
+    "alpha beta gamma delta varepsilon zeta eta theta iota kappa lambda mu nu xi pi rho sigma tau upsilon varphi chi"
+    " psi omega Gamma Delta Theta Lambda Xi Pi Sigma Upsilon Phi Psi Omega"
+)
+_GREEK = dict(zip("αβγδεζηθικλμνξπρστυφχψωΓΔΘΛΞΠΣΥΦΨΩ", _GREEK_NAMES.split(), strict=True))
 
 
 def to_tikz(placement: Placement) -> str:
@@ -29,6 +34,8 @@ def to_tikz(placement: Placement) -> str:
         r"\documentclass{article}",
         r"\usepackage[T1]{fontenc}",
         r"\usepackage{tikz}",
+        r"\usepackage{iftex}",
+        r"\newcommand\ephschar[1]{\ifPDFTeX[U+#1]\else\char\"#1\relax\fi}% letters that pdfLaTeX's fonts lack",
         rf"\usepackage[paperwidth={width:.2f}bp,paperheight={height:.2f}bp,margin=0pt]{{geometry}}",
         r"\pagestyle{empty}\parindent=0pt\topskip=0pt",
     ]
@@ -41,6 +48,10 @@ def to_tikz(placement: Placement) -> str:
         rf"\draw[line width=1.4bp,rounded corners={placement.corner:.0f}bp] "
         rf"({left:.2f},{top:.2f}) rectangle ({right:.2f},{bottom:.2f});",
     ]
+    for region in placement.regions:
+        circle = f"{_at(region.at)} circle[radius={region.radius:.2f}bp]; % {_comment(region.path)}"
+        body.append(rf"\filldraw[fill=ephscomposite!35,draw=ephscompositerim] {circle}")
+        body.append(_node(region.label, "text=ephscompositerim,"))
     for wire in placement.wires:
         dash = "" if wire.power else "[dotted]" if wire.role == "link" else "[dashed]"
         body.append(rf"\draw{dash} {' -- '.join(_at(point) for point in wire.points)}; % {_comment(wire.title)}")
@@ -70,8 +81,14 @@ def _node(text: Text, style: str) -> str:
 
 
 def _escape(words: str) -> str:
-    return "".join(_ESCAPES.get(letter, letter) for letter in words)
+    return "".join(_letter(letter) for letter in words)
+
+
+def _letter(letter: str) -> str:
+    if letter in _GREEK:
+        return rf"\ensuremath{{\{_GREEK[letter]}}}"
+    return _ESCAPES.get(letter, letter if ord(letter) < 0x100 else rf"\ephschar{{{ord(letter):04X}}}")
 
 
 def _comment(words: str) -> str:
-    return words.replace("\n", " ")
+    return "".join(letter if ord(letter) < 0x100 else "?" for letter in words.replace("\n", " "))

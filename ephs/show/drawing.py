@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, final
 
-from ephs.operad import Pattern
+from ephs.operad import Nesting, Pattern
 from ephs.show.diagram_png import to_png
 from ephs.show.diagram_svg import to_svg
 from ephs.show.diagram_tikz import to_tikz
 from ephs.show.errors import ShowError
-from ephs.show.geometry import Placement
+from ephs.show.geometry import Placement, faults
 from ephs.show.layout import place
 
 if TYPE_CHECKING:
@@ -38,6 +38,11 @@ class Drawing:
     def png(self) -> bytes:
         """The picture as the bytes of a PNG file."""
         return to_png(self.placement)
+
+    @property
+    def faults(self) -> list[str]:
+        """What is wrong with the picture, in words; empty for author-placed and for small patterns."""
+        return faults(self.placement)
 
     def save(self, path: str | FilePath) -> FilePath:
         """Write the picture to a file: .svg, .tex or .png, by its name.
@@ -68,11 +73,12 @@ class Drawing:
 
 
 def draw(
-    source: "Pattern | System",
+    source: "Pattern | Nesting | System",
     path: str | FilePath | None = None,
     *,
     kinds: Mapping[str, str] | None = None,
     positions: Mapping[str, tuple[float, float]] | None = None,
+    opened: bool = False,
 ) -> Drawing:
     """Draw a pattern or a system as a syntactic picture.
 
@@ -83,21 +89,23 @@ def draw(
 
     Parameters
     ----------
-    source : Pattern or System
-        What to draw, one level of it; flatten it first to see all.
+    source : Pattern, Nesting or System
+        What to draw, the outermost level of it; flatten it first to see all.
     path : str or Path, optional
         Where to save the picture: .svg, .tex or .png.
     kinds : mapping of str to str, optional
         Kind of each box, by path, where the system does not say it.
     positions : mapping of str to (float, float), optional
         Points for all boxes, and junctions if wanted, in steps of a grid, y upwards. By default they are found.
+    opened : bool
+        Whether composites are opened by one level.
 
     Raises
     ------
     ShowError
         For an unknown kind, positions that do not fit the pattern, or a file name that does not say its format.
     """
-    drawing = Drawing(place(source, kinds=kinds, positions=positions))
+    drawing = Drawing(place(source, kinds=kinds, positions=positions, opened=opened))
     if path is not None:
         drawing.save(path)
     return drawing

@@ -72,6 +72,18 @@ class PlacedJunction:
 
 @final
 @dataclass(frozen=True, slots=True)
+class PlacedRegion:
+    """A composite that is opened: a disc round its nodes, `members`, with its name inside at the top."""
+
+    path: str
+    at: Point
+    radius: float
+    label: Text
+    members: frozenset[str]
+
+
+@final
+@dataclass(frozen=True, slots=True)
 class Wire:
     """A line of the picture, from one node to another or to the outer rectangle.
 
@@ -107,6 +119,7 @@ class Placement:
     wires: tuple[Wire, ...]
     rectangle: tuple[float, float, float, float]
     corner: float
+    regions: tuple[PlacedRegion, ...] = ()
 
     @property
     def size(self) -> tuple[float, float]:
@@ -137,11 +150,36 @@ def gap(point: Point, line: tuple[Point, ...]) -> float:
 def trespasses(placement: Placement) -> list[tuple[str, str]]:
     """Every (wire, node) such that the wire runs through a box or junction that it is not attached to."""
     nodes = placement.nodes()
-    return [
+    through = [
         (wire.title, path)
         for wire in placement.wires
         for path, (centre, radius) in nodes.items()
         if path not in wire.ends and gap(centre, wire.points) < radius
+    ]
+    return through + [
+        (wire.title, region.path)
+        for wire in placement.wires
+        for region in placement.regions
+        if region.members.isdisjoint(wire.ends) and gap(region.at, wire.points) < region.radius
+    ]
+
+
+def overlaps(placement: Placement) -> list[tuple[str, str]]:
+    """Every two boxes or junctions that overlap, and every node in an opened composite that it does not belong to."""
+    nodes = placement.nodes()
+    found = [
+        (first, second)
+        for (first, (at, r)), (second, (there, s)) in itertools.combinations(nodes.items(), 2)
+        if math.dist(at, there) < r + s
+    ]
+    for one, two in itertools.combinations(placement.regions, 2):
+        if math.dist(one.at, two.at) < one.radius + two.radius:
+            found.append((one.path, two.path))
+    return found + [
+        (path, region.path)
+        for region in placement.regions
+        for path, (at, r) in nodes.items()
+        if path not in region.members and math.dist(at, region.at) < r + region.radius
     ]
 
 
@@ -161,7 +199,7 @@ def inside(bounds: tuple[float, float, float, float], starts: Points, ends: Poin
 
 def blots(placement: Placement) -> list[str]:
     """Every name beside a junction or wire that lies on a wire, a box, a junction or another such name."""
-    texts = [junction.label for junction in placement.junctions]
+    texts = [region.label for region in placement.regions] + [junction.label for junction in placement.junctions]
     texts += [wire.label for wire in placement.wires if wire.label is not None]
     pieces = [piece for wire in placement.wires for piece in itertools.pairwise(wire.points)]
     lines = np.array(pieces, dtype=float).reshape(-1, 2, 2)
@@ -180,6 +218,13 @@ def blots(placement: Placement) -> list[str]:
         if on_wire or on_node or on_text:
             found.append(text.base + text.sub)
     return found
+
+
+def faults(placement: Placement) -> list[str]:
+    """What is wrong with the picture, in words: wires through foreign nodes, names on something."""
+    through = [f"{wire} runs through {node}" for wire, node in trespasses(placement)]
+    through += [f"{one} overlaps {other}" for one, other in overlaps(placement)]
+    return through + [f"the name {name} lies on a wire, a node or another name" for name in blots(placement)]
 
 
 def crossings(placement: Placement) -> int:

@@ -1,11 +1,11 @@
 """What a picture of a pattern is about: nodes with sizes and edges, before anything has a place."""
 
 import itertools
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, final
 
-from ephs.operad import Pattern
+from ephs.operad import Nesting, Pattern
 from ephs.show.errors import ShowError
 from ephs.show.geometry import KINDS
 
@@ -87,13 +87,23 @@ def short_names(paths: list[str]) -> dict[str, str]:
     return {path: next((s for s in each if counts[s] == 1), path) for path, each in suffixes.items()}
 
 
+def _names(paths: list[str], inside: tuple[str, ...]) -> dict[str, str]:
+    within = {path: path[len(top) + 1 :] for path in paths for top in inside if path.startswith(f"{top}.")}
+    others = short_names([path for path in paths if path not in within])
+    return {path: within.get(path) or others[path] for path in paths}
+
+
 def _suffixes(path: str) -> list[str]:
     parts = path.split(".") if path != "." else [path]
     return [".".join(parts[-count:]) for count in range(1, len(parts) + 1)]
 
 
-def read(source: "Pattern | System", kinds: Mapping[str, str] | None = None) -> Graph:
+def read(
+    source: "Pattern | Nesting | System", kinds: Mapping[str, str] | None = None, inside: Iterable[str] = ()
+) -> Graph:
     """Read a pattern, or a system with the kinds of its fillings, as a graph.
+
+    What lies below one of the paths `inside` is named relative to it.
 
     Raises
     ------
@@ -102,13 +112,15 @@ def read(source: "Pattern | System", kinds: Mapping[str, str] | None = None) -> 
     """
     if isinstance(source, Pattern):
         pattern, found = source, {}
+    elif isinstance(source, Nesting):
+        pattern, found = source.pattern, {str(box): "composite" for box in source.children}
     else:
         pattern = source.pattern
         found = {str(path): str(filling.kind) for path, filling in source.fillings.items()}
     found |= {str(path): str(kind) for path, kind in (kinds or {}).items()}
 
-    boxes = short_names([str(path) for path in pattern.boxes])
-    dots = short_names([str(path) for path in pattern.junctions])
+    boxes = _names([str(path) for path in pattern.boxes], tuple(inside))
+    dots = _names([str(path) for path in pattern.junctions], tuple(inside))
     edges: list[Edge] = []
     for box, content in pattern.boxes.items():
         for name, port in content.ports.items():

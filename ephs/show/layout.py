@@ -8,23 +8,26 @@ picture.
 import itertools
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 
-from ephs.operad import Pattern
+from ephs.operad import Nesting, Pattern
+from ephs.show import opening
 from ephs.show import positions as places
 from ephs.show.geometry import (
     PlacedBox,
     PlacedJunction,
+    PlacedRegion,
     Placement,
     Point,
     Points,
     Text,
     Wire,
     crossings,
+    faults,
     hatching,
-    trespasses,
 )
 from ephs.show.graph import DOT, TYPE, Disc, Edge, Graph, read, width_of
 from ephs.show.lettering import Sheet, around, beside
@@ -35,14 +38,17 @@ if TYPE_CHECKING:
 
 MARGIN = 10.0
 PORT_TYPE = 8.0
+ROOMY = 60
+"""Nodes up to which a picture is drawn larger if names lack room."""
 Rectangle = tuple[float, float, float, float]
 
 
 def place(
-    source: "Pattern | System",
+    source: "Pattern | Nesting | System",
     *,
     kinds: Mapping[str, str] | None = None,
     positions: Mapping[str, tuple[float, float]] | None = None,
+    opened: bool = False,
 ) -> Placement:
     """Place a pattern or system in the plane.
 
@@ -54,38 +60,68 @@ def place(
         Kind of each box, by path: storage, environment, reversible, irreversible, composite or unknown.
     positions : mapping of str to (float, float), optional
         Points for the boxes, and for junctions if wanted, in steps of a grid, y upwards. By default they are found.
+    opened : bool
+        Whether composites show what is inside; points are then those of the inner boxes.
 
     Raises
     ------
     ShowError
         For an unknown kind, or positions that do not fit the pattern.
     """
-    graph = read(source, kinds)
+    if opened and isinstance(source, Nesting) and source.pattern.is_identity:
+        source = source.flatten()
+    parts = opening.opened(source, kinds) if opened and not isinstance(source, Pattern) else None
+    graph = read(source, kinds) if parts is None else parts.graph
+    page = _Page(graph, {} if parts is None else parts.members)
     if positions is not None:
-        return _picture(graph, places.given(graph, positions))
-    best: Placement | None = None
-    least = math.inf
-    for points in places.proposals(graph):
-        now = _picture(graph, points)
+        return _roomy(page, places.given(graph, positions))
+    best: tuple[float, Points, Placement] | None = None
+    for points in places.proposals(graph) if parts is None else parts.proposals():
+        now = _picture(page, points)
         width, height = now.size
         bends = sum(len(wire.points) > 2 for wire in now.wires)
-        cost = 1000.0 * len(trespasses(now)) + 12.0 * crossings(now) + 4.0 * bends + (width + height) / 60.0
-        if cost < least - 1e-6:
-            best, least = now, cost
-    return best if best is not None else _picture(graph, np.zeros((0, 2)))
+        cost = 300.0 * len(faults(now)) + 12.0 * crossings(now) + 4.0 * bends + (width + height) / 60.0
+        if best is None or cost < best[0] - 1e-6:
+            best = cost, points, now
+    if best is None:
+        return _picture(page, np.zeros((0, 2)))
+    return _roomy(page, best[1], best[2])
 
 
-def _picture(graph: Graph, points: Points) -> Placement:
-    radii = graph.radii()
-    paths = list(radii)
-    at = {path: (float(x), float(y)) for path, (x, y) in zip(paths, points, strict=True)}
-    wires = [_wire(edge, line, None) for edge, line in _inner_lines(graph, at, radii)]
+@final
+@dataclass(frozen=True, slots=True)
+class _Page:
+    """What is to be drawn: the graph, and which of its nodes are in which opened composite."""
+
+    graph: Graph
+    members: Mapping[str, frozenset[str]]
+
+
+def _roomy(page: _Page, points: Points, first: Placement | None = None) -> Placement:
+    """The picture, with its nodes drawn apart until every name and wire has room; the best one if none has."""
+    best = _picture(page, points) if first is None else first
+    count = len(faults(best))
+    for factor in (1.2, 1.5, 1.9, 2.4, 3.0, 4.0):
+        if count == 0 or len(points) > ROOMY:
+            break
+        now = _picture(page, factor * points, factor)
+        if len(faults(now)) < count:
+            best, count = now, len(faults(now))
+    return best
+
+
+def _picture(page: _Page, points: Points, room: float = 1.0) -> Placement:
+    graph, radii = page.graph, page.graph.radii()
+    at = {path: (float(x), float(y)) for path, (x, y) in zip(radii, points, strict=True)}
+    regions = opening.regions(page.members, at, radii)
+    field = _Field(at, radii, regions)
+    wires = [_wire(edge, line, None) for edge, line in _inner_lines(graph, field, 16.0 * room)]
     # Once without the outer ports, to learn how large the rectangle must be, and once with them.
-    sheet = _sheet(at, radii, wires, None)
+    sheet = _sheet(field, wires, None)
     labels = [_label(path, name, at, sheet).bounds for path, name in graph.dots]
-    rectangle = _bounds(at, radii, wires, labels)
-    wires += _outer_wires(graph, at, radii, wires, rectangle)
-    sheet = _sheet(at, radii, wires, rectangle)
+    rectangle = _bounds(field, wires, labels)
+    wires += _outer_wires(graph, field, wires, rectangle)
+    sheet = _sheet(field, wires, rectangle)
     named = [(path, _label(path, name, at, sheet)) for path, name in graph.dots]
     ports = {edge.title: edge.port for edge in graph.edges}
     wires = [_with_label(wire, ports[wire.title], sheet) for wire in wires]
@@ -96,37 +132,45 @@ def _picture(graph: Graph, points: Points) -> Placement:
         tuple(_moved_wire(wire, shift) for wire in wires),
         (MARGIN, MARGIN, rectangle[2] - rectangle[0], rectangle[3] - rectangle[1]),
         14.0,
+        tuple(replace(r, at=_moved(r.at, shift), label=_shifted(r.label, shift)) for r in regions),
     )
 
 
-def _obstacles(at: Mapping[str, Point], radii: Mapping[str, float], ends: tuple[str, ...]) -> Points:
-    rows = [(*at[path], radii[path]) for path in at if path not in ends]
-    return np.array(rows, dtype=float).reshape(-1, 3)
+@final
+@dataclass(frozen=True, slots=True)
+class _Field:
+    """Where nodes and opened composites are, before the picture has its rectangle."""
+
+    at: Mapping[str, Point]
+    radii: Mapping[str, float]
+    regions: tuple[PlacedRegion, ...]
+
+    def obstacles(self, ends: tuple[str, ...]) -> Points:
+        """Rows (x, y, radius) of what a wire with these ends has to keep clear of."""
+        rows = [(*point, self.radii[path]) for path, point in self.at.items() if path not in ends]
+        rows += [(*region.at, region.radius) for region in self.regions if region.members.isdisjoint(ends)]
+        return np.array(rows, dtype=float).reshape(-1, 3)
 
 
-def _inner_lines(
-    graph: Graph, at: Mapping[str, Point], radii: Mapping[str, float]
-) -> list[tuple[Edge, tuple[Point, ...]]]:
+def _inner_lines(graph: Graph, field: _Field, apart: float) -> list[tuple[Edge, tuple[Point, ...]]]:
     groups: dict[tuple[str, ...], list[Edge]] = {}
     for edge in graph.edges:
         if edge.role != "outer":
             groups.setdefault(edge.ends, []).append(edge)
     lines: list[tuple[Edge, tuple[Point, ...]]] = []
     for ends, edges in groups.items():
-        start, end = at[ends[0]], at[ends[1]]
-        obstacles = _obstacles(at, radii, ends)
+        start, end = field.at[ends[0]], field.at[ends[1]]
+        obstacles = field.obstacles(ends)
         for index, edge in enumerate(edges):
-            amount = 16.0 * (index - (len(edges) - 1) / 2)
+            amount = apart * (index - (len(edges) - 1) / 2)
             line = bulged(start, end, amount) if amount else (start, end)
             clear = all(straight(a, b, obstacles) for a, b in itertools.pairwise(line))
             line = line if clear else route(start, end, obstacles)
-            lines.append((edge, trimmed(line, radii[ends[0]])))
+            lines.append((edge, trimmed(line, field.radii[ends[0]])))
     return lines
 
 
-def _outer_wires(
-    graph: Graph, at: Mapping[str, Point], radii: Mapping[str, float], wires: list[Wire], rectangle: Rectangle
-) -> list[Wire]:
+def _outer_wires(graph: Graph, field: _Field, wires: list[Wire], rectangle: Rectangle) -> list[Wire]:
     found: list[Wire] = []
     left, top, right, bottom = rectangle
     taken: list[Point] = []
@@ -134,8 +178,8 @@ def _outer_wires(
         if edge.role != "outer":
             continue
         (path,) = edge.ends
-        x, y = at[path]
-        obstacles = _obstacles(at, radii, edge.ends)
+        x, y = field.at[path]
+        obstacles = field.obstacles(edge.ends)
         inset = 16.0
         ends = [(left, y), (right, y), (x, top), (x, bottom)]
         ends += [(side, v) for side in (left, right) for v in np.linspace(top + inset, bottom - inset, 9).tolist()]
@@ -167,9 +211,11 @@ def _meet(first: Wire, second: Wire) -> int:
     return crossings(Placement((), (), (first, second), (0.0, 0.0, 0.0, 0.0), 0.0))
 
 
-def _sheet(at: Mapping[str, Point], radii: Mapping[str, float], wires: list[Wire], bounds: Rectangle | None) -> Sheet:
+def _sheet(field: _Field, wires: list[Wire], bounds: Rectangle | None) -> Sheet:
     pieces = [piece for wire in wires for piece in zip(wire.points, wire.points[1:], strict=False)]
-    return Sheet(_obstacles(at, radii, ()), np.array(pieces, dtype=float).reshape(-1, 2, 2), bounds)
+    nodes = np.array([(*field.at[path], field.radii[path]) for path in field.at], dtype=float).reshape(-1, 3)
+    titles = [region.label.bounds for region in field.regions]
+    return Sheet(nodes, np.array(pieces, dtype=float).reshape(-1, 2, 2), bounds, titles)
 
 
 def _label(path: str, name: tuple[str, str], at: Mapping[str, Point], sheet: Sheet) -> Text:
@@ -177,11 +223,11 @@ def _label(path: str, name: tuple[str, str], at: Mapping[str, Point], sheet: She
     return sheet.write(name, size, around(at[path], DOT, name, size))
 
 
-def _bounds(
-    at: Mapping[str, Point], radii: Mapping[str, float], wires: list[Wire], labels: list[Rectangle]
-) -> Rectangle:
+def _bounds(field: _Field, wires: list[Wire], labels: list[Rectangle]) -> Rectangle:
     air = 18.0
-    lefts = [(x - radii[path], y - radii[path], x + radii[path], y + radii[path]) for path, (x, y) in at.items()]
+    discs = [(point, field.radii[path]) for path, point in field.at.items()]
+    discs += [(region.at, region.radius) for region in field.regions]
+    lefts = [(x - radius, y - radius, x + radius, y + radius) for (x, y), radius in discs]
     dots = [(x, y, x, y) for wire in wires for x, y in wire.points]
     every = np.array([*lefts, *dots, *labels, *([] if lefts else [(0.0, 0.0, 60.0, 30.0)])])
     return (

@@ -82,10 +82,11 @@ def around(centre: Point, radius: float, name: tuple[str, str], size: float) -> 
 
 
 def beside(line: tuple[Point, ...], name: tuple[str, str], size: float) -> list[Place]:
-    """Places at either side of a wire, near its first end."""
+    """Places at either side of a wire, near its first end before farther on."""
     half = width_of(*name, size) / 2
     places: list[Place] = []
-    for along in (5.0, 7.0, 9.0, 11.5, 14.0, 17.0, 20.0, 24.0):
+    length = sum(math.dist(a, b) for a, b in itertools.pairwise(line))
+    for along in (5.0, 7.0, 9.0, 11.5, 14.0, 17.0, 20.0, 24.0, *(part * length for part in (0.4, 0.5, 0.6, 0.7, 0.8))):
         (x, y), (dx, dy) = _at(line, along)
         for side in (1.0, -1.0):
             nx, ny = -dy * side, dx * side

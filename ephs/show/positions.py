@@ -6,6 +6,7 @@ from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ephs.show.errors import ShowError
 from ephs.show.geometry import Points, distances
@@ -28,6 +29,7 @@ def given(graph: Graph, positions: Mapping[str, tuple[float, float]]) -> Points:
         If a name is unknown, a box has no point, or two nodes share one.
     """
     known = {str(name): (float(x), float(y)) for name, (x, y) in positions.items()}
+    placed = set(known)
     paths = list(graph.radii())
     for name in known:
         if name not in paths:
@@ -38,16 +40,18 @@ def given(graph: Graph, positions: Mapping[str, tuple[float, float]]) -> Points:
     for path, _ in graph.dots:
         if path not in known:
             around = [known[e.ends[0]] for e in graph.edges if e.role == "port" and e.ends[1] == path]
+            around = around or [known[disc.path] for disc in graph.discs]
             known[path] = (sum(x for x, _ in around) / len(around), sum(y for _, y in around) / len(around))
-            if len(around) == 1:
-                # A junction of one box only would sit on it.
-                known[path] = (known[path][0] + 0.8, known[path][1])
+            # A junction of one box would sit on it, and one of several could sit on another node.
+            while any(math.dist(known[path], point) < 0.3 for other, point in known.items() if other != path):
+                known[path] = (known[path][0] + 0.8, known[path][1] + 0.1)
     for index, first in enumerate(paths):
         for second in paths[index + 1 :]:
             if math.dist(known[first], known[second]) < 1e-9:
                 raise ShowError("coincide", path=first, found=second)
     points = np.array([(GRID * known[p][0], -GRID * known[p][1]) for p in paths], dtype=float).reshape(-1, 2)
-    return _spread(graph, points, wires=False)
+    free = np.array([path not in placed for path in paths], dtype=bool)
+    return _spread(graph, points, wires=True, free=free) if free.any() else points
 
 
 def proposals(graph: Graph) -> Iterator[Points]:
@@ -72,7 +76,16 @@ def _neato(graph: Graph, start: int) -> Points:
     radii = graph.radii()
     names = {path: f"n{index}" for index, path in enumerate(radii)}
     names |= {end: f"o{index}" for index, (_, end) in enumerate(_edges(graph)) if end.startswith(_OUTER)}
-    net = pygraphviz.AGraph(strict=True, directed=False, mode="KK", overlap="false", start=str(start), sep="+8")
+    net = pygraphviz.AGraph(
+        strict=True,
+        directed=False,
+        mode="KK",
+        overlap="false",
+        start=str(start),
+        sep="+8",
+        epsilon="0.02",
+        maxiter="20000",
+    )
     for path, name in names.items():
         side = 2 * radii.get(path, 2.0) / 72
         net.add_node(name, shape="circle", fixedsize="true", label="", width=side, height=side)
@@ -127,8 +140,8 @@ def _upright(points: Points) -> Points:
     return turned * np.where(turned[0] > 1e-6, -1.0, 1.0)
 
 
-def _spread(graph: Graph, points: Points, *, wires: bool) -> Points:
-    """Push apart nodes that overlap and, if `wires`, nodes that lie on a foreign wire."""
+def _spread(graph: Graph, points: Points, *, wires: bool, free: NDArray[np.bool_] | None = None) -> Points:
+    """Push apart nodes that overlap and, if `wires`, nodes that lie on a foreign wire; all, or those that are free."""
     paths = list(graph.radii())
     radii = np.array([graph.radii()[path] for path in paths])
     index = {path: i for i, path in enumerate(paths)}
@@ -145,6 +158,8 @@ def _spread(graph: Graph, points: Points, *, wires: bool) -> Points:
         moved = push.sum(axis=1)
         if wires and len(ends):
             moved += _off_wires(places, radii, ends)
+        if free is not None:
+            moved[~free] = 0.0
         if np.abs(moved).max(initial=0.0) < 0.05:
             break
         places += 0.7 * moved

@@ -3,18 +3,24 @@
 import math
 import re
 import xml.etree.ElementTree as Xml
+from dataclasses import replace
 from itertools import combinations
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from ephs.operad import Pattern, junction, quantity
-from ephs.show import ShowError, draw, place
-from ephs.show.geometry import Placement, Wire, crossings, gap, trespasses
+from ephs.show import Drawing, ShowError, draw, place
+from ephs.show.geometry import Placement, Wire, crossings, faults, gap, overlaps, trespasses
 from ephs.show.graph import short_names, subscripted
 from ephs.show.palette import FILLS
 from ephs.show.positions import _networkx, _spread
+from ephs.testing import nestings, patterns
+from tests.show.baselines import FOLDER, drawings
 from tests.show.pictures_of_patterns import KINDS, PICTURES, flat, joint, kinds_of
 
+BASELINES = drawings()
 SVG = "{http://www.w3.org/2000/svg}"
 
 
@@ -22,6 +28,57 @@ SVG = "{http://www.w3.org/2000/svg}"
 def drawn(request):
     pattern = PICTURES[request.param]()
     return pattern, draw(pattern, kinds=kinds_of(pattern))
+
+
+calm = settings(suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large], deadline=None)
+SMALL = patterns(max_boxes=12, max_inner_junctions=8)
+
+
+@settings(calm, max_examples=settings().max_examples // 2)
+@given(SMALL)
+def test_nothing_lies_on_anything_else(pattern):
+    """No name on a wire, a box, a junction or another name; no wire through what it is not attached to."""
+    assert faults(place(pattern)) == []
+
+
+@settings(calm, max_examples=settings().max_examples // 2)
+@given(SMALL, st.permutations([(x, y) for x in range(7) for y in range(5)]), st.booleans())
+def test_nothing_lies_on_anything_else_where_the_author_places(pattern, points, junctions):
+    named = [*pattern.boxes, *(pattern.junctions if junctions else ())]
+    at = {str(path): point for path, point in zip(named, points, strict=False)}
+    assert faults(place(pattern, positions=at)) == []
+
+
+@settings(calm, max_examples=settings().max_examples // 5)
+@given(nestings(max_depth=2, max_boxes=3))
+def test_an_opened_composite_encloses_its_own(nesting):
+    picture = place(nesting, opened=True)
+    assert trespasses(picture) == [] and overlaps(picture) == []
+    nodes = picture.nodes()
+    for region in picture.regions:
+        assert region.members == {path for path in nodes if path.startswith(f"{region.path}.")}
+        assert all(math.dist(region.at, nodes[p][0]) + nodes[p][1] < region.radius for p in region.members)
+
+
+def test_a_picture_says_how_much_of_it_is_wrong():
+    good = place(PICTURES["body"]())
+    nodes = good.nodes()
+    across = Wire("port pe.q on junction p", ("pe",), "port", True, (nodes["pe"][0], nodes["p"][0]), None)
+    heap = replace(good, wires=(across,), junctions=(*good.junctions, replace(good.junctions[0], path="again")))
+    found = "; ".join(Drawing(heap).faults)
+    assert "port pe.q on junction p runs through pkc" in found
+    assert "q overlaps again" in found and "the name q lies on" in found
+
+
+@pytest.mark.parametrize("name", sorted(file.stem for file in FOLDER.glob("*.svg")))
+def test_pictures_stay_as_they_were_looked_at(name):
+    drawing = BASELINES[name]
+    assert drawing.faults == []
+    assert drawing.svg == (FOLDER / f"{name}.svg").read_text(encoding="utf-8")
+
+
+def test_every_kept_picture_is_compared():
+    assert set(BASELINES) == {file.stem for file in FOLDER.glob("*.svg")} and len(BASELINES) == 7
 
 
 def test_no_node_touches_another(drawn):
