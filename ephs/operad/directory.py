@@ -1,6 +1,6 @@
 """Directories: prefix-free maps from paths to values, the monad by which names nest."""
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, ItemsView, Iterable, Iterator, Mapping, ValuesView
 from typing import TypeAlias, TypeVar, cast, final
 
 from ephs.operad.errors import PatternError
@@ -84,6 +84,14 @@ class Directory(Mapping[Path, T_co]):
 
     def __iter__(self) -> Iterator[Path]:
         return iter(self._items)
+
+    def items(self) -> ItemsView[Path, T_co]:
+        """Paths and values; a view, as of a dictionary."""
+        return self._items.items()
+
+    def values(self) -> ValuesView[T_co]:
+        """The values; a view, as of a dictionary."""
+        return self._items.values()
 
     def __len__(self) -> int:
         return len(self._items)

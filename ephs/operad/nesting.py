@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import cast, final
 
+from ephs.operad.collector import paused_collector
 from ephs.operad.directory import Directory, Entries
 from ephs.operad.errors import PatternError
 from ephs.operad.names import Path, paths_text
@@ -78,7 +79,8 @@ class Nesting:
         """
         from ephs.operad.substitution import flatten
 
-        return flatten(self)
+        with paused_collector():
+            return flatten(self)
 
     def bottom_up(self) -> Pattern:
         """Flatten the children first, then substitute them; equal to `flatten`."""

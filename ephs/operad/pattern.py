@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, final
 
+from ephs.operad.collector import paused_collector
 from ephs.operad.directory import Directory, Entries
 from ephs.operad.errors import PatternError
 from ephs.operad.names import ROOT, Path, PathLike, paths_text
@@ -60,6 +61,8 @@ class Pattern:
     boxes : Directory[Box]
     links : frozenset of frozensets of Path
         The classes of two junctions or more.
+    interface : Interface
+        The outer ports, each named like the junction that it exposes.
 
     Raises
     ------
@@ -82,6 +85,7 @@ class Pattern:
     junctions: Directory[Junction]
     boxes: Directory[Box]
     links: frozenset[frozenset[Path]]
+    interface: Interface
     _classes: Mapping[Path, frozenset[Path]]
     _normal: NormalForm | None
 
@@ -110,6 +114,9 @@ class Pattern:
             "junctions": junctions,
             "boxes": boxes,
             "links": frozenset(classes.values()),
+            "interface": Directory.trusted(
+                {path: PortType(j.quantity, j.power) for path, j in junctions.items() if j.exposed}
+            ),
             "_classes": classes,
             "_normal": None,
         }
@@ -143,12 +150,6 @@ class Pattern:
         """Whether this is the identity of its interface; only identities have a box at the root path."""
         return ROOT in self.boxes
 
-    @property
-    def interface(self) -> Interface:
-        """The outer ports, each named like the junction that it exposes."""
-        exposed = [(path, j) for path, j in self.junctions.items() if j.exposed]
-        return Directory([(path, PortType(j.quantity, j.power)) for path, j in exposed])
-
     def state_class(self, junction: PathLike) -> frozenset[Path]:
         """The junctions that share their state with this one, itself included.
 
@@ -167,7 +168,8 @@ class Pattern:
         """What decides equality; computed once."""
         found = self._normal
         if found is None:
-            found = normal_form(self)
+            with paused_collector():
+                found = normal_form(self)
             object.__setattr__(self, "_normal", found)
         return found
 
