@@ -21,7 +21,7 @@ from typing import NoReturn, final
 
 from ephs.operad.documents import quantity_from, quantity_record
 from ephs.operad.errors import PatternError
-from ephs.operad.names import ROOT, Path
+from ephs.operad.names import MOST_NAMES, ROOT, Path
 from ephs.operad.parts import Junction, Port
 from ephs.operad.pattern import Pattern
 from ephs.operad.quantities import PortType, Quantity, known_quantity, quantity_word
@@ -166,10 +166,10 @@ class _Reader:
             self.take()
             return ROOT
         names = [self.name("a name")]
-        while self.peek() == ".":
+        while self.peek() == "." and len(names) <= MOST_NAMES:
             self.take()
             names.append(self.name("a name"))
-        return Path(names)
+        return Path(names)  # which refuses too many
 
     def junction(self) -> Junction:
         quantity = self.quantity()
