@@ -92,7 +92,7 @@ def from_dict(document: Mapping[str, object]) -> Pattern:
 def quantity_from(where: str, record: Mapping[str, object]) -> Quantity:
     """Read the quantity in a document's record."""
     given, frame = record["quantity"], record.get("frame")
-    if frame is not None and not isinstance(frame, str):
+    if "frame" in record and not isinstance(frame, str):
         _refuse(f"{where}.frame", frame, "text")
     if isinstance(given, str):
         parameters = {name: _number(f"{where}.{name}", record[name]) for name in ("pitch",) if name in record}

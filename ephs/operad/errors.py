@@ -33,9 +33,9 @@ _TEXTS = {
     "filling-type": "box {box}: the filling is {found}, expected {expected}",
     "interface": "box {box}: the filling's interface does not match: {ports}. Found {found}, expected"
     " {expected}; rename ports with Pattern.rename, nothing is matched by type alone",
-    "not-a-filling": "box {what}: found a {found}, expected a System or a primitive",
+    "not-a-filling": "box {what}: found {found}, expected a System or a primitive",
     "no-filling": "the boxes {expected} want fillings, found none; give each box a system or a primitive",
-    "rename": "cannot rename {what} {found}: there is none of this name; expected one of {expected}",
+    "rename": "there is no {what} named {found} to rename; the names are {expected}",
     "pair": "the kind of relative pose is {found!r}, expected one of {expected}",
     "pair-parameters": "relative pose {what}: found the parameters {found}, expected {expected}",
     "parity": "quantity {what}: the parity is {found!r}, expected +1 (even under time reversal) or -1 (odd)",

@@ -220,7 +220,11 @@ def _renaming(first: Pattern, second: Pattern, found: Mapping[Node, Node]) -> Re
     fresh = _fresh(second)
     # What is left are handles, of which neither number nor names count.
     junctions |= {path: next(fresh) for path in first.junctions if path not in junctions}
-    return Renaming(boxes, junctions, ports)
+    return Renaming(
+        dict(sorted(boxes.items())),
+        dict(sorted(junctions.items())),
+        {box: dict(sorted(names.items())) for box, names in sorted(ports.items())},
+    )
 
 
 def _fresh(pattern: Pattern) -> Iterator[Path]:

@@ -152,39 +152,42 @@ def filling(**junctions) -> Pattern:
     return Pattern(junctions, {"x": {name: name for name in junctions}})
 
 
-@pytest.mark.parametrize(
-    ("fillings", "facts", "words"),
-    [
-        ({"c": filling()}, {"kind": "unknown-box", "box": "c", "expected": "a, b"}, ["c", "a, b"]),
-        ({"a": "no pattern"}, {"kind": "filling-type", "box": "a", "found": "str"}, ["str", "a Pattern"]),
-        (
-            {"a": filling(q=junction(Q, True))},
-            {"kind": "interface", "box": "a", "port": "s"},
-            ["missing s", "entropy"],
-        ),
-        (
-            {"a": filling(q=junction(Q, True), s=junction(quantity.entropy, True), t=junction(Q, True))},
-            {"kind": "interface", "box": "a", "port": "t"},
-            ["extra t", "{q: displacement on real, s: entropy on real}"],
-        ),
-        (
-            {"a": filling(q=junction(quantity.momentum, True), s=junction(quantity.entropy, True))},
-            {"kind": "interface", "box": "a", "port": "q"},
-            ["differing q", "momentum", "displacement"],
-        ),
-        (
-            {"a": filling(q=junction(Q, True, False), s=junction(quantity.entropy, True))},
-            {"kind": "interface", "box": "a", "port": "q"},
-            ["differing q", "~displacement"],
-        ),
-        (
-            {"a": filling(r=junction(Q, True), s=junction(quantity.entropy, True))},
-            {"kind": "interface", "box": "a", "port": "q"},
-            ["missing q", "extra r", "Pattern.rename"],
-        ),
-    ],
-)
-def test_a_filling_that_does_not_fit_is_refused(fillings, facts, words):
+# name: (fillings, facts of the error, words of its message)
+REFUSED = {
+    "unknown box": ({"c": filling()}, {"kind": "unknown-box", "box": "c", "expected": "a, b"}, ["c", "a, b"]),
+    "no pattern": ({"a": "no pattern"}, {"kind": "filling-type", "box": "a", "found": "str"}, ["str", "a Pattern"]),
+    "missing port": (
+        {"a": filling(q=junction(Q, True))},
+        {"kind": "interface", "box": "a", "port": "s"},
+        ["missing s", "entropy"],
+    ),
+    "extra port": (
+        {"a": filling(q=junction(Q, True), s=junction(quantity.entropy, True), t=junction(Q, True))},
+        {"kind": "interface", "box": "a", "port": "t"},
+        ["extra t", "{q: displacement on real, s: entropy on real}"],
+    ),
+    "other quantity": (
+        {"a": filling(q=junction(quantity.momentum, True), s=junction(quantity.entropy, True))},
+        {"kind": "interface", "box": "a", "port": "q"},
+        ["differing q", "momentum", "displacement"],
+    ),
+    "other kind of port": (
+        {"a": filling(q=junction(Q, True, False), s=junction(quantity.entropy, True))},
+        {"kind": "interface", "box": "a", "port": "q"},
+        ["differing q", "~displacement"],
+    ),
+    "other name": (
+        {"a": filling(r=junction(Q, True), s=junction(quantity.entropy, True))},
+        {"kind": "interface", "box": "a", "port": "q"},
+        ["missing q", "extra r", "Pattern.rename"],
+    ),
+}
+MISFITS = {name: fillings for name, (fillings, _, _) in REFUSED.items()}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_a_filling_that_does_not_fit_is_refused(case):
+    fillings, facts, words = REFUSED[case]
     with pytest.raises(PatternError) as caught:
         UPPER.substitute(fillings)
     assert {name: getattr(caught.value, name) for name in facts} == facts
