@@ -10,6 +10,7 @@ from ephs.mechanics.build import drive_ports, initial_state, scene_inputs, scene
 from ephs.mechanics.motion import SceneMotion
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.solve.adaptive import ADAPTIVE, Control, integrate_adaptive
 from ephs.mechanics.solve.errors import OptionError
 from ephs.mechanics.solve.integrate import METHODS, Grid, integrate
 from ephs.mechanics.solve.problem import Problem, Signal
@@ -59,11 +60,14 @@ def simulate(
     initial
         Values of states by path; a system's others at the identity, a scene's as it says.
     method
-        ``"natural"``, which ``"auto"`` chooses too.
+        ``"natural"``, which ``"auto"`` chooses too, or ``"radau"``: order 5, stiff and adaptive, for systems whose
+        states are on vector spaces.
+    rtol, atol
+        Of adaptive methods: each state x is wanted to atol + rtol·|x| a step, atol in the state's own unit.
     step
         The grid is t₀ + k·step, the last step shortened to end on ``until``. Without it (until − t₀)/1000, or
         ``max_step`` where that is smaller. The natural method's steps are constant: rtol, atol and min_step steer
-        adaptive methods only.
+        adaptive methods only, and those only without ``step``.
     save_at
         Times to keep, met by dense output; every step where None.
     form
@@ -101,13 +105,21 @@ def simulate(
         problem = problem_of_scene(model, initial, inputs)
     else:
         problem = problem_of_system(model, initial, inputs, reference)
+    times = _times(save_at, t0, until)
+    if chosen in ADAPTIVE:
+        most = np.inf if max_step is None else float(max_step)
+        least = 0.0 if min_step is None else float(min_step)
+        control = Control(float(rtol), float(atol), None if step is None else float(step), least, most, max_steps)
+        return integrate_adaptive(
+            problem, float(t0), float(until), method=chosen, control=control, save_at=times, progress=progress
+        )
     span = float(until) - float(t0)
     h = float(step) if step is not None else min(span / STEPS, float(max_step) if max_step is not None else np.inf)
     return integrate(
         problem,
         Grid(float(t0), float(until), h),
         method=chosen,
-        save_at=_times(save_at, t0, until),
+        save_at=times,
         max_steps=max_steps,
         progress=progress,
     )
@@ -190,15 +202,16 @@ def signal(value: Any, *, effort: bool) -> Signal:
 
 
 def _takes_state(function: Callable[..., Any]) -> bool:
+    """Whether it wants a second argument: one that must be given, or is called state."""
     import inspect
 
     try:
-        inspect.signature(function).bind(0.0, {})
-    except TypeError:
+        parameters = inspect.signature(function).parameters.values()
+    except (TypeError, ValueError):  # functions in C tell no signature; those of mathematics take one argument
         return False
-    except ValueError:  # some functions in C tell no signature; those that mathematics has take one argument
-        return False
-    return True
+    places = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
+    given = [p for p in parameters if p.kind in places and (p.default is p.empty or p.name == "state")]
+    return len(given) >= 2 and not isinstance(function, np.ufunc)
 
 
 def _part(whole: Signal, where: slice) -> Signal:
@@ -234,8 +247,8 @@ def _scene_inputs(scene: Scene, inputs: Mapping[str, Any]) -> tuple[dict[str, Si
 def _method(name: str) -> str:
     if name == "auto":
         return "natural"
-    if name not in METHODS:
-        raise OptionError("method", name, f"one of auto, {', '.join(METHODS)}")
+    if name not in METHODS and name not in ADAPTIVE:
+        raise OptionError("method", name, f"one of auto, {', '.join([*METHODS, *ADAPTIVE])}")
     return name
 
 

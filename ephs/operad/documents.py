@@ -94,6 +94,7 @@ def quantity_from(where: str, record: Mapping[str, object]) -> Quantity:
     given, frame = record["quantity"], record.get("frame")
     if "frame" in record and not isinstance(frame, str):
         _refuse(f"{where}.frame", frame, "text")
+    frame = frame if isinstance(frame, str) else None
     if isinstance(given, str):
         parameters = {name: _number(f"{where}.{name}", record[name]) for name in ("pitch",) if name in record}
         arguments = (_text(f"{where}.pair", record["pair"]),) if "pair" in record else ()

@@ -146,7 +146,8 @@ def _relation(primitive: Primitive) -> _Evaluate:
 
     def evaluate(scal: Array, point: dict[Any, Array], dims: list[int], views: list[Array]) -> None:
         v, e, lam, flow, condition, jacobian = views
-        h = float(scal[0])
+        # h = 0 asks for the continuous relation: without a step the increments v are zero, of whatever length it is.
+        h = float(scal[0]) or 1.0
         local = Natural(Reference(float(scal[1]), float(scal[2])), h).behaviour(primitive, point)
         if isinstance(local, Storing):
             raise TypeError("a storage is not a relation")

@@ -20,6 +20,10 @@ class Outcome(StrEnum):
     TEMPERATURE = "an absolute temperature that is not positive"
     EXTENT = "a length or a volume that is not positive"
     PYTHON = "a Python function of the model raised an exception"
+    UNSUITED = "a state that the method cannot carry"
+    INCONSISTENT = "an initial state that contradicts the constraints"
+    TINY = "a step below the least that is allowed"
+    MANY = "more steps than are allowed"
     UNDETERMINED = "the motion is not determined"
     INTERRUPTED = "interrupted"
 
@@ -32,6 +36,10 @@ _ADVICE = {
     Outcome.TEMPERATURE: "check initial temperatures and heat capacities, or take a smaller step",
     Outcome.EXTENT: "check initial values, or take a smaller step",
     Outcome.PYTHON: "see the exception above this one",
+    Outcome.UNSUITED: "use the method natural",
+    Outcome.INCONSISTENT: "give initial values that satisfy the constraints",
+    Outcome.TINY: "loosen rtol and atol, lower min_step, or look for a singularity at this time",
+    Outcome.MANY: "raise max_steps, or loosen rtol and atol",
     Outcome.UNDETERMINED: "add what gives the effort there: a storage, friction, or a constraint",
     Outcome.INTERRUPTED: "what was computed is in .partial",
 }

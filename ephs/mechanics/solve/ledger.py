@@ -74,12 +74,13 @@ class Ledgers:
         return moved if moved > still else max(still, float(np.abs(q - q[0]).max())) or 1.0
 
     def defect(self, mechanical: bool) -> Array:
-        """Relative defect of the energy balance, (n,); ``mechanical``: of K + V + heat − work as well."""
+        """Relative defect of the energy balance since the first row, (n,); ``mechanical``: of K + V + heat − work, too."""
         if not self.heat.size:
             return np.zeros(0)
-        defects = [self._change(self.kinetic, self.potential, self.thermal, self.environment) - self.work]
+        work, heat = self.work - self.work[0], self.heat - self.heat[0]
+        defects = [self._change(self.kinetic, self.potential, self.thermal, self.environment) - work]
         if mechanical:
-            defects.append(self._change(self.kinetic, self.potential) + self.heat - self.work)
+            defects.append(self._change(self.kinetic, self.potential) + heat - work)
         return np.max(np.abs(defects), axis=0) / self.scale
 
     @staticmethod

@@ -1,0 +1,235 @@
+"""Radau IIA: the published examples against hand-written equations, order, balances, dense output, refusals."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import ephs
+from ephs import Pattern, library
+from ephs.mechanics.solve.errors import Outcome
+from ephs.mechanics.solve.radau import COEFFICIENTS, NODES
+from examples import oscillator, physics
+
+K, M, D, T0 = 1.5, 1.0, 0.1, 293.15
+
+
+def free(_t, y):
+    q, p = y
+    return [p, -K * q]
+
+
+def damped(_t, y):
+    q, p, _s = y
+    return [p, -K * q - D * p, D * p * p / T0]
+
+
+def springs(_t, y):
+    """Together they are one spring of 1.5 N/m, and each has its share."""
+    a, b, p = y
+    return [0.75 * p, 0.25 * p, -K * (a + b)]
+
+
+def masses(_t, y):
+    q, p, p2 = y
+    u = (p + p2) / 1.0
+    return [u, -0.4 * K * q, -0.6 * K * q]
+
+
+def lever(_t, y):
+    """The spring moves by half of what the mass does."""
+    q, p, _s = y
+    return [p / 2.0, -K * q / 2.0 - D * p, D * p * p / T0]
+
+
+def motor(t, y):
+    bs, ss, br, p, sr = y
+    heat = [0.5 * np.exp(s / 2.0) for s in (ss, sr)]
+    return [
+        np.sin(t) - 0.01 * bs,
+        0.01 * bs**2 / heat[0],
+        np.sin(t) - 0.01 * br - bs * p,
+        bs * br - 0.01 * p - 0.1,
+        (0.01 * br**2 + 0.01 * p**2) / heat[1],
+    ]
+
+
+def cylinder(_t, y):
+    s1, v1, s2, v2, p, s = y
+    e1, e2 = (np.exp(entropy / 2.5) * volume ** (-1 / 1.5) for entropy, volume in ((s1, v1), (s2, v2)))
+    hot1, hot2, hot = e1 / 2.5, e2 / 2.5, np.exp(s / 2.0) / 2.0
+    u = p / 0.5
+    return [
+        0.01 * (hot - hot1) / hot1,
+        0.02 * u,
+        0.01 * (hot - hot2) / hot2,
+        -0.02 * u,
+        0.02 * (e1 / 1.5 / v1 - e2 / 1.5 / v2) - 0.02 * u,
+        0.02 * u * u / hot + 0.01 * (hot1 - hot) / hot + 0.01 * (hot2 - hot) / hot,
+    ]
+
+
+DRIVEN = {"q": {"effort": np.sin}, "p": {"flow": -0.1}}
+EXAMPLES = {
+    # name: (system, right-hand side, states in its order with their initial values, inputs)
+    "oscillator": (oscillator.free_oscillator, free, {"osc.pe.q": 1.0, "osc.ke.p": 0.5}, None),
+    "damped oscillator": (
+        oscillator.damped_oscillator, damped, {"osc.pe.q": 1.0, "osc.ke.p": 0.5, "env.s": 0.0}, None,
+    ),
+    "springs in series": (physics.springs, springs, {"a.q": 0.3, "b.q": 0.1, "ke.p": 3.0}, None),
+    "rigidly linked masses": (physics.masses, masses, {"pe.q": 0.2, "ke.p": 0.4, "other.p": 0.6}, None),
+    "lever": (physics.lever, lever, {"pe.q": 1.0, "ke.p": 0.5, "env.s": 0.0}, None),
+    "motor": (
+        physics.motor,
+        motor,
+        {"stator.coil.b": 0.3, "stator.tc.s": 1.0, "rotor.coil.b": 0.2, "rotor.mass.p": 0.1, "rotor.tc.s": 1.1},
+        DRIVEN,
+    ),
+    "cylinder and piston": (physics.cylinder, cylinder, physics.CYLINDER_START, None),
+}  # fmt: skip
+
+
+def order_of(case):
+    """States in the order of the right-hand side; of the cylinder it is not that of the initial values."""
+    if case == "cylinder and piston":
+        return ["gas1.s", "gas1.v", "gas2.s", "gas2.v", "piston.mass.p", "piston.tc.s"]
+    return list(EXAMPLES[case][2])
+
+
+def independent(case, times):
+    _, slope, start, _ = EXAMPLES[case]
+    y0 = [start[name] for name in order_of(case)]
+    return solve_ivp(slope, (0.0, times[-1]), y0, method="DOP853", rtol=3e-14, atol=1e-14, t_eval=times).y.T
+
+
+@pytest.mark.parametrize("case", EXAMPLES)
+def test_the_published_examples_have_the_motion_of_their_equations(case):
+    system, _, start, inputs = EXAMPLES[case]
+    times = np.linspace(1.0, 10.0, 10)
+    sol = ephs.simulate(
+        system, 10.0, initial=start, inputs=inputs, method="radau", rtol=1e-11, atol=1e-11, save_at=times
+    )
+    assert np.array_equal(sol.t, times)
+    found = np.column_stack([sol[name] for name in order_of(case)])
+    assert np.abs(found - independent(case, times)).max() <= 1e-9
+    assert sol.energy_error.max() <= 1e-9 and sol.stats["least_production"] >= 0.0
+
+
+@pytest.mark.parametrize("case", EXAMPLES)
+def test_the_natural_method_has_the_same_motion_and_exact_balances(case):
+    system, _, start, inputs = EXAMPLES[case]
+    errors = []
+    for h in (0.02, 0.01):
+        sol = ephs.simulate(system, 2.0, initial=start, inputs=inputs, step=h)
+        found = np.array([sol[name][-1] for name in order_of(case)])
+        errors.append(np.abs(found - independent(case, np.array([2.0]))[-1]).max())
+        assert sol.energy_error.max() <= 1e-11
+    assert errors[1] <= 1e-3 and np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.1)
+
+
+def test_energy_of_the_cylinder_does_not_drift():
+    """EPHS.jl's own test of this run, 200 s at step 0.1, allows 1e-3."""
+    sol = ephs.simulate(physics.cylinder, 200.0, initial=physics.CYLINDER_START, step=0.1)
+    assert np.abs(sol.energy / sol.energy[0] - 1.0).max() <= 1e-11
+    assert np.all(np.diff(sol.entropy) >= 0.0)
+    assert np.abs(sol["gas1.v"] + sol["gas2.v"] - 1.0).max() <= 1e-12
+
+
+@pytest.mark.parametrize("case", ["damped oscillator", "springs in series", "cylinder and piston"])
+def test_constant_steps_have_order_five(case):
+    system, _, start, _ = EXAMPLES[case]
+    exact = independent(case, np.array([2.0]))[-1]
+    errors = []
+    for h in (0.2, 0.1, 0.05):
+        sol = ephs.simulate(system, 2.0, initial=start, method="radau", step=h, rtol=1e-10, atol=1e-12)
+        errors.append(np.abs(np.array([sol[name][-1] for name in order_of(case)]) - exact).max())
+        assert len(sol.t) == round(2.0 / h) + 1
+    assert np.log2(errors[1] / errors[2]) == pytest.approx(5.0, abs=0.5)
+
+
+def test_the_coefficients_integrate_polynomials_of_degree_four_over_the_step():
+    for k in range(5):
+        assert COEFFICIENTS[-1] @ NODES**k == pytest.approx(1.0 / (k + 1), abs=1e-14)
+    for k in range(3):
+        assert pytest.approx(NODES ** (k + 1) / (k + 1), abs=1e-14) == COEFFICIENTS @ NODES**k
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-8, 1e-10])
+def test_the_error_keeps_to_the_tolerance(tolerance):
+    system, _, start, _ = EXAMPLES["cylinder and piston"]
+    sol = ephs.simulate(system, 10.0, initial=start, method="radau", rtol=tolerance, atol=tolerance)
+    found = np.array([sol[name][-1] for name in order_of("cylinder and piston")])
+    assert np.abs(found - independent("cylinder and piston", np.array([10.0]))[-1]).max() <= 10.0 * tolerance
+
+
+def test_stiffness_costs_no_steps():
+    """A friction of 10⁶ kg/s slows the mass in microseconds; what is left is slow."""
+    stiff = oscillator.damped(
+        osc=oscillator.oscillator(pe=library.spring(k=1.5), ke=library.point_mass(m=1.0), pkc=library.pkc()),
+        mf=library.friction(d=1e6),
+        env=library.environment(),
+    )
+    sol = ephs.simulate(stiff, 10.0, initial={"osc.pe.q": 1.0, "osc.ke.p": 1.0}, method="radau", rtol=1e-6, atol=1e-9)
+    assert sol.stats["steps"] < 200
+    assert sol["osc.pe.q"][-1] == pytest.approx(np.exp(-1.5e-6 * 10.0) + 1e-6, abs=1e-8)
+    assert sol.energy_error.max() <= 1e-6
+
+
+def test_supplied_work_is_in_the_balance():
+    _, _, start, inputs = EXAMPLES["motor"]
+    sol = ephs.simulate(physics.motor, 5.0, initial=start, inputs=inputs, method="radau", rtol=1e-9, atol=1e-9)
+    assert sol.summary()["work"] != 0.0 and sol.summary()["heat"] > 0.0
+    assert sol.energy_error.max() <= 1e-8
+
+
+def test_initial_values_against_the_constraints_are_refused():
+    start = {"pe.q": 0.2, "ke.p": 0.4, "other.p": 0.0}
+    with pytest.raises(ephs.SimulationError, match="contradicts the constraints") as caught:
+        ephs.simulate(physics.masses, 1.0, initial=start, method="radau")
+    assert caught.value.outcome == Outcome.INCONSISTENT and caught.value.path in ("ke.p", "other.p")
+
+
+def test_states_on_groups_are_refused_by_name():
+    body = ephs.mechanics.rigid_body(mass=1.0, inertia=[0.1, 0.2, 0.3])
+    free_body = Pattern.from_text("p: body_momentum; body(p)")(body=body)
+    with pytest.raises(ephs.SimulationError, match=r"body\.pe\.q.*vector spaces.*natural"):
+        ephs.simulate(free_body, 1.0, method="radau")
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"rtol": -1.0}, "rtol is -1.0"),
+        ({"atol": float("nan")}, "atol is nan"),
+        ({"rtol": 0.0, "atol": 0.0}, "rtol or atol > 0"),
+        ({"step": 0.0}, "step is 0.0"),
+        ({"max_step": -1.0}, "max_step is -1.0"),
+        ({"min_step": -1.0}, "min_step is -1.0"),
+        ({"until": 0.0}, "until is 0.0"),
+    ],
+)
+def test_impossible_options_are_refused(options, words):
+    until = options.pop("until", 1.0)
+    with pytest.raises(ephs.OptionError, match=words):
+        ephs.simulate(oscillator.free_oscillator, until, method="radau", **options)
+
+
+def test_what_was_computed_is_kept_when_a_run_ends_early():
+    start = {"osc.pe.q": 1.0}
+    with pytest.raises(ephs.SimulationError, match="more steps than are allowed") as caught:
+        ephs.simulate(oscillator.free_oscillator, 10.0, initial=start, method="radau", max_steps=5)
+    assert len(caught.value.partial.t) == 6 and caught.value.partial.t[-1] == caught.value.time
+    with pytest.raises(ephs.SimulationError, match="below the least") as caught:
+        ephs.simulate(
+            oscillator.free_oscillator, 10.0, initial=start, method="radau", min_step=5.0, rtol=1e-12, atol=1e-12
+        )
+
+
+def test_an_explosion_ends_where_it_happens():
+    """An energy −q⁴/4 lets the mass run away in finite time."""
+    hill = ephs.storage({"q": ephs.quantity.displacement}, lambda q: -0.25 * q**4, lambda q: [-(q**3)])
+    system = Pattern.from_text("q: displacement; p: momentum; pe(q); pkc(q, p); ke(p)")(
+        pe=hill, pkc=library.pkc(), ke=library.point_mass(m=1.0)
+    )
+    with pytest.raises(ephs.SimulationError) as caught:
+        ephs.simulate(system, 10.0, initial={"pe.q": 1.0, "ke.p": 1.0}, method="radau", rtol=1e-6, atol=1e-6)
+    assert 1.0 < caught.value.time < 2.0 and caught.value.partial["pe.q"][-1] > 100.0
