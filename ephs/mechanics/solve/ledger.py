@@ -74,7 +74,7 @@ class Ledgers:
         return moved if moved > still else max(still, float(np.abs(q - q[0]).max())) or 1.0
 
     def defect(self, mechanical: bool) -> Array:
-        """Relative defect of the energy balance since the first row, (n,); ``mechanical``: of K + V + heat − work, too."""
+        """Relative defect of the energy balance since the first row, (n,); ``mechanical``: of K + V + heat − work."""
         if not self.heat.size:
             return np.zeros(0)
         work, heat = self.work - self.work[0], self.heat - self.heat[0]
