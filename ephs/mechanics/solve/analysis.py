@@ -5,15 +5,18 @@ show over a step, (mass/h)^(−1/2); never on the saddle-point matrix, whose piv
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, final
 
 import numpy as np
 from scipy import linalg
+from scipy.sparse import block_array, csr_array
+from scipy.sparse.csgraph import connected_components
 
 from ephs.mechanics.solve.errors import SolveError
 from ephs.mechanics.solve.lu_kernels import factorise
 from ephs.mechanics.solve.model import Model, evaluate_at
-from ephs.mechanics.solve.natural_kernels import Order
+from ephs.mechanics.solve.natural_kernels import STORING, Order
 from ephs.mechanics.solve.sparse import Index, order
 from ephs.semantics.bundle import Array
 
@@ -97,48 +100,70 @@ def analyse(model: Model, x: Array, z: Array, h: float) -> Analysis:
 
 
 def dependent_rows(model: Model, values: Array) -> Index:
-    """Marks constraint equations that depend on the others: (rows,) of 0 and 1."""
+    """Marks constraint equations that depend on the others: (rows,) of 0 and 1.
+
+    Rows that share no effort cannot depend on each other, so that the rank is decided part by part.
+    """
     t = model.tables
     n_rate, n_effort, size = int(t.counts[0]), int(t.counts[1]), model.unknowns
     out = np.zeros(size, dtype=np.int64)
     rows = model.constraint_rows
     if not rows.size:
         return out
-    matrix = np.zeros((rows.size, n_effort))
     of = np.full(size, -1)
     of[rows] = np.arange(rows.size)
     inside = (of[t.row] >= 0) & (t.column >= n_rate) & (t.column < n_rate + n_effort)
-    matrix[of[t.row[inside]], t.column[inside] - n_rate] += values[inside]
-    matrix = matrix @ _compliance(model, values)
-    norms = np.linalg.norm(matrix, axis=1)
-    matrix /= np.where(norms > 0.0, norms, 1.0)[:, None]
-    factors: Any = linalg.qr(matrix.T, mode="r", pivoting=True)
-    triangle, pivots = factors
-    sizes = np.zeros(rows.size)
-    sizes[: min(triangle.shape)] = np.abs(np.diag(triangle))
-    rank = int(np.sum(sizes > RANK * sizes[0])) if sizes[0] > 0.0 else 0
-    out[rows[pivots[rank:]]] = 1
+    entries = (values[inside], (of[t.row[inside]], t.column[inside] - n_rate))
+    matrix = csr_array(entries, shape=(rows.size, n_effort)) @ _compliance(model, values)
+    count, part = connected_components(block_array([[None, matrix], [matrix.T, None]]), directed=False)
+    for members in _groups(part[: rows.size], count):
+        local = matrix[members]
+        dense = local[:, np.unique(local.indices)].toarray()
+        if not dense.size:  # equations without efforts hold of themselves, or contradict
+            out[rows[members]] = 1
+            continue
+        norms = np.linalg.norm(dense, axis=1)
+        dense /= np.where(norms > 0.0, norms, 1.0)[:, None]
+        factors: Any = linalg.qr(dense.T, mode="r", pivoting=True)
+        triangle, pivots = factors
+        sizes = np.zeros(members.size)
+        sizes[: min(triangle.shape)] = np.abs(np.diag(triangle))
+        rank = int(np.sum(sizes > RANK * sizes[0])) if sizes[0] > 0.0 else 0
+        out[rows[members[pivots[rank:]]]] = 1
     return out
 
 
-def _compliance(model: Model, values: Array) -> Array:
-    """Block-diagonal square root of ∂e/∂w at storages, the identity at efforts that no storage gives."""
+def _groups(part: Index, count: int) -> list[Index]:
+    """The places of each number below count that occurs."""
+    order = np.argsort(part, kind="stable")
+    cuts = np.searchsorted(part[order], np.arange(count + 1))
+    return [order[a:b] for a, b in pairwise(cuts) if b > a]
+
+
+def _compliance(model: Model, values: Array) -> Any:
+    """Block-diagonal square root of ∂e/∂w at storages, the identity at efforts that no storage gives; sparse."""
     t = model.tables
-    scale = np.eye(int(t.counts[1]))
-    for slot in model.descriptor.components:
-        if slot.primitive.kind != "storage":
-            continue
-        rates = np.array([i for s in slot.reads for i in range(s.rates.start, s.rates.stop)], dtype=int)
-        block = np.zeros((rates.size, rates.size))
-        local = {int(r): i for i, r in enumerate(rates)}
-        mask = np.isin(t.row, rates) & np.isin(t.column, rates) & (np.arange(t.row.size) < t.row.size - model.unknowns)
-        for k in np.flatnonzero(mask):
-            block[local[int(t.row[k])], local[int(t.column[k])]] -= values[k]
-        sigma, vectors = np.linalg.eigh(0.5 * (block + block.T))
+    rows: list[Index] = []
+    columns: list[Index] = []
+    entries: list[Array] = []
+    plain = np.ones(int(t.counts[1]), dtype=bool)
+    for i in np.flatnonzero(t.kind == STORING):
+        n = int(t.dims[i, 0])
+        places = t.jacobian[t.jacobian_at[i] : t.jacobian_at[i] + n * n]
+        block = -np.where(places >= 0, values[places], 0.0).reshape(n, n)
+        sigma, vectors = np.linalg.eigh(0.5 * (block + block.T)) if n > 1 else (block[0], np.ones((1, 1)))
         if sigma.size and sigma[-1] > 0.0 and sigma[0] > 1e-14 * sigma[-1]:
-            index = np.array(slot.efforts, dtype=int)
-            scale[np.ix_(index, index)] = (vectors * np.sqrt(sigma)) @ vectors.T
-    return scale
+            index = t.e_index[t.e_at[i] : t.e_at[i] + n]
+            rows.append(np.repeat(index, n))
+            columns.append(np.tile(index, n))
+            entries.append(((vectors * np.sqrt(sigma)) @ vectors.T).ravel())
+            plain[index] = False
+    rest = np.flatnonzero(plain)
+    whole = (
+        np.concatenate([*entries, np.ones(rest.size)]),
+        (np.concatenate([*rows, rest]), np.concatenate([*columns, rest])),
+    )
+    return csr_array(whole, shape=(plain.size, plain.size))
 
 
 def _null_unknown(model: Model, chosen: Index, data: Array) -> int:

@@ -62,3 +62,45 @@ def solve(rows, columns, start, column, diagonal, value, right, x, row):
         row[i] = total * value[diagonal[i]]
     for i in range(n):
         x[columns[i]] = row[i]
+
+
+@kernel
+def fill(first, column, start, out, link):
+    """The pattern of L + U by rows, in this order of rows and columns without further pivoting.
+
+    The rows of A, their diagonals included, are column[first[i]:first[i+1]], ascending. ``start`` (n + 1,) and ``out``
+    receive the pattern of the factors, ascending too; ``link`` (n + 1,) is scratch. Returns the number of entries, or
+    minus the row at which ``out`` was full, less one.
+    """
+    n = start.shape[0] - 1
+    count = 0
+    start[0] = 0
+    for i in range(n):
+        # The row as a linked list in ascending order, n at its end.
+        head = column[first[i]]
+        for p in range(first[i], first[i + 1] - 1):
+            link[column[p]] = column[p + 1]
+        link[column[first[i + 1] - 1]] = n
+        k = head
+        while k < i:
+            # Row k of U is merged in, behind its diagonal.
+            here = k
+            for q in range(start[k], start[k + 1]):
+                j = out[q]
+                if j > k:
+                    while link[here] < j:
+                        here = link[here]
+                    if link[here] != j:
+                        link[j] = link[here]
+                        link[here] = j
+                    here = j
+            k = link[k]
+        k = head
+        while k < n:
+            if count == out.shape[0]:
+                return -i - 1
+            out[count] = k
+            count += 1
+            k = link[k]
+        start[i + 1] = count
+    return count

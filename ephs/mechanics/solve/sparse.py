@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
+from ephs.mechanics.solve.lu_kernels import fill
 from ephs.semantics.bundle import Array
 
 Index = NDArray[np.int64]
@@ -56,26 +57,15 @@ def order(n: int, row: Index, column: Index, value: Array) -> Elimination:
     scale_r, scale_c = _equilibrate(n, row, column, value)
     scaled = value * scale_r[row] * scale_c[column]
     pattern = sparse.csc_matrix((scaled, (row, column)), shape=(n, n))
-    best: tuple[int, Index, Index, list[list[int]]] | None = None
+    best: Elimination | None = None
     for choice in ("COLAMD", "MMD_AT_PLUS_A"):
         factor = splu(pattern, permc_spec=choice, diag_pivot_thresh=0.1, options={"SymmetricMode": choice != "COLAMD"})
         rows, columns = np.argsort(factor.perm_r).astype(np.int64), np.argsort(factor.perm_c).astype(np.int64)
-        filled = _fill(n, row, column, rows, columns)
-        size = sum(map(len, filled))
-        if best is None or size < best[0]:
-            best = (size, rows, columns, filled)
+        found = _eliminate(n, row, column, rows, columns)
+        if best is None or found.fill < best.fill:
+            best = found
     assert best is not None
-    _, rows, columns, filled = best
-    start = np.concatenate([[0], np.cumsum([len(r) for r in filled])]).astype(np.int64)
-    flat = np.array([j for r in filled for j in r], dtype=np.int64)
-    where = {(i, j): int(start[i]) + k for i, r in enumerate(filled) for k, j in enumerate(r)}
-    to_row, to_column = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
-    to_row[rows], to_column[columns] = np.arange(n), np.arange(n)
-    place = np.array(
-        [where[int(i), int(j)] for i, j in zip(to_row[row], to_column[column], strict=True)], dtype=np.int64
-    )
-    diagonal = np.array([where[i, i] for i in range(n)], dtype=np.int64)
-    return Elimination(rows, columns, start, flat, diagonal, place)
+    return best
 
 
 def _equilibrate(n: int, row: Index, column: Index, value: Array) -> tuple[Array, Array]:
@@ -92,29 +82,26 @@ def _equilibrate(n: int, row: Index, column: Index, value: Array) -> tuple[Array
     return scale_r, scale_c
 
 
-def _fill(n: int, row: Index, column: Index, rows: Index, columns: Index) -> list[list[int]]:
-    """The pattern of L + U by rows when rows and columns are taken in the given order without further pivoting."""
+def _eliminate(n: int, row: Index, column: Index, rows: Index, columns: Index) -> Elimination:
+    """What rows and columns taken in the given order, without further pivoting, fill."""
     to_row, to_column = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
     to_row[rows], to_column[columns] = np.arange(n), np.arange(n)
-    pattern: list[set[int]] = [{i} for i in range(n)]
-    for i, j in zip(to_row[row].tolist(), to_column[column].tolist(), strict=True):
-        pattern[i].add(j)
-    upper: list[list[int]] = []
-    out: list[list[int]] = []
-    for i in range(n):
-        mine = pattern[i]
-        pending = sorted(j for j in mine if j < i)
-        done: set[int] = set()
-        while pending:
-            k = pending.pop(0)
-            if k in done:
-                continue
-            done.add(k)
-            fresh = [j for j in upper[k] if j not in mine]
-            mine.update(fresh)
-            if any(j < i for j in fresh):
-                pending = sorted({*pending, *(j for j in fresh if j < i)})
-        ordered = sorted(mine)
-        out.append(ordered)
-        upper.append([j for j in ordered if j > i])
-    return out
+    # Places as single numbers, row by row, so that they sort and are found again.
+    given = to_row[row] * n + to_column[column]
+    own = np.arange(n) * n + np.arange(n)
+    places = np.unique(np.concatenate([given, own]))
+    first = np.searchsorted(places, np.arange(n + 1) * n).astype(np.int64)
+    start, link = np.zeros(n + 1, dtype=np.int64), np.zeros(n + 1, dtype=np.int64)
+    room = 4 * places.size
+    while True:
+        out = np.empty(room, dtype=np.int64)
+        count = fill(first, places % n, start, out, link)
+        if count >= 0:
+            break
+        room *= 2
+    flat = out[:count].copy()
+    filled = np.repeat(np.arange(n), np.diff(start)) * n + flat
+    return Elimination(
+        rows, columns, start, flat, np.searchsorted(filled, own).astype(np.int64),
+        np.searchsorted(filled, given).astype(np.int64),
+    )  # fmt: skip
