@@ -149,10 +149,12 @@ def _compliance(model: Model, values: Array) -> Any:
     plain = np.ones(int(t.counts[1]), dtype=bool)
     for i in np.flatnonzero(t.kind == STORING):
         n = int(t.dims[i, 0])
+        if not n:  # of a fixed joint
+            continue
         places = t.jacobian[t.jacobian_at[i] : t.jacobian_at[i] + n * n]
         block = -np.where(places >= 0, values[places], 0.0).reshape(n, n)
         sigma, vectors = np.linalg.eigh(0.5 * (block + block.T)) if n > 1 else (block[0], np.ones((1, 1)))
-        if sigma.size and sigma[-1] > 0.0 and sigma[0] > 1e-14 * sigma[-1]:
+        if sigma[-1] > 0.0 and sigma[0] > 1e-14 * sigma[-1]:
             index = t.e_index[t.e_at[i] : t.e_at[i] + n]
             rows.append(np.repeat(index, n))
             columns.append(np.tile(index, n))
