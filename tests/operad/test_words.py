@@ -7,9 +7,9 @@ import pytest
 from tests.operad.words import GOLDEN, words
 
 EXPECTED = json.loads(GOLDEN.read_text(encoding="utf-8")) if GOLDEN.exists() else {}
-FOUND = words()
+WORDS = words()
 
 
-@pytest.mark.parametrize("what", sorted(EXPECTED | FOUND))
+@pytest.mark.parametrize("what", sorted(EXPECTED | WORDS))
 def test_it_says_what_it_said(what):
-    assert FOUND.get(what) == EXPECTED.get(what)
+    assert WORDS[what]() == EXPECTED.get(what)

@@ -31,11 +31,22 @@ from tests.operad.test_substitution import MISFITS, UPPER
 
 GOLDEN = File(__file__).with_name("words.json")
 Q = quantity.displacement
-RICH = Pattern.from_text(
-    "q: displacement, exposed; r: displacement; x.y: pose @ B, exposed as state; a(q, p=~r); b.c(~x.y); b.d(); q ~ r"
-)
-IDENTITY = Pattern.identity({"q": PortType(Q), "x": PortType(quantity.pose, False)})
-NESTED = Nesting(models.DAMPED, {"osc": models.OSCILLATOR})
+TEXT = "q: displacement, exposed; r: displacement; x.y: pose @ B, exposed as state; a(q, p=~r); b.c(~x.y); b.d(); q ~ r"
+
+
+def rich() -> Pattern:
+    """A pattern with something of everything, made anew."""
+    return Pattern.from_text(TEXT)
+
+
+def identity() -> Pattern:
+    """An identity with a power port and a state port."""
+    return Pattern.identity({"q": PortType(Q), "x": PortType(quantity.pose, False)})
+
+
+def nested() -> Nesting:
+    """The damped oscillator on two levels."""
+    return Nesting(models.DAMPED, {"osc": models.OSCILLATOR})
 
 
 def space(**parts: object) -> dict[str, object]:
@@ -77,18 +88,18 @@ DOCUMENTS: dict[str, Any] = {
 }
 TEXTS = ["", "{", '{"format": 1, "format": 1}', '{"a": {"b": 1, "c": 2, "b": 3}}', '{"format": NaN}', "[-Infinity]"]
 SHOWN: dict[str, Callable[[], object]] = {
-    "pattern": lambda: str(RICH),
-    "pattern, repr": lambda: repr(RICH),
-    "pattern, text form": RICH.to_text,
-    "pattern, json": RICH.to_json,
-    "pattern, summary": lambda: RICH.summary,
-    "identity": lambda: str(IDENTITY),
-    "identity, repr": lambda: repr(IDENTITY),
-    "identity, text form": IDENTITY.to_text,
-    "identity, json": IDENTITY.to_json,
+    "pattern": lambda: str(rich()),
+    "pattern, repr": lambda: repr(rich()),
+    "pattern, text form": lambda: rich().to_text(),
+    "pattern, json": lambda: rich().to_json(),
+    "pattern, summary": lambda: rich().summary,
+    "identity": lambda: str(identity()),
+    "identity, repr": lambda: repr(identity()),
+    "identity, text form": lambda: identity().to_text(),
+    "identity, json": lambda: identity().to_json(),
     "empty pattern": lambda: str(Pattern({}, {})),
-    "nesting": lambda: str(NESTED),
-    "nesting, repr": lambda: repr(NESTED),
+    "nesting": lambda: str(nested()),
+    "nesting, repr": lambda: repr(nested()),
     "nested nesting": lambda: str(Nesting(Pattern({}, {"a": {}}), {"a": Nesting(Pattern({}, {"b": {}}))})),
     "directory": lambda: str(Directory({"a.b": 1, "c": 2, "a.d.e": 3})),
     "directory, repr": lambda: repr(Directory({"a.b": 1, "c": 2})),
@@ -106,19 +117,19 @@ SHOWN: dict[str, Callable[[], object]] = {
             Quantity("k", Space("s", 1, 2), 1),
         )
     ),
-    "parts": lambda: "\n".join([str(RICH.boxes["a"]), *(f"{j}; {j!r}" for j in RICH.junctions.values())]),
-    "port types": lambda: "\n".join(str(kind) for kind in RICH.interface.values()),
+    "parts": lambda: "\n".join([str(rich().boxes["a"]), *(f"{j}; {j!r}" for j in rich().junctions.values())]),
+    "port types": lambda: "\n".join(str(kind) for kind in rich().interface.values()),
     "renaming": lambda: str(
-        RICH.isomorphic(RICH.rename(boxes={"a": "z"}, ports={"a": {"p": "y"}}, junctions={"q": "s"}))
+        rich().isomorphic(rich().rename(boxes={"a": "z"}, ports={"a": {"p": "y"}}, junctions={"q": "s"}))
     ),
     "renaming, none": lambda: str(Pattern({}, {}).isomorphic(Pattern({}, {}))),
     "graph": lambda: "\n".join(
         [
             *(
                 f"{node} {data | {'state_class': sorted(data['state_class'])} if 'state_class' in data else data}"
-                for node, data in RICH.to_networkx().nodes(data=True)
+                for node, data in rich().to_networkx().nodes(data=True)
             ),
-            *(str(edge) for edge in RICH.to_networkx().edges(keys=True, data=True)),
+            *(str(edge) for edge in rich().to_networkx().edges(keys=True, data=True)),
         ]
     ),
     "remarks": lambda: "\n".join(
@@ -129,7 +140,7 @@ SHOWN: dict[str, Callable[[], object]] = {
     "equation that does not": lambda: str(
         Equation(models.OSCILLATOR, models.DAMPED, "left unit", (models.OSCILLATOR, Path.parse("a")))
     ),
-    "canonical hash": lambda: RICH.canonical_hash(),
+    "canonical hash": lambda: rich().canonical_hash(),
 }
 
 
@@ -169,17 +180,18 @@ LONG: dict[str, Callable[[], object]] = {
 }
 
 
-def words() -> dict[str, str]:
-    """Everything that is said, by name."""
+def words() -> dict[str, Callable[[], str]]:
+    """Everything that is said, by name; said when called."""
     refused: dict[str, Callable[[], object]] = {name: make for name, (make, _) in REFUSED.items()}
     refused |= {f"document: {name}": lambda d=d: Pattern.from_dict(d) for name, (d, _) in BROKEN.items()}
     refused |= {name: lambda d=d: Pattern.from_dict(d) for name, d in DOCUMENTS.items()}
     refused |= {f"json: {text}": lambda text=text: Pattern.from_json(text) for text in TEXTS}
     refused |= {f"text: {text}": lambda text=text: Pattern.from_text(text) for text in BROKEN_TEXT}
     refused |= {f"filling: {name}": lambda f=f: UPPER.substitute(f) for name, f in MISFITS.items()}
-    shown = {f"shown: {name}": str(make()) for name, make in SHOWN.items()}
-    return shown | {f"refused: {name}": said(make) for name, make in (refused | LONG).items()}
+    shown = {f"shown: {name}": lambda make=make: str(make()) for name, make in SHOWN.items()}
+    return shown | {f"refused: {name}": lambda make=make: said(make) for name, make in (refused | LONG).items()}
 
 
 if __name__ == "__main__":
-    GOLDEN.write_text(json.dumps(words(), ensure_ascii=False, indent=1) + "\n", encoding="utf-8")
+    text = json.dumps({name: say() for name, say in words().items()}, ensure_ascii=False, indent=1)
+    GOLDEN.write_text(text + "\n", encoding="utf-8")
