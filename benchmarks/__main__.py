@@ -1,11 +1,16 @@
-"""``python -m benchmarks [order] [balance] [size] [--out DIR]`` prints the tables as Markdown, charts go into DIR."""
+"""``python -m benchmarks [NAME ...] [--out DIR]`` prints the tables as Markdown, charts go into DIR."""
 
 import sys
 from pathlib import Path
 
-from benchmarks import balance, order, size
+from benchmarks import balance, cells, order, size
 
-TABLES = {"order": lambda _: order.table(), "balance": lambda _: balance.table(), "size": size.table}
+TABLES = {
+    "order": lambda _: order.table(),
+    "balance": lambda _: balance.table(),
+    "size": size.table,
+    "cells": cells.table,
+}
 
 
 def main(words: list[str]) -> int:

@@ -16,6 +16,7 @@ import numpy as np
 
 from ephs.operad import ROOT, Path, Pattern
 from ephs.semantics.bundle import Array, Reference
+from ephs.semantics.errors import AssemblyError
 from ephs.semantics.primitives import Point, Primitive, Reversible, Storage
 from ephs.semantics.spaces import manifold
 from ephs.semantics.subspace import Subspace
@@ -83,7 +84,7 @@ class LinearRelation:
 @final
 @dataclass(frozen=True, slots=True)
 class Relation:
-    """The relation of a system, as a value.
+    """The relation of a system, as a value; every composite has one, also what cannot be simulated.
 
     Call ``at(state)`` for the subspace at a state; ``compose`` glues relations along a pattern.
     """
@@ -110,7 +111,11 @@ class Relation:
         frozen = dict(efforts or {})
         unit = _unit(system, point, self.reference)
         if self.route == "flat":
-            return _flat(system, point, frozen, self.reference, unit)
+            try:
+                return _flat(system, point, frozen, self.reference, unit)
+            except AssemblyError:
+                # What cannot be simulated means something all the same: the flat pattern glues the parts' relations.
+                system = system.flatten()
         return _nested(system, point, frozen, self.reference, unit)
 
 

@@ -89,8 +89,9 @@ def test_an_outer_power_port_over_state_ports_is_an_open_circuit():
     )  # fmt: skip
     relation = open_circuit(mkc=library.mkc()).relation
     with pytest.raises(AssemblyError, match="bs"):
-        relation(route="flat").at()
+        open_circuit(mkc=library.mkc()).descriptor()
     nested = relation(route="nested").at()
+    assert nested.distance(relation(route="flat").at()) <= 1e-14
     names = [str(path) for path, _ in nested.ports]
     assert np.abs(nested.subspace.basis[names.index("bs")]).max() <= 1e-15
     assert [note.kind for note in open_circuit.lint()] == ["open-circuit"]

@@ -62,16 +62,19 @@ class Ledgers:
 
     @property
     def scale(self) -> float:
-        """Largest K + |V − V₀| + |heat| + |work| over the run; of thermal energies where nothing moves; in J.
+        """Largest K + |V − V₀| + |heat| + |work| over the run; where nothing moves, what the storages exchange; in J.
 
         What stands still moves by rounding: a billionth of the energies is the least that counts.
         """
-        v, q = self.potential, self.thermal
+        v = self.potential
         if not v.size:
             return 1.0
         moved = float(np.max(self.kinetic + np.abs(v - v[0]) + np.abs(self.heat) + np.abs(self.work)))
         still = 1e-9 * float(np.abs(v).max())
-        return moved if moved > still else max(still, float(np.abs(q - q[0]).max())) or 1.0
+        if moved > still:
+            return moved
+        exchanged = [np.abs(energy - energy[0]) for energy in self.storages.values()]
+        return max(still, float(np.max(np.sum(exchanged, axis=0), initial=0.0))) or 1.0
 
     def defect(self, mechanical: bool) -> Array:
         """Relative defect of the energy balance since the first row, (n,); ``mechanical``: of K + V + heat − work."""
