@@ -79,6 +79,35 @@ def test_a_ring_of_six_is_not_two_rings_of_three():
     assert ring(6).isomorphic(two) is None and ring(6).canonical_hash() == two.canonical_hash()
 
 
+def test_cells_of_refinement_need_not_be_orbits():
+    """A ring of six beside two of three: all boxes look alike, but not every one can take the place of each other."""
+    wires = {f"b{k}": (k, (k + 1) % 6) for k in range(6)}
+    wires |= {f"c{k}": (6 + k, 6 + (k + 1) % 3 + 3 * (k // 3)) for k in range(6)}
+    f = Pattern(
+        {f"j{k}": junction(Q) for k in range(12)}, {b: {"x": f"j{x}", "y": f"j{y}"} for b, (x, y) in wires.items()}
+    )
+    assert f.automorphisms() == 12 * (6 * 6 * 2)
+
+
+def test_symmetries_may_have_to_keep_outer_names():
+    outer = "q: angle, exposed; r: angle, exposed; x: angle, exposed as state; y: angle, exposed as state"
+    f = Pattern.from_text(f"{outer}; a(q, ~x); b(q=r, x=~y)")
+    assert (f.automorphisms(), f.automorphisms(fix_interface=True)) == (2, 1)
+    swapped = f.rename(junctions={"x": "y", "y": "x"})
+    assert f.isomorphic(swapped) is not None and f.isomorphic(swapped, fix_interface=True) is None
+    one = Pattern.from_text("x: angle, exposed as state; a(~x)")
+    assert one.isomorphic(one.rename(junctions={"x": "z"}), fix_interface=True) is None
+    assert one.isomorphic(one, fix_interface=True) is not None
+
+
+def test_handles_get_names_that_are_free():
+    many = Pattern.from_text("q: angle; h: angle; i: angle; a(q, ~h, ~i); q ~ h ~ i")
+    taken = Pattern.from_text("q: angle; state0(q, h=~q, i=~q)")
+    found = many.isomorphic(taken)
+    assert found is not None and found(many) == taken
+    assert {str(found.junctions[Path.parse(name)]) for name in "hi"} == {"state1", "state2"}
+
+
 def test_outer_names_may_be_held():
     f = Pattern.from_text("q: displacement, exposed; a(q)")
     g = f.rename(junctions={"q": "r"})

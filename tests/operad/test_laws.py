@@ -4,10 +4,10 @@ from dataclasses import replace
 from itertools import pairwise
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import find, given, settings
 from hypothesis import strategies as st
 
-from ephs.operad import LAWS, ROOT, Equation, Path, Pattern, Port, Quantity, junction, quantity
+from ephs.operad import LAWS, ROOT, Directory, Equation, Path, Pattern, Port, Quantity, junction, quantity
 from ephs.testing import check_operad_laws, law_inputs, nestings, patterns
 
 ALL = [
@@ -35,6 +35,32 @@ def test_every_law_is_stated_once():
 def test_law(law, data):
     equation = law(*data.draw(law_inputs(law)))
     assert equation.holds, f"{law.statement}\n{equation}"
+
+
+@pytest.mark.parametrize("name", ["left unit", "right unit", "interface"])
+def test_no_law_holds_of_a_substitution_that_forgets_what_it_is_given(name, monkeypatch):
+    """A law of which a wrong substitution is no counterexample says nothing; the others compare two of them."""
+    law = next(law for law in LAWS if law.name == name)
+
+    def forgetful(nesting):
+        return Pattern({}, {}) if nesting.children else nesting.pattern
+
+    def fails(inputs):
+        monkeypatch.setattr("ephs.operad.substitution.flatten", forgetful)
+        try:
+            return not law(*inputs).holds
+        except Exception:  # names of what was forgotten are not there: that is seen, too
+            return True
+        finally:
+            monkeypatch.undo()
+
+    find(law_inputs(law), fails, settings=settings(max_examples=500, database=None, deadline=None))
+
+
+def test_hashes_tell_patterns_and_directories_apart():
+    texts = [f"q: angle; {'; '.join(f'b{k}(q)' for k in range(count))}" for count in range(1, 9)]
+    assert len({hash(Pattern.from_text(text)) for text in texts}) > 4
+    assert len({hash(Directory({"a": k})) for k in range(8)}) > 4
 
 
 @settings(max_examples=2 * settings().max_examples)

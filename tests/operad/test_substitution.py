@@ -3,7 +3,7 @@
 import pytest
 from hypothesis import given
 
-from ephs.operad import Pattern, PatternError, PortType, junction, quantity
+from ephs.operad import Directory, Nesting, Pattern, PatternError, PortType, junction, quantity
 from ephs.testing import patterns
 
 Q = quantity.displacement
@@ -130,6 +130,47 @@ def test_patterns_without_state_ports_substitute_without_links(f):
         }
     )
     assert not whole.links
+
+
+def test_what_fills_an_identity_takes_its_frames():
+    """And keeps all else: inner junctions, links, and what fills it in turn."""
+    plain, tagged = PortType(Q), PortType(Q.in_frame("C"))
+    lower = Pattern(
+        {"q": junction(Q.in_frame("C"), True), "r": junction(Q.in_frame("C")), "s": junction(quantity.momentum)},
+        {"a": {"q": "q", "r": "r", "s": "s"}},
+        [("q", "r")],
+    )
+    deep = Pattern(
+        {p: junction(t.quantity, True) for p, t in lower.boxes["a"].interface.items()},
+        {"x": {"y": "q", "z": "r", "w": "s"}},
+    )
+    whole = Nesting(Pattern.identity({"q": plain}), {".": Nesting(lower, {"a": deep})}).flatten()
+    assert whole.interface == Directory({"q": plain})
+    assert whole.junctions["r"] == junction(Q.in_frame("C")) and [names(g) for g in whole.links] == [{"q", "r"}]
+    assert names(whole.boxes) == {"a.x"}
+    inner = Nesting(Pattern.identity({"q": plain}), {".": Pattern.identity({"q": tagged})}).flatten()
+    assert inner.is_identity and inner.interface == Directory({"q": plain})
+    with pytest.raises(PatternError, match=r"box b: .*differing q"):
+        upper = Pattern({"q": junction(Q)}, {"b": {"q": "q"}})
+        wrong = Nesting(
+            Pattern.identity({"q": plain}), {".": Pattern({"q": junction(quantity.momentum, True)}, {"x": {"q": "q"}})}
+        )
+        Nesting(upper, {"b": wrong}).flatten()
+
+
+def test_a_class_without_power_and_outer_name_is_named_by_its_shortest_path():
+    lower = Pattern({"a": junction(Q, True, False)}, {"x": {"q": "~a"}})
+    upper = Pattern({"z": junction(Q)}, {"b": {"a": "~z"}, "c": {"q": "~z"}})
+    assert names(upper.substitute(b=lower).junctions) == {"z"}
+
+
+def test_interfaces_stay_the_same_objects_where_no_frame_changes():
+    lower = Pattern({"q": junction(Q, exposed=True), "r": junction(Q)}, {"x": {"q": "q", "r": "r"}})
+    upper = Pattern({"q": junction(Q)}, {"a": {"q": "q"}})
+    assert upper.substitute(a=lower).boxes["a.x"].interface is lower.boxes["x"].interface
+    framed = Pattern({"q": junction(Q.in_frame("C"))}, {"a": {"q": "q"}}).substitute(a=lower)
+    assert framed.boxes["a.x"].interface["q"].quantity == Q.in_frame("C")
+    assert framed.boxes["a.x"].interface["r"].quantity == Q
 
 
 def test_frames_keep_wires_apart():

@@ -39,6 +39,19 @@ def rich() -> Pattern:
     return Pattern.from_text(TEXT)
 
 
+def odd() -> Pattern:
+    """Names that need quotes, letters of many scripts, quantities of every form, several links."""
+    return Pattern.from_text(
+        """
+        "ω(1)".θ: joint_momentum(screw, pitch=0.25)
+        漢: {"kind": "St", "space": {"name": "ℝ", "dim": 1, "size": 2, "parameters": {"ä": 1, "b": 2}}, "parity": 1} @ Ü
+        a: angle; b: angle; c: charge; d: charge, exposed as state; e: charge; f: entropy
+        "box,two"("ω(1)".θ, 漢, x=~a, y=b, c, e, z=~f)
+        a ~ b; c ~ d ~ e
+        """
+    )
+
+
 def identity() -> Pattern:
     """An identity with a power port and a state port."""
     return Pattern.identity({"q": PortType(Q), "x": PortType(quantity.pose, False)})
@@ -140,7 +153,24 @@ SHOWN: dict[str, Callable[[], object]] = {
     "equation that does not": lambda: str(
         Equation(models.OSCILLATOR, models.DAMPED, "left unit", (models.OSCILLATOR, Path.parse("a")))
     ),
+    "odd pattern": lambda: str(odd()),
+    "odd pattern, summary": lambda: odd().summary,
+    "odd pattern, repr": lambda: repr(odd()),
+    "odd pattern, text form": lambda: odd().to_text(),
+    "odd pattern, json": lambda: odd().to_json(),
+    "one junction": lambda: Pattern.from_text("q: angle; a(q)").summary,
+    "states without names": lambda: Pattern.from_text("x: angle; y: angle; a(~x); b(~y); state0(~x)").to_json(),
+    "states shared with names": lambda: Pattern.from_text(
+        "h: angle; q: angle; o: angle, exposed as state; n: angle, exposed as state; a(~h, q); b(~o, ~n); h ~ q; o ~ n"
+    ).to_json(),
+    "nesting of two, repr": lambda: repr(
+        Nesting(Pattern({}, {"a": {}, "b": {}}), {"a": Pattern({}, {}), "b": Pattern({}, {"c": {}})})
+    ),
     "canonical hash": lambda: rich().canonical_hash(),
+    "canonical hash of the joint": lambda: models.JOINT.canonical_hash(),
+    "canonical hash of a chain": lambda: Pattern(
+        {f"j{k}": junction(Q) for k in range(9)}, {f"b{k}": {"x": f"j{k}", "y": f"j{k + 1}"} for k in range(8)}
+    ).canonical_hash(),
 }
 
 
@@ -149,7 +179,7 @@ def said(make: Callable[[], object]) -> str:
     try:
         make()
     except PatternError as error:
-        facts = {"box": error.box, "port": error.port, "junction": error.junction}
+        facts = {"box": error.box, "port": error.port, "junction": error.junction, "found": str(error.found)[:300]}
         return f"{error} {[error.kind, facts]}"
     return "nothing is refused"
 
@@ -176,6 +206,36 @@ LONG: dict[str, Callable[[], object]] = {
     "not text": lambda: Pattern.from_text(5),
     "deep json": lambda: Pattern.from_json("[" * 100_000),
     "no utf-8": lambda: Pattern.from_json(b"\xff\xfe\xfa"),
+    "too many digits": lambda: Pattern.from_json('{"format": ' + "9" * 5000 + "}"),
+    "key given twice, not the first": lambda: Pattern.from_json('{"c": 2, "b": 1, "b": 3}'),
+    "pitch beside a description": lambda: Pattern.from_dict(
+        FINE | {"junctions": {"q": {"quantity": {}, "pitch": 1.0}}}
+    ),
+    "format as a list": lambda: Pattern.from_dict(FINE | {"format": [1]}),
+    "box that is no text": lambda: Pattern({"q": junction(Q)}, {"a": [1, 2]}),
+    "link to nothing that has a name": lambda: Pattern({}, {"a": {}}, [["p", "q"]]),
+    "junction renamed to another's name": lambda: models.DAMPED.rename(junctions={"p": "s"}),
+    "no such junction to rename": lambda: models.DAMPED.rename(junctions={"x": "y"}),
+    "ports of no such box to rename": lambda: models.DAMPED.rename(ports={"x": {"p": "q"}}),
+    "port renamed to another's name": lambda: models.DAMPED.rename(ports={"mf": {"p": "s"}}, boxes={"mf": "friction"}),
+    "no such port of an identity": lambda: identity().rename(junctions={"y": "z"}),
+    "no such inner port of an identity": lambda: identity().rename(junctions={"q": "z"}, ports={".": {"y": "z"}}),
+    "frame without name": lambda: Pattern.from_text("q: angle @ ,"),
+    "quantity without name": lambda: Pattern.from_text("q: ("),
+    "name without second part": lambda: Pattern.from_text("q.(x)"),
+    "name without quotes": lambda: Pattern.from_text('""(x)'),
+    "argument without name": lambda: Pattern.from_text("q: relative_pose(,)"),
+    "arguments without end": lambda: Pattern.from_text("q: relative_pose(screw pitch=1)"),
+    "number in parts": lambda: Pattern.from_text("q: relative_pose(screw, pitch=1.x.2)"),
+    "identity with links": lambda: Pattern.from_text("q: angle, exposed; r: angle, exposed; .(q, r); q ~ r"),
+    "second description": lambda: Pattern.from_text(
+        'a({); q: {"kind": "x", "space": {"name": "r", "dim": 1, "size": 1}, "parity": 1}'
+    ),
+    "misfit within an identity": lambda: Nesting(
+        Pattern({"q": junction(Q)}, {"a": {"q": "q"}}),
+        {"a": Nesting(Pattern.identity({"q": PortType(Q)}), {".": Pattern.from_text("q: angle, exposed; b(q)")})},
+    ).flatten(),
+    "nothing to fill": lambda: Pattern({}, {})(),
     "filled by a number": lambda: models.DAMPED(osc=1, mf=2, env=3),
 }
 
