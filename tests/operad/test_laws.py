@@ -61,6 +61,7 @@ def test_hashes_tell_patterns_and_directories_apart():
     texts = [f"q: angle; {'; '.join(f'b{k}(q)' for k in range(count))}" for count in range(1, 9)]
     assert len({hash(Pattern.from_text(text)) for text in texts}) > 4
     assert len({hash(Directory({"a": k})) for k in range(8)}) > 4
+    assert Directory({}) != 5 and Directory({}) != {} and Pattern({}, {}) != 5
 
 
 @settings(max_examples=2 * settings().max_examples)

@@ -179,7 +179,8 @@ def said(make: Callable[[], object]) -> str:
     try:
         make()
     except PatternError as error:
-        facts = {"box": error.box, "port": error.port, "junction": error.junction, "found": str(error.found)[:300]}
+        facts = {"box": error.box, "port": error.port, "junction": error.junction}
+        facts |= {"found": str(error.found)[:300], "expected": str(error.expected)[:300]}
         return f"{error} {[error.kind, facts]}"
     return "nothing is refused"
 
@@ -235,6 +236,16 @@ LONG: dict[str, Callable[[], object]] = {
         Pattern({"q": junction(Q)}, {"a": {"q": "q"}}),
         {"a": Nesting(Pattern.identity({"q": PortType(Q)}), {".": Pattern.from_text("q: angle, exposed; b(q)")})},
     ).flatten(),
+    "box filled twice": lambda: models.DAMPED({"mf": 1}, mf=2),
+    "child given twice": lambda: Nesting(models.DAMPED, [("osc", models.OSCILLATOR), ("osc", models.OSCILLATOR)]),
+    "identity's port given twice": lambda: Pattern.identity([("q", PortType(Q)), ("q", PortType(Q))]),
+    "two wrong parameters": lambda: quantity.relative_pose("screw", lead=1.0, angle=2.0),
+    "box like one of many junctions": lambda: Pattern(
+        {"a": junction(Q), "b": junction(Q)}, {"b": {"x": "a", "y": "b"}, "c": {}}
+    ),
+    "links of other quantities, two": lambda: Pattern.from_text(
+        "a: angle; b: charge; c: angle; d: charge; x(a, b, c, d); c ~ d; a ~ b"
+    ),
     "nothing to fill": lambda: Pattern({}, {})(),
     "filled by a number": lambda: models.DAMPED(osc=1, mf=2, env=3),
 }
