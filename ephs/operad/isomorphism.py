@@ -70,7 +70,7 @@ def to_networkx(pattern: Pattern) -> "nx.MultiGraph[Any]":
     return graph
 
 
-def isomorphism(first: Pattern, second: Pattern, *, fix_interface: bool = False) -> Renaming | None:
+def isomorphism(first: Pattern, second: Pattern, *, fix_interface: bool) -> Renaming | None:
     """A renaming that makes the first pattern equal to the second; see `Pattern.isomorphic`."""
     if first.is_identity != second.is_identity:
         return None
@@ -79,7 +79,7 @@ def isomorphism(first: Pattern, second: Pattern, *, fix_interface: bool = False)
     return None if found is None else _renaming(first, second, found)
 
 
-def automorphisms(pattern: Pattern, *, fix_interface: bool = False) -> int:
+def automorphisms(pattern: Pattern, *, fix_interface: bool) -> int:
     """How many renamings leave the pattern as it is; see `Pattern.automorphisms`.
 
     By orbits and stabilisers: fix one node after the other, and multiply by the number of places that it could take.

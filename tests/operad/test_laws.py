@@ -7,7 +7,7 @@ import pytest
 from hypothesis import find, given, settings
 from hypothesis import strategies as st
 
-from ephs.operad import LAWS, ROOT, Directory, Equation, Path, Pattern, Port, Quantity, junction, quantity
+from ephs.operad import LAWS, ROOT, Directory, Equation, Path, Pattern, Port, Quantity, junction, law, quantity
 from ephs.testing import check_operad_laws, law_inputs, nestings, patterns
 
 ALL = [
@@ -165,6 +165,16 @@ def test_an_anonymous_class_may_be_named_differently_by_history():
     right = f.substitute(a=g.substitute(b=h))
     assert set(left.junctions) != set(right.junctions)
     assert left == right and hash(left) == hash(right)
+
+
+def test_names_that_stay_need_not_be_given(models):
+    for name in ("equivariance in boxes", "equivariance in junctions", "equivariance in ports"):
+        assert law(name)(models.DAMPED, Path.parse("osc"), models.OSCILLATOR, {}).holds
+
+
+def test_what_cannot_be_a_path_is_no_key():
+    with pytest.raises(KeyError, match="~x"):
+        Directory({"x": 1})["~x"]
 
 
 def test_an_equation_shows_both_sides():

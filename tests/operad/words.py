@@ -158,6 +158,9 @@ SHOWN: dict[str, Callable[[], object]] = {
     "odd pattern, repr": lambda: repr(odd()),
     "odd pattern, text form": lambda: odd().to_text(),
     "odd pattern, json": lambda: odd().to_json(),
+    "description behind a brace": lambda: Pattern.from_text(
+        '# {\nq: {"kind": "x", "space": {"name": "r", "dim": 1, "size": 1}, "parity": 1}; a(q)'
+    ).to_text(),
     "one junction": lambda: Pattern.from_text("q: angle; a(q)").summary,
     "states without names": lambda: Pattern.from_text("x: angle; y: angle; a(~x); b(~y); state0(~x)").to_json(),
     "states shared with names": lambda: Pattern.from_text(
@@ -236,6 +239,11 @@ LONG: dict[str, Callable[[], object]] = {
         Pattern({"q": junction(Q)}, {"a": {"q": "q"}}),
         {"a": Nesting(Pattern.identity({"q": PortType(Q)}), {".": Pattern.from_text("q: angle, exposed; b(q)")})},
     ).flatten(),
+    "name with a dot": lambda: Path(("a.b",)),
+    "name that is a long list": lambda: Path((list(range(1000)),)),
+    "link of nothing": lambda: Pattern({}, {"a": {}}, [[]]),
+    "clash two levels apart": lambda: Directory({"a": 1, "a.b.c": 2}),
+    "clash three levels apart": lambda: Directory({"a": 1, "a.b.c.d": 2}),
     "box filled twice": lambda: models.DAMPED({"mf": 1}, mf=2),
     "child given twice": lambda: Nesting(models.DAMPED, [("osc", models.OSCILLATOR), ("osc", models.OSCILLATOR)]),
     "identity's port given twice": lambda: Pattern.identity([("q", PortType(Q)), ("q", PortType(Q))]),
