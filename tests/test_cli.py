@@ -84,9 +84,10 @@ def house(monkeypatch, tmp_path):
         report.write_text("<html>")
         return report
 
-    def draw(system):
+    def draw(system, path, *, opened):
         calls.drawn = system
-        return SimpleNamespace(save=lambda path: Path(path).write_text("<svg>"))
+        Path(path).write_text("<svg>")
+        return SimpleNamespace(faults=["a name lies on a wire"] if opened else [])
 
     names = {
         "load": load,
@@ -248,6 +249,11 @@ def test_draw_takes_the_hierarchy_or_its_flattening(house, capsys):
     assert cli.main(["draw", "crank.toml", "--flat", "-o", "b.png"]) == 0
     assert house.drawn == "flattened"
     assert capsys.readouterr().out.split() == ["pictures/a.svg", "b.png"]
+    assert cli.main(["draw", "crank.toml", "--opened", "-o", "c.svg"]) == 0
+    assert capsys.readouterr().out.splitlines() == [
+        "c.svg",
+        "1 names or wires lie on something else, as there is no room",
+    ]
 
 
 def test_a_model_from_a_python_file(house):
