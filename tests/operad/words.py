@@ -254,6 +254,7 @@ LONG: dict[str, Callable[[], object]] = {
     "links of other quantities, two": lambda: Pattern.from_text(
         "a: angle; b: charge; c: angle; d: charge; x(a, b, c, d); c ~ d; a ~ b"
     ),
+    "misfit of an identity": lambda: identity().substitute({".": Pattern.from_text("q: angle, exposed; b(q)")}),
     "nothing to fill": lambda: Pattern({}, {})(),
     "filled by a number": lambda: models.DAMPED(osc=1, mf=2, env=3),
 }
