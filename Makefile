@@ -13,11 +13,11 @@ export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
 .DELETE_ON_ERROR:
-.PHONY: help demo test lint types docs bench fuzz mutate clean
+.PHONY: help demo test lint types docs bench fuzz mutate mutants clean
 
 help:
 	@echo 'make demo   simulate scenes/$(SCENE).toml and write out/$(SCENE)/report.html'
-	@echo 'make test   run the tests; make lint, make types: style and types; make fuzz: the laws, for long; make mutate: what goes red when the code is broken'
+	@echo 'make test   run the tests; make lint, make types: style and types; make fuzz: the laws, for long; make mutate: what goes red when the code is broken; make mutants: the same for the operad, by mutmut'
 	@echo 'make docs   build docs/_build/html; make bench: measure; make clean: remove what was built'
 
 # One stamp an extra: installing again is needed only when pyproject.toml has changed.
@@ -48,6 +48,9 @@ fuzz: $(VENV)/.installed-dev
 mutate: $(VENV)/.installed-dev
 	$(BIN)/python -m tests.mutate
 
+mutants: $(VENV)/.installed-mutants
+	$(BIN)/mutmut run --max-children $(CORES)
+
 bench: $(VENV)/.installed-dev
 	$(BIN)/python -m benchmarks
 
@@ -65,5 +68,5 @@ docs: $(VENV)/.installed-docs $(MATHJAX)
 	@echo 'The pages: docs/_build/html/index.html'
 
 clean:
-	rm -rf out docs/_build .build .pytest_cache .hypothesis .ruff_cache .coverage dist
+	rm -rf out mutants docs/_build .build .pytest_cache .hypothesis .ruff_cache .coverage dist
 	find ephs tests -name __pycache__ -type d -prune -exec rm -rf {} +
