@@ -245,7 +245,7 @@ def draw(
         drawing = draw_pattern(system.flatten() if flat else system, output, opened=opened)
     print(output)
     if drawing.faults:
-        print(f"{len(drawing.faults)} names or wires lie on something else, as there is no room")
+        print(f"names and wires that lie on something else, as there is no room: {len(drawing.faults)}")
     return 0
 
 

@@ -67,14 +67,14 @@ MUTATIONS = {
     ),
     "substitution": Mutation(
         "ephs/operad/substitution.py",
-        "        target[path] = box / path\n",
-        "        target[path] = path\n",
+        "        target[path] = kept = box / path\n",
+        "        target[path] = kept = path\n",
         OPERAD + SEMANTICS,
     ),
     "substitution, absorbed elsewhere": Mutation(
         "ephs/operad/substitution.py",
-        "target[path] = content.ports[path].junction  # absorbed",
-        "target[path] = min(content.ports.values(), key=lambda p: p.junction).junction",
+        "target[path] = outer.target[content.ports[path].junction]  # absorbed",
+        "target[path] = outer.target[min(content.ports.values(), key=lambda p: p.junction).junction]",
         OPERAD + SEMANTICS,
     ),
     "gluing": Mutation(

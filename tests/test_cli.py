@@ -252,7 +252,7 @@ def test_draw_takes_the_hierarchy_or_its_flattening(house, capsys):
     assert cli.main(["draw", "crank.toml", "--opened", "-o", "c.svg"]) == 0
     assert capsys.readouterr().out.splitlines() == [
         "c.svg",
-        "1 names or wires lie on something else, as there is no room",
+        "names and wires that lie on something else, as there is no room: 1",
     ]
 
 

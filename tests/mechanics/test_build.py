@@ -19,6 +19,7 @@ from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.testing import mechanisms
 
 ROOT = File(__file__).parents[2]
+# Mechanisms are large, and each is solved: what Hypothesis deems slow and large is meant here.
 calm = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
 
 LEG = """format = 1

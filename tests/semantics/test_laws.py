@@ -21,6 +21,7 @@ from ephs.testing import (
 )
 
 # A system holds many draws; what is slow is the plain solver, which is the point.
+# Relations of whole hierarchies are composed and compared: what Hypothesis deems slow and large is meant here.
 patient = settings(suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large], deadline=None)
 few = settings(patient, max_examples=25)
 seeds = st.integers(0, 2**16)
@@ -92,6 +93,7 @@ def test_names_of_boxes_mean_nothing(system, seed):
 
 
 def test_systems_of_depth_three_open_and_closed_with_groups_are_generated():
+    # A search for one example, however long: `find` has no law to be slow at.
     quick = settings(max_examples=2000, database=None, suppress_health_check=list(HealthCheck))
 
     def depth(system):

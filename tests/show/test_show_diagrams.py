@@ -30,6 +30,7 @@ def drawn(request):
     return pattern, draw(pattern, kinds=kinds_of(pattern))
 
 
+# Patterns of twelve boxes are large to draw, and placing them takes its time: both are meant here.
 calm = settings(suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large], deadline=None)
 SMALL = patterns(max_boxes=12, max_inner_junctions=8)
 

@@ -6,11 +6,11 @@ from typing import Any, final
 
 import numpy as np
 
-from ephs.mechanics.solve.errors import Interrupted, OptionError, Outcome, SimulationError, SolveError
-from ephs.mechanics.solve.integrate import Grid, Progress, coordinates
-from ephs.mechanics.solve.ledger import ledgers
+from ephs.mechanics.solve.errors import OptionError, Outcome, SolveError
+from ephs.mechanics.solve.integrate import Grid, Progress, failures_of, solution_of
 from ephs.mechanics.solve.model import compile_model
 from ephs.mechanics.solve.natural import Chunk
+from ephs.mechanics.solve.natural_kernels import IRREVERSIBLE
 from ephs.mechanics.solve.problem import Problem
 from ephs.mechanics.solve.radau import Radau, RadauState, Step
 from ephs.mechanics.solve.record import Recorder
@@ -83,15 +83,10 @@ def integrate_adaptive(
     if not (np.isfinite(until) and until > t0):
         raise OptionError("until", until, f"a time after t0 = {t0!r} s")
     run = _Run(problem, method, t0, until, control, form, save_at, progress, begin)
-    try:
+    with failures_of(run):
         run.start(problem.descriptor.pack(problem.initial))
         run.setup = time.perf_counter() - begin
         run.advance()
-    except SolveError as error:
-        failed = Interrupted if isinstance(error.cause, KeyboardInterrupt) else SimulationError
-        raise failed(error.outcome, run.t, error.path, error.equation, run.solution()) from error.cause
-    except KeyboardInterrupt as error:
-        raise Interrupted(Outcome.INTERRUPTED, run.t, "", "", run.solution()) from error
     return run.solution()
 
 
@@ -186,7 +181,8 @@ class _Run:
     def _accept(self, step: Step, end: float | None) -> None:
         self.iterations += step.iterations
         t = step.end.t if end is None else end
-        added, least = self.stepper.quadrature(step)
+        powers, least = self.stepper.powers(step)
+        added = self.stepper.integral(step, powers, step.end.t)
         if self.save_at is None:
             self._keep([(t, step.end.x, *self._row(step.end, self.sums + added, least))])
         else:
@@ -194,7 +190,7 @@ class _Run:
             rows: list[tuple[float, Array, Array, Array]] = []
             for when in self.save_at[self.saved : last]:
                 x, z = self.stepper.dense(step, when) if when < t else (step.end.x, step.end.z)
-                sums = self.sums + (self.stepper.quadrature(step, when)[0] if when < t else added)
+                sums = self.sums + (self.stepper.integral(step, powers, when) if when < t else added)
                 rows.append((when, x, *self._row(RadauState(when, x, z), sums, least)))
             self._keep(rows)
             self.saved = last
@@ -208,7 +204,7 @@ class _Run:
 
     def _row(self, state: RadauState, sums: Array, least: float) -> tuple[Array, Array]:
         energies = self.stepper.energies(state)
-        made = self.stepper.model.tables.kind == 2
+        made = self.stepper.model.tables.kind == IRREVERSIBLE
         return np.where(made, sums[4:], energies), np.array([*sums[:4], least])
 
     def _keep(self, rows: list[tuple[float, Array, Array, Array]]) -> None:
@@ -236,6 +232,4 @@ class _Run:
 
     def solution(self) -> Solution:
         """The solution so far."""
-        problem, record = self.problem, self.recorder.result()
-        states = {slot.path: coordinates(slot.quantity, record.x[:, slot.point]) for slot in problem.descriptor.states}
-        return Solution(problem.name, record.t, states, ledgers(problem, record), self.stats(), problem)
+        return solution_of(self.problem, self.recorder.result(), self.stats())

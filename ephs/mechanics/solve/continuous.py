@@ -12,7 +12,7 @@ from scipy.sparse import csc_array
 
 from ephs.mechanics.solve.errors import SolveError
 from ephs.mechanics.solve.model import Model
-from ephs.mechanics.solve.natural_kernels import Memory, account, evaluate
+from ephs.mechanics.solve.natural_kernels import STORING, Memory, account, evaluate
 from ephs.semantics.bundle import Array
 
 __all__ = ["Continuous", "Matrices"]
@@ -83,7 +83,7 @@ class Continuous:
     def energies(self, x: Array, z: Array, inputs: Array) -> Array:
         """(components,): energy of each storage at the states x, zero elsewhere."""
         self._evaluate(x, z, self._still, inputs)
-        return np.where(self.model.tables.kind == 0, self._memory.energy, 0.0)
+        return np.where(self.model.tables.kind == STORING, self._memory.energy, 0.0)
 
     def _evaluate(self, x: Array, z: Array, scal: Array, inputs: Array) -> None:
         status, component = evaluate(self.model.tables, x, z, scal, inputs, self._memory)

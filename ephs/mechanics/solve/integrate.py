@@ -1,9 +1,10 @@
 """The time loop: compiled steps in chunks, and between chunks progress, interruption and what is kept."""
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Generator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, final
+from typing import Any, Protocol, final
 
 import numpy as np
 
@@ -12,13 +13,13 @@ from ephs.mechanics.solve.ledger import ledgers
 from ephs.mechanics.solve.model import Model, compile_model
 from ephs.mechanics.solve.natural import Chunk, Natural, NaturalState
 from ephs.mechanics.solve.problem import Problem
-from ephs.mechanics.solve.record import Recorder
+from ephs.mechanics.solve.record import Record, Recorder
 from ephs.mechanics.solve.solution import Solution
 from ephs.operad import Quantity
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import Pair
 
-__all__ = ["METHODS", "Grid", "integrate"]
+__all__ = ["METHODS", "Grid", "Progress", "failures_of", "integrate", "solution_of"]
 
 METHODS: dict[str, Callable[[Model], Natural]] = {"natural": Natural}
 """Method name -> what makes it for a compiled model."""
@@ -85,7 +86,7 @@ def integrate(
     model = compile_model(d, problem.reference, problem.inputs(grid.t0, problem.initial))
     stepper = METHODS[method](model)
     run = _Run(problem, grid, stepper, Recorder(d, grid.t0, x0, save_at), form, begin, progress)
-    try:
+    with failures_of(run):
         run.recorder.start(stepper.energies(x0))
         run.state = stepper.init(x0)
         stepper.prepare(run.state, grid.h)
@@ -93,12 +94,35 @@ def integrate(
         run.full_steps(max_steps)
         if grid.last:
             run.take(grid.last, 1, grid.until)
+    return run.solution()
+
+
+class Run(Protocol):
+    """A run in progress: where it stands, and what it has so far."""
+
+    t: float
+
+    def solution(self) -> Solution:
+        """The solution so far."""
+        ...
+
+
+@contextmanager
+def failures_of(run: Run) -> Generator[None, None, None]:
+    """Failures and interruptions inside become those of the run, with its time and partial solution."""
+    try:
+        yield
     except SolveError as error:
         failed = Interrupted if isinstance(error.cause, KeyboardInterrupt) else SimulationError
         raise failed(error.outcome, run.t, error.path, error.equation, run.solution()) from error.cause
     except KeyboardInterrupt as error:
         raise Interrupted(Outcome.INTERRUPTED, run.t, "", "", run.solution()) from error
-    return run.solution()
+
+
+def solution_of(problem: Problem, record: Record, stats: Mapping[str, Any]) -> Solution:
+    """What was kept of a run, as users read it."""
+    states = {slot.path: coordinates(slot.quantity, record.x[:, slot.point]) for slot in problem.descriptor.states}
+    return Solution(problem.name, record.t, states, ledgers(problem, record), dict(stats), problem)
 
 
 class _Run:
@@ -185,9 +209,7 @@ class _Run:
 
     def solution(self) -> Solution:
         """The solution so far."""
-        problem, record = self.problem, self.recorder.result()
-        states = {slot.path: coordinates(slot.quantity, record.x[:, slot.point]) for slot in problem.descriptor.states}
-        return Solution(problem.name, record.t, states, ledgers(problem, record), self.stats(), problem)
+        return solution_of(self.problem, self.recorder.result(), self.stats())
 
 
 def coordinates(quantity: Quantity, x: Array) -> Array:

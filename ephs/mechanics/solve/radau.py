@@ -171,16 +171,19 @@ class Radau:
         basis = np.linalg.solve(np.vander(NODES, increasing=True).T, np.array([1.0, theta, theta**2]))
         return x, basis @ step.stages
 
-    def quadrature(self, step: Step, t: float | None = None) -> tuple[Array, float]:
-        """What came into the ledgers from the start of the step to a time, its end where None; and the least entropy
-        production of a component at a stage, times the step."""
-        part = COEFFICIENTS[-1] if t is None else _moments(NODES, (t - step.start.t) / step.h)
+    def powers(self, step: Step) -> tuple[Array, float]:
+        """What flows into the ledgers at the stages, per second, (3, 4 + components); and the least entropy production
+        of a component at a stage, times the step."""
         xs = step.start.x + step.h * COEFFICIENTS @ step.stages[:, : self._rates]
         found = [
             self.equations.powers(x, z, self.inputs(step.start.t + c * step.h, x))
             for x, z, c in zip(xs, step.stages, NODES, strict=True)
         ]
-        return step.h * part @ np.array([sums for sums, _ in found]), step.h * min(least for _, least in found)
+        return np.array([sums for sums, _ in found]), step.h * min(least for _, least in found)
+
+    def integral(self, step: Step, powers: Array, t: float) -> Array:
+        """What came into the ledgers from the start of the step to a time within it."""
+        return step.h * _moments(NODES, (t - step.start.t) / step.h) @ powers
 
     def energies(self, state: RadauState) -> Array:
         """(components,): energy of each storage, zero elsewhere."""
