@@ -4,6 +4,7 @@ Base points are drawn with a fixed seed, so that a wrong primitive is refused ev
 Conditions: Lohmayer, Capobianco, Leyendecker, section 2, with time-reversal parity as a further one.
 """
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from ephs.operad import Path
 from ephs.semantics.bundle import POSITIVE, Array, Bundle, Reference
 from ephs.semantics.errors import StructureError
-from ephs.semantics.spaces import manifold
+from ephs.semantics.spaces import codes, manifold
 from ephs.semantics.subspace import Subspace
 
 if TYPE_CHECKING:
@@ -60,6 +61,13 @@ def _reversed(primitive_bundle: Bundle, x: "Point") -> dict[Path, Array]:
     }
 
 
+def _opposite(bundle: Bundle, x: "Point") -> Iterator[tuple[Path, Array]]:
+    """The states with a rotation, by the other one of its two quaternions."""
+    for port in x:
+        if manifold(bundle.interface[port].quantity.space).code in (codes.SO3, codes.SE3, codes.SO3xR3):
+            yield port, np.concatenate([-x[port][:4], x[port][4:]])
+
+
 def _odd(bundle: Bundle, port: Path) -> bool:
     return bundle.interface[port].quantity.parity < 0
 
@@ -87,6 +95,10 @@ def check_storage(storage: "Storage") -> None:
         mirrored = float(storage.energy(_reversed(bundle, x)))
         if not abs(energy - mirrored) <= EVENNESS * (abs(energy) + abs(mirrored)):
             raise StructureError("even", name, found=mirrored, expected=energy, witness=_show(x))
+        for port, opposite in _opposite(bundle, x):
+            found = float(storage.energy({**x, port: opposite}))
+            if not abs(energy - found) <= EVENNESS * (abs(energy) + abs(found)):
+                raise StructureError("rotation-sign", name, what="the energy tells", port=port, witness=_show(x))
         _check_gradient(storage, x, gradient, energy)
         for _, where, quantity in bundle.items():
             if quantity.kind == "entropy" and not gradient[where][0] > 0.0:
@@ -181,6 +193,10 @@ def check_reversible(reversible: "Reversible") -> None:
         found = here.image(mirror).distance(there)
         if not found <= 1e-9:
             raise StructureError("parity", name, found=found, witness=_show(x))
+        for port, opposite in _opposite(bundle, x):
+            found = here.distance(dirac(*reversible.structure({**x, port: opposite})))
+            if not found <= 1e-9:
+                raise StructureError("rotation-sign", name, what="the structure tells", port=port, witness=_show(x))
 
 
 def check_irreversible(irreversible: "Irreversible") -> None:
@@ -219,3 +235,7 @@ def check_irreversible(irreversible: "Irreversible") -> None:
         found = float(np.abs(mirrored - parity[:, None] * matrix * parity[None, :]).max(initial=0.0))
         if not found <= TOLERANCE * scale:
             raise StructureError("parity", name, found=found, witness=_show(x))
+        for port, opposite in _opposite(bundle, x):
+            found = float(np.abs(irreversible.matrix({**x, port: opposite}, e, reference) - matrix).max(initial=0.0))
+            if not found <= TOLERANCE * scale:
+                raise StructureError("rotation-sign", name, what="the matrix M tells", port=port, witness=_show(x))

@@ -1,6 +1,8 @@
 """Primitives of one's own, from plain Python functions of the port variables.
 
-Their structure is checked when they are made.
+Their structure is checked when they are made. The functions are traced with SymPy: gradients, Jacobians, formulas and
+compiled kernels come from that, once for all primitives that differ in numbers only. A function that branches on its
+arguments or turns them into floats cannot be traced; it is then differenced, and called back in Python.
 """
 
 import inspect
@@ -15,7 +17,7 @@ from ephs.semantics import library
 from ephs.semantics.bundle import Array, Bundle, Reference
 from ephs.semantics.checks import random_point
 from ephs.semantics.errors import StructureError
-from ephs.semantics.primitives import Irreversible, Point, Reversible, Storage
+from ephs.semantics.primitives import Formula, Irreversible, Kernel, Point, Reversible, Storage
 
 __all__ = ["constraint", "gyrator", "irreversible", "storage", "transformer"]
 
@@ -39,7 +41,8 @@ def storage(
     energy
         E in J, called with the ports' states by name: floats where scalar, else arrays.
     gradient
-        dE, left-trivialised: a sequence with an entry for each port, or (n,); by differences where None.
+        dE, left-trivialised: a sequence with an entry for each port, or (n,). Where None it is derived from the
+        energy; by differences where that cannot be traced.
 
     Raises
     ------
@@ -61,12 +64,26 @@ def storage(
     if gradient is not None:
         _takes(name, "gradient", gradient, tuple(interface))
     given = gradient
+
+    def value(x: Point) -> float:
+        return _real(name, energy(**_named(x)))
+
+    from ephs.semantics.symbols.forms import storage_form
+    from ephs.semantics.symbols.tracing import Untraceable
+
+    try:
+        form = storage_form(interface, energy)
+    except Untraceable:
+        form = None
+    derived = None if form is None else form.gradient
     return Storage(
         name,
         interface,
-        energy=lambda x: float(energy(**_named(x))),
-        gradient=None if given is None else lambda x: _flat(name, given(**_named(x)), n),
+        energy=value,
+        gradient=derived if given is None else lambda x: _flat(name, given(**_named(x)), n),
         parameters=(("energy", _name(energy)),),
+        kernel=None if form is None else form.kernel,
+        formula=Formula(energy),
     )
 
 
@@ -89,9 +106,16 @@ def gyrator(ports: Ports, matrix: Matrix, *, name: str = "gyrator") -> Reversibl
     n = Bundle.of(interface).size
     if not callable(matrix):
         return library.constant_structure(name, interface, _matrix(name, matrix, n, n), np.zeros((0, n)))
-    read = _reader(name, interface, matrix)
+    given = matrix
+    read = _reader(name, interface, given)
+    formula = Formula(_both(given, None))
     return Reversible(
-        name, interface, lambda x: (_matrix(name, read(x), n, n), np.zeros((0, n))), reads=_reads(interface)
+        name,
+        interface,
+        lambda x: (_matrix(name, read(x), n, n), np.zeros((0, n))),
+        reads=_reads(interface),
+        kernel=_kernel(interface, formula, 0),
+        formula=formula,
     )
 
 
@@ -119,13 +143,22 @@ def transformer(ports: Ports, matrix: Matrix, *, name: str = "transformer") -> R
     if not callable(matrix):
         zero = np.zeros((bundle.size, bundle.size))
         return library.constant_structure(name, interface, zero, whole(_matrix(name, matrix, k, first)))
-    read = _reader(name, interface, matrix)
+    given = matrix
+    read = _reader(name, interface, given)
+    right = np.eye(k).astype(object)
+
+    def beside(**x: Any) -> Any:
+        return np.hstack([-np.asarray(given(**x), dtype=object).reshape(k, first), right])
+
+    formula = Formula(_both(None, beside))
     return Reversible(
         name,
         interface,
         lambda x: (np.zeros((bundle.size, bundle.size)), whole(_matrix(name, read(x), k, first))),
         reads=_reads(interface),
         multipliers=k,
+        kernel=_kernel(interface, formula, k),
+        formula=formula,
     )
 
 
@@ -148,14 +181,18 @@ def constraint(ports: Ports, matrix: Matrix, *, multipliers: int | None = None, 
         rows: Any = matrix
         k = len(rows) if np.ndim(rows) == 2 else 1
         return library.constant_structure(name, interface, zero, _matrix(name, np.atleast_2d(rows), k, n))
-    read = _reader(name, interface, matrix)
+    given = matrix
+    read = _reader(name, interface, given)
     k = _rows(interface, read) if multipliers is None else multipliers
+    formula = Formula(_both(None, given))
     return Reversible(
         name,
         interface,
         lambda x: (zero, _matrix(name, read(x), k, n)),
         reads=_reads(interface),
         multipliers=k,
+        kernel=_kernel(interface, formula, k),
+        formula=formula,
     )
 
 
@@ -189,7 +226,40 @@ def irreversible(ports: Ports, matrix: Callable[..., Any], *, name: str = "irrev
         energy = bundle.split(e + bundle.intensive(reference))
         return _matrix(name, matrix(**_named({**energy, **x})), bundle.size, bundle.size)
 
-    return Irreversible(name, interface, evaluate, _reads(interface))
+    formula = Formula(matrix)
+    return Irreversible(
+        name, interface, evaluate, _reads(interface), kernel=_kernel(interface, formula, None), formula=formula
+    )
+
+
+def _both(skew: Callable[..., Any] | None, constraint: Callable[..., Any] | None) -> Callable[..., Any]:
+    """(L, C) as one function of the states."""
+
+    def structure(**x: Any) -> tuple[Any, Any]:
+        return None if skew is None else skew(**x), None if constraint is None else constraint(**x)
+
+    return structure
+
+
+def _kernel(interface: Interface, formula: Formula, multipliers: int | None) -> Kernel | None:
+    """The kernel of a reversible structure with so many multipliers, or of an irreversible one; None if untraced."""
+    from ephs.semantics.symbols.forms import irreversible_kernel, reversible_kernel
+    from ephs.semantics.symbols.tracing import Untraceable
+
+    reads = _reads(interface)
+    try:
+        if multipliers is None:
+            return irreversible_kernel(interface, reads, formula)
+        return reversible_kernel(interface, reads, formula, multipliers)
+    except Untraceable:
+        return None
+
+
+def _real(name: str, value: Any) -> float:
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise StructureError("parameter", name, key="energy", found=value, expected="a real number") from None
 
 
 def _interface(name: str, ports: Ports) -> Interface:

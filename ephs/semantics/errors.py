@@ -28,6 +28,10 @@ _TEXTS = {
     "even": (
         "{path}: the energy is not even under time reversal: {found} against {expected} (witness state {witness})"
     ),
+    "rotation-sign": (
+        "{path}: {what} the quaternions q and −q of port {port} apart, which are one rotation (witness state "
+        "{witness}); use products of two of its entries, or a rotation matrix"
+    ),
     "gradient-shape": "{path}: the gradient is {found}, its ports want {expected}",
     "gradient": (
         "{path}: the gradient's entry {entry} is {found}, differences of the energy say {expected} (witness "

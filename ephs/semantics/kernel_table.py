@@ -19,10 +19,11 @@ from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.primitives import Kernel, Primitive, Reversible, Storage
 from ephs.semantics.spaces import manifold
 
-__all__ = ["EXTENT", "OK", "SIGNATURE", "TEMPERATURE", "TURN", "Callback", "address_of", "prototype"]
+__all__ = ["DOMAIN", "EXTENT", "OK", "SIGNATURE", "TEMPERATURE", "TURN", "Callback", "address_of", "prototype"]
 
-OK, TURN, TEMPERATURE, RAISED, EXTENT = 0, 1, 2, 3, 4
-"""What a kernel returns: done; half a turn in a step; θ ≤ 0; a Python function raised; a length or volume ≤ 0."""
+OK, TURN, TEMPERATURE, RAISED, EXTENT, DOMAIN = 0, 1, 2, 3, 4, 5
+"""What a kernel returns: done; half a turn in a step; θ ≤ 0; a Python function raised; a length or volume ≤ 0; a value
+that is not a finite number."""
 
 SIGNATURE = (
     "int64(CPointer(int64), CPointer(float64), CPointer(float64), CPointer(float64), CPointer(float64), "
@@ -69,6 +70,12 @@ class Callback:
 def address_of(primitive: Primitive) -> tuple[int, tuple[float, ...], Callback | None]:
     """(address, parameters, callback or None) of a primitive's discrete relation."""
     kernel: Kernel | None = primitive.kernel
+    if kernel is not None and kernel.source:
+        from ephs.semantics.symbols.programs import address_of_source
+
+        inner, _ = address_of_source(kernel.source)
+        outer = int(_compiled(kernel.module, kernel.name).address)
+        return outer, (float(inner), *kernel.parameters), None
     if kernel is not None:
         return int(_compiled(kernel.module, kernel.name).address), kernel.parameters, None
     callback = _callback(primitive)

@@ -15,7 +15,7 @@ from ephs.semantics.pattern_relation import pattern_relation
 from ephs.semantics.primitives import Point, Primitive, Reversible
 from ephs.semantics.probe import Probe, SystemLaw, Verdict, random_probe
 from ephs.semantics.relation import LinearRelation, Sources, fold, read_point
-from ephs.semantics.subspace import RANK_TOLERANCE, Subspace
+from ephs.semantics.subspace import Subspace
 from ephs.semantics.system import System
 
 __all__ = [
@@ -38,7 +38,14 @@ def _functoriality(probe: Probe) -> Verdict:
         for route in ("flat", "nested")
     )
     distance = flat.distance(nested)
-    return Verdict(distance, 1e-12, f"projectors of dimension {flat.dimension} differ by {distance:.1e}")
+    detail = f"projectors of dimension {flat.dimension} differ by {distance:.1e}"
+    return Verdict(distance, _rounding(flat.subspace, nested.subspace), detail)
+
+
+def _rounding(*subspaces: Subspace) -> float:
+    """What projectors may differ by: 1e-13 times the condition of the eliminations; those of other relations differ by
+    a tenth and more."""
+    return min(1e-6, 1e-13 * max(10.0, *(subspace.condition for subspace in subspaces)))
 
 
 def _patterns(system: System, path: Path = ROOT) -> Iterator[tuple[Path, Pattern]]:
@@ -124,19 +131,8 @@ def _dirac(probe: Probe) -> Verdict:
     if 2 * found.dimension != len(kept):
         return Verdict(np.inf, 0.0, f"dimension {found.dimension}, expected {len(kept) // 2}")
     worst = isotropy(found, form[np.ix_(kept, kept)])
-    # two steps of elimination, each as uncertain as the least singular value that it keeps
-    condition = max(_condition(matrix @ whole.basis), _condition(filled.basis[kept]))
     detail = f"dimension {found.dimension} on {len(kept)} flows and efforts, isotropic to {worst:.1e}"
-    return Verdict(worst, 1e-13 * condition, detail)
-
-
-def _condition(matrix: Array) -> float:
-    """The largest singular value over the least that counts, at least 1."""
-    if not matrix.size:
-        return 1.0
-    sigma = np.linalg.svd(matrix, compute_uv=False)
-    counting = sigma[sigma > RANK_TOLERANCE * max(float(sigma[0]), 1e-300)]
-    return float(sigma[0] / counting[-1]) if counting.size else 1.0
+    return Verdict(worst, 1e-13 * found.condition, detail)
 
 
 def _renaming(probe: Probe) -> Verdict:
@@ -165,7 +161,8 @@ def _renaming(probe: Probe) -> Verdict:
     order = [i for path, _ in one.rates for i in where[new(path)]]
     order += range(len(order), two.subspace.ambient)
     distance = float(np.abs(one.projector - two.projector[np.ix_(order, order)]).max(initial=0.0))
-    return Verdict(distance, 1e-12, f"{len(boxes)} boxes renamed, projectors differ by {distance:.1e}")
+    detail = f"{len(boxes)} boxes renamed, projectors differ by {distance:.1e}"
+    return Verdict(distance, _rounding(one.subspace, two.subspace), detail)
 
 
 def _places(relation: LinearRelation) -> dict[Path, range]:

@@ -315,7 +315,7 @@ def _primitive(primitive: Primitive, x: Point, e: Array | None, reference: Refer
 
 def compose_linear(pattern: Pattern, parts: Mapping[Path, LinearRelation]) -> LinearRelation:
     """Glue the relations of the boxes along a pattern: shared effort, net flow; then forget the inner ports."""
-    unit = next((part.unit for part in parts.values()), 1.0)
+    unit = max((part.unit for part in parts.values()), default=1.0)  # what has no storage inside knows none but 1
     inner = Subspace(np.zeros((0, 0)))
     places: dict[tuple[Path, Path], tuple[int, int]] = {}  # (box, port) -> (first flow, first effort)
     rates: list[tuple[Path, int, int]] = []

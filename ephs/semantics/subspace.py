@@ -26,9 +26,13 @@ class Subspace:
     ----------
     basis
         (n, r), orthonormal columns.
+    condition
+        Largest singular value over the least that counted, multiplied over the eliminations that led here: by what
+        factor the basis may carry rounding.
     """
 
     basis: Array
+    condition: float = 1.0
 
     @staticmethod
     def from_kernel(matrix: Array) -> "Subspace":
@@ -40,7 +44,7 @@ class Subspace:
             return Subspace(np.eye(n))
         _, sigma, vt = np.linalg.svd(rows, full_matrices=True)
         rank = int(np.sum(sigma > RANK_TOLERANCE * sigma[0]))
-        return Subspace(np.ascontiguousarray(vt[rank:].T))
+        return Subspace(np.ascontiguousarray(vt[rank:].T), _condition(sigma, rank))
 
     @staticmethod
     def from_span(vectors: Array) -> "Subspace":
@@ -49,7 +53,7 @@ class Subspace:
             return Subspace(np.zeros((vectors.shape[0], 0)))
         u, sigma, _ = np.linalg.svd(vectors, full_matrices=False)
         rank = int(np.sum(sigma > RANK_TOLERANCE * max(sigma[0], 1e-300)))
-        return Subspace(np.ascontiguousarray(u[:, :rank]))
+        return Subspace(np.ascontiguousarray(u[:, :rank]), _condition(sigma, rank))
 
     @property
     def ambient(self) -> int:
@@ -68,7 +72,7 @@ class Subspace:
 
     def project(self, kept: Iterable[int]) -> "Subspace":
         """Keep some coordinates: ∃ the others. The rank is decided on an orthonormal basis, so it is well scaled."""
-        return Subspace.from_span(self.basis[list(kept), :])
+        return Subspace.from_span(self.basis[list(kept), :])._after(self)
 
     def restrict(self, matrix: Array) -> "Subspace":
         """The vectors of this subspace which also satisfy matrix z = 0."""
@@ -76,16 +80,20 @@ class Subspace:
         # a row that holds already leaves rounding, which must not be taken for an equation
         left = np.linalg.norm(product, axis=1) > RANK_TOLERANCE * np.linalg.norm(matrix, axis=1)
         coefficients = Subspace.from_kernel(product[left])
-        return Subspace(self.basis @ coefficients.basis)
+        return Subspace(self.basis @ coefficients.basis, coefficients.condition)._after(self)
 
     def image(self, matrix: Array) -> "Subspace":
         """The image under a linear map, (m, n)."""
-        return Subspace.from_span(matrix @ self.basis)
+        return Subspace.from_span(matrix @ self.basis)._after(self)
 
     def direct_sum(self, other: "Subspace") -> "Subspace":
         """Side by side in ℝⁿ⁺ᵐ."""
         (n, r), (m, s) = self.basis.shape, other.basis.shape
-        return Subspace(np.block([[self.basis, np.zeros((n, s))], [np.zeros((m, r)), other.basis]]))
+        both = np.block([[self.basis, np.zeros((n, s))], [np.zeros((m, r)), other.basis]])
+        return Subspace(both, max(self.condition, other.condition))
+
+    def _after(self, before: "Subspace") -> "Subspace":
+        return Subspace(self.basis, self.condition * before.condition)
 
     def distance(self, other: "Subspace") -> float:
         """Largest entry of the difference of the orthogonal projectors: 0 if equal, of order 1 if not."""
@@ -97,3 +105,7 @@ class Subspace:
         """Distance of a vector from the subspace, relative to its length."""
         off = vector - self.basis @ (self.basis.T @ vector)
         return float(np.linalg.norm(off) / max(np.linalg.norm(vector), 1e-300))
+
+
+def _condition(sigma: Array, rank: int) -> float:
+    return float(sigma[0] / sigma[rank - 1]) if rank else 1.0

@@ -1,13 +1,16 @@
 """The mechanical primitives, and that the compiled kernels compute what their plain definitions say."""
 
 import ctypes
+import math
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import ephs
 from ephs.mechanics import components
+from ephs.operad import Quantity, Space
 from ephs.operad import quantity as Q
 from ephs.semantics import Reference, Storage, StructureError, library
 from ephs.semantics.behaviour import Natural
@@ -17,6 +20,7 @@ from ephs.semantics.laws import isotropy
 from ephs.semantics.spaces import PAIRS, SE3, pair
 
 REFERENCE = Reference()
+PLANE = Quantity("plane", Space("real", 2, 2), 1)
 SIZES = [0.0, 1e-10, 1e-7, 1e-4, 0.02, 0.3]
 seeds = st.integers(0, 2**20)
 POINTER = ctypes.POINTER(ctypes.c_double)
@@ -53,6 +57,44 @@ def primitives():
     out["ideal_gas"] = library.ideal_gas(c1=2.0, c2=1.5, v0=1.0, c=1.5)
     out["heat_transfer"] = library.heat_transfer(h=2.0)
     out["environment"] = library.environment()
+    return out | traced()
+
+
+def traced():
+    """Primitives of plain functions: their kernels are made from formulas."""
+    b = np.array([[1.0, 0.3], [0.3, 2.0]])
+    ball, planar = Q.relative_pose("spherical"), Q.relative_pose("planar")
+    out = {
+        "traced scalar": ephs.storage({"q": Q.displacement}, lambda q: 0.7 * q**4 + math.cos(q)),
+        "traced ports": ephs.storage({"q": Q.displacement, "v": Q.volume}, lambda q, v: np.cosh(q) * (1.0 + v**4)),
+        "traced heat": ephs.storage({"s": Q.entropy}, lambda s: 3e4 * math.exp(s / 100.0)),
+        "traced vector": ephs.storage({"x": PLANE}, lambda x: 0.5 * x @ b @ x + np.sin(x[0] * x[1])),
+        "traced rotation": ephs.storage({"q": ball}, lambda q: 2.0 * (q[1:] @ q[1:]) * q[0] ** 2),
+        "traced planar": ephs.storage({"q": planar}, lambda q: np.cos(q[0]) * q[1] + q[2] ** 2),
+        "traced pose": ephs.storage({"q": Q.pose}, lambda q: 9.81 * q[6] + q[1] ** 2 + q[4] * q[5] * q[2] ** 2),
+        "traced direct pose": ephs.storage(
+            {"q": Q.direct_pose}, lambda q: 9.81 * q[6] * q[1] * q[0] + np.sqrt(1.0 + q[4] ** 2)
+        ),
+        "traced gyrator": ephs.gyrator(
+            {"b": Q.flux_linkage, "p": Q.angular_momentum, "~bs": Q.flux_linkage, "~q": Q.angle},
+            lambda bs, q: np.tanh(bs) * np.cos(q) * np.array([[0.0, 1.0], [-1.0, 0.0]]),
+        ),
+        "traced transformer": ephs.transformer(
+            {"p": Q.angular_momentum, "p2": Q.momentum, "~q": Q.angle}, lambda q: [[0.3 * math.sin(q)]]
+        ),
+        "traced constraint": ephs.constraint(
+            {"p": Q.body_momentum, "p2": Q.momentum, "~q": Q.pose},
+            lambda q: [[q[1] * q[0], q[2] ** 2, 0.0, q[4], 0.0, 1.0, q[5]]]
+        ),
+        "traced friction": ephs.irreversible(
+            {"p": Q.momentum, "s": Q.entropy}, lambda p, s: abs(p) * np.array([[s, -p], [-p, p * p / s]])
+        ),
+        "traced piston friction": ephs.irreversible(
+            {"p": Q.momentum, "s": Q.entropy, "~v": Q.volume},
+            lambda p, s, v: 0.3 / v * np.array([[s, -p], [-p, p * p / s]]),
+        ),
+    }  # fmt: skip
+    assert [name for name, primitive in out.items() if primitive.kernel is None] == []
     return out
 
 

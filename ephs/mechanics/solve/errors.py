@@ -19,6 +19,7 @@ class Outcome(StrEnum):
     TURN = "a rotation of π or more in one step"
     TEMPERATURE = "an absolute temperature that is not positive"
     EXTENT = "a length or a volume that is not positive"
+    DOMAIN = "an energy or a flow that is not a finite number"
     PYTHON = "a Python function of the model raised an exception"
     UNSUITED = "a state that the method cannot carry"
     INCONSISTENT = "an initial state that contradicts the constraints"
@@ -35,6 +36,7 @@ _ADVICE = {
     Outcome.TURN: "take a smaller step: h·|ω| must stay below π",
     Outcome.TEMPERATURE: "check initial temperatures and heat capacities, or take a smaller step",
     Outcome.EXTENT: "check initial values, or take a smaller step",
+    Outcome.DOMAIN: "check initial values and the component's function there, or take a smaller step",
     Outcome.PYTHON: "see the exception above this one",
     Outcome.UNSUITED: "use the method natural",
     Outcome.INCONSISTENT: "give initial values that satisfy the constraints",
@@ -43,7 +45,7 @@ _ADVICE = {
     Outcome.UNDETERMINED: "add what gives the effort there: a storage, friction, or a constraint",
     Outcome.INTERRUPTED: "what was computed is in .partial",
 }
-_OF_KERNEL = {1: Outcome.TURN, 2: Outcome.TEMPERATURE, 3: Outcome.PYTHON, 4: Outcome.EXTENT}
+_OF_KERNEL = {1: Outcome.TURN, 2: Outcome.TEMPERATURE, 3: Outcome.PYTHON, 4: Outcome.EXTENT, 5: Outcome.DOMAIN}
 
 
 @final

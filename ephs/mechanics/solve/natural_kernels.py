@@ -5,10 +5,10 @@
 
 from typing import NamedTuple
 
-from ephs.mechanics.solve.calling import call_kernel
 from ephs.mechanics.solve.lu_kernels import factorise, solve
 from ephs.mechanics.solve.sparse import Index
 from ephs.semantics.bundle import Array
+from ephs.semantics.calling import call_kernel
 from ephs.semantics.spaces import jit
 from ephs.semantics.spaces.codes import SE3, SO3, SO3xR3
 from ephs.semantics.spaces.se3_kernels import retract

@@ -1,0 +1,147 @@
+"""Traced primitives: from a function of port variables to its formula, its derivatives and its compiled kernel."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, final
+
+import numpy as np
+
+from ephs.operad import Interface, Path
+from ephs.semantics.bundle import Array, Bundle
+from ephs.semantics.primitives import Formula, Kernel, Point
+from ephs.semantics.spaces import manifold
+from ephs.semantics.symbols.algebra import Expr, sp
+from ephs.semantics.symbols.programs import PRESSURE, TEMPERATURE, Base, relation_program, storage_program
+from ephs.semantics.symbols.tracing import Trace, Untraceable, symbols_of, trace
+
+__all__ = ["StorageForm", "irreversible_kernel", "reversible_kernel", "storage_form"]
+
+KERNELS = "ephs.semantics.symbols.traced_kernels"
+LARGEST = 16
+_HEAT = {"entropy": 1.0, "volume": 2.0}
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class StorageForm:
+    """A traced energy: its gradient for Python, its kernel."""
+
+    gradient: Callable[[Point], Array]
+    kernel: Kernel
+
+
+def storage_form(interface: Interface, energy: Callable[..., Any]) -> StorageForm:
+    """Trace an energy of the states of power ports.
+
+    Raises
+    ------
+    Untraceable
+        It needs numbers, or has more states than a kernel's scratch can hold.
+    """
+    bundle = Bundle.of(interface)
+    states, base = _states(interface, bundle.ports)
+    traced = trace(energy, states)
+    if traced.outputs.size != 1 or sum(len(x) for _, x in base) > LARGEST:
+        raise Untraceable("one number is expected, of sixteen at most")
+    parameters = tuple(traced.parameters)
+    program = storage_program(traced.outputs.item(), parameters, base)
+    numbers = np.array(list(traced.parameters.values()) or [0.0])
+    n = bundle.size
+
+    def gradient(x: Point) -> Array:
+        out = (np.empty(n), np.empty(1), np.empty(n * n))
+        program(np.zeros(3), numbers, np.concatenate([x[p] for p in bundle.ports]), np.empty(0), np.empty(0), out)
+        return out[0]
+
+    layout = [float(len(bundle.ports))]
+    at = 0
+    for (code, x), (_, where, quantity) in zip(base, bundle.items(), strict=True):
+        kind = _HEAT.get(quantity.kind, 0.0)
+        layout += [float(code), float(at), float(len(x)), float(where.start), float(where.stop - where.start), kind]
+        at += len(x)
+    kernel = Kernel(KERNELS, "storage", (*layout, *traced.parameters.values()), program.source)
+    return StorageForm(gradient, kernel)
+
+
+def reversible_kernel(interface: Interface, reads: tuple[Path, ...], formula: Formula, multipliers: int) -> Kernel:
+    """Trace f = L(x) e + C(x)ᵀ λ, 0 = C(x) e."""
+    bundle = Bundle.of(interface)
+    states, base = _states(interface, reads)
+    n, k = bundle.size, multipliers
+    efforts, forces = tuple(sp.symbols(f"e_:{n}", real=True)), tuple(sp.symbols(f"lambda_:{k}", real=True))
+    function = formula.function
+
+    def stacked(**x: Any) -> Any:
+        return _stacked(function(**x), n, k)
+
+    traced = trace(stacked, states)
+    skew, constraint = sp.Matrix(n, n, traced.outputs[: n * n]), sp.Matrix(k, n, traced.outputs[n * n :])
+    e, lam = sp.Matrix(n, 1, efforts), sp.Matrix(k, 1, forces)
+    flows = (skew * e + constraint.T * lam) if k else skew * e
+    conditions = constraint * e if k else sp.Matrix(0, 1, [])
+    return _relation(interface, reads, base, traced, (tuple(flows), tuple(conditions)), (efforts, forces))
+
+
+def irreversible_kernel(interface: Interface, reads: tuple[Path, ...], formula: Formula) -> Kernel:
+    """Trace f = M(x, eᴱ) e / θ₀."""
+    bundle = Bundle.of(interface)
+    states, base = _states(interface, reads)
+    n = bundle.size
+    energy: dict[str, Any] = {}
+    efforts: list[Expr] = []
+    exergy: list[Expr] = []
+    for port, where, quantity in bundle.items():
+        mine = tuple(sp.symbols(f"e_{where.start}:{where.stop}", real=True))
+        base_effort = {"entropy": TEMPERATURE, "volume": -PRESSURE}.get(quantity.kind, sp.Integer(0))
+        efforts += mine
+        exergy += mine
+        shifted = tuple(symbol + base_effort for symbol in mine)
+        energy[str(port)] = shifted[0] if len(shifted) == 1 else shifted
+    traced = trace(formula.function, {**energy, **states})
+    if traced.outputs.shape != (n, n):
+        raise Untraceable(f"the matrix is {traced.outputs.shape}")
+    matrix = sp.Matrix(n, n, list(traced.outputs.flat))
+    flows = tuple(matrix * sp.Matrix(n, 1, exergy) / TEMPERATURE)
+    return _relation(interface, reads, base, traced, (flows, ()), (tuple(efforts), ()))
+
+
+def _stacked(matrices: tuple[Any, Any], n: int, k: int) -> Any:
+    skew, constraint = matrices
+    parts = [np.zeros(n * n) if skew is None else np.asarray(skew, dtype=object).reshape(n * n)]
+    parts.append(np.zeros(k * n) if constraint is None else np.asarray(constraint, dtype=object).reshape(k * n))
+    return np.concatenate(parts).astype(object)
+
+
+def _states(interface: Interface, ports: tuple[Path, ...]) -> tuple[dict[str, Any], Base]:
+    states: dict[str, Any] = {}
+    base: list[tuple[int, tuple[Expr, ...]]] = []
+    for number, port in enumerate(ports):
+        quantity = interface[port].quantity
+        space = manifold(quantity.space)
+        symbols = symbols_of(f"x_{number}", quantity, space.size)
+        states[str(port)] = symbols[0] if len(symbols) == 1 else symbols
+        base.append((space.code, symbols))
+    return states, tuple(base)
+
+
+def _relation(
+    interface: Interface,
+    reads: tuple[Path, ...],
+    base: Base,
+    traced: Trace,
+    outputs: tuple[tuple[Expr, ...], tuple[Expr, ...]],
+    unknowns: tuple[tuple[Expr, ...], tuple[Expr, ...]],
+) -> Kernel:
+    bundle = Bundle.of(interface)
+    program = relation_program(*outputs, tuple(traced.parameters), base, *unknowns)
+    hot = [float(where.start) for _, where, quantity in bundle.items() if quantity.kind == "entropy"]
+    if not any(TEMPERATURE in entry.free_symbols for entry in outputs[0]):
+        hot = []  # a reversible relation divides by no temperature
+    layout = [float(len(reads)), float(len(hot))]
+    at = first = 0
+    for (code, x), port in zip(base, reads, strict=True):
+        dim = manifold(interface[port].quantity.space).dim
+        layout += [float(code), float(at), float(len(x)), float(first), float(dim)]
+        at, first = at + len(x), first + dim
+    numbers = (*layout, *hot, *traced.parameters.values())
+    return Kernel(KERNELS, "relation", numbers, program.source)
