@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ephs.operad import Directory, Path, PortType, Quantity, quantity
-from ephs.semantics import library
+from ephs.semantics import structures
 from ephs.semantics.bundle import Array
 from ephs.semantics.errors import StructureError
 from ephs.semantics.primitives import Irreversible, Kernel, Point, Reversible, Storage, power_ports
@@ -54,7 +54,7 @@ def kinetic(mass: float, inertia: Array, group: str = "SE3") -> Storage:
     inverse = np.linalg.inv(whole)
     inverse = 0.5 * (inverse + inverse.T)
     entries = (("mass", float(mass)), ("inertia", tuple(np.asarray(inertia, dtype=float).ravel().tolist())))
-    return library.quadratic("kinetic", power_ports(p=MOMENTA[group]), inverse, entries)
+    return structures.quadratic("kinetic", power_ports(p=MOMENTA[group]), inverse, entries)
 
 
 def gravity(weight: Array, group: str = "SE3") -> Storage:
@@ -111,7 +111,7 @@ def no_potential(of: Quantity, port: str) -> Storage:
         energy=lambda _x: 0.0,
         gradient=lambda _x: np.zeros(n),
         discrete_gradient=lambda _x, _v: np.zeros(n),
-        kernel=Kernel(library.KERNELS, "no_effort"),
+        kernel=Kernel(structures.KERNELS, "no_effort"),
     )
 
 
@@ -194,7 +194,7 @@ def _rotation_mean(start: Array, v: Array) -> Array:
 
 def kinematic_coupling(q: Quantity, p: Quantity, q_port: str, p_port: str) -> Reversible:
     """q.f = −p.e, p.f = q.e, trivialised; ports as named."""
-    return library.coupling("pkc", power_ports(**{q_port: q, p_port: p}))
+    return structures.coupling("pkc", power_ports(**{q_port: q, p_port: p}))
 
 
 def lie_poisson(group: str = "SE3") -> Reversible:
@@ -219,7 +219,7 @@ def frame_change(offset: Array, inner: str, outer: str) -> Reversible:
     interface = power_ports(**{outer: quantity.body_momentum, inner: quantity.body_momentum})
     parameters = (("offset", tuple(np.asarray(offset, dtype=float).tolist())),)
     constraint = np.hstack([-carried, np.eye(6)])
-    return library.constant_structure("frame_change", interface, np.zeros((12, 12)), constraint, parameters)
+    return structures.constant_structure("frame_change", interface, np.zeros((12, 12)), constraint, parameters)
 
 
 def holonomic(of: Pair) -> Reversible:
@@ -279,11 +279,11 @@ def joint_friction(
     if not callable(mu):
         matrix = np.array(mu, dtype=float).reshape(of.dim, of.dim)
         entries = (("mu", tuple(matrix.ravel().tolist())),)
-        return library.dissipation(name, Directory(ports), matrix, parameters=entries)
+        return structures.dissipation(name, Directory(ports), matrix, parameters=entries)
     q_r = Path.of("q_r")
     resistance = mu
     ports["q_r"] = PortType(_relative(of), False)
-    return library.dissipation(
+    return structures.dissipation(
         name,
         Directory(ports),
         lambda x, u, theta: np.asarray(resistance(of.coordinates(x[q_r]), u, theta), dtype=float).reshape(
@@ -352,7 +352,7 @@ def point_damper(damping: float) -> Irreversible:
 
     kernel = Kernel(SPRINGS, "point_damper", (damping,))
     entries = (("damping", damping),)
-    return library.dissipation(
+    return structures.dissipation(
         "point_damper", Directory(ports), resistance, reads=(q_r,), kernel=kernel, parameters=entries
     )
 
@@ -360,13 +360,13 @@ def point_damper(damping: float) -> Irreversible:
 def ground(of: Quantity = quantity.body_momentum) -> Reversible:
     """A frame that stands still: e = 0, f = λ; port p."""
     n = of.space.dim
-    return library.constant_structure("ground", power_ports(p=of), np.zeros((n, n)), np.eye(n))
+    return structures.constant_structure("ground", power_ports(p=of), np.zeros((n, n)), np.eye(n))
 
 
 def thermal_node(capacity: float, temperature: float) -> Storage:
     """Heat capacity C from temperature T₀ at s = 0: E = C T₀ (exp(s/C) − 1); port s. C in J/K, T₀ in K."""
     entries = (("capacity", float(capacity)), ("temperature", float(temperature)))
-    return library.exponential("thermal_node", capacity * temperature, capacity, entries)
+    return structures.exponential("thermal_node", capacity * temperature, capacity, entries)
 
 
 def _relative(of: Pair) -> Quantity:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ephs.operad import Directory, Interface, Path, PortType, Quantity
-from ephs.semantics import library
+from ephs.semantics import structures
 from ephs.semantics.bundle import Array, Bundle, Reference
 from ephs.semantics.checks import random_point
 from ephs.semantics.errors import StructureError
@@ -105,7 +105,7 @@ def gyrator(ports: Ports, matrix: Matrix, *, name: str = "gyrator") -> Reversibl
     interface = _interface(name, ports)
     n = Bundle.of(interface).size
     if not callable(matrix):
-        return library.constant_structure(name, interface, _matrix(name, matrix, n, n), np.zeros((0, n)))
+        return structures.constant_structure(name, interface, _matrix(name, matrix, n, n), np.zeros((0, n)))
     given = matrix
     read = _reader(name, interface, given)
     formula = Formula(_both(given, None))
@@ -142,7 +142,7 @@ def transformer(ports: Ports, matrix: Matrix, *, name: str = "transformer") -> R
 
     if not callable(matrix):
         zero = np.zeros((bundle.size, bundle.size))
-        return library.constant_structure(name, interface, zero, whole(_matrix(name, matrix, k, first)))
+        return structures.constant_structure(name, interface, zero, whole(_matrix(name, matrix, k, first)))
     given = matrix
     read = _reader(name, interface, given)
     right = np.eye(k).astype(object)
@@ -180,7 +180,7 @@ def constraint(ports: Ports, matrix: Matrix, *, multipliers: int | None = None, 
     if not callable(matrix):
         rows: Any = matrix
         k = len(rows) if np.ndim(rows) == 2 else 1
-        return library.constant_structure(name, interface, zero, _matrix(name, np.atleast_2d(rows), k, n))
+        return structures.constant_structure(name, interface, zero, _matrix(name, np.atleast_2d(rows), k, n))
     given = matrix
     read = _reader(name, interface, given)
     k = _rows(interface, read) if multipliers is None else multipliers

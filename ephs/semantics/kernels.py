@@ -122,6 +122,16 @@ def constant_structure(dims, scal, p, x0, v, e, lam, f, c, jac, work):
     return 0
 
 
+def modulated_gyrator(dims, scal, p, x0, v, e, lam, f, c, jac, work):
+    """f = x (e₂, −e₁) with a state x at the midpoint."""
+    state = nb.carray(x0, 1)[0] + 0.5 * nb.carray(v, 1)[0]
+    effort, flow, slope = nb.carray(e, 2), nb.carray(f, 2), nb.carray(jac, 6)
+    flow[0], flow[1] = state * effort[1], -state * effort[0]
+    slope[0], slope[1], slope[2] = 0.0, state, 0.5 * effort[1]
+    slope[3], slope[4], slope[5] = -state, 0.0, -0.5 * effort[0]
+    return 0
+
+
 def dissipation(dims, scal, p, x0, v, e, lam, f, c, jac, work):
     """p.f = μ u, s.f = −⟨u|μ u⟩/θ on ports (p, s); p = μ (d, d)."""
     n, m = dims[0], dims[2]

@@ -7,13 +7,16 @@ conventions; Lohmayer, Capobianco, Leyendecker for ``spring``, ``point_mass``, `
 
 import math
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
 from ephs.operad import Directory, Interface, Path, PortType, Quantity, quantity
+from ephs.semantics import formulas
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.errors import StructureError
-from ephs.semantics.primitives import Irreversible, Kernel, Point, Reversible, Storage, power_ports
+from ephs.semantics.primitives import Formula, Irreversible, Kernel, Point, Reversible, Storage, power_ports
+from ephs.semantics.structures import KERNELS, constant_structure, dissipation, exp, expm1, exponential, quadratic
 
 __all__ = [
     "capacitor",
@@ -37,22 +40,14 @@ __all__ = [
     "thermal_capacity",
 ]
 
-KERNELS = "ephs.semantics.kernels"
+Structure = tuple[Sequence[Sequence[Any]] | None, Sequence[Sequence[Any]] | None]
+"""L and C, either of which may be left out."""
 
 
 def _positive(path: str, **parameters: float) -> None:
     for key, value in parameters.items():
         if not (math.isfinite(value) and value > 0.0):
             raise StructureError("parameter", path, key=key, found=value, expected="a number > 0")
-
-
-def _exp(x: float) -> float:
-    """The exponential, infinite where it overflows: iterates of a solver may go there."""
-    return math.exp(x) if x < 709.0 else math.inf
-
-
-def _expm1(x: float) -> float:
-    return math.expm1(x) if x < 709.0 else math.inf
 
 
 def _finite(path: str, **parameters: float) -> None:
@@ -70,96 +65,58 @@ def _non_negative(path: str, **parameters: float) -> None:
 # ---- storage ---------------------------------------------------------------------------------------------------
 
 
-def quadratic(name: str, interface: Interface, matrix: Array, parameters: tuple[tuple[str, object], ...]) -> Storage:
-    """E = ½ xᵀ Q x on vector spaces; Q (n, n) symmetric. Its discrete gradient Q (x⁰ + v/2) is exact."""
-
-    def vector(x: Point) -> Array:
-        return np.concatenate([x[p] for p in ports])
-
-    ports = tuple(interface)
-    q = np.array(matrix, dtype=float)
-    return Storage(
-        name,
-        interface,
-        energy=lambda x: 0.5 * float(vector(x) @ q @ vector(x)),
-        gradient=lambda x: q @ vector(x),
-        discrete_gradient=lambda x0, v: q @ (vector(x0) + 0.5 * v),
-        parameters=parameters,
-        kernel=Kernel(KERNELS, "quadratic", tuple(q.ravel())),
-    )
-
-
-def _scalar(name: str, port: str, of: Quantity, stiffness: float, **parameters: float) -> Storage:
-    return quadratic(name, power_ports(**{port: of}), np.array([[stiffness]]), tuple(parameters.items()))
+def _scalar(name: str, port: str, of: Quantity, energy: Callable[..., object], **parameters: float) -> Storage:
+    """E = ½ Q x² as a function of the state and the parameters, whose second difference is Q."""
+    stiffness = float(energy(1.0, **parameters)) * 2.0  # pyright: ignore[reportArgumentType] - a number, of numbers
+    formula = Formula(energy, tuple(parameters))
+    return quadratic(name, power_ports(**{port: of}), np.array([[stiffness]]), tuple(parameters.items()), formula)
 
 
 def spring(*, k: float) -> Storage:
-    """Spring of stiffness k in N/m; port q: E = ½ k q²."""
+    """Spring of stiffness k in N/m; port q: E = k*q**2/2."""
     _positive("spring", k=k)
-    return _scalar("spring", "q", quantity.displacement, k, k=k)
+    return _scalar("spring", "q", quantity.displacement, formulas.spring, k=k)
 
 
 def point_mass(*, m: float) -> Storage:
-    """Point mass of m kg; port p: E = p²/(2m)."""
+    """Point mass of m kg; port p: E = p**2/(2*m)."""
     _positive("point_mass", m=m)
-    return _scalar("point_mass", "p", quantity.momentum, 1.0 / m, m=m)
+    return _scalar("point_mass", "p", quantity.momentum, formulas.point_mass, m=m)
 
 
 def rotor(*, j: float) -> Storage:
-    """Rotor of inertia j in kg m²; port p, an angular momentum: E = p²/(2j)."""
+    """Rotor of inertia j in kg m²; port p, an angular momentum: E = p**2/(2*j)."""
     _positive("rotor", j=j)
-    return _scalar("rotor", "p", quantity.angular_momentum, 1.0 / j, j=j)
+    return _scalar("rotor", "p", quantity.angular_momentum, formulas.rotor, j=j)
 
 
 def capacitor(*, c: float) -> Storage:
-    """Capacitor of c farad; port q, a charge: E = q²/(2c)."""
+    """Capacitor of c farad; port q, a charge: E = q**2/(2*c)."""
     _positive("capacitor", c=c)
-    return _scalar("capacitor", "q", quantity.charge, 1.0 / c, c=c)
+    return _scalar("capacitor", "q", quantity.charge, formulas.capacitor, c=c)
 
 
 def inductor(*, l: float) -> Storage:  # noqa: E741 - the field's symbol
-    """Inductor of l henry; port b, a flux linkage: E = b²/(2l)."""
+    """Inductor of l henry; port b, a flux linkage: E = b**2/(2*l)."""
     _positive("inductor", l=l)
-    return _scalar("inductor", "b", quantity.flux_linkage, 1.0 / l, l=l)
+    return _scalar("inductor", "b", quantity.flux_linkage, formulas.inductor, l=l)
 
 
 def thermal_capacity(*, c1: float, c2: float) -> Storage:
-    """Thermal capacity; port s: E = c1·exp(s/c2), temperature θ = E/c2."""
+    """Thermal capacity; port s: E = c1*exp(s/c2), temperature θ = E/c2."""
     _positive("thermal_capacity", c1=c1, c2=c2)
-    return exponential("thermal_capacity", c1, c2, (("c1", c1), ("c2", c2)))
-
-
-def exponential(name: str, c1: float, c2: float, parameters: tuple[tuple[str, object], ...]) -> Storage:
-    """E = c1·(exp(s/c2) − 1): energies count from s = 0, so that small heats are not lost beside a large E."""
-    port = Path.of("s")
-
-    def gradient(x: Point) -> Array:
-        return np.array([c1 / c2 * _exp(float(x[port][0]) / c2)])
-
-    def discrete_gradient(x0: Point, v: Array) -> Array:
-        rise = float(v[0]) / c2
-        mean = _expm1(rise) / rise if rise != 0.0 else 1.0
-        return gradient(x0) * mean
-
-    return Storage(
-        name,
-        power_ports(s=quantity.entropy),
-        energy=lambda x: c1 * _expm1(float(x[port][0]) / c2),
-        gradient=gradient,
-        discrete_gradient=discrete_gradient,
-        parameters=parameters,
-        kernel=Kernel(KERNELS, "exponential", (c1, c2)),
-    )
+    formula = Formula(formulas.thermal_capacity, ("c1", "c2"))
+    return exponential("thermal_capacity", c1, c2, (("c1", c1), ("c2", c2)), formula)
 
 
 def ideal_gas(*, c1: float, c2: float, v0: float, c: float) -> Storage:
-    """Ideal gas; ports s, v: E = c1·exp(s/c2)·(v0/v)^(1/c), θ = ∂E/∂s, π = −∂E/∂v."""
+    """Ideal gas; ports s, v: E = c1*(v0/v)**(1/c)*exp(s/c2), θ = ∂E/∂s, π = −∂E/∂v."""
     _positive("ideal_gas", c1=c1, c2=c2, v0=v0, c=c)
     s, v = Path.of("s"), Path.of("v")
 
     def energy(x: Point) -> float:
         volume = float(x[v][0])
-        return c1 * _exp(float(x[s][0]) / c2) * (v0 / volume) ** (1.0 / c) if volume > 0.0 else math.nan
+        return c1 * exp(float(x[s][0]) / c2) * (v0 / volume) ** (1.0 / c) if volume > 0.0 else math.nan
 
     def gradient(x: Point) -> Array:
         e = energy(x)
@@ -171,9 +128,9 @@ def ideal_gas(*, c1: float, c2: float, v0: float, c: float) -> Storage:
         heat, growth = float(step[0]) / c2, float(step[1]) / volume
         if not (volume > 0.0 and growth > -1.0):  # an iterate of a solver may lie where no gas is
             return np.full(2, math.nan)
-        a = c1 * _exp(float(x0[s][0]) / c2)
+        a = c1 * exp(float(x0[s][0]) / c2)
         b = (v0 / volume) ** (1.0 / c)
-        rise, fall = _expm1(heat), _expm1(-math.log1p(growth) / c)
+        rise, fall = expm1(heat), expm1(-math.log1p(growth) / c)
         by_s = a / c2 * (rise / heat if heat != 0.0 else 1.0)
         by_v = b / volume * (fall / growth if growth != 0.0 else -1.0 / c)
         return np.array([by_s * b * (1.0 + 0.5 * fall), by_v * a * (1.0 + 0.5 * rise)])
@@ -181,7 +138,18 @@ def ideal_gas(*, c1: float, c2: float, v0: float, c: float) -> Storage:
     parameters = (("c1", c1), ("c2", c2), ("v0", v0), ("c", c))
     interface = power_ports(s=quantity.entropy, v=quantity.volume)
     kernel = Kernel(KERNELS, "ideal_gas", (c1, c2, v0, c))
-    return Storage("ideal_gas", interface, energy, gradient, discrete_gradient, parameters=parameters, kernel=kernel)
+
+    formula = Formula(formulas.ideal_gas, ("c1", "c2", "v0", "c"))
+    return Storage(
+        "ideal_gas",
+        interface,
+        energy,
+        gradient,
+        discrete_gradient,
+        parameters=parameters,
+        kernel=kernel,
+        formula=formula,
+    )
 
 
 def environment() -> Storage:
@@ -198,49 +166,37 @@ def environment() -> Storage:
 # ---- reversible ------------------------------------------------------------------------------------------------
 
 
-def constant_structure(
-    name: str,
-    interface: Interface,
-    skew: Array,
-    constraint: Array,
-    parameters: tuple[tuple[str, object], ...] = (),
-) -> Reversible:
-    """A Dirac structure that does not depend on states: L (n, n), C (k, n)."""
-    n, k = skew.shape[0], constraint.shape[0]
-    return Reversible(
-        name,
-        interface,
-        structure=lambda _x: (skew, constraint),
-        parameters=parameters,
-        multipliers=k,
-        kernel=Kernel(KERNELS, "constant_structure", (*skew.ravel(), *constraint.reshape(k, n).ravel())),
-    )
-
-
-def _gyrator(name: str, interface: Interface, matrix: Sequence[Sequence[float]], **parameters: float) -> Reversible:
-    skew = np.array(matrix, dtype=float)
-    return constant_structure(name, interface, skew, np.zeros((0, skew.shape[0])), tuple(parameters.items()))
-
-
-def coupling(name: str, interface: Interface) -> Reversible:
-    """q.f = −p.e, p.f = q.e, on ports q and p of equal dimension: L = [[0, −1], [1, 0]]."""
-    n = next(iter(interface.values())).quantity.space.dim
-    eye, zero = np.eye(n), np.zeros((n, n))
-    return constant_structure(name, interface, np.block([[zero, -eye], [eye, zero]]), np.zeros((0, 2 * n)))
+def _constant(name: str, interface: Interface, matrices: Callable[..., Structure], **parameters: float) -> Reversible:
+    """A constant structure from its matrices as functions of the parameters: (L, C), either of which may be None."""
+    n = sum(port.quantity.space.dim for port in interface.values())
+    skew, constraint = matrices(**parameters)
+    left = np.zeros((n, n)) if skew is None else np.array(skew, dtype=float)
+    right = np.zeros((0, n)) if constraint is None else np.array(constraint, dtype=float)
+    formula = Formula(matrices, tuple(parameters))
+    return constant_structure(name, interface, left, right, tuple(parameters.items()), formula)
 
 
 def pkc() -> Reversible:
-    """Potential-kinetic coupling; ports q, p: q.f = −p.e, p.f = q.e."""
-    return coupling("pkc", power_ports(q=quantity.displacement, p=quantity.momentum))
+    """Potential-kinetic coupling; ports q, p: q.f = −p.e, p.f = q.e.
+
+    L = [[0, -1], [1, 0]].
+    """
+    return _constant("pkc", power_ports(q=quantity.displacement, p=quantity.momentum), formulas.pkc)
 
 
 def emc() -> Reversible:
-    """Electro-magnetic coupling; ports q, b: q.f = b.e, b.f = −q.e."""
-    return _gyrator("emc", power_ports(q=quantity.charge, b=quantity.flux_linkage), [[0.0, 1.0], [-1.0, 0.0]])
+    """Electro-magnetic coupling; ports q, b: q.f = b.e, b.f = −q.e.
+
+    L = [[0, 1], [-1, 0]].
+    """
+    return _constant("emc", power_ports(q=quantity.charge, b=quantity.flux_linkage), formulas.emc)
 
 
 def mkc() -> Reversible:
-    """Magneto-kinetic coupling of a DC shunt motor; ports b, p, state port bs: b.f = bs.x·p.e, p.f = −bs.x·b.e."""
+    """Magneto-kinetic coupling of a DC shunt motor; ports b, p, state port bs: b.f = bs.x·p.e, p.f = −bs.x·b.e.
+
+    L = [[0, bs], [-bs, 0]].
+    """
     stator = Path.of("bs")
     interface = Directory(
         {
@@ -254,100 +210,96 @@ def mkc() -> Reversible:
         flux = float(x[stator][0])
         return np.array([[0.0, flux], [-flux, 0.0]]), np.zeros((0, 2))
 
-    return Reversible("mkc", interface, structure, reads=(stator,))
+    formula = Formula(formulas.mkc)
+    kernel = Kernel(KERNELS, "modulated_gyrator")
+    return Reversible("mkc", interface, structure, reads=(stator,), kernel=kernel, formula=formula)
 
 
 def lever(*, r: float) -> Reversible:
-    """Lever of ratio r; ports q1, q2: q1.f = −r·q2.f, q2.e = r·q1.e."""
+    """Lever of ratio r; ports q1, q2: q1.f = −r·q2.f, q2.e = r·q1.e.
+
+    C = [[-r, 1]].
+    """
     _finite("lever", r=r)
     interface = power_ports(q1=quantity.displacement, q2=quantity.displacement)
-    return constant_structure("lever", interface, np.zeros((2, 2)), np.array([[-r, 1.0]]), (("r", r),))
+    return _constant("lever", interface, formulas.lever, r=r)
 
 
 def series_springs() -> Reversible:
-    """Two springs in series; ports q, q2: q.f = λ, q2.f = −λ, 0 = q2.e − q.e."""
+    """Two springs in series; ports q, q2: q.f = λ, q2.f = −λ, 0 = q2.e − q.e.
+
+    C = [[1, -1]].
+    """
     interface = power_ports(q=quantity.displacement, q2=quantity.displacement)
-    return constant_structure("series_springs", interface, np.zeros((2, 2)), np.array([[1.0, -1.0]]))
+    return _constant("series_springs", interface, formulas.equal)
 
 
 def rigid_link() -> Reversible:
-    """Two rigidly linked masses; ports p, p2: p.f = λ, p2.f = −λ, 0 = p2.e − p.e."""
+    """Two rigidly linked masses; ports p, p2: p.f = λ, p2.f = −λ, 0 = p2.e − p.e.
+
+    C = [[1, -1]].
+    """
     interface = power_ports(p=quantity.momentum, p2=quantity.momentum)
-    return constant_structure("rigid_link", interface, np.zeros((2, 2)), np.array([[1.0, -1.0]]))
+    return _constant("rigid_link", interface, formulas.equal)
 
 
 def piston(*, a: float) -> Reversible:
-    """Piston of area a in m²; ports v1, v2, p: v1.f = −a·p.e, v2.f = a·p.e, p.f = a·(v1.e − v2.e)."""
+    """Piston of area a in m²; ports v1, v2, p: v1.f = −a·p.e, v2.f = a·p.e, p.f = a·(v1.e − v2.e).
+
+    L = [[0, 0, -a], [0, 0, a], [a, -a, 0]].
+    """
     _positive("piston", a=a)
     interface = power_ports(v1=quantity.volume, v2=quantity.volume, p=quantity.momentum)
-    return _gyrator("piston", interface, [[0.0, 0.0, -a], [0.0, 0.0, a], [a, -a, 0.0]], a=a)
+    return _constant("piston", interface, formulas.piston, a=a)
 
 
 # ---- irreversible ----------------------------------------------------------------------------------------------
 
 
-def dissipation(
-    name: str,
-    interface: Interface,
-    resistance: Array | Callable[[Point, Array, float], Array],
-    *,
-    reads: tuple[Path, ...] = (),
-    kernel: Kernel | None = None,
-    parameters: tuple[tuple[str, object], ...] = (),
-) -> Irreversible:
-    """Dissipation of a port's power into heat: p.f = μ u, s.f = −⟨u|μ u⟩/θ, with u = p.e and θ = θ₀ + s.e.
-
-    M = [[θ μ, −μ u], [−(μ u)ᵀ, ⟨u|μ u⟩/θ]].
-
-    Parameters
-    ----------
-    interface
-        The dissipating power port, then the entropy port, then state ports that are read.
-    resistance
-        μ (d, d), symmetric and non-negative; or a function of (states read, u, θ).
-    """
-    d = next(iter(interface.values())).quantity.space.dim
-
-    def matrix(x: Point, e: Array, reference: Reference) -> Array:
-        u, theta = e[:d], reference.temperature + float(e[d])
-        mu = resistance(x, u, theta) if callable(resistance) else resistance
-        drag = mu @ u
-        out = np.empty((d + 1, d + 1))
-        out[:d, :d] = theta * mu
-        out[:d, d] = out[d, :d] = -drag
-        out[d, d] = float(u @ drag) / theta
-        return out
-
-    if not callable(resistance):
-        kernel = Kernel(KERNELS, "dissipation", tuple(np.asarray(resistance, dtype=float).ravel()))
-    return Irreversible(name, interface, matrix, reads, parameters, kernel)
-
-
 def friction(*, d: float) -> Irreversible:
-    """Linear friction of d in N s/m; ports p, s: p.f = d·p.e, s.f = −d·p.e²/θ, θ = θ₀ + s.e."""
+    """Linear friction of d in N s/m; ports p, s: p.f = d·p.e, s.f = −d·p.e²/θ, θ = θ₀ + s.e.
+
+    M = [[d*s, -d*p], [-d*p, d*p**2/s]], of the energy efforts: p the velocity, s the temperature.
+    """
     _non_negative("friction", d=d)
     ports = power_ports(p=quantity.momentum, s=quantity.entropy)
-    return dissipation("friction", ports, np.array([[d]]), parameters=(("d", d),))
+    return dissipation(
+        "friction", ports, np.array([[d]]), parameters=(("d", d),), formula=Formula(formulas.friction, ("d",))
+    )
 
 
 def rotational_friction(*, d: float) -> Irreversible:
-    """Linear friction of a rotation, d in N m s; ports p, s: p.f = d·p.e, s.f = −d·p.e²/θ."""
+    """Linear friction of a rotation, d in N m s; ports p, s: p.f = d·p.e, s.f = −d·p.e²/θ.
+
+    M = [[d*s, -d*p], [-d*p, d*p**2/s]], of the energy efforts: p the angular velocity, s the temperature.
+    """
     _non_negative("rotational_friction", d=d)
     ports = power_ports(p=quantity.angular_momentum, s=quantity.entropy)
-    return dissipation("rotational_friction", ports, np.array([[d]]), parameters=(("d", d),))
+    return dissipation(
+        "rotational_friction",
+        ports,
+        np.array([[d]]),
+        parameters=(("d", d),),
+        formula=Formula(formulas.friction, ("d",)),
+    )
 
 
 def resistor(*, r: float) -> Irreversible:
-    """Resistor of r ohm; ports b, s: b.f = r·b.e, s.f = −r·b.e²/θ."""
+    """Resistor of r ohm; ports b, s: b.f = r·b.e, s.f = −r·b.e²/θ.
+
+    M = [[r*s, -b*r], [-b*r, b**2*r/s]], of the energy efforts: b the current, s the temperature.
+    """
     _non_negative("resistor", r=r)
     ports = power_ports(b=quantity.flux_linkage, s=quantity.entropy)
-    return dissipation("resistor", ports, np.array([[r]]), parameters=(("r", r),))
+    return dissipation(
+        "resistor", ports, np.array([[r]]), parameters=(("r", r),), formula=Formula(formulas.resistor, ("r",))
+    )
 
 
 def heat_transfer(*, h: float) -> Irreversible:
     """Heat transfer of h in W/K; ports s1, s2: s1.f = −h(θ₂−θ₁)/θ₁, s2.f = −h(θ₁−θ₂)/θ₂.
 
-    M = h [[θ₂/θ₁, −1], [−1, θ₁/θ₂]].
+    M = [[h*s2/s1, -h], [-h, h*s1/s2]], of the temperatures.
     """
     _non_negative("heat_transfer", h=h)
 
@@ -356,4 +308,6 @@ def heat_transfer(*, h: float) -> Irreversible:
         return h * np.array([[second / first, -1.0], [-1.0, first / second]])
 
     ports = power_ports(s1=quantity.entropy, s2=quantity.entropy)
-    return Irreversible("heat_transfer", ports, matrix, (), (("h", h),), Kernel(KERNELS, "heat_transfer", (h,)))
+    formula = Formula(formulas.heat_transfer, ("h",))
+    kernel = Kernel(KERNELS, "heat_transfer", (h,))
+    return Irreversible("heat_transfer", ports, matrix, (), (("h", h),), kernel, formula)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from ephs.mechanics import components
 from ephs.operad import Interface, Path
 from ephs.operad import quantity as quantities
-from ephs.semantics import Irreversible, Reference, Reversible, Storage, library
+from ephs.semantics import Irreversible, Reference, Reversible, Storage, library, structures
 from ephs.semantics.bundle import Array, Bundle
 from ephs.semantics.primitives import Point
 from ephs.semantics.spaces import Pair
@@ -47,7 +47,7 @@ def storages(draw: st.DrawFn, interface: Interface) -> Storage:
     parity = bundle.parity()
     factor = rng.standard_normal((bundle.size, bundle.size))
     matrix = factor @ factor.T + np.eye(bundle.size)
-    return library.quadratic("random storage", interface, _even(matrix, parity), ())
+    return structures.quadratic("random storage", interface, _even(matrix, parity), ())
 
 
 @st.composite
@@ -79,7 +79,7 @@ def reversibles(
     constraint = constraint[np.linalg.norm(constraint, axis=1) > 0.1]
     used = reads if reads and draw(st.booleans()) else ()
     if not used:
-        return library.constant_structure("random Dirac structure", interface, skew, constraint)
+        return structures.constant_structure("random Dirac structure", interface, skew, constraint)
 
     def structure(x: Point) -> tuple[Array, Array]:
         return (1.0 + 0.5 * np.cos(sum(float(v @ v) for v in x.values()))) * skew, constraint

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ephs.operad import Pattern, PatternError, junction, quantity
-from ephs.semantics import AssemblyError, Reference, SemanticsError, System, library
+from ephs.semantics import AssemblyError, Reference, SemanticsError, System, library, structures
 from ephs.semantics.pattern_relation import pattern_relation
 from ephs.semantics.relation import compose_linear
 
@@ -164,7 +164,7 @@ def test_a_box_with_two_ports_on_one_junction_adds_its_flows():
         junctions={"v": junction(Q.volume), "p": junction(Q.momentum)},
         boxes={"piston": {"v1": "v", "v2": "v", "p": "p"}, "gas": {"v": "v"}, "m": {"p": "p"}},
     )
-    balloon = library.quadratic("balloon", library.power_ports(v=Q.volume), np.array([[3.0]]), ())
+    balloon = structures.quadratic("balloon", library.power_ports(v=Q.volume), np.array([[3.0]]), ())
     system = both(piston=library.piston(a=0.3), gas=balloon, m=library.point_mass(m=1.0))
     state = {"gas.v": 1.0, "m.p": 2.0}
     flat, nested = (system.relation(route=route).at(state) for route in ("flat", "nested"))

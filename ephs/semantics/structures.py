@@ -1,0 +1,143 @@
+"""What primitives are made of: quadratic and exponential energies, constant Dirac structures, dissipation."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from ephs.operad import Interface, Path, quantity
+from ephs.semantics.bundle import Array, Reference
+from ephs.semantics.primitives import Formula, Irreversible, Kernel, Point, Reversible, Storage, power_ports
+
+__all__ = ["KERNELS", "constant_structure", "coupling", "dissipation", "exponential", "quadratic"]
+
+KERNELS = "ephs.semantics.kernels"
+"""The module of the compiled counterparts."""
+
+
+def exp(x: float) -> float:
+    """The exponential, infinite where it overflows: iterates of a solver may go there."""
+    return math.exp(x) if x < 709.0 else math.inf
+
+
+def expm1(x: float) -> float:
+    """exp(x) − 1, infinite where it overflows."""
+    return math.expm1(x) if x < 709.0 else math.inf
+
+
+def quadratic(
+    name: str,
+    interface: Interface,
+    matrix: Array,
+    parameters: tuple[tuple[str, object], ...],
+    formula: Formula | None = None,
+) -> Storage:
+    """E = ½ xᵀ Q x on vector spaces; Q (n, n) symmetric. Its discrete gradient Q (x⁰ + v/2) is exact."""
+
+    def vector(x: Point) -> Array:
+        return np.concatenate([x[p] for p in ports])
+
+    ports = tuple(interface)
+    q = np.array(matrix, dtype=float)
+    return Storage(
+        name,
+        interface,
+        energy=lambda x: 0.5 * float(vector(x) @ q @ vector(x)),
+        gradient=lambda x: q @ vector(x),
+        discrete_gradient=lambda x0, v: q @ (vector(x0) + 0.5 * v),
+        parameters=parameters,
+        kernel=Kernel(KERNELS, "quadratic", tuple(q.ravel())),
+        formula=formula,
+    )
+
+
+def exponential(
+    name: str, c1: float, c2: float, parameters: tuple[tuple[str, object], ...], formula: Formula | None = None
+) -> Storage:
+    """E = c1·(exp(s/c2) − 1): energies count from s = 0, so that small heats are not lost beside a large E."""
+    port = Path.of("s")
+
+    def gradient(x: Point) -> Array:
+        return np.array([c1 / c2 * exp(float(x[port][0]) / c2)])
+
+    def discrete_gradient(x0: Point, v: Array) -> Array:
+        rise = float(v[0]) / c2
+        mean = expm1(rise) / rise if rise != 0.0 else 1.0
+        return gradient(x0) * mean
+
+    return Storage(
+        name,
+        power_ports(s=quantity.entropy),
+        energy=lambda x: c1 * expm1(float(x[port][0]) / c2),
+        gradient=gradient,
+        discrete_gradient=discrete_gradient,
+        parameters=parameters,
+        kernel=Kernel(KERNELS, "exponential", (c1, c2)),
+        formula=formula,
+    )
+
+
+def constant_structure(
+    name: str,
+    interface: Interface,
+    skew: Array,
+    constraint: Array,
+    parameters: tuple[tuple[str, object], ...] = (),
+    formula: Formula | None = None,
+) -> Reversible:
+    """A Dirac structure that does not depend on states: L (n, n), C (k, n)."""
+    n, k = skew.shape[0], constraint.shape[0]
+    return Reversible(
+        name,
+        interface,
+        structure=lambda _x: (skew, constraint),
+        parameters=parameters,
+        multipliers=k,
+        kernel=Kernel(KERNELS, "constant_structure", (*skew.ravel(), *constraint.reshape(k, n).ravel())),
+        formula=formula or Formula(lambda: (skew, constraint)),
+    )
+
+
+def coupling(name: str, interface: Interface) -> Reversible:
+    """q.f = −p.e, p.f = q.e, on ports q and p of equal dimension: L = [[0, −1], [1, 0]]."""
+    n = next(iter(interface.values())).quantity.space.dim
+    eye, zero = np.eye(n), np.zeros((n, n))
+    return constant_structure(name, interface, np.block([[zero, -eye], [eye, zero]]), np.zeros((0, 2 * n)))
+
+
+def dissipation(
+    name: str,
+    interface: Interface,
+    resistance: Array | Callable[[Point, Array, float], Array],
+    *,
+    reads: tuple[Path, ...] = (),
+    kernel: Kernel | None = None,
+    parameters: tuple[tuple[str, object], ...] = (),
+    formula: Formula | None = None,
+) -> Irreversible:
+    """Dissipation of a port's power into heat: p.f = μ u, s.f = −⟨u|μ u⟩/θ, with u = p.e and θ = θ₀ + s.e.
+
+    M = [[θ μ, −μ u], [−(μ u)ᵀ, ⟨u|μ u⟩/θ]].
+
+    Parameters
+    ----------
+    interface
+        The dissipating power port, then the entropy port, then state ports that are read.
+    resistance
+        μ (d, d), symmetric and non-negative; or a function of (states read, u, θ).
+    """
+    d = next(iter(interface.values())).quantity.space.dim
+
+    def matrix(x: Point, e: Array, reference: Reference) -> Array:
+        u, theta = e[:d], reference.temperature + float(e[d])
+        mu = resistance(x, u, theta) if callable(resistance) else resistance
+        drag = mu @ u
+        out = np.empty((d + 1, d + 1))
+        out[:d, :d] = theta * mu
+        out[:d, d] = out[d, :d] = -drag
+        out[d, d] = float(u @ drag) / theta
+        return out
+
+    if not callable(resistance):
+        kernel = Kernel(KERNELS, "dissipation", tuple(np.asarray(resistance, dtype=float).ravel()))
+    return Irreversible(name, interface, matrix, reads, parameters, kernel, formula)
