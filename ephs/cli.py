@@ -5,7 +5,6 @@ Exit codes: 0 done; 1 a law fails (``check``); 2 bad input; 3 the run failed par
 
 import json
 import math
-import runpy
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -14,8 +13,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import App, CycloptsError, Parameter
 
+from ephs.cli_input import EXTRAS, TEXTS, BadInput, Base, addressed, load_model, naming
+
 if TYPE_CHECKING:
-    from ephs import Scene, Solution, System
+    from ephs import Solution
 
 __all__ = ["main"]
 
@@ -25,25 +26,11 @@ Exergetic port-Hamiltonian systems: compose physical models by pattern, simulate
   ephs run scenes/slider-crank.toml --until 5     simulate; writes out/slider-crank/report.html
   ephs check scenes/slider-crank.toml             check the model: structure, laws, assembly, mobility
   ephs draw scenes/slider-crank.toml -o a.svg     draw the interconnection pattern
+  ephs equations scenes/slider-crank.toml         print the equations; --latex for a paper
 
 SCENE is a scene file (.toml), or FILE.py:NAME, a System or Scene of that name in a Python file of yours.
 ephs COMMAND --help explains a command."""
 
-_TEXTS = {
-    "initial": "--initial {found}: expected PATH=NUMBER or PATH=NUMBER,NUMBER,..., as in osc.pe.q=1.0",
-    "suffix": "{found}: expected one of {expected}; choose the file name's ending accordingly",
-    "no-file": "{found}: no such file; expected a scene file (.toml) or FILE.py:NAME",
-    "no-name": "{file}: no {name} in it; found {found}. Give one as {file}:NAME",
-    "not-a-model": "{file}: {name} is a {found}, expected a System or a Scene",
-    "user-code": "{file}: line {line}: {found}; mend the file, then run again",
-    "extra": "{file}: the module {found} is not installed; python -m pip install 'ephs[{extra}]'",
-    "no-report": "report.html was not written: the module {found} is not installed; "
-    "python -m pip install 'ephs[{extra}]' and run again (the solution is saved)",
-    "out": "{file}: {found}; choose another folder or file",
-    "failed": "{file}: the run failed: {found}",
-    "interrupted": "{file}: interrupted{at}",
-}
-_EXTRAS = {"matplotlib": "viz", "pygraphviz": "viz", "viser": "viz", "mujoco": "models"}
 _PICTURES = (".svg", ".tex", ".png")
 _FIGURES = {
     "steps": ("steps", "d"),
@@ -57,10 +44,6 @@ _FIGURES = {
     "work": ("work, J", ".4g"),
     "integrate_s": ("time stepping, s", ".2f"),
 }
-
-
-class BadInput(Exception):
-    """Input that cannot be used; the text is for the user."""
 
 
 def _version() -> str:
@@ -85,7 +68,6 @@ def _positive(_type: object, value: float | None) -> None:
 
 
 Positive = Annotated[float | None, Parameter(validator=_positive)]
-Base = Literal["fixed", "free"]
 
 
 @app.default
@@ -140,10 +122,10 @@ def run(
     """
     import ephs
 
-    model = _load(scene, base=base, adjust=adjust)
+    model = load_model(scene, base=base, adjust=adjust)
     name = model.name if isinstance(model, ephs.Scene) else scene.rpartition(":")[2]
     folder = out or Path("out", name)
-    with _input(scene, folder):
+    with addressed(scene, folder):
         folder.mkdir(parents=True, exist_ok=True)
     given = {
         "initial": _initial(initial or []),
@@ -155,21 +137,21 @@ def run(
     }
     chosen: dict[str, Any] = {key: value for key, value in given.items() if value is not None}
     try:
-        with _input(scene, folder), _progress(name) as progress:
+        with addressed(scene, folder), _progress(name) as progress:
             solution = ephs.simulate(model, until, progress=progress, **chosen)
     except ephs.SimulationError as error:
         if error.partial is None:
-            raise BadInput(_naming(scene, str(error))) from error
+            raise BadInput(naming(scene, str(error))) from error
         stopped = isinstance(error, ephs.Interrupted)
         if stopped:
-            _complain(_TEXTS["interrupted"].format(file=scene, at=f" at t = {error.partial.t[-1]:.6g} s"))
+            _complain(TEXTS["interrupted"].format(file=scene, at=f" at t = {error.partial.t[-1]:.6g} s"))
         else:
-            _complain(_TEXTS["failed"].format(file=scene, found=error))
-        with _input(scene, folder):
+            _complain(TEXTS["failed"].format(file=scene, found=error))
+        with addressed(scene, folder):
             _write(error.partial, folder)
         _complain(f"saved what was computed: {folder}")
         return 130 if stopped else 3
-    with _input(scene, folder):
+    with addressed(scene, folder):
         _write(solution, folder)
     return 0
 
@@ -191,8 +173,8 @@ def check(scene: str, /, *, base: Base = "fixed", adjust: bool = False) -> int:
     from rich.table import Table
     from rich.text import Text
 
-    model = _load(scene, base=base, adjust=adjust)
-    with _input(scene):
+    model = load_model(scene, base=base, adjust=adjust)
+    with addressed(scene):
         from ephs.mechanics.check import check_model
 
         report = check_model(model)
@@ -202,6 +184,42 @@ def check(scene: str, /, *, base: Base = "fixed", adjust: bool = False) -> int:
         table.add_row(Text(name), verdict, Text(detail))
     Console().print(table)
     return 0 if report.ok else 1
+
+
+@app.command
+def equations(
+    scene: str,
+    /,
+    *,
+    form: Literal["relation", "descriptor", "reduced"] = "reduced",
+    latex: bool = False,
+    base: Base = "fixed",
+    adjust: bool = False,
+) -> int:
+    """Print the equations, with the names of junctions.
+
+    Parameters
+    ----------
+    scene
+        A scene file (.toml), or FILE.py:NAME.
+    form
+        relation: what the pattern says of each junction and each component of its ports; descriptor: efforts of
+        storages, balances and conditions; reduced: interface variables eliminated.
+    latex
+        As LaTeX, an align environment.
+    base
+        How the root of an imported model meets the ground.
+    adjust
+        Assemble a scene that does not quite close.
+    """
+    import ephs
+
+    model = load_model(scene, base=base, adjust=adjust)
+    with addressed(scene):
+        system = model.system() if isinstance(model, ephs.Scene) else model
+        found = system.equations(form)
+    print(found.latex() if latex else found)
+    return 0
 
 
 @app.command
@@ -235,9 +253,9 @@ def draw(
     import ephs
 
     if output.suffix not in _PICTURES:
-        raise BadInput(_TEXTS["suffix"].format(found=output, expected=", ".join(_PICTURES)))
-    model = _load(scene, base=base, adjust=adjust)
-    with _input(scene, output):
+        raise BadInput(TEXTS["suffix"].format(found=output, expected=", ".join(_PICTURES)))
+    model = load_model(scene, base=base, adjust=adjust)
+    with addressed(scene, output):
         from ephs.show import draw as draw_pattern
 
         system = model.system() if isinstance(model, ephs.Scene) else model
@@ -275,85 +293,8 @@ def _initial(entries: Sequence[str]) -> dict[str, list[float]] | None:
         try:
             values[path] = [float(number) for number in numbers.split(",")]
         except ValueError as error:
-            raise BadInput(_TEXTS["initial"].format(found=entry)) from error
+            raise BadInput(TEXTS["initial"].format(found=entry)) from error
     return values or None
-
-
-def _load(scene: str, *, base: Base, adjust: bool) -> "Scene | System":
-    import ephs
-
-    file, separator, name = scene.rpartition(":")
-    if separator and file.endswith(".py"):
-        return _load_from_python(Path(file), name)
-    if scene.endswith(".py"):
-        raise BadInput(_TEXTS["no-name"].format(file=scene, name="name was given", found=scene))
-    if not Path(scene).is_file():
-        raise BadInput(_TEXTS["no-file"].format(found=scene))
-    with _input(scene):
-        return ephs.load(scene, base=base, adjust=adjust)
-
-
-def _load_from_python(file: Path, name: str) -> "Scene | System":
-    import ephs
-
-    if not file.is_file():
-        raise BadInput(_TEXTS["no-file"].format(found=file))
-    sys.path.insert(0, str(file.parent.resolve()))  # as `python FILE.py` does, for modules beside the file
-    try:
-        names = runpy.run_path(str(file), run_name="__ephs__")
-    except (Exception, SystemExit) as error:
-        found = f"{type(error).__name__}: {error}"
-        raise BadInput(_TEXTS["user-code"].format(file=file, line=_line(error, file), found=found)) from error
-    finally:
-        sys.path.remove(str(file.parent.resolve()))
-    models = [key for key, value in names.items() if isinstance(value, (ephs.System, ephs.Scene))]
-    if name not in names:
-        found = ", ".join(models) or "no System and no Scene"
-        raise BadInput(_TEXTS["no-name"].format(file=file, name=name or "name was given", found=found))
-    if name not in models:
-        raise BadInput(_TEXTS["not-a-model"].format(file=file, name=name, found=type(names[name]).__name__))
-    return names[name]
-
-
-def _line(error: BaseException, file: Path) -> int | str:
-    """Return the deepest line of the user's own file that the error went through."""
-    if isinstance(error, SyntaxError) and error.filename == str(file) and error.lineno:
-        return error.lineno
-    line: int | str = "?"
-    trace = error.__traceback__
-    while trace is not None:
-        if trace.tb_frame.f_code.co_filename == str(file):
-            line = trace.tb_lineno
-        trace = trace.tb_next
-    return line
-
-
-@contextmanager
-def _input(scene: str, target: Path | None = None) -> Iterator[None]:
-    """Turn the errors that speak to the user into ``BadInput`` that names the file."""
-    import ephs
-
-    try:
-        yield
-    except (BadInput, ephs.SimulationError):
-        raise
-    except ModuleNotFoundError as error:
-        module = (error.name or "").partition(".")[0]
-        if module not in _EXTRAS:
-            raise
-        raise BadInput(_TEXTS["extra"].format(file=scene, found=module, extra=_EXTRAS[module])) from error
-    except OSError as error:
-        where = error.filename or target or scene
-        raise BadInput(_TEXTS["out"].format(file=where, found=error.strerror or error)) from error
-    except Exception as error:
-        # The exception classes of this package are addressed to the user; all others are defects.
-        if type(error).__module__.partition(".")[0] != "ephs":
-            raise
-        raise BadInput(_naming(scene, str(error))) from error
-
-
-def _naming(scene: str, message: str) -> str:
-    return message if str(Path(scene)) in message else f"{scene}: {message}"
 
 
 @contextmanager
@@ -389,9 +330,9 @@ def _write(solution: "Solution", folder: Path) -> None:
         print(f"report: {write_report(solution, folder)}")
     except ModuleNotFoundError as error:
         module = (error.name or "").partition(".")[0]
-        if module not in _EXTRAS:
+        if module not in EXTRAS:
             raise
-        _complain(_TEXTS["no-report"].format(found=module, extra=_EXTRAS[module]))
+        _complain(TEXTS["no-report"].format(found=module, extra=EXTRAS[module]))
 
 
 def _complain(message: str) -> None:

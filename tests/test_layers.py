@@ -21,13 +21,14 @@ MAY_KNOW = {
     "ephs.show": {"ephs", "ephs.operad", "ephs.semantics", "ephs.mechanics", "ephs.show"},
     "ephs.testing": {"ephs", "ephs.operad", "ephs.semantics", "ephs.mechanics", "ephs.testing"},
     "ephs.cli": {"ephs"},
+    "ephs.cli_input": {"ephs"},
     "ephs.plugin": {"ephs"},
     "ephs.__main__": {"ephs"},
     "ephs": {"ephs"},
 }
 # Doors for notebooks: a value shows itself by the room of pictures, which is loaded when it is asked to.
 DOORS = {"ephs.operad.pattern", "ephs.semantics.system", "ephs.mechanics.solve.solution"}
-OPEN = {"ephs.cli", "ephs.plugin", "ephs.__main__", "ephs"}  # these stand above all rooms
+OPEN = {"ephs.cli", "ephs.cli_input", "ephs.plugin", "ephs.__main__", "ephs"}  # these stand above all rooms
 HEAVY = (
     "scipy",
     "networkx",

@@ -5,14 +5,16 @@ are left-trivialised; 6-vectors are (angular, linear). Equations of Lohmayer, Ca
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
+from ephs.mechanics import notation
 from ephs.operad import Directory, Path, PortType, Quantity, quantity
-from ephs.semantics import structures
+from ephs.semantics import formulas, structures
 from ephs.semantics.bundle import Array
 from ephs.semantics.errors import StructureError
-from ephs.semantics.primitives import Irreversible, Kernel, Point, Reversible, Storage, power_ports
+from ephs.semantics.primitives import Formula, Irreversible, Kernel, Point, Reversible, Storage, power_ports
 from ephs.semantics.spaces import SE3, SO3, Pair, codes, manifold, pair
 from ephs.semantics.spaces.rotations import quaternion_to_matrix, rotation_dexp
 
@@ -54,7 +56,8 @@ def kinetic(mass: float, inertia: Array, group: str = "SE3") -> Storage:
     inverse = np.linalg.inv(whole)
     inverse = 0.5 * (inverse + inverse.T)
     entries = (("mass", float(mass)), ("inertia", tuple(np.asarray(inertia, dtype=float).ravel().tolist())))
-    return structures.quadratic("kinetic", power_ports(p=MOMENTA[group]), inverse, entries)
+    made = structures.quadratic("kinetic", power_ports(p=MOMENTA[group]), inverse, entries)
+    return replace(made, notation=notation.kinetic)
 
 
 def gravity(weight: Array, group: str = "SE3") -> Storage:
@@ -112,6 +115,7 @@ def no_potential(of: Quantity, port: str) -> Storage:
         gradient=lambda _x: np.zeros(n),
         discrete_gradient=lambda _x, _v: np.zeros(n),
         kernel=Kernel(structures.KERNELS, "no_effort"),
+        notation=notation.nothing,
     )
 
 
@@ -207,7 +211,9 @@ def lie_poisson(group: str = "SE3") -> Reversible:
         return np.array(columns).T, np.zeros((0, 6))
 
     name = "lie_poisson" if group == "SE3" else "direct_lie_poisson"
-    return Reversible("lie_poisson", power_ports(p=MOMENTA[group]), structure, reads=(p,), kernel=Kernel(KERNELS, name))
+    kernel = Kernel(KERNELS, name)
+    ports = power_ports(p=MOMENTA[group])
+    return Reversible("lie_poisson", ports, structure, reads=(p,), kernel=kernel, notation=notation.lie_poisson)
 
 
 def frame_change(offset: Array, inner: str, outer: str) -> Reversible:
@@ -219,7 +225,8 @@ def frame_change(offset: Array, inner: str, outer: str) -> Reversible:
     interface = power_ports(**{outer: quantity.body_momentum, inner: quantity.body_momentum})
     parameters = (("offset", tuple(np.asarray(offset, dtype=float).tolist())),)
     constraint = np.hstack([-carried, np.eye(6)])
-    return structures.constant_structure("frame_change", interface, np.zeros((12, 12)), constraint, parameters)
+    made = structures.constant_structure("frame_change", interface, np.zeros((12, 12)), constraint, parameters)
+    return replace(made, notation=notation.frame_change)
 
 
 def holonomic(of: Pair) -> Reversible:
@@ -262,7 +269,9 @@ def holonomic(of: Pair) -> Reversible:
 
     kernel = Kernel(HOLONOMIC, "holonomic", (float(of.code), *of.basis.reshape(6, d).ravel().tolist()))
     parameters = (("pair", of.name), *of.parameters)
-    return Reversible("holonomic", interface, structure, (q_r,), discrete, parameters, 6, kernel)
+    return Reversible(
+        "holonomic", interface, structure, (q_r,), discrete, parameters, 6, kernel, notation=notation.holonomic
+    )
 
 
 def joint_friction(
@@ -279,11 +288,12 @@ def joint_friction(
     if not callable(mu):
         matrix = np.array(mu, dtype=float).reshape(of.dim, of.dim)
         entries = (("mu", tuple(matrix.ravel().tolist())),)
-        return structures.dissipation(name, Directory(ports), matrix, parameters=entries)
+        made = structures.dissipation(name, Directory(ports), matrix, parameters=entries)
+        return replace(made, notation=notation.friction)
     q_r = Path.of("q_r")
     resistance = mu
     ports["q_r"] = PortType(_relative(of), False)
-    return structures.dissipation(
+    made = structures.dissipation(
         name,
         Directory(ports),
         lambda x, u, theta: np.asarray(resistance(of.coordinates(x[q_r]), u, theta), dtype=float).reshape(
@@ -292,6 +302,7 @@ def joint_friction(
         reads=(q_r,),
         parameters=(("mu", getattr(mu, "__name__", "function")),),
     )
+    return replace(made, notation=notation.friction)
 
 
 def point_spring(stiffness: float, length: float) -> Storage:
@@ -352,9 +363,10 @@ def point_damper(damping: float) -> Irreversible:
 
     kernel = Kernel(SPRINGS, "point_damper", (damping,))
     entries = (("damping", damping),)
-    return structures.dissipation(
+    made = structures.dissipation(
         "point_damper", Directory(ports), resistance, reads=(q_r,), kernel=kernel, parameters=entries
     )
+    return replace(made, notation=notation.friction)
 
 
 def ground(of: Quantity = quantity.body_momentum) -> Reversible:
@@ -366,7 +378,8 @@ def ground(of: Quantity = quantity.body_momentum) -> Reversible:
 def thermal_node(capacity: float, temperature: float) -> Storage:
     """Heat capacity C from temperature T₀ at s = 0: E = C T₀ (exp(s/C) − 1); port s. C in J/K, T₀ in K."""
     entries = (("capacity", float(capacity)), ("temperature", float(temperature)))
-    return structures.exponential("thermal_node", capacity * temperature, capacity, entries)
+    formula = Formula(formulas.thermal_node, ("capacity", "temperature"))
+    return structures.exponential("thermal_node", capacity * temperature, capacity, entries, formula)
 
 
 def _relative(of: Pair) -> Quantity:

@@ -39,6 +39,11 @@ def thermal_capacity(s: Any, c1: Any, c2: Any) -> Any:
     return c1 * np.exp(s / c2)
 
 
+def thermal_node(s: Any, capacity: Any, temperature: Any) -> Any:
+    """E = C T₀ exp(s/C)."""
+    return capacity * temperature * np.exp(s / capacity)
+
+
 def ideal_gas(s: Any, v: Any, c1: Any, c2: Any, v0: Any, c: Any) -> Any:
     """E = c1 exp(s/c2) (v0/v)^(1/c)."""
     return c1 * np.exp(s / c2) * (v0 / v) ** (1 / c)

@@ -83,6 +83,11 @@ class Storage:
         Names and numbers, for printing and comparison.
     environment
         True for the reference environment: H ≡ 0 and e = 0; the state still integrates the flow.
+    kernel, formula
+        The compiled counterpart, and the defining function for printed equations.
+    notation
+        How equations between vectors are written: a function of a `symbols.voices.Voice` that gives efforts by port,
+        or (flows by port, conditions).
     """
 
     name: str
@@ -94,6 +99,7 @@ class Storage:
     environment: bool = False
     kernel: Kernel | None = field(default=None, compare=False, repr=False)
     formula: Formula | None = field(default=None, compare=False, repr=False)
+    notation: Callable[[Any], Any] | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         for port, port_type in self.interface.items():
@@ -189,7 +195,7 @@ class Storage:
         start, end = float(self.energy(x0)), float(self.energy(self.retract(x0, v)))
         defect, near = end - start - along, WEIGHT * float((low + high - 2.0 * gradient) @ step)
         port = next(port for port, place, _ in self.bundle.items() if place == where)
-        terms = float(np.abs(gradient).sum()) * float(np.abs(x0[port]).max())
+        terms = float(np.abs(gradient).sum()) * float(np.abs(x0[port]).max(initial=0.0))
         if abs(near - defect) <= ROUNDING * (abs(start) + abs(end) + terms):
             defect = near
         return gradient + (defect / square) * step if square > 0.0 else gradient
@@ -226,6 +232,7 @@ class Reversible:
     multipliers: int = 0
     kernel: Kernel | None = field(default=None, compare=False, repr=False)
     formula: Formula | None = field(default=None, compare=False, repr=False)
+    notation: Callable[[Any], Any] | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         from ephs.semantics.checks import check_reversible
@@ -267,6 +274,7 @@ class Irreversible:
     parameters: tuple[tuple[str, object], ...] = ()
     kernel: Kernel | None = field(default=None, compare=False, repr=False)
     formula: Formula | None = field(default=None, compare=False, repr=False)
+    notation: Callable[[Any], Any] | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         from ephs.semantics.checks import check_irreversible

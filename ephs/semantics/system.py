@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from ephs.semantics.descriptor import Descriptor
     from ephs.semantics.relation import Relation
     from ephs.semantics.report import CheckReport
+    from ephs.semantics.symbols.equations import Equations
 
 __all__ = ["Filling", "System"]
 
@@ -174,6 +175,24 @@ class System:
         from ephs.semantics.descriptor import assemble
 
         return assemble(self.flatten())
+
+    def equations(self, form: Literal["relation", "descriptor", "reduced"] = "reduced") -> "Equations":
+        """The equations of the system, with the names of its junctions; as text, LaTeX, or SymPy's expressions.
+
+        Parameters
+        ----------
+        form
+            ``"relation"``: what the pattern says of each junction, and each component of its ports; ``"descriptor"``:
+            efforts of storages, balances, conditions; ``"reduced"``: interface variables eliminated.
+
+        Raises
+        ------
+        AssemblyError
+            A descriptor or reduced form is asked of what has no square system of equations.
+        """
+        from ephs.semantics.symbols.equations import equations_of
+
+        return equations_of(self, form)
 
     def check(self, reference: Reference | None = None, *, state: Mapping[str, object] | None = None) -> "CheckReport":
         """Check the structure of the components, that there are equations, and the laws.

@@ -190,7 +190,7 @@ def test_a_discrete_gradient_gives_the_rise_and_is_symmetric(name, seed, size):
     rise = storage.energy(x1) - storage.energy(x)
     scale = abs(storage.energy(x)) + abs(storage.energy(x1)) + (np.abs(effort) + np.abs(intensive)) @ np.abs(v)
     # where an energy is a small difference of terms, it feels the rounding of the states
-    rounded = np.abs(effort + intensive).sum() * max(float(np.abs(value).max()) for value in x.values())
+    rounded = np.abs(effort + intensive).sum() * max(float(np.abs(value).max(initial=0.0)) for value in x.values())
     assert abs(rise - (effort + intensive) @ v) <= 2e-14 * scale + 2e-15 * rounded + 8e-16 * np.abs(v).sum()
     back = storage.discrete_effort(x1, -v, REFERENCE)
     assert np.abs(back - effort).max(initial=0.0) <= 1e-12 * max(1.0, np.abs(effort).max(initial=0.0))

@@ -3,7 +3,7 @@
 from importlib import import_module
 from typing import Any, TypeAlias
 
-__all__ = ["Expr", "python_code", "sp"]
+__all__ = ["Expr", "python_code", "sp", "text_of"]
 
 sp: Any = import_module("sympy")
 Expr: TypeAlias = Any
@@ -14,3 +14,27 @@ def python_code(expression: Expr) -> str:
     """An expression as Python, with functions of `math`."""
     printer: Any = import_module("sympy.printing.pycode").PythonCodePrinter({"fully_qualified_modules": True})
     return str(printer.doprint(expression))
+
+
+def text_of(expression: Expr) -> str:
+    """An expression as text; compositions of operators are written side by side."""
+    return str(_Text().doprint(expression))
+
+
+_Printer: Any = import_module("sympy.printing.str").StrPrinter
+
+
+class _Text(_Printer):
+    """SymPy's own, but for products that do not commute."""
+
+    def _print_Mul(self, expression: Expr) -> str:
+        numbers, operators = expression.args_cnc()
+        if not operators:
+            return str(_Printer._print_Mul(self, expression))
+        factor = sp.Mul(*numbers)
+        head = {1: "", -1: "-"}.get(factor, f"{_Printer.doprint(self, factor)} ")
+        mine = sp.printing.precedence.PRECEDENCE["Mul"]
+        return head + " ".join(_Printer.parenthesize(self, entry, mine) for entry in operators)
+
+    def _print_Pow(self, expression: Expr, rational: bool = False) -> str:
+        return str(_Printer._print_Pow(self, expression, rational)).replace("**", "^")

@@ -1,0 +1,111 @@
+"""What the command line is given: files to models, and every error that speaks to the user to one clear text."""
+
+import runpy
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    from ephs import Scene, System
+
+__all__ = ["EXTRAS", "TEXTS", "BadInput", "Base", "addressed", "load_model", "naming"]
+
+Base = Literal["fixed", "free"]
+TEXTS = {
+    "initial": "--initial {found}: expected PATH=NUMBER or PATH=NUMBER,NUMBER,..., as in osc.pe.q=1.0",
+    "suffix": "{found}: expected one of {expected}; choose the file name's ending accordingly",
+    "no-file": "{found}: no such file; expected a scene file (.toml) or FILE.py:NAME",
+    "no-name": "{file}: no {name} in it; found {found}. Give one as {file}:NAME",
+    "not-a-model": "{file}: {name} is a {found}, expected a System or a Scene",
+    "user-code": "{file}: line {line}: {found}; mend the file, then run again",
+    "extra": "{file}: the module {found} is not installed; python -m pip install 'ephs[{extra}]'",
+    "no-report": "report.html was not written: the module {found} is not installed; "
+    "python -m pip install 'ephs[{extra}]' and run again (the solution is saved)",
+    "out": "{file}: {found}; choose another folder or file",
+    "failed": "{file}: the run failed: {found}",
+    "interrupted": "{file}: interrupted{at}",
+}
+EXTRAS = {"matplotlib": "viz", "pygraphviz": "viz", "viser": "viz", "mujoco": "models"}
+
+
+class BadInput(Exception):
+    """Input that cannot be used; the text is for the user."""
+
+
+def load_model(scene: str, *, base: Base, adjust: bool) -> "Scene | System":
+    import ephs
+
+    file, separator, name = scene.rpartition(":")
+    if separator and file.endswith(".py"):
+        return _from_python(Path(file), name)
+    if scene.endswith(".py"):
+        raise BadInput(TEXTS["no-name"].format(file=scene, name="name was given", found=scene))
+    if not Path(scene).is_file():
+        raise BadInput(TEXTS["no-file"].format(found=scene))
+    with addressed(scene):
+        return ephs.load(scene, base=base, adjust=adjust)
+
+
+def _from_python(file: Path, name: str) -> "Scene | System":
+    import ephs
+
+    if not file.is_file():
+        raise BadInput(TEXTS["no-file"].format(found=file))
+    sys.path.insert(0, str(file.parent.resolve()))  # as `python FILE.py` does, for modules beside the file
+    try:
+        names = runpy.run_path(str(file), run_name="__ephs__")
+    except (Exception, SystemExit) as error:
+        found = f"{type(error).__name__}: {error}"
+        raise BadInput(TEXTS["user-code"].format(file=file, line=_line(error, file), found=found)) from error
+    finally:
+        sys.path.remove(str(file.parent.resolve()))
+    models = [key for key, value in names.items() if isinstance(value, (ephs.System, ephs.Scene))]
+    if name not in names:
+        found = ", ".join(models) or "no System and no Scene"
+        raise BadInput(TEXTS["no-name"].format(file=file, name=name or "name was given", found=found))
+    if name not in models:
+        raise BadInput(TEXTS["not-a-model"].format(file=file, name=name, found=type(names[name]).__name__))
+    return names[name]
+
+
+def _line(error: BaseException, file: Path) -> int | str:
+    """Return the deepest line of the user's own file that the error went through."""
+    if isinstance(error, SyntaxError) and error.filename == str(file) and error.lineno:
+        return error.lineno
+    line: int | str = "?"
+    trace = error.__traceback__
+    while trace is not None:
+        if trace.tb_frame.f_code.co_filename == str(file):
+            line = trace.tb_lineno
+        trace = trace.tb_next
+    return line
+
+
+@contextmanager
+def addressed(scene: str, target: Path | None = None) -> Iterator[None]:
+    """Turn the errors that speak to the user into ``BadInput`` that names the file."""
+    import ephs
+
+    try:
+        yield
+    except (BadInput, ephs.SimulationError):
+        raise
+    except ModuleNotFoundError as error:
+        module = (error.name or "").partition(".")[0]
+        if module not in EXTRAS:
+            raise
+        raise BadInput(TEXTS["extra"].format(file=scene, found=module, extra=EXTRAS[module])) from error
+    except OSError as error:
+        where = error.filename or target or scene
+        raise BadInput(TEXTS["out"].format(file=where, found=error.strerror or error)) from error
+    except Exception as error:
+        # The exception classes of this package are addressed to the user; all others are defects.
+        if type(error).__module__.partition(".")[0] != "ephs":
+            raise
+        raise BadInput(naming(scene, str(error))) from error
+
+
+def naming(scene: str, message: str) -> str:
+    return message if str(Path(scene)) in message else f"{scene}: {message}"

@@ -1,0 +1,54 @@
+"""Eliminating unknowns from equations that hold them linearly."""
+
+from collections.abc import Mapping
+
+from ephs.semantics.symbols.algebra import Expr, sp
+
+__all__ = ["coefficient_of", "eliminate", "settled", "tidy"]
+
+
+def tidy(expression: Expr) -> Expr:
+    expanded = sp.expand(expression)
+    if not expanded.is_commutative:
+        return expanded
+    return min((expanded, sp.simplify(expanded)), key=sp.count_ops)
+
+
+def settled(expression: Expr, known: Mapping[Expr, Expr]) -> Expr:
+    """An expression with all that is known inserted, until nothing changes."""
+    while True:
+        new = expression.subs(known)
+        if new == expression:
+            return sp.expand(new)
+        expression = new
+
+
+def eliminate(algebraic: Mapping[str, Expr], candidates: list[Expr]) -> tuple[dict[Expr, Expr], dict[str, Expr]]:
+    """Solve equations for unknowns that occur once, with coefficient ±1 or a number that cannot vanish."""
+    left = dict(algebraic)
+    solved: dict[Expr, Expr] = {}
+    for unknown in candidates:
+        for name, expression in left.items():
+            coefficient = coefficient_of(expression, unknown)
+            if coefficient is None:
+                continue
+            value = sp.expand(unknown - expression / coefficient)
+            del left[name]
+            left = {key: sp.expand(other.subs(unknown, value)) for key, other in left.items()}
+            solved = {symbol: sp.expand(entry.subs(unknown, value)) for symbol, entry in solved.items()}
+            solved[unknown] = value
+            break
+    return solved, left
+
+
+def coefficient_of(expression: Expr, unknown: Expr) -> Expr | None:
+    """The factor of an unknown that occurs linearly: a number, or of numbers also a positive parameter."""
+    terms = [term for term in sp.Add.make_args(expression) if term.has(unknown)]
+    if len(terms) != 1:
+        return None
+    factor, rest = terms[0].as_independent(unknown)
+    if rest != unknown or factor == 0:
+        return None
+    if factor.is_number or (factor.is_commutative and factor.is_positive):
+        return factor
+    return None

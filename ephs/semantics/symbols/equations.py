@@ -1,0 +1,265 @@
+"""The equations of a system, written with the names of its junctions, in three forms.
+
+*relation*: junction by junction what the pattern says, component by component what its filling says.
+*descriptor*: the square form: efforts of storages, balances of flows, conditions.
+*reduced*: what is left when interface variables are eliminated.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Literal, final
+
+from ephs.operad import Path, Quantity
+from ephs.semantics.symbols.algebra import Expr, sp, text_of
+from ephs.semantics.symbols.elimination import coefficient_of, eliminate, settled, tidy
+from ephs.semantics.symbols.voices import say
+from ephs.semantics.symbols.words import operator
+from ephs.semantics.symbols.writer import Junction, Parts, Writer, parts_of
+from ephs.semantics.system import System
+
+__all__ = ["Equation", "Equations", "Form", "equations_of"]
+
+Form = Literal["relation", "descriptor", "reduced"]
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Equation:
+    """left = right, both of SymPy, and where it comes from."""
+
+    left: Expr
+    right: Expr
+    about: str
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Equations:
+    """The equations of a system; as text by ``str``, as LaTeX by ``latex()``.
+
+    Parameters
+    ----------
+    names
+        Symbol -> how LaTeX writes it.
+    """
+
+    form: Form
+    rows: tuple[Equation, ...]
+    names: Mapping[Expr, str]
+
+    def __iter__(self) -> Iterator[Equation]:
+        return iter(self.rows)
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __getitem__(self, left: str) -> Expr:
+        """The right side of the equation whose left side reads so.
+
+        Raises
+        ------
+        KeyError
+            There is none; the message lists the left sides.
+        """
+        for row in self.rows:
+            if str(row.left) == left:
+                return row.right
+        raise KeyError(f"{left}: the left sides are {', '.join(str(row.left) for row in self.rows)}")
+
+    def __str__(self) -> str:
+        lines: list[str] = []
+        about = ""
+        for row in self.rows:
+            if row.about != about:
+                about = row.about
+                lines.append(f"{about}:")
+            lines.append(f"  {text_of(row.left)} = {text_of(row.right)}")
+        return "\n".join(lines)
+
+    def latex(self) -> str:
+        """An ``align`` environment with a line for each equation."""
+        lines: list[str] = []
+        about = ""
+        for row in self.rows:
+            if row.about != about:
+                about = row.about
+                spelled = about.replace("_", r"\_")
+                lines.append(rf"  \intertext{{{spelled}}}")
+            lines.append(rf"  {self._tex(row.left)} &= {self._tex(row.right)} \\")
+        return "\n".join([r"\begin{align*}", *lines, r"\end{align*}"])
+
+    def _tex(self, expression: Expr) -> str:
+        return str(sp.latex(expression, symbol_names=dict(self.names), mul_symbol=r" \, "))
+
+    def _repr_latex_(self) -> str:  # pyright: ignore[reportUnusedFunction] - notebooks call it
+        rows = "".join(rf"{self._tex(row.left)} &= {self._tex(row.right)} \\" for row in self.rows)
+        return rf"$\displaystyle \begin{{aligned}}{rows}\end{{aligned}}$"
+
+
+def equations_of(system: System, form: Form) -> Equations:
+    """The equations of a system, see the module.
+
+    Raises
+    ------
+    AssemblyError
+        The descriptor and the reduced form of what has no square system of equations.
+    ValueError
+        There is no such form.
+    """
+    writers: dict[str, Callable[[Writer], Iterator[Equation]]] = {
+        "relation": _relation,
+        "descriptor": _descriptor,
+        "reduced": _reduced,
+    }
+    if form not in writers:
+        raise ValueError(f"form is {form!r}, expected one of {', '.join(writers)}")
+    writer = Writer(system.flatten())
+    return Equations(form, tuple(writers[form](writer)), writer.words.latex)
+
+
+def _rate(writer: Writer, junction: Path, quantity: Quantity) -> Expr:
+    return writer.words.rate(junction, quantity)
+
+
+def _moving(writer: Writer, junction: Path, quantity: Quantity, flow: Expr) -> Expr:
+    """What the derivative of a state by time is, from its left-trivialised flow."""
+    if quantity.kind in ("pose", "direct_pose", "relative_pose"):
+        return operator("tangent", writer.words.state(junction, quantity)) * flow
+    return flow
+
+
+# ---- the relation ----------------------------------------------------------------------------------------------
+
+
+def _relation(writer: Writer) -> Iterator[Equation]:
+    pattern, words = writer.flat.pattern, writer.words
+    for path, junction in pattern.junctions.items():
+        about = f"junction {path}"
+        on = [
+            (box / port, where.power)
+            for box, b in pattern.boxes.items()
+            for port, where in b.ports.items()
+            if where.junction == path
+        ]
+        states = [words.port(name, "x", junction.quantity) for name, _ in on]
+        if junction.exposed:
+            states.append(words.port(path, "x", junction.quantity))
+        for one, other in pairwise(states):
+            yield Equation(one, other, about)
+        inner = [name for name, power in on if power]
+        outer = junction.exposed and junction.power
+        net = sum((words.port(name, "f", junction.quantity) for name in inner), sp.Integer(0))
+        if inner or outer:
+            yield Equation(net, words.port(path, "f", junction.quantity) if outer else sp.Integer(0), about)
+        efforts = [words.port(name, "e", junction.quantity) for name in inner]
+        if outer:
+            efforts.append(words.port(path, "e", junction.quantity))
+        for one, other in pairwise(efforts):
+            yield Equation(one, other, about)
+    for path, primitive in writer.components():
+        about = f"{path} ({primitive.name}, {primitive.kind})"
+
+        def effort(port: Path, quantity: Quantity, path: Path = path) -> Expr:
+            return words.port(path / port, "e", quantity)
+
+        said = say(writer.voice(path, primitive, effort))
+        for port, expression in said.efforts.items():
+            junction, quantity = writer.state(path, port)
+            yield Equation(words.port(path / port, "x", quantity), words.state(junction, quantity), about)
+            yield Equation(words.port(path / port, "f", quantity), _flow_of(writer, junction, quantity), about)
+            yield Equation(words.port(path / port, "e", quantity), sp.expand(expression), about)
+        for port, expression in said.flows.items():
+            quantity = primitive.bundle.quantity(port)
+            yield Equation(words.port(path / port, "f", quantity), sp.expand(expression), about)
+        for condition in said.conditions:
+            yield Equation(sp.Integer(0), sp.expand(condition), about)
+
+
+def _flow_of(writer: Writer, junction: Path, quantity: Quantity) -> Expr:
+    """The left-trivialised derivative of a state by time."""
+    rate = _rate(writer, junction, quantity)
+    if quantity.kind in ("pose", "direct_pose", "relative_pose"):
+        return operator("tangent", writer.words.state(junction, quantity)) ** -1 * rate
+    return rate
+
+
+# ---- the descriptor form ---------------------------------------------------------------------------------------
+
+
+def _descriptor(writer: Writer) -> Iterator[Equation]:
+    parts = parts_of(writer, writer.junctions())
+    for junction, (expression, quantity, path) in parts.storages.items():
+        yield Equation(writer.effort(junction, quantity), sp.expand(expression), f"effort of {path}")
+    for junction, balance in parts.balances.items():
+        rate = parts.rates.get(junction)
+        about = f"flows at {junction}"
+        if rate is None:
+            yield Equation(sp.Integer(0), sp.expand(balance), about)
+        else:
+            quantity = parts.storages[junction][1]
+            right = _moving(writer, junction, quantity, sp.expand(rate - balance))
+            yield Equation(_rate(writer, junction, quantity), right, about)
+    for path, condition in parts.conditions:
+        yield Equation(sp.Integer(0), sp.expand(condition), f"condition of {path}")
+
+
+# ---- the reduced form ------------------------------------------------------------------------------------------
+
+
+def _reduced(writer: Writer) -> Iterator[Equation]:
+    junctions = writer.junctions()
+    parts = parts_of(writer, junctions)
+    outer = [slot for slot in junctions if slot.exposed]
+    known = {writer.effort(j, quantity): e for j, (e, quantity, _) in parts.storages.items()}
+    open_flows = {slot.path: writer.words.port(slot.path, "f", slot.quantity) for slot in outer}
+    algebraic: dict[str, Expr] = {}
+    for junction, balance in parts.balances.items():
+        if junction not in parts.rates and junction not in open_flows:
+            algebraic[f"flows at {junction}"] = sp.expand(balance.subs(known))
+    for number, (path, condition) in enumerate(parts.conditions):
+        algebraic[f"condition of {path}" + " " * number] = sp.expand(condition.subs(known))
+    candidates = _candidates(writer, junctions, parts)
+    solved, algebraic = eliminate(algebraic, candidates)
+    known = {symbol: settled(e, solved) for symbol, e in known.items()} | solved
+
+    def final(expression: Expr) -> Expr:
+        return tidy(settled(expression, known))
+
+    for junction, rate in parts.rates.items():
+        quantity = parts.storages[junction][1]
+        flow = final(rate - parts.balances[junction])
+        yield Equation(_rate(writer, junction, quantity), _moving(writer, junction, quantity, flow), "states")
+    for expression in algebraic.values():
+        if final(expression) != 0:
+            yield Equation(sp.Integer(0), final(expression), "conditions")
+    for slot in outer:
+        effort = writer.effort(slot.path, slot.quantity)
+        if effort in known:
+            yield Equation(effort, final(effort), "outer ports")
+        if slot.path not in parts.rates:
+            flow = open_flows[slot.path]
+            yield Equation(flow, final(flow + parts.balances[slot.path]), "outer ports")
+
+
+def _candidates(writer: Writer, junctions: list[Junction], parts: Parts) -> list[Expr]:
+    """Unknowns in the order in which they should go: flows through transformers, inner efforts, other multipliers."""
+    transformers: list[Expr] = []
+    others: list[Expr] = []
+    for path, primitive in writer.components():
+        said = parts.said[path]
+        own = list(said.multipliers)
+        efforts = [writer.effort(writer.junction(path, port), q) for port, _, q in primitive.bundle.items()]
+        solvable = any(
+            coefficient_of(sp.expand(condition), effort) is not None
+            for condition in said.conditions
+            for effort in efforts
+            if len(said.conditions) == 1 and len(efforts) == 2
+        )
+        (transformers if solvable else others).extend(own)
+    inner = [
+        writer.effort(slot.path, slot.quantity)
+        for slot in junctions
+        if slot.path not in parts.storages and not slot.exposed
+    ]
+    return [*transformers, *inner, *others]

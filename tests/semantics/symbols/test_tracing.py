@@ -1,0 +1,227 @@
+"""Tracing: what functions say of symbols is what they say of numbers; derivatives, kernels and messages follow."""
+
+import math
+from math import sin
+
+import numpy as np
+import pytest
+import sympy as sp
+from hypothesis import given
+from hypothesis import strategies as st
+
+import ephs
+from ephs import library
+from ephs import quantity as Q
+from ephs.mechanics import components
+from ephs.operad import Path
+from ephs.semantics import Reference
+from ephs.semantics.checks import random_point
+from ephs.semantics.spaces import manifold
+from ephs.semantics.symbols.forms import storage_form
+from ephs.semantics.symbols.programs import storage_program
+from ephs.semantics.symbols.tracing import Untraceable, trace
+from ephs.semantics.symbols.voices import formula_text
+from tests.semantics.test_primitives import ARGUMENTS
+
+UNARY = [np.sin, np.cos, np.tanh, np.arctan, np.exp, np.cosh, math.cos, math.sinh, math.atan, math.expm1, abs]
+seeds = st.integers(0, 2**20)
+
+
+def branches():
+    """Random functions of two numbers, of which none leaves its domain on [0.3, 2]²."""
+    leaf = st.one_of(st.sampled_from(["x", "y"]), st.floats(0.3, 2.0))
+    return st.recursive(
+        leaf,
+        lambda inner: st.one_of(
+            st.tuples(st.sampled_from(UNARY), inner),
+            st.tuples(st.sampled_from(["+", "-", "*"]), inner, inner),
+            st.tuples(st.just("pow"), inner, st.sampled_from([2, 3, 2.0])),
+        ),
+        max_leaves=6,
+    )
+
+
+def value(tree, x, y):
+    if isinstance(tree, str):
+        return x if tree == "x" else y
+    if isinstance(tree, float):
+        return tree
+    if tree[0] in UNARY:
+        return tree[0](value(tree[1], x, y))
+    a = value(tree[1], x, y)
+    if tree[0] == "pow":
+        return a ** tree[2]
+    b = value(tree[2], x, y)
+    return {"+": a + b, "-": a - b, "*": a * b}[tree[0]]
+
+
+@given(branches(), st.floats(0.3, 2.0), st.floats(0.3, 2.0))
+def test_symbols_say_what_numbers_say(tree, x, y):
+    one, two = sp.symbols("x y", real=True)
+    try:
+        traced = trace(lambda x, y: plain(value(tree, x, y)), {"x": one, "y": two})
+        expected = float(value(tree, x, y))
+    except (Untraceable, OverflowError):
+        return  # functions of `math` that a tree holds as values are not found
+    if not abs(expected) < 1e6:
+        return
+    found = float(traced.numbered.item().subs({one: x, two: y}))
+    assert abs(found - expected) <= 1e-9 * (1.0 + abs(expected))
+
+
+def plain(entry):
+    return entry
+
+
+def helper(q):
+    return sin(q) + math.exp(-q)
+
+
+def test_functions_of_math_are_traced_also_in_helpers():
+    q = sp.Symbol("q", real=True)
+    assert trace(helper, {"q": q}).outputs.item() == sp.sin(q) + sp.exp(-q)
+    assert (
+        trace(lambda q: 2.5 * helper(q), {"q": q}).numbered.item().equals(sp.Rational(5, 2) * (sp.sin(q) + sp.exp(-q)))
+    )
+    assert math.sin(0.5) == sin(0.5)  # the functions themselves are left alone
+
+
+@pytest.mark.parametrize(
+    "function",
+    [
+        lambda q: q if q > 0 else -q,
+        lambda q: float(q) ** 2,
+        lambda q: np.where(q > 0.0, q, 0.0),
+        lambda q: 1j * q,
+        lambda q: "energy",
+        lambda q: int(q),
+        lambda q: [q, [q]],
+        lambda q: q.no_such_thing,
+    ],
+)
+def test_what_needs_numbers_is_not_traced(function):
+    with pytest.raises(Untraceable):
+        trace(function, {"q": sp.Symbol("q", real=True)})
+
+
+def test_functions_that_differ_in_numbers_share_one_program():
+    def spring(k, power):
+        return ephs.storage({"q": Q.displacement}, lambda q: k * abs(q) ** power + np.cos(k * q))
+
+    one, other, third = spring(1.5, 4), spring(2.25, 4), spring(1.5, 2)
+    assert one.kernel.source == other.kernel.source != third.kernel.source
+    assert one.kernel.parameters != other.kernel.parameters
+    before = storage_program.cache_info().misses
+    for k in np.linspace(1.1, 1.9, 20):
+        spring(k, 4)
+    assert storage_program.cache_info().misses == before
+
+
+SPACES = {
+    "number": (Q.displacement, lambda x: 0.3 * x**4 + np.sin(x)),
+    "angle": (Q.relative_pose("revolute"), lambda x: 1.0 - np.cos(x)),
+    "two": (Q.relative_pose("cylindrical"), lambda x: np.cos(x[0]) * x[1] ** 2),
+    "rotation": (Q.relative_pose("spherical"), lambda x: x[0] * x[1] + x[2] ** 2),
+    "planar": (Q.relative_pose("planar"), lambda x: np.sin(x[0]) * x[1] - x[2] ** 3),
+    "pose": (Q.pose, lambda x: x[4] ** 2 * x[0] ** 2 + x[6] * x[2] * x[3]),
+    "direct": (Q.direct_pose, lambda x: x[4] ** 2 * x[0] ** 2 + x[6] * x[2] * x[3]),
+    "momentum": (Q.body_momentum, lambda x: 0.5 * x @ x + x[0] ** 2 * x[5] ** 2),
+}
+
+
+@pytest.mark.parametrize("name", SPACES)
+@given(seed=seeds)
+def test_gradients_are_the_left_trivialised_derivatives(name, seed):
+    quantity, energy = SPACES[name]
+    interface = library.power_ports(x=quantity)
+    rng, space, port = np.random.default_rng(seed), manifold(quantity.space), Path.of("x")
+    x, v = space.random(rng), rng.standard_normal(space.dim)
+
+    def along(t):
+        there = space.retract(x, t * v)
+        return float(energy(there[0] if space.size == 1 else there))
+
+    gradient = storage_form(interface, energy).gradient({port: x})
+    h = 1e-3
+    slope = (8.0 * (along(h) - along(-h)) - (along(2 * h) - along(-2 * h))) / (12.0 * h)
+    assert abs(gradient @ v - slope) <= 1e-8 * (1.0 + np.abs(gradient) @ np.abs(v) + np.abs(x).max() ** 4)
+
+
+# ---- the library -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", [name for name in ARGUMENTS if name != "environment"])
+def test_docstrings_show_what_the_formula_says(name):
+    primitive = getattr(library, name)(**ARGUMENTS[name])
+    assert formula_text(primitive) in " ".join(getattr(library, name).__doc__.split())
+
+
+@pytest.mark.parametrize("name", [name for name in ARGUMENTS if name != "environment"])
+@given(seed=seeds)
+def test_what_is_simulated_is_what_the_formula_says(name, seed):
+    primitive = getattr(library, name)(**ARGUMENTS[name])
+    _agrees(primitive, np.random.default_rng(seed))
+
+
+def test_thermal_nodes_of_scenes_are_what_their_formula_says():
+    _agrees(components.thermal_node(50.0, 300.0), np.random.default_rng(0))
+
+
+def _agrees(primitive, rng):
+    bundle, reference = primitive.bundle, Reference()
+    given = {name: dict(primitive.parameters)[name] for name in primitive.formula.parameters}
+    x, other = (random_point(bundle, primitive.reads, rng) for _ in range(2))
+
+    def formula(values):
+        return primitive.formula.function(**{str(p): float(v[0]) for p, v in values.items()}, **given)
+
+    if primitive.kind == "storage":
+        rise = primitive.energy(x) - primitive.energy(other)
+        assert abs(formula(x) - formula(other) - rise) <= 1e-13 * (abs(formula(x)) + abs(formula(other)))
+    elif primitive.kind == "reversible":
+        for matrix, expected in zip(formula(x), primitive.structure(x), strict=True):
+            assert np.array_equal(np.zeros(expected.shape) if matrix is None else np.array(matrix, float), expected)
+    else:
+        e = rng.standard_normal(bundle.size)
+        energy = bundle.split(e + bundle.intensive(reference))
+        expected = primitive.matrix(x, e, reference)
+        assert np.allclose(np.array(formula({**energy, **x}), float), expected, rtol=1e-13, atol=0.0)
+
+
+# ---- runs ------------------------------------------------------------------------------------------------------
+
+
+def oscillator(energy):
+    from examples import oscillator as shipped
+
+    parts = {"pe": ephs.storage({"q": Q.displacement}, energy), "ke": library.point_mass(m=1.0), "pkc": library.pkc()}
+    return shipped.closed(osc=shipped.oscillator(**parts))
+
+
+def test_a_traced_component_moves_as_one_that_is_called_back():
+    def traced(q):
+        return 0.75 * q * q + 0.1 * q**4
+
+    def opaque(q):
+        return 0.75 * float(q) * q + 0.1 * q**4
+
+    initial = {"osc.pe.q": 1.0}
+    one, other = (ephs.simulate(oscillator(f), 2.0, initial=initial, step=0.01) for f in (traced, opaque))
+    assert np.abs(one["osc.pe.q"] - other["osc.pe.q"]).max() <= 1e-9
+    assert one.summary()["max_energy_error"] <= 1e-13
+
+
+@pytest.mark.parametrize(
+    ("energy", "outcome"),
+    [
+        (lambda q: 0.5 * q**2 + np.log(1.2 + q), "not a finite number"),  # the logarithm ends at q = −1.2
+        (lambda q: 0.5 * q**2 - np.sqrt(1.1 + q), "not a finite number"),
+    ],
+)
+def test_leaving_the_domain_of_a_function_is_reported(energy, outcome):
+    with pytest.raises(ephs.SimulationError, match=outcome) as caught:
+        ephs.simulate(oscillator(energy), 10.0, initial={"osc.pe.q": 0.5, "osc.ke.p": -3.0}, step=0.01)
+    assert caught.value.path == "osc.pe"
+    assert 0.0 < caught.value.time < 10.0
+    assert len(caught.value.partial) >= 2
+    assert np.all(np.isfinite(caught.value.partial["osc.pe.q"]))
