@@ -100,9 +100,9 @@ def check_storage(storage: "Storage") -> None:
             if not abs(energy - found) <= EVENNESS * (abs(energy) + abs(found)):
                 raise StructureError("rotation-sign", name, what="the energy tells", port=port, witness=_show(x))
         _check_gradient(storage, x, gradient, energy)
-        for _, where, quantity in bundle.items():
+        for port, where, quantity in bundle.items():
             if quantity.kind == "entropy" and not gradient[where][0] > 0.0:
-                raise StructureError("temperature", name, found=float(gradient[where][0]))
+                raise StructureError("cold", name, port=port, found=float(gradient[where][0]), witness=_show(x))
 
 
 def _inside(storage: "Storage", rng: np.random.Generator) -> tuple[dict[Path, Array], float, Array]:

@@ -66,7 +66,8 @@ def storage(
     given = gradient
 
     def value(x: Point) -> float:
-        return _real(name, energy(**_named(x)))
+        with np.errstate(all="ignore"):  # what is not a number is found by its value
+            return _real(name, energy(**_named(x)))
 
     from ephs.semantics.symbols.forms import storage_form
     from ephs.semantics.symbols.tracing import Untraceable

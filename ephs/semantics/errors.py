@@ -40,6 +40,10 @@ _TEXTS = {
     "temperature": (
         "{path}: the absolute temperature is {found} K, expected > 0; check the state or the energy function"
     ),
+    "cold": (
+        "{path}: the absolute temperature ∂E/∂{port} is {found} K, expected > 0 (witness state {witness}); check the "
+        "sign of the energy function"
+    ),
     "rotation": "{path}: a rotation of π or more in one step; take a smaller step",
     "storage-ports": (
         "{path}: the storage has the state port {found}; a storage owns its states, expected power ports only"

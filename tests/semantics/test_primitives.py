@@ -192,7 +192,32 @@ BAD = {
     "mixed constraint": (lambda: ephs.constraint(QP, [[1.0, 1.0]]), "parity"),
     "odd energy": (lambda: ephs.storage({"p": Q.momentum}, lambda p: p), "even"),
     "wrong gradient": (lambda: ephs.storage({"q": Q.displacement}, lambda q: q**2, lambda q: [q]), "gradient"),
-    "negative temperature": (lambda: ephs.storage({"s": Q.entropy}, lambda s: -np.exp(s)), "temperature"),
+    "negative temperature": (lambda: ephs.storage({"s": Q.entropy}, lambda s: -np.exp(s)), "cold"),
+    "temperature of zero": (lambda: ephs.storage({"s": Q.entropy}, lambda s: 3.0 + 0.0 * s), "cold"),
+    "complex energy": (lambda: ephs.storage({"q": Q.displacement}, lambda q: 1j * q), "parameter"),
+    "energy without end": (lambda: ephs.storage({"q": Q.displacement}, lambda q: q / 0.0), "finite"),
+    "energy that is nowhere a number": (
+        lambda: ephs.storage({"q": Q.displacement}, lambda q: np.sqrt(-1.0 - q * q)), "finite"
+    ),
+    "tells two quaternions apart": (lambda: ephs.storage({"q": Q.pose}, lambda q: q[1]), "rotation-sign"),
+    "constraint tells them apart": (
+        lambda: ephs.constraint({"p": Q.momentum, "p2": Q.momentum, "~q": Q.pose}, lambda q: [[1.0, q[1]]]),
+        "rotation-sign",
+    ),
+    "friction tells them apart": (
+        lambda: ephs.irreversible(
+            PS | {"~q": Q.pose}, lambda p, s, q: (2.0 + q[1]) * np.array([[s, -p], [-p, p * p / s]])
+        ),
+        "rotation-sign",
+    ),
+    "makes volume": (lambda: ephs.gyrator({"v": Q.volume, "p": Q.momentum}, [[0.0, -1.0], [1.0, 0.0]]), "conservation"),
+    "makes volume of heat": (
+        lambda: ephs.irreversible({"v": Q.volume, "s": Q.entropy}, lambda v, s: [[s * s, -s * v], [-s * v, v * v]]),
+        "conservation",
+    ),
+    "doubles entropy": (lambda: ephs.transformer({"s": Q.entropy, "s2": Q.entropy}, [[2.0]]), "conservation"),
+    "odd transformer": (lambda: ephs.transformer(QP, [[1.0]]), "parity"),
+    "matrix of another size": (lambda: ephs.irreversible(PS, lambda p, s: [[s]]), "parameter"),
     "state port": (lambda: ephs.storage({"q": Q.displacement, "~p": Q.momentum}, lambda q: q**2), "storage-ports"),
     "not symmetric": (lambda: ephs.irreversible(PS, lambda p, s: [[s, -p], [0.0, p * p / s]]), "symmetry"),
     "negative": (lambda: ephs.irreversible(PS, lambda p, s: [[-s, p], [p, -p * p / s]]), "definite"),
@@ -214,6 +239,14 @@ def test_what_is_not_its_structure_is_refused(case):
         make()
     assert caught.value.kind == kind
     assert caught.value.path in str(caught.value)
+    if kind in ("isotropy", "conservation", "symmetry", "energy", "gradient"):
+        assert "entry" in str(caught.value)
+    if kind not in ("parameter", "storage-ports", "gradient-shape"):
+        assert "witness state" in str(caught.value)
+
+
+def test_at_least_twenty_wrong_primitives_are_refused():
+    assert len(BAD) >= 20
 
 
 def test_errors_survive_being_sent_to_another_process():
