@@ -17,12 +17,12 @@ from ephs.mechanics.scene.model import GROUND, Joint, Scene
 from ephs.mechanics.solve.instant import instant, mobility
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
-from ephs.semantics.spaces import SE3, Pair
+from ephs.semantics.spaces import SE3
 
 if TYPE_CHECKING:
     from ephs.mechanics.solve.solution import Solution
 
-__all__ = ["BodyMotion", "JointMotion", "SceneMotion", "ThermalMotion"]
+__all__ = ["BodyMotion", "JointMotion", "MarkerMotion", "SceneMotion", "ThermalMotion"]
 
 RANK = 1e-9
 """Singular values of the joint equations in the mass metric below this fraction of the largest count as zero."""
@@ -108,6 +108,15 @@ class JointMotion:
 
 
 @final
+@dataclass(frozen=True, slots=True, eq=False)
+class MarkerMotion:
+    """A marker: position in m and velocity in m/s, in the world; (n, 3) each."""
+
+    position: Array
+    velocity: Array
+
+
+@final
 class SceneMotion:
     """The motion of a scene, read from a solution."""
 
@@ -116,8 +125,6 @@ class SceneMotion:
         self._bodies = dict(scene.all_bodies())
         self._joints = dict(scene.all_joints())
         self._implicit = dict(scene.implicit_joints())
-        problem = solution.problem
-        self._quantities = {} if problem is None else {s.path: s.quantity for s in problem.descriptor.states}
         self._couplings = {name: coupling_of(joint) for name, joint in self._joints.items()}
 
     # ---- reading -----------------------------------------------------------------------------------------------
@@ -144,6 +151,19 @@ class SceneMotion:
         node = nodes[name]
         s = self._solution[component_path("thermal", name) / "s"]
         return ThermalMotion(node.temperature * np.exp(s / node.capacity), s)
+
+    def marker(self, name: str) -> MarkerMotion:
+        """The motion of a marker."""
+        markers = dict(self._scene.all_markers())
+        if name not in markers:
+            raise KeyError(f"{name}: no such marker; the markers are {', '.join(markers) or 'none'}")
+        at, carrier = markers[name].at, markers[name].body
+        if carrier == GROUND:
+            still = np.tile(at, (len(self._solution), 1))
+            return MarkerMotion(still, np.zeros_like(still))
+        body = self.body(carrier)
+        swung = body.twist[:, 3:] + np.cross(body.twist[:, :3], at)
+        return MarkerMotion(body.position + body.rotation @ at, np.einsum("nij,nj->ni", body.rotation, swung))
 
     def poses(self, name: str) -> Array:
         """(n, 7) of a body, or of the ground."""
@@ -261,22 +281,21 @@ class SceneMotion:
         box = at / "second" / "hc" if self._joints[name].middle is not None else at / "hc"
         out = np.empty((len(self._solution), 6))
         for i in range(len(self._solution)):
-            state = {slot.path: self._raw(slot.path, i) for slot in d.states}
-            for body in self._bodies:
-                if self._bodies[body].mass > 0.0:
-                    state[component_path("bodies", body) / "ke" / "p"] = self._momentum(body, i)
+            state = self.state(i)
             inputs = problem.inputs(float(self._solution.t[i]), state)
             out[i] = instant(d, problem.reference, d.pack(state), inputs).multiplier(box)
         return out
 
-    def _momentum(self, body: str, i: int) -> Array:
-        u, b = self.twists[body][i], self._bodies[body]
-        return np.concatenate([b.inertia @ u[:3], b.mass * u[3:]])
-
-    def _raw(self, path: Path, i: int) -> Array:
-        value = np.atleast_1d(self._solution[path][i])
-        quantity = self._quantities[path]
-        return Pair.from_space(quantity.space).element(value) if quantity.kind == "relative_pose" else value
+    def state(self, i: int) -> dict[Path, Array]:
+        """The states at the i-th instant, momenta projected on the joints."""
+        state = self._solution.state_at(i)
+        for name, body in self._bodies.items():
+            if body.mass > 0.0:
+                u = self.twists[name][i]
+                state[component_path("bodies", name) / "ke" / "p"] = np.concatenate(
+                    [body.inertia @ u[:3], body.mass * u[3:]]
+                )
+        return state
 
     def _rows(self) -> Iterator[tuple[slice, str, Array, Array, Array]]:
         for at in self._chunks():

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ephs.mechanics.build import drive_ports, initial_state, scene_inputs, scene_system, wrench_port
+from ephs.mechanics.build import component_path, drive_ports, initial_state, scene_inputs, scene_system, wrench_port
 from ephs.mechanics.motion import SceneMotion
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
-from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.scene.model import Marker, Scene
 from ephs.mechanics.solve.adaptive import ADAPTIVE, Control, integrate_adaptive
 from ephs.mechanics.solve.errors import OptionError
 from ephs.mechanics.solve.integrate import METHODS, Grid, integrate
@@ -18,6 +18,7 @@ from ephs.mechanics.solve.solution import Solution
 from ephs.operad import Path
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.errors import AssemblyError
+from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.semantics.system import System
 
 if TYPE_CHECKING:
@@ -75,8 +76,8 @@ def simulate(
         least that a method can use.
     inputs
         ``{port: {"effort": f}}`` or ``{"flow": f}`` at outer ports; of a scene also ``{"joints.pin": f}``, a
-        generalised force on u_r, and ``{"bodies.crank": f}``, a wrench in the body frame; f a constant, f(t), or
-        f(t, state).
+        generalised force on u_r, ``{"bodies.crank": f}``, a wrench in the body frame, and ``{"markers.tip": f}``, a
+        force in world axes; f a constant, f(t), or f(t, state).
     reference
         The reference environment of a system; a scene's world gives its own.
     progress
@@ -229,19 +230,34 @@ def _sum(one: Signal, other: Signal) -> Signal:
 def _scene_inputs(scene: Scene, inputs: Mapping[str, Any]) -> tuple[dict[str, Signal], dict[str, Signal]]:
     forces: dict[str, Signal] = {}
     wrenches: dict[str, Signal] = {}
+    joints, bodies, markers = dict(scene.all_joints()), dict(scene.all_bodies()), dict(scene.all_markers())
     for key, value in inputs.items():
         kind, _, name = key.partition(".")
-        if kind == "joints" and name in dict(scene.all_joints()):
-            forces[name] = signal(value, effort=False)
-        elif kind == "bodies" and name in dict(scene.all_bodies()):
-            wrenches[name] = signal(value, effort=False)
+        given = signal(value, effort=False)
+        if kind == "joints" and name in joints:
+            forces[name] = given
+        elif kind == "bodies" and name in bodies:
+            wrenches[name] = _sum(wrenches[name], given) if name in wrenches else given
+        elif kind == "markers" and name in markers and markers[name].body in bodies:
+            body, push = markers[name].body, _at_marker(markers[name], given)
+            wrenches[body] = _sum(wrenches[body], push) if body in wrenches else push
         else:
-            joints, bodies = (
-                ", ".join(f"{k}.{n}" for n, _ in entries)
-                for k, entries in (("joints", scene.all_joints()), ("bodies", scene.all_bodies()))
+            known = (
+                [f"joints.{n}" for n in joints] + [f"bodies.{n}" for n in bodies] + [f"markers.{n}" for n in markers]
             )
-            raise AssemblyError("unknown-input", key, expected=", ".join(filter(None, (joints, bodies))))
+            raise AssemblyError("unknown-input", key, expected=", ".join(known))
     return forces, wrenches
+
+
+def _at_marker(marker: Marker, force: Signal) -> Signal:
+    """A force in world axes at a marker as a wrench in the body's frame."""
+    pose = component_path("bodies", marker.body) / "pe" / "q"
+
+    def wrench(t: float, state: Mapping[Path, Array]) -> Array:
+        own = quaternion_to_matrix(state[pose][:4]).T @ force.at(t, state)
+        return np.concatenate([np.cross(marker.at, own), own])
+
+    return Signal(wrench)
 
 
 def _method(name: str) -> str:

@@ -7,6 +7,7 @@ from ephs.show.animation import animate as animate
 from ephs.show.drawing import Drawing as Drawing
 from ephs.show.drawing import draw as draw
 from ephs.show.errors import ShowError as ShowError
+from ephs.show.flows import plot_exergy_flow as plot_exergy_flow
 from ephs.show.geometry import Placement as Placement
 from ephs.show.layout import place as place
 from ephs.show.plots import plot_constraints as plot_constraints
@@ -27,6 +28,7 @@ __all__ = [
     "plot_energy",
     "plot_entropy",
     "plot_exergy",
+    "plot_exergy_flow",
     "plot_motion",
     "write_report",
 ]

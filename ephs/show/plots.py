@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 _WIDTH, _ROW = 7.2, 2.0
 _MOST_NAMES = 14
 _DASHES = ("-", (0, (5, 1.5)), (0, (1.5, 1.2)), (0, (5, 1.2, 1.2, 1.2)))
-_STYLE = {
+STYLE = {
     "font.family": "DejaVu Sans",
     "font.size": 9.0,
     "axes.labelsize": 9.0,
@@ -132,7 +132,7 @@ def _panels(sol: Any, what: str, heights: list[float]) -> "tuple[Figure, list[Ax
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    style: Any = _STYLE
+    style: Any = STYLE
     with rc_context(style):
         figure = Figure(figsize=(_WIDTH, 0.7 + _ROW * sum(heights)), layout="constrained", facecolor="white")
         FigureCanvasAgg(figure)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ephs.show.animation import animate
 from ephs.show.drawing import draw
+from ephs.show.flows import plot_exergy_flow
 from ephs.show.plots import plot_constraints, plot_energy, plot_entropy, plot_exergy, plot_motion
 
 if TYPE_CHECKING:
@@ -42,6 +43,7 @@ _PLOTS = (
     ("Motion", plot_motion),
     ("Energy", plot_energy),
     ("Exergy", plot_exergy),
+    ("Where exergy went", plot_exergy_flow),
     ("Entropy", plot_entropy),
     ("Constraints", plot_constraints),
 )

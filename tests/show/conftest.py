@@ -7,7 +7,8 @@ from typing import Any, final
 import numpy as np
 import pytest
 
-from ephs.operad import Pattern, junction, quantity
+from ephs.mechanics.solve.books import Entry
+from ephs.operad import Path, Pattern, junction, quantity
 
 
 @final
@@ -68,6 +69,16 @@ class FakeSolution:
         if name in self.__dict__["ledgers"]:
             return self.__dict__["ledgers"][name]
         raise AttributeError(name)
+
+    def ledger(self, path: Any) -> Any:
+        """One storage that gives its exergy to one friction."""
+        rest = np.exp(-self.t)
+        nothing = np.zeros_like(self.t)
+        store = Entry(Path.of("store"), rest, rest, nothing, nothing, nothing, nothing, nothing)
+        friction = Entry(Path.of("friction"), *[nothing] * 5, (1.0 - rest) / 300.0, 1.0 - rest)
+        made, lost = friction.made, friction.destroyed
+        parts = {"store": store, "friction": friction}
+        return Entry(Path.of(path), rest, rest, nothing, nothing, nothing, made, lost, parts)
 
     def body(self, name: str) -> Any:
         return self.body_records[name]

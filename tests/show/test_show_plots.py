@@ -12,6 +12,7 @@ from ephs.show import (
     plot_energy,
     plot_entropy,
     plot_exergy,
+    plot_exergy_flow,
     plot_motion,
     report,
     write_report,
@@ -133,3 +134,10 @@ def test_names_cannot_break_the_page(circuit, tmp_path):
     books, states = circuit.ledgers, circuit.states
     rude = type(circuit)("<b>&", circuit.t, None, circuit.system, books, states)
     assert "<title>&lt;b&gt;&amp;</title>" in write_report(rude, tmp_path).read_text(encoding="utf-8")
+
+
+def test_exergy_flows_from_sources_to_sinks(circuit):
+    figure = plot_exergy_flow(circuit)
+    texts = [text.get_text() for text in figure.axes[0].texts]
+    assert any(text.startswith("store gives") and "100.0 %" in text for text in texts)
+    assert any(text.startswith("friction destroys") for text in texts)

@@ -13,6 +13,7 @@ from ephs.mechanics.scene.model import (
     Conduction,
     Displacement,
     Joint,
+    Marker,
     Scene,
     Spring,
     ThermalNode,
@@ -27,6 +28,7 @@ _ARRAYS = {
     Body: {"inertia", "pose", "twist"},
     Joint: {"frame1", "frame2", "friction", "stiffness", "rest", "drive", "coordinate", "rate", "middle"},
     Spring: {"at1", "at2"},
+    Marker: {"at"},
 }
 _PARTS = {
     "bodies": Body,
@@ -34,6 +36,7 @@ _PARTS = {
     "springs": Spring,
     "thermal": ThermalNode,
     "conduction": Conduction,
+    "markers": Marker,
     "parts": Scene,
 }
 
@@ -75,7 +78,7 @@ def _value(cls: Any, data: dict[str, Any]) -> Any:
 def _scene(data: dict[str, Any]) -> Scene:
     given = dict(data)
     for key, cls in _PARTS.items():
-        entries: dict[str, Any] = given[key]
+        entries: dict[str, Any] = given.get(key, {})  # files of before there were markers have none
         if cls is Conduction:
             entries = {name: entry | {"between": tuple(entry["between"])} for name, entry in entries.items()}
         make = _scene if cls is Scene else lambda entry, cls=cls: _value(cls, entry)

@@ -38,6 +38,7 @@ _NEUTRAL: dict[str, Any] = {
     "between": ["environment", "environment"],
     "conductance": 0.0,
     "use": "?",
+    "body": "ground",
 }
 
 _NESTED: dict[str, type[Entry]] = {

@@ -61,6 +61,7 @@ def _read(path: Path, adjust: bool, world: World | None, stack: tuple[Path, ...]
     joints = [resolve.resolve_joint(n, t, names, faults) for n, t in sections["joints"].items()]
     springs = {n: resolve.resolve_spring(n, t, names, faults) for n, t in sections["springs"].items()}
     conduction = resolve.resolve_conduction(document, names, faults)
+    markers = resolve.resolve_markers(document, names, faults)
     if faults:
         return None
     placed, coupled, open_joints = assemble(bodies, [j for j in joints if j is not None], parts)
@@ -74,6 +75,7 @@ def _read(path: Path, adjust: bool, world: World | None, stack: tuple[Path, ...]
         conduction,
         parts,
         str(path),
+        markers=markers,
     )
     if adjust:
         scene, open_joints = adjusted(scene)

@@ -153,6 +153,16 @@ class Conduction:
 
 
 @final
+@dataclass(frozen=True, slots=True, eq=False)
+class Marker:
+    """A point of interest: ``at`` ``(3,)`` in its body's centre-of-mass frame (ground: world)."""
+
+    name: str
+    body: str
+    at: Array
+
+
+@final
 @dataclass(frozen=True, slots=True)
 class Displacement:
     """How far the assembly moved a body: m, rad, and the change of its velocity in m/s and rad/s."""
@@ -212,6 +222,7 @@ class Scene:
     parts: Mapping[str, "Scene"] = field(default_factory=dict)
     source: str | None = None
     adjusted: Adjustment | None = None
+    markers: Mapping[str, Marker] = field(default_factory=dict)
 
     def system(self) -> "System":
         """The scene as a hierarchical exergetic port-Hamiltonian system."""
@@ -291,6 +302,12 @@ class Scene:
                     heat=_seen(path, s.heat),
                 )
                 yield seen.name, seen
+
+    def all_markers(self) -> Iterator[tuple[str, Marker]]:
+        """Every marker with its dotted name."""
+        for path, scene in self._scenes():
+            for marker in scene.markers.values():
+                yield path + marker.name, replace(marker, name=path + marker.name, body=_seen(path, marker.body))
 
     def all_thermal(self) -> Iterator[tuple[str, ThermalNode]]:
         """Every thermal node with its dotted name."""

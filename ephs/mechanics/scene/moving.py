@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ephs.mechanics.scene.model import GROUND, Body, Joint, Scene, Spring, World, frozen
+from ephs.mechanics.scene.model import GROUND, Body, Joint, Marker, Scene, Spring, World, frozen
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces import rotations as so3
 
@@ -33,9 +33,13 @@ def moved(scene: Scene, pose: Array, world: World) -> Scene:
     def spring(s: Spring) -> Spring:
         return replace(s, at1=point(s.body1, s.at1), at2=point(s.body2, s.at2))
 
+    def marker(m: Marker) -> Marker:
+        return replace(m, at=point(m.body, m.at))
+
     return replace(
         scene,
         world=world,
+        markers={name: marker(m) for name, m in scene.markers.items()},
         bodies={name: body(b) for name, b in scene.bodies.items()},
         joints={name: joint(j) for name, j in scene.joints.items()},
         springs={name: spring(s) for name, s in scene.springs.items()},

@@ -15,7 +15,7 @@ from ephs.mechanics.scene import values
 from ephs.mechanics.scene.entries import Checked, Document, shown
 from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing
 from ephs.mechanics.scene.geometry import Coupling, coupling, joint_types
-from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Conduction, Spring, ThermalNode, World, frozen
+from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Conduction, Marker, Spring, ThermalNode, World, frozen
 from ephs.mechanics.scene.placing import Place, resolve_place
 from ephs.mechanics.scene.schema import BodyEntry, JointEntry, SpringEntry
 
@@ -186,6 +186,16 @@ def resolve_thermal(document: Document) -> dict[str, ThermalNode]:
     """The thermal nodes."""
     tables = document.sections["thermal"]
     return {name: ThermalNode(name, t.entry.capacity, t.entry.temperature) for name, t in tables.items()}
+
+
+def resolve_markers(document: Document, names: Names, faults: list[Fault]) -> dict[str, Marker]:
+    """The markers, their bodies checked."""
+    found: dict[str, Marker] = {}
+    for name, table in document.sections["markers"].items():
+        if table.sound("body"):
+            names.check(table.entry.body, f"markers.{name}.body", "body", faults)
+        found[name] = Marker(name, table.entry.body, frozen(table.entry.at))
+    return found
 
 
 def resolve_conduction(document: Document, names: Names, faults: list[Fault]) -> dict[str, Conduction]:

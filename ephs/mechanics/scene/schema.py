@@ -186,6 +186,13 @@ class ConductionEntry(Entry):
     conductance: NonNegative = Field(description="W/K")
 
 
+class MarkerEntry(Entry):
+    """``[markers.NAME]``"""
+
+    body: Text = Field(description='the body that carries it, or "ground"')
+    at: Vector = Field(default=[0.0, 0.0, 0.0], description="in its centre-of-mass frame (ground: world), m")
+
+
 class PartEntry(Entry):
     """``[parts.NAME]``"""
 
@@ -206,6 +213,7 @@ class SceneFile(Entry):
     springs: dict[str, SpringEntry] = Field(default_factory=dict)
     thermal: dict[str, ThermalEntry] = Field(default_factory=dict)
     conduction: dict[str, ConductionEntry] = Field(default_factory=dict)
+    markers: dict[str, MarkerEntry] = Field(default_factory=dict)
     parts: dict[str, PartEntry] = Field(default_factory=dict)
 
 
@@ -215,6 +223,7 @@ SECTIONS: dict[str, type[Entry]] = {
     "springs": SpringEntry,
     "thermal": ThermalEntry,
     "conduction": ConductionEntry,
+    "markers": MarkerEntry,
     "parts": PartEntry,
 }
 

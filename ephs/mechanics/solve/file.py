@@ -18,14 +18,16 @@ from ephs.semantics.bundle import Array
 
 __all__ = ["dataset", "load", "save"]
 
-FORMAT = 1
-_BOOKS = ("storages", "makers", "entropies")
+FORMAT = 2
+_BOOKS = ("storages", "makers", "entropies", "volumes", "momenta", "exergies")
 _UNITS = {
     "entropy": "J/K",
     "made": "J/K",
     "least": "J/K",
     "makers": "J/K",
     "entropies": "J/K",
+    "volumes": "m³",
+    "momenta": "N s",
 }
 
 
@@ -40,6 +42,7 @@ def dataset(solution: Solution) -> xr.Dataset:
     attributes = {
         "ephs_format": FORMAT,
         "name": solution.name,
+        "reference_temperature": solution.ledgers.temperature,
         "stats": json.dumps(dict(solution.stats)),
         "model": solution.problem.document if solution.problem is not None else "",
     }
@@ -93,7 +96,7 @@ def load(path: str | File, problem_of: Callable[[str], Problem]) -> Solution:
         data.attrs["name"],
         np.asarray(data["t"].values),
         states,
-        Ledgers(**plain, **books),
+        Ledgers(**plain, **books, temperature=float(data.attrs["reference_temperature"])),
         json.loads(data.attrs["stats"]),
         problem_of(model) if model else None,
     )
@@ -105,6 +108,6 @@ def _ledgers(ledgers: Ledgers) -> list[tuple[str, Array]]:
         value = getattr(ledgers, field.name)
         if isinstance(value, Mapping):
             out += [(f"{field.name}:{path}", values) for path, values in value.items()]
-        else:
+        elif isinstance(value, np.ndarray):
             out.append((field.name, value))
     return out

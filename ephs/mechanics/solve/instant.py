@@ -45,6 +45,8 @@ class Instant:
         (multiplier_size,) of least norm.
     determined
         (multiplier_size,) whether each is the only one possible.
+    flows
+        Outer port -> (dim,) the flow into the system.
     """
 
     descriptor: Descriptor
@@ -52,6 +54,7 @@ class Instant:
     efforts: Array
     multipliers: Array
     determined: Array
+    flows: Mapping[Path, Array]
 
     def multiplier(self, component: Path) -> Array:
         """The multipliers of a component, NaN where they are not determined."""
@@ -80,9 +83,19 @@ def mobility(descriptor: Descriptor, x: Array, prescribed: Collection[Path] = ()
 
 
 def instant(
-    descriptor: Descriptor, reference: Reference, x: Array, inputs: Mapping[Path, Input] | None = None
+    descriptor: Descriptor,
+    reference: Reference,
+    x: Array,
+    inputs: Mapping[Path, Input] | None = None,
+    rising: Mapping[Path, Array] | None = None,
 ) -> Instant:
-    """Solve the equations at the states x; prescribed efforts count as constant in time."""
+    """Solve the equations at the states x.
+
+    Parameters
+    ----------
+    rising
+        Outer port -> derivative by time of the effort that is prescribed there; zero where not given.
+    """
     d = descriptor
     given = d.complete_inputs(inputs)
     stored = _stored_efforts(d, reference, x)
@@ -106,26 +119,33 @@ def instant(
     for slot in d.outer:
         if not given[slot.path].effort:
             right[slot.efforts] += given[slot.path].value
-    held, at = np.zeros((n_o, size)), n_w + n_l + n_e
+    held, lift, at = np.zeros((n_o, size)), np.zeros(n_o), n_w + n_l + n_e
     row = 0
     for slot in driven:
         dim = slot.quantity.space.dim
         balance[slot.efforts, at + row : at + row + dim] -= np.eye(dim)
         held[row : row + dim, rise][:, slot.efforts] = np.eye(dim)
+        lift[row : row + dim] = (rising or {}).get(slot.path, 0.0)
         row += dim
     differentiated = np.zeros((n_l, size))
     differentiated[:, rise] = constraint
     turning = -_turned_constraints(d, x, _known_rates(d, constraint, flows)) @ efforts
     matrix = np.vstack([balance, growth, differentiated, held])
     scale = np.maximum(np.abs(matrix).max(axis=1, initial=0.0), 1e-300)
-    everything = np.concatenate([right, np.zeros(n_w), turning, np.zeros(n_o)])
+    everything = np.concatenate([right, np.zeros(n_w), turning, lift])
     solution, free = _least_norm(matrix / scale[:, None], everything / scale)
+    outer = {slot.path: given[slot.path].value for slot in d.outer}
+    row = at
+    for slot in driven:
+        outer[slot.path] = solution[row : row + slot.quantity.space.dim]
+        row += slot.quantity.space.dim
     return Instant(
         d,
         {slot.path: solution[slot.rates] for slot in d.states},
         efforts,
         solution[lam],
         np.abs(free[lam]).max(axis=1, initial=0.0) < 1e-7,
+        outer,
     )
 
 

@@ -36,8 +36,12 @@ class Ledgers:
         Entropy made since the start; least production of a component in the step before: J/K.
     storages, makers
         Energy of each storage in J, entropy made by each irreversible component in J/K, by path.
-    entropies
-        Entropy of each storage that has one, in J/K, by path.
+    entropies, volumes, momenta
+        Entropy in J/K, volume in m³ and momentum in N s of each storage that has one, by path.
+    exergies
+        Exergy of each storage in J, by path.
+    temperature
+        θ₀ of the reference environment, in K.
     """
 
     kinetic: Array
@@ -54,6 +58,10 @@ class Ledgers:
     storages: Mapping[Path, Array]
     makers: Mapping[Path, Array]
     entropies: Mapping[Path, Array]
+    volumes: Mapping[Path, Array]
+    momenta: Mapping[Path, Array]
+    exergies: Mapping[Path, Array]
+    temperature: float
 
     @property
     def energy(self) -> Array:
@@ -99,6 +107,8 @@ def ledgers(problem: Problem, record: Record) -> Ledgers:
     storages: dict[Path, Array] = {}
     makers: dict[Path, Array] = {}
     entropies: dict[Path, Array] = {}
+    amounts: dict[str, dict[Path, Array]] = {"entropy": entropies, "volume": {}, "momentum": {}}
+    exergies: dict[Path, Array] = {}
     for number, slot in enumerate(problem.descriptor.components):
         primitive = slot.primitive
         if isinstance(primitive, Irreversible):
@@ -109,15 +119,20 @@ def ledgers(problem: Problem, record: Record) -> Ledgers:
         for state in slot.reads:
             if state.quantity.environment:
                 exchanged = exchanged + reference.intensive(state.quantity) * record.x[:, state.point][:, 0]
+            values = record.x[:, state.point]
+            if state.quantity.kind in amounts and values.shape[1] == 1:
+                book = amounts[state.quantity.kind]
+                book[slot.path] = book.get(slot.path, 0.0) + values[:, 0]
             if state.quantity.kind == "entropy":
-                entropies[slot.path] = record.x[:, state.point][:, 0]
-                entropy = entropy + entropies[slot.path]
+                entropy = entropy + values[:, 0]
         if primitive.environment:
             environment = environment + exchanged
             storages[slot.path] = exchanged
+            exergies[slot.path] = np.zeros(n)
             continue
         energy = storages[slot.path] = record.energies[:, number]
-        exergy = exergy + energy - exchanged
+        exergies[slot.path] = energy - exchanged
+        exergy = exergy + exergies[slot.path]
         if any(state.quantity.environment for state in slot.reads):
             thermal = thermal + energy
         elif any(state.quantity.parity < 0 for state in slot.reads):
@@ -127,5 +142,5 @@ def ledgers(problem: Problem, record: Record) -> Ledgers:
     heat, work, supplied, made, least = record.ledgers.T
     return Ledgers(
         kinetic, potential, thermal, environment, exergy, entropy, heat, work, supplied, made, least,
-        storages, makers, entropies,
+        storages, makers, entropies, amounts["volume"], amounts["momentum"], exergies, reference.temperature,
     )  # fmt: skip

@@ -61,6 +61,14 @@ class Motion(Protocol):
         """The temperature of a thermal node."""
         ...
 
+    def marker(self, name: str) -> Any:
+        """The motion of a marker."""
+        ...
+
+    def state(self, i: int) -> dict[Path, Array]:
+        """The states at the i-th instant, as the continuous relations want them."""
+        ...
+
     def constraint_error(self) -> Array:
         """(n,) largest position residual of any joint, in m or rad."""
         ...

@@ -1,33 +1,26 @@
 """Solutions: the motion of a system with its ledgers."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path as File
 from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
+from ephs.mechanics.solve.books import Entry, entry_of
 from ephs.mechanics.solve.ledger import Ledgers
 from ephs.mechanics.solve.problem import Motion, Problem
-from ephs.operad import Path
+from ephs.operad import ROOT, Path
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces import Pair
 from ephs.semantics.system import System
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-__all__ = ["Entry", "Solution"]
+    from ephs.mechanics.solve.ports import PortMotion
 
-
-@final
-@dataclass(frozen=True, slots=True, eq=False)
-class Entry:
-    """The ledger of a component or subsystem: energy in J, entropy and entropy made in J/K; (n,) each."""
-
-    energy: Array
-    entropy: Array
-    made: Array
+__all__ = ["Solution"]
 
 
 @final
@@ -174,30 +167,50 @@ class Solution:
         """The temperature of a thermal node."""
         return self._moving("thermal nodes").thermal(name)
 
+    def marker(self, name: str) -> Any:
+        """The motion of a marker: position and velocity in the world."""
+        return self._moving("markers").marker(name)
+
     def point(self, body: str, xyz: "ArrayLike") -> Array:
         """(n, 3) world position of a point that is given in the body's frame."""
         motion = self.body(body)
         return motion.position + motion.rotation @ np.asarray(xyz, dtype=float)
 
-    def ledger(self, path: str | Path) -> Entry:
-        """The ledger of a component, or of all components of a subsystem.
+    def ledger(self, path: str | Path = ROOT) -> Entry:
+        """The ledger of a component, a subsystem, or everything; ``.parts`` are the ledgers one level below.
 
         Raises
         ------
         KeyError
             No storage and no irreversible component lies there.
         """
-        at = Path.of(path)
-        books = self.ledgers
-        parts = [
-            [values for key, values in book.items() if at.is_prefix_of(key)]
-            for book in (books.storages, books.entropies, books.makers)
-        ]
-        if not any(parts):
-            known = ", ".join(map(str, {**books.storages, **books.makers}))
+        found = entry_of(self.ledgers, Path.of(path))
+        if found is None:
+            known = ", ".join(map(str, {**self.ledgers.storages, **self.ledgers.makers}))
             raise KeyError(f"{path}: no storage and no irreversible component there; those that keep books are {known}")
-        energy, entropy, made = (np.sum(p, axis=0) if p else np.zeros(len(self)) for p in parts)
-        return Entry(energy, entropy, made)
+        return found
+
+    def state_at(self, i: int) -> dict[Path, Array]:
+        """The states at the i-th instant, as they are stored: relative poses as elements of their group."""
+        out: dict[Path, Array] = {}
+        quantities = {} if self.system is None else self.system.states
+        for path, values in self.states.items():
+            value, quantity = np.atleast_1d(values[i]), quantities[path]
+            relative = quantity.kind == "relative_pose"
+            out[path] = Pair.from_space(quantity.space).element(value) if relative else value
+        return out
+
+    def port(self, path: str | Path) -> "PortMotion":
+        """Flow, effort and power at an outer power port, by the continuous relations at each instant.
+
+        Raises
+        ------
+        KeyError
+            There is no such port; the message lists those that there are.
+        """
+        from ephs.mechanics.solve.ports import port_motion
+
+        return port_motion(self, Path.of(path))
 
     def summary(self) -> dict[str, Any]:
         """The values of ``summary.json``."""

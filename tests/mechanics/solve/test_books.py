@@ -1,0 +1,105 @@
+"""Ledgers of parts at every level, and what outer ports carried."""
+
+import numpy as np
+import pytest
+
+import ephs
+from ephs.show.flows import exergy_bands
+from examples import oscillator, physics
+
+START = {"stator.tc.s": 1.0, "rotor.tc.s": 1.0, "stator.coil.b": 0.3}
+
+
+@pytest.fixture(scope="module")
+def motor():
+    drive = {"q": {"effort": np.sin}, "p": {"flow": -0.1}}
+    return ephs.simulate(physics.motor, 4.0, initial=START, inputs=drive, step=0.02)
+
+
+@pytest.fixture(scope="module")
+def cylinder():
+    return ephs.simulate(physics.cylinder, 5.0, initial=physics.CYLINDER_START, step=0.05)
+
+
+def entries(entry):
+    yield entry
+    for part in entry.parts.values():
+        yield from entries(part)
+
+
+@pytest.mark.parametrize("name", ["motor", "cylinder"])
+def test_books_add_up_at_every_level_and_balance(name, request):
+    sol = request.getfixturevalue(name)
+    whole = sol.ledger()
+    for entry in entries(whole):
+        for book in ("energy", "exergy", "entropy", "volume", "momentum", "made", "destroyed"):
+            if entry.parts:
+                parts = np.sum([getattr(part, book) for part in entry.parts.values()], axis=0)
+                assert np.array_equal(getattr(entry, book), parts) or np.allclose(
+                    getattr(entry, book), parts, rtol=1e-14
+                )
+        assert np.array_equal(sol.ledger(entry.path).energy, entry.energy)
+        assert np.all(np.diff(entry.made) >= -1e-15 * entry.made.max(initial=1e-300))
+    # of the whole, what is supplied is what the run counted at the outer ports, in every step
+    held = sum(np.abs(energy).max() for energy in sol.ledgers.storages.values())
+    assert np.abs(whole.energy_supplied - sol.work).max() <= 1e-13 * held * np.sqrt(len(sol))
+    scale = np.abs(whole.exergy).max() + np.abs(whole.destroyed).max()
+    assert np.abs(whole.exergy_supplied - sol.ledgers.supplied).max() <= 1e-12 * scale
+
+
+def test_volume_is_handed_from_gas_to_gas(cylinder):
+    whole, first, second = cylinder.ledger(), cylinder.ledger("gas1"), cylinder.ledger("gas2")
+    assert np.abs(whole.volume - whole.volume[0]).max() <= 1e-14 * whole.volume[0]
+    assert np.ptp(first.volume) > 1e-3
+    assert np.allclose(np.diff(first.volume), -np.diff(second.volume), atol=1e-15)
+    assert np.abs(whole.energy_supplied).max() <= 1e-11 * np.abs(whole.energy).max()
+
+
+def test_a_dissipating_part_is_supplied_what_it_destroys(motor):
+    friction = motor.ledger("rotor.mf")
+    assert np.array_equal(friction.exergy_supplied, friction.destroyed)
+    assert not friction.energy.any()
+    reference = 293.15
+    assert np.allclose(friction.destroyed, reference * friction.made, rtol=1e-15)
+
+
+def test_an_entry_prints_its_parts(motor):
+    text = str(motor.ledger("rotor"))
+    assert "exergy stored" in text
+    assert [line.split()[0] for line in text.splitlines()[2:]] == ["rotor", *motor.ledger("rotor").parts]
+    with pytest.raises(KeyError, match="no storage and no irreversible component there"):
+        motor.ledger("rotor.mkc")
+
+
+@pytest.mark.parametrize("path", [".", "rotor", "rotor.tc"])
+def test_sources_and_sinks_of_exergy_balance(motor, path):
+    bands = exergy_bands(motor, path)
+    given, taken = (sum(band.amount for band in bands if band.source == side) for side in (True, False))
+    assert given == pytest.approx(taken, rel=1e-9)
+    assert all(band.amount > 0.0 for band in bands)
+
+
+def test_ports_carry_the_work_of_the_run(motor):
+    """The power at the ports, integrated over time, is what the run counted: the rest is of second order."""
+    power = motor.port("q").power + motor.port("p").power
+    assert np.trapezoid(power, motor.t) == pytest.approx(motor.work[-1], rel=1e-3)
+    voltage, load = motor.port("q"), motor.port("p")
+    assert np.allclose(voltage.effort[:, 0], np.sin(motor.t), atol=1e-12)
+    assert np.allclose(load.flow, -0.1)
+    # the current is that of the coils, the speed that of the rotor
+    coils = motor["stator.coil.b"] / dict(physics.motor.leaves())[ephs.Path.of("stator.coil")].parameters[0][1]
+    coils = coils + motor["rotor.coil.b"] / dict(physics.motor.leaves())[ephs.Path.of("rotor.coil")].parameters[0][1]
+    assert np.allclose(voltage.flow[:, 0], coils, rtol=1e-9, atol=1e-12)
+    assert np.array_equal(voltage.exergetic_power, voltage.power)  # neither entropy nor volume
+
+
+def test_a_prescribed_velocity_needs_the_force_of_newton():
+    """p.e = sin t at a mass on a spring: the force is m cos t + k q."""
+    parts = oscillator.oscillator(
+        pe=ephs.library.spring(k=3.0), ke=ephs.library.point_mass(m=2.0), pkc=ephs.library.pkc()
+    )
+    sol = ephs.simulate(parts, 1.0, step=0.001, inputs={"p": {"effort": np.sin}})
+    force = sol.port("p").flow[:, 0]
+    assert np.allclose(force, 2.0 * np.cos(sol.t) + 3.0 * sol["pe.q"], atol=1e-6)
+    with pytest.raises(KeyError, match="no such outer power port; the ports are p"):
+        sol.port("q")
