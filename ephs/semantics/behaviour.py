@@ -13,7 +13,7 @@ from ephs.operad import Path
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.primitives import Irreversible, Point, Primitive, Reversible, Storage, midpoint
 
-__all__ = ["Behaviour", "Continuous", "Natural", "Relating", "Storing"]
+__all__ = ["GRADIENTS", "Behaviour", "Continuous", "Gradient", "Natural", "Relating", "Storing"]
 
 
 @final
@@ -53,19 +53,53 @@ class Continuous:
         return Relating(lambda e, _lam, _rates: (primitive.flow(x, e, self.reference), np.zeros(0)))
 
 
+Gradient = Callable[[Storage, Point, Array, Reference], Array]
+"""(storage, x⁰, increment v (n,), reference) -> effort (n,) over the step."""
+
+
+def own_gradient(storage: Storage, x0: Point, v: Array, reference: Reference) -> Array:
+    """The storage's discrete gradient: the energy balance is exact."""
+    return storage.discrete_effort(x0, v, reference)
+
+
+def midpoint_gradient(storage: Storage, x0: Point, v: Array, reference: Reference) -> Array:
+    """The effort half way: exact for quadratic energies only."""
+    return storage.effort(storage.retract(x0, 0.5 * v), reference)
+
+
+def average_gradient(storage: Storage, x0: Point, v: Array, reference: Reference) -> Array:
+    """The mean of the effort along the step, by the quadrature of Gauss with eight nodes."""
+    nodes, weights = np.polynomial.legendre.leggauss(8)
+    shares = 0.5 * (1.0 + nodes)
+    efforts = [storage.effort(storage.retract(x0, s * v), reference) for s in shares]
+    return 0.5 * np.einsum("i,in->n", weights, np.array(efforts))
+
+
+GRADIENTS: Mapping[str, Gradient] = {
+    "own": own_gradient,
+    "midpoint": midpoint_gradient,
+    "average": average_gradient,
+}
+"""Discrete gradients under which discretising commutes with composing: each is of one storage alone."""
+
+
 @final
 @dataclass(frozen=True, slots=True)
 class Natural:
-    """Primitives over a step h, each discretised on its own: x¹ = x⁰·exp(h f), discrete gradients, D_h, M_h."""
+    """Primitives over a step h, each discretised on its own: x¹ = x⁰·exp(h f), discrete gradients, D_h, M_h.
+
+    This is the discrete functor: the pattern glues what it gives by the same formula as the continuous relations.
+    """
 
     reference: Reference
     h: float
+    gradient: Gradient = own_gradient
 
     def behaviour(self, primitive: Primitive, x: Point) -> Behaviour:
         """The discrete relation from the state x⁰ at the start of the step."""
         h = self.h
         if isinstance(primitive, Storage):
-            return Storing(lambda rate: primitive.discrete_effort(x, h * rate, self.reference))
+            return Storing(lambda rate: self.gradient(primitive, x, h * rate, self.reference))
         if isinstance(primitive, Irreversible):
             return Relating(
                 lambda e, _lam, rates: (

@@ -110,7 +110,7 @@ def test_the_report_says_what_there_is(pendulum, tmp_path):
         "housing",
     ):
         assert words in page
-    assert outside_frames(page).count("<svg") == 6
+    assert outside_frames(page).count("<svg") == 7
     assert page.count("<iframe") == 1
     frame = html.unescape(re.findall(r'srcdoc="([^"]*)"', page)[0])
     assert "__VISER_EMBED_DATA__" in frame
