@@ -3,13 +3,14 @@
 import sys
 from pathlib import Path
 
-from benchmarks import balance, cells, order, size
+from benchmarks import balance, cells, order, size, traced
 
 TABLES = {
     "order": lambda _: order.table(),
     "balance": lambda _: balance.table(),
     "size": size.table,
     "cells": cells.table,
+    "traced": lambda _: traced.table(),
 }
 
 

@@ -16,7 +16,7 @@ from ephs.mechanics.solve.integrate import METHODS, Grid, integrate
 from ephs.mechanics.solve.problem import Problem, Signal
 from ephs.mechanics.solve.solution import Solution
 from ephs.operad import Path
-from ephs.semantics.bundle import Array, Reference
+from ephs.semantics.bundle import POSITIVE, Array, Reference
 from ephs.semantics.errors import AssemblyError
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.semantics.system import System
@@ -142,7 +142,11 @@ def problem_of_system(
             raise AssemblyError("input", port, found=given, expected="{'effort': f} or {'flow': f}")
         ((side, value),) = given.items()
         signals[Path.of(port)] = signal(value, effort=side == "effort")
-    return Problem(name, system, descriptor, system.state(initial), signals, reference or Reference())
+    state = system.state(initial)
+    for slot in descriptor.states:
+        if slot.quantity.kind in POSITIVE and not np.all(state[slot.path] > 0.0):
+            raise AssemblyError("positive", slot.path, quantity=slot.quantity.kind, found=float(state[slot.path][0]))
+    return Problem(name, system, descriptor, state, signals, reference or Reference())
 
 
 def problem_of_scene(

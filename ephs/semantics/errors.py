@@ -58,6 +58,7 @@ _TEXTS = {
         "storage there, or expose the junction as a power port to one"
     ),
     "state": "{path}: the initial value has shape {found}, expected {expected} ({quantity})",
+    "positive": ("{path}: the initial {quantity} is {found}, expected a number > 0; give initial={{'{path}': …}}"),
     "unknown-state": "{path}: no such state; the states are {expected}",
     "missing-input": ("{path}: the outer port is open: give inputs={{'{path}': {{'flow': …}}}} or {{'effort': …}}"),
     "unknown-input": "{path}: no such outer power port; the open ports are {expected}",

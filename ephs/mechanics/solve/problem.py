@@ -1,6 +1,6 @@
 """What a solver is given: a system, its initial states, what is prescribed at its outer ports, and its surroundings."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol, final
 
@@ -14,9 +14,26 @@ from ephs.semantics.system import System
 if TYPE_CHECKING:
     from ephs.mechanics.solve.solution import Solution
 
-__all__ = ["Motion", "Problem", "Signal"]
+__all__ = ["Motion", "Problem", "Signal", "States"]
 
 State = Mapping[Path, Array]
+
+
+@final
+class States(Mapping[Path, Array]):
+    """States by path, as an input's function reads them: ``state["bodies.rod.pe.q"]`` or by `Path`."""
+
+    def __init__(self, states: State) -> None:
+        self._states = states
+
+    def __getitem__(self, path: "str | Path") -> Array:
+        return self._states[Path.of(path)]
+
+    def __iter__(self) -> Iterator[Path]:
+        return iter(self._states)
+
+    def __len__(self) -> int:
+        return len(self._states)
 
 
 @final
@@ -42,7 +59,7 @@ class Signal:
 
     def at(self, t: float, state: State) -> Array:
         """The value at a time and state, (dim,)."""
-        value = self.value(t, state) if callable(self.value) else self.value
+        value = self.value(t, States(state)) if callable(self.value) else self.value
         return np.atleast_1d(np.asarray(value, dtype=float))
 
 

@@ -205,7 +205,8 @@ def _reversible(voice: Voice, reversible: Reversible) -> Said:
 def _dissipation(voice: Voice, irreversible: Irreversible) -> dict[Path, Expr]:
     ports = irreversible.bundle.ports
     # a temperature as one symbol: the formula is simple in it
-    energy = {str(port): sp.Symbol(f"E_{port}", real=True, positive=True) for port in ports}
+    hot = {port: True if q.kind == "entropy" else None for port, _, q in irreversible.bundle.items()}
+    energy = {str(port): sp.Symbol(f"E_{port}", real=True, positive=hot[port]) for port in ports}
     shift = {energy[str(p)]: voice.e[str(p)] + _intensive(irreversible.bundle.quantity(p)) for p in ports}
     reads = {str(port): voice.x[str(port)] for port in irreversible.reads}
     found = formula_symbols(irreversible, voice.parameter, {**energy, **reads})

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 import ephs
 from ephs import library as lib
+from ephs import quantity as Q
 from ephs.mechanics.solve.integrate import Grid
 from ephs.mechanics.solve.model import compile_model
 from ephs.mechanics.solve.natural import Natural
@@ -240,3 +241,21 @@ def test_a_piston_swings_between_two_gases():
     assert np.all(np.diff(sol.entropy) >= 0.0)
     assert sol.ledger("friction").made[-1] > 0.0
     assert np.abs(sol["mass.p"][-1]) < 0.01 * np.abs(sol["mass.p"]).max()
+
+
+def test_a_volume_wants_an_initial_value():
+    from examples import physics
+
+    start = dict(physics.CYLINDER_START)
+    start.pop("gas1.v")
+    with pytest.raises(ephs.SemanticsError, match=r"gas1\.v: the initial volume is 0\.0, expected a number > 0"):
+        ephs.simulate(physics.cylinder, 1.0, initial=start, step=0.1)
+
+
+def test_an_energy_that_is_not_smooth_where_the_run_begins_is_named():
+    from examples import oscillator
+
+    root = ephs.storage({"q": Q.displacement}, lambda q: np.sqrt(abs(q)))
+    system = oscillator.closed(osc=oscillator.oscillator(pe=root, ke=lib.point_mass(m=1.0), pkc=lib.pkc()))
+    with pytest.raises(ephs.SimulationError, match=r"t = 0 s at osc\.pe: an energy or a flow that is not a finite"):
+        ephs.simulate(system, 1.0, step=0.1)

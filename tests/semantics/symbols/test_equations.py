@@ -260,3 +260,17 @@ def test_functions_of_ones_own_are_written_out():
     opaque = ephs.storage({"q": Q.displacement}, lambda q: float(q) ** 2)
     system = oscillator.closed(osc=oscillator.oscillator(pe=opaque, ke=lib.point_mass(m=1.0), pkc=lib.pkc()))
     assert text_of(system.equations()["dp/dt"]) == "-dE[osc.pe]/dosc.q(osc.q)"
+
+
+def test_drag_keeps_the_sign_of_the_velocity():
+    """|u| u is not u²: velocities have either sign, temperatures one."""
+
+    def drag(p, s):
+        return 0.2 * abs(p) * np.array([[s, -p], [-p, p * p / s]])
+
+    brake = ephs.irreversible({"p": Q.momentum, "s": Q.entropy}, drag)
+    system = oscillator.damped(osc=OSCILLATOR, mf=brake, env=lib.environment())
+    assert "Abs(p)" in text_of(system.equations()["dp/dt"])
+    m, p = sp.Symbol("m", positive=True), sp.Symbol("p", real=True)
+    slowing = system.equations()["dp/dt"].subs({sp.Symbol("osc.q", real=True): 0})
+    assert sp.simplify(slowing + sp.Abs(p) * p / (5 * m**2)) == 0
