@@ -65,13 +65,17 @@ def check_system(
 def check_structure(system: System) -> CheckItem:
     """Check the conditions on every component once more."""
     count = 0
+    slow: list[Path] = []
     for path, primitive in system.leaves():
         count += 1
+        if primitive.kernel is None:
+            slow.append(path)
         try:
             _conditions(primitive)
         except SemanticsError as error:
             return CheckItem("structure", False, f"{path}: {error}")
-    return CheckItem("structure", True, f"{count} components are the structures that they claim to be")
+    remark = f"; called back in Python, which is slow: {', '.join(map(str, slow))}" if slow else ""
+    return CheckItem("structure", True, f"{count} components are the structures that they claim to be{remark}")
 
 
 def _conditions(primitive: Primitive) -> None:

@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ephs.show.figures import new_figure
 from ephs.show.palette import BLUE, GREEN, GREY, ORANGE, RED, SKY
 from ephs.show.plots import STYLE
 
@@ -55,13 +56,12 @@ def exergy_bands(sol: Any, path: Any = ".", first: int = 0, last: int = -1) -> l
 def plot_exergy_flow(sol: Any, path: Any = ".") -> "Figure":
     """A Sankey picture: what gave exergy on the left, what took or destroyed it on the right, widths in J."""
     import matplotlib as mpl
-    from matplotlib.figure import Figure
 
     bands = exergy_bands(sol, path)
     total = sum(band.amount for band in bands if band.source)
     with mpl.rc_context(STYLE):  # pyright: ignore[reportArgumentType] - the style's values are of many types
         most = max(sum(band.source for band in bands), sum(not band.source for band in bands), 1)
-        figure = Figure(figsize=(7.2, 1.6 + 0.26 * most), layout="constrained")
+        figure = new_figure(7.2, 1.6 + 0.26 * most)
         axes = figure.subplots()
         axes.set_axis_off()
         axes.set_xlim(-1.05, 2.05)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ephs.show.figures import new_figure
 from ephs.show.palette import BLACK, BLUE, CYCLE, GREEN, GREY, ORANGE, PURPLE, RED, SKY
 from ephs.show.series import Array, scene_panels, state_panels, thinned
 
@@ -129,13 +130,10 @@ def _array(values: Any) -> Array:
 
 def _panels(sol: Any, what: str, heights: list[float]) -> "tuple[Figure, list[Axes]]":
     from matplotlib import rc_context
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
 
     style: Any = STYLE
     with rc_context(style):
-        figure = Figure(figsize=(_WIDTH, 0.7 + _ROW * sum(heights)), layout="constrained", facecolor="white")
-        FigureCanvasAgg(figure)
+        figure = new_figure(_WIDTH, 0.7 + _ROW * sum(heights))
         grid = figure.subplots(len(heights), 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": heights})
         axes: list[Axes] = list(grid[:, 0])
         axes[0].set_title(f"{sol.name}: {what}", loc="left")

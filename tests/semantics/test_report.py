@@ -71,3 +71,15 @@ def test_a_state_outside_the_domain_is_reported():
     report = cold.check(state={"m.p": np.float64(1e12)})
     assert report.items[2].ok  # it has equations
     assert isinstance(report.ok, bool)
+
+
+def test_what_is_called_back_in_python_is_named():
+    import ephs
+    from ephs import quantity as Q
+    from examples import oscillator
+
+    opaque = ephs.storage({"q": Q.displacement}, lambda q: float(q) ** 2)
+    parts = {"pe": opaque, "ke": ephs.library.point_mass(m=1.0), "pkc": ephs.library.pkc()}
+    report = oscillator.closed(osc=oscillator.oscillator(**parts)).check()
+    assert report.ok
+    assert "called back in Python, which is slow: osc.pe" in str(report)

@@ -141,3 +141,8 @@ def test_exergy_flows_from_sources_to_sinks(circuit):
     texts = [text.get_text() for text in figure.axes[0].texts]
     assert any(text.startswith("store gives") and "100.0 %" in text for text in texts)
     assert any(text.startswith("friction destroys") for text in texts)
+
+
+def test_figures_show_themselves_in_notebooks(circuit):
+    assert plot_exergy_flow(circuit)._repr_png_().startswith(b"\x89PNG")
+    assert plot_energy(circuit)._repr_png_().startswith(b"\x89PNG")

@@ -1,0 +1,34 @@
+"""Figures that are bound to no window, and show themselves in notebooks without one."""
+
+import io
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["new_figure"]
+
+
+def new_figure(width: float, height: float) -> "Figure":
+    """An empty figure of this size in inches."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    figure = _kind()(figsize=(width, height), layout="constrained", facecolor="white")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+@cache
+def _kind() -> Any:
+    from matplotlib.figure import Figure
+
+    class Shown(Figure):
+        """A figure that notebooks show as a picture also where no drawing backend was chosen."""
+
+        def _repr_png_(self) -> bytes:  # pyright: ignore[reportUnusedFunction] - notebooks call it
+            stream = io.BytesIO()
+            self.savefig(stream, format="png", dpi=110)
+            return stream.getvalue()
+
+    return Shown
