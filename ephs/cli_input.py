@@ -35,6 +35,13 @@ class BadInput(Exception):
 
 
 def load_model(scene: str, *, base: Base, adjust: bool) -> "Scene | System":
+    """A scene file, or FILE.py:NAME, as a model.
+
+    Raises
+    ------
+    BadInput
+        There is no such file or name, or it is faulty.
+    """
     import ephs
 
     file, separator, name = scene.rpartition(":")
@@ -108,4 +115,5 @@ def addressed(scene: str, target: Path | None = None) -> Iterator[None]:
 
 
 def naming(scene: str, message: str) -> str:
+    """A message that names the file, once."""
     return message if str(Path(scene)) in message else f"{scene}: {message}"

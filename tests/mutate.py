@@ -17,6 +17,7 @@ PLAIN = ("tests/mechanics/test_components.py", "tests/mechanics/test_models.py",
 COMPILED = ("tests/mechanics/test_components.py", "tests/mechanics/test_motions.py")
 SEMANTICS = ("tests/semantics/test_primitives.py", "tests/semantics/test_laws.py", "tests/semantics/test_relations.py")
 OPERAD = ("tests/operad",)
+SYMBOLS = ("tests/semantics/symbols",)
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,27 @@ class Mutation:
 
 
 MUTATIONS = {
+    "left trivialisation": Mutation(
+        "ephs/semantics/symbols/programs.py", "[[-a, -b, -c], [w, -c, b]", "[[-a, -b, -c], [w, c, b]", SYMBOLS
+    ),
+    "traced correction": Mutation(
+        "ephs/semantics/symbols/traced_kernels.py", "near += WEIGHT *", "near -= WEIGHT *", COMPILED
+    ),
+    "traced slope": Mutation(
+        "ephs/semantics/symbols/traced_kernels.py", "0.5 * slope[at + q]", "slope[at + q]", COMPILED
+    ),
+    "equations": Mutation(
+        "ephs/semantics/symbols/writer.py",
+        "parts.balances[writer.junction(path, port)] += expression",
+        "parts.balances[writer.junction(path, port)] -= expression",
+        SYMBOLS,
+    ),
+    "books": Mutation(
+        "ephs/mechanics/solve/books.py",
+        "self.exergy - self.exergy[:1] + self.destroyed",
+        "self.exergy - self.exergy[:1] - self.destroyed",
+        ("tests/mechanics/solve/test_books.py",),
+    ),
     "lp": Mutation("ephs/mechanics/components.py", "[-space.ad(unit).T @ x[p]", "[space.ad(unit).T @ x[p]", PLAIN),
     "lp, compiled": Mutation(
         "ephs/mechanics/kernels.py",
@@ -57,7 +79,7 @@ MUTATIONS = {
         COMPILED,
     ),
     "mf": Mutation(
-        "ephs/semantics/library.py",
+        "ephs/semantics/structures.py",
         "out[:d, d] = out[d, :d] = -drag",
         "out[:d, d] = out[d, :d] = drag",
         SEMANTICS + PLAIN,

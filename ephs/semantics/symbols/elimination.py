@@ -8,6 +8,7 @@ __all__ = ["coefficient_of", "eliminate", "settled", "tidy"]
 
 
 def tidy(expression: Expr) -> Expr:
+    """An equal expression that is shorter, if one is found; of operators the expanded one."""
     expanded = sp.expand(expression)
     if not expanded.is_commutative:
         return expanded

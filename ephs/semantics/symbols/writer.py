@@ -109,6 +109,7 @@ class Parts:
 
 
 def parts_of(writer: Writer, junctions: list[Junction]) -> Parts:
+    """The square form of a flat system."""
     parts = Parts({}, {}, {slot.path: sp.Integer(0) for slot in junctions}, [], {})
     for path, primitive in writer.components():
 
