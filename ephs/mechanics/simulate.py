@@ -8,6 +8,7 @@ import numpy as np
 
 from ephs.mechanics.build import component_path, drive_ports, initial_state, scene_inputs, scene_system, wrench_port
 from ephs.mechanics.motion import SceneMotion
+from ephs.mechanics.reduced.run import EXPLICIT, integrate_reduced
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.mechanics.scene.model import Marker, Scene
 from ephs.mechanics.solve.adaptive import ADAPTIVE, Control, integrate_adaptive
@@ -107,10 +108,18 @@ def simulate(
     else:
         problem = problem_of_system(model, initial, inputs, reference)
     times = _times(save_at, t0, until)
-    if chosen in ADAPTIVE:
+    if chosen in (*ADAPTIVE, *EXPLICIT):
         most = np.inf if max_step is None else float(max_step)
         least = 0.0 if min_step is None else float(min_step)
         control = Control(float(rtol), float(atol), None if step is None else float(step), least, most, max_steps)
+        if chosen in EXPLICIT:
+            if problem.scene is None:
+                raise OptionError("method", chosen, "natural or radau: explicit methods are for scenes")
+            if form != "reduced":
+                raise OptionError("form", form, f"reduced, which the method {chosen} solves")
+            return integrate_reduced(
+                problem, float(t0), float(until), method=chosen, control=control, save_at=times, progress=progress
+            )
         return integrate_adaptive(
             problem, float(t0), float(until), method=chosen, control=control, save_at=times, progress=progress
         )
@@ -267,8 +276,8 @@ def _at_marker(marker: Marker, force: Signal) -> Signal:
 def _method(name: str) -> str:
     if name == "auto":
         return "natural"
-    if name not in METHODS and name not in ADAPTIVE:
-        raise OptionError("method", name, f"one of auto, {', '.join([*METHODS, *ADAPTIVE])}")
+    if name not in (*METHODS, *ADAPTIVE, *EXPLICIT):
+        raise OptionError("method", name, f"one of auto, {', '.join([*METHODS, *ADAPTIVE, *EXPLICIT])}")
     return name
 
 

@@ -1,0 +1,196 @@
+"""Explicit methods on the reduced form: references by others, the natural method's limit, orders, loops, inputs."""
+
+from pathlib import Path as File
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+import ephs
+from benchmarks.cases import CASES
+from ephs.mechanics.reduced.mechanism import reduce_scene
+from ephs.mechanics.simulate import problem_of_scene
+from ephs.mechanics.solve.model import compile_model
+from ephs.testing import mechanisms
+
+SCENES = sorted((File(__file__).parents[3] / "scenes").glob("*.toml"))
+BY_NAME = {case.name: case for case in CASES}
+TIGHT = {"method": "rk87", "rtol": 1e-10, "atol": 1e-10}
+
+
+def distance(one, other, scene):
+    """Largest difference of positions and rotations of bodies, coordinates of joints, entropies, in this order."""
+    worst = 0.0
+    for name, _ in scene.all_bodies():
+        a, b = one.body(name), other.body(name)
+        worst = max(worst, np.abs(a.position - b.position).max(), np.abs(a.rotation - b.rotation).max())
+    for path in one:
+        if tuple(path)[-1] == "s":
+            worst = max(worst, np.abs(one[path] - other[path]).max())
+    return worst
+
+
+def limit_is_met(scene, until, h, slack=0.05):
+    """The explicit result lies where the natural method's steps h and h/2 point to."""
+    exact = ephs.simulate(scene, until, save_at=[until], **TIGHT)
+    coarse, fine = (ephs.simulate(scene, until, step=step, save_at=[until]) for step in (h, 0.5 * h))
+    far, near = distance(coarse, exact, scene), distance(fine, exact, scene)
+    assert near <= (0.25 + slack) * far + 1e-8
+    assert exact.constraint_error.max(initial=0.0) <= 1e-10
+    assert exact.energy_error.max(initial=0.0) <= 1e-7
+    return exact, fine
+
+
+@pytest.mark.parametrize("file", SCENES, ids=lambda file: file.stem)
+def test_the_natural_method_tends_to_the_explicit_one(file):
+    scene = ephs.load(file)
+    h = 5e-4 if file.stem == "heavy-top" else 4e-3
+    exact, fine = limit_is_met(scene, 0.4, h)
+    assert exact.heat[-1] == pytest.approx(fine.heat[-1], rel=2e-2, abs=1e-6)
+    assert exact.work[-1] == pytest.approx(fine.work[-1], rel=2e-2, abs=1e-6)
+    for name, _ in scene.all_joints():
+        assert np.allclose(exact.joint(name).coordinate[-1], fine.joint(name).coordinate[-1], atol=1e-2)
+
+
+@settings(max_examples=12)
+@given(scene=mechanisms(max_bodies=3))
+def test_so_it_does_on_generated_mechanisms(scene):
+    limit_is_met(scene, 0.05, 5e-3, slack=0.2)
+
+
+@pytest.mark.parametrize("name", ["andrews-squeezer", "revolute-chain-4", "spherical-chain-2", "tumbling-body"])
+def test_references_of_independent_computations_are_met(name):
+    case = BY_NAME[name]
+    sol = ephs.simulate(case.scene(), case.time, method="rk87", rtol=1e-12, atol=1e-12, save_at=[case.time])
+    assert case.error(sol) <= 1e-9
+    assert sol.constraint_error.max() <= 1e-10
+
+
+def test_a_fast_top_is_met_by_smaller_tolerances():
+    case = BY_NAME["heavy-top"]
+    errors = [
+        case.error(ephs.simulate(case.scene(), case.time, method="rk87", rtol=tol, atol=tol, save_at=[case.time]))
+        for tol in (1e-8, 1e-10, 1e-12)
+    ]
+    assert errors[2] <= 1e-9
+    assert errors[0] > errors[1] > errors[2]
+
+
+@pytest.mark.parametrize("tolerance", [1e-8, 1e-10, 1e-11, 1e-12])
+def test_a_four_bar_passes_through_its_singular_configuration(tolerance):
+    """In line, the loop's rows depend on one another; the motion goes on along its branch."""
+    case = BY_NAME["four-bar-windows-1"]
+    sol = ephs.simulate(
+        case.scene(), case.time, method="rk87", rtol=tolerance, atol=tolerance, save_at=np.linspace(0.0, case.time, 50)
+    )
+    assert case.error(sol) <= 1e-5
+    assert sol.constraint_error.max() <= 1e-10
+    assert sol.energy_error.max() <= 1e-5
+
+
+@pytest.mark.parametrize(("method", "order", "steps"), [("rk54", 5, (40, 80)), ("rk87", 8, (10, 20))])
+def test_orders_are_those_of_the_methods(method, order, steps):
+    scene = BY_NAME["spherical-chain-2"].scene()
+    exact = ephs.simulate(scene, 0.5, method="rk87", rtol=1e-13, atol=1e-13, save_at=[0.5])
+    found = [
+        distance(ephs.simulate(scene, 0.5, method=method, step=0.5 / n, save_at=[0.5]), exact, scene) for n in steps
+    ]
+    assert np.log2(found[0] / found[1]) == pytest.approx(order, abs=0.5)
+
+
+def test_dense_output_has_the_order_of_the_steps():
+    scene = BY_NAME["spherical-chain-2"].scene()
+    times = np.linspace(0.0, 1.0, 23)
+    every = ephs.simulate(scene, 1.0, save_at=times, **TIGHT)
+    for t in (7, 22):
+        alone = ephs.simulate(scene, times[t], save_at=[times[t]], **TIGHT)
+        off = (
+            np.abs(every.body("b1").position[t] - alone.body("b1").position[-1])
+            if "b1" in dict(scene.all_bodies())
+            else 0
+        )
+        assert np.max(off) <= 1e-8
+    assert np.array_equal(every.t, times)
+
+
+def test_a_group_of_bodies_that_nothing_holds_moves_freely(tmp_path):
+    text = """
+    format = 1
+    [world]
+    gravity = [0.0, 0.0, 0.0]
+    [bodies.a]
+    mass = 1.0
+    inertia = [0.1, 0.2, 0.25]
+    angular_velocity = [1.0, 2.0, 0.5]
+    [bodies.b]
+    mass = 2.0
+    inertia = [0.3, 0.2, 0.25]
+    [joints.ball]
+    type = "spherical"
+    bodies = ["a", "b"]
+    frame1 = { position = [0.0, 0.0, 0.5] }
+    frame2 = { position = [0.0, 0.0, -0.5] }
+    friction = 0.1
+    """
+    file = tmp_path / "pair.toml"
+    file.write_text(text)
+    scene = ephs.load(file, adjust=True)
+    sol, _ = limit_is_met(scene, 0.3, 4e-3)
+    momentum = [sum(sol.scene.body(n).mass * sol.body(n).velocity[i] for n in "ab") for i in (0, -1)]
+    assert np.allclose(momentum[0], momentum[1], atol=1e-9)
+
+
+def test_inputs_of_time_and_state_act_and_are_counted():
+    scene = BY_NAME["revolute-chain-4"].scene()
+    name = next(name for name, _ in scene.all_joints())
+    body = next(name for name, _ in scene.all_bodies())
+    inputs = {
+        f"joints.{name}": lambda t, state: 2.0 * np.sin(3.0 * t) - 0.3 * state[f"joints.{name}.pe.q_r"],
+        f"bodies.{body}": lambda t: [0.0, 0.0, 0.0, 0.1 * t, 0.0, 0.0],
+    }
+    exact = ephs.simulate(scene, 0.5, inputs=inputs, save_at=[0.5], **TIGHT)
+    far, near = (
+        distance(ephs.simulate(scene, 0.5, inputs=inputs, step=h, save_at=[0.5]), exact, scene) for h in (4e-3, 2e-3)
+    )
+    assert near <= 0.3 * far
+    assert exact.energy_error[-1] <= 1e-8
+    assert exact.work[-1] != 0.0
+
+
+def test_few_unknowns_are_left():
+    scene = ephs.load(SCENES[0].parent / "four-bar.toml")
+    problem = problem_of_scene(scene)
+    model = compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
+    reduced = reduce_scene(scene, problem, model)
+    assert reduced.freedoms == 3
+    assert len(reduced.cut) == 1
+    assert reduced.unknowns < 0.1 * model.unknowns
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"method": "rk87", "form": "paper"}, "form is 'paper', expected reduced"),
+        ({"method": "rk87", "rtol": -1.0}, "rtol is -1.0"),
+        ({"method": "rk87", "rtol": np.nan}, "rtol is nan"),
+        ({"method": "rk54", "max_step": 0.0}, "max_step is 0.0"),
+        ({"method": "rk45"}, "method is 'rk45', expected one of auto, natural, radau, rk54, rk87"),
+    ],
+)
+def test_bad_options_are_named(options, message):
+    with pytest.raises(ephs.OptionError, match=message):
+        ephs.simulate(BY_NAME["tumbling-body"].scene(), 0.1, **options)
+
+
+def test_explicit_methods_are_for_scenes():
+    from examples import oscillator
+
+    with pytest.raises(ephs.OptionError, match="expected natural or radau"):
+        ephs.simulate(oscillator.free_oscillator, 1.0, method="rk87")
+
+
+def test_too_many_steps_end_a_run_and_keep_what_there_is():
+    with pytest.raises(ephs.SimulationError, match="more steps than are allowed") as caught:
+        ephs.simulate(BY_NAME["heavy-top"].scene(), 2.0, method="rk54", max_steps=20)
+    assert len(caught.value.partial) == 21
+    assert caught.value.partial.t[-1] == caught.value.time
