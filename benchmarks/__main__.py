@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 
-from benchmarks import balance, cells, order, size, traced
+from benchmarks import accuracy, balance, cells, order, size, traced
 
 TABLES = {
     "order": lambda _: order.table(),
@@ -11,6 +11,7 @@ TABLES = {
     "size": size.table,
     "cells": cells.table,
     "traced": lambda _: traced.table(),
+    "accuracy": lambda _: accuracy.table(),
 }
 
 

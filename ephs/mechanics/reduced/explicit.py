@@ -12,8 +12,9 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.build import component_path, drive_ports, wrench_port
-from ephs.mechanics.reduced.loop_kernels import accelerate, constraint_rows, correct, loop_gaps, reduce_rows
+from ephs.mechanics.reduced.loop_kernels import constraint_rows, correct, loop_gaps, reduce_rows
 from ephs.mechanics.reduced.mechanism import Reduced
+from ephs.mechanics.reduced.step_kernels import advance, rates, stages
 from ephs.mechanics.reduced.sweep_kernels import inertia_sweep, kinematics
 from ephs.mechanics.reduced.tables import CUT, SPRING
 from ephs.mechanics.scene.geometry import Coupling
@@ -23,7 +24,6 @@ from ephs.mechanics.solve.model import Model
 from ephs.mechanics.solve.problem import Problem
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
-from ephs.semantics.spaces.se3_kernels import dexp_left_inv
 
 __all__ = ["Explicit", "ReducedState", "Tableau", "tableau"]
 
@@ -107,12 +107,11 @@ class Explicit:
         self.work = reduced.workspace()
         t = reduced.tables
         self._moving = [i for i in range(len(reduced.edges)) if t.kind[i] != SPRING]
-        sizes = [int(t.dim[i]) for i in self._moving]
-        self._v_at = dict(zip(self._moving, np.cumsum([0, *sizes])[:-1].tolist(), strict=False))
-        tree = [(self._v_at[i], int(t.dim[i])) for i in range(reduced.links)]
-        self._tree = np.concatenate([np.arange(at, at + d) for at, d in tree]).astype(int)
+        sizes = [int(t.dim[i]) if t.kind[i] != SPRING else 0 for i in range(len(reduced.edges))]
+        self._v_at = np.cumsum([0, *sizes])[:-1].astype(np.int64)
+        self._tree = np.arange(sum(sizes[: reduced.links]))
         self._rank = 0
-        self._curved = [i for i in self._moving if int(t.code[i]) != 0]
+        self._q = np.zeros(reduced.coordinates)
         self.nv, self.n, self.ns = sum(sizes), reduced.freedoms, len(reduced.entropies)
         self.size = self.nv + self.n + self.ns + 2 + len(reduced.made)
         self._scal = model.scal(0.0)
@@ -136,7 +135,7 @@ class Explicit:
                 found.append((wrench_port(name), self._wrench, links[name]))
         r_at, dim = self.reduced.tables.r_at, self.reduced.tables.dim
         for name, j in scene.all_joints():
-            edges = [i for i, e in enumerate(self.reduced.edges) if e.name == name and i in self._v_at]
+            edges = [i for i, e in enumerate(self.reduced.edges) if e.name == name and i in self._moving]
             edges.sort(key=lambda i: self.reduced.edges[i].freedoms.start)
             for (port, _), i in zip(drive_ports(j), edges, strict=True):
                 if port in signals and not signals[port].effort:
@@ -153,48 +152,35 @@ class Explicit:
     def advance(self, q: Array, v: Array) -> Array:
         """q·exp(v), joint by joint."""
         out = np.array(q)
-        t = self.reduced.tables
-        for i in self._moving:
-            at, size, first = int(t.q_at[i]), int(t.q_size[i]), self._v_at[i]
-            manifold = self.reduced.edges[i].pair.manifold
-            out[at : at + size] = manifold.retract(q[at : at + size], v[first : first + manifold.dim])
+        advance(self.reduced.tables, self._v_at, q, v, out)
         return out
 
     def rates(self, t: float, base: Array, y: Array) -> Array:
-        """ẏ of y = (v, r, s, books) at q = base·exp(v)."""
+        """ẏ of y = (v, r, s, books) at q = base·exp(v).
+
+        Raises
+        ------
+        SolveError
+            A component cannot be evaluated there, or the mass matrix is singular.
+        """
         nv, n, ns = self.nv, self.n, self.ns
-        v, r, s = y[:nv], y[nv : nv + n], y[nv + n : nv + n + ns]
-        q = self.advance(base, v)
         self.evaluations += 1
         if not self._constant:
-            self._place_inputs(t, self.states(ReducedState(t, q, r, s, y[nv + n + ns :])))
+            parts = np.split(y, [nv, nv + n, nv + n + ns])
+            self._place_inputs(t, self.states(ReducedState(t, self.advance(base, parts[0]), *parts[1:])))
         out = np.zeros(self.size)
-        at = nv + n + ns
-        tables, w = self.reduced.tables, self.work
-        status, component = accelerate(
-            tables, w, q, r, s, self._drive, self._wrench, self._scal,
-            out[nv : nv + n], out[nv + n : at], out[at + 2 :], out[at : at + 2],
-        )  # fmt: skip
+        self._refuse(
+            *rates(
+                self.reduced.tables, self.work, self._v_at, base, self._q, y, self._drive, self._wrench, self._scal, out
+            )
+        )
+        return out
+
+    def _refuse(self, status: int, component: int) -> None:
         if status == SINGULAR:
             raise SolveError(Outcome.SINGULAR, "", "the mass matrix")
         if status:
             raise SolveError.of_component(int(status), self.model, int(component))
-        self._turn(v, r, out)
-        return out
-
-    def _turn(self, v: Array, r: Array, out: Array) -> None:
-        """v̇ = dexp⁻¹(v) r: of cut joints too, whose rates the sweep has left."""
-        t = self.reduced.tables
-        for i in self._moving:
-            first, d = self._v_at[i], int(t.dim[i])
-            where = slice(first, first + d)
-            rate = self.work.rate[i, :d] if t.kind[i] == CUT else r[t.r_at[i] : t.r_at[i] + d]
-            if i in self._curved:
-                matrix = np.zeros((d, d))
-                dexp_left_inv(int(t.code[i]), v[where], matrix)
-                out[where] = matrix @ rate
-            else:
-                out[where] = rate
 
     # ---- closing loops -----------------------------------------------------------------------------------------
 
@@ -268,14 +254,24 @@ class Explicit:
     def step(self, state: ReducedState, h: float, first: Array | None = None) -> tuple[ReducedState, Array, Array]:
         """One step without control: the state after it, the rates at its stages, y at its end."""
         method, y0 = self.method, self.vector(state)
-        k = np.zeros((method.b.size + 1, self.size))
-        for i in range(method.b.size):
-            if i == 0 and first is not None:
-                k[0] = first
-            else:
-                k[i] = self.rates(state.t + method.c[i] * h, state.q, y0 + h * (method.a[i, :i] @ k[:i]))
-        y1 = y0 + h * (method.b @ k[: method.b.size])
-        k[-1] = self.rates(state.t + h, state.q, y1)
+        count = method.b.size
+        k, y1 = np.zeros((count + 1, self.size)), np.empty(self.size)
+        if first is not None:
+            k[0] = first
+        if self._constant:
+            self._refuse(
+                *stages(
+                    self.reduced.tables, self.work, self._v_at, method.a, method.b, state.q, self._q, y0, h,
+                    first is not None, k, y1, self._drive, self._wrench, self._scal,
+                )
+            )  # fmt: skip
+            self.evaluations += count + (first is None)
+        else:
+            for i in range(count):
+                if i or first is None:
+                    k[i] = self.rates(state.t + method.c[i] * h, state.q, y0 + h * (method.a[i, :i] @ k[:i]))
+            y1 = y0 + h * (method.b @ k[:count])
+            k[-1] = self.rates(state.t + h, state.q, y1)
         nv, n, ns = self.nv, self.n, self.ns
         end = ReducedState(
             state.t + h, self.advance(state.q, y1[:nv]), y1[nv : nv + n], y1[nv + n : nv + n + ns], y1[nv + n + ns :]
