@@ -18,6 +18,7 @@ COMPILED = ("tests/mechanics/test_components.py", "tests/mechanics/test_motions.
 SEMANTICS = ("tests/semantics/test_primitives.py", "tests/semantics/test_laws.py", "tests/semantics/test_relations.py")
 OPERAD = ("tests/operad",)
 SYMBOLS = ("tests/semantics/symbols",)
+REDUCED = ("tests/mechanics/reduced",)
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,18 @@ MUTATIONS = {
         "parts.balances[writer.junction(path, port)] += expression",
         "parts.balances[writer.junction(path, port)] -= expression",
         SYMBOLS,
+    ),
+    "reduced, turning frames": Mutation(
+        "ephs/mechanics/reduced/sweep_kernels.py",
+        "w.bias[i, k] = carried[k] + column[k]",
+        "w.bias[i, k] = carried[k] - column[k]",
+        REDUCED,
+    ),
+    "reduced, cut joints": Mutation(
+        "ephs/mechanics/reduced/loop_kernels.py", "total[k] += turned[k]", "total[k] -= turned[k]", REDUCED
+    ),
+    "reduced, heat": Mutation(
+        "ephs/mechanics/reduced/sweep_kernels.py", "s_rate[t.heat[i]] -= w.f[d]", "s_rate[t.heat[i]] += w.f[d]", REDUCED
     ),
     "books": Mutation(
         "ephs/mechanics/solve/books.py",

@@ -62,8 +62,8 @@ def simulate(
     initial
         Values of states by path; a system's others at the identity, a scene's as it says.
     method
-        ``"natural"``, which ``"auto"`` chooses too, or ``"radau"``: order 5, stiff and adaptive, for systems whose
-        states are on vector spaces.
+        ``"natural"``, which ``"auto"`` chooses too; ``"radau"``: order 5, stiff and adaptive, for systems whose states
+        are on vector spaces; ``"rk54"``, ``"rk87"``: explicit and adaptive, for scenes, on their reduced form.
     rtol, atol
         Of adaptive methods: each state x is wanted to atol + rtol·|x| a step, atol in the state's own unit.
     step
