@@ -18,6 +18,7 @@ __all__ = ["StorageForm", "irreversible_kernel", "reversible_kernel", "storage_f
 
 KERNELS = "ephs.semantics.symbols.traced_kernels"
 LARGEST = 16
+"""How many numbers a storage's states may have: a traced kernel lays out its scratch for so many."""
 _HEAT = {"entropy": 1.0, "volume": 2.0}
 
 
@@ -133,6 +134,8 @@ def _relation(
     unknowns: tuple[tuple[Expr, ...], tuple[Expr, ...]],
 ) -> Kernel:
     bundle = Bundle.of(interface)
+    if any(len(x) > LARGEST for _, x in base):
+        raise Untraceable("a state of more than sixteen numbers")
     program = relation_program(*outputs, tuple(traced.parameters), base, *unknowns)
     hot = [float(where.start) for _, where, quantity in bundle.items() if quantity.kind == "entropy"]
     if not any(TEMPERATURE in entry.free_symbols for entry in outputs[0]):

@@ -15,8 +15,6 @@ from ephs.semantics.calling import call_kernel
 from ephs.semantics.spaces.jit import kernel
 from ephs.semantics.spaces.se3_kernels import dexp_left, retract
 
-LARGEST = 16
-"""Of the numbers of a storage's states, so that its scratch fits the memory that a kernel is given."""
 NODE, WEIGHT = 0.5 * math.sqrt(0.6), 5.0 / 18.0
 """Of Gauss' quadrature with three nodes on an interval: the outer nodes' distance from the middle, their weight."""
 ROUNDING = 8.0 * 2.220446049250313e-16

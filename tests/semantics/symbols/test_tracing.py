@@ -225,3 +225,18 @@ def test_leaving_the_domain_of_a_function_is_reported(energy, outcome):
     assert 0.0 < caught.value.time < 10.0
     assert len(caught.value.partial) >= 2
     assert np.all(np.isfinite(caught.value.partial["osc.pe.q"]))
+
+
+def test_states_too_large_for_a_kernel_are_called_back():
+    from ephs import Quantity, Space
+
+    wide = Quantity("field", Space("real", 20, 20), 1)
+    storage = ephs.storage({"x": wide}, lambda x: 0.5 * x @ x)
+    reading = ephs.gyrator(
+        {"q": Q.displacement, "p": Q.momentum, "~x": wide},
+        lambda x: (1.0 + x @ x) * np.array([[0.0, -1.0], [1.0, 0.0]]),
+    )
+    assert storage.kernel is None
+    assert reading.kernel is None
+    x = {Path.of("x"): np.arange(20.0)}
+    assert np.allclose(storage.energy_gradient(x), np.arange(20.0), atol=1e-8)
