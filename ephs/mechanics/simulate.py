@@ -8,7 +8,7 @@ import numpy as np
 
 from ephs.mechanics.build import component_path, drive_ports, initial_state, scene_inputs, scene_system, wrench_port
 from ephs.mechanics.motion import SceneMotion
-from ephs.mechanics.reduced.run import EXPLICIT, integrate_reduced
+from ephs.mechanics.reduced import EXPLICIT
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.mechanics.scene.model import Marker, Scene
 from ephs.mechanics.solve.adaptive import ADAPTIVE, Control, integrate_adaptive
@@ -117,6 +117,8 @@ def simulate(
                 raise OptionError("method", chosen, "natural or radau: explicit methods are for scenes")
             if form != "reduced":
                 raise OptionError("form", form, f"reduced, which the method {chosen} solves")
+            from ephs.mechanics.reduced.run import integrate_reduced  # its kernels take a quarter of a second to load
+
             return integrate_reduced(
                 problem, float(t0), float(until), method=chosen, control=control, save_at=times, progress=progress
             )

@@ -18,9 +18,8 @@ from ephs.mechanics.solve.solution import Solution
 from ephs.semantics.bundle import Array
 from ephs.semantics.primitives import Irreversible
 
-__all__ = ["EXPLICIT", "integrate_reduced"]
+__all__ = ["integrate_reduced"]
 
-EXPLICIT = ("rk54", "rk87")
 RESPONSE = 0.1
 
 
