@@ -115,10 +115,11 @@ def ledgers(problem: Problem, record: Record) -> Ledgers:
             makers[slot.path] = record.energies[:, number]
         if not isinstance(primitive, Storage):
             continue
-        exchanged = np.zeros(n)
+        exchanged: Array | None = None  # most storages have no part in it: nothing is made for them
         for state in slot.reads:
             if state.quantity.environment:
-                exchanged = exchanged + reference.intensive(state.quantity) * record.x[:, state.point][:, 0]
+                share = reference.intensive(state.quantity) * record.x[:, state.point][:, 0]
+                exchanged = share if exchanged is None else exchanged + share
             values = record.x[:, state.point]
             if state.quantity.kind in amounts and values.shape[1] == 1:
                 book = amounts[state.quantity.kind]
@@ -126,12 +127,12 @@ def ledgers(problem: Problem, record: Record) -> Ledgers:
             if state.quantity.kind == "entropy":
                 entropy = entropy + values[:, 0]
         if primitive.environment:
-            environment = environment + exchanged
-            storages[slot.path] = exchanged
+            storages[slot.path] = np.zeros(n) if exchanged is None else exchanged
+            environment = environment + storages[slot.path]
             exergies[slot.path] = np.zeros(n)
             continue
         energy = storages[slot.path] = record.energies[:, number]
-        exergies[slot.path] = energy - exchanged
+        exergies[slot.path] = energy if exchanged is None else energy - exchanged
         exergy = exergy + exergies[slot.path]
         if any(state.quantity.environment for state in slot.reads):
             thermal = thermal + energy
