@@ -9,6 +9,7 @@ import numpy as np
 from ephs.mechanics.build import component_path
 from ephs.mechanics.reduced.tables import CUT, SPRING, TREE, Mechanism, Workspace
 from ephs.mechanics.scene.model import GROUND, IDENTITY_POSE, Scene
+from ephs.mechanics.solve.errors import OptionError
 from ephs.mechanics.solve.model import Model
 from ephs.mechanics.solve.problem import Problem
 from ephs.operad import Path
@@ -113,6 +114,10 @@ def reduce_scene(scene: Scene, problem: Problem, model: Model) -> Reduced:
     masses = [body.mass for _, body in scene.all_bodies()]
     joints = _joints(scene, number, masses)
     tree, cut = _spanning(joints, masses)
+    over = [edge.name for edge in cut if edge.motion is not None]
+    if over:  # prescribed joints are cut last: only a loop of nothing else is left over
+        found = f"that of {', '.join(over)}, which closes a loop of prescribed joints"
+        raise OptionError("motion", found, "one joint of each loop without prescribed motion, or the method natural")
     order = [child for _, child, _ in tree]
     place = {body: i for i, body in enumerate(order)} | {-1: -1}
     springs = _springs(scene, number)

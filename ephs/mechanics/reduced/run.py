@@ -123,12 +123,7 @@ class _Run:
 
     def _shrink(self, h: float, cause: SolveError | None) -> None:
         self.rejected += 1
-        least = max(self.control.least, 16.0 * np.spacing(max(abs(self.t), abs(self.until))))
-        if h < least:
-            if cause is not None:
-                raise cause
-            raise SolveError(Outcome.TINY, "", f"{h:.3g} s")
-        self.h = h
+        self.h = self.control.allowed(h, max(abs(self.t), abs(self.until)), cause)
 
     def _accept(self, end: ReducedState, h: float, at: float | None) -> None:
         made = end.books[2:] - self.state.books[2:]
@@ -175,6 +170,7 @@ class _Run:
             "cut_joints": [edge.name for edge in self.reduced.cut],
             "dependent_equations": 0,
             "unknowns": self.reduced.unknowns,
+            "paper_unknowns": self.model.unknowns,
             "setup_s": self.setup,
             "integrate_s": time.perf_counter() - self.begin - self.setup,
             "least_production": self.least if np.isfinite(self.least) else 0.0,

@@ -60,6 +60,18 @@ class Control:
         if not self.least >= 0.0:
             raise OptionError("min_step", self.least, "a number of seconds ≥ 0")
 
+    def allowed(self, h: float, latest: float, cause: SolveError | None) -> float:
+        """A shorter step h, at times up to ``latest``.
+
+        Raises
+        ------
+        SolveError
+            It is below the least that is allowed, or that rounding leaves: the cause, if there is one.
+        """
+        if h < max(self.least, 16.0 * np.spacing(latest)):
+            raise cause or SolveError(Outcome.TINY, "", f"{h:.3g} s")
+        return h
+
 
 def integrate_adaptive(
     problem: Problem,
@@ -171,12 +183,7 @@ class _Run:
 
     def _shrink(self, h: float, cause: SolveError | None) -> None:
         self.rejected += 1
-        least = max(self.control.least, 16.0 * np.spacing(max(abs(self.t), abs(self.until))))
-        if h < least:
-            if cause is not None:
-                raise cause
-            raise SolveError(Outcome.TINY, "", f"{h:.3g} s")
-        self.h = h
+        self.h = self.control.allowed(h, max(abs(self.t), abs(self.until)), cause)
 
     def _accept(self, step: Step, end: float | None) -> None:
         self.iterations += step.iterations

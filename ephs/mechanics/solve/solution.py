@@ -193,11 +193,9 @@ class Solution:
     def state_at(self, i: int) -> dict[Path, Array]:
         """The states at the i-th instant, as they are stored: relative poses as elements of their group."""
         out: dict[Path, Array] = {}
-        quantities = {} if self.system is None else self.system.states
-        for path, values in self.states.items():
-            value, quantity = np.atleast_1d(values[i]), quantities[path]
-            relative = quantity.kind == "relative_pose"
-            out[path] = Pair.from_space(quantity.space).element(value) if relative else value
+        for slot in [] if self.problem is None else self.problem.descriptor.states:
+            value, relative = np.atleast_1d(self.states[slot.path][i]), slot.quantity.kind == "relative_pose"
+            out[slot.path] = Pair.from_space(slot.quantity.space).element(value) if relative else value
         return out
 
     def port(self, path: str | Path) -> "PortMotion":
@@ -224,7 +222,10 @@ class Solution:
             "rejected": self.stats["rejected"],
             "setup_s": self.stats["setup_s"],
             "integrate_s": self.stats["integrate_s"],
-            "unknowns": {"paper": self.stats["unknowns"], "used": self.stats["unknowns"]},
+            "unknowns": {
+                "paper": self.stats.get("paper_unknowns", self.stats["unknowns"]),
+                "used": self.stats["unknowns"],
+            },
             "max_energy_error": float(self.energy_error.max(initial=0.0)),
             "max_constraint_error": float(self.constraint_error.max(initial=0.0)),
             "max_velocity_error": float(self.velocity_error.max(initial=0.0)),

@@ -24,18 +24,21 @@ def settled(expression: Expr, known: Mapping[Expr, Expr]) -> Expr:
         expression = new
 
 
-def eliminate(algebraic: Mapping[str, Expr], candidates: list[Expr]) -> tuple[dict[Expr, Expr], dict[str, Expr]]:
-    """Solve equations for unknowns that occur once, with coefficient ±1 or a number that cannot vanish."""
-    left = dict(algebraic)
+def eliminate(equations: list[Expr], unknowns: list[Expr]) -> tuple[dict[Expr, Expr], list[Expr]]:
+    """Solve expressions that vanish for unknowns that they hold once, with a factor that cannot vanish.
+
+    Returns what was solved, and the expressions left.
+    """
+    left = list(equations)
     solved: dict[Expr, Expr] = {}
-    for unknown in candidates:
-        for name, expression in left.items():
+    for unknown in unknowns:
+        for number, expression in enumerate(left):
             coefficient = coefficient_of(expression, unknown)
             if coefficient is None:
                 continue
             value = sp.expand(unknown - expression / coefficient)
-            del left[name]
-            left = {key: sp.expand(other.subs(unknown, value)) for key, other in left.items()}
+            del left[number]
+            left = [sp.expand(other.subs(unknown, value)) for other in left]
             solved = {symbol: sp.expand(entry.subs(unknown, value)) for symbol, entry in solved.items()}
             solved[unknown] = value
             break
@@ -43,13 +46,13 @@ def eliminate(algebraic: Mapping[str, Expr], candidates: list[Expr]) -> tuple[di
 
 
 def coefficient_of(expression: Expr, unknown: Expr) -> Expr | None:
-    """The factor of an unknown that occurs linearly: a number, or of numbers also a positive parameter."""
+    """The factor of an unknown that occurs linearly, where it is a number or a parameter that cannot vanish."""
     terms = [term for term in sp.Add.make_args(expression) if term.has(unknown)]
     if len(terms) != 1:
         return None
     factor, rest = terms[0].as_independent(unknown)
     if rest != unknown or factor == 0:
         return None
-    if factor.is_number or (factor.is_commutative and factor.is_positive):
+    if factor.is_number or (factor.is_commutative and factor.is_nonzero):
         return factor
     return None

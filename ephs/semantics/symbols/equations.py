@@ -14,7 +14,7 @@ from ephs.operad import Path, Quantity
 from ephs.semantics.symbols.algebra import Expr, sp, text_of
 from ephs.semantics.symbols.elimination import coefficient_of, eliminate, settled, tidy
 from ephs.semantics.symbols.voices import say
-from ephs.semantics.symbols.words import operator
+from ephs.semantics.symbols.words import curved, operator
 from ephs.semantics.symbols.writer import Junction, Parts, Writer, parts_of
 from ephs.semantics.system import System
 
@@ -63,9 +63,9 @@ class Equations:
             There is none; the message lists the left sides.
         """
         for row in self.rows:
-            if str(row.left) == left:
+            if text_of(row.left) == left:
                 return row.right
-        raise KeyError(f"{left}: the left sides are {', '.join(str(row.left) for row in self.rows)}")
+        raise KeyError(f"{left}: the left sides are {', '.join(text_of(row.left) for row in self.rows)}")
 
     def __str__(self) -> str:
         lines: list[str] = []
@@ -118,13 +118,9 @@ def equations_of(system: System, form: Form) -> Equations:
     return Equations(form, tuple(writers[form](writer)), writer.words.latex)
 
 
-def _rate(writer: Writer, junction: Path, quantity: Quantity) -> Expr:
-    return writer.words.rate(junction, quantity)
-
-
 def _moving(writer: Writer, junction: Path, quantity: Quantity, flow: Expr) -> Expr:
     """What the derivative of a state by time is, from its left-trivialised flow."""
-    if quantity.kind in ("pose", "direct_pose", "relative_pose"):
+    if curved(quantity):
         return operator("tangent", writer.words.state(junction, quantity)) * flow
     return flow
 
@@ -178,8 +174,8 @@ def _relation(writer: Writer) -> Iterator[Equation]:
 
 def _flow_of(writer: Writer, junction: Path, quantity: Quantity) -> Expr:
     """The left-trivialised derivative of a state by time."""
-    rate = _rate(writer, junction, quantity)
-    if quantity.kind in ("pose", "direct_pose", "relative_pose"):
+    rate = writer.words.rate(junction, quantity)
+    if curved(quantity):
         return operator("tangent", writer.words.state(junction, quantity)) ** -1 * rate
     return rate
 
@@ -199,7 +195,7 @@ def _descriptor(writer: Writer) -> Iterator[Equation]:
         else:
             quantity = parts.storages[junction][1]
             right = _moving(writer, junction, quantity, sp.expand(rate - balance))
-            yield Equation(_rate(writer, junction, quantity), right, about)
+            yield Equation(writer.words.rate(junction, quantity), right, about)
     for path, condition in parts.conditions:
         yield Equation(sp.Integer(0), sp.expand(condition), f"condition of {path}")
 
@@ -213,14 +209,9 @@ def _reduced(writer: Writer) -> Iterator[Equation]:
     outer = [slot for slot in junctions if slot.exposed]
     known = {writer.effort(j, quantity): e for j, (e, quantity, _) in parts.storages.items()}
     open_flows = {slot.path: writer.words.port(slot.path, "f", slot.quantity) for slot in outer}
-    algebraic: dict[str, Expr] = {}
-    for junction, balance in parts.balances.items():
-        if junction not in parts.rates and junction not in open_flows:
-            algebraic[f"flows at {junction}"] = sp.expand(balance.subs(known))
-    for number, (path, condition) in enumerate(parts.conditions):
-        algebraic[f"condition of {path}" + " " * number] = sp.expand(condition.subs(known))
-    candidates = _candidates(writer, junctions, parts)
-    solved, algebraic = eliminate(algebraic, candidates)
+    idle = [b for j, b in parts.balances.items() if j not in parts.rates and j not in open_flows]
+    algebraic = [sp.expand(e.subs(known)) for e in [*idle, *(condition for _, condition in parts.conditions)]]
+    solved, algebraic = eliminate(algebraic, _candidates(writer, junctions, parts))
     known = {symbol: settled(e, solved) for symbol, e in known.items()} | solved
 
     def final(expression: Expr) -> Expr:
@@ -229,8 +220,8 @@ def _reduced(writer: Writer) -> Iterator[Equation]:
     for junction, rate in parts.rates.items():
         quantity = parts.storages[junction][1]
         flow = final(rate - parts.balances[junction])
-        yield Equation(_rate(writer, junction, quantity), _moving(writer, junction, quantity, flow), "states")
-    for expression in algebraic.values():
+        yield Equation(writer.words.rate(junction, quantity), _moving(writer, junction, quantity, flow), "states")
+    for expression in algebraic:
         if final(expression) != 0:
             yield Equation(sp.Integer(0), final(expression), "conditions")
     for slot in outer:

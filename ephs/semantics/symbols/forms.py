@@ -14,7 +14,7 @@ from ephs.semantics.symbols.algebra import Expr, sp
 from ephs.semantics.symbols.programs import PRESSURE, TEMPERATURE, Base, relation_program, storage_program
 from ephs.semantics.symbols.tracing import Trace, Untraceable, symbols_of, trace
 
-__all__ = ["StorageForm", "irreversible_kernel", "reversible_kernel", "storage_form"]
+__all__ = ["StorageForm", "irreversible_kernel", "reversible_kernel", "stacked", "storage_form"]
 
 KERNELS = "ephs.semantics.symbols.traced_kernels"
 LARGEST = 16
@@ -70,13 +70,8 @@ def reversible_kernel(interface: Interface, reads: tuple[Path, ...], formula: Fo
     states, base = _states(interface, reads)
     n, k = bundle.size, multipliers
     efforts, forces = tuple(sp.symbols(f"e_:{n}", real=True)), tuple(sp.symbols(f"lambda_:{k}", real=True))
-    function = formula.function
-
-    def stacked(**x: Any) -> Any:
-        return _stacked(function(**x), n, k)
-
-    traced = trace(stacked, states)
-    skew, constraint = sp.Matrix(n, n, traced.outputs[: n * n]), sp.Matrix(k, n, traced.outputs[n * n :])
+    traced = trace(stacked(formula, n, k), states)
+    skew, constraint = (sp.Matrix(len(rows), n, list(rows.flat)) for rows in np.split(traced.outputs, [n]))
     e, lam = sp.Matrix(n, 1, efforts), sp.Matrix(k, 1, forces)
     flows = (skew * e + constraint.T * lam) if k else skew * e
     conditions = constraint * e if k else sp.Matrix(0, 1, [])
@@ -106,11 +101,17 @@ def irreversible_kernel(interface: Interface, reads: tuple[Path, ...], formula: 
     return _relation(interface, reads, base, traced, (flows, ()), (tuple(efforts), ()))
 
 
-def _stacked(matrices: tuple[Any, Any], n: int, k: int) -> Any:
-    skew, constraint = matrices
-    parts = [np.zeros(n * n) if skew is None else np.asarray(skew, dtype=object).reshape(n * n)]
-    parts.append(np.zeros(k * n) if constraint is None else np.asarray(constraint, dtype=object).reshape(k * n))
-    return np.concatenate(parts).astype(object)
+def stacked(formula: Formula, n: int, multipliers: int) -> Callable[..., Any]:
+    """The two matrices of a reversible structure as one: L (n, n) above C (k, n)."""
+    function, k = formula.function, multipliers
+
+    def both(**x: Any) -> Any:
+        skew, constraint = function(**x)
+        upper = np.zeros((n, n)) if skew is None else np.asarray(skew, dtype=object)
+        lower = np.zeros((k, n)) if constraint is None else np.asarray(constraint, dtype=object)
+        return np.vstack([upper.reshape(n, n), lower.reshape(k, n)]).astype(object)
+
+    return both
 
 
 def _states(interface: Interface, ports: tuple[Path, ...]) -> tuple[dict[str, Any], Base]:

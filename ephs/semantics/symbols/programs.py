@@ -9,7 +9,7 @@ import importlib.util
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path as File
 from typing import Any, final
 
@@ -152,12 +152,10 @@ def _plain(source: str) -> Callable[..., Any]:
     text = "\n".join(lines).replace(
         "def value(dims, scal, p, x0, v, e, lam, f, c, jac, work)", "def value(scal, p, x0, e, lam, f, c, jac)"
     )
-    names: dict[str, Any] = {}
-    exec(compile(text, "<formula>", "exec"), names)  # the text is our own, written from expressions
-    return names["value"]
+    return _unstored(text)
 
 
-@lru_cache(maxsize=512)
+@cache  # without a limit: a function that is dropped would leave its address behind in models
 def address_of_source(source: str) -> tuple[int, Any]:
     """(address, what keeps it alive) of a program's compiled function; kept on disk where there is a cache."""
     from ephs.semantics.kernel_table import SIGNATURE

@@ -11,11 +11,12 @@ import numpy as np
 
 from ephs.operad import Path, Quantity
 from ephs.semantics.bundle import Array
-from ephs.semantics.primitives import Formula, Irreversible, Primitive, Reversible, Storage
+from ephs.semantics.primitives import Irreversible, Primitive, Reversible, Storage
 from ephs.semantics.symbols.algebra import Expr, sp
+from ephs.semantics.symbols.forms import stacked
 from ephs.semantics.symbols.programs import PRESSURE, TEMPERATURE
 from ephs.semantics.symbols.tracing import Untraceable, trace
-from ephs.semantics.symbols.words import Words, latex_name, operator, pairing, plain
+from ephs.semantics.symbols.words import Words, curved, latex_name, operator, pairing, plain
 
 __all__ = ["Said", "Voice", "formula_symbols", "formula_text", "say"]
 
@@ -118,7 +119,10 @@ def formula_symbols(primitive: Primitive, parameter: Callable[[str], Expr], argu
     if formula is None:
         raise Untraceable("no formula")
     given = {**arguments, **{name: parameter(name) for name in formula.parameters}}
-    return trace(_function(primitive, formula), given).numbered
+    function = formula.function
+    if isinstance(primitive, Reversible):
+        function = stacked(formula, primitive.bundle.size, primitive.multipliers)
+    return trace(function, given).numbered
 
 
 def formula_text(primitive: Primitive) -> str:
@@ -139,21 +143,6 @@ def formula_text(primitive: Primitive) -> str:
     n = primitive.bundle.size
     parts = [("L", found[:n]), ("C", found[n:])]
     return ", ".join(f"{name} = {matrix.tolist()}" for name, matrix in parts if matrix.any())
-
-
-def _function(primitive: Primitive, formula: Formula) -> Callable[..., Any]:
-    """A reversible component's function gives two matrices: here one below the other."""
-    if not isinstance(primitive, Reversible):
-        return formula.function
-    function, n, k = formula.function, primitive.bundle.size, primitive.multipliers
-
-    def stacked(**x: Any) -> Any:
-        skew, constraint = function(**x)
-        upper = np.zeros((n, n)) if skew is None else np.asarray(skew)
-        lower = np.zeros((k, n)) if constraint is None else np.asarray(constraint)
-        return np.vstack([upper.astype(object).reshape(n, n), lower.astype(object).reshape(k, n)])
-
-    return stacked
 
 
 def _intensive(quantity: Quantity) -> Expr:
@@ -183,8 +172,7 @@ def _slopes(voice: Voice, storage: Storage) -> dict[Path, Expr]:
             slope = operator("differential", voice.label, x)
         else:
             slope = operator("partial", voice.label, x, sp.Tuple(*states))
-        group = quantity.space.dim != quantity.space.size or quantity.kind in ("pose", "relative_pose")
-        out[port] = operator("cotangent", x) * slope if group else slope
+        out[port] = operator("cotangent", x) * slope if curved(quantity) else slope
     return out
 
 

@@ -9,7 +9,7 @@ from typing import Any, final
 from ephs.operad import Path, Quantity
 from ephs.semantics.symbols.algebra import Expr, sp
 
-__all__ = ["OPERATORS", "Words", "latex_name", "operator", "pairing", "plain"]
+__all__ = ["OPERATORS", "Words", "curved", "latex_name", "operator", "pairing", "plain"]
 
 OPERATORS: dict[str, tuple[str, str]] = {
     "tangent": ("TL({0})", r"\mathrm{{T}}_e L_{{{0}}}"),
@@ -85,6 +85,11 @@ def plain(quantity: Quantity) -> bool:
     return quantity.space.name == "real" and quantity.space.dim == 1
 
 
+def curved(quantity: Quantity) -> bool:
+    """Whether states are elements of a group, and rates and covectors left-trivialised."""
+    return quantity.space.name != "real" and not quantity.space.name.endswith("*")
+
+
 @final
 class Words:
     """The symbols of one system, each with its LaTeX name."""
@@ -124,16 +129,12 @@ class Words:
         """The path of a component, as a subscript."""
         return self.symbol(str(path), _label(path), scalar=False)
 
-    def parameter(self, name: str, owner: Path | None) -> Expr:
+    def parameter(self, name: str, owner: Path | None, *, positive: bool) -> Expr:
         """A component's parameter; with its owner's path where others have one of this name."""
         greek = {"mu": r"\mu", "theta": r"\theta"}.get(name, latex_name(Path.of(name)))
         text = name if owner is None else f"{owner}.{name}"
-        return self.symbol(
-            text,
-            greek if owner is None else _beside(greek, _label(owner)),
-            scalar=True,
-            positive=name not in ("r", "d"),
-        )
+        latex = greek if owner is None else _beside(greek, _label(owner))
+        return self.symbol(text, latex, scalar=True, positive=positive)
 
 
 def latex_name(path: Path) -> str:

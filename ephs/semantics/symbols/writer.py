@@ -62,8 +62,12 @@ class Writer:
     def voice(self, path: Path, primitive: Primitive, effort: Callable[[Path, Quantity], Expr]) -> Voice:
         """A component with the symbols of its surroundings."""
 
+        values = dict(primitive.parameters)
+
         def parameter(name: str) -> Expr:
-            return self.words.parameter(name, path if name in self._shared else None)
+            value = values[name]
+            positive = isinstance(value, (int, float)) and value > 0.0  # the symbol stands for this number
+            return self.words.parameter(name, path if name in self._shared else None, positive=positive)
 
         x = {str(port): self.words.state(*self.state(path, port)) for port in primitive.reads}
         e = {str(port): effort(port, primitive.bundle.quantity(port)) for port in primitive.bundle.ports}

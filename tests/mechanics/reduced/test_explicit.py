@@ -83,9 +83,10 @@ def test_a_four_bar_passes_through_its_singular_configuration(tolerance):
     sol = ephs.simulate(
         case.scene(), case.time, method="rk87", rtol=tolerance, atol=tolerance, save_at=np.linspace(0.0, case.time, 50)
     )
-    assert case.error(sol) <= 1e-5
+    # some thousand steps' tolerances, and what a passage leaves
+    assert case.error(sol) <= 3e3 * tolerance + 1e-8
     assert sol.constraint_error.max() <= 1e-10
-    assert sol.energy_error.max() <= 1e-5
+    assert sol.energy_error.max() <= 3e3 * tolerance + 1e-8
 
 
 @pytest.mark.parametrize(("method", "order", "steps"), [("rk54", 5, (40, 80)), ("rk87", 8, (10, 20))])
@@ -104,12 +105,8 @@ def test_dense_output_has_the_order_of_the_steps():
     every = ephs.simulate(scene, 1.0, save_at=times, **TIGHT)
     for t in (7, 22):
         alone = ephs.simulate(scene, times[t], save_at=[times[t]], **TIGHT)
-        off = (
-            np.abs(every.body("b1").position[t] - alone.body("b1").position[-1])
-            if "b1" in dict(scene.all_bodies())
-            else 0
-        )
-        assert np.max(off) <= 1e-8
+        for name, _ in scene.all_bodies():
+            assert np.abs(every.body(name).position[t] - alone.body(name).position[-1]).max() <= 1e-8
     assert np.array_equal(every.t, times)
 
 
@@ -165,6 +162,33 @@ def test_few_unknowns_are_left():
     assert reduced.freedoms == 3
     assert len(reduced.cut) == 1
     assert reduced.unknowns < 0.1 * model.unknowns
+    summary = ephs.simulate(scene, 0.1, **TIGHT).summary()
+    assert summary["unknowns"] == {"paper": model.unknowns, "used": reduced.unknowns}
+
+
+def test_a_loop_of_prescribed_joints_is_refused_by_name(tmp_path):
+    text = """
+    format = 1
+    [bodies.bar]
+    mass = 1.0
+    inertia = [0.1, 0.1, 0.1]
+    [joints.left]
+    type = "revolute"
+    bodies = ["ground", "bar"]
+    at = [0.0, 0.0, 0.0]
+    axis = [1.0, 0.0, 0.0]
+    motion = { rate = 0.0 }
+    [joints.right]
+    type = "revolute"
+    bodies = ["ground", "bar"]
+    at = [0.5, 0.0, 0.0]
+    axis = [1.0, 0.0, 0.0]
+    motion = { rate = 0.0 }
+    """
+    file = tmp_path / "held.toml"
+    file.write_text(text)
+    with pytest.raises(ephs.OptionError, match=r"that of (left|right), which closes a loop of prescribed joints"):
+        ephs.simulate(ephs.load(file), 0.1, **TIGHT)
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,7 @@ from ephs.semantics.symbols.tracing import Untraceable, trace
 from ephs.semantics.symbols.voices import formula_text
 from tests.semantics.test_primitives import ARGUMENTS
 
-UNARY = [np.sin, np.cos, np.tanh, np.arctan, np.exp, np.cosh, math.cos, math.sinh, math.atan, math.expm1, abs]
+UNARY = [np.sin, np.cos, np.tanh, np.arctan, np.exp, np.cosh, np.sinh, np.expm1, abs]
 seeds = st.integers(0, 2**20)
 
 
@@ -58,19 +58,13 @@ def value(tree, x, y):
 @given(branches(), st.floats(0.3, 2.0), st.floats(0.3, 2.0))
 def test_symbols_say_what_numbers_say(tree, x, y):
     one, two = sp.symbols("x y", real=True)
-    try:
-        traced = trace(lambda x, y: plain(value(tree, x, y)), {"x": one, "y": two})
+    traced = trace(lambda x, y: value(tree, x, y), {"x": one, "y": two})
+    with np.errstate(over="ignore", invalid="ignore"):
         expected = float(value(tree, x, y))
-    except (Untraceable, OverflowError):
-        return  # functions of `math` that a tree holds as values are not found
     if not abs(expected) < 1e6:
         return
     found = float(traced.numbered.item().subs({one: x, two: y}))
     assert abs(found - expected) <= 1e-9 * (1.0 + abs(expected))
-
-
-def plain(entry):
-    return entry
 
 
 def helper(q):
