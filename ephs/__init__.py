@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from ephs.mechanics.check import check_model as check_model
+    from ephs.mechanics.methods import register_method as register_method
     from ephs.mechanics.scene import Scene as Scene
     from ephs.mechanics.scene import SceneError as SceneError
     from ephs.mechanics.scene.load import load as load
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from ephs.mechanics.solve.errors import Interrupted as Interrupted
     from ephs.mechanics.solve.errors import OptionError as OptionError
     from ephs.mechanics.solve.errors import SimulationError as SimulationError
+    from ephs.mechanics.solve.events import Event as Event
     from ephs.mechanics.solve.solution import Solution as Solution
     from ephs.operad import Directory as Directory
     from ephs.operad import Path as Path
@@ -63,8 +65,10 @@ _HOMES = {
     "ephs.mechanics.scene": ("Scene", "SceneError"),
     "ephs.mechanics.scene.load": ("load",),
     "ephs.mechanics.check": ("check_model",),
+    "ephs.mechanics.methods": ("register_method",),
     "ephs.mechanics.simulate": ("load_solution", "simulate"),
     "ephs.mechanics.solve.errors": ("Interrupted", "OptionError", "SimulationError"),
+    "ephs.mechanics.solve.events": ("Event",),
     "ephs.mechanics.solve.solution": ("Solution",),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import App, CycloptsError, Parameter
 
+from ephs.cli_charts import charts
 from ephs.cli_input import EXTRAS, TEXTS, BadInput, Base, addressed, load_model, naming
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ Exergetic port-Hamiltonian systems: compose physical models by pattern, simulate
   ephs check scenes/slider-crank.toml             check the model: structure, laws, assembly, mobility
   ephs draw scenes/slider-crank.toml -o a.svg     draw the interconnection pattern
   ephs equations scenes/slider-crank.toml         print the equations; --latex for a paper
+  ephs chart stability -o out/charts              draw where which method fails; work-precision: its speed and error
 
 SCENE is a scene file (.toml), or FILE.py:NAME, a System or Scene of that name in a Python file of yours.
 ephs COMMAND --help explains a command."""
@@ -62,11 +64,16 @@ app = App(
 )
 
 
+KEPT = 500
+"""Intervals at whose ends results are kept where steps are chosen."""
+
+
 def _positive(_type: object, value: float | None) -> None:
     if value is not None and not (value > 0 and math.isfinite(value)):
         raise ValueError(f"found {value:g}, expected a positive finite number")
 
 
+app.command(charts)
 Positive = Annotated[float | None, Parameter(validator=_positive)]
 
 
@@ -108,7 +115,7 @@ def run(
     atol
         Absolute tolerance, for methods that choose their step.
     step
-        Constant step size, in seconds.
+        Constant step size, in seconds; without it 501 even instants are kept.
     form
         Which form of the equations is integrated.
     initial
@@ -136,6 +143,8 @@ def run(
         "form": form,
     }
     chosen: dict[str, Any] = {key: value for key, value in given.items() if value is not None}
+    if step is None:  # steps that are chosen may be long: pictures want more
+        chosen["save_at"] = [until * k / KEPT for k in range(KEPT + 1)]
     try:
         with addressed(scene, folder), _progress(name) as progress:
             solution = ephs.simulate(model, until, progress=progress, **chosen)

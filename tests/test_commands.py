@@ -27,13 +27,14 @@ def test_run_writes_the_result_folder(tmp_path, capsys):
     assert main(["run", str(ROOT / "scenes/slider-crank.toml"), "--until", "0.2", "--out", str(tmp_path)]) == 0
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert summary["scene"] == "slider-crank"
-    assert summary["method"] == "natural"
+    assert summary["method"] == "rk87"
     assert summary["t_end"] == 0.2
     assert summary["mobility"] == 1
     assert set(summary["bodies"]) == {"crank", "rod", "slider"}
     assert summary["thermal"]["housing"]["temperature"] > 293.15
-    for key in ("max_energy_error", "max_constraint_error", "max_velocity_error"):
-        assert summary[key] < 1e-12
+    assert summary["max_energy_error"] < 1e-6  # the tolerance where none is given
+    for key in ("max_constraint_error", "max_velocity_error"):
+        assert summary[key] < 1e-10
     solution = ephs.load_solution(tmp_path / "solution.nc")
     assert solution.body("rod").position[-1].tolist() == summary["bodies"]["rod"]["position"]
     page = (tmp_path / "report.html").read_text()

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ephs.mechanics.redundancy import dependences, in_words, indeterminate, wrenches_in_words
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.simulate import problem_of_scene, problem_of_system
 from ephs.mechanics.solve.errors import SolveError
@@ -84,13 +85,11 @@ def _parts(problem: Problem) -> Iterator[CheckItem]:
 def _motion(problem: Problem) -> Iterator[CheckItem]:
     """Mobility, redundancy, closure, and the balances over some steps."""
     found = mobility(problem.descriptor, problem.descriptor.pack(problem.initial), problem.prescribed)
-    yield CheckItem("mobility", True, f"{found.mobility} independent motions in this configuration")
-    detail = f"{found.redundant} of the constraint equations depend on others"
-    if found.redundant:
-        detail += "; the motion is unique, their multipliers are not"
-    yield CheckItem("redundant constraints", True, detail)
+    motions = f"{found.mobility or 'no'} independent motion{'s' if found.mobility != 1 else ''}"
+    yield CheckItem("mobility", True, f"{motions} in this configuration")
+    yield from _redundancy(problem, found.redundant)
     try:
-        start = integrate(problem, Grid(0.0, STEPS * STEP, STEP), method="natural")
+        start = integrate(problem, Grid(0.0, STEPS * STEP, STEP))
     except (SolveError, RuntimeError) as error:
         yield CheckItem("motion", False, str(error))
         return
@@ -102,3 +101,19 @@ def _motion(problem: Problem) -> Iterator[CheckItem]:
     yield CheckItem("power balance", error < 1e-10, detail)
     least = float(start.stats["least_production"])
     yield CheckItem("entropy production", least >= 0.0, f"the least of a component in these steps is {least:.1e} J/K")
+
+
+def _redundancy(problem: Problem, count: int) -> Iterator[CheckItem]:
+    """Which constraints depend on which; of a system without a scene, only how many do."""
+    if problem.scene is None:
+        detail = f"{count} of the constraint equations depend on others"
+        if count:
+            detail += "; the motion is unique, their multipliers are not"
+        yield CheckItem("redundant constraints", True, detail)
+        return
+    repeated = dependences(problem.scene)
+    detail = in_words(repeated) or "none"
+    if repeated and not any(each.here for each in repeated):  # where motions part, none is unique
+        detail += "; the motion is unique all the same"
+    yield CheckItem("redundant constraints", True, detail)
+    yield CheckItem("joint wrenches", True, wrenches_in_words(indeterminate(problem.scene)))

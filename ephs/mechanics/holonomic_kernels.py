@@ -101,7 +101,7 @@ def holonomic(dims, scal, p, x0, v, e, lam, f, c, jac, work):
     pose_compose(g4, exp_side, g5)
     pose_log(g5, total)
     for i in range(6):
-        residual[i] = total[i] / h
+        residual[i] = total[i] / h if h != 0.0 else c_e[i]  # at an instant F is C e
         condition[i] = residual[i]
     # -- ∂F: right-trivialised variations of the factors, carried to the left end
     dexp_inv(total, back)

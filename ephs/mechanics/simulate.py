@@ -7,18 +7,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ephs.mechanics.build import component_path, drive_ports, initial_state, scene_inputs, scene_system, wrench_port
+from ephs.mechanics.methods import METHODS, Method, Setting, chosen, component_method
 from ephs.mechanics.motion import SceneMotion
-from ephs.mechanics.reduced import EXPLICIT
+from ephs.mechanics.redundancy import explain
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.mechanics.scene.model import Marker, Scene
-from ephs.mechanics.solve.adaptive import ADAPTIVE, Control, integrate_adaptive
+from ephs.mechanics.solve.control import Control, Tolerance
 from ephs.mechanics.solve.errors import OptionError
-from ephs.mechanics.solve.integrate import METHODS, Grid, integrate
+from ephs.mechanics.solve.events import events_of
+from ephs.mechanics.solve.integrate import Grid, integrate
+from ephs.mechanics.solve.loop import integrate_stepwise
 from ephs.mechanics.solve.problem import Problem, Signal
 from ephs.mechanics.solve.solution import Solution
 from ephs.operad import Path
 from ephs.semantics.bundle import POSITIVE, Array, Reference
+from ephs.semantics.checks import random_efforts
 from ephs.semantics.errors import AssemblyError
+from ephs.semantics.primitives import Irreversible
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.semantics.system import System
 
@@ -27,8 +32,6 @@ if TYPE_CHECKING:
 
 __all__ = ["load_solution", "problem_of_scene", "problem_of_system", "simulate"]
 
-STEPS = 1000
-"""Number of steps where neither a step nor anything else says how many."""
 FORMS = ("paper", "folded", "reduced")
 
 
@@ -39,8 +42,8 @@ def simulate(
     t0: float = 0.0,
     initial: Mapping[str, "ArrayLike"] | None = None,
     method: str = "auto",
-    rtol: float = 1e-6,
-    atol: float = 1e-9,
+    rtol: "float | Mapping[str, float]" = 1e-6,
+    atol: "float | Mapping[str, float]" = 1e-9,
     step: float | None = None,
     max_step: float | None = None,
     min_step: float | None = None,
@@ -58,23 +61,30 @@ def simulate(
     Parameters
     ----------
     until, t0
-        End and start in s.
+        End and start in s. An end before the start runs backward in time, where nothing produces entropy.
     initial
         Values of states by path; a system's others at the identity, a scene's as it says.
     method
-        ``"natural"``, which ``"auto"`` chooses too; ``"radau"``: order 5, stiff and adaptive, for systems whose states
-        are on vector spaces; ``"rk54"``, ``"rk87"``: explicit and adaptive, for scenes, on their reduced form.
+        One of `ephs.mechanics.methods.METHODS`: ``"natural"``, ``"natural4"``, ``"variational"``, ``"radau"``,
+        ``"alpha"``, ``"rk54"``, ``"rk87"``, ``"ida"``; or ``"auto"``: natural with ``step``; without it explicit, and
+        radau from where the problem shows itself stiff, for scenes, radau for systems on vector spaces.
     rtol, atol
-        Of adaptive methods: each state x is wanted to atol + rtol·|x| a step, atol in the state's own unit.
+        Without ``step``: each state x is wanted to atol + rtol·|x| a step, atol in the state's own unit. Either may be
+        a mapping from kinds of quantities or paths to numbers, ``"*"`` for all others.
     step
-        The grid is t₀ + k·step, the last step shortened to end on ``until``. Without it (until − t₀)/1000, or
-        ``max_step`` where that is smaller. The natural method's steps are constant: rtol, atol and min_step steer
-        adaptive methods only, and those only without ``step``.
+        The grid is t₀ + k·step, the last step shortened to end on ``until``. Without it rtol and atol steer.
+    max_step, min_step, max_steps
+        Limits for the steps in s that are chosen, and for their number.
     save_at
         Times to keep, met by dense output; every step where None.
     form
-        Equations as flattened, ``"paper"``, are what the natural method solves; ``"reduced"``, the default, is the
+        Equations as flattened, ``"paper"``, are what the natural methods solve; ``"reduced"``, the default, is the
         least that a method can use.
+    events
+        `ephs.Event` values or functions f(t, state) -> number, whose zeros are located, recorded in ``sol.events``,
+        and end the run where they say so.
+    options
+        The method's own: ``{"rho": 0.8}`` of alpha.
     inputs
         ``{port: {"effort": f}}`` or ``{"flow": f}`` at outer ports; of a scene also ``{"joints.pin": f}``, a
         generalised force on u_r, ``{"bodies.crank": f}``, a wrench in the body frame, and ``{"markers.tip": f}``, a
@@ -93,48 +103,96 @@ def simulate(
     OptionError
         An option is not known, or not possible with the method; a ValueError.
     """
-    chosen = _method(method)
     if form not in FORMS:
         raise OptionError("form", form, f"one of {', '.join(FORMS)}")
-    if form == "folded":
-        raise OptionError("form", form, f"paper or reduced, which the method {chosen} solves")
-    for name, value in (("events", events), ("options", options)):
-        if value:
-            raise OptionError(name, value, f"none: the method {chosen} takes no {name}")
     if isinstance(model, Scene):
         if reference is not None:
             raise OptionError("reference", reference, "none: a scene's [world] has its own")
         problem = problem_of_scene(model, initial, inputs)
     else:
         problem = problem_of_system(model, initial, inputs, reference)
-    times = _times(save_at, t0, until)
-    if chosen in (*ADAPTIVE, *EXPLICIT):
-        most = np.inf if max_step is None else float(max_step)
-        least = 0.0 if min_step is None else float(min_step)
-        control = Control(float(rtol), float(atol), None if step is None else float(step), least, most, max_steps)
-        if chosen in EXPLICIT:
-            if problem.scene is None:
-                raise OptionError("method", chosen, "natural or radau: explicit methods are for scenes")
-            if form != "reduced":
-                raise OptionError("form", form, f"reduced, which the method {chosen} solves")
-            from ephs.mechanics.reduced.run import integrate_reduced  # its kernels take a quarter of a second to load
-
-            return integrate_reduced(
-                problem, float(t0), float(until), method=chosen, control=control, save_at=times, progress=progress
-            )
-        return integrate_adaptive(
-            problem, float(t0), float(until), method=chosen, control=control, save_at=times, progress=progress
+    method_of = METHODS["natural4"] if method == "auto" and form == "paper" and step is None else None
+    chosen_method, reason = (method_of, "the paper's form") if method_of else chosen(method, problem, step=step)
+    _fits(form, chosen_method)
+    start, end = float(t0), float(until)
+    if not (np.isfinite(start) and np.isfinite(end) and end != start):
+        raise OptionError("until", until, f"a finite time other than t0 = {t0!r} s")
+    if end < start:
+        _reversible(problem, end)
+    control = _control(problem, rtol, atol, step, min_step, max_step, max_steps)
+    unknown = [key for key in options or {} if key not in chosen_method.options]
+    if unknown:
+        known = ", ".join(chosen_method.options) or "none"
+        raise OptionError("options", unknown[0], f"options of {chosen_method.name}: {known}")
+    times, watched = _times(save_at, start, end), events_of(events)
+    setting = Setting(problem, start, control, dict(options or {}))
+    if chosen_method.name in ("natural", "natural4") and control.step is not None and not watched and end > start:
+        return integrate(
+            problem,
+            Grid(start, end, control.step),
+            make=component_method(chosen_method.order),
+            save_at=times,
+            max_steps=max_steps,
+            progress=progress,
         )
-    span = float(until) - float(t0)
-    h = float(step) if step is not None else min(span / STEPS, float(max_step) if max_step is not None else np.inf)
-    return integrate(
+    return integrate_stepwise(
         problem,
-        Grid(float(t0), float(until), h),
-        method=chosen,
+        start,
+        end,
+        make=lambda: chosen_method.make(setting),
+        control=control,
+        events=watched,
         save_at=times,
-        max_steps=max_steps,
         progress=progress,
+        remarks={"auto": reason} if method == "auto" else {},
     )
+
+
+def _fits(form: str, method: Method) -> None:
+    reduced = not method.systems or method.name == "radau"
+    if form == "folded" or (form == "paper" and reduced):
+        raise OptionError("form", form, f"{'' if reduced else 'paper or '}reduced, which {method.name} solves")
+
+
+def _control(
+    problem: Problem,
+    rtol: "float | Mapping[str, float]",
+    atol: "float | Mapping[str, float]",
+    step: float | None,
+    min_step: float | None,
+    max_step: float | None,
+    max_steps: int | None,
+) -> Control:
+    relative, absolute = Tolerance.of("rtol", rtol, 1e-6), Tolerance.of("atol", atol, 1e-9)
+    states = [(slot.path, slot.quantity.kind) for slot in problem.descriptor.states]
+    relative.known("rtol", states)
+    absolute.known("atol", states)
+    return Control(
+        relative,
+        absolute,
+        None if step is None else float(step),
+        0.0 if min_step is None else float(min_step),
+        np.inf if max_step is None else float(max_step),
+        max_steps,
+    )
+
+
+def _reversible(problem: Problem, until: float) -> None:
+    """Refuse to run backward what produces entropy.
+
+    Raises
+    ------
+    OptionError
+        It names the component.
+    """
+    rng, d = np.random.default_rng(1), problem.descriptor
+    x = d.pack(problem.initial)
+    for slot in d.components:
+        if isinstance(slot.primitive, Irreversible):
+            e = random_efforts(slot.primitive.bundle, rng)
+            if np.any(slot.primitive.flow(d.point(slot, x), e, problem.reference)):
+                expected = f"a time after t0: {slot.path} produces entropy, which does not run backward"
+                raise OptionError("until", until, expected)
 
 
 def problem_of_system(
@@ -191,6 +249,7 @@ def problem_of_scene(
         motion=lambda solution: SceneMotion(scene, solution),
         scene=scene,
         document=scene_to_text(scene),
+        dependences=lambda: explain(scene),
     )
 
 
@@ -275,20 +334,13 @@ def _at_marker(marker: Marker, force: Signal) -> Signal:
     return Signal(wrench)
 
 
-def _method(name: str) -> str:
-    if name == "auto":
-        return "natural"
-    if name not in (*METHODS, *ADAPTIVE, *EXPLICIT):
-        raise OptionError("method", name, f"one of auto, {', '.join([*METHODS, *ADAPTIVE, *EXPLICIT])}")
-    return name
-
-
 def _times(save_at: "ArrayLike | None", t0: float, until: float) -> Array | None:
     if save_at is None:
         return None
     times = np.atleast_1d(np.asarray(save_at, dtype=float))
-    if times.ndim != 1 or not np.all(np.isfinite(times)) or np.any(np.diff(times) <= 0.0):
-        raise OptionError("save_at", save_at, "ascending times in s")
-    if times.size and not (t0 <= times[0] and times[-1] <= until):
-        raise OptionError("save_at", save_at, f"times in [{t0!r}, {until!r}] s")
+    forward = until > t0
+    if times.ndim != 1 or not np.all(np.isfinite(times)) or np.any(np.diff(times if forward else -times) <= 0.0):
+        raise OptionError("save_at", save_at, "ascending times in s" if forward else "descending times in s")
+    if times.size and not (min(t0, until) <= times.min() and times.max() <= max(t0, until)):
+        raise OptionError("save_at", save_at, f"times in [{min(t0, until)!r}, {max(t0, until)!r}] s")
     return times

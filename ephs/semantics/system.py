@@ -13,7 +13,7 @@ from ephs.operad import ROOT, Directory, Interface, Nesting, Path, Pattern, Quan
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.errors import AssemblyError, SemanticsError
 from ephs.semantics.primitives import Irreversible, Primitive, Reversible, Storage
-from ephs.semantics.spaces import manifold
+from ephs.semantics.spaces import Pair, manifold
 
 if TYPE_CHECKING:
     from ephs.semantics.descriptor import Descriptor
@@ -148,6 +148,8 @@ class System:
                 raise AssemblyError("unknown-state", name, expected=_names(set(states)))
             space = states[path].space
             array = np.atleast_1d(np.asarray(value, dtype=float))
+            if states[path].kind == "relative_pose" and array.shape == (space.dim,) != (space.size,):
+                array = Pair.from_space(space).element(array)  # as solutions give them
             if array.shape != (space.size,):
                 raise AssemblyError(
                     "state", name, found=array.shape, expected=(space.size,), quantity=states[path].kind

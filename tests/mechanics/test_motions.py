@@ -11,8 +11,8 @@ import ephs
 from benchmarks.cases import CASES
 from ephs.mechanics import components, joint, rigid_body
 from ephs.mechanics.build import initial_state, scene_system
+from ephs.mechanics.methods import METHODS
 from ephs.mechanics.scene.model import frozen
-from ephs.mechanics.solve.integrate import METHODS
 from ephs.operad import quantity as Q
 from ephs.semantics import Reference
 from ephs.semantics.laws import Probe, system_law
@@ -85,27 +85,37 @@ def test_loops_and_all_pairs_and_heat_are_generated():
         find(mechanisms(), lambda s, kind=kind: any(j.kind == kind for j in s.joints.values()), settings=quick)
 
 
-@pytest.mark.parametrize("method", METHODS)
+STEPS = {2: (0.01, 0.005), 4: (0.04, 0.02), 5: (0.05, 0.025), 8: (0.1, 0.05)}
+BALANCED = ("natural", "natural4")
+
+
+@pytest.mark.parametrize("method", [m.name for m in METHODS.values() if m.fixed and m.scenes])
 @pytest.mark.parametrize("kind", [*PAIRS, "universal"])
 def test_every_pair_with_every_method(kind, method):
-    """One body on another on the ground, rubbing, heating a node: balances, closure, and order two."""
+    """One body on another on the ground, rubbing, heating a node: balances, closure, and the method's order."""
     scenes = mechanisms(max_bodies=2, kinds=(kind,), loops=False)
     # A search for one example, however long: `find` has no law to be slow at.
     quick = settings(max_examples=500, database=None, derandomize=True, suppress_health_check=list(HealthCheck))
     scene = find(scenes, lambda s: len(s.bodies) == 2 and bool(s.thermal) and np.any(s.springs), settings=quick)
-    ends = []
-    for h in (0.01, 0.005, 0.0025):
+
+    def end(sol):
+        return np.concatenate([sol.body(name).position[-1] for name in scene.bodies])
+
+    exact = end(ephs.simulate(scene, 0.2, method="rk87", rtol=1e-13, atol=1e-13))
+    order, errors = METHODS[method].order, []
+    for h in STEPS[order]:
         sol = ephs.simulate(scene, 0.2, method=method, step=h)
-        assert sol.energy_error.max() <= 1e-12
+        assert sol.energy_error.max() <= (1e-12 if method in BALANCED else 1e-3)
         assert sol.constraint_error.max() <= 1e-12
         assert sol.velocity_error.max() <= 1e-11
         assert sol.stats["least_production"] >= 0.0
-        ends.append(np.concatenate([sol.body(name).position[-1] for name in scene.bodies]))
+        errors.append(np.abs(end(sol) - exact).max())
     if kind == "fixed":  # nothing moves
-        assert np.abs(ends[0] - ends[2]).max() <= 1e-15
+        assert max(errors) <= 1e-15
         return
-    change = np.linalg.norm(ends[0] - ends[1]) / np.linalg.norm(ends[1] - ends[2])
-    assert np.log2(change) == pytest.approx(METHODS[method].order, abs=0.25)
+    observed = np.log2(errors[0] / errors[1])
+    assert observed >= order - (0.1 if order <= 4 else 0.5)
+    assert observed <= order + 0.25 or errors[0] < 1e-6  # no method is better than it says where errors can be seen
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)

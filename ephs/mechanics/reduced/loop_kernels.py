@@ -196,8 +196,9 @@ def accelerate(t, w, q, r, s, drive, wrench, scal, r_rate, s_rate, made, powers)
     status, component = forces(t, w, q, r, s, drive, wrench, scal, s_rate, made, powers)
     if status != 0:
         return status, component
-    if inertia_sweep(t, w) != 0:
-        return 20, 0
+    still = inertia_sweep(t, w)
+    if still != 0:
+        return 20, still - 1
     for i in range(n):  # M⁻¹ force
         entry = w.force[i]
         for k in range(i):

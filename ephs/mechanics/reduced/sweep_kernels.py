@@ -36,7 +36,7 @@ def _component(t, w, number, scal, x):
 
 
 @kernel
-def _cross_momentum(u, p, out):
+def cross_momentum(u, p, out):
     """ad*_u p."""
     out[0] = p[1] * u[2] - p[2] * u[1] + p[4] * u[5] - p[5] * u[4]
     out[1] = p[2] * u[0] - p[0] * u[2] + p[5] * u[3] - p[3] * u[5]
@@ -189,7 +189,7 @@ def forces(t, w, q, r, s, drive, wrench, scal, s_rate, made, powers):
             for j in range(6):
                 momentum[k] += t.inertia[i, k, j] * w.twist[i, j]
                 w.load[i, k] += t.inertia[i, k, j] * w.bias[i, j]
-        _cross_momentum(w.twist[i], momentum, turned)
+        cross_momentum(w.twist[i], momentum, turned)
         for k in range(6):
             w.load[i, k] -= turned[k]
         if t.weight[i] >= 0:

@@ -26,6 +26,8 @@ class Outcome(StrEnum):
     TINY = "a step below the least that is allowed"
     MANY = "more steps than are allowed"
     UNDETERMINED = "the motion is not determined"
+    EVENT = "an event's function has no value"
+    IRREVERSIBLE = "friction or heat, which do not run backwards"
     INTERRUPTED = "interrupted"
 
 
@@ -42,7 +44,9 @@ _ADVICE = {
     Outcome.INCONSISTENT: "give initial values that satisfy the constraints",
     Outcome.TINY: "loosen rtol and atol, lower min_step, or look for a singularity at this time",
     Outcome.MANY: "raise max_steps, or loosen rtol and atol",
-    Outcome.UNDETERMINED: "add what gives the effort there: a storage, friction, or a constraint",
+    Outcome.UNDETERMINED: "add what determines it there: a storage, friction, or a constraint",
+    Outcome.EVENT: "see the exception above this one, or give a function that is a number everywhere",
+    Outcome.IRREVERSIBLE: "run forward in time, or take friction and conduction out",
     Outcome.INTERRUPTED: "what was computed is in .partial",
 }
 _OF_KERNEL = {1: Outcome.TURN, 2: Outcome.TEMPERATURE, 3: Outcome.PYTHON, 4: Outcome.EXTENT, 5: Outcome.DOMAIN}

@@ -8,6 +8,7 @@ from typing import Any, Protocol, final
 
 import numpy as np
 
+from ephs.mechanics.solve.driven import ComponentMethod, advance_driven
 from ephs.mechanics.solve.errors import Interrupted, OptionError, Outcome, SimulationError, SolveError
 from ephs.mechanics.solve.ledger import ledgers
 from ephs.mechanics.solve.model import Model, compile_model
@@ -19,10 +20,8 @@ from ephs.operad import Quantity
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import Pair
 
-__all__ = ["METHODS", "Grid", "Progress", "failures_of", "integrate", "solution_of"]
+__all__ = ["Grid", "Progress", "failures_of", "integrate", "solution_of"]
 
-METHODS: dict[str, Callable[[Model], Natural]] = {"natural": Natural}
-"""Method name -> what makes it for a compiled model."""
 RESPONSE = 0.1
 """Wanted seconds between two looks at progress and Ctrl-C."""
 LARGEST_CHUNK = 4096
@@ -67,13 +66,12 @@ def integrate(
     problem: Problem,
     grid: Grid,
     *,
-    method: str,
-    form: str = "paper",
+    make: Callable[[Model], ComponentMethod] = Natural,
     save_at: Array | None = None,
     max_steps: int | None = None,
     progress: Progress | None = None,
 ) -> Solution:
-    """Solve an initial value problem on a grid.
+    """Solve an initial value problem on a grid, forward in time, by a method that discretises component by component.
 
     Raises
     ------
@@ -84,8 +82,8 @@ def integrate(
     d = problem.descriptor
     x0 = d.pack(problem.initial)
     model = compile_model(d, problem.reference, problem.inputs(grid.t0, problem.initial))
-    stepper = METHODS[method](model)
-    run = _Run(problem, grid, stepper, Recorder(d, grid.t0, x0, save_at), form, begin, progress)
+    stepper = make(model)
+    run = _Run(problem, grid, stepper, Recorder(d, grid.t0, x0, save_at), begin, progress)
     with failures_of(run):
         run.recorder.start(stepper.energies(x0))
         run.state = stepper.init(x0)
@@ -101,6 +99,7 @@ class Run(Protocol):
     """A run in progress: where it stands, and what it has so far."""
 
     t: float
+    problem: Problem
 
     def solution(self) -> Solution:
         """The solution so far."""
@@ -114,7 +113,11 @@ def failures_of(run: Run) -> Generator[None, None, None]:
         yield
     except SolveError as error:
         failed = Interrupted if isinstance(error.cause, KeyboardInterrupt) else SimulationError
-        raise failed(error.outcome, run.t, error.path, error.equation, run.solution()) from error.cause
+        told = [error.equation]
+        if error.outcome in (Outcome.SINGULAR, Outcome.CONTRADICTION, Outcome.DIVERGED) and run.problem.dependences:
+            told.append(run.problem.dependences())
+        equation = "; ".join(filter(None, told))
+        raise failed(error.outcome, run.t, error.path, equation, run.solution()) from error.cause
     except KeyboardInterrupt as error:
         raise Interrupted(Outcome.INTERRUPTED, run.t, "", "", run.solution()) from error
 
@@ -134,14 +137,13 @@ class _Run:
         self,
         problem: Problem,
         grid: Grid,
-        stepper: Natural,
+        stepper: ComponentMethod,
         recorder: Recorder,
-        form: str,
         begin: float,
         progress: Progress | None,
     ) -> None:
         self.problem, self.grid, self.stepper, self.recorder = problem, grid, stepper, recorder
-        self.form, self.begin, self.progress = form, begin, progress
+        self.begin, self.progress = begin, progress
         self.t, self.setup, self.steps, self.iterations = grid.t0, 0.0, 0, 0
 
     def full_steps(self, max_steps: int | None) -> None:
@@ -161,8 +163,10 @@ class _Run:
 
     def take(self, h: float, count: int, end: float | None) -> None:
         """Some steps of one length; ``end`` is their exact end where the grid would round it."""
-        inputs = None if self.problem.constant else self._inputs(h)
-        self.state, chunk = self.stepper.advance(self.state, h, count, inputs)
+        if self.problem.constant:
+            self.state, chunk = self.stepper.advance(self.state, h, count)
+        else:
+            self.state, chunk = advance_driven(self.problem, self.stepper, self.state, self.t, h)
         self.iterations += chunk.iterations
         times = np.array([self.grid.time(self.steps + k + 1) for k in range(chunk.steps)])
         if h != self.grid.h:
@@ -181,25 +185,16 @@ class _Run:
             self.steps += chunk.steps
             self.t = float(times[-1])
 
-    def _inputs(self, h: float) -> Array:
-        """Inputs at the middle of the step, the states there guessed from the last rates."""
-        d, state = self.problem.descriptor, self.state
-        w = state.z[: d.rate_size] if self.steps else np.zeros(d.rate_size)
-        middle = d.advance(state.x, 0.5 * h * w)
-        given = self.problem.inputs(self.t + 0.5 * h, d.unpack(middle))
-        return np.concatenate([*(given[slot.path].value for slot in d.outer), np.zeros(1)])
-
     def stats(self) -> dict[str, Any]:
         """What the run did so far."""
-        analysis = self.stepper.analysis
         return {
             "method": self.stepper.name,
-            "form": self.form,
+            "form": "paper",
             "steps": self.steps,
             "rejected": 0,
             "iterations": self.iterations,
             "orders": self.stepper.changes,
-            "dependent_equations": len(analysis.redundant) if analysis is not None else 0,
+            "dependent_equations": len(self.stepper.redundant),
             "unknowns": self.stepper.model.unknowns,
             "setup_s": self.setup,
             "integrate_s": time.perf_counter() - self.begin - self.setup,

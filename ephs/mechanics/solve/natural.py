@@ -22,7 +22,7 @@ from ephs.mechanics.solve.natural_kernels import (
 )
 from ephs.semantics.bundle import Array
 
-__all__ = ["Chunk", "Natural", "NaturalState"]
+__all__ = ["Chunk", "Natural", "NaturalState", "guessed_efforts", "of_status"]
 
 SETTLING = 16
 """Steps after a change of order until the next: the values at the change itself may be exceptional."""
@@ -92,10 +92,13 @@ class Natural:
         The present order of elimination, None before the first step.
     changes
         How often the order was decided anew.
+    nodes
+        Where in a step inputs are wanted.
     """
 
     name = "natural"
     order = 2
+    nodes = (0.5,)
 
     def __init__(self, model: Model) -> None:
         self.model = model
@@ -106,12 +109,8 @@ class Natural:
 
     def init(self, x: Array) -> NaturalState:
         """The state of the method at the states x; unknowns are guessed from the efforts there."""
-        d, n_rate = self.model.descriptor, int(self.model.tables.counts[0])
-        z = np.zeros(self.model.unknowns)
-        for slot in d.components:
-            if slot.primitive.kind == "storage":
-                z[[n_rate + i for i in slot.efforts]] = slot.primitive.effort(d.point(slot, x), self.model.reference)
-        return NaturalState(x.copy(), z, z.copy(), np.zeros(4 + len(d.components)))
+        z = guessed_efforts(self.model, x)
+        return NaturalState(x.copy(), z, z.copy(), np.zeros(4 + len(self.model.descriptor.components)))
 
     def energies(self, x: Array) -> Array:
         """(components,): energy of each storage at the states x, zero elsewhere."""
@@ -152,10 +151,10 @@ class Natural:
         Parameters
         ----------
         inputs
-            Values at the outer ports during these steps, the model's own where None.
+            (1, …) values at the outer ports during these steps, the model's own where None.
         """
         model, t = self.model, self.model.tables
-        given = model.input_values() if inputs is None else inputs
+        given = model.input_values() if inputs is None else inputs[0]
         x, z, previous, sums = (a.copy() for a in (state.x, state.z, state.previous, state.sums))
         rows = np.empty((steps, x.size))
         energies, ledgers = np.empty((steps, t.kind.size)), np.empty((steps, 5))
@@ -186,11 +185,25 @@ class Natural:
             elif status >= COMPONENT:
                 failure = SolveError.of_component(status, model, component)
             elif fresh and not taken:
-                failure = SolveError(_OUTCOMES[status], "", "")
+                failure = of_status(status)
             else:
                 self.analysis, fresh, self._unsettled = None, True, SETTLING
         after = NaturalState(x, z, previous, sums)
         return after, Chunk(rows[:done], energies[:done], ledgers[:done], int(iterations), failure)
+
+    @property
+    def redundant(self) -> tuple[str, ...]:
+        """The equations that the method leaves out, in words."""
+        return self.analysis.redundant if self.analysis is not None else ()
+
+    def points(self, state: NaturalState, h: float, x: Array) -> list[Array]:
+        """The state in the middle of a step from x, by the rates that ``state`` holds."""
+        return self.stage_points(state, h, x)
+
+    def stage_points(self, state: NaturalState, h: float, x: Array) -> list[Array]:
+        """The state in the middle of the step from x that led to ``state``."""
+        d = self.model.descriptor
+        return [d.advance(x, 0.5 * h * state.z[: d.rate_size])]
 
     def _order(self, x: Array, z: Array, h: float) -> Analysis:
         if self.analysis is None:
@@ -204,3 +217,18 @@ class Natural:
             self._unsettled = max(0, self._unsettled - taken)
             if not self._unsettled:
                 self.analysis = None
+
+
+def guessed_efforts(model: Model, x: Array) -> Array:
+    """Unknowns at the states x: the efforts of storages, all else zero."""
+    d, n_rate = model.descriptor, int(model.tables.counts[0])
+    z = np.zeros(model.unknowns)
+    for slot in d.components:
+        if slot.primitive.kind == "storage":
+            z[[n_rate + i for i in slot.efforts]] = slot.primitive.effort(d.point(slot, x), model.reference)
+    return z
+
+
+def of_status(status: int) -> SolveError:
+    """What the compiled loop reported of a step as a whole."""
+    return SolveError(_OUTCOMES[status], "", "")

@@ -116,6 +116,8 @@ class Problem:
         Makes of a solution the motion in the terms of its field; None for a system that is not a scene.
     scene
         The scene that the system was built from, or None.
+    dependences
+        Says in words which constraints depend on which: what a run that fails at them tells its user.
     document
         The scene as text, for solution files.
     """
@@ -129,6 +131,7 @@ class Problem:
     motion: Callable[["Solution"], Motion] | None = None
     scene: Any = None
     document: str = ""
+    dependences: Callable[[], str] | None = None
 
     def inputs(self, t: float, state: State) -> dict[Path, Input]:
         """The inputs of the descriptor form at a time."""

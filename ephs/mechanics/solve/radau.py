@@ -6,7 +6,7 @@ nor a choice of causality is needed, and what is algebraic in them is met at the
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, final
 
 import numpy as np
@@ -14,20 +14,23 @@ from scipy.linalg import get_lapack_funcs
 from scipy.sparse.linalg import splu
 
 from ephs.mechanics.solve.continuous import Continuous, Matrices
+from ephs.mechanics.solve.control import Control
 from ephs.mechanics.solve.errors import Outcome, SolveError
-from ephs.mechanics.solve.model import Model
+from ephs.mechanics.solve.loop import Attempt, Row
+from ephs.mechanics.solve.model import compile_model
+from ephs.mechanics.solve.natural_kernels import IRREVERSIBLE
+from ephs.mechanics.solve.problem import Problem
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.codes import VECTOR
 
-__all__ = ["Radau", "RadauState", "Step"]
+__all__ = ["COEFFICIENTS", "NODES", "T_INVERSE", "VALUES", "Radau", "RadauState", "T"]
 
 _S6 = 6.0**0.5
 NODES = np.array([(4.0 - _S6) / 10.0, (4.0 + _S6) / 10.0, 1.0])
 DENSE = 48
 """Unknowns up to which factorising without regard to zeros is faster."""
 ITERATIONS = 10
-Inputs = Callable[[float, Array], Array]
 
 
 def _moments(nodes: Array, theta: float) -> Array:
@@ -37,12 +40,16 @@ def _moments(nodes: Array, theta: float) -> Array:
 
 
 COEFFICIENTS = np.array([_moments(NODES, node) for node in NODES])
-_VALUES, _VECTORS = np.linalg.eig(COEFFICIENTS)
-_REAL = int(np.argmin(np.abs(np.imag(_VALUES))))
-_COMPLEX = int(np.argmax(np.imag(_VALUES)))
-_PAIR = int(np.argmin(np.imag(_VALUES)))
-GAMMA = float(_VALUES[_REAL].real)
-T = _VECTORS[:, [_REAL, _COMPLEX, _PAIR]]
+_EIGENVALUES, _VECTORS = np.linalg.eig(COEFFICIENTS)
+_ORDER = [
+    int(np.argmin(np.abs(np.imag(_EIGENVALUES)))),
+    int(np.argmax(np.imag(_EIGENVALUES))),
+    int(np.argmin(np.imag(_EIGENVALUES))),
+]
+VALUES = _EIGENVALUES[_ORDER]
+"""Eigenvalues of the coefficients: the real one, then the pair."""
+GAMMA = float(VALUES[0].real)
+T = _VECTORS[:, _ORDER]
 T_INVERSE = np.linalg.inv(T)
 # The embedded method of order 3 takes γ₀ of the rate at the start; its defect, weight by weight.
 _ORDER_3 = np.array([1.0 - GAMMA, 1.0 / 2.0, 1.0 / 3.0])
@@ -52,66 +59,49 @@ DEFECT = np.linalg.solve(np.vander(NODES, increasing=True).T, _ORDER_3) - COEFFI
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class RadauState:
-    """Where the method stands: time, states, and the unknowns there."""
+    """Where the method stands.
+
+    Parameters
+    ----------
+    x, z
+        The states, and the unknowns there: rates, efforts, multipliers, outer flows.
+    sums
+        (4 + components,): heat, energy supplied, exergy supplied, entropy made; entropy made by each component.
+    """
 
     t: float
     x: Array
     z: Array
-
-
-@final
-@dataclass(frozen=True, slots=True, eq=False)
-class Step:
-    """A step that was solved.
-
-    Parameters
-    ----------
-    start, h
-        From where, and how far in s.
-    stages
-        (3, unknowns) rates, efforts, multipliers, outer flows at the nodes.
-    error
-        Estimated error of the states, relative to the tolerances.
-    iterations
-        How many Newton iterations it took.
-    """
-
-    start: RadauState
-    h: float
-    stages: Array
-    end: RadauState
-    error: float
-    iterations: int
+    sums: Array
 
 
 @final
 class Radau:
-    """The method for one model on vector spaces.
-
-    Parameters
-    ----------
-    model
-        The compiled model.
-    inputs
-        Values at the outer ports, one after the other, from the time in s and the states (point_size,).
-    rtol, atol
-        A state x is wanted to atol + rtol·|x|.
-    """
+    """The method for one problem whose states are on vector spaces."""
 
     name = "radau"
     order = 5
+    exponent = 4.0
 
-    def __init__(self, model: Model, inputs: Inputs, rtol: float, atol: float) -> None:
-        self.model, self.equations, self.inputs = model, Continuous(model), inputs
-        self.rtol, self.atol = rtol, atol
-        self.evaluations = self.factorisations = 0
-        self._rates = int(model.tables.counts[0])
+    def __init__(self, problem: Problem, t0: float, control: Control) -> None:
+        self.problem = problem
+        self.model = compile_model(problem.descriptor, problem.reference, problem.inputs(t0, problem.initial))
+        self.equations = Continuous(self.model)
+        self.rtol, self.atol = control.rtol.rates(problem.descriptor), control.atol.rates(problem.descriptor)
+        self.evaluations = self.factorisations = self.iterations = 0
+        self._rates = int(self.model.tables.counts[0])
+        self._makers = self.model.tables.kind == IRREVERSIBLE
         self._matrices: Matrices | None = None
         self._solvers: tuple[float, Any, Any] | None = None
         self._current: RadauState | None = None
 
-    def init(self, t0: float, x: Array, h: float) -> RadauState:
-        """The state of the method; rates and multipliers there come from a step too short to move anything.
+    def inputs(self, t: float, x: Array) -> Array:
+        """Values at the outer ports, one after the other."""
+        given = self.problem.inputs(t, self.problem.descriptor.unpack(x))
+        return np.concatenate([*(given[slot.path].value for slot in self.problem.descriptor.outer), np.zeros(1)])
+
+    def start(self, t: float, h: float) -> RadauState:
+        """The initial state; rates and multipliers there come from a step too short to move anything.
 
         Raises
         ------
@@ -119,9 +109,10 @@ class Radau:
             The states contradict the constraints: however short the step, they jump. Or a state is on a Lie group.
         """
         d = self.model.descriptor
+        x = d.pack(self.problem.initial)
         for slot in d.states:
             if manifold(slot.quantity.space).code != VECTOR:
-                found = f"it is on {slot.quantity.space}, radau wants vector spaces"
+                found = f"it is on {slot.quantity.space}, radau wants vector spaces where there is no scene"
                 raise SolveError(Outcome.UNSUITED, str(slot.path), found)
         z = np.zeros(self.model.unknowns)
         for slot in d.components:
@@ -129,17 +120,21 @@ class Radau:
                 z[[self._rates + i for i in slot.efforts]] = slot.primitive.effort(
                     d.point(slot, x), self.model.reference
                 )
-        start = RadauState(t0, x.copy(), z)
-        first, second = (self.step(start, 1e-7 * h * part, estimate=False) for part in (1.0, 0.5))
-        jumps = [self._size(step.end.x - x, x) for step in (first, second)]
+        start = RadauState(t, x.copy(), z, np.zeros(4 + len(d.components)))
+        first, second = (self._solved(start, 1e-7 * h * part)[1] for part in (1.0, 0.5))
+        jumps = [self._size(end - x, x) for end in (first, second)]
         if jumps[1] > 0.75 * jumps[0] and jumps[1] > 1.0:
-            entry = int(np.argmax(np.abs(second.end.x - x) / (self.atol + self.rtol * np.abs(x))))
+            entry = int(np.argmax(np.abs(second - x) / (self.atol + self.rtol * np.abs(x))))
             state = next(slot for slot in d.states if slot.point.start <= entry < slot.point.stop)
             raise SolveError(Outcome.INCONSISTENT, str(state.path), "the constraints do not hold at the start")
+        z = self._solved(start, 0.5e-7 * h)[0][-1]
         self._matrices = None
-        return RadauState(t0, x.copy(), second.end.z)
+        return replace(start, z=z)
 
-    def step(self, state: RadauState, h: float, *, estimate: bool = True) -> Step:
+    def prepare(self, state: RadauState, h: float) -> None:
+        """Nothing is left to do: the start has evaluated everything."""
+
+    def step(self, state: RadauState, h: float) -> Attempt[RadauState]:
         """One step of h seconds, solved to a fraction of the tolerances.
 
         Raises
@@ -147,6 +142,48 @@ class Radau:
         SolveError
             The stages have no solution near by, or lie outside the domain of a component.
         """
+        stages, x, iterations = self._solved(state, h)
+        powers, least = self._powers(state, h, stages)
+        sums = state.sums + h * COEFFICIENTS[-1] @ powers
+        end = RadauState(state.t + h, x, stages[-1].copy(), sums)
+        error = self._error(state, h, stages, x)
+        self.iterations += iterations
+        if iterations > 4:
+            self._matrices = None
+        return Attempt(state, end, h, error, least, (stages, powers))
+
+    def inside(self, attempt: Attempt[RadauState], t: float) -> RadauState:
+        """The state at a time within the step, by its collocation polynomial."""
+        stages, powers = attempt.detail
+        start, h = attempt.start, attempt.h
+        theta = (t - start.t) / h
+        weights = h * _moments(NODES, theta)
+        basis = np.linalg.solve(np.vander(NODES, increasing=True).T, np.array([1.0, theta, theta**2]))
+        return RadauState(
+            t, start.x + weights @ stages[:, : self._rates], basis @ stages, start.sums + weights @ powers
+        )
+
+    def at(self, state: RadauState, t: float) -> RadauState:
+        """The same state at a time that differs by rounding."""
+        return replace(state, t=t)
+
+    def row(self, state: RadauState) -> Row:
+        """What is kept of it."""
+        energies = self.equations.energies(state.x, state.z, self.inputs(state.t, state.x))
+        return Row(state.x, np.where(self._makers, state.sums[4:], energies), state.sums[:4])
+
+    def stats(self) -> dict[str, Any]:
+        """Counts, for the solution's statistics."""
+        return {
+            "form": "paper",
+            "iterations": self.iterations,
+            "evaluations": self.evaluations,
+            "factorisations": self.factorisations,
+            "unknowns": self.model.unknowns,
+        }
+
+    def _solved(self, state: RadauState, h: float) -> tuple[Array, Array, int]:
+        """Stages, the states at the end, and how many iterations that took."""
         if self._matrices is None:
             self._refresh(state)
         try:
@@ -156,38 +193,17 @@ class Radau:
                 raise
             self._refresh(state)
             stages, iterations = self._stages(state, h)
-        weights = h * COEFFICIENTS[-1]
-        x = state.x + weights @ stages[:, : self._rates]
-        end = RadauState(state.t + h, x, stages[-1].copy())
-        error = self._error(state, h, stages, x) if estimate else 0.0
-        if iterations > 4:
-            self._matrices = None
-        return Step(state, h, stages, end, error, iterations)
+        return stages, state.x + h * COEFFICIENTS[-1] @ stages[:, : self._rates], iterations
 
-    def dense(self, step: Step, t: float) -> tuple[Array, Array]:
-        """States and unknowns at a time within the step, by its collocation polynomial."""
-        theta = (t - step.start.t) / step.h
-        x = step.start.x + step.h * _moments(NODES, theta) @ step.stages[:, : self._rates]
-        basis = np.linalg.solve(np.vander(NODES, increasing=True).T, np.array([1.0, theta, theta**2]))
-        return x, basis @ step.stages
-
-    def powers(self, step: Step) -> tuple[Array, float]:
+    def _powers(self, state: RadauState, h: float, stages: Array) -> tuple[Array, float]:
         """What flows into the ledgers at the stages, per second, (3, 4 + components); and the least entropy production
         of a component at a stage, times the step."""
-        xs = step.start.x + step.h * COEFFICIENTS @ step.stages[:, : self._rates]
+        xs = state.x + h * COEFFICIENTS @ stages[:, : self._rates]
         found = [
-            self.equations.powers(x, z, self.inputs(step.start.t + c * step.h, x))
-            for x, z, c in zip(xs, step.stages, NODES, strict=True)
+            self.equations.powers(x, z, self.inputs(state.t + c * h, x))
+            for x, z, c in zip(xs, stages, NODES, strict=True)
         ]
-        return np.array([sums for sums, _ in found]), step.h * min(least for _, least in found)
-
-    def integral(self, step: Step, powers: Array, t: float) -> Array:
-        """What came into the ledgers from the start of the step to a time within it."""
-        return step.h * _moments(NODES, (t - step.start.t) / step.h) @ powers
-
-    def energies(self, state: RadauState) -> Array:
-        """(components,): energy of each storage, zero elsewhere."""
-        return self.equations.energies(state.x, state.z, self.inputs(state.t, state.x))
+        return np.array([sums for sums, _ in found]), h * min(least for _, least in found)
 
     def _refresh(self, state: RadauState) -> None:
         self._matrices = self.equations.matrices(state.x, state.z, self.inputs(state.t, state.x))
@@ -200,7 +216,7 @@ class Radau:
             m = self._matrices
             assert m is not None
             real = _solver(m.unknowns + (h * GAMMA) * m.states)
-            rest = _solver(m.unknowns + (h * complex(_VALUES[_COMPLEX])) * m.states)
+            rest = _solver(m.unknowns + (h * complex(VALUES[1])) * m.states)
             self._solvers = h, real, rest
             self.factorisations += 1
         return self._solvers[1], self._solvers[2]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 
 from ephs.mechanics.solve.books import Entry, entry_of
+from ephs.mechanics.solve.events import Crossing
 from ephs.mechanics.solve.ledger import Ledgers
 from ephs.mechanics.solve.problem import Motion, Problem
 from ephs.operad import ROOT, Path
@@ -78,6 +79,13 @@ class Solution:
     def __repr__(self) -> str:
         span = f"{self.t[0]:g} … {self.t[-1]:g} s, {len(self)} instants" if len(self) else "empty"
         return f"Solution of {self.name}: {span}, {len(self.states)} states"
+
+    @property
+    def events(self) -> tuple[Crossing, ...]:
+        """The events that happened, in their order: name, time in s, states."""
+        if self.problem is None:
+            return ()
+        return tuple(Crossing.of_record(r, self.problem.descriptor) for r in self.stats.get("events", ()))
 
     @property
     def energy(self) -> Array:

@@ -1,0 +1,143 @@
+"""What each joint holds: its wrenches about one point, and the rows that they make of the constraints on the twists.
+
+What a joint holds are the wrenches W that do no work on its freedoms, WᵀB = 0. Seen about one point and in one set of
+axes, a wrench on body 2 and its reaction on body 1 make a row (−w, w).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from ephs.mechanics.scene.kinematics import Link, elements
+from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.scene.state import Snapshot
+from ephs.semantics.bundle import Array
+from ephs.semantics.spaces import SE3
+from ephs.semantics.spaces.rotations import quaternion_to_matrix
+
+__all__ = ["RANK", "Hold", "Mechanism", "redundant"]
+
+RANK = 1e-9
+"""What remains of an orthonormal row beside the others counts as nothing below this."""
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Hold:
+    """What a joint holds, or what its prescribed motion does.
+
+    Attributes
+    ----------
+    name, joint
+        How to call it, and the joint; they differ for a motion.
+    body1, body2
+        By index, -1 for the ground.
+    wrenches
+        (6, k) on body 2 in world axes about the mechanism's centre, lengths divided by the mechanism's.
+    rows
+        (k, 6 n) on the spatial twists of all bodies, likewise.
+    rotation, point
+        The joint frame C2 in the world, and its origin as the wrenches see it.
+    """
+
+    name: str
+    joint: str
+    body1: int
+    body2: int
+    wrenches: Array
+    rows: Array
+    rotation: Array
+    point: Array
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Mechanism:
+    """A mechanism with the centre (3,) and the length in m by which it is measured."""
+
+    now: Snapshot
+    centre: Array
+    length: float
+
+    @staticmethod
+    def of(scene: Scene) -> "Mechanism":
+        """The mechanism of a scene: the origins of its joints and bodies lie within the length about the centre."""
+        now = Snapshot.of(scene)
+        ends = [link.second(now.poses)[4:] for link in now.links]
+        points = np.array([*ends, *now.poses[:, 4:]]).reshape(-1, 3)
+        centre = points.mean(axis=0) if len(points) else np.zeros(3)
+        length = float(np.linalg.norm(points - centre, axis=1).max(initial=0.0))
+        return Mechanism(now, centre, length or 1.0)
+
+    def holds(self, poses: Array, *, motions: bool = True) -> list[Hold]:
+        """What every joint holds in a configuration, then the prescribed motions."""
+        pairs = list(zip(self.now.links, elements(self.now.links, poses), strict=True))
+        out = [self._hold(link, poses, x) for link, x in pairs]
+        if motions:
+            out += [self._hold(link, poses, x, moved=True) for link, x in pairs if link.motion is not None]
+        return [hold for hold in out if hold.wrenches.shape[1]]
+
+    def moved(self, step: Array) -> Array:
+        """The poses (n, 7) after spatial twists (n, 6) about the centre, lengths divided by the mechanism's."""
+        out = self.now.poses.copy()
+        for pose, twist in zip(out, step, strict=True):
+            pose[4:] -= self.centre
+            pose[:] = SE3.compose(SE3.exp(np.concatenate([twist[:3], self.length * twist[3:]])), pose)
+            pose[4:] += self.centre
+        return out
+
+    def _hold(self, link: Link, poses: Array, x: Array, *, moved: bool = False) -> Hold:
+        basis = link.coupling.basis(x).copy()
+        basis[3:] /= self.length
+        # a single freedom moves: the wrench that does work on it alone is the freedom itself
+        local = basis / np.linalg.norm(basis) if moved else _annihilator(basis)
+        rows = np.zeros((local.shape[1], poses.shape[0], 6))
+        # body 1 feels the wrench where its own frame puts C2: the same place, as far as the joint is closed
+        for body, sign, end in (
+            (link.body1, -1.0, SE3.compose(link.first(poses), link.coupling.include(x))),
+            (link.body2, 1.0, link.second(poses)),
+        ):
+            if body >= 0:
+                rows[:, body] += sign * self._lifted(local, end).T
+        second = link.second(poses)
+        return Hold(
+            f"the motion of {link.name}" if moved else link.name,
+            link.name,
+            link.body1,
+            link.body2,
+            self._lifted(local, second),
+            rows.reshape(local.shape[1], 6 * poses.shape[0]),
+            quaternion_to_matrix(second[:4]),
+            (second[4:] - self.centre) / self.length,
+        )
+
+    def _lifted(self, wrenches: Array, pose: Array) -> Array:
+        """Wrenches in a frame, in world axes about the centre."""
+        rotation, at = quaternion_to_matrix(pose[:4]), (pose[4:] - self.centre) / self.length
+        force = rotation @ wrenches[3:]
+        return np.vstack([rotation @ wrenches[:3] + np.cross(at, force.T).T, force])
+
+
+def redundant(holds: Sequence[Hold], tolerance: float = RANK) -> list[Array]:
+    """Of each hold, coefficients (k, r) of the combinations that lie in the span of the holds before."""
+    span = np.zeros((holds[0].rows.shape[1] if holds else 0, 0))
+    out: list[Array] = []
+    for hold in holds:
+        q, triangle = np.linalg.qr(hold.rows.T)
+        rest = q - span @ (span.T @ q)
+        rest -= span @ (span.T @ rest)  # once is not enough where little is left
+        u, sigma, vt = np.linalg.svd(rest, full_matrices=False)
+        new = sigma > tolerance
+        out.append(np.linalg.solve(triangle, vt[~new].T))
+        span = np.hstack([span, u[:, new]])
+    return out
+
+
+def _annihilator(basis: Array) -> Array:
+    """An orthonormal basis of the wrenches that do no work on the twists in the columns."""
+    if not basis.shape[1]:
+        return np.eye(6)
+    u, sigma, _ = np.linalg.svd(basis)
+    return u[:, int(np.sum(sigma > RANK * sigma[0])) :]

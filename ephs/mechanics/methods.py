@@ -1,0 +1,244 @@
+"""The methods by name: what each is, whom it serves, and how it is made for a problem."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, final
+
+from ephs.mechanics.solve.control import Control, Policy, Proportional, Symmetric
+from ephs.mechanics.solve.errors import OptionError
+from ephs.mechanics.solve.loop import Stepper
+from ephs.mechanics.solve.problem import Problem
+from ephs.semantics.spaces import manifold
+from ephs.semantics.spaces.codes import VECTOR
+
+__all__ = ["METHODS", "Method", "Setting", "on_joints", "register_method"]
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Setting:
+    """What a method is made for.
+
+    Parameters
+    ----------
+    t0
+        The start in s.
+    control
+        Tolerances and limits; without ``control.step`` the method has to choose its steps.
+    options
+        The method's own, by name.
+    """
+
+    problem: Problem
+    t0: float
+    control: Control
+    options: Mapping[str, Any]
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Method:
+    """What one must know of a method to choose it, and how it is made.
+
+    Parameters
+    ----------
+    order
+        With which power of the step its error falls.
+    adaptive, fixed
+        Whether it runs by rtol and atol, and with a constant step.
+    systems, scenes
+        Whether it solves a System, and a Scene.
+    summary
+        In words.
+    make
+        The method for a setting, and what chooses its steps: None where they are constant.
+    options
+        Names of the options that it takes.
+    """
+
+    name: str
+    order: int
+    adaptive: bool
+    fixed: bool
+    systems: bool
+    scenes: bool
+    summary: str
+    make: Callable[[Setting], tuple[Stepper[Any], Policy | None]]
+    options: tuple[str, ...] = ()
+
+
+def on_joints(make: Callable[..., Any]) -> Callable[[Setting], tuple[Stepper[Any], Policy | None]]:
+    """What makes a method on the reduced form of a scene, from ``make(equations, control, **options)``.
+
+    Its steps follow proportional-integral control by its ``exponent`` and its ``share``.
+    """
+
+    def made(setting: Setting) -> tuple[Stepper[Any], Policy | None]:
+        from ephs.mechanics.reduced.equations import Equations  # its kernels take a quarter of a second to load
+
+        equations = Equations(setting.problem.scene, setting.problem, setting.t0)
+        stepper = make(equations, setting.control, **setting.options)
+        return stepper, None if setting.control.step is not None else Proportional(
+            lambda: stepper.exponent, stepper.share
+        )
+
+    return made
+
+
+def _tableau(name: str) -> Callable[..., Any]:
+    def make(equations: Any, control: Control) -> Any:
+        from ephs.mechanics.reduced.explicit import Explicit, tableau
+
+        return Explicit(equations, control, tableau(name))
+
+    return make
+
+
+def _alpha(equations: Any, control: Control, **options: Any) -> Any:
+    from ephs.mechanics.reduced.alpha import Alpha
+
+    return Alpha(equations, control, **options)
+
+
+def _implicit(equations: Any, control: Control) -> Any:
+    from ephs.mechanics.reduced.implicit import Implicit
+
+    return Implicit(equations, control)
+
+
+def _variational(equations: Any, control: Control) -> Any:
+    from ephs.mechanics.reduced.variational import Variational
+
+    return Variational(equations, control)
+
+
+def _ida(equations: Any, control: Control) -> Any:
+    from ephs.mechanics.reduced.ida import Ida
+
+    return Ida(equations, control)
+
+
+def _auto(equations: Any, control: Control) -> Any:
+    from ephs.mechanics.reduced.auto import Auto
+
+    return Auto(equations, control)
+
+
+def _component_wise(setting: Setting, order: int) -> tuple[Stepper[Any], Policy | None]:
+    from ephs.mechanics.solve.model import compile_model
+    from ephs.mechanics.solve.paced import Paced
+
+    problem = setting.problem
+    model = compile_model(problem.descriptor, problem.reference, problem.inputs(setting.t0, problem.initial))
+    chosen = setting.control.step is None
+    paced = Paced(problem, component_method(order)(model), setting.control, doubled=chosen)
+    return paced, Symmetric(order + 1.0) if chosen else None
+
+
+def component_method(order: int) -> Callable[[Any], Any]:
+    """The method of order 2 or 4 that discretises component by component."""
+    if order == 4:
+        from ephs.mechanics.solve.natural4 import Natural4
+
+        return Natural4
+    from ephs.mechanics.solve.natural import Natural
+
+    return Natural
+
+
+def _natural(setting: Setting) -> tuple[Stepper[Any], Policy | None]:
+    return _component_wise(setting, 2)
+
+
+def _natural4(setting: Setting) -> tuple[Stepper[Any], Policy | None]:
+    return _component_wise(setting, 4)
+
+
+def _radau(setting: Setting) -> tuple[Stepper[Any], Policy | None]:
+    if setting.problem.scene is not None:
+        return on_joints(_implicit)(setting)
+    from ephs.mechanics.solve.radau import Radau
+
+    stepper = Radau(setting.problem, setting.t0, setting.control)
+    return stepper, None if setting.control.step is not None else Proportional(lambda: stepper.exponent)
+
+
+METHODS: dict[str, Method] = {}
+"""The methods that there are."""
+
+
+def register_method(method: Method) -> None:
+    """Make a method known to `simulate` by its name.
+
+    Raises
+    ------
+    OptionError
+        The name is taken, or it neither chooses its steps nor takes constant ones.
+    """
+    if method.name in METHODS or method.name == "auto":
+        raise OptionError("method", method.name, "a name that is not taken")
+    if not (method.adaptive or method.fixed) or not (method.systems or method.scenes):
+        raise OptionError("method", method.name, "steps chosen or constant, systems or scenes")
+    METHODS[method.name] = method
+
+
+for _method in (
+    Method("natural", 2, True, True, True, True, "balances and positions of joints exact, any system", _natural),
+    Method("natural4", 4, True, True, True, True, "the same of order 4", _natural4),
+    Method("variational", 2, False, True, False, True, "symplectic, momentum maps exact", on_joints(_variational)),
+    Method("radau", 5, True, True, True, True, "Radau IIA, stiff", _radau),
+    Method("alpha", 2, True, True, False, True, "generalised-α, damps what is fast", on_joints(_alpha), ("rho",)),
+    Method("rk54", 5, True, True, False, True, "Dormand and Prince, explicit", on_joints(_tableau("rk54"))),
+    Method(
+        "rk87", 8, True, True, False, True, "Dormand and Prince, explicit, many digits", on_joints(_tableau("rk87"))
+    ),
+    Method("ida", 5, True, False, False, True, "IDA of SUNDIALS, an independent check", on_joints(_ida)),
+):
+    register_method(_method)
+
+
+def _for_scenes(setting: Setting) -> tuple[Stepper[Any], Policy | None]:
+    try:
+        return on_joints(_auto)(setting)
+    except OptionError:  # joints that the reduced form cannot have, such as loops of prescribed ones
+        return _natural(setting)
+
+
+AUTO = Method("auto", 8, True, False, False, True, "rk54 or rk87, radau where stiff", _for_scenes)
+"""What `auto` is for scenes that the reduced form serves."""
+
+
+def chosen(name: str, problem: Problem, *, step: float | None) -> tuple[Method, str]:
+    """The method of a name, and why where the name is ``auto``.
+
+    Raises
+    ------
+    OptionError
+        There is no such method, or it does not serve this problem.
+    """
+    if name == "auto":
+        return _for_all(problem, step)
+    if name not in METHODS:
+        raise OptionError("method", name, f"one of auto, {', '.join(METHODS)}")
+    method = METHODS[name]
+    if problem.scene is None and not method.systems:
+        serving = ", ".join(m.name for m in METHODS.values() if m.systems)
+        raise OptionError("method", name, f"{serving}: {name} is for scenes")
+    if problem.scene is not None and not method.scenes:
+        raise OptionError("method", name, f"{', '.join(m.name for m in METHODS.values() if m.scenes)} for a scene")
+    if step is not None and not method.fixed:
+        raise OptionError("step", step, f"none: {name} chooses its steps")
+    if step is None and not method.adaptive:
+        raise OptionError("step", step, f"a number of seconds: {name} takes constant steps")
+    return method, ""
+
+
+def _for_all(problem: Problem, step: float | None) -> tuple[Method, str]:
+    if step is not None:
+        return METHODS["natural"], "a constant step is given"
+    if problem.scene is not None:
+        return AUTO, "a scene without a constant step"
+    flat = all(manifold(slot.quantity.space).code == VECTOR for slot in problem.descriptor.states)
+    if flat:
+        return METHODS["radau"], "a system on vector spaces without a constant step"
+    return METHODS["natural4"], "a system on Lie groups without a constant step"

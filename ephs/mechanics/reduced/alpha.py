@@ -1,0 +1,120 @@
+"""The generalised-α method on Lie groups: order 2, damps what the step does not resolve, to ρ∞ a step.
+
+Chung and Hulbert, *J. Appl. Mech.* 60 (1993), 371-375; on groups Brüls, Cardona and Arnold, *Mech. Mach. Theory* 48
+(2012), 121-137. Here on the reduced form: accelerations are those along the constraints, loops are closed after each
+step. Entropies follow by the trapezoidal rule.
+"""
+
+from dataclasses import dataclass
+from typing import Any, final
+
+import numpy as np
+from scipy.linalg import lu_factor, lu_solve
+
+from ephs.mechanics.reduced.equations import Equations, ReducedState
+from ephs.mechanics.reduced.jacobian import Jacobian
+from ephs.mechanics.reduced.method import ReducedMethod
+from ephs.mechanics.solve.control import Control
+from ephs.mechanics.solve.errors import OptionError, Outcome, SolveError
+from ephs.mechanics.solve.loop import Attempt
+from ephs.semantics.bundle import Array
+
+__all__ = ["Alpha"]
+
+ITERATIONS = 20
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class _Memory:
+    """What the method remembers of the step before: the state's ẏ, and the mean acceleration."""
+
+    q: Array
+    rates: Array
+    mean: Array
+
+
+@final
+class Alpha(ReducedMethod):
+    """The method on one mechanism.
+
+    Parameters
+    ----------
+    rho
+        ρ∞, what is left after a step of a mode that is far too fast for it: 1 nothing damped, 0 all.
+    """
+
+    name = "alpha"
+    exponent = 3.0
+    share = 1.0
+
+    def __init__(self, equations: Equations, control: Control, rho: float = 0.8) -> None:
+        if not 0.0 <= rho <= 1.0:
+            raise OptionError("options['rho']", rho, "a number from 0 to 1")
+        super().__init__(equations, control)
+        self.jacobian = Jacobian(equations)
+        self._m, self._f = (2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0)
+        self._gamma = 0.5 + self._f - self._m
+        self._beta = 0.25 * (0.5 + self._gamma) ** 2
+        self._memory: dict[int, _Memory] = {}
+        self.counts = {"iterations": 0, "jacobians": 0, "rho": rho}
+
+    def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
+        """One step of h seconds."""
+        eq = self.equations
+        nv, n, ns = eq.nv, eq.n, eq.ns
+        y0 = eq.vector(state)
+        memory = self._remembered(state, y0)
+        before, mean = memory.rates, memory.mean
+        rate, fall = slice(nv, nv + n), slice(nv + n, nv + n + ns)
+        solver = self._solver(state, h)
+        tree = np.arange(n)
+        mean1, rates = mean.copy(), before.copy()
+        y1, last, moved = y0.copy(), np.inf, np.inf
+        for _ in range(ITERATIONS):
+            y1[tree] = h * y0[rate] + h * h * ((0.5 - self._beta) * mean + self._beta * mean1)
+            y1[n:nv] = 0.5 * h * (before[n:nv] + rates[n:nv])
+            y1[rate] = y0[rate] + h * ((1.0 - self._gamma) * mean + self._gamma * mean1)
+            y1[fall] = y0[fall] + 0.5 * h * (before[fall] + rates[fall])
+            found = eq.rates(state.t + h, state.q, y1)
+            self.counts["iterations"] += 1
+            target = (1.0 - self._f) * found[rate] + self._f * before[rate] - self._m * mean
+            change = lu_solve(solver, (1.0 - self._m) * mean1 - target, check_finite=False)
+            drift = 0.5 * h * (found - rates)
+            rates = found
+            mean1 -= change
+            scale = self.atol + self.rtol * eq.sizes(y0, y1)
+            parts = np.concatenate([self._beta * h * h * change, self._gamma * h * change, drift[fall]])
+            moved = float(np.max(np.abs(parts) / scale, initial=0.0))
+            if not np.isfinite(moved) or moved <= 1e-4 or (moved > 0.5 * last and moved <= 1e-2):
+                break
+            last = moved
+        if not moved <= 1e-2:
+            if self.jacobian.fresh(state):
+                raise SolveError(Outcome.DIVERGED, "", "")
+            self.jacobian.at(state, renew=True)
+            self.counts["jacobians"] += 1
+            return self.step(state, h)
+        y1[nv + n + ns :] = y0[nv + n + ns :] + 0.5 * h * (before + rates)[nv + n + ns :]
+        closed = eq.closed(eq.state(state, y1, state.t + h))
+        missed = h * h * (self._beta - 1.0 / 6.0) * (mean1 - mean)
+        estimate = np.concatenate([missed, np.zeros(n), np.zeros(ns)])
+        error = float(np.max(np.abs(eq.along(estimate)) / (self.atol + self.rtol * eq.sizes(y0, y1)), initial=0.0))
+        self._memory = {id(state.q): memory, id(closed.q): _Memory(closed.q, rates, mean1)}
+        return Attempt(state, closed, h, error, eq.least(state, closed))
+
+    def _remembered(self, state: ReducedState, y0: Array) -> _Memory:
+        """The state's rates and mean acceleration; at a start both are the true ones."""
+        found = self._memory.get(id(state.q))
+        if found is None or found.q is not state.q:
+            rates = self.equations.rates(state.t, state.q, y0)
+            found = _Memory(state.q, rates, rates[self.equations.nv : self.equations.nv + self.equations.n])
+            self._memory = {id(state.q): found}
+        return found
+
+    def _solver(self, state: ReducedState, h: float) -> Any:
+        eq = self.equations
+        whole = self.jacobian.at(state)
+        rate = slice(eq.nv, eq.nv + eq.n)
+        slope = self._beta * h * h * whole[rate, : eq.n] + self._gamma * h * whole[rate, rate]
+        return lu_factor((1.0 - self._m) * np.eye(eq.n) - (1.0 - self._f) * slope, check_finite=False)

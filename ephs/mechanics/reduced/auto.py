@@ -1,0 +1,71 @@
+"""The method that chooses by what it meets: explicit until steps are held back by stability, then implicit.
+
+Stiffness is what Hairer and Wanner test in DOPRI5 and DOP853: the last two stages of a step show how fast its fastest
+mode is, and a step that this holds at the limit of stability again and again serves stability, not accuracy.
+"""
+
+from typing import Any, final
+
+from ephs.mechanics.reduced.equations import Equations, ReducedState
+from ephs.mechanics.reduced.explicit import Explicit, tableau
+from ephs.mechanics.reduced.implicit import Implicit
+from ephs.mechanics.reduced.method import ReducedMethod
+from ephs.mechanics.solve.control import Control
+from ephs.mechanics.solve.errors import Outcome, SolveError
+from ephs.mechanics.solve.loop import Attempt
+
+__all__ = ["Auto"]
+
+LIMITS = {"rk54": 3.25, "rk87": 6.1}
+"""h·|λ| at the limit of stability."""
+PATIENCE = 15
+"""Steps at the limit before the method is changed."""
+DIGITS = 1e-5
+"""Tolerances below this are for order 8."""
+
+
+@final
+class Auto(ReducedMethod):
+    """rk54 or rk87 by the tolerance, and radau from where the problem shows itself stiff."""
+
+    name = "auto"
+
+    def __init__(self, equations: Equations, control: Control) -> None:
+        super().__init__(equations, control)
+        name = "rk87" if control.rtol.value < DIGITS else "rk54"
+        self._explicit = Explicit(equations, control, tableau(name))
+        self._implicit: Implicit | None = None
+        self._held = self._free = self._failures = 0
+        self.name, self.exponent, self.share = name, self._explicit.exponent, self._explicit.share
+        self.counts: dict[str, Any] = {"chosen": name, "switches": []}
+
+    def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
+        """One step of h seconds."""
+        if self._implicit is not None:
+            found = self._implicit.step(state, h)
+            self.counts |= self._implicit.counts
+            return found
+        try:
+            found = self._explicit.step(state, h)
+        except SolveError as error:
+            self._failures += 1
+            if self._failures > PATIENCE and error.outcome not in (Outcome.PYTHON, Outcome.UNSUITED):
+                self._switch(state.t, h, "its steps fail")
+            raise
+        if found.error <= 1.0:
+            self._failures = 0
+            if self._explicit.stiffness > LIMITS[self._explicit.name]:
+                self._held, self._free = self._held + 1, 0
+                if self._held == PATIENCE:
+                    self._switch(found.end.t, h, f"h·|λ| = {self._explicit.stiffness:.1f} holds its steps")
+            else:
+                self._free += 1
+                if self._free == 6:
+                    self._held = 0
+        return found
+
+    def _switch(self, t: float, h: float, reason: str) -> None:
+        self._implicit = Implicit(self.equations, self.control)
+        self.exponent = self._implicit.exponent
+        self.counts["switches"].append({"t": float(t), "to": "radau", "step": float(h), "reason": reason})
+        self.name = f"{self._explicit.name}, radau"

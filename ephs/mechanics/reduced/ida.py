@@ -1,0 +1,97 @@
+"""IDA of SUNDIALS on the reduced form: an independent integrator, to check the others against.
+
+Its unknowns are the increments from a base that is moved, with the loops closed, where they have grown or a loop has
+opened by rounding; each move starts IDA anew, at order 1. Needs the package scikit-sundae.
+"""
+
+from typing import Any, final
+
+import numpy as np
+
+from ephs.mechanics.reduced.equations import Equations, ReducedState
+from ephs.mechanics.reduced.method import ReducedMethod
+from ephs.mechanics.solve.control import Control
+from ephs.mechanics.solve.errors import OptionError, Outcome, SolveError
+from ephs.mechanics.solve.loop import Attempt
+from ephs.semantics.bundle import Array
+
+__all__ = ["Ida"]
+
+FAR = 1.5
+"""Increments beyond this on a group ask for another base, in rad or m."""
+OPEN = 10.0
+"""Loops open by more than this, relative to the tolerance, ask for another base."""
+PART = 1e-2
+"""IDA's share of the tolerances: it keeps them a step, and its many steps' errors add up."""
+
+
+@final
+class Ida(ReducedMethod):
+    """The integrator on one mechanism. It takes its own steps, at most as long as the loop proposes."""
+
+    name = "ida"
+    exponent = 5.0
+
+    def __init__(self, equations: Equations, control: Control) -> None:
+        super().__init__(equations, control)
+        self._base: ReducedState | None = None
+        self._last: Array | None = None
+        self._solver: Any = None
+        self._sign = 1.0
+        self.counts = {"restarts": 0}
+
+    def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
+        """One of IDA's steps, h seconds or less."""
+        if self._last is not state.q or self._base is None:
+            self._restart(state, h)
+        base = self._base
+        assert base is not None
+        found = self._solver.step(state.t + h - base.t, method="onestep", tstop=state.t + h - base.t)
+        if not found.success:
+            raise SolveError(Outcome.DIVERGED, "", f"IDA: {found.message}")
+        t, y = float(np.ravel(found.t)[-1]) + base.t, np.array(found.y[-1] if found.y.ndim > 1 else found.y)
+        if t == state.t:
+            raise SolveError(Outcome.TINY, "", "IDA's step")
+        return self._attempt(state, y, t)
+
+    def inside(self, attempt: Attempt[ReducedState], t: float) -> ReducedState:
+        """The state at a time within a step, by a run of its own from the step's start."""
+        own = Ida(self.equations, self.control)
+        state = attempt.start
+        while state.t != t:
+            state = own.step(state, t - state.t).end
+        return state
+
+    def _attempt(self, state: ReducedState, y: Array, t: float) -> Attempt[ReducedState]:
+        eq = self.equations
+        assert self._base is not None
+        free = eq.state(self._base, y, t)
+        closed = eq.closed(free)
+        moved = eq.gap(free) if closed is not free else 0.0
+        self._last = closed.q
+        if np.max(np.abs(y[eq.curved]), initial=0.0) > FAR or moved > OPEN * float(np.min(self.rtol)):
+            self._base = None
+        return Attempt(state, closed, t - state.t, 0.0, eq.least(state, closed))
+
+    def _restart(self, state: ReducedState, h: float) -> None:
+        try:
+            from sksundae.ida import IDA
+        except ImportError as error:
+            raise OptionError("method", "ida", "the package scikit-sundae, which is not installed") from error
+        eq = self.equations
+        self._base = state
+        self.counts["restarts"] += 1
+        y0 = eq.vector(state)
+        rtol = PART * float(np.min(self.rtol, initial=1.0))
+        atol = np.full(y0.size, PART * float(np.min(self.atol, initial=1.0)))
+        failure: list[SolveError] = []
+
+        def residual(t: float, y: Array, yp: Array, out: Array) -> None:
+            try:
+                out[:] = yp - eq.rates(state.t + t, state.q, np.asarray(y))
+            except SolveError as error:
+                failure[:] = [error]
+                out[:] = np.nan
+
+        self._solver = IDA(residual, rtol=max(rtol, 1e-14), atol=np.maximum(atol, 1e-15), max_num_steps=100000)
+        self._solver.init_step(0.0, y0, eq.rates(state.t, state.q, y0))

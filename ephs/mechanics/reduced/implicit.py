@@ -1,0 +1,136 @@
+"""Radau IIA of order 5 on the reduced form: stiff, adaptive, loops closed after each step.
+
+Hairer and Wanner, *Solving Ordinary Differential Equations II*, IV.8. The stages live in the increments of one step,
+y = (v, r, s), so that the same collocation serves joints on every group; heat and work are its quadratures.
+"""
+
+from typing import Any, final
+
+import numpy as np
+from scipy.linalg import lu_factor, lu_solve
+
+from ephs.mechanics.reduced.equations import Equations, ReducedState
+from ephs.mechanics.reduced.jacobian import Jacobian
+from ephs.mechanics.reduced.method import ReducedMethod
+from ephs.mechanics.solve.control import Control
+from ephs.mechanics.solve.errors import Outcome, SolveError
+from ephs.mechanics.solve.loop import Attempt
+from ephs.mechanics.solve.radau import COEFFICIENTS, NODES, T_INVERSE, VALUES, T
+from ephs.semantics.bundle import Array
+
+__all__ = ["Implicit"]
+
+ITERATIONS = 8
+_S6 = 6.0**0.5
+_EMBEDDED = np.array([-13.0 - 7.0 * _S6, -13.0 + 7.0 * _S6, -1.0]) / 3.0
+_RATE = float((1.0 / VALUES[0]).real)
+_INVERSE = np.linalg.inv(COEFFICIENTS)
+
+
+@final
+class Implicit(ReducedMethod):
+    """The method on one mechanism."""
+
+    name = "radau"
+    exponent = 4.0
+
+    def __init__(self, equations: Equations, control: Control) -> None:
+        super().__init__(equations, control)
+        self.jacobian = Jacobian(equations)
+        least = float(np.min(self.rtol, initial=1.0))
+        # As far as Newton's method is taken, relative to the tolerance: less than the method's own error.
+        self._enough = max(1e-13 / max(least, 1e-13), min(0.03, least**0.5)) if control.step is None else 1e-7
+        self._solvers: tuple[float, Any, Any] | None = None
+        self._known: tuple[Array, Array] | None = None
+        self.counts = {"iterations": 0, "factorisations": 0, "jacobians": 0}
+
+    def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
+        """One step of h seconds."""
+        eq = self.equations
+        y0 = eq.vector(state)
+        if self._known is None or self._known[0] is not state.q:
+            self._known = state.q, eq.rates(state.t, state.q, y0)
+        first = self._known[1]
+        try:
+            stages, made, fast = self._stages(state, y0, h)
+        except SolveError:
+            if self.jacobian.fresh(state):
+                raise
+            self._renew(state)
+            stages, made, fast = self._stages(state, y0, h)
+        y1 = y0 + np.concatenate([stages[-1], h * (COEFFICIENTS[-1] @ made)])
+        end = eq.state(state, y1, state.t + h)
+        closed, error = self._closed(state, end, y0, y1, first, stages, h)
+        if not fast:
+            self._renew(closed)
+        return Attempt(state, closed, h, error, eq.least(state, closed))
+
+    def _renew(self, state: ReducedState) -> None:
+        self.jacobian.at(state, renew=True)
+        self.counts["jacobians"] = self.jacobian.count
+        self._solvers = None
+
+    def _solve(self, state: ReducedState, h: float) -> tuple[Any, Any]:
+        if self._solvers is None or self._solvers[0] != h:
+            matrix, unit = self.jacobian.at(state), np.eye(self.jacobian.size)
+            real = lu_factor(_RATE / h * unit - matrix, check_finite=False)
+            rest = lu_factor(1.0 / (complex(VALUES[1]) * h) * unit - matrix, check_finite=False)
+            self._solvers = h, real, rest
+            self.counts["factorisations"] += 1
+        return self._solvers[1], self._solvers[2]
+
+    def _allowed(self, y0: Array, y1: Array) -> Array:
+        return self.atol + self.rtol * self.equations.sizes(y0, y1)
+
+    def _stages(self, state: ReducedState, y0: Array, h: float) -> tuple[Array, Array, bool]:
+        """(increments of (v, r, s) at the stages, rates of heat, work and what is made there, Newton was fast)."""
+        eq, size = self.equations, self.jacobian.size
+        real, rest = self._solve(state, h)
+        allowed = self._allowed(y0, y0)
+        stages, rates = np.zeros((3, size)), np.zeros((3, eq.size))
+        before = rate = np.inf
+        for iteration in range(1, ITERATIONS + 1):
+            for i, node in enumerate(NODES):
+                y = y0.copy()
+                y[:size] += stages[i]
+                rates[i] = eq.rates(state.t + node * h, state.q, y)
+            self.counts["iterations"] += 1
+            defect = T_INVERSE @ (rates[:, :size] - _INVERSE @ stages / h)
+            pair = lu_solve(rest, defect[1], check_finite=False)
+            change = np.real(
+                T @ np.array([lu_solve(real, np.real(defect[0]), check_finite=False), pair, np.conj(pair)])
+            )
+            moved = float(np.max(np.abs(change[:, eq.counted]) / allowed, initial=0.0))
+            if not np.isfinite(moved):
+                break
+            stages += change
+            if iteration > 1:
+                rate = moved / before
+                if rate >= 1.0 and moved > 10.0 * self._enough:
+                    break
+            if moved <= self._enough or (iteration > 1 and moved * rate <= self._enough * (1.0 - min(rate, 0.9))):
+                return stages, rates[:, size:], iteration <= 4 or rate < 0.1
+            if iteration > 2 and rate > 0.5 and moved <= 1e-2:  # rounding is all that is left
+                return stages, rates[:, size:], False
+            before = moved
+        raise SolveError(Outcome.DIVERGED, "", "")
+
+    def _closed(
+        self, state: ReducedState, end: ReducedState, y0: Array, y1: Array, first: Array, stages: Array, h: float
+    ) -> tuple[ReducedState, float]:
+        """The end with its loops closed, and the difference to the embedded method of order 3, filtered by the
+        equations as its stiff part must be, relative to what is allowed."""
+        eq, size = self.equations, self.jacobian.size
+        real, _ = self._solve(state, h)
+        rough = _EMBEDDED @ stages / h
+        allowed = self._allowed(y0, y1)
+        found = lu_solve(real, first[:size] + rough, check_finite=False)
+        closed = eq.closed(end)
+        error = float(np.max(np.abs(eq.along(found[eq.counted])) / allowed, initial=0.0))
+        if error > 1.0:  # again from where it leads: of stiff parts the first estimate is far too large
+            moved = y0.copy()
+            moved[:size] += found
+            found = lu_solve(real, eq.rates(state.t, state.q, moved)[:size] + rough, check_finite=False)
+            closed = eq.closed(end)
+            error = float(np.max(np.abs(eq.along(found[eq.counted])) / allowed, initial=0.0))
+        return closed, error

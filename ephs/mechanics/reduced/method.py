@@ -1,0 +1,77 @@
+"""What every method on the reduced form is: a step, and around it what the time loop asks for."""
+
+from abc import ABC, abstractmethod
+from dataclasses import replace
+from typing import Any
+
+from ephs.mechanics.reduced.equations import Equations, ReducedState
+from ephs.mechanics.solve.control import Control
+from ephs.mechanics.solve.loop import Attempt, Row
+
+__all__ = ["ReducedMethod"]
+
+
+class ReducedMethod(ABC):
+    """A method on a mechanism in joint coordinates; one's own has to say `step`.
+
+    Parameters
+    ----------
+    equations
+        The mechanism.
+    control
+        Tolerances and limits.
+
+    Attributes
+    ----------
+    name
+        What the registry calls it.
+    exponent
+        The power of the step with which its estimate of the error falls.
+    share
+        How a step's part of the tolerance depends on its length, see `Proportional`.
+    counts
+        Its own counts, for the solution's statistics.
+    """
+
+    name: str
+    exponent: float
+    share: float = 0.0
+
+    def __init__(self, equations: Equations, control: Control) -> None:
+        self.equations, self.control = equations, control
+        self.rtol, self.atol = equations.allowed(control.rtol, control.atol)
+        self.counts: dict[str, Any] = {}
+
+    @abstractmethod
+    def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
+        """One step of h seconds, which may be negative.
+
+        Raises
+        ------
+        SolveError
+            The step has no solution.
+        """
+
+    def start(self, t: float, h: float) -> ReducedState:
+        """The initial state with its loops closed."""
+        return self.equations.start(t)
+
+    def prepare(self, state: ReducedState, h: float) -> None:
+        """Compile what is not in the cache, before time counts."""
+        self.equations.prepare(state)
+
+    def inside(self, attempt: Attempt[ReducedState], t: float) -> ReducedState:
+        """A shorter step from the same start: dense output of full order."""
+        return self.step(attempt.start, t - attempt.start.t).end
+
+    def at(self, state: ReducedState, t: float) -> ReducedState:
+        """The same state at a time that differs by rounding."""
+        return replace(state, t=t)
+
+    def row(self, state: ReducedState) -> Row:
+        """What is kept of it."""
+        return self.equations.row(state)
+
+    def stats(self) -> dict[str, Any]:
+        """Counts, for the solution's statistics."""
+        return self.equations.stats() | self.counts

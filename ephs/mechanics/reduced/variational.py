@@ -1,0 +1,188 @@
+"""The variational midpoint method on the reduced form: symplectic, momentum maps exact, order 2.
+
+The discrete Lagrangian is L_d(q, ξ) = h L(q·exp(ξ/2), ξ/h) (Marsden and West, *Acta Numerica* 10 (2001), 357-514); in
+terms of momenta it is a map (q⁰, p⁰) → (q¹, p¹) with
+
+    p⁰ + G(q⁰)ᵀλ = D(−ξ)ᵀ(p̄ − ½h D(−ξ/2)⁻ᵀ g),   p¹ = D(ξ)ᵀ(p̄ + ½h D(ξ/2)⁻ᵀ g) + G(q¹)ᵀμ,   D = dexp⁻¹,
+
+where p̄ = ∂L/∂r and g = ∂L/∂q + f in the middle of the step. λ closes the loops at q¹, μ makes their rates vanish there,
+as in RATTLE. Forces f without potential act in the middle, as the discrete principle of Lagrange and d'Alembert says.
+"""
+
+from typing import Any, final
+
+import numpy as np
+
+from ephs.mechanics.reduced.action_kernels import action_derivatives
+from ephs.mechanics.reduced.equations import Equations, ReducedState
+from ephs.mechanics.reduced.method import ReducedMethod
+from ephs.mechanics.solve.control import Control
+from ephs.mechanics.solve.errors import Outcome, SolveError
+from ephs.mechanics.solve.loop import Attempt
+from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.codes import VECTOR
+from ephs.semantics.spaces.se3_kernels import dexp_left_inv
+
+__all__ = ["Variational"]
+
+ITERATIONS = 40
+RANK = 1e-9
+"""Singular values of the step's equations below this fraction of the largest count as zero."""
+DIFFERENCE = 1e-6
+
+
+@final
+class Variational(ReducedMethod):
+    """The method on one mechanism."""
+
+    name = "variational"
+    exponent = 3.0
+
+    def __init__(self, equations: Equations, control: Control) -> None:
+        super().__init__(equations, control)
+        t = equations.reduced.tables
+        self._groups = [
+            (int(t.code[i]), slice(int(t.r_at[i]), int(t.r_at[i] + t.dim[i])))
+            for i in range(equations.reduced.links)
+            if t.code[i] != VECTOR
+        ]
+        self._driven = np.flatnonzero(t.driven)
+        self._rows = int(t.rows.sum() + t.driven.sum())
+        self._matrix: Array | None = None
+        self._guess: tuple[Array, Array] | None = None
+        self.counts: dict[str, Any] = {"iterations": 0, "jacobians": 0}
+
+    def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
+        """One step of h seconds."""
+        eq = self.equations
+        n = eq.n
+        momentum = eq.mass(state.q, state.r) @ state.r
+        before = eq.rows() if self._rows else np.zeros((0, n))
+        xi = h * (self._guess[1] if self._guess is not None and self._guess[0] is state.q else state.r)
+        try:
+            xi, push, middle = self._solved(state, h, momentum, before, xi)
+        except SolveError:
+            self._matrix = None
+            xi, push, middle = self._solved(state, h, momentum, before, h * state.r)
+        middle_momentum, force, s_rate, made, powers = middle
+        after = self._turned(xi, middle_momentum + 0.5 * h * self._untwisted(0.5 * xi, force))
+        q = eq.moved(state.q, xi)
+        mass = eq.mass(q, state.r)
+        free = np.asarray(np.linalg.solve(mass, after), dtype=float)
+        s = state.s + h * s_rate
+        books = state.books + h * np.concatenate([powers, made])
+        end = ReducedState(state.t + h, q, free, s, books)
+        closed = eq.closed(end)
+        if self._driven.size:  # the work of what is prescribed: its impulses at both ends of the step
+            impulse = mass @ closed.r - after
+            rows = eq.rows()
+            second = np.linalg.lstsq(rows.T, impulse, rcond=RANK)[0][: self._driven.size]
+            rates = closed.r[self._driven]
+            books[1] += float((push[: self._driven.size] + second) @ rates)
+        self._guess = closed.q, closed.r + (closed.r - state.r) * 0.5
+        return Attempt(state, closed, h, 0.0, eq.least(state, closed))
+
+    def _solved(
+        self, state: ReducedState, h: float, momentum: Array, before: Array, xi: Array
+    ) -> tuple[Array, Array, tuple[Array, Array, Array, Array, Array]]:
+        """ξ, the impulses G⁰ᵀλ, and what the middle of the step gives, to rounding."""
+        m = self._rows
+        push, last = np.zeros(m), np.inf
+        middle = self._middle(state, h, xi)
+        for iteration in range(ITERATIONS):
+            residual = self._start(xi, h, middle) - momentum - before.T @ push
+            gap, rows = self._gap(state, xi, h)
+            scale = max(float(np.abs(momentum).max(initial=0.0)), abs(h) * float(np.abs(middle[1]).max(initial=0.0)))
+            worst = max(
+                float(np.abs(residual).max(initial=0.0)) / max(scale, 1e-300), float(np.abs(gap).max(initial=0.0))
+            )
+            if not np.isfinite(worst):
+                break
+            if worst <= 4e-16 or (worst < 1e-11 and worst > 0.5 * last):
+                return xi, push, middle
+            if self._matrix is None or (iteration > 3 and worst > 0.1 * last):
+                self._matrix = self._slope(state, h, xi, middle)
+            change, impulse = _least(self._matrix, before, rows, -residual, -gap)
+            xi, push = xi + change, push + impulse
+            middle = self._middle(state, h, xi)
+            self.counts["iterations"] += 1
+            last = worst
+        raise SolveError(Outcome.DIVERGED, "", "")
+
+    def _start(self, xi: Array, h: float, middle: tuple[Array, Array, Array, Array, Array]) -> Array:
+        """The momentum at the step's start that the middle of the step stands for."""
+        momentum, force = middle[:2]
+        return self._turned(-xi, momentum - 0.5 * h * self._untwisted(-0.5 * xi, force))
+
+    def _middle(self, state: ReducedState, h: float, xi: Array) -> tuple[Array, Array, Array, Array, Array]:
+        """p̄, g, ṡ, what components make, heat and work per second, in the middle of a step."""
+        eq = self.equations
+        q, r = eq.moved(state.q, 0.5 * xi), xi / h
+        momentum, force = np.zeros(eq.n), np.zeros(eq.n)
+        s_rate, made, powers = np.zeros(eq.ns), np.zeros(len(eq.reduced.made)), np.zeros(2)
+        s = state.s
+        for _ in range(2 if eq.ns else 1):  # temperatures in the middle, by two passes
+            made[:] = 0.0
+            eq.load(state.t + 0.5 * h, q, r, s)
+            eq.refuse(
+                *action_derivatives(
+                    eq.reduced.tables, eq.work, q, r, s, eq.drive, eq.wrench, eq.scal, s_rate, made, powers,
+                    momentum, force,
+                )
+            )  # fmt: skip
+            s = state.s + 0.5 * h * s_rate
+        eq.evaluations += 1
+        return momentum, force, s_rate, made, powers
+
+    def _gap(self, state: ReducedState, xi: Array, h: float) -> tuple[Array, Array]:
+        """Residuals of prescribed joints and loops at the end of the step, and their rows on changes of ξ."""
+        eq = self.equations
+        if not self._rows:
+            return np.zeros(0), np.zeros((0, eq.n))
+        residual, rows = eq.gaps(eq.moved(state.q, xi), state.r)
+        residual[: self._driven.size] = xi[self._driven] - h * eq.prescribed
+        return residual, rows
+
+    def _slope(self, state: ReducedState, h: float, xi: Array, middle: Any) -> Array:
+        """∂p⁰/∂ξ by differences."""
+        here = self._start(xi, h, middle)
+        out = np.empty((xi.size, xi.size))
+        for j in range(xi.size):
+            moved = xi.copy()
+            moved[j] += DIFFERENCE
+            out[:, j] = (self._start(moved, h, self._middle(state, h, moved)) - here) / DIFFERENCE
+        self.counts["jacobians"] += 1
+        return out
+
+    def _turned(self, xi: Array, covector: Array) -> Array:
+        """D(ξ)ᵀ of a covector, joint by joint."""
+        out = covector.copy()
+        for code, where in self._groups:
+            out[where] = _inverse_differential(code, xi[where]).T @ covector[where]
+        return out
+
+    def _untwisted(self, xi: Array, covector: Array) -> Array:
+        """D(ξ)⁻ᵀ of a covector, joint by joint."""
+        out = covector.copy()
+        for code, where in self._groups:
+            out[where] = np.linalg.solve(_inverse_differential(code, xi[where]).T, covector[where])
+        return out
+
+
+def _inverse_differential(code: int, xi: Array) -> Array:
+    out = np.empty((xi.size, xi.size))
+    dexp_left_inv(code, xi, out)
+    return out
+
+
+def _least(matrix: Array, before: Array, rows: Array, first: Array, second: Array) -> tuple[Array, Array]:
+    """Changes of ξ and of the impulses; of least norm where rows depend on one another."""
+    n, m = matrix.shape[0], rows.shape[0]
+    if not m:
+        return np.asarray(np.linalg.solve(matrix, first), dtype=float), np.zeros(0)
+    # scaled so that impulses and increments count alike
+    size = float(np.abs(matrix).max())
+    whole = np.block([[matrix / size, -before.T], [rows, np.zeros((m, m))]])
+    right = np.concatenate([first / size, second])
+    found = np.asarray(np.linalg.lstsq(whole, right, rcond=RANK)[0], dtype=float)
+    return found[:n], size * found[n:]

@@ -1,0 +1,87 @@
+"""Methods that discretise component by component, and one step of theirs with inputs that change."""
+
+from typing import Protocol
+
+import numpy as np
+
+from ephs.mechanics.solve.model import Model
+from ephs.mechanics.solve.natural import Chunk, NaturalState
+from ephs.mechanics.solve.problem import Problem
+from ephs.semantics.bundle import Array
+
+__all__ = ["ComponentMethod", "advance_driven"]
+
+ROUNDS = 12
+
+
+class ComponentMethod(Protocol):
+    """A method that discretises component by component: `Natural`, `Natural4`."""
+
+    model: Model
+    name: str
+    order: int
+    nodes: tuple[float, ...]
+    changes: int
+
+    @property
+    def redundant(self) -> tuple[str, ...]:
+        """The equations that the method leaves out, in words."""
+        ...
+
+    def init(self, x: Array) -> NaturalState:
+        """The state of the method at the states x."""
+        ...
+
+    def energies(self, x: Array) -> Array:
+        """(components,): energy of each storage at the states x."""
+        ...
+
+    def prepare(self, state: NaturalState, h: float) -> None:
+        """Compile what is not in the cache, before time counts."""
+        ...
+
+    def advance(
+        self, state: NaturalState, h: float, steps: int, inputs: Array | None = None
+    ) -> tuple[NaturalState, Chunk]:
+        """Up to so many steps of h seconds."""
+        ...
+
+    def points(self, state: NaturalState, h: float, x: Array) -> list[Array]:
+        """The states at the nodes of a step of h seconds from x, by the rates that ``state`` holds."""
+        ...
+
+    def stage_points(self, state: NaturalState, h: float, x: Array) -> list[Array]:
+        """The states at the nodes of the step from x that led to ``state``."""
+        ...
+
+
+def advance_driven(
+    problem: Problem, method: ComponentMethod, state: NaturalState, t: float, h: float
+) -> tuple[NaturalState, Chunk]:
+    """One step with inputs at the method's nodes; of the state they are taken at the step's own, by iteration."""
+    if problem.constant:
+        return method.advance(state, h, 1)
+    d = problem.descriptor
+
+    def given(points: list[Array]) -> Array:
+        rows: list[Array] = []
+        for node, x in zip(method.nodes, points, strict=True):
+            inputs = problem.inputs(t + node * h, d.unpack(x))
+            rows.append(np.concatenate([*(inputs[slot.path].value for slot in d.outer), np.zeros(1)]))
+        return np.array(rows)
+
+    inputs = given(method.points(state, h, state.x))
+    first, last = method.advance(state, h, 1, inputs), np.inf
+    found = first
+    for _ in range(ROUNDS):
+        if found[1].failure is not None:
+            return found
+        again = given(method.stage_points(found[0], h, state.x))
+        change = float(np.max(np.abs(again - inputs), initial=0.0))
+        if change <= 1e-13 * float(np.max(np.abs(again), initial=0.0)):
+            return found
+        if change >= 0.9 * last:  # a feedback too stiff for this step: what was guessed first is what is left
+            return first
+        last, inputs = change, again
+        found = method.advance(state, h, 1, inputs)
+    return found

@@ -1,0 +1,301 @@
+"""The time loop of methods that take one step a call: control, events, what is kept, progress and interruption."""
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Generic, Protocol, TypeVar, final
+
+import numpy as np
+
+from ephs.mechanics.solve.control import Control, Policy
+from ephs.mechanics.solve.errors import OptionError, Outcome, SolveError
+from ephs.mechanics.solve.events import Crossing, Event, Watch
+from ephs.mechanics.solve.integrate import Grid, Progress, failures_of, solution_of
+from ephs.mechanics.solve.problem import Problem, States
+from ephs.mechanics.solve.record import Record
+from ephs.mechanics.solve.solution import Solution
+from ephs.operad import Path
+from ephs.semantics.bundle import Array
+
+__all__ = ["Attempt", "Row", "Stepper", "integrate_stepwise"]
+
+S = TypeVar("S")
+RESPONSE = 0.1
+FIRST = 1e-4
+"""Part of the time span that the first step takes: too long it is rejected, too short it grows fast."""
+FINAL = (Outcome.PYTHON, Outcome.UNSUITED, Outcome.EVENT, Outcome.INCONSISTENT)
+"""What a shorter step does not mend."""
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Row:
+    """What is kept at one instant.
+
+    Parameters
+    ----------
+    x
+        (point_size,) the states.
+    energies
+        (components,): energy of each storage in J, entropy made by each irreversible component in J/K.
+    sums
+        (4,): heat, energy supplied, exergy supplied in J, entropy made in J/K.
+    """
+
+    x: Array
+    energies: Array
+    sums: Array
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Attempt(Generic[S]):
+    """A step that was solved.
+
+    Parameters
+    ----------
+    start, end
+        The method's state before and after it.
+    h
+        Its length in s.
+    error
+        Estimated error relative to the tolerances; 0 where the method has no estimate.
+    least
+        The least entropy production of a component in it, in J/K.
+    detail
+        What dense output needs.
+    """
+
+    start: S
+    end: S
+    h: float
+    error: float
+    least: float
+    detail: Any = None
+
+
+class Stepper(Protocol[S]):
+    """A method on one problem: it starts, steps, and says what is where. States are values with a time ``t``."""
+
+    name: str
+
+    def start(self, t: float, h: float) -> S:
+        """The method's state at the initial values; h is the length of the first step."""
+        ...
+
+    def prepare(self, state: S, h: float) -> None:
+        """Compile what is not in the cache, before time counts."""
+        ...
+
+    def step(self, state: S, h: float) -> Attempt[S]:
+        """One step of h seconds, which may be negative.
+
+        Raises
+        ------
+        SolveError
+            The step has no solution.
+        """
+        ...
+
+    def inside(self, attempt: Attempt[S], t: float) -> S:
+        """The state at a time within a step, to the method's order."""
+        ...
+
+    def at(self, state: S, t: float) -> S:
+        """The same state at a time that differs by rounding."""
+        ...
+
+    def row(self, state: S) -> Row:
+        """What is kept of it."""
+        ...
+
+    def stats(self) -> dict[str, Any]:
+        """Counts, for the solution's statistics."""
+        ...
+
+
+def integrate_stepwise(
+    problem: Problem,
+    t0: float,
+    until: float,
+    *,
+    make: Callable[[], tuple[Stepper[S], Policy | None]],
+    control: Control,
+    events: tuple[Event, ...] = (),
+    save_at: Array | None = None,
+    progress: Progress | None = None,
+    remarks: Mapping[str, Any] | None = None,
+) -> Solution:
+    """Solve an initial value problem, forward or backward in time.
+
+    Parameters
+    ----------
+    make
+        Makes the method, and what chooses its steps; None: they are constant.
+    remarks
+        What else the statistics are to say.
+
+    Raises
+    ------
+    SimulationError
+        The run failed part-way; ``.partial`` holds the solution up to there. `Interrupted` where the user stopped it.
+    """
+    begin = time.perf_counter()
+    if not (np.isfinite(until) and until != t0):
+        raise OptionError("until", until, f"a time other than t0 = {t0!r} s")
+    run = _Run(problem, t0, until, *make(), control, events, save_at, progress, remarks or {}, begin)
+    with failures_of(run):
+        run.start()
+        run.setup = time.perf_counter() - begin
+        run.advance()
+    return run.solution()
+
+
+class _Run(Generic[S]):
+    """One run in progress."""
+
+    state: S
+
+    def __init__(
+        self,
+        problem: Problem,
+        t0: float,
+        until: float,
+        stepper: Stepper[S],
+        policy: Policy | None,
+        control: Control,
+        events: tuple[Event, ...],
+        save_at: Array | None,
+        progress: Progress | None,
+        remarks: Mapping[str, Any],
+        begin: float,
+    ) -> None:
+        self.problem, self.until, self.stepper, self.control = problem, until, stepper, control
+        self.policy, self.events, self.progress, self.begin = policy, events, progress, begin
+        self.remarks = remarks
+        self.t = self.t0 = t0
+        self.sign = 1.0 if until > t0 else -1.0
+        self.save_at = save_at
+        self.setup = 0.0
+        self.steps = self.rejected = self.saved = 0
+        self.looked = begin
+        self.least = np.inf
+        self.shortest, self.longest = np.inf, 0.0
+        self.rows: list[tuple[float, Row, float]] = []
+        self.watch: Watch | None = None
+
+    def start(self) -> None:
+        """The initial state, and the first row."""
+        span = abs(self.until - self.t0)
+        control = self.control
+        self.h = control.step or min(max(FIRST * span, control.least), control.most, span)
+        self.state = self.stepper.start(self.t0, self.sign * self.h)
+        row = self.stepper.row(self.state)
+        if self.save_at is None or (self.save_at.size and self.save_at[0] == self.t0):
+            self.rows.append((self.t0, row, 0.0))
+            self.saved = 1
+        self.stepper.prepare(self.state, self.sign * self.h)
+        if self.events:
+            self.watch = Watch(self.events, self.t0, self._states(row))
+
+    def advance(self) -> None:
+        """Step after step to the end, or to an event that stops the run."""
+        control = self.control
+        grid = None if self.policy else Grid(0.0, abs(self.until - self.t0), float(control.step or 0.0))
+        while self.t != self.until:
+            if control.max_steps is not None and self.steps >= control.max_steps:
+                raise SolveError(Outcome.MANY, "", f"{control.max_steps}")
+            rest = abs(self.until - self.t)
+            if grid:
+                self.h = min(grid.time(self.steps + 1) - abs(self.t - self.t0), rest)
+                if rest - self.h <= 1e-9 * grid.h:
+                    self.h = rest
+            # No sliver is left for a last step.
+            h = self.h if rest > 1.01 * self.h else rest if rest <= 1.0000001 * self.h or grid else 0.5 * rest
+            try:
+                attempt = self.stepper.step(self.state, self.sign * h)
+            except SolveError as error:
+                if grid or error.outcome in FINAL:
+                    raise
+                self._shrink(0.25 * h, error)
+                continue
+            if self.policy:
+                accepted, wanted = self.policy.judge(h, attempt.error, abs(self.until - self.t0))
+                if not accepted:
+                    self._shrink(min(wanted, control.most), None)
+                    continue
+                if h == self.h or wanted < self.h:  # a step that was cut for the end says nothing of longer ones
+                    self.h = max(min(wanted, control.most), min(control.least, h))
+            if self._accept(attempt, self.until if h == rest and abs(attempt.h) == h else None):
+                return
+
+    def _shrink(self, h: float, cause: SolveError | None) -> None:
+        self.rejected += 1
+        self.h = self.control.allowed(h, max(abs(self.t), abs(self.until)), cause)
+
+    def _accept(self, attempt: Attempt[S], end: float | None) -> bool:
+        """Keep a step; whether an event ends the run with it."""
+        t = self.t + attempt.h if end is None else end
+        if end is None and self.policy is None:
+            t = self.t0 + self.sign * (self.steps + 1) * float(self.control.step or 0.0)
+        after = self.stepper.at(attempt.end, t)
+        stopped = None
+        if self.watch:
+
+            def inside(when: float) -> Mapping[Path, Array]:
+                return self._states(self.stepper.row(self.stepper.inside(attempt, when)))
+
+            stopped = self.watch.step(self.t, t, self._states(self.stepper.row(after)), inside)
+            if stopped is not None and stopped != t:
+                t, after = stopped, self.stepper.at(self.stepper.inside(attempt, stopped), stopped)
+        self.least = min(self.least, attempt.least)
+        self.shortest, self.longest = min(self.shortest, abs(attempt.h)), max(self.longest, abs(attempt.h))
+        if self.save_at is None:
+            self.rows.append((t, self.stepper.row(after), attempt.least))
+        else:
+            last = int(np.searchsorted(self.sign * self.save_at, self.sign * t, side="right"))
+            for when in self.save_at[self.saved : last]:
+                found = after if when == t else self.stepper.inside(attempt, float(when))
+                self.rows.append((float(when), self.stepper.row(found), attempt.least))
+            self.saved = last
+        self.state, self.t = after, t
+        self.steps += 1
+        now = time.perf_counter()
+        if self.progress is not None and now - self.looked > RESPONSE:
+            self.looked = now
+            self.progress(self.t, self.until, self.stats())
+        return stopped is not None
+
+    def _states(self, row: Row) -> Mapping[Path, Array]:
+        return States(self.problem.descriptor.unpack(row.x))
+
+    def stats(self) -> dict[str, Any]:
+        """What the run did so far."""
+        least = float(self.least) if np.isfinite(self.least) else 0.0
+        crossings: list[Crossing] = self.watch.crossings if self.watch else []
+        return {
+            "method": self.stepper.name,
+            "steps": self.steps,
+            "rejected": self.rejected,
+            "shortest_step": float(self.shortest) if self.steps else 0.0,
+            "longest_step": self.longest,
+            "dependent_equations": 0,
+            **({"step": self.control.step} if self.policy is None else {}),
+            **self.stepper.stats(),
+            **self.remarks,
+            "setup_s": self.setup,
+            "integrate_s": time.perf_counter() - self.begin - self.setup,
+            "least_production": least,
+            **({"events": [crossing.record(self.problem.descriptor) for crossing in crossings]} if self.watch else {}),
+        }
+
+    def solution(self) -> Solution:
+        """The solution so far."""
+        count, size = len(self.problem.descriptor.components), self.problem.descriptor.point_size
+        record = Record(
+            np.array([t for t, _, _ in self.rows]),
+            np.array([row.x for _, row, _ in self.rows]).reshape(-1, size),
+            np.array([row.energies for _, row, _ in self.rows]).reshape(-1, count),
+            np.array([[*row.sums, least] for _, row, least in self.rows]).reshape(-1, 5),
+        )
+        return solution_of(self.problem, record, self.stats())

@@ -1,0 +1,241 @@
+"""The natural method of order 4: three Gauss stages, energy and holonomic relations exact, friction included.
+
+The corrections that make it so are one term a component (see `gauss_kernels`), so that discretising commutes with
+composing as it does at order 2. A composition of steps of order 2 would have to step backwards through dissipation.
+"""
+
+from typing import final
+
+import numpy as np
+
+from ephs.mechanics.solve.analysis import DEFECT, SHRUNK, dependent_rows
+from ephs.mechanics.solve.errors import Outcome, SolveError
+from ephs.mechanics.solve.gauss_kernels import Groups, Scheme, Stages, gauss_advance, linearise
+from ephs.mechanics.solve.lu_kernels import factorise
+from ephs.mechanics.solve.model import Model, evaluate_at
+from ephs.mechanics.solve.natural import Chunk, NaturalState, guessed_efforts, of_status
+from ephs.mechanics.solve.natural_kernels import COMPONENT, DONE, Memory, Order
+from ephs.mechanics.solve.sparse import Index, order
+from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.codes import SE3
+
+__all__ = ["Natural4"]
+
+INSTANT = 1e-7
+"""The step, in s, over which derivatives by increments are taken at a stage: so short that it is an instant."""
+
+
+_STAGES = 3
+_NODES = 0.5 * (1.0 + np.polynomial.legendre.leggauss(_STAGES)[0])
+
+
+def _weights(theta: float) -> Array:
+    """(stages,) weights of the stages' values for the integral from 0 to theta of the polynomial through them."""
+    powers = np.array([theta ** (k + 1) / (k + 1) for k in range(_STAGES)])
+    return np.asarray(np.linalg.solve(np.vander(_NODES, increasing=True).T, powers), dtype=float)
+
+
+def _values(theta: float) -> Array:
+    """(stages,) weights of the stages' values for that of the polynomial through them."""
+    powers = theta ** np.arange(_STAGES)
+    return np.asarray(np.linalg.solve(np.vander(_NODES, increasing=True).T, powers), dtype=float)
+
+
+SCHEME = Scheme(np.array([_weights(c) for c in _NODES]), _weights(1.0), _NODES)
+AHEAD = np.array([_values(1.0 + c) for c in _NODES])
+
+
+@final
+class Natural4:
+    """The method for one model. It keeps scratch memory: use one for each thread.
+
+    Attributes
+    ----------
+    nodes
+        Where in a step inputs are wanted.
+    changes
+        How often the order of elimination was decided anew.
+    redundant
+        The equations that it leaves out, in words.
+    """
+
+    name = "natural4"
+    order = 4
+    nodes = tuple(_NODES.tolist())
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        self.changes = 0
+        self.redundant: tuple[str, ...] = ()
+        t, n = model.tables, model.unknowns
+        self._memory: Memory = model.memory()
+        self._groups = _groups(model)
+        self._where = _entries(model)
+        size, entries, rates = int(model.descriptor.point_size), int(t.row.size), int(t.counts[0])
+        k = _STAGES
+        self._scratch = Stages(
+            x=np.zeros((k, size)), v=np.zeros((k, rates)), turn=np.zeros((k, 8)), outer=np.zeros((k, 8)),
+            whole=np.zeros(rates), mean=np.zeros(n), gradient=np.zeros(rates), gap=np.zeros(n),
+            energy=np.zeros(t.kind.size), residual=np.zeros((k, n)), scale=np.zeros((k, n)),
+            data=np.zeros((k, entries)), slope=np.zeros((k, entries)), matrix=np.zeros(len(self._where)),
+            change=np.zeros(k * n), dense=np.zeros(k * n), factors=np.zeros(1), pivot=np.zeros(k * n),
+            small=np.zeros(200),
+        )  # fmt: skip
+        self._order: Order | None = None
+
+    def init(self, x: Array) -> NaturalState:
+        """The state of the method at the states x; unknowns are guessed from the efforts there."""
+        z = np.tile(guessed_efforts(self.model, x), (_STAGES, 1))
+        return NaturalState(x.copy(), z, z.copy(), np.zeros(4 + len(self.model.descriptor.components)))
+
+    def energies(self, x: Array) -> Array:
+        """(components,): energy of each storage at the states x, zero elsewhere."""
+        status, component, memory = evaluate_at(self.model, x, guessed_efforts(self.model, x), 1.0)
+        if status:
+            raise SolveError.of_component(status, self.model, component)
+        return memory.energy
+
+    def prepare(self, state: NaturalState, h: float) -> None:
+        """Decide the order of elimination and compile what is not in the cache, before time counts."""
+        self.advance(state, h, 0)
+
+    def points(self, state: NaturalState, h: float, x: Array) -> list[Array]:
+        """The states at the nodes of a step from x, by the rates that ``state`` holds, continued."""
+        d, rates = self.model.descriptor, int(self.model.tables.counts[0])
+        return [d.advance(x, h * ((_weights(1.0 + c) - _weights(1.0)) @ state.z[:, :rates])) for c in self.nodes]
+
+    def stage_points(self, state: NaturalState, h: float, x: Array) -> list[Array]:
+        """The states at the nodes of the step that was solved last."""
+        return list(self._scratch.x.copy())
+
+    def advance(
+        self, state: NaturalState, h: float, steps: int, inputs: Array | None = None
+    ) -> tuple[NaturalState, Chunk]:
+        """Up to ``steps`` steps of h seconds; the chunk says what stopped them early.
+
+        Parameters
+        ----------
+        inputs
+            (3, …) values at the outer ports at the nodes of these steps, the model's own where None.
+        """
+        model, t = self.model, self.model.tables
+        given = np.tile(model.input_values(), (_STAGES, 1)) if inputs is None else np.ascontiguousarray(inputs)
+        x, z, previous, sums = (a.copy() for a in (state.x, state.z, state.previous, state.sums))
+        rows, energies, ledgers = np.empty((steps, x.size)), np.empty((steps, t.kind.size)), np.empty((steps, 5))
+        scal, still, unit = (model.scal(value) for value in (h, 0.0, INSTANT))
+        parts = np.array([model.scal(h * weight) for weight in SCHEME.b])
+        done = iterations = 0
+        failure: SolveError | None = None
+        fresh = self._order is None
+        while failure is None:
+            try:
+                if self._order is None:
+                    self._decide(x, z, h, given)
+            except SolveError as error:
+                failure = error
+                break
+            assert self._order is not None
+            o = self._order._replace(floor=np.zeros_like(self._order.floor)) if fresh else self._order
+            wanted = min(steps - done, 1) if fresh else steps - done
+            status, component, taken, spent = gauss_advance(
+                t, self._groups, SCHEME, o, self._where, x, z, previous, scal, still, unit, parts, given, AHEAD,
+                self._memory, self._scratch, sums, wanted, rows[done:], energies[done:], ledgers[done:],
+            )  # fmt: skip
+            done, iterations = done + taken, iterations + spent
+            if status == DONE:
+                fresh = False
+                if done >= steps:
+                    break
+            elif status >= COMPONENT:
+                failure = SolveError.of_component(status, model, component)
+            elif fresh and not taken:
+                failure = of_status(status)
+            else:  # another order, at these values
+                self._order, fresh = None, True
+        after = NaturalState(x, z, previous, sums)
+        return after, Chunk(rows[:done], energies[:done], ledgers[:done], int(iterations), failure)
+
+    def _decide(self, x: Array, z: Array, h: float, inputs: Array) -> None:
+        """Rank of the constraints, and an order of elimination for all stages, at these values."""
+        model, t, n = self.model, self.model.tables, self.model.unknowns
+        status, component, memory = evaluate_at(model, x, z[0], h)
+        if status:
+            raise SolveError.of_component(status, model, component)
+        dropped = dependent_rows(model, memory.data)
+        s = self._scratch
+        status, component = linearise(
+            t,
+            self._groups,
+            SCHEME,
+            x,
+            z,
+            model.scal(h),
+            model.scal(0.0),
+            model.scal(INSTANT),
+            inputs,
+            self._memory,
+            s,
+            True,
+        )
+        if status:
+            raise SolveError.of_component(int(status), model, int(component))
+        where = self._where
+        i, j, source = where.T
+        inside = source >= 0
+        rows = np.where(inside, t.row[source], -source - 1) + i * n
+        columns = np.where(inside, t.column[source], -source - 1) + j * n
+        in_rates = inside & (t.column[source] < t.counts[0])
+        data = np.where(inside & (i == j), s.data[i, source], 0.0)
+        data += np.where(in_rates, h * SCHEME.a[i, j] * s.slope[i, source], 0.0)
+        out = dropped[np.where(inside, t.row[source], -source - 1)] == 1
+        data[~inside] = 1.0
+        active = np.where(inside, ~out, out)
+        chosen = np.flatnonzero(active)
+        entries = np.where(data[chosen] == 0.0, 1e-300, data[chosen])  # a place that is zero now may fill later
+        try:
+            found = order(_STAGES * n, rows[chosen], columns[chosen], entries)
+        except RuntimeError as error:
+            raise SolveError(Outcome.SINGULAR, "", "") from error
+        place = np.full(len(where), -1, dtype=np.int64)
+        place[chosen] = found.place
+        made = Order(
+            found.rows, found.columns, found.start, found.column, found.diagonal, place, np.tile(dropped, _STAGES),
+            np.zeros(_STAGES * n), np.array([DEFECT]),
+        )  # fmt: skip
+        self._scratch = s._replace(factors=np.zeros(found.fill))
+        ratio = np.zeros(_STAGES * n)
+        matrix = np.where(active, data, 0.0)
+        if not factorise(
+            place, made.start, made.entry, made.diagonal, matrix, self._scratch.factors, s.dense, made.floor, ratio
+        ):
+            raise SolveError(Outcome.SINGULAR, "", "")
+        self._order = made._replace(floor=SHRUNK * ratio)
+        self.redundant = tuple(model.row_name(int(row)) for row in np.flatnonzero(dropped))
+        self.changes += 1
+
+
+def _groups(model: Model) -> Groups:
+    """The velocities of joints: twists of two frames, and a velocity on the pair's group."""
+    rows: list[tuple[int, int, int, int]] = []
+    for number, slot in enumerate(model.descriptor.components):
+        kernel = slot.primitive.kernel
+        if kernel is not None and kernel.name == "holonomic":
+            code, efforts = int(kernel.parameters[0]), list(slot.efforts)
+            for first, dim, group in ((0, 6, SE3), (6, 6, SE3), (12, len(efforts) - 12, code)):
+                if dim:
+                    rows.append((number, group, efforts[first], dim))
+    table = np.array(rows, dtype=np.int64).reshape(-1, 4)
+    return Groups(*(np.ascontiguousarray(column) for column in table.T))
+
+
+def _entries(model: Model) -> Index:
+    """(entries, 3): stage of the row, stage of the column, entry of the model's matrix; −1 − row: its place holder."""
+    t, n = model.tables, model.unknowns
+    plain, rates = t.row.size - n, int(t.counts[0])
+    out: list[tuple[int, int, int]] = []
+    for i in range(_STAGES):
+        for source in range(plain):
+            others = range(_STAGES) if t.column[source] < rates else (i,)
+            out += [(i, j, source) for j in others]
+        out += [(i, i, -1 - row) for row in range(n)]
+    return np.array(out, dtype=np.int64).reshape(-1, 3)

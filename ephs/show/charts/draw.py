@@ -1,0 +1,266 @@
+"""The figures of measurements, and their data as CSV and JSON beside them."""
+
+import csv
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ephs.mechanics.methods import METHODS
+from ephs.show.charts.families import Family
+from ephs.show.charts.measure import Point
+from ephs.show.charts.outcomes import Outcome
+from ephs.show.charts.peers import PEERS
+from ephs.show.charts.runs import Ending, Setting
+from ephs.show.charts.stability import Cell
+from ephs.show.figures import new_figure
+from ephs.show.palette import BLACK, BLUE, GREEN, GREY, INK, ORANGE, PURPLE, RED, SKY
+from ephs.show.plots import STYLE
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["draw_stability", "draw_work_precision", "write_cells"]
+
+_COLOURS = (BLUE, SKY, GREEN, ORANGE, RED, PURPLE, BLACK, "#8c6d1f")
+_PEER_COLOURS = ("#6b7280", "#9aa3af", "#4b5563", "#b8bec7")
+_MARKERS = ("o", "s", "D", "^", "v", "P", "X", "h")
+_PEER_MARKERS = ("<", ">", "p", "d")
+_FILLS = {
+    Outcome.ACCURATE: GREEN,
+    Outcome.WRONG_BUT_BOUNDED: "#f0e442",
+    Outcome.ENERGY_DRIFT: PURPLE,
+    Outcome.DAMPED: SKY,
+    Outcome.REFUSED: "#d1d5db",
+    Outcome.DIVERGED: RED,
+    Outcome.UNKNOWN: "#ffffff",
+}
+_SIGNS = {
+    Outcome.WRONG_BUT_BOUNDED: "wrong",
+    Outcome.ENERGY_DRIFT: "drift",
+    Outcome.DAMPED: "damped",
+    Outcome.REFUSED: "–",
+    Outcome.DIVERGED: "diverged",
+    Outcome.UNKNOWN: "?",
+}
+_DPI = 150
+
+
+def draw_work_precision(points: Sequence[Point], title: str, folder: Path, name: str) -> list[Path]:
+    """Error against wall time and against evaluations; PNG, SVG, CSV and JSON of this name.
+
+    Methods over tolerances have filled marks and full lines, over steps hollow marks and dashed lines. What failed is
+    marked at the right edge.
+    """
+    from matplotlib import rc_context
+
+    style: Any = STYLE
+    series: dict[tuple[str, str], list[Point]] = {}
+    for point in points:
+        series.setdefault((point.method, point.setting.kind), []).append(point)
+    with rc_context(style):
+        figure = new_figure(10.0, 5.6)
+        left, right = figure.subplots(1, 2, sharey=True)
+        for axes, key, label in ((left, "seconds", "wall time [s]"), (right, "evaluations", "evaluations, iterations")):
+            axes.set_xscale("log")
+            axes.set_yscale("log")
+            axes.set_xlabel(label)
+            for (method, kind), found in series.items():
+                _curve(axes, method, kind, found, key)
+        left.set_ylabel("error at the end [m, 1]")
+        left.set_title(title, loc="left")
+        _failures(right, series)
+        handles, labels = left.get_legend_handles_labels()
+        extra, said = right.get_legend_handles_labels()
+        more = [(h, text) for h, text in zip(extra, said, strict=True) if text not in labels]
+        handles, labels = [*handles, *(h for h, _ in more)], [*labels, *(text for _, text in more)]
+        if any(point.floor for point in points):
+            from matplotlib.lines import Line2D
+
+            handles.append(Line2D([], [], color=INK, marker="x", markersize=4.0, linestyle="none"))
+            labels.append("near the reference's own error")
+        if handles:
+            figure.legend(handles, labels, loc="outside lower center", ncols=5, frameon=False, fontsize=8.0)
+    return [*_save(figure, folder, name), *_write_data([_flat(point) for point in points], folder, name)]
+
+
+def draw_stability(cells: Sequence[Cell], family: Family, folder: Path, name: str) -> list[Path]:
+    """A matrix of outcomes: rows are methods with their settings, columns the family's values.
+
+    A cell says the error of an accurate run, or what else came of it; the method's messages are in the data.
+    """
+    from matplotlib import rc_context
+    from matplotlib.patches import Patch, Rectangle
+
+    values = list(dict.fromkeys(cell.value for cell in cells))
+    rows = list(dict.fromkeys(_row(cell, family) for cell in cells))
+    style: Any = STYLE
+    with rc_context(style):
+        width = 2.6 + 1.15 * max(len(values), 4)
+        figure = new_figure(width, 1.7 + 0.23 * len(rows))
+        axes = figure.subplots()
+        for cell in cells:
+            x, y = values.index(cell.value), rows.index(_row(cell, family))
+            axes.add_patch(Rectangle((x, y), 1, 1, facecolor=_FILLS[cell.outcome], edgecolor="white", linewidth=1.2))
+            dark = cell.outcome in (Outcome.ACCURATE, Outcome.DIVERGED)
+            axes.text(
+                x + 0.5,
+                y + 0.5,
+                _said(cell, family),
+                ha="center",
+                va="center",
+                color="white" if dark else INK,
+                size=7.5,
+            )
+        axes.set_xlim(0, len(values))
+        axes.set_ylim(len(rows), 0)
+        axes.set_xticks([i + 0.5 for i in range(len(values))], [family.label(value) for value in values])
+        axes.set_yticks(
+            [i + 0.5 for i in range(len(rows))], [" ".join(filter(None, row)) for row in rows], fontsize=8.0
+        )
+        for text, (method, _) in zip(axes.get_yticklabels(), rows, strict=True):
+            text.set_fontweight("bold" if method in family.recommended else "normal")
+        for before, row, after in zip(range(len(rows)), rows, rows[1:], strict=False):
+            if row[0] != after[0]:
+                axes.axhline(before + 1, color=GREY, linewidth=0.8)
+        axes.grid(visible=False)
+        axes.tick_params(length=0)
+        for side in axes.spines.values():
+            side.set_visible(False)
+        unit = "" if family.unit == "1" else f" [{family.unit}]"
+        axes.set_xlabel(f"{family.parameter}{unit}")
+        axes.set_title(f"{family.name}: {family.summary}", loc="left", fontsize=9.0, wrap=True)
+        seen = {cell.outcome for cell in cells}
+        patches = [
+            Patch(facecolor=fill, edgecolor=GREY, linewidth=0.5, label=outcome.value)
+            for outcome, fill in _FILLS.items()
+            if outcome in seen
+        ]
+        patches.append(Patch(alpha=0.0, label="bold: recommended here"))
+        figure.legend(handles=patches, loc="outside lower center", ncols=4, frameon=False, fontsize=8.0)
+    return _save(figure, folder, name)
+
+
+def _write_data(rows: Sequence[Mapping[str, Any]], folder: Path, name: str) -> list[Path]:
+    """The same rows as CSV and as JSON, what is not a number as null."""
+    table, data = folder / f"{name}.csv", folder / f"{name}.json"
+    with table.open("w", encoding="utf-8", newline="") as stream:
+        if rows:
+            writer = csv.DictWriter(stream, list(rows[0]))
+            writer.writeheader()
+            writer.writerows(rows)
+    clean = [{key: _number(value) for key, value in row.items()} for row in rows]
+    data.write_text(json.dumps(clean, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    return [table, data]
+
+
+def write_cells(cells: Sequence[Cell], folder: Path, name: str) -> list[Path]:
+    """The data of matrices."""
+    return _write_data([_flat(cell) for cell in cells], folder, name)
+
+
+def _number(value: Any) -> Any:
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _flat(record: Point | Cell) -> dict[str, Any]:
+    """A record as one row, its setting as two entries."""
+    row: dict[str, Any] = {}
+    for field in fields(record):
+        value = getattr(record, field.name)
+        if isinstance(value, Setting):
+            row |= {"control": value.kind, "setting": value.value}
+        else:
+            row[field.name] = str(value) if isinstance(value, Outcome | Ending) else value
+    return row
+
+
+def _look(method: str) -> tuple[str, str]:
+    """One colour and one marker a method, the same in every figure."""
+    if method in METHODS:
+        at = list(METHODS).index(method)
+        return _COLOURS[at % len(_COLOURS)], _MARKERS[at % len(_MARKERS)]
+    at = list(PEERS).index(method) if method in PEERS else 0
+    return _PEER_COLOURS[at % len(_PEER_COLOURS)], _PEER_MARKERS[at % len(_PEER_MARKERS)]
+
+
+def _curve(axes: "Axes", method: str, kind: str, points: Sequence[Point], key: str) -> None:
+    done = [p for p in points if p.outcome is Ending.DONE and getattr(p, key) > 0 and p.error > 0.0]
+    if not done:
+        return
+    colour, marker = _look(method)
+    x, y = [getattr(p, key) for p in done], [p.error for p in done]
+    hollow = kind == "step"
+    axes.plot(
+        x,
+        y,
+        color=colour,
+        marker=marker,
+        markersize=5.0,
+        markerfacecolor="white" if hollow else colour,
+        linestyle="--" if hollow else "-",
+        linewidth=1.1,
+        label=f"{method}{', steps' if hollow and _both(method) else ''}",
+    )
+    floor = [p for p in done if p.floor]
+    if floor:
+        axes.plot([getattr(p, key) for p in floor], [p.error for p in floor], "x", color=INK, markersize=4.0)
+
+
+def _both(method: str) -> bool:
+    found = METHODS.get(method) or PEERS.get(method)
+    return found is not None and found.adaptive and found.fixed
+
+
+def _failures(axes: "Axes", series: Mapping[tuple[str, str], Sequence[Point]]) -> None:
+    """At the right edge, one row a series: how many of its runs failed."""
+    failed = {key: [p for p in points if p.outcome is not Ending.DONE] for key, points in series.items()}
+    failed = {key: points for key, points in failed.items() if points}
+    if not failed:
+        return
+    axes.text(1.06, 1.0, "failed", transform=axes.transAxes, fontsize=8.0, color=GREY, va="bottom")
+    for row, ((method, kind), points) in enumerate(failed.items()):
+        colour, marker = _look(method)
+        y = 0.96 - 0.045 * row
+        axes.plot(
+            [1.05],
+            [y],
+            transform=axes.transAxes,
+            clip_on=False,
+            color=colour,
+            marker=marker,
+            markersize=5.0,
+            markerfacecolor="white" if kind == "step" else colour,
+            linestyle="none",
+        )
+        ways = {p.outcome for p in points}
+        how = next(iter(ways)).value if len(ways) == 1 else "failed"
+        text = f"{method}, {'steps' if kind == 'step' else 'tol'}: {len(points)} {how}"
+        axes.text(1.08, y, text, transform=axes.transAxes, fontsize=7.0, va="center", color=INK)
+
+
+def _row(cell: Cell, family: Family) -> tuple[str, str]:
+    """Method and setting; where the step is the column, it is not in the row."""
+    by_step = family.role == "step" and cell.setting.kind == "step"
+    return cell.method, "" if by_step else str(cell.setting)
+
+
+def _said(cell: Cell, family: Family) -> str:
+    if family.name == "chaos" and np.isfinite(cell.horizon):
+        return f"{cell.horizon:.3g} s"
+    if cell.outcome is Outcome.ACCURATE:
+        return "0" if cell.error == 0.0 else f"{cell.error:.0e}".replace("e-0", "e-")
+    return "slow" if cell.message.startswith(Ending.SLOW) else _SIGNS[cell.outcome]
+
+
+def _save(figure: "Figure", folder: Path, name: str) -> list[Path]:
+    folder.mkdir(parents=True, exist_ok=True)
+    files = [folder / f"{name}.png", folder / f"{name}.svg"]
+    for file in files:
+        figure.savefig(file, dpi=_DPI)
+    return files

@@ -1,0 +1,188 @@
+"""Work and precision: what an error costs, method by method."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from ephs.mechanics.methods import METHODS
+from ephs.mechanics.scene.model import Scene
+from ephs.show.charts.peers import PEERS, PeerError, PeerRun
+from ephs.show.charts.reference import Motion, Reference, tight_reference
+from ephs.show.charts.runs import Array, Ending, Setting, attempt
+
+__all__ = ["STEPS", "TOLERANCES", "Point", "work_precision"]
+
+TOLERANCES = tuple(10.0**-k for k in range(3, 13))
+STEPS = tuple(20 * 2**k for k in range(11))
+"""Into how many steps the time is divided."""
+FLOOR = 100.0
+"""An error below this many cross-checks of the reference says nothing."""
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Point:
+    """One method at one setting.
+
+    Parameters
+    ----------
+    method
+        Its name; a peer's starts with that of its program.
+    setting
+        Tolerance or step.
+    error
+        Largest deviation of a component of a position, in m, or of a rotation matrix at the end; NaN without a result.
+    seconds
+        Median over the repeats of the time of integration.
+    evaluations
+        Of the accelerations, or iterations where the method solves equations; 0 where it does not tell.
+    outcome, message
+        How the run ended, and what it told its user.
+    floor
+        Whether the error is too near that of the reference to be known.
+    """
+
+    method: str
+    setting: Setting
+    error: float
+    seconds: float
+    evaluations: int
+    steps: int
+    outcome: Ending
+    message: str = ""
+    floor: bool = False
+
+
+def work_precision(
+    scene: Scene,
+    until: float,
+    methods: Sequence[str] | None = None,
+    *,
+    reference: Reference | None = None,
+    repeats: int = 3,
+    limit: float = 20.0,
+    tolerances: Sequence[float] = TOLERANCES,
+    steps: Sequence[int] = STEPS,
+    peers: bool = True,
+    note: Callable[[str], None] | None = None,
+) -> list[Point]:
+    """Measure error, time and evaluations of every method over its settings.
+
+    Parameters
+    ----------
+    methods
+        Names of `METHODS` or of `PEERS`; all unless given. Methods that can do both run over tolerances and over steps.
+    reference
+        What is true at ``until``; a tight run unless given.
+    repeats
+        Runs of which the median time is taken.
+    limit
+        Wall time in s for a method: one whose run took a quarter of it is not refined further.
+    peers
+        Whether other programs that are installed are measured too, where they can do the scene.
+    note
+        Called with the name of each method before it is measured.
+    """
+    truth = tight_reference(scene, until) if reference is None else reference
+    everything = [*(name for name, method in METHODS.items() if method.scenes), *(PEERS if peers else ())]
+    points: list[Point] = []
+    for name in everything if methods is None else methods:
+        if note is not None:
+            note(name)
+        for settings in _settings(name, until, tolerances, steps):
+            if name in METHODS:
+                points += _own(scene, until, name, settings, truth, repeats, limit)
+            elif name in PEERS:
+                points += _foreign(scene, until, name, settings, truth, repeats, limit, told=methods is not None)
+    return points
+
+
+def _settings(name: str, until: float, tolerances: Sequence[float], steps: Sequence[int]) -> list[list[Setting]]:
+    method = METHODS.get(name) or PEERS[name]
+    found: list[list[Setting]] = []
+    if method.adaptive:
+        found.append([Setting("tolerance", value) for value in tolerances])
+    if method.fixed:
+        found.append([Setting("step", until / count) for count in steps])
+    return found
+
+
+def _own(
+    scene: Scene, until: float, name: str, settings: list[Setting], truth: Reference, repeats: int, limit: float
+) -> list[Point]:
+    points: list[Point] = []
+    for setting in settings:
+        first = attempt(scene, until, name, setting, limit=limit)
+        if first.solution is None:
+            points.append(Point(name, setting, np.nan, np.nan, 0, 0, first.ending, first.message))
+            if first.ending is not Ending.FAILED:  # a finer setting changes nothing, or takes longer still
+                break
+            continue
+        if setting is settings[0] and first.wall > limit / 4.0:  # kernels may have been compiled
+            first = attempt(scene, until, name, setting, limit=limit)
+            if first.solution is None:
+                break
+        rest = [attempt(scene, until, name, setting, limit=limit) for _ in range(_more(repeats, first.wall, limit))]
+        runs = [run.solution.stats["integrate_s"] for run in [*rest, first] if run.solution is not None]
+        stats, error = first.solution.stats, float(Motion.of(first.solution).off(truth.motion)[-1])
+        count = int(stats.get("evaluations", stats.get("iterations", 0)))
+        points.append(_point(name, setting, error, float(np.median(runs)), count, int(stats["steps"]), truth))
+        if first.wall > limit / 4.0:
+            break
+    return points
+
+
+def _foreign(
+    scene: Scene,
+    until: float,
+    name: str,
+    settings: list[Setting],
+    truth: Reference,
+    repeats: int,
+    limit: float,
+    *,
+    told: bool,
+) -> list[Point]:
+    points: list[Point] = []
+    try:
+        run = PEERS[name].prepare(scene, until)
+    except PeerError as error:  # of all programs those that can are shown; of the one that was asked for, why not
+        refused = Point(name, settings[0], np.nan, np.nan, 0, 0, Ending.REFUSED, str(error))
+        return [refused] if told else []
+    for setting in settings:
+        try:
+            first: PeerRun = run(setting, limit)
+            rest = [run(setting, limit) for _ in range(_more(repeats, first.seconds, limit))]
+        except PeerError as error:
+            points.append(Point(name, setting, np.nan, np.nan, 0, 0, error.ending, str(error)))
+            if error.ending is not Ending.FAILED:
+                break
+            continue
+        seconds = float(np.median([each.seconds for each in [*rest, first]]))
+        still: Array = np.zeros(1)
+        end = Motion(truth.motion.t[-1:], first.position[None], first.rotation[None], still, 0.0)
+        error = float(end.off(_end(truth.motion))[0])
+        points.append(_point(name, setting, error, seconds, first.evaluations, first.steps, truth))
+        if first.seconds > limit / 4.0:
+            break
+    return points
+
+
+def _end(motion: Motion) -> Motion:
+    return Motion(motion.t[-1:], motion.position[-1:], motion.rotation[-1:], motion.balance[-1:], motion.turnover)
+
+
+def _more(repeats: int, wall: float, limit: float) -> int:
+    """How many more runs: none where one alone took most of the time that there is."""
+    return 0 if wall > limit / 4.0 else repeats - 1
+
+
+def _point(
+    name: str, setting: Setting, error: float, seconds: float, evaluations: int, steps: int, truth: Reference
+) -> Point:
+    floor = error < FLOOR * truth.cross_check
+    if not np.isfinite(error):
+        return Point(name, setting, np.nan, seconds, evaluations, steps, Ending.FAILED, "the result is not finite")
+    return Point(name, setting, error, seconds, evaluations, steps, Ending.DONE, floor=floor)

@@ -1,0 +1,185 @@
+"""What measured motions are compared with: states from a file, or a run with tight tolerances."""
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, final
+
+import numpy as np
+
+import ephs
+from ephs.mechanics.methods import METHODS
+from ephs.mechanics.scene.model import Scene
+from ephs.semantics.spaces.rotations import quaternion_to_matrix
+from ephs.show.charts.errors import ChartError
+from ephs.show.charts.runs import Array, Ending, Setting, attempt
+
+__all__ = ["Motion", "Reference", "resting_reference", "shipped_reference", "tight_reference"]
+
+TIGHT = ((1e-13, 1e-12), (1e-12, 1e-11), (1e-10, 1e-9))
+"""Tolerance of the reference and of the run that estimates its error, best first."""
+LEAST_ORDER = 5
+TRUSTED = 1e-4
+"""Cross-check of a reference for which no other method is tried."""
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """Where the b bodies of a scene were at n times.
+
+    Parameters
+    ----------
+    t
+        (n,) in s.
+    position, rotation
+        (n, b, 3) of the centres of mass in m, (n, b, 3, 3) body to world.
+    balance
+        (n,) kinetic + potential + heat − work less the same at the start, in J.
+    turnover
+        Largest K + |V − V₀| + |heat| + |work|, in J.
+    """
+
+    t: Array
+    position: Array
+    rotation: Array
+    balance: Array
+    turnover: float
+
+    @staticmethod
+    def of(solution: ephs.Solution) -> "Motion":
+        """The motion of a solution, at its times."""
+        names = [name for name, _ in solution.scene.all_bodies()]
+        bodies = [solution.body(name) for name in names]
+        kinetic, potential, heat, work = solution.kinetic, solution.potential, solution.heat, solution.work
+        total = kinetic + potential + heat - work
+        turnover = kinetic + np.abs(potential - potential[0]) + np.abs(heat) + np.abs(work)
+        return Motion(
+            solution.t,
+            np.stack([body.position for body in bodies], axis=1),
+            np.stack([body.rotation for body in bodies], axis=1),
+            total - total[0],
+            float(np.max(turnover)),
+        )
+
+    def off(self, other: "Motion", length: float = 1.0) -> Array:
+        """(n,) largest deviation of any component of a position, in units of ``length``, or of a rotation matrix."""
+        moved = np.abs(self.position - other.position).max(axis=(1, 2)) / length
+        return np.maximum(moved, np.abs(self.rotation - other.rotation).max(axis=(1, 2, 3)))
+
+    @property
+    def length(self) -> float:
+        """How far bodies are from their common centre, over all times, in m; 1 where they all stay in one point."""
+        size = float(np.linalg.norm(self.position - self.centre, axis=-1).max())
+        return size if size > 1e-9 else 1.0
+
+    @property
+    def centre(self) -> Array:
+        """(3,) mean position."""
+        return self.position.mean(axis=(0, 1))
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Reference:
+    """A motion that counts as true.
+
+    Parameters
+    ----------
+    cross_check
+        How far an independent or a looser computation of it was off at the end.
+    source
+        Where it is from, in words.
+    """
+
+    motion: Motion
+    cross_check: float
+    source: str
+
+
+def tight_reference(scene: Scene, until: float, *, save_at: Array | None = None, limit: float = 60.0) -> Reference:
+    """A run with tight tolerances, by the method of highest order that can.
+
+    Parameters
+    ----------
+    limit
+        Wall time in s of one run.
+
+    Raises
+    ------
+    ChartError
+        No method reaches the end.
+    """
+    said, slow, best = "", set[str](), None
+    for method, tight, loose in _candidates(until):
+        if method in slow and tight.value < TIGHT[-1][0]:
+            continue
+        runs = [attempt(scene, until, method, tight, limit=limit, save_at=save_at)]
+        if runs[0].solution is not None:
+            runs.append(attempt(scene, until, method, loose, limit=limit, save_at=save_at))
+        if runs[0].ending in (Ending.REFUSED, Ending.SLOW):  # of looser tolerances only the last is tried
+            slow.add(method)
+        solutions = [run.solution for run in runs if run.solution is not None]
+        if len(solutions) < 2:
+            said = said or runs[-1].message
+            continue
+        motion, check = map(Motion.of, solutions)
+        if not (np.isfinite(motion.position).all() and np.isfinite(check.position).all()):
+            continue
+        found = Reference(motion, float(motion.off(check)[-1]), f"{method}, {tight}")
+        if found.cross_check <= TRUSTED:
+            return found
+        best = found if best is None or found.cross_check < best.cross_check else best
+    if best is None:
+        raise ChartError("reference", path=scene.name, found=said, expected=f"t = {until:g} s")
+    return best
+
+
+def resting_reference(scene: Scene, save_at: Array) -> Reference:
+    """The initial state for ever, for a mechanism that cannot move."""
+    n = len(save_at)
+    poses = np.array([body.pose for _, body in scene.all_bodies()])
+    rotations = np.array([quaternion_to_matrix(pose[:4]) for pose in poses])
+    position, rotation = np.tile(poses[:, 4:], (n, 1, 1)), np.tile(rotations, (n, 1, 1, 1))
+    return Reference(Motion(save_at, position, rotation, np.zeros(n), 0.0), 0.0, "it cannot move")
+
+
+def shipped_reference(file: Path, scene: Scene, until: float | None = None) -> tuple[Reference, float]:
+    """The states of a file, at a time or at the earliest that it has, and this time.
+
+    The file is JSON: ``{"how": text, "states": {time: {"cross_check": number, "bodies": {name: {"position": [3],
+    "quaternion": [4]}}}}}``.
+
+    Raises
+    ------
+    ChartError
+        It is no such file, it has no state at this time, or other bodies than the scene.
+    """
+    try:
+        data: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+        states: dict[float, Any] = {float(time): state for time, state in data["states"].items()}
+        found = min(states) if until is None else until
+        if found not in states:
+            times = ", ".join(f"{time:g}" for time in sorted(states))
+            raise ChartError("reference-time", path=str(file), found=f"{found:g}", expected=times)
+        bodies = [states[found]["bodies"][name] for name, _ in scene.all_bodies()]
+        position = np.array([[body["position"] for body in bodies]], dtype=float)
+        rotation = np.array([[quaternion_to_matrix(np.array(body["quaternion"], dtype=float)) for body in bodies]])
+        check, how = float(states[found].get("cross_check", 0.0)), str(data.get("how", file.name))
+    except (KeyError, TypeError, AttributeError, ValueError) as error:
+        if isinstance(error, ChartError):
+            raise
+        raise ChartError("reference-file", path=str(file), found=f"{type(error).__name__}: {error}") from error
+    motion = Motion(np.array([found]), position, rotation, np.zeros(1), 0.0)
+    return Reference(motion, check, how), found
+
+
+def _candidates(until: float) -> Iterator[tuple[str, Setting, Setting]]:
+    """Method, tight and loose setting: adaptive ones of high order first, then constant steps, robust methods first."""
+    adaptive = [m for m in METHODS.values() if m.scenes and m.adaptive and m.order >= LEAST_ORDER]
+    for tight, loose in TIGHT:
+        for method in sorted(adaptive, key=lambda m: -m.order):
+            yield method.name, Setting("tolerance", tight), Setting("tolerance", loose)
+    for method in sorted((m for m in METHODS.values() if m.scenes and m.fixed), key=lambda m: m.order):
+        yield method.name, Setting("step", until / 8000), Setting("step", until / 4000)

@@ -1,0 +1,135 @@
+"""One run under limits: its solution, or how it ended and what it told its user."""
+
+import time
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+import ephs
+from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.solve.errors import Outcome as Failure
+
+__all__ = ["MOST_STEPS", "Array", "Ending", "Run", "Setting", "attempt"]
+
+Array = NDArray[np.float64]
+MOST_STEPS = 500_000
+"""Of one run, where nothing smaller is asked for."""
+
+
+_REFUSALS = (Failure.UNSUITED, Failure.INCONSISTENT, Failure.UNDETERMINED, Failure.PYTHON)
+
+
+class Ending(StrEnum):
+    """How a run ended."""
+
+    DONE = "done"
+    REFUSED = "refused"  # at every setting
+    FAILED = "failed"  # at this setting
+    SLOW = "took too long"
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """What steers a run: a tolerance, rtol = atol, or a constant step in s."""
+
+    kind: str
+    value: float
+
+    def __str__(self) -> str:
+        return f"tol {self.value:.0e}" if self.kind == "tolerance" else f"h = {self.value:.3g} s"
+
+    def options(self) -> dict[str, Any]:
+        """As `ephs.simulate` takes them."""
+        return {"rtol": self.value, "atol": self.value} if self.kind == "tolerance" else {"step": self.value}
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Run:
+    """A solution, or None; how the run ended, its message, and the wall time in s of everything."""
+
+    solution: ephs.Solution | None
+    ending: Ending
+    message: str
+    wall: float
+
+
+class _TooLong(Exception):
+    """Raised from inside a run to stop it."""
+
+
+class _Watch:
+    """Stops a run at its time limit, which begins with the first sign of life: kernels are compiled before that."""
+
+    def __init__(self, limit: float) -> None:
+        self.begin, self.limit, self.fired = time.perf_counter(), limit, False
+        self.alive: float | None = None
+
+    @property
+    def spent(self) -> float:
+        """Seconds since the start."""
+        return time.perf_counter() - self.begin
+
+    def __call__(self, t: float, until: float, stats: Mapping[str, Any]) -> None:
+        now = time.perf_counter()
+        if self.alive is None:
+            self.alive = now
+        elif now - self.alive > self.limit:
+            self.fired = True
+            raise _TooLong(f"{Ending.SLOW}: {self.limit:g} s of wall time were over at t = {t:.3g} of {until:g} s")
+
+
+def attempt(
+    scene: Scene,
+    until: float,
+    method: str,
+    setting: Setting,
+    *,
+    limit: float,
+    save_at: Array | None = None,
+    max_steps: int = MOST_STEPS,
+) -> Run:
+    """Run a scene once; whatever goes wrong comes back as a value.
+
+    Parameters
+    ----------
+    limit
+        Wall time in s after which the run is stopped.
+    save_at
+        Times that are kept; the end alone unless given.
+    """
+    watch = _Watch(limit)
+    times = np.array([until]) if save_at is None else save_at
+    try:
+        with warnings.catch_warnings(), np.errstate(all="ignore"):
+            warnings.simplefilter("ignore")  # what overflows on its way to a failure is part of the failure
+            solution = ephs.simulate(
+                scene,
+                until,
+                method=method,
+                save_at=times,
+                max_steps=max_steps,
+                progress=watch,
+                **setting.options(),
+            )
+        return Run(solution, Ending.DONE, "", watch.spent)
+    except ephs.Interrupted as error:
+        if not watch.fired:
+            raise KeyboardInterrupt from error
+        ending, message = Ending.FAILED, str(error)
+    except ephs.SimulationError as error:
+        ending, message = (Ending.REFUSED if error.outcome in _REFUSALS else Ending.FAILED), str(error)
+    except _TooLong as error:
+        ending, message = Ending.SLOW, str(error)
+    except Exception as error:  # a chart of failures outlives all of them, also those that speak to no user
+        spoken = type(error).__module__.startswith("ephs.")
+        ending, message = Ending.REFUSED, str(error) if spoken else f"{type(error).__name__}: {error}"
+    if watch.fired and ending is not Ending.SLOW:  # a method that made a failure of its own of it
+        ending, message = Ending.SLOW, f"{Ending.SLOW}: {message}"
+    return Run(None, ending, message, watch.spent)

@@ -1,0 +1,354 @@
+"""What all methods share: control of the step, events, time backwards, registration; and what each one promises."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import ephs
+from benchmarks.cases import CASES
+from ephs import Pattern, junction
+from ephs import library as lib
+from ephs import quantity as Q
+from ephs.mechanics import methods as registry
+from ephs.mechanics.methods import METHODS, Method, on_joints, register_method
+from ephs.mechanics.reduced.method import ReducedMethod
+from ephs.mechanics.solve.loop import Attempt
+from ephs.testing import mechanisms
+
+ROOT = Path(__file__).parents[2]
+BY_NAME = {case.name: case for case in CASES}
+OSCILLATOR = Pattern(
+    junctions={"q": junction(Q.displacement), "p": junction(Q.momentum)},
+    boxes={"pe": {"q": "q"}, "ke": {"p": "p"}, "pkc": {"q": "q", "p": "p"}},
+)(pe=lib.spring(k=1.0), ke=lib.point_mass(m=1.0), pkc=lib.pkc())
+OF_SYSTEMS = [m.name for m in METHODS.values() if m.systems]
+OF_SCENES = [m.name for m in METHODS.values() if m.scenes]
+ADAPTIVE = [m.name for m in METHODS.values() if m.adaptive and m.scenes]
+LAB = ("natural", "natural4")
+
+
+def setting(method: str, step: float = 0.005, tolerance: float = 1e-7) -> dict:
+    """Steps chosen where the method can, a constant one else."""
+    if METHODS[method].adaptive and method not in ("natural", "alpha"):
+        return {"method": method, "rtol": tolerance, "atol": tolerance}
+    return {"method": method, "step": step}
+
+
+def scene_of(text, folder):
+    file = folder / "scene.toml"
+    file.write_text(text)
+    return ephs.load(file)
+
+
+def bodies(sol, i):
+    return np.concatenate(
+        [np.r_[sol.body(n).position[i], sol.body(n).rotation[i].ravel()] for n, _ in sol.problem.scene.all_bodies()]
+    )
+
+
+# ---- events ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("method", OF_SYSTEMS)
+def test_events_are_located_on_the_oscillator(method):
+    event = ephs.Event(lambda t, state: state["pe.q"][0] - 0.5, "half")
+    sol = ephs.simulate(OSCILLATOR, 6.0, initial={"pe.q": 1.0}, events=[event], **setting(method, 0.002))
+    assert [c.name for c in sol.events] == ["half", "half"]
+    assert np.allclose([c.t for c in sol.events], [np.pi / 3, 2.0 * np.pi - np.pi / 3], atol=1e-5)
+    assert all(abs(c.state["pe.q"][0] - 0.5) <= 1e-14 for c in sol.events)
+
+
+@pytest.mark.parametrize("method", OF_SCENES)
+def test_an_event_stops_a_scene_where_it_happens(method):
+    scene = ephs.load(ROOT / "scenes/chain.toml")
+    name = next(n for n, _ in scene.all_bodies())
+    path = f"bodies.{name}.pe.q"
+    full = ephs.simulate(scene, 0.4, **setting(method, 0.01))
+    z = full[path][:, 6]
+    height = 0.5 * (z[0] + z[-1])
+    event = ephs.Event(lambda t, state: state[path][6] - height, "height", stop=True)
+    sol = ephs.simulate(scene, 0.4, events=[event], **setting(method, 0.01))
+    assert len(sol.events) == 1 and sol.t[-1] == sol.events[0].t < 0.4
+    assert abs(sol[path][-1, 6] - height) <= 1e-13
+    if method in LAB:
+        assert sol.energy_error.max() <= 1e-12
+
+
+@given(st.floats(0.1, 0.9), st.sampled_from([-1, 0, 1]))
+@settings(max_examples=25)
+def test_directions_of_events(level, direction):
+    event = ephs.Event(lambda t, state: state["pe.q"][0] - level, "level", direction)
+    sol = ephs.simulate(OSCILLATOR, 2.0 * np.pi, initial={"pe.q": 1.0}, events=[event], rtol=1e-9, atol=1e-9)
+    falls, rises = np.arccos(level), 2.0 * np.pi - np.arccos(level)
+    expected = {-1: [falls], 0: [falls, rises], 1: [rises]}[direction]
+    assert np.allclose([c.t for c in sol.events], expected, atol=1e-6)
+
+
+def test_events_survive_a_file(tmp_path):
+    scene = ephs.load(ROOT / "scenes/heavy-top.toml")
+
+    def quarter(t, state):
+        return t - 0.25
+
+    sol = ephs.simulate(scene, 0.5, events=[quarter])
+    sol.save(tmp_path / "solution.nc")
+    again = ephs.load_solution(tmp_path / "solution.nc")
+    assert [c.name for c in again.events] == ["quarter"]
+    assert again.events[0].t == sol.events[0].t == pytest.approx(0.25, abs=1e-14)
+    for path, value in sol.events[0].state.items():
+        assert np.array_equal(again.events[0].state[path], value)
+
+
+def test_a_function_without_value_is_an_error_that_keeps_the_solution():
+    with pytest.raises(ephs.SimulationError, match="an event's function has no value") as caught:
+        ephs.simulate(OSCILLATOR, 1.0, initial={"pe.q": 1.0}, events=[lambda t, s: np.nan if t > 0.5 else 1.0])
+    assert caught.value.partial is not None and caught.value.partial.t[-1] <= 0.6
+
+
+# ---- backward -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("method", OF_SCENES)
+def test_there_and_back_again(method):
+    """A reversible motion run forward and then backward ends where it began."""
+    scene = BY_NAME["spherical-chain-2"].scene()
+    there = ephs.simulate(scene, 0.3, **setting(method, 0.005, 1e-9))
+    ahead = {str(path): there[path][-1] for path in there.states}
+    back = ephs.simulate(scene, 0.0, t0=0.3, initial=ahead, **setting(method, 0.005, 1e-9))
+    assert back.t[0] == 0.3 and back.t[-1] == 0.0 and np.all(np.diff(back.t) < 0.0)
+    bound = {"natural": 1e-9, "variational": 1e-9, "alpha": 1e-4}.get(method, 3e-7)
+    assert np.abs(bodies(back, -1) - bodies(there, 0)).max() <= bound
+
+
+def test_friction_does_not_run_backward():
+    with pytest.raises(ephs.OptionError, match=r"until is -1.*mf produces entropy"):
+        ephs.simulate(ephs.load(ROOT / "scenes/mbs.toml"), -1.0)
+
+
+# ---- steps ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("method", ADAPTIVE)
+@pytest.mark.parametrize("name", ["spherical-chain-2", "andrews-squeezer", "revolute-chain-4"])
+def test_tolerances_are_met_within_ten(name, method):
+    case = BY_NAME[name]
+    until = min(case.time, 0.5)
+    exact = bodies(ephs.simulate(case.scene(), until, method="rk87", rtol=1e-13, atol=1e-13, save_at=[until]), -1)
+    tolerance = 1e-4 if METHODS[method].order == 2 else 1e-7
+    sol = ephs.simulate(case.scene(), until, method=method, rtol=tolerance, atol=tolerance, save_at=[until])
+    assert np.abs(bodies(sol, -1) - exact).max() <= 10.0 * tolerance
+    assert sol.constraint_error.max() <= 1e-10
+
+
+@pytest.mark.parametrize("method", [m for m in ADAPTIVE if m != "ida"])
+def test_steps_keep_their_limits(method):
+    scene = BY_NAME["spherical-chain-2"].scene()
+    sol = ephs.simulate(scene, 0.2, method=method, rtol=1e-3, atol=1e-3, max_step=0.01)
+    assert np.diff(sol.t).max() <= 0.01 * (1.0 + 1e-12)
+    assert sol.stats["longest_step"] <= 0.01 * (1.0 + 1e-12)
+    with pytest.raises(ephs.SimulationError, match="below the least"):
+        ephs.simulate(scene, 0.2, method=method, rtol=1e-13, atol=1e-13, min_step=0.05)
+
+
+def test_a_tolerance_for_one_joint_steers_by_it():
+    scene = ephs.load(ROOT / "scenes/chain.toml")
+    joint = next(n for n, _ in scene.all_joints())
+    loose = ephs.simulate(scene, 1.0, method="rk54", rtol=0.0, atol=1e-3)
+    tight = ephs.simulate(scene, 1.0, method="rk54", rtol=0.0, atol={"*": 1e-3, f"joints.{joint}": 1e-9})
+    assert tight.stats["steps"] > 2 * loose.stats["steps"]
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"rtol": -1.0}, "rtol is -1.0"),
+        ({"atol": {"entropi": 1e-3}}, r"atol\['entropi'\]"),
+        ({"rtol": "fine"}, "rtol is 'fine'"),
+        ({"rtol": 0.0, "atol": 0.0}, "rtol or atol > 0"),
+        ({"method": "euler"}, "one of auto, natural"),
+        ({"step": float("nan")}, "step is nan"),
+        ({"step": -0.1}, "step is -0.1"),
+        ({"min_step": -1.0}, "min_step"),
+        ({"min_step": 1.0, "max_step": 0.1}, "min_step is 1.0"),
+        ({"max_steps": 0}, "max_steps is 0"),
+        ({"events": [3]}, "events is 3"),
+        ({"events": [ephs.Event(len, "a"), ephs.Event(len, "a")]}, "names that differ"),
+        ({"options": {"rho": 0.5}, "method": "rk54"}, "options of rk54: none"),
+        ({"options": {"rho": 1.5}, "method": "alpha"}, r"options\['rho'\]"),
+        ({"method": "variational"}, "takes constant steps"),
+        ({"method": "ida", "step": 0.1}, "ida chooses its steps"),
+        ({"save_at": [0.0, 3.0]}, "save_at"),
+        ({"until": float("inf")}, "until is inf"),
+    ],
+)
+def test_bad_options_are_refused_by_name(options, words):
+    scene = BY_NAME["heavy-top"].scene()
+    with pytest.raises(ephs.OptionError, match=words):
+        ephs.simulate(scene, **{"until": 1.0, **options})
+
+
+def test_initial_states_off_the_joints_are_refused():
+    scene = ephs.load(ROOT / "scenes/slider-crank.toml")
+    path = "bodies.crank.pe.q"
+    moved = np.array(ephs.simulate(scene, 1e-3)[path][0])
+    moved[4] += 0.01
+    for method in ("rk87", "radau", "variational"):
+        with pytest.raises(ephs.SimulationError, match=r"contradicts the constraints") as caught:
+            ephs.simulate(scene, 0.1, initial={path: moved}, **setting(method))
+        assert caught.value.path == path
+
+
+# ---- promises -------------------------------------------------------------------------------------------------------
+
+
+@given(mechanisms(max_bodies=3))
+@settings(max_examples=10, deadline=None)
+def test_natural4_balances_on_generated_mechanisms(scene):
+    sol = ephs.simulate(scene, 0.1, method="natural4", step=0.01)
+    assert sol.energy_error.max() <= 1e-12
+    assert sol.constraint_error.max() <= 1e-12
+    assert sol.stats["least_production"] >= 0.0
+
+
+def test_natural4_is_of_order_four_with_friction_heat_and_loops():
+    scene = ephs.load(ROOT / "scenes/slider-crank.toml")
+    exact = bodies(ephs.simulate(scene, 0.3, method="rk87", rtol=1e-13, atol=1e-13), -1)
+    errors = [
+        np.abs(bodies(ephs.simulate(scene, 0.3, method="natural4", step=h), -1) - exact).max() for h in (0.02, 0.01)
+    ]
+    assert np.log2(errors[0] / errors[1]) >= 3.9
+
+
+def test_feedback_keeps_the_order_of_natural4():
+    """A force that reads the state is taken at the stages themselves."""
+    exact = {}
+    for name, force in (("plain", lambda t, s: -0.5 * s["pe.q"]),):
+        open_pattern = Pattern(
+            junctions={"q": junction(Q.displacement), "p": junction(Q.momentum, exposed=True)},
+            boxes={"pe": {"q": "q"}, "ke": {"p": "p"}, "pkc": {"q": "q", "p": "p"}},
+        )
+        system = open_pattern(pe=lib.spring(k=1.0), ke=lib.point_mass(m=1.0), pkc=lib.pkc())
+        run = {"initial": {"pe.q": 1.0}, "inputs": {"p": {"flow": force}}, "method": "natural4"}
+        errors = [
+            abs(ephs.simulate(system, 2.0, step=h, **run)["pe.q"][-1] - np.cos(2.0 * 1.5**0.5)) for h in (0.2, 0.1)
+        ]
+        exact[name] = np.log2(errors[0] / errors[1])
+    assert exact["plain"] >= 3.9
+
+
+TUMBLING = """
+format = 1
+[world]
+gravity = [0.0, 0.0, 0.0]
+[bodies.a]
+mass = 1.0
+inertia = [1.0, 2.0, 2.5]
+velocity = [0.1, 0.2, -0.1]
+angular_velocity = [0.5, 1.0, 2.0]
+[bodies.b]
+mass = 0.5
+inertia = [0.3, 0.2, 0.4]
+[joints.ball]
+type = "spherical"
+bodies = ["a", "b"]
+frame1 = { position = [0.5, 0.0, 0.1] }
+frame2 = { position = [-0.4, 0.2, 0.0] }
+rate = [0.3, -0.5, 0.8]
+"""
+
+
+def momenta(scene, sol):
+    """Linear and angular momentum of all bodies about the world's origin, (n, 6)."""
+    total = np.zeros((len(sol), 6))
+    for name, body in scene.all_bodies():
+        motion = sol.body(name)
+        linear = body.mass * motion.velocity
+        spin = np.einsum("nij,jk,nk->ni", motion.rotation, np.array(body.inertia), motion.angular_velocity)
+        total[:, :3] += linear
+        total[:, 3:] += spin + np.cross(motion.position, linear)
+    return total
+
+
+def test_variational_keeps_momenta_exactly_and_energy_without_drift(tmp_path):
+    scene = scene_of(TUMBLING, tmp_path)
+    sol = ephs.simulate(scene, 20.0, method="variational", step=0.02)
+    found = momenta(scene, sol)
+    assert np.abs(found - found[0]).max() <= 1e-12 * np.abs(found).max()
+    energy = sol.ledgers.energy - sol.ledgers.energy[0]
+    first, last = np.abs(energy[:500]).max(), np.abs(energy[-500:]).max()
+    assert 1e-9 < first < 1e-2 and last <= 2.0 * first
+    other = momenta(scene, ephs.simulate(scene, 20.0, method="alpha", step=0.02))
+    assert np.abs(other - other[0]).max() > 1e-6  # other methods do not
+
+
+def test_alpha_damps_what_is_fast_and_rho_one_does_not():
+    scene = ephs.load(ROOT / "scenes/heavy-top.toml")
+    kept = {rho: ephs.simulate(scene, 1.0, method="alpha", step=0.02, options={"rho": rho}) for rho in (0.0, 1.0)}
+    lost = {rho: abs(sol.ledgers.energy[-1] - sol.ledgers.energy[0]) for rho, sol in kept.items()}
+    assert lost[1.0] < lost[0.0]
+
+
+STIFF = """
+format = 1
+[bodies.a]
+mass = 1.0
+inertia = [0.1, 0.1, 0.1]
+position = [1.0, 0.0, 0.0]
+[joints.pin]
+type = "revolute"
+bodies = ["ground", "a"]
+at = [0.0, 0.0, 0.0]
+axis = [0.0, 1.0, 0.0]
+friction = 1e5
+stiffness = 1.0
+"""
+
+
+def test_auto_changes_to_radau_where_a_scene_is_stiff(tmp_path):
+    scene = scene_of(STIFF, tmp_path)
+    sol = ephs.simulate(scene, 10.0)
+    (switch,) = sol.stats["switches"]
+    assert switch["to"] == "radau" and "radau" in sol.stats["method"]
+    assert "holds its steps" in switch["reason"] or "fail" in switch["reason"]
+    assert sol.stats["steps"] < 1000
+    slow = ephs.simulate(scene, 10.0, method="radau", rtol=1e-9, atol=1e-9)
+    assert np.abs(bodies(sol, -1) - bodies(slow, -1)).max() <= 1e-5
+
+
+def test_auto_stays_explicit_where_nothing_is_stiff():
+    sol = ephs.simulate(BY_NAME["spherical-chain-2"].scene(), 1.0, rtol=1e-8)
+    assert sol.stats["switches"] == [] and sol.stats["method"] == "rk87"
+
+
+# ---- one's own ------------------------------------------------------------------------------------------------------
+
+
+class Midpoint(ReducedMethod):
+    """The explicit midpoint rule."""
+
+    name, exponent = "explicit-midpoint", 3.0
+
+    def step(self, state, h):
+        eq = self.equations
+        y0 = eq.vector(state)
+        half = y0 + 0.5 * h * eq.rates(state.t, state.q, y0)
+        end = eq.closed(eq.state(state, y0 + h * eq.rates(state.t + 0.5 * h, state.q, half), state.t + h))
+        return Attempt(state, end, h, 0.0, eq.least(state, end))
+
+
+def test_a_method_of_ones_own(monkeypatch):
+    monkeypatch.setattr(registry, "METHODS", dict(METHODS))
+    own = Method("explicit-midpoint", 2, False, True, False, True, "the explicit midpoint rule", on_joints(Midpoint))
+    register_method(own)
+    with pytest.raises(ephs.OptionError, match="a name that is not taken"):
+        register_method(own)
+    scene = BY_NAME["spherical-chain-2"].scene()
+    exact = bodies(ephs.simulate(scene, 0.2, method="rk87", rtol=1e-13, atol=1e-13), -1)
+    errors = [
+        np.abs(bodies(ephs.simulate(scene, 0.2, method="explicit-midpoint", step=h), -1) - exact).max()
+        for h in (0.01, 0.005)
+    ]
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.1)

@@ -1,0 +1,229 @@
+"""Charts: outcomes told apart, errors that fall with tolerances, failures recorded, files and messages written."""
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import ephs
+from ephs.cli import main
+from ephs.mechanics.methods import METHODS
+from ephs.show.charts import (
+    FAMILIES,
+    Outcome,
+    draw_work_precision,
+    shipped_reference,
+    stability,
+    tight_reference,
+    work_precision,
+)
+from ephs.show.charts.families import scene_family
+from ephs.show.charts.outcomes import ACCURATE, BOUND, ENERGY, horizon, judge
+from ephs.show.charts.peers import PEERS, PeerError
+from ephs.show.charts.reference import Motion
+from ephs.show.charts.runs import Ending, Setting, attempt
+
+ROOT = Path(__file__).resolve().parents[2]
+TOP = ROOT / "scenes/heavy-top.toml"
+T = np.linspace(0.0, 10.0, 101)
+
+
+def swing(amplitude=1.0, phase=0.0, decay=0.0, drift=0.0):
+    """A point that swings along x with an energy of 1 J, and the balance that someone made of it."""
+    x = amplitude * np.exp(-decay * T) * np.cos(T + phase)
+    position = np.stack([x, np.zeros_like(x), np.zeros_like(x)], axis=-1)[:, None, :]
+    rotation = np.tile(np.eye(3), (len(T), 1, 1, 1))
+    return Motion(T, position, rotation, drift * T / T[-1], 1.0)
+
+
+def spoilt(motion, value):
+    position = motion.position.copy()
+    position[50] = value
+    return replace(motion, position=position)
+
+
+@pytest.mark.parametrize(
+    ("found", "outcome"),
+    [
+        (swing(), Outcome.ACCURATE),
+        (swing(phase=0.5 * ACCURATE), Outcome.ACCURATE),
+        (swing(phase=1.0), Outcome.WRONG_BUT_BOUNDED),
+        (swing(phase=1.0, drift=0.5 * ENERGY), Outcome.WRONG_BUT_BOUNDED),
+        (swing(phase=1.0, drift=2.0 * ENERGY), Outcome.ENERGY_DRIFT),
+        (swing(phase=1.0, drift=-2.0 * ENERGY), Outcome.DAMPED),
+        (swing(decay=0.3), Outcome.DAMPED),
+        (swing(amplitude=2.0 * BOUND), Outcome.DIVERGED),
+        (spoilt(swing(), np.nan), Outcome.DIVERGED),
+        (spoilt(swing(), np.inf), Outcome.DIVERGED),
+        (replace(swing(), turnover=1e6), Outcome.DIVERGED),
+    ],
+)
+def test_outcomes_are_told_apart(found, outcome):
+    assert judge(found, swing())[0] is outcome
+
+
+def test_an_unmoved_body_is_judged_by_its_balance():
+    rest = Motion(T, np.zeros((101, 1, 3)), np.tile(np.eye(3), (101, 1, 1, 1)), np.zeros(101), 0.0)
+    assert judge(rest, rest) == (Outcome.ACCURATE, 0.0)
+    assert judge(replace(rest, turnover=1.0), rest)[0] is Outcome.DIVERGED
+
+
+def test_the_horizon_is_the_last_good_time():
+    assert horizon(swing(), swing()) == T[-1]
+    late = spoilt(swing(), 1.0)
+    assert horizon(late, swing()) == T[49]
+    assert horizon(swing(phase=1.0), swing()) == 0.0
+
+
+def test_errors_fall_with_tolerances_and_are_written(tmp_path):
+    scene = ephs.load(TOP)
+    points = work_precision(scene, 0.1, ["rk54"], tolerances=(1e-4, 1e-8), steps=(20, 80), repeats=1)
+    by_tolerance = [p for p in points if p.setting.kind == "tolerance"]
+    by_step = [p for p in points if p.setting.kind == "step"]
+    assert [p.outcome for p in points] == [Ending.DONE] * 4
+    for loose, tight in (by_tolerance, by_step):
+        assert tight.error < 1e-2 * loose.error
+        assert tight.evaluations > loose.evaluations > 0
+        assert tight.seconds > 0.0
+    files = draw_work_precision(points, "top", tmp_path, "wp")
+    assert [file.name for file in files] == ["wp.png", "wp.svg", "wp.csv", "wp.json"]
+    assert all(file.stat().st_size > 0 for file in files)
+    with files[2].open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert [float(row["error"]) for row in rows] == [p.error for p in points]
+    assert [row["setting"] for row in json.loads(files[3].read_text())] == [p.setting.value for p in points]
+
+
+def test_points_at_the_floor_of_the_reference_are_marked():
+    scene = ephs.load(TOP)
+    truth = tight_reference(scene, 0.05)
+    assert 0.0 < truth.cross_check < 1e-9
+    vague = replace(truth, cross_check=1.0)
+    for reference, floor in ((truth, False), (vague, True)):
+        (point,) = work_precision(scene, 0.05, ["rk87"], reference=reference, tolerances=(1e-4,), steps=(), repeats=1)
+        assert point.floor is floor
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_every_method_gives_a_motion_or_says_why_not(method, tmp_path):
+    scene = ephs.load(TOP)
+    points = work_precision(scene, 0.01, [method], tolerances=(1e-4,), steps=(20,), repeats=1)
+    assert len(points) == METHODS[method].adaptive + METHODS[method].fixed
+    for point in points:
+        assert np.isfinite(point.error) if point.outcome is Ending.DONE else point.message
+    assert draw_work_precision(points, method, tmp_path, "wp")[0].is_file()
+
+
+def test_a_run_that_takes_too_long_is_stopped():
+    run = attempt(ephs.load(TOP), 1e4, "rk54", Setting("step", 1e-3), limit=0.1, max_steps=10**8)
+    assert (run.solution, run.ending) == (None, Ending.SLOW)
+    assert "took too long" in run.message
+
+
+def test_a_shipped_reference_agrees_with_a_tight_run():
+    scene = ephs.load(TOP)
+    shipped, until = shipped_reference(ROOT / "benchmarks/reference/heavy-top.json", scene)
+    assert until == 0.5
+    assert shipped.motion.off(tight_reference(scene, until).motion)[0] < 1e-9
+
+
+@pytest.mark.parametrize("file", ["scenes/chain.toml", "benchmarks/scenes/spherical-chain-2.toml"])
+@pytest.mark.parametrize("peer", ["pin DOP853", "mujoco RK4"])
+def test_peers_compute_the_same_motion(file, peer):
+    scene = ephs.load(ROOT / file)
+    truth = tight_reference(scene, 0.5)
+    setting = {"tolerances": (1e-12,), "steps": (2000,)}
+    (point,) = work_precision(scene, 0.5, [peer], reference=truth, repeats=1, **setting)
+    assert point.outcome is Ending.DONE
+    assert point.error < 1e-9
+
+
+def test_peers_carry_free_and_fixed_bodies():
+    free = FAMILIES["long-spin"].make(1.0)
+    truth = tight_reference(free, 1.0)
+    for peer in ("pin DOP853", "mujoco RK4"):
+        (point,) = work_precision(free, 1.0, [peer], reference=truth, tolerances=(1e-12,), steps=(2000,), repeats=1)
+        assert point.error < 1e-9
+
+
+@pytest.mark.parametrize("peer", PEERS)
+@pytest.mark.parametrize("file", ["four-bar", "slider-crank", "mbs", "universal"])
+def test_peers_refuse_what_they_cannot_do(file, peer):
+    scene = ephs.load(ROOT / f"scenes/{file}.toml")
+    with pytest.raises(PeerError, match="expected"):
+        PEERS[peer].prepare(scene, 1.0)
+    assert work_precision(scene, 1.0, [peer], reference=tight_reference(scene, 0.01))[0].outcome is Ending.REFUSED
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_every_family_makes_its_scenes(name):
+    family = FAMILIES[name]
+    for value in family.values:
+        assert isinstance(family.make(value), ephs.Scene)
+        assert family.end(value) > 0.0
+        assert family.label(value)
+        assert all(0.0 < step <= family.end(value) for step in family.steps_at(value))
+    assert set(family.recommended) <= set(METHODS)
+
+
+def test_failures_of_methods_are_cells():
+    cells = stability(FAMILIES["half-turn"], ["natural", "rk87"], quick=True)
+    assert {cell.value for cell in cells} == {0.5, 1.1}
+    natural = {cell.value: cell for cell in cells if cell.method == "natural" and cell.setting.kind == "step"}
+    assert natural[1.1].outcome is not Outcome.ACCURATE
+    spun = stability(FAMILIES["spin"], ["natural"], quick=True)
+    refused = [cell for cell in spun if cell.outcome is Outcome.REFUSED]
+    assert refused
+    assert all(cell.message for cell in refused)
+    assert any("π" in cell.message for cell in refused)
+
+
+def test_a_scene_of_ones_own_is_a_family_by_step():
+    family = scene_family(ephs.load(TOP), 0.1)
+    cells = stability(family, ["rk87"], quick=True)
+    steps = [cell for cell in cells if cell.setting.kind == "step"]
+    assert [cell.setting.value for cell in steps] == [cell.value for cell in steps] == [0.1 / 1000, 0.1 / 10]
+    assert steps[0].outcome is Outcome.ACCURATE
+    assert steps[0].error < steps[1].error
+
+
+def test_the_commands_write_their_folders(tmp_path, capsys):
+    words = ["chart", "work-precision", str(TOP), "--until", "0.01", "--method", "pin DOP853", "-o", str(tmp_path)]
+    assert main(words) == 0
+    assert main(["chart", "stability", "half-turn", "--quick", "-o", str(tmp_path)]) == 0
+    said = capsys.readouterr().out
+    for name in ("work-precision-heavy-top", "stability-half-turn"):
+        for ending in ("png", "svg"):
+            assert str(tmp_path / f"{name}.{ending}") in said
+            assert (tmp_path / f"{name}.{ending}").is_file()
+    cells = json.loads((tmp_path / "stability.json").read_text())
+    assert {cell["outcome"] for cell in cells} <= {outcome.value for outcome in Outcome}
+    assert {cell["method"] for cell in cells} == {name for name, method in METHODS.items() if method.scenes}
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["work-precision", str(TOP), "--method", "euler"], "natural"),
+        (["work-precision", "nowhere.toml"], "no such file"),
+        (["work-precision"], "found no scene"),
+        (["work-precision", str(TOP), "--until", "-1"], "--until"),
+        (["work-precision", str(TOP), "--reference", str(TOP)], "no reference states"),
+        (["work-precision", str(TOP), "--reference", "nowhere.json"], "nowhere.json"),
+        (["work-precision", str(TOP), "--reference", "benchmarks/reference/tumbling-body.json"], "tumbling-body"),
+        (["work-precision", f"{ROOT / 'examples/oscillator.py'}:free_oscillator"], "expected a Scene"),
+        (["stability", "nothing"], "half-turn"),
+        (["stability", "nowhere.toml"], "no such file"),
+        (["stability", "half-turn", "--until", "nan"], "--until"),
+    ],
+)
+def test_bad_names_are_one_message(words, said, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    assert main(["chart", *words, "-o", str(tmp_path)]) == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert "Traceback" not in error
+    assert not list(tmp_path.iterdir())
