@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 
-from benchmarks import accuracy, balance, cells, order, size, traced
+from benchmarks import accuracy, balance, cells, long, order, size, traced
 
 TABLES = {
     "order": lambda _: order.table(),
@@ -12,6 +12,7 @@ TABLES = {
     "cells": cells.table,
     "traced": lambda _: traced.table(),
     "accuracy": lambda _: accuracy.table(),
+    "long": long.table,
 }
 
 

@@ -208,8 +208,8 @@ AUTO = Method("auto", 8, True, False, False, True, "rk54 or rk87, radau where st
 """What `auto` is for scenes that the reduced form serves."""
 
 
-def chosen(name: str, problem: Problem, *, step: float | None) -> tuple[Method, str]:
-    """The method of a name, and why where the name is ``auto``.
+def chosen(name: str | Method, problem: Problem, *, step: float | None) -> tuple[Method, str]:
+    """The method of a name, and why where the name is ``auto``; a method that is given as a value is itself.
 
     Raises
     ------
@@ -218,9 +218,10 @@ def chosen(name: str, problem: Problem, *, step: float | None) -> tuple[Method, 
     """
     if name == "auto":
         return _for_all(problem, step)
-    if name not in METHODS:
+    if not isinstance(name, Method) and name not in METHODS:
         raise OptionError("method", name, f"one of auto, {', '.join(METHODS)}")
-    method = METHODS[name]
+    method = name if isinstance(name, Method) else METHODS[name]
+    name = method.name
     if problem.scene is None and not method.systems:
         serving = ", ".join(m.name for m in METHODS.values() if m.systems)
         raise OptionError("method", name, f"{serving}: {name} is for scenes")

@@ -15,9 +15,10 @@ from ephs.mechanics.scene.model import Marker, Scene
 from ephs.mechanics.solve.control import Control, Tolerance
 from ephs.mechanics.solve.errors import OptionError
 from ephs.mechanics.solve.events import events_of
-from ephs.mechanics.solve.integrate import Grid, integrate
+from ephs.mechanics.solve.integrate import Grid, integrate, solution_of
 from ephs.mechanics.solve.loop import integrate_stepwise
 from ephs.mechanics.solve.problem import Problem, Signal
+from ephs.mechanics.solve.record import Record
 from ephs.mechanics.solve.solution import Solution
 from ephs.operad import Path
 from ephs.semantics.bundle import POSITIVE, Array, Reference
@@ -32,6 +33,10 @@ if TYPE_CHECKING:
 
 __all__ = ["load_solution", "problem_of_scene", "problem_of_system", "simulate"]
 
+OPEN = 1e-6
+"""m or rad by which given initial states may leave a joint open."""
+OFF = 1e-3
+"""Part by which a given momentum may contradict the joints: nodal momenta of some methods do, to their order."""
 FORMS = ("paper", "folded", "reduced")
 
 
@@ -41,7 +46,7 @@ def simulate(
     *,
     t0: float = 0.0,
     initial: Mapping[str, "ArrayLike"] | None = None,
-    method: str = "auto",
+    method: str | Method = "auto",
     rtol: "float | Mapping[str, float]" = 1e-6,
     atol: "float | Mapping[str, float]" = 1e-9,
     step: float | None = None,
@@ -67,7 +72,8 @@ def simulate(
     method
         One of `ephs.mechanics.methods.METHODS`: ``"natural"``, ``"natural4"``, ``"variational"``, ``"radau"``,
         ``"alpha"``, ``"rk54"``, ``"rk87"``, ``"ida"``; or ``"auto"``: natural with ``step``; without it explicit, and
-        radau from where the problem shows itself stiff, for scenes, radau for systems on vector spaces.
+        radau from where the problem shows itself stiff, for scenes, radau for systems on vector spaces. Or a
+        `Method` of one's own.
     rtol, atol
         Without ``step``: each state x is wanted to atol + rtol·|x| a step, atol in the state's own unit. Either may be
         a mapping from kinds of quantities or paths to numbers, ``"*"`` for all others.
@@ -239,7 +245,7 @@ def problem_of_scene(
             signals[port] = _sum(signals[port], extra) if port in signals else extra
     signals |= {wrench_port(body): wrench for body, wrench in wrenches.items()}
     world = scene.world
-    return Problem(
+    problem = Problem(
         scene.name,
         system,
         system.descriptor(),
@@ -251,6 +257,32 @@ def problem_of_scene(
         document=scene_to_text(scene),
         dependences=lambda: explain(scene),
     )
+    if initial:
+        _on_joints(problem)
+    return problem
+
+
+def _on_joints(problem: Problem) -> None:
+    """Hold initial states that were given against the joints.
+
+    Raises
+    ------
+    AssemblyError
+        A joint is open, or a momentum contradicts the joints by more than methods leave it off them.
+    """
+    d = problem.descriptor
+    x = d.pack(problem.initial)
+    once = Record(np.zeros(1), x[None, :], np.zeros((1, len(d.components))), np.zeros((1, 5)))
+    motion = SceneMotion(problem.scene, solution_of(problem, once, {}))
+    gap = float(motion.constraint_error()[0])
+    if gap > OPEN:
+        raise AssemblyError("open-joint", problem.name, found=gap)
+    for path, value in motion.state(0).items():
+        given = problem.initial[path]
+        if value.shape == given.shape and path[-1] == "p":
+            off = float(np.abs(value - given).max()) / max(1.0, float(np.abs(given).max()))
+            if off > OFF:
+                raise AssemblyError("off-joint", path, found=off)
 
 
 def load_solution(path: str | File) -> Solution:

@@ -59,6 +59,14 @@ _TEXTS = {
     ),
     "state": "{path}: the initial value has shape {found}, expected {expected} ({quantity})",
     "positive": ("{path}: the initial {quantity} is {found}, expected a number > 0; give initial={{'{path}': …}}"),
+    "open-joint": (
+        "{path}: the initial states leave a joint open by {found:.1e} m or rad; give all states of one configuration, "
+        "or scene.with_state(coordinates=…)"
+    ),
+    "off-joint": (
+        "{path}: the initial value contradicts the joints, it is off by {found:.1e}; give all states of one motion, or "
+        "scene.with_state(rates=…)"
+    ),
     "unknown-state": "{path}: no such state; the states are {expected}",
     "missing-input": ("{path}: the outer port is open: give inputs={{'{path}': {{'flow': …}}}} or {{'effort': …}}"),
     "unknown-input": "{path}: no such outer power port; the open ports are {expected}",

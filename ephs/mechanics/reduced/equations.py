@@ -216,7 +216,7 @@ class Equations:
     def gaps(self, q: Array, r: Array) -> tuple[Array, Array]:
         """Position residuals of loops at q, zeros for prescribed joints before them; and the rows (m, n) there."""
         tables, w = self.reduced.tables, self.work
-        fitted = self._fitted(q, r)
+        fitted = self.fitted(q, r)
         residual = np.zeros(int(tables.rows.sum() + tables.driven.sum()))
         loop_gaps(tables, w, fitted, residual)
         self._sweep()
@@ -240,7 +240,7 @@ class Equations:
         residual, change = np.zeros(m), np.zeros(self.n)
         gap = before = np.inf
         for _ in range(ROUNDS):
-            q = self._fitted(q, r)
+            q = self.fitted(q, r)
             gap = float(loop_gaps(tables, w, q, residual))
             if gap <= GAP or gap > 0.5 * before:
                 break
@@ -260,7 +260,7 @@ class Equations:
         """By how much the loops are open, in m or rad."""
         tables = self.reduced.tables
         m = int(tables.rows.sum() + tables.driven.sum())
-        q = self._fitted(state.q, state.r)
+        q = self.fitted(state.q, state.r)
         return float(loop_gaps(tables, self.work, q, np.zeros(m))) if m else 0.0
 
     def _rows(self, m: int) -> int:
@@ -271,7 +271,7 @@ class Equations:
         self._rank = int(reduce_rows(w, m))
         return self._rank
 
-    def _fitted(self, q: Array, r: Array) -> Array:
+    def fitted(self, q: Array, r: Array) -> Array:
         """q with the cut joints' elements nearest to where their bodies put them; leaves the sweep at q."""
         tables, w = self.reduced.tables, self.work
         out = np.array(q)

@@ -20,7 +20,7 @@ from ephs.semantics.bundle import Array
 
 __all__ = ["Implicit"]
 
-ITERATIONS = 8
+ITERATIONS = 10
 _S6 = 6.0**0.5
 _EMBEDDED = np.array([-13.0 - 7.0 * _S6, -13.0 + 7.0 * _S6, -1.0]) / 3.0
 _RATE = float((1.0 / VALUES[0]).real)
@@ -39,7 +39,7 @@ class Implicit(ReducedMethod):
         self.jacobian = Jacobian(equations)
         least = float(np.min(self.rtol, initial=1.0))
         # As far as Newton's method is taken, relative to the tolerance: less than the method's own error.
-        self._enough = max(1e-13 / max(least, 1e-13), min(0.03, least**0.5)) if control.step is None else 1e-7
+        self._enough = max(1e-13 / max(least, 1e-13), min(0.03, least**0.5)) if control.step is None else 1e-6
         self._solvers: tuple[float, Any, Any] | None = None
         self._known: tuple[Array, Array] | None = None
         self.counts = {"iterations": 0, "factorisations": 0, "jacobians": 0}
@@ -88,7 +88,7 @@ class Implicit(ReducedMethod):
         real, rest = self._solve(state, h)
         allowed = self._allowed(y0, y0)
         stages, rates = np.zeros((3, size)), np.zeros((3, eq.size))
-        before = rate = np.inf
+        before = rate = moved = np.inf
         for iteration in range(1, ITERATIONS + 1):
             for i, node in enumerate(NODES):
                 y = y0.copy()
@@ -113,6 +113,8 @@ class Implicit(ReducedMethod):
             if iteration > 2 and rate > 0.5 and moved <= 1e-2:  # rounding is all that is left
                 return stages, rates[:, size:], False
             before = moved
+        if moved <= 1e-2:  # near a change of rank the matrix is no good, and the iteration slow
+            return stages, rates[:, size:], False
         raise SolveError(Outcome.DIVERGED, "", "")
 
     def _closed(

@@ -29,6 +29,8 @@ ITERATIONS = 40
 RANK = 1e-9
 """Singular values of the step's equations below this fraction of the largest count as zero."""
 DIFFERENCE = 1e-6
+FAR = 1e4
+"""Residuals beyond this, relative to momenta or in m, are of an iteration that has gone astray."""
 
 
 @final
@@ -96,13 +98,16 @@ class Variational(ReducedMethod):
             worst = max(
                 float(np.abs(residual).max(initial=0.0)) / max(scale, 1e-300), float(np.abs(gap).max(initial=0.0))
             )
-            if not np.isfinite(worst):
+            if not worst < FAR:
                 break
             if worst <= 4e-16 or (worst < 1e-11 and worst > 0.5 * last):
                 return xi, push, middle
             if self._matrix is None or (iteration > 3 and worst > 0.1 * last):
                 self._matrix = self._slope(state, h, xi, middle)
-            change, impulse = _least(self._matrix, before, rows, -residual, -gap)
+            try:
+                change, impulse = _least(self._matrix, before, rows, -residual, -gap)
+            except np.linalg.LinAlgError as error:
+                raise SolveError(Outcome.SINGULAR, "", "") from error
             xi, push = xi + change, push + impulse
             middle = self._middle(state, h, xi)
             self.counts["iterations"] += 1

@@ -298,7 +298,10 @@ def gauss_advance(
             status, component, iterations = gauss_newton(t, g, p, o, where, x, z, scal, still, unit, inputs, m, s)
             total += iterations
         if status != 0:
-            z[:, :] = previous
+            if status == 3:  # rank was decided at the start of the step, and is another on its way
+                previous[:, :] = z
+            else:
+                z[:, :] = previous
             return status, component, step, total
         least = 0.0
         for i in range(stages):

@@ -322,7 +322,10 @@ def advance(t, o, x, z, previous, scal, inputs, m, sums, steps, states, energies
         total += iterations
         if status != 0:
             for i in range(z.shape[0]):
-                z[i] = previous[i]
+                if status == 3:  # rank was decided at the start of the step, and is another on its way
+                    previous[i] = z[i]
+                else:
+                    z[i] = previous[i]
             return status, component, step, total
         for i in range(t.states.shape[0]):
             code, at, size, rate, dim = t.states[i]

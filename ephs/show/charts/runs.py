@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import ephs
+from ephs.mechanics.methods import Method
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.solve.errors import Outcome as Failure
 
@@ -88,7 +89,7 @@ class _Watch:
 def attempt(
     scene: Scene,
     until: float,
-    method: str,
+    method: str | Method,
     setting: Setting,
     *,
     limit: float,

@@ -13,6 +13,7 @@ from ephs.show.charts.families import Family
 from ephs.show.charts.outcomes import ACCURATE, Outcome, horizon, judge
 from ephs.show.charts.reference import Motion, Reference, resting_reference, tight_reference
 from ephs.show.charts.runs import Array, Ending, Run, Setting, attempt
+from ephs.show.charts.specimens import SPECIMENS
 
 __all__ = ["Cell", "stability"]
 
@@ -71,7 +72,7 @@ def stability(
     Parameters
     ----------
     methods
-        Names of `METHODS`; all for scenes unless given.
+        Names of `METHODS` and `SPECIMENS`; all for scenes unless given.
     quick
         Only the easiest and the most difficult value, and the largest step.
     limit
@@ -79,7 +80,8 @@ def stability(
     note
         Called with each value's label before it is run.
     """
-    chosen = [m for m in METHODS.values() if m.scenes and (methods is None or m.name in methods)]
+    everything = {**METHODS, **SPECIMENS}
+    chosen = [m for m in everything.values() if m.scenes and (methods is None or m.name in methods)]
     values = (family.values[0], family.values[-1]) if quick else family.values
     cells: list[Cell] = []
     for value in values:
@@ -122,7 +124,7 @@ def _runs(
         if setting.kind in slow:
             yield setting, Run(None, Ending.SLOW, f"{Ending.SLOW}: already at {slow[setting.kind]}", 0.0)
             continue
-        run = attempt(scene, float(times[-1]), method.name, setting, limit=limit, save_at=times, max_steps=MOST_STEPS)
+        run = attempt(scene, float(times[-1]), method, setting, limit=limit, save_at=times, max_steps=MOST_STEPS)
         if run.ending is Ending.SLOW:
             slow[setting.kind] = setting
         yield setting, run

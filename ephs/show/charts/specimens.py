@@ -1,0 +1,131 @@
+"""Methods that charts show to fail, and why: no methods to use, and not known to `simulate` by name.
+
+Both are for mechanisms whose joints are all revolute, prismatic, screw or cylindrical, without heat; loops are what
+they fail at.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ephs.mechanics.methods import Method, on_joints
+from ephs.mechanics.reduced.action_kernels import action_derivatives
+from ephs.mechanics.reduced.equations import Equations, ReducedState
+from ephs.mechanics.reduced.method import ReducedMethod
+from ephs.mechanics.solve.control import Control
+from ephs.mechanics.solve.errors import Outcome, SolveError
+from ephs.mechanics.solve.loop import Attempt
+from ephs.show.charts.runs import Array
+
+__all__ = ["SPECIMENS", "TrapezoidalIndex3", "VelocityMidpoint"]
+
+SOLVED, DIFFERENCE, ITERATIONS = 1e-12, 1e-7, 20
+
+
+class _OnLoops(ReducedMethod):
+    """What both share: generalised forces and rows of the loops at given coordinates and rates."""
+
+    exponent = 3.0
+
+    def __init__(self, equations: Equations, control: Control) -> None:
+        super().__init__(equations, control)
+        if equations.curved.size or equations.reduced.tables.driven.any():
+            raise SolveError(Outcome.UNSUITED, "", "joints with rotations about more than one axis, or prescribed")
+
+    def forces(self, q: Array, r: Array, s: Array) -> tuple[Array, Array]:
+        """∂L/∂r and ∂L/∂q with the forces that no potential has."""
+        eq = self.equations
+        momentum, force = np.zeros(eq.n), np.zeros(eq.n)
+        made, powers = np.zeros(len(eq.reduced.made)), np.zeros(2)
+        eq.refuse(
+            *action_derivatives(
+                eq.reduced.tables, eq.work, q, r, s, eq.drive, eq.wrench, eq.scal, np.zeros(eq.ns), made, powers,
+                momentum, force,
+            )
+        )  # fmt: skip
+        return momentum, force
+
+    def solved(self, residual: Callable[[Array], Array], guess: Array) -> Array:
+        """A root by Newton's method, of least change where equations depend on one another."""
+        z, before = guess.copy(), np.inf
+        for _ in range(ITERATIONS):
+            here = residual(z)
+            size = float(np.abs(here).max())
+            if not np.isfinite(size):
+                break
+            if size <= SOLVED or (size <= 1e-9 and size > 0.5 * before):
+                return z
+            before = size
+            columns = [(residual(z + DIFFERENCE * unit) - here) / DIFFERENCE for unit in np.eye(z.size)]
+            z = z - np.linalg.lstsq(np.column_stack(columns), here, rcond=1e-8)[0]
+        raise SolveError(Outcome.DIVERGED, "", "")
+
+
+class VelocityMidpoint(_OnLoops):
+    """The midpoint rule with constraints on velocities (index 2): nothing brings positions back that have drifted."""
+
+    name = "velocity-midpoint"
+
+    def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
+        """One step of h seconds."""
+        eq, n = self.equations, self.equations.n
+        before, _ = self.forces(state.q, state.r, state.s)
+        m = eq.gaps(state.q, state.r)[1].shape[0]
+
+        def residual(z: Array) -> Array:
+            r = 0.5 * (state.r + z[:n])
+            middle = eq.moved(state.q, 0.5 * h * r)
+            _, force = self.forces(middle, r, state.s)
+            rows = eq.gaps(middle, r)[1]
+            after, _ = self.forces(eq.moved(state.q, h * r), z[:n], state.s)
+            return np.concatenate([after - before - h * force - rows.T @ z[n:], rows @ r])
+
+        z = self.solved(residual, np.concatenate([state.r, np.zeros(m)]))
+        q = eq.fitted(eq.moved(state.q, 0.5 * h * (state.r + z[:n])), z[:n])
+        return Attempt(state, ReducedState(state.t + h, q, z[:n], state.s, state.books), h, 0.0, 0.0)
+
+
+class TrapezoidalIndex3(_OnLoops):
+    """The trapezoidal rule with constraints on positions alone (index 3): multipliers swing ever more."""
+
+    name = "trapezoidal-index3"
+
+    def __init__(self, equations: Equations, control: Control) -> None:
+        super().__init__(equations, control)
+        self._push: tuple[Array, Array] | None = None
+
+    def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
+        """One step of h seconds."""
+        eq, n = self.equations, self.equations.n
+        before, pull = self.forces(state.q, state.r, state.s)
+        rows = eq.gaps(state.q, state.r)[1]
+        known = self._push[1] if self._push is not None and self._push[0] is state.q else np.zeros(rows.shape[0])
+
+        def residual(z: Array) -> Array:
+            q, r = eq.moved(state.q, z[:n]), 2.0 * z[:n] / h - state.r
+            after, force = self.forces(q, r, state.s)
+            gap, there = eq.gaps(q, r)
+            balance = after - before - 0.5 * h * (pull + force + rows.T @ known + there.T @ z[n:])
+            return np.concatenate([balance, gap])
+
+        z = self.solved(residual, np.concatenate([h * state.r, known]))
+        rates = 2.0 * z[:n] / h - state.r
+        q = eq.fitted(eq.moved(state.q, z[:n]), rates)
+        self._push = q, z[n:]
+        return Attempt(state, ReducedState(state.t + h, q, rates, state.s, state.books), h, 0.0, 0.0)
+
+
+SPECIMENS = {
+    method.name: method
+    for method in (
+        Method(
+            "velocity-midpoint", 2, False, True, False, True,
+            "specimen: constraints on velocities, positions drift", on_joints(VelocityMidpoint),
+        ),
+        Method(
+            "trapezoidal-index3", 2, False, True, False, True,
+            "specimen: constraints on positions, multipliers swing", on_joints(TrapezoidalIndex3),
+        ),
+    )
+}  # fmt: skip
+"""Name -> method; they may be given to `simulate` as values."""
