@@ -3,10 +3,11 @@
 import sys
 from pathlib import Path
 
-from benchmarks import accuracy, balance, cells, long, order, size, traced
+from benchmarks import accuracy, balance, cells, long, order, orders, size, traced
 
 TABLES = {
     "order": lambda _: order.table(),
+    "orders": lambda _: orders.table(),
     "balance": lambda _: balance.table(),
     "size": size.table,
     "cells": cells.table,

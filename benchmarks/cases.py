@@ -44,8 +44,11 @@ class Case:
 
     def reference(self) -> dict[str, Any]:
         """Body name -> position, quaternion, velocity, angular_velocity at ``time``."""
-        data = json.loads((HERE / "reference" / f"{self.name}.json").read_text())
-        return data["states"][repr(self.time)]["bodies"]
+        return self._known()["bodies"]
+
+    def cross_check(self) -> float:
+        """The largest difference between two independent computations of the reference."""
+        return float(self._known()["cross_check"] or 0.0)
 
     def error(self, solution: ephs.Solution) -> float:
         """Largest deviation of any body's position or rotation matrix at the end from the reference."""
@@ -56,6 +59,10 @@ class Case:
             turned = np.abs(body.rotation[-1] - _matrix(state["quaternion"])).max()
             worst = max(worst, float(off), float(turned))
         return worst
+
+    def _known(self) -> dict[str, Any]:
+        data = json.loads((HERE / "reference" / f"{self.name}.json").read_text())
+        return data["states"][repr(self.time)]
 
     def _rubbing(self, joint: Joint) -> Joint:
         return replace(joint, friction=frozen(self.friction * np.eye(joint.dim)))

@@ -2,10 +2,10 @@
 
 Chung and Hulbert, *J. Appl. Mech.* 60 (1993), 371-375; on groups Brüls, Cardona and Arnold, *Mech. Mach. Theory* 48
 (2012), 121-137. Here on the reduced form: accelerations are those along the constraints, loops are closed after each
-step. Entropies follow by the trapezoidal rule.
+step. Entropies follow by the trapezoidal rule. A state's memory holds ẏ there, and the mean acceleration.
 """
 
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any, final
 
 import numpy as np
@@ -17,21 +17,10 @@ from ephs.mechanics.reduced.method import ReducedMethod
 from ephs.mechanics.solve.control import Control
 from ephs.mechanics.solve.errors import OptionError, Outcome, SolveError
 from ephs.mechanics.solve.loop import Attempt
-from ephs.semantics.bundle import Array
 
 __all__ = ["Alpha"]
 
 ITERATIONS = 20
-
-
-@final
-@dataclass(frozen=True, slots=True, eq=False)
-class _Memory:
-    """What the method remembers of the step before: the state's ẏ, and the mean acceleration."""
-
-    q: Array
-    rates: Array
-    mean: Array
 
 
 @final
@@ -56,7 +45,7 @@ class Alpha(ReducedMethod):
         self._m, self._f = (2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0)
         self._gamma = 0.5 + self._f - self._m
         self._beta = 0.25 * (0.5 + self._gamma) ** 2
-        self._memory: dict[int, _Memory] = {}
+        self._enough = 1e-4 if control.step is None else 1e-6
         self.counts = {"iterations": 0, "jacobians": 0, "rho": rho}
 
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
@@ -64,8 +53,11 @@ class Alpha(ReducedMethod):
         eq = self.equations
         nv, n, ns = eq.nv, eq.n, eq.ns
         y0 = eq.vector(state)
-        memory = self._remembered(state, y0)
-        before, mean = memory.rates, memory.mean
+        if state.memory:
+            before, mean = state.memory
+        else:  # at a start the mean acceleration is the true one
+            before = eq.rates(state.t, state.q, y0)
+            mean = before[nv : nv + n]
         rate, fall = slice(nv, nv + n), slice(nv + n, nv + n + ns)
         solver = self._solver(state, h)
         tree = np.arange(n)
@@ -86,7 +78,7 @@ class Alpha(ReducedMethod):
             scale = self.atol + self.rtol * eq.sizes(y0, y1)
             parts = np.concatenate([self._beta * h * h * change, self._gamma * h * change, drift[fall]])
             moved = float(np.max(np.abs(parts) / scale, initial=0.0))
-            if not np.isfinite(moved) or moved <= 1e-4 or (moved > 0.5 * last and moved <= 1e-2):
+            if not np.isfinite(moved) or moved <= self._enough or (moved > 0.5 * last and moved <= 1e-2):
                 break
             last = moved
         if not moved <= 1e-2:
@@ -100,17 +92,7 @@ class Alpha(ReducedMethod):
         missed = h * h * (self._beta - 1.0 / 6.0) * (mean1 - mean)
         estimate = np.concatenate([missed, np.zeros(n), np.zeros(ns)])
         error = float(np.max(np.abs(eq.along(estimate)) / (self.atol + self.rtol * eq.sizes(y0, y1)), initial=0.0))
-        self._memory = {id(state.q): memory, id(closed.q): _Memory(closed.q, rates, mean1)}
-        return Attempt(state, closed, h, error, eq.least(state, closed))
-
-    def _remembered(self, state: ReducedState, y0: Array) -> _Memory:
-        """The state's rates and mean acceleration; at a start both are the true ones."""
-        found = self._memory.get(id(state.q))
-        if found is None or found.q is not state.q:
-            rates = self.equations.rates(state.t, state.q, y0)
-            found = _Memory(state.q, rates, rates[self.equations.nv : self.equations.nv + self.equations.n])
-            self._memory = {id(state.q): found}
-        return found
+        return Attempt(state, replace(closed, memory=(rates, mean1)), h, error, eq.least(state, closed))
 
     def _solver(self, state: ReducedState, h: float) -> Any:
         eq = self.equations

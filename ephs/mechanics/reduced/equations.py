@@ -48,6 +48,8 @@ class ReducedState:
     ----------
     books
         Heat and work in J, then the entropy that each component made in J/K.
+    memory
+        What a method takes along from step to step; none after a start.
     """
 
     t: float
@@ -55,6 +57,7 @@ class ReducedState:
     r: Array
     s: Array
     books: Array
+    memory: tuple[Array, ...] = ()
 
 
 @final
@@ -134,8 +137,8 @@ class Equations:
         nv, n, ns = self.nv, self.n, self.ns
         self.evaluations += 1
         if not self._constant:
-            parts = np.split(y, [nv, nv + n, nv + n + ns])
-            self._place_inputs(t, self.states(ReducedState(t, self.advance(base, parts[0]), *parts[1:])))
+            v, r, s, books = np.split(y, [nv, nv + n, nv + n + ns])
+            self._place_inputs(t, self.states(ReducedState(t, self.advance(base, v), r, s, books)))
         out = np.zeros(self.size)
         self.refuse(
             *rates(
@@ -291,8 +294,8 @@ class Equations:
     def state(self, base: ReducedState, y: Array, t: float) -> ReducedState:
         """The state that the vector y means, counted from ``base``; its loops are as they come."""
         nv, n, ns = self.nv, self.n, self.ns
-        parts = np.split(y, [nv, nv + n, nv + n + ns])
-        return ReducedState(t, self.advance(base.q, parts[0]), *parts[1:])
+        v, r, s, books = np.split(y, [nv, nv + n, nv + n + ns])
+        return ReducedState(t, self.advance(base.q, v), r, s, books)
 
     def allowed(self, rtol: Tolerance, atol: Tolerance) -> tuple[Array, Array]:
         """rtol and atol of what counts in an error: the tree's increments, its rates, the entropies."""

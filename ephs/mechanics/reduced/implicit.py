@@ -21,6 +21,7 @@ from ephs.semantics.bundle import Array
 __all__ = ["Implicit"]
 
 ITERATIONS = 10
+ROUNDING = 1e-14
 _S6 = 6.0**0.5
 _EMBEDDED = np.array([-13.0 - 7.0 * _S6, -13.0 + 7.0 * _S6, -1.0]) / 3.0
 _RATE = float((1.0 / VALUES[0]).real)
@@ -37,9 +38,13 @@ class Implicit(ReducedMethod):
     def __init__(self, equations: Equations, control: Control) -> None:
         super().__init__(equations, control)
         self.jacobian = Jacobian(equations)
-        least = float(np.min(self.rtol, initial=1.0))
-        # As far as Newton's method is taken, relative to the tolerance: less than the method's own error.
-        self._enough = max(1e-13 / max(least, 1e-13), min(0.03, least**0.5)) if control.step is None else 1e-6
+        if control.step is None:
+            # As far as Newton's method is taken, relative to the tolerance: less than the method's own error.
+            least = float(np.min(self.rtol, initial=1.0))
+            self._enough, self._rough = max(1e-13 / max(least, 1e-13), min(0.03, least**0.5)), 1e-2
+        else:  # to rounding, and near changes of rank as far as it goes
+            self.rtol, self.atol = np.full_like(self.rtol, ROUNDING), np.full_like(self.atol, ROUNDING)
+            self._enough, self._rough = 1.0, 1e5
         self._solvers: tuple[float, Any, Any] | None = None
         self._known: tuple[Array, Array] | None = None
         self.counts = {"iterations": 0, "factorisations": 0, "jacobians": 0}
@@ -106,14 +111,14 @@ class Implicit(ReducedMethod):
             stages += change
             if iteration > 1:
                 rate = moved / before
-                if rate >= 1.0 and moved > 10.0 * self._enough:
+                if rate >= 1.0 and moved > max(10.0 * self._enough, self._rough):
                     break
             if moved <= self._enough or (iteration > 1 and moved * rate <= self._enough * (1.0 - min(rate, 0.9))):
                 return stages, rates[:, size:], iteration <= 4 or rate < 0.1
-            if iteration > 2 and rate > 0.5 and moved <= 1e-2:  # rounding is all that is left
+            if iteration > 2 and rate > 0.5 and moved <= self._rough:  # rounding is all that is left
                 return stages, rates[:, size:], False
             before = moved
-        if moved <= 1e-2:  # near a change of rank the matrix is no good, and the iteration slow
+        if moved <= self._rough:  # near a change of rank the matrix is no good, and the iteration slow
             return stages, rates[:, size:], False
         raise SolveError(Outcome.DIVERGED, "", "")
 

@@ -1,17 +1,22 @@
 """Methods that discretise component by component, and one step of theirs with inputs that change."""
 
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
 
+from ephs.mechanics.solve.errors import Outcome
 from ephs.mechanics.solve.model import Model
 from ephs.mechanics.solve.natural import Chunk, NaturalState
 from ephs.mechanics.solve.problem import Problem
 from ephs.semantics.bundle import Array
 
-__all__ = ["ComponentMethod", "advance_driven"]
+__all__ = ["ComponentMethod", "advance_driven", "advance_whole"]
 
 ROUNDS = 12
+CUTS = 6
+"""How often a step without solution is halved."""
+_CURABLE = (Outcome.DIVERGED, Outcome.SINGULAR, Outcome.CONTRADICTION)
 
 
 class ComponentMethod(Protocol):
@@ -55,12 +60,46 @@ class ComponentMethod(Protocol):
         ...
 
 
+def advance_whole(
+    method: ComponentMethod, state: NaturalState, h: float, steps: int, inputs: Array | None = None, cuts: int = CUTS
+) -> tuple[NaturalState, Chunk]:
+    """Up to so many steps of h seconds; one that has no solution is taken in halves, and these so on ``cuts`` times.
+
+    A part keeps every balance and every joint as a whole step does.
+    """
+    chunks: list[Chunk] = []
+    while steps:
+        state, chunk = method.advance(state, h, steps, inputs)
+        chunks.append(chunk)
+        steps -= chunk.steps
+        if chunk.failure is None or not cuts or chunk.failure.outcome not in _CURABLE:
+            break
+        after, parts = advance_whole(method, state, 0.5 * h, 2, inputs, cuts - 1)
+        if parts.failure is not None:
+            break
+        ledgers = parts.ledgers[-1:].copy()
+        ledgers[0, 4] = parts.ledgers[:, 4].min()
+        chunks[-1] = replace(chunk, failure=None)
+        chunks.append(Chunk(parts.x[-1:], parts.energies[-1:], ledgers, parts.iterations, None, 1))
+        state, steps = after, steps - 1
+    if len(chunks) == 1:
+        return state, chunks[0]
+    return state, Chunk(
+        np.concatenate([chunk.x for chunk in chunks]),
+        np.concatenate([chunk.energies for chunk in chunks]),
+        np.concatenate([chunk.ledgers for chunk in chunks]),
+        sum(chunk.iterations for chunk in chunks),
+        chunks[-1].failure,
+        sum(chunk.cut for chunk in chunks),
+    )
+
+
 def advance_driven(
     problem: Problem, method: ComponentMethod, state: NaturalState, t: float, h: float
 ) -> tuple[NaturalState, Chunk]:
     """One step with inputs at the method's nodes; of the state they are taken at the step's own, by iteration."""
     if problem.constant:
-        return method.advance(state, h, 1)
+        return advance_whole(method, state, h, 1)
     d = problem.descriptor
 
     def given(points: list[Array]) -> Array:
@@ -71,7 +110,7 @@ def advance_driven(
         return np.array(rows)
 
     inputs = given(method.points(state, h, state.x))
-    first, last = method.advance(state, h, 1, inputs), np.inf
+    first, last = advance_whole(method, state, h, 1, inputs), np.inf
     found = first
     for _ in range(ROUNDS):
         if found[1].failure is not None:
@@ -83,5 +122,5 @@ def advance_driven(
         if change >= 0.9 * last:  # a feedback too stiff for this step: what was guessed first is what is left
             return first
         last, inputs = change, again
-        found = method.advance(state, h, 1, inputs)
+        found = advance_whole(method, state, h, 1, inputs)
     return found

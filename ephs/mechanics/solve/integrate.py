@@ -8,11 +8,12 @@ from typing import Any, Protocol, final
 
 import numpy as np
 
-from ephs.mechanics.solve.driven import ComponentMethod, advance_driven
+from ephs.mechanics.solve.driven import ComponentMethod, advance_driven, advance_whole
 from ephs.mechanics.solve.errors import Interrupted, OptionError, Outcome, SimulationError, SolveError
 from ephs.mechanics.solve.ledger import ledgers
 from ephs.mechanics.solve.model import Model, compile_model
 from ephs.mechanics.solve.natural import Chunk, Natural, NaturalState
+from ephs.mechanics.solve.natural_kernels import IRREVERSIBLE
 from ephs.mechanics.solve.problem import Problem
 from ephs.mechanics.solve.record import Record, Recorder
 from ephs.mechanics.solve.solution import Solution
@@ -83,7 +84,8 @@ def integrate(
     x0 = d.pack(problem.initial)
     model = compile_model(d, problem.reference, problem.inputs(grid.t0, problem.initial))
     stepper = make(model)
-    run = _Run(problem, grid, stepper, Recorder(d, grid.t0, x0, save_at), begin, progress)
+    inside = _Inside(problem, make, model)
+    run = _Run(problem, grid, stepper, Recorder(d, grid.t0, x0, save_at, inside), begin, progress)
     with failures_of(run):
         run.recorder.start(stepper.energies(x0))
         run.state = stepper.init(x0)
@@ -93,6 +95,27 @@ def integrate(
         if grid.last:
             run.take(grid.last, 1, grid.until)
     return run.solution()
+
+
+@final
+class _Inside:
+    """Dense output: a shorter step from the start of a step, by a method of its own."""
+
+    def __init__(self, problem: Problem, make: Callable[[Model], ComponentMethod], model: Model) -> None:
+        self._problem, self._make, self._model = problem, make, model
+        self._method: ComponentMethod | None = None
+
+    def __call__(self, start: tuple[float, Array, Array, Array], when: float) -> tuple[Array, Array, Array]:
+        if self._method is None:
+            self._method = self._make(self._model)
+        t, x, energies, ledgers = start
+        made = np.where(self._model.tables.kind == IRREVERSIBLE, energies, 0.0)
+        fresh = self._method.init(x)
+        state = NaturalState(x, fresh.z, fresh.previous, np.concatenate([ledgers[:4], made]))
+        _, chunk = advance_driven(self._problem, self._method, state, t, when - t)
+        if chunk.failure is not None:
+            raise chunk.failure
+        return chunk.x[-1], chunk.energies[-1], chunk.ledgers[-1]
 
 
 class Run(Protocol):
@@ -144,7 +167,7 @@ class _Run:
     ) -> None:
         self.problem, self.grid, self.stepper, self.recorder = problem, grid, stepper, recorder
         self.begin, self.progress = begin, progress
-        self.t, self.setup, self.steps, self.iterations = grid.t0, 0.0, 0, 0
+        self.t, self.setup, self.steps, self.iterations, self.cut = grid.t0, 0.0, 0, 0, 0
 
     def full_steps(self, max_steps: int | None) -> None:
         """All steps of full length, in chunks that adapt to the time that they take."""
@@ -164,10 +187,11 @@ class _Run:
     def take(self, h: float, count: int, end: float | None) -> None:
         """Some steps of one length; ``end`` is their exact end where the grid would round it."""
         if self.problem.constant:
-            self.state, chunk = self.stepper.advance(self.state, h, count)
+            self.state, chunk = advance_whole(self.stepper, self.state, h, count)
         else:
             self.state, chunk = advance_driven(self.problem, self.stepper, self.state, self.t, h)
         self.iterations += chunk.iterations
+        self.cut += chunk.cut
         times = np.array([self.grid.time(self.steps + k + 1) for k in range(chunk.steps)])
         if h != self.grid.h:
             times = times - self.grid.h + h
@@ -193,6 +217,7 @@ class _Run:
             "steps": self.steps,
             "rejected": 0,
             "iterations": self.iterations,
+            "cut_steps": self.cut,
             "orders": self.stepper.changes,
             "dependent_equations": len(self.stepper.redundant),
             "unknowns": self.stepper.model.unknowns,

@@ -63,6 +63,8 @@ class Chunk:
         (steps, components): energy of each storage in J, entropy made so far by each irreversible component in J/K.
     ledgers
         (steps, 5): heat, energy supplied, exergy supplied, entropy made, least entropy production in the step.
+    cut
+        How many of the steps were taken in parts.
     """
 
     x: Array
@@ -70,6 +72,7 @@ class Chunk:
     ledgers: Array
     iterations: int
     failure: SolveError | None
+    cut: int = 0
 
     @property
     def steps(self) -> int:

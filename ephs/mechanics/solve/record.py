@@ -1,5 +1,6 @@
 """What a run keeps: every step, or dense output at the times asked for."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import final
 
@@ -8,9 +9,10 @@ import numpy as np
 from ephs.mechanics.solve.natural import Chunk
 from ephs.semantics.bundle import Array
 from ephs.semantics.descriptor import Descriptor
-from ephs.semantics.spaces import manifold
 
-__all__ = ["Record", "Recorder"]
+__all__ = ["Inside", "Record", "Recorder"]
+
+Inside = Callable[[tuple[float, Array, Array, Array], float], tuple[Array, Array, Array]]
 
 
 @final
@@ -43,12 +45,15 @@ class Recorder:
     Parameters
     ----------
     save_at
-        Times to keep, ascending, or None for every step. States between steps lie on the geodesic of the step, whose
-        error is of the method's order; ledgers are linear in between.
+        Times to keep, ascending, or None for every step.
+    inside
+        (time, states, energies, ledgers) at a step's start, and a time within the step -> the same there.
     """
 
-    def __init__(self, descriptor: Descriptor, t0: float, x0: Array, save_at: Array | None) -> None:
-        self._d, self._t0, self._x0 = descriptor, t0, x0
+    def __init__(
+        self, descriptor: Descriptor, t0: float, x0: Array, save_at: Array | None, inside: "Inside | None" = None
+    ) -> None:
+        self._d, self._t0, self._x0, self._inside = descriptor, t0, x0, inside
         self._save_at = None if save_at is None else np.asarray(save_at, dtype=float)
         self._next = 0
         self._rows: list[tuple[Array, Array, Array, Array]] = []
@@ -93,15 +98,13 @@ class Recorder:
         self, wanted: Array, t: Array, x: Array, energies: Array, ledgers: Array
     ) -> tuple[Array, Array, Array, Array]:
         i = np.clip(np.searchsorted(t, wanted, side="left") - 1, 0, t.size - 2)
-        part = (wanted - t[i]) / (t[i + 1] - t[i])
-        states = np.empty((wanted.size, x.shape[1]))
-        for slot in self._d.states:
-            space = manifold(slot.quantity.space)
-            for row, (k, s) in enumerate(zip(i, part, strict=True)):
-                a, b = x[k, slot.point], x[k + 1, slot.point]
-                states[row, slot.point] = b if s == 1.0 else space.retract(a, s * space.increment(a, b))
-
-        def linear(values: Array) -> Array:
-            return values[i] + part[:, None] * (values[i + 1] - values[i])
-
-        return wanted, states, linear(energies), np.column_stack([linear(ledgers[:, :4]), ledgers[i + 1, 4]])
+        rows: list[tuple[Array, Array, Array]] = []
+        for k, when in zip(i, wanted, strict=True):
+            if when == t[k + 1] or self._inside is None:
+                rows.append((x[k + 1], energies[k + 1], ledgers[k + 1]))
+            elif when == t[k]:
+                rows.append((x[k], energies[k], ledgers[k]))
+            else:
+                rows.append(self._inside((float(t[k]), x[k], energies[k], ledgers[k]), float(when)))
+        states, stored, sums = (np.array(column) for column in zip(*rows, strict=True))
+        return wanted, states, stored, sums

@@ -13,7 +13,7 @@ from ephs.mechanics.reduced.action_kernels import action_derivatives
 from ephs.mechanics.reduced.equations import Equations, ReducedState
 from ephs.mechanics.reduced.method import ReducedMethod
 from ephs.mechanics.solve.control import Control
-from ephs.mechanics.solve.errors import Outcome, SolveError
+from ephs.mechanics.solve.errors import OptionError, Outcome, SolveError
 from ephs.mechanics.solve.loop import Attempt
 from ephs.show.charts.runs import Array
 
@@ -30,7 +30,8 @@ class _OnLoops(ReducedMethod):
     def __init__(self, equations: Equations, control: Control) -> None:
         super().__init__(equations, control)
         if equations.curved.size or equations.reduced.tables.driven.any():
-            raise SolveError(Outcome.UNSUITED, "", "joints with rotations about more than one axis, or prescribed")
+            expected = "a scene of revolute, prismatic, screw and cylindrical joints, none prescribed"
+            raise OptionError("method", self.name, expected)
 
     def forces(self, q: Array, r: Array, s: Array) -> tuple[Array, Array]:
         """∂L/∂r and ∂L/∂q with the forces that no potential has."""
@@ -90,16 +91,12 @@ class TrapezoidalIndex3(_OnLoops):
 
     name = "trapezoidal-index3"
 
-    def __init__(self, equations: Equations, control: Control) -> None:
-        super().__init__(equations, control)
-        self._push: tuple[Array, Array] | None = None
-
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
         """One step of h seconds."""
         eq, n = self.equations, self.equations.n
         before, pull = self.forces(state.q, state.r, state.s)
         rows = eq.gaps(state.q, state.r)[1]
-        known = self._push[1] if self._push is not None and self._push[0] is state.q else np.zeros(rows.shape[0])
+        known = state.memory[0] if state.memory else np.zeros(rows.shape[0])
 
         def residual(z: Array) -> Array:
             q, r = eq.moved(state.q, z[:n]), 2.0 * z[:n] / h - state.r
@@ -111,8 +108,8 @@ class TrapezoidalIndex3(_OnLoops):
         z = self.solved(residual, np.concatenate([h * state.r, known]))
         rates = 2.0 * z[:n] / h - state.r
         q = eq.fitted(eq.moved(state.q, z[:n]), rates)
-        self._push = q, z[n:]
-        return Attempt(state, ReducedState(state.t + h, q, rates, state.s, state.books), h, 0.0, 0.0)
+        end = ReducedState(state.t + h, q, rates, state.s, state.books, (z[n:],))
+        return Attempt(state, end, h, 0.0, 0.0)
 
 
 SPECIMENS = {
