@@ -77,7 +77,7 @@ class Ida(ReducedMethod):
         try:
             from sksundae.ida import IDA
         except ImportError as error:
-            raise OptionError("method", "ida", "the package scikit-sundae, which is not installed") from error
+            raise OptionError("method", "ida", "another, or ephs[ida] installed, which brings scikit-sundae") from error
         eq = self.equations
         self._base = state
         self.counts["restarts"] += 1
