@@ -52,7 +52,7 @@ _DPI = 150
 
 
 def draw_work_precision(points: Sequence[Point], title: str, folder: Path, name: str) -> list[Path]:
-    """Error against wall time and against evaluations; PNG, SVG, CSV and JSON of this name.
+    """Error against wall time, evaluations, and the tolerance asked for; PNG, SVG, CSV and JSON of this name.
 
     Methods over tolerances have filled marks and full lines, over steps hollow marks and dashed lines. What failed is
     marked at the right edge.
@@ -64,19 +64,28 @@ def draw_work_precision(points: Sequence[Point], title: str, folder: Path, name:
     for point in points:
         series.setdefault((point.method, point.setting.kind), []).append(point)
     with rc_context(style):
-        figure = new_figure(10.0, 5.6)
-        left, right = figure.subplots(1, 2, sharey=True)
-        for axes, key, label in ((left, "seconds", "wall time [s]"), (right, "evaluations", "evaluations, iterations")):
+        figure = new_figure(12.0, 5.6)
+        left, middle, right = figure.subplots(1, 3, sharey=True)
+        panels = (
+            (left, "seconds", "wall time [s]"),
+            (middle, "evaluations", "evaluations, iterations"),
+            (right, "tolerance", "tolerance asked for"),
+        )
+        for axes, key, label in panels:
             axes.set_xscale("log")
             axes.set_yscale("log")
             axes.set_xlabel(label)
             for (method, kind), found in series.items():
                 _curve(axes, method, kind, found, key)
+        asked = [point.tolerance for point in points if point.tolerance > 0.0]
+        if asked:
+            right.plot([min(asked), max(asked)], [min(asked), max(asked)], color=GREY, linewidth=0.8, zorder=0.5)
+            right.invert_xaxis()
         left.set_ylabel("error at the end [m, 1]")
         left.set_title(title, loc="left")
         _failures(right, series)
         handles, labels = left.get_legend_handles_labels()
-        extra, said = right.get_legend_handles_labels()
+        extra, said = middle.get_legend_handles_labels()
         more = [(h, text) for h, text in zip(extra, said, strict=True) if text not in labels]
         handles, labels = [*handles, *(h for h, _ in more)], [*labels, *(text for _, text in more)]
         if any(point.floor for point in points):

@@ -54,6 +54,11 @@ class Point:
     message: str = ""
     floor: bool = False
 
+    @property
+    def tolerance(self) -> float:
+        """The tolerance that was asked for; 0 where the step was constant."""
+        return self.setting.value if self.setting.kind == "tolerance" else 0.0
+
 
 def work_precision(
     scene: Scene,
