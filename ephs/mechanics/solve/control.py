@@ -153,23 +153,30 @@ class Proportional:
     exponent
         Says with which power of the step the estimate falls, which may change from step to step.
     share
-        A step of h in a run of T may have (h/T)^share of the tolerance: with 0 errors add up over the steps; with 1
-        they make the tolerance together, but where a force jumps no step would be short enough.
+        A step of h in a run of T aims at (h/T)^share of the tolerance: with 0 errors add up over the steps, with 1
+        they make the tolerance together.
     damping
         How much the last error counts, 0 for none.
     """
+
+    STRICT = 30.0
 
     def __init__(self, exponent: Callable[[], float], share: float = 0.0, damping: float = 0.4) -> None:
         self._exponent, self._share, self._damping, self._before = exponent, share, damping, 1e-4
         self._failed = False
 
     def judge(self, h: float, error: float, span: float) -> tuple[bool, float]:
-        """Accept what is at most 1; a step after a failure does not grow."""
+        """Accept what is at most 1; a step after a failure does not grow.
+
+        What is accepted knows the share up to a limit only: where rates jump, no step would be short enough.
+        """
+        part = (span / h) ** self._share
         exponent = self._exponent() - self._share
-        error *= (span / h) ** self._share
-        if not error <= 1.0:
+        strict = error * min(part, self.STRICT)
+        error *= part
+        if not strict <= 1.0:
             self._failed = True
-            return False, h * (max(0.2, 0.9 * error ** (-1.0 / exponent)) if np.isfinite(error) else 0.1)
+            return False, h * (max(0.2, 0.9 * strict ** (-1.0 / exponent)) if np.isfinite(strict) else 0.1)
         main = (1.0 - 0.75 * self._damping) / exponent
         factor = 0.9 * max(error, 1e-10) ** -main * self._before ** (self._damping / exponent)
         self._before = max(error, 1e-4)
