@@ -5,8 +5,11 @@ from dataclasses import dataclass
 from typing import Any, final
 
 from ephs.mechanics.solve.control import Control, Policy, Proportional, Symmetric
+from ephs.mechanics.solve.driven import ComponentMethod
 from ephs.mechanics.solve.errors import OptionError
 from ephs.mechanics.solve.loop import Stepper
+from ephs.mechanics.solve.model import Model, compile_model
+from ephs.mechanics.solve.natural import Natural
 from ephs.mechanics.solve.problem import Problem
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.codes import VECTOR
@@ -54,6 +57,8 @@ class Method:
         The method for a setting, and what chooses its steps: None where they are constant.
     options
         Names of the options that it takes.
+    many
+        Makes, for a compiled model, what takes many constant steps in one compiled call; None where there is no such.
     """
 
     name: str
@@ -65,6 +70,7 @@ class Method:
     summary: str
     make: Callable[[Setting], tuple[Stepper[Any], Policy | None]]
     options: tuple[str, ...] = ()
+    many: Callable[[Model], ComponentMethod] | None = None
 
 
 def on_joints(make: Callable[..., Any]) -> Callable[[Setting], tuple[Stepper[Any], Policy | None]]:
@@ -124,34 +130,24 @@ def _auto(equations: Any, control: Control) -> Any:
     return Auto(equations, control)
 
 
-def _component_wise(setting: Setting, order: int) -> tuple[Stepper[Any], Policy | None]:
-    from ephs.mechanics.solve.model import compile_model
-    from ephs.mechanics.solve.paced import Paced
+def _component_wise(
+    make: Callable[[Model], ComponentMethod],
+) -> Callable[[Setting], tuple[Stepper[Any], Policy | None]]:
+    def made(setting: Setting) -> tuple[Stepper[Any], Policy | None]:
+        from ephs.mechanics.solve.paced import Paced
 
-    problem = setting.problem
-    model = compile_model(problem.descriptor, problem.reference, problem.inputs(setting.t0, problem.initial))
-    chosen = setting.control.step is None
-    paced = Paced(problem, component_method(order)(model), setting.control, doubled=chosen)
-    return paced, Symmetric(order + 1.0) if chosen else None
+        problem = setting.problem
+        model = compile_model(problem.descriptor, problem.reference, problem.inputs(setting.t0, problem.initial))
+        method, free = make(model), setting.control.step is None
+        return Paced(problem, method, setting.control, doubled=free), Symmetric(method.order + 1.0) if free else None
 
-
-def component_method(order: int) -> Callable[[Any], Any]:
-    """The method of order 2 or 4 that discretises component by component."""
-    if order == 4:
-        from ephs.mechanics.solve.natural4 import Natural4
-
-        return Natural4
-    from ephs.mechanics.solve.natural import Natural
-
-    return Natural
+    return made
 
 
-def _natural(setting: Setting) -> tuple[Stepper[Any], Policy | None]:
-    return _component_wise(setting, 2)
+def _of_order_4(model: Model) -> ComponentMethod:
+    from ephs.mechanics.solve.natural4 import Natural4
 
-
-def _natural4(setting: Setting) -> tuple[Stepper[Any], Policy | None]:
-    return _component_wise(setting, 4)
+    return Natural4(model)
 
 
 def _radau(setting: Setting) -> tuple[Stepper[Any], Policy | None]:
@@ -183,8 +179,20 @@ def register_method(method: Method) -> None:
 
 
 for _method in (
-    Method("natural", 2, True, True, True, True, "balances and positions of joints exact, any system", _natural),
-    Method("natural4", 4, True, True, True, True, "the same of order 4", _natural4),
+    Method(
+        "natural",
+        2,
+        True,
+        True,
+        True,
+        True,
+        "balances and positions of joints exact, any system",
+        _component_wise(Natural),
+        many=Natural,
+    ),
+    Method(
+        "natural4", 4, True, True, True, True, "the same of order 4", _component_wise(_of_order_4), many=_of_order_4
+    ),
     Method("variational", 2, False, True, False, True, "symplectic, momentum maps exact", on_joints(_variational)),
     Method("radau", 5, True, True, True, True, "Radau IIA, stiff", _radau),
     Method("alpha", 2, True, True, False, True, "generalised-α, damps what is fast", on_joints(_alpha), ("rho",)),
@@ -201,7 +209,7 @@ def _for_scenes(setting: Setting) -> tuple[Stepper[Any], Policy | None]:
     try:
         return on_joints(_auto)(setting)
     except OptionError:  # joints that the reduced form cannot have, such as loops of prescribed ones
-        return _natural(setting)
+        return METHODS["natural"].make(setting)
 
 
 AUTO = Method("auto", 8, True, False, False, True, "rk54 or rk87, radau where stiff", _for_scenes)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ephs.mechanics.build import component_path, drive_ports, initial_state, scene_inputs, scene_system, wrench_port
-from ephs.mechanics.methods import METHODS, Method, Setting, chosen, component_method
+from ephs.mechanics.methods import METHODS, Method, Setting, chosen
 from ephs.mechanics.motion import SceneMotion
 from ephs.mechanics.redundancy import explain
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
@@ -75,7 +75,7 @@ def simulate(
         radau from where the problem shows itself stiff, for scenes, radau for systems on vector spaces. Or a
         `Method` of one's own.
     rtol, atol
-        Without ``step``: each state x is wanted to atol + rtol·|x| a step, atol in the state's own unit. Either may be
+        Without ``step``: each state x is wanted to atol + rtol·|x|, atol in the state's own unit. Either may be
         a mapping from kinds of quantities or paths to numbers, ``"*"`` for all others.
     step
         The grid is t₀ + k·step, the last step shortened to end on ``until``. Without it rtol and atol steer.
@@ -132,11 +132,11 @@ def simulate(
         raise OptionError("options", unknown[0], f"options of {chosen_method.name}: {known}")
     times, watched = _times(save_at, start, end), events_of(events)
     setting = Setting(problem, start, control, dict(options or {}))
-    if chosen_method.name in ("natural", "natural4") and control.step is not None and not watched and end > start:
+    if chosen_method.many is not None and control.step is not None and not watched and end > start:
         return integrate(
             problem,
             Grid(start, end, control.step),
-            make=component_method(chosen_method.order),
+            make=chosen_method.many,
             save_at=times,
             max_steps=max_steps,
             progress=progress,

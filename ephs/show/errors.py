@@ -30,12 +30,25 @@ _TEXTS = {
         "body {path}: found shape {found}, expected one of box = [x, y, z], sphere = r, cylinder = [radius, length], "
         "mesh = FILE; correct its shape"
     ),
+    "reference": (
+        "{path}: found no method that reaches {expected} with tight tolerances, expected one for the reference "
+        "({found}); shorten the time, or give a reference file"
+    ),
+    "doubt": (
+        "{path}: found that references differ by {found} at the end, expected at most {expected}; "
+        "errors are not known, shorten the time"
+    ),
+    "reference-time": "{path}: found no state at {found} s, expected one of the times {expected}; choose one of these",
+    "reference-file": (
+        "{path}: found no reference states ({found}), expected JSON with states.TIME.bodies.NAME.position and "
+        ".quaternion for every body of the scene; correct the file"
+    ),
 }
 
 
 @final
 class ShowError(ValueError):
-    """Something cannot be drawn as it was asked for.
+    """Something cannot be drawn, or measured for a chart, as it was asked for.
 
     Parameters
     ----------

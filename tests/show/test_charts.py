@@ -228,3 +228,18 @@ def test_bad_names_are_one_message(words, said, tmp_path, capsys, monkeypatch):
     assert said in error
     assert "Traceback" not in error
     assert not list(tmp_path.iterdir())
+
+
+def test_the_specimen_on_velocities_drifts_where_a_method_does_not():
+    scene = ephs.load(ROOT / "scenes/four-bar.toml")
+    gaps = [
+        ephs.simulate(scene, 0.04, method=method, step=0.01).constraint_error
+        for method in (SPECIMENS["velocity-midpoint"], "natural")
+    ]
+    assert gaps[0][-1] > 10.0 * gaps[0][1] > 1e-10
+    assert gaps[1].max() <= 1e-13
+
+
+def test_specimens_say_which_scenes_they_know():
+    with pytest.raises(ephs.OptionError, match="a scene of revolute, prismatic, screw and cylindrical joints"):
+        ephs.simulate(ephs.load(TOP), 0.1, method=SPECIMENS["trapezoidal-index3"], step=0.01)

@@ -33,21 +33,28 @@ class Ida(ReducedMethod):
     exponent = 5.0
 
     def __init__(self, equations: Equations, control: Control) -> None:
+        try:
+            from sksundae.ida import IDA
+        except ImportError as error:
+            raise OptionError("method", "ida", "another, or ephs[ida] installed, which brings scikit-sundae") from error
         super().__init__(equations, control)
+        self._make: Any = IDA
+        self._failure: SolveError | None = None
         self._base: ReducedState | None = None
         self._last: Array | None = None
         self._solver: Any = None
-        self._sign = 1.0
         self.counts = {"restarts": 0}
 
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
         """One of IDA's steps, h seconds or less."""
         if self._last is not state.q or self._base is None:
-            self._restart(state, h)
+            self._restart(state)
         base = self._base
         assert base is not None
         found = self._solver.step(state.t + h - base.t, method="onestep", tstop=state.t + h - base.t)
         if not found.success:
+            if self._failure is not None:
+                raise self._failure
             raise SolveError(Outcome.DIVERGED, "", f"IDA: {found.message}")
         t, y = float(np.ravel(found.t)[-1]) + base.t, np.array(found.y[-1] if found.y.ndim > 1 else found.y)
         if t == state.t:
@@ -73,25 +80,21 @@ class Ida(ReducedMethod):
             self._base = None
         return Attempt(state, closed, t - state.t, 0.0, eq.least(state, closed))
 
-    def _restart(self, state: ReducedState, h: float) -> None:
-        try:
-            from sksundae.ida import IDA
-        except ImportError as error:
-            raise OptionError("method", "ida", "another, or ephs[ida] installed, which brings scikit-sundae") from error
+    def _restart(self, state: ReducedState) -> None:
         eq = self.equations
         self._base = state
         self.counts["restarts"] += 1
         y0 = eq.vector(state)
         rtol = PART * float(np.min(self.rtol, initial=1.0))
         atol = np.full(y0.size, PART * float(np.min(self.atol, initial=1.0)))
-        failure: list[SolveError] = []
+        self._failure = None
 
         def residual(t: float, y: Array, yp: Array, out: Array) -> None:
             try:
                 out[:] = yp - eq.rates(state.t + t, state.q, np.asarray(y))
             except SolveError as error:
-                failure[:] = [error]
+                self._failure = error
                 out[:] = np.nan
 
-        self._solver = IDA(residual, rtol=max(rtol, 1e-14), atol=np.maximum(atol, 1e-15), max_num_steps=100000)
+        self._solver = self._make(residual, rtol=max(rtol, 1e-14), atol=np.maximum(atol, 1e-15), max_num_steps=100000)
         self._solver.init_step(0.0, y0, eq.rates(state.t, state.q, y0))

@@ -187,10 +187,10 @@ class Proportional:
 
 @final
 class Symmetric:
-    """The step is what its own error makes it, wherever it began: backwards the same steps come.
+    """The step is what its own error makes it, not what the steps before it were.
 
-    Each is tried again until its error is within a factor of what was aimed at, so that the step's length is, to that
-    factor, a function of the step alone; Stoffer, *Computing* 55 (1995), 1-22, calls such steps reversible.
+    Each is tried again until its error is within a factor of what was aimed at: to that factor the step's length is a
+    function of the step alone, and the same backward in time.
 
     Parameters
     ----------

@@ -27,7 +27,6 @@ class Outcome(StrEnum):
     MANY = "more steps than are allowed"
     UNDETERMINED = "the motion is not determined"
     EVENT = "an event's function has no value"
-    IRREVERSIBLE = "friction or heat, which do not run backwards"
     INTERRUPTED = "interrupted"
 
 
@@ -46,7 +45,6 @@ _ADVICE = {
     Outcome.MANY: "raise max_steps, or loosen rtol and atol",
     Outcome.UNDETERMINED: "add what determines it there: a storage, friction, or a constraint",
     Outcome.EVENT: "see the exception above this one, or give a function that is a number everywhere",
-    Outcome.IRREVERSIBLE: "run forward in time, or take friction and conduction out",
     Outcome.INTERRUPTED: "what was computed is in .partial",
 }
 _OF_KERNEL = {1: Outcome.TURN, 2: Outcome.TEMPERATURE, 3: Outcome.PYTHON, 4: Outcome.EXTENT, 5: Outcome.DOMAIN}

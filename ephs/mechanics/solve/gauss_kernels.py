@@ -37,7 +37,6 @@ class Scheme(NamedTuple):
 
     a: Array  # (stages, stages)
     b: Array
-    c: Array
 
 
 class Groups(NamedTuple):

@@ -22,7 +22,7 @@ from ephs.mechanics.solve.natural_kernels import (
 )
 from ephs.semantics.bundle import Array
 
-__all__ = ["Chunk", "Natural", "NaturalState", "guessed_efforts", "of_status"]
+__all__ = ["Chunk", "Natural", "NaturalState", "guessed_efforts", "of_status", "stored_energies"]
 
 SETTLING = 16
 """Steps after a change of order until the next: the values at the change itself may be exceptional."""
@@ -117,10 +117,7 @@ class Natural:
 
     def energies(self, x: Array) -> Array:
         """(components,): energy of each storage at the states x, zero elsewhere."""
-        status, component, memory = evaluate_at(self.model, x, self.init(x).z, 1.0)
-        if status:
-            raise SolveError.of_component(status, self.model, component)
-        return memory.energy
+        return stored_energies(self.model, x)
 
     def prepare(self, state: NaturalState, h: float) -> None:
         """Decide the order of elimination and compile what is not in the cache, before time counts."""
@@ -230,6 +227,14 @@ def guessed_efforts(model: Model, x: Array) -> Array:
         if slot.primitive.kind == "storage":
             z[[n_rate + i for i in slot.efforts]] = slot.primitive.effort(d.point(slot, x), model.reference)
     return z
+
+
+def stored_energies(model: Model, x: Array) -> Array:
+    """(components,): energy of each storage at the states x, zero elsewhere."""
+    status, component, memory = evaluate_at(model, x, guessed_efforts(model, x), 1.0)
+    if status:
+        raise SolveError.of_component(status, model, component)
+    return memory.energy
 
 
 def of_status(status: int) -> SolveError:

@@ -9,11 +9,12 @@ from typing import final
 import numpy as np
 
 from ephs.mechanics.solve.analysis import DEFECT, SHRUNK, dependent_rows
+from ephs.mechanics.solve.collocation import moments, values
 from ephs.mechanics.solve.errors import Outcome, SolveError
 from ephs.mechanics.solve.gauss_kernels import Groups, Scheme, Stages, gauss_advance, linearise
 from ephs.mechanics.solve.lu_kernels import factorise
 from ephs.mechanics.solve.model import Model, evaluate_at
-from ephs.mechanics.solve.natural import Chunk, NaturalState, guessed_efforts, of_status
+from ephs.mechanics.solve.natural import Chunk, NaturalState, guessed_efforts, of_status, stored_energies
 from ephs.mechanics.solve.natural_kernels import COMPONENT, DONE, Memory, Order
 from ephs.mechanics.solve.sparse import Index, order
 from ephs.semantics.bundle import Array
@@ -27,22 +28,8 @@ INSTANT = 1e-7
 
 _STAGES = 3
 _NODES = 0.5 * (1.0 + np.polynomial.legendre.leggauss(_STAGES)[0])
-
-
-def _weights(theta: float) -> Array:
-    """(stages,) weights of the stages' values for the integral from 0 to theta of the polynomial through them."""
-    powers = np.array([theta ** (k + 1) / (k + 1) for k in range(_STAGES)])
-    return np.asarray(np.linalg.solve(np.vander(_NODES, increasing=True).T, powers), dtype=float)
-
-
-def _values(theta: float) -> Array:
-    """(stages,) weights of the stages' values for that of the polynomial through them."""
-    powers = theta ** np.arange(_STAGES)
-    return np.asarray(np.linalg.solve(np.vander(_NODES, increasing=True).T, powers), dtype=float)
-
-
-SCHEME = Scheme(np.array([_weights(c) for c in _NODES]), _weights(1.0), _NODES)
-AHEAD = np.array([_values(1.0 + c) for c in _NODES])
+SCHEME = Scheme(np.array([moments(_NODES, c) for c in _NODES]), moments(_NODES, 1.0))
+AHEAD = np.array([values(_NODES, 1.0 + c) for c in _NODES])
 
 
 @final
@@ -90,10 +77,7 @@ class Natural4:
 
     def energies(self, x: Array) -> Array:
         """(components,): energy of each storage at the states x, zero elsewhere."""
-        status, component, memory = evaluate_at(self.model, x, guessed_efforts(self.model, x), 1.0)
-        if status:
-            raise SolveError.of_component(status, self.model, component)
-        return memory.energy
+        return stored_energies(self.model, x)
 
     def prepare(self, state: NaturalState, h: float) -> None:
         """Decide the order of elimination and compile what is not in the cache, before time counts."""
@@ -102,7 +86,8 @@ class Natural4:
     def points(self, state: NaturalState, h: float, x: Array) -> list[Array]:
         """The states at the nodes of a step from x, by the rates that ``state`` holds, continued."""
         d, rates = self.model.descriptor, int(self.model.tables.counts[0])
-        return [d.advance(x, h * ((_weights(1.0 + c) - _weights(1.0)) @ state.z[:, :rates])) for c in self.nodes]
+        ahead = [moments(_NODES, 1.0 + c) - SCHEME.b for c in self.nodes]
+        return [d.advance(x, h * (weights @ state.z[:, :rates])) for weights in ahead]
 
     def stage_points(self, state: NaturalState, h: float, x: Array) -> list[Array]:
         """The states at the nodes of the step that was solved last."""

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.linalg import get_lapack_funcs
 from scipy.sparse.linalg import splu
 
+from ephs.mechanics.solve.collocation import moments, values
 from ephs.mechanics.solve.continuous import Continuous, Matrices
 from ephs.mechanics.solve.control import Control
 from ephs.mechanics.solve.errors import Outcome, SolveError
@@ -33,13 +34,7 @@ DENSE = 48
 ITERATIONS = 10
 
 
-def _moments(nodes: Array, theta: float) -> Array:
-    """∫₀^θ of each Lagrange polynomial on the nodes, (3,)."""
-    powers = np.array([theta ** (k + 1) / (k + 1) for k in range(nodes.size)])
-    return np.asarray(np.linalg.solve(np.vander(nodes, increasing=True).T, powers), dtype=float)
-
-
-COEFFICIENTS = np.array([_moments(NODES, node) for node in NODES])
+COEFFICIENTS = np.array([moments(NODES, node) for node in NODES])
 _EIGENVALUES, _VECTORS = np.linalg.eig(COEFFICIENTS)
 _ORDER = [
     int(np.argmin(np.abs(np.imag(_EIGENVALUES)))),
@@ -157,10 +152,12 @@ class Radau:
         stages, powers = attempt.detail
         start, h = attempt.start, attempt.h
         theta = (t - start.t) / h
-        weights = h * _moments(NODES, theta)
-        basis = np.linalg.solve(np.vander(NODES, increasing=True).T, np.array([1.0, theta, theta**2]))
+        weights = h * moments(NODES, theta)
         return RadauState(
-            t, start.x + weights @ stages[:, : self._rates], basis @ stages, start.sums + weights @ powers
+            t,
+            start.x + weights @ stages[:, : self._rates],
+            values(NODES, theta) @ stages,
+            start.sums + weights @ powers,
         )
 
     def at(self, state: RadauState, t: float) -> RadauState:

@@ -12,8 +12,8 @@ import ephs
 from ephs.mechanics.methods import METHODS
 from ephs.mechanics.scene.model import Scene
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
-from ephs.show.charts.errors import ChartError
 from ephs.show.charts.runs import Array, Ending, Setting, attempt
+from ephs.show.errors import ShowError
 
 __all__ = ["Motion", "Reference", "resting_reference", "shipped_reference", "tight_reference"]
 
@@ -108,7 +108,7 @@ def tight_reference(scene: Scene, until: float, *, save_at: Array | None = None,
 
     Raises
     ------
-    ChartError
+    ShowError
         No method reaches the end.
     """
     said, slow, best = "", set[str](), None
@@ -132,7 +132,7 @@ def tight_reference(scene: Scene, until: float, *, save_at: Array | None = None,
             return found
         best = found if best is None or found.cross_check < best.cross_check else best
     if best is None:
-        raise ChartError("reference", path=scene.name, found=said, expected=f"t = {until:g} s")
+        raise ShowError("reference", path=scene.name, found=said, expected=f"t = {until:g} s")
     return best
 
 
@@ -153,7 +153,7 @@ def shipped_reference(file: Path, scene: Scene, until: float | None = None) -> t
 
     Raises
     ------
-    ChartError
+    ShowError
         It is no such file, it has no state at this time, or other bodies than the scene.
     """
     try:
@@ -162,15 +162,15 @@ def shipped_reference(file: Path, scene: Scene, until: float | None = None) -> t
         found = min(states) if until is None else until
         if found not in states:
             times = ", ".join(f"{time:g}" for time in sorted(states))
-            raise ChartError("reference-time", path=str(file), found=f"{found:g}", expected=times)
+            raise ShowError("reference-time", path=str(file), found=f"{found:g}", expected=times)
         bodies = [states[found]["bodies"][name] for name, _ in scene.all_bodies()]
         position = np.array([[body["position"] for body in bodies]], dtype=float)
         rotation = np.array([[quaternion_to_matrix(np.array(body["quaternion"], dtype=float)) for body in bodies]])
         check, how = float(states[found].get("cross_check", 0.0)), str(data.get("how", file.name))
     except (KeyError, TypeError, AttributeError, ValueError) as error:
-        if isinstance(error, ChartError):
+        if isinstance(error, ShowError):
             raise
-        raise ChartError("reference-file", path=str(file), found=f"{type(error).__name__}: {error}") from error
+        raise ShowError("reference-file", path=str(file), found=f"{type(error).__name__}: {error}") from error
     motion = Motion(np.array([found]), position, rotation, np.zeros(1), 0.0)
     return Reference(motion, check, how), found
 

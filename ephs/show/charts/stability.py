@@ -8,12 +8,12 @@ import numpy as np
 
 from ephs.mechanics.methods import METHODS, Method
 from ephs.mechanics.scene.model import Scene
-from ephs.show.charts.errors import ChartError
 from ephs.show.charts.families import Family
 from ephs.show.charts.outcomes import ACCURATE, Outcome, horizon, judge
 from ephs.show.charts.reference import Motion, Reference, resting_reference, tight_reference
 from ephs.show.charts.runs import Array, Ending, Run, Setting, attempt
 from ephs.show.charts.specimens import SPECIMENS
+from ephs.show.errors import ShowError
 
 __all__ = ["Cell", "stability"]
 
@@ -138,8 +138,8 @@ def _truth(family: Family, value: float, times: Array, limit: float) -> tuple[Re
         found = tight_reference(scene, float(times[-1]), save_at=times, limit=4.0 * limit)
         off, most = found.cross_check / found.motion.length, ACCURATE / 2.0
         if not off <= most:
-            raise ChartError("doubt", path=scene.name, found=f"{off:.1e}", expected=f"{most:.0e}")
-    except ChartError as error:
+            raise ShowError("doubt", path=scene.name, found=f"{off:.1e}", expected=f"{most:.0e}")
+    except ShowError as error:
         return None, str(error)
     return found, ""
 
