@@ -16,7 +16,6 @@ from ephs.mechanics import methods as registry
 from ephs.mechanics.methods import METHODS, Method, on_joints, register_method
 from ephs.mechanics.reduced.method import ReducedMethod
 from ephs.mechanics.solve.loop import Attempt
-from ephs.testing import mechanisms
 
 ROOT = Path(__file__).parents[2]
 BY_NAME = {case.name: case for case in CASES}
@@ -203,15 +202,6 @@ def test_initial_states_off_the_joints_are_refused(method):
 
 
 # ---- promises -------------------------------------------------------------------------------------------------------
-
-
-@given(mechanisms(max_bodies=3))
-@settings(max_examples=10, deadline=None)
-def test_natural4_balances_on_generated_mechanisms(scene):
-    sol = ephs.simulate(scene, 0.1, method="natural4", step=0.01)
-    assert sol.energy_error.max() <= 1e-12
-    assert sol.constraint_error.max() <= 1e-12
-    assert sol.stats["least_production"] >= 0.0
 
 
 def test_natural4_is_of_order_four_with_friction_heat_and_loops():
