@@ -1,0 +1,97 @@
+"""The smallest connected subgroup of SE(3) that carries the motions which given twists generate.
+
+Bodies that are moved by joints with world twists ξ₁ … ξₖ (at one configuration) are displaced by products of exp(ξᵢ sᵢ):
+they never leave the subgroup whose algebra is the closure of the ξᵢ under sums and brackets.
+"""
+
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from ephs.semantics.bundle import Array
+from ephs.semantics.spaces import SE3
+
+__all__ = ["Subgroup", "generated"]
+
+SAME = 1e-8
+"""Twists of size one that differ by less are the same: what scene files are held to."""
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Subgroup:
+    """A connected subgroup of SE(3).
+
+    Parameters
+    ----------
+    basis
+        (6, n): an orthonormal basis of its algebra, angular part first, in the frame of the twists that generate it.
+    """
+
+    basis: Array
+
+    @property
+    def dim(self) -> int:
+        """Its dimension."""
+        return self.basis.shape[1]
+
+    @property
+    def translations(self) -> Array:
+        """(3, k): an orthonormal basis of the translations in it."""
+        turning = self.basis[:3]
+        _, sizes, right = np.linalg.svd(turning, full_matrices=True)
+        rank = int(np.sum(sizes > SAME))
+        return self.basis[3:] @ right[rank:].T
+
+    @property
+    def turning(self) -> Array:
+        """(3, k): an orthonormal basis of the axes that it turns about."""
+        left, sizes, _ = np.linalg.svd(self.basis[:3], full_matrices=False)
+        return left[:, sizes > SAME]
+
+    def pitch(self) -> float:
+        """Advance in m/rad along its one axis of rotation, the translations that it has taken out."""
+        axis = self.turning[:, 0]
+        twist = self.basis @ np.linalg.lstsq(self.basis[:3], axis, rcond=None)[0]
+        free = self.translations
+        return float(axis @ (twist[3:] - free @ (free.T @ twist[3:])))
+
+    def contains(self, twist: Array) -> bool:
+        """Whether a twist (6,) of size about one lies in its algebra."""
+        return float(np.abs(twist - self.basis @ (self.basis.T @ twist)).max()) < SAME * max(
+            1.0, float(np.abs(twist).max())
+        )
+
+    @property
+    def name(self) -> str:
+        """The usual name of its conjugacy class."""
+        turns, shifts = self.turning.shape[1], self.translations.shape[1]
+        if turns == 0:
+            return ("1", "ℝ", "ℝ²", "ℝ³")[shifts]
+        if turns == 1 and shifts <= 2 and abs(self.pitch()) > SAME:
+            return ("H", "H×ℝ", "H⋉ℝ²")[shifts]
+        if turns == 1:
+            return ("SO(2)", "SO(2)×ℝ", "SE(2)", "SE(2)×ℝ")[shifts]
+        return "SO(3)" if shifts == 0 else "SE(3)"
+
+
+def generated(twists: Array) -> Subgroup:
+    """The smallest subgroup whose algebra has these twists (n, 6), angular part first, in one frame."""
+    basis = np.zeros((6, 0))
+    queue = [np.asarray(twist, dtype=float) for twist in twists]
+    while queue and basis.shape[1] < 6:
+        twist = queue.pop(0)
+        size = float(np.linalg.norm(twist))
+        if size <= SAME:
+            continue
+        rest = twist / size
+        for _ in range(2):
+            rest = rest - basis @ (basis.T @ rest)
+        left = float(np.linalg.norm(rest))
+        if left <= SAME:
+            continue
+        new = rest / left
+        queue += [SE3.ad(basis[:, i]) @ new for i in range(basis.shape[1])]
+        basis = np.column_stack([basis, new])
+    return Subgroup(basis)
