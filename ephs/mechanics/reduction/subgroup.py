@@ -1,7 +1,7 @@
 """The smallest connected subgroup of SE(3) that carries the motions which given twists generate.
 
-Bodies that are moved by joints with world twists ξ₁ … ξₖ (at one configuration) are displaced by products of exp(ξᵢ sᵢ):
-they never leave the subgroup whose algebra is the closure of the ξᵢ under sums and brackets.
+Bodies that are moved by joints with world twists ξ₁ … ξₖ (at one configuration) are displaced by products of
+exp(ξᵢ sᵢ): they never leave the subgroup whose algebra is the closure of the ξᵢ under sums and brackets.
 """
 
 from dataclasses import dataclass
