@@ -1,6 +1,7 @@
 """The rigid body as a system of four boxes (Lohmayer, Capobianco, Leyendecker, section 4)."""
 
 from collections.abc import Callable
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +20,7 @@ __all__ = ["body_pattern", "rigid_body"]
 GRAVITY = (0.0, 0.0, -9.81)
 
 
+@cache
 def body_pattern(group: str = "SE3", *, massless: bool = False) -> Pattern:
     """Potential energy at the pose q, kinetic energy and gyroscopic forces at the momentum p, coupled; p is exposed.
 

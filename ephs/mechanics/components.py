@@ -6,6 +6,7 @@ are left-trivialised; 6-vectors are (angular, linear). Equations of Lohmayer, Ca
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -56,7 +57,7 @@ def kinetic(mass: float, inertia: Array, group: str = "SE3") -> Storage:
     inverse = np.linalg.inv(whole)
     inverse = 0.5 * (inverse + inverse.T)
     entries = (("mass", float(mass)), ("inertia", tuple(np.asarray(inertia, dtype=float).ravel().tolist())))
-    made = structures.quadratic("kinetic", power_ports(p=MOMENTA[group]), inverse, entries)
+    made = structures.quadratic("kinetic", power_ports(p=MOMENTA[group]), inverse, entries, trusted=True)
     return replace(made, notation=notation.kinetic)
 
 
@@ -90,6 +91,7 @@ def gravity(weight: Array, group: str = "SE3") -> Storage:
         discrete_gradient=discrete_gradient,
         parameters=(("weight", tuple(w.tolist())),),
         kernel=Kernel(KERNELS, "gravity" if turning else "direct_gravity", tuple(w.tolist())),
+        trusted=True,
     )
 
 
@@ -105,6 +107,7 @@ def potential(of: Quantity, port: str, energy: Callable[[Array], float], name: s
     )
 
 
+@cache
 def no_potential(of: Quantity, port: str) -> Storage:
     """No energy, yet the state is kept; port as named."""
     n = of.space.dim
@@ -116,6 +119,7 @@ def no_potential(of: Quantity, port: str) -> Storage:
         discrete_gradient=lambda _x, _v: np.zeros(n),
         kernel=Kernel(structures.KERNELS, "no_effort"),
         notation=notation.nothing,
+        trusted=True,
     )
 
 
@@ -163,6 +167,7 @@ def pair_spring(of: Pair, stiffness: Array, rest: Array) -> Storage:
         discrete_gradient,
         (("stiffness", tuple(k.tolist())), ("rest", tuple(zero.tolist()))),
         kernel=Kernel(SPRINGS, "coordinate_spring", (float(of.code), *k.tolist(), *zero.tolist())),
+        trusted=bool(np.all(np.isfinite(k)) and np.all(np.isfinite(zero))),
     )
 
 
@@ -196,11 +201,13 @@ def _rotation_mean(start: Array, v: Array) -> Array:
     return omega + (0.5 * (first + last) * rise - float(omega @ v)) / square * v
 
 
+@cache
 def kinematic_coupling(q: Quantity, p: Quantity, q_port: str, p_port: str) -> Reversible:
     """q.f = −p.e, p.f = q.e, trivialised; ports as named."""
-    return structures.coupling("pkc", power_ports(**{q_port: q, p_port: p}))
+    return structures.coupling("pkc", power_ports(**{q_port: q, p_port: p}), trusted=True)
 
 
+@cache
 def lie_poisson(group: str = "SE3") -> Reversible:
     """Gyroscopic forces p.f = −ad*_{p.e} p.x; port p, whose state it reads."""
     p = Path.of("p")
@@ -213,7 +220,9 @@ def lie_poisson(group: str = "SE3") -> Reversible:
     name = "lie_poisson" if group == "SE3" else "direct_lie_poisson"
     kernel = Kernel(KERNELS, name)
     ports = power_ports(p=MOMENTA[group])
-    return Reversible("lie_poisson", ports, structure, reads=(p,), kernel=kernel, notation=notation.lie_poisson)
+    return Reversible(
+        "lie_poisson", ports, structure, reads=(p,), kernel=kernel, notation=notation.lie_poisson, trusted=True
+    )
 
 
 def frame_change(offset: Array, inner: str, outer: str) -> Reversible:
@@ -225,10 +234,13 @@ def frame_change(offset: Array, inner: str, outer: str) -> Reversible:
     interface = power_ports(**{outer: quantity.body_momentum, inner: quantity.body_momentum})
     parameters = (("offset", tuple(np.asarray(offset, dtype=float).tolist())),)
     constraint = np.hstack([-carried, np.eye(6)])
-    made = structures.constant_structure("frame_change", interface, np.zeros((12, 12)), constraint, parameters)
+    made = structures.constant_structure(
+        "frame_change", interface, np.zeros((12, 12)), constraint, parameters, trusted=True
+    )
     return replace(made, notation=notation.frame_change)
 
 
+@cache
 def holonomic(of: Pair) -> Reversible:
     """The joint's relation: f = C*λ, 0 = C e, C = [Ad_{I(q_r)⁻¹}, −1, B]; ports p_j1, p_j2, p_r, state port q_r.
 
@@ -270,7 +282,16 @@ def holonomic(of: Pair) -> Reversible:
     kernel = Kernel(HOLONOMIC, "holonomic", (float(of.code), *of.basis.reshape(6, d).ravel().tolist()))
     parameters = (("pair", of.name), *of.parameters)
     return Reversible(
-        "holonomic", interface, structure, (q_r,), discrete, parameters, 6, kernel, notation=notation.holonomic
+        "holonomic",
+        interface,
+        structure,
+        (q_r,),
+        discrete,
+        parameters,
+        6,
+        kernel,
+        notation=notation.holonomic,
+        trusted=True,
     )
 
 
@@ -288,7 +309,8 @@ def joint_friction(
     if not callable(mu):
         matrix = np.array(mu, dtype=float).reshape(of.dim, of.dim)
         entries = (("mu", tuple(matrix.ravel().tolist())),)
-        made = structures.dissipation(name, Directory(ports), matrix, parameters=entries)
+        sound = bool(np.all(np.isfinite(matrix))) and _dissipates(matrix)
+        made = structures.dissipation(name, Directory(ports), matrix, parameters=entries, trusted=sound)
         return replace(made, notation=notation.friction)
     q_r = Path.of("q_r")
     resistance = mu
@@ -303,6 +325,11 @@ def joint_friction(
         parameters=(("mu", getattr(mu, "__name__", "function")),),
     )
     return replace(made, notation=notation.friction)
+
+
+def _dissipates(mu: Array) -> bool:
+    """Whether μ is exactly symmetric and certainly non-negative."""
+    return not mu.any() or (np.array_equal(mu, mu.T) and float(np.linalg.eigvalsh(mu)[0]) >= 0.0)
 
 
 def point_spring(stiffness: float, length: float) -> Storage:

@@ -1,6 +1,7 @@
 """Joints as systems of seven boxes, and what is built of them: springs between points, universal joints."""
 
 from collections.abc import Callable, Mapping
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,6 +23,7 @@ __all__ = ["joint", "joint_pattern", "mbs_pattern", "spring_damper", "universal_
 Friction = Callable[[Array, Array, float], Array]
 
 
+@cache
 def joint_pattern(of: Pair, *, reading: bool = False, heat: bool = False, driven: bool = False) -> Pattern:
     """The joint of a pair: offsets o1, o2, the holonomic relation hc, energy pe with its coupling pkc, friction mf.
 

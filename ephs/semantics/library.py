@@ -7,6 +7,7 @@ conventions; Lohmayer, Capobianco, Leyendecker for ``spring``, ``point_mass``, `
 
 import math
 from collections.abc import Callable, Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -152,6 +153,7 @@ def ideal_gas(*, c1: float, c2: float, v0: float, c: float) -> Storage:
     )
 
 
+@cache
 def environment() -> Storage:
     """The reference environment; port s: e = 0, and its entropy integrates the flow."""
     return Storage(

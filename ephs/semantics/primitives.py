@@ -7,6 +7,7 @@ checks, the discrete relation and the compiled kernel all derive from that one o
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any, Literal, final
 
 import numpy as np
@@ -35,12 +36,15 @@ class Kernel:
     ----------
     source
         Of the program that a traced primitive runs inside it; its address comes before the parameters.
+    inner
+        A kernel that this one calls: its address comes before the parameters, its own numbers after them.
     """
 
     module: str
     name: str
     parameters: tuple[float, ...] = ()
     source: str = ""
+    inner: "Kernel | None" = None
 
 
 @final
@@ -88,6 +92,8 @@ class Storage:
     notation
         How equations between vectors are written: a function of a `symbols.voices.Voice` that gives efforts by port,
         or (flows by port, conditions).
+    trusted
+        Skip the checks: what makes it accepts only parameters for which they hold. Tests run them all the same.
     """
 
     name: str
@@ -100,8 +106,11 @@ class Storage:
     kernel: Kernel | None = field(default=None, compare=False, repr=False)
     formula: Formula | None = field(default=None, compare=False, repr=False)
     notation: Callable[[Any], Any] | None = field(default=None, compare=False, repr=False)
+    trusted: bool = field(default=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
+        if self.trusted:
+            return
         for port, port_type in self.interface.items():
             if not port_type.power:
                 raise StructureError("storage-ports", self.name, found=str(port))
@@ -221,6 +230,8 @@ class Reversible:
     discrete
         (C_h (k, n), F (k,)) from (h, x⁰, increments of the read states, e): the discrete constraint, with
         C_h e = F, used in place of C at the midpoint.
+    trusted
+        Skip the checks, as of a `Storage`.
     """
 
     name: str
@@ -233,8 +244,11 @@ class Reversible:
     kernel: Kernel | None = field(default=None, compare=False, repr=False)
     formula: Formula | None = field(default=None, compare=False, repr=False)
     notation: Callable[[Any], Any] | None = field(default=None, compare=False, repr=False)
+    trusted: bool = field(default=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
+        if self.trusted:
+            return
         from ephs.semantics.checks import check_reversible
 
         check_reversible(self)
@@ -265,6 +279,8 @@ class Irreversible:
     ----------
     matrix
         M (n, n) in the units of θ₀·f/e, from (states of ``reads``, e (n,), reference).
+    trusted
+        Skip the checks, as of a `Storage`.
     """
 
     name: str
@@ -275,8 +291,11 @@ class Irreversible:
     kernel: Kernel | None = field(default=None, compare=False, repr=False)
     formula: Formula | None = field(default=None, compare=False, repr=False)
     notation: Callable[[Any], Any] | None = field(default=None, compare=False, repr=False)
+    trusted: bool = field(default=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
+        if self.trusted:
+            return
         from ephs.semantics.checks import check_irreversible
 
         check_irreversible(self)
@@ -312,6 +331,7 @@ class Irreversible:
 Primitive = Storage | Reversible | Irreversible
 
 
+@cache
 def power_ports(**ports: Quantity) -> Interface:
     """An interface of power ports only."""
     return Directory({name: PortType(quantity, True) for name, quantity in ports.items()})

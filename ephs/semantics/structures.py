@@ -31,6 +31,8 @@ def quadratic(
     matrix: Array,
     parameters: tuple[tuple[str, object], ...],
     formula: Formula | None = None,
+    *,
+    trusted: bool = False,
 ) -> Storage:
     """E = ½ xᵀ Q x on vector spaces; Q (n, n) symmetric. Its discrete gradient Q (x⁰ + v/2) is exact."""
 
@@ -48,6 +50,7 @@ def quadratic(
         parameters=parameters,
         kernel=Kernel(KERNELS, "quadratic", tuple(q.ravel())),
         formula=formula,
+        trusted=trusted,
     )
 
 
@@ -84,6 +87,8 @@ def constant_structure(
     constraint: Array,
     parameters: tuple[tuple[str, object], ...] = (),
     formula: Formula | None = None,
+    *,
+    trusted: bool = False,
 ) -> Reversible:
     """A Dirac structure that does not depend on states: L (n, n), C (k, n)."""
     n, k = skew.shape[0], constraint.shape[0]
@@ -95,14 +100,16 @@ def constant_structure(
         multipliers=k,
         kernel=Kernel(KERNELS, "constant_structure", (*skew.ravel(), *constraint.reshape(k, n).ravel())),
         formula=formula or Formula(lambda: (skew, constraint)),
+        trusted=trusted,
     )
 
 
-def coupling(name: str, interface: Interface) -> Reversible:
+def coupling(name: str, interface: Interface, *, trusted: bool = False) -> Reversible:
     """q.f = −p.e, p.f = q.e, on ports q and p of equal dimension: L = [[0, −1], [1, 0]]."""
     n = next(iter(interface.values())).quantity.space.dim
     eye, zero = np.eye(n), np.zeros((n, n))
-    return constant_structure(name, interface, np.block([[zero, -eye], [eye, zero]]), np.zeros((0, 2 * n)))
+    skew = np.block([[zero, -eye], [eye, zero]])
+    return constant_structure(name, interface, skew, np.zeros((0, 2 * n)), trusted=trusted)
 
 
 def dissipation(
@@ -114,6 +121,7 @@ def dissipation(
     kernel: Kernel | None = None,
     parameters: tuple[tuple[str, object], ...] = (),
     formula: Formula | None = None,
+    trusted: bool = False,
 ) -> Irreversible:
     """Dissipation of a port's power into heat: p.f = μ u, s.f = −⟨u|μ u⟩/θ, with u = p.e and θ = θ₀ + s.e.
 
@@ -140,4 +148,4 @@ def dissipation(
 
     if not callable(resistance):
         kernel = Kernel(KERNELS, "dissipation", tuple(np.asarray(resistance, dtype=float).ravel()))
-    return Irreversible(name, interface, matrix, reads, parameters, kernel, formula)
+    return Irreversible(name, interface, matrix, reads, parameters, kernel, formula, trusted=trusted)

@@ -2,6 +2,7 @@
 
 import ctypes
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from ephs.semantics.checks import dirac, random_efforts, random_point
 from ephs.semantics.kernel_table import EXTENT, OK, TEMPERATURE, TURN, address_of, prototype
 from ephs.semantics.laws import isotropy
 from ephs.semantics.spaces import PAIRS, SE3, pair
+from ephs.testing import mechanisms
 
 REFERENCE = Reference()
 PLANE = Quantity("plane", Space("real", 2, 2), 1)
@@ -330,3 +332,17 @@ def test_a_spring_without_length_has_no_direction():
 def test_springs_on_rotation_vectors_are_isotropic_about_zero(stiffness, rest, key):
     with pytest.raises(StructureError, match=key):
         components.pair_spring(pair("spherical"), np.array(stiffness), np.array(rest))
+
+
+@settings(deadline=None, max_examples=30)
+@given(mechanisms())
+def test_what_is_trusted_passes_the_checks(scene):
+    for path, primitive in scene.system().leaves():
+        checked = replace(primitive, trusted=False)  # raises where a check fails
+        assert checked.trusted is False, path
+
+
+@pytest.mark.parametrize("mu", [[[1.0, 0.5], [0.0, 1.0]], [[1.0, 2.0], [2.0, 1.0]], [[-1.0, 0.0], [0.0, 1.0]]])
+def test_friction_that_makes_energy_is_not_trusted(mu):
+    with pytest.raises(StructureError):
+        components.joint_friction(pair("cylindrical"), np.array(mu))

@@ -25,6 +25,9 @@ from ephs.semantics.spaces import manifold
 
 __all__ = ["Model", "compile_model"]
 
+LINEAR = frozenset({("ephs.semantics.kernels", "constant_structure"), ("ephs.semantics.kernels", "quadratic")})
+"""Kernels whose Jacobian's entries are their parameters: what vanishes depends on which parameters do."""
+
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,7 +82,7 @@ class Model:
             f=np.zeros(n * n + n + 1),
             c=np.zeros(k + 2),
             jac=np.zeros((n + k) * (n + k + nv) + 1),
-            work=np.zeros(2048),
+            work=np.zeros(4096),
             data=np.zeros(size),
             factors=np.zeros(fill),
             residual=np.zeros(rows),
@@ -176,9 +179,7 @@ def compile_model(descriptor: Descriptor, reference: Reference, inputs: Mapping[
         [manifold(s.quantity.space).code, s.at, s.quantity.space.size, s.rate, s.quantity.space.dim] for s in d.states
     ]
     block, group = _blocks(d, given, size)
-    entries = _Entries()
-    _constant_entries(d, entries, outer, n_rate)
-    constants = len(entries.place)
+    constant_at, values = _constant_entries(d, outer, n_rate, size)
     table = Tables(
         counts=np.array([n_rate, n_effort, n_lam, size], dtype=np.int64),
         kind=np.array(kinds, dtype=np.int64),
@@ -206,49 +207,35 @@ def compile_model(descriptor: Descriptor, reference: Reference, inputs: Mapping[
         outer=np.array(outer, dtype=np.int64).reshape(-1, 4),
         input_at=np.array(input_at, dtype=np.int64),
     )
-    places: list[list[int]] = []
-    for number, slot in enumerate(d.components):
-        pattern = _local_pattern(slot, reference, callbacks.get(number))
-        places.append(_places(slot, pattern, entries, n_rate, n_effort))
-    j_flat, j_at = _flatten(places)
-    for i in range(size):
-        entries.append(i, i)
-    template = np.zeros(len(entries.place_list))
-    template[:constants] = entries.values
+    local = [
+        _places(slot, _local_pattern(slot, reference, callbacks.get(number)), n_rate, n_effort, size)
+        for number, slot in enumerate(d.components)
+    ]
+    j_at = np.cumsum([0, *map(len, local)])[:-1].astype(np.int64)
+    flat = np.concatenate([*local, np.full(1, -1)])
+    place, found = _numbered(np.concatenate([constant_at, flat]))
+    template = np.zeros(place.size + size)
+    np.add.at(template, found[: values.size], values)
+    diagonal = np.arange(size, dtype=np.int64)  # entries of their own, which hold what the loop adds
     table = table._replace(
-        jacobian=j_flat,
+        jacobian=np.append(found[values.size : -1], 0),
         jacobian_at=j_at,
-        row=np.array([r for r, _ in entries.place_list], dtype=np.int64),
-        column=np.array([c for _, c in entries.place_list], dtype=np.int64),
+        row=np.concatenate([place // size, diagonal]),
+        column=np.concatenate([place % size, diagonal]),
         template=template,
     )
     first = n_rate + n_effort
     return Model(d, reference, given, table, callbacks, np.arange(first, size, dtype=np.int64))
 
 
-class _Entries:
-    """Collects the matrix' entries, each place once; the last ones are the diagonal's place holders."""
-
-    def __init__(self) -> None:
-        self.place: dict[tuple[int, int], int] = {}
-        self.place_list: list[tuple[int, int]] = []
-        self.values: list[float] = []
-
-    def at(self, row: int, column: int) -> int:
-        key = (row, column)
-        if key not in self.place:
-            self.place[key] = len(self.place_list)
-            self.place_list.append(key)
-        return self.place[key]
-
-    def constant(self, row: int, column: int, value: float) -> None:
-        index = self.at(row, column)
-        if index == len(self.values):
-            self.values.append(0.0)
-        self.values[index] += value
-
-    def append(self, row: int, column: int) -> None:
-        self.place_list.append((row, column))
+def _numbered(keys: Index) -> tuple[Index, Index]:
+    """The keys ≥ 0, each once, in the order of their first appearance; and each key's number there, or −1."""
+    unique, first, inverse = np.unique(keys, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    order = order[unique[order] >= 0]
+    number = np.full(unique.size, -1, dtype=np.int64)
+    number[order] = np.arange(order.size)
+    return unique[order].astype(np.int64), number[inverse.ravel()]
 
 
 def _flatten(rows: list[list[Any]], kind: type = int) -> tuple[Any, Index]:
@@ -257,22 +244,33 @@ def _flatten(rows: list[list[Any]], kind: type = int) -> tuple[Any, Index]:
     return flat, at
 
 
-def _constant_entries(d: Descriptor, entries: _Entries, outer: list[list[int]], n_rate: int) -> None:
+def _constant_entries(d: Descriptor, outer: list[list[int]], n_rate: int, size: int) -> tuple[Index, Array]:
+    """Places, row · size + column, and values of the entries that never change."""
+    rows: list[int] = []
+    columns: list[int] = []
+    values: list[float] = []
+
+    def add(row: int, column: int, value: float) -> None:
+        rows.append(row)
+        columns.append(column)
+        values.append(value)
+
     for slot in d.components:
         if isinstance(slot.primitive, Storage):
             rates = [i for s in slot.reads for i in range(s.rates.start, s.rates.stop)]
             for rate, effort in zip(rates, slot.efforts, strict=True):
-                entries.constant(rate, n_rate + effort, 1.0)
-                entries.constant(n_rate + effort, rate, 1.0)
+                add(rate, n_rate + effort, 1.0)
+                add(n_rate + effort, rate, 1.0)
     for at, dim, prescribed, unknown in outer:
         if prescribed:
             for j in range(dim):
-                entries.constant(unknown + j, n_rate + at + j, 1.0)
-                entries.constant(n_rate + at + j, unknown + j, -1.0)
+                add(unknown + j, n_rate + at + j, 1.0)
+                add(n_rate + at + j, unknown + j, -1.0)
+    return np.array(rows, dtype=np.int64) * size + np.array(columns, dtype=np.int64), np.array(values)
 
 
-def _places(slot: ComponentSlot, pattern: Array, entries: _Entries, n_rate: int, n_effort: int) -> list[int]:
-    """Where each local Jacobian entry goes in the matrix; −1 where it is structurally zero."""
+def _places(slot: ComponentSlot, pattern: Array, n_rate: int, n_effort: int, size: int) -> Index:
+    """Where each local Jacobian entry goes in the matrix, row · size + column; −1 where it is structurally zero."""
     rates = [i for s in slot.reads for i in range(s.rates.start, s.rates.stop)]
     efforts = [n_rate + i for i in slot.efforts]
     if isinstance(slot.primitive, Storage):
@@ -280,11 +278,8 @@ def _places(slot: ComponentSlot, pattern: Array, entries: _Entries, n_rate: int,
     else:
         lam = [n_rate + n_effort + slot.multiplier + i for i in range(slot.multipliers)]
         rows, columns = [*efforts, *lam], [*efforts, *lam, *rates]
-    return [
-        entries.at(row, column) if pattern[i, j] else -1
-        for i, row in enumerate(rows)
-        for j, column in enumerate(columns)
-    ]
+    at = np.array(rows, dtype=np.int64)[:, None] * size + np.array(columns, dtype=np.int64)[None, :]
+    return np.where(pattern, at, -1).ravel()
 
 
 def _local_pattern(slot: ComponentSlot, reference: Reference, callback: Callback | None) -> Array:
@@ -298,7 +293,12 @@ def _local_pattern(slot: ComponentSlot, reference: Reference, callback: Callback
     shape = (n, n) if isinstance(slot.primitive, Storage) else (n + k, n + k + nv)
     if callback is not None or not shape[0]:
         return np.ones(shape, dtype=bool)
-    key = (slot.primitive.kernel, tuple(s.quantity for s in slot.reads), n, k)
+    kernel = slot.primitive.kernel
+    numbers = kernel.parameters if kernel is not None else ()
+    if kernel is not None and (kernel.module, kernel.name) in LINEAR:
+        numbers = tuple(number != 0.0 for number in numbers)
+    names = None if kernel is None else (kernel.module, kernel.name, kernel.source)
+    key = (names, numbers, tuple(s.quantity for s in slot.reads), n, k)
     if key not in _patterns:
         _patterns[key] = _sample_pattern(slot, reference, shape)
     return _patterns[key]
@@ -334,7 +334,7 @@ def _sample_pattern(slot: ComponentSlot, reference: Reference, shape: tuple[int,
             np.zeros(n * n + n + 1),
             np.zeros(k + 2),
             np.zeros((n + k) * (n + k + nv) + 1),
-            np.zeros(2048),
+            np.zeros(4096),
         ]
         pointers = [a.ctypes.data_as(ctypes.POINTER(ctypes.c_double)) for a in arrays]
         call(dims.ctypes.data_as(ctypes.POINTER(ctypes.c_int64)), *pointers)
