@@ -6,6 +6,7 @@ coordinate; a body without a velocity likewise, at its rate. What then remains o
 unless the scene is adjusted.
 """
 
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from typing import TypeAlias
 
@@ -42,24 +43,28 @@ def assemble(
         d.name: Body(d.name, d.mass, frozen(d.inertia), frozen(poses[i]), frozen(twists[i]), d.shape)
         for i, d in enumerate(drafts)
     }
-    placed = {d.name: _joint(d, link, x, twists) for d, link, x in zip(joints, links, xs, strict=True)}
-    return bodies, placed, measure(links, xs, poses, twists, names)
+    slips = [link.slip(twists, x) for link, x in zip(links, xs, strict=True)]
+    placed = {d.name: _joint(d, link, x, s[0]) for d, link, x, s in zip(joints, links, xs, slips, strict=True)}
+    return bodies, placed, measure(links, xs, poses, slips, names)
 
 
 def measure(
-    links: Sequence[Link], xs: Sequence[Array], poses: Array, twists: Array, names: Sequence[str]
+    links: Sequence[Link],
+    xs: Sequence[Array],
+    poses: Array,
+    slips: Sequence[tuple[Array, Array]],
+    names: Sequence[str],
 ) -> list[Fault]:
     """A fault for each joint that has a gap, a velocity that it does not allow, or another rate than it was
-    given."""
+    given; ``slips`` are the links' own."""
     faults: list[Fault] = []
-    for link, x in zip(links, xs, strict=True):
+    for link, x, (rate, residual) in zip(links, xs, slips, strict=True):
         who = " and ".join(names[b] for b in (link.body1, link.body2) if b >= 0)
         key = f"joints.{link.name}"
         distance, angle = link.gap(poses, x)
         if max(distance, angle) > TOLERANCE:
             faults.append(fault("gap", key, f"a gap of {distance:.3g} m and {angle:.3g} rad", who=who))
             continue
-        rate, residual = link.slip(twists, x)
         spin, speed = float(np.linalg.norm(residual[:3])), float(np.linalg.norm(residual[3:]))
         if max(spin, speed) > TOLERANCE:
             text = f"velocities that open it by {speed:.3g} m/s and {spin:.3g} rad/s"
@@ -78,9 +83,10 @@ def _place(
 ) -> Array:
     poses = np.array([IDENTITY_POSE if d.pose is None else d.pose for d in drafts] + list(rest)).reshape(-1, 7)
     links = {j.name: _link(j, index, poses) for j in joints if j.place.in_bodies}
+    by_name = {j.name: j for j in joints}
 
     def follow(body: int, name: str) -> None:
-        link, draft = links[name], next(j for j in joints if j.name == name)
+        link, draft = links[name], by_name[name]
         x = link.coupling.identity() if draft.coordinates is None else link.coupling.element(draft.coordinates)
         poses[body] = link.place_second(poses, x) if link.body2 == body else link.place_first(poses, x)
 
@@ -127,15 +133,27 @@ def _settle(open_bodies: list[int], links: Sequence[Link], follow: Callable[[int
     Where all wait for each other, a body follows any of its links whose other end is settled, or stays
     where it is.
     """
-    of = {b: [link for link in links if b in (link.body1, link.body2)] for b in open_bodies}
-    waiting = [b for b in open_bodies if of[b]]
+    of: dict[int, list[Link]] = {b: [] for b in open_bodies}
+    for link in links:
+        for b in dict.fromkeys((link.body1, link.body2)):
+            if b in of:
+                of[b].append(link)
+    waiting = {b: None for b in open_bodies if of[b]}  # in order
+    followers: dict[int, list[int]] = {}
+    for b in waiting:
+        followers.setdefault(_other(of[b][0], b), []).append(b)
+    ready = deque(b for b in waiting if _other(of[b][0], b) not in waiting)
     while waiting:
-        ready = [(b, link) for b in waiting for link in of[b][:1] if _other(link, b) not in waiting]
-        ready = ready or [(b, link) for b in waiting for link in of[b] if _other(link, b) not in waiting][:1]
-        for body, link in ready:
+        if ready:
+            body = ready.popleft()
+            link = of[body][0]
+        else:
+            ways = ((b, link) for b in waiting for link in of[b] if _other(link, b) not in waiting)
+            body, link = next(ways, (next(iter(waiting)), None))
+        if link is not None:
             follow(body, link.name)
-        settled = {b for b, _ in ready} or {waiting[0]}
-        waiting = [b for b in waiting if b not in settled]
+        del waiting[body]
+        ready.extend(b for b in followers.get(body, []) if b in waiting)
 
 
 def _other(link: Link, body: int) -> int:
@@ -154,8 +172,7 @@ def _link(draft: JointDraft, index: Mapping[str, int], poses: Array) -> Link:
     return Link(draft.name, body1, body2, frame1, frame2, coupling, coordinates, draft.rate, draft.motion)
 
 
-def _joint(draft: JointDraft, link: Link, x: Array, twists: Array) -> Joint:
-    rate, _ = link.slip(twists, x)
+def _joint(draft: JointDraft, link: Link, x: Array, rate: Array) -> Joint:
     return Joint(
         name=draft.name,
         kind=draft.kind,

@@ -5,12 +5,13 @@ Poses are 7-vectors ``[w, x, y, z, rx, ry, rz]``; every twist is left-trivialise
 """
 
 from dataclasses import dataclass
+from functools import cache
 from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ephs.mechanics.scene.model import IDENTITY_POSE, Joint
+from ephs.mechanics.scene.model import IDENTITY_POSE, Joint, frozen
 from ephs.semantics.spaces import PAIRS, SE3, Pair, pair
 from ephs.semantics.spaces import rotations as so3
 from ephs.semantics.spaces.codes import SE3 as SE3_CODE
@@ -67,6 +68,10 @@ class Coupling:
         after = SE3.compose(self.middle, self.pair.include(x[1:]))
         return np.column_stack((SE3.adjoint(SE3.inverse(after)) @ self.pair.basis[:, 0], self.pair.basis[:, 0]))
 
+    def left_inverse(self, basis: Array) -> Array:
+        """(d, 6) of least norm with B⁺ B = 1, of a basis (6, d) that `basis` gave."""
+        return _left_inverse(self.pair) if self.middle is None else np.asarray(np.linalg.pinv(basis), dtype=float)
+
     def coordinates(self, x: Array) -> Array:
         """The coordinates (d,) of an element."""
         return self.pair.coordinates(x) if self.middle is None else np.array(x)
@@ -80,9 +85,8 @@ class Coupling:
         if self.middle is not None:
             return self._fit_universal(relative, near)
         x = self._start(relative) if near is None else np.array(near)
-        left_inverse = np.linalg.pinv(self.pair.basis)
         for _ in range(30):
-            step = left_inverse @ SE3.log(SE3.compose(SE3.inverse(self.pair.include(x)), relative))
+            step = _left_inverse(self.pair) @ SE3.log(SE3.compose(SE3.inverse(self.pair.include(x)), relative))
             x = self.pair.manifold.retract(x, step)
             if np.linalg.norm(step) < 1e-13:
                 break
@@ -102,6 +106,11 @@ class Coupling:
         found = np.array([first, np.arctan2(rest[1, 0] - rest[0, 1], rest[0, 0] + rest[1, 1])])
         about = np.zeros(2) if near is None else near
         return found - 2.0 * np.pi * np.round((found - about) / (2.0 * np.pi))
+
+
+@cache
+def _left_inverse(of: Pair) -> Array:
+    return frozen(np.linalg.pinv(of.basis))
 
 
 def coupling(kind: str, pitch: float = 0.0, middle: Array | None = None) -> Coupling:

@@ -83,7 +83,7 @@ class Link:
         rows1, rows2 = self.rows(x)
         relative = rows1 @ twist(twists, self.body1) + rows2 @ twist(twists, self.body2)
         basis = self.coupling.basis(x)
-        rate = np.linalg.pinv(basis) @ relative
+        rate = self.coupling.left_inverse(basis) @ relative
         return rate, relative - basis @ rate
 
     def place_second(self, poses: Array, x: Array) -> Array:

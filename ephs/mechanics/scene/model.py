@@ -264,31 +264,30 @@ class Scene:
 
     def body(self, name: str) -> Body:
         """The body of this (dotted) name, its names seen from here."""
+        part, path, own = self._part_of(name)
+        if part is not None and own in part.bodies:
+            return replace(part.bodies[own], name=path + own)
         return _find(dict(self.all_bodies()), name, "body")
 
     def joint(self, name: str) -> Joint:
         """The joint of this (dotted) name, its names seen from here; the implicit free joint of a body
         without a joint too."""
+        part, path, own = self._part_of(name)
+        if part is not None and own in part.joints:
+            return _joint_seen(path, part.joints[own])
         return _find(dict(self.all_joints()) | dict(self.implicit_joints()), name, "joint")
 
     def all_bodies(self) -> Iterator[tuple[str, Body]]:
         """Every body with its dotted name, parts included."""
         for path, scene in self._scenes():
             for body in scene.bodies.values():
-                yield path + body.name, replace(body, name=path + body.name)
+                yield path + body.name, replace(body, name=path + body.name) if path else body
 
     def all_joints(self) -> Iterator[tuple[str, Joint]]:
         """Every joint with its dotted name; the bodies and heat sink that it names are dotted too."""
         for path, scene in self._scenes():
             for j in scene.joints.values():
-                seen = replace(
-                    j,
-                    name=path + j.name,
-                    body1=_seen(path, j.body1),
-                    body2=_seen(path, j.body2),
-                    heat=_seen(path, j.heat),
-                )
-                yield seen.name, seen
+                yield path + j.name, _joint_seen(path, j)
 
     def all_springs(self) -> Iterator[tuple[str, Spring]]:
         """Every spring with its dotted name, as `all_joints`."""
@@ -345,6 +344,14 @@ class Scene:
             lines += ["  " + line for line in str(self.adjusted).splitlines()]
         return "\n".join(lines)
 
+    def _part_of(self, name: str) -> "tuple[Scene | None, str, str]":
+        """The part that a dotted name leads into, or None; the path before the last name; the last name."""
+        *parts, own = name.split(".")
+        scene: Scene | None = self
+        for part in parts:
+            scene = None if scene is None else scene.parts.get(part)
+        return scene, name[: len(name) - len(own)], own
+
     def _scenes(self, path: str = "") -> Iterator[tuple[str, "Scene"]]:
         yield path, self
         for name, part in self.parts.items():
@@ -372,6 +379,12 @@ def free_joint(body: Body) -> Joint:
         coordinate=body.pose,
         rate=body.twist,
     )
+
+
+def _joint_seen(path: str, j: Joint) -> Joint:
+    """A joint as seen from outside the part at a path."""
+    ends = {key: _seen(path, getattr(j, key)) for key in ("body1", "body2", "heat")}
+    return replace(j, name=path + j.name, **ends) if path else j
 
 
 def _seen(path: str, name: str) -> str:

@@ -96,7 +96,8 @@ def with_state(
         moved = project_velocities(links, poses, twists, now.roots(), frozenset(speeds))
         twists = twists if moved is None else moved
 
-    faults = measure(links, xs, poses, twists, now.names)
+    slips = [link.slip(twists, x) for link, x in zip(links, xs, strict=True)]
+    faults = measure(links, xs, poses, slips, now.names)
     if faults:
         raise SceneError(where, faults)
     return rebuilt(scene, now, poses, twists, xs)

@@ -190,11 +190,10 @@ class RigidMotions(Manifold):
 
     def adjoint(self, x: Array) -> Array:
         rotation = so3.quaternion_to_matrix(x[:4])
-        return np.block([[rotation, np.zeros((3, 3))], [so3.hat(x[4:]) @ rotation, rotation]])
+        return _lower(rotation, so3.hat(x[4:]) @ rotation)
 
     def ad(self, u: Array) -> Array:
-        turn = so3.hat(u[:3])
-        return np.block([[turn, np.zeros((3, 3))], [so3.hat(u[3:]), turn]])
+        return _lower(so3.hat(u[:3]), so3.hat(u[3:]))
 
     def dexp(self, v: Array) -> Array:
         # ad satisfies (A² + θ²)² A = 0, so four powers suffice.
@@ -214,6 +213,14 @@ class RigidMotions(Manifold):
 
     def random(self, rng: np.random.Generator) -> Array:
         return np.concatenate((so3.random_quaternion(rng), rng.standard_normal(3)))
+
+
+def _lower(diagonal: Array, below: Array) -> Array:
+    """[[D, 0], [B, D]] of 3×3 blocks."""
+    out = np.zeros((6, 6))
+    out[:3, :3] = out[3:, 3:] = diagonal
+    out[3:, :3] = below
+    return out
 
 
 def _matrix(pose: Array) -> Array:

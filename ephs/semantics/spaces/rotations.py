@@ -86,10 +86,15 @@ def rotation_dexp_inv(w: Array) -> Array:
 
 
 def quaternion_to_matrix(q: Array) -> Array:
-    """Rotation matrix of a unit quaternion."""
-    w, v = q[0], q[1:]
-    skew = hat(v)
-    return np.eye(3) + 2.0 * w * skew + 2.0 * skew @ skew
+    """Rotation matrix of a unit quaternion: 1 + 2 w v̂ + 2 v̂²."""
+    w, x, y, z = (float(entry) for entry in q)
+    return np.array(
+        [
+            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+            [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+            [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+        ]
+    )
 
 
 def matrix_to_quaternion(m: Array) -> Array:
