@@ -142,6 +142,25 @@ def test_peers_compute_the_same_motion(file, peer):
     assert point.error < 1e-9
 
 
+@pytest.mark.parametrize(
+    ("name", "peer", "until", "bound"),
+    [
+        ("four-bar-windows-1", "pin DOP853", 0.5, 1e-8),
+        ("four-bar-windows-1", "pin soft DOP853", 0.5, 1e-8),
+        ("four-bar-windows-1", "mujoco RK4", 0.5, 1e-8),
+        ("four-body-loop", "pin DOP853", 0.2, 1e-8),
+        ("four-body-loop", "mujoco RK4", 0.2, 1e-6),
+        ("andrews-squeezer", "mujoco RK4", 0.01, 1e-6),
+    ],
+)
+def test_peers_close_loops_pull_springs_and_drive(name, peer, until, bound):
+    scene = ephs.load(ROOT / f"benchmarks/scenes/{name}.toml")
+    setting = {"tolerances": (1e-10,), "steps": (4000,)}
+    (point,) = work_precision(scene, until, [peer], reference=tight_reference(scene, until), repeats=1, **setting)
+    assert point.outcome is Ending.DONE, point.message
+    assert point.error < bound
+
+
 def test_peers_carry_free_and_fixed_bodies():
     free = FAMILIES["long-spin"].make(1.0)
     truth = tight_reference(free, 1.0)
