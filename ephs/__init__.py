@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from ephs.mechanics.check import check_model as check_model
+    from ephs.mechanics.dynamics import dynamics as dynamics
     from ephs.mechanics.methods import register_method as register_method
     from ephs.mechanics.scene import Scene as Scene
     from ephs.mechanics.scene import SceneError as SceneError
@@ -65,6 +66,7 @@ _HOMES = {
     "ephs.mechanics.scene": ("Scene", "SceneError"),
     "ephs.mechanics.scene.load": ("load",),
     "ephs.mechanics.check": ("check_model",),
+    "ephs.mechanics.dynamics": ("dynamics",),
     "ephs.mechanics.methods": ("register_method",),
     "ephs.mechanics.simulate": ("load_solution", "simulate"),
     "ephs.mechanics.solve.errors": ("Interrupted", "OptionError", "SimulationError"),

@@ -30,12 +30,15 @@ class Setting:
         Tolerances and limits; without ``control.step`` the method has to choose its steps.
     options
         The method's own, by name.
+    equations
+        The reduced form of the problem's scene, where it is there already.
     """
 
     problem: Problem
     t0: float
     control: Control
     options: Mapping[str, Any]
+    equations: Any = None
 
 
 @final
@@ -59,6 +62,8 @@ class Method:
         Names of the options that it takes.
     many
         Makes, for a compiled model, what takes many constant steps in one compiled call; None where there is no such.
+    forms
+        Forms of the equations that it takes besides the least, which is what ``"reduced"`` asks for.
     """
 
     name: str
@@ -71,6 +76,7 @@ class Method:
     make: Callable[[Setting], tuple[Stepper[Any], Policy | None]]
     options: tuple[str, ...] = ()
     many: Callable[[Model], ComponentMethod] | None = None
+    forms: tuple[str, ...] = ()
 
 
 def on_joints(make: Callable[..., Any]) -> Callable[[Setting], tuple[Stepper[Any], Policy | None]]:
@@ -82,7 +88,7 @@ def on_joints(make: Callable[..., Any]) -> Callable[[Setting], tuple[Stepper[Any
     def made(setting: Setting) -> tuple[Stepper[Any], Policy | None]:
         from ephs.mechanics.reduced.equations import Equations  # its kernels take a quarter of a second to load
 
-        equations = Equations(setting.problem.scene, setting.problem, setting.t0)
+        equations = setting.equations or Equations(setting.problem.scene, setting.problem, setting.t0)
         stepper = make(equations, setting.control, **setting.options)
         return stepper, None if setting.control.step is not None else Proportional(
             lambda: stepper.exponent, stepper.share
@@ -189,9 +195,19 @@ for _method in (
         "balances and positions of joints exact, any system",
         _component_wise(Natural),
         many=Natural,
+        forms=("paper", "folded"),
     ),
     Method(
-        "natural4", 4, True, True, True, True, "the same of order 4", _component_wise(_of_order_4), many=_of_order_4
+        "natural4",
+        4,
+        True,
+        True,
+        True,
+        True,
+        "the same of order 4",
+        _component_wise(_of_order_4),
+        many=_of_order_4,
+        forms=("paper", "folded"),
     ),
     Method("variational", 2, False, True, False, True, "symplectic, momentum maps exact", on_joints(_variational)),
     Method("radau", 5, True, True, True, True, "Radau IIA, stiff", _radau),

@@ -1,6 +1,7 @@
 """Compiled discrete relations of springs and dampers, after the plain definitions in `ephs.mechanics.components`.
 
-Signature and layout as in `ephs.semantics.kernel_table`. Their slopes only steer Newton's method: differences do.
+Signature and layout as in `ephs.semantics.kernel_table`. Slopes at a step of length zero are exact; along a step they
+only steer Newton's method, and differences do.
 """
 
 # numba infers the types of these functions, and exports what it does not list.
@@ -13,7 +14,7 @@ import numba as nb
 from ephs.mechanics.kernels import transposed_jacobian
 from ephs.semantics.spaces import jit
 from ephs.semantics.spaces.codes import SE2, SE3, SO3
-from ephs.semantics.spaces.se3_kernels import quat_rotate_back, retract
+from ephs.semantics.spaces.se3_kernels import dexp_left_inv, log_quaternion, quat_rotate_back, quat_to_matrix, retract
 
 kernel = jit.kernel
 DELTA = 1e-6
@@ -28,6 +29,9 @@ def coordinate_spring(dims, scal, p, x0, v, e, lam, f, c, jac, work):
     moved, there, back = scratch[0:6][:d], scratch[6:12][:d], scratch[12:18][:d]
     code, stiffness, rest = int(par[0]), par[1 : 1 + d], par[1 + d :]
     energy[0] = _coordinate_spring(code, stiffness, rest, x, step, effort, scratch[20:])
+    if _still(step):
+        _coordinate_slope(code, stiffness, x, effort, slope, scratch[20:])
+        return 0
     for i in range(d):
         for j in range(d):
             moved[j] = step[j]
@@ -38,6 +42,53 @@ def coordinate_spring(dims, scal, p, x0, v, e, lam, f, c, jac, work):
         for j in range(d):
             slope[j, i] = (there[j] - back[j]) / (2.0 * DELTA)
     return 0
+
+
+@kernel
+def _still(step):
+    size = 0.0
+    for i in range(step.shape[0]):
+        size += abs(step[i])
+    return size == 0.0
+
+
+@kernel
+def _coordinate_slope(code, stiffness, x, effort, slope, work):
+    """∂e/∂v at v = 0: half of the derivative of the effort along the group."""
+    slope[:, :] = 0.0
+    if code == SE2:
+        c, s = math.cos(x[0]), math.sin(x[0])
+        along, across = stiffness[1], stiffness[2]
+        slope[0, 0] = 0.5 * stiffness[0]
+        slope[1, 0], slope[2, 0] = 0.5 * effort[2], -0.5 * effort[1]
+        slope[1, 1] = 0.5 * (c * c * along + s * s * across)
+        slope[2, 2] = 0.5 * (s * s * along + c * c * across)
+        slope[1, 2] = slope[2, 1] = 0.5 * c * s * (across - along)
+    elif code in (SO3, SE3):
+        omega, turn = work[0:3], work[3:12].reshape((3, 3))
+        omega[0], omega[1], omega[2] = log_quaternion(x[0], x[1], x[2], x[3])
+        dexp_left_inv(SO3, omega, turn)
+        for i in range(3):
+            for j in range(3):
+                slope[i, j] = 0.5 * stiffness[0] * turn[i, j]
+        if code == SE3:
+            quat_to_matrix(x[:4], turn)
+            for i in range(3):
+                for j in range(3):
+                    for k in range(3):
+                        slope[3 + i, 3 + j] += 0.5 * turn[k, i] * stiffness[3 + k] * turn[k, j]
+            _half_cross(effort[3:], slope)
+    else:
+        for i in range(slope.shape[0]):
+            slope[i, i] = 0.5 * stiffness[i]
+
+
+@kernel
+def _half_cross(y, slope):
+    """½ ỹ by the rotation, of a vector y of the world in turning axes, into rows 3 to 5."""
+    slope[3, 1], slope[3, 2] = -0.5 * y[2], 0.5 * y[1]
+    slope[4, 0], slope[4, 2] = 0.5 * y[2], -0.5 * y[0]
+    slope[5, 0], slope[5, 1] = -0.5 * y[1], 0.5 * y[0]
 
 
 @kernel
@@ -137,7 +188,18 @@ def point_spring(dims, scal, p, x0, v, e, lam, f, c, jac, work):
     moved, there, back = scratch[0:6], scratch[6:12], scratch[12:18]
     pull, local, end, turn = scratch[18:21], scratch[21:24], scratch[24:31], scratch[32:41].reshape((3, 3))
     energy[0], status = _point_spring(par, pose, step, effort, pull, local, end, turn)
-    for i in range(6):  # the slope only steers Newton's method: differences do
+    if status == 0 and _still(step):
+        square = pose[4] ** 2 + pose[5] ** 2 + pose[6] ** 2
+        bent = par[0] * par[1] / (square * math.sqrt(square))
+        quat_rotate_back(pose[:4], pose[4:], local)
+        slope[:, :] = 0.0
+        for i in range(3):
+            slope[3 + i, 3 + i] = 0.5 * par[0] * (1.0 - par[1] / math.sqrt(square))
+            for j in range(3):
+                slope[3 + i, 3 + j] += 0.5 * bent * local[i] * local[j]
+        _half_cross(effort[3:], slope)
+        return 0
+    for i in range(6):
         for j in range(6):
             moved[j] = step[j]
         moved[i] = step[i] + DELTA
@@ -183,6 +245,9 @@ def point_damper(dims, scal, p, x0, v, e, lam, f, c, jac, work):
             slope[3 + i, 3 + j] = par[0] * axis[i] * axis[j]
         slope[6, 3 + i] = -2.0 * par[0] * rate * axis[i] / theta
     slope[6, 6] = par[0] * rate * rate / (theta * theta)
+    if _still(step):
+        _damper_slope(par[0], theta, pose, effort, rate, axis, slope)
+        return 0
     for i in range(6):
         for j in range(6):
             moved[j] = step[j]
@@ -193,6 +258,34 @@ def point_damper(dims, scal, p, x0, v, e, lam, f, c, jac, work):
         for j in range(7):
             slope[j, 7 + i] = (there[j] - back[j]) / (2.0 * DELTA)
     return 0
+
+
+@kernel
+def _damper_slope(damping, theta, pose, effort, rate, axis, slope):
+    """The flow's derivative by the increment at v = 0: n changes by ½ (1 − nnᵀ)(ñω + υ/|r|)."""
+    length = math.sqrt(pose[4] ** 2 + pose[5] ** 2 + pose[6] ** 2)
+    for k in range(6):
+        a = b = c = 0.0
+        if k == 0:
+            b, c = axis[2], -axis[1]
+        elif k == 1:
+            a, c = -axis[2], axis[0]
+        elif k == 2:
+            a, b = axis[1], -axis[0]
+        else:
+            part = axis[k - 3] / length
+            a, b, c = -part * axis[0], -part * axis[1], -part * axis[2]
+            if k == 3:
+                a += 1.0 / length
+            elif k == 4:
+                b += 1.0 / length
+            else:
+                c += 1.0 / length
+        turned = a * effort[3] + b * effort[4] + c * effort[5]
+        slope[3, 7 + k] = 0.5 * damping * (turned * axis[0] + rate * a)
+        slope[4, 7 + k] = 0.5 * damping * (turned * axis[1] + rate * b)
+        slope[5, 7 + k] = 0.5 * damping * (turned * axis[2] + rate * c)
+        slope[6, 7 + k] = -damping * rate * turned / theta
 
 
 @kernel

@@ -59,7 +59,9 @@ class PaperStates:
         q = np.zeros(reduced.coordinates)
         for i, edge in enumerate(reduced.edges):
             if tables.kind[i] != SPRING:
-                given = edge.coordinate if edge.path is None else initial[edge.path / "pe" / "q_r"]
+                body = component_path("bodies", str(reduced.bodies[i])) if i < reduced.links else Path()
+                # of a body that no joint holds, the element is its pose
+                given = initial[body / "pe" / "q" if edge.path is None else edge.path / "pe" / "q_r"]
                 q[int(tables.q_at[i]) : int(tables.q_at[i] + tables.q_size[i])] = given
         s = np.array([float(initial[path][0]) for path in reduced.entropies])
         return q, self._rates_of(q), s
