@@ -9,6 +9,7 @@ import numpy as np
 from ephs.mechanics.build import component_path, drive_ports, initial_state, scene_inputs, scene_system, wrench_port
 from ephs.mechanics.methods import METHODS, Method, Setting, chosen
 from ephs.mechanics.motion import SceneMotion
+from ephs.mechanics.reduction.folded import folded_problem
 from ephs.mechanics.redundancy import explain
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.mechanics.scene.model import Marker, Scene
@@ -84,8 +85,8 @@ def simulate(
     save_at
         Times to keep, met by dense output; every step where None.
     form
-        Equations as flattened, ``"paper"``, are what the natural methods solve; ``"reduced"``, the default, is the
-        least that a method can use.
+        ``"paper"``: as flattened, what the natural methods solve; ``"folded"``: the same with transformers and the
+        junctions behind them taken out, for them too; ``"reduced"``, the default: the least that a method can use.
     events
         `ephs.Event` values or functions f(t, state) -> number, whose zeros are located, recorded in ``sol.events``,
         and end the run where they say so.
@@ -117,9 +118,11 @@ def simulate(
         problem = problem_of_scene(model, initial, inputs)
     else:
         problem = problem_of_system(model, initial, inputs, reference)
-    method_of = METHODS["natural4"] if method == "auto" and form == "paper" and step is None else None
-    chosen_method, reason = (method_of, "the paper's form") if method_of else chosen(method, problem, step=step)
+    method_of = METHODS["natural4"] if method == "auto" and form != "reduced" and step is None else None
+    chosen_method, reason = (method_of, f"the {form} form") if method_of else chosen(method, problem, step=step)
     _fits(form, chosen_method)
+    if form == "folded":
+        problem = folded_problem(problem)
     start, end = float(t0), float(until)
     if not (np.isfinite(start) and np.isfinite(end) and end != start):
         raise OptionError("until", until, f"a finite time other than t0 = {t0!r} s")
@@ -155,9 +158,9 @@ def simulate(
 
 
 def _fits(form: str, method: Method) -> None:
-    reduced = not method.systems or method.name == "radau"
-    if form == "folded" or (form == "paper" and reduced):
-        raise OptionError("form", form, f"{'' if reduced else 'paper or '}reduced, which {method.name} solves")
+    forms = (*method.forms, "reduced")
+    if form not in forms:
+        raise OptionError("form", form, f"{' or '.join(forms)}, which {method.name} solves")
 
 
 def _control(

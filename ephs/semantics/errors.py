@@ -71,6 +71,7 @@ _TEXTS = {
     "missing-input": ("{path}: the outer port is open: give inputs={{'{path}': {{'flow': …}}}} or {{'effort': …}}"),
     "unknown-input": "{path}: no such outer power port; the open ports are {expected}",
     "input": "{path}: the input is {found}, expected {expected}",
+    "rewrite": "{path}: {rule} would change what the system means: {found}",
 }
 
 

@@ -69,17 +69,23 @@ class Callback:
 
 def address_of(primitive: Primitive) -> tuple[int, tuple[float, ...], Callback | None]:
     """(address, parameters, callback or None) of a primitive's discrete relation."""
-    kernel: Kernel | None = primitive.kernel
-    if kernel is not None and kernel.source:
-        from ephs.semantics.symbols.programs import address_of_source
-
-        inner, _ = address_of_source(kernel.source)
-        outer = int(_compiled(kernel.module, kernel.name).address)
-        return outer, (float(inner), *kernel.parameters), None
-    if kernel is not None:
-        return int(_compiled(kernel.module, kernel.name).address), kernel.parameters, None
+    if primitive.kernel is not None:
+        return *_of_kernel(primitive.kernel), None
     callback = _callback(primitive)
     return callback.address, (), callback
+
+
+def _of_kernel(kernel: Kernel) -> tuple[int, tuple[float, ...]]:
+    """Address and parameters, with those of what runs inside."""
+    own = int(_compiled(kernel.module, kernel.name).address)
+    if kernel.inner is not None:
+        inner, numbers = _of_kernel(kernel.inner)
+        return own, (float(inner), *kernel.parameters, *numbers)
+    if kernel.source:
+        from ephs.semantics.symbols.programs import address_of_source
+
+        return own, (float(address_of_source(kernel.source)[0]), *kernel.parameters)
+    return own, kernel.parameters
 
 
 def _callback(primitive: Primitive) -> Callback:

@@ -46,6 +46,7 @@ class Groups(NamedTuple):
     code: Index
     effort: Index  # (groups,): first effort
     dim: Index
+    metric: Array  # (groups, 6, 6): in which the component measures it; the identity but where its frame is another
 
 
 class Stages(NamedTuple):
@@ -205,10 +206,15 @@ def _correct(t, g, p, h, z, s):
             continue
         at = lam_at + t.multiplier_at[c]
         square = power = 0.0
-        for j in range(t.dims[c, 0]):
-            effort = n_rate + t.e_index[t.e_at[c] + j]
-            for i in range(stages):
-                square += p.b[i] * z[i, effort] * z[i, effort]
+        last = k
+        while last < g.component.shape[0] and g.component[last] == c:
+            first = n_rate + g.effort[last]
+            for j in range(g.dim[last]):
+                for q in range(g.dim[last]):
+                    if g.metric[last, j, q] != 0.0:
+                        for i in range(stages):
+                            square += p.b[i] * z[i, first + j] * g.metric[last, j, q] * z[i, first + q]
+            last += 1
         for j in range(t.dims[c, 1]):
             delta, force = s.gap[at + j], 0.0
             for i in range(stages):
@@ -218,10 +224,14 @@ def _correct(t, g, p, h, z, s):
             for i in range(stages):
                 s.residual[i, at + j] += delta
         if square > 1e-280:
-            for j in range(t.dims[c, 0]):
-                effort = n_rate + t.e_index[t.e_at[c] + j]
-                for i in range(stages):
-                    s.residual[i, effort] += power / square * z[i, effort]
+            for group in range(k, last):
+                first = n_rate + g.effort[group]
+                for j in range(g.dim[group]):
+                    for q in range(g.dim[group]):
+                        share = power / square * g.metric[group, j, q]
+                        if share != 0.0:
+                            for i in range(stages):
+                                s.residual[i, first + j] += share * z[i, first + q]
 
 
 @kernel

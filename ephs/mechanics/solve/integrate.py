@@ -147,6 +147,8 @@ def failures_of(run: Run) -> Generator[None, None, None]:
 
 def solution_of(problem: Problem, record: Record, stats: Mapping[str, Any]) -> Solution:
     """What was kept of a run, as users read it."""
+    if problem.shown is not None:
+        problem, record = problem.shown(record)
     states = {slot.path: coordinates(slot.quantity, record.x[:, slot.point]) for slot in problem.descriptor.states}
     return Solution(problem.name, record.t, states, ledgers(problem, record), dict(stats), problem)
 
@@ -213,7 +215,7 @@ class _Run:
         """What the run did so far."""
         return {
             "method": self.stepper.name,
-            "form": "paper",
+            **self.problem.remarks,
             "steps": self.steps,
             "rejected": 0,
             "iterations": self.iterations,

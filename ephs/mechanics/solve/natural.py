@@ -231,7 +231,7 @@ def guessed_efforts(model: Model, x: Array) -> Array:
 
 def stored_energies(model: Model, x: Array) -> Array:
     """(components,): energy of each storage at the states x, zero elsewhere."""
-    status, component, memory = evaluate_at(model, x, guessed_efforts(model, x), 1.0)
+    status, component, memory = evaluate_at(model, x, guessed_efforts(model, x), 0.0)
     if status:
         raise SolveError.of_component(status, model, component)
     return memory.energy

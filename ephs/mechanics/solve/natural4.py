@@ -18,6 +18,8 @@ from ephs.mechanics.solve.natural import Chunk, NaturalState, guessed_efforts, o
 from ephs.mechanics.solve.natural_kernels import COMPONENT, DONE, Memory, Order
 from ephs.mechanics.solve.sparse import Index, order
 from ephs.semantics.bundle import Array
+from ephs.semantics.primitives import Kernel
+from ephs.semantics.pullback import pulled_ports
 from ephs.semantics.spaces.codes import SE3
 
 __all__ = ["Natural4"]
@@ -202,15 +204,30 @@ class Natural4:
 def _groups(model: Model) -> Groups:
     """The velocities of joints: twists of two frames, and a velocity on the pair's group."""
     rows: list[tuple[int, int, int, int]] = []
+    metrics: list[Array] = []
     for number, slot in enumerate(model.descriptor.components):
         kernel = slot.primitive.kernel
-        if kernel is not None and kernel.name == "holonomic":
-            code, efforts = int(kernel.parameters[0]), list(slot.efforts)
-            for first, dim, group in ((0, 6, SE3), (6, 6, SE3), (12, len(efforts) - 12, code)):
+        inside = kernel.inner or kernel if kernel is not None else None
+        if kernel is not None and inside is not None and inside.name == "holonomic":
+            code, efforts = int(inside.parameters[0]), list(slot.efforts)
+            for (first, matrix), group in zip(_ports(kernel, len(efforts)), (SE3, SE3, code), strict=True):
+                dim = matrix.shape[1]
                 if dim:
                     rows.append((number, group, efforts[first], dim))
+                    metric = np.zeros((6, 6))
+                    metric[:dim, :dim] = matrix.T @ matrix
+                    metrics.append(metric)
     table = np.array(rows, dtype=np.int64).reshape(-1, 4)
-    return Groups(*(np.ascontiguousarray(column) for column in table.T))
+    number, code, effort, dim = (np.ascontiguousarray(column) for column in table.T)
+    return Groups(number, code, effort, dim, np.array(metrics).reshape(-1, 6, 6))
+
+
+def _ports(kernel: Kernel, size: int) -> list[tuple[int, Array]]:
+    """(first of its efforts, the map by which the relation sees them) of the two frames and the freedoms of a joint."""
+    if kernel.inner is None:
+        return [(0, np.eye(6)), (6, np.eye(6)), (12, np.eye(size - 12))]
+    found = [(at, matrix) for _, _, at, _, matrix in pulled_ports(kernel)]
+    return found if len(found) == 3 else [*found, (size, np.zeros((0, 0)))]
 
 
 def _entries(model: Model) -> Index:

@@ -80,7 +80,7 @@ class Paced:
     def stats(self) -> dict[str, Any]:
         """Counts, for the solution's statistics."""
         return {
-            "form": "paper",
+            **self.problem.remarks,
             "iterations": self._iterations,
             "orders": self.method.changes,
             "dependent_equations": len(self.method.redundant),

@@ -1,7 +1,7 @@
 """What a solver is given: a system, its initial states, what is prescribed at its outer ports, and its surroundings."""
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol, final
 
 import numpy as np
@@ -12,6 +12,7 @@ from ephs.semantics.descriptor import Descriptor, Input
 from ephs.semantics.system import System
 
 if TYPE_CHECKING:
+    from ephs.mechanics.solve.record import Record
     from ephs.mechanics.solve.solution import Solution
 
 __all__ = ["Motion", "Problem", "Signal", "States"]
@@ -120,6 +121,11 @@ class Problem:
         Says in words which constraints depend on which: what a run that fails at them tells its user.
     document
         The scene as text, for solution files.
+    shown
+        What was computed of this problem, as a record of the one that it was made from, which solutions are of; None
+        where none was.
+    remarks
+        What the statistics of a run say of it: the form of its equations.
     """
 
     name: str
@@ -132,6 +138,8 @@ class Problem:
     scene: Any = None
     document: str = ""
     dependences: Callable[[], str] | None = None
+    shown: "Callable[[Record], tuple[Problem, Record]] | None" = None
+    remarks: Mapping[str, Any] = field(default_factory=lambda: {"form": "paper"})
 
     def inputs(self, t: float, state: State) -> dict[Path, Input]:
         """The inputs of the descriptor form at a time."""

@@ -1,0 +1,246 @@
+"""Rewrites of systems: what one is, on what condition it may be done, and how states go to and fro.
+
+A rewrite makes of a system a smaller one that says the same of what is kept. Each names its strength, the condition
+that it has checked, in words, and a map of states in both directions.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import final
+
+from ephs.operad import Directory, Path, Pattern, PortType
+from ephs.operad.parts import Junction, Port
+from ephs.semantics.bundle import Array
+from ephs.semantics.errors import AssemblyError
+from ephs.semantics.primitives import Primitive, Storage
+from ephs.semantics.system import System
+
+__all__ = ["Draft", "Rewritten", "Rule", "Site", "StateMap", "Strength", "rewrite", "sites_of"]
+
+State = Mapping[Path, Array]
+
+
+class Strength(StrEnum):
+    """What a rewrite leaves as it is."""
+
+    RELATION = "same relation"
+    """At every state, all that the kept variables may be."""
+    TRAJECTORIES = "same trajectories"
+    """The motions of the kept variables; not what was differentiated away, such as reactions."""
+    MOTION = "same motion"
+    """The motion, but the kept reactions differ."""
+
+
+def _same(state: State) -> dict[Path, Array]:
+    return dict(state)
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class StateMap:
+    """How states go to and fro.
+
+    Parameters
+    ----------
+    forward
+        States of the system before -> states of the system after.
+    back
+        States of the system after, and those before at the start -> states of the system before at that instant.
+    """
+
+    forward: Callable[[State], dict[Path, Array]] = _same
+    back: Callable[[State, State], dict[Path, Array]] = lambda state, _start: dict(state)
+
+    def then(self, other: "StateMap") -> "StateMap":
+        """This map, then another one."""
+
+        def back(state: State, start: State) -> dict[Path, Array]:
+            return self.back(other.back(state, self.forward(start)), start)
+
+        return StateMap(lambda state: other.forward(self.forward(state)), back)
+
+
+@dataclass(slots=True)
+class Draft:
+    """A flat system that is being rewritten; private to a rewrite, so that many sites cost one new pattern.
+
+    Parameters
+    ----------
+    junctions, wires, fillings
+        By path: junctions; ports of each box; what fills it.
+    links
+        Classes of junctions that share their state.
+    """
+
+    junctions: dict[Path, Junction]
+    wires: dict[Path, dict[Path, Port]]
+    fillings: dict[Path, Primitive]
+    links: frozenset[frozenset[Path]]
+    _at: dict[Path, dict[tuple[Path, Path], bool]] = field(default_factory=dict[Path, dict[tuple[Path, Path], bool]])
+
+    @staticmethod
+    def of(system: System) -> "Draft":
+        """A copy of a system, flattened."""
+        flat = system.flatten()
+        pattern = flat.pattern
+        wires = {box: dict(content.ports.items()) for box, content in pattern.boxes.items()}
+        draft = Draft(dict(pattern.junctions.items()), wires, dict(flat.leaves()), pattern.links)
+        for box, ports in wires.items():
+            for port, where in ports.items():
+                draft._at.setdefault(where.junction, {})[box, port] = where.power
+        return draft
+
+    def on(self, junction: Path) -> list[tuple[Path, Path]]:
+        """The power ports on a junction: (box, port)."""
+        return [place for place, power in self._at.get(junction, {}).items() if power]
+
+    def reading(self, junction: Path) -> list[tuple[Path, Path]]:
+        """The state ports that read the state of a junction, linked ones included."""
+        classes = [group for group in self.links if junction in group]
+        members = {junction}.union(*classes)
+        return [place for j in members for place, power in self._at.get(j, {}).items() if not power]
+
+    def stored(self, junction: Path) -> Path | None:
+        """The storage on a junction, None where there is none."""
+        return next((box for box, _ in self.on(junction) if isinstance(self.fillings[box], Storage)), None)
+
+    def replace(self, box: Path, filling: Primitive, ports: Mapping[Path, Path]) -> None:
+        """Fill a box anew; ports that are not given a junction keep theirs, and those that it has not are gone."""
+        before = self.wires[box]
+        self._unwire(box)
+        kinds = filling.interface
+        self.wires[box] = {port: Port(ports.get(port) or before[port].junction, kinds[port].power) for port in kinds}
+        self.fillings[box] = filling
+        for port, where in self.wires[box].items():
+            self._at.setdefault(where.junction, {})[box, port] = where.power
+
+    def remove(self, boxes: Iterable[Path], junctions: Iterable[Path] = ()) -> None:
+        """Take boxes out, and junctions that nothing lies on then."""
+        for box in boxes:
+            self._unwire(box)
+            del self.wires[box], self.fillings[box]
+        for path in junctions:
+            del self.junctions[path]
+            self.links = frozenset(rest for group in self.links if len(rest := group - {path}) > 1)
+
+    def system(self) -> System:
+        """The system as it stands now."""
+        pattern = Pattern(self.junctions, self.wires, [tuple(group) for group in self.links])
+        return System(pattern, Directory(dict(self.fillings)))
+
+    def kind(self, junction: Path) -> PortType:
+        """The type of a power port on a junction."""
+        return PortType(self.junctions[junction].quantity, True)
+
+    def _unwire(self, box: Path) -> None:
+        for port, where in self.wires[box].items():
+            del self._at[where.junction][box, port]
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Site:
+    """A place where a rule applies, or would if its condition held.
+
+    Parameters
+    ----------
+    rule
+        The rule's name.
+    where
+        The component, or the junction, that it is about.
+    reason
+        Why it may be done, in words.
+    refusal
+        Why it may not, in words; "" where its condition holds.
+    make
+        Does it to a draft in which the site still is, and gives the map of states.
+    """
+
+    rule: str
+    where: Path
+    strength: Strength
+    reason: str
+    refusal: str
+    make: Callable[[Draft], StateMap]
+
+    def apply(self, system: System) -> "Rewritten":
+        """The system rewritten at this site.
+
+        Raises
+        ------
+        AssemblyError
+            The rule's condition does not hold; the message says why.
+        """
+        if self.refusal:
+            raise AssemblyError("rewrite", self.where, rule=self.rule, found=self.refusal)
+        draft = Draft.of(system)
+        states = self.make(draft)
+        return Rewritten(draft.system(), states, (self,))
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Rewritten:
+    """A system after rewrites.
+
+    Parameters
+    ----------
+    system
+        Flat.
+    states
+        From the states before all of them to those after, and back.
+    done
+        What was done, in order.
+    """
+
+    system: System
+    states: StateMap
+    done: tuple[Site, ...]
+
+    def then(self, other: "Rewritten") -> "Rewritten":
+        """These rewrites, then others."""
+        return Rewritten(other.system, self.states.then(other.states), (*self.done, *other.done))
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """A kind of rewrite.
+
+    Parameters
+    ----------
+    places
+        Where in a draft it may be worth a look.
+    at
+        The site at such a place of a draft that may have changed since, refused or not; None where there is none.
+    """
+
+    name: str
+    strength: Strength
+    places: Callable[[Draft], Iterable[tuple[Path, ...]]]
+    at: Callable[[Draft, tuple[Path, ...]], Site | None]
+
+
+def sites_of(system: System, rule: Rule) -> tuple[Site, ...]:
+    """Where a rule applies or is refused, anywhere in a hierarchical system; paths are those of its flat form."""
+    draft = Draft.of(system)
+    found = (rule.at(draft, place) for place in rule.places(draft))
+    return tuple(site for site in found if site is not None)
+
+
+def rewrite(system: System, rules: Iterable[Rule]) -> Rewritten:
+    """Rewrite a system by rules until none applies; the order makes no difference but for names."""
+    draft = Draft.of(system)
+    states, done, known = StateMap(), list[Site](), tuple(rules)
+    again = True
+    while again:
+        again = False
+        for rule in known:
+            for place in tuple(rule.places(draft)):
+                site = rule.at(draft, place)
+                if site is not None and not site.refusal:
+                    states = states.then(site.make(draft))
+                    done.append(site)
+                    again = True
+    return Rewritten(draft.system(), states, tuple(done))

@@ -1,0 +1,428 @@
+"""Folding: the same relation in fewer unknowns, at an instant and over a step, whatever is folded first."""
+
+import ctypes
+from pathlib import Path as File
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import ephs
+from benchmarks.cases import CASES
+from ephs import Path, Pattern, System, junction, library, quantity
+from ephs.mechanics import components, joint
+from ephs.mechanics.build import scene_system
+from ephs.mechanics.reduction.folding import FOLD
+from ephs.mechanics.reduction.rewrite import rewrite, sites_of
+from ephs.operad import PortType
+from ephs.semantics import StructureError
+from ephs.semantics.behaviour import Natural
+from ephs.semantics.bundle import Reference
+from ephs.semantics.checks import check_irreversible, check_reversible, random_efforts, random_point
+from ephs.semantics.kernel_table import OK, address_of, prototype
+from ephs.semantics.laws import random_probe
+from ephs.semantics.pullback import Map, pull_back
+from ephs.semantics.spaces import PAIRS, SE3, pair
+from ephs.testing import mechanisms
+
+SCENES = sorted((File(__file__).parents[3] / "scenes").glob("*.toml"))
+SMALL = [case for case in CASES if len(dict(case.scene().all_bodies())) <= 16]
+seeds = st.integers(0, 2**20)
+MOMENTUM = PortType(quantity.body_momentum, True)
+DOUBLE = ctypes.POINTER(ctypes.c_double)
+
+
+def joint_pair(kind):
+    return pair(kind, **dict.fromkeys(PAIRS[kind].parameters, 0.3))
+
+
+def same_relation(before, after, seed):
+    """Equal projectors at a random state, within what their eliminations carry."""
+    probe = random_probe(before, seed)
+    state = {str(path): value for path, value in probe.state.items()}
+    # the arguments of an Onsager matrix whose ports were folded would be others: there they are zero
+    kept = dict(after.leaves())
+    efforts = {
+        path: probe.efforts[path] for path, part in before.leaves() if kept.get(path) is part and path in probe.efforts
+    }
+    one, other = (system.relation(probe.reference).at(state, efforts) for system in (before, after))
+    condition = max(10.0, one.subspace.condition, other.subspace.condition)
+    assert one.distance(other) <= min(1e-6, 1e-13 * condition)
+
+
+# ---- primitives through maps -----------------------------------------------------------------------------------
+
+
+def pulled(kind, seed, first, second):
+    """A joint's relation seen from the bodies; an end is at an offset, as it is, or on the ground."""
+    rng = np.random.default_rng(seed)
+    ends = {
+        "offset": lambda: Map(SE3.adjoint(SE3.inverse(SE3.random(rng))), MOMENTUM),
+        "plain": lambda: Map(np.eye(6), MOMENTUM),
+        "ground": lambda: Map(np.zeros((6, 0)), None),
+    }
+    inner = components.holonomic(joint_pair(kind))
+    maps = {Path.of("p_j1"): ends[first](), Path.of("p_j2"): ends[second]()}
+    return inner, pull_back(inner, maps)
+
+
+def compiled(primitive, h, x, v, e, lam):
+    """(values, Jacobian) of the kernel."""
+    address, numbers, _ = address_of(primitive)
+    n, k, m = e.size, lam.size, v.size
+    state = np.concatenate([*(x[p] for p in primitive.reads), [0.0]])
+    dims = np.array([n, k, m, state.size - 1], dtype=np.int64)
+    arrays = [np.array([h, 293.15, 101325.0]), np.array([*numbers, 0.0]), state]
+    arrays += [np.append(a, 0.0) for a in (v, e, lam)]
+    arrays += [np.zeros(n * n + n + 1), np.zeros(k + 2), np.zeros((n + k) * (n + k + m) + 1), np.zeros(4096)]
+    status = prototype(address)(
+        dims.ctypes.data_as(ctypes.POINTER(ctypes.c_int64)), *[a.ctypes.data_as(DOUBLE) for a in arrays]
+    )
+    assert status == OK
+    values = np.concatenate([arrays[6][:n], arrays[7][:k]])
+    return values, arrays[8][: (n + k) * (n + k + m)].reshape(n + k, -1)
+
+
+def agrees(primitive, seed, size):
+    """The kernel against the plain definition, its Jacobian against differences of that."""
+    rng = np.random.default_rng(seed)
+    h, n = 10.0 ** rng.uniform(-4.0, -1.0), primitive.bundle.size
+    k = primitive.multipliers if primitive.kind == "reversible" else 0
+    x = random_point(primitive.bundle, primitive.reads, rng)
+    dims = [primitive.interface[p].quantity.space.dim for p in primitive.reads]
+    z = np.concatenate(
+        [random_efforts(primitive.bundle, rng), rng.standard_normal(k), size * rng.standard_normal(sum(dims))]
+    )
+    local = Natural(Reference(), h).behaviour(primitive, x)
+
+    def plain(at):
+        rates = np.split(at[n + k :] / h, np.cumsum(dims)[:-1]) if dims else []
+        return np.concatenate(local.relate(at[:n], at[n : n + k], dict(zip(primitive.reads, rates, strict=True))))
+
+    values, jacobian = compiled(primitive, h, x, z[n + k :], z[:n], z[n : n + k])
+    expected = plain(z)
+    assert np.abs(values - expected).max() <= 2e-13 * max(1.0, np.abs(expected).max())
+    columns = [(plain(z + step) - plain(z - step)) / 2e-5 for step in 1e-5 * np.eye(z.size)]
+    assert np.abs(jacobian - np.array(columns).T).max() <= 3e-6 * max(1.0, np.abs(jacobian).max())
+
+
+@pytest.mark.parametrize("kind", PAIRS)
+@settings(max_examples=15)
+@given(seed=seeds, ends=st.sampled_from(["offset offset", "plain offset", "ground offset", "offset ground"]))
+def test_a_joint_seen_from_its_bodies_has_a_kernel_that_is_its_definition(kind, seed, ends):
+    inner, outer = pulled(kind, seed, *ends.split())
+    check_reversible(outer)
+    assert outer.kernel.inner is inner.kernel
+    agrees(outer, seed, 0.1)
+
+
+@settings(max_examples=15)
+@given(seed=seeds)
+def test_friction_and_traced_constraints_keep_their_kernels(seed):
+    rng = np.random.default_rng(seed)
+    inner = components.joint_friction(joint_pair("spherical"), np.eye(3))
+    momentum = PortType(quantity.joint_momentum("spherical"), True)
+    outer = pull_back(inner, {Path.of("p_r"): Map(rng.standard_normal((3, 3)), momentum)})
+    check_irreversible(outer)
+    assert outer.kernel.inner is inner.kernel
+    agrees(outer, seed, 0.1)
+    traced = ephs.constraint(
+        {"p": quantity.body_momentum, "p2": quantity.momentum, "~q": quantity.pose},
+        lambda q: [[q[1] * q[0], q[2] ** 2, 0.0, q[4], 0.0, 1.0, q[5]]],
+    )
+    agrees(pull_back(traced, {Path.of("p"): Map(rng.standard_normal((6, 6)), MOMENTUM)}), seed, 0.1)
+
+
+@given(seed=seeds)
+def test_maps_in_series_multiply(seed):
+    """Pulling back twice is pulling back by the product, in the plain relation and in the numbers of the kernel."""
+    rng = np.random.default_rng(seed)
+    inner = components.holonomic(joint_pair("cylindrical"))
+    first, second = rng.standard_normal((2, 6, 6))
+    port = Path.of("p_j1")
+    twice = pull_back(pull_back(inner, {port: Map(first, MOMENTUM)}), {port: Map(second, MOMENTUM)})
+    once = pull_back(inner, {port: Map(first @ second, MOMENTUM)})
+    assert twice.kernel.inner is inner.kernel
+    assert np.allclose(twice.kernel.parameters, once.kernel.parameters, rtol=1e-13, atol=1e-13)
+    x = random_point(twice.bundle, twice.reads, rng)
+    one, other = twice.structure(x)[1], once.structure(x)[1]
+    assert np.abs(one - other).max() <= 1e-13 * np.abs(one).max()
+
+
+def test_a_map_of_entropy_ports_is_checked():
+    """Half the temperature elsewhere is no frame to see friction from."""
+    inner = components.joint_friction(joint_pair("revolute"), np.eye(1))
+    with pytest.raises(StructureError):
+        pull_back(inner, {Path.of("s"): Map(np.array([[0.5]]), PortType(quantity.entropy, True))})
+
+
+# ---- systems ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", PAIRS)
+@settings(max_examples=5)
+@given(seed=seeds)
+def test_a_folded_joint_has_the_relation_and_the_matrix_of_the_literature(kind, seed):
+    """C' = [Ad_{I⁻¹}Ad_{o₁⁻¹}, −Ad_{o₂⁻¹}, B]."""
+    rng = np.random.default_rng(seed)
+    of = joint_pair(kind)
+    o1, o2 = SE3.random(rng), SE3.random(rng)
+    pitch = dict(of.parameters).get("pitch", 0.0)
+    system = joint(kind, o1, o2, 0.2, 1.5, pitch=pitch)
+    done = rewrite(system, [FOLD])
+    same_relation(system, done.system, seed)
+    left = dict(done.system.leaves())
+    assert {str(path) for path in left} == {"hc", "pe", "pkc", "mf", "env"}
+    x = random_point(left[Path.of("hc")].bundle, left[Path.of("hc")].reads, rng)
+    (pose,) = (of.include(value) for value in x.values())
+    ad = [SE3.adjoint(SE3.inverse(o)) for o in (pose, o1, o2)]
+    expected = np.hstack([ad[0] @ ad[1], -ad[2], of.basis])
+    _, found = left[Path.of("hc")].structure(x)
+    assert np.abs(found - expected).max() <= 1e-14 * max(1.0, np.abs(expected).max())
+
+
+@settings(max_examples=25)
+@given(scene=mechanisms(max_bodies=2), seed=seeds)
+def test_a_folded_mechanism_has_the_same_relation(scene, seed):
+    system = scene_system(scene, wrenches=[name for name, _ in scene.all_bodies()])
+    done = rewrite(system, [FOLD])
+    assert sum(path[-1] in ("o1", "o2") for path, _ in done.system.leaves()) == 0
+    assert set(done.system.states) == set(system.states)
+    same_relation(system, done.system, seed)
+
+
+@st.composite
+def lever_networks(draw, loops=False):
+    """Levers and friction between junctions, some of which store momentum or are outer ports, one may stand still."""
+    rng = np.random.default_rng(draw(seeds))
+    count = draw(st.integers(2, 6))
+    roles = [draw(st.sampled_from(["plain", "plain", "stored", "open"])) for _ in range(count)]
+    junctions = {f"j{i}": junction(quantity.momentum, exposed=role == "open") for i, role in enumerate(roles)}
+    boxes, parts = {}, {}
+    for i, role in enumerate(roles):
+        if role == "stored":
+            boxes[f"mass{i}"], parts[f"mass{i}"] = {"p": f"j{i}"}, library.point_mass(m=float(rng.uniform(0.5, 2.0)))
+        if draw(st.booleans()):
+            junctions[f"s{i}"] = junction(quantity.entropy)
+            boxes[f"rub{i}"], parts[f"rub{i}"] = (
+                {"p": f"j{i}", "s": f"s{i}"},
+                library.friction(d=float(rng.uniform(0.1, 1.0))),
+            )
+            boxes[f"env{i}"], parts[f"env{i}"] = {"s": f"s{i}"}, library.environment()
+    for k in range(draw(st.integers(count, count + 2)) if loops else count - 1):
+        a = draw(st.integers(0, count - 1)) if k >= count - 1 else k + 1
+        b = draw(st.integers(0, count - 1)) if k >= count - 1 else draw(st.integers(0, k))
+        ratio = float(rng.choice([1.0, rng.uniform(0.5, 2.0)]))
+        name = f"lever{k}"
+        boxes[name] = {"a": f"j{a}", "b": f"j{b}"}
+        parts[name] = ephs.transformer({"a": quantity.momentum, "b": quantity.momentum}, [[ratio]])
+    if draw(st.booleans()):
+        boxes["still"], parts["still"] = {"p": "j0"}, components.ground(quantity.momentum)
+    return Pattern(junctions=junctions, boxes=boxes)(parts)
+
+
+def in_order(system, rng):
+    """Fold site by site in a random order until none is left."""
+    done = system.flatten()
+    while sites := [site for site in sites_of(done, FOLD) if not site.refusal]:
+        done = sites[int(rng.integers(len(sites)))].apply(done).system
+    return done
+
+
+@settings(max_examples=60)
+@given(system=lever_networks(), seed=seeds)
+def test_the_order_of_folding_makes_no_difference(system, seed):
+    rng = np.random.default_rng(seed)
+    one, other = in_order(system, rng), in_order(system, rng)
+    assert one.pattern.isomorphic(other.pattern, fix_interface=True)
+    same_relation(one, other, seed)
+    same_relation(system, one, seed)
+    whole = rewrite(system, [FOLD]).system
+    assert whole.pattern.isomorphic(one.pattern, fix_interface=True)
+
+
+@settings(max_examples=60)
+@given(system=lever_networks(loops=True), seed=seeds)
+def test_loops_of_levers_mean_what_they_did(system, seed):
+    """They repeat what others say, or hold everything; the split of a flow between two ports of a box is arbitrary."""
+    rng = np.random.default_rng(seed)
+    one, other = in_order(system, rng), in_order(system, rng)
+    same_relation(one, other, seed)
+    same_relation(system, one, seed)
+
+
+@settings(max_examples=10)
+@given(scene=mechanisms(max_bodies=2), seed=seeds)
+def test_nor_does_it_in_mechanisms(scene, seed):
+    rng = np.random.default_rng(seed)
+    system = scene.system()
+    one = in_order(system, rng)
+    assert rewrite(system, [FOLD]).system.pattern.isomorphic(one.pattern, fix_interface=True)
+    same_relation(system, one, seed)
+
+
+def chain(**middle):
+    """A mass, a lever, a junction that a test may spoil, and a second lever to friction."""
+    junctions = {name: junction(quantity.momentum) for name in ("a", "b", "c")}
+    junctions["b"] = junction(quantity.momentum, exposed=middle.get("exposed", False))
+    junctions["s"] = junction(quantity.entropy)
+    boxes = {
+        "mass": {"p": "a"},
+        "first": {"x": "a", "y": "b"},
+        "second": {"x": "b", "y": "c"},
+        "rub": {"p": "c", "s": "s"},
+        "env": {"s": "s"},
+    }
+    ports = {"x": quantity.momentum, "y": quantity.momentum}
+    parts = {
+        "mass": library.point_mass(m=2.0),
+        "first": ephs.transformer(ports, [[3.0]]),
+        "second": ephs.transformer(ports, [[0.5]]),
+        "rub": library.friction(d=0.4),
+        "env": library.environment(),
+    }
+    if middle.get("stored"):
+        boxes["load"], parts["load"] = {"p": "b"}, library.point_mass(m=1.0)
+    return Pattern(junctions=junctions, boxes=boxes)(parts)
+
+
+def test_levers_in_series_multiply():
+    done = rewrite(chain(), [FOLD])
+    assert {str(path) for path, _ in done.system.leaves()} == {"mass", "rub", "env"}
+    rub = dict(done.system.leaves())[Path.of("rub")]
+    matrix = rub.matrix({}, np.array([1.0, 0.0]), Reference())
+    assert matrix[0, 0] / 293.15 == pytest.approx(0.4 * (3.0 * 0.5) ** 2, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("fault", "words"), [("exposed", "b is an outer port"), ("stored", "load stores a state at b")]
+)
+def test_a_junction_that_is_needed_is_not_folded(fault, words):
+    system = chain(**{fault: True})
+    refused = [site for site in sites_of(system, FOLD) if words in site.refusal]
+    assert refused
+    with pytest.raises(ephs.AssemblyError, match=words):
+        refused[0].apply(system)
+    done = rewrite(system, [FOLD]).system
+    assert {str(path) for path, _ in done.leaves()} >= {"first", "rub"}
+    same_relation(system, done, 3)
+
+
+def test_a_junction_whose_state_is_read_is_not_folded():
+    reader = ephs.gyrator(
+        {"a": quantity.flux_linkage, "b": quantity.angular_momentum, "~x": quantity.momentum},
+        lambda x: [[0.0, x], [-x, 0.0]],
+    )
+    junctions = {name: junction(quantity.momentum, exposed=name == "p") for name in ("p", "b")}
+    junctions |= {
+        "a": junction(quantity.flux_linkage, exposed=True),
+        "c": junction(quantity.angular_momentum, exposed=True),
+    }
+    boxes = {"lever": {"x": "p", "y": "b"}, "reader": {"a": "a", "b": "c", "x": "~b"}}
+    ports = {"x": quantity.momentum, "y": quantity.momentum}
+    system = Pattern(junctions=junctions, boxes=boxes)(lever=ephs.transformer(ports, [[2.0]]), reader=reader)
+    refusals = [site.refusal for site in sites_of(system, FOLD)]
+    assert any("reader reads the state of b" in refusal for refusal in refusals)
+    assert all(refusals)
+
+
+# ---- steps -----------------------------------------------------------------------------------------------------
+
+
+def agree(scene, method, step, steps):
+    """Paper and folded forms after some steps, relative to the states' sizes; 1e-12 a step."""
+    paper, folded = (
+        ephs.simulate(scene, steps * step, step=step, method=method, form=form) for form in ("paper", "folded")
+    )
+    assert list(paper) == list(folded)
+    for path in paper:
+        scale = max(1.0, float(np.abs(paper[path]).max(initial=0.0)))
+        assert np.abs(paper[path] - folded[path]).max(initial=0.0) <= steps * 1e-12 * scale, path
+    assert folded.stats["unknowns"] < paper.stats["unknowns"]
+    assert folded.summary()["unknowns"] == {"paper": paper.stats["unknowns"], "used": folded.stats["unknowns"]}
+    scale = 1.0 + np.abs(paper.energy).max()
+    for books in ("energy", "heat", "work", "entropy", "kinetic", "potential"):
+        assert np.abs(getattr(paper, books) - getattr(folded, books)).max() <= steps * 1e-12 * scale, books
+    return paper, folded
+
+
+@pytest.mark.parametrize("method", ["natural", "natural4"])
+@pytest.mark.parametrize("file", SCENES, ids=lambda file: file.stem)
+def test_folded_steps_are_the_same_steps(file, method):
+    scene = ephs.load(file)
+    agree(scene, method, 5e-4 if file.stem == "heavy-top" else 2e-3, 20)
+
+
+@pytest.mark.parametrize("method", ["natural", "natural4"])
+@pytest.mark.parametrize("stem", ["mbs", "chain"])
+def test_coarse_steps_are_the_same_too(stem, method):
+    """There the corrections are large: measured in the frames of the bodies they would be others."""
+    agree(ephs.load(SCENES[0].parent / f"{stem}.toml"), method, 0.1 if stem == "mbs" else 0.05, 4)
+
+
+@pytest.mark.parametrize("stem", ["four-bar", "universal"])
+def test_everything_that_is_read_from_a_motion_is_there(stem):
+    scene = ephs.load(SCENES[0].parent / f"{stem}.toml")
+    paper, folded = agree(scene, "natural", 2e-3, 2)
+    for name, _ in scene.all_joints():
+        one, other = paper.joint(name), folded.joint(name)
+        assert np.allclose(one.coordinate, other.coordinate, atol=1e-11)
+        assert np.allclose(one.rate, other.rate, atol=1e-9)
+        assert np.allclose(one.wrench, other.wrench, atol=1e-6, equal_nan=True)
+    for name, _ in scene.all_bodies():
+        assert np.allclose(paper.body(name).velocity, folded.body(name).velocity, atol=1e-9)
+    assert set(folded.ledger().parts) == set(paper.ledger().parts)
+    assert folded.system == paper.system
+
+
+@pytest.mark.parametrize("case", SMALL, ids=lambda case: case.name)
+def test_so_they_are_in_the_benchmarks(case):
+    agree(case.with_friction(), "natural", case.step / 4, 5)
+
+
+@pytest.mark.parametrize("method", ["natural", "natural4"])
+@settings(max_examples=12)
+@given(scene=mechanisms(max_bodies=3))
+def test_and_in_generated_mechanisms(method, scene):
+    agree(scene, method, 5e-3, 4)
+
+
+def test_chosen_steps_inputs_and_events_are_served():
+    """What reads states reads the same states; the energies of dense output are the same too."""
+    scene = ephs.load(SCENES[0].parent / "four-bar.toml")
+    found = [
+        ephs.simulate(
+            scene,
+            0.3,
+            method="natural4",
+            form=form,
+            rtol=1e-6,
+            atol=1e-6,
+            save_at=[0.1, 0.25],
+            inputs={"joints.main": lambda t, state: 0.1 - 0.01 * float(state["bodies.crank.ke.p"][0])},
+            events=[ephs.Event(lambda t, state: t - 0.2, "then")],
+        )
+        for form in ("paper", "folded")
+    ]
+    for path in found[0]:
+        assert np.allclose(found[0][path], found[1][path], rtol=1e-6, atol=1e-6)
+    assert found[0].energy[-1] == pytest.approx(found[1].energy[-1], rel=1e-8)
+    assert found[0].events[0].t == pytest.approx(0.2)
+    states = [one.events[0].state["bodies.rocker.pe.q"] for one in found]
+    assert np.allclose(*states, atol=1e-6)
+
+
+def test_a_failed_run_keeps_the_papers_solution():
+    scene = ephs.load(SCENES[0].parent / "heavy-top.toml")
+    with pytest.raises(ephs.SimulationError) as failed:
+        ephs.simulate(scene, 1.0, step=0.1, method="natural", form="folded")
+    assert failed.value.partial["bodies.top.pe.q"].shape[1] == 7
+
+
+def test_methods_in_joint_coordinates_have_no_folded_form():
+    scene = ephs.load(SCENES[0].parent / "mbs.toml")
+    with pytest.raises(ephs.OptionError, match="form is 'folded', expected reduced"):
+        ephs.simulate(scene, 1.0, method="rk87", form="folded")
+    assert ephs.simulate(scene, 0.01, form="folded").stats["method"] == "natural4"
+    assert isinstance(ephs.simulate(scene, 0.01, form="folded").system, System)
