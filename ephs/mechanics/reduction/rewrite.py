@@ -5,7 +5,7 @@ that it has checked, in words, and a map of states in both directions.
 """
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import StrEnum
 from typing import final
 
@@ -61,11 +61,11 @@ class StateMap:
         return StateMap(lambda state: other.forward(self.forward(state)), back)
 
 
-@dataclass(slots=True)
+@final
 class Draft:
-    """A flat system that is being rewritten; private to a rewrite, so that many sites cost one new pattern.
+    """A flat system that is being rewritten: what rules look at and change, so that many sites cost one new pattern.
 
-    Parameters
+    Attributes
     ----------
     junctions, wires, fillings
         By path: junctions; ports of each box; what fills it.
@@ -73,23 +73,17 @@ class Draft:
         Classes of junctions that share their state.
     """
 
-    junctions: dict[Path, Junction]
-    wires: dict[Path, dict[Path, Port]]
-    fillings: dict[Path, Primitive]
-    links: frozenset[frozenset[Path]]
-    _at: dict[Path, dict[tuple[Path, Path], bool]] = field(default_factory=dict[Path, dict[tuple[Path, Path], bool]])
-
-    @staticmethod
-    def of(system: System) -> "Draft":
-        """A copy of a system, flattened."""
+    def __init__(self, system: System) -> None:
         flat = system.flatten()
         pattern = flat.pattern
-        wires = {box: dict(content.ports.items()) for box, content in pattern.boxes.items()}
-        draft = Draft(dict(pattern.junctions.items()), wires, dict(flat.leaves()), pattern.links)
-        for box, ports in wires.items():
+        self.junctions: dict[Path, Junction] = dict(pattern.junctions.items())
+        self.wires = {box: dict(content.ports.items()) for box, content in pattern.boxes.items()}
+        self.fillings: dict[Path, Primitive] = dict(flat.leaves())
+        self.links = pattern.links
+        self._at: dict[Path, dict[tuple[Path, Path], bool]] = {}
+        for box, ports in self.wires.items():
             for port, where in ports.items():
-                draft._at.setdefault(where.junction, {})[box, port] = where.power
-        return draft
+                self._at.setdefault(where.junction, {})[box, port] = where.power
 
     def on(self, junction: Path) -> list[tuple[Path, Path]]:
         """The power ports on a junction: (box, port)."""
@@ -174,7 +168,7 @@ class Site:
         """
         if self.refusal:
             raise AssemblyError("rewrite", self.where, rule=self.rule, found=self.refusal)
-        draft = Draft.of(system)
+        draft = Draft(system)
         states = self.make(draft)
         return Rewritten(draft.system(), states, (self,))
 
@@ -224,14 +218,14 @@ class Rule:
 
 def sites_of(system: System, rule: Rule) -> tuple[Site, ...]:
     """Where a rule applies or is refused, anywhere in a hierarchical system; paths are those of its flat form."""
-    draft = Draft.of(system)
+    draft = Draft(system)
     found = (rule.at(draft, place) for place in rule.places(draft))
     return tuple(site for site in found if site is not None)
 
 
 def rewrite(system: System, rules: Iterable[Rule]) -> Rewritten:
     """Rewrite a system by rules until none applies; the order makes no difference but for names."""
-    draft = Draft.of(system)
+    draft = Draft(system)
     states, done, known = StateMap(), list[Site](), tuple(rules)
     again = True
     while again:
