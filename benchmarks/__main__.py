@@ -1,11 +1,31 @@
-"""``python -m benchmarks [NAME ...] [--out DIR]`` prints the tables as Markdown, charts go into DIR."""
+"""``python -m benchmarks [NAME ...] [--out DIR] [--json FILE]`` prints tables as Markdown.
 
+Charts go into DIR, the numbers of those benchmarks that compare with other programs into FILE.
+"""
+
+import json
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
-from benchmarks import accuracy, balance, cells, long, order, orders, size, traced
+from benchmarks import (
+    accuracy,
+    balance,
+    cells,
+    evaluation,
+    growth,
+    implicit,
+    long,
+    order,
+    orders,
+    size,
+    start,
+    traced,
+    work,
+)
+from benchmarks.report import Report
 
-TABLES = {
+TABLES: dict[str, Callable[[Path | None], str | Report]] = {
     "order": lambda _: order.table(),
     "orders": lambda _: orders.table(),
     "balance": lambda _: balance.table(),
@@ -14,26 +34,38 @@ TABLES = {
     "traced": lambda _: traced.table(),
     "accuracy": lambda _: accuracy.table(),
     "long": long.table,
+    "evaluation": lambda _: evaluation.report(),
+    "work": work.report,
+    "growth": lambda _: growth.report(),
+    "start": lambda _: start.report(),
+    "implicit": lambda _: implicit.report(),
 }
 
 
 def main(words: list[str]) -> int:
     """Measure what is named, everything where nothing is."""
-    out: Path | None = None
     names = list(words)
-    if "--out" in names:
-        at = names.index("--out")
-        if at + 1 == len(names):
-            print("--out: found nothing after it, expected a folder", file=sys.stderr)
-            return 2
-        out = Path(names.pop(at + 1))
-        names.pop(at)
+    files: dict[str, Path | None] = {"--out": None, "--json": None}
+    for key, what in (("--out", "a folder"), ("--json", "a file")):
+        if key in names:
+            at = names.index(key)
+            if at + 1 == len(names):
+                print(f"{key}: found nothing after it, expected {what}", file=sys.stderr)
+                return 2
+            files[key] = Path(names.pop(at + 1))
+            names.pop(at)
     unknown = [name for name in names if name not in TABLES]
     if unknown:
         print(f"{', '.join(unknown)}: no such benchmark; there are {', '.join(TABLES)}", file=sys.stderr)
         return 2
+    found: dict[str, object] = {}
     for name in names or TABLES:
-        print(f"\n## {name}\n\n{TABLES[name](out)}")
+        result = TABLES[name](files["--out"])
+        if isinstance(result, Report):
+            found[name] = list(result.rows)
+        print(f"\n## {name}\n\n{result.text if isinstance(result, Report) else result}")
+        if files["--json"] is not None:
+            files["--json"].write_text(json.dumps(found, indent=1), encoding="utf-8")
     return 0
 
 

@@ -7,7 +7,7 @@ all of 1 m and 1 kg, that move at 1 m/s: they pass configurations in which their
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import NamedTemporaryFile, TemporaryDirectory
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 import ephs
 from ephs.mechanics.scene.model import Scene
 
-__all__ = ["FAMILIES", "bodies", "named", "scene", "text"]
+__all__ = ["FAMILIES", "bodies", "named", "scene", "text", "write"]
 
 Array = NDArray[np.float64]
 LENGTH, WIDTH, DEPTH, MASS = 1.0, 0.1, 0.06, 1.0
@@ -128,6 +128,13 @@ def scene(family: str, count: int) -> Scene:
         file = Path(folder) / f"{family}-{count}.toml"
         file.write_text(text(family, count), encoding="utf-8")
         return ephs.load(file)
+
+
+def write(family: str, count: int) -> str:
+    """A scene of a family as a file of its own for a while; its path. Who asks for it removes it."""
+    with NamedTemporaryFile("w", suffix=".toml", delete=False, encoding="utf-8") as file:
+        file.write(text(family, count))
+    return file.name
 
 
 def named(name: str) -> Scene:

@@ -1,12 +1,12 @@
 """Work and precision: what an error costs, method by method."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import final
 
 import numpy as np
 
-from ephs.mechanics.methods import METHODS
+from ephs.mechanics.methods import AUTO, METHODS
 from ephs.mechanics.scene.model import Scene
 from ephs.show.charts.peers import PEERS, PeerError, PeerRun
 from ephs.show.charts.reference import Motion, Reference, tight_reference
@@ -72,13 +72,15 @@ def work_precision(
     steps: Sequence[int] = STEPS,
     peers: bool = True,
     note: Callable[[str], None] | None = None,
+    enough: Callable[[Point], bool] | None = None,
 ) -> list[Point]:
     """Measure error, time and evaluations of every method over its settings.
 
     Parameters
     ----------
     methods
-        Names of `METHODS` or of `PEERS`; all unless given. Methods that can do both run over tolerances and over steps.
+        Names of `METHODS` or of `PEERS`, or ``"auto"``; all but that unless given. Methods that can do both run over
+        tolerances and over steps.
     reference
         What is true at ``until``; a tight run unless given.
     repeats
@@ -89,6 +91,8 @@ def work_precision(
         Whether other programs that are installed are measured too, where they can do the scene.
     note
         Called with the name of each method before it is measured.
+    enough
+        Called with each point: whether the method need not be refined further.
     """
     truth = tight_reference(scene, until) if reference is None else reference
     everything = [*(name for name, method in METHODS.items() if method.scenes), *(PEERS if peers else ())]
@@ -97,15 +101,19 @@ def work_precision(
         if note is not None:
             note(name)
         for settings in _settings(name, until, tolerances, steps):
-            if name in METHODS:
-                points += _own(scene, until, name, settings, truth, repeats, limit)
-            elif name in PEERS:
-                points += _foreign(scene, until, name, settings, truth, repeats, limit, told=methods is not None)
+            if name in PEERS:
+                found = _foreign(scene, until, name, settings, truth, repeats, limit, told=methods is not None)
+            else:
+                found = _own(scene, until, name, settings, truth, repeats, limit)
+            for point in found:
+                points.append(point)
+                if enough is not None and enough(point):
+                    break
     return points
 
 
 def _settings(name: str, until: float, tolerances: Sequence[float], steps: Sequence[int]) -> list[list[Setting]]:
-    method = METHODS.get(name) or PEERS[name]
+    method = AUTO if name == "auto" else METHODS.get(name) or PEERS[name]
     found: list[list[Setting]] = []
     if method.adaptive:
         found.append([Setting("tolerance", value) for value in tolerances])
@@ -116,27 +124,25 @@ def _settings(name: str, until: float, tolerances: Sequence[float], steps: Seque
 
 def _own(
     scene: Scene, until: float, name: str, settings: list[Setting], truth: Reference, repeats: int, limit: float
-) -> list[Point]:
-    points: list[Point] = []
+) -> Iterator[Point]:
     for setting in settings:
         first = attempt(scene, until, name, setting, limit=limit)
         if first.solution is None:
-            points.append(Point(name, setting, np.nan, np.nan, 0, 0, first.ending, first.message))
+            yield Point(name, setting, np.nan, np.nan, 0, 0, first.ending, first.message)
             if first.ending is not Ending.FAILED:  # a finer setting changes nothing, or takes longer still
-                break
+                return
             continue
         if setting is settings[0] and first.wall > limit / 4.0:  # kernels may have been compiled
             first = attempt(scene, until, name, setting, limit=limit)
             if first.solution is None:
-                break
+                return
         rest = [attempt(scene, until, name, setting, limit=limit) for _ in range(_more(repeats, first.wall, limit))]
         runs = [run.solution.stats["integrate_s"] for run in [*rest, first] if run.solution is not None]
         stats, error = first.solution.stats, float(Motion.of(first.solution).off(truth.motion)[-1])
         count = int(stats.get("evaluations", stats.get("iterations", 0)))
-        points.append(_point(name, setting, error, float(np.median(runs)), count, int(stats["steps"]), truth))
+        yield _point(name, setting, error, float(np.median(runs)), count, int(stats["steps"]), truth)
         if first.wall > limit / 4.0:
-            break
-    return points
+            return
 
 
 def _foreign(
@@ -149,30 +155,29 @@ def _foreign(
     limit: float,
     *,
     told: bool,
-) -> list[Point]:
-    points: list[Point] = []
+) -> Iterator[Point]:
     try:
         run = PEERS[name].prepare(scene, until)
     except PeerError as error:  # of all programs those that can are shown; of the one that was asked for, why not
-        refused = Point(name, settings[0], np.nan, np.nan, 0, 0, Ending.REFUSED, str(error))
-        return [refused] if told else []
+        if told:
+            yield Point(name, settings[0], np.nan, np.nan, 0, 0, Ending.REFUSED, str(error))
+        return
     for setting in settings:
         try:
             first: PeerRun = run(setting, limit)
             rest = [run(setting, limit) for _ in range(_more(repeats, first.seconds, limit))]
         except PeerError as error:
-            points.append(Point(name, setting, np.nan, np.nan, 0, 0, error.ending, str(error)))
+            yield Point(name, setting, np.nan, np.nan, 0, 0, error.ending, str(error))
             if error.ending is not Ending.FAILED:
-                break
+                return
             continue
         seconds = float(np.median([each.seconds for each in [*rest, first]]))
         still: Array = np.zeros(1)
         end = Motion(truth.motion.t[-1:], first.position[None], first.rotation[None], still, 0.0)
         error = float(end.off(_end(truth.motion))[0])
-        points.append(_point(name, setting, error, seconds, first.evaluations, first.steps, truth))
+        yield _point(name, setting, error, seconds, first.evaluations, first.steps, truth)
         if first.seconds > limit / 4.0:
-            break
-    return points
+            return
 
 
 def _end(motion: Motion) -> Motion:

@@ -19,6 +19,8 @@ TIGHT, SOFT = 1e-8, 1e-2
 """Proximal parameters of closed loops: the second passes configurations in which constraints lose rank."""
 GAIN = 100.0
 """Of Baumgarte's stabilisation of closed loops, in s⁻²."""
+MOST = 4 * 2**30
+"""Bytes of the largest array that Pinocchio makes, 48 n³ of n velocities; beyond that a scene is refused."""
 FEW = 2
 """Up to so many quaternions are treated one by one, more in arrays."""
 
@@ -70,7 +72,7 @@ class PinModel:
     Raises
     ------
     PeerError
-        The scene has springs.
+        The scene has springs, or too many freedoms.
     """
 
     def __init__(self, given: PeerScene, proximal: float = TIGHT) -> None:
@@ -109,6 +111,8 @@ class PinModel:
             body = bodies[branch.outer]
             inertia = pin.Inertia(body.mass, np.zeros(3), np.array(body.inertia))
             self.model.appendBodyToJoint(number, inertia, self._se3(SE3.inverse(own)))
+        if 48 * int(self.model.nv) ** 3 > MOST:
+            raise PeerError(f"{int(self.model.nv)} velocities, expected fewer: memory grows as their cube")
         self.data = self.model.createData()
         self.nq = int(self.model.nq)
         self.start = np.concatenate([*q, *v])

@@ -1,0 +1,62 @@
+"""How long one waits for the first result: in a new process, of a large scene, and with nothing compiled yet."""
+
+import sys
+import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from benchmarks import families
+from benchmarks.process import run
+from benchmarks.report import Report, table_of
+
+__all__ = ["measure", "report"]
+
+LIMIT = 600.0
+CASES = (("revolute-chain", 4), ("four-bar-windows", 1), ("revolute-chain", 1000), ("four-bar-windows", 320))
+
+
+def measure(family: str, size: int) -> dict[str, float]:
+    """Seconds of the import, of reading the scene, and of a first and a second short simulation with its parts.
+
+    What lies between a simulation's whole time and its integration is set-up: the system, its tables, the solution.
+    """
+    begin = time.perf_counter()
+    import ephs
+
+    imported = time.perf_counter()
+    file = Path(families.write(family, size))
+    written = time.perf_counter()
+    scene = ephs.load(file)
+    loaded = time.perf_counter()
+    file.unlink()
+    found = {"import": imported - begin, "load": loaded - written}
+    for name in ("first", "second"):
+        start = time.perf_counter()
+        sol = ephs.simulate(scene, 1e-3, method="rk87", rtol=1e-6, atol=1e-6, save_at=[1e-3])
+        whole = time.perf_counter() - start
+        found |= {name: whole, f"{name} set-up": whole - float(sol.stats["integrate_s"])}
+    return found
+
+
+def report() -> Report:
+    """One row a scene, with compiled functions on disk; then one with an empty cache."""
+    rows: list[dict[str, Any]] = []
+    for family, size in CASES:
+        key = {"scene": f"{family}-{size}"}
+        call = f"benchmarks.start:measure({family!r}, {size})"
+        run(call, LIMIT, key)  # fills the cache
+        begin = time.perf_counter()
+        found = run(call, LIMIT, key)
+        rows.append({**key, "cache": "filled", "process": time.perf_counter() - begin, **found})
+        print(rows[-1], file=sys.stderr, flush=True)
+    with TemporaryDirectory() as folder:
+        key = {"scene": f"{CASES[0][0]}-{CASES[0][1]}"}
+        call = f"benchmarks.start:measure({CASES[0][0]!r}, {CASES[0][1]})"
+        begin = time.perf_counter()
+        found = run(call, LIMIT, key, {"NUMBA_CACHE_DIR": folder})
+        rows.append({**key, "cache": "empty", "process": time.perf_counter() - begin, **found})
+    columns = {"scene": ("scene", 1.0), "compiled functions": ("cache", 1.0), "whole process [s]": ("process", 1.0)}
+    parts = ("import", "load", "first", "first set-up", "second", "second set-up")
+    columns |= {f"{part} [s]": (part, 1.0) for part in parts} | {"": ("failure", 1.0)}
+    return Report(table_of(rows, columns), rows)
