@@ -8,8 +8,8 @@ from ephs.mechanics.redundancy import dependences, in_words, indeterminate, wren
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.simulate import problem_of_scene, problem_of_system
 from ephs.mechanics.solve.errors import SolveError
-from ephs.mechanics.solve.instant import mobility
 from ephs.mechanics.solve.integrate import Grid, integrate
+from ephs.mechanics.solve.mobility import mobility
 from ephs.mechanics.solve.problem import Problem
 from ephs.semantics.errors import SemanticsError
 from ephs.semantics.laws import Probe, system_law

@@ -14,7 +14,8 @@ from ephs.mechanics.batch import adjoint_inverse, compose, inverse, rotations
 from ephs.mechanics.build import component_path
 from ephs.mechanics.scene.geometry import Coupling, coupling_of
 from ephs.mechanics.scene.model import GROUND, Joint, Scene
-from ephs.mechanics.solve.instant import instant, mobility
+from ephs.mechanics.solve.instant import instant
+from ephs.mechanics.solve.mobility import mobility
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
