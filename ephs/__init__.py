@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from ephs.mechanics.check import check_model as check_model
     from ephs.mechanics.dynamics import dynamics as dynamics
     from ephs.mechanics.methods import register_method as register_method
+    from ephs.mechanics.reduction.report import reduce as reduce
     from ephs.mechanics.scene import Scene as Scene
     from ephs.mechanics.scene import SceneError as SceneError
     from ephs.mechanics.scene.load import load as load
@@ -68,6 +69,7 @@ _HOMES = {
     "ephs.mechanics.check": ("check_model",),
     "ephs.mechanics.dynamics": ("dynamics",),
     "ephs.mechanics.methods": ("register_method",),
+    "ephs.mechanics.reduction.report": ("reduce",),
     "ephs.mechanics.simulate": ("load_solution", "simulate"),
     "ephs.mechanics.solve.errors": ("Interrupted", "OptionError", "SimulationError"),
     "ephs.mechanics.solve.events": ("Event",),

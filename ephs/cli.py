@@ -27,6 +27,7 @@ Exergetic port-Hamiltonian systems: compose physical models by pattern, simulate
   ephs run scenes/slider-crank.toml --until 5     simulate; writes out/slider-crank/report.html
   ephs check scenes/slider-crank.toml             check the model: structure, laws, assembly, mobility
   ephs draw scenes/slider-crank.toml -o a.svg     draw the interconnection pattern
+  ephs reduce scenes/slider-crank.toml            what a reduction takes out, and why it may
   ephs equations scenes/slider-crank.toml         print the equations; --latex for a paper
   ephs chart stability -o out/charts              draw where which method fails; work-precision: its speed and error
 
@@ -228,6 +229,28 @@ def equations(
         system = model.system() if isinstance(model, ephs.Scene) else model
         found = system.equations(form)
     print(found.latex() if latex else found)
+    return 0
+
+
+@app.command
+def reduce(scene: str, /, *, base: Base = "fixed", adjust: bool = False) -> int:
+    """List what the reduction takes out, why it may, and how many unknowns are left.
+
+    Parameters
+    ----------
+    scene
+        A scene file (.toml), or FILE.py:NAME.
+    base
+        How the root of an imported model meets the ground.
+    adjust
+        Assemble a scene that does not quite close.
+    """
+    import ephs
+
+    model = load_model(scene, base=base, adjust=adjust)
+    with addressed(scene):
+        found = ephs.reduce(model)
+    print(found)
     return 0
 
 

@@ -204,5 +204,9 @@ def _ends(draft: Draft, start: Path) -> int:
     return ends + still
 
 
-FOLD = Rule(NAME, Strength.RELATION, _places, _at)
+WHY = (
+    "behind it nothing is stored, nothing is read and no port is open: what lies there may as well be seen from before "
+    "it; and where the effort is zero whatever happens, as at the ground, nothing needs a port"
+)
+FOLD = Rule(NAME, Strength.RELATION, WHY, _places, _at)
 """Fold what determines an effort from another one."""

@@ -204,6 +204,8 @@ class Rule:
 
     Parameters
     ----------
+    why
+        On what condition, and why it may be done then, in words for all its sites.
     places
         Where in a draft it may be worth a look.
     at
@@ -212,6 +214,7 @@ class Rule:
 
     name: str
     strength: Strength
+    why: str
     places: Callable[[Draft], Iterable[tuple[Path, ...]]]
     at: Callable[[Draft, tuple[Path, ...]], Site | None]
 

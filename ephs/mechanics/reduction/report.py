@@ -1,0 +1,48 @@
+"""`reduce`: from the paper's equations to the least that serve, step by step, with the reasons."""
+
+from ephs.mechanics.reduction.coordinates import coordinate_steps
+from ephs.mechanics.reduction.rewrite import rewrite
+from ephs.mechanics.reduction.rules import RULES
+from ephs.mechanics.reduction.steps import Reduction, Step, listed
+from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.simulate import problem_of_scene
+from ephs.semantics.system import System
+
+__all__ = ["reduce"]
+
+
+def reduce(model: System | Scene) -> Reduction:
+    """What a reduction takes out of a model, why it may, and how many unknowns are left after each step.
+
+    Rewrites of the system come first; of a scene the reductions of coordinates follow, down to the form that
+    ``form="reduced"`` integrates.
+
+    Raises
+    ------
+    SemanticsError
+        The model has no square system of equations.
+    """
+    if isinstance(model, Scene):
+        problem = problem_of_scene(model)
+        system, name = problem.system, model.name
+    else:
+        problem, system, name = None, model, "system"
+    # an outer port whose effort is prescribed has a flow for an unknown, here and in all that follow
+    held = sum(system.interface[port].quantity.space.dim for port in problem.prescribed) if problem else 0
+    before = _unknowns(system) + held
+    steps: list[Step] = []
+    for rule in RULES:
+        done = rewrite(system, [rule])
+        if done.done:
+            system, after = done.system, _unknowns(done.system) + held
+            where = tuple(dict.fromkeys(str(site.where) for site in done.done))
+            steps.append(Step(rule.name, rule.strength, where, f"{listed(where)}: {rule.why}", before, after))
+            before = after
+    if problem is not None and isinstance(model, Scene):
+        steps += coordinate_steps(model, problem, before)
+    return Reduction(name, tuple(steps))
+
+
+def _unknowns(system: System) -> int:
+    d = system.descriptor()
+    return d.rate_size + d.effort_size + d.multiplier_size

@@ -1,0 +1,8 @@
+"""The rewrites that there are, in the order in which `ephs.reduce` does them."""
+
+from ephs.mechanics.reduction.folding import FOLD
+from ephs.mechanics.reduction.rewrite import Rule
+
+__all__ = ["RULES"]
+
+RULES: tuple[Rule, ...] = (FOLD,)

@@ -1,0 +1,324 @@
+"""What `reduce` says: groups, loops, redundancy and cyclic coordinates against independent computations of each."""
+
+from pathlib import Path as File
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+import ephs
+from benchmarks.cases import CASES
+from ephs import library
+from ephs.cli import main
+from ephs.mechanics.build import component_path, initial_state
+from ephs.mechanics.reduced.mechanism import reduce_scene
+from ephs.mechanics.reduction import coordinates
+from ephs.mechanics.reduction.rewrite import Strength
+from ephs.mechanics.scene.geometry import coupling_of
+from ephs.mechanics.simulate import problem_of_scene
+from ephs.mechanics.solve.instant import mobility
+from ephs.mechanics.solve.model import compile_model
+from ephs.semantics.spaces import SE3
+from ephs.testing import mechanisms
+
+SCENES = sorted((File(__file__).parents[3] / "scenes").glob("*.toml"))
+BY_NAME = {case.name: case for case in CASES}
+
+
+def reduced_of(scene):
+    problem = problem_of_scene(scene)
+    return reduce_scene(
+        scene, problem, compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
+    )
+
+
+def scene_of(tmp_path, text):
+    file = tmp_path / "scene.toml"
+    file.write_text("format = 1\nname = 'scene'\n" + text)
+    return ephs.load(file)
+
+
+def named(reduction, name):
+    return next(step for step in reduction.steps if step.name == name)
+
+
+# ---- groups ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("stem", "words"),
+    [
+        ("four-bar", "SE(2) (dimension 3) with the normal (0, 0, 1)"),
+        ("heavy-top", "SO(3) (dimension 3) about the point (0, 0, 0)"),
+    ],
+)
+def test_the_group_of_a_motion_is_named(stem, words):
+    step = named(ephs.reduce(ephs.load(SCENES[0].parent / f"{stem}.toml")), "the group of the motion")
+    assert words in step.reason
+    assert step.strength == Strength.TRAJECTORIES
+
+
+SLIDES = """
+[bodies.a]
+mass = 1.0
+inertia = [1.0, 1.0, 1.0]
+[bodies.b]
+mass = 1.0
+inertia = [1.0, 1.0, 1.0]
+[joints.one]
+type = "prismatic"
+bodies = ["ground", "a"]
+at = [0.0, 0.0, 0.0]
+axis = [1.0, 0.0, 0.0]
+[joints.two]
+type = "{kind}"
+bodies = ["a", "b"]
+at = [0.0, 0.0, 1.0]
+axis = [0.0, 1.0, 0.0]
+"""
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"), [("prismatic", "ℝ²"), ("revolute", "SE(2)"), ("cylindrical", "SE(2)×ℝ"), ("spherical", "SE(3)")]
+)
+def test_slides_and_pins_make_the_groups_that_they_generate(tmp_path, kind, name):
+    (part,) = coordinates.mechanisms(reduced_of(scene_of(tmp_path, SLIDES.format(kind=kind))))
+    assert part.group.name == name
+    assert part.bodies == ("a", "b")
+
+
+@settings(max_examples=15)
+@given(scene=mechanisms(max_bodies=3), seed=st.integers(0, 2**20))
+def test_bodies_never_leave_the_group_of_their_mechanism(scene, seed):
+    """Displacements from the start are in it: the logarithm of q q⁰⁻¹, where it is short, lies in the algebra."""
+    found = coordinates.mechanisms(reduced_of(scene))
+    solution = ephs.simulate(scene, 0.05, method="natural", step=0.01)
+    for part in found:
+        for name in part.bodies:
+            poses = solution[component_path("bodies", name) / "pe" / "q"]
+            twist = SE3.log(SE3.compose(poses[-1], SE3.inverse(poses[0])))
+            outside = twist - part.group.basis @ (part.group.basis.T @ twist)
+            assert np.abs(outside).max() <= 1e-10 * max(1.0, np.abs(twist).max())
+
+
+# ---- loops and redundancy ----------------------------------------------------------------------------------------
+
+
+def check_rank(scene):
+    """The tree's freedoms that the loops' equations leave are the motions that the paper's constraints leave."""
+    problem, reduced = problem_of_scene(scene), reduced_of(scene)
+    found = mobility(problem.descriptor, problem.descriptor.pack(problem.initial))
+    assert reduced.freedoms - coordinates._rank(reduced, coordinates.loops(reduced)) == found.mobility
+    steps = list(coordinates.coordinate_steps(scene, problem, 1000))
+    unknowns = next((s for s in steps if s.name == "loops closed within their groups"), steps[0]).after
+    assert unknowns == 2 * reduced.freedoms + sum(loop.rows for loop in coordinates.loops(reduced))
+    assert unknowns == reduced.unknowns
+    return steps
+
+
+@pytest.mark.parametrize("file", SCENES, ids=lambda file: file.stem)
+def test_loops_impose_all_that_they_did(file):
+    check_rank(ephs.load(file))
+
+
+@settings(max_examples=25)
+@given(scene=mechanisms(max_bodies=3))
+def test_so_they_do_in_generated_mechanisms(scene):
+    check_rank(scene)
+
+
+def test_the_squeezer_closes_three_loops_with_two_equations_each():
+    steps = check_rank(BY_NAME["andrews-squeezer"].scene())
+    loop = next(step for step in steps if step.name == "loops closed within their groups")
+    assert loop.before - loop.after == 9
+    assert loop.reason.count("imposes 2 in place of 5") == 3
+    assert not any(step.name == "redundant constraints" for step in steps)
+
+
+def test_what_no_group_explains_is_found_by_rank():
+    """Both ends of the shafts of a universal joint are held: turning about them closes only where they meet."""
+    scene = ephs.load(SCENES[0].parent / "universal.toml")
+    reduced = reduced_of(scene)
+    step = named(ephs.reduce(scene), "redundant constraints")
+    (loop,) = coordinates.loops(reduced)
+    assert step.before - step.after == loop.rows - coordinates._rank(reduced, (loop,))
+    assert "output repeats" in step.reason
+    assert step.strength == Strength.MOTION
+
+
+# ---- cyclic coordinates -------------------------------------------------------------------------------------------
+
+
+def count(scene):
+    reduced = reduced_of(scene)
+    return sum(coordinates.cyclic(scene, reduced, part).dim for part in coordinates.mechanisms(reduced))
+
+
+TOP = """
+[world]
+gravity = {gravity}
+[bodies.top]
+mass = 1.0
+inertia = [1.0, 1.0, 1.0]
+position = [0.0, 0.0, 1.0]
+{joint}
+"""
+PIVOT = """
+[joints.tip]
+type = "{kind}"
+bodies = ["ground", "top"]
+at = [0.0, 0.0, 0.0]
+axis = {axis}
+{more}
+"""
+UP, ACROSS, TILTED = "[0.0, 0.0, 1.0]", "[1.0, 0.0, 0.0]", "[0.6, 0.0, 0.8]"
+
+
+@pytest.mark.parametrize(
+    ("gravity", "kind", "axis", "more", "expected"),
+    [
+        ("[0.0, 0.0, 0.0]", None, UP, "", 6),
+        ("[0.0, 0.0, -9.81]", None, UP, "", 3),
+        ("[0.0, 0.0, -9.81]", "spherical", UP, "", 1),
+        ("[0.0, 0.0, 0.0]", "spherical", UP, "", 3),
+        ("[0.0, 0.0, -9.81]", "revolute", UP, "", 1),
+        ("[0.0, 0.0, -9.81]", "revolute", TILTED, "", 0),
+        ("[0.0, 0.0, -9.81]", "prismatic", ACROSS, "", 1),
+        ("[0.0, 0.0, -9.81]", "prismatic", UP, "", 0),
+        ("[0.0, 0.0, -9.81]", "cylindrical", UP, "", 1),
+        ("[0.0, 0.0, -9.81]", "planar", UP, "", 3),
+        ("[0.0, 0.0, -9.81]", "planar", ACROSS, "", 1),
+        ("[0.0, 0.0, -9.81]", "screw", UP, "pitch = 0.1", 0),
+        ("[0.0, 0.0, 0.0]", "screw", UP, "pitch = 0.1", 1),
+        ("[0.0, 0.0, -9.81]", "revolute", UP, "stiffness = 2.0", 0),
+        ("[0.0, 0.0, -9.81]", "revolute", UP, "friction = 2.0", 1),
+    ],
+)
+def test_cyclic_coordinates_of_one_joint(tmp_path, gravity, kind, axis, more, expected):
+    joint = "" if kind is None else PIVOT.format(kind=kind, axis=axis, more=more)
+    assert count(scene_of(tmp_path, TOP.format(gravity=gravity, joint=joint))) == expected
+
+
+def test_a_spring_to_the_ground_and_a_loop_read_where_a_mechanism_is(tmp_path):
+    joint = PIVOT.format(kind="spherical", axis=UP, more="")
+    spring = "[springs.s]\nbodies = ['ground', 'top']\nat1 = [1.0, 0.0, 0.0]\nat2 = [0.0, 0.2, 0.0]\nstiffness = 1.0\n"
+    assert count(scene_of(tmp_path, TOP.format(gravity="[0.0, 0.0, -9.81]", joint=joint + spring))) == 0
+    assert count(ephs.load(SCENES[0].parent / "four-bar.toml")) == 0
+
+
+@settings(max_examples=20)
+@given(scene=mechanisms(max_bodies=3, loops=False, springs=False, heat=False), seed=st.integers(0, 2**20))
+def test_moving_along_cyclic_coordinates_changes_nothing_else(scene, seed):
+    """Started elsewhere along them, momenta and all other coordinates go as before."""
+    reduced = reduced_of(scene)
+    rng = np.random.default_rng(seed)
+    changed = {str(path): value for path, value in initial_state(scene).items()}
+    shifted = set()
+    for part in coordinates.mechanisms(reduced):
+        group = coordinates.cyclic(scene, reduced, part)
+        if not group.dim:
+            continue
+        move = SE3.exp(group.basis @ (0.5 * rng.standard_normal(group.dim)))
+        for name in part.bodies:
+            path = str(component_path("bodies", name) / "pe" / "q")
+            changed[path] = SE3.compose(move, changed[path])
+            shifted.add(path)
+        for i in part.edges:
+            edge = reduced.edges[i]
+            if edge.path is None or min(edge.body1, edge.body2) >= 0 or edge.pair.dim == 0:
+                continue
+            (joint,) = [j for n, j in scene.all_joints() if n == edge.name]
+            assume(joint.middle is None and joint.body1 == "ground")
+            path = str(edge.path / "pe" / "q_r")
+            of = coupling_of(joint)
+            frame = np.array(joint.frame1)
+            turned = SE3.compose(SE3.compose(SE3.inverse(frame), SE3.compose(move, frame)), of.include(changed[path]))
+            changed[path] = of.fit(turned, changed[path])
+            shifted.add(path)
+    assume(shifted)
+    try:
+        one, other = (ephs.simulate(scene, 0.02, method="natural", step=2e-3, initial=x) for x in (None, changed))
+    except ephs.SimulationError:  # of a run that stops the law says nothing
+        assume(False)
+    assume(one.stats["cut_steps"] == other.stats["cut_steps"] == 0)
+    for path in one:
+        if str(path) not in shifted:
+            assert np.abs(one[path] - other[path]).max(initial=0.0) <= 1e-9 * max(
+                1.0, np.abs(one[path]).max(initial=0.0)
+            ), path
+
+
+# ---- the whole ----------------------------------------------------------------------------------------------------
+
+
+TWO = """
+[bodies.a]
+mass = 1.0
+inertia = [1.0, 1.0, 1.0]
+[bodies.b]
+mass = 1.0
+inertia = [1.0, 1.0, 1.0]
+[joints.one]
+type = "revolute"
+bodies = ["ground", "a"]
+at = [0.0, 0.0, 1.0]
+axis = [1.0, 0.0, 0.0]
+friction = 0.1
+heat = "warm"
+[joints.two]
+type = "spherical"
+bodies = ["ground", "b"]
+at = [0.0, 1.0, 1.0]
+friction = 0.1
+heat = "warm"
+[thermal.warm]
+capacity = 10.0
+temperature = 300.0
+"""
+
+
+def test_mechanisms_that_share_ground_and_heat_only_are_separate(tmp_path):
+    step = named(ephs.reduce(scene_of(tmp_path, TWO)), "separate mechanisms")
+    assert step.where == ("a", "b")
+    assert "2 mechanisms of 1 to 3 freedoms" in step.reason
+
+
+@pytest.mark.parametrize("file", SCENES, ids=lambda file: file.stem)
+def test_each_step_begins_where_the_last_one_ended(file):
+    scene = ephs.load(file)
+    found = ephs.reduce(scene)
+    assert found.before == ephs.simulate(scene, 1e-4, method="natural", step=1e-4, form="paper").stats["unknowns"]
+    for one, other in zip(found.steps, found.steps[1:], strict=False):
+        assert one.after == other.before
+        assert one.after <= one.before
+    text = str(found)
+    for step in found.steps:
+        assert step.name in text
+        assert step.reason.split()[0] in text
+        assert f"{step.before} → {step.after}" in text
+
+
+def test_systems_are_reduced_as_far_as_systems_go():
+    found = ephs.reduce(_levers())
+    assert found.steps[0].name == "fold a transformer"
+    assert found.after < found.before
+
+
+def _levers():
+    ports = {"x": ephs.quantity.momentum, "y": ephs.quantity.momentum}
+    pattern = ephs.Pattern(
+        junctions={"a": ephs.junction(ephs.quantity.momentum), "b": ephs.junction(ephs.quantity.momentum)},
+        boxes={"mass": {"p": "a"}, "lever": {"x": "a", "y": "b"}, "rod": {"x": "b"}},
+    )
+    hold = ephs.constraint({"x": ephs.quantity.momentum}, [[1.0]])
+    return pattern(mass=library.point_mass(m=1.0), lever=ephs.transformer(ports, [[2.0]]), rod=hold)
+
+
+def test_the_command_prints_the_table(capsys):
+    assert main(["reduce", str(SCENES[0].parent / "four-bar.toml")]) == 0
+    out = capsys.readouterr().out
+    assert "224 unknowns" in out
+    assert "joints.main.o1" in out
+    assert "knee imposes 2 in place of 5" in out
+    assert main(["reduce", "nothing.toml"]) == 2
