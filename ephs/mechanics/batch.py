@@ -23,7 +23,7 @@ def compose(a: Array, b: Array) -> Array:
     """(n, 7) products of poses."""
     aw, av, bw, bv = a[:, :1], a[:, 1:4], b[:, :1], b[:, 1:4]
     w = aw * bw - np.sum(av * bv, axis=1, keepdims=True)
-    v = aw * bv + bw * av + np.cross(av, bv)
+    v = aw * bv + bw * av + _cross(av, bv)
     return np.concatenate([w, v, a[:, 4:] + turned(a, b[:, 4:])], axis=1)
 
 
@@ -36,8 +36,8 @@ def inverse(a: Array) -> Array:
 
 def turned(a: Array, v: Array) -> Array:
     """(n, 3) vectors turned by poses."""
-    twice = 2.0 * np.cross(a[:, 1:4], v)
-    return v + a[:, :1] * twice + np.cross(a[:, 1:4], twice)
+    twice = 2.0 * _cross(a[:, 1:4], v)
+    return v + a[:, :1] * twice + _cross(a[:, 1:4], twice)
 
 
 def adjoint_inverse(a: Array) -> Array:
@@ -50,3 +50,8 @@ def adjoint_inverse(a: Array) -> Array:
     o = np.zeros_like(x)
     out[:, 3:, :3] = np.array([[o, -z, y], [z, o, -x], [-y, x, o]]).transpose(2, 0, 1) @ r
     return out
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """(n, 3) row by row; NumPy's own costs several times as much."""
+    return a[:, [1, 2, 0]] * b[:, [2, 0, 1]] - a[:, [2, 0, 1]] * b[:, [1, 2, 0]]

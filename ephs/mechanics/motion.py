@@ -12,6 +12,7 @@ import numpy as np
 
 from ephs.mechanics.batch import adjoint_inverse, compose, inverse, rotations
 from ephs.mechanics.build import component_path
+from ephs.mechanics.projection import Held, project, project_dense
 from ephs.mechanics.scene.geometry import Coupling, coupling_of
 from ephs.mechanics.scene.model import GROUND, Joint, Scene
 from ephs.mechanics.solve.instant import instant
@@ -25,10 +26,10 @@ if TYPE_CHECKING:
 
 __all__ = ["BodyMotion", "JointMotion", "MarkerMotion", "SceneMotion", "ThermalMotion"]
 
-RANK = 1e-9
-"""Singular values of the joint equations in the mass metric below this fraction of the largest count as zero."""
 CHUNK = 512
 """Instants that are projected together; bounds the memory."""
+MANY = 40
+"""Joints beyond which velocities are projected by sparse matrices."""
 
 
 @final
@@ -234,6 +235,8 @@ class SceneMotion:
             half[:3, :3] = (vectors / np.sqrt(sigma)) @ vectors.T
             half[3:, 3:] = np.eye(3) / np.sqrt(body.mass)
             root[name] = half
+        if len(self._joints) > MANY and not light and all(j.middle is None for j in self._joints.values()):
+            return self._of_many(heavy, root, twists, rates)
         columns = {name: 6 * i for i, name in enumerate(heavy)}
         free: dict[str, int] = {}
         width = 0
@@ -259,13 +262,36 @@ class SceneMotion:
                     right[:, row] = joint.motion
                     row += 1
             stacked = np.column_stack([twists[name][at] for name in heavy]) if heavy else np.zeros((size, 0))
-            u, rest = _project(known, unknown, right, stacked, [root[name] for name in heavy])
+            u, rest = project_dense(known, unknown, right, stacked, [root[name] for name in heavy])
             for name in heavy:
                 twists[name][at] = u[:, columns[name] : columns[name] + 6]
             for name in light:
                 twists[name][at] = rest[:, free[name] : free[name] + 6]
             for name in rates:
                 rates[name][at] = rest[:, free[name] : free[name] + self._couplings[name].dim]
+        for name in self._implicit:
+            rates[name] = twists[name]
+        return twists, rates
+
+    def _of_many(
+        self, names: list[str], root: dict[str, Array], twists: dict[str, Array], rates: dict[str, Array]
+    ) -> tuple[dict[str, Array], dict[str, Array]]:
+        """The same of a large mechanism without massless bodies and universal joints, by sparse matrices."""
+        number = {name: i for i, name in enumerate(names)}
+        roots = np.array([root[name] for name in names])
+        for at in self._chunks():
+            held: list[Held] = []
+            for name, first, second, basis in self._joint_rows(at):
+                joint = self._joints[name]
+                ends = ((joint.body1, first), (joint.body2, second))
+                rows = {number[body]: block for body, block in ends if body != GROUND}
+                held.append(Held(rows, basis[0], joint.motion))
+            given = np.stack([twists[name][at] for name in names], axis=1)
+            found, turned = project(held, roots, given)
+            for name, i in number.items():
+                twists[name][at] = found[:, i]
+            for name, rate in zip(self._joints, turned, strict=True):
+                rates[name][at] = rate
         for name in self._implicit:
             rates[name] = twists[name]
         return twists, rates
@@ -336,8 +362,9 @@ class SceneMotion:
 
     def _chunks(self) -> Iterator[slice]:
         n = len(self._solution)
-        for start in range(0, n, CHUNK):
-            yield slice(start, min(n, start + CHUNK))
+        size = max(1, CHUNK * MANY // max(MANY, len(self._joints)))
+        for start in range(0, n, size):
+            yield slice(start, min(n, start + size))
 
     # ---- summary -----------------------------------------------------------------------------------------------
 
@@ -371,23 +398,3 @@ class SceneMotion:
                 for name, _ in self._scene.all_thermal()
             },
         }
-
-
-def _project(known: Array, unknown: Array, right: Array, twists: Array, roots: list[Array]) -> tuple[Array, Array]:
-    """Twists nearest to the given ones in the mass metric with known·u + unknown·r = right, and such r."""
-    inverse_of_unknown = np.linalg.pinv(unknown, rcond=RANK) if unknown.shape[2] else np.zeros(unknown.shape).mT
-    whitened = np.zeros_like(known)
-    for i, root in enumerate(roots):
-        where = slice(6 * i, 6 * i + 6)
-        whitened[:, :, where] = known[:, :, where] @ root
-    defect = np.einsum("nij,nj->ni", known, twists) - right
-    rest = defect - np.einsum("nij,nj->ni", unknown @ inverse_of_unknown, defect)
-    kept = whitened - unknown @ (inverse_of_unknown @ whitened)
-    out = twists.copy()
-    if roots:
-        shift = np.einsum("nij,nj->ni", np.linalg.pinv(kept, rcond=RANK), rest)
-        for i, root in enumerate(roots):
-            where = slice(6 * i, 6 * i + 6)
-            out[:, where] -= shift[:, where] @ root
-    r = -np.einsum("nij,nj->ni", inverse_of_unknown, np.einsum("nij,nj->ni", known, out) - right)
-    return out, r
