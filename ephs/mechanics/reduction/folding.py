@@ -16,7 +16,7 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.primitives import Irreversible, Primitive, Reversible, Storage
 from ephs.semantics.pullback import Map, pull_back
 
-__all__ = ["FOLD"]
+__all__ = ["FOLD", "transformations"]
 
 SINGULAR = 1e-12
 NAME = "fold a transformer"
@@ -73,6 +73,14 @@ def _folds(draft: Draft, box: Path) -> Iterator["_Fold"]:
         mapped = _map(columns, size, junction)
         if mapped is not None:
             yield _Fold(box, junction, *mapped)
+
+
+def transformations(draft: Draft, junction: Path) -> Iterator[tuple[Array, Path | None]]:
+    """(matrix, other junction) of each component that determines the effort at a junction; None where it is zero."""
+    for box, _ in draft.on(junction):
+        for fold in _folds(draft, box):
+            if fold.junction == junction:
+                yield fold.matrix, fold.target
 
 
 def _idle(draft: Draft, box: Path) -> Site | None:
@@ -161,6 +169,11 @@ class _Fold:
         It is not where all junctions that determine one another end in one, nor where two are in series.
         """
         others = self.neighbours(draft)
+        if self.target is None:  # first what is seen through a transformer: where the frame stands is known by it
+            for box, _ in others:
+                for fold in _folds(draft, box):
+                    if fold.target is not None and fold.junction != self.junction and not fold.refusal(draft):
+                        return f"{box} comes first"
         rivals = [box for box, _ in others if any(fold.junction == self.junction for fold in _folds(draft, box))]
         if len(others) < 2 or not rivals or _ends(draft, self.junction) < 2:
             return ""
