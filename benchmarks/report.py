@@ -34,7 +34,7 @@ def table_of(rows: Sequence[Mapping[str, Any]], columns: Mapping[str, tuple[str,
 def _shown(value: Any, scale: float) -> str:
     if value is None:
         return "–"
-    return f"{scale * value:.3g}" if isinstance(value, float) else str(value)
+    return f"{scale * value:.3g}" if isinstance(value, float) or scale != 1.0 else str(value)
 
 
 def exponent(sizes: Sequence[float], values: Sequence[float]) -> float:
