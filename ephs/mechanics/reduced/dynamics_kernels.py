@@ -97,6 +97,32 @@ def inverse_dynamics(t, w, d, q, r, s, drive, wrench, scal, s_rate, made, powers
 
 
 @kernel
+def place(t, w, d, r):
+    """Frames of links and of edges' ends, and what of the twists turns with each joint."""
+    links = t.parent.shape[0]
+    for i in range(links):
+        frame(w.inner[i], d.turn[i], d.place[i])
+        for k in range(6):
+            d.along[i, k] = 0.0
+            for j in range(t.dim[i]):
+                d.along[i, k] += w.motion[i, j, k] * r[t.r_at[i] + j]
+            d.moving[i, k] = w.twist[i, k] - (d.along[i, k] if t.forward[i] == 1 else 0.0)
+    for i in range(links, t.kind.shape[0]):
+        frames_of_ends(t, w, d, i)
+        relative(t, d, i, w.twist, d.slip[i])
+        if t.first[i] >= 0:
+            into(d.end_turn[i, 0], d.end_place[i, 0], w.twist[t.first[i]], d.held[i])
+
+
+@kernel
+def gather(t, d, loads):
+    """Loads of links and what they carry, inwards."""
+    for i in range(t.parent.shape[0] - 1, -1, -1):
+        if t.parent[i] >= 0:
+            out_of(d.turn[i], d.place[i], loads[i], loads[t.parent[i]], 1.0)
+
+
+@kernel
 def settle(t, w, d, r):
     """What tangents start from, at ṙ = d.rate and the multipliers: frames, accelerations, and loads gathered inwards.
 
@@ -105,13 +131,12 @@ def settle(t, w, d, r):
     """
     links = t.parent.shape[0]
     one, two, three = d.small[0:6], d.small[6:12], d.small[12:18]
+    place(t, w, d, r)
     for i in range(links):
         parent = t.parent[i]
-        frame(w.inner[i], d.turn[i], d.place[i])
         for k in range(6):
-            one[k] = two[k] = d.along[i, k] = 0.0
+            one[k] = two[k] = 0.0
             for j in range(t.dim[i]):
-                d.along[i, k] += w.motion[i, j, k] * r[t.r_at[i] + j]
                 two[k] += w.motion[i, j, k] * d.rate[t.r_at[i] + j]
         if parent >= 0:
             into(d.turn[i], d.place[i], d.speed[parent], one)
@@ -119,7 +144,6 @@ def settle(t, w, d, r):
         for k in range(6):
             d.speed[i, k] = one[k] + three[k] + two[k]
             d.lifted[i, k] = one[k] + (two[k] if t.forward[i] == 0 else 0.0)
-            d.moving[i, k] = w.twist[i, k] - (d.along[i, k] if t.forward[i] == 1 else 0.0)
         for k in range(6):
             d.momentum[i, k] = 0.0
             for j in range(6):
@@ -129,10 +153,7 @@ def settle(t, w, d, r):
     for j in range(t.driven.shape[0]):
         m += t.driven[j]
     for i in range(links, t.kind.shape[0]):
-        frames_of_ends(t, w, d, i)
-        relative(t, d, i, w.twist, d.slip[i])
         if t.first[i] >= 0:
-            into(d.end_turn[i, 0], d.end_place[i, 0], w.twist[t.first[i]], d.held[i])
             into(d.end_turn[i, 0], d.end_place[i, 0], d.speed[t.first[i]], d.held_rate[i])
         if t.kind[i] == CUT:
             relative(t, d, i, d.speed, one)
@@ -151,9 +172,7 @@ def settle(t, w, d, r):
                 d.closing[i, k] = three[k]
             m += t.rows[i]
             out_of_edge(t, d, i, three, three, d.total)
-    for i in range(links - 1, -1, -1):
-        if t.parent[i] >= 0:
-            out_of(d.turn[i], d.place[i], d.total[i], d.total[t.parent[i]], 1.0)
+    gather(t, d, d.total)
 
 
 @kernel

@@ -22,6 +22,8 @@ __all__ = ["Implicit"]
 
 ITERATIONS = 10
 ROUNDING = 1e-14
+FAST = 2e-3
+"""A rate of convergence that a new matrix would not better: an exact one costs about as much as an iteration."""
 _S6 = 6.0**0.5
 _EMBEDDED = np.array([-13.0 - 7.0 * _S6, -13.0 + 7.0 * _S6, -1.0]) / 3.0
 _RATE = float((1.0 / VALUES[0]).real)
@@ -114,7 +116,7 @@ class Implicit(ReducedMethod):
                 if rate >= 1.0 and moved > max(10.0 * self._enough, self._rough):
                     break
             if moved <= self._enough or (iteration > 1 and moved * rate <= self._enough * (1.0 - min(rate, 0.9))):
-                return stages, rates[:, size:], iteration <= 4 or rate < 0.1
+                return stages, rates[:, size:], iteration <= 2 or rate < FAST
             if iteration > 2 and rate > 0.5 and moved <= self._rough:  # rounding is all that is left
                 return stages, rates[:, size:], False
             before = moved

@@ -1,26 +1,30 @@
-"""The Jacobian of the reduced form, and one that is kept while it serves."""
+"""The Jacobian of the reduced form, exact, and kept while it serves."""
 
 from typing import final
 
 import numpy as np
 
 from ephs.mechanics.reduced.equations import Equations, ReducedState
+from ephs.mechanics.reduced.tables import SPRING
+from ephs.mechanics.reduced.tangent import Linearised
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.codes import VECTOR
 
 __all__ = ["Jacobian"]
 
 RELATIVE = 2e-8
-"""Of the differences: about the root of the rounding unit."""
+"""Of the differences by which inputs that are Python functions of the state are differentiated."""
 
 
 @final
 class Jacobian:
-    """∂ẏ/∂y of y = (v, r, s) at v = 0, by differences: it steers Newton's method, not what that converges to."""
+    """∂ẏ/∂y of y = (v, r, s) at v = 0: by tangents; of inputs that are functions, by differences of their values."""
 
     def __init__(self, equations: Equations) -> None:
         self.equations = equations
         self.size = equations.nv + equations.n + equations.ns
         self.count = 0
+        self._linear = Linearised(equations)
         self._at: Array | None = None
         self._value = np.zeros((self.size, self.size))
 
@@ -29,17 +33,52 @@ class Jacobian:
         return self._at is state.q
 
     def at(self, state: ReducedState, *, renew: bool = False) -> Array:
-        """The matrix (size, size), made anew where asked for or where there is none."""
+        """The matrix (size, size), made anew where asked for or where there is none.
+
+        Raises
+        ------
+        SolveError
+            A component cannot be evaluated there, or the mass matrix is singular.
+        """
         if self._at is not None and not renew:
             return self._value
-        eq = self.equations
-        y = eq.vector(state)
-        middle = eq.rates(state.t, state.q, y)[: self.size]
-        value = np.empty((self.size, self.size))
-        for j in range(self.size):
-            moved = y.copy()
-            moved[j] += RELATIVE * max(1.0, abs(y[j]))
-            value[:, j] = (eq.rates(state.t, state.q, moved)[: self.size] - middle) / (moved[j] - y[j])
+        eq, linear = self.equations, self._linear
+        n, nv = eq.n, eq.nv
+        eq.load(state.t, state.q, state.r, state.s)
+        linear.forward(state.q, state.r, state.s)
+        columns = linear.columns(solve=True, fit=False)
+        if not eq.problem.constant:
+            columns[:n] += self._inputs(state)
+        rates = np.concatenate([state.r, linear.cut_rates])
+        value = np.zeros((self.size, self.size))
+        value[:n, nv : nv + n] = np.eye(n)
+        value[n:nv], value[nv : nv + n], value[nv + n :] = columns[n:nv], columns[:n], columns[nv:]
+        t = eq.reduced.tables
+        for i, edge in enumerate(eq.reduced.edges):
+            if t.kind[i] != SPRING and t.code[i] != VECTOR:  # v̇ = dexp⁻¹(v) r turns with v: r + ½ [v, r] + …
+                where = slice(int(t.r_at[i]), int(t.r_at[i] + t.dim[i]))
+                value[where, where] -= 0.5 * edge.pair.manifold.ad(rates[where])
         self._value, self._at = value, state.q
         self.count += 1
         return value
+
+    def _inputs(self, state: ReducedState) -> Array:
+        """(n, size) what the inputs' dependence on the state adds to ∂ṙ/∂y."""
+        eq = self.equations
+        y = eq.vector(state)[: self.size]
+        middle = eq.drive.copy(), eq.wrench.copy()
+        out = np.empty((eq.n, self.size))
+        changes: list[tuple[Array, Array]] = []
+        for j in range(self.size):
+            moved = y.copy()
+            moved[j] += RELATIVE * max(1.0, abs(y[j]))
+            v, r, s = np.split(moved, [eq.nv, eq.nv + eq.n])
+            eq.load(state.t, eq.advance(state.q, v), r, s)
+            by = moved[j] - y[j]
+            changes.append(((eq.drive - middle[0]) / by, (eq.wrench - middle[1]) / by))
+        eq.drive[:], eq.wrench[:] = middle
+        self._linear.forward(state.q, state.r, state.s)
+        self._linear.columns(solve=True, fit=False)
+        for j, (drive, wrench) in enumerate(changes):
+            out[:, j] = self._linear.pushed(drive, wrench)
+        return out

@@ -4,10 +4,11 @@ from typing import Any, NamedTuple, final
 
 import numpy as np
 
+from ephs.mechanics.reduced.action_tangent_kernels import action_slopes
 from ephs.mechanics.reduced.dynamics_kernels import by_force, forward_dynamics, inverse_dynamics
 from ephs.mechanics.reduced.equations import Equations
-from ephs.mechanics.reduced.tables import Mechanism
-from ephs.mechanics.reduced.tangent_kernels import jacobian
+from ephs.mechanics.reduced.tables import CUT, Mechanism
+from ephs.mechanics.reduced.tangent_kernels import by_push, jacobian
 from ephs.semantics.bundle import Array
 
 __all__ = ["Linearised", "Tangents"]
@@ -159,6 +160,39 @@ class Linearised:
         out = np.empty((eq.n, eq.n))
         by_force(eq.work, self.memory, self._rows, self._rank, out)
         return out
+
+    def action(self, q: Array, r: Array, s: Array) -> tuple[Array, Array]:
+        """((n, 2n), (n, 2n)) ∂/∂(q, r) of the momenta ∂L/∂r and of ∂L/∂q with the forces that no potential has.
+
+        Raises
+        ------
+        SolveError
+            A component cannot be evaluated there.
+        """
+        eq = self.equations
+        momentum, force = np.empty((eq.n, 2 * eq.n)), np.empty((eq.n, 2 * eq.n))
+        eq.refuse(
+            *action_slopes(
+                eq.reduced.tables, eq.work, self.memory, q, r, s, eq.drive, eq.wrench, eq.scal,
+                self._s_rate, self._made, self._powers, momentum, force,
+            )
+        )  # fmt: skip
+        return momentum, force
+
+    def pushed(self, drive: Array, wrench: Array) -> Array:
+        """(n,) the change of the tree's accelerations under further forces (nv,) on all joints and wrenches (links, 6)
+        on the links, after `forward` and `columns`."""
+        eq, d, out = self.equations, self.memory, np.empty(self.equations.n)
+        d.ddrive[:], d.dwrench[:] = drive, wrench
+        by_push(eq.reduced.tables, eq.work, d, self._rows, self._rank, out)
+        d.ddrive[:], d.dwrench[:] = 0.0, 0.0
+        return out
+
+    @property
+    def cut_rates(self) -> Array:
+        """(nv − n,) the rates of cut joints where `forward` was called last."""
+        t, w = self.equations.reduced.tables, self.equations.work
+        return np.concatenate([np.zeros(0), *(w.rate[i, : t.dim[i]] for i in range(t.kind.size) if t.kind[i] == CUT)])
 
     def targets(self, q: Array, r: Array, s: Array) -> tuple[Array, int]:
         """(m,) what the constraints' rows on the accelerations are to be, −(d rows/dt)·r; and the rows' rank."""

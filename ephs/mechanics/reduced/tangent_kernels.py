@@ -18,7 +18,7 @@ kernel = jit.kernel
 
 
 @kernel
-def tangent(t, w, d, r, fit):
+def tangent(t, w, d, fit, inert):
     """One direction: from d.dq, dr, da, ds, ddrive, dwrench to the changes of the residual d.force, of the constraints'
     accelerations d.row, of the cut joints' rates d.cut, of the entropies' rates d.heat.
 
@@ -26,6 +26,8 @@ def tangent(t, w, d, r, fit):
     ----------
     fit
         1: the cut joints' elements follow those of the tree; 0: they change as d.dq says.
+    inert
+        0: without the forces of inertia, and without what is said of accelerations.
     """
     links = t.parent.shape[0]
     sigma, spin, one, two = d.small[0:6], d.small[6:12], d.small[12:18], d.small[18:24]
@@ -72,6 +74,11 @@ def tangent(t, w, d, r, fit):
             bracket(w.twist[i], spin, one)
             for k in range(6):
                 d.dspeed[i, k] += one[k]
+        for k in range(6):
+            for j in range(6):
+                d.dtotal[i, k] += d.weight[i, k, j] * d.eta[i, j]
+        if inert == 0:
+            continue
         bracket(d.dtwist[i], d.along[i], one)
         for k in range(6):
             d.dspeed[i, k] += one[k]
@@ -79,7 +86,7 @@ def tangent(t, w, d, r, fit):
             two[k] = 0.0
             for j in range(6):
                 two[k] += t.inertia[i, k, j] * d.dtwist[i, j]
-                d.dtotal[i, k] += t.inertia[i, k, j] * d.dspeed[i, j] + d.weight[i, k, j] * d.eta[i, j]
+                d.dtotal[i, k] += t.inertia[i, k, j] * d.dspeed[i, j]
         cross_momentum(d.dtwist[i], d.momentum[i], one)
         cross_momentum(w.twist[i], two, three)
         for k in range(6):
@@ -226,7 +233,7 @@ def jacobian(t, w, d, q, r, s, drive, scal, m, rank, fit, solve, out):
         else:  # the environment's temperature is what it is
             out[:, column] = 0.0
             continue
-        tangent(t, w, d, r, fit)
+        tangent(t, w, d, fit, 1)
         if column < nv:
             d.dq[column] = 0.0
         elif column < nv + n:
@@ -244,3 +251,16 @@ def jacobian(t, w, d, q, r, s, drive, scal, m, rank, fit, solve, out):
         for i in range(ns):
             out[nv + i, column] = d.heat[i]
     return 0, 0
+
+
+@kernel
+def by_push(t, w, d, m, rank, out):
+    """The change of ṙ by d.ddrive and d.dwrench."""
+    d.dq[:] = 0.0
+    d.dr[:] = 0.0
+    d.da[:] = 0.0
+    d.ds[:] = 0.0
+    tangent(t, w, d, 0, 1)
+    for i in range(out.shape[0]):
+        out[i] = -d.force[i]
+    solve_constrained(w, m, rank, out, d.row, d.row, d.change)

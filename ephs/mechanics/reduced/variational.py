@@ -16,19 +16,20 @@ import numpy as np
 from ephs.mechanics.reduced.action_kernels import action_derivatives
 from ephs.mechanics.reduced.equations import Equations, ReducedState
 from ephs.mechanics.reduced.method import ReducedMethod
+from ephs.mechanics.reduced.tables import CUT
+from ephs.mechanics.reduced.tangent import Linearised
 from ephs.mechanics.solve.control import Control
 from ephs.mechanics.solve.errors import Outcome, SolveError
 from ephs.mechanics.solve.loop import Attempt
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.codes import VECTOR
-from ephs.semantics.spaces.se3_kernels import dexp_left_inv
+from ephs.semantics.spaces.se3_kernels import dexp_left, dexp_left_inv
 
 __all__ = ["Variational"]
 
 ITERATIONS = 40
 RANK = 1e-9
 """Singular values of the step's equations below this fraction of the largest count as zero."""
-DIFFERENCE = 1e-6
 FAR = 1e4
 """Residuals beyond this, relative to momenta or in m, are of an iteration that has gone astray."""
 
@@ -48,7 +49,12 @@ class Variational(ReducedMethod):
             for i in range(equations.reduced.links)
             if t.code[i] != VECTOR
         ]
+        self._spaces = [e.pair.manifold for e in equations.reduced.edges[: equations.reduced.links]]
+        self._spaces = [space for space in self._spaces if space.code != VECTOR]
         self._driven = np.flatnonzero(t.driven)
+        self._linear = Linearised(equations)
+        # springs at cut joints are bent where these are, in the middle of the step too
+        self._bent = bool(np.any((t.kind == CUT) & (t.spring >= 0)))
         self._rows = int(t.rows.sum() + t.driven.sum())
         self._matrix: Array | None = None
         self._guess: tuple[Array, Array] | None = None
@@ -123,6 +129,8 @@ class Variational(ReducedMethod):
         """p̄, g, ṡ, what components make, heat and work per second, in the middle of a step."""
         eq = self.equations
         q, r = eq.moved(state.q, 0.5 * xi), xi / h
+        if self._bent:
+            q = eq.fitted(q, r)
         momentum, force = np.zeros(eq.n), np.zeros(eq.n)
         s_rate, made, powers = np.zeros(eq.ns), np.zeros(len(eq.reduced.made)), np.zeros(2)
         s = state.s
@@ -149,14 +157,26 @@ class Variational(ReducedMethod):
         return residual, rows
 
     def _slope(self, state: ReducedState, h: float, xi: Array, middle: Any) -> Array:
-        """∂p⁰/∂ξ by differences."""
-        here = self._start(xi, h, middle)
-        out = np.empty((xi.size, xi.size))
-        for j in range(xi.size):
-            moved = xi.copy()
-            moved[j] += DIFFERENCE
-            out[:, j] = (self._start(moved, h, self._middle(state, h, moved)) - here) / DIFFERENCE
+        """∂p⁰/∂ξ: the mechanism's part exact, that of dexp⁻¹ to first order in ξ, where it does not vanish."""
+        eq, n = self.equations, xi.size
+        momentum, force = middle[:2]
+        q, r = eq.moved(state.q, 0.5 * xi), xi / h
+        eq.load(state.t + 0.5 * h, q, r, state.s)
+        by_momentum, by_force = self._linear.action(eq.fitted(q, r), r, state.s)
+        along = np.eye(n)
+        for code, where in self._groups:
+            dexp_left(code, 0.5 * xi[where], along[where, where])
+        slopes = [0.5 * whole[:, :n] @ along + whole[:, n:] / h for whole in (by_momentum, by_force)]
+        start = momentum - 0.5 * h * self._untwisted(-0.5 * xi, force)
+        change = slopes[0] - 0.5 * h * (self._untwisted(-0.5 * xi, slopes[1]) + 0.25 * self._turning(force))
         self.counts["jacobians"] += 1
+        return self._turned(-xi, change) - 0.5 * self._turning(start)
+
+    def _turning(self, covector: Array) -> Array:
+        """(n, n) the derivative of ad*_ξ of a covector by ξ, joint by joint."""
+        out = np.zeros((covector.size, covector.size))
+        for space, (_, where) in zip(self._spaces, self._groups, strict=True):
+            out[where, where] = np.column_stack([space.ad(unit).T @ covector[where] for unit in np.eye(space.dim)])
         return out
 
     def _turned(self, xi: Array, covector: Array) -> Array:

@@ -1,0 +1,204 @@
+"""Derivatives are exact: to what differences are good for, closed forms to rounding, and as one function's inverse."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+import ephs
+from ephs.mechanics.reduced.action_kernels import action_derivatives
+from ephs.mechanics.reduced.equations import Equations
+from ephs.mechanics.reduced.jacobian import Jacobian
+from ephs.mechanics.reduced.tangent import Linearised
+from ephs.mechanics.simulate import problem_of_scene
+from ephs.testing import mechanisms
+from tests.mechanics.dynamics.drawn import moving
+
+GOOD = 1e-8
+"""What extrapolated differences are good for, relative to the largest entry."""
+
+
+def difference(function, size, step=1e-3):
+    """(…, size) by central differences, extrapolated twice."""
+    columns = []
+    for unit in np.eye(size):
+        d = [(function(h * unit) - function(-h * unit)) / (2.0 * h) for h in (step, step / 2.0, step / 4.0)]
+        once = [(4.0 * d[1] - d[0]) / 3.0, (4.0 * d[2] - d[1]) / 3.0]
+        columns.append((16.0 * once[1] - once[0]) / 15.0)
+    return np.array(columns).T
+
+
+def close(found, expected, tolerance=GOOD):
+    assert found.shape == expected.shape
+    assert np.abs(found - expected).max(initial=0.0) <= tolerance * max(1.0, np.abs(expected).max(initial=0.0))
+
+
+def shifted(model, state, part, by):
+    """The state with its tree's joints moved, or its rates or entropies changed."""
+    if part == "q":
+        return model.moved(state, by)
+    array = np.array(state.array)
+    ends = array.size - len(model.layout.entropies)
+    where = slice(ends - model.layout.n, ends) if part == "r" else slice(ends, None)
+    array[where] += by
+    return model.unpack(array)
+
+
+@settings(max_examples=40)
+@given(drawn=moving())
+def test_accelerations_differentiate_as_differences_say(drawn):
+    _, model, state, rng = drawn
+    n, free = model.layout.n, model.freedoms
+    forces = model.layout.by_joint(rng.standard_normal(model.layout.total))
+
+    def acceleration(at, more=None):
+        whole = {name: forces[name] + (0.0 if more is None else more[name]) for name in forces}
+        found = model.acceleration(at, whole)
+        out = np.zeros(n)
+        for name, where in free.items():
+            out[where] = found[name][model.layout.freedoms[name] < n]
+        return out
+
+    exact = model.derivatives(state, forces)
+    close(exact.acceleration_q, difference(lambda v: acceleration(model.moved(state, v)), n))
+    close(exact.acceleration_r, difference(lambda v: acceleration(shifted(model, state, "r", v)), n))
+    if len(model.layout.entropies):
+        ns = len(model.layout.entropies)
+        close(exact.acceleration_s, difference(lambda v: acceleration(shifted(model, state, "s", v)), ns))
+    linear = np.array([acceleration(state, model.layout.by_joint(unit)) - acceleration(state) for unit in np.eye(n)]).T
+    close(exact.acceleration_force, linear)
+
+
+@settings(max_examples=40)
+@given(drawn=moving())
+def test_forces_differentiate_as_differences_say(drawn):
+    _, model, state, rng = drawn
+    n = model.layout.n
+    wanted = rng.standard_normal(n)
+    given_a = model.layout.by_joint(wanted)
+
+    def forces(at, a=given_a):
+        found = model.inverse_dynamics(at, a)
+        out = np.zeros(model.layout.total)
+        for name, where in model.layout.freedoms.items():
+            out[where] = found[name]
+        return out[:n]
+
+    exact = model.derivatives(state, accelerations=given_a)
+    close(exact.force_q, difference(lambda v: forces(model.moved(state, v)), n))
+    close(exact.force_r, difference(lambda v: forces(shifted(model, state, "r", v)), n))
+    close(exact.force_a, difference(lambda v: forces(state, model.layout.by_joint(wanted + v)), n))
+
+
+@settings(max_examples=40)
+@given(drawn=moving(loops=False))
+def test_forward_and_inverse_derivatives_are_those_of_inverse_functions(drawn):
+    """∂ṙ/∂q = −M⁻¹ ∂τ/∂q at the same accelerations, where nothing is prescribed and no loop closed: to rounding."""
+    scene, model, state, _ = drawn
+    if any(joint.motion is not None for joint in scene.joints.values()):
+        return
+    exact = model.derivatives(state)
+    mass = model.mass_matrix(state)
+    tolerance = 10.0 * np.finfo(float).eps * np.linalg.cond(mass)
+    for forward, inverse in (
+        (exact.acceleration_q, exact.force_q),
+        (exact.acceleration_r, exact.force_r),
+        (exact.acceleration_force, -np.eye(model.layout.n)),
+    ):
+        expected = -np.linalg.solve(mass, inverse)
+        size = np.abs(np.linalg.inv(mass)) @ np.abs(inverse)
+        assert np.abs(forward - expected).max() <= tolerance * max(1.0, size.max())
+
+
+def test_a_pendulum_on_a_spring_has_the_derivatives_of_its_formula(tmp_path):
+    """a = (−m g l sin φ − k φ − μ r + τ)/I."""
+    text = """
+    format = 1
+    [bodies.bob]
+    mass = 2.0
+    inertia = [0.3, 0.2, 0.1]
+    [joints.pin]
+    type = "revolute"
+    bodies = ["ground", "bob"]
+    frame1 = { rotation = [0.5, 0.5, 0.5, 0.5] }
+    frame2 = { position = [0.0, 0.0, 0.7], rotation = [0.5, 0.5, 0.5, 0.5] }
+    coordinate = 0.8
+    rate = 1.3
+    stiffness = 4.0
+    friction = 0.6
+    """
+    file = tmp_path / "pendulum.toml"
+    file.write_text(text)
+    model = ephs.dynamics(ephs.load(file))
+    exact, state = model.derivatives(model.state0, {"pin": 0.4}), model.state0
+    inertia, weight = 0.3 + 2.0 * 0.49, 2.0 * 9.81 * 0.7
+    a = (-weight * np.sin(0.8) - 4.0 * 0.8 - 0.6 * 1.3 + 0.4) / inertia
+    assert model.acceleration(state, {"pin": 0.4})["pin"] == pytest.approx([a], rel=1e-14)
+    assert exact.acceleration_q[0, 0] == pytest.approx((-weight * np.cos(0.8) - 4.0) / inertia, rel=1e-14)
+    assert exact.acceleration_r[0, 0] == pytest.approx(-0.6 / inertia, rel=1e-14)
+    assert exact.acceleration_force[0, 0] == pytest.approx(1.0 / inertia, rel=1e-14)
+    assert exact.force_a[0, 0] == pytest.approx(inertia, rel=1e-14)
+
+
+@settings(max_examples=30)
+@given(drawn=moving())
+def test_the_jacobian_of_a_step_is_that_of_its_right_hand_side(drawn):
+    scene, model, state, _ = drawn
+    equations = Equations(scene, problem_of_scene(scene), 0.0)
+    q, r, s = model.layout.split(state.array)
+    here = replace(equations.start(0.0), q=q, r=r, s=s)
+    jacobian = Jacobian(equations)
+    y, size = equations.vector(here), jacobian.size
+
+    def rates(change):
+        moved = y.copy()
+        moved[:size] += change
+        return equations.rates(0.0, q, moved)[:size]
+
+    close(jacobian.at(here), difference(rates, size))
+
+
+@settings(max_examples=15)
+@given(scene=mechanisms(max_bodies=3, springs=False))
+def test_inputs_that_read_the_state_are_in_the_jacobian(scene):
+    body = next(name for name, _ in scene.all_bodies())
+    joint = next((name for name, j in scene.all_joints() if j.dim), None)
+    inputs = {f"bodies.{body}": lambda t, state: np.tanh(state[f"bodies.{body}.pe.q"][1:])}
+    if joint is not None:
+        dim = scene.joint(joint).dim
+        inputs[f"joints.{joint}"] = lambda t, state: -0.7 * np.sin(t + np.arange(dim))
+    equations = Equations(scene, problem_of_scene(scene, None, inputs), 0.0)
+    start = equations.start(0.0)
+    jacobian = Jacobian(equations)
+    y, size = equations.vector(start), jacobian.size
+
+    def rates(change):
+        moved = y.copy()
+        moved[:size] += change
+        return equations.rates(0.3, start.q, moved)[:size]
+
+    close(jacobian.at(replace(start, t=0.3)), difference(rates, size), 1e-6)
+
+
+@settings(max_examples=30)
+@given(drawn=moving())
+def test_momenta_and_their_forces_differentiate_as_differences_say(drawn):
+    scene, model, state, _ = drawn
+    equations = Equations(scene, problem_of_scene(scene), 0.0)
+    q, r, s = model.layout.split(state.array)
+    n = equations.n
+    linear = Linearised(equations)
+
+    def action(change):
+        moved, rates = equations.fitted(equations.moved(q, change[:n]), r + change[n:]), r + change[n:]
+        s_rate, made, powers = np.zeros(equations.ns), np.zeros(len(equations.reduced.made)), np.zeros(2)
+        momentum, force = np.zeros(n), np.zeros(n)
+        status = action_derivatives(
+            equations.reduced.tables, equations.work, moved, rates, s, equations.drive, equations.wrench,
+            equations.scal, s_rate, made, powers, momentum, force,
+        )  # fmt: skip
+        equations.refuse(*status)
+        return np.concatenate([momentum, force])
+
+    close(np.vstack(linear.action(q, r, s)), difference(action, 2 * n))

@@ -1,0 +1,200 @@
+"""The functions of a scene's state agree with one another, with plain NumPy, and with what simulations do."""
+
+from pathlib import Path as File
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import ephs
+from ephs.mechanics.methods import METHODS
+from ephs.mechanics.reduced.loop_kernels import RANK
+from tests.mechanics.dynamics.drawn import moving
+
+SCENES = sorted((File(__file__).parents[3] / "scenes").glob("*.toml"))
+EPS = np.finfo(float).eps
+
+
+def whole(model, by_joint):
+    """(total,) of joint -> (d,)."""
+    out = np.zeros(model.layout.total)
+    for name, where in model.layout.freedoms.items():
+        out[where] = by_joint[name]
+    return out
+
+
+@settings(max_examples=50)
+@given(drawn=moving())
+def test_accelerations_solve_the_equations_of_motion(drawn):
+    """M a + C r + g = applied + forces + rowsᵀ λ and rows·a = target, with the least forces of the rows: by NumPy."""
+    _, model, state, rng = drawn
+    n = model.layout.n
+    forces = np.concatenate([rng.standard_normal(n), np.zeros(model.layout.total - n)])
+    mass, constraints = model.mass_matrix(state), model.constraints(state)
+    pushed = model.applied(state) + forces[:n] - model.bias(state)
+    root = np.linalg.cholesky(mass)
+    free = np.linalg.solve(mass, pushed)
+    scaled = np.linalg.solve(root, constraints.rows.T).T
+    left, sizes, right = np.linalg.svd(scaled, full_matrices=False)
+    k = constraints.rank
+    assert np.all(sizes[k:] <= RANK * sizes.max(initial=0.0)) or k == 0
+    correction = right[:k].T @ (left[:, :k].T @ (constraints.target - constraints.rows @ free) / sizes[:k])
+    expected = free + np.linalg.solve(root.T, correction)
+    found = whole(model, model.acceleration(state, model.layout.by_joint(forces)))
+    terms = np.abs(np.linalg.inv(mass)) @ (np.abs(pushed) + np.abs(model.bias(state)))
+    tolerance = 10.0 * np.linalg.cond(mass) * EPS * max(1.0, terms.max(), np.abs(expected).max())
+    assert np.abs(found[:n] - expected).max(initial=0.0) <= tolerance / (RANK if k else 1.0)
+
+
+@settings(max_examples=50)
+@given(drawn=moving())
+def test_inverse_dynamics_inverts_accelerations(drawn):
+    """The forces for some accelerations make those that the constraints allow of them."""
+    _, model, state, rng = drawn
+    n = model.layout.n
+    reached = model.acceleration(state, model.layout.by_joint(rng.standard_normal(model.layout.total)))
+    forces = model.inverse_dynamics(state, reached)
+    again = model.acceleration(state, forces)
+    condition = np.linalg.cond(model.mass_matrix(state))
+    size = max(1.0, np.abs(whole(model, reached)).max(), np.abs(model.bias(state)).max(initial=0.0) * condition)
+    assert np.abs(whole(model, again) - whole(model, reached)).max() <= 1e3 * condition * EPS * size
+    assert all(not forces[name].any() for name in model.cut if not (model.layout.freedoms[name] < n).any())
+
+
+@settings(max_examples=50)
+@given(drawn=moving())
+def test_jacobians_carry_rates_to_bodies(drawn):
+    _, model, state, rng = drawn
+    rates = whole(model, state.rates)[: model.layout.n]
+    at = rng.standard_normal(3)
+    for name, body in model.bodies(state).items():
+        scale = 100.0 * EPS * max(1.0, np.abs(model.jacobian(state, name)).max() * np.abs(rates).sum())
+        assert np.abs(model.jacobian(state, name) @ rates - body.twist).max() <= scale
+        velocity = body.point(at)[1]
+        assert np.abs(model.jacobian(state, name, at) @ rates - velocity).max() <= 10.0 * scale
+    kinetic = 0.5 * rates @ model.mass_matrix(state) @ rates
+    assert model.energies(state).kinetic == pytest.approx(kinetic, rel=1e-12, abs=1e-12)
+
+
+@settings(max_examples=50)
+@given(drawn=moving())
+def test_gravity_is_the_slope_of_its_potential(drawn):
+    scene, model, state, rng = drawn
+    along = rng.standard_normal(model.layout.n)
+
+    def potential(h):
+        poses = model.bodies(model.moved(state, h * along))
+        return -sum(scene.body(name).mass * scene.world.gravity @ b.position for name, b in poses.items())
+
+    h = 1e-3
+    d = [(potential(k) - potential(-k)) / (2.0 * k) for k in (h, 0.5 * h)]
+    assert model.gravity(state) @ along == pytest.approx((4.0 * d[1] - d[0]) / 3.0, rel=1e-8, abs=1e-8)
+    assert np.allclose(model.bias(state) - model.bias(state, gravity=False), model.gravity(state), atol=1e-12, rtol=0)
+
+
+@settings(max_examples=50)
+@given(drawn=moving())
+def test_power_balances(drawn):
+    """What forces, drives and prescribed motions do, less heat, is the rate of kinetic and potential energy."""
+    _, model, state, _ = drawn
+    h = 1e-3
+    steps = [model.step(state, k * h, "rk87") for k in (1.0, 2.0)]
+    rates = whole(model, state.rates)
+    a = whole(model, model.acceleration(state))
+    after = [whole(model, x.rates) for x in steps]
+    forward = (4.0 * (after[0] - rates) - (after[1] - rates)) / (2.0 * h)
+    assert np.abs(forward - a).max() <= 1e-3 * max(1.0, np.abs(a).max())
+
+
+@settings(max_examples=25)
+@given(drawn=moving(), method=st.sampled_from([m.name for m in METHODS.values() if m.fixed and m.scenes]))
+def test_a_step_is_the_first_of_a_simulation_and_changes_no_state(drawn, method):
+    scene, model, state, _ = drawn
+    before = state.array.copy()
+    h = 2e-3
+    step = model.step(model.state0, h, method)
+    again = model.step(model.state0, h, method)
+    assert np.array_equal(step.array, again.array)
+    assert np.array_equal(state.array, before)
+    sol = ephs.simulate(scene, h, method=method, step=h)
+    for name, body in model.bodies(step).items():
+        # natural methods' momenta lie off the joints by their own error; positions do not
+        assert np.abs(sol.body(name).position[-1] - body.position).max() <= 1e-9 * max(1.0, np.abs(body.position).max())
+        assert np.abs(sol.body(name).velocity[-1] - body.velocity).max() <= 1e-7 * max(1.0, np.abs(body.velocity).max())
+
+
+@pytest.mark.parametrize("file", SCENES, ids=lambda file: file.stem)
+def test_shipped_scenes(file):
+    scene = ephs.load(file)
+    model = ephs.dynamics(scene)
+    state = model.state0
+    assert set(model.joints) >= {name for name, _ in scene.all_joints()}
+    for name, joint in scene.all_joints():
+        assert np.allclose(state.rates[name], joint.rate, atol=1e-9)
+    for name, body in scene.all_bodies():
+        assert np.allclose(model.bodies(state)[name].position, body.pose[4:], atol=1e-9)
+        assert np.allclose(model.bodies(state)[name].twist, body.twist, atol=1e-9)
+    assert np.array_equal(model.unpack(state.array).array, state.array)
+    assert not state.array.flags.writeable
+    assert str(len(model.joints)) in repr(model)
+
+
+def test_other_states_come_from_coordinates_and_rates():
+    scene = ephs.load(SCENES[0].parent / "chain.toml")
+    model = ephs.dynamics(scene)
+    names = [name for name, j in scene.all_joints() if j.dim == 1]
+    state = model.state({names[0]: 0.3}, {names[0]: -0.2})
+    assert state.coordinates[names[0]] == pytest.approx([0.3], abs=1e-12)
+    assert state.rates[names[0]] == pytest.approx([-0.2], abs=1e-12)
+
+
+def test_energy_stays_where_nothing_acts():
+    scene = ephs.load(SCENES[0].parent / "mbs.toml")
+    model = ephs.dynamics(scene)
+    state = model.state0
+    start = model.energies(state).total
+    for _ in range(20):
+        state = model.step(state, 1e-3, "rk87")
+    assert model.energies(state).total == pytest.approx(start, rel=1e-10)
+    assert model.energies(state).thermal > 0.0 or not any(j.friction.any() for _, j in scene.all_joints())
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda m: m.acceleration(m.state0, {"nothing": 1.0}), r"forces\['nothing'\] is 1.0, expected a joint: main"),
+        (lambda m: m.acceleration(m.state0, {"main": [1.0, 2.0]}), "expected 1 finite numbers"),
+        (lambda m: m.inverse_dynamics(m.state0, {"main": np.nan}), "expected 1 finite numbers"),
+        (lambda m: m.jacobian(m.state0, "nobody"), "body is 'nobody', expected one of"),
+        (lambda m: m.jacobian(m.state0, "crank", [1.0]), r"point is \(1,\), expected \(3,\)"),
+        (lambda m: m.unpack([1.0]), "array is"),
+        (lambda m: m.moved(m.state0, [1.0]), "increments is"),
+        (lambda m: m.step(m.state0, 0.0), "h is 0.0"),
+        (lambda m: m.step(m.state0, 1e-3, "ida"), "ida chooses its steps"),
+        (lambda m: m.step(m.state0, 1e-3, "nothing"), "method is 'nothing'"),
+    ],
+)
+def test_bad_arguments_are_named(call, message):
+    model = ephs.dynamics(ephs.load(SCENES[0].parent / "four-bar.toml"))
+    with pytest.raises(ephs.OptionError, match=message):
+        call(model)
+
+
+def test_what_no_mass_determines_is_named(tmp_path):
+    text = """
+    format = 1
+    [bodies.frame]
+    mass = 0.0
+    inertia = [0.0, 0.0, 0.0]
+    [joints.pin]
+    type = "revolute"
+    bodies = ["ground", "frame"]
+    at = [0.0, 0.0, 0.0]
+    axis = [1.0, 0.0, 0.0]
+    """
+    file = tmp_path / "light.toml"
+    file.write_text(text)
+    model = ephs.dynamics(ephs.load(file))
+    with pytest.raises(ephs.SimulationError, match="joint pin, which moves no mass"):
+        model.acceleration(model.state0)
