@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from ephs.mechanics.reduction.frames import Joint, anchor, bodies, inertia_at, joint_at, joints, reach
+from ephs.mechanics.reduction.merging import MERGE
 from ephs.mechanics.reduction.rewrite import Draft, Rule, Site, State, StateMap, Strength
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
@@ -125,7 +126,7 @@ def _pose(draft: Draft, place: tuple[Path, ...]) -> Site | None:
     elif {b for b, _ in draft.on(body.momentum)} == {body.coupling} and draft.junctions[body.momentum].exposed:
         refusal = f"nothing else lies on the outer port {body.momentum}"
     elif waiting := [at for at in _at(draft, body.momentum) if _goes(draft, at)]:
-        refusal = f"{waiting[0]} {FIRST}"  # its coordinates are found again by this pose
+        refusal = f"{waiting[0]} {FIRST}"  # it takes the pose along, or is found again by it
     else:
         # of bodies that nothing ties to the ground the first keeps its pose, in whatever order the others lose theirs
         way = reach(draft, body.momentum, {None, *(j for j in found if j < body.momentum)})
@@ -160,9 +161,14 @@ def _at(draft: Draft, momentum: Path) -> list[Path]:
 
 
 def _goes(draft: Draft, box: Path) -> bool:
-    """Whether a joint holds nothing, or will when its idle friction is gone."""
+    """Whether a joint holds nothing, or everything, or will when something else is gone."""
     site = _joint(draft, (box,))
-    return site is not None and (not site.refusal or site.refusal.endswith(FIRST))
+    return _merges(draft, box) or (site is not None and (not site.refusal or site.refusal.endswith("first")))
+
+
+def _merges(draft: Draft, box: Path) -> bool:
+    site = MERGE.at(draft, (box,))
+    return site is not None and (not site.refusal or site.refusal.endswith("first"))
 
 
 # ---- joints that hold nothing ---------------------------------------------------------------------------------------
@@ -237,6 +243,8 @@ def _gyroscopic(draft: Draft, place: tuple[Path, ...]) -> Site | None:
         refusal = "a wrench from outside may turn it"
     elif inertia is None:
         refusal = "nothing stores its momentum"
+    elif waiting := [at for at in _at(draft, momentum) if _merges(draft, at)]:
+        refusal = f"{waiting[0]} {FIRST}"
     else:
         if part.kernel.name == "lie_poisson":
             moves = _moves(draft, momentum)

@@ -14,7 +14,7 @@ from ephs.mechanics.build import initial_state
 from ephs.mechanics.components import ground
 from ephs.mechanics.reduction.dropping import DROP_FRICTION, DROP_GYROSCOPIC, DROP_JOINT, DROP_POSE
 from ephs.mechanics.reduction.folding import FOLD
-from ephs.mechanics.reduction.rewrite import rewrite, sites_of
+from ephs.mechanics.reduction.rewrite import Strength, rewrite, sites_of
 from ephs.mechanics.reduction.rules import RULES
 from ephs.mechanics.scene.model import frozen
 from ephs.mechanics.simulate import problem_of_system
@@ -254,7 +254,7 @@ def light(scene):
 def test_reduced_systems_take_the_same_steps_and_every_state_is_found_again(scene, floating):
     scene = light(scene) if floating else scene
     system = scene.system()
-    done = rewrite(system, RULES)
+    done = rewrite(system, [rule for rule in RULES if rule.strength == Strength.RELATION])
     start = initial_state(scene)
     step, steps = 5e-3, 4
     runs = []

@@ -1,0 +1,102 @@
+"""Bodies that are joined rigidly: the same accelerations as one body, and every state found again."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+import ephs
+from ephs import Path
+from ephs.mechanics import joint, mbs_pattern, rigid_body
+from ephs.mechanics.build import initial_state
+from ephs.mechanics.reduction.dropping import DROP_FRICTION
+from ephs.mechanics.reduction.folding import FOLD
+from ephs.mechanics.reduction.merging import MERGE
+from ephs.mechanics.reduction.rewrite import rewrite, sites_of
+from ephs.mechanics.scene.model import frozen
+from ephs.mechanics.solve.instant import instant
+from ephs.semantics import Reference
+from ephs.semantics.spaces import SE3
+from ephs.testing import mechanisms
+
+KINDS = ("fixed", "revolute", "spherical", "free")
+RULES = (FOLD, DROP_FRICTION, MERGE)
+
+
+def rates(system, state):
+    d = system.flatten().descriptor()
+    return instant(d, Reference(), d.pack(state)).rates
+
+
+@settings(max_examples=40)
+@given(scene=mechanisms(max_bodies=4, kinds=KINDS, loops=False, heat=False), weightless=st.booleans())
+def test_merged_bodies_move_as_they_did(scene, weightless):
+    """ṗ = ṗ₁ + Ad*_{x⁻¹}ṗ₂ where x is constant, and all other rates are what they were."""
+    assume(any(j.kind == "fixed" and "ground" not in (j.body1, j.body2) for _, j in scene.all_joints()))
+    if weightless:
+        scene = replace(scene, world=replace(scene.world, gravity=frozen([0.0, 0.0, 0.0])))
+    # a fixed joint has nothing to rub and nothing to heat: its friction goes first
+    system, start = scene.system(), initial_state(scene)
+    done = rewrite(system, RULES)
+    assert any(site.rule == MERGE.name for site in done.done)
+    before, after = rates(system, start), rates(done.system, done.states.forward(start))
+    # the map of momenta is linear, and so the map of their rates
+    mapped = done.states.forward({path: before[path] if path[-1] == "p" else start[path] for path in start})
+    scale = max(1.0, *(np.abs(value).max(initial=0.0) for value in before.values()))
+    for path, value in after.items():
+        expected = mapped[path] if path[-1] == "p" else before[path]
+        assert np.abs(value - expected).max(initial=0.0) <= 1e-8 * scale, path
+    found = done.states.back(done.states.forward(start), start)
+    assert set(found) == set(start)
+    for path, value in start.items():
+        assert np.abs(found[path] - value).max(initial=0.0) <= 1e-9 * max(1.0, np.abs(value).max(initial=0.0)), path
+
+
+def two(link):
+    bodies = {f"body{i}": rigid_body(float(i), [0.3, 0.4, 0.5]) for i in (1, 2)}
+    return mbs_pattern()(joint=link, **bodies)
+
+
+def test_the_inertia_is_that_of_both():
+    """Parallel axes: two bodies a distance apart."""
+    aside = np.array([1.0, 0.0, 0.0, 0.0, 0.6, 0.0, 0.0])
+    done = rewrite(two(joint("fixed", aside)), RULES)
+    ke = dict(done.system.leaves())[Path.of("body1.ke")]
+    whole = np.linalg.inv(np.array(ke.kernel.parameters).reshape(6, 6))
+    shift = 2.0 * (0.6**2 * np.eye(3) - np.outer(aside[4:], aside[4:]))
+    assert np.abs(whole[:3, :3] - (np.diag([0.6, 0.8, 1.0]) + shift)).max() <= 1e-14
+    assert np.abs(whole[3:, 3:] - 3.0 * np.eye(3)).max() <= 1e-14
+
+
+@settings(max_examples=10)
+@given(seed=st.integers(0, 2**20))
+def test_the_order_of_merging_makes_no_difference(seed):
+    rng = np.random.default_rng(seed)
+    momentum = ephs.quantity.body_momentum
+    junctions = {f"p{i}": ephs.junction(momentum) for i in range(4)}
+    boxes = {f"b{i}": {"p": f"p{i}"} for i in range(4)} | {
+        f"w{i}": {"p1": f"p{i}", "p2": f"p{i + 1}"} for i in range(3)
+    }
+    parts = {f"b{i}": rigid_body(1.0 + i, [0.3, 0.4, 0.5]) for i in range(4)}
+    parts |= {f"w{i}": joint("fixed", SE3.random(rng), SE3.random(rng)) for i in range(3)}
+    start = rewrite(ephs.Pattern(junctions=junctions, boxes=boxes)(parts), (FOLD, DROP_FRICTION)).system
+    found = []
+    for _ in range(2):
+        done = start
+        while sites := [site for site in sites_of(done, MERGE) if not site.refusal]:
+            done = sites[int(rng.integers(len(sites)))].apply(done).system
+        found.append(done)
+    assert found[0].pattern.isomorphic(found[1].pattern)
+    inertias = [dict(one.leaves())[Path.of("b0.ke")].kernel.parameters for one in found]
+    assert np.abs(np.subtract(*map(np.array, inertias))).max() <= 1e-12
+    assert len(found[0].states) == 2
+
+
+def test_what_is_not_rigid_or_not_alone_stays():
+    assert not sites_of(rewrite(two(joint("revolute")), [FOLD]).system, MERGE)
+    (site,) = sites_of(rewrite(two(joint("fixed")), [FOLD]).system, MERGE)
+    assert site.refusal == "joint.mf comes first"
+    with pytest.raises(ephs.AssemblyError, match="comes first"):
+        site.apply(rewrite(two(joint("fixed")), [FOLD]).system)
