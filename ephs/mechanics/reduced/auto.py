@@ -6,20 +6,19 @@ mode is, and a step that this holds at the limit of stability again and again se
 
 from typing import Any, final
 
+from ephs.mechanics.engine.march_kernels import PATIENCE
 from ephs.mechanics.reduced.equations import Equations, ReducedState
 from ephs.mechanics.reduced.explicit import Explicit, tableau
 from ephs.mechanics.reduced.implicit import Implicit
 from ephs.mechanics.reduced.method import ReducedMethod
 from ephs.mechanics.solve.control import Control
 from ephs.mechanics.solve.errors import Outcome, SolveError
-from ephs.mechanics.solve.loop import Attempt
+from ephs.mechanics.solve.loop import Attempt, Leg, Span
 
 __all__ = ["Auto"]
 
 LIMITS = {"rk54": 3.25, "rk87": 6.1}
 """h·|λ| at the limit of stability."""
-PATIENCE = 15
-"""Steps at the limit before the method is changed."""
 DIGITS = 1e-5
 """Tolerances below this are for order 8."""
 
@@ -63,6 +62,10 @@ class Auto(ReducedMethod):
                 if self._free == 6:
                     self._held = 0
         return found
+
+    def many(self, span: Span[ReducedState]) -> Leg[ReducedState] | None:
+        """Explicit steps, many in one compiled call, until the problem shows itself stiff."""
+        return self._explicit.many(span, LIMITS[self._explicit.name], self._switch)
 
     def _switch(self, t: float, h: float, reason: str) -> None:
         self._implicit = Implicit(self.equations, self.control)

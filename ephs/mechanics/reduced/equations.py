@@ -5,18 +5,23 @@ spaces, v̇ = dexp⁻¹(v) r.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any, final
 
 import numpy as np
 
 from ephs.mechanics.build import component_path, drive_ports, wrench_port
-from ephs.mechanics.reduced.loop_kernels import constraint_rows, correct, loop_gaps, reduce_rows
+from ephs.mechanics.engine.build import engine_of, memory_of
+from ephs.mechanics.engine.engine_kernels import DEPENDENT, STILL, resolve
+from ephs.mechanics.engine.march_kernels import C_COLUMNS, C_COMPONENT, C_EVALUATIONS, attempt
+from ephs.mechanics.engine.rate_kernels import OPEN, across, advance, close, derive, joint_rates
+from ephs.mechanics.engine.tables import Scheme
+from ephs.mechanics.reduced.loop_kernels import accelerate, constraint_rows, correct, loop_gaps, reduce_rows
 from ephs.mechanics.reduced.mechanism import reduce_scene
 from ephs.mechanics.reduced.paper import PaperStates
-from ephs.mechanics.reduced.step_kernels import advance, rates, stages
 from ephs.mechanics.reduced.sweep_kernels import inertia_sweep, kinematics
-from ephs.mechanics.reduced.tables import CUT, SPRING
+from ephs.mechanics.reduced.tables import CUT, SPRING, Workspace
 from ephs.mechanics.scene.geometry import Coupling
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.solve.continuous import Continuous
@@ -36,7 +41,8 @@ GAP = 1e-12
 CLOSED = 1e-10
 """Residuals above this cannot be accepted."""
 ROUNDS = 12
-SINGULAR = 20
+ASIDE = 0.1
+"""How far, in rad or m, a mechanism is moved to see which of its constraints repeat others wherever it is."""
 
 
 @final
@@ -69,12 +75,15 @@ class Equations:
         self.model = model = compile_model(problem.descriptor, problem.reference, problem.inputs(t0, problem.initial))
         self.reduced = reduced = reduce_scene(scene, problem, model)
         self._continuous = Continuous(model)
-        self.work = reduced.workspace()
+        self._light = reduced.workspace(dense=False)
+        self._dense: Workspace | None = None
         t = reduced.tables
         self._moving = [i for i in range(len(reduced.edges)) if t.kind[i] != SPRING]
         sizes = [int(t.dim[i]) if t.kind[i] != SPRING else 0 for i in range(len(reduced.edges))]
         self._v_at = np.cumsum([0, *sizes])[:-1].astype(np.int64)
         self._rank = 0
+        self._careful = self._factored = False
+        self._closed_at = np.zeros(0), np.zeros(0)
         self._q = np.zeros(reduced.coordinates)
         self.nv, self.n, self.ns = sum(sizes), reduced.freedoms, len(reduced.entropies)
         self.size = self.nv + self.n + self.ns + 2 + len(reduced.made)
@@ -89,10 +98,40 @@ class Equations:
         self.drive = np.zeros(self.nv)
         self.wrench = np.zeros((reduced.links, 6))
         self._ports = self._find_ports(scene)
-        self._constant = problem.constant
+        self.constant = problem.constant
         self._place_inputs(0.0, None)
-        self._paper = PaperStates(reduced, problem, self.work)
+        self._paper = PaperStates(reduced, problem, self._light)
         self.evaluations = 0
+        self.gravity = np.array(scene.world.gravity, dtype=float)
+        self.motions = np.zeros(self.n)
+        self.motions[t.driven.astype(bool)] = self.prescribed
+        self._change, self._moved = np.zeros(self.n), np.zeros(self.nv)
+        self._acted = self._find_acted()
+        self._build(None)
+
+    def _build(self, kept: "list[Array] | None") -> None:
+        """The compiled engine, with all rows of the cut joints or those that are kept."""
+        self.engine = engine_of(self.reduced, self.gravity, self._acted, kept)
+        self.memory = memory_of(self.engine, self.ns)
+
+    def _find_acted(self) -> tuple[frozenset[int], frozenset[int]]:
+        """Edges and links on which given forces act."""
+        t = self.reduced.tables
+        edges: set[int] = set()
+        links: set[int] = set()
+        for _, array, where in self._ports:
+            if array is self.wrench:
+                links.add(int(where))
+            else:
+                edges |= {i for i in self._moving if t.dim[i] and int(t.r_at[i]) == where.start}
+        return frozenset(edges), frozenset(links)
+
+    @property
+    def work(self) -> Workspace:
+        """Memory of the sweeps over dense matrices."""
+        if self._dense is None:
+            self._dense = self.reduced.workspace(dense=True)
+        return self._dense
 
     # ---- inputs ------------------------------------------------------------------------------------------------
 
@@ -123,7 +162,7 @@ class Equations:
     def advance(self, q: Array, v: Array) -> Array:
         """q·exp(v), joint by joint."""
         out = np.array(q)
-        advance(self.reduced.tables, self._v_at, q, v, out)
+        advance(self.engine, q, v, out)
         return out
 
     def rates(self, t: float, base: Array, y: Array) -> Array:
@@ -136,54 +175,70 @@ class Equations:
         """
         nv, n, ns = self.nv, self.n, self.ns
         self.evaluations += 1
-        if not self._constant:
+        self._factored = False
+        if not self.constant:
             v, r, s, books = np.split(y, [nv, nv + n, nv + n + ns])
             self._place_inputs(t, self.states(ReducedState(t, self.advance(base, v), r, s, books)))
         out = np.zeros(self.size)
-        self.refuse(
-            *rates(
-                self.reduced.tables, self.work, self._v_at, base, self._q, y, self.drive, self.wrench, self.scal, out
-            )
-        )
+        status, component = derive(
+            self.engine, self.memory, base, self._q, y, self.drive, self.wrench, self.scal, out
+        )  # fmt: skip
+        if status == DEPENDENT:
+            status, component = self._rates_carefully(y, out)
+        self.refuse(status, component)
         return out
 
-    def stages(
-        self, state: ReducedState, a: Array, b: Array, c: Array, h: float, y0: Array, k: Array, y1: Array
-    ) -> None:
-        """The rates k (stages + 1, size) at an explicit method's stages and end, k[0] known; y at the end into y1."""
-        count = b.size
-        if self._constant:
-            self.refuse(
-                *stages(
-                    self.reduced.tables, self.work, self._v_at, a, b, state.q, self._q, y0, h, True, k, y1,
-                    self.drive, self.wrench, self.scal,
-                )
+    def _rates_carefully(self, y: Array, out: Array) -> tuple[int, int]:
+        """The rates of the tree and of the entropies, where constraints nearly repeat each other."""
+        r, rest = slice(self.nv, self.nv + self.n), self.nv + self.n
+        at = rest + self.ns
+        out[at:] = 0.0
+        found = accelerate(
+            self.reduced.tables, self.work, self._q, y[r], y[rest:at], self.drive, self.wrench, self.scal, out[r],
+            out[rest:at], out[at + 2 :], out[at : at + 2],
+        )  # fmt: skip
+        joint_rates(self.engine, self.memory, y, y[r], out)
+        return int(found[0]), int(found[1])
+
+    def stages(self, state: ReducedState, scheme: Scheme, c: Array, h: float, y0: Array, k: Array, y1: Array) -> Array:
+        """The rates k (stages + 1, size) at an explicit method's stages and end, k[0] known; y at the end into y1.
+
+        Returns y at the last stage.
+        """
+        count = scheme.b.size
+        before = np.zeros(self.size)
+        if self.constant:
+            control = np.zeros(C_COLUMNS)
+            status = attempt(
+                self.engine, self.memory, scheme, before, state.q, y0, h, k, y1, self._q, self.drive, self.wrench,
+                self.scal, control,
             )  # fmt: skip
-            self.evaluations += count
-            return
+            self.evaluations += int(control[C_EVALUATIONS])
+            if status != DEPENDENT:
+                self.refuse(status, int(control[C_COMPONENT]))
+                return before
         for i in range(1, count):
-            k[i] = self.rates(state.t + c[i] * h, state.q, y0 + h * (a[i, :i] @ k[:i]))
-        y1[:] = y0 + h * (b @ k[:count])
+            before = y0 + h * (scheme.a[i, :i] @ k[:i])
+            k[i] = self.rates(state.t + c[i] * h, state.q, before)
+        y1[:] = y0 + h * (scheme.b @ k[:count])
         k[-1] = self.rates(state.t + h, state.q, y1)
+        return before
 
     def load(self, t: float, q: Array, r: Array, s: Array) -> None:
         """Put what drives at a time and state into ``drive`` and ``wrench``."""
-        if not self._constant:
+        if not self.constant:
             books = np.zeros(2 + len(self.reduced.made))
             self._place_inputs(t, self.states(ReducedState(t, q, r, s, books)))
 
     def prepare(self, state: ReducedState) -> None:
         """Compile what is not in the cache."""
-        y = self.vector(state)
-        k, a, b = np.zeros((2, self.size)), np.zeros((1, 1)), np.ones(1)
-        k[0] = self.rates(state.t, state.q, y)
-        self.stages(state, a, b, b, 0.0, y, k, y.copy())
+        self.rates(state.t, state.q, self.vector(state))
         self.evaluations = 0
 
     def refuse(self, status: int, component: int) -> None:
         """Raise what a compiled function reported, if it did."""
-        if status == SINGULAR:
-            raise self._unmoved(component)
+        if status == STILL:
+            raise self._unmoved(int(component))
         if status:
             raise SolveError.of_component(int(status), self.model, int(component))
 
@@ -235,11 +290,26 @@ class Equations:
         SolveError
             The loops do not close near by.
         """
+        if not (self.engine.cut.size or self.prescribed.size):
+            return state
+        q, r = np.array(state.q), np.array(state.r)
+        status, gap = close(self.engine, self.memory, q, r, self.motions, self._change, self._moved)
+        if status == OPEN:
+            raise SolveError(Outcome.DIVERGED, "", f"loops stay open by {gap:.1e} m or rad")
+        self._careful = status == DEPENDENT
+        if status == STILL:
+            self._sweep()
+        if status != 0:
+            return self.closed_carefully(state)
+        self._closed_at, self._factored = (q, r), True
+        return ReducedState(state.t, q, r, state.s, state.books)
+
+    def closed_carefully(self, state: ReducedState) -> ReducedState:
+        """`closed`, by orthogonal elimination in the mass metric: for constraints that nearly repeat each other."""
         tables, w = self.reduced.tables, self.work
         q, r = state.q, np.array(state.r)
         m = int(tables.rows.sum() + tables.driven.sum())
-        if m == 0:
-            return state
+        self._careful = True
         residual, change = np.zeros(m), np.zeros(self.n)
         gap = before = np.inf
         for _ in range(ROUNDS):
@@ -326,7 +396,7 @@ class Equations:
         return size
 
     def along(self, estimate: Array) -> Array:
-        """An estimate for (v of the tree, r, s) without its parts across the constraints.
+        """An estimate for (v of the tree, r, s) without its parts across the constraints, where loops were closed last.
 
         Closing the loops takes those out; near a singular configuration they are most of the estimate.
         """
@@ -334,6 +404,15 @@ class Equations:
         if m == 0:
             return estimate
         out, change = np.array(estimate), np.zeros(self.n)
+        if not self._careful:
+            q, r = self._closed_at
+            if not self._factored:
+                close(self.engine, self.memory, q, r, self.motions, self._change, self._moved)
+            for part in (slice(0, self.n), slice(self.n, 2 * self.n)):
+                across(self.engine, self.memory, q, out[part])
+                resolve(self.engine, self.memory, q, change)
+                out[part] += change
+            return out
         for part in (slice(0, self.n), slice(self.n, 2 * self.n)):
             correct(self.work, self._rank, -self.work.row[:m] @ out[part], change)
             out[part] += change
@@ -376,4 +455,27 @@ class Equations:
         """
         state = self.closed(ReducedState(t, *self._paper.initial(), np.zeros(2 + len(self.reduced.made))))
         self._paper.check(state.q, state.r, state.s)
+        if self._careful:
+            self._without_repeated(state)
         return state
+
+    def _without_repeated(self, state: ReducedState) -> None:
+        """Leave out of the engine the rows that others imply, where that is so aside of the initial state, too."""
+        m, tables = int(self.reduced.tables.rows.sum()), self.reduced.tables
+        n = self.prescribed.size
+        rng = np.random.default_rng(1)
+        push, change = rng.standard_normal(self.n), np.zeros(self.n)
+        self.mass(state.q, state.r)
+        rank = self._rows(m + n)
+        correct(self.work, rank, -self.work.row[: m + n] @ push, change)
+        push += change
+        try:
+            aside = self.closed_carefully(
+                replace(state, q=self.moved(state.q, ASIDE * push / max(1e-9, np.abs(push).max())))
+            )
+        except SolveError:
+            return
+        self.mass(aside.q, aside.r)
+        chosen = {int(row) - n for row in self.work.chosen[: self._rows(m + n)]}
+        first = np.cumsum([0, *tables.rows[tables.kind == CUT]])
+        self._build([np.array([j for j in range(b - a) if a + j in chosen], dtype=int) for a, b in pairwise(first)])

@@ -1,53 +1,81 @@
 """Explicit Runge-Kutta methods on the reduced form: adaptive, loops projected back after each step.
 
-Coefficients are those of Dormand and Prince, of orders 5(4) and 8(5, 3), as SciPy ships them.
+Coefficients are those of Dormand and Prince, of orders 5(4) and 8(5, 3), as SciPy ships them. Steps of a mechanism on
+which nothing but given constants acts are taken many in one compiled call.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, final
 
 import numpy as np
 
+from ephs.mechanics.engine.march_kernels import (
+    C_BEFORE,
+    C_COLUMNS,
+    C_COMPONENT,
+    C_DAMPING,
+    C_END,
+    C_EVALUATIONS,
+    C_EXPONENT,
+    C_FRESH,
+    C_GRID,
+    C_H,
+    C_LEAST,
+    C_LEAST_STEP,
+    C_LIMIT,
+    C_LONGEST,
+    C_MOST,
+    C_ORIGIN,
+    C_REFUSALS,
+    C_REJECTED,
+    C_ROWS,
+    C_SAVED,
+    C_SHARE,
+    C_SHORTEST,
+    C_SPAN,
+    C_STEPS,
+    C_STIFF,
+    C_STRICT,
+    C_T,
+    C_TRIED,
+    CAREFUL,
+    DONE,
+    PATIENCE,
+    REFUSED,
+    SHORT,
+    STIFF,
+    judge,
+    march,
+    measure,
+    stiffness,
+)
+from ephs.mechanics.engine.rate_kernels import OPEN
+from ephs.mechanics.engine.tables import Scheme, State
 from ephs.mechanics.reduced.equations import Equations, ReducedState
 from ephs.mechanics.reduced.method import ReducedMethod
-from ephs.mechanics.solve.control import Control
-from ephs.mechanics.solve.loop import Attempt
+from ephs.mechanics.solve.control import Control, Proportional
+from ephs.mechanics.solve.errors import Outcome, SolveError
+from ephs.mechanics.solve.loop import Attempt, Counts, Leg, Span
 from ephs.semantics.bundle import Array
 
 __all__ = ["Explicit", "Tableau", "tableau"]
+
+ROWS = 1024
+"""Rows that are kept before they are handed over."""
 
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Tableau:
-    """The coefficients of an explicit method; ``error`` and, of order 8, ``coarse`` estimate its error."""
+    """The coefficients of an explicit method; ``exponent``: the power of the step with which its estimate falls."""
 
     name: str
     order: int
-    a: Array
-    b: Array
+    scheme: Scheme
     c: Array
-    error: Array
-    coarse: Array | None
-
-    def estimates(self, k: Array, h: float) -> list[Array]:
-        """The vectors that estimate a step's error: one, or a fine and a rough one."""
-        return [h * (weights @ k) for weights in (self.error, self.coarse) if weights is not None]
-
-    @staticmethod
-    def measure(estimates: list[Array]) -> float:
-        """Their size, where each is relative to what is allowed: at most 1 where a step may be accepted."""
-        size = max(estimates[0].size, 1)
-        squares = [float(estimate @ estimate) for estimate in estimates]
-        if len(squares) == 1 or squares[0] == 0.0:
-            return float(np.sqrt(squares[0] / size))
-        return squares[0] / np.sqrt((squares[0] + 0.01 * squares[1]) * size)
-
-    @property
-    def exponent(self) -> float:
-        """The power of the step with which the estimate falls."""
-        return 8.0 if self.coarse is not None else 5.0
+    exponent: float
 
 
 @cache
@@ -57,10 +85,10 @@ def tableau(name: str) -> Tableau:
 
     method: Any = DOP853 if name == "rk87" else RK45
     n = method.n_stages
-    a, b, c = np.array(method.A)[:n, :n], np.array(method.B), np.array(method.C)[:n]
+    a, b, c = (np.ascontiguousarray(x, dtype=float) for x in (method.A[:n, :n], method.B, method.C[:n]))
     if name == "rk87":
-        return Tableau(name, 8, a, b, c, np.array(DOP853.E5), np.array(DOP853.E3))
-    return Tableau(name, 5, a, b, c, np.array(RK45.E), None)
+        return Tableau(name, 8, Scheme(a, b, np.array(DOP853.E5), np.array(DOP853.E3), 1), c, 8.0)
+    return Tableau(name, 5, Scheme(a, b, np.array(RK45.E), np.zeros(n + 1), 0), c, 5.0)
 
 
 @final
@@ -82,36 +110,179 @@ class Explicit(ReducedMethod):
 
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
         """One step of h seconds."""
-        eq, method = self.equations, self.method
+        eq, scheme = self.equations, self.method.scheme
         if self._known is None or self._known[0] is not state.q:
             self._known = state.q, eq.rates(state.t, state.q, eq.vector(state))
-        end, k, y0, y1 = self._stages(state, h, self._known[1])
+        y0, y1 = eq.vector(state), np.empty(eq.size)
+        k = np.zeros((scheme.b.size + 1, eq.size))
+        k[0] = self._known[1]
+        before = eq.stages(state, scheme, self.method.c, h, y0, k, y1)
+        end = eq.state(state, y1, state.t + h)
         allowed = self.atol + self.rtol * eq.sizes(y0, y1)
         closed = eq.closed(end)
-        error = method.measure([eq.along(e[eq.counted]) / allowed for e in method.estimates(k, h)])
-        self._look(k, y1, allowed, h)
+        estimates = [
+            eq.along(h * (weights @ k)[eq.counted])
+            for weights in ((scheme.error, scheme.coarse) if scheme.order8 else (scheme.error,))
+        ]
+        error = float(measure(estimates[0], estimates[-1], allowed, scheme.order8 == 1))
+        self.stiffness = float(stiffness(scheme, before, k, y1, h, eq.n, eq.nv, allowed))
         if closed is end and closed.q is not state.q:  # nothing was projected: the last rates are the next first ones
             first = k[-1].copy()
             first[: eq.nv] = closed.r
             self._known = closed.q, first
         return Attempt(state, closed, h, error, eq.least(state, closed))
 
-    def _stages(self, state: ReducedState, h: float, first: Array) -> tuple[ReducedState, Array, Array, Array]:
-        eq, method = self.equations, self.method
-        y0 = eq.vector(state)
-        k, y1 = np.zeros((method.b.size + 1, eq.size)), np.empty(eq.size)
-        k[0] = first
-        eq.stages(state, method.a, method.b, method.c, h, y0, k, y1)
-        return eq.state(state, y1, state.t + h), k, y0, y1
+    def many(
+        self, span: Span[ReducedState], limit: float = 0.0, left: Callable[[float, float, str], None] | None = None
+    ) -> Leg[ReducedState] | None:
+        """Takes many steps in one compiled call, where nothing has to be asked of Python at each.
 
-    def _look(self, k: Array, y1: Array, allowed: Array, h: float) -> None:
-        """h·|λ| of the mode that the last two stages differ in: what says that a problem is stiff.
-
-        Hairer and Wanner, *Solving Ordinary Differential Equations II*, IV.2.
+        Where stability, whose limit is h·|λ| = ``limit``, holds its steps back, it calls left(t, h, reason) and ends.
         """
-        eq, method = self.equations, self.method
-        before = h * (method.a[-1] @ k[: method.a.shape[1]])
-        after = h * (method.b @ k[: method.b.size])
-        rise = np.linalg.norm(((k[-1] - k[-2])[eq.counted]) / allowed)
-        run = np.linalg.norm(((after - before)[eq.counted]) / allowed)
-        self.stiffness = float(abs(h) * rise / run) if run > 0.0 else 0.0
+        return _March(self, span, limit, left) if self.equations.constant else None
+
+
+@final
+class _March:
+    """One run in compiled steps. Times in it are counted from the start and grow."""
+
+    def __init__(
+        self,
+        method: Explicit,
+        span: Span[ReducedState],
+        limit: float,
+        left: Callable[[float, float, str], None] | None,
+    ) -> None:
+        eq, scheme = method.equations, method.method.scheme
+        self.method, self.span, self.left, self._leave = method, span, False, left
+        self._handed = 0
+        size, q = eq.size, span.state.q
+        rows = ROWS if span.save_at is None else max(span.save_at.size, 1)
+        self.times = np.zeros(0) if span.save_at is None else np.abs(span.save_at - span.t0)
+        stages, counted = (scheme.b.size + 1, size), method.atol.size
+        self.memory = State(
+            q=np.array(q), y=eq.vector(span.state), k=np.zeros(stages), y1=np.zeros(size), q1=np.zeros(q.size),
+            k2=np.zeros(stages), y2=np.zeros(size), q2=np.zeros(q.size), b=np.zeros(size),
+            atol=np.array(method.atol), rtol=np.array(method.rtol), allowed=np.zeros(counted),
+            fine=np.zeros(counted), coarse=np.zeros(counted), motions=eq.motions, change=np.zeros(eq.n),
+            moved=np.zeros(eq.nv), rows_t=np.zeros((rows, 2)), rows_q=np.zeros((rows, q.size)),
+            rows_y=np.zeros((rows, size - eq.nv)),
+        )  # fmt: skip
+        c = self.control = np.zeros(C_COLUMNS)
+        policy = span.policy
+        c[C_END], c[C_SPAN], c[C_ORIGIN], c[C_H] = span.until - span.t0, abs(span.until - span.t0), span.t0, span.h
+        c[C_LEAST_STEP], c[C_MOST] = span.control.least, span.control.most
+        c[C_BEFORE], c[C_SHORTEST], c[C_LEAST] = 1e-4, np.inf, np.inf
+        c[C_EXPONENT], c[C_SHARE], c[C_DAMPING] = method.exponent, method.share, 0.4
+        c[C_STRICT] = Proportional.STRICT
+        c[C_SAVED] = -1.0 if span.save_at is None else float(span.saved)
+        c[C_LIMIT] = limit
+        c[C_GRID] = 0.0 if policy else float(span.control.step or 0.0)
+
+    def advance(self, steps: int) -> bool:
+        """Up to so many steps; whether the end is reached.
+
+        Raises
+        ------
+        SolveError
+            The steps get too short, or a state cannot be evaluated.
+        """
+        eq, c = self.method.equations, self.control
+        before = c[C_EVALUATIONS]
+        scheme = self.method.method.scheme
+        found = march(eq.engine, eq.memory, scheme, self.memory, c, self.times, eq.drive, eq.wrench, eq.scal, steps)
+        eq.evaluations += int(c[C_EVALUATIONS] - before)
+        self.method.stiffness = float(c[C_STIFF])
+        if found == CAREFUL:
+            self._step()
+        elif found == STIFF and self._leave is not None:
+            failing = c[C_REFUSALS] > PATIENCE
+            reason = "its steps fail" if failing else f"h·|λ| = {c[C_STIFF]:.1f} holds its steps"
+            self._leave(self.time, float(c[C_H]), reason)
+            self.left = True
+        elif found == SHORT:
+            raise SolveError(Outcome.TINY, "", f"{c[C_H]:.3g} s")
+        elif found >= REFUSED:
+            self._refused(int(found) - REFUSED)
+        return found == DONE
+
+    def _refused(self, status: int) -> None:
+        if status == OPEN:
+            raise SolveError(Outcome.DIVERGED, "", "loops stay open")
+        self.method.equations.refuse(status, int(self.control[C_COMPONENT]))
+
+    def _step(self) -> None:
+        """One step with the careful elimination, where constraints nearly repeat each other."""
+        c, s, h = self.control, self.memory, float(self.control[C_TRIED])
+        sign = 1.0 if c[C_END] >= 0.0 else -1.0
+        state = self.state
+        try:
+            attempt = self.method.step(state, sign * h)
+        except SolveError as error:
+            if c[C_GRID]:
+                raise
+            c[C_H], c[C_REJECTED] = 0.25 * h, c[C_REJECTED] + 1.0
+            self.span.control.allowed(float(c[C_H]), max(abs(state.t), abs(self.span.until)), error)
+            return
+        if not (c[C_GRID] or judge(c, h, attempt.error)):
+            c[C_REJECTED] += 1.0
+            self.span.control.allowed(float(c[C_H]), max(abs(state.t), abs(self.span.until)), None)
+            return
+        now = float(c[C_T])
+        after = float(abs(c[C_END])) if h >= abs(c[C_END]) - now else now + h
+        wanted = [(after, attempt.end)]
+        if c[C_SAVED] >= 0.0:
+            last = int(np.searchsorted(self.times, after, side="right"))
+            wanted = [
+                (when, attempt.end if when == after else self.method.step(state, sign * (when - now)).end)
+                for when in self.times[int(c[C_SAVED]) : last].tolist()
+            ]
+            c[C_SAVED] = last
+        for when, found in wanted:
+            row = int(c[C_ROWS])
+            s.rows_t[row] = when, attempt.least
+            s.rows_q[row], s.rows_y[row] = found.q, self.method.equations.vector(found)[self.method.equations.nv :]
+            c[C_ROWS] += 1.0
+        s.q[:], s.y[:] = attempt.end.q, self.method.equations.vector(attempt.end)
+        c[C_T], c[C_STEPS], c[C_FRESH] = after, c[C_STEPS] + 1.0, 0.0
+        c[C_SHORTEST], c[C_LONGEST] = min(c[C_SHORTEST], h), max(c[C_LONGEST], h)
+        c[C_LEAST] = min(c[C_LEAST], attempt.least)
+
+    @property
+    def time(self) -> float:
+        """The time reached."""
+        sign = 1.0 if self.control[C_END] >= 0.0 else -1.0
+        done = self.control[C_T] >= abs(self.control[C_END])
+        return self.span.until if done else self.span.t0 + sign * float(self.control[C_T])
+
+    @property
+    def state(self) -> ReducedState:
+        """The state reached."""
+        return self._state(self.time, self.memory.q, self.memory.y[self.method.equations.nv :])
+
+    def _state(self, t: float, q: Array, rest: Array) -> ReducedState:
+        n, ns = self.method.equations.n, self.method.equations.ns
+        return ReducedState(t, q.copy(), rest[:n].copy(), rest[n : n + ns].copy(), rest[n + ns :].copy())
+
+    def rows(self) -> list[tuple[float, ReducedState, float]]:
+        """What was kept since the last call: time, state, the step's least production."""
+        sign, s = (1.0 if self.control[C_END] >= 0.0 else -1.0), self.memory
+        out: list[tuple[float, ReducedState, float]] = []
+        for row in range(int(self.control[C_ROWS])):
+            passed, least = s.rows_t[row].tolist()
+            t = self.span.until if passed == abs(self.control[C_END]) else self.span.t0 + sign * passed
+            if self.span.save_at is not None:
+                t = float(self.span.save_at[self.span.saved + self._handed + row])
+            out.append((t, self._state(t, s.rows_q[row], s.rows_y[row]), least))
+        self._handed += len(out)
+        self.control[C_ROWS] = 0.0
+        return out
+
+    @property
+    def counts(self) -> Counts:
+        """What it did so far."""
+        c = self.control
+        return Counts(
+            int(c[C_STEPS]), int(c[C_REJECTED]), float(c[C_SHORTEST]), float(c[C_LONGEST]), float(c[C_LEAST]),
+            float(c[C_H]),
+        )  # fmt: skip

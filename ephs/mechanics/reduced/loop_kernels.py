@@ -14,7 +14,7 @@ from ephs.mechanics.reduced.tables import CUT
 from ephs.semantics.spaces import jit
 from ephs.semantics.spaces.se3_kernels import coadjoint_apply, include, pose_compose, pose_inverse, pose_log
 
-kernel = jit.kernel
+kernel = jit.lean_kernel
 RANK = 1e-4
 """A constraint row whose part off the others is less than this, relative to the largest row, is left out. Generous on
 purpose: it carries explicit methods through singular configurations."""

@@ -1,13 +1,16 @@
 """From a scene to the tables of its reduced form: a spanning tree of joints, the rest cut."""
 
+from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import final
+from typing import Any, final
 
+import networkx as nx
 import numpy as np
 
 from ephs.mechanics.build import component_path
 from ephs.mechanics.reduced.tables import CUT, SPRING, TREE, Mechanism, Workspace
+from ephs.mechanics.reduction.subgroup import generated
 from ephs.mechanics.scene.model import GROUND, IDENTITY_POSE, Scene
 from ephs.mechanics.solve.errors import OptionError
 from ephs.mechanics.solve.model import Model
@@ -66,6 +69,10 @@ class Reduced:
         Paths of the states of entropy, in the order of s.
     made
         Paths of the components that make entropy.
+    unknowns
+        How many numbers have to be found.
+    twists
+        Of each edge, (6, d): its freedoms in the world, at the initial configuration.
     """
 
     tables: Mechanism
@@ -75,6 +82,7 @@ class Reduced:
     entropies: tuple[Path, ...]
     made: tuple[Path, ...]
     unknowns: int
+    twists: tuple[Array, ...]
 
     @property
     def cut(self) -> tuple[Edge, ...]:
@@ -91,10 +99,11 @@ class Reduced:
         """The number of the tree's freedoms."""
         return int(self.tables.driven.size)
 
-    def workspace(self) -> Workspace:
-        """Scratch memory for one thread."""
+    def workspace(self, *, dense: bool) -> Workspace:
+        """Scratch memory for one thread; dense: with the matrices of all freedoms and constraints."""
         t = self.tables
         links, edges, n, m = self.links, len(self.edges), self.freedoms, int(t.rows.sum()) + int(t.driven.sum())
+        n, m = (n, m) if dense else (0, 0)
         shapes: dict[str, tuple[int, ...]] = {
             "pose": (links, 7), "inner": (links, 7), "twist": (links, 6), "bias": (links, 6), "load": (links, 6),
             "composite": (links, 6, 6), "motion": (edges, 6, 6), "relative": (edges, 7), "rate": (edges, 6),
@@ -113,6 +122,7 @@ def reduce_scene(scene: Scene, problem: Problem, model: Model) -> Reduced:
     number = {name: i for i, name in enumerate(names)} | {GROUND: -1}
     masses = [body.mass for _, body in scene.all_bodies()]
     joints = _joints(scene, number, masses)
+    poses = [np.array(body.pose) for _, body in scene.all_bodies()]
     tree, cut = _spanning(joints, masses)
     over = [edge.name for edge in cut if edge.motion is not None]
     if over:  # prescribed joints are cut last: only a loop of nothing else is left over
@@ -122,18 +132,45 @@ def reduce_scene(scene: Scene, problem: Problem, model: Model) -> Reduced:
     place = {body: i for i, body in enumerate(order)} | {-1: -1}
     springs = _springs(scene, number)
     edges = [edge for edge, _, _ in tree] + cut + springs
+    twists = _twists(edges, len(tree) + len(cut), poses)
     kinds = [TREE] * len(tree) + [CUT] * len(cut) + [SPRING] * len(springs)
     component = {slot.path: i for i, slot in enumerate(problem.descriptor.components)}
     entropies = _entropies(problem)
     made = tuple(slot.path for slot in problem.descriptor.components if isinstance(slot.primitive, Irreversible))
     parents = [place[edge.body1 if forward else edge.body2] for edge, _, forward in tree]
     mechanism = _tables(
-        scene, model, edges, kinds, [f for *_, f in tree], parents, order, place, component, entropies, made, names
+        scene,
+        model,
+        edges,
+        kinds,
+        [f for *_, f in tree],
+        parents,
+        order,
+        place,
+        component,
+        entropies,
+        made,
+        names,
+        twists,
     )
     bodies = tuple(names[b] if b < len(names) else None for b in order)
     n = int(mechanism.driven.size)
     rows = int(mechanism.rows.sum())
-    return Reduced(mechanism, tuple(edges), bodies, len(order), tuple(entropies), made, 2 * n + rows)
+    return Reduced(mechanism, tuple(edges), bodies, len(order), tuple(entropies), made, 2 * n + rows, tuple(twists))
+
+
+def _twists(edges: list[Edge], joints: int, poses: list[Array]) -> list[Array]:
+    """The freedoms of all joints in the world, where bodies have these poses; none of springs."""
+    ground = SE3.identity()
+    known = dict(enumerate(poses)) | {-1: ground}
+    out: list[Array] = []
+    for edge in edges[:joints]:
+        if edge.body2 in known:  # a frame inside a universal joint has no pose, but one of its joints' bodies does
+            frame = SE3.compose(known[edge.body2], edge.offset2)
+        else:
+            frame = SE3.compose(SE3.compose(known[edge.body1], edge.offset1), edge.pair.include(edge.coordinate))
+        out.append(SE3.adjoint(frame) @ edge.pair.basis)
+    return out + [np.zeros((6, 0))] * (len(edges) - joints)
 
 
 def _joints(scene: Scene, number: Mapping[str, int], masses: list[float]) -> list[Edge]:
@@ -171,56 +208,49 @@ def _joints(scene: Scene, number: Mapping[str, int], masses: list[float]) -> lis
     return out
 
 
+def _graph(count: int, edges: list[Edge]) -> nx.Graph:
+    """Bodies and the ground, −1, with an edge where there is a joint."""
+    graph = nx.Graph()
+    graph.add_nodes_from(range(-1, count))
+    graph.add_edges_from((edge.body1, edge.body2) for edge in edges)
+    return graph
+
+
 def _islands(count: int, edges: list[Edge]) -> list[int]:
     """The first body of each group that has no joint with the ground."""
-    leader = list(range(count + 1))
-
-    def find(body: int) -> int:
-        while leader[body] != body:
-            body = leader[body]
-        return body
-
-    for edge in edges:
-        one, two = find(edge.body1 + 1), find(edge.body2 + 1)
-        leader[max(one, two)] = min(one, two)
-    return [body for body in range(count) if find(body + 1) == body + 1]
+    return sorted(min(group) for group in nx.connected_components(_graph(count, edges)) if -1 not in group)
 
 
 def _spanning(joints: list[Edge], masses: list[float]) -> tuple[list[tuple[Edge, int, bool]], list[Edge]]:
     """The tree as (edge, body that it leads to, walked forward), parents first; and the edges left.
 
     Prescribed joints and those of frames without mass come into the tree first, then those of few freedoms: a joint of
-    many freedoms costs the fewest constraints where it is cut.
+    many freedoms costs the fewest constraints where it is cut. Among equals those near the ground come first: then
+    branches are short, and few loops are open at one body.
     """
+    depth = nx.single_source_shortest_path_length(_graph(len(masses), joints), -1)
+    groups = nx.utils.UnionFind(range(-1, len(masses)))
 
-    def cost(edge: Edge) -> tuple[bool, bool, int]:
+    def cost(edge: Edge) -> tuple[bool, bool, int, int]:
         light = any(body >= 0 and masses[body] == 0.0 for body in (edge.body1, edge.body2))
-        return (edge.motion is None, not light, edge.pair.dim)
-
-    leader = list(range(len(masses) + 1))
-
-    def find(body: int) -> int:
-        while leader[body] != body:
-            body = leader[body]
-        return body
+        return (edge.motion is None, not light, edge.pair.dim, min(depth[edge.body1], depth[edge.body2]))
 
     kept: list[Edge] = []
     cut: list[Edge] = []
     for edge in sorted(joints, key=cost):
-        one, two = find(edge.body1 + 1), find(edge.body2 + 1)
-        if one == two:
+        if groups[edge.body1] == groups[edge.body2]:
             cut.append(edge)
         else:
-            leader[one] = two
+            groups.union(edge.body1, edge.body2)
             kept.append(edge)
     at: dict[int, list[Edge]] = {}
     for edge in kept:
         at.setdefault(edge.body1, []).append(edge)
         at.setdefault(edge.body2, []).append(edge)
     out: list[tuple[Edge, int, bool]] = []
-    queue, reached = [-1], {-1}
+    queue, reached = deque([-1]), {-1}
     while queue:
-        here = queue.pop(0)
+        here = queue.popleft()
         for edge in at.get(here, []):
             there = edge.body2 if edge.body1 == here else edge.body1
             if there not in reached:
@@ -264,6 +294,7 @@ def _tables(
     entropies: Mapping[Path, tuple[int, int]],
     made: tuple[Path, ...],
     names: list[str],
+    twists: list[Array],
 ) -> Mechanism:
     links, count = len(order), len(edges)
     inertia = np.zeros((links, 6, 6))
@@ -281,24 +312,26 @@ def _tables(
     place_of = {effort: i for i, (_, effort) in enumerate(entropies.values())}
     at_q = at_r = 0
     driven: list[int] = []
-    spring, friction, heat = (np.full(count, -1) for _ in range(3))
+    spring, friction, resisting, heat = (np.full(count, -1) for _ in range(4))
     for i, (edge, kind) in enumerate(zip(edges, kinds, strict=True)):
         b, d = edge.pair.basis, edge.pair.dim
         basis[i, :, :d], left[i, :d] = b, np.linalg.pinv(b)
         if kind == CUT:
-            rows[i] = 6 - d
-            normal[i, : 6 - d] = _complement(b, length)
+            found = _complement(b, _loop(i, edges, parents, place, twists, scene), length)
+            rows[i] = len(found)
+            normal[i, : len(found)] = found
         if kind != SPRING:
             q_at[i], r_at[i] = at_q, at_r
             at_q, at_r = at_q + edge.pair.size, at_r + d
         if kind == TREE:
             driven += [int(edge.motion is not None)] * d
         if edge.path is not None:
-            spring[i], friction[i], heat[i] = _parts(model, component, place_of, edge.path)
+            spring[i], resisting[i], heat[i] = _parts(model, component, place_of, edge.path)
+            friction[i] = -1 if _idle(model, resisting[i]) else resisting[i]
     conduction = [
         (i, *(place_of[effort] for effort in slot.efforts))
         for i, slot in enumerate(model.descriptor.components)
-        if isinstance(slot.primitive, Irreversible) and len(slot.efforts) == 2 and i not in friction
+        if isinstance(slot.primitive, Irreversible) and len(slot.efforts) == 2 and i not in resisting
     ]
     t = model.tables
     storages = [(i, model.descriptor.components[i].primitive) for i, _ in entropies.values()]
@@ -343,12 +376,44 @@ def _length(edges: list[Edge]) -> float:
     return float(np.mean([x for x in far if x > 0.0])) if any(x > 0.0 for x in far) else 1.0
 
 
-def _complement(basis: Array, length: float) -> Array:
-    """Rows (6 − d, 6) that vanish on the columns of B, those of rotations times a length."""
-    d = basis.shape[1]
-    rows = np.linalg.svd(basis.T, full_matrices=True)[2][d:] if d else np.eye(6)
-    turning = np.linalg.norm(rows[:, :3], axis=1) > 0.5
-    return np.where(turning[:, None], length, 1.0) * rows
+def _complement(basis: Array, group: Array, length: float) -> Array:
+    """Rows (k − d, 6) that vanish on the columns of B, d of k in a group's algebra; rotations count times a length."""
+    scale = np.array([length] * 3 + [1.0] * 3)
+    whole = np.linalg.qr(scale[:, None] * group)[0] if group.shape[1] < 6 else np.eye(6)
+    if basis.shape[1]:
+        left, sizes, _ = np.linalg.svd(whole.T @ (scale[:, None] * basis), full_matrices=True)
+        whole = whole @ left[:, sizes.size :]
+    return scale * whole.T
+
+
+def _loop(
+    cut: int, edges: list[Edge], parents: list[int], place: Mapping[int, int], twists: list[Array], scene: Scene
+) -> Array:
+    """(6, k): the algebra, in the frame C2 of a cut joint, of the group that the joints of its loop generate.
+
+    The bodies of the loop never leave it relative to each other, so rows beyond it would say nothing.
+    """
+    ends = [place[edges[cut].body1], place[edges[cut].body2]]
+    passed: list[int] = []
+    while ends[0] != ends[1]:
+        later = int(ends[1] > ends[0])
+        passed.append(ends[later])
+        ends[later] = parents[ends[later]]
+    bodies = list(scene.all_bodies())
+    edge = edges[cut]
+    if 0 <= edge.body2 < len(bodies):
+        frame = SE3.compose(np.array(bodies[edge.body2][1].pose), edge.offset2)
+    else:  # the ground
+        frame = edge.offset2
+    seen = SE3.adjoint(SE3.inverse(frame)) @ np.column_stack([twists[i] for i in [*passed, cut]])
+    return generated(seen.T).basis
+
+
+def _idle(model: Model, component: int) -> bool:
+    """Whether a joint's friction or a damper resists nothing."""
+    entries: dict[str, Any] = dict(model.descriptor.components[component].primitive.parameters)
+    given = entries.get("mu", entries.get("damping"))
+    return given is not None and not isinstance(given, str) and not np.any(given)
 
 
 def _parts(model: Model, component: Mapping[Path, int], efforts: Mapping[int, int], path: Path) -> tuple[int, int, int]:

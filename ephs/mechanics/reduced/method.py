@@ -6,7 +6,7 @@ from typing import Any
 
 from ephs.mechanics.reduced.equations import Equations, ReducedState
 from ephs.mechanics.solve.control import Control
-from ephs.mechanics.solve.loop import Attempt, Row
+from ephs.mechanics.solve.loop import Attempt, Leg, Row, Span
 
 __all__ = ["ReducedMethod"]
 
@@ -59,6 +59,10 @@ class ReducedMethod(ABC):
     def prepare(self, state: ReducedState, h: float) -> None:
         """Compile what is not in the cache, before time counts."""
         self.equations.prepare(state)
+
+    def many(self, span: Span[ReducedState]) -> Leg[ReducedState] | None:
+        """None: one step a call."""
+        return None
 
     def inside(self, attempt: Attempt[ReducedState], t: float) -> ReducedState:
         """A shorter step from the same start: dense output of full order."""

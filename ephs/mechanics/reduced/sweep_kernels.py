@@ -21,7 +21,7 @@ from ephs.semantics.spaces.se3_kernels import (
     pose_inverse,
 )
 
-kernel = jit.kernel
+kernel = jit.lean_kernel
 
 
 @kernel
@@ -97,7 +97,8 @@ def kinematics(t, w, q, r):
                 total[k] += w.motion[i, j, k] * r[t.r_at[i] + j]
         parent = t.parent[i]
         if parent < 0:
-            w.pose[i, :] = w.inner[i]
+            for k in range(7):
+                w.pose[i, k] = w.inner[i, k]
             for k in range(6):
                 w.twist[i, k] = total[k]
                 w.bias[i, k] = 0.0
@@ -257,7 +258,9 @@ def inertia_sweep(t, w):
     x, product, force, other = w.matrix, w.scratch[0:36].reshape(6, 6), w.small[160:166], w.small[166:172]
     w.mass[:] = 0.0
     for i in range(links):
-        w.composite[i] = t.inertia[i]
+        for k in range(6):
+            for m in range(6):
+                w.composite[i, k, m] = t.inertia[i, k, m]
     for i in range(links - 1, -1, -1):
         d, at, parent = t.dim[i], t.r_at[i], t.parent[i]
         for j in range(d):

@@ -17,10 +17,12 @@ from ephs.mechanics.solve.solution import Solution
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 
-__all__ = ["Attempt", "Row", "Stepper", "integrate_stepwise"]
+__all__ = ["Attempt", "Counts", "Leg", "Row", "Span", "Stepper", "integrate_stepwise"]
 
 S = TypeVar("S")
 RESPONSE = 0.1
+BURST = 2000
+"""Steps in one compiled call at most, for progress and interruption."""
 FIRST = 1e-4
 """Part of the time span that the first step takes: too long it is rejected, too short it grows fast."""
 FINAL = (Outcome.PYTHON, Outcome.UNSUITED, Outcome.EVENT, Outcome.INCONSISTENT)
@@ -74,6 +76,73 @@ class Attempt(Generic[S]):
     detail: Any = None
 
 
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Span(Generic[S]):
+    """What is left of a run: from a state to a time, by steps of which the next one is h seconds long.
+
+    ``save_at`` are the times to keep, of which ``saved`` are kept already; None: every step. Without a ``policy`` steps
+    are constant.
+    """
+
+    state: S
+    t0: float
+    until: float
+    h: float
+    control: Control
+    policy: Policy | None
+    save_at: Array | None
+    saved: int
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Counts:
+    """Steps that were taken, tries that were rejected, lengths in s, the least entropy production, the next step."""
+
+    steps: int
+    rejected: int
+    shortest: float
+    longest: float
+    least: float
+    h: float
+
+
+class Leg(Protocol[S]):
+    """A run in compiled code, some steps a call. It is ``left`` where it will not go on before the end."""
+
+    left: bool
+
+    def advance(self, steps: int) -> bool:
+        """Up to so many steps; whether the end is reached.
+
+        Raises
+        ------
+        SolveError
+            A step has no solution.
+        """
+        ...
+
+    def rows(self) -> list[tuple[float, S, float]]:
+        """What was kept since the last call: time, state, the least production in its step."""
+        ...
+
+    @property
+    def time(self) -> float:
+        """The time reached."""
+        ...
+
+    @property
+    def state(self) -> S:
+        """The state reached."""
+        ...
+
+    @property
+    def counts(self) -> Counts:
+        """What it did so far."""
+        ...
+
+
 class Stepper(Protocol[S]):
     """A method on one problem: it starts, steps, and says what is where. States are values with a time ``t``."""
 
@@ -95,6 +164,10 @@ class Stepper(Protocol[S]):
         SolveError
             The step has no solution.
         """
+        ...
+
+    def many(self, span: Span[S]) -> Leg[S] | None:
+        """What takes many steps in one compiled call; None where there is no such, or where inputs must be asked."""
         ...
 
     def inside(self, attempt: Attempt[S], t: float) -> S:
@@ -181,7 +254,7 @@ class _Run(Generic[S]):
         self.looked = begin
         self.least = np.inf
         self.shortest, self.longest = np.inf, 0.0
-        self.rows: list[tuple[float, Row, float]] = []
+        self.rows: list[tuple[float, S, float]] = []
         self.watch: Watch | None = None
 
     def start(self) -> None:
@@ -192,14 +265,43 @@ class _Run(Generic[S]):
         self.state = self.stepper.start(self.t0, self.sign * self.h)
         row = self.stepper.row(self.state)
         if self.save_at is None or (self.save_at.size and self.save_at[0] == self.t0):
-            self.rows.append((self.t0, row, 0.0))
+            self.rows.append((self.t0, self.state, 0.0))
             self.saved = 1
         self.stepper.prepare(self.state, self.sign * self.h)
         if self.events:
             self.watch = Watch(self.events, self.t0, self._states(row))
 
     def advance(self) -> None:
-        """Step after step to the end, or to an event that stops the run."""
+        """To the end, or to an event that stops the run: in compiled code as far as that goes, then step after step."""
+        if self.watch is None:
+            leg = self.stepper.many(
+                Span(
+                    self.state, self.t0, self.until, self.h, self.control, self.policy, self.save_at, self.saved
+                )
+            )  # fmt: skip
+            if leg is not None:
+                self._follow(leg)
+        self._advance_stepwise()
+
+    def _follow(self, leg: Leg[S]) -> None:
+        """Compiled steps until the end, or where they leave off."""
+        done = False
+        while not (done or leg.left):
+            if self.control.max_steps is not None and self.steps >= self.control.max_steps:
+                raise SolveError(Outcome.MANY, "", f"{self.control.max_steps}")
+            burst = BURST if self.control.max_steps is None else min(BURST, self.control.max_steps - self.steps)
+            try:
+                done = leg.advance(burst)
+            finally:
+                fresh, counts = leg.rows(), leg.counts
+                self.rows += fresh
+                self.saved += len(fresh)
+                self.t, self.steps, self.rejected, self.h = leg.time, counts.steps, counts.rejected, counts.h
+                self.shortest, self.longest, self.least = counts.shortest, counts.longest, counts.least
+            self._look()
+        self.state = leg.state
+
+    def _advance_stepwise(self) -> None:
         control = self.control
         grid = None if self.policy else Grid(0.0, abs(self.until - self.t0), float(control.step or 0.0))
         while self.t != self.until:
@@ -251,20 +353,24 @@ class _Run(Generic[S]):
         self.least = min(self.least, attempt.least)
         self.shortest, self.longest = min(self.shortest, abs(attempt.h)), max(self.longest, abs(attempt.h))
         if self.save_at is None:
-            self.rows.append((t, self.stepper.row(after), attempt.least))
+            self.rows.append((t, after, attempt.least))
         else:
             last = int(np.searchsorted(self.sign * self.save_at, self.sign * t, side="right"))
             for when in self.save_at[self.saved : last]:
                 found = after if when == t else self.stepper.inside(attempt, float(when))
-                self.rows.append((float(when), self.stepper.row(found), attempt.least))
+                self.rows.append((float(when), found, attempt.least))
             self.saved = last
         self.state, self.t = after, t
         self.steps += 1
+        self._look()
+        return stopped is not None
+
+    def _look(self) -> None:
+        """Tell the progress, from time to time."""
         now = time.perf_counter()
         if self.progress is not None and now - self.looked > RESPONSE:
             self.looked = now
             self.progress(self.t, self.until, self.stats())
-        return stopped is not None
 
     def _states(self, row: Row) -> Mapping[Path, Array]:
         return States(self.problem.descriptor.unpack(row.x))
@@ -291,11 +397,13 @@ class _Run(Generic[S]):
 
     def solution(self) -> Solution:
         """The solution so far."""
+        stats = self.stats()
+        kept = [self.stepper.row(state) for _, state, _ in self.rows]
         count, size = len(self.problem.descriptor.components), self.problem.descriptor.point_size
         record = Record(
             np.array([t for t, _, _ in self.rows]),
-            np.array([row.x for _, row, _ in self.rows]).reshape(-1, size),
-            np.array([row.energies for _, row, _ in self.rows]).reshape(-1, count),
-            np.array([[*row.sums, least] for _, row, least in self.rows]).reshape(-1, 5),
+            np.array([row.x for row in kept]).reshape(-1, size),
+            np.array([row.energies for row in kept]).reshape(-1, count),
+            np.array([[*row.sums, least] for row, (_, _, least) in zip(kept, self.rows, strict=True)]).reshape(-1, 5),
         )
-        return solution_of(self.problem, record, self.stats())
+        return solution_of(self.problem, record, stats)

@@ -7,7 +7,7 @@ import numpy as np
 
 from ephs.mechanics.solve.control import Control
 from ephs.mechanics.solve.driven import ComponentMethod, advance_driven
-from ephs.mechanics.solve.loop import Attempt, Row
+from ephs.mechanics.solve.loop import Attempt, Row, Span
 from ephs.mechanics.solve.natural import NaturalState
 from ephs.mechanics.solve.problem import Problem
 from ephs.semantics.bundle import Array
@@ -54,6 +54,9 @@ class Paced:
     def prepare(self, state: PacedState, h: float) -> None:
         """Compile what is not in the cache, before time counts."""
         self.method.prepare(state.inner, h)
+
+    def many(self, span: Span[PacedState]) -> None:
+        """None: one step a call."""
 
     def step(self, state: PacedState, h: float) -> Attempt[PacedState]:
         """One step of h seconds."""

@@ -17,7 +17,7 @@ from ephs.mechanics.solve.collocation import moments, values
 from ephs.mechanics.solve.continuous import Continuous, Matrices
 from ephs.mechanics.solve.control import Control
 from ephs.mechanics.solve.errors import Outcome, SolveError
-from ephs.mechanics.solve.loop import Attempt, Row
+from ephs.mechanics.solve.loop import Attempt, Row, Span
 from ephs.mechanics.solve.model import compile_model
 from ephs.mechanics.solve.natural_kernels import IRREVERSIBLE
 from ephs.mechanics.solve.problem import Problem
@@ -128,6 +128,9 @@ class Radau:
 
     def prepare(self, state: RadauState, h: float) -> None:
         """Nothing is left to do: the start has evaluated everything."""
+
+    def many(self, span: Span[RadauState]) -> None:
+        """None: one step a call."""
 
     def step(self, state: RadauState, h: float) -> Attempt[RadauState]:
         """One step of h seconds, solved to a fraction of the tolerances.

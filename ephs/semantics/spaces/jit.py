@@ -1,9 +1,9 @@
 """Compilation of kernels, with a disk cache that cannot go stale.
 
 Numba files a compiled function under the source of the *file that defines it*. If a helper in another file
-changes, the caller is taken from the cache with the old helper inside. Here the cache lies in a folder named
-by a fingerprint of all sources from which kernels are made, and of the compiler's versions, so that any
-change starts a new folder.
+changes, the caller is taken from the cache with the old helper inside. Here the cache of a file's kernels lies in a
+folder named by a fingerprint of the file, of all sources from which it imports, and theirs, and of the compiler's
+versions, so that a change starts new folders for what it can reach, and only for that.
 
 Rule for authors: whatever a kernel takes from other modules (helpers, constants) must come from a file that
 counts as a source: one whose text imports ``spaces.jit``, one with ``kernels`` in its name, or one in this
@@ -13,6 +13,7 @@ folder.
 import hashlib
 import os
 import platform
+import re
 import tempfile
 import warnings
 from collections.abc import Callable, Generator
@@ -22,6 +23,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, TypeVar, final
 
+IMPORT = re.compile(r"^\s*from (ephs[\w.]*) import \(?([^()\n]*)", re.MULTILINE)
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
@@ -45,28 +47,64 @@ def _is_source(path: Path, here: Path) -> bool:
 
 
 @cache
-def fingerprint() -> str:
-    """Name of the present state of all kernels: their sources, Numba, LLVM's binding, NumPy and Python."""
+def _reached(path: Path) -> frozenset[Path]:
+    """The files of the package that a file imports directly."""
+    root = Path(__file__).resolve().parents[3]
+    found: set[Path] = set()
+    for module, names in IMPORT.findall(path.read_text(encoding="utf-8")):
+        at = root.joinpath(*module.split("."))
+        inside = [at / f"{name.strip().split(' ')[0]}.py" for name in names.split(",")]
+        found |= {file for file in (at.with_suffix(".py"), at / "__init__.py", *inside) if file.is_file()}
+    return frozenset(found)
+
+
+@cache
+def sources_of(path: Path) -> tuple[Path, ...]:
+    """A file, the sources that it reaches by imports, and what these import directly, in a fixed order."""
+    here = Path(__file__).resolve().parent
+    found, rest = {path}, [path]
+    while rest:
+        for file in _reached(rest.pop()) - found:
+            found.add(file)
+            if _is_source(file, here):
+                rest.append(file)
+    return tuple(sorted(found))
+
+
+@cache
+def fingerprint(path: Path | None = None) -> str:
+    """Name of the present state of a file's kernels, or of all: their sources, Numba, LLVM's binding, NumPy, Python."""
     versions = [import_module(name).__version__ for name in ("numba", "llvmlite", "numpy")]
     digest = hashlib.sha256()
     digest.update(repr((platform.python_implementation(), platform.python_version(), versions)).encode())
     root = Path(__file__).resolve().parents[2]
-    for path in kernel_sources():
-        content = path.read_bytes()
-        digest.update(f"{path.relative_to(root).as_posix()}:{len(content)}:".encode())
+    for source in kernel_sources() if path is None else sources_of(path):
+        content = source.read_bytes()
+        digest.update(f"{source.relative_to(root).as_posix()}:{len(content)}:".encode())
         digest.update(content)
     return digest.hexdigest()[:24]
 
 
 @cache
-def cache_folder() -> Path | None:
-    """Folder of the compiled kernels; None, after one warning, where it cannot be written.
+def cache_folder(path: Path | None = None) -> Path | None:
+    """Folder of the compiled kernels of a file of the package, or of what is generated from all.
 
-    It lies below ``NUMBA_CACHE_DIR`` if that is set, else below ``XDG_CACHE_HOME`` or ``~/.cache``.
+    None, after one warning, where it cannot be written. It lies below ``NUMBA_CACHE_DIR`` if that is set, else below
+    ``XDG_CACHE_HOME`` or ``~/.cache``.
     """
-    base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
+    base = _base()
+    if base is None:
+        return None
+    folder = base / fingerprint(path)
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+@cache
+def _base() -> Path | None:
+    given = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
     try:
-        folder = (Path(base) if base else Path.home() / ".cache") / "ephs" / fingerprint()
+        folder = (Path(given) if given else Path.home() / ".cache") / "ephs"
         folder.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=folder).close()
     except (OSError, RuntimeError) as fault:
@@ -90,7 +128,9 @@ def _caching(function: Callable[..., Any]) -> Generator[bool, None, None]:
     # Numba chooses a function's cache folder when it is decorated, from this setting, and keeps it.
     # It refuses to cache what has no source file, such as functions typed at a prompt.
     settings = _numba().config
-    folder = cache_folder() if Path(function.__code__.co_filename).is_file() else None
+    file = Path(function.__code__.co_filename)
+    inside = file.resolve().is_relative_to(Path(__file__).resolve().parents[2])
+    folder = cache_folder(file.resolve() if inside else None) if file.is_file() else None
     before = settings.CACHE_DIR
     settings.CACHE_DIR = before if folder is None else str(folder)
     try:
@@ -110,6 +150,18 @@ def kernel(function: Function) -> Function:
         return function
     with _caching(function) as cached:
         return _numba().njit(cache=cached, fastmath=False, error_model="numpy")(function)
+
+
+def lean_kernel(function: Function) -> Function:
+    """Compile as `kernel` does a function that neither allocates, nor assigns whole arrays, nor returns one.
+
+    Then references to arrays are not counted. To count them, for each call, for all arrays of the tables that it takes,
+    costs more than a small mechanism's accelerations.
+    """
+    if not compiling():
+        return function
+    with _caching(function) as cached:
+        return _numba().njit(cache=cached, fastmath=False, error_model="numpy", _nrt=False)(function)
 
 
 def cfunc_kernel(signature: Any) -> Callable[[Function], Function]:

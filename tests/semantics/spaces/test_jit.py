@@ -64,6 +64,9 @@ def test_cache_is_used_and_never_stale(package):
     (package / "ephs/semantics/spaces/helper_kernels.py").write_text(HELPER.format(number=5.0))
     assert run(RUN, package).startswith("6.0 ")
     assert not list(package.glob("ephs/**/*.nbi"))
+    # What it does not reach leaves it alone.
+    (package / "ephs/semantics/spaces/other_kernels.py").write_text(HELPER.format(number=7.0))
+    assert "cache_hits=Counter({(float64,): 1}), cache_misses=Counter()" in run(RUN, package)
 
 
 def test_without_compilation_kernels_are_plain_functions(package):
@@ -83,19 +86,24 @@ def test_real_kernels_run_without_compilation():
     assert done.stdout == "True\n", done.stderr
 
 
+def clear():
+    jit.cache_folder.cache_clear()
+    jit._base.cache_clear()
+
+
 def test_unwritable_folder_warns_once_and_goes_on(tmp_path, monkeypatch):
     occupied = tmp_path / "file"
     occupied.write_text("not a folder")
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
     monkeypatch.setenv("XDG_CACHE_HOME", str(occupied))
-    jit.cache_folder.cache_clear()
+    clear()
     try:
         with pytest.warns(jit.KernelCacheWarning, match="XDG_CACHE_HOME") as caught:
             plain, other = jit.kernel(_double), jit.kernel(_double)
         assert len(caught) == 1
         assert plain(2.0) == other(2.0) == 4.0
     finally:
-        jit.cache_folder.cache_clear()
+        clear()
 
 
 def _double(x):

@@ -1,0 +1,159 @@
+"""What acts on a mechanism besides inertia and gravity: springs, friction and its heat, conduction, given wrenches."""
+
+# numba infers the types of these functions, and exports what it does not list.
+# pyright: basic, reportPrivateImportUsage=false
+
+from ephs.mechanics.engine.row_kernels import arm, place, place_ground, relative_pose, seen, wrench_on
+from ephs.semantics.calling import call_kernel
+from ephs.semantics.spaces import jit
+
+kernel = jit.lean_kernel
+
+ON_TREE, ON_CUT, ON_BODIES = range(3)
+"""Kinds of edges that carry components."""
+
+
+@kernel
+def component(f, m, number, scal, x):
+    """Call a component's kernel at states x, without increments; efforts in m.e, flows in m.f."""
+    return call_kernel(  # pyright: ignore[reportCallIssue] - the typing context is numba's
+        f.address[number], f.dims[number].ctypes.data, scal.ctypes.data,
+        f.parameters[f.parameter_at[number] :].ctypes.data, x.ctypes.data, m.small[200:].ctypes.data,
+        m.e.ctypes.data, m.small[220:].ctypes.data, m.f.ctypes.data, m.c.ctypes.data, m.jac.ctypes.data,
+        m.scratch.ctypes.data,
+    )  # fmt: skip
+
+
+@kernel
+def _load(planar, work, i, wrench):
+    """Take a wrench on link i, in its frame, out of its load."""
+    if not planar:
+        for k in range(6):
+            work[i, 24 + k] -= wrench[k]
+    else:
+        c, s = work[i, 0], work[i, 1]
+        work[i, 11] -= wrench[2]
+        work[i, 12] -= c * wrench[3] - s * wrench[4]
+        work[i, 13] -= s * wrench[3] + c * wrench[4]
+
+
+@kernel
+def _put(e, m, i, planar, out):
+    if i < 0:
+        place_ground(e.gravity, out)
+    else:
+        place(m.work, i, planar, out)
+
+
+@kernel
+def temperatures(f, m, s, s_rate, scal):
+    """Efforts of all entropies; (status, component)."""
+    for k in range(f.node.shape[0]):
+        m.temperature[k] = 0.0
+        s_rate[k] = 0.0
+        if f.node[k] >= 0:
+            m.small[190] = s[k]
+            status = component(f, m, f.node[k], scal, m.small[190:])
+            if status != 0:
+                return status, f.node[k]
+            m.temperature[k] = m.e[0]
+    return 0, 0
+
+
+@kernel
+def act(e, m, q, r, s, drive, wrench, scal, s_rate, made, powers):
+    """Forces on joints into m.force, wrenches into the loads, heat and work into powers; (status, component)."""
+    f, planar = e.forces, e.flag[0] == 1
+    status, number = temperatures(f, m, s, s_rate, scal)
+    if status != 0:
+        return status, number
+    powers[0] = powers[1] = 0.0
+    one, two, here = m.small[0:24], m.small[24:48], m.small[48:54]
+    for b in range(f.body.shape[0]):
+        i = f.body[b]
+        if i == -1:
+            continue
+        wrench_on(f.body_frame[b], 0, wrench[b], 0, 1.0, here)
+        if i >= 0:
+            _put(e, m, i, planar, one)
+            for k in range(6):
+                powers[1] += here[k] * one[12 + k]
+            _load(planar, m.work, i, here)
+    rate, pull, wide, x = m.small[54:60], m.small[60:66], m.small[66:72], m.small[72:80]
+    arms, first = m.small[80:92], m.small[92:98]
+    for i in range(f.edge.shape[0]):
+        kind, a, b, d = f.edge[i, 0], f.edge[i, 1], f.edge[i, 2], f.edge[i, 3]
+        at, size, v = f.edge[i, 4], f.edge[i, 5], f.edge[i, 6]
+        if kind == ON_TREE:
+            for j in range(d):
+                rate[j] = r[v + j]
+        else:
+            if kind == ON_CUT:
+                twist = m.relative[f.edge[i, 7], 19:25]
+                for k in range(12):
+                    arms[k] = m.relative[f.edge[i, 7], 7 + k]
+            else:
+                _put(e, m, a, planar, one)
+                _put(e, m, b, planar, two)
+                arm(one, two, f.frame[i], 12, arms)
+                relative_pose(f.frame[i], arms, x, m.small[100:110])
+                seen(arms, 0, one, 12, first)
+                seen(f.frame[i], 12, two, 12, wide)
+                for k in range(6):
+                    wide[k] -= first[k]
+                twist = wide
+            for j in range(d):
+                rate[j] = 0.0
+                for k in range(6):
+                    rate[j] += f.left[i, 6 * j + k] * twist[k]
+        if kind != ON_BODIES:
+            for j in range(size):
+                x[j] = q[at + j]
+        for j in range(d):
+            pull[j] = 0.0
+            if kind != ON_BODIES:
+                pull[j] = drive[v + j]
+                powers[1] += pull[j] * rate[j]
+        if f.part[i, 0] >= 0:
+            status = component(f, m, f.part[i, 0], scal, x)
+            if status != 0:
+                return status, f.part[i, 0]
+            for j in range(d):
+                pull[j] -= m.e[j]
+        if f.part[i, 1] >= 0:
+            heat = f.part[i, 2]
+            for j in range(d):
+                m.e[j] = rate[j]
+            m.e[d] = m.temperature[heat]
+            status = component(f, m, f.part[i, 1], scal, x)
+            if status != 0:
+                return status, f.part[i, 1]
+            for j in range(d):
+                pull[j] -= m.f[j]
+                powers[0] += m.f[j] * rate[j]
+            s_rate[heat] -= m.f[d]
+            made[f.made_at[f.part[i, 1]]] = -m.f[d]
+        if kind == ON_TREE:
+            for j in range(d):
+                m.force[v + j] += pull[j]
+            continue
+        for k in range(6):
+            wide[k] = 0.0
+            for j in range(d):
+                wide[k] += f.left[i, 6 * j + k] * pull[j]
+        if b >= 0:
+            wrench_on(f.frame[i], 12, wide, 0, 1.0, first)
+            _load(planar, m.work, b, first)
+        if a >= 0:
+            wrench_on(arms, 0, wide, 0, -1.0, first)
+            _load(planar, m.work, a, first)
+    for k in range(f.conduction.shape[0]):
+        number, one_end, other = f.conduction[k, 0], f.conduction[k, 1], f.conduction[k, 2]
+        m.e[0], m.e[1] = m.temperature[one_end], m.temperature[other]
+        status = component(f, m, number, scal, x)
+        if status != 0:
+            return status, number
+        s_rate[one_end] -= m.f[0]
+        s_rate[other] -= m.f[1]
+        made[f.made_at[number]] = -m.f[0] - m.f[1]
+    return 0, 0

@@ -1,0 +1,220 @@
+"""The right-hand side of a mechanism's equations, and loops closed after a step."""
+
+# numba infers the types of these functions, and exports what it does not list.
+# pyright: basic, reportPrivateImportUsage=false
+
+from ephs.mechanics.engine.closing_kernels import nearly_dependent
+from ephs.mechanics.engine.engine_kernels import DEPENDENT, NEAR, STILL, accelerate, fold, move, resolve
+from ephs.mechanics.engine.inward_kernels import turned
+from ephs.mechanics.engine.row_kernels import cut_gaps, fit, seen
+from ephs.mechanics.engine.tree_kernels import (
+    DENSE,
+    DIM,
+    FORWARD,
+    G_BASIS,
+    G_RATE,
+    KIND,
+    PARENT,
+    Q_AT,
+    R_AT,
+    REVOLUTE,
+    SPHERICAL,
+)
+from ephs.semantics.spaces import jit
+from ephs.semantics.spaces.codes import VECTOR
+from ephs.semantics.spaces.se3_kernels import dexp_left_inv, retract
+
+kernel = jit.lean_kernel
+
+GAP, CLOSED, ROUNDS = 1e-13, 1e-8, 20
+"""Loops are closed to GAP where rounding lets them, and a state is refused where they stay open by CLOSED."""
+OPEN = 22
+"""Status: loops do not close."""
+
+
+@kernel
+def advance(e, base, v, q):
+    """q = base·exp(v), joint by joint."""
+    for i in range(e.chart.shape[0]):
+        code, d, at, size, first = e.chart[i, 0], e.chart[i, 1], e.chart[i, 2], e.chart[i, 3], e.chart[i, 4]
+        if code == VECTOR:
+            for j in range(d):
+                q[at + j] = base[at + j] + v[first + j]
+        else:
+            retract(code, base[at : at + size], v[first : first + d], q[at : at + size])
+
+
+@kernel
+def derive(e, m, base, q, y, drive, wrench, scal, out):
+    """ẏ of y = (v, r, s, heat, work, made) at q = base·exp(v), which is left in q; (status, component)."""
+    nv, n, ns = drive.shape[0], m.force.shape[0], e.forces.node.shape[0]
+    at = nv + n + ns
+    for j in range(at, out.shape[0]):
+        out[j] = 0.0
+    advance(e, base, y, q)
+    r = y[nv : nv + n]
+    status, component = accelerate(
+        e, m, q, r, y[nv + n : at], drive, wrench, scal,
+        out[nv : nv + n], out[nv + n : at], out[at + 2 :], out[at : at + 2],
+    )  # fmt: skip
+    if status != 0:
+        return status, component
+    joint_rates(e, m, y, r, out)
+    return 0, 0
+
+
+@kernel
+def joint_rates(e, m, y, r, out):
+    """v̇ = dexp⁻¹(v) r of all joints, that of cut ones from the outward sweep, into out."""
+    for i in range(e.chart.shape[0]):
+        code, d, first, where, number = e.chart[i, 0], e.chart[i, 1], e.chart[i, 4], e.chart[i, 5], e.chart[i, 6]
+        for j in range(d):
+            if number < 0:
+                value = r[where + j]
+            else:
+                value = 0.0
+                for k in range(6):
+                    value += e.cut_basis[number, 36 + 6 * j + k] * m.relative[number, 19 + k]
+            if code == VECTOR:
+                out[first + j] = value
+            else:
+                m.small[j] = value
+        if code != VECTOR:
+            turn = m.scratch[0 : d * d].reshape(d, d)
+            dexp_left_inv(code, y[first : first + d], turn)
+            for j in range(d):
+                value = 0.0
+                for k in range(d):
+                    value += turn[j, k] * m.small[k]
+                out[first + j] = value
+
+
+@kernel
+def close(e, m, q, r, motions, change, moved):
+    """Close the loops and put the rates on them, by the least change in the mass metric; (status, gap).
+
+    ``motions`` are the prescribed rates of the tree's freedoms, others 0; ``change`` (n,), ``moved`` (size of v,) are
+    memory.
+    """
+    before = gap = 1e300
+    for _ in range(ROUNDS):
+        move(e, m, q, r)
+        fit(e, m, q)
+        gap = cut_gaps(e, m, q)
+        if fold(e, m, q, m.zero) != 0:
+            return STILL, gap
+        if nearly_dependent(e.closing, m.row_value, m.largest, NEAR):
+            return DEPENDENT, gap
+        if gap <= GAP or gap > 0.5 * before:
+            break
+        before = gap
+        cut_gaps(e, m, q)
+        resolve(e, m, q, change)
+        _moved(e, change, moved)
+        advance(e, q, moved, q)
+    if not gap <= CLOSED:
+        return OPEN, gap
+    for j in range(r.shape[0]):
+        if motions[j] != 0.0:
+            r[j] = motions[j]
+    relative_rates(e, m, r)
+    resolve(e, m, q, change)
+    for j in range(r.shape[0]):
+        r[j] += change[j]
+    return 0, gap
+
+
+@kernel
+def _moved(e, change, moved):
+    """The tree's change as an increment of all joints, cut ones at rest."""
+    for i in range(e.chart.shape[0]):
+        for j in range(e.chart[i, 1]):
+            moved[e.chart[i, 4] + j] = change[e.chart[i, 5] + j] if e.chart[i, 6] < 0 else 0.0
+
+
+@kernel
+def relative_rates(e, m, r):
+    """Targets that take the cut joints' forbidden velocities away, where the outward sweep has been at r."""
+    for i in range(e.cut.shape[0]):
+        for j in range(e.cut[i, 8]):
+            total = 0.0
+            for k in range(6):
+                total -= e.cut_basis[i, 72 + 6 * j + k] * m.relative[i, 19 + k]
+            m.row_value[e.cut[i, 7] + j, 0] = total
+
+
+@kernel
+def across(e, m, q, x):
+    """Targets that take a change x (n,) of the tree's rates back across the constraints, at the outward sweep's q."""
+    planar = e.flag[0] == 1
+    spread(e, m, q, x, planar)
+    one, two, first, second = m.small[0:6], m.small[6:12], m.small[12:18], m.small[18:24]
+    for i in range(e.cut.shape[0]):
+        _changed(m.work, e.cut[i, 0], planar, one)
+        _changed(m.work, e.cut[i, 1], planar, two)
+        seen(m.relative[i], 7, one, 0, first)
+        seen(e.cut_frame[i], 12, two, 0, second)
+        for j in range(e.cut[i, 8]):
+            total = 0.0
+            for k in range(6):
+                total -= e.cut_basis[i, 72 + 6 * j + k] * (second[k] - first[k])
+            m.row_value[e.cut[i, 7] + j, 0] = total
+
+
+@kernel
+def _changed(work, i, planar, out):
+    """δu of link i, body-fixed."""
+    for k in range(6):
+        out[k] = 0.0
+    if i < 0:
+        return
+    if planar:
+        c, s, x, y = work[i, 0], work[i, 1], work[i, 26], work[i, 27]
+        out[2], out[3], out[4] = work[i, 25], c * x + s * y, c * y - s * x
+    else:
+        for k in range(6):
+            out[k] = work[i, 72 + k]
+
+
+@kernel
+def spread(e, m, q, x, planar):
+    """The twists that rates x of the joints make, to where links keep their accelerations."""
+    link, work = e.link, m.work
+    for i in range(link.shape[0]):
+        parent, at, d = link[i, PARENT], link[i, R_AT], link[i, DIM]
+        if planar:
+            rate = x[at] * link[i, FORWARD]
+            a0 = a1 = a2 = 0.0
+            if parent >= 0:
+                a0 = work[parent, 25]
+                a1, a2 = work[parent, 26] - a0 * work[i, 5], work[parent, 27] + a0 * work[i, 4]
+            if link[i, KIND] == REVOLUTE:
+                a0 += rate
+            else:
+                a1, a2 = a1 + work[i, 29] * rate, a2 + work[i, 30] * rate
+            work[i, 25], work[i, 26], work[i, 27] = a0, a1, a2
+            continue
+        for k in range(6):
+            work[i, 72 + k] = 0.0
+        if parent >= 0:
+            seen(work[i], 0, work[parent], 72, work[i, 72:78])
+        if link[i, KIND] == REVOLUTE:
+            work[i, 74] += x[at] * link[i, FORWARD]
+        elif link[i, KIND] == SPHERICAL:
+            a, b, c = x[at], x[at + 1], x[at + 2]
+            if link[i, FORWARD] < 0:
+                a, b, c = turned(q, link[i, Q_AT], a, b, c)
+                a, b, c = -a, -b, -c
+            work[i, 72] += a
+            work[i, 73] += b
+            work[i, 74] += c
+        else:
+            g = link[i, DENSE]
+            for j in range(d):
+                rate = x[at + j]
+                if link[i, FORWARD] < 0:
+                    rate = 0.0
+                    for k in range(d):
+                        rate -= m.dense[g, G_RATE + 6 * j + k] * x[at + k]
+                for k in range(6):
+                    work[i, 72 + k] += m.dense[g, G_BASIS + 6 * j + k] * rate

@@ -1,0 +1,170 @@
+"""The compiled engine against the sweeps over dense matrices, against itself without compilation, in growth."""
+
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path as File
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+import ephs
+from benchmarks.cases import CASES
+from ephs.mechanics.engine.closing import closing
+from ephs.mechanics.engine.engine_kernels import accelerate, resolve
+from ephs.mechanics.engine.rate_kernels import across
+from ephs.mechanics.reduced.equations import Equations
+from ephs.mechanics.reduced.loop_kernels import accelerate as accelerate_densely
+from ephs.mechanics.simulate import problem_of_scene
+from ephs.mechanics.solve.errors import SolveError
+from ephs.testing import mechanisms
+
+ROOT = File(__file__).parents[3]
+SCENES = {file.stem: file for file in sorted((ROOT / "scenes").glob("*.toml"))} | {
+    case.name: ROOT / "benchmarks" / "scenes" / f"{case.name}.toml" for case in CASES
+}
+
+
+def equations(scene):
+    return Equations(scene, problem_of_scene(scene), 0.0)
+
+
+def moved(eq, seed=0, far=0.3):
+    """A state aside of the initial one, its loops closed, moving."""
+    rng = np.random.default_rng(seed)
+    start = eq.start(0.0)
+    for size in (far, 0.3 * far, 0.0):
+        q = eq.moved(start.q, size * rng.standard_normal(eq.n))
+        try:
+            return eq.closed(replace(start, q=q, r=rng.standard_normal(eq.n)))
+        except SolveError:
+            continue
+    return start
+
+
+def both(eq, state):
+    """(ṙ, ṡ, made, powers) of the engine and of the dense sweeps."""
+    out = []
+    for function, tables, memory in (
+        (accelerate, eq.engine, eq.memory),
+        (accelerate_densely, eq.reduced.tables, eq.work),
+    ):
+        found = [np.zeros(n) for n in (eq.n, eq.ns, len(eq.reduced.made), 2)]
+        status = function(tables, memory, state.q, state.r, state.s, eq.drive, eq.wrench, eq.scal, *found)
+        assert status[0] == 0
+        out.append(found)
+    return out
+
+
+def agree(eq, state):
+    """Equal to rounding: generalised forces of the difference against those of the accelerations themselves."""
+    (a, heat, made, powers), (b, heat_b, made_b, powers_b) = both(eq, state)
+    mass = eq.mass(state.q, state.r)
+    size = np.abs(mass).max() * max(1.0, np.abs(b).max()) * np.linalg.cond(mass) ** 0.5
+    assert np.abs(mass @ (a - b)).max() <= 1e-11 * size
+    for one, two in ((heat, heat_b), (made, made_b), (powers, powers_b)):
+        assert np.abs(one - two).max(initial=0.0) <= 1e-9 * max(1.0, np.abs(two).max(initial=0.0))
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_scenes_accelerate_as_the_dense_sweeps_say(name):
+    eq = equations(ephs.load(SCENES[name]))
+    for seed in range(3):
+        agree(eq, moved(eq, seed))
+
+
+@settings(max_examples=40)
+@given(scene=mechanisms(max_bodies=4))
+def test_so_do_generated_mechanisms(scene):
+    eq = equations(scene)
+    agree(eq, moved(eq))
+
+
+@settings(max_examples=15)
+@given(scene=mechanisms(max_bodies=3))
+def test_least_corrections_take_rates_onto_the_constraints(scene):
+    """J (x + change) = 0 on all rows, and the change is M⁻¹Jᵀμ: the least in the mass metric."""
+    eq = equations(scene)
+    state = moved(eq)
+    if not eq.engine.closing.row.size:
+        return
+    eq.closed(state)
+    x, change = np.random.default_rng(1).standard_normal(eq.n), np.zeros(eq.n)
+    across(eq.engine, eq.memory, state.q, x)
+    resolve(eq.engine, eq.memory, state.q, change)
+    mass = eq.mass(state.q, state.r)
+    rows = eq.rows()
+    assert np.abs(rows @ (x + change)).max() <= 1e-10
+    push = mass @ change
+    left = push - rows.T @ np.linalg.lstsq(rows.T, push, rcond=1e-9)[0]
+    assert np.abs(left).max() <= 1e-9 * max(1.0, np.abs(push).max())
+
+
+@pytest.mark.parametrize("method", ["rk54", "rk87"])
+@pytest.mark.parametrize("name", ["four-bar", "chain", "mbs"])
+def test_a_compiled_run_takes_the_steps_of_one_step_a_call(name, method):
+    scene = ephs.load(SCENES[name])
+    times = np.linspace(0.0, 0.5, 7)
+    one, other = (
+        ephs.simulate(scene, 0.5, method=method, save_at=times, events=events) for events in ((), (lambda t, x: 1.0,))
+    )
+    assert one.stats["steps"] == other.stats["steps"]
+    for path in one:
+        assert np.abs(one[path] - other[path]).max(initial=0.0) <= 1e-9
+
+
+def test_rows_that_are_kept_do_not_depend_on_how_many_fit():
+    """More steps than one call hands over."""
+    scene = ephs.load(SCENES["chain"])
+    sol = ephs.simulate(scene, 1.5, method="rk54", step=1e-3)
+    assert len(sol) == 1501
+    assert np.allclose(sol.t, 1e-3 * np.arange(1501), atol=1e-12)
+    last = ephs.simulate(scene, 1.5, method="rk54", step=1e-3, save_at=[1.5])
+    assert all(np.array_equal(sol[path][-1], last[path][-1]) for path in sol)
+
+
+@pytest.mark.parametrize("windows", [10, 40])
+def test_a_ladder_of_loops_has_few_rows_open_at_once(windows):
+    """Uprights on the ground, a beam from each to the next, cut at the next."""
+    parents = [-1] * (windows + 1) + list(range(windows))
+    ends = [(windows + 1 + k, k + 1) for k in range(windows) for _ in range(2)]
+    program = closing(parents, ends)
+    assert program.slot.shape[0] <= 7 * program.row.shape[0]
+    assert program.flat.size <= 40 * program.row.shape[0]
+    assert program.blocks == 1
+
+
+CODE = """
+import numpy as np, ephs
+from ephs.mechanics.reduced.equations import Equations
+from ephs.mechanics.simulate import problem_of_scene
+from ephs.mechanics.engine.engine_kernels import evaluations
+for name in ({names}):
+    scene = ephs.load(name)
+    eq = Equations(scene, problem_of_scene(scene), 0.0)
+    rng = np.random.default_rng(2)
+    q = np.zeros(eq.reduced.coordinates)
+    for i in eq._moving:
+        at, edge = int(eq.reduced.tables.q_at[i]), eq.reduced.edges[i]
+        q[at : at + edge.pair.size] = edge.pair.identity() if False else edge.pair.element(0.1 * np.ones(edge.pair.dim))
+    rates = np.zeros((1, eq.n))
+    evaluations(eq.engine, eq.memory, q[None], rng.standard_normal((1, eq.n)), rates, 1)
+    print(*[float(x).hex() for x in rates[0]])
+"""
+
+
+def test_without_compilation_the_numbers_are_the_same():
+    names = ", ".join(repr(str(SCENES[name])) for name in ("chain", "spherical-chain-2", "four-bar", "slider-crank"))
+    out = []
+    for disabled in ("0", "1"):
+        done = subprocess.run(
+            [sys.executable, "-c", CODE.format(names=names)],
+            capture_output=True, text=True, env=os.environ | {"NUMBA_DISABLE_JIT": disabled},
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+        out.append([[float.fromhex(x) for x in line.split()] for line in done.stdout.splitlines()])
+    assert len(out[0]) == 4
+    for one, other in zip(*out, strict=True):
+        assert np.allclose(one, other, rtol=1e-12, atol=1e-12)
