@@ -25,6 +25,79 @@ def _call(address, dims, scal, p, x, v, e, lam, f, c, jac, work):
     )  # fmt: skip
 
 
+@kernel
+def _columns_of_six(matrix, rows, wide, a, par, place):
+    """The six columns from a: times T (6, 6); loops of fixed length are unrolled."""
+    for i in range(rows):
+        at = i * wide + a
+        x0, x1, x2 = matrix[at], matrix[at + 1], matrix[at + 2]
+        x3, x4, x5 = matrix[at + 3], matrix[at + 4], matrix[at + 5]
+        for j in range(6):
+            p = place + j
+            matrix[at + j] = (
+                x0 * par[p]
+                + x1 * par[p + 6]
+                + x2 * par[p + 12]
+                + x3 * par[p + 18]
+                + x4 * par[p + 24]
+                + x5 * par[p + 30]
+            )
+
+
+@kernel
+def _rows_of_six(matrix, wide, a, par, place):
+    """The six rows from a: Tᵀ times them."""
+    at = a * wide
+    for j in range(at, at + wide):
+        x0, x1, x2 = matrix[j], matrix[j + wide], matrix[j + 2 * wide]
+        x3, x4, x5 = matrix[j + 3 * wide], matrix[j + 4 * wide], matrix[j + 5 * wide]
+        for i in range(6):
+            p = place + i
+            matrix[j + i * wide] = (
+                x0 * par[p]
+                + x1 * par[p + 6]
+                + x2 * par[p + 12]
+                + x3 * par[p + 18]
+                + x4 * par[p + 24]
+                + x5 * par[p + 30]
+            )
+
+
+@kernel
+def _columns(matrix, rows, wide, a, da, db, par, place, line):
+    """The da columns from a: times T (da, db)."""
+    for i in range(rows):
+        for j in range(db):
+            line[j] = 0.0
+            for q in range(da):
+                line[j] += matrix[i * wide + a + q] * par[place + q * db + j]
+        for j in range(db):
+            matrix[i * wide + a + j] = line[j]
+
+
+@kernel
+def _rows(matrix, wide, a, da, db, par, place, line):
+    """The da rows from a: Tᵀ (db, da) times them."""
+    for j in range(wide):
+        for i in range(db):
+            line[i] = 0.0
+            for q in range(da):
+                line[i] += par[place + q * db + i] * matrix[(a + q) * wide + j]
+        for i in range(db):
+            matrix[(a + i) * wide + j] = line[i]
+
+
+@kernel
+def _gather(out, to, matrix, at, layout, ports, n, inner, rest):
+    """One row: the columns of each port, then the others."""
+    for port in range(ports):
+        a, b, db = int(layout[3 + 5 * port]), int(layout[5 + 5 * port]), int(layout[6 + 5 * port])
+        for j in range(db):
+            out[to + b + j] = matrix[at + a + j]
+    for j in range(rest):
+        out[to + n + j] = matrix[at + inner + j]
+
+
 def pulled(dims, scal, p, x0, v, e, lam, f, c, jac, work):
     """e' = T e, (f', c) = relation(e', λ), f = Tᵀ f'; T block by block, a block for each port of the relation inside.
 
@@ -71,61 +144,32 @@ def pulled(dims, scal, p, x0, v, e, lam, f, c, jac, work):
     )  # fmt: skip
     if status != 0:
         return status
-    # columns: J' T, in place as far as the efforts of a port are fewer or as many; then rows: Tᵀ J'
+    # columns: J' T, in place, as the efforts of a port are fewer or as many; then rows: Tᵀ J'
     rows, width = inner + k, n + k + m
     place = first
     for port in range(ports):
         a, da = int(layout[3 + 5 * port]), int(layout[4 + 5 * port])
         db = int(layout[6 + 5 * port])
         if layout[7 + 5 * port] == 1.0:
-            line = mem[0:db]
-            for i in range(rows):
-                for j in range(db):
-                    line[j] = 0.0
-                for q in range(da):
-                    entry = own_j[i * wide + a + q]
-                    if entry != 0.0:
-                        for j in range(db):
-                            line[j] += entry * par[place + q * db + j]
-                for j in range(db):
-                    own_j[i * wide + a + j] = line[j]
-            place += da * db
-    place = first
-    for port in range(ports):
-        a, da = int(layout[3 + 5 * port]), int(layout[4 + 5 * port])
-        b, db = int(layout[5 + 5 * port]), int(layout[6 + 5 * port])
-        matrix = layout[7 + 5 * port] == 1.0
-        for i in range(db):
-            total = 0.0 if matrix else own_f[a + i]
-            if matrix:
+            if da == 6 and db == 6:
+                _columns_of_six(own_j, rows, wide, a, par, place)
+                _rows_of_six(own_j, wide, a, par, place)
+            elif db > 0:
+                _columns(own_j, rows, wide, a, da, db, par, place, mem)
+                _rows(own_j, wide, a, da, db, par, place, mem)
+            for i in range(db):
+                total = 0.0
                 for q in range(da):
                     total += par[place + q * db + i] * own_f[a + q]
-            flow[b + i] = total
-            row = (b + i) * width
-            for other in range(ports):
-                oa = int(layout[3 + 5 * other])
-                ob, odb = int(layout[5 + 5 * other]), int(layout[6 + 5 * other])
-                for j in range(odb):
-                    total = 0.0 if matrix else own_j[(a + i) * wide + oa + j]
-                    if matrix:
-                        for q in range(da):
-                            total += par[place + q * db + i] * own_j[(a + q) * wide + oa + j]
-                    slope[row + ob + j] = total
-            for j in range(k + m):
-                total = 0.0 if matrix else own_j[(a + i) * wide + inner + j]
-                if matrix:
-                    for q in range(da):
-                        total += par[place + q * db + i] * own_j[(a + q) * wide + inner + j]
-                slope[row + n + j] = total
-        if matrix:
+                mem[i] = total
+            for i in range(db):
+                own_f[a + i] = mem[i]
             place += da * db
+    for port in range(ports):
+        a, b, db = int(layout[3 + 5 * port]), int(layout[5 + 5 * port]), int(layout[6 + 5 * port])
+        for i in range(db):
+            flow[b + i] = own_f[a + i]
+            _gather(slope, (b + i) * width, own_j, (a + i) * wide, layout, ports, n, inner, k + m)
     for i in range(k):
-        row = (n + i) * width
-        for other in range(ports):
-            oa = int(layout[3 + 5 * other])
-            ob, odb = int(layout[5 + 5 * other]), int(layout[6 + 5 * other])
-            for j in range(odb):
-                slope[row + ob + j] = own_j[(inner + i) * wide + oa + j]
-        for j in range(k + m):
-            slope[row + n + j] = own_j[(inner + i) * wide + inner + j]
+        _gather(slope, (n + i) * width, own_j, (inner + i) * wide, layout, ports, n, inner, k + m)
     return 0
