@@ -9,6 +9,7 @@ steps in compiled code, which costs it little more than the accelerations; its l
 import sys
 import time
 from collections.abc import Callable
+from functools import cache
 from importlib import import_module
 from statistics import median
 from typing import Any
@@ -17,11 +18,12 @@ import numpy as np
 
 from benchmarks import families
 from benchmarks.report import Report, table_of
+from ephs.mechanics.engine.march_kernels import C_COLUMNS, attempt
 from ephs.mechanics.reduced.equations import Equations
 from ephs.mechanics.reduced.explicit import tableau
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.simulate import problem_of_scene
-from ephs.show.charts.peer_mujoco import mujoco_model
+from ephs.show.charts.peer_mujoco import mujoco_model, silent
 from ephs.show.charts.peer_pin import PinModel
 from ephs.show.charts.peer_scene import PeerError, peer_scene
 
@@ -41,19 +43,36 @@ Block = Callable[[int], float]
 def own(scene: Scene) -> tuple[Block, int]:
     """Our accelerations: a block of rounds, and how many evaluations a round has."""
     equations = Equations(scene, problem_of_scene(scene), 0.0)
-    state, method = equations.start(0.0), tableau("rk87")
-    count = method.b.size
+    state, scheme = equations.start(0.0), tableau("rk87").scheme
+    count = scheme.b.size
     y0 = equations.vector(state)
-    k, y1 = np.zeros((count + 1, equations.size)), np.empty(equations.size)
+    k, y1, before = np.zeros((count + 1, equations.size)), np.empty(equations.size), np.zeros(equations.size)
     k[0] = equations.rates(0.0, state.q, y0)
+    control, q1, repeated = np.zeros(C_COLUMNS), np.array(state.q), _repeated()
+    arguments = (
+        equations.engine, equations.memory, scheme, before, state.q, y0, 1e-3, k, y1, q1,
+        equations.drive, equations.wrench, equations.scal, control,
+    )  # fmt: skip
 
     def block(rounds: int) -> float:
         begin = time.perf_counter()
-        for _ in range(rounds):
-            equations.stages(state, method.a, method.b, method.c, 1e-3, y0, k, y1)
+        repeated(rounds, *arguments)
         return time.perf_counter() - begin
 
     return block, count
+
+
+@cache
+def _repeated() -> Callable[..., None]:
+    """Explicit steps from the same state again and again, without a call from Python for each."""
+    import numba
+
+    @numba.njit
+    def repeated(rounds, e, m, scheme, before, base, y0, h, k, y1, q1, drive, wrench, scal, control):  # noqa: ANN
+        for _ in range(rounds):
+            attempt(e, m, scheme, before, base, y0, h, k, y1, q1, drive, wrench, scal, control)
+
+    return repeated
 
 
 def _pin(scene: Scene) -> tuple[Block, int]:
@@ -107,6 +126,7 @@ def _pin_loops(model: PinModel) -> Block:
 
 def _mujoco(scene: Scene) -> tuple[Block, int]:
     mujoco: Any = import_module("mujoco")
+    mujoco.set_mju_user_warning(silent)  # else it writes a log file into the working folder
     model, data = mujoco_model(peer_scene(scene), "Euler", 1e-7)
     count = 10
 

@@ -13,7 +13,7 @@ from ephs.semantics.spaces.rotations import matrix_to_quaternion, quaternion_to_
 from ephs.show.charts.peer_scene import Branch, Go, PeerError, PeerRun, PeerScene, peer_scene, start
 from ephs.show.charts.runs import Array, Ending, Setting
 
-__all__ = ["integrator", "mjcf", "mujoco_model"]
+__all__ = ["integrator", "mjcf", "mujoco_model", "silent"]
 
 IMPEDANCE = 'solimp="0.9999 0.9999 0.001 0.5 2"'
 """Of a closed loop: the most that it takes."""
@@ -29,7 +29,7 @@ def integrator(method: str) -> Callable[[Scene, float], Go]:
         stages = 4 if method == "RK4" else 1
 
         def go(setting: Setting, limit: float) -> PeerRun:
-            mujoco.set_mju_user_warning(_silent)  # else it writes a log file into the working folder
+            mujoco.set_mju_user_warning(silent)  # else it writes a log file into the working folder
             try:
                 return run(setting, limit)
             finally:
@@ -78,8 +78,8 @@ def mujoco_model(given: PeerScene, method: str, step: float) -> tuple[Any, Any]:
     return model, data
 
 
-def _silent(_text: str) -> None:
-    """What a run's state tells as well."""
+def silent(_text: str) -> None:
+    """Take a warning of MuJoCo, which a run's state tells as well."""
 
 
 def _rate(scene: Scene, branch: Branch) -> Array:
