@@ -64,7 +64,7 @@ class Dynamics:
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         self._problem = problem_of_scene(scene)
-        self._equations = Equations(scene, self._problem, 0.0)
+        self._equations = Equations(scene, self._problem, 0.0, pushed=True)
         self._linear = Linearised(self._equations)
         self.layout = Layout.of(self._equations.reduced)
         self._links = Links(scene, self._equations)

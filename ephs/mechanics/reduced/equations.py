@@ -68,9 +68,12 @@ class ReducedState:
 
 @final
 class Equations:
-    """The reduced form of one problem. It keeps scratch memory: use one for each thread."""
+    """The reduced form of one problem. It keeps scratch memory: use one for each thread.
 
-    def __init__(self, scene: Scene, problem: Problem, t0: float) -> None:
+    With ``pushed`` forces may be put into ``drive`` at every joint, not only where the problem has an input.
+    """
+
+    def __init__(self, scene: Scene, problem: Problem, t0: float, *, pushed: bool = False) -> None:
         self.problem = problem
         self.model = model = compile_model(problem.descriptor, problem.reference, problem.inputs(t0, problem.initial))
         self.reduced = reduced = reduce_scene(scene, problem, model)
@@ -106,7 +109,7 @@ class Equations:
         self.motions = np.zeros(self.n)
         self.motions[t.driven.astype(bool)] = self.prescribed
         self._change, self._moved = np.zeros(self.n), np.zeros(self.nv)
-        self._acted = self._find_acted()
+        self._acted = self._find_acted(set(self._moving) if pushed else set())
         self._build(None)
 
     def _build(self, kept: "list[Array] | None") -> None:
@@ -114,10 +117,9 @@ class Equations:
         self.engine = engine_of(self.reduced, self.gravity, self._acted, kept)
         self.memory = memory_of(self.engine, self.ns)
 
-    def _find_acted(self) -> tuple[frozenset[int], frozenset[int]]:
-        """Edges and links on which given forces act."""
+    def _find_acted(self, edges: set[int]) -> tuple[frozenset[int], frozenset[int]]:
+        """Edges, beside those given, and links on which given forces act."""
         t = self.reduced.tables
-        edges: set[int] = set()
         links: set[int] = set()
         for _, array, where in self._ports:
             if array is self.wrench:
