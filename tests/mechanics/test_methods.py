@@ -15,7 +15,7 @@ from ephs import quantity as Q
 from ephs.mechanics import methods as registry
 from ephs.mechanics.methods import METHODS, Method, on_joints, register_method
 from ephs.mechanics.reduced.method import ReducedMethod
-from ephs.mechanics.solve.loop import Attempt
+from ephs.mechanics.solve.stepping import Attempt
 
 ROOT = Path(__file__).parents[2]
 BY_NAME = {case.name: case for case in CASES}

@@ -16,7 +16,7 @@ from ephs.mechanics.reduced.jacobian import Jacobian
 from ephs.mechanics.reduced.method import ReducedMethod
 from ephs.mechanics.solve.control import Control
 from ephs.mechanics.solve.errors import OptionError, Outcome, SolveError
-from ephs.mechanics.solve.loop import Attempt
+from ephs.mechanics.solve.stepping import Attempt
 
 __all__ = ["Alpha"]
 

@@ -13,7 +13,7 @@ from ephs.mechanics.reduced.implicit import Implicit
 from ephs.mechanics.reduced.method import ReducedMethod
 from ephs.mechanics.solve.control import Control
 from ephs.mechanics.solve.errors import Outcome, SolveError
-from ephs.mechanics.solve.loop import Attempt, Leg, Span
+from ephs.mechanics.solve.stepping import Attempt, Leg, Span
 
 __all__ = ["Auto"]
 

@@ -27,9 +27,9 @@ from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.solve.continuous import Continuous
 from ephs.mechanics.solve.control import Tolerance
 from ephs.mechanics.solve.errors import Outcome, SolveError
-from ephs.mechanics.solve.loop import Row
 from ephs.mechanics.solve.model import compile_model
 from ephs.mechanics.solve.problem import Problem
+from ephs.mechanics.solve.stepping import Row
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.codes import VECTOR

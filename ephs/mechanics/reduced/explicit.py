@@ -57,7 +57,7 @@ from ephs.mechanics.reduced.equations import Equations, ReducedState
 from ephs.mechanics.reduced.method import ReducedMethod
 from ephs.mechanics.solve.control import Control, Proportional
 from ephs.mechanics.solve.errors import Outcome, SolveError
-from ephs.mechanics.solve.loop import Attempt, Counts, Leg, Span
+from ephs.mechanics.solve.stepping import Attempt, Counts, Leg, Span
 from ephs.semantics.bundle import Array
 
 __all__ = ["Explicit", "Tableau", "tableau"]

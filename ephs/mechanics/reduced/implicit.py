@@ -14,8 +14,8 @@ from ephs.mechanics.reduced.jacobian import Jacobian
 from ephs.mechanics.reduced.method import ReducedMethod
 from ephs.mechanics.solve.control import Control
 from ephs.mechanics.solve.errors import Outcome, SolveError
-from ephs.mechanics.solve.loop import Attempt
 from ephs.mechanics.solve.radau import COEFFICIENTS, NODES, T_INVERSE, VALUES, T
+from ephs.mechanics.solve.stepping import Attempt
 from ephs.semantics.bundle import Array
 
 __all__ = ["Implicit"]

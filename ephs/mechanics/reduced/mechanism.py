@@ -1,57 +1,26 @@
 """From a scene to the tables of its reduced form: a spanning tree of joints, the rest cut."""
 
-from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, final
 
-import networkx as nx
 import numpy as np
 
 from ephs.mechanics.build import component_path
+from ephs.mechanics.reduced.spanning import Edge, joints_of, loop_algebra, spanning_tree, springs_of, twists_of
 from ephs.mechanics.reduced.tables import CUT, SPRING, TREE, Mechanism, Workspace
-from ephs.mechanics.reduction.subgroup import generated
-from ephs.mechanics.scene.model import GROUND, IDENTITY_POSE, Scene
+from ephs.mechanics.scene.model import GROUND, Scene
 from ephs.mechanics.solve.errors import OptionError
 from ephs.mechanics.solve.model import Model
 from ephs.mechanics.solve.problem import Problem
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.primitives import Irreversible, Storage
-from ephs.semantics.spaces import SE3, Pair, pair
+from ephs.semantics.spaces import pair
 
-__all__ = ["Edge", "Reduced", "reduce_scene"]
+__all__ = ["Reduced", "reduce_scene"]
 
 FREE = pair("free")
-
-
-@final
-@dataclass(frozen=True, slots=True, eq=False)
-class Edge:
-    """A joint between two links, or a spring.
-
-    Parameters
-    ----------
-    name
-        Of the joint, as inputs and messages call it.
-    path
-        Of its box in the system; None for the free joint that no box stands for.
-    body1, body2
-        Numbers of the links, −1 for the ground.
-    freedoms
-        Which of the joint's freedoms this edge has: a universal joint is two edges.
-    """
-
-    name: str
-    path: Path | None
-    body1: int
-    body2: int
-    offset1: Array
-    offset2: Array
-    pair: Pair
-    motion: float | None
-    coordinate: Array
-    freedoms: slice
 
 
 @final
@@ -121,18 +90,18 @@ def reduce_scene(scene: Scene, problem: Problem, model: Model) -> Reduced:
     names = [name for name, _ in scene.all_bodies()]
     number = {name: i for i, name in enumerate(names)} | {GROUND: -1}
     masses = [body.mass for _, body in scene.all_bodies()]
-    joints = _joints(scene, number, masses)
+    joints = joints_of(scene, number, masses)
     poses = [np.array(body.pose) for _, body in scene.all_bodies()]
-    tree, cut = _spanning(joints, masses)
+    tree, cut = spanning_tree(joints, masses)
     over = [edge.name for edge in cut if edge.motion is not None]
     if over:  # prescribed joints are cut last: only a loop of nothing else is left over
         found = f"that of {', '.join(over)}, which closes a loop of prescribed joints"
         raise OptionError("motion", found, "one joint of each loop without prescribed motion, or the method natural")
     order = [child for _, child, _ in tree]
     place = {body: i for i, body in enumerate(order)} | {-1: -1}
-    springs = _springs(scene, number)
+    springs = springs_of(scene, number)
     edges = [edge for edge, _, _ in tree] + cut + springs
-    twists = _twists(edges, len(tree) + len(cut), poses)
+    twists = twists_of(edges, len(tree) + len(cut), poses)
     kinds = [TREE] * len(tree) + [CUT] * len(cut) + [SPRING] * len(springs)
     component = {slot.path: i for i, slot in enumerate(problem.descriptor.components)}
     entropies = _entropies(problem)
@@ -157,117 +126,6 @@ def reduce_scene(scene: Scene, problem: Problem, model: Model) -> Reduced:
     n = int(mechanism.driven.size)
     rows = int(mechanism.rows.sum())
     return Reduced(mechanism, tuple(edges), bodies, len(order), tuple(entropies), made, 2 * n + rows, tuple(twists))
-
-
-def _twists(edges: list[Edge], joints: int, poses: list[Array]) -> list[Array]:
-    """The freedoms of all joints in the world, where bodies have these poses; none of springs."""
-    ground = SE3.identity()
-    known = dict(enumerate(poses)) | {-1: ground}
-    out: list[Array] = []
-    for edge in edges[:joints]:
-        if edge.body2 in known:  # a frame inside a universal joint has no pose, but one of its joints' bodies does
-            frame = SE3.compose(known[edge.body2], edge.offset2)
-        else:
-            frame = SE3.compose(SE3.compose(known[edge.body1], edge.offset1), edge.pair.include(edge.coordinate))
-        out.append(SE3.adjoint(frame) @ edge.pair.basis)
-    return out + [np.zeros((6, 0))] * (len(edges) - joints)
-
-
-def _joints(scene: Scene, number: Mapping[str, int], masses: list[float]) -> list[Edge]:
-    """All joints as edges; universal ones as two, with a frame without mass between them."""
-    out: list[Edge] = []
-    own = {name for name, _ in scene.all_joints()}
-    for name, j in [*scene.all_joints(), *scene.implicit_joints()]:
-        at = component_path("joints", name) if name in own else None
-        first, second = number[j.body1], number[j.body2]
-        if j.middle is None:
-            kind = pair(j.kind, pitch=j.pitch) if j.kind == "screw" else pair(j.kind)
-            out.append(
-                Edge(
-                    name, at, first, second, np.array(j.frame1), np.array(j.frame2), kind, j.motion,
-                    np.array(j.coordinate), slice(0, kind.dim),
-                )
-            )  # fmt: skip
-            continue
-        between = len(masses)
-        masses.append(0.0)
-        revolute, unit = pair("revolute"), np.array(IDENTITY_POSE)
-        halves = ((first, between, np.array(j.frame1), unit), (between, second, np.array(j.middle), np.array(j.frame2)))
-        for i, (one, two, frame1, frame2) in enumerate(halves):
-            path = None if at is None else at / ("first", "second")[i]
-            where = slice(i, i + 1)
-            given = np.array(j.coordinate)[where]
-            out.append(Edge(name, path, one, two, frame1, frame2, revolute, j.motion, given, where))
-    reached = _islands(len(masses), out)
-    poses = {number[name]: body.pose for name, body in scene.all_bodies()}
-    for body in reached:  # a group of bodies that nothing ties to the ground moves with its first one
-        out.append(
-            Edge("", None, -1, body, np.array(IDENTITY_POSE), np.array(IDENTITY_POSE), FREE, None,
-                 np.array(poses[body]), slice(0, 6))
-        )  # fmt: skip
-    return out
-
-
-def _graph(count: int, edges: list[Edge]) -> nx.Graph:
-    """Bodies and the ground, −1, with an edge where there is a joint."""
-    graph = nx.Graph()
-    graph.add_nodes_from(range(-1, count))
-    graph.add_edges_from((edge.body1, edge.body2) for edge in edges)
-    return graph
-
-
-def _islands(count: int, edges: list[Edge]) -> list[int]:
-    """The first body of each group that has no joint with the ground."""
-    return sorted(min(group) for group in nx.connected_components(_graph(count, edges)) if -1 not in group)
-
-
-def _spanning(joints: list[Edge], masses: list[float]) -> tuple[list[tuple[Edge, int, bool]], list[Edge]]:
-    """The tree as (edge, body that it leads to, walked forward), parents first; and the edges left.
-
-    Prescribed joints and those of frames without mass come into the tree first, then those of few freedoms: a joint of
-    many freedoms costs the fewest constraints where it is cut. Among equals those near the ground come first: then
-    branches are short, and few loops are open at one body.
-    """
-    depth = nx.single_source_shortest_path_length(_graph(len(masses), joints), -1)
-    groups = nx.utils.UnionFind(range(-1, len(masses)))
-
-    def cost(edge: Edge) -> tuple[bool, bool, int, int]:
-        light = any(body >= 0 and masses[body] == 0.0 for body in (edge.body1, edge.body2))
-        return (edge.motion is None, not light, edge.pair.dim, min(depth[edge.body1], depth[edge.body2]))
-
-    kept: list[Edge] = []
-    cut: list[Edge] = []
-    for edge in sorted(joints, key=cost):
-        if groups[edge.body1] == groups[edge.body2]:
-            cut.append(edge)
-        else:
-            groups.union(edge.body1, edge.body2)
-            kept.append(edge)
-    at: dict[int, list[Edge]] = {}
-    for edge in kept:
-        at.setdefault(edge.body1, []).append(edge)
-        at.setdefault(edge.body2, []).append(edge)
-    out: list[tuple[Edge, int, bool]] = []
-    queue, reached = deque([-1]), {-1}
-    while queue:
-        here = queue.popleft()
-        for edge in at.get(here, []):
-            there = edge.body2 if edge.body1 == here else edge.body1
-            if there not in reached:
-                reached.add(there)
-                queue.append(there)
-                out.append((edge, there, edge.body1 == here))
-    return out, cut
-
-
-def _springs(scene: Scene, number: Mapping[str, int]) -> list[Edge]:
-    out: list[Edge] = []
-    for name, s in scene.all_springs():
-        frames = [np.concatenate([[1.0, 0.0, 0.0, 0.0], np.asarray(at, dtype=float)]) for at in (s.at1, s.at2)]
-        path, ends = component_path("springs", name), (number[s.body1], number[s.body2])
-        one, two = frames
-        out.append(Edge(name, path, *ends, one, two, FREE, None, SE3.identity(), slice(0, 6)))
-    return out
 
 
 def _entropies(problem: Problem) -> dict[Path, tuple[int, int]]:
@@ -317,7 +175,7 @@ def _tables(
         b, d = edge.pair.basis, edge.pair.dim
         basis[i, :, :d], left[i, :d] = b, np.linalg.pinv(b)
         if kind == CUT:
-            found = _complement(b, _loop(i, edges, parents, place, twists, scene), length)
+            found = _complement(b, loop_algebra(i, edges, parents, place, twists, scene), length)
             rows[i] = len(found)
             normal[i, : len(found)] = found
         if kind != SPRING:
@@ -384,29 +242,6 @@ def _complement(basis: Array, group: Array, length: float) -> Array:
         left, sizes, _ = np.linalg.svd(whole.T @ (scale[:, None] * basis), full_matrices=True)
         whole = whole @ left[:, sizes.size :]
     return scale * whole.T
-
-
-def _loop(
-    cut: int, edges: list[Edge], parents: list[int], place: Mapping[int, int], twists: list[Array], scene: Scene
-) -> Array:
-    """(6, k): the algebra, in the frame C2 of a cut joint, of the group that the joints of its loop generate.
-
-    The bodies of the loop never leave it relative to each other, so rows beyond it would say nothing.
-    """
-    ends = [place[edges[cut].body1], place[edges[cut].body2]]
-    passed: list[int] = []
-    while ends[0] != ends[1]:
-        later = int(ends[1] > ends[0])
-        passed.append(ends[later])
-        ends[later] = parents[ends[later]]
-    bodies = list(scene.all_bodies())
-    edge = edges[cut]
-    if 0 <= edge.body2 < len(bodies):
-        frame = SE3.compose(np.array(bodies[edge.body2][1].pose), edge.offset2)
-    else:  # the ground
-        frame = edge.offset2
-    seen = SE3.adjoint(SE3.inverse(frame)) @ np.column_stack([twists[i] for i in [*passed, cut]])
-    return generated(seen.T).basis
 
 
 def _idle(model: Model, component: int) -> bool:

@@ -6,7 +6,7 @@ from typing import Any
 
 from ephs.mechanics.reduced.equations import Equations, ReducedState
 from ephs.mechanics.solve.control import Control
-from ephs.mechanics.solve.loop import Attempt, Leg, Row, Span
+from ephs.mechanics.solve.stepping import Attempt, Leg, Row, Span
 
 __all__ = ["ReducedMethod"]
 

@@ -20,7 +20,7 @@ from ephs.mechanics.reduced.tables import CUT
 from ephs.mechanics.reduced.tangent import Linearised
 from ephs.mechanics.solve.control import Control
 from ephs.mechanics.solve.errors import Outcome, SolveError
-from ephs.mechanics.solve.loop import Attempt
+from ephs.mechanics.solve.stepping import Attempt
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.semantics.spaces.se3_kernels import dexp_left, dexp_left_inv

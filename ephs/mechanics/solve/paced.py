@@ -7,9 +7,9 @@ import numpy as np
 
 from ephs.mechanics.solve.control import Control
 from ephs.mechanics.solve.driven import ComponentMethod, advance_driven
-from ephs.mechanics.solve.loop import Attempt, Row, Span
 from ephs.mechanics.solve.natural import NaturalState
 from ephs.mechanics.solve.problem import Problem
+from ephs.mechanics.solve.stepping import Attempt, Row, Span
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.codes import VECTOR

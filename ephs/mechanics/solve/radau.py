@@ -17,10 +17,10 @@ from ephs.mechanics.solve.collocation import moments, values
 from ephs.mechanics.solve.continuous import Continuous, Matrices
 from ephs.mechanics.solve.control import Control
 from ephs.mechanics.solve.errors import Outcome, SolveError
-from ephs.mechanics.solve.loop import Attempt, Row, Span
 from ephs.mechanics.solve.model import compile_model
 from ephs.mechanics.solve.natural_kernels import IRREVERSIBLE
 from ephs.mechanics.solve.problem import Problem
+from ephs.mechanics.solve.stepping import Attempt, Row, Span
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.codes import VECTOR

@@ -14,7 +14,7 @@ from ephs.mechanics.reduced.equations import Equations, ReducedState
 from ephs.mechanics.reduced.method import ReducedMethod
 from ephs.mechanics.solve.control import Control
 from ephs.mechanics.solve.errors import OptionError, Outcome, SolveError
-from ephs.mechanics.solve.loop import Attempt
+from ephs.mechanics.solve.stepping import Attempt
 from ephs.show.charts.runs import Array
 
 __all__ = ["SPECIMENS", "TrapezoidalIndex3", "VelocityMidpoint"]

@@ -1,0 +1,169 @@
+"""What the time loop asks of a method: steps one a call, or many; what a step and what is kept are."""
+
+from dataclasses import dataclass
+from typing import Any, Generic, Protocol, TypeVar, final
+
+from ephs.mechanics.solve.control import Control, Policy
+from ephs.semantics.bundle import Array
+
+__all__ = ["Attempt", "Counts", "Leg", "Row", "Span", "Stepper"]
+
+S = TypeVar("S")
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Row:
+    """What is kept at one instant.
+
+    Parameters
+    ----------
+    x
+        (point_size,) the states.
+    energies
+        (components,): energy of each storage in J, entropy made by each irreversible component in J/K.
+    sums
+        (4,): heat, energy supplied, exergy supplied in J, entropy made in J/K.
+    """
+
+    x: Array
+    energies: Array
+    sums: Array
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Attempt(Generic[S]):
+    """A step that was solved.
+
+    Parameters
+    ----------
+    start, end
+        The method's state before and after it.
+    h
+        Its length in s.
+    error
+        Estimated error relative to the tolerances; 0 where the method has no estimate.
+    least
+        The least entropy production of a component in it, in J/K.
+    detail
+        What dense output needs.
+    """
+
+    start: S
+    end: S
+    h: float
+    error: float
+    least: float
+    detail: Any = None
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Span(Generic[S]):
+    """What is left of a run: from a state to a time, by steps of which the next one is h seconds long.
+
+    ``save_at`` are the times to keep, of which ``saved`` are kept already; None: every step. Without a ``policy`` steps
+    are constant.
+    """
+
+    state: S
+    t0: float
+    until: float
+    h: float
+    control: Control
+    policy: Policy | None
+    save_at: Array | None
+    saved: int
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Counts:
+    """Steps that were taken, tries that were rejected, lengths in s, the least entropy production, the next step."""
+
+    steps: int
+    rejected: int
+    shortest: float
+    longest: float
+    least: float
+    h: float
+
+
+class Leg(Protocol[S]):
+    """A run in compiled code, some steps a call. It is ``left`` where it will not go on before the end."""
+
+    left: bool
+
+    def advance(self, steps: int) -> bool:
+        """Up to so many steps; whether the end is reached.
+
+        Raises
+        ------
+        SolveError
+            A step has no solution.
+        """
+        ...
+
+    def rows(self) -> list[tuple[float, S, float]]:
+        """What was kept since the last call: time, state, the least production in its step."""
+        ...
+
+    @property
+    def time(self) -> float:
+        """The time reached."""
+        ...
+
+    @property
+    def state(self) -> S:
+        """The state reached."""
+        ...
+
+    @property
+    def counts(self) -> Counts:
+        """What it did so far."""
+        ...
+
+
+class Stepper(Protocol[S]):
+    """A method on one problem: it starts, steps, and says what is where. States are values with a time ``t``."""
+
+    name: str
+
+    def start(self, t: float, h: float) -> S:
+        """The method's state at the initial values; h is the length of the first step."""
+        ...
+
+    def prepare(self, state: S, h: float) -> None:
+        """Compile what is not in the cache, before time counts."""
+        ...
+
+    def step(self, state: S, h: float) -> Attempt[S]:
+        """One step of h seconds, which may be negative.
+
+        Raises
+        ------
+        SolveError
+            The step has no solution.
+        """
+        ...
+
+    def many(self, span: Span[S]) -> Leg[S] | None:
+        """What takes many steps in one compiled call; None where there is no such, or where inputs must be asked."""
+        ...
+
+    def inside(self, attempt: Attempt[S], t: float) -> S:
+        """The state at a time within a step, to the method's order."""
+        ...
+
+    def at(self, state: S, t: float) -> S:
+        """The same state at a time that differs by rounding."""
+        ...
+
+    def row(self, state: S) -> Row:
+        """What is kept of it."""
+        ...
+
+    def stats(self) -> dict[str, Any]:
+        """Counts, for the solution's statistics."""
+        ...
