@@ -7,10 +7,10 @@ from typing import Any, final
 from ephs.mechanics.solve.control import Control, Policy, Proportional, Symmetric
 from ephs.mechanics.solve.driven import ComponentMethod
 from ephs.mechanics.solve.errors import OptionError
-from ephs.mechanics.solve.loop import Stepper
 from ephs.mechanics.solve.model import Model, compile_model
 from ephs.mechanics.solve.natural import Natural
 from ephs.mechanics.solve.problem import Problem
+from ephs.mechanics.solve.stepping import Stepper
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.codes import VECTOR
 

@@ -123,7 +123,7 @@ def engine_of(
     return Engine(
         flag=np.array([normal is not None, forced, driven, world], dtype=np.int64),
         link=table,
-        const=numbers if normal is None else _flat_constants(numbers),
+        const=numbers if normal is None else _flat_constants(numbers, table),
         basis=np.array(basis).reshape(-1, 36),
         gravity=pull,
         chart=_chart(reduced, joints, cut),
@@ -184,17 +184,13 @@ def _flat(joint: Array, kind: str) -> Array:
     return np.column_stack([slide, np.cross(normal, slide), normal])
 
 
-def _flat_constants(numbers: Array) -> Array:
+def _flat_constants(numbers: Array, table: Index) -> Array:
     angle: Array = np.arctan2(numbers[:, 3], numbers[:, 0])
-    columns: list[Array] = [
-        numbers[:, 9],
-        numbers[:, 10],
-        angle,
-        *numbers[:, 12:15].T,
-        numbers[:, 21],
-        numbers[:, 0],
-        numbers[:, 3],
-    ]
+    height = np.zeros(len(numbers) + 1)  # the last one is the ground's
+    for i, parent in enumerate(table[:, tree.PARENT].tolist()):
+        height[i] = height[parent] + numbers[i, 11]
+    columns: list[Array] = [numbers[:, 9], numbers[:, 10], angle, *numbers[:, 12:15].T, numbers[:, 21]]
+    columns += [numbers[:, 0], numbers[:, 3], height[:-1]]
     return np.ascontiguousarray(np.column_stack(columns).reshape(-1, P_CONSTANTS))
 
 

@@ -91,7 +91,7 @@ def closing(parents: Sequence[int], ends: Sequence[tuple[int, int]]) -> Closing:
             number[link, row] = len(slots)
             slots.append([row, -1])
         carried = rows[len(order[link]) :]
-        flat += [place(a, b) for i, a in enumerate(carried) for b in carried[i:]]
+        flat += [place(a, b) for i, b in enumerate(carried) for a in carried[: i + 1]]
     for (link, row), s in number.items():
         if link != meet[row]:
             slots[s][1] = number[above[link], row]

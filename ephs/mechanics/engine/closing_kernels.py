@@ -100,17 +100,24 @@ def carry(closing, entry, row_value, covector, along, link, work, dense, i, plan
     last = closing.at[i, 0] + closing.at[i, 1]
     d = link[i, DIM] if link[i, DRIVEN] == 0 else 0
     for s in range(first, last):
-        a = closing.slot[s, 0]
+        a, up = closing.slot[s, 0], closing.slot[s, 1]
         if d:
             _along(covector, along, link, work, dense, i, s, d, planar)
-        for y in range(first, s + 1):
-            total = 0.0
-            for j in range(d):
-                total += along[s, j] * along[y, 6 + j]
-            if y == s:
-                row_value[a, 2] += total
-            entry[closing.flat[pair + _pair(y - first, s - first, last - first)]] += total
-        up = closing.slot[s, 1]
+        if d == 1:
+            x = along[s, 0]
+            row_value[a, 2] += x * along[s, 6]
+            for y in range(first, s + 1):
+                entry[closing.flat[pair]] += x * along[y, 6]
+                pair += 1
+        else:
+            for y in range(first, s + 1):
+                total = 0.0
+                for j in range(d):
+                    total += along[s, j] * along[y, 6 + j]
+                if y == s:
+                    row_value[a, 2] += total
+                entry[closing.flat[pair]] += total
+                pair += 1
         if planar:
             k0, k1, k2 = covector[s, 0], covector[s, 1], covector[s, 2]
             if d:
@@ -121,12 +128,6 @@ def carry(closing, entry, row_value, covector, along, link, work, dense, i, plan
             covector[up, 2] += k2
         else:
             _lift(covector, along, link, work, dense, i, s, up, d)
-
-
-@kernel
-def _pair(a, b, count):
-    """Place of (a, b), a ≤ b, among the pairs of ``count`` things."""
-    return a * count - (a * (a - 1)) // 2 + b - a
 
 
 @kernel

@@ -14,12 +14,13 @@ from ephs.mechanics.engine.closing_kernels import (
     push,
 )
 from ephs.mechanics.engine.force_kernels import act
-from ephs.mechanics.engine.inward_kernels import accelerate_outward, inward, load_inward
+from ephs.mechanics.engine.inward_kernels import accelerate_outward, inward, load_inward, tree
 from ephs.mechanics.engine.planar_kernels import (
     planar_accelerate_outward,
     planar_inward,
     planar_load_inward,
     planar_outward,
+    planar_tree,
 )
 from ephs.mechanics.engine.row_kernels import cut_rows, world
 from ephs.mechanics.engine.tree_kernels import (
@@ -277,8 +278,26 @@ def driven_power(e, m, r):
 
 
 @kernel
+def fall(e, m, q, r, force, rate):
+    """Accelerations of a tree on which nothing but gravity acts; 0, or 1 + a link that moves no mass."""
+    if e.flag[0] == 1:
+        planar_outward(e.link, e.const, m.work, q, r, e.gravity)
+        return planar_tree(e.link, m.work, force, rate)
+    if e.basis.shape[0] > 0:
+        _elements(e, m, q, r)
+    outward(e.link, e.const, m.work, m.dense, q, r, e.gravity)
+    found = tree(e.link, m.work, m.dense, q, force, rate)
+    if e.basis.shape[0] > 0:
+        _turn_rates(e, m, rate)
+    return found
+
+
+@kernel
 def accelerate(e, m, q, r, s, drive, wrench, scal, r_rate, s_rate, made, powers):
     """ṙ, ṡ, what each component makes, and the powers of friction and of what drives; (status, component)."""
+    if e.flag[1] + e.flag[2] + e.cut.shape[0] == 0:
+        still = fall(e, m, q, r, m.zero, r_rate)
+        return (0, 0) if still == 0 else (STILL, e.link[still - 1, R_AT])
     move(e, m, q, r)
     for j in range(m.force.shape[0]):
         m.force[j] = 0.0
@@ -304,6 +323,9 @@ def evaluations(e, m, q, r, rates, repeats):
     """Accelerations of many states q (k, size), r (k, n) without forces, into rates (k, n); what a benchmark calls."""
     for _ in range(repeats):
         for k in range(q.shape[0]):
+            if e.cut.shape[0] == 0:
+                fall(e, m, q[k], r[k], m.zero, rates[k])
+                continue
             move(e, m, q[k], r[k])
             if fold(e, m, q[k], m.zero) == 0:
                 unfold(e, m, q[k], rates[k])

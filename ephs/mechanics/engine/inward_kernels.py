@@ -27,6 +27,18 @@ kernel = jit.lean_kernel
 
 
 @kernel
+def tree(link, work, dense, q, force, rate):
+    """The inward and the second outward sweep where no loops are closed; 0, or 1 + a link that moves no mass."""
+    for i in range(link.shape[0] - 1, -1, -1):
+        if not inward(link, work, dense, i):
+            return 1 + i
+        load_inward(link, work, dense, q, force, i)
+    for i in range(link.shape[0]):
+        accelerate_outward(link, work, dense, q, rate, i)
+    return 0
+
+
+@kernel
 def turned(q, k, x, y, z):
     """R(q) applied to a vector, q the unit quaternion at q[k]."""
     a, b, c, d = q[k], q[k + 1], q[k + 2], q[k + 3]

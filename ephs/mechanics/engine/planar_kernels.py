@@ -15,15 +15,14 @@ from ephs.semantics.spaces import jit
 
 kernel = jit.lean_kernel
 
-# Columns of a link's constants: joint in the parent's frame (x, y, angle), mass, first moments, inertia about the
-# frame, direction of a sliding joint in the parent's frame.
-P_CONSTANTS = 9
+# Columns of a link's constants: 0 joint in the parent's frame (x, y, angle), 3 mass, first moments, inertia about the
+# frame, 7 direction of a sliding joint in the parent's frame, 9 height over the plane.
+P_CONSTANTS = 10
 
-# Columns of a link's memory: cos and sin of its angle, position, arm from the parent, twist (ω, v), acceleration at
-# ṙ = 0, load (N, F), inertia, gain D⁻¹Uᵀ, D⁻¹, D⁻¹(τ − SᵀP), (δα, δa), angle, direction of a sliding joint.
-P_POSE, P_ARM, P_TWIST, P_BIAS, P_LOAD, P_INERTIA, P_GAIN, P_INVERSE, P_OWN, P_CHANGE, P_ANGLE, P_SLIDE, P_MEMORY = (
-    0, 4, 6, 9, 11, 14, 20, 23, 24, 25, 28, 29, 31
-)  # fmt: skip
+# Columns of a link's memory: 0 cos and sin of its angle, 2 position, 4 arm from the parent, 6 twist (ω, v),
+# 9 acceleration at ṙ = 0, 11 load (N, F), 14 inertia, 20 gain D⁻¹Uᵀ, 23 D⁻¹, 24 D⁻¹(τ − SᵀP), 25 (δα, δa), 28 angle,
+# 29 direction of a sliding joint, 31 height.
+P_MEMORY = 32
 
 
 @kernel
@@ -57,7 +56,7 @@ def planar_outward(link, const, work, q, r, gravity):
         c, s = math.cos(phi), math.sin(phi)
         work[i, 0], work[i, 1], work[i, 2], work[i, 3] = c, s, px + ex, py + ey
         work[i, 4], work[i, 5], work[i, 6], work[i, 7], work[i, 8] = ex, ey, w, vx, vy
-        work[i, 9], work[i, 10], work[i, 28] = ax, ay, phi
+        work[i, 9], work[i, 10], work[i, 28], work[i, 31] = ax, ay, phi, const[i, 9]
         m, hx, hy = const[i, 3], c * const[i, 4] - s * const[i, 5], s * const[i, 4] + c * const[i, 5]
         work[i, 11], work[i, 12], work[i, 13] = hx * ay - hy * ax, m * ax - w * w * hx, m * ay - w * w * hy
         work[i, 14], work[i, 15], work[i, 16] = const[i, 6], -hy, hx
@@ -110,6 +109,18 @@ def planar_load_inward(link, work, force, i):
         work[parent, 11] += n + work[i, 4] * y - work[i, 5] * x
         work[parent, 12] += x
         work[parent, 13] += y
+
+
+@kernel
+def planar_tree(link, work, force, rate):
+    """The inward and the second outward sweep where no loops are closed; 0, or 1 + a link that moves no mass."""
+    for i in range(link.shape[0] - 1, -1, -1):
+        if not planar_inward(link, work, i):
+            return 1 + i
+        planar_load_inward(link, work, force, i)
+    for i in range(link.shape[0]):
+        planar_accelerate_outward(link, work, rate, i)
+    return 0
 
 
 @kernel

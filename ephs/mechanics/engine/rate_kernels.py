@@ -6,7 +6,7 @@
 from ephs.mechanics.engine.closing_kernels import nearly_dependent
 from ephs.mechanics.engine.engine_kernels import DEPENDENT, NEAR, STILL, accelerate, fold, move, resolve
 from ephs.mechanics.engine.inward_kernels import turned
-from ephs.mechanics.engine.row_kernels import cut_gaps, fit, seen
+from ephs.mechanics.engine.row_kernels import cut_gaps, cut_poses, fit, seen
 from ephs.mechanics.engine.tree_kernels import (
     DENSE,
     DIM,
@@ -99,6 +99,7 @@ def close(e, m, q, r, motions, change, moved):
     before = gap = 1e300
     for _ in range(ROUNDS):
         move(e, m, q, r)
+        cut_poses(e, m)
         fit(e, m, q)
         gap = cut_gaps(e, m, q)
         if fold(e, m, q, m.zero) != 0:

@@ -53,7 +53,7 @@ def place(work, i, planar, out):
     if planar:
         c, s = work[i, 0], work[i, 1]
         out[0], out[1], out[2], out[3], out[4], out[5] = c, -s, 0.0, s, c, 0.0
-        out[6], out[7], out[8], out[9], out[10], out[11] = 0.0, 0.0, 1.0, work[i, 2], work[i, 3], 0.0
+        out[6], out[7], out[8], out[9], out[10], out[11] = 0.0, 0.0, 1.0, work[i, 2], work[i, 3], work[i, 31]
         out[12], out[13], out[14], out[17] = 0.0, 0.0, work[i, 6], 0.0
         x, y = work[i, 7], work[i, 8]
         out[15], out[16] = c * x + s * y, c * y - s * x
@@ -181,7 +181,6 @@ def cut_rows(e, m, planar):
         relative = m.relative[i]
         arms = relative[7:19]
         arm(one, two, frame[i], 12, arms)
-        relative_pose(frame[i], arms, relative[0:7], m.small[80:90])
         seen(arms, 0, one, 12, first)
         seen(frame[i], 12, two, 12, second)
         for k in range(6):
@@ -208,6 +207,13 @@ def cut_rows(e, m, planar):
             add_covector(m.covector, end[row, 1], covector, planar, m.work, b)
             wrench_on(arms, 0, basis[i], at, -1.0, covector)
             add_covector(m.covector, end[row, 0], covector, planar, m.work, a)
+
+
+@kernel
+def cut_poses(e, m):
+    """Poses of C2 in C1 of all cut joints, where `cut_rows` has been."""
+    for i in range(e.cut.shape[0]):
+        relative_pose(e.cut_frame[i], m.relative[i, 7:19], m.relative[i, 0:7], m.small[80:90])
 
 
 @kernel

@@ -24,14 +24,14 @@ PARENT, KIND, Q_AT, R_AT, FORWARD, DIM, DRIVEN, DENSE, CODE, Q_SIZE, COLUMNS = r
 REVOLUTE, SPHERICAL, GENERAL, SLIDING = range(4)
 """Kinds of joints; GENERAL ones take a constant basis of any dimension. On SE(2) there are REVOLUTE and SLIDING."""
 
-# Columns of a link's constants: pose of the joint in the parent's frame (rows of R, p), inertia about the frame.
-C_R, C_P, C_MASS, C_FIRST, C_INERTIA, CONSTANTS = 0, 9, 12, 13, 16, 22
+# Columns of a link's constants: 0 pose of the joint in the parent's frame (rows of R, p), 12 mass, 13 first moments,
+# 16 inertia about the frame (upper triangle).
+C_MASS, CONSTANTS = 12, 22
 
-# Columns of a link's memory: R and p in the parent, twist, b, load P, A (upper triangle), C, M (upper triangle), the
-# gain D⁻¹Uᵀ (of spherical joints A⁻¹C), D⁻¹ (upper triangle), D⁻¹(τ − SᵀP), δa, R and p in the world.
-W_R, W_P, W_TWIST, W_BIAS, W_LOAD, W_A, W_C, W_M, W_GAIN, W_INVERSE, W_OWN, W_CHANGE, W_WORLD, MEMORY = (
-    0, 9, 12, 18, 24, 30, 36, 45, 51, 60, 66, 72, 78, 90
-)  # fmt: skip
+# Columns of a link's memory: 0 R and 9 p in the parent, 12 twist, 18 b, 24 load P, 30 A (upper triangle), 36 C, 45 M
+# (upper triangle), 51 the gain D⁻¹Uᵀ (of spherical joints A⁻¹C), 60 D⁻¹ (upper triangle), 66 D⁻¹(τ − SᵀP), 72 δa,
+# 78 R and 87 p in the world.
+MEMORY = 90
 
 # Columns of a general joint's numbers: pose and twist of its element, basis, U, D⁻¹Uᵀ, D⁻¹ (d², row by row), rates.
 G_TWIST, G_BASIS, G_U, G_GAIN, G_INVERSE, G_RATE, GENERAL_SIZE = 12, 18, 54, 90, 126, 162, 198

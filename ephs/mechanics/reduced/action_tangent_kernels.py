@@ -6,10 +6,10 @@
 from ephs.mechanics.reduced.dynamics_kernels import gather, place
 from ephs.mechanics.reduced.slope_kernels import component_slopes, out_of
 from ephs.mechanics.reduced.sweep_kernels import bracket, cross_momentum, forces, kinematics
-from ephs.mechanics.reduced.tangent_kernels import tangent
+from ephs.mechanics.reduced.tangent_kernels import still, tangent
 from ephs.semantics.spaces import jit
 
-kernel = jit.kernel
+kernel = jit.lean_kernel
 
 
 @kernel
@@ -39,11 +39,10 @@ def action_slopes(t, w, d, q, r, s, drive, wrench, scal, s_rate, made, powers, m
             d.lifted[i, k] = 0.0
     gather(t, d, d.total)
     gather(t, d, d.momentum)
-    d.closing[:] = 0.0
-    d.dq[:] = 0.0
-    d.dr[:] = 0.0
-    d.da[:] = 0.0
-    d.ds[:] = 0.0
+    for i in range(d.closing.shape[0]):
+        for k in range(6):
+            d.closing[i, k] = 0.0
+    still(d)
     for column in range(2 * n):
         if column < n:
             d.dq[column] = 1.0

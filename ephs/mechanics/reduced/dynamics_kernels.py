@@ -9,7 +9,7 @@ from ephs.mechanics.reduced.sweep_kernels import bracket, forces, inertia_sweep,
 from ephs.mechanics.reduced.tables import CUT
 from ephs.semantics.spaces import jit
 
-kernel = jit.kernel
+kernel = jit.lean_kernel
 
 
 @kernel
@@ -23,7 +23,7 @@ def forward_dynamics(t, w, d, q, r, s, drive, wrench, scal, s_rate, made, powers
     status, component = forces(t, w, q, r, s, drive, wrench, scal, s_rate, made, powers)
     if status != 0:
         return status, component, 0, 0
-    d.total[:] = w.load
+    _keep_loads(w, d)
     still = inertia_sweep(t, w)
     if still != 0:
         return 20, still - 1, 0, 0
@@ -46,6 +46,13 @@ def forward_dynamics(t, w, d, q, r, s, drive, wrench, scal, s_rate, made, powers
         d.multiplier[w.chosen[j]] = 0.0
     settle(t, w, d, r)
     return 0, 0, m, rank
+
+
+@kernel
+def _keep_loads(w, d):
+    for i in range(d.total.shape[0]):
+        for k in range(6):
+            d.total[i, k] = w.load[i, k]
 
 
 @kernel
@@ -84,8 +91,9 @@ def inverse_dynamics(t, w, d, q, r, s, drive, wrench, scal, s_rate, made, powers
     status, component = forces(t, w, q, r, s, drive, wrench, scal, s_rate, made, powers)
     if status != 0:
         return status, component
-    d.total[:] = w.load
-    d.multiplier[:] = 0.0
+    _keep_loads(w, d)
+    for a in range(d.multiplier.shape[0]):
+        d.multiplier[a] = 0.0
     settle(t, w, d, r)
     for i in range(t.parent.shape[0]):
         for j in range(t.dim[i]):
@@ -178,10 +186,11 @@ def settle(t, w, d, r):
 @kernel
 def by_force(w, d, m, rank, out):
     """∂ṙ/∂force: the mass matrix' inverse along the constraints."""
-    d.row[:] = 0.0
     for j in range(out.shape[1]):
-        d.force[:] = 0.0
-        d.force[j] = 1.0
-        solve_constrained(w, m, rank, d.force, d.row, w.multiplier, d.change)
+        for a in range(m):
+            d.row[a] = 0.0
+        for i in range(out.shape[0]):
+            d.force[i] = 1.0 if i == j else 0.0
+        solve_constrained(w, m, rank, d.force, d.row, d.row, d.change)
         for i in range(out.shape[0]):
             out[i, j] = d.force[i]

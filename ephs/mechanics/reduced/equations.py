@@ -4,25 +4,22 @@ What every method on the reduced form shares. A step moves q = q⁰·exp(v): the
 spaces, v̇ = dexp⁻¹(v) r.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Any, final
 
 import numpy as np
 
-from ephs.mechanics.build import component_path, drive_ports, wrench_port
+from ephs.mechanics.build import component_path
 from ephs.mechanics.engine.build import engine_of, memory_of
 from ephs.mechanics.engine.engine_kernels import DEPENDENT, STILL, resolve
 from ephs.mechanics.engine.march_kernels import C_COLUMNS, C_COMPONENT, C_EVALUATIONS, attempt
 from ephs.mechanics.engine.rate_kernels import OPEN, across, advance, close, derive, joint_rates
 from ephs.mechanics.engine.tables import Scheme
-from ephs.mechanics.reduced.loop_kernels import accelerate, constraint_rows, correct, loop_gaps, reduce_rows
+from ephs.mechanics.reduced.dense import Dense, unmoved
+from ephs.mechanics.reduced.given import Given
 from ephs.mechanics.reduced.mechanism import reduce_scene
 from ephs.mechanics.reduced.paper import PaperStates
-from ephs.mechanics.reduced.sweep_kernels import inertia_sweep, kinematics
-from ephs.mechanics.reduced.tables import CUT, SPRING, Workspace
-from ephs.mechanics.scene.geometry import Coupling
+from ephs.mechanics.reduced.tables import SPRING, Workspace
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.solve.continuous import Continuous
 from ephs.mechanics.solve.control import Tolerance
@@ -36,11 +33,6 @@ from ephs.semantics.spaces.codes import VECTOR
 
 __all__ = ["Equations", "ReducedState"]
 
-GAP = 1e-12
-"""Position residuals to which loops are closed, in m and rad."""
-CLOSED = 1e-10
-"""Residuals above this cannot be accepted."""
-ROUNDS = 12
 ASIDE = 0.1
 """How far, in rad or m, a mechanism is moved to see which of its constraints repeat others wherever it is."""
 
@@ -79,12 +71,11 @@ class Equations:
         self.reduced = reduced = reduce_scene(scene, problem, model)
         self._continuous = Continuous(model)
         self._light = reduced.workspace(dense=False)
-        self._dense: Workspace | None = None
+        self._dense: Dense | None = None
         t = reduced.tables
         self._moving = [i for i in range(len(reduced.edges)) if t.kind[i] != SPRING]
         sizes = [int(t.dim[i]) if t.kind[i] != SPRING else 0 for i in range(len(reduced.edges))]
         self._v_at = np.cumsum([0, *sizes])[:-1].astype(np.int64)
-        self._rank = 0
         self._careful = self._factored = False
         self._closed_at = np.zeros(0), np.zeros(0)
         self._q = np.zeros(reduced.coordinates)
@@ -98,66 +89,22 @@ class Equations:
         number = {slot.path: i for i, slot in enumerate(problem.descriptor.components)}
         self._makers = np.array([number[path] for path in reduced.made], dtype=int)
         self.scal = model.scal(0.0)
-        self.drive = np.zeros(self.nv)
-        self.wrench = np.zeros((reduced.links, 6))
-        self._ports = self._find_ports(scene)
+        self.given = Given(scene, problem, reduced, self.nv)
+        self.drive, self.wrench = self.given.drive, self.given.wrench
         self.constant = problem.constant
-        self._place_inputs(0.0, None)
         self._paper = PaperStates(reduced, problem, self._light)
         self.evaluations = 0
         self.gravity = np.array(scene.world.gravity, dtype=float)
         self.motions = np.zeros(self.n)
         self.motions[t.driven.astype(bool)] = self.prescribed
         self._change, self._moved = np.zeros(self.n), np.zeros(self.nv)
-        self._acted = self._find_acted(set(self._moving) if pushed else set())
+        self._acted = self.given.acted(set(self._moving) if pushed else set())
         self._build(None)
 
     def _build(self, kept: "list[Array] | None") -> None:
         """The compiled engine, with all rows of the cut joints or those that are kept."""
         self.engine = engine_of(self.reduced, self.gravity, self._acted, kept)
         self.memory = memory_of(self.engine, self.ns)
-
-    def _find_acted(self, edges: set[int]) -> tuple[frozenset[int], frozenset[int]]:
-        """Edges, beside those given, and links on which given forces act."""
-        t = self.reduced.tables
-        links: set[int] = set()
-        for _, array, where in self._ports:
-            if array is self.wrench:
-                links.add(int(where))
-            else:
-                edges |= {i for i in self._moving if t.dim[i] and int(t.r_at[i]) == where.start}
-        return frozenset(edges), frozenset(links)
-
-    @property
-    def work(self) -> Workspace:
-        """Memory of the sweeps over dense matrices."""
-        if self._dense is None:
-            self._dense = self.reduced.workspace(dense=True)
-        return self._dense
-
-    # ---- inputs ------------------------------------------------------------------------------------------------
-
-    def _find_ports(self, scene: Scene) -> list[tuple[Path, Any, Any]]:
-        """(port, array, where) of each input that is a flow."""
-        found: list[tuple[Path, Any, Any]] = []
-        links = {name: i for i, name in enumerate(self.reduced.bodies) if name is not None}
-        signals = self.problem.signals
-        for name, _ in scene.all_bodies():
-            if wrench_port(name) in signals:
-                found.append((wrench_port(name), self.wrench, links[name]))
-        r_at, dim = self.reduced.tables.r_at, self.reduced.tables.dim
-        for name, j in scene.all_joints():
-            edges = [i for i, e in enumerate(self.reduced.edges) if e.name == name and i in self._moving]
-            edges.sort(key=lambda i: self.reduced.edges[i].freedoms.start)
-            for (port, _), i in zip(drive_ports(j), edges, strict=True):
-                if port in signals and not signals[port].effort:
-                    found.append((port, self.drive, slice(int(r_at[i]), int(r_at[i] + dim[i]))))
-        return found
-
-    def _place_inputs(self, t: float, state: Mapping[Path, Array] | None) -> None:
-        for port, array, where in self._ports:
-            signal = self.problem.signals[port]
-            array[where] = signal.at(t, state or {}) if state is not None or signal.constant else 0.0
 
     # ---- the equations -----------------------------------------------------------------------------------------
 
@@ -180,27 +127,16 @@ class Equations:
         self._factored = False
         if not self.constant:
             v, r, s, books = np.split(y, [nv, nv + n, nv + n + ns])
-            self._place_inputs(t, self.states(ReducedState(t, self.advance(base, v), r, s, books)))
+            self.given.place(t, self.states(ReducedState(t, self.advance(base, v), r, s, books)))
         out = np.zeros(self.size)
         status, component = derive(
             self.engine, self.memory, base, self._q, y, self.drive, self.wrench, self.scal, out
         )  # fmt: skip
         if status == DEPENDENT:
-            status, component = self._rates_carefully(y, out)
+            status, component = self.dense.rates(self._q, y, self.given, self.scal, out)
+            joint_rates(self.engine, self.memory, y, y[self.nv : self.nv + self.n], out)
         self.refuse(status, component)
         return out
-
-    def _rates_carefully(self, y: Array, out: Array) -> tuple[int, int]:
-        """The rates of the tree and of the entropies, where constraints nearly repeat each other."""
-        r, rest = slice(self.nv, self.nv + self.n), self.nv + self.n
-        at = rest + self.ns
-        out[at:] = 0.0
-        found = accelerate(
-            self.reduced.tables, self.work, self._q, y[r], y[rest:at], self.drive, self.wrench, self.scal, out[r],
-            out[rest:at], out[at + 2 :], out[at : at + 2],
-        )  # fmt: skip
-        joint_rates(self.engine, self.memory, y, y[r], out)
-        return int(found[0]), int(found[1])
 
     def stages(self, state: ReducedState, scheme: Scheme, c: Array, h: float, y0: Array, k: Array, y1: Array) -> Array:
         """The rates k (stages + 1, size) at an explicit method's stages and end, k[0] known; y at the end into y1.
@@ -226,12 +162,6 @@ class Equations:
         k[-1] = self.rates(state.t + h, state.q, y1)
         return before
 
-    def load(self, t: float, q: Array, r: Array, s: Array) -> None:
-        """Put what drives at a time and state into ``drive`` and ``wrench``."""
-        if not self.constant:
-            books = np.zeros(2 + len(self.reduced.made))
-            self._place_inputs(t, self.states(ReducedState(t, q, r, s, books)))
-
     def prepare(self, state: ReducedState) -> None:
         """Compile what is not in the cache."""
         self.rates(state.t, state.q, self.vector(state))
@@ -240,47 +170,15 @@ class Equations:
     def refuse(self, status: int, component: int) -> None:
         """Raise what a compiled function reported, if it did."""
         if status == STILL:
-            raise self._unmoved(int(component))
+            raise unmoved(self.reduced, int(component))
         if status:
             raise SolveError.of_component(int(status), self.model, int(component))
-
-    def _sweep(self) -> None:
-        found = inertia_sweep(self.reduced.tables, self.work)
-        if found != 0:
-            raise self._unmoved(int(found) - 1)
-
-    def _unmoved(self, freedom: int) -> SolveError:
-        """A freedom whose motion no inertia determines."""
-        at = self.reduced.tables.r_at[: self.reduced.links]
-        link = int(np.flatnonzero(at <= freedom)[-1])
-        edge, body = self.reduced.edges[link], self.reduced.bodies[link]
-        name = f"joint {edge.name}" if edge.name else f"body {body}"
-        return SolveError(Outcome.UNDETERMINED, "", f"the rate of {name}, which moves no mass")
-
-    def mass(self, q: Array, r: Array) -> Array:
-        """(n, n) the mass matrix at q."""
-        kinematics(self.reduced.tables, self.work, q, r)
-        self._sweep()
-        return self.work.mass.copy()
-
-    def rows(self) -> Array:
-        """(m, n) rows of prescribed joints, then of loops, on the tree's rates, where the mass matrix was made last."""
-        return self.work.row[: int(constraint_rows(self.reduced.tables, self.work))].copy()
 
     def moved(self, q: Array, change: Array) -> Array:
         """q·exp(change), the change given for the tree's joints; cut ones stay."""
         v = np.zeros(self.nv)
         v[: self.n] = change
         return self.advance(q, v)
-
-    def gaps(self, q: Array, r: Array) -> tuple[Array, Array]:
-        """Position residuals of loops at q, zeros for prescribed joints before them; and the rows (m, n) there."""
-        tables, w = self.reduced.tables, self.work
-        fitted = self.fitted(q, r)
-        residual = np.zeros(int(tables.rows.sum() + tables.driven.sum()))
-        loop_gaps(tables, w, fitted, residual)
-        self._sweep()
-        return residual, self.rows()
 
     # ---- closing loops -----------------------------------------------------------------------------------------
 
@@ -298,64 +196,57 @@ class Equations:
         status, gap = close(self.engine, self.memory, q, r, self.motions, self._change, self._moved)
         if status == OPEN:
             raise SolveError(Outcome.DIVERGED, "", f"loops stay open by {gap:.1e} m or rad")
-        self._careful = status == DEPENDENT
-        if status == STILL:
-            self._sweep()
+        self._careful = status != 0
         if status != 0:
-            return self.closed_carefully(state)
+            return self._closed_carefully(state)
         self._closed_at, self._factored = (q, r), True
         return ReducedState(state.t, q, r, state.s, state.books)
 
-    def closed_carefully(self, state: ReducedState) -> ReducedState:
-        """`closed`, by orthogonal elimination in the mass metric: for constraints that nearly repeat each other."""
-        tables, w = self.reduced.tables, self.work
-        q, r = state.q, np.array(state.r)
-        m = int(tables.rows.sum() + tables.driven.sum())
+    def _closed_carefully(self, state: ReducedState) -> ReducedState:
+        """`closed`, for constraints that nearly repeat each other."""
         self._careful = True
-        residual, change = np.zeros(m), np.zeros(self.n)
-        gap = before = np.inf
-        for _ in range(ROUNDS):
-            q = self.fitted(q, r)
-            gap = float(loop_gaps(tables, w, q, residual))
-            if gap <= GAP or gap > 0.5 * before:
-                break
-            before = gap
-            rank = self._rows(m)
-            correct(w, rank, -residual, change)
-            q = self.moved(q, change)
-        if not gap <= CLOSED:
-            raise SolveError(Outcome.DIVERGED, "", f"loops stay open by {gap:.1e} m or rad")
-        rank = self._rows(m)
-        target = -w.row[:m] @ r
-        target[: self.prescribed.size] += self.prescribed
-        correct(w, rank, target, change)
-        return ReducedState(state.t, q, r + change, state.s, state.books)
+        q, r = self.dense.closed(state.q, state.r, self.prescribed, self.moved)
+        return ReducedState(state.t, q, r, state.s, state.books)
+
+    # ---- the same over dense matrices --------------------------------------------------------------------------
+
+    @property
+    def dense(self) -> Dense:
+        """Sweeps over dense matrices, made when they are first asked for."""
+        if self._dense is None:
+            self._dense = Dense(self.reduced)
+        return self._dense
+
+    @property
+    def work(self) -> Workspace:
+        """Their memory."""
+        return self.dense.work
+
+    def mass(self, q: Array, r: Array) -> Array:
+        """(n, n) the mass matrix at q."""
+        return self.dense.mass(q, r)
+
+    def rows(self) -> Array:
+        """(m, n) rows of prescribed joints, then of loops, on the tree's rates, where the mass matrix was made last."""
+        return self.dense.rows()
+
+    def gaps(self, q: Array, r: Array) -> tuple[Array, Array]:
+        """Position residuals of loops at q, zeros for prescribed joints before them; and the rows (m, n) there."""
+        return self.dense.gaps(q, r)
 
     def gap(self, state: ReducedState) -> float:
         """By how much the loops are open, in m or rad."""
-        tables = self.reduced.tables
-        m = int(tables.rows.sum() + tables.driven.sum())
-        q = self.fitted(state.q, state.r)
-        return float(loop_gaps(tables, self.work, q, np.zeros(m))) if m else 0.0
-
-    def _rows(self, m: int) -> int:
-        tables, w = self.reduced.tables, self.work
-        w.load[:] = 0.0
-        self._sweep()
-        constraint_rows(tables, w)
-        self._rank = int(reduce_rows(w, m))
-        return self._rank
+        return float(np.abs(self.dense.gaps(state.q, state.r)[0]).max(initial=0.0))
 
     def fitted(self, q: Array, r: Array) -> Array:
-        """q with the cut joints' elements nearest to where their bodies put them; leaves the sweep at q."""
-        tables, w = self.reduced.tables, self.work
-        out = np.array(q)
-        kinematics(tables, w, out, r)
-        for i in self._moving:
-            if tables.kind[i] == CUT:
-                edge, where = self.reduced.edges[i], slice(int(tables.q_at[i]), int(tables.q_at[i] + tables.q_size[i]))
-                out[where] = Coupling(edge.pair).fit(w.relative[i], out[where])
-        return out
+        """q with the cut joints' elements nearest to where their bodies put them; leaves the dense sweep at q."""
+        return self.dense.fitted(q, r)
+
+    def load(self, t: float, q: Array, r: Array, s: Array) -> None:
+        """Put what drives at a time and state into ``drive`` and ``wrench``."""
+        if not self.constant:
+            books = np.zeros(2 + len(self.reduced.made))
+            self.given.place(t, self.states(ReducedState(t, q, r, s, books)))
 
     # ---- a step ------------------------------------------------------------------------------------------------
 
@@ -402,8 +293,7 @@ class Equations:
 
         Closing the loops takes those out; near a singular configuration they are most of the estimate.
         """
-        m = int(self.reduced.tables.rows.sum() + self.reduced.tables.driven.sum())
-        if m == 0:
+        if not (self.engine.cut.size or self.prescribed.size):
             return estimate
         out, change = np.array(estimate), np.zeros(self.n)
         if not self._careful:
@@ -416,8 +306,7 @@ class Equations:
                 out[part] += change
             return out
         for part in (slice(0, self.n), slice(self.n, 2 * self.n)):
-            correct(self.work, self._rank, -self.work.row[:m] @ out[part], change)
-            out[part] += change
+            out[part] += self.dense.back(out[part])
         return out
 
     def row(self, state: ReducedState) -> Row:
@@ -463,21 +352,11 @@ class Equations:
 
     def _without_repeated(self, state: ReducedState) -> None:
         """Leave out of the engine the rows that others imply, where that is so aside of the initial state, too."""
-        m, tables = int(self.reduced.tables.rows.sum()), self.reduced.tables
-        n = self.prescribed.size
-        rng = np.random.default_rng(1)
-        push, change = rng.standard_normal(self.n), np.zeros(self.n)
-        self.mass(state.q, state.r)
-        rank = self._rows(m + n)
-        correct(self.work, rank, -self.work.row[: m + n] @ push, change)
-        push += change
+        push = np.random.default_rng(1).standard_normal(self.n)
+        push += self.dense.back(push)
+        q = self.moved(state.q, ASIDE * push / max(1e-9, np.abs(push).max()))
         try:
-            aside = self.closed_carefully(
-                replace(state, q=self.moved(state.q, ASIDE * push / max(1e-9, np.abs(push).max())))
-            )
+            aside = self._closed_carefully(replace(state, q=q))
         except SolveError:
             return
-        self.mass(aside.q, aside.r)
-        chosen = {int(row) - n for row in self.work.chosen[: self._rows(m + n)]}
-        first = np.cumsum([0, *tables.rows[tables.kind == CUT]])
-        self._build([np.array([j for j in range(b - a) if a + j in chosen], dtype=int) for a, b in pairwise(first)])
+        self._build(self.dense.independent(aside.q, aside.r))

@@ -12,7 +12,7 @@ from ephs.mechanics.solve.errors import Outcome, SolveError
 from ephs.mechanics.solve.problem import Problem
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
-from ephs.semantics.spaces import manifold
+from ephs.semantics.spaces import SE3, manifold
 
 __all__ = ["PaperStates"]
 
@@ -85,17 +85,25 @@ class PaperStates:
                 raise SolveError(Outcome.INCONSISTENT, str(slot.path), f"it is off by {found:.1e}")
 
     def _rates_of(self, q: Array) -> Array:
-        """The tree's rates from the bodies' momenta."""
-        tables, reduced, initial = self.reduced.tables, self.reduced, self.problem.initial
-        heavy = [(i, name) for i, name in enumerate(reduced.bodies) if name is not None and np.any(tables.inertia[i])]
-        columns = np.zeros((6 * len(heavy), self.reduced.freedoms))
-        for j, unit in enumerate(np.eye(self.reduced.freedoms)):
-            kinematics(tables, self.work, q, unit)
-            columns[:, j] = np.concatenate([self.work.twist[i] for i, _ in heavy]) if heavy else 0.0
-        twists = [
-            np.linalg.solve(tables.inertia[i], initial[component_path("bodies", name) / "ke" / "p"])
-            for i, name in heavy
-        ]
-        if not twists:
-            return np.zeros(self.reduced.freedoms)
-        return np.asarray(np.linalg.lstsq(columns, np.concatenate(twists), rcond=None)[0], dtype=float)
+        """The tree's rates from the bodies' momenta: from each body to the nearest one with inertia before it."""
+        tables, reduced, initial, w = self.reduced.tables, self.reduced, self.problem.initial, self.work
+        rates = np.zeros(reduced.freedoms)
+        kinematics(tables, w, q, rates)
+        twists: dict[int, Array] = {-1: np.zeros(6)}
+        for i, name in enumerate(reduced.bodies):
+            if name is None or not np.any(tables.inertia[i]):
+                continue
+            momentum = initial[component_path("bodies", name) / "ke" / "p"]
+            twists[i] = np.linalg.solve(tables.inertia[i], momentum)
+            columns: list[Array] = []
+            freedoms: list[int] = []
+            carried, here = np.eye(6), i
+            while here == i or here not in twists:
+                d, at = int(tables.dim[here]), int(tables.r_at[here])
+                columns.append(carried @ w.motion[here, :d].T)
+                freedoms += range(at, at + d)
+                carried = carried @ SE3.adjoint(SE3.inverse(w.inner[here]))
+                here = int(tables.parent[here])
+            own = twists[i] - carried @ twists[here]
+            rates[freedoms] = np.linalg.lstsq(np.column_stack(columns), own, rcond=None)[0]
+        return rates

@@ -8,7 +8,7 @@ from ephs.mechanics.reduced.tables import CUT, SPRING
 from ephs.semantics.spaces import jit
 from ephs.semantics.spaces.se3_kernels import pose_compose, quat_to_matrix
 
-kernel = jit.kernel
+kernel = jit.lean_kernel
 
 
 @kernel
@@ -117,7 +117,9 @@ def component_slopes(t, w, d, q, r, s, drive, scal):
                 for k in range(dim):
                     d.stiffness[i, j, k] = 2.0 * w.f[dim * j + k]
         else:
-            d.stiffness[i, :, :] = 0.0
+            for j in range(dim):
+                for k in range(dim):
+                    d.stiffness[i, j, k] = 0.0
         if t.friction[i] >= 0:
             number = t.friction[i]
             for j in range(dim):

@@ -7,8 +7,9 @@ import numpy as np
 from ephs.mechanics.reduced.action_tangent_kernels import action_slopes
 from ephs.mechanics.reduced.dynamics_kernels import by_force, forward_dynamics, inverse_dynamics
 from ephs.mechanics.reduced.equations import Equations
+from ephs.mechanics.reduced.jacobian_kernels import jacobian
 from ephs.mechanics.reduced.tables import CUT, Mechanism
-from ephs.mechanics.reduced.tangent_kernels import by_push, jacobian
+from ephs.mechanics.reduced.tangent_kernels import by_push
 from ephs.semantics.bundle import Array
 
 __all__ = ["Linearised", "Tangents"]
@@ -63,6 +64,21 @@ class Tangents(NamedTuple):
     dspeed: Array
     dtotal: Array
     stirred: Any  # (links,)
+    velocity: Array  # (links, 6): twists, in the world's frame as all that follows
+    surge: Array  # (links, 6): accelerations
+    carried: Array  # (links, 6): loads gathered
+    axis: Array  # (links, 6, 6): of joints, rows
+    heft: Array  # (links, 6, 6): inertia of the link and what it carries
+    drift: Array  # (links, 6, 6): forces by rates
+    pulled: Array  # (links, 6, 6): gravity by places
+    by_gain: Array  # (links, 6, 6): rows of the three, of each joint
+    by_drift: Array
+    by_place: Array
+    corner_turn: Array  # (edges, 3, 3): C2 of cut joints and springs
+    corner_place: Array  # (edges, 3)
+    world_turn: Array  # (3, 3)
+    world_place: Array  # (3,)
+    wide: Array  # (2, 6, 6)
     small: Array  # (96,)
 
     @staticmethod
@@ -79,7 +95,9 @@ class Tangents(NamedTuple):
             ("weight", (links, 6, 6)), ("stiffness damping", (edges, 6, 6)), ("made_by_warmth", (edges,)),
             ("flow", (t.conduction.shape[0], 2, 2)), ("dx drate dpull", (6,)), ("small", (96,)),
             ("change force dr da", (n,)), ("rate dq ddrive", (nv,)), ("cut", (nv - n,)), ("multiplier row", (m,)),
-            ("node heat warmth ds", (ns,)),
+            ("node heat warmth ds", (ns,)), ("velocity surge carried", (links, 6)),
+            ("axis heft drift pulled by_gain by_drift by_place", (links, 6, 6)), ("corner_turn", (edges, 3, 3)),
+            ("corner_place", (edges, 3)), ("world_turn", (3, 3)), ("world_place", (3,)), ("wide", (2, 6, 6)),
         ]  # fmt: skip
         arrays: dict[str, Any] = {name: np.zeros(shape) for group, shape in names for name in group.split()}
         arrays["stirred"] = np.zeros(links, dtype=np.bool_)

@@ -9,12 +9,12 @@ residual is M ṙ + … − forces − Jᵀλ; multipliers are held while it is 
 # pyright: basic, reportPrivateImportUsage=false
 
 from ephs.mechanics.reduced.dynamics_kernels import solve_constrained
-from ephs.mechanics.reduced.slope_kernels import component_slopes, into, out_of, out_of_edge, relative
+from ephs.mechanics.reduced.slope_kernels import into, out_of, out_of_edge, relative
 from ephs.mechanics.reduced.sweep_kernels import bracket, cross_momentum
 from ephs.mechanics.reduced.tables import CUT, SPRING
 from ephs.semantics.spaces import jit
 
-kernel = jit.kernel
+kernel = jit.lean_kernel
 
 
 @kernel
@@ -119,7 +119,7 @@ def tangent(t, w, d, fit, inert):
         else:
             for k in range(6):
                 sigma[k] = spin[k] = two[k] = 0.0
-        _edge(t, d, i, sigma, spin, fit, one)
+        change_of_edge(t, d, i, sigma, spin, fit, one)
         if t.kind[i] == CUT:
             for j in range(t.dim[i]):
                 d.cut[t.r_at[i] - n + j] = d.drate[j]
@@ -164,7 +164,7 @@ def tangent(t, w, d, fit, inert):
         for j in range(t.dim[i]):
             d.dpull[j] = 0.0
         if d.stirred[i] or warm or pushed:
-            _edge(t, d, i, sigma, spin, fit, two)
+            change_of_edge(t, d, i, sigma, spin, fit, two)
         for j in range(t.dim[i]):
             entry = -d.dpull[j]
             for k in range(6):
@@ -180,7 +180,7 @@ def tangent(t, w, d, fit, inert):
 
 
 @kernel
-def _edge(t, d, i, sigma, spin, fit, wide):
+def change_of_edge(t, d, i, sigma, spin, fit, wide):
     """The change of an edge's own force, d.dpull (and as a wrench, wide, where the edge is not of the tree), and of the
     entropy that its friction makes, from the changes of its relative pose and of its relative twist."""
     dim, at, links = t.dim[i], t.r_at[i], t.parent.shape[0]
@@ -212,54 +212,17 @@ def _edge(t, d, i, sigma, spin, fit, wide):
 
 
 @kernel
-def jacobian(t, w, d, q, r, s, drive, scal, m, rank, fit, solve, out):
-    """All directions (dq of tree and cut joints, dr, ds) as columns; rows are ṙ or, where not solved for, the residual;
-    the rates of the cut joints; ṡ. (status, component)."""
-    status, number = component_slopes(t, w, d, q, r, s, drive, scal)
-    if status != 0:
-        return status, number
-    n, nv, ns = w.mass.shape[0], d.dq.shape[0], t.node.shape[0]
-    d.dq[:] = 0.0
-    d.dr[:] = 0.0
-    d.da[:] = 0.0
-    d.ds[:] = 0.0
-    for column in range(nv + n + ns):
-        if column < nv:
-            d.dq[column] = 1.0
-        elif column < nv + n:
-            d.dr[column - nv] = 1.0
-        elif t.node[column - nv - n] >= 0:
-            d.ds[column - nv - n] = 1.0
-        else:  # the environment's temperature is what it is
-            out[:, column] = 0.0
-            continue
-        tangent(t, w, d, fit, 1)
-        if column < nv:
-            d.dq[column] = 0.0
-        elif column < nv + n:
-            d.dr[column - nv] = 0.0
-        else:
-            d.ds[column - nv - n] = 0.0
-        if solve == 1:
-            for i in range(n):
-                d.force[i] = -d.force[i]
-            solve_constrained(w, m, rank, d.force, d.row, d.row, d.change)
-        for i in range(n):
-            out[i, column] = d.force[i]
-        for i in range(nv - n):
-            out[n + i, column] = d.cut[i]
-        for i in range(ns):
-            out[nv + i, column] = d.heat[i]
-    return 0, 0
+def still(d):
+    """No changes."""
+    for values in (d.dq, d.dr, d.da, d.ds):
+        for k in range(values.shape[0]):
+            values[k] = 0.0
 
 
 @kernel
 def by_push(t, w, d, m, rank, out):
     """The change of ṙ by d.ddrive and d.dwrench."""
-    d.dq[:] = 0.0
-    d.dr[:] = 0.0
-    d.da[:] = 0.0
-    d.ds[:] = 0.0
+    still(d)
     tangent(t, w, d, 0, 1)
     for i in range(out.shape[0]):
         out[i] = -d.force[i]
