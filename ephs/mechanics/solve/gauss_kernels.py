@@ -19,7 +19,7 @@ the order fall to 2 (Hairer, Lubich and Roche, *Lecture Notes in Mathematics* 14
 
 from typing import NamedTuple
 
-from ephs.mechanics.solve.lu_kernels import factorise, solve
+from ephs.mechanics.solve.lu_kernels import copy, factorise, solve
 from ephs.mechanics.solve.natural_kernels import account, evaluate, measure, tighten
 from ephs.mechanics.solve.sparse import Index
 from ephs.semantics.bundle import Array
@@ -27,7 +27,7 @@ from ephs.semantics.spaces import jit
 from ephs.semantics.spaces.codes import SE3, SO3, VECTOR, SO3xR3
 from ephs.semantics.spaces.se3_kernels import dexp_left_inv, retract
 
-kernel = jit.kernel
+kernel = jit.lean_kernel
 
 _FIXED = 30
 
@@ -149,10 +149,10 @@ def linearise(t, g, p, x, z, scal, still, unit, inputs, m, s, fresh):
         status, component = evaluate(t, s.x[i], z[i], still, inputs[i], m)
         if status != 0:
             return status, component
-        s.residual[i, :] = m.residual
-        s.scale[i, :] = m.scale
+        copy(m.residual, s.residual[i])
+        copy(m.scale, s.scale[i])
         if fresh:
-            s.data[i, :] = m.data
+            copy(m.data, s.data[i])
             for j in range(n):
                 s.mean[j] = 0.0 if j < n_rate else z[i, j]
             status, component = evaluate(t, s.x[i], s.mean, unit, inputs[i], m)
@@ -247,13 +247,13 @@ def gauss_newton(t, g, p, o, where, x, z, scal, still, unit, inputs, m, s):
             return status, component, iteration
         ratio = defect = 0.0
         for i in range(stages):
-            m.residual[:] = s.residual[i]
-            m.scale[:] = s.scale[i]
+            copy(s.residual[i], m.residual)
+            copy(s.scale[i], m.scale)
             found = measure(t, z[i], o.dropped[:n], m)
             if found != found:
                 return 1, 0, iteration
             ratio, defect = max(ratio, found), max(defect, m.defect[0])
-            s.residual[i, :] = m.residual
+            copy(m.residual, s.residual[i])
         if ratio <= 4e-16 or (ratio < 1e-11 and ratio > 0.7 * before):
             return (3 if defect > o.tolerance[0] else 0), 0, iteration
         if iteration > 25 and ratio > 0.9 * before:
@@ -303,14 +303,16 @@ def gauss_advance(
         total += iterations
         if status != 0:  # once more from a guess that cannot be far off: what was last, everywhere
             for i in range(stages):
-                z[i, :] = previous[stages - 1]
+                copy(previous[stages - 1], z[i])
             status, component, iterations = gauss_newton(t, g, p, o, where, x, z, scal, still, unit, inputs, m, s)
             total += iterations
         if status != 0:
             if status == 3:  # rank was decided at the start of the step, and is another on its way
-                previous[:, :] = z
+                for i in range(stages):
+                    copy(z[i], previous[i])
             else:
-                z[:, :] = previous
+                for i in range(stages):
+                    copy(previous[i], z[i])
             return status, component, step, total
         least = 0.0
         for i in range(stages):
@@ -321,7 +323,7 @@ def gauss_advance(
             retract(code, x[at : at + size], s.whole[rate : rate + dim], x[at : at + size])
             if code in (SO3, SE3, SO3xR3):
                 tighten(x[at : at + 4])
-        states[step, :] = x
+        copy(x, states[step])
         for i in range(t.kind.shape[0]):
             energies[step, i] = s.energy[i] if t.kind[i] == 0 else m.energy[i]
         for i in range(4):

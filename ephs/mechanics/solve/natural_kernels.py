@@ -5,7 +5,7 @@
 
 from typing import NamedTuple
 
-from ephs.mechanics.solve.lu_kernels import factorise, solve
+from ephs.mechanics.solve.lu_kernels import copy, factorise, solve
 from ephs.mechanics.solve.sparse import Index
 from ephs.semantics.bundle import Array
 from ephs.semantics.calling import call_kernel
@@ -13,7 +13,7 @@ from ephs.semantics.spaces import jit
 from ephs.semantics.spaces.codes import SE3, SO3, SO3xR3
 from ephs.semantics.spaces.se3_kernels import retract
 
-kernel = jit.kernel
+kernel = jit.lean_kernel
 
 DONE, DIVERGED, PIVOT, INCONSISTENT, COMPONENT = 0, 1, 2, 3, 10
 """What `advance` returns: COMPONENT + what a component's kernel returned (see `ephs.semantics.kernel_table`)."""
@@ -98,7 +98,7 @@ def evaluate(t, x, z, scal, inputs, m):
     n_rate, n_effort = t.counts[0], t.counts[1]
     lam_at = n_rate + n_effort
     h = scal[0]
-    m.data[:] = t.template
+    copy(t.template, m.data)
     m.residual[:] = 0.0
     m.scale[:] = 0.0
     for i in range(t.kind.shape[0]):
@@ -335,8 +335,8 @@ def advance(t, o, x, z, previous, scal, inputs, m, sums, steps, states, energies
             if code in (SO3, SE3, SO3xR3):
                 tighten(x[at : at + 4])
         least = account(t, z, scal, inputs, m, sums)
-        states[step, :] = x
-        energies[step, :] = m.energy
+        copy(x, states[step])
+        copy(m.energy, energies[step])
         for i in range(4):
             ledgers[step, i] = sums[i]
         ledgers[step, 4] = least

@@ -156,12 +156,12 @@ def lean_kernel(function: Function) -> Function:
     """Compile as `kernel` does a function that neither allocates, nor assigns whole arrays, nor returns one.
 
     Then references to arrays are not counted. To count them, for each call, for all arrays of the tables that it takes,
-    costs more than a small mechanism's accelerations.
+    costs more than a small mechanism's accelerations. Other threads go on meanwhile.
     """
     if not compiling():
         return function
     with _caching(function) as cached:
-        return _numba().njit(cache=cached, fastmath=False, error_model="numpy", _nrt=False)(function)
+        return _numba().njit(cache=cached, fastmath=False, error_model="numpy", nogil=True, _nrt=False)(function)
 
 
 def cfunc_kernel(signature: Any) -> Callable[[Function], Function]:
