@@ -5,12 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import ephs
 from ephs.mechanics.reduced.action_kernels import action_derivatives
 from ephs.mechanics.reduced.equations import Equations
 from ephs.mechanics.reduced.jacobian import Jacobian
 from ephs.mechanics.reduced.tangent import Linearised
+from ephs.mechanics.reduced.tangent_kernels import still, tangent
 from ephs.mechanics.simulate import problem_of_scene
 from ephs.testing import mechanisms
 from tests.mechanics.dynamics.drawn import moving
@@ -202,3 +204,23 @@ def test_momenta_and_their_forces_differentiate_as_differences_say(drawn):
         return np.concatenate([momentum, force])
 
     close(np.vstack(linear.action(q, r, s)), difference(action, 2 * n))
+
+
+@settings(max_examples=30)
+@given(drawn=moving(), fit=st.booleans())
+def test_columns_by_all_joints_are_what_single_directions_say(drawn, fit):
+    """Two ways to one Jacobian, both exact: to rounding."""
+    scene, model, state, _ = drawn
+    equations = Equations(scene, problem_of_scene(scene), 0.0)
+    linear, (q, r, s) = Linearised(equations), model.layout.split(state.array)
+    linear.forward(q, r, s)
+    found = linear.columns(solve=False, fit=fit)
+    d, n, nv = linear.memory, equations.n, equations.nv
+    still(d)
+    for column, (values, at) in enumerate([*((d.dq, j) for j in range(n)), *((d.dr, j) for j in range(n))]):
+        values[at] = 1.0
+        tangent(equations.reduced.tables, equations.work, d, int(fit), 1)
+        values[at] = 0.0
+        expected = np.concatenate([d.force, d.cut, d.heat])
+        size = max(1.0, np.abs(d.total).max(initial=0.0), np.abs(expected).max(initial=0.0))
+        assert np.abs(found[:, column if column < n else nv + column - n] - expected).max() <= 1e-12 * size
