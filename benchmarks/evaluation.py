@@ -9,7 +9,6 @@ steps in compiled code, which costs it little more than the accelerations; its l
 import sys
 import time
 from collections.abc import Callable
-from functools import cache
 from importlib import import_module
 from statistics import median
 from typing import Any
@@ -18,9 +17,8 @@ import numpy as np
 
 from benchmarks import families
 from benchmarks.report import Report, table_of
-from ephs.mechanics.engine.march_kernels import C_COLUMNS, attempt
+from ephs.mechanics.engine.engine_kernels import evaluations
 from ephs.mechanics.reduced.equations import Equations
-from ephs.mechanics.reduced.explicit import tableau
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.simulate import problem_of_scene
 from ephs.show.charts.peer_mujoco import mujoco_model, silent
@@ -38,41 +36,24 @@ SLOW = 5e-3
 
 Block = Callable[[int], float]
 """Seconds of so many rounds of evaluations."""
+STATES = 16
+"""Different states that are evaluated in turn."""
 
 
 def own(scene: Scene) -> tuple[Block, int]:
     """Our accelerations: a block of rounds, and how many evaluations a round has."""
     equations = Equations(scene, problem_of_scene(scene), 0.0)
-    state, scheme = equations.start(0.0), tableau("rk87").scheme
-    count = scheme.b.size
-    y0 = equations.vector(state)
-    k, y1, before = np.zeros((count + 1, equations.size)), np.empty(equations.size), np.zeros(equations.size)
-    k[0] = equations.rates(0.0, state.q, y0)
-    control, q1, repeated = np.zeros(C_COLUMNS), np.array(state.q), _repeated()
-    arguments = (
-        equations.engine, equations.memory, scheme, before, state.q, y0, 1e-3, k, y1, q1,
-        equations.drive, equations.wrench, equations.scal, control,
-    )  # fmt: skip
+    state, rng = equations.start(0.0), np.random.default_rng(0)
+    q = np.array([state.q] * STATES)
+    r = np.array([state.r + 0.1 * rng.standard_normal(equations.n) for _ in range(STATES)])
+    rates = np.zeros((STATES, equations.n))
 
     def block(rounds: int) -> float:
         begin = time.perf_counter()
-        repeated(rounds, *arguments)
+        evaluations(equations.engine, equations.memory, q, r, rates, rounds)
         return time.perf_counter() - begin
 
-    return block, count
-
-
-@cache
-def _repeated() -> Callable[..., None]:
-    """Explicit steps from the same state again and again, without a call from Python for each."""
-    import numba
-
-    @numba.njit
-    def repeated(rounds, e, m, scheme, before, base, y0, h, k, y1, q1, drive, wrench, scal, control):  # noqa: ANN
-        for _ in range(rounds):
-            attempt(e, m, scheme, before, base, y0, h, k, y1, q1, drive, wrench, scal, control)
-
-    return repeated
+    return block, STATES
 
 
 def _pin(scene: Scene) -> tuple[Block, int]:

@@ -331,9 +331,11 @@ def _initial(entries: Sequence[str]) -> dict[str, list[float]] | None:
 
 @contextmanager
 def _progress(name: str) -> Iterator[Callable[[float, float, Mapping[str, Any]], None]]:
-    """Show a bar with the time left, on a terminal only."""
+    """Show a bar with the time left, and what is compiled before, on a terminal only."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    from ephs.mechanics.compiling import compiling
 
     console = Console(stderr=True)
     note = TextColumn("{task.fields[note]}")
@@ -345,7 +347,11 @@ def _progress(name: str) -> Iterator[Callable[[float, float, Mapping[str, Any]],
             steps = f", {stats['steps']} steps" if "steps" in stats else ""
             bar.update(task, total=until, completed=t, note=f"t = {t:.3g} of {until:g} s{steps}")
 
-        yield progress
+        def say(function: str) -> None:
+            bar.update(task, note=f"compiling {function}, kept for the next run" if function else "")
+
+        with compiling(say):
+            yield progress
 
 
 def _write(solution: "Solution", folder: Path) -> None:
