@@ -7,7 +7,6 @@ import numpy as np
 from ephs.mechanics.dynamics.results import BodyState
 from ephs.mechanics.reduced.equations import Equations
 from ephs.mechanics.reduced.sweep_kernels import kinematics
-from ephs.mechanics.reduced.tables import CUT
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.solve.errors import OptionError
 from ephs.semantics.bundle import Array
@@ -30,12 +29,6 @@ class Links:
     def place(self, q: Array, r: Array) -> None:
         """Poses, twists and accelerations at ṙ = 0 of all links, into the scratch memory."""
         kinematics(self.equations.reduced.tables, self.equations.work, q, r)
-
-    def cut_rates(self) -> Array:
-        """The rates of cut joints' freedoms."""
-        t, w = self.equations.reduced.tables, self.equations.work
-        rates = [w.rate[i, : t.dim[i]] for i in range(t.kind.size) if t.kind[i] == CUT]
-        return np.concatenate([np.zeros(0), *rates])
 
     def bodies(self) -> dict[str, BodyState]:
         """Body -> pose and twist, in the scene's order."""

@@ -349,7 +349,7 @@ class Dynamics:
 
     def _state(self, at: ReducedState) -> State:
         self._links.place(at.q, at.r)
-        return self.layout.state(at.q, np.concatenate([at.r, self._links.cut_rates()]), at.s)
+        return self.layout.state(at.q, np.concatenate([at.r, self._linear.cut_rates]), at.s)
 
     def _of_states(self, states: States) -> State:
         eq = self._equations

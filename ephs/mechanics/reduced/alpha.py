@@ -21,6 +21,7 @@ from ephs.mechanics.solve.stepping import Attempt
 __all__ = ["Alpha"]
 
 ITERATIONS = 20
+ROUNDING = 1e-14
 
 
 @final
@@ -46,6 +47,8 @@ class Alpha(ReducedMethod):
         self._gamma = 0.5 + self._f - self._m
         self._beta = 0.25 * (0.5 + self._gamma) ** 2
         self._enough = 1e-4 if control.step is None else 1e-6
+        # what is good enough where it gets no better: tolerances near rounding cannot be met a hundred times over
+        self._rough = max(1e-2, ROUNDING / max(float(np.min(self.rtol, initial=1.0)), ROUNDING))
         self.counts = {"iterations": 0, "jacobians": 0, "rho": rho}
 
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
@@ -78,10 +81,10 @@ class Alpha(ReducedMethod):
             scale = self.atol + self.rtol * eq.sizes(y0, y1)
             parts = np.concatenate([self._beta * h * h * change, self._gamma * h * change, drift[fall]])
             moved = float(np.max(np.abs(parts) / scale, initial=0.0))
-            if not np.isfinite(moved) or moved <= self._enough or (moved > 0.5 * last and moved <= 1e-2):
+            if not np.isfinite(moved) or moved <= self._enough or (moved > 0.5 * last and moved <= self._rough):
                 break
             last = moved
-        if not moved <= 1e-2:
+        if not moved <= self._rough:
             if self.jacobian.fresh(state):
                 raise SolveError(Outcome.DIVERGED, "", "")
             self.jacobian.at(state, renew=True)

@@ -208,7 +208,7 @@ class Linearised:
 
     @property
     def cut_rates(self) -> Array:
-        """(nv − n,) the rates of cut joints where `forward` was called last."""
+        """(nv − n,) the rates of cut joints where the links' motion was computed last."""
         t, w = self.equations.reduced.tables, self.equations.work
         return np.concatenate([np.zeros(0), *(w.rate[i, : t.dim[i]] for i in range(t.kind.size) if t.kind[i] == CUT)])
 

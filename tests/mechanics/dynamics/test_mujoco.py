@@ -34,6 +34,14 @@ ALL_JOINTS = """
 """
 
 
+@pytest.fixture(autouse=True)
+def without_a_log_file():
+    """Files of older versions make MuJoCo warn, into the working folder."""
+    mujoco.set_mju_user_warning(lambda text: None)
+    yield
+    mujoco.set_mju_user_warning(None)
+
+
 @pytest.mark.parametrize("source", [*MODELS, ALL_JOINTS], ids=lambda s: s.stem if isinstance(s, File) else "all-joints")
 def test_mujoco_accelerates_alike(source):
     is_file = isinstance(source, File)
