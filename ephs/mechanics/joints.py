@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ephs.mechanics import components
+from ephs.mechanics import components, springs
 from ephs.operad import Pattern, junction, quantity
 from ephs.semantics import library
 from ephs.semantics.bundle import Array
@@ -148,8 +148,8 @@ def spring_damper(
         k in N/m, L in m of ½ k (distance − L)², c in N s/m.
     """
     free = pair("free")
-    spring = components.point_spring(stiffness, length)
-    damper = components.point_damper(damping) if damping else components.joint_friction(free, np.zeros((6, 6)))
+    spring = springs.point_spring(stiffness, length)
+    damper = springs.point_damper(damping) if damping else components.joint_friction(free, np.zeros((6, 6)))
     frames = [np.concatenate([[1.0, 0.0, 0.0, 0.0], np.asarray(at, dtype=float)]) for at in (at1, at2)]
     return _joint(free, frames[0], frames[1], spring, damper, heat, False)
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import ephs
-from ephs.mechanics import components
+from ephs.mechanics import components, springs
 from ephs.operad import Quantity, Space
 from ephs.operad import quantity as Q
 from ephs.semantics import Reference, Storage, StructureError, library
@@ -52,8 +52,8 @@ def primitives():
     out["pkc"] = components.kinematic_coupling(Q.pose, Q.body_momentum, "q", "p")
     out["no_potential"] = components.no_potential(Q.pose, "q")
     out["frame_change"] = components.frame_change(SE3.exp(np.array([0.3, -0.2, 0.5, 1.0, 2.0, -1.0])), "p_j1", "p1")
-    out["point_spring"] = components.point_spring(2.0, 1.0)
-    out["point_damper"] = components.point_damper(3.0)
+    out["point_spring"] = springs.point_spring(2.0, 1.0)
+    out["point_damper"] = springs.point_damper(3.0)
     out["ground"] = components.ground()
     out["thermal_node"] = components.thermal_node(50.0, 300.0)
     out["ideal_gas"] = library.ideal_gas(c1=2.0, c2=1.5, v0=1.0, c=1.5)

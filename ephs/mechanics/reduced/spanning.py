@@ -151,6 +151,7 @@ def spanning_tree(joints: list[Edge], masses: list[float]) -> tuple[list[tuple[E
 
 
 def springs_of(scene: Scene, number: Mapping[str, int]) -> list[Edge]:
+    """Springs between points, as edges with all freedoms."""
     out: list[Edge] = []
     for name, s in scene.all_springs():
         frames = [np.concatenate([[1.0, 0.0, 0.0, 0.0], np.asarray(at, dtype=float)]) for at in (s.at1, s.at2)]
