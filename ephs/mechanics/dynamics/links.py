@@ -4,11 +4,13 @@ from typing import final
 
 import numpy as np
 
+from ephs.mechanics.build import component_path
 from ephs.mechanics.dynamics.results import BodyState
 from ephs.mechanics.reduced.equations import Equations
 from ephs.mechanics.reduced.sweep_kernels import kinematics
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.solve.errors import OptionError
+from ephs.mechanics.solve.problem import State as States
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
@@ -55,6 +57,15 @@ class Links:
         for i in range(t.parent.size):
             inertia, u = t.inertia[i], w.twist[i]
             out += self._of_link(i).T @ (inertia @ w.bias[i] - SE3.ad(u).T @ (inertia @ u))
+        return out
+
+    def momenta(self, states: States) -> Array:
+        """(n,) what the bodies' momenta are on the tree's freedoms: M r, where they are on the joints."""
+        out = np.zeros(self.equations.n)
+        for name, i in self._number.items():
+            path = component_path("bodies", name) / "ke" / "p"
+            if path in states:
+                out += self._of_link(i).T @ states[path]
         return out
 
     def gravity(self) -> Array:

@@ -353,9 +353,11 @@ class Dynamics:
 
     def _of_states(self, states: States) -> State:
         eq = self._equations
-        paper = PaperStates(eq.reduced, replace(self._problem, initial=states), eq.work)
-        with _failures():
-            return self._state(eq.closed(ReducedState(0.0, *paper.initial(), self._books())))
+        q, r, s = PaperStates(eq.reduced, replace(self._problem, initial=states), eq.work).initial()
+        with _failures():  # momenta that some methods leave off the joints count by the nearest ones in the mass metric
+            mass = eq.mass(q, r)
+            r = np.asarray(np.linalg.solve(mass, self._links.momenta(states)), dtype=float)
+            return self._state(eq.closed(ReducedState(0.0, q, r, s, self._books())))
 
     @contextmanager
     def _pushed(self, forces: Mapping[str, ArrayLike] | None) -> Generator[None, None, None]:
