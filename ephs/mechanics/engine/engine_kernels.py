@@ -167,53 +167,69 @@ def move(e, m, q, r):
             world(e.link, m.work)
     if e.cut.shape[0] > 0:
         clear(m.entry, m.row_value, m.covector)
-        cut_rows(e, m, planar)
+        cut_rows(
+            e.cut, e.cut_frame, e.cut_basis, e.closing.end, e.gravity, m.work, m.relative, m.row_value, m.covector,
+            m.small, planar,
+        )  # fmt: skip
 
 
 @kernel
 def fold(e, m, q, force):
     """The inward sweep; returns 0, or 1 + the link whose joint moves no mass."""
-    planar, loops = e.flag[0] == 1, m.row_value.shape[0] > 0
-    n = e.link.shape[0]
+    return _fold(
+        e.link, e.closing, m.work, m.dense, m.entry, m.row_value, m.covector, m.along, q, force, e.flag[0] == 1
+    )
+
+
+@kernel
+def _fold(link, closing, work, dense, entry, row_value, covector, along, q, force, planar):
+    loops, n = row_value.shape[0] > 0, link.shape[0]
     for i in range(n - 1, -1, -1):
-        if loops:
-            eliminate(e.closing, m.entry, m.row_value, m.covector, m.work, i, planar)
-            eliminate_load(e.closing, m.entry, m.row_value, m.covector, m.work, i, planar)
+        ending = closing.at[i, 2] if loops else 0
+        rows = loops and closing.at[i, 1] > ending
+        if ending:
+            eliminate(closing, entry, row_value, covector, work, i, planar)
+            eliminate_load(closing, entry, row_value, covector, work, i, planar)
         if planar:
-            if not planar_inward(e.link, m.work, i):
+            if not planar_inward(link, work, i):
                 return 1 + i
-            planar_load_inward(e.link, m.work, force, i)
+            planar_load_inward(link, work, force, i)
         else:
-            if not inward(e.link, m.work, m.dense, i):
+            if not inward(link, work, dense, i):
                 return 1 + i
-            load_inward(e.link, m.work, m.dense, q, force, i)
-        if loops:
-            carry(e.closing, m.entry, m.row_value, m.covector, m.along, e.link, m.work, m.dense, i, planar)
-            carry_load(e.closing, m.row_value, m.along, e.link, m.work, i, planar)
+            load_inward(link, work, dense, q, force, i)
+        if rows:
+            carry(closing, entry, row_value, covector, along, link, work, dense, i, planar)
+            carry_load(closing, row_value, along, link, work, i, planar)
     if loops:
-        eliminate(e.closing, m.entry, m.row_value, m.covector, m.work, n, planar)
-        eliminate_load(e.closing, m.entry, m.row_value, m.covector, m.work, n, planar)
+        eliminate(closing, entry, row_value, covector, work, n, planar)
+        eliminate_load(closing, entry, row_value, covector, work, n, planar)
     return 0
 
 
 @kernel
 def unfold(e, m, q, rate):
     """The second outward sweep: accelerations of joints and links, multipliers."""
-    planar, loops = e.flag[0] == 1, m.row_value.shape[0] > 0
-    n = e.link.shape[0]
-    if loops:
-        multipliers(e.closing, m.entry, m.row_value, m.covector, m.work, n, planar)
-    for i in range(n):
-        if loops:
-            push(e.closing, m.row_value, m.along, e.link, m.work, i, planar)
-        if planar:
-            planar_accelerate_outward(e.link, m.work, rate, i)
-        else:
-            accelerate_outward(e.link, m.work, m.dense, q, rate, i)
-        if loops:
-            multipliers(e.closing, m.entry, m.row_value, m.covector, m.work, i, planar)
+    _unfold(e.link, e.closing, m.work, m.dense, m.entry, m.row_value, m.covector, m.along, q, rate, e.flag[0] == 1)
     if e.basis.shape[0] > 0:
         _turn_rates(e, m, rate)
+
+
+@kernel
+def _unfold(link, closing, work, dense, entry, row_value, covector, along, q, rate, planar):
+    loops, n = row_value.shape[0] > 0, link.shape[0]
+    if loops:
+        multipliers(closing, entry, row_value, covector, work, n, planar)
+    for i in range(n):
+        ending = closing.at[i, 2] if loops else 0
+        if loops and closing.at[i, 1] > ending:
+            push(closing, row_value, along, link, work, i, planar)
+        if planar:
+            planar_accelerate_outward(link, work, rate, i)
+        else:
+            accelerate_outward(link, work, dense, q, rate, i)
+        if ending:
+            multipliers(closing, entry, row_value, covector, work, i, planar)
 
 
 @kernel

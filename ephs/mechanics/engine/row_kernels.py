@@ -163,22 +163,21 @@ def add_covector(covector, slot, k, planar, work, i):
 
 
 @kernel
-def cut_rows(e, m, planar):
+def cut_rows(cut, frame, basis, end, gravity, work, motion, row_value, covectors, small, planar):
     """Rows, targets and relative motions of all cut joints, at the motion that the outward sweep found."""
-    cut, frame, basis, end = e.cut, e.cut_frame, e.cut_basis, e.closing.end
-    one, two, rest = m.small[0:24], m.small[24:48], m.small[48:54]
-    first, second, total, covector = m.small[54:60], m.small[60:66], m.small[66:72], m.small[72:78]
+    one, two, rest = small[0:24], small[24:48], small[48:54]
+    first, second, total, covector = small[54:60], small[60:66], small[66:72], small[72:78]
     for i in range(cut.shape[0]):
         a, b = cut[i, 0], cut[i, 1]
         if a < 0:
-            place_ground(e.gravity, one)
+            place_ground(gravity, one)
         else:
-            place(m.work, a, planar, one)
+            place(work, a, planar, one)
         if b < 0:
-            place_ground(e.gravity, two)
+            place_ground(gravity, two)
         else:
-            place(m.work, b, planar, two)
-        relative = m.relative[i]
+            place(work, b, planar, two)
+        relative = motion[i]
         arms = relative[7:19]
         arm(one, two, frame[i], 12, arms)
         seen(arms, 0, one, 12, first)
@@ -202,11 +201,11 @@ def cut_rows(e, m, planar):
             value = 0.0
             for k in range(6):
                 value -= basis[i, at + k] * total[k]
-            m.row_value[row, 0] = value
+            row_value[row, 0] = value
             wrench_on(frame[i], 12, basis[i], at, 1.0, covector)
-            add_covector(m.covector, end[row, 1], covector, planar, m.work, b)
+            add_covector(covectors, end[row, 1], covector, planar, work, b)
             wrench_on(arms, 0, basis[i], at, -1.0, covector)
-            add_covector(m.covector, end[row, 0], covector, planar, m.work, a)
+            add_covector(covectors, end[row, 0], covector, planar, work, a)
 
 
 @kernel

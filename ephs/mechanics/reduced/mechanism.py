@@ -186,10 +186,11 @@ def _tables(
         if edge.path is not None:
             spring[i], resisting[i], heat[i] = _parts(model, component, place_of, edge.path)
             friction[i] = -1 if _idle(model, resisting[i]) else resisting[i]
+    resists = set(resisting.tolist())
     conduction = [
         (i, *(place_of[effort] for effort in slot.efforts))
         for i, slot in enumerate(model.descriptor.components)
-        if isinstance(slot.primitive, Irreversible) and len(slot.efforts) == 2 and i not in resisting
+        if isinstance(slot.primitive, Irreversible) and len(slot.efforts) == 2 and i not in resists
     ]
     t = model.tables
     storages = [(i, model.descriptor.components[i].primitive) for i, _ in entropies.values()]
