@@ -95,8 +95,8 @@ def test_gravity_is_the_slope_of_its_potential(drawn):
 
 @settings(max_examples=50)
 @given(drawn=moving())
-def test_power_balances(drawn):
-    """What forces, drives and prescribed motions do, less heat, is the rate of kinetic and potential energy."""
+def test_accelerations_are_how_rates_change(drawn):
+    """Of all joints, cut ones included, along two steps of high order."""
     _, model, state, _ = drawn
     h = 1e-3
     steps = [model.step(state, k * h, "rk87") for k in (1.0, 2.0)]
