@@ -34,10 +34,12 @@ def attempt(e, m, scheme, b, base, y0, h, k, y1, q1, drive, wrench, scal, contro
     size = y0.shape[0]
     for i in range(1, count + 1):
         for j in range(size):
-            total = 0.0
-            for s in range(i):
-                total += (scheme.a[i, s] if i < count else scheme.b[s]) * k[s, j]
-            y1[j] = y0[j] + h * total
+            y1[j] = y0[j]
+        for s in range(i):
+            weight = h * (scheme.a[i, s] if i < count else scheme.b[s])
+            if weight != 0.0:
+                for j in range(size):
+                    y1[j] += weight * k[s, j]
         if i == count - 1:
             for j in range(size):
                 b[j] = y1[j]
@@ -74,11 +76,14 @@ def estimate(e, m, weights, k, h, nv, q1, loops, out, change):
     """h Σ weights·k of what counts in an error; without its parts across the constraints, which closing takes out."""
     n = m.force.shape[0]
     for j in range(out.shape[0]):
-        at = j if j < n else nv - n + j
-        total = 0.0
-        for s in range(k.shape[0]):
-            total += weights[s] * k[s, at]
-        out[j] = h * total
+        out[j] = 0.0
+    for s in range(k.shape[0]):
+        weight = h * weights[s]
+        if weight != 0.0:
+            for j in range(n):
+                out[j] += weight * k[s, j]
+            for j in range(n, out.shape[0]):
+                out[j] += weight * k[s, nv - n + j]
     if loops:
         for part in range(2):
             across(e, m, q1, out[part * n : (part + 1) * n])

@@ -4,6 +4,7 @@ What every method on the reduced form shares. A step moves q = q⁰·exp(v): the
 spaces, v̇ = dexp⁻¹(v) r.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, final
 
@@ -19,9 +20,9 @@ from ephs.mechanics.reduced.dense import Dense, unmoved
 from ephs.mechanics.reduced.given import Given
 from ephs.mechanics.reduced.mechanism import reduce_scene
 from ephs.mechanics.reduced.paper import PaperStates
+from ephs.mechanics.reduced.table_kernels import stored_energies
 from ephs.mechanics.reduced.tables import SPRING, Workspace
 from ephs.mechanics.scene.model import Scene
-from ephs.mechanics.solve.continuous import Continuous
 from ephs.mechanics.solve.control import Tolerance
 from ephs.mechanics.solve.errors import Outcome, SolveError
 from ephs.mechanics.solve.model import compile_model
@@ -69,7 +70,7 @@ class Equations:
         self.problem = problem
         self.model = model = compile_model(problem.descriptor, problem.reference, problem.inputs(t0, problem.initial))
         self.reduced = reduced = reduce_scene(scene, problem, model)
-        self._continuous = Continuous(model)
+        self._stored = model.memory()
         self._light = reduced.workspace(dense=False)
         self._dense: Dense | None = None
         t = reduced.tables
@@ -311,11 +312,22 @@ class Equations:
 
     def row(self, state: ReducedState) -> Row:
         """What is kept of a state."""
-        x = self.problem.descriptor.pack(self.states(state))
-        energies = self._continuous.energies(x, np.zeros(self.model.unknowns), self.model.input_values())
-        energies[self._makers] = state.books[2:]
-        heat, work = state.books[0], state.books[1]
-        return Row(x, energies, np.array([heat, work, work, state.books[2:].sum()]))
+        return self.rows_of([state])[0]
+
+    def rows_of(self, states: Sequence[ReducedState]) -> list[Row]:
+        """What is kept of many states."""
+        if not states:
+            return []
+        q, r, s = zip(*((state.q, state.r, state.s) for state in states), strict=True)
+        x = self._paper.rows(np.array(q), np.array(r), np.array(s))
+        energies = np.zeros((len(states), len(self.problem.descriptor.components)))
+        self.refuse(*stored_energies(self.model.tables, self.scal, self._stored, x, energies))
+        out: list[Row] = []
+        for state, point, energy in zip(states, x, energies, strict=True):
+            energy[self._makers] = state.books[2:]
+            heat, work = state.books[0], state.books[1]
+            out.append(Row(point, energy, np.array([heat, work, work, state.books[2:].sum()])))
+        return out
 
     def least(self, start: ReducedState, end: ReducedState) -> float:
         """The least entropy that a component made between two states, in J/K."""

@@ -1,6 +1,7 @@
 """What every method on the reduced form is: a step, and around it what the time loop asks for."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -75,6 +76,10 @@ class ReducedMethod(ABC):
     def row(self, state: ReducedState) -> Row:
         """What is kept of it."""
         return self.equations.row(state)
+
+    def rows(self, states: Sequence[ReducedState]) -> list[Row]:
+        """What is kept of many."""
+        return self.equations.rows_of(states)
 
     def stats(self) -> dict[str, Any]:
         """Counts, for the solution's statistics."""

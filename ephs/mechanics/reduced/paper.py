@@ -1,5 +1,6 @@
 """Between the reduced form and the paper's states: every state of the system from joints' elements, and back."""
 
+from collections.abc import Iterator
 from typing import final
 
 import numpy as np
@@ -7,6 +8,7 @@ import numpy as np
 from ephs.mechanics.build import component_path
 from ephs.mechanics.reduced.mechanism import Reduced
 from ephs.mechanics.reduced.sweep_kernels import kinematics
+from ephs.mechanics.reduced.table_kernels import ELEMENT, ENTROPY, MOMENTUM, POSE, RELATIVE, paper_rows
 from ephs.mechanics.reduced.tables import SPRING, Workspace
 from ephs.mechanics.solve.errors import Outcome, SolveError
 from ephs.mechanics.solve.problem import Problem
@@ -27,31 +29,49 @@ class PaperStates:
 
     def __init__(self, reduced: Reduced, problem: Problem, work: Workspace) -> None:
         self.reduced, self.problem, self.work = reduced, problem, work
-        self._signs: dict[Path, float] = {}
+        slots = {slot.path: slot for slot in problem.descriptor.states}
+        self._paths: list[Path] = []
+        plan: list[tuple[int, int, int, int]] = []
+        for path, source, number in self._sources():
+            if path in slots:
+                self._paths.append(path)
+                plan.append((source, number, slots[path].at, slots[path].quantity.space.size))
+        self._plan = np.array(plan, dtype=np.int64).reshape(-1, 4)
+        self._sign: Array | None = None
+        self._rest = problem.descriptor.pack(problem.initial)
+
+    def _sources(self) -> Iterator[tuple[Path, int, int]]:
+        """(path, where it comes from, number of the link, edge or entropy) of the states."""
+        for number, path in enumerate(self.reduced.entropies):
+            yield path, ENTROPY, number
+        for link, name in enumerate(self.reduced.bodies):
+            if name is not None:
+                at = component_path("bodies", name)
+                yield at / "pe" / "q", POSE, link
+                yield at / "ke" / "p", MOMENTUM, link
+        for number, edge in enumerate(self.reduced.edges):
+            if edge.path is not None:
+                spring = self.reduced.tables.kind[number] == SPRING
+                yield edge.path / "pe" / "q_r", RELATIVE if spring else ELEMENT, number
+
+    def rows(self, q: Array, r: Array, s: Array) -> Array:
+        """(rows, point_size) all states, of rows of joints' elements, rates and entropies."""
+        out = np.tile(self._rest, (q.shape[0], 1))
+        if self._sign is None and q.shape[0]:
+            self._sign = np.ones(len(self._paths))
+            first = self.rows(q[:1], r[:1], s[:1])[0]
+            for k, (source, _, at, _) in enumerate(self._plan.tolist()):
+                # a pose has two quaternions: that one which is continuous with the initial one
+                if source in (POSE, RELATIVE) and float(first[at : at + 4] @ self._rest[at : at + 4]) < 0.0:
+                    self._sign[k] = -1.0
+        if self._sign is not None:
+            paper_rows(self.reduced.tables, self.work, self._plan, self._sign, q, r, s, out)
+        return out
 
     def at(self, q: Array, r: Array, s: Array) -> dict[Path, Array]:
         """All states of the scene's system."""
-        tables, w, reduced = self.reduced.tables, self.work, self.reduced
-        kinematics(tables, w, q, r)
-        out: dict[Path, Array] = {path: s[i : i + 1] for i, path in enumerate(reduced.entropies)}
-        for link, name in enumerate(reduced.bodies):
-            if name is not None:
-                at = component_path("bodies", name)
-                out[at / "pe" / "q"] = self._signed(at / "pe" / "q", w.pose[link])
-                if np.any(tables.inertia[link]):
-                    out[at / "ke" / "p"] = tables.inertia[link] @ w.twist[link]
-        for i, edge in enumerate(reduced.edges):
-            if edge.path is not None:
-                where = slice(int(tables.q_at[i]), int(tables.q_at[i] + tables.q_size[i]))
-                spring = tables.kind[i] == SPRING
-                own = self._signed(edge.path / "pe" / "q_r", w.relative[i]) if spring else q[where].copy()
-                out[edge.path / "pe" / "q_r"] = own
-        return out
-
-    def _signed(self, path: Path, pose: Array) -> Array:
-        """A pose by that of its two quaternions which is continuous with the initial one."""
-        sign = self._signs.setdefault(path, 1.0 if float(pose[:4] @ self.problem.initial[path][:4]) >= 0.0 else -1.0)
-        return np.concatenate([sign * pose[:4], pose[4:]])
+        x = self.rows(q[None], r[None], s[None])[0]
+        return {path: x[at : at + size] for path, (*_, at, size) in zip(self._paths, self._plan.tolist(), strict=True)}
 
     def initial(self) -> tuple[Array, Array, Array]:
         """(q, r, s) of the problem's initial states."""

@@ -240,7 +240,7 @@ class _Run(Generic[S]):
     def solution(self) -> Solution:
         """The solution so far."""
         stats = self.stats()
-        kept = [self.stepper.row(state) for _, state, _ in self.rows]
+        kept = self.stepper.rows([state for _, state, _ in self.rows])
         count, size = len(self.problem.descriptor.components), self.problem.descriptor.point_size
         record = Record(
             np.array([t for t, _, _ in self.rows]),

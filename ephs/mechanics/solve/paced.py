@@ -1,5 +1,6 @@
 """The natural methods one step a call: with steps of any length, error estimates, events and inputs that change."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, final
 
@@ -75,6 +76,10 @@ class Paced:
     def at(self, state: PacedState, t: float) -> PacedState:
         """The same state at a time that differs by rounding."""
         return replace(state, t=t)
+
+    def rows(self, states: Sequence[PacedState]) -> list[Row]:
+        """What is kept of many."""
+        return [self.row(state) for state in states]
 
     def row(self, state: PacedState) -> Row:
         """What is kept of it."""

@@ -5,7 +5,7 @@ equations g(x, ẋ, e, λ) = 0: the unknowns of a stage are its rates, efforts a
 nor a choice of causality is needed, and what is algebraic in them is met at the end of the step, which is a stage.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, final
 
@@ -166,6 +166,10 @@ class Radau:
     def at(self, state: RadauState, t: float) -> RadauState:
         """The same state at a time that differs by rounding."""
         return replace(state, t=t)
+
+    def rows(self, states: Sequence[RadauState]) -> list[Row]:
+        """What is kept of many."""
+        return [self.row(state) for state in states]
 
     def row(self, state: RadauState) -> Row:
         """What is kept of it."""

@@ -1,5 +1,6 @@
 """What the time loop asks of a method: steps one a call, or many; what a step and what is kept are."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar, final
 
@@ -162,6 +163,10 @@ class Stepper(Protocol[S]):
 
     def row(self, state: S) -> Row:
         """What is kept of it."""
+        ...
+
+    def rows(self, states: Sequence[S]) -> list[Row]:
+        """What is kept of many."""
         ...
 
     def stats(self) -> dict[str, Any]:
