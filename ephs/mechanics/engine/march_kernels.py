@@ -132,13 +132,13 @@ def judge(control, h, error):
 
 
 @kernel
-def finish(e, m, base, y1, q1, motions, change, moved, drive, loops):
+def finish(e, m, base, y1, q1, change, moved, drive, loops):
     """From a step's end to a state: joints' elements in q1, loops closed, rates in y1; a status."""
     nv, n = drive.shape[0], m.force.shape[0]
     advance(e, base, y1, q1)
     if not loops:
         return 0
-    status, _ = close(e, m, q1, y1[nv : nv + n], motions, change, moved)
+    status, _ = close(e, m, q1, y1[nv : nv + n], change, moved)
     return status
 
 
@@ -223,7 +223,7 @@ def march(e, m, scheme, s, control, times, drive, wrench, scal, steps):
         if status == 0:
             allowance(e, s.atol, s.rtol, s.y, s.y1, nv, s.allowed)
             control[C_STIFF] = stiffness(scheme, s.b, s.k, s.y1, h, n, nv, s.allowed)
-            status = finish(e, m, s.q, s.y1, s.q1, s.motions, s.change, s.moved, drive, loops)
+            status = finish(e, m, s.q, s.y1, s.q1, s.change, s.moved, drive, loops)
         if status == DEPENDENT:
             return CAREFUL
         if status == 0:
@@ -269,7 +269,7 @@ def march(e, m, scheme, s, control, times, drive, wrench, scal, steps):
                         e, m, scheme, s.b, s.q, s.y, sign * part, s.k2, s.y2, s.q2, drive, wrench, scal, control
                     )  # fmt: skip
                     if status == 0:
-                        status = finish(e, m, s.q, s.y2, s.q2, s.motions, s.change, s.moved, drive, loops)
+                        status = finish(e, m, s.q, s.y2, s.q2, s.change, s.moved, drive, loops)
                     if status == DEPENDENT:
                         return CAREFUL
                     if status != 0:

@@ -90,11 +90,10 @@ def joint_rates(e, m, y, r, out):
 
 
 @kernel
-def close(e, m, q, r, motions, change, moved):
+def close(e, m, q, r, change, moved):
     """Close the loops and put the rates on them, by the least change in the mass metric; (status, gap).
 
-    ``motions`` are the prescribed rates of the tree's freedoms, others 0; ``change`` (n,), ``moved`` (size of v,) are
-    memory.
+    Prescribed rates are as they should be; ``change`` (n,) and ``moved`` (size of v,) are memory.
     """
     before = gap = 1e300
     for _ in range(ROUNDS):
@@ -115,10 +114,7 @@ def close(e, m, q, r, motions, change, moved):
         advance(e, q, moved, q)
     if not gap <= CLOSED:
         return OPEN, gap
-    for j in range(r.shape[0]):
-        if motions[j] != 0.0:
-            r[j] = motions[j]
-    relative_rates(e, m, r)
+    relative_rates(e, m)
     resolve(e, m, q, change)
     for j in range(r.shape[0]):
         r[j] += change[j]
@@ -134,7 +130,7 @@ def _moved(e, change, moved):
 
 
 @kernel
-def relative_rates(e, m, r):
+def relative_rates(e, m):
     """Targets that take the cut joints' forbidden velocities away, where the outward sweep has been at r."""
     for i in range(e.cut.shape[0]):
         for j in range(e.cut[i, 8]):

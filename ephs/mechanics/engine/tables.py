@@ -92,7 +92,6 @@ class State(NamedTuple):
     allowed: Array
     fine: Array
     coarse: Array
-    motions: Array  # (n,): prescribed rates, others 0
     change: Array  # (n,)
     moved: Array  # (size of v,)
     rows_t: Array  # (rows, 2): time from the start, the step's least production

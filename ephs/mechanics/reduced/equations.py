@@ -96,8 +96,7 @@ class Equations:
         self._paper = PaperStates(reduced, problem, self._light)
         self.evaluations = 0
         self.gravity = np.array(scene.world.gravity, dtype=float)
-        self.motions = np.zeros(self.n)
-        self.motions[t.driven.astype(bool)] = self.prescribed
+        self._driven = np.flatnonzero(t.driven)
         self._change, self._moved = np.zeros(self.n), np.zeros(self.nv)
         self._acted = self.given.acted(set(self._moving) if pushed else set())
         self._build(None)
@@ -193,8 +192,10 @@ class Equations:
         """
         if not (self.engine.cut.size or self.prescribed.size):
             return state
+        if np.any(state.r[self._driven] != self.prescribed):  # all rates give way, in the mass metric
+            return self._closed_carefully(state)
         q, r = np.array(state.q), np.array(state.r)
-        status, gap = close(self.engine, self.memory, q, r, self.motions, self._change, self._moved)
+        status, gap = close(self.engine, self.memory, q, r, self._change, self._moved)
         if status == OPEN:
             raise SolveError(Outcome.DIVERGED, "", f"loops stay open by {gap:.1e} m or rad")
         self._careful = status != 0
@@ -207,6 +208,7 @@ class Equations:
         """`closed`, for constraints that nearly repeat each other."""
         self._careful = True
         q, r = self.dense.closed(state.q, state.r, self.prescribed, self.moved)
+        r[self._driven] = self.prescribed
         return ReducedState(state.t, q, r, state.s, state.books)
 
     # ---- the same over dense matrices --------------------------------------------------------------------------
@@ -300,7 +302,7 @@ class Equations:
         if not self._careful:
             q, r = self._closed_at
             if not self._factored:
-                close(self.engine, self.memory, q, r, self.motions, self._change, self._moved)
+                close(self.engine, self.memory, q, r, self._change, self._moved)
             for part in (slice(0, self.n), slice(self.n, 2 * self.n)):
                 across(self.engine, self.memory, q, out[part])
                 resolve(self.engine, self.memory, q, change)

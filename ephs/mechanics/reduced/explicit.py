@@ -164,7 +164,7 @@ class _March:
             q=np.array(q), y=eq.vector(span.state), k=np.zeros(stages), y1=np.zeros(size), q1=np.zeros(q.size),
             k2=np.zeros(stages), y2=np.zeros(size), q2=np.zeros(q.size), b=np.zeros(size),
             atol=np.array(method.atol), rtol=np.array(method.rtol), allowed=np.zeros(counted),
-            fine=np.zeros(counted), coarse=np.zeros(counted), motions=eq.motions, change=np.zeros(eq.n),
+            fine=np.zeros(counted), coarse=np.zeros(counted), change=np.zeros(eq.n),
             moved=np.zeros(eq.nv), rows_t=np.zeros((rows, 2)), rows_q=np.zeros((rows, q.size)),
             rows_y=np.zeros((rows, size - eq.nv)),
         )  # fmt: skip
