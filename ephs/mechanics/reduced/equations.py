@@ -169,6 +169,8 @@ class Equations:
 
     def refuse(self, status: int, component: int) -> None:
         """Raise what a compiled function reported, if it did."""
+        if status == STILL and not np.all(np.isfinite(self.memory.work)):
+            raise SolveError(Outcome.DIVERGED, "", "the state has left the range of numbers")
         if status == STILL:
             raise unmoved(self.reduced, int(component))
         if status:

@@ -174,3 +174,8 @@ def test_without_compilation_the_numbers_are_the_same(tmp_path):
     for line, expected in zip(lines, compiled, strict=True):
         found = [float.fromhex(x) for x in line.split()]
         assert np.allclose(found, expected, rtol=1e-12, atol=1e-12 * np.abs(expected).max())
+
+
+def test_a_run_that_leaves_the_range_of_numbers_is_not_blamed_on_masses():
+    with pytest.raises(ephs.SimulationError, match="no solution near by"):
+        ephs.simulate(ephs.load(SCENES["chain"]), 2000.0, method="rk54", step=20.0)
