@@ -23,8 +23,7 @@ from ephs.semantics.spaces import jit
 
 kernel = jit.lean_kernel
 
-T_TARGET, T_MULTIPLIER, T_RAW, T_PIVOT, T_COLUMNS = range(5)
-"""Columns of a row's numbers."""
+# Columns of a row's numbers: 0 target, 1 multiplier, 2 size before elimination, 3 pivot.
 
 
 @kernel

@@ -29,6 +29,7 @@ from ephs.mechanics.engine.tree_kernels import (
     DIM,
     DRIVEN,
     FORWARD,
+    G_BACK,
     G_BASIS,
     G_RATE,
     G_TWIST,
@@ -59,7 +60,7 @@ STILL, DEPENDENT = 20, 21
 @kernel
 def _elements(e, m, q, r):
     """Poses and twists of general joints; of those walked backward also what turns their rates."""
-    joint, column, image = m.small[0:7], m.small[7:13], m.small[13:19]
+    joint = m.small[0:7]
     for i in range(e.link.shape[0]):
         if e.link[i, KIND] != GENERAL:
             continue
@@ -74,22 +75,16 @@ def _elements(e, m, q, r):
             for j in range(d):
                 for a in range(6):
                     m.dense[k, G_TWIST + a] += e.basis[k, 6 * j + a] * r[where + j]
-        else:  # the element is inverted: its twist is −Ad_x B r = B (−L r)
+        else:  # the element is inverted: its twist is −Ad_x B r = B (−L r), and L⁻¹ is L of the inverse
+            _carried(e, m, k, d, joint, G_RATE)
             for j in range(d):
-                for a in range(6):
-                    column[a] = e.basis[k, 6 * j + a]
-                adjoint_apply(joint, column, image)
-                for a in range(6):
-                    m.dense[k, G_TWIST + a] -= image[a] * r[where + j]
                 for n in range(d):
-                    above = below = 0.0
                     for a in range(6):
-                        above += e.basis[k, 6 * n + a] * image[a]
-                        below += e.basis[k, 6 * n + a] * e.basis[k, 6 * n + a]
-                    m.dense[k, G_RATE + 6 * n + j] = above / below
+                        m.dense[k, G_TWIST + a] -= e.basis[k, 6 * n + a] * m.dense[k, G_RATE + 6 * n + j] * r[where + j]
             pose_inverse(joint, m.small[20:27])
             for a in range(7):
                 joint[a] = m.small[20 + a]
+            _carried(e, m, k, d, joint, G_BACK)
         quat_to_matrix(joint, m.small[30:39].reshape(3, 3))
         for j in range(9):
             m.dense[k, j] = m.small[30 + j]
@@ -98,59 +93,47 @@ def _elements(e, m, q, r):
 
 
 @kernel
+def _carried(e, m, k, d, pose, out):
+    """L = B⁺ Ad B of a general joint at a pose; its basis has orthogonal columns."""
+    column, image = m.small[7:13], m.small[13:19]
+    for j in range(d):
+        for a in range(6):
+            column[a] = e.basis[k, 6 * j + a]
+        adjoint_apply(pose, column, image)
+        for n in range(d):
+            above = below = 0.0
+            for a in range(6):
+                above += e.basis[k, 6 * n + a] * image[a]
+                below += e.basis[k, 6 * n + a] * e.basis[k, 6 * n + a]
+            m.dense[k, out + 6 * n + j] = above / below
+
+
+@kernel
 def _turn_forces(e, m, force):
     """Forces on the rates of general joints that are walked backward, on the rates that the sweeps use: −L⁻ᵀ τ."""
-    a = m.small[100:142]
     for i in range(e.link.shape[0]):
-        if e.link[i, KIND] != GENERAL or e.link[i, FORWARD] > 0:
-            continue
-        k, d, at = e.link[i, DENSE], e.link[i, DIM], e.link[i, R_AT]
-        for j in range(d):  # (Lᵀ | τ), by Gauss with pivots
-            for n in range(d):
-                a[7 * j + n] = m.dense[k, G_RATE + 6 * n + j]
-            a[7 * j + 6] = force[at + j]
-        for p in range(d):
-            best = p
-            for j in range(p + 1, d):
-                if abs(a[7 * j + p]) > abs(a[7 * best + p]):
-                    best = j
-            for n in range(7):
-                a[7 * p + n], a[7 * best + n] = a[7 * best + n], a[7 * p + n]
+        if e.link[i, KIND] == GENERAL and e.link[i, FORWARD] < 0:
+            k, d, at = e.link[i, DENSE], e.link[i, DIM], e.link[i, R_AT]
             for j in range(d):
-                if j != p:
-                    factor = a[7 * j + p] / a[7 * p + p]
-                    for n in range(7):
-                        a[7 * j + n] -= factor * a[7 * p + n]
-        for j in range(d):
-            force[at + j] = -a[7 * j + 6] / a[7 * j + j]
+                m.small[j] = 0.0
+                for n in range(d):
+                    m.small[j] -= m.dense[k, G_BACK + 6 * n + j] * force[at + n]
+            for j in range(d):
+                force[at + j] = m.small[j]
 
 
 @kernel
 def _turn_rates(e, m, rate):
     """Rates of general joints that are walked backward: −L⁻¹ ρ."""
     for i in range(e.link.shape[0]):
-        if e.link[i, KIND] != GENERAL or e.link[i, FORWARD] > 0:
-            continue
-        k, d, at = e.link[i, DENSE], e.link[i, DIM], e.link[i, R_AT]
-        a = m.small[100:142]
-        for j in range(d):
-            for n in range(d):
-                a[7 * j + n] = m.dense[k, G_RATE + 6 * j + n]
-            a[7 * j + 6] = rate[at + j]
-        for p in range(d):
-            best = p
-            for j in range(p + 1, d):
-                if abs(a[7 * j + p]) > abs(a[7 * best + p]):
-                    best = j
-            for n in range(7):
-                a[7 * p + n], a[7 * best + n] = a[7 * best + n], a[7 * p + n]
+        if e.link[i, KIND] == GENERAL and e.link[i, FORWARD] < 0:
+            k, d, at = e.link[i, DENSE], e.link[i, DIM], e.link[i, R_AT]
             for j in range(d):
-                if j != p:
-                    factor = a[7 * j + p] / a[7 * p + p]
-                    for n in range(7):
-                        a[7 * j + n] -= factor * a[7 * p + n]
-        for j in range(d):
-            rate[at + j] = -a[7 * j + 6] / a[7 * j + j]
+                m.small[j] = 0.0
+                for n in range(d):
+                    m.small[j] -= m.dense[k, G_BACK + 6 * j + n] * rate[at + n]
+            for j in range(d):
+                rate[at + j] = m.small[j]
 
 
 @kernel

@@ -4,24 +4,13 @@
 # pyright: basic, reportPrivateImportUsage=false
 
 from ephs.mechanics.engine.row_kernels import arm, place, place_ground, relative_pose, seen, wrench_on
-from ephs.semantics.calling import call_kernel
+from ephs.mechanics.reduced.sweep_kernels import component_at
 from ephs.semantics.spaces import jit
 
 kernel = jit.lean_kernel
 
 ON_TREE, ON_CUT, ON_BODIES = range(3)
 """Kinds of edges that carry components."""
-
-
-@kernel
-def component(f, m, number, scal, x):
-    """Call a component's kernel at states x, without increments; efforts in m.e, flows in m.f."""
-    return call_kernel(  # pyright: ignore[reportCallIssue] - the typing context is numba's
-        f.address[number], f.dims[number].ctypes.data, scal.ctypes.data,
-        f.parameters[f.parameter_at[number] :].ctypes.data, x.ctypes.data, m.small[200:].ctypes.data,
-        m.e.ctypes.data, m.small[220:].ctypes.data, m.f.ctypes.data, m.c.ctypes.data, m.jac.ctypes.data,
-        m.scratch.ctypes.data,
-    )  # fmt: skip
 
 
 @kernel
@@ -53,7 +42,7 @@ def temperatures(f, m, s, s_rate, scal):
         s_rate[k] = 0.0
         if f.node[k] >= 0:
             m.small[190] = s[k]
-            status = component(f, m, f.node[k], scal, m.small[190:])
+            status = component_at(f, m, f.node[k], scal, m.small[190:])
             if status != 0:
                 return status, f.node[k]
             m.temperature[k] = m.e[0]
@@ -115,7 +104,7 @@ def act(e, m, q, r, s, drive, wrench, scal, s_rate, made, powers):
                 pull[j] = drive[v + j]
                 powers[1] += pull[j] * rate[j]
         if f.part[i, 0] >= 0:
-            status = component(f, m, f.part[i, 0], scal, x)
+            status = component_at(f, m, f.part[i, 0], scal, x)
             if status != 0:
                 return status, f.part[i, 0]
             for j in range(d):
@@ -125,7 +114,7 @@ def act(e, m, q, r, s, drive, wrench, scal, s_rate, made, powers):
             for j in range(d):
                 m.e[j] = rate[j]
             m.e[d] = m.temperature[heat]
-            status = component(f, m, f.part[i, 1], scal, x)
+            status = component_at(f, m, f.part[i, 1], scal, x)
             if status != 0:
                 return status, f.part[i, 1]
             for j in range(d):
@@ -150,7 +139,7 @@ def act(e, m, q, r, s, drive, wrench, scal, s_rate, made, powers):
     for k in range(f.conduction.shape[0]):
         number, one_end, other = f.conduction[k, 0], f.conduction[k, 1], f.conduction[k, 2]
         m.e[0], m.e[1] = m.temperature[one_end], m.temperature[other]
-        status = component(f, m, number, scal, x)
+        status = component_at(f, m, number, scal, x)
         if status != 0:
             return status, number
         s_rate[one_end] -= m.f[0]

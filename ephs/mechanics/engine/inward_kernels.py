@@ -102,37 +102,7 @@ def _inward_spherical(work, i, parent):
     m0, m1 = work[i, 45] - c0 * g0 - c3 * g3 - c6 * g6, work[i, 46] - c0 * g1 - c3 * g4 - c6 * g7
     m2, m3 = work[i, 47] - c0 * g2 - c3 * g5 - c6 * g8, work[i, 48] - c1 * g1 - c4 * g4 - c7 * g7
     m4, m5 = work[i, 49] - c1 * g2 - c4 * g5 - c7 * g8, work[i, 50] - c2 * g2 - c5 * g5 - c8 * g8
-    r0, r1, r2, r3, r4, r5 = work[i, 0], work[i, 1], work[i, 2], work[i, 3], work[i, 4], work[i, 5]
-    r6, r7, r8, p0, p1, p2 = work[i, 6], work[i, 7], work[i, 8], work[i, 9], work[i, 10], work[i, 11]
-    t0, t1, t2 = r0 * m0 + r1 * m1 + r2 * m2, r0 * m1 + r1 * m3 + r2 * m4, r0 * m2 + r1 * m4 + r2 * m5
-    t3, t4, t5 = r3 * m0 + r4 * m1 + r5 * m2, r3 * m1 + r4 * m3 + r5 * m4, r3 * m2 + r4 * m4 + r5 * m5
-    t6, t7, t8 = r6 * m0 + r7 * m1 + r8 * m2, r6 * m1 + r7 * m3 + r8 * m4, r6 * m2 + r7 * m4 + r8 * m5
-    n0, n1, n2 = t0 * r0 + t1 * r1 + t2 * r2, t0 * r3 + t1 * r4 + t2 * r5, t0 * r6 + t1 * r7 + t2 * r8
-    n3, n4, n5 = t3 * r3 + t4 * r4 + t5 * r5, t3 * r6 + t4 * r7 + t5 * r8, t6 * r6 + t7 * r7 + t8 * r8
-    e0, e1, e2 = p1 * n2 - p2 * n1, p1 * n4 - p2 * n3, p1 * n5 - p2 * n4
-    e3, e4, e5 = p2 * n0 - p0 * n2, p2 * n1 - p0 * n4, p2 * n2 - p0 * n5
-    e6, e7, e8 = p0 * n1 - p1 * n0, p0 * n3 - p1 * n1, p0 * n4 - p1 * n2
-    work[parent, 30] += e2 * p1 - e1 * p2
-    work[parent, 31] += e0 * p2 - e2 * p0
-    work[parent, 32] += e1 * p0 - e0 * p1
-    work[parent, 33] += e3 * p2 - e5 * p0
-    work[parent, 34] += e4 * p0 - e3 * p1
-    work[parent, 35] += e7 * p0 - e6 * p1
-    work[parent, 36] += e0
-    work[parent, 37] += e1
-    work[parent, 38] += e2
-    work[parent, 39] += e3
-    work[parent, 40] += e4
-    work[parent, 41] += e5
-    work[parent, 42] += e6
-    work[parent, 43] += e7
-    work[parent, 44] += e8
-    work[parent, 45] += n0
-    work[parent, 46] += n1
-    work[parent, 47] += n2
-    work[parent, 48] += n3
-    work[parent, 49] += n4
-    work[parent, 50] += n5
+    fold_inertia(work, i, parent, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, m0, m1, m2, m3, m4, m5)
     return True
 
 

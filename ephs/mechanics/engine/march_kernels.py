@@ -18,8 +18,8 @@ kernel = jit.lean_kernel
 (
     C_T, C_END, C_H, C_SPAN, C_LEAST_STEP, C_MOST, C_BEFORE, C_FAILED, C_STEPS, C_REJECTED, C_EVALUATIONS, C_ROWS,
     C_SAVED, C_SHORTEST, C_LONGEST, C_LEAST, C_STIFF, C_COMPONENT, C_EXPONENT, C_SHARE, C_DAMPING, C_STRICT, C_FRESH,
-    C_TRIED, C_ERROR, C_GRID, C_ORIGIN, C_LIMIT, C_HELD, C_FREE, C_REFUSALS, C_COLUMNS,
-) = range(32)  # fmt: skip
+    C_TRIED, C_GRID, C_ORIGIN, C_LIMIT, C_HELD, C_FREE, C_REFUSALS, C_COLUMNS,
+) = range(31)  # fmt: skip
 DONE, PAUSED, CAREFUL, SHORT, FULL, STIFF, REFUSED = range(7)
 """How `march` ends: at the end; after as many steps as asked; where loops are nearly dependent, and a careful step has
 to be taken; where the step gets too short; where no more rows fit; where a component cannot be evaluated."""
@@ -231,7 +231,6 @@ def march(e, m, scheme, s, control, times, drive, wrench, scal, steps):
             if scheme.order8 == 1:
                 estimate(e, m, scheme.coarse, s.k, sign * h, nv, s.q1, loops, s.coarse, s.change)
             error = measure(s.fine, s.coarse, s.allowed, scheme.order8 == 1)
-            control[C_ERROR] = error
             accepted = grid or judge(control, h, error)
         elif grid:
             return REFUSED + status

@@ -11,9 +11,9 @@ from ephs.semantics.spaces.se3_kernels import include, pose_compose, pose_invers
 
 kernel = jit.lean_kernel
 
-# Columns of a cut joint's relative motion: pose of C2 in C1 as (7,), R and p of C2 in body 1's link, twist in C2.
-M_POSE, M_ARM, M_TWIST, M_SIZE = 0, 7, 19, 25
-B_BASIS, B_LEFT, B_ROWS, B_SIZE = 0, 36, 72, 108
+# Columns of a cut joint's relative motion: 0 pose of C2 in C1 as (7,), 7 R and p of C2 in body 1's link, 19 twist in
+# C2; of its numbers: 0 B (6, 6) row by row, 36 (BᵀB)⁻¹Bᵀ, 72 covectors of its rows.
+M_SIZE, B_SIZE = 25, 108
 
 
 @kernel

@@ -47,7 +47,7 @@ class Memory(NamedTuple):
     """What one evaluation writes."""
 
     work: Array  # (links, 90 or 31)
-    dense: Array  # (general joints, 198)
+    dense: Array  # (general joints, 234)
     force: Array  # (n,)
     zero: Array  # (n,): stays zero
     relative: Array  # (cut joints, 25): see `row_kernels`
@@ -57,7 +57,7 @@ class Memory(NamedTuple):
     along: Array  # (slots, 12)
     largest: Array  # (blocks,)
     temperature: Array  # (entropies,)
-    small: Array  # (256,)
+    small: Array  # (512,)
     e: Array
     f: Array
     c: Array

@@ -33,8 +33,9 @@ C_MASS, CONSTANTS = 12, 22
 # 78 R and 87 p in the world.
 MEMORY = 90
 
-# Columns of a general joint's numbers: pose and twist of its element, basis, U, D⁻¹Uᵀ, D⁻¹ (d², row by row), rates.
-G_TWIST, G_BASIS, G_U, G_GAIN, G_INVERSE, G_RATE, GENERAL_SIZE = 12, 18, 54, 90, 126, 162, 198
+# Columns of a general joint's numbers: pose and twist of its element, basis, U, D⁻¹Uᵀ, D⁻¹ (d², row by row), L and L⁻¹
+# of those that are walked backward.
+G_TWIST, G_BASIS, G_U, G_GAIN, G_INVERSE, G_RATE, G_BACK, GENERAL_SIZE = 12, 18, 54, 90, 126, 162, 198, 234
 
 
 @kernel

@@ -75,17 +75,15 @@ class Equations:
         self._dense: Dense | None = None
         t = reduced.tables
         self._moving = [i for i in range(len(reduced.edges)) if t.kind[i] != SPRING]
-        sizes = [int(t.dim[i]) if t.kind[i] != SPRING else 0 for i in range(len(reduced.edges))]
-        self._v_at = np.cumsum([0, *sizes])[:-1].astype(np.int64)
         self._careful = self._factored = False
         self._closed_at = np.zeros(0), np.zeros(0)
         self._q = np.zeros(reduced.coordinates)
-        self.nv, self.n, self.ns = sum(sizes), reduced.freedoms, len(reduced.entropies)
+        self.nv, self.n, self.ns = int(t.dim[self._moving].sum()), reduced.freedoms, len(reduced.entropies)
         self.size = self.nv + self.n + self.ns + 2 + len(reduced.made)
         driven = [i for i in range(reduced.links) if t.driven[t.r_at[i] : t.r_at[i] + t.dim[i]].any()]
         self.prescribed = np.array([float(reduced.edges[i].motion or 0.0) for i in driven])
         groups = [i for i in self._moving if t.code[i] != VECTOR]
-        self.curved = np.array([self._v_at[i] + j for i in groups for j in range(int(t.dim[i]))], dtype=int)
+        self.curved = np.array([int(t.r_at[i]) + j for i in groups for j in range(int(t.dim[i]))], dtype=int)
         self.counted = np.r_[np.arange(self.n), self.nv : self.nv + self.n + self.ns]
         number = {slot.path: i for i, slot in enumerate(problem.descriptor.components)}
         self._makers = np.array([number[path] for path in reduced.made], dtype=int)

@@ -121,6 +121,7 @@ def reduce_scene(scene: Scene, problem: Problem, model: Model) -> Reduced:
         made,
         names,
         twists,
+        poses,
     )
     bodies = tuple(names[b] if b < len(names) else None for b in order)
     n = int(mechanism.driven.size)
@@ -153,6 +154,7 @@ def _tables(
     made: tuple[Path, ...],
     names: list[str],
     twists: list[Array],
+    poses: list[Array],
 ) -> Mechanism:
     links, count = len(order), len(edges)
     inertia = np.zeros((links, 6, 6))
@@ -175,7 +177,7 @@ def _tables(
         b, d = edge.pair.basis, edge.pair.dim
         basis[i, :, :d], left[i, :d] = b, np.linalg.pinv(b)
         if kind == CUT:
-            found = _complement(b, loop_algebra(i, edges, parents, place, twists, scene), length)
+            found = _complement(b, loop_algebra(i, edges, parents, place, twists, poses), length)
             rows[i] = len(found)
             normal[i, : len(found)] = found
         if kind != SPRING:

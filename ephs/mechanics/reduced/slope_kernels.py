@@ -3,7 +3,7 @@
 # numba infers the types of these functions, and exports what it does not list.
 # pyright: basic, reportPrivateImportUsage=false
 
-from ephs.mechanics.reduced.sweep_kernels import _component
+from ephs.mechanics.reduced.sweep_kernels import component_at
 from ephs.mechanics.reduced.tables import CUT, SPRING
 from ephs.semantics.spaces import jit
 from ephs.semantics.spaces.se3_kernels import pose_compose, quat_to_matrix
@@ -89,13 +89,13 @@ def component_slopes(t, w, d, q, r, s, drive, scal):
         d.node[k] = 0.0
         if t.node[k] >= 0:
             w.small[380] = s[k]
-            status = _component(t, w, t.node[k], scal, w.small[380:])
+            status = component_at(t, w, t.node[k], scal, w.small[380:])
             if status != 0:
                 return status, t.node[k]
             d.node[k] = 2.0 * w.f[0]
     for i in range(links):
         if t.weight[i] >= 0:
-            status = _component(t, w, t.weight[i], scal, w.pose[i])
+            status = component_at(t, w, t.weight[i], scal, w.pose[i])
             if status != 0:
                 return status, t.weight[i]
             for k in range(6):
@@ -109,7 +109,7 @@ def component_slopes(t, w, d, q, r, s, drive, scal):
         for j in range(t.q_size[i]):
             x[j] = w.relative[i, j] if t.kind[i] == SPRING else q[t.q_at[i] + j]
         if t.spring[i] >= 0:
-            status = _component(t, w, t.spring[i], scal, x)
+            status = component_at(t, w, t.spring[i], scal, x)
             if status != 0:
                 return status, t.spring[i]
             for j in range(dim):
@@ -125,7 +125,7 @@ def component_slopes(t, w, d, q, r, s, drive, scal):
             for j in range(dim):
                 w.e[j] = r[t.r_at[i] + j] if i < links else w.rate[i, j]
             w.e[dim] = w.temperature[t.heat[i]]
-            status = _component(t, w, number, scal, x)
+            status = component_at(t, w, number, scal, x)
             if status != 0:
                 return status, number
             reads = t.dims[number, 2]
@@ -148,7 +148,7 @@ def component_slopes(t, w, d, q, r, s, drive, scal):
     for k in range(t.conduction.shape[0]):
         number, one, two = t.conduction[k, 0], t.conduction[k, 1], t.conduction[k, 2]
         w.e[0], w.e[1] = w.temperature[one], w.temperature[two]
-        status = _component(t, w, number, scal, x)
+        status = component_at(t, w, number, scal, x)
         if status != 0:
             return status, number
         for a in range(2):

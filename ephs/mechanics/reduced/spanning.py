@@ -49,17 +49,22 @@ class Edge:
     freedoms: slice
 
 
+def _frame2(edge: Edge, poses: list[Array]) -> Array:
+    """The pose in the world of a joint's frame on body 2, where bodies have these poses."""
+    if edge.body2 < 0:
+        return edge.offset2
+    if edge.body2 < len(poses):
+        return SE3.compose(poses[edge.body2], edge.offset2)
+    # a frame inside a universal joint has no pose, but the other body of its joint does
+    one = edge.offset1 if edge.body1 < 0 else SE3.compose(poses[edge.body1], edge.offset1)
+    return SE3.compose(one, edge.pair.include(edge.coordinate))
+
+
 def twists_of(edges: list[Edge], joints: int, poses: list[Array]) -> list[Array]:
     """The freedoms of all joints in the world, where bodies have these poses; none of springs."""
-    ground = SE3.identity()
-    known = dict(enumerate(poses)) | {-1: ground}
     out: list[Array] = []
     for edge in edges[:joints]:
-        if edge.body2 in known:  # a frame inside a universal joint has no pose, but one of its joints' bodies does
-            frame = SE3.compose(known[edge.body2], edge.offset2)
-        else:
-            frame = SE3.compose(SE3.compose(known[edge.body1], edge.offset1), edge.pair.include(edge.coordinate))
-        out.append(SE3.adjoint(frame) @ edge.pair.basis)
+        out.append(SE3.adjoint(_frame2(edge, poses)) @ edge.pair.basis)
     return out + [np.zeros((6, 0))] * (len(edges) - joints)
 
 
@@ -162,7 +167,7 @@ def springs_of(scene: Scene, number: Mapping[str, int]) -> list[Edge]:
 
 
 def loop_algebra(
-    cut: int, edges: list[Edge], parents: list[int], place: Mapping[int, int], twists: list[Array], scene: Scene
+    cut: int, edges: list[Edge], parents: list[int], place: Mapping[int, int], twists: list[Array], poses: list[Array]
 ) -> Array:
     """(6, k): the algebra, in the frame C2 of a cut joint, of the group that the joints of its loop generate.
 
@@ -174,11 +179,5 @@ def loop_algebra(
         later = int(ends[1] > ends[0])
         passed.append(ends[later])
         ends[later] = parents[ends[later]]
-    bodies = list(scene.all_bodies())
-    edge = edges[cut]
-    if 0 <= edge.body2 < len(bodies):
-        frame = SE3.compose(np.array(bodies[edge.body2][1].pose), edge.offset2)
-    else:  # the ground
-        frame = edge.offset2
-    seen = SE3.adjoint(SE3.inverse(frame)) @ np.column_stack([twists[i] for i in [*passed, cut]])
+    seen = SE3.adjoint(SE3.inverse(_frame2(edges[cut], poses))) @ np.column_stack([twists[i] for i in [*passed, cut]])
     return generated(seen.T).basis

@@ -25,8 +25,11 @@ kernel = jit.lean_kernel
 
 
 @kernel
-def _component(t, w, number, scal, x):
-    """Call a component's kernel at states x, without increments; efforts in w.e, flows in w.f."""
+def component_at(t, w, number, scal, x):
+    """Call a component's kernel at states x, without increments; efforts in w.e, flows in w.f.
+
+    ``t`` are tables with the components' addresses, ``w`` the memory of the sweeps or of the engine.
+    """
     return call_kernel(  # pyright: ignore[reportCallIssue] - the typing context is numba's
         t.address[number], t.dims[number].ctypes.data, scal.ctypes.data,
         t.parameters[t.parameter_at[number] :].ctypes.data, x.ctypes.data, w.small[400:].ctypes.data,
@@ -175,7 +178,7 @@ def forces(t, w, q, r, s, drive, wrench, scal, s_rate, made, powers):
         s_rate[k] = 0.0
         if t.node[k] >= 0:
             w.small[380] = s[k]
-            status = _component(t, w, t.node[k], scal, w.small[380:])
+            status = component_at(t, w, t.node[k], scal, w.small[380:])
             if status != 0:
                 return status, t.node[k]
             w.temperature[k] = w.e[0]
@@ -194,7 +197,7 @@ def forces(t, w, q, r, s, drive, wrench, scal, s_rate, made, powers):
         for k in range(6):
             w.load[i, k] -= turned[k]
         if t.weight[i] >= 0:
-            status = _component(t, w, t.weight[i], scal, w.pose[i])
+            status = component_at(t, w, t.weight[i], scal, w.pose[i])
             if status != 0:
                 return status, t.weight[i]
             for k in range(6):
@@ -213,7 +216,7 @@ def forces(t, w, q, r, s, drive, wrench, scal, s_rate, made, powers):
                 pull[j] = drive[t.r_at[i] + j]
                 powers[1] += pull[j] * rate[j]
         if t.spring[i] >= 0:
-            status = _component(t, w, t.spring[i], scal, x)
+            status = component_at(t, w, t.spring[i], scal, x)
             if status != 0:
                 return status, t.spring[i]
             for j in range(d):
@@ -222,7 +225,7 @@ def forces(t, w, q, r, s, drive, wrench, scal, s_rate, made, powers):
             for j in range(d):
                 w.e[j] = rate[j]
             w.e[d] = w.temperature[t.heat[i]]
-            status = _component(t, w, t.friction[i], scal, x)
+            status = component_at(t, w, t.friction[i], scal, x)
             if status != 0:
                 return status, t.friction[i]
             for j in range(d):
@@ -242,7 +245,7 @@ def forces(t, w, q, r, s, drive, wrench, scal, s_rate, made, powers):
     for k in range(t.conduction.shape[0]):
         number, one, two = t.conduction[k, 0], t.conduction[k, 1], t.conduction[k, 2]
         w.e[0], w.e[1] = w.temperature[one], w.temperature[two]
-        status = _component(t, w, number, scal, x)
+        status = component_at(t, w, number, scal, x)
         if status != 0:
             return status, number
         s_rate[one] -= w.f[0]
