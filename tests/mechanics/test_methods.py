@@ -203,6 +203,38 @@ def test_initial_states_off_the_joints_are_refused(method):
 
 # ---- promises -------------------------------------------------------------------------------------------------------
 
+FREE = """
+[bodies.one]
+mass = 0.5
+inertia = [0.04, 0.03, 0.04, 0.01, 0.0, 0.0]
+[bodies.two]
+mass = 2.0
+inertia = [0.07, 0.15, 0.13]
+[joints.one]
+type = "free"
+bodies = ["ground", "one"]
+frame1 = { position = [-0.8, 0.9, 0.1], rotation = [0.8, -0.4, -0.4, 0.2] }
+frame2 = { position = [1.5, 0.2, 0.3], rotation = [0.8, 0.0, 0.0, 0.6] }
+friction = [0.1, 0.4, 0.2, 0.2, 0.2, 0.2]
+[joints.two]
+type = "free"
+bodies = ["ground", "two"]
+frame1 = { position = [-0.9, 0.2, -0.7], rotation = [0.9, -0.3, -0.3, -0.1] }
+frame2 = { position = [-0.3, -0.5, 0.8], rotation = [0.9, -0.1, -0.3, -0.3] }
+friction = [0.3, 0.2, 0.2, 0.3, 0.5, 0.2]
+"""
+
+
+@pytest.mark.parametrize("method", BALANCED)
+def test_a_force_that_is_zero_but_for_rounding_stops_no_step(method, tmp_path):
+    scene, rng = scene_of("format = 1\nname = 'free'\n" + FREE, tmp_path), np.random.default_rng(3)
+    for _ in range(60):
+        pose, rate = rng.uniform(-1.0, 1.0, (2, 2, 6))
+        start = scene.with_state(
+            coordinates=dict(zip(("one", "two"), pose, strict=True)), rates={"one": rate[0], "two": rate[1]}
+        )
+        assert ephs.simulate(start, 0.01, method=method, step=2e-3).stats["cut_steps"] == 0
+
 
 def test_natural4_is_of_order_four_with_friction_heat_and_loops():
     scene = ephs.load(ROOT / "scenes/slider-crank.toml")

@@ -93,6 +93,29 @@ class Memory(NamedTuple):
 
 
 @kernel
+def weigh(t, m):
+    """Measure the effort of each storage, too, by the balances that it takes part in.
+
+    One that is zero, of a joint without stiffness, is known to the rounding of those, which is all its own size.
+    """
+    n_rate, n_effort = t.counts[0], t.counts[1]
+    least = m.dense
+    for i in range(n_effort):
+        least[i] = 1e300
+    for k in range(t.row.shape[0]):
+        row, effort = t.row[k], t.column[k] - n_rate
+        entry = abs(m.data[k])
+        if row >= n_rate and 0 <= effort < n_effort and entry > 0.0:
+            least[effort] = min(least[effort], m.scale[row] / entry)
+    for i in range(t.kind.shape[0]):
+        if t.kind[i] == 0:
+            for j in range(t.dims[i, 0]):
+                row, effort = t.read_w[t.read_w_at[i] + j], t.e_index[t.e_at[i] + j]
+                if least[effort] < 1e300:
+                    m.scale[row] = max(m.scale[row], least[effort])
+
+
+@kernel
 def evaluate(t, x, z, scal, inputs, m):
     """Residual, its scale, and the matrix at z; returns (status, component)."""
     n_rate, n_effort = t.counts[0], t.counts[1]
@@ -205,6 +228,7 @@ def evaluate(t, x, z, scal, inputs, m):
                     if place >= 0:
                         flow = m.scale[n_rate + t.e_index[e_at + q]]
                         m.scale[row] = max(m.scale[row], abs(m.data[place]) * flow)
+    weigh(t, m)
     return 0, 0
 
 
