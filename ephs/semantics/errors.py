@@ -68,6 +68,7 @@ _TEXTS = {
         "scene.with_state(rates=…)"
     ),
     "unknown-state": "{path}: no such state; the states are {expected}",
+    "unknown-parameter": "{path}: no number of a component of the library; {hint}",
     "missing-input": ("{path}: the outer port is open: give inputs={{'{path}': {{'flow': …}}}} or {{'effort': …}}"),
     "unknown-input": "{path}: no such outer power port; the open ports are {expected}",
     "input": "{path}: the input is {found}, expected {expected}",

@@ -137,6 +137,11 @@ TEXTS: dict[str, tuple[str, str]] = {
         "velocities that satisfy the joints",
         "the prescribed rates contradict each other; mend them",
     ),
+    # numbers by path
+    "unknown parameter": ("a number of the scene, by its path", "{hint}"),
+    "entry": ("an entry {shape}", "say which of the numbers is meant"),
+    "one number": ("one number for all freedoms", "vary its entries one by one"),
+    "held velocity": ("a free body", "vary the rate of a joint instead: joints.{joint}.rate"),
     # states
     "unknown state": ("one of its {what}s", "{hint}"),
     "state length": ("{what}", "give one number a freedom, in the order of the freedoms"),

@@ -1,0 +1,293 @@
+"""The numbers of a scene's things: how each is read, written and held against its range."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ephs.mechanics.scene.errors import Fault, fault
+from ephs.mechanics.scene.geometry import body_twist, coupling_of
+from ephs.mechanics.scene.model import GROUND, IDENTITY_POSE, Joint, Scene, frozen
+from ephs.semantics.spaces import SE3
+from ephs.semantics.spaces import rotations as so3
+
+__all__ = ["FIELDS", "Field", "placed"]
+
+Array = NDArray[np.float64]
+Least = tuple[float, bool]
+"""A bound from below, and whether it is excluded."""
+NON_NEGATIVE: Least = (0.0, False)
+POSITIVE: Least = (0.0, True)
+
+
+def _sound(_scene: Scene, _name: str, _before: Scene, _strict: bool) -> list[Fault]:
+    return []
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Field:
+    """A number, or an array of numbers, of a body, joint, …
+
+    Parameters
+    ----------
+    get, put
+        The array from (scene, dotted name); the scene from (scene, dotted name, array).
+    least
+        Bound of every number.
+    spread
+        Whether one number may stand for all freedoms.
+    moves
+        ``"frame"`` where bodies have to follow, ``"state"`` where it is a joint's coordinate or rate.
+    faults
+        What is wrong with the new value: from (scene, name, the scene before, strict).
+    """
+
+    get: Callable[[Scene, str], Array]
+    put: Callable[[Scene, str, Array], Scene]
+    least: Least | None = None
+    spread: bool = False
+    moves: str = ""
+    faults: Callable[[Scene, str, Scene, bool], list[Fault]] = _sound
+
+
+def placed(scene: Scene, before: Scene, coordinates: Mapping[str, Array], rates: Mapping[str, Array]) -> Scene:
+    """The scene with its bodies where its joints want them: joints keep the coordinates and rates that are not given,
+    as the scene before had them, unless they close a loop."""
+    joints = dict(before.all_joints())
+    for name, joint in joints.items():
+        kept = {"coordinate": joint.coordinate, "rate": joint.rate}
+        scene = _edited(scene, "joints", name, lambda j, kept=kept: replace(j, **kept))
+    return scene.with_state(coordinates, rates, adjust=True)
+
+
+def _edited(scene: Scene, kind: str, name: str, change: Callable[[Any], Any]) -> Scene:
+    """The scene with one of its things changed, in whichever part it is."""
+    own = getattr(scene, kind)
+    if name in own:
+        return replace(scene, **{kind: {**own, name: change(own[name])}})
+    part, _, rest = name.partition(".")
+    return replace(scene, parts={**scene.parts, part: _edited(scene.parts[part], kind, rest, change)})
+
+
+def _thing(scene: Scene, kind: str, name: str) -> Any:
+    own = getattr(scene, kind)
+    if name in own:
+        return own[name]
+    part, _, rest = name.partition(".")
+    return _thing(scene.parts[part], kind, rest)
+
+
+def _attribute(kind: str, key: str, least: Least | None = None, **more: Any) -> Field:
+    """A number or an array that is an attribute."""
+
+    def get(scene: Scene, name: str) -> Array:
+        return np.asarray(getattr(_thing(scene, kind, name), key), dtype=float)
+
+    def put(scene: Scene, name: str, values: Array) -> Scene:
+        value = frozen(values) if values.ndim else float(values)
+        return _edited(scene, kind, name, lambda thing: replace(thing, **{key: value}))
+
+    return Field(get, put, least, **more)
+
+
+def _world(key: str, least: Least | None = None) -> Field:
+    """A number of the world, which is the same in all parts."""
+
+    def put(scene: Scene, name: str, values: Array) -> Scene:
+        world = replace(scene.world, **{key: frozen(values) if values.ndim else float(values)})
+        return replace(scene, world=world, parts={n: put(part, name, values) for n, part in scene.parts.items()})
+
+    return Field(lambda scene, _: np.asarray(getattr(scene.world, key), dtype=float), put, least)
+
+
+# ---- bodies ------------------------------------------------------------------------------------------------------
+
+_SIX = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+
+
+def _inertia(scene: Scene, name: str) -> Array:
+    return np.array([_thing(scene, "bodies", name).inertia[at] for at in _SIX])
+
+
+def _put_inertia(scene: Scene, name: str, values: Array) -> Scene:
+    xx, yy, zz, xy, xz, yz = values.tolist()
+    tensor = frozen([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    return _edited(scene, "bodies", name, lambda body: replace(body, inertia=tensor))
+
+
+def _body_faults(scene: Scene, name: str, before: Scene, strict: bool) -> list[Fault]:
+    """An inertia that no mass distribution has."""
+    body, key = scene.body(name), f"bodies.{name}.inertia"
+    moments = np.linalg.eigvalsh(body.inertia)
+    slack = 1e-9 * float(np.abs(moments).max())
+    text = "principal moments " + ", ".join(f"{moment:.6g}" for moment in moments)
+    if body.mass == 0.0 and body.inertia.any():
+        return [fault("massless", key, text)]
+    if moments[0] < -slack:
+        return [fault("inertia indefinite", key, text)]
+    old = np.linalg.eigvalsh(before.body(name).inertia)
+    sound = old[2] <= old[0] + old[1] + 1e-9 * float(np.abs(old).max())
+    if strict and sound and moments[2] > moments[0] + moments[1] + slack:
+        return [fault("inertia triangle", key, text)]
+    return []
+
+
+def _put_position(scene: Scene, name: str, values: Array) -> Scene:
+    """The centre of mass elsewhere: the body moves on as it did, its joints stay; a free body starts there."""
+    body = scene.body(name)
+    pose = np.concatenate([body.pose[:4], values])
+    joints = [j for _, j in scene.all_joints() if name in (j.body1, j.body2)]
+    shift = so3.quaternion_to_matrix(body.pose[:4]).T @ (values - body.pose[4:])
+    twist = np.array(body.twist)
+    if joints:
+        twist[3:] += np.cross(twist[:3], shift)
+    scene = _edited(scene, "bodies", name, lambda b: replace(b, pose=frozen(pose), twist=frozen(twist)))
+    back = np.concatenate([IDENTITY_POSE[:4], -shift])
+    for joint in joints:
+        frames = {
+            key: frozen(SE3.compose(back, getattr(joint, key)))
+            for key, at in (("frame1", joint.body1), ("frame2", joint.body2))
+            if at == name
+        }
+        scene = _edited(scene, "joints", joint.name, lambda j, frames=frames: replace(j, **frames))
+    return scene
+
+
+def _velocity(scene: Scene, name: str) -> Array:
+    body = scene.body(name)
+    return so3.quaternion_to_matrix(body.pose[:4]) @ body.twist[3:]
+
+
+def _put_velocity(scene: Scene, name: str, values: Array) -> Scene:
+    body = scene.body(name)
+    twist = frozen(body_twist(body.pose, values, body.twist[:3]))
+    return _edited(scene, "bodies", name, lambda b: replace(b, twist=twist))
+
+
+def _put_spin(scene: Scene, name: str, values: Array) -> Scene:
+    twist = frozen(np.concatenate([values, scene.body(name).twist[3:]]))
+    return _edited(scene, "bodies", name, lambda b: replace(b, twist=twist))
+
+
+def _free_only(key: str) -> Callable[[Scene, str, Scene, bool], list[Fault]]:
+    def faults(scene: Scene, name: str, _before: Scene, _strict: bool) -> list[Fault]:
+        joint = next((j.name for _, j in scene.all_joints() if name in (j.body1, j.body2)), None)
+        if joint is None:
+            return []
+        return [fault("held velocity", f"bodies.{name}.{key}", f"a body held by joint {joint}", joint=joint)]
+
+    return faults
+
+
+# ---- joints ------------------------------------------------------------------------------------------------------
+
+
+def _pose(scene: Scene, body: str) -> Array:
+    return IDENTITY_POSE if body == GROUND else scene.body(body).pose
+
+
+def _at(scene: Scene, name: str) -> Array:
+    joint = scene.joint(name)
+    return SE3.compose(_pose(scene, joint.body1), joint.frame1)[4:]
+
+
+def _put_at(scene: Scene, name: str, values: Array) -> Scene:
+    """The joint elsewhere in the world: both of its frames move by as much."""
+    joint, by = scene.joint(name), values - _at(scene, name)
+    frames: dict[str, Array] = {}
+    for key, body in (("frame1", joint.body1), ("frame2", joint.body2)):
+        frame = np.array(getattr(joint, key))
+        frame[4:] += so3.quaternion_to_matrix(_pose(scene, body)[:4]).T @ by
+        frames[key] = frozen(frame)
+    return _edited(scene, "joints", name, lambda j: replace(j, **frames))
+
+
+def _frame(key: str) -> Field:
+    def put(scene: Scene, name: str, values: Array) -> Scene:
+        frame = np.concatenate([getattr(scene.joint(name), key)[:4], values])
+        return _edited(scene, "joints", name, lambda j: replace(j, **{key: frozen(frame)}))
+
+    return Field(lambda scene, name: np.array(getattr(scene.joint(name), key)[4:]), put, moves="frame")
+
+
+def _coordinate(scene: Scene, name: str) -> Array:
+    joint = scene.joint(name)
+    return coupling_of(joint).coordinates(joint.coordinate)
+
+
+def _put_coordinate(scene: Scene, name: str, values: Array) -> Scene:
+    element = frozen(coupling_of(scene.joint(name)).element(values))
+    return _edited(scene, "joints", name, lambda j: replace(j, coordinate=element))
+
+
+def _motion(scene: Scene, name: str) -> Array:
+    rate = scene.joint(name).motion
+    return np.zeros(0) if rate is None else np.array([rate])
+
+
+def _put_motion(scene: Scene, name: str, values: Array) -> Scene:
+    return _edited(scene, "joints", name, lambda j: replace(j, motion=float(values[0]), rate=frozen(values)))
+
+
+def _stiffness_faults(scene: Scene, name: str, _before: Scene, _strict: bool) -> list[Fault]:
+    """A rotation vector has one stiffness, and rest 0."""
+    joint: Joint = scene.joint(name)
+    turning, key = coupling_of(joint).turning, f"joints.{name}"
+    about, rest = joint.stiffness[list(turning)], joint.rest[list(turning)]
+    faults = [fault("isotropic", f"{key}.stiffness", about.tolist())] if np.any(about != about[:1]) else []
+    return faults + ([fault("rest rotation", f"{key}.rest", rest.tolist())] if np.any(about) and np.any(rest) else [])
+
+
+def _friction_faults(scene: Scene, name: str, _before: Scene, _strict: bool) -> list[Fault]:
+    moments = np.linalg.eigvalsh(scene.joint(name).friction)
+    if moments.size and moments[0] < -1e-9 * float(np.abs(moments).max()):
+        return [fault("friction sign", f"joints.{name}.friction", f"the eigenvalue {moments[0]:.6g}")]
+    return []
+
+
+FIELDS: Mapping[str, Mapping[str, Field]] = {
+    "world": {
+        "gravity": _world("gravity"),
+        "temperature": _world("temperature", POSITIVE),
+        "pressure": _world("pressure", POSITIVE),
+    },
+    "bodies": {
+        "mass": _attribute("bodies", "mass", NON_NEGATIVE, faults=_body_faults),
+        "inertia": Field(_inertia, _put_inertia, faults=_body_faults),
+        "position": Field(lambda scene, name: np.array(scene.body(name).pose[4:]), _put_position),
+        "angular_velocity": Field(
+            lambda scene, name: np.array(scene.body(name).twist[:3]), _put_spin, faults=_free_only("angular_velocity")
+        ),
+        "velocity": Field(_velocity, _put_velocity, faults=_free_only("velocity")),
+    },
+    "joints": {
+        "pitch": _attribute("joints", "pitch", moves="frame"),
+        "friction": _attribute("joints", "friction", spread=True, faults=_friction_faults),
+        "stiffness": _attribute("joints", "stiffness", spread=True, faults=_stiffness_faults),
+        "rest": _attribute("joints", "rest", faults=_stiffness_faults),
+        "drive": _attribute("joints", "drive"),
+        "coordinate": Field(_coordinate, _put_coordinate, moves="state"),
+        "motion.rate": Field(_motion, _put_motion, moves="state"),
+        "rate": _attribute("joints", "rate", moves="state"),
+        "at": Field(_at, _put_at, moves="frame"),
+        "frame1.position": _frame("frame1"),
+        "frame2.position": _frame("frame2"),
+    },
+    "springs": {
+        "stiffness": _attribute("springs", "stiffness"),
+        "length": _attribute("springs", "length", NON_NEGATIVE),
+        "damping": _attribute("springs", "damping", NON_NEGATIVE),
+        "at1": _attribute("springs", "at1"),
+        "at2": _attribute("springs", "at2"),
+    },
+    "thermal": {
+        "capacity": _attribute("thermal", "capacity", POSITIVE),
+        "temperature": _attribute("thermal", "temperature", POSITIVE),
+    },
+    "conduction": {"conductance": _attribute("conduction", "conductance", NON_NEGATIVE)},
+    "markers": {"at": _attribute("markers", "at")},
+}
+"""Kind of thing -> key of the scene file -> its numbers."""

@@ -1,0 +1,257 @@
+"""Numbers of a model by path: read one, or make the model with other ones.
+
+Paths of a scene are keys of its file, names in parts dotted: ``bodies.crank.mass``, ``bodies.left.crank.inertia[0]``,
+``joints.pin.friction``, ``joints.pin.frame1.position[2]``, ``springs.s.length``, ``world.gravity[2]``. Those of a
+system are its components' parameters: ``osc.pe.k``.
+
+Positions mean what they mean in a file whose joints are given by ``at`` and ``axis``: a body's ``position`` moves its
+centre of mass (with its axes, springs and markers) while its joints stay where they are in the world, a joint's ``at``
+moves the joint. After a change of frames, coordinates or rates the bodies follow their joints as `Scene.with_state` has
+it: joints keep what is not varied, unless they close a loop; then the nearest state that closes it is taken.
+"""
+
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, TypeVar, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ephs.mechanics.scene.errors import Fault, SceneError, did_you_mean, fault, listing
+from ephs.mechanics.scene.fields import FIELDS, Field, placed
+from ephs.mechanics.scene.model import Scene
+from ephs.semantics.errors import AssemblyError
+from ephs.semantics.primitives import Irreversible, Reversible, Storage
+from ephs.semantics.system import Filling, System
+
+__all__ = ["names", "read", "varied"]
+
+Array = NDArray[np.float64]
+Model = TypeVar("Model", Scene, System)
+_INDEX = re.compile(r"((?:\[\d+\])*)$")
+
+
+def read(model: Scene | System, path: str) -> float:
+    """The number at a path.
+
+    Raises
+    ------
+    SceneError, AssemblyError
+        A scene, a system has no such number; the message names the nearest one.
+    """
+    if isinstance(model, System):
+        return _component(model, path)[2]
+    return _Place.of(model, path).read(model)
+
+
+def varied(model: Model, values: Mapping[str, float], *, strict: bool = True) -> Model:
+    """The model with other numbers at some paths, all else the same; loops of a scene closed.
+
+    Parameters
+    ----------
+    values
+        Path -> number, in the unit of the scene file or the component.
+    strict
+        Refuse an inertia that no mass distribution has, unless the body had such a one.
+
+    Raises
+    ------
+    SceneError
+        With every fault: an unknown path, a number out of its range, a loop that does not close.
+    AssemblyError, StructureError
+        The same of a system's components.
+    """
+    if isinstance(model, System):
+        return _system(model, values)
+    return _scene(model, values, strict)
+
+
+def names(model: Scene | System) -> list[str]:
+    """All paths that `read` takes, entries of vectors one by one."""
+    if isinstance(model, System):
+        leaves = ((path, filling) for path, filling in model.leaves() if filling.name in _library())
+        return [f"{path}.{key}" for path, filling in leaves for key, _ in filling.parameters]
+    return list(_paths(model))
+
+
+# ---- scenes ------------------------------------------------------------------------------------------------------
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class _Place:
+    """Where a path of a scene leads: the thing, its field, and the entry of it."""
+
+    path: str
+    key: str
+    name: str
+    field: Field
+    index: tuple[int, ...]
+
+    @staticmethod
+    def of(scene: Scene, path: str) -> "_Place":
+        stem, index = _INDEX.split(path)[:2]
+        entries = tuple(int(number) for number in re.findall(r"\d+", index))
+        kind, _, rest = stem.partition(".")
+        for key, field in FIELDS.get(kind, {}).items():
+            name = rest.removesuffix(key).removesuffix(".") if rest.endswith(key) else None
+            if name is not None and (not name or rest == f"{name}.{key}") and _has(scene, kind, name):
+                found = _Place(path, key, name, field, entries)
+                found.entry(field.get(scene, name), scene)
+                return found
+        raise _unknown(scene, path)
+
+    def entry(self, values: Array, scene: Scene) -> Any:
+        """What of the field's array is meant: an index, or a slice for all of it where one number stands for all."""
+        if values.ndim == len(self.index) and all(i < n for i, n in zip(self.index, values.shape, strict=True)):
+            return self.index
+        if values.ndim == 2 and len(self.index) == 1 and self.index[0] < len(values):
+            return self.index * 2
+        if not self.index and (values.size == 1 or (self.field.spread and values.size)):
+            return (slice(None),) * values.ndim if values.ndim < 2 else tuple(np.diag_indices(len(values)))
+        shape = "".join(f"[0…{n - 1}]" for n in values.shape) if values.size else "of nothing: there is no such number"
+        found = "".join(f"[{i}]" for i in self.index) or "no index"
+        raise SceneError(scene.source or scene.name, [fault("entry", self.path, found, shape=shape)])
+
+    def read(self, scene: Scene) -> float:
+        """The number."""
+        values = self.field.get(scene, self.name)
+        if self.index:
+            return float(values[self.entry(values, scene)])
+        if not _uniform(values):
+            raise SceneError(scene.source or scene.name, [fault("one number", self.path, values.tolist())])
+        return float(values.flat[0])
+
+    def put(self, scene: Scene, value: float) -> Scene:
+        """The scene with another number there."""
+        values = np.array(self.field.get(scene, self.name))
+        entry = self.entry(values, scene)
+        if values.ndim == 2 and not self.index:
+            values[:] = 0.0
+        values[entry] = value
+        if values.ndim == 2 and len(self.index) == 2:
+            values[self.index[::-1]] = value
+        return self.field.put(scene, self.name, values)
+
+
+def _scene(scene: Scene, values: Mapping[str, float], strict: bool) -> Scene:
+    places = [_Place.of(scene, path) for path in values]
+    faults: list[Fault] = []
+    found, coordinates, rates = scene, dict[str, Array](), dict[str, Array]()
+    # The bodies' and joints' own numbers first: coordinates are then reached with them.
+    for place in sorted(places, key=lambda place: place.field.moves == "state"):
+        value = float(values[place.path])
+        least = place.field.least
+        if not np.isfinite(value):
+            faults.append(fault("finite", place.path, value))
+        elif least is not None and not (value > least[0] if least[1] else value >= least[0]):
+            faults.append(fault("range", place.path, value, what=f"a number {'>' if least[1] else '≥'} {least[0]:g}"))
+        else:
+            found = place.put(found, value)
+    for place in places:
+        faults += place.field.faults(found, place.name, scene, strict)
+    if faults:
+        raise SceneError(scene.source or scene.name, faults)
+    for place in places:
+        if place.key == "coordinate":
+            coordinates[place.name] = place.field.get(found, place.name)
+        elif place.field.moves == "state":
+            rates[place.name] = found.joint(place.name).rate
+    if any(place.field.moves for place in places):
+        return placed(found, scene, coordinates, rates)
+    return found
+
+
+def _uniform(values: Array) -> bool:
+    """Whether one number says all: each is that number, or a matrix is that number times the identity."""
+    return bool(np.all(values == (values.flat[0] * np.eye(len(values)) if values.ndim == 2 else values.flat[0])))
+
+
+def _has(scene: Scene, kind: str, name: str) -> bool:
+    return not name if kind == "world" else name in _things(scene, kind)
+
+
+def _things(scene: Scene, kind: str) -> Mapping[str, Any]:
+    every: Mapping[str, Callable[[], Iterable[tuple[str, Any]]]] = {
+        "bodies": scene.all_bodies,
+        "joints": scene.all_joints,
+        "springs": scene.all_springs,
+        "thermal": scene.all_thermal,
+        "conduction": scene.all_conduction,
+        "markers": scene.all_markers,
+    }
+    return dict(every[kind]())
+
+
+def _paths(scene: Scene) -> Iterator[str]:
+    for kind, fields in FIELDS.items():
+        for name in ("",) if kind == "world" else _things(scene, kind):
+            for key, field in fields.items():
+                stem = f"{kind}.{name}.{key}" if name else f"{kind}.{key}"
+                values = field.get(scene, name)
+                if values.size == 1 or (field.spread and values.size and _uniform(values)):
+                    yield stem
+                if values.ndim and values.size > 1:
+                    yield from (f"{stem}[{']['.join(map(str, index))}]" for index in np.ndindex(values.shape))
+
+
+def _unknown(scene: Scene, path: str) -> SceneError:
+    known = list(_paths(scene))
+    hint = did_you_mean(path, known, f"there are: {listing(known)}")
+    return SceneError(scene.source or scene.name, [fault("unknown parameter", "", f'"{path}"', hint=hint)])
+
+
+# ---- systems -----------------------------------------------------------------------------------------------------
+
+
+def _library() -> dict[str, Callable[..., Filling]]:
+    from ephs.semantics import library
+
+    return {name: getattr(library, name) for name in library.__all__}
+
+
+def _component(system: System, path: str) -> tuple[Filling, str, float]:
+    """The component that a path leads to, the parameter's name and its number."""
+    *box, key = path.split(".")
+    filling: Any = system
+    for word in _boxes(system, box):
+        filling = filling.fillings[word] if isinstance(filling, System) else None
+    if isinstance(filling, Storage | Reversible | Irreversible) and filling.name in _library():
+        parameters: dict[str, Any] = dict(filling.parameters)
+        if key in parameters:
+            return filling, key, float(parameters[key])
+    known = names(system)
+    raise AssemblyError("unknown-parameter", path, hint=did_you_mean(path, known, f"there are: {listing(known)}"))
+
+
+def _boxes(system: System, words: list[str]) -> list[Any]:
+    """The boxes from outside to inside on the way that the words name; a box may have a dotted name."""
+    filling: Any = system
+    found: list[Any] = []
+    while words and isinstance(filling, System):
+        box = next((b for b in filling.fillings if [*map(str, b)] == words[: len(tuple(b))]), None)
+        if box is None:
+            return []
+        found.append(box)
+        words, filling = words[len(tuple(box)) :], filling.fillings[box]
+    return [] if words else found
+
+
+def _system(system: System, values: Mapping[str, float]) -> System:
+    found = system
+    changes: dict[tuple[Any, ...], dict[str, float]] = {}
+    for path, value in values.items():
+        _component(system, path)
+        *box, key = path.split(".")
+        changes.setdefault(tuple(_boxes(system, box)), {})[key] = float(value)
+    for boxes, parameters in changes.items():
+        found = _refilled(found, boxes, parameters)
+    return found
+
+
+def _refilled(filling: Any, boxes: tuple[Any, ...], parameters: Mapping[str, float]) -> Any:
+    if not boxes:
+        return _library()[filling.name](**{**dict(filling.parameters), **parameters})
+    inner = _refilled(filling.fillings[boxes[0]], boxes[1:], parameters)
+    return System.of(filling.pattern, {**dict(filling.fillings.items()), boxes[0]: inner})
