@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from ephs.mechanics.solve.errors import SimulationError as SimulationError
     from ephs.mechanics.solve.events import Event as Event
     from ephs.mechanics.solve.solution import Solution as Solution
+    from ephs.mechanics.sweep.sweep import SweepInterrupted as SweepInterrupted
+    from ephs.mechanics.sweep.sweep import sweep as sweep
     from ephs.operad import Directory as Directory
     from ephs.operad import Path as Path
     from ephs.operad import Pattern as Pattern
@@ -74,6 +76,7 @@ _HOMES = {
     "ephs.mechanics.solve.errors": ("Interrupted", "OptionError", "SimulationError"),
     "ephs.mechanics.solve.events": ("Event",),
     "ephs.mechanics.solve.solution": ("Solution",),
+    "ephs.mechanics.sweep.sweep": ("SweepInterrupted", "sweep"),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 _PACKAGES = ("mechanics", "operad", "semantics", "show", "testing")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from cyclopts import App, Parameter
 
-from ephs.cli_input import BadInput, addressed, load_model
+from ephs.cli_input import BadInput, addressed, load_model, say
 
 if TYPE_CHECKING:
     from ephs import Scene
@@ -84,7 +84,7 @@ def work_precision(
             files = draw_work_precision(points, title, output, f"work-precision-{scene.name}")
         best = min((p.error for p in points if p.outcome == "done"), default=float("nan"))
         failed = sum(p.outcome != "done" for p in points)
-        _say(f"{scene.name}: {len(points)} runs, {failed} failed, least error {best:.1e}", *map(str, files))
+        say(f"{scene.name}: {len(points)} runs, {failed} failed, least error {best:.1e}", *map(str, files))
     return 0
 
 
@@ -117,9 +117,9 @@ def stability(*families: str, output: Output, until: float = UNTIL, quick: bool 
             files = draw_stability(found, family, output, f"stability-{family.name}")
             cells += found
         counts = Counter(cell.outcome.value for cell in found)
-        _say(f"{family.name}: {', '.join(f'{n} {outcome}' for outcome, n in counts.items())}", *map(str, files))
+        say(f"{family.name}: {', '.join(f'{n} {outcome}' for outcome, n in counts.items())}", *map(str, files))
     with addressed(str(output), output):
-        _say("messages and errors:", *map(str, write_cells(cells, output, "stability")))
+        say("messages and errors:", *map(str, write_cells(cells, output, "stability")))
     return 0
 
 
@@ -181,9 +181,3 @@ def _status(name: str) -> Iterator[Callable[[str], None]]:
 
     with Console(stderr=True).status(name) as status:
         yield lambda what: status.update(f"{name}: {what}")
-
-
-def _say(*lines: str) -> None:
-    from rich.console import Console
-
-    Console(soft_wrap=True, highlight=False, markup=False).print("\n  ".join(lines))

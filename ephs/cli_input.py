@@ -1,4 +1,4 @@
-"""What the command line is given: files to models, and every error that speaks to the user to one clear text."""
+"""What the command line is given and gives: files to models, errors that speak to the user to clear texts, results."""
 
 import runpy
 import sys
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 if TYPE_CHECKING:
     from ephs import Scene, System
 
-__all__ = ["EXTRAS", "TEXTS", "BadInput", "Base", "addressed", "load_model", "naming"]
+__all__ = ["EXTRAS", "TEXTS", "BadInput", "Base", "addressed", "load_model", "naming", "say"]
 
 Base = Literal["fixed", "free"]
 TEXTS = {
@@ -27,7 +27,7 @@ TEXTS = {
     "failed": "{file}: the run failed: {found}",
     "interrupted": "{file}: interrupted{at}",
 }
-EXTRAS = {"matplotlib": "viz", "pygraphviz": "viz", "viser": "viz", "mujoco": "models"}
+EXTRAS = {"matplotlib": "viz", "pygraphviz": "viz", "viser": "viz", "mujoco": "models", "distributed": "cluster"}
 
 
 class BadInput(Exception):
@@ -117,3 +117,10 @@ def addressed(scene: str, target: Path | None = None) -> Iterator[None]:
 def naming(scene: str, message: str) -> str:
     """A message that names the file, once."""
     return message if str(Path(scene)) in message else f"{scene}: {message}"
+
+
+def say(*lines: str) -> None:
+    """Print results, those after the first line indented."""
+    from rich.console import Console
+
+    Console(soft_wrap=True, highlight=False, markup=False).print("\n  ".join(lines))

@@ -32,7 +32,7 @@ from ephs.semantics.system import System
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-__all__ = ["load_solution", "problem_of_scene", "problem_of_system", "simulate"]
+__all__ = ["control_of", "load_solution", "problem_of_scene", "problem_of_system", "simulate", "times_of"]
 
 OPEN = 1e-6
 """m or rad by which given initial states may leave a joint open."""
@@ -128,12 +128,12 @@ def simulate(
         raise OptionError("until", until, f"a finite time other than t0 = {t0!r} s")
     if end < start:
         _reversible(problem, end)
-    control = _control(problem, rtol, atol, step, min_step, max_step, max_steps)
+    control = control_of(problem, rtol, atol, step, min_step, max_step, max_steps)
     unknown = [key for key in options or {} if key not in chosen_method.options]
     if unknown:
         known = ", ".join(chosen_method.options) or "none"
         raise OptionError("options", unknown[0], f"options of {chosen_method.name}: {known}")
-    times, watched = _times(save_at, start, end), events_of(events)
+    times, watched = times_of(save_at, start, end), events_of(events)
     setting = Setting(problem, start, control, dict(options or {}))
     if chosen_method.many is not None and control.step is not None and not watched and end > start:
         return integrate(
@@ -163,7 +163,7 @@ def _fits(form: str, method: Method) -> None:
         raise OptionError("form", form, f"{' or '.join(forms)}, which {method.name} solves")
 
 
-def _control(
+def control_of(
     problem: Problem,
     rtol: "float | Mapping[str, float]",
     atol: "float | Mapping[str, float]",
@@ -172,6 +172,13 @@ def _control(
     max_step: float | None,
     max_steps: int | None,
 ) -> Control:
+    """How the steps of a problem are chosen.
+
+    Raises
+    ------
+    OptionError
+        A tolerance is no number, or is given for what the problem does not have.
+    """
     relative, absolute = Tolerance.of("rtol", rtol, 1e-6), Tolerance.of("atol", atol, 1e-9)
     states = [(slot.path, slot.quantity.kind) for slot in problem.descriptor.states]
     relative.known("rtol", states)
@@ -369,7 +376,14 @@ def _at_marker(marker: Marker, force: Signal) -> Signal:
     return Signal(wrench)
 
 
-def _times(save_at: "ArrayLike | None", t0: float, until: float) -> Array | None:
+def times_of(save_at: "ArrayLike | None", t0: float, until: float) -> Array | None:
+    """The times to keep, None: every step.
+
+    Raises
+    ------
+    OptionError
+        They are not in order, or not within the run.
+    """
     if save_at is None:
         return None
     times = np.atleast_1d(np.asarray(save_at, dtype=float))

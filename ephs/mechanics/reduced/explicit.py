@@ -266,17 +266,23 @@ class _March:
 
     def rows(self) -> list[tuple[float, ReducedState, float]]:
         """What was kept since the last call: time, state, the step's least production."""
-        sign, s = (1.0 if self.control[C_END] >= 0.0 else -1.0), self.memory
+        sign = 1.0 if self.control[C_END] >= 0.0 else -1.0
         out: list[tuple[float, ReducedState, float]] = []
-        for row in range(int(self.control[C_ROWS])):
-            passed, least = s.rows_t[row].tolist()
+        for row, (times, q, y) in enumerate(zip(*self.kept(), strict=True)):
+            passed, least = times.tolist()
             t = self.span.until if passed == abs(self.control[C_END]) else self.span.t0 + sign * passed
             if self.span.save_at is not None:
                 t = float(self.span.save_at[self.span.saved + self._handed + row])
-            out.append((t, self._state(t, s.rows_q[row], s.rows_y[row]), least))
+            out.append((t, self._state(t, q, y), least))
         self._handed += len(out)
         self.control[C_ROWS] = 0.0
         return out
+
+    def kept(self) -> tuple[Array, Array, Array]:
+        """The rows that `rows` would hand over: (n, 2) time from the start and least production, (n, ·) elements, and
+        (n, ·) rates, entropies and books; views of the memory."""
+        count = int(self.control[C_ROWS])
+        return self.memory.rows_t[:count], self.memory.rows_q[:count], self.memory.rows_y[:count]
 
     @property
     def counts(self) -> Counts:

@@ -17,7 +17,7 @@ from ephs.mechanics.solve.stepping import Attempt, Leg, Row, Span, Stepper
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 
-__all__ = ["integrate_stepwise"]
+__all__ = ["first_step", "integrate_stepwise"]
 
 S = TypeVar("S")
 RESPONSE = 0.1
@@ -66,6 +66,11 @@ def integrate_stepwise(
     return run.solution()
 
 
+def first_step(control: Control, span: float) -> float:
+    """The length of the first step, in s, of a run over ``span`` seconds."""
+    return control.step or min(max(FIRST * span, control.least), control.most, span)
+
+
 class _Run(Generic[S]):
     """One run in progress."""
 
@@ -101,9 +106,7 @@ class _Run(Generic[S]):
 
     def start(self) -> None:
         """The initial state, and the first row."""
-        span = abs(self.until - self.t0)
-        control = self.control
-        self.h = control.step or min(max(FIRST * span, control.least), control.most, span)
+        self.h = first_step(self.control, abs(self.until - self.t0))
         self.state = self.stepper.start(self.t0, self.sign * self.h)
         row = self.stepper.row(self.state)
         if self.save_at is None or (self.save_at.size and self.save_at[0] == self.t0):

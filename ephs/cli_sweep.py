@@ -1,0 +1,171 @@
+"""`ephs sweep`: one model with many values of some numbers, one table."""
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import App, Parameter
+
+from ephs.cli_input import BadInput, Base, addressed, load_model, say
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["sweeps"]
+
+_TEXTS = {
+    "vary": "--vary {found}: expected PATH=FROM:TO:COUNT or PATH=VALUE,VALUE,..., as in bodies.crank.mass=0.1:0.5:9",
+    "none": "ephs sweep {file}: nothing is varied; expected --vary PATH=FROM:TO:COUNT, bodies.crank.mass=0.1:0.5:9",
+    "until": "--until {found}: expected a number of seconds above 0",
+    "dask": "--dask {address}: {found}; start a scheduler there, then run again",
+}
+LISTED = 5
+"""Different reasons of failure that are printed."""
+
+sweeps = App(name="sweep", help="Run an ensemble of a model, in parallel.")
+
+
+@sweeps.default
+def sweep(
+    scene: str,
+    /,
+    *,
+    vary: list[str] | None = None,
+    until: float,
+    output: Annotated[Path, Parameter(name=["--output", "-o"])],
+    paired: bool = False,
+    keep: list[str] | None = None,
+    instants: int = 100,
+    method: str | None = None,
+    rtol: float | None = None,
+    atol: float | None = None,
+    step: float | None = None,
+    workers: int | None = None,
+    dask: str | None = None,
+    base: Base = "fixed",
+    adjust: bool = False,
+) -> int:
+    """Run a model with many values of some numbers; writes sweep.nc into a folder.
+
+    Parameters
+    ----------
+    scene
+        A scene file (.toml), or FILE.py:NAME.
+    vary
+        PATH=FROM:TO:COUNT or PATH=VALUE,VALUE,...; may be given several times.
+    until
+        End of the simulated time, in seconds.
+    output
+        Folder for the table.
+    paired
+        Take the values of all paths together, the first with the first; else all are combined with all.
+    keep
+        Names of what is kept, such as joints.pin.rate or energy; may be given several times.
+    instants
+        Parts into which the time is cut; results are kept at their ends.
+    method
+        Integration method, for example rk87.
+    rtol
+        Relative tolerance, for methods that choose their step.
+    atol
+        Absolute tolerance, for methods that choose their step.
+    step
+        Constant step size, in seconds.
+    workers
+        Threads; as many as there are cores unless given.
+    dask
+        Address of a Dask scheduler to run on instead, as in tcp://127.0.0.1:8786.
+    base
+        How the root of an imported model meets the ground.
+    adjust
+        Assemble a scene that does not quite close.
+    """
+    if not vary:
+        raise BadInput(_TEXTS["none"].format(file=scene))
+    if not 0.0 < until < float("inf"):
+        raise BadInput(_TEXTS["until"].format(found=until))
+    values = dict(_values(entry) for entry in vary)
+    model = load_model(scene, base=base, adjust=adjust)
+    with addressed(scene, output):
+        output.mkdir(parents=True, exist_ok=True)
+    import numpy as np
+
+    from ephs.mechanics.sweep.sweep import SweepInterrupted
+    from ephs.mechanics.sweep.sweep import sweep as run
+
+    given = {"method": method, "rtol": rtol, "atol": atol, "step": step}
+    options: dict[str, Any] = {key: value for key, value in given.items() if value is not None}
+    stopped = False
+    with addressed(scene, output), _client(dask) as client, _progress() as progress:
+        try:
+            table = run(
+                model, values, until, save_at=until * np.arange(instants + 1) / instants, outputs=keep, paired=paired,
+                workers=workers, client=client, progress=progress, **options,
+            )  # fmt: skip
+        except SweepInterrupted as error:
+            table, stopped = error.partial, True
+    with addressed(scene, output):
+        _write(table, output)
+    return 130 if stopped else 3 if int(table.attrs["failed"]) else 0
+
+
+def _values(entry: str) -> tuple[str, list[float]]:
+    path, separator, text = entry.partition("=")
+    try:
+        if not (separator and path):
+            raise ValueError
+        if ":" not in text:
+            return path, [float(word) for word in text.split(",")]
+        first, last, count = text.split(":")
+        low, high, n = float(first), float(last), int(count)
+        if n < 1:
+            raise ValueError
+        return path, [low + (high - low) * k / max(n - 1, 1) for k in range(n)]
+    except ValueError:
+        raise BadInput(_TEXTS["vary"].format(found=entry)) from None
+
+
+@contextmanager
+def _client(address: str | None) -> Iterator[Any]:
+    if address is None:
+        yield None
+        return
+    from distributed import Client
+
+    try:
+        client = Client(address, timeout="10s")
+    except (OSError, ValueError) as error:
+        raise BadInput(_TEXTS["dask"].format(address=address, found=error)) from error
+    with client:
+        yield client
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[int, int, int], None]]:
+    """A bar with what is done, what failed, and the time left, on a terminal only."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[note]}"), TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("members", total=None, note="")
+
+        def progress(done: int, members: int, failed: int) -> None:
+            bar.update(task, total=members, completed=done, note=f"{done} of {members}, {failed} failed")
+
+        yield progress
+
+
+def _write(table: "xr.Dataset", folder: Path) -> None:
+    file = folder / "sweep.nc"
+    table.to_netcdf(file, engine="h5netcdf")
+    members, failed, seconds = (table.attrs[key] for key in ("members", "failed", "seconds"))
+    reasons = Counter(str(text) for text in table["status"].values.ravel() if text != "done")
+    say(
+        f"{members} members, {failed} failed, in {seconds:.2f} s: {members / seconds:.0f} a second",
+        *(f"{count} × {text}" for text, count in reasons.most_common(LISTED)),
+        f"table: {file}",
+    )

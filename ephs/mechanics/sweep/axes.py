@@ -1,0 +1,90 @@
+"""What a sweep varies: paths, their values, and the members that these make."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, final
+
+import numpy as np
+
+from ephs.mechanics.solve.errors import OptionError
+from ephs.semantics.bundle import Array
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+__all__ = ["MEMBER", "Axes"]
+
+MEMBER = "member"
+"""The one dimension of members that are given one by one."""
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Axes:
+    """The numbers that are varied.
+
+    Parameters
+    ----------
+    paths
+        Where they stand in the model, see `ephs.mechanics.scene.parameters`.
+    values
+        Of each path, (n,).
+    paired
+        Member k takes the k-th value of every path; else every value of one is combined with all of the others.
+    """
+
+    paths: tuple[str, ...]
+    values: tuple[Array, ...]
+    paired: bool
+
+    @staticmethod
+    def of(vary: "Mapping[str, ArrayLike]", *, paired: bool) -> "Axes":
+        """From what a user gives.
+
+        Raises
+        ------
+        OptionError
+            There is nothing to vary, a value is no finite number, or paired paths have different numbers of values.
+        """
+        if not vary:
+            raise OptionError("vary", dict(vary), "a path and its values, such as {'bodies.crank.mass': [0.1, 0.2]}")
+        values: list[Array] = []
+        for path, given in vary.items():
+            try:
+                found = np.atleast_1d(np.asarray(given, dtype=float))
+            except (TypeError, ValueError):
+                found = np.zeros(0)
+            if found.ndim != 1 or not found.size or not np.all(np.isfinite(found)):
+                raise OptionError(f"vary[{path!r}]", given, "one finite number or a list of them")
+            values.append(found)
+        sizes = {found.size for found in values}
+        if paired and len(sizes) > 1:
+            found = {path: found.size for path, found in zip(vary, values, strict=True)}
+            raise OptionError("vary", found, "equally many values for every path, because paired=True")
+        return Axes(tuple(vary), tuple(values), paired)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """How the members are arranged."""
+        return (self.values[0].size,) if self.paired else tuple(found.size for found in self.values)
+
+    @property
+    def dims(self) -> tuple[str, ...]:
+        """A name for each direction in which they are."""
+        return (MEMBER,) if self.paired else self.names
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What the paths are called in the table, where a joint's coordinate is that at any time, not the initial."""
+        initial = [
+            path.startswith("joints.") and re.search(r"\.(coordinate|rate)[\[\]\d]*$", path) for path in self.paths
+        ]
+        return tuple(f"initial.{path}" if first else path for path, first in zip(self.paths, initial, strict=True))
+
+    @property
+    def members(self) -> Array:
+        """(members, paths), the last path varying fastest."""
+        if self.paired:
+            return np.column_stack(self.values)
+        return np.stack(np.meshgrid(*self.values, indexing="ij"), axis=-1).reshape(-1, len(self.paths))

@@ -1,0 +1,288 @@
+"""Members of one scene that differ in numbers only: one set of compiled tables, filled anew for each.
+
+What a member's tables and start hold is its *image*: all their numbers in one row. Where the numbers that one path
+changes are none that another one does, the image of a member is put together from images along each path; where they
+follow a path's value in a straight line, two images say all others. Both are checked on members built in full; where
+they do not hold, every member is.
+"""
+
+import threading
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any, final
+
+import numpy as np
+
+from ephs.mechanics.build import component_path
+from ephs.mechanics.methods import Setting, chosen
+from ephs.mechanics.reduced.auto import Auto
+from ephs.mechanics.reduced.equations import Equations, ReducedState
+from ephs.mechanics.reduced.explicit import Explicit
+from ephs.mechanics.reduced.tables import TREE
+from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.scene.parameters import varied
+from ephs.mechanics.simulate import control_of, problem_of_scene, times_of
+from ephs.mechanics.solve.loop import first_step
+from ephs.mechanics.solve.stepping import Span
+from ephs.mechanics.sweep.axes import Axes
+from ephs.mechanics.sweep.outputs import Output
+from ephs.semantics.bundle import Array
+from ephs.semantics.spaces import Pair
+
+__all__ = ["Ensemble", "Unlike"]
+
+AGREE = 1e-12
+"""By which an image that was put together may differ from one that was built, relative to the number where above 1."""
+STRAIGHT = 12
+"""Values of one path above which it is looked whether two images say all others."""
+BURST = 100_000
+"""Steps that a member may take in compiled code; one that needs more is run on its own, where it can be followed."""
+
+
+class Unlike(Exception):
+    """A scene cannot be run as others are: it has other tables, or needs another method."""
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class _Made:
+    """Compiled equations and where they start."""
+
+    equations: Equations
+    start: ReducedState
+
+    @staticmethod
+    def of(scene: Scene, t0: float) -> "_Made":
+        equations = Equations(scene, problem_of_scene(scene), t0)
+        return _Made(equations, equations.start(t0))
+
+    def arrays(self) -> list[Array]:
+        """All numbers that a run depends on, the start's last."""
+        eq = self.equations
+        engine: Iterator[Any] = iter((*eq.engine, *eq.engine.forces, *eq.engine.closing))
+        tables = [a for a in engine if isinstance(a, np.ndarray) and a.dtype == np.float64]
+        return [*tables, eq.drive, eq.wrench, eq.scal, self.start.q, self.start.r, self.start.s]
+
+    def counts(self) -> list[Any]:
+        """What has to be the same in all members."""
+        eq = self.equations
+        engine: Iterator[Any] = iter((*eq.engine, *eq.engine.forces, *eq.engine.closing))
+        return [a for a in engine if isinstance(a, np.ndarray) and a.dtype != np.float64]
+
+    def image(self) -> Array:
+        """All numbers in one row."""
+        return np.concatenate([a.ravel() for a in self.arrays()])
+
+
+@final
+class Ensemble:
+    """The members of a sweep over one scene by explicit steps in compiled code.
+
+    Parameters
+    ----------
+    options
+        Those of `ephs.simulate` that say how steps are taken.
+
+    Raises
+    ------
+    Unlike
+        The scene, the options or the outputs need more than that.
+    """
+
+    def __init__(
+        self, scene: Scene, axes: Axes, t0: float, until: float, save_at: Array, options: Mapping[str, Any],
+        outputs: tuple[Output, ...],
+    ) -> None:  # fmt: skip
+        self._scene, self._axes, self._t0, self._until = scene, axes, t0, until
+        self._options = dict(options)
+        if self._options.pop("form", "reduced") != "reduced" or set(self._options) - _STEERING:
+            raise Unlike
+        self._times = times_of(save_at, t0, until)
+        self._first = [float(found[0]) for found in axes.values]
+        self._lock = threading.Lock()
+        self._own = threading.local()
+        self._along: dict[tuple[int, float], Array] = {}
+        base = self._made(self._first)
+        if self._stepper(base.equations) is None:
+            raise Unlike
+        self._base, self._counts, self._sizes = base.image(), base.counts(), [a.size for a in base.arrays()]
+        self._reads = [_reading(base.equations, output) for output in outputs]
+        self._whole = False
+        self._lines: dict[int, tuple[float, float, Array]] = {}
+        self._look()
+
+    # ---- images --------------------------------------------------------------------------------------------------
+
+    def image(self, values: Array) -> Array:
+        """The numbers of the member with these values.
+
+        Raises
+        ------
+        Unlike
+            It has other tables than the rest.
+        SceneError, SolveError
+            There is no such member.
+        """
+        if self._whole:
+            return self._built(values)
+        out = self._base.copy()
+        for axis, value in enumerate(values.tolist()):
+            found = self._one(axis, value)
+            changed = found != self._base
+            out[changed] = found[changed]
+        return out
+
+    def _look(self) -> None:
+        """See how paths change the image: each for itself, in straight lines, or all together."""
+        values = self._axes.values
+        ends = [[self._one(i, float(end)) for end in (found.min(), found.max())] for i, found in enumerate(values)]
+        touched = [np.any([self._apart(end, self._base) for end in both], axis=0) for both in ends]
+        if any(np.any(one & other) for one, other in combinations(touched, 2)):
+            self._whole = True
+            return
+        for i, (found, (low, high)) in enumerate(zip(values, ends, strict=True)):
+            if np.unique(found).size > STRAIGHT:
+                least, most = float(found.min()), float(found.max())
+                self._lines[i] = (least, most - least, np.where(touched[i], high - low, 0.0))
+                inner = np.sort(found)[[found.size // 5, found.size // 2, (4 * found.size) // 5]]
+                if not all(self._same(self._one(i, float(x)), self._built(self._single(i, float(x)))) for x in inner):
+                    del self._lines[i]
+        members = self._axes.members
+        chosen = np.unique(np.linspace(0, len(members) - 1, 4).astype(int))
+        self._whole = not all(self._same(self.image(members[k]), self._built(members[k])) for k in chosen)
+
+    def _one(self, axis: int, value: float) -> Array:
+        """The image where one path alone is varied."""
+        if axis in self._lines:
+            least, span, slope = self._lines[axis]
+            return self._along[axis, least] + ((value - least) / span) * slope
+        with self._lock:
+            found = self._along.get((axis, value))
+        if found is None:
+            found = self._built(self._single(axis, value))
+            with self._lock:
+                self._along[axis, value] = found
+        return found
+
+    def _single(self, axis: int, value: float) -> Array:
+        return np.array([*self._first[:axis], value, *self._first[axis + 1 :]])
+
+    def _built(self, values: Array) -> Array:
+        made = self._made(values.tolist())
+        if [a.size for a in made.arrays()] != self._sizes:
+            raise Unlike
+        if any(a.shape != b.shape or np.any(a != b) for a, b in zip(made.counts(), self._counts, strict=True)):
+            raise Unlike
+        return made.image()
+
+    def _made(self, values: list[float]) -> _Made:
+        return _Made.of(varied(self._scene, dict(zip(self._axes.paths, values, strict=True))), self._t0)
+
+    @staticmethod
+    def _apart(one: Array, other: Array) -> Any:
+        return np.abs(one - other) > AGREE * np.maximum(1.0, np.abs(other))
+
+    def _same(self, one: Array, other: Array) -> bool:
+        return not np.any(self._apart(one, other))
+
+    # ---- running -------------------------------------------------------------------------------------------------
+
+    def run(self, values: Array) -> tuple[list[Array], int, int]:
+        """One member: its outputs, steps and rejected steps; several threads may do so at once.
+
+        Raises
+        ------
+        Unlike
+            It has to be run on its own.
+        SceneError, SolveError
+            There is no such member, or a step has no solution.
+        """
+        image = self.image(values)
+        equations, stepper = self._threads_own()
+        start = self._fill(equations, image)
+        times = self._times
+        assert times is not None  # a sweep says what it keeps
+        first = int(times.size > 0 and times[0] == self._t0)
+        control = stepper.control
+        leg: Any = stepper.many(
+            Span(
+                start, self._t0, self._until, first_step(control, abs(self._until - self._t0)), control,
+                None if control.step is not None else _CHOSEN, times, first,
+            )
+        )  # fmt: skip
+        if not leg.advance(BURST) or leg.left:
+            raise Unlike
+        _, q, y = leg.kept()
+        if first:
+            beginning = np.concatenate([start.r, start.s, start.books])
+            q, y = np.concatenate([start.q[None], q]), np.concatenate([beginning[None], y])
+        counts = leg.counts
+        return [read(q, y) for read in self._reads], counts.steps, counts.rejected
+
+    def _threads_own(self) -> tuple[Equations, Any]:
+        if not getattr(self._own, "ready", None):
+            equations = self._made(self._first).equations
+            equations.start(self._t0)
+            self._own.ready = equations, self._stepper(equations)
+        return self._own.ready
+
+    def _fill(self, equations: Equations, image: Array) -> ReducedState:
+        """Put an image into the tables; the state that it starts from."""
+        q, r, s = (np.zeros(n) for n in self._sizes[-3:])
+        made = _Made(equations, ReducedState(self._t0, q, r, s, np.zeros(0)))
+        at = 0
+        for array in made.arrays():
+            array.ravel()[:] = image[at : at + array.size]
+            at += array.size
+        return ReducedState(self._t0, q, r, s, np.zeros(2 + len(equations.reduced.made)))
+
+    def _stepper(self, equations: Equations) -> Any:
+        """The method on these equations, None where it does not take many steps in one call."""
+        given = self._options
+        method, _ = chosen(given.get("method", "auto"), equations.problem, step=given.get("step"))
+        if method.many is not None:
+            return None
+        control = control_of(
+            equations.problem, given.get("rtol", 1e-6), given.get("atol", 1e-9), given.get("step"),
+            given.get("min_step"), given.get("max_step"), given.get("max_steps"),
+        )  # fmt: skip
+        stepper, _ = method.make(Setting(equations.problem, self._t0, control, {}, equations))
+        return stepper if isinstance(stepper, Explicit | Auto) and equations.constant else None
+
+
+_STEERING = {"method", "rtol", "atol", "step", "min_step", "max_step"}
+_CHOSEN: Any = True
+"""Stands for the policy of steps that are chosen, which compiled code follows on its own."""
+
+
+def _reading(equations: Equations, output: Output) -> Any:
+    """How an output is read from rows of elements and of rates, entropies and books.
+
+    Raises
+    ------
+    Unlike
+        It needs the whole solution.
+    """
+    n, ns, reduced = equations.n, equations.ns, equations.reduced
+    if output.name in ("heat", "work"):
+        at = n + ns + ("heat", "work").index(output.name)
+        return lambda q, y: y[:, at]
+    kind, _, rest = output.name.partition(".")
+    name, _, what = rest.rpartition(".")
+    found = [
+        i for i, edge in enumerate(reduced.edges) if edge.name == name and edge.path == component_path("joints", name)
+    ]
+    if kind != "joints" or len(found) != 1 or reduced.tables.kind[found[0]] != TREE:
+        raise Unlike
+    edge, t = reduced.edges[found[0]], reduced.tables
+    if what == "rate":
+        at, dim = int(t.r_at[found[0]]), int(t.dim[found[0]])
+        return lambda q, y: y[:, at : at + dim]
+    if what == "coordinate":
+        at, size = int(t.q_at[found[0]]), int(t.q_size[found[0]])
+        pair: Pair = edge.pair
+        if size == edge.pair.dim:
+            return lambda q, y: q[:, at : at + size]
+        return lambda q, y: np.array([pair.coordinates(row) for row in q[:, at : at + size]])
+    raise Unlike

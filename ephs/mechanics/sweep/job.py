@@ -1,0 +1,168 @@
+"""A sweep as a value that goes to whoever runs some of its members: threads, or processes elsewhere."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, final
+
+import numpy as np
+
+from ephs.mechanics.scene.document import scene_from_text, scene_to_text
+from ephs.mechanics.scene.errors import SceneError
+from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.scene.parameters import varied
+from ephs.mechanics.simulate import simulate
+from ephs.mechanics.solve.errors import Interrupted, SimulationError, SolveError
+from ephs.mechanics.solve.sparse import Index
+from ephs.mechanics.sweep.axes import Axes
+from ephs.mechanics.sweep.ensemble import Ensemble, Unlike
+from ephs.mechanics.sweep.outputs import Output
+from ephs.semantics.bundle import Array
+from ephs.semantics.errors import AssemblyError, SemanticsError
+
+if TYPE_CHECKING:
+    from ephs.semantics.system import System
+
+__all__ = ["DONE", "Batch", "Job"]
+
+DONE = "done"
+"""The status of a member that ran to the end."""
+ALIKE = 3
+"""Members below which no tables are shared."""
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Batch:
+    """Some members that were run.
+
+    Parameters
+    ----------
+    numbers
+        Which ones.
+    values
+        Of each output (members, instants, columns), NaN where a member failed.
+    status
+        ``"done"``, or why not.
+    steps, rejected
+        (members,).
+    """
+
+    numbers: Index
+    values: tuple[Array, ...]
+    status: tuple[str, ...]
+    steps: Index
+    rejected: Index
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Job:
+    """What is to be run.
+
+    Parameters
+    ----------
+    model
+        A scene as text, which goes anywhere, or a system.
+    save_at
+        Times to keep, s.
+    options
+        Those of `ephs.simulate`.
+    token
+        What tells it from other jobs.
+    """
+
+    model: "str | System"
+    axes: Axes
+    t0: float
+    until: float
+    save_at: Array
+    options: Mapping[str, Any]
+    outputs: tuple[Output, ...]
+    token: str
+
+    @staticmethod
+    def document(model: "Scene | System") -> "str | System":
+        """How a job holds a model."""
+        return scene_to_text(model) if isinstance(model, Scene) else model
+
+    def run(self, numbers: Index) -> Batch:
+        """Some members, one after the other; one that fails does not stop the others."""
+        return _prepared(_Key(self)).run(numbers)
+
+    def prepare(self) -> None:
+        """Make what all members share."""
+        _prepared(_Key(self))
+
+
+class _Key:
+    """A job, equal to its copies in the same process."""
+
+    def __init__(self, job: Job) -> None:
+        self.job = job
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Key) and other.job.token == self.job.token
+
+    def __hash__(self) -> int:
+        return hash(self.job.token)
+
+
+@lru_cache(maxsize=4)
+def _prepared(key: _Key) -> "_Prepared":
+    return _Prepared(key.job)
+
+
+@final
+class _Prepared:
+    """A job in the process that runs it."""
+
+    def __init__(self, job: Job) -> None:
+        self.job = job
+        self.model: Any = scene_from_text(job.model) if isinstance(job.model, str) else job.model
+        self.members = job.axes.members
+        self.ensemble: Ensemble | None = None
+        if isinstance(self.model, Scene) and len(self.members) >= ALIKE:
+            try:
+                self.ensemble = Ensemble(self.model, job.axes, job.t0, job.until, job.save_at, job.options, job.outputs)
+            except (Unlike, SolveError, SceneError, SemanticsError):  # members say on their own what is wrong
+                self.ensemble = None
+
+    def run(self, numbers: Index) -> Batch:
+        found = [self._member(self.members[k]) for k in numbers]
+        shape = next((([v.shape for v in values]) for values, *_ in found if values is not None), None)
+        values = () if shape is None else tuple(
+            np.array([np.full(size, np.nan) if row is None else row[i] for row, *_ in found])
+            for i, size in enumerate(shape)
+        )  # fmt: skip
+        status = tuple(text for _, text, _, _ in found)
+        steps, rejected = (np.array([row[i] for row in found], dtype=np.int64) for i in (2, 3))
+        return Batch(numbers, values, status, steps, rejected)
+
+    def _member(self, values: Array) -> tuple[list[Array] | None, str, int, int]:
+        if self.ensemble is not None:
+            try:
+                read, steps, rejected = self.ensemble.run(values)
+            except (Unlike, SolveError, SceneError, SemanticsError):
+                pass
+            else:
+                return [row.reshape(len(row), -1) for row in read], DONE, steps, rejected
+        return self._alone(values)
+
+    def _alone(self, values: Array) -> tuple[list[Array] | None, str, int, int]:
+        """By `simulate`, which tells what failed, when and where."""
+        job = self.job
+        try:
+            model = varied(self.model, dict(zip(job.axes.paths, values.tolist(), strict=True)))
+            solution = simulate(model, job.until, t0=job.t0, save_at=job.save_at, **job.options)
+        except Interrupted:
+            raise KeyboardInterrupt from None
+        except SimulationError as error:
+            stats = error.partial.stats if error.partial is not None else {}
+            return None, str(error), int(stats.get("steps", 0)), int(stats.get("rejected", 0))
+        except (SceneError, AssemblyError, SemanticsError) as error:
+            return None, str(error), 0, 0
+        read = [np.asarray(output.read(solution)) for output in job.outputs]
+        stats = solution.stats
+        columns = [row.reshape(len(solution), -1) for row in read]
+        return columns, DONE, int(stats["steps"]), int(stats["rejected"])

@@ -1,0 +1,223 @@
+"""`sweep`: one model with many values of some numbers, in parallel."""
+
+import os
+import time
+import uuid
+from collections.abc import Callable, Generator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.scene.parameters import read
+from ephs.mechanics.simulate import times_of
+from ephs.mechanics.solve.errors import OptionError
+from ephs.mechanics.solve.sparse import Index
+from ephs.mechanics.sweep.axes import Axes
+from ephs.mechanics.sweep.job import DONE, Batch, Job
+from ephs.mechanics.sweep.outputs import outputs_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import ArrayLike
+
+    from ephs.semantics.system import System
+
+__all__ = ["NOT_RUN", "SweepInterrupted", "sweep"]
+
+NOT_RUN = "not run"
+"""The status of members that an interruption left."""
+INSTANTS = 100
+"""Parts into which the time is cut where no instants are asked for."""
+BATCHES = 16
+"""Batches for each worker, so that progress is seen and all of them end at nearly the same time."""
+MOST = 256
+"""Members in a batch at most."""
+RETRIES = 5
+"""How often the members of a worker that was lost are run anew."""
+_OPTIONS = ("method", "rtol", "atol", "step", "min_step", "max_step", "max_steps", "form", "inputs", "options",
+            "reference")  # fmt: skip
+
+
+class SweepInterrupted(KeyboardInterrupt):
+    """A sweep that the user stopped.
+
+    Attributes
+    ----------
+    partial
+        The table of what was run; the status of the others is ``"not run"``.
+    """
+
+    def __init__(self, partial: "xr.Dataset") -> None:
+        super().__init__("interrupted; what was computed is in .partial")
+        self.partial = partial
+
+
+def sweep(
+    model: "System | Scene",
+    vary: "Mapping[str, ArrayLike]",
+    until: float,
+    *,
+    t0: float = 0.0,
+    save_at: "ArrayLike | None" = None,
+    outputs: Sequence[str] | None = None,
+    paired: bool = False,
+    workers: int | None = None,
+    client: Any = None,
+    progress: Callable[[int, int, int], None] | None = None,
+    **options: Any,
+) -> "xr.Dataset":
+    """Run a model with many values of some of its numbers.
+
+    Members are independent: each is what `ephs.simulate` gives of the model with its numbers, within rounding, and the
+    same bit for bit whoever runs it. Members of a scene that differ in numbers only, by the explicit methods and with
+    constant inputs, share one set of compiled tables.
+
+    Parameters
+    ----------
+    vary
+        Path -> (n,) values: ``bodies.crank.mass``, ``joints.pin.friction``, ``joints.pin.rate``, ``osc.pe.k``; see
+        `ephs.mechanics.scene.parameters`.
+    until, t0
+        End and start in s.
+    save_at
+        (k,) instants to keep, in s; 101 even ones where None.
+    outputs
+        Names of what is kept: ``joints.pin.coordinate``, ``bodies.crank.position``, ``thermal.housing.temperature``,
+        ``energy``, the path of a state. By default coordinates and rates of all joints, heat and work; of a system
+        all states.
+    paired
+        Member k takes the k-th value of every path. Else all values of one are combined with all of the others.
+    workers
+        Threads; as many as there are cores where None.
+    client
+        A ``dask.distributed.Client`` to run on instead; members of a worker that is lost are run by others.
+    progress
+        Called as progress(done, members, failed) after every batch.
+    options
+        Of `ephs.simulate`: method, rtol, atol, step, form, inputs, …
+
+    Returns
+    -------
+    xarray.Dataset
+        Each output over the varied paths (or ``member``), ``t``, and its own places; joints' coordinates and rates
+        that are varied stand there as ``initial.joints.…``; ``status`` is ``"done"`` or the
+        reason of a failure, where values are NaN; ``steps`` and ``rejected`` are counts.
+
+    Raises
+    ------
+    OptionError
+        An option is not known or not possible.
+    SceneError, AssemblyError
+        There is no such path.
+    SweepInterrupted
+        It was stopped; ``.partial`` holds what was run.
+    """
+    axes = Axes.of(vary, paired=paired)
+    unknown = [key for key in options if key not in _OPTIONS]
+    if unknown:
+        raise OptionError(unknown[0], options[unknown[0]], f"no such option; there are {', '.join(_OPTIONS)}")
+    for path in axes.paths:
+        read(model, path)
+    start, end = float(t0), float(until)
+    if save_at is None:
+        save_at = start + (end - start) * np.arange(INSTANTS + 1) / INSTANTS
+    times = times_of(save_at, start, end)
+    assert times is not None  # instants were chosen
+    kept = outputs_of(model, outputs)
+    job = Job(Job.document(model), axes, start, end, times, dict(options), kept, uuid.uuid4().hex)
+    count = len(axes.members)
+    batches: list[Batch] = []
+    begin = time.perf_counter()
+    run = _on_threads(job, count, workers) if client is None else _on_cluster(job, count, client)
+    try:
+        for batch in run:
+            batches.append(batch)
+            if progress is not None:
+                failed = sum(text != DONE for found in batches for text in found.status)
+                progress(sum(len(found.numbers) for found in batches), count, failed)
+    except KeyboardInterrupt:
+        raise SweepInterrupted(_table(job, batches, model, time.perf_counter() - begin)) from None
+    finally:
+        run.close()
+    return _table(job, batches, model, time.perf_counter() - begin)
+
+
+def _parts(count: int, workers: int) -> list[Index]:
+    size = max(1, min(MOST, -(-count // (BATCHES * workers))))
+    return [np.arange(at, min(at + size, count)) for at in range(0, count, size)]
+
+
+def _on_threads(job: Job, count: int, workers: int | None) -> Generator[Batch, None, None]:
+    threads = workers or os.cpu_count() or 1
+    job.prepare()
+    with ThreadPoolExecutor(threads) as pool:
+        waiting: set[Future[Batch]] = {pool.submit(job.run, part) for part in _parts(count, threads)}
+        try:
+            while waiting:
+                done, waiting = wait(waiting, return_when=FIRST_COMPLETED)
+                yield from (future.result() for future in done)
+        finally:
+            for future in waiting:
+                future.cancel()
+
+
+def _on_cluster(job: Job, count: int, client: Any) -> Generator[Batch, None, None]:
+    """On a Dask cluster, which gives the batches of a worker that is lost to others."""
+    from distributed import as_completed
+
+    workers = max(1, sum(client.nthreads().values()))
+    shared = client.scatter(job, broadcast=True)
+    futures = [client.submit(_batch, shared, part, pure=False, retries=RETRIES) for part in _parts(count, workers)]
+    try:
+        for future in as_completed(futures):
+            yield future.result()
+    finally:
+        client.cancel([future for future in futures if not future.done()])
+
+
+def _batch(job: Job, numbers: Index) -> Batch:
+    return job.run(numbers)
+
+
+def _table(job: Job, batches: Sequence[Batch], model: "System | Scene", seconds: float) -> "xr.Dataset":
+    """All batches as one dataset."""
+    import xarray as xr
+
+    axes, count, instants = job.axes, len(job.axes.members), job.save_at.size
+    status = np.full(count, NOT_RUN, dtype=object)
+    steps, rejected = np.zeros(count, dtype=np.int64), np.zeros(count, dtype=np.int64)
+    for batch in batches:
+        status[batch.numbers] = batch.status
+        steps[batch.numbers], rejected[batch.numbers] = batch.steps, batch.rejected
+    variables: dict[str, Any] = {}
+    places: dict[str, Any] = {}
+    for i, output in enumerate(job.outputs):
+        found = [(batch.numbers, batch.values[i]) for batch in batches if batch.values]
+        width = found[0][1].shape[2] if found else 1
+        whole = np.full((count, instants, width), np.nan)
+        for numbers, values in found:
+            whole[numbers] = values
+        dims = (*axes.dims, "t")
+        whole = whole.reshape(*axes.shape, instants, width)
+        attributes = {"units": output.units} if output.units else {}
+        if width == 1:
+            variables[output.name] = (dims, whole[..., 0], attributes)
+            continue
+        dim, labels = output.labels(width)
+        variables[output.name] = ((*dims, dim), whole, attributes)
+        if labels:
+            places[dim] = list(labels)
+    for name, values in (("status", status.astype(str)), ("steps", steps), ("rejected", rejected)):
+        variables[name] = (axes.dims, values.reshape(axes.shape))
+    coordinates = {
+        name: (axes.dims if axes.paired else (name,), values)
+        for name, values in zip(axes.names, axes.values, strict=True)
+    }
+    times = ("t", job.save_at, {"units": "s"})
+    attributes = {
+        "model": getattr(model, "name", "system"), "members": count, "failed": int(np.sum(status != DONE)),
+        "seconds": seconds, "t0": job.t0, "until": job.until,
+    }  # fmt: skip
+    return xr.Dataset(variables, {**coordinates, "t": times, **places}, attributes)

@@ -1,0 +1,254 @@
+"""A sweep is what its members are alone, whoever runs them, and loses none."""
+
+import json
+import os
+import signal
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import ephs
+from ephs import Pattern, junction
+from ephs import library as lib
+from ephs import quantity as Q
+from ephs.cli import main
+from ephs.mechanics.scene.parameters import names, read, varied
+from ephs.mechanics.sweep.axes import Axes
+from ephs.mechanics.sweep.ensemble import Ensemble
+from ephs.mechanics.sweep.outputs import outputs_of
+from ephs.testing import mechanisms
+
+ROOT = Path(__file__).parents[3]
+SCENES = ROOT / "scenes"
+CHAIN = ROOT / "benchmarks" / "scenes" / "revolute-chain-4.toml"
+OSCILLATOR = Pattern(
+    junctions={"q": junction(Q.displacement), "p": junction(Q.momentum)},
+    boxes={"pe": {"q": "q"}, "ke": {"p": "p"}, "pkc": {"q": "q", "p": "p"}},
+)(pe=lib.spring(k=1.0), ke=lib.point_mass(m=1.0), pkc=lib.pkc())
+WELDED = """
+format = 1
+name = "welded"
+[bodies.one]
+mass = 1.0
+inertia = [0.1, 0.1, 0.1]
+[bodies.two]
+mass = 1.0
+inertia = [0.1, 0.1, 0.1]
+[joints.pin]
+type = "spherical"
+bodies = ["ground", "one"]
+frame1 = {}
+frame2 = { position = [0.0, 0.0, 0.5] }
+[joints.weld]
+type = "fixed"
+bodies = ["one", "two"]
+frame1 = { position = [0.0, 0.0, -0.5] }
+frame2 = {}
+"""
+TIMES = np.array([0.0, 0.02, 0.05])
+
+
+def alone(model, table, where, **options):
+    """The member at a place of the table, by `simulate`."""
+    paths = {str(name).removeprefix("initial."): name for name in table.coords if "." in str(name)}
+    at = table.isel(where)
+    return ephs.simulate(
+        varied(model, {path: float(at[name]) for path, name in paths.items() if path in names(model)}),
+        float(table.t[-1]), save_at=table.t.values, **options,
+    )  # fmt: skip
+
+
+def agree(model, table, places, tolerance=1e-11, **options):
+    for where in places:
+        sol = alone(model, table, where, **options)
+        for output in outputs_of(model, [str(n) for n in table.data_vars if n not in ("status", "steps", "rejected")]):
+            found, expected = table[output.name].isel(where).values, np.squeeze(output.read(sol))
+            assert np.abs(found - expected).max(initial=0.0) <= tolerance * max(1.0, np.abs(expected).max()), output
+
+
+# ---- members ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("file", "vary"),
+    [
+        (CHAIN, {"bodies.rod1.mass": [0.5, 1.0, 2.0], "joints.j0.rate": [0.0, 1.0]}),
+        (CHAIN, {"joints.j0.coordinate": np.linspace(-1.0, 1.0, 15), "bodies.rod3.mass": np.linspace(1, 3, 20)}),
+        (CHAIN, {"joints.j1.stiffness": [1.0, 3.0], "joints.j1.rest": [0.1, 0.2]}),
+        (CHAIN, {"joints.j1.frame2.position[0]": [0.1, 0.2, 0.3], "joints.j0.friction": [0.0, 0.1]}),
+        (SCENES / "four-bar.toml", {"bodies.coupler.mass": [0.5, 1.0, 2.0]}),
+        (SCENES / "heavy-top.toml", {"joints.tip.coordinate[0]": np.linspace(0.0, 1.0, 15)}),
+        (SCENES / "heavy-top.toml", {"world.gravity[2]": [-9.81, -1.62, 0.0, 3.0]}),
+    ],
+)
+def test_members_are_what_simulate_gives(file, vary):
+    scene = ephs.load(file)
+    table = ephs.sweep(scene, vary, 0.05, save_at=TIMES)
+    assert set(table.status.values.ravel()) == {"done"}
+    shape = table.status.shape
+    ends = [dict(zip(table.status.dims, np.unravel_index(k, shape), strict=True)) for k in (0, table.status.size // 3)]
+    agree(scene, table, [*ends, dict(zip(table.status.dims, (n - 1 for n in shape), strict=True))])
+
+
+@settings(max_examples=12)
+@given(scene=mechanisms(max_bodies=2), data=st.data())
+def test_members_of_any_mechanism_by_any_number(scene, data):
+    known = [path for path in names(scene) if (read(scene, path) and ".mass" in path) or ".friction" in path]
+    paths = data.draw(st.lists(st.sampled_from(known), min_size=1, max_size=2, unique=True))
+    factors = [1.0, 1.25, 1.5]
+    values = {path: [read(scene, path) * f for f in factors] for path in paths}
+    table = ephs.sweep(scene, values, 0.02, save_at=[0.0, 0.02], paired=True, rtol=1e-7, atol=1e-7)
+    for k in range(3):
+        if table.status.values[k] == "done":
+            agree(scene, table, [{"member": k}], 1e-9, rtol=1e-7, atol=1e-7)
+
+
+def test_what_two_paths_change_together_is_built_in_full(tmp_path):
+    scene = ephs.load(CHAIN)
+    apart = Axes.of({"bodies.rod1.mass": [1.0, 2.0], "bodies.rod2.mass": [1.0, 2.0]}, paired=False)
+    file = tmp_path / "welded.toml"
+    file.write_text(WELDED)
+    # the moment of a mass that begins with the arm 0 is changed by neither alone
+    product = Axes.of({"joints.weld.frame1.position[0]": [0.0, 0.2], "bodies.two.mass": [1.0, 2.0]}, paired=False)
+    for model, axes in ((scene, apart), (ephs.load(file), product)):
+        ensemble = Ensemble(model, axes, 0.0, 0.1, TIMES, {}, outputs_of(model, None))
+        for values in axes.members:
+            assert np.allclose(ensemble.image(values), ensemble._built(values), rtol=1e-12, atol=1e-12)
+
+
+def test_a_system_of_no_bodies_by_its_closed_form():
+    stiffness = [1.0, 4.0, 9.0]
+    table = ephs.sweep(OSCILLATOR, {"pe.k": stiffness}, 1.0, save_at=[0.0, 0.5, 1.0], method="natural4", step=0.01)
+    assert float(np.abs(table["pe.q"]).max()) == 0.0  # it starts at rest
+    table = ephs.sweep(
+        OSCILLATOR, {"pe.k": stiffness}, 1.0, save_at=[0.0, 0.5, 1.0], method="radau", rtol=1e-10, atol=1e-10,
+        outputs=["pe.q", "energy"],
+    )  # fmt: skip
+    assert table["energy"].attrs["units"] == "J" and table["pe.q"].dims == ("pe.k", "t")
+
+
+@pytest.mark.parametrize("method", ["natural", "variational", "radau", "auto"])
+def test_every_kind_of_method_and_of_output(method):
+    scene = ephs.load(SCENES / "slider-crank.toml")
+    options = {"method": method} | ({"step": 0.005} if method in ("natural", "variational") else {})
+    kept = [out.name for out in outputs_of(scene, None)] + [
+        "bodies.crank.position", "bodies.crank.quaternion", "energy", "entropy", "constraint_error",
+    ]  # fmt: skip
+    mass = read(scene, "bodies.crank.mass")
+    table = ephs.sweep(scene, {"bodies.crank.mass": [mass, 1.5 * mass]}, 0.05, save_at=TIMES, outputs=kept, **options)
+    agree(scene, table, [{"bodies.crank.mass": 1}], 1e-9, **options)
+    assert list(table["quaternion"].values) == ["w", "x", "y", "z"] and table["xyz"].size == 3
+
+
+# ---- nothing is lost -------------------------------------------------------------------------------------------------
+
+
+def test_threads_change_no_bit():
+    scene = ephs.load(CHAIN)
+    vary = {"joints.j0.rate": np.linspace(0.0, 1.0, 40), "bodies.rod1.mass": [1.0, 2.0]}
+    tables = [ephs.sweep(scene, vary, 0.2, save_at=[0.2], workers=n).drop_attrs() for n in (1, 2, 5)]
+    assert tables[0].identical(tables[1]) and tables[0].identical(tables[2])
+
+
+def test_members_that_fail_are_kept_with_their_reasons():
+    scene = ephs.load(CHAIN)
+    table = ephs.sweep(scene, {"bodies.rod1.mass": [1.0, -1.0, 2.0, 3.0]}, 0.1, save_at=[0.1])
+    assert table.attrs["failed"] == 1 and "expected a number ≥ 0" in str(table.status.values[1])
+    assert np.isnan(table["joints.j0.coordinate"].values[1]).all()
+    assert np.isfinite(table["joints.j0.coordinate"].values[[0, 2, 3]]).all()
+    few = ephs.sweep(scene, {"joints.j0.rate": [0.0, 1.0, 2.0]}, 1.0, save_at=[1.0], max_steps=2)
+    assert few.attrs["failed"] == 3 and "more steps than are allowed" in str(few.status.values[0])
+
+
+def test_an_interruption_keeps_what_was_run():
+    def stop(done, members, failed):
+        raise KeyboardInterrupt
+
+    with pytest.raises(ephs.SweepInterrupted) as caught:
+        ephs.sweep(
+            ephs.load(CHAIN), {"joints.j0.rate": np.linspace(0, 1, 64)}, 0.1, save_at=[0.1], workers=1, progress=stop
+        )
+    status = caught.value.partial.status.values
+    assert {"done", "not run"} == set(status)
+    done = status == "done"
+    assert np.isfinite(caught.value.partial["joints.j0.coordinate"].values[done]).all()
+
+
+@pytest.mark.filterwarnings("ignore")  # of the cluster, whose worker goes
+def test_a_cluster_gives_the_same_and_a_worker_that_dies_loses_nothing():
+    from distributed import Client, LocalCluster
+
+    scene = ephs.load(CHAIN)
+    vary = {"joints.j0.rate": np.linspace(0.0, 1.0, 30), "bodies.rod1.mass": [1.0, 2.0]}
+    expected = ephs.sweep(scene, vary, 0.2, save_at=[0.2]).drop_attrs()
+    killed: list[int] = []
+    with (
+        LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, host="127.0.0.1") as cluster,
+        Client(cluster) as client,
+    ):
+
+        def kill(done, members, failed):
+            if not killed and done >= members // 3:
+                killed.append(next(iter(client.run(os.getpid).values())))
+                os.kill(killed[0], signal.SIGKILL)
+
+        found = ephs.sweep(scene, vary, 0.2, save_at=[0.2], client=client, progress=kill).drop_attrs()
+    assert killed and found.identical(expected)
+
+
+# ---- what is asked for -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("vary", "more", "says"),
+    [
+        ({}, {}, "a path and its values"),
+        ({"bodies.rod1.mass": [1.0, np.nan]}, {}, "one finite number or a list of them"),
+        ({"bodies.rod1.mass": "heavy"}, {}, "one finite number or a list of them"),
+        ({"bodies.rod1.mass": [1.0], "bodies.rod2.mass": [1.0, 2.0]}, {"paired": True}, "equally many values"),
+        ({"bodies.rod1.mass": [1.0]}, {"outputs": ["enrgy"]}, 'did you mean "energy"'),
+        ({"bodies.rod1.mass": [1.0]}, {"stepp": 0.1}, "no such option"),
+        ({"bodies.rod1.mass": [1.0]}, {"save_at": [2.0]}, "save_at"),
+    ],
+)
+def test_wrong_questions_are_refused(vary, more, says):
+    with pytest.raises(ephs.OptionError, match=says):
+        ephs.sweep(ephs.load(CHAIN), vary, 0.1, **more)
+
+
+def test_an_unknown_path_names_the_nearest():
+    with pytest.raises(ephs.SceneError, match=r"bodies\.rod1\.mass"):
+        ephs.sweep(ephs.load(CHAIN), {"bodies.rod1.mas": [1.0]}, 0.1)
+
+
+def test_the_command_writes_a_table(tmp_path, capsys):
+    import xarray as xr
+
+    words = ["sweep", str(CHAIN), "--vary", "bodies.rod1.mass=1:2:3", "--vary", "joints.j0.rate=0,1", "--until", "0.1"]
+    assert main([*words, "-o", str(tmp_path), "--keep", "energy", "--instants", "4"]) == 0
+    assert "6 members, 0 failed" in capsys.readouterr().out
+    with xr.open_dataset(tmp_path / "sweep.nc", engine="h5netcdf") as table:
+        assert dict(table.sizes) == {"bodies.rod1.mass": 3, "initial.joints.j0.rate": 2, "t": 5}
+        assert table["bodies.rod1.mass"].values.tolist() == [1.0, 1.5, 2.0]
+    assert main(["sweep", str(CHAIN), "--vary", "bodies.rod1.mass=-1,1", "--until", "0.1", "-o", str(tmp_path)]) == 3
+
+
+@pytest.mark.parametrize("entry", ["bodies.rod1.mass", "bodies.rod1.mass=1:2", "=1", "bodies.rod1.mass=1:2:0", "a=x"])
+def test_the_command_says_how_to_vary(entry, tmp_path, capsys):
+    assert main(["sweep", str(CHAIN), "--vary", entry, "--until", "0.1", "-o", str(tmp_path)]) == 2
+    assert "expected PATH=FROM:TO:COUNT" in capsys.readouterr().err
+
+
+def test_a_job_travels_as_a_value():
+    import pickle
+
+    from ephs.mechanics.sweep.job import Job
+
+    scene = ephs.load(CHAIN)
+    axes = Axes.of({"joints.j0.rate": [0.0, 1.0, 2.0]}, paired=False)
+    job = Job(Job.document(scene), axes, 0.0, 0.1, np.array([0.1]), {}, outputs_of(scene, None), "a")
+    again = pickle.loads(pickle.dumps(job))
+    assert json.dumps(again.run(np.arange(3)).status) == json.dumps(job.run(np.arange(3)).status)
