@@ -13,9 +13,11 @@ kernel = jit.lean_kernel
 
 
 @kernel
-def jacobian(t, w, d, q, r, s, drive, scal, m, rank, fit, solve, out):
+def jacobian(t, w, d, unread, q, r, s, drive, scal, m, rank, fit, solve, out):
     """All directions (dq of tree and cut joints, dr, ds) as columns; rows are ṙ or, where not solved for, the residual;
-    the rates of the cut joints; ṡ. (status, component)."""
+    the rates of the cut joints; ṡ. (status, component).
+
+    ``unread`` (n,) marks freedoms of the tree whose coordinates nothing reads: their columns are zero."""
     status, number = component_slopes(t, w, d, q, r, s, drive, scal)
     if status != 0:
         return status, number
@@ -27,6 +29,9 @@ def jacobian(t, w, d, q, r, s, drive, scal, m, rank, fit, solve, out):
     for i in range(links):
         for j in range(t.dim[i]):
             for turning in range(2):
+                if turning == 1 and unread[t.r_at[i] + j] == 1:
+                    _put_nothing(out, t.r_at[i] + j)
+                    continue
                 column(t, w, d, i, j, turning, fit)
                 _put(t, w, d, m, rank, solve, (0 if turning == 1 else nv) + t.r_at[i] + j, out)
     for k in range(n, nv):

@@ -10,6 +10,7 @@ from ephs.mechanics.reduced.equations import Equations
 from ephs.mechanics.reduced.jacobian_kernels import jacobian
 from ephs.mechanics.reduced.tables import CUT, Mechanism
 from ephs.mechanics.reduced.tangent_kernels import by_push
+from ephs.mechanics.reduction.coordinates import unread
 from ephs.semantics.bundle import Array
 
 __all__ = ["Linearised", "Tangents"]
@@ -111,6 +112,7 @@ class Linearised:
     def __init__(self, equations: Equations) -> None:
         self.equations = equations
         self.memory = Tangents.of(equations.reduced.tables)
+        self._unread = unread(equations.problem.scene, equations.reduced)
         self._s_rate = np.zeros(equations.ns)
         self._made, self._powers = np.zeros(len(equations.reduced.made)), np.zeros(2)
         self._rows = self._rank = 0
@@ -166,8 +168,8 @@ class Linearised:
         out = np.empty((eq.nv + eq.ns, eq.nv + eq.n + eq.ns))
         eq.refuse(
             *jacobian(
-                eq.reduced.tables, eq.work, self.memory, *self._point, eq.drive, eq.scal, self._rows, self._rank,
-                int(fit), int(solve), out,
+                eq.reduced.tables, eq.work, self.memory, self._unread, *self._point, eq.drive, eq.scal,
+                self._rows, self._rank, int(fit), int(solve), out,
             )
         )  # fmt: skip
         return out

@@ -19,9 +19,10 @@ from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.solve.errors import OptionError
 from ephs.mechanics.solve.model import compile_model
 from ephs.mechanics.solve.problem import Problem
+from ephs.mechanics.solve.sparse import Index
 from ephs.semantics.bundle import Array
 
-__all__ = ["coordinate_steps", "cyclic", "loops", "mechanisms"]
+__all__ = ["coordinate_steps", "cyclic", "loops", "mechanisms", "unread"]
 
 SAME, RANK = 1e-8, 1e-9
 """What counts as nothing: of twists of size one, of singular values beside the largest."""
@@ -159,6 +160,20 @@ def cyclic(scene: Scene, reduced: Reduced, part: Part) -> Subgroup:
     return Subgroup(np.linalg.qr(free)[0] @ left[:, : int(np.sum(sizes > 1.0 - SAME))])
 
 
+def unread(scene: Scene, reduced: Reduced) -> Index:
+    """(n,) 1 for the tree's freedoms whose columns of a Jacobian by coordinates are zero wherever the mechanism is.
+
+    Those of joints all of whose motions are cyclic: the others' cyclic motions are no columns, but their combinations.
+    """
+    out, t = np.zeros(reduced.freedoms, dtype=np.int64), reduced.tables
+    for part in mechanisms(reduced):
+        group = cyclic(scene, reduced, part)
+        (held,) = [i for i in part.edges if t.first[i] < 0 or t.second[i] < 0] if group.dim else [-1]
+        if group.dim and group.dim == int(t.dim[held]):
+            out[int(t.r_at[held]) : int(t.r_at[held]) + group.dim] = 1
+    return out
+
+
 def _invariance(gravity: Array) -> Array:
     """(6, k), orthonormal: motions of everything that leave the potential of gravity as it is."""
     size = float(np.linalg.norm(gravity))
@@ -279,7 +294,8 @@ def _cyclic(scene: Scene, reduced: Reduced, before: int) -> Step | None:
     said = [f"of {_called(part)}, {_motions(group)}" for part, group in found[:4]]
     said += [f"and of {len(found) - 4} more mechanisms"] if len(found) > 4 else []
     count = sum(group.dim for _, group in found)
-    reason = f"{pull}: {'; '.join(said)}; no Jacobian has a column for these coordinates, they follow by quadrature"
+    reason = f"{pull}: {'; '.join(said)}; they follow by quadrature, and Jacobians leave out the columns of "
+    reason += "joints that move in no other way"
     where = tuple(_called(part) for part, _ in found)
     return Step("cyclic coordinates", Strength.TRAJECTORIES, where, reason, before, before - count)
 

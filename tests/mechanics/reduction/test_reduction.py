@@ -200,6 +200,25 @@ def test_cyclic_coordinates_of_one_joint(tmp_path, gravity, kind, axis, more, ex
     assert count(scene_of(tmp_path, TOP.format(gravity=gravity, joint=joint))) == expected
 
 
+@pytest.mark.parametrize(
+    ("gravity", "kind", "axis", "more", "expected"),
+    [
+        ("[0.0, 0.0, 0.0]", None, UP, "", [1] * 6),
+        ("[0.0, 0.0, -9.81]", None, UP, "", [0] * 6),
+        ("[0.0, 0.0, 0.0]", "spherical", UP, "", [1] * 3),
+        ("[0.0, 0.0, -9.81]", "spherical", UP, "", [0] * 3),
+        ("[0.0, 0.0, -9.81]", "revolute", UP, "", [1]),
+        ("[0.0, 0.0, -9.81]", "revolute", ACROSS, "", [0]),
+        ("[0.0, 0.0, -9.81]", "planar", UP, "", [1] * 3),
+        ("[0.0, 0.0, -9.81]", "revolute", UP, "stiffness = 2.0", [0]),
+    ],
+)
+def test_jacobians_leave_out_joints_that_only_move_what_nothing_reads(tmp_path, gravity, kind, axis, more, expected):
+    joint = "" if kind is None else PIVOT.format(kind=kind, axis=axis, more=more)
+    scene = scene_of(tmp_path, TOP.format(gravity=gravity, joint=joint))
+    assert coordinates.unread(scene, reduced_of(scene)).tolist() == expected
+
+
 def test_a_spring_to_the_ground_and_a_loop_read_where_a_mechanism_is(tmp_path):
     joint = PIVOT.format(kind="spherical", axis=UP, more="")
     spring = "[springs.s]\nbodies = ['ground', 'top']\nat1 = [1.0, 0.0, 0.0]\nat2 = [0.0, 0.2, 0.0]\nstiffness = 1.0\n"
