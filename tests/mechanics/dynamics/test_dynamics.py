@@ -43,7 +43,7 @@ def test_accelerations_solve_the_equations_of_motion(drawn):
     expected = free + np.linalg.solve(root.T, correction)
     found = whole(model, model.acceleration(state, model.layout.by_joint(forces)))
     terms = np.abs(np.linalg.inv(mass)) @ (np.abs(pushed) + np.abs(model.bias(state)))
-    tolerance = 10.0 * np.linalg.cond(mass) * EPS * max(1.0, terms.max(), np.abs(expected).max())
+    tolerance = 100.0 * np.linalg.cond(mass) * EPS * max(1.0, terms.max(), np.abs(expected).max())
     assert np.abs(found[:n] - expected).max(initial=0.0) <= tolerance / (RANK if k else 1.0)
 
 
