@@ -4,16 +4,18 @@ Stiffness is what Hairer and Wanner test in DOPRI5 and DOP853: the last two stag
 mode is, and a step that this holds at the limit of stability again and again serves stability, not accuracy.
 """
 
-from typing import Any, final
+from typing import TYPE_CHECKING, Any, final
 
 from ephs.mechanics.engine.march_kernels import PATIENCE
 from ephs.mechanics.reduced.equations import Equations, ReducedState
 from ephs.mechanics.reduced.explicit import Explicit, tableau
-from ephs.mechanics.reduced.implicit import Implicit
 from ephs.mechanics.reduced.method import ReducedMethod
 from ephs.mechanics.solve.control import Control
 from ephs.mechanics.solve.errors import Outcome, SolveError
 from ephs.mechanics.solve.stepping import Attempt, Leg, Span
+
+if TYPE_CHECKING:
+    from ephs.mechanics.reduced.implicit import Implicit
 
 __all__ = ["Auto"]
 
@@ -68,6 +70,8 @@ class Auto(ReducedMethod):
         return self._explicit.many(span, LIMITS[self._explicit.name], self._switch)
 
     def _switch(self, t: float, h: float, reason: str) -> None:
+        from ephs.mechanics.reduced.implicit import Implicit  # with its derivatives, which explicit runs do not need
+
         self._implicit = Implicit(self.equations, self.control)
         self.exponent = self._implicit.exponent
         self.counts["switches"].append({"t": float(t), "to": "radau", "step": float(h), "reason": reason})

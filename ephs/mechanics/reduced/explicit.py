@@ -1,13 +1,12 @@
 """Explicit Runge-Kutta methods on the reduced form: adaptive, loops projected back after each step.
 
-Coefficients are those of Dormand and Prince, of orders 5(4) and 8(5, 3), as SciPy ships them. Steps of a mechanism on
-which nothing but given constants acts are taken many in one compiled call.
+Steps of a mechanism on which nothing but given constants acts are taken many in one compiled call.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, final
+from typing import final
 
 import numpy as np
 
@@ -53,6 +52,7 @@ from ephs.mechanics.engine.march_kernels import (
 )
 from ephs.mechanics.engine.rate_kernels import OPEN
 from ephs.mechanics.engine.tables import Scheme, State
+from ephs.mechanics.reduced import tableaux as t
 from ephs.mechanics.reduced.equations import Equations, ReducedState
 from ephs.mechanics.reduced.method import ReducedMethod
 from ephs.mechanics.solve.control import Control, Proportional
@@ -81,14 +81,18 @@ class Tableau:
 @cache
 def tableau(name: str) -> Tableau:
     """The method rk54 or rk87."""
-    from scipy.integrate import DOP853, RK45
-
-    method: Any = DOP853 if name == "rk87" else RK45
-    n = method.n_stages
-    a, b, c = (np.ascontiguousarray(x, dtype=float) for x in (method.A[:n, :n], method.B, method.C[:n]))
     if name == "rk87":
-        return Tableau(name, 8, Scheme(a, b, np.array(DOP853.E5), np.array(DOP853.E3), 1), c, 8.0)
-    return Tableau(name, 5, Scheme(a, b, np.array(RK45.E), np.zeros(n + 1), 0), c, 5.0)
+        scheme = Scheme(_square(t.A8), np.array(t.B8), np.array(t.E8_5), np.array(t.E8_3), 1)
+        return Tableau(name, 8, scheme, np.array(t.C8), 8.0)
+    scheme = Scheme(_square(t.A5), np.array(t.B5), np.array(t.E5), np.zeros(len(t.B5) + 1), 0)
+    return Tableau(name, 5, scheme, np.array(t.C5), 5.0)
+
+
+def _square(rows: tuple[tuple[float, ...], ...]) -> Array:
+    out = np.zeros((len(rows) + 1, len(rows) + 1))
+    for i, row in enumerate(rows, 1):
+        out[i, : len(row)] = row
+    return out
 
 
 @final

@@ -9,9 +9,6 @@ from itertools import pairwise
 from typing import Any, final
 
 import numpy as np
-from scipy import linalg
-from scipy.sparse import block_array, csr_array
-from scipy.sparse.csgraph import connected_components
 
 from ephs.mechanics.solve.errors import SolveError
 from ephs.mechanics.solve.lu_kernels import factorise
@@ -104,6 +101,10 @@ def dependent_rows(model: Model, values: Array) -> Index:
 
     Rows that share no effort cannot depend on each other, so that the rank is decided part by part.
     """
+    from scipy import linalg
+    from scipy.sparse import block_array, csr_array
+    from scipy.sparse.csgraph import connected_components
+
     t = model.tables
     n_rate, n_effort, size = int(t.counts[0]), int(t.counts[1]), model.unknowns
     out = np.zeros(size, dtype=np.int64)
@@ -142,6 +143,8 @@ def _groups(part: Index, count: int) -> list[Index]:
 
 def _compliance(model: Model, values: Array) -> Any:
     """Block-diagonal square root of ∂e/∂w at storages, the identity at efforts that no storage gives; sparse."""
+    from scipy.sparse import csr_array
+
     t = model.tables
     rows: list[Index] = []
     columns: list[Index] = []

@@ -9,8 +9,6 @@ from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
-from scipy.sparse.linalg import splu
 
 from ephs.mechanics.solve.lu_kernels import fill
 from ephs.semantics.bundle import Array
@@ -54,6 +52,9 @@ def order(n: int, row: Index, column: Index, value: Array) -> Elimination:
     RuntimeError
         The matrix is exactly singular.
     """
+    from scipy import sparse
+    from scipy.sparse.linalg import splu
+
     scale_r, scale_c = _equilibrate(n, row, column, value)
     scaled = value * scale_r[row] * scale_c[column]
     pattern = sparse.csc_matrix((scaled, (row, column)), shape=(n, n))

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 
 import ephs
 from benchmarks.cases import CASES
+from ephs.mechanics.reduced.explicit import tableau
 from ephs.mechanics.reduced.mechanism import reduce_scene
 from ephs.mechanics.simulate import problem_of_scene
 from ephs.mechanics.solve.model import compile_model
@@ -221,3 +222,15 @@ def test_too_many_steps_end_a_run_and_keep_what_there_is():
         ephs.simulate(BY_NAME["heavy-top"].scene(), 2.0, method="rk54", max_steps=20)
     assert len(caught.value.partial) == 21
     assert caught.value.partial.t[-1] == caught.value.time
+
+
+@pytest.mark.parametrize(("name", "scipys"), [("rk54", "RK45"), ("rk87", "DOP853")])
+def test_coefficients_are_those_of_scipy(name, scipys):
+    import scipy.integrate
+
+    method, own = getattr(scipy.integrate, scipys), tableau(name)
+    n = method.n_stages
+    assert np.array_equal(own.scheme.a, method.A[:n, :n]) and np.array_equal(own.scheme.b, method.B)
+    assert np.array_equal(own.c, method.C[:n])
+    estimates = (method.E5, method.E3) if name == "rk87" else (method.E, np.zeros(n + 1))
+    assert np.array_equal(own.scheme.error, estimates[0]) and np.array_equal(own.scheme.coarse, estimates[1])
