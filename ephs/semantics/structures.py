@@ -92,13 +92,14 @@ def constant_structure(
 ) -> Reversible:
     """A Dirac structure that does not depend on states: L (n, n), C (k, n)."""
     n, k = skew.shape[0], constraint.shape[0]
+    entries = [*skew.ravel().tolist(), *constraint.reshape(k, n).ravel().tolist()]
     return Reversible(
         name,
         interface,
         structure=lambda _x: (skew, constraint),
         parameters=parameters,
         multipliers=k,
-        kernel=Kernel(KERNELS, "constant_structure", (*skew.ravel(), *constraint.reshape(k, n).ravel())),
+        kernel=Kernel(KERNELS, "constant_structure", tuple(entry or 0.0 for entry in entries)),  # most share one zero
         formula=formula or Formula(lambda: (skew, constraint)),
         trusted=trusted,
     )

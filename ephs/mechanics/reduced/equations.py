@@ -68,7 +68,9 @@ class Equations:
 
     def __init__(self, scene: Scene, problem: Problem, t0: float, *, pushed: bool = False) -> None:
         self.problem = problem
-        self.model = model = compile_model(problem.descriptor, problem.reference, problem.inputs(t0, problem.initial))
+        self.model = model = compile_model(
+            problem.descriptor, problem.reference, problem.inputs(t0, problem.initial), matrix=False
+        )
         self.reduced = reduced = reduce_scene(scene, problem, model)
         self._stored = model.memory()
         self._light = reduced.workspace(dense=False)

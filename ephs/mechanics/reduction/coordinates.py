@@ -81,7 +81,7 @@ class Loop:
 
 def coordinate_steps(scene: Scene, problem: Problem, before: int) -> Iterator[Step]:
     """The steps from a scene's system to its form in joint coordinates, as far as there is one."""
-    model = compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
+    model = compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial), matrix=False)
     try:
         reduced = reduce_scene(scene, problem, model)
     except OptionError:

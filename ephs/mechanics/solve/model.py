@@ -1,7 +1,7 @@
 """The compiled model of a system: its descriptor form as tables of numbers and addresses."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, final
 
 import numpy as np
@@ -131,8 +131,16 @@ class Model:
         return "the prescribed effort of an outer port"
 
 
-def compile_model(descriptor: Descriptor, reference: Reference, inputs: Mapping[Path, Input] | None) -> Model:
+def compile_model(
+    descriptor: Descriptor, reference: Reference, inputs: Mapping[Path, Input] | None, *, matrix: bool = True
+) -> Model:
     """Tabulate a descriptor form. Kernels are compiled where needed, and cached on disk.
+
+    Parameters
+    ----------
+    matrix
+        Whether to lay out the Jacobian, which most of the tables is; without it the components are there, and the whole
+        cannot be evaluated.
 
     Raises
     ------
@@ -179,7 +187,6 @@ def compile_model(descriptor: Descriptor, reference: Reference, inputs: Mapping[
         [manifold(s.quantity.space).code, s.at, s.quantity.space.size, s.rate, s.quantity.space.dim] for s in d.states
     ]
     block, group = _blocks(d, given, size)
-    constant_at, values = _constant_entries(d, outer, n_rate, size)
     table = Tables(
         counts=np.array([n_rate, n_effort, n_lam, size], dtype=np.int64),
         kind=np.array(kinds, dtype=np.int64),
@@ -207,10 +214,15 @@ def compile_model(descriptor: Descriptor, reference: Reference, inputs: Mapping[
         outer=np.array(outer, dtype=np.int64).reshape(-1, 4),
         input_at=np.array(input_at, dtype=np.int64),
     )
+    first = n_rate + n_effort
+    model = Model(d, reference, given, table, callbacks, np.arange(first, size, dtype=np.int64))
+    if not matrix:
+        return model
     local = [
         _places(slot, _local_pattern(slot, reference, callbacks.get(number)), n_rate, n_effort, size)
         for number, slot in enumerate(d.components)
     ]
+    constant_at, values = _constant_entries(d, outer, n_rate, size)
     j_at = np.cumsum([0, *map(len, local)])[:-1].astype(np.int64)
     flat = np.concatenate([*local, np.full(1, -1)])
     place, found = _numbered(np.concatenate([constant_at, flat]))
@@ -224,8 +236,7 @@ def compile_model(descriptor: Descriptor, reference: Reference, inputs: Mapping[
         column=np.concatenate([place % size, diagonal]),
         template=template,
     )
-    first = n_rate + n_effort
-    return Model(d, reference, given, table, callbacks, np.arange(first, size, dtype=np.int64))
+    return replace(model, tables=table)
 
 
 def _numbered(keys: Index) -> tuple[Index, Index]:
