@@ -8,13 +8,13 @@ import numpy as np
 from ephs.mechanics.batch import rotations, turned
 from ephs.mechanics.build import drive_ports, wrench_port
 from ephs.mechanics.scene.model import GROUND, Joint, Scene, Spring
-from ephs.mechanics.solve.problem import Problem
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 
-__all__ = ["Inputs", "Read", "body_loads", "joint_load", "sampled_inputs"]
+__all__ = ["Inputs", "Read", "body_loads", "joint_load"]
 
 Inputs = Mapping[Path, Array]
+"""(n, dim) of what is prescribed at each outer port."""
 
 
 class Read(Protocol):
@@ -28,26 +28,6 @@ class Read(Protocol):
     def poses(self, name: str) -> Array:
         """(n, 7) of a body, or of the ground."""
         ...
-
-    def state(self, i: int) -> dict[Path, Array]:
-        """The states at an instant, as inputs read them."""
-        ...
-
-
-def sampled_inputs(problem: Problem, t: Array, read: Read) -> dict[Path, Array]:
-    """(n, dim) of what is prescribed at each outer port."""
-    out: dict[Path, Array] = {}
-    changing = {path: signal for path, signal in problem.signals.items() if not signal.constant}
-    for path, signal in problem.signals.items():
-        if signal.constant:
-            value = signal.at(0.0, {})
-            out[path] = np.broadcast_to(value, (t.size, value.size))
-    if changing:
-        states = [read.state(i) for i in range(t.size)]
-        for path, signal in changing.items():
-            rows = [signal.at(float(time), state) for time, state in zip(t, states, strict=True)]
-            out[path] = np.array(rows).reshape(t.size, -1)
-    return out
 
 
 def body_loads(scene: Scene, inputs: Inputs, read: Read) -> dict[str, Array]:

@@ -12,10 +12,11 @@ import numpy as np
 
 from ephs.mechanics.batch import adjoint_inverse, compose, inverse, rotations
 from ephs.mechanics.build import component_path
-from ephs.mechanics.loads import sampled_inputs
 from ephs.mechanics.projection import Held, project, project_dense
+from ephs.mechanics.readout import variables
 from ephs.mechanics.scene.geometry import Coupling, coupling_of
 from ephs.mechanics.scene.model import GROUND, Joint, Scene
+from ephs.mechanics.solve.dataset import Variable
 from ephs.mechanics.solve.mobility import mobility
 from ephs.mechanics.wrenches import root_of, wrenches
 from ephs.operad import Path
@@ -299,9 +300,11 @@ class SceneMotion:
 
     @cached_property
     def _wrenches(self) -> dict[str, Array]:
-        problem = self._solution.problem
-        assert problem is not None  # a motion is made for a problem
-        return wrenches(self._scene, sampled_inputs(problem, self._solution.t, self), self)
+        return wrenches(self._scene, {path: given.values for path, given in self._solution.inputs.items()}, self)
+
+    def variables(self, *, wrenches: bool) -> dict[str, Variable]:
+        """Bodies, joints, thermal nodes and markers as labelled arrays."""
+        return variables(self._scene, self, wrenches=wrenches)
 
     def state(self, i: int) -> dict[Path, Array]:
         """The states at the i-th instant, momenta projected on the joints."""
