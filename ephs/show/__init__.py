@@ -10,6 +10,7 @@ from ephs.show.errors import ShowError as ShowError
 from ephs.show.flows import plot_exergy_flow as plot_exergy_flow
 from ephs.show.geometry import Placement as Placement
 from ephs.show.layout import place as place
+from ephs.show.page import Page as Page
 from ephs.show.plots import plot_constraints as plot_constraints
 from ephs.show.plots import plot_energy as plot_energy
 from ephs.show.plots import plot_entropy as plot_entropy
@@ -19,6 +20,7 @@ from ephs.show.report import write_report as write_report
 
 __all__ = [
     "Drawing",
+    "Page",
     "Placement",
     "ShowError",
     "animate",

@@ -12,16 +12,18 @@ from typing import Any, final
 import numpy as np
 
 from ephs.show.errors import ShowError
-from ephs.show.motion import Array, Film, between, film, frame_all, point_of
+from ephs.show.motion import Array, Film, best_side, between, film, frame_all, point_of
 from ephs.show.overlays import ARROWS, GROUND, Heat, Loads, heat_of, loads_of, tint
 from ephs.show.page import Page
 from ephs.show.solids import Solid, solid_of
-from ephs.show.symbols import add_body, add_joint, add_spring, ink
+from ephs.show.symbols import METAL, Colour, add_body, add_joint, add_spring, ink
 
 __all__ = ["animate"]
 
 LONGEST = 0.35
 """Length of the longest arrow, in parts of the scene's size."""
+THROUGH = 0.6
+"""Opacity of bodies with arrows inside."""
 
 
 def animate(
@@ -128,21 +130,24 @@ class _Stage:
     def _played(self, server: Any) -> str:
         places, reaches = self._places()
         size = _size(places, reaches)
-        _set(server, places, reaches, size)
+        tips = [self._tips(kind, frame, size) for kind in self._kinds() for frame in range(len(self.frames.times))]
+        seen = np.concatenate([places, *(tip[:, 1] for tip in tips)])
+        _set(server, seen, np.concatenate([reaches, np.zeros(len(seen) - len(places))]), size, best_side(places))
         nodes: dict[str, Any] = {}
-        warm: list[tuple[str, Any, Any]] = []  # thermal node, what has its colour, its colour when cold
+        warm: list[_Warm] = []
         for index, name in enumerate(self.bodies):
             pose = self.frames.poses[name][0]
             nodes[name] = server.scene.add_frame(_node(name), show_axes=False, wxyz=pose[:4], position=pose[4:])
             solid, shape = self.solids[name], self.bodies[name].shape
-            drawn = add_body(server, f"{_node(name)}/shape", solid, shape, ink(index), size)
-            warm.append((name, drawn, drawn.color))
+            opacity = None if self.loads is None else THROUGH
+            drawn = add_body(server, f"{_node(name)}/shape", solid, shape, ink(index), size, opacity)
+            warm.append(_Warm(name, drawn, "color", drawn.color))
         for name, joint in self.joints.items():
             parent = "/ground" if joint.body1 == GROUND else _node(joint.body1)
             metal = add_joint(server, f"{parent}/joint {name}", joint, self._symbol_size(joint, size))
-            warm += [(joint.heat, drawn, drawn.color) for drawn in metal] if self.heat else []
+            warm += [_Warm(joint.heat, drawn, "color", METAL) for drawn in metal] if self.heat else []
         coils = {name: add_spring(server, f"/springs/{name}", size) for name in self.springs}
-        warm += [(self.springs[name].heat, coil, (70, 76, 84)) for name, coil in coils.items()] if self.heat else []
+        warm += [_Warm(self.springs[name].heat, coil, "colors", METAL) for name, coil in coils.items() if self.heat]
         arrows = self._arrows(server, size)
         recording = server.get_scene_serializer()
         for frame in range(len(self.frames.times)):
@@ -155,8 +160,9 @@ class _Stage:
                 coil.wxyz, coil.position, coil.scale = turn, start, (1.0, 1.0, max(length, 1e-9))
             for kind, node in arrows.items():
                 node.points = self._tips(kind, frame, size)
-            if self.heat is not None:
-                _glow(self.heat, warm, frame)
+            for each in warm:
+                if self.heat is not None:
+                    each.glow(self.heat, frame)
             # Only Python's own float will do here.
             recording.insert_sleep(float(self.frames.pause))
         return str(recording.as_html())
@@ -169,7 +175,9 @@ class _Stage:
                 if self.loads.largest[kind] > 0.0:
                     colour = "rgb({},{},{})".format(*ARROWS[kind])
                     most = f"{self.loads.largest[kind]:.3g} {unit}"
-                    rows.append(f'<b style="color:{colour}">➞</b> {kind} on body 2, the longest {most}')
+                    rows.append(
+                        f'<b style="color:{colour};font-size:1.4em;line-height:1">→</b> {kind} on body 2, the longest {most}'
+                    )
             if self.loads.loose:
                 rows.append(f"indeterminate, so in part not drawn: {html.escape(', '.join(self.loads.loose))}")
         if self.heat is not None and self.heat.high > self.heat.low:
@@ -188,8 +196,6 @@ class _Stage:
         return f'<div id="legend" style="{style}">{"<br>".join(rows)}</div>'
 
     def _arrows(self, server: Any, size: float) -> dict[str, Any]:
-        if self.loads is None:
-            return {}
         return {
             kind: server.scene.add_arrows(
                 f"/{kind}s",
@@ -199,9 +205,12 @@ class _Stage:
                 head_radius=0.015 * size,
                 head_length=0.035 * size,
             )
-            for kind in ARROWS
-            if self.loads.largest[kind] > 0.0
+            for kind in self._kinds()
         }
+
+    def _kinds(self) -> list[str]:
+        """The kinds of arrows that there are."""
+        return [] if self.loads is None else [kind for kind, most in self.loads.largest.items() if most > 0.0]
 
     def _tips(self, kind: str, frame: int, size: float) -> Any:
         """(n, 2, 3) start and end of each joint's arrow of this kind."""
@@ -238,16 +247,27 @@ class _Stage:
         return float(np.clip(0.16 * small, 0.014 * size, 0.05 * size))
 
 
-def _glow(heat: Heat, warm: list[tuple[str, Any, Any]], frame: int) -> None:
-    """Colour what belongs to a thermal node; what did not change is not said again."""
-    for node, drawn, cold in warm:
-        if node in heat.temperatures:
-            share = heat.share(node, frame)
-            # below a tenth the own colour fades into that of warm metal
-            fade = min(1.0, 10.0 * share)
-            colour = tuple(round((1.0 - fade) * a + fade * b) for a, b in zip(cold, tint(share), strict=True))
-            if "color" in dir(drawn) and tuple(drawn.color) != colour:
-                drawn.color = colour
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class _Warm:
+    """What is drawn of a thermal node: the property that is its colour, and that colour when cold."""
+
+    node: str
+    drawn: Any
+    name: str
+    cold: Colour
+
+    def glow(self, heat: Heat, frame: int) -> None:
+        """Colour it; what did not change is not said again, which keeps the page small."""
+        share, before = heat.share(self.node, frame), heat.share(self.node, max(0, frame - 1))
+        if self.node in heat.temperatures and (frame == 0 or self._colour(share) != self._colour(before)):
+            setattr(self.drawn, self.name, self._colour(share))
+
+    def _colour(self, share: float) -> Colour:
+        # below a tenth the own colour fades into that of warm metal
+        fade = min(1.0, 10.0 * share)
+        red, green, blue = (round((1.0 - fade) * a + fade * b) for a, b in zip(self.cold, tint(share), strict=True))
+        return red, green, blue
 
 
 def _node(name: str) -> str:
@@ -259,23 +279,23 @@ def _size(places: Array, reaches: Array) -> float:
     return across if across > 0 else 1.0
 
 
-def _set(server: Any, places: Array, reaches: Array, size: float) -> None:
+def _set(server: Any, places: Array, reaches: Array, size: float, side: Array) -> None:
     """Ground, light and camera."""
-    view = frame_all(places, np.maximum(reaches, size / 25))
+    view = frame_all(places, np.maximum(reaches, size / 25), side)
     server.scene.set_up_direction("+z")
     camera = server.initial_camera
     camera.position, camera.look_at, camera.fov = view.position, view.target, view.field
     camera.near, camera.far = 0.002 * size, 200.0 * size
     decade = 10.0 ** math.floor(math.log10(size / 2))
     cell = decade * max(step for step in (1.0, 2.0, 5.0) if step * decade <= size / 2)
-    side = cell * 2 * math.ceil(1.5 * size / cell)
+    width = cell * 2 * math.ceil(1.5 * size / cell)
     low = float((places[:, 2] - reaches).min()) - 0.02 * size
     middle = (round(view.target[0] / cell) * cell, round(view.target[1] / cell) * cell, low)
     server.scene.add_frame("/ground", show_axes=False)
     server.scene.add_grid(
         "/grid",
-        width=side,
-        height=side,
+        width=width,
+        height=width,
         position=middle,
         cell_size=cell / 5,
         section_size=cell,

@@ -167,11 +167,16 @@ def best_side(points: Array) -> Array:
     return way / np.linalg.norm(way)
 
 
-def frame_all(points: Array, reach: "float | Array", field: float = math.radians(40.0)) -> View:
-    """A camera that sees all points (n, 3) with the balls of `reach` m (a number, or (n,)) about them."""
+def frame_all(
+    points: Array, reach: "float | Array", way: Array | None = None, field: float = math.radians(40.0)
+) -> View:
+    """A camera that sees all points (n, 3) with the balls of `reach` m (a number, or (n,)) about them.
+
+    It stands on the side `way`, (3,) of length 1; by default where the points are seen best.
+    """
+    way = best_side(points) if way is None else way
     ball = np.broadcast_to(np.asarray(reach, dtype=float), (len(points),))
     target = 0.5 * ((points - ball[:, None]).min(axis=0) + (points + ball[:, None]).max(axis=0))
-    way = best_side(points)
     nearer = (points - target) @ way
     aside = np.linalg.norm(points - target - nearer[:, None] * way, axis=1)
     # a ball touches the cone of sight where its centre is its radius / cos within it

@@ -6,12 +6,12 @@ from typing import Any, final
 import numpy as np
 
 from ephs.show.motion import Array, Film, between_instants, nearest, point_of, rotate
-from ephs.show.symbols import Colour
+from ephs.show.symbols import METAL, Colour
 
 __all__ = ["ARROWS", "Heat", "Loads", "heat_of", "loads_of", "tint"]
 
 ARROWS: dict[str, Colour] = {"force": (214, 51, 108), "moment": (112, 72, 232)}
-_WARM = np.array([(70, 76, 84), (148, 46, 36), (226, 92, 28), (255, 172, 48), (255, 236, 170)], dtype=float)
+_WARM = np.array([METAL, (148, 46, 36), (226, 92, 28), (255, 172, 48), (255, 236, 170)], dtype=float)
 GROUND = "ground"
 
 

@@ -28,23 +28,28 @@ def ink(index: int) -> Colour:
     return _INKS[index % len(_INKS)]
 
 
-def add_body(server: Any, node: str, solid: Solid, shape: Any, colour: Colour, size: float) -> Any:
+def add_body(
+    server: Any, node: str, solid: Solid, shape: Any, colour: Colour, size: float, opacity: float | None
+) -> Any:
     """Draw a body at its frame, and give the node that has its colour; `size` is that of the whole scene, m."""
     scene = server.scene
     match solid.kind:
         case "sphere":
-            return scene.add_icosphere(node, radius=float(shape["sphere"]), color=colour, subdivisions=4)
+            return scene.add_icosphere(
+                node, radius=float(shape["sphere"]), color=colour, subdivisions=4, opacity=opacity
+            )
         case "cylinder":
             radius, length = shape["cylinder"]
-            return scene.add_cylinder(node, radius=float(radius), height=float(length), color=colour)
+            return scene.add_cylinder(node, radius=float(radius), height=float(length), color=colour, opacity=opacity)
         case "point":
             return scene.add_icosphere(node, radius=0.012 * size, color=MUTED, subdivisions=3)
         case _:
             # flat faces want corners of their own, so that their edges stay sharp
             corners = solid.vertices[solid.triangles].reshape(-1, 3)
             faces = np.arange(len(corners)).reshape(-1, 3)
-            tone, opacity = (MUTED, 0.75) if solid.kind == "stand-in" else (colour, None)
-            return scene.add_mesh_simple(node, vertices=corners, faces=faces, color=tone, opacity=opacity)
+            tone = MUTED if solid.kind == "stand-in" else colour
+            through = opacity or (0.75 if solid.kind == "stand-in" else None)
+            return scene.add_mesh_simple(node, vertices=corners, faces=faces, color=tone, opacity=through)
 
 
 def add_joint(server: Any, node: str, joint: Any, size: float) -> list[Any]:

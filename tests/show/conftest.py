@@ -41,6 +41,10 @@ class FakeScene:
     def all_thermal(self) -> list[tuple[str, Any]]:
         return [("housing", None)]
 
+    @property
+    def world(self) -> Record:
+        return Record({"temperature": 293.15})
+
 
 @final
 @dataclass(frozen=True)
@@ -190,14 +194,22 @@ def pendulum() -> FakeSolution:
         "body1": "ground",
         "body2": "rod",
         "frame1": np.array([*along_x, 0.0, 0.0, 1.0]),
+        "heat": "housing",
     }
     slide = {
         "kind": "prismatic",
         "body1": "rod",
         "body2": "arm.weight",
         "frame1": np.array([*still, 0.0, 0.0, -0.2]),
+        "heat": "environment",
     }
-    spring = {"body1": "ground", "body2": "rod", "at1": [0.0, 0.5, 1.0], "at2": [0.0, 0.0, -0.25]}
+    spring = {
+        "body1": "ground",
+        "body2": "rod",
+        "at1": [0.0, 0.5, 1.0],
+        "at2": [0.0, 0.0, -0.25],
+        "heat": "environment",
+    }
     scene = FakeScene(
         {"rod": Record(rod), "arm.weight": Record(weight)},
         {"pin": Record(joint), "slide": Record(slide)},
