@@ -175,9 +175,8 @@ class _Stage:
                 if self.loads.largest[kind] > 0.0:
                     colour = "rgb({},{},{})".format(*ARROWS[kind])
                     most = f"{self.loads.largest[kind]:.3g} {unit}"
-                    rows.append(
-                        f'<b style="color:{colour};font-size:1.4em;line-height:1">→</b> {kind} on body 2, the longest {most}'
-                    )
+                    arrow = f'<b style="color:{colour};font-size:1.4em;line-height:1">→</b>'
+                    rows.append(f"{arrow} {kind} on body 2, the longest {most}")
             if self.loads.loose:
                 rows.append(f"indeterminate, so in part not drawn: {html.escape(', '.join(self.loads.loose))}")
         if self.heat is not None and self.heat.high > self.heat.low:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from ephs.mechanics.solve.books import Entry
+from ephs.mechanics.solve.labels import labels_of
 from ephs.operad import Path, Pattern, junction, quantity
 
 
@@ -68,6 +69,11 @@ class FakeSolution:
     body_records: dict[str, Any] = field(default_factory=dict)
     joint_records: dict[str, Any] = field(default_factory=dict)
     thermal_records: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def labels(self) -> dict[str, Any]:
+        quantities = {"pe.q": quantity.displacement, "ke.p": quantity.momentum, "env.s": quantity.entropy}
+        return {path: labels_of(quantities.get(path, quantity.body_momentum)) for path in self.states}
 
     def __getattr__(self, name: str) -> Any:
         if name in self.__dict__["ledgers"]:
@@ -195,6 +201,8 @@ def pendulum() -> FakeSolution:
         "body2": "rod",
         "frame1": np.array([*along_x, 0.0, 0.0, 1.0]),
         "heat": "housing",
+        "pitch": 0.0,
+        "middle": None,
     }
     slide = {
         "kind": "prismatic",
@@ -202,6 +210,8 @@ def pendulum() -> FakeSolution:
         "body2": "arm.weight",
         "frame1": np.array([*still, 0.0, 0.0, -0.2]),
         "heat": "environment",
+        "pitch": 0.0,
+        "middle": None,
     }
     spring = {
         "body1": "ground",

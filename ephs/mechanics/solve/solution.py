@@ -313,7 +313,7 @@ class Solution:
 
         save(self, File(path), wrenches=wrenches)
 
-    def plot(self, kind: str = "motion", **options: Any) -> "Figure":
+    def plot(self, kind: str = "motion", *arguments: Any, **options: Any) -> "Figure":
         """A matplotlib figure that shows itself in notebooks: of the motion, or of another `kind`.
 
         Kinds are motion, phase, energy, exergy, entropy, flow, constraints, wrenches and mechanism; the functions of
@@ -326,7 +326,7 @@ class Solution:
         """
         from ephs.show import plot
 
-        return plot(self, kind, **options)
+        return plot(self, kind, *arguments, **options)
 
     def animate(self, path: str | File | None = None, **options: Any) -> "Page":
         """One self-contained HTML page with the moving mechanism, which shows itself in notebooks.
