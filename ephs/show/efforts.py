@@ -65,7 +65,7 @@ def plot_wrenches(sol: Any, *joints: str) -> "Figure":
         figure.align_ylabels(list(grid[:, 1]))
         handles = grid[0, 0].get_lines()[:3]
         legend = {"loc": "outside upper right", "ncols": 3, "frameon": False, "fontsize": 8.0}
-        figure.legend(handles, ["x", "y", "z of C2"], **legend)
+        figure.legend(handles, ["x", "y", "z, axes of C2"], **legend)
         rest = f" ({len(chosen)} of {len(known)} joints)" if len(chosen) < len(known) else ""
         figure.suptitle(f"{sol.name}: joint wrenches{rest}", x=0.01, ha="left", fontsize=10.0)
     return figure
@@ -79,14 +79,5 @@ def _draw(axes: "Axes", t: Any, values: Any, title: str) -> None:
     if largest < 1e-9:  # rounding would fill the panel
         axes.set_ylim(-1.0, 1.0)
     if loose:
-        axes.text(
-            0.99,
-            0.95,
-            f"{', '.join(loose)} indeterminate",
-            transform=axes.transAxes,
-            ha="right",
-            va="top",
-            color=GREY,
-            fontsize=8.0,
-        )
+        axes.set_title(f"{', '.join(loose)} indeterminate", loc="right", color=GREY, fontsize=7.5, pad=2.0)
     axes.set_ylabel(title)

@@ -49,7 +49,7 @@ def plot_phase(sol: Any, *which: str | tuple[str, str]) -> "Figure":
 
     known = _freedoms(sol) if sol.scene is not None else {}
     curves = [_curve(sol, each, known) for each in which] or _default(sol, known)
-    columns = min(3, len(curves))
+    columns = 2 if len(curves) == 4 else min(3, len(curves))
     rows = -(-len(curves) // columns)
     style: Any = STYLE
     with rc_context(style):
@@ -64,8 +64,11 @@ def plot_phase(sol: Any, *which: str | tuple[str, str]) -> "Figure":
 
 
 def _freedoms(sol: Any) -> dict[str, _Curve]:
-    places = freedom_lines(sol.scene, lambda name: sol.joint(name).coordinate)
-    rates = freedom_lines(sol.scene, lambda name: sol.joint(name).rate)
+    def place(name: str) -> Any:
+        return sol.joint(name).coordinate
+
+    places = freedom_lines(sol.scene, place, place)
+    rates = freedom_lines(sol.scene, place, lambda name: sol.joint(name).rate)
     return {
         name: _Curve(f"{name} [{unit}]", f"rate [{unit}/s]", x, y)
         for (name, unit, x), (_, _, y) in zip(places, rates, strict=True)
@@ -91,7 +94,7 @@ def _curve(sol: Any, which: str | tuple[str, str], known: dict[str, _Curve]) -> 
 
 def _default(sol: Any, known: dict[str, _Curve]) -> list[_Curve]:
     if sol.scene is not None:
-        moving = [curve for curve in known.values() if float(np.ptp(curve.x)) > 1e-9]
+        moving = [curve for curve in known.values() if float(np.nanmax(curve.x) - np.nanmin(curve.x)) > 1e-9]
         if moving:
             return moving[:MOST]
         raise ShowError("nothing", path=str(sol.name), found="freedom that moves", expected="a joint's")
@@ -118,8 +121,8 @@ def _draw(axes: "Axes", curve: _Curve) -> None:
 
 def _direction(axes: "Axes", curve: _Curve) -> None:
     """An arrow head where the curve has run a fifth of its way over the picture."""
-    wide, high = (float(np.ptp(values)) or 1.0 for values in (curve.x, curve.y))
-    way = np.cumsum(np.hypot(np.diff(curve.x) / wide, np.diff(curve.y) / high))
+    wide, high = (float(np.nanmax(values) - np.nanmin(values)) or 1.0 for values in (curve.x, curve.y))
+    way = np.cumsum(np.nan_to_num(np.hypot(np.diff(curve.x) / wide, np.diff(curve.y) / high)))
     if not way[-1] > 0.0:
         return
     k = int(np.searchsorted(way, min(0.6, 0.2 * way[-1])))

@@ -22,7 +22,7 @@ def thinned(t: Array, values: Array, most: int = 2000) -> tuple[Array, Array]:
         piece = np.nan_to_num(values[first:last])
         kept += sorted({first + int(piece.argmin()), first + int(piece.argmax())})
     kept.append(len(t) - 1)
-    index = np.unique(np.array(kept))
+    index = np.unique(np.concatenate([kept, np.flatnonzero(np.isnan(values))]))
     return t[index], values[index]
 
 
@@ -52,11 +52,20 @@ def state_panels(sol: Any) -> dict[str, list[tuple[str, Array]]]:
     return panels
 
 
-def freedom_lines(scene: Any, read: Callable[[str], Any]) -> Iterator[tuple[str, str, Array]]:
-    """Name, unit and values (n,) of each freedom of each joint, of what ``read(joint)`` gives, (n, d)."""
+def freedom_lines(
+    scene: Any, places: Callable[[str], Any], read: Callable[[str], Any]
+) -> Iterator[tuple[str, str, Array]]:
+    """Name, unit and values (n,) of each freedom of each joint, of what ``read(joint)`` gives, (n, d).
+
+    ``places(joint)`` gives the coordinates, which say where a line has to be broken: there values are NaN.
+    """
     for name, joint in scene.all_joints():
         labels = freedoms_of(joint)
-        values = np.asarray(read(name), dtype=float)
+        values = np.array(read(name), dtype=float)
+        turning = [k for k, freedom in enumerate(labels.names) if freedom in ("rx", "ry", "rz")]
+        if turning:  # rotation vectors are principal values: where they start anew, a line ends
+            jumps = np.linalg.norm(np.diff(np.asarray(places(name), dtype=float)[:, turning], axis=0), axis=1) > np.pi
+            values[1:][jumps] = np.nan
         for k, freedom in enumerate(labels.names):
             yield name if len(labels.names) == 1 else f"{name} {freedom}", labels.units[k], values[:, k]
 
@@ -65,7 +74,8 @@ def scene_panels(sol: Any) -> dict[str, list[tuple[str, Array]]]:
     """Joint angles and distances, positions of bodies and temperatures, one panel for each unit and direction."""
     scene = sol.scene
     panels: dict[str, list[tuple[str, Array]]] = {}
-    for name, unit, column in freedom_lines(scene, lambda joint: sol.joint(joint).coordinate):
+    places: Callable[[str], Any] = lambda joint: sol.joint(joint).coordinate  # noqa: E731 - it is read twice
+    for name, unit, column in freedom_lines(scene, places, places):
         panel = "joint distance [m]" if unit == "m" else "joint angle [rad]"
         panels.setdefault(panel, []).append((name, column))
     for name, _ in scene.all_bodies():

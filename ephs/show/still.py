@@ -43,18 +43,13 @@ def draw_still(axes: "Axes", scene: Any, poses: dict[str, Array], way: Array | N
     )
     view = _view(best_side(cloud) if way is None else way)
     size = float(np.linalg.norm(np.ptp(cloud @ view[:, :2], axis=0))) or 1.0
-    faces: list[tuple[float, Array, tuple[float, ...]]] = []
-    edges: list[tuple[float, Array]] = []
-    for index, (name, solid) in enumerate(solids.items()):
-        colour = np.array(MUTED if solid.kind == "stand-in" else ink(index)) / 255.0
-        _add(solid, corners[name] @ view, colour, faces, edges)
-    # one painter for all: the far faces first, each with the edges that lie on it
-    faces.sort(key=lambda face: face[0])
-    colours = [colour for _, _, colour in faces]
-    axes.add_collection(
-        PolyCollection([f[:, :2] for _, f, _ in faces], facecolors=colours, edgecolors=colours, linewidths=0.4)
-    )
-    axes.add_collection(LineCollection([e[:, :2] for _, e in edges], colors=INK, linewidths=0.7))
+    order = sorted(solids, key=lambda name: float((corners[name] @ view[:, 2]).mean()))
+    for depth, name in enumerate(order):  # the far bodies first
+        solid, tone = solids[name], MUTED if solids[name].kind == "stand-in" else ink(list(solids).index(name))
+        faces, colours, edges = _surface(solid, corners[name] @ view, 0.4 + 0.6 * np.array(tone) / 255.0)
+        level = 1.0 + depth / len(order)
+        axes.add_collection(PolyCollection(faces, facecolors=colours, edgecolors=colours, linewidths=0.4, zorder=level))
+        axes.add_collection(LineCollection(edges, colors=INK, linewidths=0.7, zorder=level))
     for start, end in ends.values():
         axes.plot(*_coil(start @ view, end @ view, 0.018 * size), color=INK, linewidth=1.0, zorder=4)
     for name, joint in joints.items():
@@ -74,10 +69,11 @@ def _view(way: Array) -> Array:
     return np.column_stack([right, np.cross(way, right), way])
 
 
-def _add(solid: Solid, at: Array, colour: Array, faces: list[Any], edges: list[Any]) -> None:
-    """Shaded faces that look at the eye, and the edges where the surface bends or turns away."""
+def _surface(solid: Solid, at: Array, colour: Array) -> tuple[list[Array], list[Any], list[Array]]:
+    """Faces that look at the eye, the far ones first, their shades, and the edges where the surface bends or ends."""
     beside: dict[tuple[int, int], list[Array]] = {}
-    shown: list[tuple[Any, Array]] = []
+    shown: list[tuple[float, Array, Any]] = []
+    light = _LIGHT / np.linalg.norm(_LIGHT)
     for face in solid.faces:
         normal = np.cross(at[face[1]] - at[face[0]], at[face[2]] - at[face[1]])
         length = float(np.linalg.norm(normal))
@@ -87,22 +83,16 @@ def _add(solid: Solid, at: Array, colour: Array, faces: list[Any], edges: list[A
         for a, b in zip(face, np.roll(face, -1), strict=True):
             beside.setdefault((min(a, b), max(a, b)), []).append(normal)
         if normal[2] > 0.0:
-            shown.append((face, normal))
-    light = _LIGHT / np.linalg.norm(_LIGHT)
-    for face, normal in shown:
-        bright = 0.62 + 0.38 * max(0.0, float(normal @ light))
-        faces.append(
-            (
-                float(at[face, 2].mean()),
-                at[face],
-                tuple(1.0 - (1.0 - colour) * 0.9 if bright > 0.98 else colour * bright),
-            )
-        )
+            shade = np.clip(colour * (0.74 + 0.3 * max(0.0, float(normal @ light))), 0.0, 1.0)
+            shown.append((float(at[face, 2].mean()), at[face, :2], shade))
+    shown.sort(key=lambda entry: entry[0])
+    edges: list[Array] = []
     for (a, b), normals in beside.items():
         seen = [n[2] > 0.0 for n in normals]
         bent = len(normals) == 2 and float(normals[0] @ normals[1]) < _SMOOTH
         if any(seen) and (not all(seen) or bent or len(normals) == 1):
-            edges.append((float(at[[a, b], 2].mean()), at[[a, b]]))
+            edges.append(at[[a, b], :2])
+    return [face for _, face, _ in shown], [shade for _, _, shade in shown], edges
 
 
 def _ends(spring: Any, poses: dict[str, Array]) -> tuple[Array, Array]:
@@ -154,17 +144,25 @@ def _joint(axes: "Axes", joint: Any, place: Array, axis: Array, r: float) -> Non
 
 
 def _words(axes: "Axes", bodies: dict[str, Array], joints: dict[str, Array], size: float) -> None:
+    """Names: of bodies beside their middle, of joints above theirs; joints at one place share a line."""
     from matplotlib.patheffects import withStroke
 
     halo = [withStroke(linewidth=2.2, foreground=PAPER)]
-    for name, at in bodies.items():
-        text = axes.text(at[0], at[1], name, ha="center", va="center", fontsize=8.0, color=INK, zorder=9)
-        text.set_path_effects(halo)
+    groups: list[tuple[Array, list[str]]] = []
     for name, at in joints.items():
-        text = axes.text(
-            at[0], at[1] + 0.045 * size, name, ha="center", va="bottom", fontsize=7.0, color=GREY, zorder=8
-        )
-        text.set_path_effects(halo)
+        near = next((names for place, names in groups if np.linalg.norm(place - at[:2]) < 0.04 * size), None)
+        if near is None:
+            groups.append((at[:2], [name]))
+        else:
+            near.append(name)
+    for at, names in groups:
+        style: dict[str, Any] = {"ha": "right", "va": "bottom", "fontsize": 7.0, "color": GREY, "zorder": 8}
+        axes.annotate(", ".join(names), at, (-5, 5), textcoords="offset points", **style).set_path_effects(halo)
+    for name, at in bodies.items():
+        style = {"ha": "left", "va": "top", "fontsize": 8.0, "color": INK, "zorder": 9}
+        taken = any(np.linalg.norm(place - at[:2]) < 0.06 * size for place, _ in groups)
+        shift = (7, -7) if taken else (3, 4)
+        axes.annotate(name, at[:2], shift, textcoords="offset points", **style).set_path_effects(halo)
 
 
 def _bar(axes: "Axes", cloud: Array, size: float) -> None:
@@ -175,4 +173,5 @@ def _bar(axes: "Axes", cloud: Array, size: float) -> None:
     axes.plot([left, left + length], [low, low], color=INK, linewidth=1.6, solid_capstyle="butt")
     words = f"{length:g} m" if length >= 0.5 else f"{1000.0 * length:g} mm"
     axes.text(left + 0.5 * length, low - 0.02 * size, words, ha="center", va="top", fontsize=7.5, color=INK)
-    axes.plot([float(cloud[:, 0].max())], [low - 0.08 * size], alpha=0.0)
+    axes.update_datalim([(float(cloud[:, 0].max()), low - 0.08 * size)])
+    axes.autoscale_view()
