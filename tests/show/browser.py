@@ -11,10 +11,12 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
-from websockets.sync.client import ClientConnection, connect
+
+if TYPE_CHECKING:
+    from websockets.sync.client import ClientConnection
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
 FLAGS = (
@@ -39,7 +41,7 @@ def browser() -> str | None:
 class Tab:
     """A page in the browser, with all that it asked for and complained of."""
 
-    def __init__(self, socket: ClientConnection) -> None:
+    def __init__(self, socket: "ClientConnection") -> None:
         self.socket, self.numbers = socket, itertools.count(1)
         self.requests: list[str] = []
         self.complaints: list[str] = []
@@ -94,6 +96,8 @@ class Tab:
 @contextmanager
 def opened(page: Path, width: int = 900, height: int = 640) -> Iterator[Tab]:
     """Show a page."""
+    from websockets.sync.client import connect
+
     program = browser()
     if program is None:
         raise FileNotFoundError("no browser")
