@@ -126,5 +126,5 @@ def _direction(axes: "Axes", curve: _Curve) -> None:
     if not way[-1] > 0.0:
         return
     k = int(np.searchsorted(way, min(0.6, 0.2 * way[-1])))
-    ends = {"xy": (curve.x[k + 1], curve.y[k + 1]), "xytext": (curve.x[k], curve.y[k])}
-    axes.annotate("", **ends, arrowprops={"arrowstyle": "-|>", "color": BLUE, "lw": 0, "mutation_scale": 11})
+    start, end = (curve.x[k], curve.y[k]), (curve.x[k + 1], curve.y[k + 1])
+    axes.annotate("", end, start, arrowprops={"arrowstyle": "-|>", "color": BLUE, "lw": 0, "mutation_scale": 11})

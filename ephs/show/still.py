@@ -147,7 +147,7 @@ def _words(axes: "Axes", bodies: dict[str, Array], joints: dict[str, Array], siz
     """Names: of bodies beside their middle, of joints above theirs; joints at one place share a line."""
     from matplotlib.patheffects import withStroke
 
-    halo = [withStroke(linewidth=2.2, foreground=PAPER)]
+    halo: list[Any] = [withStroke(linewidth=2.2, foreground=PAPER)]
     groups: list[tuple[Array, list[str]]] = []
     for name, at in joints.items():
         near = next((names for place, names in groups if np.linalg.norm(place - at[:2]) < 0.04 * size), None)
@@ -157,12 +157,14 @@ def _words(axes: "Axes", bodies: dict[str, Array], joints: dict[str, Array], siz
             near.append(name)
     for at, names in groups:
         style: dict[str, Any] = {"ha": "right", "va": "bottom", "fontsize": 7.0, "color": GREY, "zorder": 8}
-        axes.annotate(", ".join(names), at, (-5, 5), textcoords="offset points", **style).set_path_effects(halo)
+        axes.annotate(", ".join(names), (at[0], at[1]), (-5, 5), textcoords="offset points", **style).set_path_effects(
+            halo
+        )
     for name, at in bodies.items():
         style = {"ha": "left", "va": "top", "fontsize": 8.0, "color": INK, "zorder": 9}
         taken = any(np.linalg.norm(place - at[:2]) < 0.06 * size for place, _ in groups)
         shift = (7, -7) if taken else (3, 4)
-        axes.annotate(name, at[:2], shift, textcoords="offset points", **style).set_path_effects(halo)
+        axes.annotate(name, (at[0], at[1]), shift, textcoords="offset points", **style).set_path_effects(halo)
 
 
 def _bar(axes: "Axes", cloud: Array, size: float) -> None:
