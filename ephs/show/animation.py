@@ -4,6 +4,7 @@ import contextlib
 import html
 import io
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path as FilePath
@@ -15,8 +16,8 @@ from ephs.show.errors import ShowError
 from ephs.show.motion import Array, Film, best_side, between, film, frame_all, point_of
 from ephs.show.overlays import ARROWS, GROUND, Heat, Loads, heat_of, loads_of, tint
 from ephs.show.page import Page
-from ephs.show.solids import Solid, solid_of
-from ephs.show.symbols import METAL, Colour, add_body, add_joint, add_spring, ink
+from ephs.show.solids import Solid, held_at, solid_of
+from ephs.show.symbols import METAL, Colour, add_body, add_joint, add_spring, add_stick, ink
 
 __all__ = ["animate"]
 
@@ -117,14 +118,11 @@ class _Stage:
         """The page as viser makes it."""
         import viser
 
-        # The helper writes a banner to the terminal whatever it is told.
-        with contextlib.redirect_stdout(io.StringIO()):
+        with _silence():
             server = viser.ViserServer(host=host, port=port, verbose=False)
-        try:
-            with contextlib.redirect_stdout(io.StringIO()):
+            try:
                 return self._played(server)
-        finally:
-            with contextlib.redirect_stdout(io.StringIO()):
+            finally:
                 server.stop()
 
     def _played(self, server: Any) -> str:
@@ -142,6 +140,9 @@ class _Stage:
             opacity = None if self.loads is None else THROUGH
             drawn = add_body(server, f"{_node(name)}/shape", solid, shape, ink(index), size, opacity)
             warm.append(_Warm(name, drawn, "color", drawn.color))
+            for k, point in enumerate(held_at(name, self.joints.values(), self.springs.values())):
+                if stick := solid.stick(point):
+                    add_stick(server, f"{_node(name)}/stick {k}", stick, drawn.color, 0.008 * size)
         for name, joint in self.joints.items():
             parent = "/ground" if joint.body1 == GROUND else _node(joint.body1)
             metal = add_joint(server, f"{parent}/joint {name}", joint, self._symbol_size(joint, size))
@@ -267,6 +268,20 @@ class _Warm:
         fade = min(1.0, 10.0 * share)
         red, green, blue = (round((1.0 - fade) * a + fade * b) for a, b in zip(self.cold, tint(share), strict=True))
         return red, green, blue
+
+
+@contextlib.contextmanager
+def _silence() -> Iterator[None]:
+    """The helper writes a banner whatever it is told: to the terminal, and in notebooks through rich."""
+    import rich
+
+    console = rich.get_console()
+    before, console.quiet = console.quiet, True
+    try:
+        with contextlib.redirect_stdout(io.StringIO()):
+            yield
+    finally:
+        console.quiet = before
 
 
 def _node(name: str) -> str:

@@ -155,7 +155,8 @@ def best_side(points: Array) -> Array:
     scatter = points - points.mean(axis=0)
     _, spread, axes = np.linalg.svd(scatter.T @ scatter)
     if spread[1] > 1e-12 * max(spread[0], 1e-30) and spread[2] < 0.05 * spread[0]:
-        normal = axes[2] * (1.0 if axes[2] @ np.array([1.0, -1.2, 0.8]) >= 0 else -1.0)
+        front = np.array([0.0, 0.0, 1.0]) if abs(axes[2, 2]) > 0.3 else np.array([1.0, -1.2, 0.8])
+        normal = axes[2] * (1.0 if axes[2] @ front >= 0 else -1.0)
         side = np.cross(normal, np.array([0.0, 0.0, 1.0]))
         length = float(np.linalg.norm(side))
         # Flat motions are seen from the front, a little from above and from the side.

@@ -13,6 +13,8 @@ __all__ = ["ARROWS", "Heat", "Loads", "heat_of", "loads_of", "tint"]
 ARROWS: dict[str, Colour] = {"force": (214, 51, 108), "moment": (112, 72, 232)}
 _WARM = np.array([METAL, (148, 46, 36), (226, 92, 28), (255, 172, 48), (255, 236, 170)], dtype=float)
 GROUND = "ground"
+NOISE = 1e-9
+"""Forces and moments below this share of the other at the joints' arms, and of a millinewton, are rounding."""
 
 
 @final
@@ -27,7 +29,7 @@ class Loads:
     force, moment : (m, n, 3)
         On body 2, in world axes, N and N m; zero where they are indeterminate.
     largest : dict of str to float
-        Largest size of each.
+        Largest size of each, zero where that is rounding.
     loose : tuple of str
         Joints that have indeterminate components; where there are some, no arrow is drawn.
     """
@@ -72,6 +74,10 @@ def loads_of(sol: Any, frames: Film, joints: dict[str, Any]) -> Loads:
             known = np.where(np.isnan(part).any(axis=1, keepdims=True), 0.0, part)
             out[:, i] = rotate(pose[:, :4], rotate(np.broadcast_to(frame[:4], (shape[0], 4)), known))
     largest = {"force": _largest(force), "moment": _largest(moment)}
+    arm = max([float(np.linalg.norm(np.asarray(j.frame2)[4:])) for j in joints.values()], default=0.0) or 1.0
+    for kind, other in (("force", largest["moment"] / arm), ("moment", largest["force"] * arm)):
+        if largest[kind] < NOISE * max(1e-3, other):
+            largest[kind] = 0.0
     return Loads(places, force, moment, largest, tuple(loose))
 
 

@@ -1,6 +1,7 @@
 """Bodies as surfaces: their shape, their mesh, or the box of the same mass and inertia."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path as FilePath
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from ephs.show.errors import ShowError
 from ephs.show.motion import Array, equivalent_box, rotate
 
-__all__ = ["Solid", "box", "cylinder", "solid_of", "sphere"]
+__all__ = ["Solid", "box", "cylinder", "held_at", "solid_of", "sphere"]
 
 SIDES = 28
 """Of a round solid."""
@@ -44,6 +45,11 @@ class Solid:
     def reach(self) -> float:
         """Radius in m of the ball about the centre of mass that holds it."""
         return float(np.linalg.norm(self.vertices, axis=1).max(initial=0.0))
+
+    def stick(self, point: Array) -> tuple[Array, Array] | None:
+        """From the surface's box to a point (3,) of the body that is outside of it, None where it is within."""
+        inside = np.clip(point, self.vertices.min(axis=0), self.vertices.max(axis=0))
+        return (inside, point) if float(np.linalg.norm(point - inside)) > 0.02 * self.reach else None
 
     @property
     def triangles(self) -> NDArray[np.int64]:
@@ -81,6 +87,19 @@ def sphere(radius: float) -> tuple[Array, tuple[NDArray[np.int64], ...]]:
         for j in range(SIDES)
     ]
     return radius * points, tuple(faces)
+
+
+def held_at(body: str, joints: Iterable[Any], springs: Iterable[Any]) -> list[Array]:
+    """The points (3,) of a body, in its frame, at which joints and springs take hold of it."""
+    out = [
+        np.asarray(f, dtype=float)[4:]
+        for j in joints
+        for b, f in ((j.body1, j.frame1), (j.body2, j.frame2))
+        if b == body
+    ]
+    return out + [
+        np.asarray(at, dtype=float) for s in springs for b, at in ((s.body1, s.at1), (s.body2, s.at2)) if b == body
+    ]
 
 
 def solid_of(body: Any, name: str) -> Solid:

@@ -7,7 +7,7 @@ import numpy as np
 
 from ephs.show.motion import Array, best_side, point_of, rotate
 from ephs.show.palette import GREY, INK, PAPER
-from ephs.show.solids import Solid, solid_of
+from ephs.show.solids import Solid, held_at, solid_of
 from ephs.show.symbols import MUTED, ink
 
 if TYPE_CHECKING:
@@ -48,6 +48,10 @@ def draw_still(axes: "Axes", scene: Any, poses: dict[str, Array], way: Array | N
         solid, tone = solids[name], MUTED if solids[name].kind == "stand-in" else ink(list(solids).index(name))
         faces, colours, edges = _surface(solid, corners[name] @ view, 0.4 + 0.6 * np.array(tone) / 255.0)
         level = 1.0 + depth / len(order)
+        for point in held_at(name, joints.values(), springs.values()):
+            if stick := solid.stick(point):
+                across = (poses[name][4:] + rotate(poses[name][:4], np.array(stick))) @ view
+                axes.plot(across[:, 0], across[:, 1], color=0.75 * np.array(tone) / 255.0, linewidth=2.0, zorder=level)
         axes.add_collection(PolyCollection(faces, facecolors=colours, edgecolors=colours, linewidths=0.4, zorder=level))
         axes.add_collection(LineCollection(edges, colors=INK, linewidths=0.7, zorder=level))
     for start, end in ends.values():
@@ -55,10 +59,10 @@ def draw_still(axes: "Axes", scene: Any, poses: dict[str, Array], way: Array | N
     for name, joint in joints.items():
         axis = rotate(poses.get(joint.body1, _STILL)[:4], rotate(np.asarray(joint.frame1)[:4], np.array([0.0, 0, 1.0])))
         _joint(axes, joint, places[name] @ view, axis @ view, 0.022 * size)
-    _words(axes, {name: poses[name][4:] @ view for name in solids}, {n: p @ view for n, p in places.items()}, size)
     _bar(axes, cloud @ view, size)
     axes.set_aspect("equal")
     axes.axis("off")
+    _words(axes, {name: poses[name][4:] @ view for name in solids}, {n: p @ view for n, p in places.items()}, size)
 
 
 def _view(way: Array) -> Array:
@@ -144,7 +148,7 @@ def _joint(axes: "Axes", joint: Any, place: Array, axis: Array, r: float) -> Non
 
 
 def _words(axes: "Axes", bodies: dict[str, Array], joints: dict[str, Array], size: float) -> None:
-    """Names: of bodies beside their middle, of joints above theirs; joints at one place share a line."""
+    """Names beside what they name, each where there is room; joints at one place share a line."""
     from matplotlib.patheffects import withStroke
 
     halo: list[Any] = [withStroke(linewidth=2.2, foreground=PAPER)]
@@ -155,16 +159,51 @@ def _words(axes: "Axes", bodies: dict[str, Array], joints: dict[str, Array], siz
             groups.append((at[:2], [name]))
         else:
             near.append(name)
-    for at, names in groups:
-        style: dict[str, Any] = {"ha": "right", "va": "bottom", "fontsize": 7.0, "color": GREY, "zorder": 8}
-        axes.annotate(", ".join(names), (at[0], at[1]), (-5, 5), textcoords="offset points", **style).set_path_effects(
-            halo
-        )
-    for name, at in bodies.items():
-        style = {"ha": "left", "va": "top", "fontsize": 8.0, "color": INK, "zorder": 9}
-        taken = any(np.linalg.norm(place - at[:2]) < 0.06 * size for place, _ in groups)
-        shift = (7, -7) if taken else (3, 4)
-        axes.annotate(name, (at[0], at[1]), shift, textcoords="offset points", **style).set_path_effects(halo)
+    axes.apply_aspect()
+    inch = axes.get_figure(root=True)
+    dots = 72.0 / (inch.dpi if inch is not None else 72.0)
+
+    def points(at: Array) -> Array:
+        return np.asarray(axes.transData.transform(at[:2]), dtype=float) * dots
+
+    page = np.asarray(axes.bbox.extents, dtype=float) * dots
+    taken = [_room(points(at), 0.0, 0.0, 11.0, 11.0) for at, _ in groups]
+    named = [(at[:2], name, 8.0, INK) for name, at in bodies.items()]
+    named += [(at, ", ".join(names), 7.0, GREY) for at, names in groups]
+    for at, words, letter, colour in named:
+        wide, high = 0.58 * letter * len(words), 1.15 * letter
+        rooms = [_room(points(at), *shift, wide, high) for shift in _shifts(wide, high)]
+        clashes = [sum(_overlap(room, other) for other in taken) + _beyond(room, page) for room in rooms]
+        best = int(np.argmin(clashes))
+        taken.append(rooms[best])
+        style: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": letter, "color": colour, "zorder": 9}
+        shift = _shifts(wide, high)[best]
+        axes.annotate(words, (at[0], at[1]), shift, textcoords="offset points", **style).set_path_effects(halo)
+
+
+def _shifts(wide: float, high: float) -> list[tuple[float, float]]:
+    """Where the middle of a name may be from what it names, in points; the first is the best."""
+    aside, over = 0.5 * wide + 8.0, 0.5 * high + 8.0
+    near = [(0.0, over), (aside, 0.0), (aside, over), (-aside, over), (-aside, 0.0), (0.0, -over), (aside, -over)]
+    return [(0.0, 0.0), *near, (-aside, -over), (0.0, 2.2 * over), (0.0, -2.2 * over)]
+
+
+def _room(at: Array, x: float, y: float, wide: float, high: float) -> tuple[float, float, float, float]:
+    middle = at + np.array([x, y])
+    return (middle[0] - wide / 2, middle[1] - high / 2, middle[0] + wide / 2, middle[1] + high / 2)
+
+
+def _beyond(room: tuple[float, float, float, float], page: Array) -> float:
+    """The area that leaves the picture."""
+    whole = (room[2] - room[0]) * (room[3] - room[1])
+    return whole - _overlap(room, (page[0], page[1], page[2], page[3]))
+
+
+def _overlap(one: tuple[float, float, float, float], other: tuple[float, float, float, float]) -> float:
+    """Common area."""
+    wide = min(one[2], other[2]) - max(one[0], other[0])
+    high = min(one[3], other[3]) - max(one[1], other[1])
+    return max(0.0, wide) * max(0.0, high)
 
 
 def _bar(axes: "Axes", cloud: Array, size: float) -> None:

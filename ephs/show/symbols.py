@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from ephs.show.motion import Array
+from ephs.show.motion import Array, between
 from ephs.show.solids import Solid
 
 Colour = tuple[int, int, int]
@@ -116,6 +116,13 @@ def add_spring(server: Any, node: str, size: float) -> Any:
     coil = np.stack([radius * np.cos(turns), radius * np.sin(turns), heights], axis=1)
     line = np.concatenate([[[0.0, 0.0, 0.0]], coil, [[0.0, 0.0, 1.0]]])
     return _polyline(server.scene, node, line, METAL, 3.0, units="screen")
+
+
+def add_stick(server: Any, node: str, ends: tuple[Array, Array], colour: Colour, radius: float) -> None:
+    """Draw a thin rod from point to point, m."""
+    turn, length = between(*ends)
+    middle = 0.5 * (ends[0] + ends[1])
+    server.scene.add_cylinder(node, radius=radius, height=length, color=colour, wxyz=turn, position=middle)
 
 
 def _cylinder(scene: Any, node: str, radius: float, height: float) -> Any:

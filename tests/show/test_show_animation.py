@@ -70,6 +70,7 @@ def test_the_camera_sees_every_point(points, reach):
         assert way @ ahead > 0
         angle = math.acos(np.clip(way @ ahead / np.linalg.norm(way), -1.0, 1.0))
         assert angle <= view.field / 2
+    assert place[2] > target[2]  # never from under the floor
 
 
 def test_frames_are_poses_on_the_way(pendulum):

@@ -56,7 +56,19 @@ def test_the_hook_holds_the_lamp_up(tmp_path):
     loads = loads_of(sol, frames, dict(sol.scene.all_joints()))
     assert np.allclose(loads.force, [0.0, 0.0, 2.0 * 9.81], atol=1e-9)
     assert np.allclose(loads.places, 0.0, atol=1e-9) and np.abs(loads.moment).max() < 1e-9
-    assert loads.largest["force"] == pytest.approx(19.62) and loads.loose == ()
+    assert loads.largest == {"force": pytest.approx(19.62), "moment": 0.0} and loads.loose == ()
+
+
+@given(st.tuples(*[st.floats(-2.0, 2.0)] * 3).map(np.array))
+def test_sticks_reach_what_the_body_does_not(point):
+    solid = Solid(*box(np.array([1.0, 2.0, 3.0])), "box")
+    stick = solid.stick(point)
+    outside = np.maximum(np.abs(point) - np.array([0.5, 1.0, 1.5]), 0.0)
+    assert (stick is None) == (np.linalg.norm(outside) <= 0.02 * solid.reach)
+    if stick is not None:
+        assert np.array_equal(stick[1], point) and np.linalg.norm(stick[1] - stick[0]) == pytest.approx(
+            np.linalg.norm(outside)
+        )
 
 
 def test_what_is_indeterminate_has_no_arrow():
@@ -112,6 +124,17 @@ def test_a_missing_mesh_is_replaced_and_the_page_says_so(tmp_path):
 def test_meshes_outside_of_the_scenes_folder_are_refused(tmp_path, file):
     with pytest.raises(ephs.SceneError, match=r"bodies\.lamp\.shape\.mesh.*in the scene's folder"):
         lamp(tmp_path, f'shape = {{ mesh = "{file}" }}')
+
+
+def test_notebooks_show_the_page_and_nothing_else(tmp_path):
+    """What the recording helper says through rich is not said; the console is as it was before."""
+    import rich
+
+    console = rich.get_console()
+    with console.capture() as said:
+        animate(lamp(tmp_path))
+        console.print("after")
+    assert said.get().strip() == "after"
 
 
 def test_a_page_shows_itself_whole(tmp_path):
