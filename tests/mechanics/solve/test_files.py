@@ -160,3 +160,13 @@ def test_what_is_not_there_is_answered_with_what_is_near(damped, asked, words):
     sol = ephs.simulate(damped, 0.1, step=0.1)
     with pytest.raises(KeyError, match=words):
         sol[asked]
+
+
+def test_outer_ports_carry_in_the_file_what_they_carried(tmp_path):
+    inputs = {"bodies.rod": lambda t: np.array([0.0, np.cos(50.0 * t), 0.0, 1.0, 0.0, t])}
+    sol = ephs.simulate(ephs.load("scenes/slider-crank.toml"), 0.004, step=0.001, inputs=inputs)
+    again = through_a_file(sol, tmp_path)
+    for port in ("momenta.rod", "drives.bearing"):
+        one, other = again.port(port), sol.port(port)
+        assert np.array_equal(one.flow, other.flow) and np.array_equal(one.effort, other.effort)
+    assert np.ptp(sol.port("momenta.rod").flow[:, 1]) > 0.0
