@@ -11,11 +11,11 @@ if TYPE_CHECKING:
     from ephs.mechanics.check import check_model as check_model
     from ephs.mechanics.dynamics import dynamics as dynamics
     from ephs.mechanics.methods import register_method as register_method
+    from ephs.mechanics.reading import load_solution as load_solution
     from ephs.mechanics.reduction.report import reduce as reduce
     from ephs.mechanics.scene import Scene as Scene
     from ephs.mechanics.scene import SceneError as SceneError
     from ephs.mechanics.scene.load import load as load
-    from ephs.mechanics.simulate import load_solution as load_solution
     from ephs.mechanics.simulate import simulate as simulate
     from ephs.mechanics.solve.errors import Interrupted as Interrupted
     from ephs.mechanics.solve.errors import OptionError as OptionError
@@ -72,7 +72,8 @@ _HOMES = {
     "ephs.mechanics.dynamics": ("dynamics",),
     "ephs.mechanics.methods": ("register_method",),
     "ephs.mechanics.reduction.report": ("reduce",),
-    "ephs.mechanics.simulate": ("load_solution", "simulate"),
+    "ephs.mechanics.reading": ("load_solution",),
+    "ephs.mechanics.simulate": ("simulate",),
     "ephs.mechanics.solve.errors": ("Interrupted", "OptionError", "SimulationError"),
     "ephs.mechanics.solve.events": ("Event",),
     "ephs.mechanics.solve.solution": ("Solution",),

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import App, CycloptsError, Parameter
 
+from ephs.cli_animate import animate
 from ephs.cli_charts import charts
 from ephs.cli_input import EXTRAS, TEXTS, BadInput, Base, addressed, load_model, naming
 from ephs.cli_sweep import sweeps
@@ -32,6 +33,7 @@ Exergetic port-Hamiltonian systems: compose physical models by pattern, simulate
   ephs equations scenes/slider-crank.toml         print the equations; --latex for a paper
   ephs sweep scenes/heavy-top.toml --vary bodies.top.mass=0.5:2:9 --until 1 -o out/sweep
                                                   an ensemble in parallel, one table
+  ephs animate out/slider-crank -o a.html         one page with the moving mechanism, no network needed
   ephs chart stability -o out/charts              draw where which method fails; work-precision: its speed and error
 
 SCENE is a scene file (.toml), or FILE.py:NAME, a System or Scene of that name in a Python file of yours.
@@ -77,6 +79,7 @@ def _positive(_type: object, value: float | None) -> None:
         raise ValueError(f"found {value:g}, expected a positive finite number")
 
 
+app.command(animate)
 app.command(charts)
 app.command(sweeps)
 Positive = Annotated[float | None, Parameter(validator=_positive)]

@@ -17,6 +17,7 @@ TEXTS = {
     "initial": "--initial {found}: expected PATH=NUMBER or PATH=NUMBER,NUMBER,..., as in osc.pe.q=1.0",
     "suffix": "{found}: expected one of {expected}; choose the file name's ending accordingly",
     "no-file": "{found}: no such file; expected a scene file (.toml) or FILE.py:NAME",
+    "no-result": "{found}: no solution.nc in it; expected a result folder, as ephs run writes it",
     "no-name": "{file}: no {name} in it; found {found}. Give one as {file}:NAME",
     "not-a-model": "{file}: {name} is a {found}, expected a System or a Scene",
     "user-code": "{file}: line {line}: {found}; mend the file, then run again",

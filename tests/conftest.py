@@ -8,8 +8,18 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 from hypothesis import Phase, settings  # noqa: E402
 
+from tests.show.browser import browser  # noqa: E402
+
 # The suite of somebody else's package: test_downstream.py runs it, in a process of its own.
 collect_ignore = ["downstream"]
+if browser() is None:
+    collect_ignore.append("show/test_show_browser.py")
+
+
+def pytest_report_header() -> str:
+    """Say whether pages are looked at as a browser shows them."""
+    return f"browser: {browser() or 'none, so tests/show/test_show_browser.py is left out'}"
+
 
 settings.register_profile("ci", derandomize=True, deadline=None, max_examples=50, print_blob=True)
 settings.register_profile("dev", deadline=None, max_examples=50)

@@ -105,3 +105,33 @@ def test_options_that_the_method_has_not_are_told(tmp_path, capsys):
     scene = str(ROOT / "scenes/mbs.toml")
     assert main(["run", scene, "--until", "1", "--method", "euler", "--out", str(tmp_path)]) == 2
     assert "euler" in capsys.readouterr().err
+
+
+def test_animate_makes_a_page_of_a_result_folder(tmp_path, capsys):
+    folder, page = tmp_path / "out", tmp_path / "pages" / "film.html"
+    assert main(["run", str(ROOT / "scenes/slider-crank.toml"), "--until", "0.1", "--out", str(folder)]) == 0
+    capsys.readouterr()
+    assert main(["animate", str(folder), "-o", str(page), "--wrenches", "--heat", "--fps", "10"]) == 0
+    assert capsys.readouterr().out.strip() == str(page)
+    text = page.read_text(encoding="utf-8")
+    assert "<title>slider-crank</title>" in text and "force on body 2" in text
+
+
+@pytest.mark.parametrize(
+    ("folder", "page", "words"),
+    [
+        ("nowhere", "film.html", "no solution.nc in it"),
+        ("broken", "film.html", "not a netCDF file"),
+        ("circuit", "film.html", "found no scene"),
+        ("circuit", "film.pdf", "expected one of .html"),
+    ],
+)
+def test_animate_refuses_what_it_cannot_show(tmp_path, capsys, folder, page, words):
+    (tmp_path / "broken").mkdir()
+    (tmp_path / "broken" / "solution.nc").write_text("text")
+    model = f"{ROOT / 'examples/oscillator.py'}:free_oscillator"
+    assert main(["run", model, "--until", "0.1", "--step", "0.1", "--out", str(tmp_path / "circuit")]) == 0
+    capsys.readouterr()
+    assert main(["animate", str(tmp_path / folder), "-o", str(tmp_path / page)]) == 2
+    said = capsys.readouterr().err
+    assert words in said and "Traceback" not in said

@@ -13,10 +13,12 @@ import numpy as np
 from ephs.mechanics.batch import adjoint_inverse, compose, inverse, rotations
 from ephs.mechanics.build import component_path
 from ephs.mechanics.projection import Held, project, project_dense
+from ephs.mechanics.readout import variables
 from ephs.mechanics.scene.geometry import Coupling, coupling_of
 from ephs.mechanics.scene.model import GROUND, Joint, Scene
-from ephs.mechanics.solve.instant import instant
+from ephs.mechanics.solve.dataset import Variable
 from ephs.mechanics.solve.mobility import mobility
+from ephs.mechanics.wrenches import root_of, wrenches
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
@@ -143,7 +145,7 @@ class SceneMotion:
             pair = coupling_of(joint).pair
             coordinate = np.array([pair.coordinates(row) for row in self.poses(name)]).reshape(-1, pair.dim)
             return JointMotion(self, name, coordinate)
-        return JointMotion(self, name, self._coordinates(name))
+        return JointMotion(self, name, self.coordinates(name))
 
     def thermal(self, name: str) -> ThermalMotion:
         """The temperature of a thermal node."""
@@ -173,7 +175,7 @@ class SceneMotion:
             return np.tile(SE3.identity(), (len(self._solution), 1))
         return self._solution[component_path("bodies", name) / "pe" / "q"]
 
-    def _coordinates(self, name: str) -> Array:
+    def coordinates(self, name: str) -> Array:
         at = component_path("joints", name)
         if self._joints[name].middle is not None:
             parts = [self._solution[at / part / "pe" / "q_r"] for part in ("first", "second")]
@@ -186,7 +188,7 @@ class SceneMotion:
         """(n,) largest distance or angle between where a joint's coordinates and its bodies put the frame C2."""
         worst = np.zeros(len(self._solution))
         for name, joint in self._joints.items():
-            first = compose(self._frame(joint.body1, joint.frame1), self._inclusion(name))
+            first = compose(self._frame(joint.body1, joint.frame1), self.inclusion(name))
             gap = compose(inverse(self._frame(joint.body2, joint.frame2)), first)
             angle = 2.0 * np.linalg.norm(gap[:, 1:4], axis=1)  # small angles; half turns still show
             worst = np.maximum(worst, np.maximum(angle, np.linalg.norm(gap[:, 4:], axis=1)))
@@ -230,11 +232,7 @@ class SceneMotion:
             body = self._bodies[name]
             p = self._solution[component_path("bodies", name) / "ke" / "p"]
             twists[name][:] = np.column_stack([np.linalg.solve(body.inertia, p[:, :3].T).T, p[:, 3:] / body.mass])
-            sigma, vectors = np.linalg.eigh(body.inertia)
-            half = np.zeros((6, 6))
-            half[:3, :3] = (vectors / np.sqrt(sigma)) @ vectors.T
-            half[3:, 3:] = np.eye(3) / np.sqrt(body.mass)
-            root[name] = half
+            root[name] = root_of(body)
         if len(self._joints) > MANY and not light and all(j.middle is None for j in self._joints.values()):
             return self._of_many(heavy, root, twists, rates)
         columns = {name: 6 * i for i, name in enumerate(heavy)}
@@ -242,13 +240,13 @@ class SceneMotion:
         width = 0
         for name in [*light, *rates]:
             free[name], width = width, width + (6 if name in light else self._couplings[name].dim)
-        for at in self._chunks():
+        for at in self.chunks():
             size = at.stop - at.start
             rows = 6 * len(self._joints) + sum(j.motion is not None for j in self._joints.values())
             known, unknown = np.zeros((size, rows, 6 * len(heavy))), np.zeros((size, rows, width))
             right = np.zeros((size, rows))
             row = 0
-            for name, first, second, basis in self._joint_rows(at):
+            for name, first, second, basis in self.joint_rows(at):
                 joint = self._joints[name]
                 for body, block in ((joint.body1, first), (joint.body2, second)):
                     if body in columns:
@@ -279,9 +277,9 @@ class SceneMotion:
         """The same of a large mechanism without massless bodies and universal joints, by sparse matrices."""
         number = {name: i for i, name in enumerate(names)}
         roots = np.array([root[name] for name in names])
-        for at in self._chunks():
+        for at in self.chunks():
             held: list[Held] = []
-            for name, first, second, basis in self._joint_rows(at):
+            for name, first, second, basis in self.joint_rows(at):
                 joint = self._joints[name]
                 ends = ((joint.body1, first), (joint.body2, second))
                 rows = {number[body]: block for body, block in ends if body != GROUND}
@@ -298,20 +296,15 @@ class SceneMotion:
 
     def wrench(self, name: str) -> Array:
         """(n, 6) of a joint; see `JointMotion`."""
-        if name in self._implicit:
-            return np.zeros((len(self._solution), 6))
-        problem = self._solution.problem
-        assert problem is not None  # a motion is made for a problem
-        d = problem.descriptor
-        at = component_path("joints", name)
-        # of a universal joint, the second revolute is the one whose frame C2 lies in body 2
-        box = at / "second" / "hc" if self._joints[name].middle is not None else at / "hc"
-        out = np.empty((len(self._solution), 6))
-        for i in range(len(self._solution)):
-            state = self.state(i)
-            inputs = problem.inputs(float(self._solution.t[i]), state)
-            out[i] = instant(d, problem.reference, d.pack(state), inputs).multiplier(box)
-        return out
+        return np.zeros((len(self._solution), 6)) if name in self._implicit else self._wrenches[name]
+
+    @cached_property
+    def _wrenches(self) -> dict[str, Array]:
+        return wrenches(self._scene, {path: given.values for path, given in self._solution.inputs.items()}, self)
+
+    def variables(self, *, wrenches: bool) -> dict[str, Variable]:
+        """Bodies, joints, thermal nodes and markers as labelled arrays."""
+        return variables(self._scene, self, wrenches=wrenches)
 
     def state(self, i: int) -> dict[Path, Array]:
         """The states at the i-th instant, momenta projected on the joints."""
@@ -325,26 +318,26 @@ class SceneMotion:
         return state
 
     def _rows(self) -> Iterator[tuple[slice, str, Array, Array, Array]]:
-        for at in self._chunks():
-            for name, first, second, basis in self._joint_rows(at):
+        for at in self.chunks():
+            for name, first, second, basis in self.joint_rows(at):
                 yield at, name, first, second, basis
 
-    def _joint_rows(self, at: slice) -> Iterator[tuple[str, Array, Array, Array]]:
+    def joint_rows(self, at: slice) -> Iterator[tuple[str, Array, Array, Array]]:
         """Per joint: Ad_{I⁻¹}Ad_{o₁⁻¹}, −Ad_{o₂⁻¹}, B, each (size, 6, ·), at some instants."""
         for name, joint in self._joints.items():
             coupling = self._couplings[name]
-            relative = self._inclusion(name)[at]
+            relative = self.inclusion(name)[at]
             first = adjoint_inverse(compose(np.broadcast_to(joint.frame1, relative.shape), relative))
             second = -np.broadcast_to(SE3.adjoint(SE3.inverse(joint.frame2)), first.shape)
             yield name, first, second, self._basis(joint, coupling, name, at)
 
     def _basis(self, joint: Joint, coupling: Coupling, name: str, at: slice) -> Array:
-        x = self._coordinates(name)[at]
+        x = self.coordinates(name)[at]
         if joint.middle is None:
             return np.broadcast_to(coupling.basis(coupling.identity()), (x.shape[0], 6, coupling.dim))
         return np.array([coupling.basis(row) for row in x])
 
-    def _inclusion(self, name: str) -> Array:
+    def inclusion(self, name: str) -> Array:
         """(n, 7) poses of C2 in C1 by the joint's coordinates."""
         return self._inclusions[name]
 
@@ -352,7 +345,7 @@ class SceneMotion:
     def _inclusions(self) -> dict[str, Array]:
         out: dict[str, Array] = {}
         for name, coupling in self._couplings.items():
-            rows = [coupling.include(coupling.element(row)) for row in self._coordinates(name)]
+            rows = [coupling.include(coupling.element(row)) for row in self.coordinates(name)]
             out[name] = np.array(rows).reshape(len(self._solution), 7)
         return out
 
@@ -360,7 +353,7 @@ class SceneMotion:
         poses = self.poses(body)
         return compose(poses, np.broadcast_to(offset, poses.shape))
 
-    def _chunks(self) -> Iterator[slice]:
+    def chunks(self) -> Iterator[slice]:
         n = len(self._solution)
         size = max(1, CHUNK * MANY // max(MANY, len(self._joints)))
         for start in range(0, n, size):

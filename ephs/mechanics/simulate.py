@@ -1,7 +1,6 @@
 """`simulate`: from a system or a scene to its motion."""
 
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path as File
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +10,7 @@ from ephs.mechanics.methods import METHODS, Method, Setting, chosen
 from ephs.mechanics.motion import SceneMotion
 from ephs.mechanics.reduction.folded import folded_problem
 from ephs.mechanics.redundancy import explain
-from ephs.mechanics.scene.document import scene_from_text, scene_to_text
+from ephs.mechanics.scene.document import scene_to_text
 from ephs.mechanics.scene.model import Marker, Scene
 from ephs.mechanics.solve.control import Control, Tolerance
 from ephs.mechanics.solve.errors import OptionError
@@ -32,7 +31,7 @@ from ephs.semantics.system import System
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-__all__ = ["control_of", "load_solution", "problem_of_scene", "problem_of_system", "simulate", "times_of"]
+__all__ = ["control_of", "problem_of_scene", "problem_of_system", "simulate", "times_of"]
 
 OPEN = 1e-6
 """m or rad by which given initial states may leave a joint open."""
@@ -293,19 +292,6 @@ def _on_joints(problem: Problem) -> None:
             off = float(np.abs(value - given).max()) / max(1.0, float(np.abs(given).max()))
             if off > OFF:
                 raise AssemblyError("off-joint", path, found=off)
-
-
-def load_solution(path: str | File) -> Solution:
-    """Read a solution that `Solution.save` wrote; of a scene with everything that reads its motion.
-
-    Raises
-    ------
-    FileNotFoundError, ValueError
-        There is no such file, or it is not a solution.
-    """
-    from ephs.mechanics.solve.file import load
-
-    return load(path, lambda text: problem_of_scene(scene_from_text(text)))
 
 
 def signal(value: Any, *, effort: bool) -> Signal:

@@ -30,6 +30,8 @@ _TEXTS = {
         "body {path}: found shape {found}, expected one of box = [x, y, z], sphere = r, cylinder = [radius, length], "
         "mesh = FILE; correct its shape"
     ),
+    "plot": "plot: found kind {found!r}, expected one of {expected}; {path}",
+    "nothing": "solution {path}: found no {found}, expected {expected}",
     "reference": (
         "{path}: found no method that reaches {expected} with tight tolerances, expected one for the reference "
         "({found}); shorten the time, or give a reference file"

@@ -55,12 +55,25 @@ def film(sol: Any, names: list[str], fps: float, duration: float | None, most: i
         Playing time, s; by default that of the model, so that it is seen in real time.
     """
     t = np.asarray(sol.t, dtype=float)
-    span = float(t[-1] - t[0])
+    span = abs(float(t[-1] - t[0]))
     playing = span if duration is None else float(duration)
     count = max(2, min(most, round(playing * fps) + 1))
     times = np.linspace(t[0], t[-1], count) if span > 0 else t[:1]
     poses = {name: _sampled(t, sol.body(name), times) for name in names}
     return Film(times, float(playing / max(1, count - 1)), poses)
+
+
+def between_instants(t: Array, times: Array, values: Array) -> Array:
+    """Values (n,) at the times t, which rise or fall, at other times: by straight lines."""
+    return np.interp(times, t, values) if t[-1] >= t[0] else np.interp(times, t[::-1], values[::-1])
+
+
+def nearest(t: Array, times: Array) -> NDArray[np.int64]:
+    """Index of the instant in t, which rises or falls, that is nearest to each of some times."""
+    order = np.argsort(t)
+    after = np.clip(np.searchsorted(t[order], times), 0, len(t) - 1)
+    before = np.maximum(after - 1, 0)
+    return order[np.where(times - t[order[before]] <= t[order[after]] - times, before, after)]
 
 
 def _sampled(t: Array, body: Any, times: Array) -> Array:
@@ -69,7 +82,7 @@ def _sampled(t: Array, body: Any, times: Array) -> Array:
     flips = np.where((turns[1:] * turns[:-1]).sum(axis=1) < 0, -1.0, 1.0)
     turns[1:] *= np.cumprod(flips)[:, None]
     places = np.asarray(body.position, dtype=float)
-    columns = [np.interp(times, t, column) for column in (*turns.T, *places.T)]
+    columns = [between_instants(t, times, column) for column in (*turns.T, *places.T)]
     poses = np.stack(columns, axis=1)
     poses[:, :4] /= np.linalg.norm(poses[:, :4], axis=1, keepdims=True)
     return poses
@@ -137,24 +150,39 @@ def equivalent_box(mass: float, inertia: Array) -> tuple[Array, Array]:
     return np.maximum(sides, 0.06 * longest if longest > 0 else 0.0), matrix_to_quaternion(axes)
 
 
-def frame_all(points: Array, reach: float, field: float = math.radians(40.0)) -> View:
-    """A camera that sees all points (n, 3), `reach` m about each, from where the motion is seen best."""
-    low, high = points.min(axis=0), points.max(axis=0)
-    target = 0.5 * (low + high)
-    radius = float(np.linalg.norm(points - target, axis=1).max()) + reach
+def best_side(points: Array) -> Array:
+    """(3,) the way from points (n, 3) to where their motion is seen best: flat motions from the front."""
     scatter = points - points.mean(axis=0)
     _, spread, axes = np.linalg.svd(scatter.T @ scatter)
     if spread[1] > 1e-12 * max(spread[0], 1e-30) and spread[2] < 0.05 * spread[0]:
-        normal = axes[2] * (1.0 if axes[2] @ np.array([1.0, -1.2, 0.8]) >= 0 else -1.0)
+        front = np.array([0.0, 0.0, 1.0]) if abs(axes[2, 2]) > 0.3 else np.array([1.0, -1.2, 0.8])
+        normal = axes[2] * (1.0 if axes[2] @ front >= 0 else -1.0)
         side = np.cross(normal, np.array([0.0, 0.0, 1.0]))
         length = float(np.linalg.norm(side))
         # Flat motions are seen from the front, a little from above and from the side.
-        way = (
-            normal + 0.3 * np.array([0.0, 0.0, 1.0]) - 0.35 * (side / length if length > 0.1 else np.array([0, 1.0, 0]))
-        )
+        across = side / length if length > 0.1 else np.array([0.0, 1.0, 0.0])
+        # a little from above and from the side
+        way = normal + 0.3 * np.array([0.0, 0.0, 1.0]) - 0.35 * across
     else:
         way = np.array([1.0, -1.2, 0.7])
-    place = target + way / np.linalg.norm(way) * (max(radius, 1e-3) / math.sin(field / 2))
+    return way / np.linalg.norm(way)
+
+
+def frame_all(
+    points: Array, reach: "float | Array", way: Array | None = None, field: float = math.radians(40.0)
+) -> View:
+    """A camera that sees all points (n, 3) with the balls of `reach` m (a number, or (n,)) about them.
+
+    It stands on the side `way`, (3,) of length 1; by default where the points are seen best.
+    """
+    way = best_side(points) if way is None else way
+    ball = np.broadcast_to(np.asarray(reach, dtype=float), (len(points),))
+    target = 0.5 * ((points - ball[:, None]).min(axis=0) + (points + ball[:, None]).max(axis=0))
+    nearer = (points - target) @ way
+    aside = np.linalg.norm(points - target - nearer[:, None] * way, axis=1)
+    # a ball touches the cone of sight where its centre is its radius / cos within it
+    distance = float((nearer + (aside + ball / math.cos(field / 2)) / math.tan(field / 2)).max())
+    place = target + way * max(distance, 1e-3)
     return View(
         (float(place[0]), float(place[1]), float(place[2])),
         (float(target[0]), float(target[1]), float(target[2])),

@@ -1,5 +1,7 @@
 """Colours, one meaning each, told apart by colour-blind eyes as well (after Okabe and Ito)."""
 
+from typing import Any
+
 INK = "#1a1a1a"
 GREY = "#6b7280"
 PAPER = "#ffffff"
@@ -24,3 +26,10 @@ RIMS = {
 BLUE, ORANGE, GREEN, RED = "#0072b2", "#e69f00", "#009e73", "#d55e00"
 PURPLE, SKY, BLACK = "#cc79a7", "#56b4e9", "#000000"
 CYCLE = (BLUE, RED, GREEN, PURPLE, ORANGE, SKY, BLACK)
+
+_DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1.5, 1.2)), (0, (5, 1.2, 1.2, 1.2)), (0, (9, 2)))
+
+
+def dashes(index: int) -> Any:
+    """The dashing of a line: with the colours of `CYCLE`, no two of the first 35 lines are drawn alike, nor in grey."""
+    return _DASHES[index % len(_DASHES)]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ephs.show.figures import new_figure
-from ephs.show.palette import BLACK, BLUE, CYCLE, GREEN, GREY, ORANGE, PURPLE, RED, SKY
+from ephs.show.palette import BLACK, BLUE, CYCLE, GREEN, GREY, ORANGE, PURPLE, RED, SKY, dashes
 from ephs.show.series import Array, scene_panels, state_panels, thinned
 
 if TYPE_CHECKING:
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
 _WIDTH, _ROW = 7.2, 2.0
 _MOST_NAMES = 14
-_DASHES = ("-", (0, (5, 1.5)), (0, (1.5, 1.2)), (0, (5, 1.2, 1.2, 1.2)))
 STYLE = {
     "font.family": "DejaVu Sans",
     "font.size": 9.0,
@@ -47,9 +46,8 @@ def plot_motion(sol: Any) -> "Figure":
     figure, axes = _panels(sol, "motion" if sol.scene is not None else "states", [1.0] * len(panels))
     for each, (title, lines) in zip(axes, panels.items(), strict=True):
         for index, (name, values) in enumerate(lines):
-            dashes = _DASHES[(index // len(CYCLE)) % len(_DASHES)]
             label = name if index < _MOST_NAMES else None
-            _line(each, sol, values, CYCLE[index % len(CYCLE)], label, dashes)
+            _line(each, sol, values, CYCLE[index % len(CYCLE)], label, dashes(index))
         if len(lines) > _MOST_NAMES:
             each.plot([], [], alpha=0.0, label=f"and {len(lines) - _MOST_NAMES} more")
         each.set_ylabel(title)
@@ -145,15 +143,15 @@ def _panels(sol: Any, what: str, heights: list[float]) -> "tuple[Figure, list[Ax
     return figure, axes
 
 
-def _line(axes: "Axes", sol: Any, values: Array, colour: str, label: str | None, dashes: Any = "-") -> None:
-    axes.plot(*thinned(_array(sol.t), values), color=colour, linestyle=dashes, linewidth=1.4, label=label)
+def _line(axes: "Axes", sol: Any, values: Array, colour: str, label: str | None, style: Any = "-") -> None:
+    axes.plot(*thinned(_array(sol.t), values), color=colour, linestyle=style, linewidth=1.4, label=label)
 
 
 def _accounts(axes: "Axes", sol: Any, lines: list[_Line]) -> None:
     """The entries of a ledger, without those that nothing was ever booked on (but never without the first)."""
-    for index, (name, values, colour) in enumerate(lines):
-        if index == 0 or np.any(values != 0.0):
-            _line(axes, sol, values, colour, name)
+    booked = [line for index, line in enumerate(lines) if index == 0 or np.any(line[1] != 0.0)]
+    for index, (name, values, colour) in enumerate(booked):
+        _line(axes, sol, values, colour, name, dashes(index))
 
 
 def _residual(axes: "Axes", sol: Any, lines: list[_Line], title: str) -> None:

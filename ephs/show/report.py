@@ -61,7 +61,6 @@ thead th{font-weight:600;color:#1a1a1a}
 .wide{overflow-x:auto}
 figure{margin:0 0 1.6rem}
 svg{max-width:100%;height:auto}
-iframe{width:100%;height:32rem;border:1px solid #dfe3e8;border-radius:8px}
 @media print{iframe{display:none}}
 """
 
@@ -175,8 +174,7 @@ def _animation(sol: Any) -> str:
             "<h2>Animation</h2><p>There is no animation here, because the package viser is not installed; "
             "install it with <code>pip install 'ephs[viz]'</code> and write the report again.</p>"
         )
-    page = html.escape(animate(sol), quote=True)
-    return f'<h2>Animation</h2><iframe title="animation" loading="lazy" srcdoc="{page}"></iframe>'
+    return f"<h2>Animation</h2>{animate(sol, heat=any(True for _ in sol.scene.all_thermal())).frame()}"
 
 
 def _plots(sol: Any) -> list[str]:

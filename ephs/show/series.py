@@ -1,46 +1,15 @@
 """Lines of a plot, made ready: units, thinning, few enough names."""
 
 import itertools
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ephs.mechanics.readout import freedoms_of
+
 Array = NDArray[np.float64]
-
-UNITS = {
-    "displacement": "m",
-    "momentum": "kg m/s",
-    "angle": "rad",
-    "angular_momentum": "kg m²/s",
-    "charge": "C",
-    "flux_linkage": "Wb",
-    "entropy": "J/K",
-    "volume": "m³",
-    "amount": "mol",
-    "pose": "1, m",
-    "relative_pose": "rad, m",
-    "temperature": "K",
-}
-
-# Freedoms of each kind of joint, in the order of their coordinates: an angle (True) or a length.
-FREEDOMS = {
-    "revolute": ("",),
-    "prismatic": ("",),
-    "screw": ("",),
-    "cylindrical": ("angle", "distance"),
-    "planar": ("angle", "x", "y"),
-    "spherical": ("rx", "ry", "rz"),
-    "free": ("rx", "ry", "rz", "x", "y", "z"),
-    "universal": ("angle 1", "angle 2"),
-    "fixed": (),
-}
-_LENGTHS = frozenset({"distance", "x", "y", "z"})
-
-
-def is_length(kind: str, freedom: str) -> bool:
-    """Whether a joint's coordinate is in metres; else it is in radians."""
-    return kind == "prismatic" or freedom in _LENGTHS
 
 
 def thinned(t: Array, values: Array, most: int = 2000) -> tuple[Array, Array]:
@@ -53,19 +22,8 @@ def thinned(t: Array, values: Array, most: int = 2000) -> tuple[Array, Array]:
         piece = np.nan_to_num(values[first:last])
         kept += sorted({first + int(piece.argmin()), first + int(piece.argmax())})
     kept.append(len(t) - 1)
-    index = np.unique(np.array(kept))
+    index = np.unique(np.concatenate([kept, np.flatnonzero(np.isnan(values))]))
     return t[index], values[index]
-
-
-def columns(name: str, values: Any) -> list[tuple[str, Array]]:
-    """A state (n,) or (n, k) as named lines (n,)."""
-    array = np.asarray(values, dtype=float)
-    if array.ndim == 1:
-        return [(name, array)]
-    flat = array.reshape(len(array), -1)
-    if flat.shape[1] == 1:
-        return [(name, flat[:, 0])]
-    return [(f"{name}[{k}]", flat[:, k]) for k in range(flat.shape[1])]
 
 
 def quantity_kinds(sol: Any) -> dict[str, str]:
@@ -85,24 +43,41 @@ def state_panels(sol: Any) -> dict[str, list[tuple[str, Array]]]:
     kinds = quantity_kinds(sol)
     panels: dict[str, list[tuple[str, Array]]] = {}
     for path, values in sol.states.items():
-        name = str(path)
-        kind = kinds.get(name, "state")
-        array = np.asarray(values)
-        unit = "kg m²/s, kg m/s" if kind == "momentum" and array.ndim > 1 else UNITS.get(kind, "SI unit")
-        panels.setdefault(f"{kind.replace('_', ' ')} [{unit}]", []).extend(columns(name, values))
+        labels = sol.labels[path]
+        kind = kinds.get(str(path), labels.dimension or "state").replace("_", " ")
+        array = np.asarray(values, dtype=float).reshape(len(sol.t), -1)
+        for k, column in enumerate(array.T):
+            name = f"{path} {labels.names[k]}" if len(array.T) > 1 else str(path)
+            panels.setdefault(f"{kind} [{labels.units[k]}]", []).append((name, column))
     return panels
+
+
+def freedom_lines(
+    scene: Any, places: Callable[[str], Any], read: Callable[[str], Any]
+) -> Iterator[tuple[str, str, Array]]:
+    """Name, unit and values (n,) of each freedom of each joint, of what ``read(joint)`` gives, (n, d).
+
+    ``places(joint)`` gives the coordinates, which say where a line has to be broken: there values are NaN.
+    """
+    for name, joint in scene.all_joints():
+        labels = freedoms_of(joint)
+        values = np.array(read(name), dtype=float)
+        turning = [k for k, freedom in enumerate(labels.names) if freedom in ("rx", "ry", "rz")]
+        if turning:  # rotation vectors are principal values: where they start anew, a line ends
+            jumps = np.linalg.norm(np.diff(np.asarray(places(name), dtype=float)[:, turning], axis=0), axis=1) > np.pi
+            values[1:][jumps] = np.nan
+        for k, freedom in enumerate(labels.names):
+            yield name if len(labels.names) == 1 else f"{name} {freedom}", labels.units[k], values[:, k]
 
 
 def scene_panels(sol: Any) -> dict[str, list[tuple[str, Array]]]:
     """Joint angles and distances, positions of bodies and temperatures, one panel for each unit and direction."""
     scene = sol.scene
     panels: dict[str, list[tuple[str, Array]]] = {}
-    for name, joint in scene.all_joints():
-        coordinate = np.asarray(sol.joint(name).coordinate, dtype=float).reshape(len(sol.t), -1)
-        freedoms = FREEDOMS.get(joint.kind, tuple(str(k) for k in range(coordinate.shape[1])))
-        for freedom, column in zip(freedoms, coordinate.T, strict=False):
-            panel = "joint distance [m]" if is_length(joint.kind, freedom) else "joint angle [rad]"
-            panels.setdefault(panel, []).append((f"{name} {freedom}".strip(), column))
+    places: Callable[[str], Any] = lambda joint: sol.joint(joint).coordinate  # noqa: E731 - it is read twice
+    for name, unit, column in freedom_lines(scene, places, places):
+        panel = "joint distance [m]" if unit == "m" else "joint angle [rad]"
+        panels.setdefault(panel, []).append((name, column))
     for name, _ in scene.all_bodies():
         for axis, column in zip("xyz", np.asarray(sol.body(name).position, dtype=float).T, strict=True):
             panels.setdefault(f"position {axis} [m]", []).append((name, column))

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from ephs.show.errors import ShowError
-from ephs.show.motion import Array, equivalent_box
+from ephs.show.motion import Array, between
+from ephs.show.solids import Solid
 
 Colour = tuple[int, int, int]
 
@@ -18,8 +18,8 @@ _INKS: tuple[Colour, ...] = (
     (205, 106, 78),
     (140, 140, 190),
 )
-_MUTED: Colour = (168, 174, 182)
-_METAL: Colour = (70, 76, 84)
+MUTED: Colour = (168, 174, 182)
+METAL: Colour = (70, 76, 84)
 _AXIS: Colour = (198, 58, 40)
 
 
@@ -28,69 +28,45 @@ def ink(index: int) -> Colour:
     return _INKS[index % len(_INKS)]
 
 
-def extent(body: Any) -> float:
-    """Radius, m, of a ball about the centre of mass that holds the body's shape (meshes: its stand-in)."""
-    match body.shape:
-        case {"box": [x, y, z]}:
-            return 0.5 * math.sqrt(x * x + y * y + z * z)
-        case {"sphere": radius}:
-            return float(radius)
-        case {"cylinder": [radius, length]}:
-            return math.hypot(radius, 0.5 * length)
-        case _:
-            sides, _ = equivalent_box(float(body.mass), np.asarray(body.inertia, dtype=float))
-            return 0.5 * float(np.linalg.norm(sides))
-
-
-def add_body(server: Any, node: str, body: Any, colour: Colour, size: float, name: str) -> None:
-    """Draw a body at its frame; `size` is that of the whole scene, m.
-
-    Raises
-    ------
-    ShowError
-        If its shape is none of those known, or its mesh file cannot be found.
-    """
+def add_body(
+    server: Any, node: str, solid: Solid, shape: Any, colour: Colour, size: float, opacity: float | None
+) -> Any:
+    """Draw a body at its frame, and give the node that has its colour; `size` is that of the whole scene, m."""
     scene = server.scene
-    match body.shape:
-        case {"box": [x, y, z]}:
-            scene.add_box(node, color=colour, dimensions=(float(x), float(y), float(z)))
-        case {"sphere": radius}:
-            scene.add_icosphere(node, radius=float(radius), color=colour, subdivisions=4)
-        case {"cylinder": [radius, length]}:
-            scene.add_cylinder(node, radius=float(radius), height=float(length), color=colour)
-        case {"mesh": file}:
-            _add_mesh(scene, node, file, colour, name)
-        case None | {}:
-            sides, turn = equivalent_box(float(body.mass), np.asarray(body.inertia, dtype=float))
-            if sides.max() <= 0:
-                scene.add_icosphere(node, radius=0.012 * size, color=_MUTED, subdivisions=3)
-                return
-            scene.add_box(node, color=_MUTED, dimensions=_three(sides), wxyz=turn, opacity=0.75)
-        case other:
-            raise ShowError("shape", path=name, found=str(other))
+    match solid.kind:
+        case "sphere":
+            return scene.add_icosphere(
+                node, radius=float(shape["sphere"]), color=colour, subdivisions=4, opacity=opacity
+            )
+        case "cylinder":
+            radius, length = shape["cylinder"]
+            return scene.add_cylinder(node, radius=float(radius), height=float(length), color=colour, opacity=opacity)
+        case "point":
+            return scene.add_icosphere(node, radius=0.012 * size, color=MUTED, subdivisions=3)
+        case _:
+            # flat faces want corners of their own, so that their edges stay sharp
+            corners = solid.vertices[solid.triangles].reshape(-1, 3)
+            faces = np.arange(len(corners)).reshape(-1, 3)
+            tone = MUTED if solid.kind == "stand-in" else colour
+            through = opacity or (0.75 if solid.kind == "stand-in" else None)
+            return scene.add_mesh_simple(node, vertices=corners, faces=faces, color=tone, opacity=through)
 
 
-def _add_mesh(scene: Any, node: str, file: Any, colour: Colour, name: str) -> None:
-    import trimesh
+def add_joint(server: Any, node: str, joint: Any, size: float) -> list[Any]:
+    """Draw a joint at its frame on body 1, its axis along z, and give the nodes that have the colour of metal.
 
-    try:
-        mesh = trimesh.load_mesh(str(file))
-    except (OSError, ValueError) as fault:
-        raise ShowError("shape", path=name, found=f"a mesh that cannot be read ({fault})") from fault
-    scene.add_mesh_simple(node, vertices=np.asarray(mesh.vertices), faces=np.asarray(mesh.faces), color=colour)
-
-
-def add_joint(server: Any, node: str, joint: Any, size: float) -> None:
-    """Draw a joint at its frame on body 1, its axis along z; `size` is the radius of its symbol, m."""
+    `size` is the radius of its symbol, m.
+    """
     scene = server.scene
     pose = np.asarray(joint.frame1, dtype=float)
     scene.add_frame(node, show_axes=False, wxyz=pose[:4], position=pose[4:])
+    metal: list[Any] = []
     match joint.kind:
         case "revolute":
-            _cylinder(scene, node, size, 2.6 * size)
+            metal.append(_cylinder(scene, node, size, 4.0 * size))
             _axis(scene, node, size)
         case "screw":
-            _cylinder(scene, node, 0.7 * size, 4.0 * size)
+            metal.append(_cylinder(scene, node, 0.7 * size, 4.0 * size))
             turns = np.linspace(0.0, 8 * math.pi, 97)
             thread = np.stack(
                 [
@@ -103,26 +79,33 @@ def add_joint(server: Any, node: str, joint: Any, size: float) -> None:
             _polyline(scene, f"{node}/thread", thread, _AXIS, 0.16 * size)
             _axis(scene, node, size)
         case "cylindrical":
-            _cylinder(scene, node, 0.6 * size, 6.0 * size)
-            scene.add_cylinder(f"{node}/sleeve", radius=size, height=2.0 * size, color=_METAL)
+            metal.append(_cylinder(scene, node, 0.6 * size, 6.0 * size))
+            metal.append(scene.add_cylinder(f"{node}/sleeve", radius=size, height=2.0 * size, color=METAL))
             _axis(scene, node, size)
         case "prismatic":
-            scene.add_box(f"{node}/rail", color=_METAL, dimensions=(0.7 * size, 0.7 * size, 7.0 * size))
-            scene.add_box(f"{node}/carriage", color=_METAL, dimensions=(1.6 * size, 1.6 * size, 2.0 * size))
-            _axis(scene, node, size, half=5.0)
+            metal.append(scene.add_box(f"{node}/rail", color=METAL, dimensions=(0.7 * size, 0.7 * size, 7.0 * size)))
+            metal.append(
+                scene.add_box(f"{node}/carriage", color=METAL, dimensions=(1.6 * size, 1.6 * size, 2.0 * size))
+            )
+            _axis(scene, node, size, half=6.0)
         case "planar":
-            scene.add_box(f"{node}/plate", color=_METAL, dimensions=(5.0 * size, 5.0 * size, 0.2 * size), opacity=0.6)
+            metal.append(
+                scene.add_box(
+                    f"{node}/plate", color=METAL, dimensions=(5.0 * size, 5.0 * size, 0.2 * size), opacity=0.6
+                )
+            )
             _axis(scene, node, size)
         case "spherical":
-            scene.add_icosphere(f"{node}/ball", radius=1.1 * size, color=_METAL, subdivisions=3)
+            metal.append(scene.add_icosphere(f"{node}/ball", radius=1.1 * size, color=METAL, subdivisions=3))
         case "universal":
-            scene.add_icosphere(f"{node}/cross", radius=0.8 * size, color=_METAL, subdivisions=3)
+            metal.append(scene.add_icosphere(f"{node}/cross", radius=0.8 * size, color=METAL, subdivisions=3))
             _axis(scene, node, size)
         case "fixed":
-            scene.add_box(f"{node}/weld", color=_METAL, dimensions=(1.3 * size, 1.3 * size, 1.3 * size))
+            metal.append(scene.add_box(f"{node}/weld", color=METAL, dimensions=(1.3 * size, 1.3 * size, 1.3 * size)))
         case _:
             # A free joint joins nothing that could be drawn.
             pass
+    return metal
 
 
 def add_spring(server: Any, node: str, size: float) -> Any:
@@ -132,20 +115,23 @@ def add_spring(server: Any, node: str, size: float) -> Any:
     heights = 0.08 + 0.84 * turns / turns[-1]
     coil = np.stack([radius * np.cos(turns), radius * np.sin(turns), heights], axis=1)
     line = np.concatenate([[[0.0, 0.0, 0.0]], coil, [[0.0, 0.0, 1.0]]])
-    return _polyline(server.scene, node, line, _METAL, 2.0, units="screen")
+    return _polyline(server.scene, node, line, METAL, 3.0, units="screen")
 
 
-def _three(sides: Array) -> tuple[float, float, float]:
-    return (float(sides[0]), float(sides[1]), float(sides[2]))
+def add_stick(server: Any, node: str, ends: tuple[Array, Array], colour: Colour, radius: float) -> None:
+    """Draw a thin rod from point to point, m."""
+    turn, length = between(*ends)
+    middle = 0.5 * (ends[0] + ends[1])
+    server.scene.add_cylinder(node, radius=radius, height=length, color=colour, wxyz=turn, position=middle)
 
 
-def _cylinder(scene: Any, node: str, radius: float, height: float) -> None:
-    scene.add_cylinder(f"{node}/pin", radius=radius, height=height, color=_METAL)
+def _cylinder(scene: Any, node: str, radius: float, height: float) -> Any:
+    return scene.add_cylinder(f"{node}/pin", radius=radius, height=height, color=METAL)
 
 
-def _axis(scene: Any, node: str, size: float, half: float = 3.6) -> None:
+def _axis(scene: Any, node: str, size: float, half: float = 5.0) -> None:
     ends = np.array([[0.0, 0.0, -half * size], [0.0, 0.0, half * size]])
-    _polyline(scene, f"{node}/axis", ends, _AXIS, 2.0, units="screen")
+    _polyline(scene, f"{node}/axis", ends, _AXIS, 2.5, units="screen")
 
 
 def _polyline(scene: Any, node: str, line: Array, colour: Colour, thickness: float, units: str = "world") -> Any:

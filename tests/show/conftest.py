@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from ephs.mechanics.solve.books import Entry
+from ephs.mechanics.solve.labels import labels_of
 from ephs.operad import Path, Pattern, junction, quantity
 
 
@@ -41,6 +42,10 @@ class FakeScene:
     def all_thermal(self) -> list[tuple[str, Any]]:
         return [("housing", None)]
 
+    @property
+    def world(self) -> Record:
+        return Record({"temperature": 293.15})
+
 
 @final
 @dataclass(frozen=True)
@@ -64,6 +69,11 @@ class FakeSolution:
     body_records: dict[str, Any] = field(default_factory=dict)
     joint_records: dict[str, Any] = field(default_factory=dict)
     thermal_records: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def labels(self) -> dict[str, Any]:
+        quantities = {"pe.q": quantity.displacement, "ke.p": quantity.momentum, "env.s": quantity.entropy}
+        return {path: labels_of(quantities.get(path, quantity.body_momentum)) for path in self.states}
 
     def __getattr__(self, name: str) -> Any:
         if name in self.__dict__["ledgers"]:
@@ -190,14 +200,28 @@ def pendulum() -> FakeSolution:
         "body1": "ground",
         "body2": "rod",
         "frame1": np.array([*along_x, 0.0, 0.0, 1.0]),
+        "frame2": np.array([*along_x, 0.0, 0.0, 0.25]),
+        "heat": "housing",
+        "pitch": 0.0,
+        "middle": None,
     }
     slide = {
         "kind": "prismatic",
         "body1": "rod",
         "body2": "arm.weight",
         "frame1": np.array([*still, 0.0, 0.0, -0.2]),
+        "frame2": np.array([*still, 0.0, 0.0, 0.0]),
+        "heat": "environment",
+        "pitch": 0.0,
+        "middle": None,
     }
-    spring = {"body1": "ground", "body2": "rod", "at1": [0.0, 0.5, 1.0], "at2": [0.0, 0.0, -0.25]}
+    spring = {
+        "body1": "ground",
+        "body2": "rod",
+        "at1": [0.0, 0.5, 1.0],
+        "at2": [0.0, 0.0, -0.25],
+        "heat": "environment",
+    }
     scene = FakeScene(
         {"rod": Record(rod), "arm.weight": Record(weight)},
         {"pin": Record(joint), "slide": Record(slide)},

@@ -70,6 +70,7 @@ def test_the_camera_sees_every_point(points, reach):
         assert way @ ahead > 0
         angle = math.acos(np.clip(way @ ahead / np.linalg.norm(way), -1.0, 1.0))
         assert angle <= view.field / 2
+    assert place[2] > target[2]  # never from under the floor
 
 
 def test_frames_are_poses_on_the_way(pendulum):
@@ -104,7 +105,8 @@ def test_duration_stretches_the_film(pendulum):
 def test_the_page_is_whole_and_made_in_silence(pendulum, tmp_path, capfd):
     page = animate(pendulum, tmp_path / "film.html", fps=10.0)
     assert capfd.readouterr() == ("", "")
-    assert (tmp_path / "film.html").read_text(encoding="utf-8") == page
+    assert (tmp_path / "film.html").read_text(encoding="utf-8") == page.html
+    page = page.html
     assert "__VISER_EMBED_DATA__" in page and "<title>pendulum</title>" in page
     assert not re.findall(r"<(?:script|link|img|iframe)[^>]+(?:src|href)=\"?https?://", page)
 

@@ -83,6 +83,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     "unknown body": ('"ground" or a body', "{hint}"),
     "unknown thermal": ('"environment" or a [thermal] name', "{hint}"),
     "unknown type": ("one of {known}", "{hint}"),
+    "mesh": ("a file in the scene's folder or below", "move it there, and give its path from the scene file"),
     "shape": ("one of box, sphere, cylinder, mesh", "a shape has exactly one of these keys"),
     # bodies
     "quaternion": ("a unit quaternion [w, x, y, z] to 1e-6", "divide it by its norm"),

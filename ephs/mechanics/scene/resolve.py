@@ -258,5 +258,8 @@ def _shape(entry: BodyEntry, key: str, folder: Path, faults: list[Fault]) -> Map
         faults.append(fault("shape", f"{key}.shape", " and ".join(given) or "an empty table"))
         return None
     if "mesh" in given:
-        return {"mesh": str(folder / given["mesh"])}
+        file, home = (folder / given["mesh"]).resolve(), folder.resolve()
+        if not file.is_relative_to(home):
+            faults.append(fault("mesh", f"{key}.shape.mesh", given["mesh"]))
+        return {"mesh": str(file)}
     return given

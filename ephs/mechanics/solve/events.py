@@ -10,7 +10,6 @@ from ephs.mechanics.solve.errors import OptionError, Outcome, SolveError
 from ephs.mechanics.solve.problem import States
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
-from ephs.semantics.descriptor import Descriptor
 
 __all__ = ["Crossing", "Event", "Watch", "events_of"]
 
@@ -69,14 +68,16 @@ class Crossing:
     t: float
     state: Mapping[Path, Array]
 
-    def record(self, descriptor: Descriptor) -> dict[str, Any]:
+    def record(self) -> dict[str, Any]:
         """As plain data, for statistics and files."""
-        return {"name": self.name, "t": float(self.t), "x": descriptor.pack(self.state).tolist()}
+        state = {str(path): np.atleast_1d(value).tolist() for path, value in self.state.items()}
+        return {"name": self.name, "t": float(self.t), "state": state}
 
     @classmethod
-    def of_record(cls, record: Mapping[str, Any], descriptor: Descriptor) -> "Crossing":
+    def of_record(cls, record: Mapping[str, Any]) -> "Crossing":
         """From plain data."""
-        return cls(record["name"], float(record["t"]), States(descriptor.unpack(np.array(record["x"], dtype=float))))
+        state = {Path.of(path): np.array(value, dtype=float) for path, value in record["state"].items()}
+        return cls(record["name"], float(record["t"]), States(state))
 
 
 def events_of(given: Iterable[Any] | None) -> tuple[Event, ...]:

@@ -10,58 +10,33 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from ephs.mechanics.solve.dataset import FORMAT, Variable, dataset
+from ephs.mechanics.solve.labels import Labels, labels_of
 from ephs.mechanics.solve.ledger import Ledgers
 from ephs.mechanics.solve.problem import Problem
 from ephs.mechanics.solve.solution import Solution
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 
-__all__ = ["dataset", "load", "save"]
+__all__ = ["load", "save"]
 
-FORMAT = 2
-_BOOKS = ("storages", "makers", "entropies", "volumes", "momenta", "exergies")
-_UNITS = {
-    "entropy": "J/K",
-    "made": "J/K",
-    "least": "J/K",
-    "makers": "J/K",
-    "entropies": "J/K",
-    "volumes": "m³",
-    "momenta": "N s",
-}
+READ = (2, FORMAT)
+Inputs = Mapping[Path, Array]
 
 
-def dataset(solution: Solution) -> xr.Dataset:
-    """States under ``state:PATH``, ledgers under their names, all over ``t``."""
-    variables: dict[str, Any] = {}
-    for path, values in solution.states.items():
-        dims = ("t",) if values.ndim == 1 else ("t", f"dim{values.shape[1]}")
-        variables[f"state:{path}"] = (dims, values)
-    for name, values in _ledgers(solution.ledgers):
-        variables[name] = (("t",), values, {"units": _UNITS.get(name.split(":")[0], "J")})
-    attributes = {
-        "ephs_format": FORMAT,
-        "name": solution.name,
-        "reference_temperature": solution.ledgers.temperature,
-        "stats": json.dumps(dict(solution.stats)),
-        "model": solution.problem.document if solution.problem is not None else "",
-    }
-    return xr.Dataset(variables, {"t": ("t", solution.t, {"units": "s"})}, attributes)
-
-
-def save(solution: Solution, path: File) -> None:
+def save(solution: Solution, path: File, *, wrenches: bool) -> None:
     """Write a solution; an older file of that name stays whole until the new one is."""
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
     try:
-        dataset(solution).to_netcdf(temporary, engine="h5netcdf")
+        dataset(solution, wrenches=wrenches).to_netcdf(temporary, engine="h5netcdf")
         os.replace(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)
 
 
-def load(path: str | File, problem_of: Callable[[str], Problem]) -> Solution:
-    """Read a solution; ``problem_of`` makes the problem from the model's text.
+def load(path: str | File, problem_of: Callable[[str, Array, Inputs], Problem]) -> Solution:
+    """Read a solution; ``problem_of`` makes the problem from the model's text, the times, and the inputs then.
 
     Raises
     ------
@@ -78,36 +53,72 @@ def load(path: str | File, problem_of: Callable[[str], Problem]) -> Solution:
             data = opened.load()
     except OSError as error:
         raise ValueError(f"{file}: not a netCDF file ({error})") from error
-    if data.attrs.get("ephs_format") != FORMAT:
-        raise ValueError(f"{file}: ephs_format is {data.attrs.get('ephs_format')!r}, expected {FORMAT}")
-    books: dict[str, Any] = {name: {} for name in _BOOKS}
-    states: dict[Path, Array] = {}
-    plain: dict[str, Any] = {}
+    found = data.attrs.get("ephs_format")
+    if found not in READ:
+        raise ValueError(f"{file}: ephs_format is {found}, expected one of {', '.join(map(str, READ))}")
+    groups: dict[str, dict[Path, xr.DataArray]] = {}
     for key, variable in data.data_vars.items():
         group, _, rest = str(key).partition(":")
-        if group == "state":
-            states[Path.of(rest)] = variable.values
-        elif rest:
-            books[group][Path.of(rest)] = variable.values
-        else:
-            plain[group] = variable.values
+        groups.setdefault(group, {})[Path.of(rest) if rest else Path()] = variable
+    states = groups.get("state", {})
+    inputs = {path: _variable(variable) for path, variable in groups.get("input", {}).items()}
+    t = np.asarray(data["t"].values)
     model = data.attrs["model"]
+    problem = problem_of(model, t, {path: given.values for path, given in inputs.items()}) if model else None
+    if problem is not None:
+        labels = {slot.path: labels_of(slot.quantity) for slot in problem.descriptor.states}
+    else:
+        labels = {path: _labels(variable) for path, variable in states.items()}
     return Solution(
         data.attrs["name"],
-        np.asarray(data["t"].values),
-        states,
-        Ledgers(**plain, **books, temperature=float(data.attrs["reference_temperature"])),
-        json.loads(data.attrs["stats"]),
-        problem_of(model) if model else None,
+        t,
+        {path: variable.values for path, variable in states.items()},
+        _ledgers(groups, float(data.attrs["reference_temperature"])),
+        _stats(json.loads(data.attrs["stats"]), problem),
+        problem,
+        labels,
+        inputs,
     )
 
 
-def _ledgers(ledgers: Ledgers) -> list[tuple[str, Array]]:
-    out: list[tuple[str, Array]] = []
-    for field in fields(ledgers):
-        value = getattr(ledgers, field.name)
-        if isinstance(value, Mapping):
-            out += [(f"{field.name}:{path}", values) for path, values in value.items()]
-        elif isinstance(value, np.ndarray):
-            out.append((field.name, value))
-    return out
+def _ledgers(groups: Mapping[str, Mapping[Path, xr.DataArray]], temperature: float) -> Ledgers:
+    """Books by path are groups; a single book stands under its name alone."""
+    books: dict[str, Any] = {}
+    for field in fields(Ledgers):
+        found = groups.get(field.name, {})
+        whole = found.get(Path())
+        books[field.name] = {path: each.values for path, each in found.items()} if whole is None else whole.values
+    return Ledgers(**{**books, "temperature": temperature})
+
+
+def _labels(variable: xr.DataArray) -> Labels:
+    units = str(variable.attrs.get("units", "SI"))
+    if variable.ndim == 1:
+        return Labels("", (), (units,))
+    dimension, size = str(variable.dims[1]), variable.shape[1]
+    names = variable.coords[dimension].values.tolist() if dimension in variable.coords else map(str, range(size))
+    each = units.split(", ")
+    return Labels(dimension, tuple(names), tuple(each if len(each) == size else each * size) or ("1",))
+
+
+def _variable(variable: xr.DataArray) -> Variable:
+    return Variable.of(variable.values, _labels(variable), str(variable.attrs["long_name"]))
+
+
+def _stats(stats: dict[str, Any], problem: Problem | None) -> dict[str, Any]:
+    """Statistics, with the events of format 2, which are packed states, by path."""
+    packed = [event for event in stats.get("events", ()) if "x" in event]
+    if not packed:
+        return stats
+    if problem is None:
+        return {**stats, "events": []}
+    unpack = problem.descriptor.unpack
+    events = [
+        {
+            "name": event["name"],
+            "t": event["t"],
+            "state": {str(path): np.atleast_1d(v).tolist() for path, v in unpack(np.array(event["x"])).items()},
+        }
+        for event in packed
+    ]
+    return {**stats, "events": events}

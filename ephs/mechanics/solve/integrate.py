@@ -10,6 +10,7 @@ import numpy as np
 
 from ephs.mechanics.solve.driven import ComponentMethod, advance_driven, advance_whole
 from ephs.mechanics.solve.errors import Interrupted, OptionError, Outcome, SimulationError, SolveError
+from ephs.mechanics.solve.labels import labels_of
 from ephs.mechanics.solve.ledger import ledgers
 from ephs.mechanics.solve.model import Model, compile_model
 from ephs.mechanics.solve.natural import Chunk, Natural, NaturalState
@@ -150,7 +151,8 @@ def solution_of(problem: Problem, record: Record, stats: Mapping[str, Any]) -> S
     if problem.shown is not None:
         problem, record = problem.shown(record)
     states = {slot.path: coordinates(slot.quantity, record.x[:, slot.point]) for slot in problem.descriptor.states}
-    return Solution(problem.name, record.t, states, ledgers(problem, record), dict(stats), problem)
+    labels = {slot.path: labels_of(slot.quantity) for slot in problem.descriptor.states}
+    return Solution(problem.name, record.t, states, ledgers(problem, record), dict(stats), problem, labels)
 
 
 class _Run:

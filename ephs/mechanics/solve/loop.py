@@ -237,7 +237,7 @@ class _Run(Generic[S]):
             "setup_s": self.setup,
             "integrate_s": time.perf_counter() - self.begin - self.setup,
             "least_production": least,
-            **({"events": [crossing.record(self.problem.descriptor) for crossing in crossings]} if self.watch else {}),
+            **({"events": [crossing.record() for crossing in crossings]} if self.watch else {}),
         }
 
     def solution(self) -> Solution:

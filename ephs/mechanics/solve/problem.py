@@ -12,10 +12,11 @@ from ephs.semantics.descriptor import Descriptor, Input
 from ephs.semantics.system import System
 
 if TYPE_CHECKING:
+    from ephs.mechanics.solve.dataset import Variable
     from ephs.mechanics.solve.record import Record
     from ephs.mechanics.solve.solution import Solution
 
-__all__ = ["Motion", "Problem", "Signal", "States"]
+__all__ = ["Motion", "Problem", "Signal", "State", "States"]
 
 State = Mapping[Path, Array]
 
@@ -97,6 +98,10 @@ class Motion(Protocol):
 
     def summary(self) -> dict[str, Any]:
         """What it adds to the summary."""
+        ...
+
+    def variables(self, *, wrenches: bool) -> "dict[str, Variable]":
+        """What it adds to labelled arrays."""
         ...
 
 

@@ -1,14 +1,18 @@
 """Solutions: the motion of a system with its ledgers."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import fields, replace
+from difflib import get_close_matches
 from functools import cached_property
 from pathlib import Path as File
-from typing import TYPE_CHECKING, Any, final
+from typing import TYPE_CHECKING, Any, final, overload
 
 import numpy as np
 
 from ephs.mechanics.solve.books import Entry, entry_of
+from ephs.mechanics.solve.dataset import Variable, sampled_inputs
 from ephs.mechanics.solve.events import Crossing
+from ephs.mechanics.solve.labels import Labels
 from ephs.mechanics.solve.ledger import Ledgers
 from ephs.mechanics.solve.problem import Motion, Problem
 from ephs.operad import ROOT, Path
@@ -17,9 +21,12 @@ from ephs.semantics.spaces import Pair
 from ephs.semantics.system import System
 
 if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
     from numpy.typing import ArrayLike
 
     from ephs.mechanics.solve.ports import PortMotion
+    from ephs.show import Page
 
 __all__ = ["Solution"]
 
@@ -43,6 +50,10 @@ class Solution:
         Counts and times of the run.
     problem
         What was solved; None where a file could not hold it.
+    labels
+        Names and units of the components of each state.
+    inputs
+        What was prescribed at outer ports, as a file holds it; None where the problem says it.
     """
 
     def __init__(
@@ -53,22 +64,44 @@ class Solution:
         ledgers: Ledgers,
         stats: Mapping[str, Any],
         problem: Problem | None,
+        labels: Mapping[Path, Labels],
+        inputs: Mapping[Path, Variable] | None = None,
     ) -> None:
         self.name, self.t, self.states, self.ledgers = name, t, states, ledgers
-        self.stats, self.problem = stats, problem
+        self.stats, self.problem, self.labels, self._inputs = stats, problem, labels, inputs
 
-    def __getitem__(self, path: str | Path) -> Array:
-        """The state at a port of a storage component.
+    @overload
+    def __getitem__(self, path: str | Path) -> Array: ...
+    @overload
+    def __getitem__(self, path: slice) -> "Solution": ...
+
+    def __getitem__(self, path: str | Path | slice) -> "Array | Solution":
+        """The state at a port of a storage component; of a slice, the solution at these of its instants.
 
         Raises
         ------
         KeyError
-            No such state; the message lists those that there are.
+            No such state; the message tells those that are near, or lie below, or all.
         """
+        if isinstance(path, slice):
+            return self._at(path)
         key = Path.of(path)
         if key not in self.states:
-            raise KeyError(f"{path}: no such state; the states are {', '.join(map(str, self.states))}")
+            raise KeyError(f"{path}: no such state; {_hint(key, list(self.states))}")
         return self.states[key]
+
+    def _at(self, where: slice) -> "Solution":
+        books: dict[str, Any] = {}
+        for field in fields(self.ledgers):
+            book = getattr(self.ledgers, field.name)
+            if isinstance(book, Mapping):
+                books[field.name] = {path: values[where] for path, values in book.items()}
+            elif isinstance(book, np.ndarray):
+                books[field.name] = book[where]
+        inputs = {path: replace(given, values=given.values[where]) for path, given in self.inputs.items()}
+        states = {path: values[where] for path, values in self.states.items()}
+        ledgers = replace(self.ledgers, **books)
+        return Solution(self.name, self.t[where], states, ledgers, self.stats, self.problem, self.labels, inputs)
 
     def __len__(self) -> int:
         return int(self.t.size)
@@ -83,9 +116,14 @@ class Solution:
     @property
     def events(self) -> tuple[Crossing, ...]:
         """The events that happened, in their order: name, time in s, states."""
-        if self.problem is None:
-            return ()
-        return tuple(Crossing.of_record(r, self.problem.descriptor) for r in self.stats.get("events", ()))
+        return tuple(map(Crossing.of_record, self.stats.get("events", ())))
+
+    @cached_property
+    def inputs(self) -> Mapping[Path, Variable]:
+        """What was prescribed at each outer port, with names and units: ``.values`` (n, d)."""
+        if self._inputs is not None or self.problem is None:
+            return self._inputs or {}
+        return sampled_inputs(self.problem, self.t, self.state_at if self.motion is None else self.motion.state)
 
     @property
     def energy(self) -> Array:
@@ -247,31 +285,73 @@ class Solution:
             out["states"] = {str(path): values[-1].tolist() for path, values in self.states.items() if len(self)}
         return out
 
-    def to_xarray(self) -> Any:
-        """States and ledgers as an `xarray.Dataset` over ``t``, with units."""
-        from ephs.mechanics.solve.file import dataset
+    def to_xarray(self, *, wrenches: bool = True) -> "xr.Dataset":
+        """States, ledgers, inputs and what is derived from them, over ``t``, with names and units of all components.
 
-        return dataset(self)
+        States are under ``state:PATH``, ledgers under their names, inputs under ``input:PORT``; of a scene there are
+        ``body_position``, ``body_quaternion``, ``body_velocity``, ``body_twist``, ``coordinate:JOINT``, ``rate:JOINT``,
+        ``joint_wrench``, ``temperature``, ``marker_position`` and ``marker_velocity``.
 
-    def save(self, path: str | File) -> None:
-        """Write a netCDF file that `load_solution` reads back."""
+        Parameters
+        ----------
+        wrenches
+            Whether the joints' wrenches are among them: they take longest.
+        """
+        from ephs.mechanics.solve.dataset import dataset
+
+        return dataset(self, wrenches=wrenches)
+
+    def save(self, path: str | File, *, wrenches: bool = False) -> None:
+        """Write a netCDF file that `load_solution` reads back bit by bit, and others with xarray.
+
+        Parameters
+        ----------
+        wrenches
+            Whether the joints' wrenches are written for other readers; `load_solution` finds them again by itself.
+        """
         from ephs.mechanics.solve.file import save
 
-        save(self, File(path))
+        save(self, File(path), wrenches=wrenches)
 
-    def plot(self) -> Any:
-        """The motion as a matplotlib figure; `ephs.show` has figures of energy, exergy, entropy and residuals."""
-        from ephs.show import plot_motion
+    def plot(self, kind: str = "motion", *arguments: Any, **options: Any) -> "Figure":
+        """A matplotlib figure that shows itself in notebooks: of the motion, or of another `kind`.
 
-        return plot_motion(self)
+        Kinds are motion, phase, energy, exergy, entropy, flow, constraints, wrenches and mechanism; the functions of
+        `ephs.show` with these names, as ``plot_phase``, say what their options are.
 
-    def animate(self, path: str | File | None = None) -> str:
-        """One self-contained HTML page with the moving mechanism; written to a file where a path is given."""
+        Raises
+        ------
+        ShowError
+            There is no such kind, or this solution has nothing of it.
+        """
+        from ephs.show import plot
+
+        return plot(self, kind, *arguments, **options)
+
+    def animate(self, path: str | File | None = None, **options: Any) -> "Page":
+        """One self-contained HTML page with the moving mechanism, which shows itself in notebooks.
+
+        Parameters
+        ----------
+        path
+            Where to write the page, if anywhere.
+        options
+            Those of `ephs.show.animate`: ``wrenches=True`` draws joint forces and moments as arrows, ``heat=True``
+            colours what thermal nodes warm, ``fps`` and ``duration`` say how it plays.
+        """
         from ephs.show import animate
 
-        return animate(self, path)
+        return animate(self, path, **options)
 
     def _moving(self, what: str) -> Motion:
         if self.motion is None:
             raise TypeError(f"{self.name} is not a scene, it has no {what}; states are read as sol['path']")
         return self.motion
+
+
+def _hint(path: Path, known: list[Path]) -> str:
+    below = [str(each) for each in known if each[: len(path)] == path]
+    near = get_close_matches(str(path), [str(each) for each in known], n=3, cutoff=0.7)
+    if below:
+        return f"below it lie {', '.join(below)}"
+    return f"did you mean {' or '.join(near)}?" if near else f"the states are {', '.join(map(str, known))}"

@@ -1,0 +1,86 @@
+"""A pattern beside the mechanism that it describes, in one figure."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ephs.show.diagram_png import draw_placement
+from ephs.show.errors import ShowError
+from ephs.show.figures import new_figure
+from ephs.show.layout import place
+from ephs.show.motion import best_side, between_instants, film
+from ephs.show.plots import STYLE
+from ephs.show.still import draw_still
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["plot_mechanism"]
+
+WIDTH = 7.2
+GAP = 0.15
+
+
+def plot_mechanism(sol: Any, at: float | None = None, *, opened: bool = False) -> "Figure":
+    """The interconnection pattern of a scene's system, and next to it a still of the mechanism.
+
+    Parameters
+    ----------
+    sol : Solution or Scene
+        What to draw; a scene is drawn in its initial state.
+    at : float, optional
+        Time of the still in s; by default the start.
+    opened : bool
+        Whether the pattern's composites are opened by one level.
+
+    Raises
+    ------
+    ShowError
+        If there is no scene, or the time is outside of the solution.
+    """
+    from matplotlib import rc_context
+
+    scene = sol if callable(getattr(sol, "all_bodies", None)) else sol.scene
+    if scene is None:
+        raise ShowError("nothing", path=str(sol.name), found="mechanism", expected="a scene's solution")
+    if sol is scene:
+        poses = {name: np.asarray(body.pose, dtype=float) for name, body in scene.all_bodies()}
+        way, system = None, scene.system()
+    else:
+        poses, way = _poses(sol, at)
+        system = sol.system
+    placement = place(system, opened=opened)
+    wide, high = (side / 72.0 for side in placement.size)
+    scale = min(1.0, 0.52 * WIDTH / wide, 4.4 / high)
+    style: Any = STYLE
+    with rc_context(style):
+        height = max(2.4, scale * high)
+        figure = new_figure(WIDTH, height)
+        figure.set_layout_engine("none")
+        share = scale * wide / WIDTH
+        below = 0.5 * (1.0 - scale * high / height)
+        draw_placement(figure.add_axes((0.0, below, share, scale * high / height)), placement, scale)
+        left = share + GAP / WIDTH
+        draw_still(figure.add_axes((left, 0.02, 0.99 - left, 0.96)), scene, poses, way)
+    return figure
+
+
+def _poses(sol: Any, at: float | None) -> tuple[dict[str, Any], Any]:
+    """Poses at a time, and the side from which the whole motion is seen best."""
+    t = np.asarray(sol.t, dtype=float)
+    if not len(t):
+        raise ShowError("nothing", path=str(sol.name), found="instants", expected="some to show")
+    time = float(t[0]) if at is None else float(at)
+    if not min(t[0], t[-1]) <= time <= max(t[0], t[-1]):
+        span = f"one from {t[0]:g} to {t[-1]:g} s"
+        raise ShowError("nothing", path=str(sol.name), found=f"time {time:g} s", expected=span)
+    names = [name for name, _ in sol.scene.all_bodies()]
+    frames = film(sol, names, 30.0, None, most=60)
+    places = [np.asarray(sol.body(name).position, dtype=float) for name in names]
+    still: dict[str, Any] = {}
+    for name, rows in frames.poses.items():
+        # the film has even times, and keeps quaternions on one side
+        pose = np.array([between_instants(frames.times, np.array([time]), column)[0] for column in rows.T])
+        pose[:4] /= np.linalg.norm(pose[:4])
+        still[name] = pose
+    return still, best_side(np.concatenate(places)) if places else None

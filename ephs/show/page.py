@@ -1,0 +1,44 @@
+"""A page that shows itself: in notebooks and built documentation as a frame, elsewhere as a file."""
+
+import html
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+from typing import final
+
+__all__ = ["Page"]
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Page:
+    """One HTML page that holds everything in itself.
+
+    Attributes
+    ----------
+    html : str
+        The whole document.
+    title : str
+        What it shows.
+    """
+
+    html: str
+    title: str
+
+    def save(self, path: str | FilePath) -> FilePath:
+        """Write the page to a file, whose folder is made if need be."""
+        target = FilePath(path)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_text(self.html, encoding="utf-8")
+        return target
+
+    def frame(self, height: str = "32rem") -> str:
+        """The page as a frame of another page, `height` in the words of CSS."""
+        inside, title = html.escape(self.html, quote=True), html.escape(self.title, quote=True)
+        style = f"width:100%;height:{height};border:1px solid #dfe3e8;border-radius:8px"
+        return f'<iframe title="{title}" loading="lazy" style="{style}" srcdoc="{inside}"></iframe>'
+
+    def _repr_html_(self) -> str:
+        return self.frame("26rem")
+
+    def __repr__(self) -> str:
+        return f"<Page {self.title!r}, {len(self.html) / 1e6:.1f} MB; save(path) writes it>"

@@ -1,0 +1,149 @@
+"""Bodies as surfaces: their shape, their mesh, or the box of the same mass and inertia."""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path as FilePath
+from typing import Any, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ephs.show.errors import ShowError
+from ephs.show.motion import Array, equivalent_box, rotate
+
+__all__ = ["Solid", "box", "cylinder", "held_at", "solid_of", "sphere"]
+
+SIDES = 28
+"""Of a round solid."""
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Solid:
+    """A closed surface in the body's frame.
+
+    Attributes
+    ----------
+    vertices : (n, 3)
+        In m.
+    faces : tuple of (k,) integer arrays
+        Corners of each face, seen from outside against the clock.
+    kind : str
+        ``"box"``, ``"sphere"``, ``"cylinder"``, ``"mesh"``, ``"stand-in"``, or ``"point"``: nothing is known.
+    note : str
+        Why it is a stand-in, where a mesh was wanted.
+    """
+
+    vertices: Array
+    faces: tuple[NDArray[np.int64], ...]
+    kind: str
+    note: str = ""
+
+    @property
+    def reach(self) -> float:
+        """Radius in m of the ball about the centre of mass that holds it."""
+        return float(np.linalg.norm(self.vertices, axis=1).max(initial=0.0))
+
+    def stick(self, point: Array) -> tuple[Array, Array] | None:
+        """From the surface's box to a point (3,) of the body that is outside of it, None where it is within."""
+        inside = np.clip(point, self.vertices.min(axis=0), self.vertices.max(axis=0))
+        return (inside, point) if float(np.linalg.norm(point - inside)) > 0.02 * self.reach else None
+
+    @property
+    def triangles(self) -> NDArray[np.int64]:
+        """(k, 3) corners."""
+        return np.array([(f[0], f[i], f[i + 1]) for f in self.faces for i in range(1, len(f) - 1)]).reshape(-1, 3)
+
+
+def box(sides: Array) -> tuple[Array, tuple[NDArray[np.int64], ...]]:
+    """Vertices and faces of a box about the origin."""
+    signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
+    faces = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+    return 0.5 * signs * np.asarray(sides, dtype=float), tuple(np.array(face) for face in faces)
+
+
+def cylinder(radius: float, length: float) -> tuple[Array, tuple[NDArray[np.int64], ...]]:
+    """Vertices and faces of a cylinder about z, the caps last."""
+    turns = np.linspace(0.0, 2.0 * math.pi, SIDES, endpoint=False)
+    ring = radius * np.column_stack([np.cos(turns), np.sin(turns), 0.0 * turns])
+    rise = np.array([0.0, 0.0, 0.5 * length])
+    near, far = np.arange(SIDES), np.roll(np.arange(SIDES), -1)
+    around = [np.array([i, j, j + SIDES, i + SIDES]) for i, j in zip(near, far, strict=True)]
+    return np.vstack([ring - rise, ring + rise]), (*around, near[::-1], near + SIDES)
+
+
+def sphere(radius: float) -> tuple[Array, tuple[NDArray[np.int64], ...]]:
+    """Vertices and faces of a ball."""
+    rings = SIDES // 2
+    heights = np.linspace(0.0, math.pi, rings + 1)
+    turns = np.linspace(0.0, 2.0 * math.pi, SIDES, endpoint=False)
+    up, around = np.meshgrid(heights, turns, indexing="ij")
+    points = np.stack([np.sin(up) * np.cos(around), np.sin(up) * np.sin(around), -np.cos(up)], axis=-1).reshape(-1, 3)
+    faces = [
+        np.array([i * SIDES + j, i * SIDES + (j + 1) % SIDES, (i + 1) * SIDES + (j + 1) % SIDES, (i + 1) * SIDES + j])
+        for i in range(rings)
+        for j in range(SIDES)
+    ]
+    return radius * points, tuple(faces)
+
+
+def held_at(body: str, joints: Iterable[Any], springs: Iterable[Any]) -> list[Array]:
+    """The points (3,) of a body, in its frame, at which joints and springs take hold of it."""
+    out = [
+        np.asarray(f, dtype=float)[4:]
+        for j in joints
+        for b, f in ((j.body1, j.frame1), (j.body2, j.frame2))
+        if b == body
+    ]
+    return out + [
+        np.asarray(at, dtype=float) for s in springs for b, at in ((s.body1, s.at1), (s.body2, s.at2)) if b == body
+    ]
+
+
+def solid_of(body: Any, name: str) -> Solid:
+    """The surface of a body; where its mesh cannot be read, the box of its inertia, with a note that says so.
+
+    Raises
+    ------
+    ShowError
+        If the shape is none of those known.
+    """
+    match body.shape:
+        case {"box": [x, y, z]}:
+            return Solid(*box(np.array([x, y, z], dtype=float)), "box")
+        case {"sphere": radius}:
+            return Solid(*sphere(float(radius)), "sphere")
+        case {"cylinder": [radius, length]}:
+            return Solid(*cylinder(float(radius), float(length)), "cylinder")
+        case {"mesh": file}:
+            return _mesh(FilePath(str(file)), body, name)
+        case None | {}:
+            return _stand_in(body, "")
+        case other:
+            raise ShowError("shape", path=name, found=str(other))
+
+
+def _stand_in(body: Any, note: str) -> Solid:
+    sides, turn = equivalent_box(float(body.mass), np.asarray(body.inertia, dtype=float))
+    if sides.max() <= 0.0:
+        return Solid(np.zeros((1, 3)), (), "point", note)
+    vertices, faces = box(sides)
+    return Solid(rotate(turn, vertices), faces, "stand-in", note)
+
+
+def _mesh(file: FilePath, body: Any, name: str) -> Solid:
+    if find_spec("trimesh") is None:
+        return _stand_in(body, f"{name}: {file.name} needs the package trimesh")
+    import trimesh
+
+    try:
+        loaded: Any = trimesh.load_scene(str(file))
+        mesh: Any = loaded.to_mesh()
+    except Exception as fault:  # readers of foreign files raise what they like
+        return _stand_in(body, f"{name}: {file.name} cannot be read ({fault or type(fault).__name__})")
+    vertices, faces = np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces, dtype=np.int64)
+    if not len(faces):
+        return _stand_in(body, f"{name}: {file.name} holds no surface")
+    return Solid(vertices, tuple(faces), "mesh")

@@ -1,0 +1,172 @@
+"""Files of solutions: bit by bit what was saved, whatever was solved."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+from hypothesis import given
+from hypothesis import strategies as st
+
+import ephs
+from ephs.mechanics.solve.labels import freedoms, labels_of
+from ephs.semantics.spaces import PAIRS, pair
+from ephs.testing import mechanisms, systems
+
+BOOKS = {"kinetic", "potential", "thermal", "environment", "exergy", "entropy", "heat", "work", "supplied", "made"}
+BOOKS |= {"least", "storages", "makers", "entropies", "volumes", "momenta", "exergies"}
+
+
+def same(found: ephs.Solution, expected: ephs.Solution) -> None:
+    """Everything that the two solutions hold is equal, bit by bit."""
+    one, other = found.to_xarray(), expected.to_xarray()
+    assert one.identical(other)
+    assert set(one.variables) == set(other.variables)
+    for name in one.variables:
+        a, b = one[name].values, other[name].values
+        assert a.dtype == b.dtype and (a.tobytes() == b.tobytes() if a.dtype != object else np.array_equal(a, b))
+    assert found.stats == expected.stats and found.labels == expected.labels
+    assert [(e.name, e.t) for e in found.events] == [(e.name, e.t) for e in expected.events]
+    for a, b in zip(found.events, expected.events, strict=True):
+        assert all(np.array_equal(a.state[path], b.state[path]) for path in b.state)
+    assert found.summary() == expected.summary()
+
+
+def through_a_file(sol: ephs.Solution, folder, **options) -> ephs.Solution:
+    sol.save(folder / "sol.nc", **options)
+    return ephs.load_solution(folder / "sol.nc")
+
+
+@given(mechanisms(), st.booleans(), st.booleans())
+def test_mechanisms_come_back_bit_by_bit(tmp_path_factory, scene, pushed, wrenches):
+    last = list(scene.bodies)[-1]
+    inputs = {f"bodies.{last}": lambda t, state: np.sin(t + state[f"bodies.{last}.pe.q"][4:].sum()) * np.ones(6)}
+    event = ephs.Event(lambda t, state: t - 1.5e-5, "late")
+    sol = ephs.simulate(scene, 3e-5, step=1e-5, inputs=inputs if pushed else None, events=[event])
+    assert len(sol.events) == 1
+    same(through_a_file(sol, tmp_path_factory.mktemp("files"), wrenches=wrenches), sol)
+
+
+def test_circuits_come_back_bit_by_bit(tmp_path, damped):
+    falls = ephs.Event(lambda t, state: float(state["osc.pe.q"][0]), "through zero", -1)
+    sol = ephs.simulate(damped, 9.0, initial={"osc.pe.q": 1.0}, rtol=1e-4, events=[falls])
+    again = through_a_file(sol, tmp_path)
+    same(again, sol)
+    assert len(again.events) == 2
+    same(through_a_file(again, tmp_path), sol)  # without its system it is saved again as it was
+
+
+def test_a_solution_without_instants_comes_back(tmp_path, damped):
+    sol = ephs.simulate(damped, 1.0, step=0.1, save_at=[])
+    again = through_a_file(sol, tmp_path)
+    assert len(again) == 0 and again["osc.pe.q"].shape == sol["osc.pe.q"].shape
+
+
+def test_every_variable_has_a_unit_and_every_axis_names():
+    sol = ephs.simulate(ephs.load("scenes/slider-crank.toml"), 0.01, step=0.001, inputs={"joints.bearing": np.sin})
+    data = sol.to_xarray()
+    for name, variable in data.variables.items():
+        if variable.dtype != object:
+            assert variable.attrs["units"] and variable.attrs["long_name"], name
+        assert all(dim in data.coords for dim in variable.dims), name
+    crank = data["body_position"].sel(body="crank", axis="z")
+    assert np.array_equal(crank, sol.body("crank").position[:, 2])
+    assert np.array_equal(data["body_twist"].sel(body="rod", twist="wy"), sol.body("rod").angular_velocity[:, 1])
+    assert np.array_equal(data["state:bodies.rod.pe.q"].sel(pose="x"), sol.body("rod").position[:, 0])
+    assert np.array_equal(data["coordinate:wrist"].sel(cylindrical="distance"), sol.joint("wrist").coordinate[:, 1])
+    assert data["coordinate:wrist"].attrs["units"] == "rad, m" and data["rate:wrist"].attrs["units"] == "rad/s, m/s"
+    force = data["joint_wrench"].sel(joint="cylinder", wrench=["fx", "fy", "fz"])
+    assert np.array_equal(force, sol.joint("cylinder").wrench[:, 3:])
+    assert data["temperature"].sel(node="housing").dims == ("t",)
+
+
+def test_others_read_the_file_with_xarray_alone(tmp_path):
+    sol = ephs.simulate(ephs.load("scenes/four-bar.toml"), 0.01, step=0.001)
+    sol.save(tmp_path / "sol.nc", wrenches=True)
+    with xr.open_dataset(tmp_path / "sol.nc", engine="h5netcdf") as data:
+        name = next(iter(sol.scene.bodies))
+        assert np.array_equal(data["body_position"].sel(body=name), sol.body(name).position)
+        assert data["joint_wrench"].attrs["units"] == "N m, N m, N m, N, N, N"
+
+
+def test_files_of_format_2_are_read(tmp_path):
+    """They had states without names, no units of states, and events as packed states."""
+    scene = ephs.load("scenes/heavy-top.toml")
+    event = ephs.Event(lambda t, state: t - 0.015, "late")
+    sol = ephs.simulate(scene, 0.03, step=0.01, events=[event])
+    data = sol.to_xarray()
+    kept = [name for name in data.data_vars if name.startswith("state:") or name.partition(":")[0] in BOOKS]
+    old = xr.Dataset(
+        {
+            name: (("t",) if data[name].ndim == 1 else ("t", f"dim{data[name].shape[1]}"), data[name].values)
+            for name in kept
+        },
+        {"t": data["t"]},
+        data.attrs | {"ephs_format": 2},
+    )
+    stats = dict(sol.stats)
+    packed = sol.problem.descriptor.pack(sol.events[0].state).tolist()
+    stats["events"] = [{"name": "late", "t": sol.events[0].t, "x": packed}]
+    old.attrs["stats"] = json.dumps(stats)
+    old.to_netcdf(tmp_path / "old.nc", engine="h5netcdf")
+    same(ephs.load_solution(tmp_path / "old.nc"), sol)
+
+
+@pytest.mark.parametrize("found", [1, 4, None])
+def test_other_formats_are_refused(tmp_path, found):
+    data = xr.Dataset({}, {}, {} if found is None else {"ephs_format": found})
+    data.to_netcdf(tmp_path / "sol.nc", engine="h5netcdf")
+    with pytest.raises(ValueError, match=rf"sol\.nc: ephs_format is {found}, expected one of 2, 3"):
+        ephs.load_solution(tmp_path / "sol.nc")
+
+
+@given(systems())
+def test_labels_fit_the_states_of_every_system(system):
+    for slot in system.descriptor().states:
+        labels = labels_of(slot.quantity)
+        if labels.dimension:
+            assert len(labels.names) == len(set(labels.names)) == len(labels.units)
+        else:
+            assert slot.quantity.space.size == 1 and len(labels.units) == 1
+
+
+def test_freedoms_have_the_names_of_the_contract():
+    names = {name: freedoms(pair(name)).names for name in PAIRS if "pitch" not in PAIRS[name].parameters}
+    assert names["cylindrical"] == ("angle", "distance")
+    assert names["planar"] == ("angle", "x", "y")
+    assert names["free"] == ("rx", "ry", "rz", "x", "y", "z")
+    assert names["fixed"] == ()
+    assert all(len(names[name]) == pair(name).dim for name in names)
+
+
+def test_a_slice_is_the_solution_at_these_instants():
+    sol = ephs.simulate(ephs.load("scenes/slider-crank.toml"), 0.05, step=0.001, inputs={"joints.bearing": np.sin})
+    few = sol[10::5]
+    assert np.array_equal(few.t, sol.t[10::5]) and few.t.size == 9
+    assert np.array_equal(few["bodies.rod.pe.q"], sol["bodies.rod.pe.q"][10::5])
+    assert np.array_equal(few.exergy, sol.exergy[10::5])
+    assert np.allclose(few.joint("wrist").wrench, sol.joint("wrist").wrench[10::5], rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        ("osc.pe.p", r"osc\.pe\.p: no such state; did you mean osc\.pe\.q"),
+        ("osc", r"osc: no such state; below it lie osc\.pe\.q, osc\.ke\.p"),
+        ("xyz", r"xyz: no such state; the states are osc\.pe\.q"),
+    ],
+)
+def test_what_is_not_there_is_answered_with_what_is_near(damped, asked, words):
+    sol = ephs.simulate(damped, 0.1, step=0.1)
+    with pytest.raises(KeyError, match=words):
+        sol[asked]
+
+
+def test_outer_ports_carry_in_the_file_what_they_carried(tmp_path):
+    inputs = {"bodies.rod": lambda t: np.array([0.0, np.cos(50.0 * t), 0.0, 1.0, 0.0, t])}
+    sol = ephs.simulate(ephs.load("scenes/slider-crank.toml"), 0.004, step=0.001, inputs=inputs)
+    again = through_a_file(sol, tmp_path)
+    for port in ("momenta.rod", "drives.bearing"):
+        one, other = again.port(port), sol.port(port)
+        assert np.array_equal(one.flow, other.flow) and np.array_equal(one.effort, other.effort)
+    assert np.ptp(sol.port("momenta.rod").flow[:, 1]) > 0.0

@@ -1,0 +1,162 @@
+"""Arrows and warmth: forces point as they act, colours follow temperatures, meshes are those of the file."""
+
+import html
+import struct
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import ephs
+from ephs.show import Page, animate
+from ephs.show.motion import between_instants, film, nearest
+from ephs.show.overlays import heat_of, loads_of, tint
+from ephs.show.solids import Solid, box, cylinder, solid_of, sphere
+
+PARTS = st.floats(0.05, 3.0)
+HANGING = """
+format = 1
+name = "lamp"
+[bodies.lamp]
+mass = 2.0
+inertia = [0.1, 0.1, 0.1]
+position = [0.0, 0.0, -0.5]
+rotation = [0.6, 0.0, 0.8, 0.0]
+SHAPE
+[joints.hook]
+type = "spherical"
+bodies = ["ground", "lamp"]
+at = [0.0, 0.0, 0.0]
+friction = 0.1
+heat = "hook"
+[thermal.hook]
+capacity = 10.0
+temperature = 310.0
+[conduction.air]
+between = ["hook", "environment"]
+conductance = 3.0
+"""
+
+
+def lamp(folder, shape: str = "") -> ephs.Solution:
+    (folder / "lamp.toml").write_text(HANGING.replace("SHAPE", shape))
+    return ephs.simulate(ephs.load(folder / "lamp.toml"), 1.0, step=0.02)
+
+
+def volume(solid: Solid) -> float:
+    a, b, c = (solid.vertices[solid.triangles[:, k]] for k in range(3))
+    return float(np.einsum("ni,ni->", a, np.cross(b, c))) / 6.0
+
+
+def test_the_hook_holds_the_lamp_up(tmp_path):
+    """Whatever the lamp's axes are, the force on it points up and is its weight; a ball joint holds no moment."""
+    sol = lamp(tmp_path)
+    frames = film(sol, ["lamp"], 30.0, None)
+    loads = loads_of(sol, frames, dict(sol.scene.all_joints()))
+    assert np.allclose(loads.force, [0.0, 0.0, 2.0 * 9.81], atol=1e-9)
+    assert np.allclose(loads.places, 0.0, atol=1e-9) and np.abs(loads.moment).max() < 1e-9
+    assert loads.largest == {"force": pytest.approx(19.62), "moment": 0.0} and loads.loose == ()
+
+
+@given(st.tuples(*[st.floats(-2.0, 2.0)] * 3).map(np.array))
+def test_sticks_reach_what_the_body_does_not(point):
+    solid = Solid(*box(np.array([1.0, 2.0, 3.0])), "box")
+    stick = solid.stick(point)
+    outside = np.maximum(np.abs(point) - np.array([0.5, 1.0, 1.5]), 0.0)
+    assert (stick is None) == (np.linalg.norm(outside) <= 0.02 * solid.reach)
+    if stick is not None:
+        assert np.array_equal(stick[1], point) and np.linalg.norm(stick[1] - stick[0]) == pytest.approx(
+            np.linalg.norm(outside)
+        )
+
+
+def test_what_is_indeterminate_has_no_arrow():
+    sol = ephs.simulate(ephs.load("scenes/four-bar.toml"), 0.02, step=0.01)
+    joints = dict(sol.scene.all_joints())
+    loads = loads_of(sol, film(sol, list(sol.scene.bodies), 30.0, None), joints)
+    assert set(loads.loose) == set(joints)
+    assert np.all(loads.force == 0.0) and np.isfinite(loads.moment).all()
+    assert "indeterminate" in animate(sol, wrenches=True).html.rpartition("</script>")[2]
+
+
+def test_glow_follows_the_temperature(tmp_path):
+    sol = lamp(tmp_path)
+    heat = heat_of(sol, film(sol, ["lamp"], 30.0, None), ["hook"])
+    shares = [heat.share("hook", frame) for frame in range(31)]
+    assert shares[0] == 1.0 and all(np.diff(shares) < 0.0) and heat.share("environment", 0) == 0.0
+    assert (heat.low, heat.high) == (293.15, 310.0)
+    assert [sum(tint(share)) for share in (0.0, 0.25, 0.5, 0.75, 1.0)] == sorted(
+        sum(tint(share)) for share in (0.0, 0.25, 0.5, 0.75, 1.0)
+    )
+    assert "310.00 K" in animate(sol, heat=True).html.rpartition("</script>")[2]
+
+
+@given(PARTS, PARTS, PARTS)
+def test_surfaces_are_closed_and_face_outwards(a, b, c):
+    for (vertices, faces), expected, within in (
+        (box(np.array([a, b, c])), a * b * c, 1e-12),
+        (cylinder(a, b), np.pi * a * a * b, 0.02),
+        (sphere(a), 4.0 / 3.0 * np.pi * a**3, 0.04),
+    ):
+        assert volume(Solid(vertices, faces, "box")) == pytest.approx(expected, rel=within)
+
+
+def test_a_mesh_is_drawn_as_its_file_says(tmp_path):
+    vertices, faces = box(np.array([0.1, 0.2, 0.3]))
+    corners = vertices[Solid(vertices, faces, "box").triangles]
+    data = b"".join(struct.pack("<12fH", *np.zeros(3), *each.ravel(), 0) for each in corners)
+    (tmp_path / "part.stl").write_bytes(b"\0" * 80 + struct.pack("<I", len(corners)) + data)
+    sol = lamp(tmp_path, 'shape = { mesh = "part.stl" }')
+    solid = solid_of(sol.scene.body("lamp"), "lamp")
+    assert solid.kind == "mesh" and volume(solid) == pytest.approx(0.006, rel=1e-5)
+    assert 'id="legend"' not in animate(sol, tmp_path / "film.html").html
+
+
+def test_a_missing_mesh_is_replaced_and_the_page_says_so(tmp_path):
+    sol = lamp(tmp_path, 'shape = { mesh = "gone.stl" }')
+    solid = solid_of(sol.scene.body("lamp"), "lamp")
+    assert solid.kind == "stand-in" and "gone.stl cannot be read" in solid.note
+    assert "lamp: gone.stl cannot be read" in animate(sol).html.rpartition("</script>")[2]
+
+
+@pytest.mark.parametrize("file", ["../part.stl", "/etc/part.stl"])
+def test_meshes_outside_of_the_scenes_folder_are_refused(tmp_path, file):
+    with pytest.raises(ephs.SceneError, match=r"bodies\.lamp\.shape\.mesh.*in the scene's folder"):
+        lamp(tmp_path, f'shape = {{ mesh = "{file}" }}')
+
+
+def test_notebooks_show_the_page_and_nothing_else(tmp_path):
+    """What the recording helper says through rich is not said; the console is as it was before."""
+    import rich
+
+    console = rich.get_console()
+    with console.capture() as said:
+        animate(lamp(tmp_path))
+        console.print("after")
+    assert said.get().strip() == "after"
+
+
+def test_a_page_shows_itself_whole(tmp_path):
+    page = Page('<p title="a">&amp;</p>', 'of "this"')
+    shown = page._repr_html_()
+    inside = shown.partition('srcdoc="')[2].rpartition('"></iframe>')[0]
+    assert html.unescape(inside) == page.html and 'title="of &quot;this&quot;"' in shown
+    assert page.save(tmp_path / "new" / "page.html").read_text(encoding="utf-8") == page.html
+
+
+@given(st.lists(st.floats(-5.0, 5.0), min_size=2, max_size=9, unique=True), st.booleans(), st.floats(-5.0, 5.0))
+def test_the_nearest_instant_is_found_forward_and_backward(times, backward, at):
+    t = np.sort(np.array(times))[:: -1 if backward else 1]
+    found = nearest(t, np.array([at]))[0]
+    assert abs(t[found] - at) == np.abs(t - at).min()
+    assert np.array_equal(between_instants(t, t, 2.0 * t), 2.0 * t)
+
+
+def test_a_run_backward_plays_backward(tmp_path):
+    scene = ephs.load("scenes/heavy-top.toml")
+    sol = ephs.simulate(scene, -0.2, step=None, rtol=1e-8)
+    name = next(iter(scene.bodies))
+    frames = film(sol, [name], 30.0, None)
+    assert frames.times[0] == 0.0 and frames.times[-1] == -0.2 and frames.pause > 0.0
+    assert np.allclose(frames.poses[name][-1, 4:], sol.body(name).position[-1])
