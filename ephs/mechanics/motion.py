@@ -232,7 +232,7 @@ class SceneMotion:
             twists[name][:] = np.column_stack([np.linalg.solve(body.inertia, p[:, :3].T).T, p[:, 3:] / body.mass])
             sigma, vectors = np.linalg.eigh(body.inertia)
             half = np.zeros((6, 6))
-            half[:3, :3] = (vectors / np.sqrt(sigma)) @ vectors.T
+            half[:3, :3] = (vectors / np.sqrt(np.abs(sigma))) @ vectors.T
             half[3:, 3:] = np.eye(3) / np.sqrt(body.mass)
             root[name] = half
         if len(self._joints) > MANY and not light and all(j.middle is None for j in self._joints.values()):

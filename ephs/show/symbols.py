@@ -1,6 +1,7 @@
 """How bodies, joints and springs look in space."""
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ _INKS: tuple[Colour, ...] = (
 _MUTED: Colour = (168, 174, 182)
 _METAL: Colour = (70, 76, 84)
 _AXIS: Colour = (198, 58, 40)
+_PLACES = {"position": "position", "wxyz": "rotation"}
 
 
 def ink(index: int) -> Colour:
@@ -29,8 +31,21 @@ def ink(index: int) -> Colour:
 
 
 def extent(body: Any) -> float:
-    """Radius, m, of a ball about the centre of mass that holds the body's shape (meshes: its stand-in)."""
-    match body.shape:
+    """Radius, m, of a ball about the centre of mass that holds the body's shapes (meshes: its stand-in)."""
+    return max(_reach(shape, body) + _offset(shape) for shape in _shapes(body))
+
+
+def _shapes(body: Any) -> Sequence[Any]:
+    """The shapes of a body; None stands for one that is made up."""
+    return tuple(body.shapes) or (body.shape,)
+
+
+def _offset(shape: Any) -> float:
+    return float(np.linalg.norm((shape or {}).get("position", (0.0, 0.0, 0.0))))
+
+
+def _reach(shape: Any, body: Any) -> float:
+    match shape:
         case {"box": [x, y, z]}:
             return 0.5 * math.sqrt(x * x + y * y + z * z)
         case {"sphere": radius}:
@@ -50,16 +65,23 @@ def add_body(server: Any, node: str, body: Any, colour: Colour, size: float, nam
     ShowError
         If its shape is none of those known, or its mesh file cannot be found.
     """
-    scene = server.scene
-    match body.shape:
+    for number, shape in enumerate(_shapes(body)):
+        own = node if not number else f"{node} {number + 1}"
+        _add_shape(server.scene, own, shape, body, colour, size, name)
+
+
+def _add_shape(scene: Any, node: str, shape: Any, body: Any, colour: Colour, size: float, name: str) -> None:
+    place = shape or {}
+    at: dict[str, Any] = {key: place[word] for key, word in _PLACES.items() if word in place}
+    match shape:
         case {"box": [x, y, z]}:
-            scene.add_box(node, color=colour, dimensions=(float(x), float(y), float(z)))
+            scene.add_box(node, color=colour, dimensions=(float(x), float(y), float(z)), **at)
         case {"sphere": radius}:
-            scene.add_icosphere(node, radius=float(radius), color=colour, subdivisions=4)
+            scene.add_icosphere(node, radius=float(radius), color=colour, subdivisions=4, **at)
         case {"cylinder": [radius, length]}:
-            scene.add_cylinder(node, radius=float(radius), height=float(length), color=colour)
+            scene.add_cylinder(node, radius=float(radius), height=float(length), color=colour, **at)
         case {"mesh": file}:
-            _add_mesh(scene, node, file, colour, name)
+            _add_mesh(scene, node, file, colour, name, shape.get("scale", (1.0, 1.0, 1.0)), at)
         case None | {}:
             sides, turn = equivalent_box(float(body.mass), np.asarray(body.inertia, dtype=float))
             if sides.max() <= 0:
@@ -70,14 +92,17 @@ def add_body(server: Any, node: str, body: Any, colour: Colour, size: float, nam
             raise ShowError("shape", path=name, found=str(other))
 
 
-def _add_mesh(scene: Any, node: str, file: Any, colour: Colour, name: str) -> None:
+def _add_mesh(
+    scene: Any, node: str, file: Any, colour: Colour, name: str, scale: Sequence[float], at: dict[str, Any]
+) -> None:
     import trimesh
 
     try:
-        mesh = trimesh.load_mesh(str(file))
+        mesh: Any = trimesh.load(str(file), force="mesh")
     except (OSError, ValueError) as fault:
         raise ShowError("shape", path=name, found=f"a mesh that cannot be read ({fault})") from fault
-    scene.add_mesh_simple(node, vertices=np.asarray(mesh.vertices), faces=np.asarray(mesh.faces), color=colour)
+    points = np.asarray(mesh.vertices) * np.asarray(scale, dtype=float)
+    scene.add_mesh_simple(node, vertices=points, faces=np.asarray(mesh.faces), color=colour, **at)
 
 
 def add_joint(server: Any, node: str, joint: Any, size: float) -> None:

@@ -205,7 +205,7 @@ FAULTS: dict[str, tuple[str, str, tuple[str, ...]]] = {
         "conduction.c.conductance",
         ("not below 0",),
     ),
-    "assembly": ('[assembly]\ninertia = "lax"\n', "assembly.inertia", ("'strict' or 'warn'",)),
+    "assembly": ('[assembly]\ninertia = "lax"\n', "assembly.inertia", ("'strict', 'warn' or 'nearest'",)),
     "adjust": ("[assembly]\nadjust = 1\n", "assembly.adjust", ("true or false",)),
     "gap": (
         body("position = [0.3, 0.0, 0.0]") + joint(f"frame1 = {UNIT}", f"frame2 = {UNIT}", place=False),
@@ -226,7 +226,7 @@ FAULTS: dict[str, tuple[str, str, tuple[str, ...]]] = {
     ),
     "part missing": ('[parts.p]\nuse = "no.toml"\n', "parts.p.use", ("no file",)),
     "part of itself": ('[parts.p]\nuse = "scene.toml"\n', "parts.p.use", ("scene.toml → scene.toml",)),
-    "part suffix": ('[parts.p]\nuse = "no.urdf"\n', "parts.p.use", (".toml",)),
+    "part suffix": ('[parts.p]\nuse = "no.yaml"\n', "parts.p.use", (".toml",)),
     "part's rotation": (
         '[parts.p]\nuse = "no.toml"\nrotation = [1, 1, 0, 0]\n',
         "parts.p.rotation",
@@ -302,7 +302,7 @@ def test_parts_that_use_each_other(scene):
 @pytest.mark.parametrize(
     "name, content, words",
     [
-        ("a.urdf", b"", ".toml"),
+        ("a.yaml", b"", ".toml, .urdf, .xml or .sdf"),
         ("a", b"", "without suffix"),
         ("a.toml", b"\xff\xfe", "UTF-8"),
         ("b.toml", None, "no file"),
