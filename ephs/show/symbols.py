@@ -98,7 +98,7 @@ def _add_mesh(
     import trimesh
 
     try:
-        mesh: Any = trimesh.load(str(file), force="mesh")
+        mesh: Any = trimesh.load_mesh(str(file))
     except (OSError, ValueError) as fault:
         raise ShowError("shape", path=name, found=f"a mesh that cannot be read ({fault})") from fault
     points = np.asarray(mesh.vertices) * np.asarray(scale, dtype=float)

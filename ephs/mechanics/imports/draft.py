@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 WORLD = ""
 """How joints name the ground: as no link is called."""
-MESHES = (".stl", ".obj", ".dae", ".ply", ".glb", ".gltf", ".off")
+MESHES = (".stl", ".obj", ".ply", ".glb", ".off")
 _SCHEMES = ("package://", "model://", "file://")
 
 
