@@ -40,6 +40,7 @@ class Draft:
         self._joint_names: dict[str, str] = {}
         self._centres: dict[str, Array] = {WORLD: np.zeros(3)}
         self._left: dict[str, list[str]] = {}
+        self._renamed: list[str] = []
 
     def leave(self, what: str, name: str) -> None:
         """Note what the scene does not have."""
@@ -48,8 +49,10 @@ class Draft:
             names.append(name)
 
     def left(self) -> list[str]:
-        """A line for each kind of what was left out."""
-        return [f"not modelled: {what}: {', '.join(names)}" for what, names in self._left.items()]
+        """A line for each kind of what was left out, and one for names that scenes cannot have."""
+        lines = [f"not modelled: {what}: {', '.join(names)}" for what, names in self._left.items()]
+        renamed = [f"renamed, as scenes want it: {', '.join(self._renamed)}"] if self._renamed else []
+        return lines + renamed
 
     def body(
         self,
@@ -155,7 +158,7 @@ class Draft:
             count += 1
             found = f"{stem}_{count}"
         if found != name:
-            self.leave("names, which became others", f"{name} → {found}")
+            self._renamed.append(f"{name} → {found}")
         return found
 
 

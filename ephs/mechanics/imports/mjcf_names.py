@@ -35,7 +35,7 @@ def noted(model: Any, names: Names, draft: Draft) -> None:
     """Note what the compiled model has and a scene has not."""
 
     def dofs(values: Any) -> list[str]:
-        moved = np.flatnonzero(np.asarray(values).reshape(model.nv, -1).any(axis=1))
+        moved = np.flatnonzero(np.asarray(values).reshape(model.nv, -1 if model.nv else 1).any(axis=1))
         return list(dict.fromkeys(names.joints[int(model.dof_jntid[k])] for k in moved))
 
     def joints(values: Any) -> list[str]:
