@@ -78,7 +78,7 @@ def compare(scene, model, rng, count=20):
         coordinates, rates, q, v = random_state(scene, model, rng)
         expected, rounding = accelerations(scene, model, q, v)
         found = dynamics.acceleration(dynamics.state(coordinates, rates))
-        largest = max(np.abs(a).max() for a in expected.values())
+        largest = max(np.abs(a).max() for a in expected.values()) or 1.0
         apart = max(np.abs(found[name] - a).max() for name, a in expected.items()) / largest
         worst = max(worst, apart - 10.0 * rounding)
     return worst
