@@ -4,6 +4,7 @@ import os
 import sys
 import warnings
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -326,3 +327,28 @@ def test_broken_texts_load_or_are_refused(data, tmp_path):
         except ephs.SceneError as error:
             assert error.faults
     assert not os.path.exists("MUJOCO_LOG.TXT")
+
+
+@pytest.mark.filterwarnings("ignore::ephs.ModelWarning")
+@pytest.mark.parametrize("given", ['diaginertia="1 1 5"', 'fullinertia="1 1 5 0.1 0 0"', 'diaginertia="0 1 1"'])
+def test_inertias_that_mujoco_refuses_are_kept_by_name(given, write):
+    body = f'<body name="a"><joint name="j"/><inertial pos="1 0 0" quat="0 1 0 0" mass="2" {given}/></body>'
+    path = write(mjcf(body.replace('quat="0 1 0 0"', "") if "full" in given else body), "xml")
+    with pytest.warns(ephs.SceneWarning, match=r"bodies\.a\.inertia") as caught:
+        scene = ephs.load(path)
+    assert sum(issubclass(each.category, ephs.SceneWarning) for each in caught) == 1
+    assert scene.body("a").mass == 2.0
+    found = np.diag(scene.body("a").inertia)
+    assert np.abs(found - [float(word) for word in given.split('"')[1].split()[:3]]).max() < 1e-10
+    with pytest.warns(ephs.SceneWarning, match="took"):
+        ephs.load(path, inertia="nearest")
+    if "0 1 1" not in given:  # a rod is possible
+        with pytest.raises(ephs.SceneError, match=r"bodies\.a\.inertia"):
+            ephs.load(path, inertia="strict")
+
+
+@pytest.mark.filterwarnings("ignore::ephs.ModelWarning")
+def test_masses_that_mujoco_scales_are_its_own(write):
+    body = '<body name="a"><joint/><inertial pos="0 0 0" mass="2" diaginertia="1 1 1"/></body>'
+    path = write(f'<mujoco><compiler settotalmass="6"/><worldbody>{body}</worldbody></mujoco>', "xml")
+    assert ephs.load(path).body("a").mass == 6.0
