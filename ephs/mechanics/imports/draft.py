@@ -17,6 +17,7 @@ __all__ = ["WORLD", "Draft", "along", "pose", "turned_tensor"]
 
 Array = NDArray[np.float64]
 
+LONGEST_NAME = 200
 WORLD = ""
 """How joints name the ground: as no link is called."""
 MESHES = (".stl", ".obj", ".ply", ".glb", ".off")
@@ -132,7 +133,7 @@ class Draft:
         world = {} if self.gravity is None else {"world": {"gravity": _plain(self.gravity)}}
         return {
             "format": 1,
-            "name": self.name,
+            "name": "".join("_" if c in "/\\" or not c.isprintable() else c for c in self.name).strip(". ") or "model",
             **world,
             "assembly": {"inertia": mode},
             "bodies": self._bodies,
@@ -147,16 +148,16 @@ class Draft:
 
     def _own(self, name: str, taken: Mapping[str, Any]) -> str:
         """A name that scene files allow, and that is not taken."""
-        stem = "".join(
-            "_" if letter == "." or letter.isspace() or not letter.isprintable() else letter for letter in name
-        )
-        stem = stem or "unnamed"
+        letters = ("_" if c == "." or c.isspace() or not c.isprintable() else c for c in name[:LONGEST_NAME])
+        stem = "".join(letters) or "unnamed"
+        if stem.startswith("~"):
+            stem = "_" + stem[1:]
         if stem in (GROUND, ENVIRONMENT):
             stem += "_"
         found, count = stem, 1
         while found in taken:
             count += 1
-            found = f"{stem}_{count}"
+            found = f"{stem[: LONGEST_NAME - 10]}_{count}"
         if found != name:
             self._renamed.append(f"{name} → {found}")
         return found

@@ -1,9 +1,14 @@
 """URDF: Pinocchio and MuJoCo see the same robot; friction, shapes and names are kept."""
 
+from itertools import pairwise
+from xml.sax.saxutils import quoteattr
+
 import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 import ephs
 from tests.mechanics.imports.models import URDF
@@ -85,3 +90,29 @@ def test_the_warning_comes_once_and_names_everything(write):
         "hand.tip → hand_tip, elbow.pitch → elbow_pitch",
     ):
         assert words in text
+
+
+NAMES = st.text(
+    st.characters(codec="utf-8", exclude_categories=["Cc", "Cs"], exclude_characters="\ufffe\uffff"), min_size=1
+)
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    names=st.lists(
+        NAMES | st.sampled_from(["ground", "environment", "world", "~a", "a.b", "a_b", "x" * 300]),
+        min_size=2,
+        unique=True,
+    )
+)
+def test_every_name_becomes_one_that_a_scene_may_have(names, write, quiet):
+    links = "".join(f"<link name={quoteattr(name)}/>" for name in names)
+    joints = "".join(
+        f"<joint name={quoteattr(b)} type='revolute'><parent link={quoteattr(a)}/><child link={quoteattr(b)}/></joint>"
+        for a, b in pairwise(names)
+    )
+    scene = quiet(write(f"<robot name={quoteattr(names[0])}>{links}{joints}</robot>"))
+    assert len(scene.bodies) == len(names)
+    assert len(scene.joints) == len(names)
+    assert scene.system().pattern.boxes
+    assert not {"/", "\\"} & set(scene.name)

@@ -59,6 +59,22 @@ FAULTS: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "inertia triangle": (body(inertia="[1.0, 1.0, 2.1]"), "bodies.a.inertia", ("above the sum", "warn")),
     "massless": (body(mass="0.0"), "bodies.a.inertia", ("expected 0",)),
     "quaternion": (body("rotation = [1.0, 0.0, 0.0, 0.1]"), "bodies.a.rotation", ("norm 1.00498", "unit")),
+    "shape and shapes": (
+        body("shape = { sphere = 1.0 }\nshapes = [{ sphere = 1.0 }]"),
+        "bodies.a.shape",
+        ("either shape or shapes",),
+    ),
+    "scale of a sphere": (
+        body("shapes = [{ sphere = 1.0, scale = [1.0, 1.0, 1.0] }]"),
+        "bodies.a.shapes[0].scale",
+        ("meshes only",),
+    ),
+    "key of a shape": (body("shapes = [{ spere = 1.0 }]"), "bodies.a.shapes[0].spere", ('did you mean "sphere"',)),
+    "turned shape": (
+        body("shape = { sphere = 1.0, rotation = [1.0, 1.0, 0.0, 0.0] }"),
+        "bodies.a.shape.rotation",
+        ("unit quaternion",),
+    ),
     "two shapes": (
         body("shape = { sphere = 1.0, box = [1.0, 1.0, 1.0] }"),
         "bodies.a.shape",
