@@ -53,13 +53,20 @@ def read_sdf(root: Element, draft: Draft) -> None:
     for name in [name for name, joint in joints.items() if joint.get("type") == "gearbox"]:
         draft.leave("gearboxes", name)  # a ratio of two rates is no lower pair
         del joints[name]
-    ends = {name: _ends(name, joint, links, draft) for name, joint in joints.items()}
+    ends = {name: _ends(name, joint, links, named["frame"], draft) for name, joint in joints.items()}
     if not links:
         draft.faults.append(fault("no link", "links", "none"))
     if draft.faults:
         return
     frames = Frames({**named["frame"], **named["joint"], **links}, draft.faults)
     place = read_pose(model, "model.pose", draft.faults)
+    if frame := model.get("placement_frame"):
+        place = SE3.compose(place, SE3.inverse(frames.at(frame, "model.placement_frame")))
+    if (base := _relative(model)) not in ("", "world"):
+        hint = "place it relative to the world"
+        draft.faults.append(
+            fault("not supported", "model.pose", f'"{base}"', what="other frames than its own", hint=hint)
+        )
     for name, link in links.items():
         _link(name, link, SE3.compose(place, frames.at(name, f"links.{name}.pose")), draft)
     if not draft.faults:
@@ -100,7 +107,14 @@ def _named(model: Element, tag: str, draft: Draft) -> dict[str, Element]:
     return found
 
 
-def _ends(name: str, joint: Element, links: Mapping[str, Element], draft: Draft) -> tuple[str, str]:
+def _relative(element: Element) -> str:
+    given = element.find("pose")
+    return "" if given is None else given.get("relative_to", "")
+
+
+def _ends(
+    name: str, joint: Element, links: Mapping[str, Element], frames: Mapping[str, Element], draft: Draft
+) -> tuple[str, str]:
     """The parent and the child of a joint, and a look at its kind."""
     kind = joint.get("type")
     if kind not in KINDS:
@@ -110,6 +124,8 @@ def _ends(name: str, joint: Element, links: Mapping[str, Element], draft: Draft)
     ends: list[str] = []
     for end in ("parent", "child"):
         link = (joint.findtext(end) or "").strip()
+        for _ in frames:  # a frame stands for the link that it is attached to
+            link = frames[link].get("attached_to", link) if link in frames and link not in links else link
         if link == "world" and link not in links:
             ends.append(WORLD)
             continue

@@ -6,7 +6,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import ephs
@@ -81,10 +81,11 @@ entries = st.dictionaries(
     | numbers
     | st.text()
     | st.lists(numbers)
-    | st.lists(st.fixed_dictionaries({"sphere": numbers}), min_size=1),
+    | st.lists(st.fixed_dictionaries({"sphere": numbers}), min_size=1, max_size=2),
 )
 
 
-@given(st.dictionaries(st.text(), st.dictionaries(st.text(), entries, min_size=1), min_size=1))
+@settings(max_examples=30)
+@given(st.dictionaries(st.text(), st.dictionaries(st.text(), entries, min_size=1, max_size=3), min_size=1, max_size=3))
 def test_text_keeps_every_table(tables):
     assert tomllib.loads(toml_text(tables)) == tables

@@ -123,3 +123,15 @@ def test_equalities_that_are_lower_pairs_hold(write):
     assert np.abs(sol.constraint_error).max() < 1e-10
     apart = sol.body("b").position - sol.body("a").position
     assert np.abs(apart - [1.0, 0.0, 0.5]).max() < 1e-9
+
+
+def test_frames_stand_for_their_links_and_place_the_model(write, quiet):
+    text = sdf('type="fixed"><parent>on_a</parent><child>b</child>').replace(
+        '<model name="m">',
+        '<model name="m" placement_frame="on_a"><pose>5 0 0 0 0 0</pose>'
+        '<frame name="deep" attached_to="a"/><frame name="on_a" attached_to="deep"><pose>0 2 0 0 0 0</pose></frame>',
+    )
+    scene = quiet(write(text, "sdf"))
+    assert (scene.joints["j"].body1, scene.joints["j"].body2) == ("a", "b")
+    # on_a is 2 m beside a, and comes to lie at x = 5
+    assert np.abs(scene.body("a").pose - [1, 0, 0, 0, 5, -2, 0]).max() < 1e-14
