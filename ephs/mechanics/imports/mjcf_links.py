@@ -7,7 +7,6 @@ import numpy as np
 
 from ephs.mechanics.imports.draft import Draft, pose
 from ephs.mechanics.imports.mjcf_names import Names
-from ephs.semantics.spaces import SE3
 
 __all__ = ["loops"]
 
@@ -33,8 +32,7 @@ def loops(model: Any, names: Names, draft: Draft) -> None:
             elif kind == kinds.mjEQ_CONNECT:
                 ends = [(first, pose(data[:3])), (second, pose(data[3:6]))]
             else:
-                between = SE3.compose(pose(data[3:6], data[6:10]), pose(data[:3]))
-                ends = [(first, between), (second, pose(data[:3]))]
+                ends = [(first, pose(data[3:6], data[6:10])), (second, pose(data[:3]))]
             pair = "spherical" if kind == kinds.mjEQ_CONNECT else "fixed"
             (b1, at1), (b2, at2) = ends
             draft.joint(name, pair, names.bodies[b1], names.bodies[b2], at1, at2, {})

@@ -101,7 +101,7 @@ WELDED = """<mujoco><worldbody>
       <geom size="0.1"/></body></body>
   <body name="b" pos="1 0 1.5" euler="0 30 0"><freejoint/><geom size="0.1"/></body>
 </worldbody><equality>
-  <weld name="glue" body1="a" body2="b"/><joint name="stop" joint1="lock"/>
+  <weld name="glue" body1="a" body2="b" anchor="0.2 0.1 0.3"/><joint name="stop" joint1="lock"/>
   <joint name="couple" joint1="lock" joint2="slow"/>
   <connect name="idle" body1="a" body2="b" anchor="0 0 0" active="false"/>
 </equality></mujoco>"""
@@ -135,3 +135,11 @@ def test_frames_stand_for_their_links_and_place_the_model(write, quiet):
     assert (scene.joints["j"].body1, scene.joints["j"].body2) == ("a", "b")
     # on_a is 2 m beside a, and comes to lie at x = 5
     assert np.abs(scene.body("a").pose - [1, 0, 0, 0, 5, -2, 0]).max() < 1e-14
+
+
+def test_a_pose_may_be_a_quaternion(write, quiet):
+    text = sdf(f'type="fixed">{ENDS}').replace(
+        '<pose degrees="true">1 0 1 90 0 0</pose>', '<pose rotation_format="quat_xyzw">1 0 1 0.6 0 0 0.8</pose>'
+    )
+    scene = quiet(write(text, "sdf"))
+    assert np.abs(scene.body("b").pose - [0.8, 0.6, 0, 0, 1, 0, 1]).max() < 1e-14

@@ -143,3 +143,18 @@ def test_an_argument_goes_before_the_file(tmp_path):
     assert kept.body("a").inertia[2, 2] == 3.0
     with pytest.raises(ephs.SceneError, match='"strict", "warn" or "nearest"'):
         ephs.load(write(tmp_path, text), inertia="lax")
+
+
+@pytest.mark.filterwarnings("ignore::ephs.SceneWarning")
+@pytest.mark.parametrize("size", [0.02, 1e-4])
+def test_rates_are_known_where_inertia_is_small(size, tmp_path):
+    along = np.array([0.48, 0.6, 0.64])
+    t = size * (np.eye(3) - np.outer(along, along))  # a rod across all axes
+    rod = t[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]].tolist()
+    text = PENDULUM.replace(
+        "inertia = [0.0, 0.0, 0.0]\nposition = [0.3, 0.0, -1", f"inertia = {rod}\nposition = [0.3, 0.0, -1"
+    )
+    scene = ephs.load(write(tmp_path, text)).with_state(rates={"first": 3.0, "second": -2.0})
+    sol = ephs.simulate(scene, 0.01)
+    assert abs(sol.joint("first").rate[0, 0] - 3.0) < 1e-11
+    assert abs(sol.joint("second").rate[0, 0] + 2.0) < 1e-11
