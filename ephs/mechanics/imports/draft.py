@@ -49,6 +49,10 @@ class Draft:
         if name not in names:
             names.append(name)
 
+    def rename(self, name: str, other: str) -> None:
+        """Note that something has another name in the scene."""
+        self._renamed.append(f"{name} → {other}")
+
     def left(self) -> list[str]:
         """A line for each kind of what was left out, and one for names that scenes cannot have."""
         lines = [f"not modelled: {what}: {', '.join(names)}" for what, names in self._left.items()]
@@ -159,7 +163,7 @@ class Draft:
             count += 1
             found = f"{stem[: LONGEST_NAME - 10]}_{count}"
         if found != name:
-            self._renamed.append(f"{name} → {found}")
+            self.rename(name, found)
         return found
 
 

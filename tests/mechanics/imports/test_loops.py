@@ -143,3 +143,28 @@ def test_a_pose_may_be_a_quaternion(write, quiet):
     )
     scene = quiet(write(text, "sdf"))
     assert np.abs(scene.body("b").pose - [0.8, 0.6, 0, 0, 1, 0, 1]).max() < 1e-14
+
+
+SCREW = """<mujoco><worldbody><body name="nut" pos="0.1 0 1">
+  {joints}
+  <inertial pos="0.3 0 0" mass="2" diaginertia="0.1 0.1 0.2"/></body></worldbody>
+<equality><joint name="thread" joint1="{first}" joint2="{second}" polycoef="0 {ratio} 0 0 0"/></equality></mujoco>"""
+TURN = '<joint name="turn" axis="0 0 1" damping="0.1"/>'
+
+
+@pytest.mark.parametrize("order", [1, -1])
+@pytest.mark.parametrize(("first", "second", "ratio"), [("rise", "turn", 0.05), ("turn", "rise", 20.0)])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_hinge_and_a_slide_in_a_ratio_are_a_screw(order, first, second, ratio, sign, write):
+    rise = f'<joint name="rise" type="slide" axis="0 0 {sign}" damping="4"/>'
+    text = SCREW.format(joints="".join([TURN, rise][::order]), first=first, second=second, ratio=ratio)
+    with pytest.warns(ephs.ModelWarning, match="rise → turn"):
+        scene = ephs.load(write(text, "xml"))
+    assert list(scene.bodies) == ["nut"]
+    joint = scene.joint("turn")
+    assert (joint.kind, joint.dim) == ("screw", 1)
+    assert abs(joint.pitch - sign * 0.05) < 1e-15
+    assert abs(joint.friction[0, 0] - (0.1 + 0.05**2 * 4.0)) < 1e-15
+    dynamics = ephs.dynamics(scene)
+    expected = -sign * 2.0 * 9.81 * 0.05 / (0.2 + 2.0 * 0.3**2 + 2.0 * 0.05**2)
+    assert abs(dynamics.acceleration(dynamics.state0)["turn"][0] - expected) < 1e-12
