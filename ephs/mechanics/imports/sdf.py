@@ -8,9 +8,10 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from ephs.mechanics.imports.draft import WORLD, Draft, along, pose, turned_tensor
+from ephs.mechanics.imports.elements import check_kind, check_link, check_mass, named, tensor
 from ephs.mechanics.imports.sdf_frames import MODEL, Frames, read_pose
 from ephs.mechanics.imports.xml import numbers
-from ephs.mechanics.scene.errors import did_you_mean, fault, listing
+from ephs.mechanics.scene.errors import fault
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 
@@ -48,17 +49,17 @@ def read_sdf(root: Element, draft: Draft) -> None:
         found = inner.get("name") or inner.findtext("uri") or inner.tag
         hint = "write its links and joints into the model: nothing else is read"
         draft.faults.append(fault("not supported", inner.tag, f'"{found}"', what="models within it", hint=hint))
-    named = {tag: _named(model, tag, draft) for tag in ("link", "joint", "frame")}
-    links, joints = named["link"], dict(named["joint"])
+    links, every, placed = (named(model, tag, draft.faults) for tag in ("link", "joint", "frame"))
+    joints = dict(every)
     for name in [name for name, joint in joints.items() if joint.get("type") == "gearbox"]:
         draft.leave("gearboxes", name)  # a ratio of two rates is no lower pair
         del joints[name]
-    ends = {name: _ends(name, joint, links, named["frame"], draft) for name, joint in joints.items()}
+    ends = {name: _ends(name, joint, links, placed, draft) for name, joint in joints.items()}
     if not links:
         draft.faults.append(fault("no link", "links", "none"))
     if draft.faults:
         return
-    frames = Frames({**named["frame"], **named["joint"], **links}, draft.faults)
+    frames = Frames({**placed, **every, **links}, draft.faults)
     place = read_pose(model, "model.pose", draft.faults)
     if frame := model.get("placement_frame"):
         place = SE3.compose(place, SE3.inverse(frames.at(frame, "model.placement_frame")))
@@ -94,19 +95,6 @@ def _model(root: Element, draft: Draft) -> Element | None:
     return models[0]
 
 
-def _named(model: Element, tag: str, draft: Draft) -> dict[str, Element]:
-    found: dict[str, Element] = {}
-    for number, element in enumerate(model.findall(tag)):
-        name = element.get("name")
-        if not name:
-            draft.faults.append(fault("missing", f"{tag}s[{number}].name", "nothing", what="a name"))
-        elif name in found:
-            draft.faults.append(fault("twice", f"{tag}s.{name}", f'a second {tag} "{name}"'))
-        else:
-            found[name] = element
-    return found
-
-
 def _relative(element: Element) -> str:
     given = element.find("pose")
     return "" if given is None else given.get("relative_to", "")
@@ -116,11 +104,7 @@ def _ends(
     name: str, joint: Element, links: Mapping[str, Element], frames: Mapping[str, Element], draft: Draft
 ) -> tuple[str, str]:
     """The parent and the child of a joint, and a look at its kind."""
-    kind = joint.get("type")
-    if kind not in KINDS:
-        hint = did_you_mean(kind or "", KINDS, "take one of these kinds")
-        found = "nothing" if kind is None else f'"{kind}"'
-        draft.faults.append(fault("unknown type", f"joints.{name}.type", found, known=", ".join(KINDS), hint=hint))
+    check_kind(name, joint, KINDS, draft.faults)
     ends: list[str] = []
     for end in ("parent", "child"):
         link = (joint.findtext(end) or "").strip()
@@ -129,10 +113,7 @@ def _ends(
         if link == "world" and link not in links:
             ends.append(WORLD)
             continue
-        if link not in links:
-            hint = did_you_mean(link, links, f"there are: {listing(links)}")
-            found = f'"{link}"' if link else "nothing"
-            draft.faults.append(fault("unknown link", f"joints.{name}.{end}", found, hint=hint))
+        check_link(link, f"joints.{name}.{end}", links, draft.faults)
         ends.append(link)
     if ends[0] == ends[1]:
         draft.faults.append(fault("same body", f"joints.{name}", f'"{ends[0] or "world"}" twice'))
@@ -178,18 +159,14 @@ def _link(name: str, link: Element, place: np.ndarray, draft: Draft) -> None:
             faults.append(fault("not supported", key, "inertia from shapes", what="automatic inertia", hint=hint))
         own = read_pose(inertial, f"{key}.pose", faults)
         mass = numbers(inertial.findtext("mass"), 1, f"{key}.mass", faults, (1.0,))[0]
-        if mass < 0.0:
-            faults.append(fault("range", f"{key}.mass", f"{mass:g} kg", what="a number not below 0"))
-        tensor = inertial.find("inertia")
-        t = {
-            entry: 1.0 * (entry[1] == entry[2])
-            if tensor is None
-            else numbers(tensor.findtext(entry), 1, f"{key}.inertia.{entry}", faults, (1.0 * (entry[1] == entry[2]),))[
-                0
-            ]
-            for entry in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
-        }
-        rows = [[t["ixx"], t["ixy"], t["ixz"]], [t["ixy"], t["iyy"], t["iyz"]], [t["ixz"], t["iyz"], t["izz"]]]
+        check_mass(mass, key, faults)
+        given = inertial.find("inertia")
+
+        def entry(word: str) -> float:
+            text = None if given is None else given.findtext(word)
+            return numbers(text, 1, f"{key}.inertia.{word}", faults, (1.0 * (word[1] == word[2]),))[0]
+
+        rows = tensor(entry)
         draft.body(name, mass, turned_tensor(own[:4], rows), own[4:], place)
     if link.find("collision") is not None:
         draft.leave("contacts of", name)

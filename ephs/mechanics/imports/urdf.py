@@ -6,8 +6,9 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from ephs.mechanics.imports.draft import WORLD, Draft, along, pose, turned_tensor
+from ephs.mechanics.imports.elements import check_kind, check_link, check_mass, named, tensor
 from ephs.mechanics.imports.xml import numbers, vector
-from ephs.mechanics.scene.errors import did_you_mean, fault, listing
+from ephs.mechanics.scene.errors import fault
 from ephs.mechanics.scene.geometry import coupling
 from ephs.semantics.spaces import SE3
 
@@ -33,8 +34,8 @@ def read_urdf(root: Element, draft: Draft, base: str) -> None:
     if any("xacro" in str(element.tag) for element in root.iter()):
         draft.faults.append(fault("xacro", "robot", "xacro tags"))
         return
-    links = _named(root, "link", draft)
-    joints = _named(root, "joint", draft)
+    links = named(root, "link", draft.faults)
+    joints = named(root, "joint", draft.faults)
     ends = {name: _ends(name, joint, links, draft) for name, joint in joints.items()}
     order = _outwards(links, ends, draft)
     if draft.faults or not order:
@@ -52,34 +53,14 @@ def read_urdf(root: Element, draft: Draft, base: str) -> None:
             draft.leave(_PASSED_BY[element.tag], element.get("name") or element.get("reference") or element.tag)
 
 
-def _named(root: Element, tag: str, draft: Draft) -> dict[str, Element]:
-    found: dict[str, Element] = {}
-    for number, element in enumerate(root.findall(tag)):
-        name = element.get("name")
-        if not name:
-            draft.faults.append(fault("missing", f"{tag}s[{number}].name", "nothing", what="a name"))
-        elif name in found:
-            draft.faults.append(fault("twice", f"{tag}s.{name}", f'a second {tag} "{name}"'))
-        else:
-            found[name] = element
-    return found
-
-
 def _ends(name: str, joint: Element, links: Mapping[str, Element], draft: Draft) -> tuple[str, str]:
     """The parent and the child of a joint, and a look at its kind."""
-    kind = joint.get("type")
-    if kind not in KINDS:
-        hint = did_you_mean(kind or "", KINDS, "take one of these kinds")
-        found = "nothing" if kind is None else f'"{kind}"'
-        draft.faults.append(fault("unknown type", f"joints.{name}.type", found, known=", ".join(KINDS), hint=hint))
+    check_kind(name, joint, KINDS, draft.faults)
     ends: list[str] = []
     for end in ("parent", "child"):
         element = joint.find(end)
         link = "" if element is None else element.get("link", "")
-        if link not in links:
-            hint = did_you_mean(link, links, f"there are: {listing(links)}")
-            found = f'"{link}"' if link else "nothing"
-            draft.faults.append(fault("unknown link", f"joints.{name}.{end}", found, hint=hint))
+        check_link(link, f"joints.{name}.{end}", links, draft.faults)
         ends.append(link)
     return ends[0], ends[1]
 
@@ -116,21 +97,18 @@ def _outwards(links: Mapping[str, Element], ends: Mapping[str, tuple[str, str]],
 
 
 def _link(name: str, link: Element, draft: Draft) -> None:
-    inertial, faults = link.find("inertial"), draft.faults
+    inertial = link.find("inertial")
     if inertial is None:
         draft.body(name)
     else:
         key = f"links.{name}.inertial"
         place = _origin(inertial, key, draft)
         mass = _attribute(inertial.find("mass"), "value", f"{key}.mass", draft)
-        tensor = inertial.find("inertia")
-        t = {
-            entry: _attribute(tensor, entry, f"{key}.inertia", draft, None if entry[1] == entry[2] else 0.0)
-            for entry in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
-        }
-        rows = [[t["ixx"], t["ixy"], t["ixz"]], [t["ixy"], t["iyy"], t["iyz"]], [t["ixz"], t["iyz"], t["izz"]]]
-        if mass < 0.0:
-            faults.append(fault("range", f"{key}.mass", f"{mass:g} kg", what="a number not below 0"))
+        check_mass(mass, key, draft.faults)
+        entries = inertial.find("inertia")
+        rows = tensor(
+            lambda entry: _attribute(entries, entry, f"{key}.inertia", draft, None if entry[1] == entry[2] else 0.0)
+        )
         draft.body(name, mass, turned_tensor(place[:4], rows), place[4:])
     if link.find("collision") is not None:
         draft.leave("contacts of", name)
