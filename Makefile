@@ -13,11 +13,12 @@ export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
 .DELETE_ON_ERROR:
-.PHONY: help demo test lint types docs bench fuzz mutate mutants clean
+.PHONY: help demo test real lint types docs bench fuzz mutate mutants clean
 
 help:
 	@echo 'make demo   simulate scenes/$(SCENE).toml and write out/$(SCENE)/report.html'
 	@echo 'make test   run the tests; make lint, make types: style and types; make fuzz: the laws, for long; make mutate: what goes red when the code is broken; make mutants: the same for the operad, by mutmut'
+	@echo 'make real   fetch real robots (131 MB) and hold their import against Pinocchio'
 	@echo 'make docs   build docs/_build/html; make bench: measure; make clean: remove what was built'
 
 # One stamp an extra: installing again is needed only when pyproject.toml has changed.
@@ -34,6 +35,9 @@ demo: $(VENV)/.installed-viz
 
 test: $(VENV)/.installed-dev
 	$(PYTEST) -n $(CORES)
+
+real: $(VENV)/.installed-real
+	$(PYTEST) -n $(CORES) tests_real
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .

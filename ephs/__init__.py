@@ -13,8 +13,10 @@ if TYPE_CHECKING:
     from ephs.mechanics.methods import register_method as register_method
     from ephs.mechanics.reading import load_solution as load_solution
     from ephs.mechanics.reduction.report import reduce as reduce
+    from ephs.mechanics.scene import ModelWarning as ModelWarning
     from ephs.mechanics.scene import Scene as Scene
     from ephs.mechanics.scene import SceneError as SceneError
+    from ephs.mechanics.scene import SceneWarning as SceneWarning
     from ephs.mechanics.scene.load import load as load
     from ephs.mechanics.simulate import simulate as simulate
     from ephs.mechanics.solve.errors import Interrupted as Interrupted
@@ -66,7 +68,7 @@ _HOMES = {
         "library",
     ),
     "ephs.semantics.constructors": ("constraint", "gyrator", "irreversible", "storage", "transformer"),
-    "ephs.mechanics.scene": ("Scene", "SceneError"),
+    "ephs.mechanics.scene": ("ModelWarning", "Scene", "SceneError", "SceneWarning"),
     "ephs.mechanics.scene.load": ("load",),
     "ephs.mechanics.check": ("check_model",),
     "ephs.mechanics.dynamics": ("dynamics",),

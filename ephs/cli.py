@@ -15,7 +15,18 @@ from cyclopts import App, CycloptsError, Parameter
 
 from ephs.cli_animate import animate
 from ephs.cli_charts import charts
-from ephs.cli_input import EXTRAS, TEXTS, BadInput, Base, addressed, load_model, naming
+from ephs.cli_input import (
+    AS_GIVEN,
+    EXTRAS,
+    TEXTS,
+    BadInput,
+    Loading,
+    addressed,
+    heard,
+    load_model,
+    naming,
+    noted,
+)
 from ephs.cli_sweep import sweeps
 
 if TYPE_CHECKING:
@@ -34,9 +45,11 @@ Exergetic port-Hamiltonian systems: compose physical models by pattern, simulate
   ephs sweep scenes/heavy-top.toml --vary bodies.top.mass=0.5:2:9 --until 1 -o out/sweep
                                                   an ensemble in parallel, one table
   ephs animate out/slider-crank -o a.html         one page with the moving mechanism, no network needed
+  ephs convert robot.urdf -o robot.toml           write a model in another format as a scene file
   ephs chart stability -o out/charts              draw where which method fails; work-precision: its speed and error
 
-SCENE is a scene file (.toml), or FILE.py:NAME, a System or Scene of that name in a Python file of yours.
+SCENE is a scene file (.toml), a model (URDF, MJCF, SDF: .urdf, .xml, .sdf), or FILE.py:NAME, a System or Scene of
+that name in a Python file of yours.
 ephs COMMAND --help explains a command."""
 
 _PICTURES = (".svg", ".tex", ".png")
@@ -105,15 +118,14 @@ def run(
     form: Literal["paper", "folded", "reduced"] | None = None,
     initial: list[str] | None = None,
     out: Path | None = None,
-    base: Base = "fixed",
-    adjust: bool = False,
+    loading: Loading = AS_GIVEN,
 ) -> int:
     """Simulate a scene and write its result folder.
 
     Parameters
     ----------
     scene
-        A scene file (.toml), or FILE.py:NAME.
+        A scene file (.toml), a model (.urdf, .xml, .sdf), or FILE.py:NAME.
     until
         End of the simulated time, in seconds.
     method
@@ -130,14 +142,10 @@ def run(
         Initial value of a state, PATH=NUMBER or PATH=NUMBER,NUMBER,...; may be given several times.
     out
         Result folder; out/NAME unless given.
-    base
-        How the root of an imported model meets the ground.
-    adjust
-        Assemble a scene that does not quite close.
     """
     import ephs
 
-    model = load_model(scene, base=base, adjust=adjust)
+    model = load_model(scene, loading)
     name = model.name if isinstance(model, ephs.Scene) else scene.rpartition(":")[2]
     folder = out or Path("out", name)
     with addressed(scene, folder):
@@ -174,23 +182,19 @@ def run(
 
 
 @app.command
-def check(scene: str, /, *, base: Base = "fixed", adjust: bool = False) -> int:
+def check(scene: str, /, *, loading: Loading = AS_GIVEN) -> int:
     """Check the model, not the trajectory; exit code 1 if a law fails.
 
     Parameters
     ----------
     scene
-        A scene file (.toml), or FILE.py:NAME.
-    base
-        How the root of an imported model meets the ground.
-    adjust
-        Assemble a scene that does not quite close.
+        A scene file (.toml), a model (.urdf, .xml, .sdf), or FILE.py:NAME.
     """
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
-    model = load_model(scene, base=base, adjust=adjust)
+    model = load_model(scene, loading)
     with addressed(scene):
         from ephs.mechanics.check import check_model
 
@@ -210,28 +214,23 @@ def equations(
     *,
     form: Literal["relation", "descriptor", "reduced"] = "reduced",
     latex: bool = False,
-    base: Base = "fixed",
-    adjust: bool = False,
+    loading: Loading = AS_GIVEN,
 ) -> int:
     """Print the equations, with the names of junctions.
 
     Parameters
     ----------
     scene
-        A scene file (.toml), or FILE.py:NAME.
+        A scene file (.toml), a model (.urdf, .xml, .sdf), or FILE.py:NAME.
     form
         relation: what the pattern says of each junction and each component of its ports; descriptor: efforts of
         storages, balances and conditions; reduced: interface variables eliminated.
     latex
         As LaTeX, an align environment.
-    base
-        How the root of an imported model meets the ground.
-    adjust
-        Assemble a scene that does not quite close.
     """
     import ephs
 
-    model = load_model(scene, base=base, adjust=adjust)
+    model = load_model(scene, loading)
     with addressed(scene):
         system = model.system() if isinstance(model, ephs.Scene) else model
         found = system.equations(form)
@@ -240,21 +239,17 @@ def equations(
 
 
 @app.command
-def reduce(scene: str, /, *, base: Base = "fixed", adjust: bool = False) -> int:
+def reduce(scene: str, /, *, loading: Loading = AS_GIVEN) -> int:
     """List what the reduction takes out, why it may, and how many unknowns are left.
 
     Parameters
     ----------
     scene
-        A scene file (.toml), or FILE.py:NAME.
-    base
-        How the root of an imported model meets the ground.
-    adjust
-        Assemble a scene that does not quite close.
+        A scene file (.toml), a model (.urdf, .xml, .sdf), or FILE.py:NAME.
     """
     import ephs
 
-    model = load_model(scene, base=base, adjust=adjust)
+    model = load_model(scene, loading)
     with addressed(scene):
         found = ephs.reduce(model)
     print(found)
@@ -269,31 +264,26 @@ def draw(
     output: Annotated[Path, Parameter(name=["--output", "-o"])],
     flat: bool = False,
     opened: bool = False,
-    base: Base = "fixed",
-    adjust: bool = False,
+    loading: Loading = AS_GIVEN,
 ) -> int:
     """Draw the interconnection pattern.
 
     Parameters
     ----------
     scene
-        A scene file (.toml), or FILE.py:NAME.
+        A scene file (.toml), a model (.urdf, .xml, .sdf), or FILE.py:NAME.
     output
         The picture to write; its ending chooses SVG, TikZ or PNG: .svg, .tex, .png.
     flat
         Draw the flattened pattern instead of the outermost level.
     opened
         Draw what is inside the composites of the outermost level.
-    base
-        How the root of an imported model meets the ground.
-    adjust
-        Assemble a scene that does not quite close.
     """
     import ephs
 
     if output.suffix not in _PICTURES:
         raise BadInput(TEXTS["suffix"].format(found=output, expected=", ".join(_PICTURES)))
-    model = load_model(scene, base=base, adjust=adjust)
+    model = load_model(scene, loading)
     with addressed(scene, output):
         from ephs.show import draw as draw_pattern
 
@@ -306,6 +296,32 @@ def draw(
     return 0
 
 
+@app.command
+def convert(
+    model: str,
+    /,
+    *,
+    output: Annotated[Path, Parameter(name=["--output", "-o"])],
+    loading: Loading = AS_GIVEN,
+) -> int:
+    """Write a model in another format as a scene file.
+
+    Parameters
+    ----------
+    model
+        A URDF (.urdf), an MJCF (.xml) or an SDF (.sdf).
+    output
+        The scene file (.toml) to write.
+    """
+    with addressed(model, output), heard():
+        from ephs.mechanics.imports import convert as convert_model
+
+        output.parent.mkdir(parents=True, exist_ok=True)
+        convert_model(model, output, loading.base, loading.adjust, loading.inertia or "warn")
+    print(output)
+    return 0
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line on the words after the program's name, those of the process unless given.
 
@@ -314,7 +330,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from rich.console import Console
 
     try:
-        return int(app(arguments, error_console=Console(stderr=True)) or 0)
+        with noted(_complain):
+            return int(app(arguments, error_console=Console(stderr=True)) or 0)
     except CycloptsError:
         return 2
     except BadInput as error:

@@ -126,7 +126,7 @@ def stability(*families: str, output: Output, until: float = UNTIL, quick: bool 
 def _scene(file: str) -> "Scene":
     import ephs
 
-    model = load_model(file, base="fixed", adjust=False)
+    model = load_model(file)
     if not isinstance(model, ephs.Scene):
         raise BadInput(_TEXTS["system"].format(file=file))
     return model

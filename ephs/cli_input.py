@@ -2,21 +2,36 @@
 
 import runpy
 import sys
-from collections.abc import Iterator
+import warnings
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal, final
+
+from cyclopts import Parameter
 
 if TYPE_CHECKING:
     from ephs import Scene, System
 
-__all__ = ["EXTRAS", "TEXTS", "BadInput", "Base", "addressed", "load_model", "naming", "say"]
+__all__ = [
+    "AS_GIVEN",
+    "EXTRAS",
+    "TEXTS",
+    "BadInput",
+    "Loading",
+    "addressed",
+    "heard",
+    "load_model",
+    "naming",
+    "noted",
+    "say",
+]
 
-Base = Literal["fixed", "free"]
 TEXTS = {
     "initial": "--initial {found}: expected PATH=NUMBER or PATH=NUMBER,NUMBER,..., as in osc.pe.q=1.0",
     "suffix": "{found}: expected one of {expected}; choose the file name's ending accordingly",
-    "no-file": "{found}: no such file; expected a scene file (.toml) or FILE.py:NAME",
+    "no-file": "{found}: no such file; expected a scene file (.toml), a model (.urdf, .xml, .sdf) or FILE.py:NAME",
     "no-result": "{found}: no solution.nc in it; expected a result folder, as ephs run writes it",
     "no-name": "{file}: no {name} in it; found {found}. Give one as {file}:NAME",
     "not-a-model": "{file}: {name} is a {found}, expected a System or a Scene",
@@ -35,8 +50,33 @@ class BadInput(Exception):
     """Input that cannot be used; the text is for the user."""
 
 
-def load_model(scene: str, *, base: Base, adjust: bool) -> "Scene | System":
-    """A scene file, or FILE.py:NAME, as a model.
+@Parameter(name="*")
+@final
+@dataclass(frozen=True, slots=True)
+class Loading:
+    """How files become scenes.
+
+    Parameters
+    ----------
+    base
+        How the root of a URDF meets the ground.
+    adjust
+        Assemble a scene that does not quite close.
+    inertia
+        Whether an inertia that no distribution of mass has is refused, kept, or replaced by the nearest that one has;
+        unless given, as the scene file says, and kept for other formats.
+    """
+
+    base: Literal["fixed", "free"] = "fixed"
+    adjust: bool = False
+    inertia: Literal["strict", "warn", "nearest"] | None = None
+
+
+AS_GIVEN = Loading()
+
+
+def load_model(scene: str, loading: Loading = AS_GIVEN) -> "Scene | System":
+    """A scene file, a model in another format, or FILE.py:NAME, as a model.
 
     Raises
     ------
@@ -52,8 +92,11 @@ def load_model(scene: str, *, base: Base, adjust: bool) -> "Scene | System":
         raise BadInput(TEXTS["no-name"].format(file=scene, name="name was given", found=scene))
     if not Path(scene).is_file():
         raise BadInput(TEXTS["no-file"].format(found=scene))
-    with addressed(scene):
-        return ephs.load(scene, base=base, adjust=adjust)
+    options: dict[str, Any] = {"base": loading.base, "adjust": loading.adjust}
+    if loading.inertia is not None:
+        options["inertia"] = loading.inertia
+    with addressed(scene), heard():
+        return ephs.load(scene, **options)
 
 
 def _from_python(file: Path, name: str) -> "Scene | System":
@@ -113,6 +156,33 @@ def addressed(scene: str, target: Path | None = None) -> Iterator[None]:
         if type(error).__module__.partition(".")[0] != "ephs":
             raise
         raise BadInput(naming(scene, str(error))) from error
+
+
+@contextmanager
+def noted(say: Callable[[str], None]) -> Iterator[None]:
+    """Say what this package warns of, instead of warning."""
+    with warnings.catch_warnings():
+        otherwise = warnings.showwarning
+
+        def show(message: Warning | str, category: type[Warning], *rest: Any) -> None:
+            if category.__module__.partition(".")[0] == "ephs":
+                say(str(message))
+            else:
+                otherwise(message, category, *rest)
+
+        warnings.showwarning = show
+        yield
+
+
+@contextmanager
+def heard() -> Iterator[None]:
+    """Let every warning of models and scenes through, whatever the user's filters are."""
+    import ephs
+
+    with warnings.catch_warnings():
+        for kind in (ephs.ModelWarning, ephs.SceneWarning):
+            warnings.simplefilter("always", kind)
+        yield
 
 
 def naming(scene: str, message: str) -> str:

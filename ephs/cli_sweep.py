@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Parameter
 
-from ephs.cli_input import BadInput, Base, addressed, load_model, say
+from ephs.cli_input import AS_GIVEN, BadInput, Loading, addressed, load_model, say
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -44,15 +44,14 @@ def sweep(
     step: float | None = None,
     workers: int | None = None,
     dask: str | None = None,
-    base: Base = "fixed",
-    adjust: bool = False,
+    loading: Loading = AS_GIVEN,
 ) -> int:
     """Run a model with many values of some numbers; writes sweep.nc into a folder.
 
     Parameters
     ----------
     scene
-        A scene file (.toml), or FILE.py:NAME.
+        A scene file (.toml), a model (.urdf, .xml, .sdf), or FILE.py:NAME.
     vary
         PATH=FROM:TO:COUNT or PATH=VALUE,VALUE,...; may be given several times.
     until
@@ -77,17 +76,13 @@ def sweep(
         Threads; as many as there are cores unless given.
     dask
         Address of a Dask scheduler to run on instead, as in tcp://127.0.0.1:8786.
-    base
-        How the root of an imported model meets the ground.
-    adjust
-        Assemble a scene that does not quite close.
     """
     if not vary:
         raise BadInput(_TEXTS["none"].format(file=scene))
     if not 0.0 < until < float("inf"):
         raise BadInput(_TEXTS["until"].format(found=until))
     values = dict(_values(entry) for entry in vary)
-    model = load_model(scene, base=base, adjust=adjust)
+    model = load_model(scene, loading)
     with addressed(scene, output):
         output.mkdir(parents=True, exist_ok=True)
     import numpy as np

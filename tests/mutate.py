@@ -19,6 +19,7 @@ SEMANTICS = ("tests/semantics/test_primitives.py", "tests/semantics/test_laws.py
 OPERAD = ("tests/operad",)
 SYMBOLS = ("tests/semantics/symbols",)
 REDUCED = ("tests/mechanics/reduced",)
+IMPORTS = ("tests/mechanics/imports",)
 
 
 @dataclass(frozen=True)
@@ -111,6 +112,24 @@ MUTATIONS = {
         "target[path] = outer.target[content.ports[path].junction]  # absorbed",
         "target[path] = outer.target[min(content.ports.values(), key=lambda p: p.junction).junction]",
         OPERAD + SEMANTICS,
+    ),
+    "import, angles": Mutation(
+        "ephs/mechanics/imports/draft.py",
+        "SE3.compose(_turn(2, given[2]), _turn(1, given[1]))",
+        "SE3.compose(_turn(1, given[1]), _turn(2, given[2]))",
+        IMPORTS,
+    ),
+    "import, files outside": Mutation(
+        "ephs/mechanics/imports/draft.py", "file.is_relative_to(folder) and file.is_file()", "file.is_file()", IMPORTS
+    ),
+    "import, entities": Mutation(
+        "ephs/mechanics/imports/xml.py",
+        "if declared := _DECLARATION.search(text):",
+        "if declared := None:",
+        IMPORTS,
+    ),
+    "import, welds": Mutation(
+        "ephs/mechanics/imports/mjcf_links.py", "pose(data[3:6], data[6:10])", "pose(data[3:6])", IMPORTS
     ),
     "gluing": Mutation(
         "ephs/semantics/relation.py", "outer_at[path] + i, -1.0))", "outer_at[path] + i, 1.0))", SEMANTICS

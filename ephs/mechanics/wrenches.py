@@ -152,7 +152,7 @@ def root_of(body: Body) -> Array:
     """(6, 6) symmetric root of the inverse of a body's inertia."""
     sigma, vectors = np.linalg.eigh(body.inertia)
     out = np.zeros((6, 6))
-    out[:3, :3] = (vectors / np.sqrt(sigma)) @ vectors.T
+    out[:3, :3] = (vectors / np.sqrt(np.abs(sigma))) @ vectors.T
     out[3:, 3:] = np.eye(3) / np.sqrt(body.mass)
     return out
 

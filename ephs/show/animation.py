@@ -136,13 +136,12 @@ class _Stage:
         for index, name in enumerate(self.bodies):
             pose = self.frames.poses[name][0]
             nodes[name] = server.scene.add_frame(_node(name), show_axes=False, wxyz=pose[:4], position=pose[4:])
-            solid, shape = self.solids[name], self.bodies[name].shape
-            opacity = None if self.loads is None else THROUGH
-            drawn = add_body(server, f"{_node(name)}/shape", solid, shape, ink(index), size, opacity)
-            warm.append(_Warm(name, drawn, "color", drawn.color))
+            solid, opacity = self.solids[name], None if self.loads is None else THROUGH
+            drawn = add_body(server, f"{_node(name)}/shape", solid, ink(index), size, opacity)
+            warm += [_Warm(name, part, "color", part.color) for part in drawn]
             for k, point in enumerate(held_at(name, self.joints.values(), self.springs.values())):
                 if stick := solid.stick(point):
-                    add_stick(server, f"{_node(name)}/stick {k}", stick, drawn.color, 0.008 * size)
+                    add_stick(server, f"{_node(name)}/stick {k}", stick, drawn[0].color, 0.008 * size)
         for name, joint in self.joints.items():
             parent = "/ground" if joint.body1 == GROUND else _node(joint.body1)
             metal = add_joint(server, f"{parent}/joint {name}", joint, self._symbol_size(joint, size))

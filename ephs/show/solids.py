@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path as FilePath
 from typing import Any, final
@@ -34,12 +34,18 @@ class Solid:
         ``"box"``, ``"sphere"``, ``"cylinder"``, ``"mesh"``, ``"stand-in"``, or ``"point"``: nothing is known.
     note : str
         Why it is a stand-in, where a mesh was wanted.
+    shape : mapping, optional
+        What it was made from.
+    parts : tuple of Solid
+        Of a body of several shapes, each of them.
     """
 
     vertices: Array
     faces: tuple[NDArray[np.int64], ...]
     kind: str
     note: str = ""
+    shape: Any = None
+    parts: "tuple[Solid, ...]" = ()
 
     @property
     def reach(self) -> float:
@@ -103,14 +109,36 @@ def held_at(body: str, joints: Iterable[Any], springs: Iterable[Any]) -> list[Ar
 
 
 def solid_of(body: Any, name: str) -> Solid:
-    """The surface of a body; where its mesh cannot be read, the box of its inertia, with a note that says so.
+    """The surface of a body; where a mesh of it cannot be read, the box of its inertia, with a note that says so.
 
     Raises
     ------
     ShowError
-        If the shape is none of those known.
+        If a shape is none of those known.
     """
-    match body.shape:
+    parts = tuple(_placed(shape, body, name) for shape in body.shapes or (body.shape,))
+    if len(parts) == 1:
+        return parts[0]
+    first = np.cumsum([0, *(len(part.vertices) for part in parts)])
+    faces = tuple(face + at for part, at in zip(parts, first, strict=False) for face in part.faces)
+    kind = "stand-in" if all(part.kind == "stand-in" for part in parts) else "shapes"
+    note = "; ".join(filter(None, (part.note for part in parts)))
+    return Solid(np.concatenate([part.vertices for part in parts]), faces, kind, note, None, parts)
+
+
+def _placed(shape: Any, body: Any, name: str) -> Solid:
+    """A shape where it is in the body's frame."""
+    solid = _made(shape, body, name)
+    if not shape or solid.kind == "stand-in":
+        return solid
+    turned = rotate(np.asarray(shape.get("rotation", (1.0, 0.0, 0.0, 0.0)), dtype=float), solid.vertices)
+    return replace(
+        solid, vertices=turned + np.asarray(shape.get("position", (0.0, 0.0, 0.0)), dtype=float), shape=shape
+    )
+
+
+def _made(shape: Any, body: Any, name: str) -> Solid:
+    match shape:
         case {"box": [x, y, z]}:
             return Solid(*box(np.array([x, y, z], dtype=float)), "box")
         case {"sphere": radius}:
@@ -118,7 +146,7 @@ def solid_of(body: Any, name: str) -> Solid:
         case {"cylinder": [radius, length]}:
             return Solid(*cylinder(float(radius), float(length)), "cylinder")
         case {"mesh": file}:
-            return _mesh(FilePath(str(file)), body, name)
+            return _mesh(FilePath(str(file)), shape.get("scale", (1.0, 1.0, 1.0)), body, name)
         case None | {}:
             return _stand_in(body, "")
         case other:
@@ -133,7 +161,7 @@ def _stand_in(body: Any, note: str) -> Solid:
     return Solid(rotate(turn, vertices), faces, "stand-in", note)
 
 
-def _mesh(file: FilePath, body: Any, name: str) -> Solid:
+def _mesh(file: FilePath, scale: Any, body: Any, name: str) -> Solid:
     if find_spec("trimesh") is None:
         return _stand_in(body, f"{name}: {file.name} needs the package trimesh")
     import trimesh
@@ -146,4 +174,6 @@ def _mesh(file: FilePath, body: Any, name: str) -> Solid:
     vertices, faces = np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces, dtype=np.int64)
     if not len(faces):
         return _stand_in(body, f"{name}: {file.name} holds no surface")
-    return Solid(vertices, tuple(faces), "mesh")
+    if np.prod(scale) < 0.0:  # a mirror turns faces inside out
+        faces = faces[:, ::-1]
+    return Solid(vertices * np.asarray(scale, dtype=float), tuple(faces), "mesh")

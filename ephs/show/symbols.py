@@ -21,6 +21,7 @@ _INKS: tuple[Colour, ...] = (
 MUTED: Colour = (168, 174, 182)
 METAL: Colour = (70, 76, 84)
 _AXIS: Colour = (198, 58, 40)
+_PLACES = {"position": "position", "wxyz": "rotation"}
 
 
 def ink(index: int) -> Colour:
@@ -28,19 +29,24 @@ def ink(index: int) -> Colour:
     return _INKS[index % len(_INKS)]
 
 
-def add_body(
-    server: Any, node: str, solid: Solid, shape: Any, colour: Colour, size: float, opacity: float | None
-) -> Any:
-    """Draw a body at its frame, and give the node that has its colour; `size` is that of the whole scene, m."""
-    scene = server.scene
+def add_body(server: Any, node: str, solid: Solid, colour: Colour, size: float, opacity: float | None) -> list[Any]:
+    """Draw a body at its frame, and give the nodes that have its colour; `size` is that of the whole scene, m."""
+    return [
+        _add_part(server.scene, f"{node} {number + 1}" if number else node, part, colour, size, opacity)
+        for number, part in enumerate(solid.parts or (solid,))
+    ]
+
+
+def _add_part(scene: Any, node: str, solid: Solid, colour: Colour, size: float, opacity: float | None) -> Any:
+    shape: Any = solid.shape or {}
+    at: dict[str, Any] = {key: shape[word] for key, word in _PLACES.items() if word in shape}
     match solid.kind:
         case "sphere":
-            return scene.add_icosphere(
-                node, radius=float(shape["sphere"]), color=colour, subdivisions=4, opacity=opacity
-            )
+            radius = float(shape["sphere"])
+            return scene.add_icosphere(node, radius=radius, color=colour, subdivisions=4, opacity=opacity, **at)
         case "cylinder":
-            radius, length = shape["cylinder"]
-            return scene.add_cylinder(node, radius=float(radius), height=float(length), color=colour, opacity=opacity)
+            radius, height = (float(number) for number in shape["cylinder"])
+            return scene.add_cylinder(node, radius=radius, height=height, color=colour, opacity=opacity, **at)
         case "point":
             return scene.add_icosphere(node, radius=0.012 * size, color=MUTED, subdivisions=3)
         case _:

@@ -193,8 +193,9 @@ def pendulum() -> FakeSolution:
         "mass": 0.5,
         "inertia": np.diag([0.01, 0.01, 1e-4]),
         "shape": {"box": [0.03, 0.04, 0.5]},
+        "shapes": (),
     }
-    weight = {"name": "weight", "mass": 1.0, "inertia": np.diag([1e-3, 2e-3, 2.5e-3]), "shape": None}
+    weight = {"name": "weight", "mass": 1.0, "inertia": np.diag([1e-3, 2e-3, 2.5e-3]), "shape": None, "shapes": ()}
     joint = {
         "kind": "revolute",
         "body1": "ground",

@@ -2,6 +2,7 @@
 
 import math
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,6 +19,8 @@ from ephs.show.motion import (
     point_of,
     rotate,
 )
+from ephs.show.solids import solid_of
+from ephs.show.symbols import add_body
 
 UNIT = st.floats(-1.0, 1.0)
 VECTORS = st.tuples(UNIT, UNIT, UNIT).map(np.array)
@@ -123,3 +126,36 @@ def test_impossible_films_are_refused(pendulum, asked, words):
 def test_a_system_without_scene_cannot_be_animated(circuit):
     with pytest.raises(ShowError, match="damped oscillator: found no scene"):
         animate(circuit)
+
+
+class Recorder:
+    """Notes what is added to a scene."""
+
+    def __init__(self):
+        self.scene, self.calls = self, []
+
+    def __getattr__(self, name):
+        return lambda node, **options: self.calls.append((name, node, options))
+
+
+def test_several_shapes_are_drawn_where_they_are(tmp_path):
+    mesh = tmp_path / "part.stl"
+    corners = ("0 0 0", "1 0 0", "0 1 0")
+    loop = "\n".join(f"vertex {corner}" for corner in corners)
+    mesh.write_text(f"solid s\nfacet normal 0 0 1\nouter loop\n{loop}\nendloop\nendfacet\nendsolid s\n")
+    shapes = (
+        {"box": [1.0, 2.0, 3.0], "position": [1.0, 0.0, 0.0], "rotation": [0.0, 1.0, 0.0, 0.0]},
+        {"sphere": 0.5, "position": [0.0, 0.0, 9.0]},
+        {"mesh": str(mesh), "scale": [2.0, 3.0, 1.0]},
+    )
+    body = SimpleNamespace(shape=None, shapes=shapes, mass=1.0, inertia=np.eye(3))
+    recorder = Recorder()
+    solid = solid_of(body, "a")
+    add_body(recorder, "/a/shape", solid, (0, 0, 0), 1.0, None)
+    (box, _, boxed), (ball, _, there), (part, _, scaled) = recorder.calls
+    assert (box, ball, part) == ("add_mesh_simple", "add_icosphere", "add_mesh_simple")
+    assert len({node for _, node, _ in recorder.calls}) == 3
+    assert boxed["vertices"].max(axis=0).tolist() == [1.5, 1.0, 1.5]
+    assert there["position"] == [0.0, 0.0, 9.0]
+    assert scaled["vertices"].max(axis=0).tolist() == [2.0, 3.0, 0.0]
+    assert solid.reach == pytest.approx(9.5)

@@ -125,5 +125,12 @@ class PaperStates:
                 carried = carried @ SE3.adjoint(SE3.inverse(w.inner[here]))
                 here = int(tables.parent[here])
             own = twists[i] - carried @ twists[here]
-            rates[freedoms] = np.linalg.lstsq(np.column_stack(columns), own, rcond=None)[0]
+            root = _root(tables.inertia[i])  # what hardly has inertia knows little of its twist
+            rates[freedoms] = np.linalg.lstsq(root @ np.column_stack(columns), root @ own, rcond=None)[0]
         return rates
+
+
+def _root(inertia: Array) -> Array:
+    """A symmetric root (6, 6) of an inertia, its size taken where it is negative."""
+    moments, axes = np.linalg.eigh(inertia)
+    return (axes * np.sqrt(np.abs(moments))) @ axes.T

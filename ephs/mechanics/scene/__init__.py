@@ -5,6 +5,7 @@ and is imported where it is used.
 """
 
 from ephs.mechanics.scene.errors import Fault as Fault
+from ephs.mechanics.scene.errors import ModelWarning as ModelWarning
 from ephs.mechanics.scene.errors import SceneError as SceneError
 from ephs.mechanics.scene.errors import SceneWarning as SceneWarning
 from ephs.mechanics.scene.model import Adjustment as Adjustment

@@ -40,7 +40,7 @@ def assemble(
     xs = [link.element(poses) for link in links]
     twists = _move(drafts, joints, links, xs, poses, [body.twist for _, body in others])
     bodies = {
-        d.name: Body(d.name, d.mass, frozen(d.inertia), frozen(poses[i]), frozen(twists[i]), d.shape)
+        d.name: Body(d.name, d.mass, frozen(d.inertia), frozen(poses[i]), frozen(twists[i]), d.shape, d.shapes)
         for i, d in enumerate(drafts)
     }
     slips = [link.slip(twists, x) for link, x in zip(links, xs, strict=True)]

@@ -79,6 +79,8 @@ def _scene(data: dict[str, Any]) -> Scene:
     given = dict(data)
     for key, cls in _PARTS.items():
         entries: dict[str, Any] = given.get(key, {})  # files of before there were markers have none
+        if cls is Body:
+            entries = {name: entry | {"shapes": tuple(entry.get("shapes", ()))} for name, entry in entries.items()}
         if cls is Conduction:
             entries = {name: entry | {"between": tuple(entry["between"])} for name, entry in entries.items()}
         make = _scene if cls is Scene else lambda entry, cls=cls: _value(cls, entry)

@@ -43,6 +43,7 @@ _NEUTRAL: dict[str, Any] = {
 
 _NESTED: dict[str, type[Entry]] = {
     "shape": ShapeEntry,
+    "shapes": ShapeEntry,
     "frame1": FrameEntry,
     "frame2": FrameEntry,
     "motion": MotionEntry,

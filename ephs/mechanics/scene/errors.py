@@ -53,21 +53,50 @@ class SceneWarning(UserWarning):
     """A scene that can be used, but hardly describes a real mechanism."""
 
 
+@final
+class ModelWarning(UserWarning):
+    """An imported model says more than its scene."""
+
+
 # code: (expected, advice); both may name the values given to `fault`.
 TEXTS: dict[str, tuple[str, str]] = {
     # the file
     "no file": ("a scene file", "check the path"),
     "not readable": ("a readable file", "check what the path names, and its permissions"),
-    "suffix": ("a file that ends in .toml", "convert the model to a scene file first"),
+    "suffix": ("a file that ends in .toml, .urdf, .xml or .sdf", "check the file's name"),
     "encoding": ("UTF-8 text", "save the file as UTF-8"),
     "syntax": ("valid TOML", "mend the syntax at the place named"),
     "base": ('"fixed" or "free"', "say how the root of an imported model meets the ground"),
+    "inertia mode": ('"strict", "warn" or "nearest"', "say what becomes of an impossible inertia"),
     "format": ("1", "write format = 1 as the first line"),
     "cycle": ("a scene that is no part of itself", "take one of these uses out: {chain}"),
     "world differs": (
         "{wanted}, that of the scene that uses it",
         "take [world] out of the part, or make it equal",
     ),
+    # models in other formats
+    "model suffix": ("a file that ends in .urdf, .xml or .sdf", "check the file's name"),
+    "scene suffix": ("a file that ends in .toml", "choose another name for the scene file"),
+    "size": ("at most {most:g} MB", "a model is text; meshes have files of their own"),
+    "entities": ("XML without <!DOCTYPE and <!ENTITY", "take these declarations out, comments included"),
+    "xml": ("well-formed XML", "mend the syntax at the place named"),
+    "deep": ("at most {most} levels", "no model is nested so deeply"),
+    "root element": ("one of {known}", "check what the file holds"),
+    "xacro": ("plain URDF", "expand the macros first: xacro FILE > MODEL.urdf"),
+    "value": ("{what}", "mend the value"),
+    "twice": ("a name of its own", "rename one of the two"),
+    "unknown link": ("a link of this model", "{hint}"),
+    "no link": ("at least one link", "check that the file is complete"),
+    "two parents": ("one parent", "a URDF is a tree; close loops in an SDF or a scene file"),
+    "link cycle": ("links that lead to a root", "take one of these joints out"),
+    "roots": ("one root link", "join the others to it"),
+    "unknown frame": ("a frame of this model", "{hint}"),
+    "frame cycle": ("frames that lead to the model's", "place one of them relative to the model"),
+    "one model": ("one model", "split the file, or join the models"),
+    "not supported": ("a model without {what}", "{hint}"),
+    "outside": ("a file in the model's own folder", "copy it there; nothing else is read"),
+    "not compiled": ("a model that MuJoCo compiles", "mend what it complains of"),
+    "no importer": ("the module mujoco", "python -m pip install 'ephs[models]'"),
     # keys, types and names
     "unknown key": ("one of {known}", "{hint}"),
     "missing": ("{what}", "add this key"),
@@ -84,6 +113,8 @@ TEXTS: dict[str, tuple[str, str]] = {
     "unknown thermal": ('"environment" or a [thermal] name', "{hint}"),
     "unknown type": ("one of {known}", "{hint}"),
     "mesh": ("a file in the scene's folder or below", "move it there, and give its path from the scene file"),
+    "both shapes": ("either shape or shapes", "take one of the two out"),
+    "only mesh": ("no scale for a {kind}", "scale belongs to meshes only"),
     "shape": ("one of box, sphere, cylinder, mesh", "a shape has exactly one of these keys"),
     # bodies
     "quaternion": ("a unit quaternion [w, x, y, z] to 1e-6", "divide it by its norm"),
@@ -95,6 +126,13 @@ TEXTS: dict[str, tuple[str, str]] = {
         "no principal moment above the sum of the two others",
         'mend the tensor, or set assembly.inertia = "warn"',
     ),
+    "inertia kept": (
+        "those of a distribution of mass",
+        'kept; inertia "nearest" would take the nearest possible ones',
+    ),
+    "inertia nearest": ("those of a distribution of mass", "took the nearest possible ones: {taken}"),
+    "inertia zero": ("positive principal moments", "took those below {least:.3g} kg m² as this"),
+    "mass zero": ("a mass that has this inertia, or inertia 0", "took {mass:.3g} kg"),
     "massless": ("0 for a body of mass 0", "give it a mass, or inertia = [0, 0, 0]"),
     # joints
     "same body": ("two different bodies", "a joint connects two bodies, or a body and the ground"),

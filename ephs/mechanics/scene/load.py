@@ -2,62 +2,94 @@
 
 import re
 import tomllib
+import warnings
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, final
 
 import numpy as np
 
 from ephs.mechanics.scene import resolve, values
 from ephs.mechanics.scene.assembly import assemble
 from ephs.mechanics.scene.entries import Document, read_document, shown
-from ephs.mechanics.scene.errors import Fault, SceneError, fault
+from ephs.mechanics.scene.errors import Fault, ModelWarning, SceneError, SceneWarning, fault
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Scene, World
 from ephs.mechanics.scene.moving import moved, spring_length
 from ephs.mechanics.scene.state import adjusted
 
+MODELS = (".urdf", ".xml", ".sdf")
+"""Endings of files in other formats, which are imported."""
 
-def load(path: str | PathLike[str], base: str = "fixed", adjust: bool = False) -> Scene:
-    """Read a scene file.
+
+@final
+@dataclass(frozen=True, slots=True)
+class _Reading:
+    """How files are read, and what is found in them: faults, odd inertias, what a model says more than its scene."""
+
+    base: str
+    adjust: bool
+    inertia: str | None
+    faults: list[Fault] = field(default_factory=list)
+    odd: list[Fault] = field(default_factory=list)
+    left: list[str] = field(default_factory=list)
+
+
+def load(path: str | PathLike[str], base: str = "fixed", adjust: bool = False, inertia: str | None = None) -> Scene:
+    """Read a scene file, or a model in another format.
 
     Parameters
     ----------
-    path : a ``.toml`` scene file
-    base : ``"fixed"`` or ``"free"``, how the root of an imported model meets the ground; a scene file says
-        so itself
+    path : a scene file (``.toml``), a URDF (``.urdf``), an MJCF (``.xml``) or an SDF (``.sdf``)
+    base : ``"fixed"`` or ``"free"``, how the root of a URDF meets the ground; other files say so themselves
     adjust : take the nearest consistent state where the initial state does not close; the scene's
         ``adjusted`` reports it
+    inertia : ``"strict"``, ``"warn"`` or ``"nearest"``: whether an inertia that no distribution of mass has is
+        refused, kept, or replaced by the nearest possible one; unless given, as the scene file says, and ``"warn"``
+        for other formats
+
+    Warns
+    -----
+    SceneWarning
+        Once, of all inertias that were kept or replaced.
+    ModelWarning
+        Once, of all that a model says and its scene does not.
 
     Raises
     ------
     SceneError
         With every fault that was found.
     """
-    faults: list[Fault] = []
+    r = _Reading(base, adjust, inertia)
     if base not in ("fixed", "free"):
-        faults.append(fault("base", "base", shown(base)))
-    scene = _read(Path(path), adjust, None, (), faults)
-    if scene is None or faults:
-        raise SceneError(str(path), faults)
+        r.faults.append(fault("base", "base", shown(base)))
+    if inertia not in (None, "strict", "warn", "nearest"):
+        r.faults.append(fault("inertia mode", "inertia", shown(inertia)))
+    scene = _read(Path(path), None, (), r) if not r.faults else None
+    if scene is None or r.faults:
+        raise SceneError(str(path), r.faults)
+    for kind, lines in ((SceneWarning, r.odd), (ModelWarning, r.left)):
+        if lines:
+            warnings.warn("\n  ".join([str(path) + ":", *map(str, lines)]), kind, stacklevel=2)
     return scene
 
 
-def _read(path: Path, adjust: bool, world: World | None, stack: tuple[Path, ...], faults: list[Fault]) -> Scene | None:
+def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading) -> Scene | None:
     """A scene from a file, in a given world if it is a part; None where there were faults."""
-    raw = _parse(path, faults)
+    faults = r.faults
+    raw = _parse(path, r)
     if raw is None:
         return None
     document = read_document(raw, path.stem, faults)
-    adjust = adjust or document.assembly.adjust
+    r = replace(r, adjust=r.adjust or document.assembly.adjust)
     world = _world(document, world, faults)
-    parts, lost = _parts(document, path, adjust, world, stack, faults)
+    parts, lost = _parts(document, path, world, stack, r)
     _check_names(document, faults)
     names = _names(document, parts, lost)
     sections = document.sections
-    strict = document.assembly.inertia == "strict"
-    bodies = [resolve.resolve_body(n, t, strict, path.parent, faults) for n, t in sections["bodies"].items()]
+    mode = r.inertia or document.assembly.inertia
+    bodies = [resolve.resolve_body(n, t, mode, path.parent, faults, r.odd) for n, t in sections["bodies"].items()]
     joints = [resolve.resolve_joint(n, t, names, faults) for n, t in sections["joints"].items()]
     springs = {n: resolve.resolve_spring(n, t, names, faults) for n, t in sections["springs"].items()}
     conduction = resolve.resolve_conduction(document, names, faults)
@@ -77,7 +109,7 @@ def _read(path: Path, adjust: bool, world: World | None, stack: tuple[Path, ...]
         str(path),
         markers=markers,
     )
-    if adjust:
+    if r.adjust:
         scene, open_joints = adjusted(scene)
     faults += open_joints
     if not faults:
@@ -89,7 +121,12 @@ def _read(path: Path, adjust: bool, world: World | None, stack: tuple[Path, ...]
     return None if faults else scene
 
 
-def _parse(path: Path, faults: list[Fault]) -> Mapping[str, Any] | None:
+def _parse(path: Path, r: _Reading) -> Mapping[str, Any] | None:
+    faults = r.faults
+    if path.suffix in MODELS:
+        from ephs.mechanics.imports import read_model
+
+        return read_model(path, r.base, faults, r.left)
     if path.suffix != ".toml":
         faults.append(fault("suffix", "", shown(path.suffix) if path.suffix else "a file without suffix"))
         return None
@@ -122,9 +159,10 @@ def _described(world: World) -> str:
 
 
 def _parts(
-    document: Document, path: Path, adjust: bool, world: World, stack: tuple[Path, ...], faults: list[Fault]
+    document: Document, path: Path, world: World, stack: tuple[Path, ...], r: _Reading
 ) -> tuple[dict[str, Scene], set[str]]:
     """The parts, moved to their places, and the names of those that could not be read."""
+    faults = r.faults
     stack = (*stack, path.resolve())
     found: dict[str, Scene] = {}
     for name, table in document.sections["parts"].items():
@@ -137,9 +175,11 @@ def _parts(
             chain = " → ".join(p.name for p in (*stack[stack.index(file.resolve()) :], file))
             faults.append(fault("cycle", f"{key}.use", shown(entry.use), chain=chain))
             continue
-        below: list[Fault] = []
-        part = _read(file, adjust, world, stack, below)
-        faults += [_seen_from_outside(f, key, entry.use) for f in below]
+        below = replace(r, faults=[], odd=[], left=[])
+        part = _read(file, world, stack, below)
+        faults += [_seen_from_outside(f, key, entry.use) for f in below.faults]
+        r.odd.extend(_seen_from_outside(f, key, entry.use) for f in below.odd)
+        r.left.extend(f"{key}: {line}" for line in below.left)
         if part is not None:
             found[name] = moved(part, np.array(pose), world)
     return found, set(document.sections["parts"]) - set(found)

@@ -1,8 +1,7 @@
 """What is there: a scene with every default, frame and coordinate resolved to numbers.
 
 Poses are 7-vectors ``[w, x, y, z, rx, ry, rz]``; twists are 6-vectors (angular, linear) in the body's own
-frame. All arrays are read-only. Nothing here knows of files; `load` makes these values from a TOML file,
-other readers may make them in other ways.
+frame. All arrays are read-only. Nothing here knows of files; `load` makes these values from them.
 """
 
 from collections.abc import Iterator, Mapping
@@ -53,8 +52,8 @@ class Body:
     inertia : (3, 3) kg m², about the centre of mass, in body axes
     pose : (7,) of the centre of mass and body axes in the world
     twist : (6,) in the body frame: angular velocity, and the velocity of the centre of mass in body axes
-    shape : for pictures only, one of ``{"box": [x, y, z]}``, ``{"sphere": r}``, ``{"cylinder": [radius,
-        length]}``, ``{"mesh": file}``
+    shape, shapes : one or several, for pictures only: ``{"box": [x, y, z]}``, ``{"sphere": r}``, ``{"cylinder":
+        [radius, length]}``, ``{"mesh": file, "scale": …}``, with ``position`` and ``rotation`` in the body
     """
 
     name: str
@@ -63,6 +62,7 @@ class Body:
     pose: Array
     twist: Array
     shape: Mapping[str, Any] | None = None
+    shapes: tuple[Mapping[str, Any], ...] = ()
 
 
 @final

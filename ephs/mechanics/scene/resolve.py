@@ -15,9 +15,10 @@ from ephs.mechanics.scene import values
 from ephs.mechanics.scene.entries import Checked, Document, shown
 from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing
 from ephs.mechanics.scene.geometry import Coupling, coupling, joint_types
+from ephs.mechanics.scene.inertia import mass_and_inertia
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Conduction, Marker, Spring, ThermalNode, World, frozen
 from ephs.mechanics.scene.placing import Place, resolve_place
-from ephs.mechanics.scene.schema import BodyEntry, JointEntry, SpringEntry
+from ephs.mechanics.scene.schema import BodyEntry, JointEntry, ShapeEntry, SpringEntry
 
 Array = NDArray[np.float64]
 
@@ -37,6 +38,7 @@ class BodyDraft:
     velocity: Array | None
     angular_velocity: Array | None
     shape: Mapping[str, Any] | None
+    shapes: tuple[Mapping[str, Any], ...]
 
 
 @final
@@ -90,22 +92,31 @@ def resolve_world(document: Document) -> World | None:
     return None if w is None else World(frozen(w.gravity), w.temperature, w.pressure)
 
 
-def resolve_body(name: str, table: Checked[BodyEntry], strict: bool, folder: Path, faults: list[Fault]) -> BodyDraft:
-    """A body with its inertia checked."""
+def resolve_body(
+    name: str, table: Checked[BodyEntry], mode: str, folder: Path, faults: list[Fault], odd: list[Fault]
+) -> BodyDraft:
+    """A body with its inertia checked; what ``mode`` lets through of it is appended to ``odd``."""
     entry, key = table.entry, f"bodies.{name}"
-    tensor = np.eye(3)
+    mass, tensor = entry.mass, np.eye(3)
     if table.sound("inertia"):  # a faulty mass stands as 1 here
-        tensor = values.inertia(entry, f"{key}.inertia", strict, faults)
+        mass, tensor = mass_and_inertia(entry, key, mode, faults, odd)
+    shape = [_shape(entry.shape, f"{key}.shape", folder, faults)] if entry.shape and table.sound("shape") else [None]
+    shapes: list[Mapping[str, Any] | None] = []
+    if entry.shapes and table.sound("shapes"):
+        shapes = [_shape(e, f"{key}.shapes[{i}]", folder, faults) for i, e in enumerate(entry.shapes)]
+        if entry.shape is not None:
+            faults.append(fault("both shapes", f"{key}.shape", "shape and shapes"))
     placed = entry.position is not None or entry.rotation is not None
     moving = entry.velocity is not None or entry.angular_velocity is not None
     return BodyDraft(
         name=name,
-        mass=entry.mass,
+        mass=mass,
         inertia=tensor,
         pose=values.pose(entry.position, entry.rotation, key, faults) if placed else None,
         velocity=np.array(entry.velocity or [0.0, 0.0, 0.0]) if moving else None,
         angular_velocity=np.array(entry.angular_velocity or [0.0, 0.0, 0.0]) if moving else None,
-        shape=_shape(entry, key, folder, faults) if table.sound("shape") else None,
+        shape=shape[0],
+        shapes=tuple(one for one in shapes if one is not None),
     )
 
 
@@ -250,16 +261,19 @@ def _check_motion(entry: JointEntry, d: int, drive: Array, key: str, faults: lis
         faults.append(fault("motion and drive", key, "motion and drive"))
 
 
-def _shape(entry: BodyEntry, key: str, folder: Path, faults: list[Fault]) -> Mapping[str, Any] | None:
-    if entry.shape is None:
+def _shape(entry: ShapeEntry, key: str, folder: Path, faults: list[Fault]) -> Mapping[str, Any] | None:
+    given = {name: value for name, value in entry.model_dump().items() if value is not None}
+    kinds = [name for name in given if name not in ("position", "rotation", "scale")]
+    if len(kinds) != 1:
+        faults.append(fault("shape", key, " and ".join(kinds) or "an empty table"))
         return None
-    given = {name: value for name, value in entry.shape.model_dump().items() if value is not None}
-    if len(given) != 1:
-        faults.append(fault("shape", f"{key}.shape", " and ".join(given) or "an empty table"))
-        return None
+    if "scale" in given and "mesh" not in given:
+        faults.append(fault("only mesh", f"{key}.scale", shown(given["scale"]), kind=kinds[0]))
+    if "rotation" in given:
+        given["rotation"] = values.quaternion(given["rotation"], f"{key}.rotation", faults).tolist()
     if "mesh" in given:
         file, home = (folder / given["mesh"]).resolve(), folder.resolve()
         if not file.is_relative_to(home):
-            faults.append(fault("mesh", f"{key}.shape.mesh", given["mesh"]))
-        return {"mesh": str(file)}
+            faults.append(fault("mesh", f"{key}.mesh", given["mesh"]))
+        given["mesh"] = str(file)
     return given

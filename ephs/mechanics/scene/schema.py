@@ -91,13 +91,14 @@ class AssemblyEntry(Entry):
     """``[assembly]``"""
 
     adjust: Flag = Field(default=False, description="take the nearest consistent state, and report it")
-    inertia: Literal["strict", "warn"] = Field(
-        default="strict", description='"warn" accepts a physically impossible inertia'
+    inertia: Literal["strict", "warn", "nearest"] = Field(
+        default="strict",
+        description='"warn" accepts a physically impossible inertia, "nearest" takes the nearest possible one',
     )
 
 
 class ShapeEntry(Entry):
-    """``shape``, for pictures only: one of four."""
+    """``shape``, for pictures only: one of four, and where it is in the body."""
 
     box: Annotated[list[Positive], Field(min_length=3, max_length=3)] | None = Field(
         default=None, description="edge lengths, m"
@@ -107,6 +108,9 @@ class ShapeEntry(Entry):
         default=None, description="radius and length along z, m"
     )
     mesh: Text | None = Field(default=None, description="a mesh file, beside the scene file")
+    scale: Vector | None = Field(default=None, description="of a mesh, along its axes")
+    position: Vector | None = Field(default=None, description="in the centre-of-mass frame, m")
+    rotation: Quaternion | None = Field(default=None, description="likewise, unit quaternion [w, x, y, z]")
 
 
 class BodyEntry(Entry):
@@ -119,6 +123,7 @@ class BodyEntry(Entry):
     velocity: Vector | None = Field(default=None, description="of the centre of mass, world basis, m/s")
     angular_velocity: Vector | None = Field(default=None, description="body basis, rad/s")
     shape: ShapeEntry | None = Field(default=None, description="for pictures only")
+    shapes: list[ShapeEntry] | None = Field(default=None, description="instead of shape: several")
 
 
 class FrameEntry(Entry):

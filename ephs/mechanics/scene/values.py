@@ -1,14 +1,12 @@
 """Numbers brought to their full shape, with the faults that only show in the numbers themselves."""
 
-import warnings
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ephs.mechanics.scene.entries import shown
-from ephs.mechanics.scene.errors import Fault, SceneWarning, fault
-from ephs.mechanics.scene.schema import BodyEntry
+from ephs.mechanics.scene.errors import Fault, fault
 
 Array = NDArray[np.float64]
 
@@ -31,22 +29,6 @@ def quaternion(values: list[float] | None, key: str, faults: list[Fault]) -> Arr
 def pose(position: list[float] | None, rotation: list[float] | None, key: str, faults: list[Fault]) -> Array:
     """The pose (7,) of a position and a rotation; what is None is 0 or the identity."""
     return np.concatenate((quaternion(rotation, f"{key}.rotation", faults), position or [0.0, 0.0, 0.0]))
-
-
-def inertia(entry: BodyEntry, key: str, strict: bool, faults: list[Fault]) -> Array:
-    """The inertia tensor (3, 3); faults, or warnings, where no mass distribution has it."""
-    xx, yy, zz, xy, xz, yz = (*entry.inertia, 0.0, 0.0, 0.0)[:6]
-    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    moments = np.linalg.eigvalsh(tensor)
-    slack = TOLERANCE * float(np.abs(moments).max())
-    text = "principal moments " + ", ".join(f"{moment:.6g}" for moment in moments)
-    if entry.mass == 0.0 and tensor.any():
-        faults.append(fault("massless", key, shown(entry.inertia)))
-    elif moments[0] < -slack:
-        _impossible(fault("inertia indefinite", key, text), strict, faults)
-    elif moments[2] > moments[0] + moments[1] + slack:
-        _impossible(fault("inertia triangle", key, text), strict, faults)
-    return tensor
 
 
 def freedoms(value: Any, d: int, key: str, faults: list[Fault], *, spread: bool = False, default: float = 0.0) -> Array:
@@ -92,10 +74,3 @@ def _ragged(value: Any) -> bool:
 
 def _one_a_freedom(d: int) -> str:
     return {0: "no number: this joint has no freedom", 1: "1 number"}.get(d, f"a list of {d} numbers, one a freedom")
-
-
-def _impossible(found: Fault, strict: bool, faults: list[Fault]) -> None:
-    if strict:
-        faults.append(found)
-    else:
-        warnings.warn(str(found), SceneWarning, stacklevel=2)

@@ -59,6 +59,22 @@ FAULTS: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "inertia triangle": (body(inertia="[1.0, 1.0, 2.1]"), "bodies.a.inertia", ("above the sum", "warn")),
     "massless": (body(mass="0.0"), "bodies.a.inertia", ("expected 0",)),
     "quaternion": (body("rotation = [1.0, 0.0, 0.0, 0.1]"), "bodies.a.rotation", ("norm 1.00498", "unit")),
+    "shape and shapes": (
+        body("shape = { sphere = 1.0 }\nshapes = [{ sphere = 1.0 }]"),
+        "bodies.a.shape",
+        ("either shape or shapes",),
+    ),
+    "scale of a sphere": (
+        body("shapes = [{ sphere = 1.0, scale = [1.0, 1.0, 1.0] }]"),
+        "bodies.a.shapes[0].scale",
+        ("meshes only",),
+    ),
+    "key of a shape": (body("shapes = [{ spere = 1.0 }]"), "bodies.a.shapes[0].spere", ('did you mean "sphere"',)),
+    "turned shape": (
+        body("shape = { sphere = 1.0, rotation = [1.0, 1.0, 0.0, 0.0] }"),
+        "bodies.a.shape.rotation",
+        ("unit quaternion",),
+    ),
     "two shapes": (
         body("shape = { sphere = 1.0, box = [1.0, 1.0, 1.0] }"),
         "bodies.a.shape",
@@ -205,7 +221,7 @@ FAULTS: dict[str, tuple[str, str, tuple[str, ...]]] = {
         "conduction.c.conductance",
         ("not below 0",),
     ),
-    "assembly": ('[assembly]\ninertia = "lax"\n', "assembly.inertia", ("'strict' or 'warn'",)),
+    "assembly": ('[assembly]\ninertia = "lax"\n', "assembly.inertia", ("'strict', 'warn' or 'nearest'",)),
     "adjust": ("[assembly]\nadjust = 1\n", "assembly.adjust", ("true or false",)),
     "gap": (
         body("position = [0.3, 0.0, 0.0]") + joint(f"frame1 = {UNIT}", f"frame2 = {UNIT}", place=False),
@@ -226,7 +242,7 @@ FAULTS: dict[str, tuple[str, str, tuple[str, ...]]] = {
     ),
     "part missing": ('[parts.p]\nuse = "no.toml"\n', "parts.p.use", ("no file",)),
     "part of itself": ('[parts.p]\nuse = "scene.toml"\n', "parts.p.use", ("scene.toml → scene.toml",)),
-    "part suffix": ('[parts.p]\nuse = "no.urdf"\n', "parts.p.use", (".toml",)),
+    "part suffix": ('[parts.p]\nuse = "no.yaml"\n', "parts.p.use", (".toml",)),
     "part's rotation": (
         '[parts.p]\nuse = "no.toml"\nrotation = [1, 1, 0, 0]\n',
         "parts.p.rotation",
@@ -302,7 +318,7 @@ def test_parts_that_use_each_other(scene):
 @pytest.mark.parametrize(
     "name, content, words",
     [
-        ("a.urdf", b"", ".toml"),
+        ("a.yaml", b"", ".toml, .urdf, .xml or .sdf"),
         ("a", b"", "without suffix"),
         ("a.toml", b"\xff\xfe", "UTF-8"),
         ("b.toml", None, "no file"),

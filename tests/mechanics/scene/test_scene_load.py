@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from ephs.mechanics.scene import SceneError
+from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.mechanics.scene.load import load
 from ephs.mechanics.scene.schema import json_schema
 from ephs.semantics.spaces import SE3
@@ -171,6 +172,17 @@ def test_universal_joint_at_zero(scene):
 def test_mesh_is_beside_the_scene(scene, tmp_path):
     loaded = scene(BODY + "shape = { mesh = 'a.stl' }\n")
     assert loaded.body("a").shape == {"mesh": str(tmp_path / "a.stl")}
+
+
+def test_several_shapes_in_their_places(scene, tmp_path):
+    loaded = scene(
+        BODY + "shapes = [{ sphere = 1.0, position = [1.0, 2.0, 3.0], rotation = [0.6, 0.8, 0.0, 0.0] }, "
+        "{ mesh = 'a.stl', scale = [2.0, 2.0, 2.0] }]\n"
+    )
+    ball, part = loaded.body("a").shapes
+    assert ball == {"sphere": 1.0, "position": [1.0, 2.0, 3.0], "rotation": [0.6, 0.8, 0.0, 0.0]}
+    assert part == {"mesh": str(tmp_path / "a.stl"), "scale": [2.0, 2.0, 2.0]}
+    assert scene_from_text(scene_to_text(loaded)).body("a").shapes == loaded.body("a").shapes
 
 
 LEG = """

@@ -1,0 +1,108 @@
+"""Models as scene files: the tables that the reader makes, written as TOML."""
+
+import json
+import os
+import re
+from collections.abc import Iterable, Mapping
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from ephs.mechanics.scene.errors import Fault, SceneError, fault
+
+__all__ = ["convert", "toml_text"]
+
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
+
+
+def convert(
+    model: str | PathLike[str],
+    scene: str | PathLike[str],
+    base: str = "fixed",
+    adjust: bool = False,
+    inertia: str = "warn",
+) -> None:
+    """Write a model as a scene file, which loads to the same scene as the model.
+
+    Parameters
+    ----------
+    model
+        A URDF, an MJCF or an SDF.
+    scene
+        The scene file to write; meshes stay where they are, and are named relative to it.
+    base, adjust, inertia
+        As `ephs.load` takes them; the scene file says them from then on.
+
+    Warns
+    -----
+    SceneWarning, ModelWarning
+        As `ephs.load`.
+
+    Raises
+    ------
+    SceneError
+        With every fault of the model.
+    """
+    from ephs.mechanics.imports.read import read_model
+    from ephs.mechanics.scene.load import MODELS, load
+
+    source, target = Path(model), Path(scene)
+    if source.suffix not in MODELS:
+        raise SceneError(str(model), [fault("model suffix", "", f'"{source.suffix}"')])
+    if target.suffix != ".toml":
+        raise SceneError(str(model), [fault("scene suffix", "scene", f'"{target.name}"')])
+    load(source, base, adjust, inertia)  # faults and warnings are those of loading
+    faults: list[Fault] = []
+    tables = read_model(source, base, faults, [])
+    if tables is None:
+        raise SceneError(str(model), faults)
+    tables["assembly"] = {"adjust": adjust, "inertia": inertia}
+    away = Path(os.path.relpath(source.parent.resolve(), target.parent.resolve()))
+    for body in tables["bodies"].values():
+        for shape in body.get("shapes", ()):
+            if "mesh" in shape:
+                shape["mesh"] = (away / shape["mesh"]).as_posix()
+    target.write_text(toml_text(tables), encoding="utf-8")
+
+
+def toml_text(tables: Mapping[str, Any]) -> str:
+    """Nested tables as TOML; numbers are exact. Tables within a section's entries are written inline."""
+    lines = [f"{key} = {_value(value)}" for key, value in tables.items() if not isinstance(value, Mapping)]
+    for section, entries in tables.items():
+        if not isinstance(entries, Mapping):
+            continue
+        if all(isinstance(entry, Mapping) for entry in entries.values()):
+            for name, entry in entries.items():
+                lines += ["", f"[{_key(section)}.{_key(name)}]", *_assignments(entry)]
+        else:
+            lines += ["", f"[{_key(section)}]", *_assignments(entries)]
+    return "\n".join(lines) + "\n"
+
+
+def _assignments(table: Mapping[str, Any]) -> Iterable[str]:
+    for key, value in table.items():
+        if isinstance(value, list) and value and isinstance(value[0], Mapping):
+            yield f"{_key(key)} = ["
+            yield from (f"    {_value(entry)}," for entry in value)
+            yield "]"
+        else:
+            yield f"{_key(key)} = {_value(value)}"
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{_key(key)} = {_value(entry)}" for key, entry in value.items()) + " }"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(_value, value)) + "]"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return _text(value) if isinstance(value, str) else repr(value)
+
+
+def _key(key: str) -> str:
+    return key if _BARE.fullmatch(key) else _text(key)
+
+
+def _text(text: str) -> str:
+    # TOML's basic strings are JSON's, but for one control character that JSON may leave as it is.
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -1,0 +1,214 @@
+"""The tables of a scene file in the making: links with their own frames become bodies at their centres of mass."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ephs.mechanics.scene.errors import Fault
+from ephs.mechanics.scene.geometry import frame_rotation
+from ephs.mechanics.scene.model import ENVIRONMENT, GROUND
+from ephs.semantics.spaces import SE3
+from ephs.semantics.spaces.rotations import quaternion_to_matrix
+
+__all__ = ["WORLD", "Draft", "along", "pose", "turned_tensor"]
+
+Array = NDArray[np.float64]
+
+LONGEST_NAME = 200
+WORLD = ""
+"""How joints name the ground: as no link is called."""
+MESHES = (".stl", ".obj", ".ply", ".glb", ".off")
+_SCHEMES = ("package://", "model://", "file://")
+
+
+@final
+class Draft:
+    """Collects bodies, joints, faults, and what a model says that a scene does not.
+
+    Links are known by their names in the model; their names in the scene are the same, but for dots and blanks.
+    Poses are (7,), of what is given in a link's own frame.
+    """
+
+    def __init__(self, name: str, folder: Path, faults: list[Fault]) -> None:
+        self.name, self.folder, self.faults = name, folder, faults
+        self.gravity: list[float] | None = None
+        self._bodies: dict[str, dict[str, Any]] = {}
+        self._joints: dict[str, dict[str, Any]] = {}
+        self._names: dict[str, str] = {WORLD: GROUND}
+        self._joint_names: dict[str, str] = {}
+        self._centres: dict[str, Array] = {WORLD: np.zeros(3)}
+        self._left: dict[str, list[str]] = {}
+        self._renamed: list[str] = []
+
+    def leave(self, what: str, name: str) -> None:
+        """Note what the scene does not have."""
+        names = self._left.setdefault(what, [])
+        if name not in names:
+            names.append(name)
+
+    def rename(self, name: str, other: str) -> None:
+        """Note that something has another name in the scene."""
+        self._renamed.append(f"{name} → {other}")
+
+    def left(self) -> list[str]:
+        """A line for each kind of what was left out, and one for names that scenes cannot have."""
+        lines = [f"not modelled: {what}: {', '.join(names)}" for what, names in self._left.items()]
+        renamed = [f"renamed, as scenes want it: {', '.join(self._renamed)}"] if self._renamed else []
+        return lines + renamed
+
+    def body(
+        self,
+        link: str,
+        mass: float = 0.0,
+        inertia: ArrayLike = 0.0,
+        centre: ArrayLike = (0.0, 0.0, 0.0),
+        place: Array | None = None,
+    ) -> str:
+        """A body: inertia (3, 3) about its centre of mass in the link's axes; ``place`` (7,) of the link in the world,
+        unless a joint says it. Returns its name in the scene."""
+        name = self._own(link, self._bodies)
+        self._names[link] = name
+        self._centres[link] = np.asarray(centre, dtype=float)
+        t = np.broadcast_to(np.asarray(inertia, dtype=float), (3, 3))
+        entries = _plain([t[0, 0], t[1, 1], t[2, 2], t[0, 1], t[0, 2], t[1, 2]])
+        entry: dict[str, Any] = {"mass": float(mass), "inertia": entries if any(entries[3:]) else entries[:3]}
+        if place is not None:
+            entry |= _placed(self._at(link, place, inverse=False))
+        self._bodies[name] = entry
+        return name
+
+    def frame_without_mass(self, name: str) -> str:
+        """A body without mass between two joints; returns how it is known here."""
+        return self.body(name)
+
+    def joint(
+        self, name: str, kind: str, first: str, second: str, at1: Array, at2: Array, entries: Mapping[str, Any]
+    ) -> None:
+        """A joint of two links, its frames (7,) in theirs; ``entries`` are further keys of its table."""
+        own = self._joint_names[name] = self._own(name, self._joints)
+        self._joints[own] = {
+            "type": kind,
+            "bodies": [self._names[first], self._names[second]],
+            "frame1": _placed(self._at(first, at1)),
+            "frame2": _placed(self._at(second, at2)),
+            **{key: value for key, value in entries.items() if np.any(value)},
+        }
+
+    def hold(self, name: str) -> None:
+        """Keep a joint of one freedom where it is."""
+        self._joints[self._joint_names[name]]["motion"] = {"rate": 0.0}
+
+    def shape(self, link: str, kind: str, value: Any, place: Array, **more: Any) -> None:
+        """Something to draw on a link."""
+        if kind != "mesh" and not np.all(np.asarray(value, dtype=float) > 0.0):
+            self.leave("shapes without size", self._names[link])
+            return
+        seen = {key: v for key, v in _placed(self._at(link, place)).items() if np.any(np.array(v) != _REST[key])}
+        table = {kind: value if kind == "mesh" else _plain(value), **more, **seen}
+        self._bodies[self._names[link]].setdefault("shapes", []).append(table)
+
+    def mesh(self, link: str, file: str, place: Array, scale: Sequence[float] = (1.0, 1.0, 1.0)) -> None:
+        """A mesh to draw, if it lies in the model's folder."""
+        inside = self.file_inside(file)
+        if inside is None or inside.suffix.lower() not in MESHES:
+            self.leave("meshes that are no readable file in the model's folder", file)
+            return
+        folder = self.folder.resolve()
+        more = {} if list(scale) == [1.0, 1.0, 1.0] else {"scale": _plain(scale)}
+        self.shape(link, "mesh", inside.relative_to(folder).as_posix(), place, **more)
+
+    def file_inside(self, name: str) -> Path | None:
+        """The file of a name or address, if it is in the model's folder."""
+        scheme = next((s for s in _SCHEMES if name.startswith(s)), "")
+        rest = name[len(scheme) :]
+        if scheme in ("package://", "model://"):
+            rest = rest.partition("/")[2]
+        try:
+            file, folder = (self.folder / rest).resolve(), self.folder.resolve()
+            return file if file.is_relative_to(folder) and file.is_file() else None
+        except (OSError, ValueError):  # a name that no file can have
+            return None
+
+    def document(self, mode: str = "warn") -> dict[str, Any]:
+        """The tables."""
+        world = {} if self.gravity is None else {"world": {"gravity": _plain(self.gravity)}}
+        return {
+            "format": 1,
+            "name": "".join("_" if c in "/\\" or not c.isprintable() else c for c in self.name).strip(". ") or "model",
+            **world,
+            "assembly": {"inertia": mode},
+            "bodies": self._bodies,
+            "joints": self._joints,
+        }
+
+    def _at(self, link: str, place: Array, *, inverse: bool = True) -> Array:
+        """From the link's frame to the one at its centre of mass, or what is there in the world."""
+        if not inverse:
+            return SE3.compose(place, np.concatenate([_ONE, self._centres[link]]))
+        return np.concatenate([place[:4], place[4:] - self._centres[link]])
+
+    def _own(self, name: str, taken: Mapping[str, Any]) -> str:
+        """A name that scene files allow, and that is not taken."""
+        letters = ("_" if c == "." or c.isspace() or not c.isprintable() else c for c in name[:LONGEST_NAME])
+        stem = "".join(letters) or "unnamed"
+        if stem.startswith("~"):
+            stem = "_" + stem[1:]
+        if stem in (GROUND, ENVIRONMENT):
+            stem += "_"
+        found, count = stem, 1
+        while found in taken:
+            count += 1
+            found = f"{stem[: LONGEST_NAME - 10]}_{count}"
+        if found != name:
+            self.rename(name, found)
+        return found
+
+
+_ONE = np.array([1.0, 0.0, 0.0, 0.0])
+_REST = {"position": np.zeros(3), "rotation": _ONE}
+
+
+def pose(position: ArrayLike = (0.0, 0.0, 0.0), rotation: ArrayLike = (1.0, 0.0, 0.0, 0.0)) -> Array:
+    """The pose (7,) of a position and a quaternion (4,), or roll, pitch and yaw (3,) about fixed axes."""
+    given = np.asarray(rotation, dtype=float)
+    if given.shape == (3,):
+        roll, yaw_pitch = _turn(0, given[0]), SE3.compose(_turn(2, given[2]), _turn(1, given[1]))
+        given = SE3.compose(yaw_pitch, roll)[:4]
+    return np.concatenate([given / np.linalg.norm(given), np.asarray(position, dtype=float)])
+
+
+def along(axis: ArrayLike, place: Array | None = None) -> Array | None:
+    """A frame (7,) at ``place`` whose z axis is a direction there; None where the direction is none."""
+    given = np.asarray(axis, dtype=float)
+    size = float(np.linalg.norm(given))
+    rotation = frame_rotation(given / size) if size > 1e-12 else None
+    if rotation is None:
+        return None
+    turned = np.concatenate([rotation, np.zeros(3)])
+    return turned if place is None else SE3.compose(place, turned)
+
+
+def turned_tensor(rotation: Array, tensor: ArrayLike) -> Array:
+    """A tensor (3, 3) in the axes in which its own have this rotation (4,)."""
+    r = quaternion_to_matrix(rotation)
+    t = np.asarray(tensor, dtype=float)
+    found = r @ t @ r.T if np.any(rotation != _ONE) else t
+    return 0.5 * (found + found.T)
+
+
+def _turn(axis: int, angle: float) -> Array:
+    out = np.zeros(7)
+    out[0], out[1 + axis] = np.cos(0.5 * angle), np.sin(0.5 * angle)
+    return out
+
+
+def _placed(place: Array) -> dict[str, list[float]]:
+    return {"position": _plain(place[4:]), "rotation": _plain(place[:4])}
+
+
+def _plain(values: ArrayLike) -> Any:
+    """Python's own numbers, without negative zeros."""
+    return (np.asarray(values, dtype=float) + 0.0).tolist()

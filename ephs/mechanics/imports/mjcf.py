@@ -1,0 +1,140 @@
+"""MJCF: MuJoCo compiles the model, which settles defaults, units, orientations and inertias; what it made is read.
+
+Source: the MuJoCo documentation, "XML Reference" and "Computation". Joints are read at the reference configuration.
+"""
+
+import warnings
+from collections.abc import Mapping
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from ephs.mechanics.imports.draft import Draft, along, pose, turned_tensor
+from ephs.mechanics.imports.mjcf_links import Thread, loops, screws
+from ephs.mechanics.imports.mjcf_names import Names, noted
+from ephs.mechanics.imports.mjcf_shapes import shapes
+from ephs.mechanics.imports.mjcf_source import Source
+from ephs.mechanics.scene.errors import fault
+from ephs.semantics.spaces import SE3
+
+__all__ = ["read_mjcf"]
+
+Inertias = dict[int, tuple[float, Any]]
+
+
+def read_mjcf(root: Any, draft: Draft) -> None:
+    """The bodies and joints of a model; several joints of a body get frames without mass between them."""
+    source = Source(root, draft)
+    if draft.faults:
+        return
+    try:
+        mujoco: Any = import_module("mujoco")
+    except ModuleNotFoundError:
+        draft.faults.append(fault("no importer", "", "an MJCF, but no MuJoCo to read it"))
+        return
+    said: list[str] = []
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(said.append)  # else it writes a file beside the user's
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # what is deprecated in the format
+            spec = mujoco.MjSpec.from_string(source.text, assets=source.assets)
+            spec.compiler.fusestatic = False
+            given = _own_inertias(spec)
+            model = spec.compile()
+            own: Inertias = {int(body.id): inertia for body, inertia in given}
+    except (ValueError, mujoco.FatalError) as error:
+        words = " ".join(str(error).split())
+        draft.faults.append(fault("not compiled", "", f"that MuJoCo says: {words}"))
+        return
+    finally:
+        mujoco.set_mju_user_warning(before)
+    for text in said:
+        draft.leave("what MuJoCo warns of", " ".join(text.split()))
+    names = Names(model)
+    off = mujoco.mjtDisableBit
+    if not model.opt.disableflags & off.mjDSBL_GRAVITY:
+        draft.gravity = list(model.opt.gravity)
+    else:
+        draft.gravity = [0.0, 0.0, 0.0]
+    threads = screws(model, names)
+    for b in range(1, model.nbody):
+        _body(model, b, own, names, draft)
+        _joints(model, b, names, threads, draft)
+        shapes(model, b, names.bodies[b], source, draft)
+    loops(model, names, {thread.equality for thread in threads.values()}, draft)
+    noted(model, names, draft)
+
+
+def _own_inertias(spec: Any) -> list[tuple[Any, tuple[float, Any]]]:
+    """The inertias that bodies give in numbers, with harmless ones in their places, as MuJoCo refuses impossible ones.
+
+    Left alone are models that change them as they are compiled.
+    """
+    c, found = spec.compiler, list[tuple[Any, tuple[float, Any]]]()
+    if c.balanceinertia or c.boundmass > 0.0 or c.boundinertia > 0.0 or c.settotalmass > 0.0 or c.inertiafromgeom == 1:
+        return found
+    for body in spec.bodies[1:]:
+        if body.explicitinertial:
+            whole = np.isfinite(body.fullinertia).all()
+            found.append((body, (float(body.mass), np.array(body.fullinertia if whole else body.inertia))))
+            body.mass, body.inertia = 1.0, np.ones(3)
+            body.fullinertia = np.array([np.nan, 0.0, 0.0, 0.0, 0.0, 0.0])
+    return found
+
+
+def _body(model: Any, b: int, own: Inertias, names: Names, draft: Draft) -> None:
+    mass, moments = own.get(b, (float(model.body_mass[b]), np.array(model.body_inertia[b])))
+    if moments.shape == (6,):
+        xx, yy, zz, xy, xz, yz = moments
+        tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    else:
+        tensor = np.diag(moments)
+    rotation = pose(rotation=model.body_iquat[b])[:4]
+    draft.body(names.bodies[b], mass, turned_tensor(rotation, tensor), model.body_ipos[b])
+
+
+def _joints(model: Any, b: int, names: Names, threads: Mapping[int, Thread], draft: Draft) -> None:
+    """The chain from a body's parent to it."""
+    body, before = names.bodies[b], names.bodies[int(model.body_parentid[b])]
+    at = pose(model.body_pos[b], model.body_quat[b])
+    first, count = int(model.body_jntadr[b]), int(model.body_jntnum[b])
+    if count == 0:
+        draft.joint(f"{body}_fixed", "fixed", before, body, at, pose(), {})
+    rest = list(range(first, first + count))
+    while rest:
+        j = rest.pop(0)
+        thread = threads.get(j)
+        if thread is not None:  # two joints of the file are one
+            del rest[0]
+            j = thread.hinge
+            draft.rename(names.joints[thread.slide], names.joints[j])
+        kind, last = names.kinds[j], not rest
+        frame = pose(model.jnt_pos[j] if kind in ("revolute", "spherical") else (0.0, 0.0, 0.0))
+        if kind in ("revolute", "prismatic"):
+            turned = along(model.jnt_axis[j], frame)
+            assert turned is not None  # MuJoCo makes axes unit vectors
+            frame = turned
+        after = body if last else draft.frame_without_mass(names.between(b, j))
+        entries = _passive(model, j, kind)
+        if thread is not None:
+            kind, entries["pitch"] = "screw", thread.pitch
+            entries["friction"] += thread.pitch**2 * _passive(model, thread.slide, "prismatic")["friction"]
+        draft.joint(names.joints[j], kind, before, after, SE3.compose(at, frame), frame, entries)
+        before, at = after, pose()
+
+
+def _passive(model: Any, j: int, kind: str) -> dict[str, Any]:
+    """Damping, stiffness and rest; coordinates count from the reference configuration."""
+    mujoco: Any = import_module("mujoco")
+    off, flags = mujoco.mjtDisableBit, model.opt.disableflags
+    entries: dict[str, Any] = {"friction": 0.0}
+    if not flags & off.mjDSBL_DAMPER:
+        entries["friction"] = float(model.dof_damping[model.jnt_dofadr[j]])
+    if not flags & off.mjDSBL_SPRING:
+        entries["stiffness"] = float(model.jnt_stiffness[j])
+        if kind in ("revolute", "prismatic") and entries["stiffness"]:
+            q = int(model.jnt_qposadr[j])
+            entries["rest"] = float(model.qpos_spring[q] - model.qpos0[q])
+    return entries

@@ -1,0 +1,78 @@
+"""Names of a compiled MJCF, those that it leaves out made up; and what it has that a scene has not."""
+
+from typing import Any, final
+
+import numpy as np
+
+from ephs.mechanics.imports.draft import WORLD, Draft
+
+__all__ = ["Names", "noted"]
+
+KINDS = ("free", "spherical", "prismatic", "revolute")
+
+
+@final
+class Names:
+    """Names of bodies and joints by their numbers, and the joints' kinds."""
+
+    def __init__(self, model: Any) -> None:
+        given = [model.body(b).name for b in range(model.nbody)]
+        joints = [model.joint(j).name for j in range(model.njnt)]
+        taken = {name for name in (*given, *joints) if name}
+        self.bodies = [WORLD, *(_made(name, f"body_{b}", taken) for b, name in enumerate(given) if b)]
+        self.joints = [
+            _made(name, f"{self.bodies[int(model.jnt_bodyid[j])]}_joint", taken) for j, name in enumerate(joints)
+        ]
+        self.kinds = [KINDS[int(kind)] for kind in model.jnt_type]
+        self._taken = taken
+
+    def between(self, body: int, joint: int) -> str:
+        """A name for the frame after a joint that is not its body's last."""
+        return _made("", f"{self.bodies[body]}_after_{self.joints[joint]}", self._taken)
+
+
+def noted(model: Any, names: Names, draft: Draft) -> None:
+    """Note what the compiled model has and a scene has not."""
+
+    def dofs(values: Any) -> list[str]:
+        moved = np.flatnonzero(np.asarray(values).reshape(model.nv, -1 if model.nv else 1).any(axis=1))
+        return list(dict.fromkeys(names.joints[int(model.dof_jntid[k])] for k in moved))
+
+    def joints(values: Any) -> list[str]:
+        return [names.joints[j] for j in range(model.njnt) if np.any(values[j])]
+
+    def bodies(values: Any) -> list[str]:
+        return [names.bodies[b] for b in range(1, model.nbody) if np.any(values[b])]
+
+    touching = {
+        int(model.geom_bodyid[g]) for g in range(model.ngeom) if model.geom_contype[g] or model.geom_conaffinity[g]
+    }
+    option = model.opt
+    parts = {
+        "contacts of": [names.bodies[b] or "the world" for b in sorted(touching)],
+        "rotor inertia (armature) of": dofs(model.dof_armature),
+        "dry friction of": dofs(model.dof_frictionloss),
+        "damping that is not linear of": dofs(model.dof_dampingpoly),
+        "stiffness that is not linear of": joints(model.jnt_stiffnesspoly),
+        "limits of": joints(model.jnt_limited),
+        "compensation of gravity on": bodies(model.body_gravcomp),
+        "motion capture of": bodies(model.body_mocapid >= 0),
+        "forces of a medium": [
+            word for word in ("density", "viscosity") if getattr(option, word)
+        ] + (["wind"] if np.any(option.wind) else []),
+    }  # fmt: skip
+    for what, found in parts.items():
+        for name in found:
+            draft.leave(what, name)
+
+
+def _made(name: str, otherwise: str, taken: set[str]) -> str:
+    """The name, or one that is made up and not taken."""
+    if name:
+        return name
+    found, count = otherwise, 1
+    while found in taken:
+        count += 1
+        found = f"{otherwise}_{count}"
+    taken.add(found)
+    return found

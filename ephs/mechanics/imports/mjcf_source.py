@@ -1,0 +1,158 @@
+"""MJCF before MuJoCo sees it: includes written out, what no scene has taken out and noted, files kept in the folder.
+
+MuJoCo then gets one text, and no file but meshes in the model's folder, from which it takes inertias.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import final
+from xml.etree.ElementTree import Element, tostring
+
+from ephs.mechanics.imports.draft import Draft
+from ephs.mechanics.imports.xml import read_tree
+from ephs.mechanics.scene.errors import fault
+
+__all__ = ["Source"]
+
+# Sections that a scene does not have, and how what is in them is called.
+_SECTIONS = {
+    "actuator": "actuators",
+    "sensor": "sensors",
+    "tendon": "tendons",
+    "deformable": "deformables",
+    "contact": "contact pairs and exclusions",
+    "extension": "plugins",
+}
+_SILENT = ("visual", "statistic", "custom", "keyframe", "size", "compiler-plugin")
+_ASSETS = ("texture", "material", "hfield", "skin")
+_UNSUPPORTED = {
+    "attach": "write the other model's bodies into this one",
+    "flexcomp": "take it out: bodies are rigid",
+    "composite": "write its bodies out: mujoco's compile command does",
+}
+_PAIRS = ("connect", "weld", "joint")
+_REFERENCES = ("material", "hfield", "texture")
+_MOST_INCLUDES = 100
+
+
+@final
+class Source:
+    """An MJCF as MuJoCo is to read it.
+
+    Attributes
+    ----------
+    text
+        The model, without what a scene cannot have.
+    assets
+        The meshes that it names, by the names that it has for them.
+    """
+
+    def __init__(self, root: Element, draft: Draft) -> None:
+        self._draft = draft
+        self._read: set[Path] = set()
+        self.assets: dict[str, bytes] = {}
+        self._files: dict[str, str] = {}
+        self._include(root, draft.folder, 0)
+        if draft.faults:
+            self.text = ""
+            return
+        draft.name = root.get("model") or draft.name
+        self._refuse(root)
+        self._strip(root)
+        self._meshes(root)
+        self.text = tostring(root, encoding="unicode")
+
+    def file_of(self, asset: str) -> str:
+        """The file, relative to the model's folder, of what MuJoCo knows by this name."""
+        return self._files.get(asset, asset)
+
+    def _include(self, element: Element, folder: Path, depth: int) -> None:
+        """Put the content of the included files in their places."""
+        for number, child in reversed(list(enumerate(element))):
+            if child.tag != "include":
+                self._include(child, folder, depth)
+                continue
+            name = child.get("file", "")
+            key = f'include "{name}"'
+            file = self._draft.file_inside(name)
+            element.remove(child)
+            if file is None:
+                self._draft.faults.append(fault("outside", key, "no file there"))
+                continue
+            if file in self._read or depth >= _MOST_INCLUDES:
+                self._draft.faults.append(fault("twice", key, "a second include of this file"))
+                continue
+            self._read.add(file)
+            inner = read_tree(file, self._draft.faults, key)
+            if inner is not None:
+                self._include(inner, folder, depth + 1)
+                for place, part in enumerate(inner):
+                    element.insert(number + place, part)
+
+    def _refuse(self, root: Element) -> None:
+        for element in root.iter():
+            if element.tag in _UNSUPPORTED:
+                name = element.get("name") or element.get("model") or element.tag
+                what, hint = f"<{element.tag}>", _UNSUPPORTED[element.tag]
+                self._draft.faults.append(fault("not supported", element.tag, f'"{name}"', what=what, hint=hint))
+
+    def _strip(self, root: Element) -> None:
+        for section in list(root):
+            if section.tag in _SECTIONS:
+                for number, entry in enumerate(section):
+                    self._draft.leave(_SECTIONS[section.tag], entry.get("name") or f"{entry.tag} {number + 1}")
+            if section.tag in _SECTIONS or section.tag in _SILENT:
+                root.remove(section)
+        for element in list(root.iter()):
+            for child in list(element):
+                if element.tag == "asset" and child.tag in _ASSETS:
+                    element.remove(child)
+                elif element.tag == "equality" and child.tag not in _PAIRS:
+                    name = child.get("name") or f"one of {child.tag}"
+                    self._draft.leave("equality constraints that are no lower pairs", name)
+                    element.remove(child)
+                elif element.tag == "body" and child.tag == "plugin":
+                    self._draft.leave("plugins", child.get("plugin") or "plugin")
+                    element.remove(child)
+                elif child.tag in ("light", "camera") or (element.tag == "default" and child.tag in _ASSETS):
+                    element.remove(child)
+            for reference in _REFERENCES:
+                element.attrib.pop(reference, None)
+        heights = [(parent, child) for parent, child in _geoms(root) if child.get("type") == "hfield"]
+        for parent, child in heights:
+            parent.remove(child)
+
+    def _meshes(self, root: Element) -> None:
+        """Load meshes of the folder; take out others, and the shapes made of them."""
+        compiler = root.findall("compiler")
+        folders = [c.get("meshdir") or c.get("assetdir") for c in compiler if c.get("meshdir") or c.get("assetdir")]
+        for element in compiler:
+            for word in ("meshdir", "assetdir", "texturedir", "strippath"):
+                element.attrib.pop(word, None)
+        lost: set[str] = set()
+        for assets in root.findall("asset"):
+            for mesh in assets.findall("mesh"):
+                name = mesh.get("file")
+                if name is None:
+                    continue
+                mesh.set("name", mesh.get("name") or Path(name).stem)
+                path = Path(folders[-1] or "", name).as_posix() if folders else name
+                file = self._draft.file_inside(path)
+                if file is None:
+                    self._draft.leave("meshes that are no readable file in the model's folder", path)
+                    lost.add(str(mesh.get("name")))
+                    assets.remove(mesh)
+                    continue
+                known = f"{len(self.assets)}{file.suffix.lower()}"
+                mesh.set("file", known)
+                self.assets[known] = file.read_bytes()
+                self._files[known] = file.relative_to(self._draft.folder.resolve()).as_posix()
+        for parent, child in [pair for pair in _geoms(root) if pair[1].get("mesh") in lost]:
+            parent.remove(child)
+
+
+def _geoms(root: Element) -> Iterator[tuple[Element, Element]]:
+    for parent in list(root.iter()):
+        for child in list(parent):
+            if child.tag == "geom":
+                yield parent, child

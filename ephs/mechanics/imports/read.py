@@ -1,0 +1,48 @@
+"""A model file to the tables of a scene file, by what its first element says that it is."""
+
+from pathlib import Path
+from typing import Any
+
+from ephs.mechanics.imports.draft import Draft
+from ephs.mechanics.imports.sdf import read_sdf
+from ephs.mechanics.imports.urdf import read_urdf
+from ephs.mechanics.imports.xml import read_tree
+from ephs.mechanics.scene.errors import Fault, fault
+
+__all__ = ["read_model"]
+
+KINDS = ("robot", "mujoco", "sdf")
+
+
+def read_model(path: Path, base: str, faults: list[Fault], left: list[str]) -> dict[str, Any] | None:
+    """The tables of a model; None where there were faults.
+
+    Parameters
+    ----------
+    path
+        A URDF, an MJCF or an SDF; which of them, its first element says.
+    base
+        ``"fixed"`` or ``"free"``: how the root of a URDF meets the ground.
+    left
+        Takes a line for each kind of what the tables leave out.
+    """
+    root = read_tree(path, faults)
+    if root is None:
+        return None
+    if root.tag not in KINDS:
+        known = ", ".join(f"<{kind}>" for kind in KINDS)
+        faults.append(fault("root element", "", f"<{root.tag}>", known=known))
+        return None
+    count = len(faults)
+    draft = Draft(path.stem, path.parent, faults)
+    match root.tag:
+        case "robot":
+            read_urdf(root, draft, base)
+        case "sdf":
+            read_sdf(root, draft)
+        case _:
+            from ephs.mechanics.imports.mjcf import read_mjcf
+
+            read_mjcf(root, draft)
+    left += draft.left()
+    return draft.document() if len(faults) == count else None

@@ -1,0 +1,177 @@
+"""URDF: a tree of links. Source: the URDF specification (wiki.ros.org/urdf/XML); spherical joints as in PyBullet."""
+
+from collections.abc import Mapping
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from ephs.mechanics.imports.draft import WORLD, Draft, along, pose, turned_tensor
+from ephs.mechanics.imports.elements import check_kind, check_link, check_mass, named, tensor
+from ephs.mechanics.imports.xml import numbers, vector
+from ephs.mechanics.scene.errors import fault
+from ephs.mechanics.scene.geometry import coupling
+from ephs.semantics.spaces import SE3
+
+__all__ = ["read_urdf"]
+
+KINDS = {
+    "revolute": "revolute",
+    "continuous": "revolute",
+    "prismatic": "prismatic",
+    "fixed": "fixed",
+    "floating": "free",
+    "planar": "planar",
+    "spherical": "spherical",
+}
+AXIAL = ("revolute", "prismatic", "planar")
+ROOT = "root_joint"
+_PASSED_BY = {"transmission": "transmissions", "gazebo": "simulator tags", "sensor": "sensors"}
+
+
+def read_urdf(root: Element, draft: Draft, base: str) -> None:
+    """The links and joints of a robot, its root on the ground by a joint ``root_joint``, fixed or free."""
+    draft.name = root.get("name") or draft.name
+    if any("xacro" in str(element.tag) for element in root.iter()):
+        draft.faults.append(fault("xacro", "robot", "xacro tags"))
+        return
+    links = named(root, "link", draft.faults)
+    joints = named(root, "joint", draft.faults)
+    ends = {name: _ends(name, joint, links, draft) for name, joint in joints.items()}
+    order = _outwards(links, ends, draft)
+    if draft.faults or not order:
+        return
+    for link in links:
+        _link(link, links[link], draft)
+    free = base == "free"
+    draft.joint(ROOT, "free" if free else "fixed", WORLD, order[0], pose(), pose(), {})
+    of_child = {child: name for name, (_, child) in ends.items()}
+    for link in order[1:]:
+        name = of_child[link]
+        _joint(name, joints[name], *ends[name], draft)
+    for element in root:
+        if element.tag in _PASSED_BY:
+            draft.leave(_PASSED_BY[element.tag], element.get("name") or element.get("reference") or element.tag)
+
+
+def _ends(name: str, joint: Element, links: Mapping[str, Element], draft: Draft) -> tuple[str, str]:
+    """The parent and the child of a joint, and a look at its kind."""
+    check_kind(name, joint, KINDS, draft.faults)
+    ends: list[str] = []
+    for end in ("parent", "child"):
+        element = joint.find(end)
+        link = "" if element is None else element.get("link", "")
+        check_link(link, f"joints.{name}.{end}", links, draft.faults)
+        ends.append(link)
+    return ends[0], ends[1]
+
+
+def _outwards(links: Mapping[str, Element], ends: Mapping[str, tuple[str, str]], draft: Draft) -> list[str]:
+    """The links from the root outwards; a fault where they are no tree."""
+    faults, parents, children = draft.faults, dict[str, str](), dict[str, list[str]]()
+    for name, (parent, child) in ends.items():
+        if child in parents:
+            found = f'"{child}", the child of joint "{parents[child]}" already'
+            faults.append(fault("two parents", f"joints.{name}.child", found))
+        parents.setdefault(child, name)
+        children.setdefault(parent, []).append(child)
+    roots = [link for link in links if link not in parents]
+    if not links:
+        faults.append(fault("no link", "links", "none"))
+    elif len(roots) > 1:
+        faults.append(fault("roots", "links", f"{len(roots)}: {', '.join(roots)}"))
+    if faults:
+        return []
+    order = list(roots)
+    for link in order:
+        order += children.get(link, [])
+    if len(order) < len(links):
+        lost = [link for link in links if link not in order]
+        loop = [lost[0]]
+        while (above := ends[parents[loop[-1]]][0]) not in loop:
+            loop.append(above)
+        loop = [*loop[loop.index(above) :], above]
+        key = f"joints.{parents[loop[-2]]}"
+        faults.append(fault("link cycle", key, f"a cycle of links {' → '.join(reversed(loop))}"))
+        return []
+    return order
+
+
+def _link(name: str, link: Element, draft: Draft) -> None:
+    inertial = link.find("inertial")
+    if inertial is None:
+        draft.body(name)
+    else:
+        key = f"links.{name}.inertial"
+        place = _origin(inertial, key, draft)
+        mass = _attribute(inertial.find("mass"), "value", f"{key}.mass", draft)
+        check_mass(mass, key, draft.faults)
+        entries = inertial.find("inertia")
+        rows = tensor(
+            lambda entry: _attribute(entries, entry, f"{key}.inertia", draft, None if entry[1] == entry[2] else 0.0)
+        )
+        draft.body(name, mass, turned_tensor(place[:4], rows), place[4:])
+    if link.find("collision") is not None:
+        draft.leave("contacts of", name)
+    for number, visual in enumerate(link.findall("visual")):
+        _visual(name, visual, f"links.{name}.visual[{number}]", draft)
+
+
+def _visual(link: str, visual: Element, key: str, draft: Draft) -> None:
+    geometry = visual.find("geometry")
+    place = _origin(visual, key, draft)
+    for solid in () if geometry is None else geometry:
+        at = f"{key}.{solid.tag}"
+        match solid.tag:
+            case "box":
+                draft.shape(link, "box", vector(solid, "size", at, draft.faults, ()), place)
+            case "sphere":
+                draft.shape(link, "sphere", _attribute(solid, "radius", at, draft), place)
+            case "cylinder":
+                size = [_attribute(solid, word, at, draft) for word in ("radius", "length")]
+                draft.shape(link, "cylinder", size, place)
+            case "mesh":
+                scale = vector(solid, "scale", at, draft.faults, (1.0, 1.0, 1.0))
+                draft.mesh(link, solid.get("filename", ""), place, scale)
+            case other:
+                draft.leave("shapes", f"{other} of {link}")
+
+
+def _joint(name: str, joint: Element, parent: str, child: str, draft: Draft) -> None:
+    key, kind = f"joints.{name}", KINDS[str(joint.get("type"))]
+    origin, turned = _origin(joint, key, draft), pose()
+    if kind in AXIAL:
+        axis = vector(joint.find("axis"), "xyz", f"{key}.axis", draft.faults, (1.0, 0.0, 0.0))
+        frame = along(axis)
+        if frame is None:
+            draft.faults.append(fault("direction", f"{key}.axis.xyz", str(axis)))
+        else:
+            turned = frame
+    dynamics, d = joint.find("dynamics"), coupling(kind).dim
+    entries: dict[str, object] = {}
+    if dynamics is not None:
+        damping = _attribute(dynamics, "damping", f"{key}.dynamics", draft, 0.0)
+        if damping < 0.0:
+            draft.faults.append(fault("range", f"{key}.dynamics.damping", f"{damping:g}", what="a number not below 0"))
+        elif d:
+            entries["friction"] = damping
+        if _attribute(dynamics, "friction", f"{key}.dynamics", draft, 0.0):
+            draft.leave("dry friction of", name)
+        for other in set(dynamics.attrib) - {"damping", "friction"}:
+            draft.leave("joint dynamics", f"{other} of {name}")
+    draft.joint(name, kind, parent, child, SE3.compose(origin, turned), turned, entries)
+    if d and joint.find("limit") is not None:
+        draft.leave("limits of", name)
+    mimic = joint.find("mimic")
+    if mimic is not None:
+        draft.leave("mimicry of", f"{name} (of {mimic.get('joint')})")
+
+
+def _origin(element: Element, key: str, draft: Draft) -> np.ndarray:
+    origin = element.find("origin")
+    at, faults = f"{key}.origin", draft.faults
+    return pose(vector(origin, "xyz", at, faults), vector(origin, "rpy", at, faults))
+
+
+def _attribute(element: Element | None, name: str, key: str, draft: Draft, default: float | None = None) -> float:
+    text = None if element is None else element.get(name)
+    return numbers(text, 1, f"{key}.{name}", draft.faults, () if default is None else (default,))[0]

@@ -1,0 +1,97 @@
+"""Inertia tensors that no distribution of mass has: refused, kept, or made possible.
+
+Files of real robots have them: rounded, copied, left at zero. Their motion may be determined all the same.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ephs.mechanics.scene.entries import shown
+from ephs.mechanics.scene.errors import Fault, fault
+from ephs.mechanics.scene.schema import BodyEntry
+from ephs.mechanics.scene.values import TOLERANCE
+
+Array = NDArray[np.float64]
+
+TINY = 1e-11
+"""Kinetic energy is a function of momentum only where no principal moment is zero: one that is counts as this much of
+the largest, …"""
+GYRATION = 1e-20
+"""… and as no less than the mass times this, in m²."""
+
+
+def mass_and_inertia(
+    entry: BodyEntry, key: str, mode: str, faults: list[Fault], odd: list[Fault]
+) -> tuple[float, Array]:
+    """The mass, and the inertia tensor (3, 3), of a body.
+
+    Parameters
+    ----------
+    mode
+        ``"strict"``: what is impossible is appended to ``faults``; ``"warn"``: it is kept, and appended to ``odd``;
+        ``"nearest"``: the possible tensor nearest to it is taken, and both are appended to ``odd``.
+    """
+    xx, yy, zz, xy, xz, yz = (*entry.inertia, 0.0, 0.0, 0.0)[:6]
+    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    mass, strict, where = entry.mass, mode == "strict", f"{key}.inertia"
+    if mass == 0.0 and strict and tensor.any():
+        faults.append(fault("massless", where, shown(entry.inertia)))
+        return mass, tensor
+    if not tensor.any() and (mass == 0.0 or strict):
+        return mass, tensor
+    moments = np.linalg.eigvalsh(tensor)
+    wrong = _wrong(moments)
+    if strict:
+        if wrong:
+            faults.append(fault(wrong, where, _text(moments)))
+        return mass, tensor
+    if wrong and mode == "nearest":
+        tensor = nearest_inertia(tensor)
+        odd.append(fault("inertia nearest", where, _text(moments), taken=_text(np.linalg.eigvalsh(tensor))))
+    mass, tensor = _regular(mass, tensor, key, odd)
+    moments = np.linalg.eigvalsh(tensor)
+    if mode == "warn" and _wrong(moments):
+        odd.append(fault("inertia kept", where, _text(moments)))
+    return mass, tensor
+
+
+def nearest_inertia(tensor: Array) -> Array:
+    """The tensor (3, 3) of a distribution of mass that is nearest to a given one in its second moments.
+
+    The second moments ∫ x xᵀ dm = ½ tr(I) − I of a distribution of mass have no negative eigenvalue; those that are
+    negative become zero.
+    """
+    moments, axes = np.linalg.eigh(0.5 * np.trace(tensor) * np.eye(3) - tensor)
+    second = (axes * np.maximum(moments, 0.0)) @ axes.T
+    return np.trace(second) * np.eye(3) - second
+
+
+def _wrong(moments: NDArray[Any]) -> str:
+    slack = TOLERANCE * float(np.abs(moments).max())
+    if moments[0] < -slack:
+        return "inertia indefinite"
+    return "inertia triangle" if moments[2] > moments[0] + moments[1] + slack else ""
+
+
+def _regular(mass: float, tensor: Array, key: str, odd: list[Fault]) -> tuple[float, Array]:
+    """The same with no mass and no principal moment at zero."""
+    moments, axes = np.linalg.eigh(tensor)
+    largest = float(np.abs(moments).max())
+    if mass == 0.0:
+        mass = TINY * largest
+        odd.append(fault("mass zero", f"{key}.mass", "0 kg", mass=mass))
+    least = max(TINY * largest, GYRATION * mass)
+    if moments[0] > 0.1 * TINY * largest:
+        return mass, tensor
+    small = np.abs(moments) < least
+    if small.any():
+        odd.append(fault("inertia zero", f"{key}.inertia", _text(moments), least=least))
+        tensor = (axes * np.where(small, least, moments)) @ axes.T
+        tensor = 0.5 * (tensor + tensor.T)
+    return mass, tensor
+
+
+def _text(moments: NDArray[Any]) -> str:
+    return "principal moments " + ", ".join(f"{moment:.6g}" for moment in moments)

@@ -1,0 +1,105 @@
+"""MJCF beyond the robots: meshes, defaults, frames, flags; formats are known by what is in the file."""
+
+import mujoco
+import numpy as np
+import pytest
+
+import ephs
+from ephs.semantics.spaces.rotations import quaternion_to_matrix
+from tests.mechanics.imports.models import MODELS, URDF
+
+pytestmark = pytest.mark.filterwarnings("ignore::ephs.ModelWarning")
+
+CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 0.7, 0], [0, 0.2, 0.5]])
+FACES = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
+OBJ = "".join("v {} {} {}\n".format(*c) for c in CORNERS) + "".join(
+    "f {} {} {}\n".format(*(i + 1 for i in f)) for f in FACES
+)
+RICH = """<mujoco model="rich">
+  <compiler meshdir="parts" eulerseq="zyx"/>
+  <option gravity="0 0 -2"><flag contact="disable"/></option>
+  <default><joint damping="0.1"/><default class="big"><geom density="500"/></default></default>
+  <asset><mesh name="wedge" file="wedge.obj" scale="0.5 0.5 1"/><material name="red"/>
+    <texture name="t" type="2d" builtin="flat" width="4" height="4"/></asset>
+  <visual><map znear="0.1"/></visual>
+  <worldbody>
+    <light pos="0 0 1"/><geom type="plane" size="1 1 1" material="red"/>
+    <frame pos="0 0 1" euler="30 20 10">
+      <body name="arm" childclass="big"><joint name="a" axis="0 1 0"/>
+        <geom type="mesh" mesh="wedge" pos="0.1 0 0.2" euler="0 0 40" material="red"/>
+        <replicate count="2" offset="0.3 0 0"><body name="leg" pos="0 0 0.5"><joint axis="1 0 0"/>
+          <geom type="ellipsoid" size="0.1 0.2 0.3"/></body></replicate></body>
+    </frame>
+  </worldbody>
+  <keyframe><key qpos="1 1 1"/></keyframe>
+</mujoco>"""
+
+
+@pytest.fixture
+def rich(tmp_path):
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts/wedge.obj").write_text(OBJ)
+    path = tmp_path / "rich.xml"
+    path.write_text(RICH)
+    return path
+
+
+def test_mujoco_accelerates_alike(rich):
+    model = mujoco.MjModel.from_xml_path(str(rich))
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:] = [0.3, -0.4, 0.5], [1.0, -2.0, 0.5]
+    mujoco.mj_forward(model, data)
+    dynamics = ephs.dynamics(ephs.load(rich))
+    assert dynamics.joints == ("a", "leg0_joint", "leg1_joint")
+    state = dynamics.state(*({name: x[i] for i, name in enumerate(dynamics.joints)} for x in (data.qpos, data.qvel)))
+    found = np.concatenate(list(dynamics.acceleration(state).values()))
+    assert np.abs(found - data.qacc).max() < 1e-11 * np.abs(data.qacc).max()
+
+
+def test_meshes_are_where_mujoco_has_them(rich):
+    model = mujoco.MjModel.from_xml_path(str(rich))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    body = ephs.load(rich).body("arm")
+    (shape,) = body.shapes
+    assert shape["mesh"] == str(rich.parent / "parts/wedge.obj")
+    inside = np.array(shape["position"]) + (CORNERS * shape["scale"]) @ quaternion_to_matrix(shape["rotation"]).T
+    found = body.pose[4:] + inside @ quaternion_to_matrix(body.pose[:4]).T
+    (geom,) = np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_MESH)
+    expected = data.geom_xpos[geom] + model.mesh_vert @ data.geom_xmat[geom].reshape(3, 3).T
+    apart = np.linalg.norm(found[:, None] - expected[None], axis=2).min(axis=1)
+    assert apart.max() < 1e-6  # single precision
+
+
+def test_flags_are_kept(write):
+    body = (
+        '<body name="a"><joint name="j" axis="0 1 0" damping="1" stiffness="2"/><geom size="0.1" pos="1 0 0"/></body>'
+    )
+
+    def load(flag):
+        return ephs.load(write(f"<mujoco><option><flag {flag}/></option><worldbody>{body}</worldbody></mujoco>", "xml"))
+
+    assert load('gravity="disable"').world.gravity.tolist() == [0.0, 0.0, 0.0]
+    assert load('spring="disable"').joint("j").stiffness.tolist() == [0.0]
+    assert load('damper="disable"').joint("j").friction.tolist() == [[0.0]]
+    kept = load('contact="disable"').joint("j")
+    assert (kept.stiffness.tolist(), kept.friction.tolist()) == ([2.0], [[1.0]])
+
+
+@pytest.mark.parametrize("ending", [".urdf", ".xml", ".sdf"])
+def test_a_format_is_known_by_its_first_element(ending, tmp_path):
+    path = tmp_path / f"model{ending}"
+    path.write_text(URDF)
+    assert ephs.load(path).name == "arm"
+
+
+def test_a_model_may_be_a_part(tmp_path):
+    (tmp_path / "arm.urdf").write_text(MODELS["urdf"])
+    path = tmp_path / "scene.toml"
+    path.write_text('format = 1\n[parts.left]\nuse = "arm.urdf"\nposition = [0.0, 1.0, 0.0]\n')
+    with pytest.warns(ephs.ModelWarning, match=r"parts\.left: not modelled: limits of: shoulder") as caught:
+        scene = ephs.load(path)
+    assert len(caught) == 1
+    alone = ephs.load(tmp_path / "arm.urdf")
+    moved = scene.body("left.spin").pose[4:] - alone.body("spin").pose[4:]
+    assert np.abs(moved - [0.0, 1.0, 0.0]).max() < 1e-14

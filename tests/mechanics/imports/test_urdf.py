@@ -1,0 +1,118 @@
+"""URDF: Pinocchio and MuJoCo see the same robot; friction, shapes and names are kept."""
+
+from itertools import pairwise
+from xml.sax.saxutils import quoteattr
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import ephs
+from tests.mechanics.imports.models import URDF
+from tests.mechanics.imports.pinocchio_robots import compare, robot
+
+
+@pytest.mark.parametrize("base", ["fixed", "free"])
+def test_pinocchio_sees_the_same_robot(base, write, quiet):
+    path = write(URDF)
+    scene, model = quiet(path, base=base), robot(path, base)
+    assert sum(joint.dim for joint in scene.joints.values()) == model.nv
+    heavy = sum(body.mass for body in scene.bodies.values()) - (3.0 if base == "fixed" else 0.0)  # on the ground
+    assert abs(heavy - pin.computeTotalMass(model)) < 1e-14
+    assert compare(scene, model, np.random.default_rng(1)) <= 1e-11
+
+
+def test_links_are_where_pinocchio_has_them(write, quiet):
+    path = write(URDF)
+    scene, model = quiet(path), robot(path, "fixed")
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, pin.neutral(model))
+    centres = {"turn": [0, 0, 0.3], "spin": [0.2, 0, 0], "slide": [0, 0.1, 0], "plate": [0, 0.1, 0.2]}
+    for link, inside in centres.items():
+        frame = data.oMf[model.getFrameId(link)]
+        centre = frame.act(np.array(inside))
+        assert np.abs(scene.body(link).pose[4:] - centre).max() < 1e-14
+        turned = pin.Quaternion(frame.rotation)
+        assert abs(abs(scene.body(link).pose[:4] @ [turned.w, *turned.vec()]) - 1.0) < 1e-14
+
+
+def test_what_is_kept(write, quiet):
+    scene = quiet(write(URDF))
+    assert scene.name == "arm"
+    assert scene.joints["root_joint"].kind == "fixed"
+    assert scene.joints["shoulder"].friction.tolist() == [[0.3]]
+    assert scene.bodies["hand_tip"].mass == 0.0
+    shapes = scene.bodies["base"].shapes
+    assert [(next(iter(shape)), len(shape)) for shape in shapes] == [("box", 3)]
+    # the box is 0.1 above the link's frame, whose centre of mass is at (0.1, 0.2, 0.3)
+    assert np.abs(np.array(shapes[0]["position"]) - [-0.1, -0.2, -0.2]).max() < 1e-15
+    assert scene.bodies["turn"].shapes[0]["cylinder"] == [0.05, 0.4]
+
+
+def test_a_frame_without_mass_rides_along(write, quiet):
+    scene = quiet(write(URDF), base="free")
+    sol = ephs.simulate(scene.with_state(rates={"rail": 0.5, "shoulder": 1.0}), 0.1)
+    between = sol.body("hand_tip").position - sol.body("slide").position
+    inside = np.einsum("nji,nj->ni", sol.body("slide").rotation, between)
+    assert np.abs(inside - [0.0, -0.1, 1.0]).max() < 1e-10
+    assert np.abs(sol.constraint_error).max() < 1e-10
+
+
+def test_a_spherical_joint_is_mujocos_ball(write, quiet):
+    text = """<robot name="r"><link name="a"/><link name="b"><inertial><origin xyz="0.1 0 0.3"/><mass value="2"/>
+    <inertia ixx="0.1" iyy="0.2" izz="0.15" ixy="0.01" ixz="0" iyz="0"/></inertial></link>
+    <joint name="j" type="spherical"><parent link="a"/><child link="b"/>
+    <origin xyz="0 0.2 0" rpy="0.1 0.2 0.3"/></joint>
+    </robot>"""
+    dynamics = ephs.dynamics(quiet(write(text)))
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    data.qvel[:] = [0.3, -0.2, 0.5]
+    mujoco.mj_forward(model, data)
+    found = dynamics.acceleration(dynamics.state(rates={"j": data.qvel}))["j"]
+    assert np.abs(found - data.qacc).max() < 1e-12
+
+
+def test_the_warning_comes_once_and_names_everything(write):
+    with pytest.warns(ephs.ModelWarning) as caught:
+        ephs.load(write(URDF))
+    assert len(caught) == 1
+    text = str(caught[0].message)
+    for words in (
+        "contacts of: base",
+        "limits of: shoulder, rail",
+        "mimicry of: rail (of shoulder)",
+        "dry friction of: shoulder",
+        "transmissions: motor",
+        "hand.tip → hand_tip, elbow.pitch → elbow_pitch",
+    ):
+        assert words in text
+
+
+NAMES = st.text(
+    st.characters(codec="utf-8", exclude_categories=["Cc", "Cs"], exclude_characters="\ufffe\uffff"), min_size=1
+)
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    names=st.lists(
+        NAMES | st.sampled_from(["ground", "environment", "world", "~a", "a.b", "a_b", "x" * 300]),
+        min_size=2,
+        unique=True,
+    )
+)
+def test_every_name_becomes_one_that_a_scene_may_have(names, write, quiet):
+    links = "".join(f"<link name={quoteattr(name)}/>" for name in names)
+    joints = "".join(
+        f"<joint name={quoteattr(b)} type='revolute'><parent link={quoteattr(a)}/><child link={quoteattr(b)}/></joint>"
+        for a, b in pairwise(names)
+    )
+    scene = quiet(write(f"<robot name={quoteattr(names[0])}>{links}{joints}</robot>"))
+    assert len(scene.bodies) == len(names)
+    assert len(scene.joints) == len(names)
+    assert scene.system().pattern.boxes
+    assert not {"/", "\\"} & set(scene.name)
