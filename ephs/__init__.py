@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from ephs.mechanics.check import check_model as check_model
     from ephs.mechanics.dynamics import dynamics as dynamics
+    from ephs.mechanics.linear import equilibrium as equilibrium
+    from ephs.mechanics.linear import linearize as linearize
     from ephs.mechanics.methods import register_method as register_method
     from ephs.mechanics.reduction.report import reduce as reduce
     from ephs.mechanics.scene import Scene as Scene
@@ -70,6 +72,7 @@ _HOMES = {
     "ephs.mechanics.scene.load": ("load",),
     "ephs.mechanics.check": ("check_model",),
     "ephs.mechanics.dynamics": ("dynamics",),
+    "ephs.mechanics.linear": ("equilibrium", "linearize"),
     "ephs.mechanics.methods": ("register_method",),
     "ephs.mechanics.reduction.report": ("reduce",),
     "ephs.mechanics.simulate": ("load_solution", "simulate"),
