@@ -117,7 +117,8 @@ def _settled(model: "Dynamics") -> "tuple[State, float, int]":
     best, stalled = np.inf, 0
     for step in range(STEPS):
         free = freedoms_of(model, state)
-        left = unbalanced(model, state, free)
+        by, Z = model.derivatives(state), free.Z
+        left = unbalanced(model, state, free, by.force_q)
         if left <= ENOUGH or (left <= 1e-9 and stalled >= 3):
             return state, left, step
         best, stalled = (left, 0) if left < 0.5 * best else (best, stalled + 1)
@@ -126,7 +127,6 @@ def _settled(model: "Dynamics") -> "tuple[State, float, int]":
         else:
             shift *= 0.1
         before = left
-        by, Z = model.derivatives(state), free.Z
         M = Z.T @ by.force_a @ Z
         force = M @ _still(model, state)[free.which]
         K = -M @ (by.acceleration_q @ Z)[free.which]

@@ -63,7 +63,7 @@ def _json(system: "StateSpace", matrices: dict[str, Array], path: File) -> None:
 
 def _npz(system: "StateSpace", matrices: dict[str, Array], path: File) -> None:
     names: dict[str, Any] = {"states": system.states, "inputs": system.inputs, "outputs": system.outputs}
-    arrays = {key: np.array(value, dtype=np.str_) for key, value in names.items()}
+    arrays: dict[str, Any] = {key: np.array(value, dtype=np.str_) for key, value in names.items()}
     np.savez(path, **matrices, **arrays, eigenvalues=system.eigenvalues)
 
 

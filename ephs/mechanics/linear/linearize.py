@@ -65,7 +65,7 @@ def linearize(
     elif isinstance(state, str):
         raise OptionError("state", state, "a state, or the word equilibrium")
     if isinstance(model, System):
-        given = state.states if isinstance(state, Equilibrium) else state
+        given: Any = state.states if isinstance(state, Equilibrium) else state
         return linear_system(model, given, inputs, outputs, reference)
     if reference is not None:
         raise OptionError("reference", reference, "none: a scene's [world] has its own")
@@ -78,7 +78,9 @@ def linearize(
         assert isinstance(state.model, Scene)
         model, state = state.model, None
     if isinstance(state, Mapping):
-        raise OptionError("state", "a mapping", "a State of ephs.dynamics, for a scene; or scene.with_state(…) as model")
+        raise OptionError(
+            "state", "a mapping", "a State of ephs.dynamics, for a scene; or scene.with_state(…) as model"
+        )
     if form == "reduced":
         return linear_scene(model, state, inputs, outputs)
     dynamics = Dynamics(model)

@@ -15,6 +15,9 @@ Complex = NDArray[np.complex128]
 STILL = 1e-7
 """Eigenvalues below this part of the largest count as zero: a double one is good to the root of rounding only."""
 
+ROUNDING = 1e-12
+"""Real parts below this part of the largest eigenvalue count as zero: what does not decay is not to seem to grow."""
+
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,9 +66,11 @@ def modes_of(A: Array, shapes: Mapping[str, Array]) -> tuple[Mode, ...]:
     """The modes of ẋ = A x, slowest first; ``shapes`` are the maps (d, states) from the states to what is named."""
     if not A.size:
         return ()
-    values, vectors = np.linalg.eig(A)
-    values, vectors = np.asarray(values, dtype=complex), np.asarray(vectors, dtype=complex)
-    values[np.abs(values) < STILL * np.abs(values).max(initial=0.0)] = 0.0
+    found = np.linalg.eig(A)
+    values, vectors = found[0].astype(np.complex128), found[1].astype(np.complex128)
+    top = float(np.abs(values).max(initial=0.0))
+    values[np.abs(values) < STILL * top] = 0.0
+    values.real[np.abs(values.real) < ROUNDING * top] = 0.0
     kept = [i for i in range(values.size) if values[i].imag >= 0.0]
     out: list[Mode] = []
     for i in sorted(kept, key=lambda i: (abs(values[i]), values[i].real)):

@@ -1,7 +1,7 @@
 """The descriptor form of a system at a state: its derivatives, and which states are independent.
 
-It is Tᵀ ẋ + N(e, x) + Cᵀ λ = B u, T e = dH(x), C(x) e = 0 (T takes efforts of junctions to storages). Eliminating e from
-the last two leaves conditions on x alone, whose kernel is what the states may do.
+It is Tᵀ ẋ + N(e, x) + Cᵀ λ = B u, T e = dH(x), C(x) e = 0 (T takes efforts of junctions to storages). Eliminating e
+from the last two leaves conditions on x alone, whose kernel is what the states may do.
 """
 
 from collections.abc import Mapping
@@ -28,6 +28,8 @@ __all__ = ["Parts", "Pencil", "system_problem"]
 
 RANK = 1e-10
 """Singular values below this part of the largest count as zero."""
+NOTHING = 1e-12
+"""Conditions below this part of the largest stiffness are rounding."""
 
 
 def system_problem(
@@ -156,7 +158,9 @@ class Pencil:
     def _conditions(self, parts: Parts) -> Array:
         """(c, n_w) what the states' changes must satisfy."""
         on_storages, on_holds = self._eliminated(parts)
-        return on_storages.T @ parts.Q - on_holds.T @ parts.hold_states
+        rows = on_storages.T @ parts.Q - on_holds.T @ parts.hold_states
+        largest = max(np.abs(parts.Q).max(initial=0.0), np.abs(parts.hold_states).max(initial=0.0))
+        return rows[np.abs(rows).max(axis=1, initial=0.0) > NOTHING * largest]  # constraints that repeat others say none
 
     def driven_twice(self, parts: Parts) -> bool:
         """Whether a prescribed effort holds a state itself: its flow is then the derivative of the input."""
@@ -172,9 +176,10 @@ class Pencil:
         size = np.abs(rows).max(axis=0)
         rows = rows / np.maximum(np.abs(rows).max(axis=1, initial=0.0), 1e-300)[:, None]
         # In the metric of the exergy: states of large entries in rows of efforts are as good as those of small ones.
-        weight = np.where(size > 0.0, 1.0 / np.sqrt(np.maximum(np.abs(np.diag(parts.Q)), 1e-12 * size)), 1.0)
-        _, upper, order = qr(rows * weight, mode="economic", pivoting=True)
-        diagonal = np.abs(np.diag(upper))
+        stiff = np.maximum(np.abs(np.diag(parts.Q)), 1e-12 * size.max(initial=0.0))
+        weight = np.where(size > 0.0, stiff**-0.5, 1.0)
+        factors: Any = qr(rows * weight, mode="economic", pivoting=True)
+        order, diagonal = np.asarray(factors[2], dtype=np.int64), np.abs(np.diag(factors[1]))
         rank = int(np.sum(diagonal > 1e-9 * diagonal.max(initial=0.0)))
         return np.setdiff1d(np.sort(order[rank:]), left_out)
 
@@ -228,7 +233,11 @@ class Pencil:
             if not np.isfinite(step).all():
                 return None
             z = z - step
-            moved = h * float(np.abs(step[: self.n_w]).max(initial=0.0)) + float(np.abs(step[self.n_w :]).max(initial=0.0))
-            if moved <= 1e-13 * (1.0 + float(np.abs(at).max(initial=0.0)) + float(np.abs(z[self.n_w :]).max(initial=0.0))):
+            moved = h * float(np.abs(step[: self.n_w]).max(initial=0.0)) + float(
+                np.abs(step[self.n_w :]).max(initial=0.0)
+            )
+            if moved <= 1e-13 * (
+                1.0 + float(np.abs(at).max(initial=0.0)) + float(np.abs(z[self.n_w :]).max(initial=0.0))
+            ):
                 return z
         return None

@@ -11,11 +11,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from types import MappingProxyType
-from typing import final
+from typing import Any, final
 
 import numpy as np
 
-from ephs.mechanics.dynamics import Dynamics, State
+from ephs.mechanics.dynamics import Derivatives, Dynamics, State
 from ephs.mechanics.linear.statespace import StateSpace
 from ephs.mechanics.linear.structure import PortHamiltonian
 from ephs.mechanics.scene.errors import did_you_mean, listing
@@ -61,23 +61,33 @@ def freedoms_of(model: Dynamics, state: State) -> Freedoms:
     if not found.rank:
         return Freedoms(np.arange(n), np.eye(n))
     light = 1.0 / np.sqrt(np.diag(model.mass_matrix(state)))
-    _, upper, order = qr(found.rows * light, mode="economic", pivoting=True)
-    rank = found.rank
+    factors: Any = qr(found.rows * light, mode="economic", pivoting=True)
+    upper, order, rank = np.asarray(factors[1]), np.asarray(factors[2], dtype=np.int64), found.rank
     dependent, which = order[:rank], np.sort(order[rank:])
     place = {int(j): i for i, j in enumerate(order[rank:])}
-    rest = -solve_triangular(upper[:rank, :rank], upper[:rank, rank:])[:, [place[int(j)] for j in which]]
+    rest = -np.asarray(solve_triangular(upper[:rank, :rank], upper[:rank, rank:]), dtype=float)[
+        :, [place[int(j)] for j in which]
+    ]
     Z = np.zeros((n, which.size))
     Z[which, np.arange(which.size)] = 1.0
     Z[dependent] = light[dependent][:, None] * rest / light[which]
     return Freedoms(which, Z)
 
 
-def unbalanced(model: Dynamics, state: State, free: Freedoms) -> float:
-    """What of the forces is not balanced at rest in a state, relative to all that act; 0 where nothing moves."""
+def unbalanced(model: Dynamics, state: State, free: Freedoms, stiffness: Array) -> float:
+    """What of the forces is not balanced at rest in a state, relative to all that act; 0 where nothing acts.
+
+    Weights act at their arms, and all else counts with what ``stiffness`` (n, n) makes of it over 1 rad or m: forces
+    that balance each other may vanish one by one.
+    """
     q, r, s = _split(model, state)
     rest = model.unpack(np.concatenate([q, np.zeros_like(r), s]))
     gravity, applied = model.gravity(rest), model.applied(rest)
-    left, terms = free.Z.T @ (applied - gravity), np.abs(free.Z.T) @ (np.abs(applied) + np.abs(gravity))
+    terms = np.abs(applied) + np.abs(stiffness).sum(axis=1)
+    for name, body in model.scene.all_bodies():
+        arms = np.linalg.norm(model.jacobian(rest, name)[3:], axis=0)
+        terms += arms * body.mass * float(np.linalg.norm(model.scene.world.gravity))
+    left, terms = free.Z.T @ (applied - gravity), np.abs(free.Z.T) @ terms
     return float(np.abs(left).max(initial=0.0) / (terms.max(initial=0.0) or 1.0))
 
 
@@ -168,7 +178,7 @@ class _Linear:
         A[warm, rate] = (by.entropy_r @ Z)[self.nodes]
         A[warm, warm] = by.entropy_s[np.ix_(self.nodes, self.nodes)]
         B, C, names_in, names_out = self._ports(by.acceleration_force)
-        structure, reason, A = self._structure(A, by.force_a)
+        structure, reason, A = self._structure(A, by)
         return StateSpace(
             self.model.scene.name, A, B, C, np.zeros((C.shape[0], B.shape[1])), self._names(), names_in, names_out,
             structure, reason, MappingProxyType(self._shapes()),
@@ -235,15 +245,15 @@ class _Linear:
                     return partial(self._joint, own), bool(suffix)
                 if kind == "markers":
                     marker = dict(scene.all_markers())[own]
-                    return lambda state: model.jacobian(state, marker.body, marker.at), bool(suffix)
+                    return partial(_point, model, marker.body, marker.at), bool(suffix)
                 if suffix:
-                    return lambda state: model.jacobian(state, own, np.zeros(3)), True
-                return lambda state: model.jacobian(state, own), False
+                    return partial(_point, model, own, np.zeros(3)), True
+                return partial(_twist, model, own), False
         every = [f"{key}.{n}" for key, found in known.items() for n in found]
         raise OptionError("port", name, f"{did_you_mean(name, every, listing(every))}")
 
     def _joint(self, name: str, state: State) -> Array:
-        """(d, n) a joint's rates by the tree's: a choice of them, or of a joint that closes a loop what they do to it."""
+        """(d, n) a joint's rates by the tree's: some of them, or of a joint that closes a loop what they do to it."""
         where = self.model.layout.freedoms[name]
         if name not in self.model.cut or where[0] < self.n:
             return np.eye(self.n)[where]
@@ -253,16 +263,16 @@ class _Linear:
 
     # ---- energy and dissipation --------------------------------------------------------------------------------
 
-    def _structure(self, A: Array, mass: Array) -> tuple[PortHamiltonian | None, str, Array]:
+    def _structure(self, A: Array, by: Derivatives) -> tuple[PortHamiltonian | None, str, Array]:
         """The structure, or why there is none; and A, which with a structure is (J − R) Q to rounding."""
         if self.moving:
             return None, "the mechanism moves in this state", A
-        off = unbalanced(self.model, self.state, self.free)
+        off = unbalanced(self.model, self.state, self.free, by.force_q)
         if off > BALANCED:
             return None, f"{off:.1e} of the forces is not balanced in this state", A
         k = self.k
         place, rate, warm = slice(0, k), slice(k, 2 * k), slice(2 * k, None)
-        M = self.free.Z.T @ mass @ self.free.Z
+        M = self.free.Z.T @ by.force_a @ self.free.Z
         K, still = -M @ A[rate, place], np.linalg.inv(M)
         if np.abs(K - K.T).max(initial=0.0) > ROUNDED * np.abs(K).max(initial=0.0):
             return None, "the forces in this state have no potential", A
@@ -312,7 +322,17 @@ class _Linear:
         whole = np.hstack([self.free.Z, rest])
         model = self.model
         out = {f"joints.{name}": self._joint(name, self.state) @ whole for name in model.joints if self._dim(name)}
-        return out | {f"bodies.{name}": model.jacobian(self.state, name) @ whole for name in model.bodies(self.state)}
+        out |= {f"bodies.{name}": model.jacobian(self.state, name) @ whole for name in model.bodies(self.state)}
+        warm = np.eye(2 * self.k + len(self.nodes))[2 * self.k :]
+        return out | {str(model.layout.entropies[i]): warm[j : j + 1] for j, i in enumerate(self.nodes)}
+
+
+def _point(model: Dynamics, body: str, at: Array, state: State) -> Array:
+    return model.jacobian(state, body, at)
+
+
+def _twist(model: Dynamics, body: str, state: State) -> Array:
+    return model.jacobian(state, body)
 
 
 def _split(model: Dynamics, state: State) -> tuple[Array, Array, Array]:

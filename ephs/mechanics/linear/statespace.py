@@ -81,7 +81,9 @@ class StateSpace:
         """(n,) in 1/s, in the order of the modes."""
         found: list[complex] = []
         for mode in self.modes:
-            found += [mode.eigenvalue] if mode.eigenvalue.imag == 0.0 else [mode.eigenvalue, mode.eigenvalue.conjugate()]
+            found += (
+                [mode.eigenvalue] if mode.eigenvalue.imag == 0.0 else [mode.eigenvalue, mode.eigenvalue.conjugate()]
+            )
         return np.array(found, dtype=complex)
 
     @property
@@ -143,9 +145,7 @@ class StateSpace:
         lines = [f"{self.name}: {len(self.states)} states, {len(self.inputs)} inputs, {len(self.outputs)} outputs"]
         lines.append(f"  states: {', '.join(self.states) or 'none'}")
         lines.append(f"  inputs: {', '.join(self.inputs) or 'none'}")
-        lines.append(
-            "  structure: ẋ = (J − R) Q x + B u" if self.structure else f"  structure: none, {self.reason}"
-        )
+        lines.append("  structure: ẋ = (J − R) Q x + B u" if self.structure else f"  structure: none, {self.reason}")
         lines.append(f"  {'eigenvalue 1/s':>26}{'Hz':>12}{'damping':>10}  moves most")
         for mode in self.modes:
             value = mode.eigenvalue

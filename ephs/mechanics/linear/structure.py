@@ -69,7 +69,7 @@ def laws_of(A: Array, B: Array, C: Array, D: Array, ph: PortHamiltonian, conjuga
         Whether the outputs are the inputs' power conjugates.
     """
     J, R, Q = ph.J, ph.R, ph.Q
-    least = np.linalg.eigvalsh(0.5 * (R + R.T))
+    least = np.asarray(np.linalg.eigvalsh(0.5 * (R + R.T)), dtype=float)
     out = [
         Law("A = (J − R) Q", A, (J - R) @ Q, (np.abs(J) + np.abs(R)) @ np.abs(Q)),
         Law("J is skew", J, -J.T, _size(J)),
@@ -78,7 +78,7 @@ def laws_of(A: Array, B: Array, C: Array, D: Array, ph: PortHamiltonian, conjuga
         Law("R is not negative", np.minimum(least, 0.0), np.zeros_like(least), _size(R)),
     ]
     if conjugate:
-        gain = np.linalg.eigvalsh(D + D.T)
+        gain = np.asarray(np.linalg.eigvalsh(D + D.T), dtype=float)
         out.append(Law("C = Bᵀ Q", C, B.T @ Q, np.abs(B.T) @ np.abs(Q)))
         out.append(Law("D + Dᵀ is not negative", np.minimum(gain, 0.0), np.zeros_like(gain), _size(D)))
     return tuple(out)

@@ -20,6 +20,7 @@ from ephs.mechanics.solve.model import Model
 from ephs.mechanics.solve.problem import Problem
 from ephs.mechanics.solve.replay import replay
 from ephs.mechanics.solve.solution import Solution
+from ephs.mechanics.solve.sparse import Index
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.primitives import Storage
 from ephs.semantics.spaces import manifold
@@ -145,9 +146,7 @@ class _Linear:
             at += dim if effort else 0
         ports = tuple(rows)
         for slot in self.pencil.problem.descriptor.states:
-            rows.setdefault(
-                str(slot.path), np.hstack([self.X[slot.rates], np.zeros((slot.quantity.space.dim, width))])
-            )
+            rows.setdefault(str(slot.path), np.hstack([self.X[slot.rates], np.zeros((slot.quantity.space.dim, width))]))
         for name in wanted or ():
             if name not in rows:
                 raise OptionError("outputs", name, did_you_mean(name, rows, f"one of {listing(rows)}"))
@@ -157,7 +156,7 @@ class _Linear:
         return whole[:, : self.k], whole[:, self.k :], names
 
 
-def _structure(p: Parts, X: Array, which: Array, A: Array) -> tuple[PortHamiltonian | None, str]:
+def _structure(p: Parts, X: Array, which: Index, A: Array) -> tuple[PortHamiltonian | None, str]:
     """J, R and Q on the independent states, or why there are none.
 
     Efforts that satisfy the conditions are e = V c, those of storages ε = P c with P = T V. Balances projected on V

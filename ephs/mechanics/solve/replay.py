@@ -17,7 +17,12 @@ __all__ = ["replay"]
 
 
 def replay(
-    problem: Problem, model: Model, t: Array, x: Sequence[Array], sums: Array | None = None, remark: str = "given states"
+    problem: Problem,
+    model: Model,
+    t: Array,
+    x: Sequence[Array],
+    sums: Array | None = None,
+    remark: str = "given states",
 ) -> Solution:
     """The solution of states x at the times t.
 
@@ -32,7 +37,9 @@ def replay(
     n, count = len(x), len(model.descriptor.components)
     kept = np.zeros((n, 4 + count)) if sums is None else sums
     makers = np.array([isinstance(slot.primitive, Irreversible) for slot in model.descriptor.components], dtype=bool)
-    energies = np.array([np.where(makers, row[4:], stored_energies(model, point)) for row, point in zip(kept, x, strict=True)])
+    energies = np.array(
+        [np.where(makers, row[4:], stored_energies(model, point)) for row, point in zip(kept, x, strict=True)]
+    )
     ledgers = np.column_stack([kept[:, :4], np.zeros(n)])
     record = Record(np.asarray(t, dtype=float), np.array(x).reshape(n, -1), energies.reshape(n, count), ledgers)
     stats = {
