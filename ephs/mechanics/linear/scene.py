@@ -23,9 +23,11 @@ from ephs.mechanics.scene.model import GROUND, Scene
 from ephs.mechanics.simulate import problem_of_scene
 from ephs.mechanics.solve.errors import OptionError
 from ephs.mechanics.solve.model import compile_model
+from ephs.mechanics.solve.natural import stored_energies
 from ephs.mechanics.solve.replay import replay
 from ephs.mechanics.solve.solution import Solution
 from ephs.mechanics.solve.sparse import Index
+from ephs.mechanics.solve.stepping import Row
 from ephs.semantics.bundle import Array
 
 __all__ = ["Freedoms", "freedoms_of", "linear_scene", "unbalanced"]
@@ -347,10 +349,11 @@ def _play(linear: _Linear, t: Array, moved: Array) -> Solution:
     """The mechanism along some displacements (frames, states) of the state."""
     problem = problem_of_scene(linear.model.scene)
     model = compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
-    xs = []
+    rows: list[Row] = []
     for row in moved:
         at = linear.model.moved(linear.state, linear.free.Z @ row[: linear.k])
         q, _, s = _split(linear.model, at)
         at = linear.model.unpack(np.concatenate([q, linear.free.Z @ row[linear.k : 2 * linear.k], s]))
-        xs.append(problem.descriptor.pack(linear.model.states(linear.model.closed(at))))
-    return replay(problem, model, t, xs, remark="mode")
+        x = problem.descriptor.pack(linear.model.states(linear.model.closed(at)))
+        rows.append(Row(x, stored_energies(model, x), np.zeros(4)))
+    return replay(problem, t, rows, "mode")

@@ -18,9 +18,11 @@ from ephs.mechanics.scene.errors import did_you_mean, listing
 from ephs.mechanics.solve.errors import OptionError, SimulationError, SolveError
 from ephs.mechanics.solve.model import Model
 from ephs.mechanics.solve.problem import Problem
+from ephs.mechanics.solve.natural import stored_energies
 from ephs.mechanics.solve.replay import replay
 from ephs.mechanics.solve.solution import Solution
 from ephs.mechanics.solve.sparse import Index
+from ephs.mechanics.solve.stepping import Row
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.primitives import Storage
 from ephs.semantics.spaces import manifold
@@ -217,4 +219,5 @@ def _numbered(name: str, count: int) -> list[str]:
 def _play(problem: Problem, model: Model, x: Array, X: Array, t: Array, moved: Array) -> Solution:
     """The system along some displacements (frames, states) of the state."""
     xs = [problem.descriptor.advance(x, X @ row) for row in moved]
-    return replay(problem, model, t, xs, remark="mode")
+    rows = [Row(point, stored_energies(model, point), np.zeros(4)) for point in xs]
+    return replay(problem, t, rows, "mode")
