@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from ephs.mechanics.scene import Scene as Scene
     from ephs.mechanics.scene import SceneError as SceneError
     from ephs.mechanics.scene.load import load as load
+    from ephs.mechanics.sensitivity import fit as fit
+    from ephs.mechanics.sensitivity import sensitivity as sensitivity
     from ephs.mechanics.simulate import load_solution as load_solution
     from ephs.mechanics.simulate import simulate as simulate
     from ephs.mechanics.solve.errors import Interrupted as Interrupted
@@ -75,6 +77,7 @@ _HOMES = {
     "ephs.mechanics.linear": ("equilibrium", "linearize"),
     "ephs.mechanics.methods": ("register_method",),
     "ephs.mechanics.reduction.report": ("reduce",),
+    "ephs.mechanics.sensitivity": ("fit", "sensitivity"),
     "ephs.mechanics.simulate": ("load_solution", "simulate"),
     "ephs.mechanics.solve.errors": ("Interrupted", "OptionError", "SimulationError"),
     "ephs.mechanics.solve.events": ("Event",),

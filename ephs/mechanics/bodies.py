@@ -39,6 +39,8 @@ def rigid_body(
     gravity: "ArrayLike" = GRAVITY,
     potential: Callable[[Array], float] | None = None,
     group: str = "SE3",
+    *,
+    strict: bool = True,
 ) -> System:
     """A rigid body; its port p carries the body-frame momentum, flow a wrench on the body, effort its twist.
 
@@ -55,13 +57,15 @@ def rigid_body(
     group
         ``"SE3"``: twists in the body frame, as joints want them. ``"SO3xR3"``: the velocity of the centre of mass in
         world axes.
+    strict
+        Refuse an inertia that no distribution of mass has; scenes decide that when they are read.
 
     Raises
     ------
     StructureError
-        The mass is negative, or no distribution of mass has such an inertia.
+        The mass is negative, the inertia not positive, or no distribution of mass has it.
     """
-    tensor = _inertia(mass, inertia)
+    tensor = _inertia(mass, inertia, strict)
     weight = -float(mass) * np.asarray(gravity, dtype=float)
     if group not in components.POSES:
         raise StructureError(
@@ -81,7 +85,7 @@ def rigid_body(
     return System.of(body_pattern(group, massless=not mass > 0.0), parts)
 
 
-def _inertia(mass: float, inertia: "ArrayLike") -> Array:
+def _inertia(mass: float, inertia: "ArrayLike", strict: bool) -> Array:
     given = np.asarray(inertia, dtype=float)
     if given.shape == (3,):
         tensor = np.diag(given)
@@ -103,7 +107,7 @@ def _inertia(mass: float, inertia: "ArrayLike") -> Array:
     least, middle, most = np.linalg.eigvalsh(tensor)
     if not least > 0.0:
         raise _bad("inertia", tensor.tolist(), f"positive principal moments; the least is {least:.6g}")
-    if most > (least + middle) * (1.0 + 1e-9):
+    if strict and most > (least + middle) * (1.0 + 1e-9):
         raise _bad("inertia", tensor.tolist(), f"principal moments with {most:.6g} ≤ {least:.6g} + {middle:.6g}")
     return tensor
 

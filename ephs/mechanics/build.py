@@ -248,7 +248,7 @@ def _uses_ground(scene: Scene) -> bool:
 
 
 def _body(body: Body, gravity: Array) -> System:
-    return rigid_body(body.mass, body.inertia, gravity)
+    return rigid_body(body.mass, body.inertia, gravity, strict=False)
 
 
 def _joint(j: Joint, *, driven: bool) -> System:

@@ -32,6 +32,10 @@ CENTRAL: Stencil = ((-2, 1.0 / 12.0), (-1, -2.0 / 3.0), (1, 2.0 / 3.0), (2, -1.0
 FORWARD: Stencil = ((0, -25.0 / 12.0), (1, 4.0), (2, -3.0), (3, 4.0 / 3.0), (4, -0.25))
 RELATIVE = 1e-3
 """A neighbour's distance, relative to the parameter, or absolute where that is zero."""
+SIGNED = ("position", "at", "at1", "at2", "coordinate", "rate", "rest", "drive", "gravity", "velocity")
+LEAST = 0.1
+"""What numbers of a scene that may have either sign count at least for, in m, rad, s, N: near zero they say nothing of
+their own size."""
 
 
 def difference(function: Callable[[int], Array], stencil: Stencil, step: float) -> Array:
@@ -90,7 +94,8 @@ class Family:
 
     def _parameter(self, path: str) -> Parameter:
         value = self._read(path)
-        step = RELATIVE * (abs(value) or 1.0)
+        signed = isinstance(self.model, Scene) and path.partition("[")[0].endswith(SIGNED)
+        step = RELATIVE * max(abs(value) or 1.0, LEAST if signed else 0.0)
         for stencil in (CENTRAL, FORWARD):
             try:
                 for k, _ in stencil:
