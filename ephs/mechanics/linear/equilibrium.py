@@ -23,7 +23,7 @@ ENOUGH = 1e-12
 """Part of the forces that act which may stay unbalanced."""
 STRIDE = 0.3
 """How far a mechanism goes in one step, in rad or m."""
-STEPS = 400
+STEPS = 200
 
 
 @final

@@ -87,6 +87,11 @@ class Parts:
     force: Array
     set: Array
 
+    @property
+    def bare(self) -> Array:
+        """(n_e,) which balances are of junctions without storage."""
+        return np.asarray(np.abs(self.flow_rates).max(axis=1, initial=0.0) == 0.0)
+
 
 @final
 class Pencil:
@@ -147,24 +152,40 @@ class Pencil:
             unknowns[c, b], states[c], force, given,
         )  # fmt: skip
 
-    def _eliminated(self, parts: Parts) -> tuple[Array, Array]:
-        """The left kernel of [T; C] over the efforts: what leaves conditions on states, and on inputs."""
-        rows = np.vstack([parts.T, parts.hold])
+    def algebraic(self, parts: Parts) -> tuple[Array, Array, Array]:
+        """The equations without rates: (rows on efforts, multipliers and outer flows; their right-hand sides by the
+        states; by the inputs): efforts of storages, conditions, balances at junctions without storage."""
+        bare = parts.bare
+        width = parts.flow_multipliers.shape[1]
+        rows = np.block(
+            [
+                [parts.T, np.zeros((self.n_w, width))],
+                [parts.hold, np.zeros((len(parts.hold), width))],
+                [parts.flow_efforts[bare], parts.flow_multipliers[bare]],
+            ]
+        )
+        by_states = np.vstack([parts.Q, -parts.hold_states, -parts.flow_states[bare]])
+        by_inputs = np.vstack([np.zeros((self.n_w, parts.set.shape[1])), parts.set, parts.force[bare]])
+        return rows, by_states, by_inputs
+
+    def _left(self, rows: Array) -> Array:
+        """The left kernel of the equations without rates: what leaves conditions on states, and on inputs."""
         u, sigma, _ = np.linalg.svd(rows)
-        rank = int(np.sum(sigma > RANK * sigma.max(initial=1.0)))
-        kernel = u[:, rank:]
-        return kernel[: self.n_w], kernel[self.n_w :]
+        return u[:, int(np.sum(sigma > RANK * sigma.max(initial=1.0))) :]
 
     def _conditions(self, parts: Parts) -> Array:
         """(c, n_w) what the states' changes must satisfy."""
-        on_storages, on_holds = self._eliminated(parts)
-        rows = on_storages.T @ parts.Q - on_holds.T @ parts.hold_states
-        largest = max(np.abs(parts.Q).max(initial=0.0), np.abs(parts.hold_states).max(initial=0.0))
-        return rows[np.abs(rows).max(axis=1, initial=0.0) > NOTHING * largest]  # constraints that repeat others say none
+        rows, by_states, _ = self.algebraic(parts)
+        found = self._left(rows).T @ by_states
+        largest = float(np.abs(by_states).max(initial=0.0))
+        return found[np.abs(found).max(axis=1, initial=0.0) > NOTHING * largest]  # some repeat others and say nothing
 
-    def driven_twice(self, parts: Parts) -> bool:
-        """Whether a prescribed effort holds a state itself: its flow is then the derivative of the input."""
-        return bool(np.abs(self._eliminated(parts)[1].T @ parts.set).max(initial=0.0) > 1e-9)
+    def differentiated(self, parts: Parts) -> list[str]:
+        """Outer ports whose input holds states themselves, so that its derivative would act."""
+        rows, _, by_inputs = self.algebraic(parts)
+        held = np.abs(self._left(rows).T @ by_inputs).max(axis=0, initial=0.0) > 1e-9
+        names = [str(slot.path) for slot, _ in self.ports for _ in range(slot.quantity.space.dim)]
+        return list(dict.fromkeys(name for name, hit in zip(names, held.tolist(), strict=True) if hit))
 
     def independent(self, parts: Parts, left_out: Index) -> Index:
         """Places of independent states, without some that act on nothing."""

@@ -13,18 +13,17 @@ __all__ = ["Law", "PortHamiltonian", "laws_of"]
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Law:
-    """An equation with both of its sides; ``scale`` is the size of the terms that made them, entry by entry or one."""
+    """An equation with both of its sides; ``scale`` is the size of the terms that made them."""
 
     name: str
     left: Array
     right: Array
-    scale: Array
+    scale: float
 
     @property
     def defect(self) -> float:
         """The largest difference of the sides, relative to the terms'."""
-        size = np.maximum(self.scale, np.finfo(float).tiny)
-        return float(np.max(np.abs(self.left - self.right) / size, initial=0.0))
+        return float(np.abs(self.left - self.right).max(initial=0.0)) / max(self.scale, float(np.finfo(float).tiny))
 
     def holds(self, rounding: float = 1e-12) -> bool:
         """Whether the sides agree to rounding."""
@@ -71,18 +70,18 @@ def laws_of(A: Array, B: Array, C: Array, D: Array, ph: PortHamiltonian, conjuga
     J, R, Q = ph.J, ph.R, ph.Q
     least = np.asarray(np.linalg.eigvalsh(0.5 * (R + R.T)), dtype=float)
     out = [
-        Law("A = (J − R) Q", A, (J - R) @ Q, (np.abs(J) + np.abs(R)) @ np.abs(Q)),
-        Law("J is skew", J, -J.T, _size(J)),
-        Law("R is symmetric", R, R.T, _size(R)),
+        Law("A = (J − R) Q", A, (J - R) @ Q, _size((np.abs(J) + np.abs(R)) @ np.abs(Q))),
+        Law("J is skew", J, -J.T, _size(J) + _size(R)),
+        Law("R is symmetric", R, R.T, _size(J) + _size(R)),
         Law("Q is symmetric", Q, Q.T, _size(Q)),
-        Law("R is not negative", np.minimum(least, 0.0), np.zeros_like(least), _size(R)),
+        Law("R is not negative", np.minimum(least, 0.0), np.zeros_like(least), _size(J) + _size(R)),
     ]
     if conjugate:
         gain = np.asarray(np.linalg.eigvalsh(D + D.T), dtype=float)
-        out.append(Law("C = Bᵀ Q", C, B.T @ Q, np.abs(B.T) @ np.abs(Q)))
+        out.append(Law("C = Bᵀ Q", C, B.T @ Q, _size(np.abs(B.T) @ np.abs(Q))))
         out.append(Law("D + Dᵀ is not negative", np.minimum(gain, 0.0), np.zeros_like(gain), _size(D)))
     return tuple(out)
 
 
-def _size(matrix: Array) -> Array:
-    return np.asarray(np.abs(matrix).max(initial=0.0))
+def _size(matrix: Array) -> float:
+    return float(np.abs(matrix).max(initial=0.0))

@@ -66,9 +66,9 @@ class _Linear:
         d = pencil.problem.descriptor
         self.z = pencil.unknowns(x)
         self.parts = pencil.parts(x, self.z)
-        if pencil.driven_twice(self.parts):
-            driven = ", ".join(str(slot.path) for slot, effort in pencil.ports if effort)
-            raise OptionError("inputs", driven, "flows where an effort is that of a storage: its flow is a derivative")
+        if held := pencil.differentiated(self.parts):
+            expected = "the other of effort and flow there: as it is, its derivative would act on the states"
+            raise OptionError("inputs", ", ".join(held), expected)
         still = [
             i for slot in d.components if isinstance(slot.primitive, Storage) and slot.primitive.environment
             for state in slot.reads for i in range(state.rates.start, state.rates.stop)
@@ -81,19 +81,17 @@ class _Linear:
     def whole(self, outputs: Sequence[str] | None) -> StateSpace:
         """The linear system."""
         p, X, k, pencil = self.parts, self.X, self.k, self.pencil
-        rows = np.vstack([p.T, p.hold])
-        back = np.linalg.pinv(rows, rcond=RANK)  # efforts e = by_x ξ + by_u u + W c
-        by_x = back @ np.vstack([p.Q, -p.hold_states]) @ X
-        by_u = back[:, pencil.n_w :] @ p.set
+        rows, by_states, by_inputs = pencil.algebraic(p)
+        back = np.linalg.pinv(rows, rcond=RANK)  # efforts, multipliers, outer flows: a = by ξ and u, and W c
+        by = back @ np.hstack([by_states @ X, by_inputs])
         W = _kernel(rows)
         moving = np.hstack([X, np.eye(pencil.n_w)[:, self.left_out]])
-        matrix = np.hstack([p.flow_rates @ moving, p.flow_efforts @ W, p.flow_multipliers])
-        of_x = -(p.flow_rates @ self._turning() + p.flow_efforts @ by_x + p.flow_states @ X)
-        of_u = p.force - p.flow_efforts @ by_u
-        found = _solved(matrix, np.hstack([of_x, of_u]), k)
-        first, second = moving.shape[1], moving.shape[1] + W.shape[1]
-        efforts = np.hstack([by_x, by_u]) + W @ found[first:second]
-        flows = found[second + pencil.n_l :]
+        acting = np.hstack([p.flow_efforts, p.flow_multipliers])
+        matrix = np.hstack([p.flow_rates @ moving, acting @ W])
+        right = np.hstack([-(p.flow_rates @ self._turning() + p.flow_states @ X), p.force]) - acting @ by
+        found = _solved(matrix[~p.bare], right[~p.bare], k)
+        whole = by + W @ found[moving.shape[1] :]
+        efforts, flows = whole[: pencil.n_e], whole[pencil.n_e + pencil.n_l :]
         A, B = found[:k, :k], found[:k, k:]
         names_in = self._names_in()
         C, D, names_out = self._outputs(outputs, efforts, flows)
@@ -169,12 +167,15 @@ def _structure(p: Parts, X: Array, which: Index, A: Array) -> tuple[PortHamilton
     turned = max(np.abs(p.flow_states @ X).max(initial=0.0), np.abs(p.hold_states @ X).max(initial=0.0))
     if turned > NEGATIVE * max(1.0, np.abs(p.flow_efforts).max(initial=0.0)):
         return None, "exchange or dissipation depends on the state in this state"
+    if np.abs(p.Q - p.Q.T).max(initial=0.0) > NEGATIVE * np.abs(p.Q).max(initial=0.0):
+        return None, "a potential pushes a state on a group, where it has no Hessian"
     V = _kernel(p.hold)
     P, N = p.T @ V, V.T @ p.flow_efforts @ V
     back, W = np.linalg.pinv(P, rcond=RANK), _kernel(P)
-    inner = N - N @ W @ np.linalg.pinv(W.T @ N @ W, rcond=RANK) @ W.T @ N
+    returned = W.T @ N @ W
+    inner = N - N @ W @ np.linalg.pinv(returned, rcond=RANK) @ W.T @ N
     flow = -back.T @ inner @ back
-    across = _kernel(P.T)
+    across = np.hstack([_kernel(P.T), back.T @ N @ W @ _kernel(returned)])
     held = across.T @ p.Q @ across
     project = np.eye(len(X)) - across @ np.linalg.pinv(held, rcond=RANK) @ across.T @ p.Q
     whole = (project @ flow @ project.T)[np.ix_(which, which)]
