@@ -161,9 +161,9 @@ def _culprit(model: "Dynamics", state: "State") -> tuple[str, str]:
     found = {name: float(np.abs(a).max(initial=0.0)) for name, a in model.acceleration(state).items()}
     name = max(found, key=lambda n: found[n])
     what = f"from rest it still accelerates by {found[name]:.3g} rad/s² or m/s²"
-    loose = next((j for n, j in model.scene.all_joints() if n == name), None)
-    if loose is not None and np.any(loose.drive) and not np.any(loose.stiffness):
-        what += ", its constant drive is balanced nowhere"
+    driven = [n for n, joint in model.scene.all_joints() if np.any(joint.drive) and not np.any(joint.stiffness)]
+    if driven:
+        what += f"; the constant drive of {', '.join(driven)} is balanced nowhere"
     return f"joints.{name}", what
 
 

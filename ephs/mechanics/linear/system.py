@@ -17,8 +17,8 @@ from ephs.mechanics.linear.structure import PortHamiltonian
 from ephs.mechanics.scene.errors import did_you_mean, listing
 from ephs.mechanics.solve.errors import OptionError, SimulationError, SolveError
 from ephs.mechanics.solve.model import Model
-from ephs.mechanics.solve.problem import Problem
 from ephs.mechanics.solve.natural import stored_energies
+from ephs.mechanics.solve.problem import Problem
 from ephs.mechanics.solve.replay import replay
 from ephs.mechanics.solve.solution import Solution
 from ephs.mechanics.solve.sparse import Index

@@ -51,7 +51,11 @@ class ExplicitTangent:
         eq = self.equations
         t = eq.reduced.tables
         self._parts = [
-            (slice(int(t.r_at[i]), int(t.r_at[i] + t.dim[i])), slice(int(t.q_at[i]), int(t.q_at[i] + t.q_size[i])), edge)
+            (
+                slice(int(t.r_at[i]), int(t.r_at[i] + t.dim[i])),
+                slice(int(t.q_at[i]), int(t.q_at[i] + t.q_size[i])),
+                edge,
+            )
             for i, edge in enumerate(eq.reduced.edges)
             if t.kind[i] != SPRING
         ]
@@ -61,7 +65,9 @@ class ExplicitTangent:
     def start(self) -> Point:
         """The initial state."""
         state = self.equations.start(self.t0)
-        found = [self._by(j, lambda eq: self._joined(state, eq.start(self.t0))) for j in range(len(self.family.parameters))]
+        found = [
+            self._by(j, lambda eq: self._joined(state, eq.start(self.t0))) for j in range(len(self.family.parameters))
+        ]
         nv = self.equations.nv
         return Point(state, np.array([x[:nv] for x in found]), np.array([x[nv:] for x in found]))
 
@@ -108,9 +114,7 @@ class ExplicitTangent:
 
     # ---- derivatives -------------------------------------------------------------------------------------------
 
-    def _along(
-        self, dq: Array, dy: Array, q: Array, y: Array, function: Callable[[Array, Array], Array]
-    ) -> Array:
+    def _along(self, dq: Array, dy: Array, q: Array, y: Array, function: Callable[[Array, Array], Array]) -> Array:
         """The derivative of a function of (elements, y) along a tangent."""
         eq = self.equations
         rates = slice(eq.nv, eq.nv + eq.n)

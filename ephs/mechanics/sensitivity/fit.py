@@ -12,7 +12,7 @@ from ephs.mechanics.sensitivity.readings import reading
 from ephs.mechanics.sensitivity.sensitivity import Sensitivity, sensitivity
 from ephs.mechanics.solve.errors import OptionError
 from ephs.mechanics.solve.solution import Solution
-from ephs.semantics.bundle import Array, Reference
+from ephs.semantics.bundle import Array
 from ephs.semantics.system import System
 
 if TYPE_CHECKING:
@@ -110,7 +110,9 @@ def fit(
     from scipy.optimize import least_squares
 
     record = _Record(data, sigma or {})
-    guess = {path: float((start or {})[path]) if path in (start or {}) else _own(model, path, run) for path in parameters}
+    guess = {
+        path: float((start or {})[path]) if path in (start or {}) else _own(model, path, run) for path in parameters
+    }
     lower, upper = np.array([(bounds or {}).get(path, _bounds(model, path)) for path in parameters], dtype=float).T
     scale = np.array([abs(value) or 1.0 for value in guess.values()])
     runs = _Runs(model, tuple(parameters), record, run, scale)
@@ -128,9 +130,17 @@ def fit(
     covariance, errors = _covariance(jacobian / scale, deviation)
     last = runs.at(found.x)
     return Fit(
-        values, dict(zip(parameters, errors.tolist(), strict=True)), covariance, record.residuals(last.solution), deviation,
-        _with(model, values), last.solution, runs.count, bool(found.success), str(found.message),
-    )  # fmt: skip
+        values=values,
+        errors=dict(zip(parameters, errors.tolist(), strict=True)),
+        covariance=covariance,
+        residuals=record.residuals(last.solution),
+        deviation=deviation,
+        model=_with(model, values),
+        solution=last.solution,
+        iterations=runs.count,
+        converged=bool(found.success),
+        message=str(found.message),
+    )
 
 
 @final
@@ -225,7 +235,9 @@ def _own(model: System | Scene, path: str, run: Mapping[str, Any]) -> float:
     if isinstance(model, System) and _is_state(model, path):
         stem, _, entry = path.partition("[")
         given = model.state(run.get("initial"))
-        return float(next(value for key, value in given.items() if str(key) == stem)[int(entry[:-1] or 0) if entry else 0])
+        return float(
+            next(value for key, value in given.items() if str(key) == stem)[int(entry[:-1] or 0) if entry else 0]
+        )
     return read(model, path)
 
 

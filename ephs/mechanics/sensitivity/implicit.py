@@ -95,7 +95,7 @@ class NaturalTangent:
         """One step of h seconds."""
         after = self.natural.step(point.state, h)
         x0, z, side = point.state.x, after.z, self.side
-        n, n_w = z.size, int(side.model.tables.counts[0])
+        n = z.size
         side.whole(x0, z, h)
         t = side.model.tables
         matrix = np.zeros((n, n))
@@ -138,7 +138,9 @@ class NaturalTangent:
 
     def _by(self, number: int, function: Callable[[_Side], Array]) -> Array:
         parameter = self.family.parameters[number]
-        return difference(lambda k: function(self._other(number, k * parameter.step)), parameter.stencil, parameter.step)
+        return difference(
+            lambda k: function(self._other(number, k * parameter.step)), parameter.stencil, parameter.step
+        )
 
     def _other(self, number: int, offset: float) -> _Side:
         if (number, offset) not in self._others:
@@ -168,9 +170,7 @@ class NaturalTangent:
         side = self._other(number, offset) if offset else self.side
         d = side.problem.descriptor
         rows = [
-            self._row(
-                side.model, d.advance(p.state.x, offset * p.x[number]), p.state.sums + offset * p.sums[number]
-            )
+            self._row(side.model, d.advance(p.state.x, offset * p.x[number]), p.state.sums + offset * p.sums[number])
             for p in points
         ]
         return side.problem, rows
