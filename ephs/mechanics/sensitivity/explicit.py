@@ -66,7 +66,8 @@ class ExplicitTangent:
         """The initial state."""
         state = self.equations.start(self.t0)
         found = [
-            self._by(j, lambda eq: self._joined(state, eq.start(self.t0))) for j in range(len(self.family.parameters))
+            self._by(j, lambda of, _: self._joined(state, of.start(self.t0)))
+            for j in range(len(self.family.parameters))
         ]
         nv = self.equations.nv
         return Point(state, np.array([x[:nv] for x in found]), np.array([x[nv:] for x in found]))
@@ -85,8 +86,9 @@ class ExplicitTangent:
             time = base.t + c[i] * h
             k[i] = eq.rates(time, base.q, y)
             for j in numbers:
-                along = self._along(point.q[j], dy[j], base.q, y, lambda q, v, time=time: eq.rates(time, q, v))
-                dk[i, j] = along + self._by(j, lambda other, time=time, y=y: other.rates(time, base.q, y))
+                dk[i, j] = self._change(
+                    j, point.q[j], dy[j], base.q, y, lambda of, q, v, time=time: of.rates(time, q, v)
+                )
         y1, dy1 = y0 + h * (scheme.b @ k), dy0 + h * np.einsum("s,spn->pn", scheme.b, dk)
         end = eq.state(base, y1, base.t + h)
         dq = np.array([self._carried(y1[: eq.nv], point.q[j], dy1[j, : eq.nv]) for j in numbers])
@@ -103,20 +105,28 @@ class ExplicitTangent:
         for j in range(len(point.q)):
             still = np.concatenate([np.zeros(eq.nv), point.y[j]])
 
-            def shut(at: Array, v: Array) -> Array:
-                found = eq.closed(replace(end, q=at, r=v[eq.nv : moving]))
+            def shut(of: Equations, at: Array, v: Array) -> Array:
+                found = of.closed(replace(end, q=at, r=v[eq.nv : moving]))
                 return self._joined(closed, found)[:moving]
 
-            change = self._along(point.q[j], still, end.q, eq.vector(end), shut)
-            change = change + self._by(j, lambda other: self._joined(closed, other.closed(end))[:moving])
+            change = self._change(j, point.q[j], still, end.q, eq.vector(end), shut)
             q[j], y[j, : eq.n] = change[: eq.nv], change[eq.nv :]
         return Point(closed, q, y)
 
     # ---- derivatives -------------------------------------------------------------------------------------------
 
-    def _along(self, dq: Array, dy: Array, q: Array, y: Array, function: Callable[[Array, Array], Array]) -> Array:
-        """The derivative of a function of (elements, y) along a tangent."""
-        eq = self.equations
+    def _change(
+        self,
+        number: int,
+        dq: Array,
+        dy: Array,
+        q: Array,
+        y: Array,
+        function: Callable[[Equations, Array, Array], Array],
+    ) -> Array:
+        """The derivative of a function of (equations, elements, y) by a parameter and along a tangent: at once, where
+        the parameter's neighbours move the state little enough, else one after the other."""
+        eq, parameter = self.equations, self.family.parameters[number]
         rates = slice(eq.nv, eq.nv + eq.n)
         fast = max(1.0, float(np.abs(y[rates]).max(initial=0.0)))
         size = max(
@@ -125,19 +135,25 @@ class ExplicitTangent:
             float(np.abs(dy[rates]).max(initial=0.0)) / fast,
             float(np.abs(dy[rates.stop : rates.stop + eq.ns]).max(initial=0.0)),
         )
-        if size == 0.0:
-            return np.zeros_like(function(q, y))
-        step = SMALL / size
-        return difference(lambda k: function(eq.advance(q, k * step * dq), y + k * step * dy), CENTRAL, step)
 
-    def _by(self, number: int, function: Callable[[Equations], Array]) -> Array:
-        """The derivative of a function of the equations by a parameter."""
-        parameter = self.family.parameters[number]
-        return difference(
-            lambda k: function(self._other(number, k * parameter.step)[1]), parameter.stencil, parameter.step
+        def beside(of: Equations, by: float) -> Array:
+            return function(of, eq.advance(q, by * dq) if by else q, y + by * dy)
+
+        if parameter.step * size <= 2.0 * SMALL:
+            return self._by(number, lambda of, by: beside(of, by))
+        step = SMALL / size
+        return difference(lambda k: beside(eq, k * step), CENTRAL, step) + self._by(
+            number, lambda of, _: beside(of, 0.0)
         )
 
+    def _by(self, number: int, function: Callable[[Equations, float], Array]) -> Array:
+        """The derivative of a function of (equations, offset) by a parameter."""
+        step, stencil = self.family.parameters[number].step, self.family.parameters[number].stencil
+        return difference(lambda k: function(self._other(number, k * step)[1], k * step), stencil, step)
+
     def _other(self, number: int, offset: float) -> tuple[Problem, Equations]:
+        if not offset:
+            return self.family.problem, self.equations
         if (number, offset) not in self._others:
             problem = self.family.at(number, offset)
             found = Equations(problem.scene, problem, self.t0)
@@ -173,7 +189,7 @@ class ExplicitTangent:
 
     def beside(self, number: int, offset: float, points: list[Point]) -> tuple[Problem, list[Row]]:
         """The same of a neighbour, by the tangents; and its problem."""
-        problem, eq = self._other(number, offset) if offset else (self.family.problem, self.equations)
+        problem, eq = self._other(number, offset)
         states: list[ReducedState] = []
         for point in points:
             state, dy = point.state, offset * point.y[number]

@@ -83,6 +83,7 @@ class Family:
             if path.startswith("joints.") and joint and f"joints.{joint}" not in self._inputs:
                 assert isinstance(model, Scene)
                 self._inputs[f"joints.{joint}"] = np.zeros(model.joint(joint).dim)
+        self._neighbours: dict[tuple[str, float], Problem] = {}
         self.problem = self._made({})
         self._states = {str(slot.path): slot for slot in self.problem.descriptor.states}
         self.parameters = tuple(self._parameter(path) for path in paths)
@@ -90,7 +91,12 @@ class Family:
     def at(self, number: int, offset: float) -> Problem:
         """The problem with one parameter elsewhere by an offset in its own unit."""
         parameter = self.parameters[number]
-        return self._made({parameter.path: parameter.value + offset})
+        return self._beside(parameter.path, parameter.value, offset)
+
+    def _beside(self, path: str, value: float, offset: float) -> Problem:
+        if (path, offset) not in self._neighbours:
+            self._neighbours[path, offset] = self._made({path: value + offset}) if offset else self.problem
+        return self._neighbours[path, offset]
 
     def _parameter(self, path: str) -> Parameter:
         value = self._read(path)
@@ -99,7 +105,7 @@ class Family:
         for stencil in (CENTRAL, FORWARD):
             try:
                 for k, _ in stencil:
-                    self._made({path: value + k * step})
+                    self._beside(path, value, k * step)
             except (SceneError, StructureError):
                 if stencil is FORWARD:
                     raise

@@ -121,7 +121,7 @@ def fit(
         raise OptionError("data", f"{record.size} numbers", f"{x0.size} or more, for as many parameters")
     found = least_squares(
         runs.residual, x0, jac=runs.jacobian, bounds=(lower / scale, upper / scale), x_scale="jac",
-        xtol=1e-14, ftol=1e-14, gtol=1e-14, max_nfev=max_evaluations,
+        xtol=1e-9, ftol=1e-12, gtol=1e-14, max_nfev=max_evaluations,
     )  # fmt: skip
     values = dict(zip(parameters, (found.x * scale).tolist(), strict=True))
     residual, jacobian = runs.residual(found.x), runs.jacobian(found.x)

@@ -85,7 +85,7 @@ class NaturalTangent:
         d = self.family.problem.descriptor
         x0 = d.pack(self.family.problem.initial)
         found = [
-            self._by(j, lambda side: self._increment(x0, d.pack(side.problem.initial)))
+            self._by(j, lambda of, _: self._increment(x0, d.pack(of.problem.initial)))
             for j in range(len(self.family.parameters))
         ]
         state = self.natural.init(x0)
@@ -101,11 +101,12 @@ class NaturalTangent:
         matrix = np.zeros((n, n))
         np.add.at(matrix, (t.row, t.column), side.memory.data)
         d = self.family.problem.descriptor
-        known, by_p = [], []
-        for j in range(len(point.x)):
-            known.append(self._along(point.x[j], lambda e, j=j: side.whole(d.advance(x0, e * point.x[j]), z, h)))
-            by_p.append(self._by(j, lambda other: other.whole(x0, z, h)))
-        right = np.array(known) + np.array(by_p)
+        changes: list[Array] = []
+        for j, tangent in enumerate(point.x):
+            changes.append(
+                self._change(j, tangent, lambda of, by, u=tangent: of.whole(d.advance(x0, by * u) if by else x0, z, h))
+            )
+        right = np.array(changes)
         dz = -self._solved(matrix, right[:, :n].T).T
         dx, dsums = np.empty_like(point.x), point.sums + right[:, n:]
         for j in range(len(point.x)):
@@ -129,20 +130,24 @@ class NaturalTangent:
                 pass
         return np.asarray(np.linalg.lstsq(matrix / rows, right / rows, rcond=1e-12)[0], dtype=float)
 
-    def _along(self, dx: Array, function: Callable[[float], Array]) -> Array:
+    def _change(self, number: int, dx: Array, function: Callable[[_Side, float], Array]) -> Array:
+        """The derivative of a function of (model, share of the tangent) by a parameter and along the tangent: at once,
+        where the parameter's neighbours move the state little enough, else one after the other."""
         size = float(np.abs(dx).max(initial=0.0))
-        if size == 0.0:
-            return np.zeros_like(function(0.0))
+        if self.family.parameters[number].step * size <= 2.0 * SMALL:
+            return self._by(number, function)
         step = SMALL / size
-        return difference(lambda k: function(k * step), CENTRAL, step)
+        along = difference(lambda k: function(self.side, k * step), CENTRAL, step)
+        return along + self._by(number, lambda of, _: function(of, 0.0))
 
-    def _by(self, number: int, function: Callable[[_Side], Array]) -> Array:
-        parameter = self.family.parameters[number]
-        return difference(
-            lambda k: function(self._other(number, k * parameter.step)), parameter.stencil, parameter.step
-        )
+    def _by(self, number: int, function: Callable[[_Side, float], Array]) -> Array:
+        """The derivative of a function of (model, offset) by a parameter."""
+        step, stencil = self.family.parameters[number].step, self.family.parameters[number].stencil
+        return difference(lambda k: function(self._other(number, k * step), k * step), stencil, step)
 
     def _other(self, number: int, offset: float) -> _Side:
+        if not offset:
+            return self.side
         if (number, offset) not in self._others:
             found = _Side.of(self.family.at(number, offset), self.t0)
             same_shape(self.side.memory.residual, found.memory.residual, self.family.parameters[number].path)
@@ -167,7 +172,7 @@ class NaturalTangent:
 
     def beside(self, number: int, offset: float, points: list[Point]) -> tuple[Problem, list[Row]]:
         """The same of a neighbour, by the tangents; and its problem."""
-        side = self._other(number, offset) if offset else self.side
+        side = self._other(number, offset)
         d = side.problem.descriptor
         rows = [
             self._row(side.model, d.advance(p.state.x, offset * p.x[number]), p.state.sums + offset * p.sums[number])

@@ -183,8 +183,8 @@ def _along(family: Family, method: str, grid: Array, times: Array | None) -> Sen
         problem, rows = stepper.beside(number, offset, kept)
         return replay(problem, wanted, rows, method)
 
-    offsets = [
-        min([parameter.step, *(NEAR / size for p in kept if (size := stepper.size(p, j)) > 0.0)])
-        for j, parameter in enumerate(family.parameters)
-    ]
+    offsets: list[float] = []
+    for j, parameter in enumerate(family.parameters):
+        size = max((stepper.size(p, j) for p in kept), default=0.0)
+        offsets.append(parameter.step if parameter.step * size <= 2.0 * NEAR else NEAR / size)
     return Sensitivity(solution, family.parameters, neighbour, np.array(offsets))

@@ -39,7 +39,8 @@ def agrees(scene, paths, until, names, tolerance=GOOD, compared=None, **options)
             size = got[name][..., number].size
             part = slice(start, start + size)
             start += size
-            scale = max(np.abs(expected[part]).max(), 1e-9)
+            own = np.abs(reading(found.solution, name)).max() / max(abs(value), 1.0)
+            scale = max(np.abs(expected[part]).max(), 1e-3 * own)
             assert np.abs(mine[part] - expected[part]).max() < tolerance * scale, (path, name)
     return found
 
