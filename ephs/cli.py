@@ -15,6 +15,7 @@ from cyclopts import App, CycloptsError, Parameter
 
 from ephs.cli_charts import charts
 from ephs.cli_input import EXTRAS, TEXTS, BadInput, Base, addressed, load_model, naming
+from ephs.cli_linear import linearizing
 from ephs.cli_sweep import sweeps
 
 if TYPE_CHECKING:
@@ -30,6 +31,8 @@ Exergetic port-Hamiltonian systems: compose physical models by pattern, simulate
   ephs draw scenes/slider-crank.toml -o a.svg     draw the interconnection pattern
   ephs reduce scenes/slider-crank.toml            what a reduction takes out, and why it may
   ephs equations scenes/slider-crank.toml         print the equations; --latex for a paper
+  ephs linearize scenes/four-bar.toml --at equilibrium
+                                                  state space, eigenvalues and modes
   ephs sweep scenes/heavy-top.toml --vary bodies.top.mass=0.5:2:9 --until 1 -o out/sweep
                                                   an ensemble in parallel, one table
   ephs chart stability -o out/charts              draw where which method fails; work-precision: its speed and error
@@ -79,6 +82,7 @@ def _positive(_type: object, value: float | None) -> None:
 
 app.command(charts)
 app.command(sweeps)
+app.command(linearizing)
 Positive = Annotated[float | None, Parameter(validator=_positive)]
 
 

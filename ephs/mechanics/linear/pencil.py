@@ -88,9 +88,14 @@ class Parts:
     set: Array
 
     @property
-    def bare(self) -> Array:
-        """(n_e,) which balances are of junctions without storage."""
-        return np.asarray(np.abs(self.flow_rates).max(axis=1, initial=0.0) == 0.0)
+    def bare(self) -> Index:
+        """Which balances are of junctions without storage."""
+        return np.flatnonzero(np.abs(self.flow_rates).max(axis=1, initial=0.0) == 0.0)
+
+    @property
+    def stored(self) -> Index:
+        """Which are of the others."""
+        return np.setdiff1d(np.arange(len(self.flow_rates)), self.bare)
 
 
 @final

@@ -89,7 +89,7 @@ class _Linear:
         acting = np.hstack([p.flow_efforts, p.flow_multipliers])
         matrix = np.hstack([p.flow_rates @ moving, acting @ W])
         right = np.hstack([-(p.flow_rates @ self._turning() + p.flow_states @ X), p.force]) - acting @ by
-        found = _solved(matrix[~p.bare], right[~p.bare], k)
+        found = _solved(matrix[p.stored], right[p.stored], k)
         whole = by + W @ found[moving.shape[1] :]
         efforts, flows = whole[: pencil.n_e], whole[pencil.n_e + pencil.n_l :]
         A, B = found[:k, :k], found[:k, k:]

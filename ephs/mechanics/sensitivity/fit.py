@@ -8,7 +8,7 @@ import numpy as np
 
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.parameters import read, varied
-from ephs.mechanics.sensitivity.readings import reading
+from ephs.mechanics.sensitivity.readings import reading_of
 from ephs.mechanics.sensitivity.sensitivity import Sensitivity, sensitivity
 from ephs.mechanics.solve.errors import OptionError
 from ephs.mechanics.solve.solution import Solution
@@ -84,7 +84,7 @@ def fit(
     ----------
     data
         ``"t"``: (n,) times in s; and name -> (n,) or (n, d) what was recorded, by the names of
-        `ephs.mechanics.sensitivity.readings.reading`: ``joints.pin.coordinate``, ``bodies.rod.position``,
+        `ephs.mechanics.sensitivity.readings`: ``joints.pin.coordinate``, ``bodies.rod.position``,
         ``markers.tip.position``, ``osc.pe.q``. Entries that are NaN were not recorded.
     parameters
         Paths, as for `sensitivity`; initial values among them.
@@ -109,7 +109,7 @@ def fit(
     """
     from scipy.optimize import least_squares
 
-    record = _Record(data, sigma or {})
+    record = _Record(model, data, sigma or {})
     guess = {
         path: float((start or {})[path]) if path in (start or {}) else _own(model, path, run) for path in parameters
     }
@@ -119,8 +119,9 @@ def fit(
     x0 = np.clip(np.array(list(guess.values())), lower, upper) / scale
     if record.size < x0.size:
         raise OptionError("data", f"{record.size} numbers", f"{x0.size} or more, for as many parameters")
+    jacobian_of: Any = runs.jacobian
     found = least_squares(
-        runs.residual, x0, jac=runs.jacobian, bounds=(lower / scale, upper / scale), x_scale="jac",
+        runs.residual, x0, jac=jacobian_of, bounds=(lower / scale, upper / scale), x_scale="jac",
         xtol=1e-9, ftol=1e-12, gtol=1e-14, max_nfev=max_evaluations,
     )  # fmt: skip
     values = dict(zip(parameters, (found.x * scale).tolist(), strict=True))
@@ -147,7 +148,7 @@ def fit(
 class _Record:
     """What was recorded, as one vector."""
 
-    def __init__(self, data: Mapping[str, "ArrayLike"], sigma: Mapping[str, float]) -> None:
+    def __init__(self, model: System | Scene, data: Mapping[str, "ArrayLike"], sigma: Mapping[str, float]) -> None:
         if "t" not in data or len(data) < 2:
             raise OptionError("data", sorted(data), "the times t, and a reading at least")
         self.t = np.asarray(data["t"], dtype=float)
@@ -155,6 +156,7 @@ class _Record:
         for name, values in self.values.items():
             if values.shape[:1] != self.t.shape:
                 raise OptionError(f"data[{name!r}]", values.shape, f"({self.t.size}, …): one row a time")
+        self._readings = {name: reading_of(model, name) for name in self.values}
         self.kept = {name: np.isfinite(values) for name, values in self.values.items()}
         self.size = int(sum(kept.sum() for kept in self.kept.values()))
         self._weights = {name: 1.0 / float(sigma.get(name, 1.0)) for name in self.values}
@@ -175,7 +177,7 @@ class _Record:
         return {name: values - self._read(solution, name) for name, values in self.values.items()}
 
     def _read(self, solution: Solution, name: str) -> Array:
-        found, wanted = reading(solution, name), self.values[name].shape
+        found, wanted = self._readings[name](solution), self.values[name].shape
         if found.shape != wanted and found.size != self.values[name].size:
             raise OptionError(f"data[{name!r}]", wanted, f"{found.shape}")
         return found.reshape(wanted)

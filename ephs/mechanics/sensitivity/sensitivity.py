@@ -8,7 +8,7 @@ import numpy as np
 
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.sensitivity.family import Family, Parameter, difference
-from ephs.mechanics.sensitivity.readings import reading
+from ephs.mechanics.sensitivity.readings import reading_of
 from ephs.mechanics.simulate import simulate
 from ephs.mechanics.solve.errors import OptionError, SimulationError, SolveError
 from ephs.mechanics.solve.replay import replay
@@ -33,6 +33,8 @@ class Sensitivity:
 
     Parameters
     ----------
+    model
+        The scene or the system.
     solution
         The motion.
     parameters
@@ -43,6 +45,7 @@ class Sensitivity:
         (p,) the offsets over which readings are differenced.
     """
 
+    model: System | Scene
     solution: Solution
     parameters: tuple[Parameter, ...]
     neighbour: Callable[[int, float], Solution]
@@ -59,15 +62,15 @@ class Sensitivity:
         return tuple(parameter.path for parameter in self.parameters)
 
     def __getitem__(self, name: str) -> Array:
-        """(n, …, p) the derivative of a reading, see `ephs.mechanics.sensitivity.readings.reading`: a state's path,
-        ``joints.pin.coordinate``, ``bodies.rod.position``, ``heat``.
+        """(n, …, p) the derivative of a reading: a state's path, ``joints.pin.coordinate``, ``bodies.rod.position``,
+        ``heat``; see `ephs.mechanics.sensitivity.readings`.
 
         Raises
         ------
         OptionError
             There is nothing of that name.
         """
-        return self.of(lambda solution: reading(solution, name))
+        return self.of(reading_of(self.model, name))
 
     def of(self, function: "Callable[[Solution], ArrayLike]") -> Array:
         """(…, p) the derivative of anything that is read from a `Solution`: its final state, an integral over its
@@ -187,4 +190,4 @@ def _along(family: Family, method: str, grid: Array, times: Array | None) -> Sen
     for j, parameter in enumerate(family.parameters):
         size = max((stepper.size(p, j) for p in kept), default=0.0)
         offsets.append(parameter.step if parameter.step * size <= 2.0 * NEAR else NEAR / size)
-    return Sensitivity(solution, family.parameters, neighbour, np.array(offsets))
+    return Sensitivity(family.model, solution, family.parameters, neighbour, np.array(offsets))

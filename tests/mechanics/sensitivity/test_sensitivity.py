@@ -7,7 +7,7 @@ import ephs
 from ephs import Pattern
 from ephs import library as lib
 from ephs.mechanics.scene.parameters import read, varied
-from ephs.mechanics.sensitivity.readings import reading
+from ephs.mechanics.sensitivity.readings import reading_of
 
 GOOD = 1e-8
 """What extrapolated differences of runs are good for, relative to the largest; 1e-7 is asked for."""
@@ -18,6 +18,10 @@ def extrapolated(function, h):
     d = [(function(s) - function(-s)) / (2.0 * s) for s in (h, h / 2.0, h / 4.0)]
     once = [(4.0 * d[1] - d[0]) / 3.0, (4.0 * d[2] - d[1]) / 3.0]
     return (16.0 * once[1] - once[0]) / 15.0
+
+
+def reading(solution, name):
+    return reading_of(solution.scene or solution.system, name)(solution)
 
 
 def agrees(scene, paths, until, names, tolerance=GOOD, compared=None, **options):
