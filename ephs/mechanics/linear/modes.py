@@ -47,7 +47,7 @@ class Mode:
     @property
     def damping(self) -> float:
         """Damping ratio −Re λ/|λ|: 0 undamped, 1 without oscillation, below 0 growing; NaN where nothing changes."""
-        return -self.eigenvalue.real / abs(self.eigenvalue) if self.eigenvalue else float("nan")
+        return 0.0 - self.eigenvalue.real / abs(self.eigenvalue) if self.eigenvalue else float("nan")
 
     @property
     def stable(self) -> bool:
