@@ -61,12 +61,18 @@ def test_a_noisy_motion_gives_them_within_three_deviations(case):
         name: values if name == "t" else values + noise * rng.standard_normal(values.shape)
         for name, values in data.items()
     }
-    found = ephs.fit(scene, noisy, paths, sigma=dict.fromkeys(noisy, noise), **STEPS)
+    found = ephs.fit(scene, noisy, paths, sigma=dict.fromkeys(noisy, 2.0 * noise), **STEPS)
     off = np.array([found.values[path] - read(scene, path) for path in paths])
     errors = np.array([found.errors[path] for path in paths])
     assert np.all(np.abs(off) < 3.0 * errors)
-    assert 0.6 < found.deviation < 1.4  # in units of sigma
-    assert np.allclose(np.sqrt(np.diag(found.covariance)), errors)
+    assert 0.3 < found.deviation < 0.7  # in units of sigma
+    tangent = ephs.sensitivity(found.model, paths, data["t"][-1], save_at=data["t"], **STEPS)
+    names = [name for name in data if name != "t"]
+    rows = np.concatenate([tangent[name].reshape(-1, len(paths)) for name in names])
+    left = np.concatenate([found.residuals[name].ravel() for name in names])
+    expected = left @ left / (left.size - len(paths)) * np.linalg.inv(rows.T @ rows)
+    assert np.abs(found.covariance / expected - 1.0).max() < 1e-3
+    assert np.sqrt(np.diag(found.covariance)) == pytest.approx(errors)
 
 
 def test_a_system_is_fitted_with_its_initial_value():
