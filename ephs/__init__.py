@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from ephs.mechanics.check import check_model as check_model
     from ephs.mechanics.dynamics import dynamics as dynamics
+    from ephs.mechanics.linear import equilibrium as equilibrium
+    from ephs.mechanics.linear import linearize as linearize
     from ephs.mechanics.methods import register_method as register_method
     from ephs.mechanics.reading import load_solution as load_solution
     from ephs.mechanics.reduction.report import reduce as reduce
@@ -18,6 +20,8 @@ if TYPE_CHECKING:
     from ephs.mechanics.scene import SceneError as SceneError
     from ephs.mechanics.scene import SceneWarning as SceneWarning
     from ephs.mechanics.scene.load import load as load
+    from ephs.mechanics.sensitivity import fit as fit
+    from ephs.mechanics.sensitivity import sensitivity as sensitivity
     from ephs.mechanics.simulate import simulate as simulate
     from ephs.mechanics.solve.errors import Interrupted as Interrupted
     from ephs.mechanics.solve.errors import OptionError as OptionError
@@ -72,10 +76,12 @@ _HOMES = {
     "ephs.mechanics.scene.load": ("load",),
     "ephs.mechanics.check": ("check_model",),
     "ephs.mechanics.dynamics": ("dynamics",),
+    "ephs.mechanics.linear": ("equilibrium", "linearize"),
     "ephs.mechanics.methods": ("register_method",),
     "ephs.mechanics.reduction.report": ("reduce",),
     "ephs.mechanics.reading": ("load_solution",),
     "ephs.mechanics.simulate": ("simulate",),
+    "ephs.mechanics.sensitivity": ("fit", "sensitivity"),
     "ephs.mechanics.solve.errors": ("Interrupted", "OptionError", "SimulationError"),
     "ephs.mechanics.solve.events": ("Event",),
     "ephs.mechanics.solve.solution": ("Solution",),

@@ -23,10 +23,12 @@ from ephs.cli_input import (
     Loading,
     addressed,
     heard,
+    initial_values,
     load_model,
     naming,
     noted,
 )
+from ephs.cli_linear import linearizing
 from ephs.cli_sweep import sweeps
 
 if TYPE_CHECKING:
@@ -42,6 +44,8 @@ Exergetic port-Hamiltonian systems: compose physical models by pattern, simulate
   ephs draw scenes/slider-crank.toml -o a.svg     draw the interconnection pattern
   ephs reduce scenes/slider-crank.toml            what a reduction takes out, and why it may
   ephs equations scenes/slider-crank.toml         print the equations; --latex for a paper
+  ephs linearize scenes/four-bar.toml --at equilibrium
+                                                  state space, eigenvalues and modes
   ephs sweep scenes/heavy-top.toml --vary bodies.top.mass=0.5:2:9 --until 1 -o out/sweep
                                                   an ensemble in parallel, one table
   ephs animate out/slider-crank -o a.html         one page with the moving mechanism, no network needed
@@ -95,6 +99,7 @@ def _positive(_type: object, value: float | None) -> None:
 app.command(animate)
 app.command(charts)
 app.command(sweeps)
+app.command(linearizing)
 Positive = Annotated[float | None, Parameter(validator=_positive)]
 
 
@@ -151,7 +156,7 @@ def run(
     with addressed(scene, folder):
         folder.mkdir(parents=True, exist_ok=True)
     given = {
-        "initial": _initial(initial or []),
+        "initial": initial_values(initial or []),
         "method": method,
         "rtol": rtol,
         "atol": atol,
@@ -340,17 +345,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         _complain("interrupted")
         return 130
-
-
-def _initial(entries: Sequence[str]) -> dict[str, list[float]] | None:
-    values: dict[str, list[float]] = {}
-    for entry in entries:
-        path, _, numbers = entry.partition("=")
-        try:
-            values[path] = [float(number) for number in numbers.split(",")]
-        except ValueError as error:
-            raise BadInput(TEXTS["initial"].format(found=entry)) from error
-    return values or None
 
 
 @contextmanager

@@ -3,7 +3,7 @@
 import runpy
 import sys
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +22,7 @@ __all__ = [
     "Loading",
     "addressed",
     "heard",
+    "initial_values",
     "load_model",
     "naming",
     "noted",
@@ -183,6 +184,24 @@ def heard() -> Iterator[None]:
         for kind in (ephs.ModelWarning, ephs.SceneWarning):
             warnings.simplefilter("always", kind)
         yield
+
+
+def initial_values(entries: Sequence[str]) -> dict[str, list[float]] | None:
+    """What PATH=NUMBER,NUMBER,... says; None where nothing is said.
+
+    Raises
+    ------
+    BadInput
+        An entry is not of that form.
+    """
+    values: dict[str, list[float]] = {}
+    for entry in entries:
+        path, _, numbers = entry.partition("=")
+        try:
+            values[path] = [float(number) for number in numbers.split(",")]
+        except ValueError as error:
+            raise BadInput(TEXTS["initial"].format(found=entry)) from error
+    return values or None
 
 
 def naming(scene: str, message: str) -> str:

@@ -39,6 +39,7 @@ def rigid_body(
     gravity: "ArrayLike" = GRAVITY,
     potential: Callable[[Array], float] | None = None,
     group: str = "SE3",
+    *,
     strict: bool = True,
 ) -> System:
     """A rigid body; its port p carries the body-frame momentum, flow a wrench on the body, effort its twist.
@@ -57,7 +58,8 @@ def rigid_body(
         ``"SE3"``: twists in the body frame, as joints want them. ``"SO3xR3"``: the velocity of the centre of mass in
         world axes.
     strict
-        Refuse an inertia that no distribution of mass has; else one without an inverse only.
+        Refuse an inertia that no distribution of mass has; else one without an inverse only. Scenes decide that when
+        they are read.
 
     Raises
     ------
@@ -108,7 +110,7 @@ def _inertia(mass: float, inertia: "ArrayLike", strict: bool) -> Array:
         return tensor
     if not least > 0.0:
         raise _bad("inertia", tensor.tolist(), f"positive principal moments; the least is {least:.6g}")
-    if most > (least + middle) * (1.0 + 1e-9):
+    if strict and most > (least + middle) * (1.0 + 1e-9):
         raise _bad("inertia", tensor.tolist(), f"principal moments with {most:.6g} ≤ {least:.6g} + {middle:.6g}")
     return tensor
 

@@ -21,6 +21,7 @@ from ephs.mechanics.simulate import problem_of_scene
 from ephs.mechanics.solve.errors import OptionError, SimulationError, SolveError
 from ephs.mechanics.solve.problem import State as States
 from ephs.mechanics.solve.sparse import Index
+from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.primitives import Storage
 
@@ -153,6 +154,10 @@ class Dynamics:
         """Body -> where it is and how it moves."""
         self._at(state)
         return self._links.bodies()
+
+    def states(self, state: State) -> dict[Path, Array]:
+        """All states of the scene's system by path, as `simulate` takes them for ``initial``."""
+        return {**self._problem.initial, **self._equations.states(self._reduced(state))}
 
     # ---- accelerations and forces ------------------------------------------------------------------------------
 
@@ -306,16 +311,18 @@ class Dynamics:
         n, nv = self._equations.n, self._equations.nv
         with self._pushed(forces):
             a = self._linear.forward(q, r, s)[:n]
-            forward = self._linear.columns(solve=True, fit=True)[:n]
+            forward = self._linear.columns(solve=True, fit=True)
             by_force = self._linear.mobility()
         if accelerations is not None:
             a = self.layout.vector("accelerations", accelerations)[:n]
         with _failures():
             self._linear.inverse(q, r, s, a)
             inverse = self._linear.columns(solve=False, fit=True)[:n]
+        at_q, at_r, at_s = slice(0, n), slice(nv, nv + n), slice(nv + n, None)
         return Derivatives(
-            forward[:, :n], forward[:, nv : nv + n], by_force, forward[:, nv + n :],
-            inverse[:, :n], inverse[:, nv : nv + n], self.mass_matrix(state),
+            forward[:n, at_q], forward[:n, at_r], by_force, forward[:n, at_s],
+            inverse[:, at_q], inverse[:, at_r], self.mass_matrix(state),
+            forward[nv:, at_q], forward[nv:, at_r], forward[nv:, at_s],
         )  # fmt: skip
 
     # ---- steps -------------------------------------------------------------------------------------------------

@@ -124,6 +124,8 @@ class Derivatives:
         (n, entropies) of the accelerations by entropies, in 1/(s² J/K): not zero where friction depends on temperature.
     force_q, force_r, force_a
         Of inverse dynamics at given accelerations; force_a is the mass matrix.
+    entropy_q, entropy_r, entropy_s
+        (entropies, n), (entropies, entropies) of the entropies' rates ṡ.
     """
 
     acceleration_q: Array
@@ -133,3 +135,6 @@ class Derivatives:
     force_q: Array
     force_r: Array
     force_a: Array
+    entropy_q: Array
+    entropy_r: Array
+    entropy_s: Array

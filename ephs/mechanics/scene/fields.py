@@ -22,7 +22,7 @@ NON_NEGATIVE: Least = (0.0, False)
 POSITIVE: Least = (0.0, True)
 
 
-def _sound(_scene: Scene, _name: str, _before: Scene, _strict: bool) -> list[Fault]:
+def _sound(_scene: Scene, _name: str, _before: Scene) -> list[Fault]:
     return []
 
 
@@ -42,7 +42,7 @@ class Field:
     moves
         ``"frame"`` where bodies have to follow, ``"state"`` where it is a joint's coordinate or rate.
     faults
-        What is wrong with the new value: from (scene, name, the scene before, strict).
+        What is wrong with the new value: from (scene, name, the scene before).
     """
 
     get: Callable[[Scene, str], Array]
@@ -50,7 +50,7 @@ class Field:
     least: Least | None = None
     spread: bool = False
     moves: str = ""
-    faults: Callable[[Scene, str, Scene, bool], list[Fault]] = _sound
+    faults: Callable[[Scene, str, Scene], list[Fault]] = _sound
 
 
 def placed(scene: Scene, before: Scene, coordinates: Mapping[str, Array], rates: Mapping[str, Array]) -> Scene:
@@ -118,7 +118,7 @@ def _put_inertia(scene: Scene, name: str, values: Array) -> Scene:
     return _edited(scene, "bodies", name, lambda body: replace(body, inertia=tensor))
 
 
-def _body_faults(scene: Scene, name: str, before: Scene, strict: bool) -> list[Fault]:
+def _body_faults(scene: Scene, name: str, before: Scene) -> list[Fault]:
     """An inertia that no mass distribution has."""
     body, key = scene.body(name), f"bodies.{name}.inertia"
     moments = np.linalg.eigvalsh(body.inertia)
@@ -130,7 +130,7 @@ def _body_faults(scene: Scene, name: str, before: Scene, strict: bool) -> list[F
         return [fault("inertia indefinite", key, text)]
     old = np.linalg.eigvalsh(before.body(name).inertia)
     sound = old[2] <= old[0] + old[1] + 1e-9 * float(np.abs(old).max())
-    if strict and sound and moments[2] > moments[0] + moments[1] + slack:
+    if sound and moments[2] > moments[0] + moments[1] + slack:
         return [fault("inertia triangle", key, text)]
     return []
 
@@ -172,8 +172,8 @@ def _put_spin(scene: Scene, name: str, values: Array) -> Scene:
     return _edited(scene, "bodies", name, lambda b: replace(b, twist=twist))
 
 
-def _free_only(key: str) -> Callable[[Scene, str, Scene, bool], list[Fault]]:
-    def faults(scene: Scene, name: str, _before: Scene, _strict: bool) -> list[Fault]:
+def _free_only(key: str) -> Callable[[Scene, str, Scene], list[Fault]]:
+    def faults(scene: Scene, name: str, _before: Scene) -> list[Fault]:
         joint = next((j.name for _, j in scene.all_joints() if name in (j.body1, j.body2)), None)
         if joint is None:
             return []
@@ -232,7 +232,7 @@ def _put_motion(scene: Scene, name: str, values: Array) -> Scene:
     return _edited(scene, "joints", name, lambda j: replace(j, motion=float(values[0]), rate=frozen(values)))
 
 
-def _stiffness_faults(scene: Scene, name: str, _before: Scene, _strict: bool) -> list[Fault]:
+def _stiffness_faults(scene: Scene, name: str, _before: Scene) -> list[Fault]:
     """A rotation vector has one stiffness, and rest 0."""
     joint: Joint = scene.joint(name)
     turning, key = coupling_of(joint).turning, f"joints.{name}"
@@ -241,7 +241,7 @@ def _stiffness_faults(scene: Scene, name: str, _before: Scene, _strict: bool) ->
     return faults + ([fault("rest rotation", f"{key}.rest", rest.tolist())] if np.any(about) and np.any(rest) else [])
 
 
-def _friction_faults(scene: Scene, name: str, _before: Scene, _strict: bool) -> list[Fault]:
+def _friction_faults(scene: Scene, name: str, _before: Scene) -> list[Fault]:
     moments = np.linalg.eigvalsh(scene.joint(name).friction)
     if moments.size and moments[0] < -1e-9 * float(np.abs(moments).max()):
         return [fault("friction sign", f"joints.{name}.friction", f"the eigenvalue {moments[0]:.6g}")]

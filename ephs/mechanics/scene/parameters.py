@@ -53,7 +53,8 @@ def varied(model: Model, values: Mapping[str, float], *, strict: bool = True) ->
     values
         Path -> number, in the unit of the scene file or the component.
     strict
-        Refuse an inertia that no mass distribution has, unless the body had such a one.
+        Refuse what cannot be: numbers out of their range, an inertia that no mass distribution has unless the body had
+        such a one. Differences by parameters look beyond such bounds.
 
     Raises
     ------
@@ -145,12 +146,12 @@ def _scene(scene: Scene, values: Mapping[str, float], strict: bool) -> Scene:
         least = place.field.least
         if not np.isfinite(value):
             faults.append(fault("finite", place.path, value))
-        elif least is not None and not (value > least[0] if least[1] else value >= least[0]):
+        elif strict and least is not None and not (value > least[0] if least[1] else value >= least[0]):
             faults.append(fault("range", place.path, value, what=f"a number {'>' if least[1] else '≥'} {least[0]:g}"))
         else:
             found = place.put(found, value)
-    for place in places:
-        faults += place.field.faults(found, place.name, scene, strict)
+    for place in places if strict else ():
+        faults += place.field.faults(found, place.name, scene)
     if faults:
         raise SceneError(scene.source or scene.name, faults)
     for place in places:

@@ -26,6 +26,7 @@ class Outcome(StrEnum):
     TINY = "a step below the least that is allowed"
     MANY = "more steps than are allowed"
     UNDETERMINED = "the motion is not determined"
+    RESTLESS = "no state in which nothing moves"
     EVENT = "an event's function has no value"
     INTERRUPTED = "interrupted"
 
@@ -44,6 +45,7 @@ _ADVICE = {
     Outcome.TINY: "loosen rtol and atol, lower min_step, or look for a singularity at this time",
     Outcome.MANY: "raise max_steps, or loosen rtol and atol",
     Outcome.UNDETERMINED: "add what determines it there: a storage, friction, or a constraint",
+    Outcome.RESTLESS: "start nearer to one, or add what holds it: a spring, a stop of the drive, an environment",
     Outcome.EVENT: "see the exception above this one, or give a function that is a number everywhere",
     Outcome.INTERRUPTED: "what was computed is in .partial",
 }

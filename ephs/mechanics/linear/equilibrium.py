@@ -1,0 +1,221 @@
+"""States in which nothing moves: of a scene by its forces, of a system by letting it settle."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, final
+
+import numpy as np
+
+from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.solve.errors import OptionError, Outcome, SimulationError, SolveError
+from ephs.operad import Path
+from ephs.semantics.bundle import Array, Reference
+from ephs.semantics.system import System
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from ephs.mechanics.dynamics import Dynamics, State
+
+__all__ = ["Equilibrium", "equilibrium"]
+
+ENOUGH = 1e-12
+"""Part of the forces that act which may stay unbalanced."""
+STRIDE = 0.3
+"""How far a mechanism goes in one step, in rad or m."""
+STEPS = 200
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Equilibrium:
+    """A state in which nothing moves.
+
+    Parameters
+    ----------
+    model
+        The scene at rest there; or the system, which has no state of its own.
+    states
+        Path -> value of all states: ``initial`` of `simulate`.
+    residual
+        Of a scene: the part of the forces that is not balanced. Of a system: the largest rate, per second, relative
+        to the state.
+    steps
+        How many steps led there.
+    """
+
+    model: Scene | System
+    states: Mapping[Path, Array]
+    residual: float
+    steps: int
+
+
+def equilibrium(
+    model: System | Scene,
+    *,
+    initial: "Mapping[str, ArrayLike] | None" = None,
+    inputs: Mapping[str, Any] | None = None,
+    reference: Reference | None = None,
+) -> Equilibrium:
+    """A state near by in which nothing moves.
+
+    A scene goes from its initial state, rates zero, to where gravity, springs and drives balance: by steps along the
+    eigenvectors of its stiffness in the mass metric, against the forces also where it is not stable, so that it comes
+    to rest in a minimum of the energy unless it starts balanced. A system settles by implicit Euler steps of growing
+    length, which keep its linear invariants (charges, volumes, entropies of what exchanges none).
+
+    Parameters
+    ----------
+    initial
+        Of a system: where it starts, states by path, others at the identity.
+    inputs
+        Of a system: ``{port: {"effort": e}}`` or ``{"flow": f}``, constant; zero flow at ports that are not named.
+    reference
+        The reference environment of a system.
+
+    Raises
+    ------
+    SimulationError
+        None was found: the message says what still moves, and where.
+    """
+    if isinstance(model, System):
+        return _of_system(model, initial, inputs, reference)
+    for key, value in (("initial", initial), ("inputs", inputs), ("reference", reference)):
+        if value is not None:
+            raise OptionError(key, value, "none, of a scene: vary the scene instead")
+    return _of_scene(model)
+
+
+# ---- scenes ------------------------------------------------------------------------------------------------------
+
+
+def _of_scene(scene: Scene) -> Equilibrium:
+    from ephs.mechanics.dynamics import Dynamics
+
+    moving = [name for name, joint in scene.all_joints() if joint.motion]
+    if moving:
+        raise _none(f"joints.{moving[0]}", "its motion is prescribed")
+    model = Dynamics(_resting(scene))
+    state, left, steps = _settled(model)
+    found = _at(model, state)
+    return Equilibrium(found, model.states(state), left, steps)
+
+
+def _resting(scene: Scene) -> Scene:
+    """The scene with all rates zero."""
+    joints = [*scene.all_joints(), *scene.implicit_joints()]
+    return scene.with_state(rates={name: np.zeros(joint.dim) for name, joint in joints})
+
+
+def _settled(model: "Dynamics") -> "tuple[State, float, int]":
+    """The state where forces balance; the part of them that does not; steps."""
+    from scipy.linalg import eigh
+
+    from ephs.mechanics.linear.scene import freedoms_of, unbalanced
+
+    state, shift, before = model.state0, 0.0, np.inf
+    best, stalled = np.inf, 0
+    for step in range(STEPS):
+        free = freedoms_of(model, state)
+        by, Z = model.derivatives(state), free.Z
+        left = unbalanced(model, state, free, by.force_q)
+        if left <= ENOUGH or (left <= 1e-9 and stalled >= 3):
+            return state, left, step
+        best, stalled = (left, 0) if left < 0.5 * best else (best, stalled + 1)
+        if left > before:
+            shift = max(4.0 * shift, 1e-3)
+        else:
+            shift *= 0.1
+        before = left
+        M = Z.T @ by.force_a @ Z
+        force = M @ _still(model, state)[free.which]
+        K = -M @ (by.acceleration_q @ Z)[free.which]
+        values, ways = eigh(0.5 * (K + K.T), 0.5 * (M + M.T))
+        size = np.abs(values)
+        flat = size <= 1e-10 * size.max(initial=0.0)
+        push = ways.T @ force
+        push[flat & (np.abs(push) <= 1e-9 * np.abs(push).max(initial=0.0))] = 0.0
+        stretch = push / np.where(flat, max(float(size.max(initial=0.0)), 1e-300), size + shift * size.max(initial=0.0))
+        change = Z @ (ways @ stretch)
+        change /= max(1.0, float(np.abs(change).max(initial=0.0)) / STRIDE)
+        state = _without_rates(model, model.closed(model.moved(state, change)))
+    raise _none(*_culprit(model, state))
+
+
+def _still(model: "Dynamics", state: "State") -> Array:
+    """(n,) accelerations from rest."""
+    found = model.acceleration(state)
+    out = np.zeros(model.layout.n)
+    for name, where in model.freedoms.items():
+        out[where] = found[name][: where.size]
+    return out
+
+
+def _without_rates(model: "Dynamics", state: "State") -> "State":
+    q, r, s = model.layout.split(state.array)
+    return model.unpack(np.concatenate([q, np.zeros_like(r), s]))
+
+
+def _culprit(model: "Dynamics", state: "State") -> tuple[str, str]:
+    """The joint that accelerates most from rest, and how."""
+    found = {name: float(np.abs(a).max(initial=0.0)) for name, a in model.acceleration(state).items()}
+    name = max(found, key=lambda n: found[n])
+    what = f"from rest it still accelerates by {found[name]:.3g} rad/s² or m/s²"
+    driven = [n for n, joint in model.scene.all_joints() if np.any(joint.drive) and not np.any(joint.stiffness)]
+    if driven:
+        what += f"; the constant drive of {', '.join(driven)} is balanced nowhere"
+    return f"joints.{name}", what
+
+
+def _at(model: "Dynamics", state: "State") -> Scene:
+    """The scene in a state."""
+    coordinates = {name: state.coordinates[name] for name in model.joints if state.coordinates[name].size}
+    known = {name for name, _ in [*model.scene.all_joints(), *model.scene.implicit_joints()]}
+    return model.scene.with_state(
+        {name: value for name, value in coordinates.items() if name in known and name not in model.cut}, adjust=True
+    )
+
+
+# ---- systems -----------------------------------------------------------------------------------------------------
+
+
+def _of_system(
+    system: System,
+    initial: "Mapping[str, ArrayLike] | None",
+    inputs: Mapping[str, Any] | None,
+    reference: Reference | None,
+) -> Equilibrium:
+    from ephs.mechanics.linear.pencil import Pencil, system_problem
+
+    problem = system_problem(system, initial, inputs, reference)
+    pencil, d = Pencil(problem), problem.descriptor
+    x, h = d.pack(problem.initial), 1e-3
+    z, size, left, done = np.zeros(pencil.model.unknowns), 0.0, np.inf, 0
+    try:
+        for step in range(STEPS):
+            done = step
+            found = pencil.implicit_step(x, z, h)
+            if found is None:
+                h *= 0.25
+                if h < 1e-12:
+                    break
+                continue
+            z, before = found, x
+            x = d.advance(x, h * z[: pencil.n_w])
+            size = max(float(np.abs(x).max(initial=0.0)), 1e-9)
+            moved = float(np.abs(x - before).max(initial=0.0)) / size
+            left = float(np.abs(z[: pencil.n_w][pencil.counted]).max(initial=0.0)) / size
+            if not np.isfinite(left) or size > 1e12:
+                break
+            if h >= 1e6 and left <= 1e-12:
+                return Equilibrium(system, d.unpack(x), left, step)
+            h = min(h * (4.0 if moved < 0.5 else 1.5), 1e12)
+    except SolveError as error:
+        raise _none(error.path, error.equation or error.outcome.value) from error.cause
+    fastest = max(d.states, key=lambda slot: float(np.abs(z[slot.rates]).max(initial=0.0)))
+    rate = float(np.abs(z[fastest.rates]).max(initial=0.0))
+    raise _none(str(fastest.path), f"after {done} steps it still changes by {rate:.3g} a second")
+
+
+def _none(path: str, what: str) -> SimulationError:
+    return SimulationError(Outcome.RESTLESS, 0.0, path, what, None)

@@ -1,0 +1,359 @@
+"""A scene linearised in joint coordinates.
+
+Small motions about a state are η, increments of a choice of independent freedoms, and ρ, of their rates: the tree's
+joints move by δq = Z η (left-trivialised) and change their rates by δr = Z ρ + Y η, so that loops stay closed and
+prescribed joints follow their motion. Freedoms are chosen so that Z, the identity on them, is small: by pivots of the
+constraints' rows in the mass metric. With δq' = δr − ad_r δq the derivatives of `Dynamics` give A; nothing is
+differenced but outputs' own turning, and that only where the mechanism moves.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from types import MappingProxyType
+from typing import Any, final
+
+import numpy as np
+
+from ephs.mechanics.dynamics import Derivatives, Dynamics, State
+from ephs.mechanics.linear.statespace import StateSpace
+from ephs.mechanics.linear.structure import PortHamiltonian
+from ephs.mechanics.scene.errors import did_you_mean, listing
+from ephs.mechanics.scene.model import GROUND, Scene
+from ephs.mechanics.simulate import problem_of_scene
+from ephs.mechanics.solve.errors import OptionError
+from ephs.mechanics.solve.model import compile_model
+from ephs.mechanics.solve.natural import stored_energies
+from ephs.mechanics.solve.replay import replay
+from ephs.mechanics.solve.solution import Solution
+from ephs.mechanics.solve.sparse import Index
+from ephs.mechanics.solve.stepping import Row
+from ephs.semantics.bundle import Array
+
+__all__ = ["Freedoms", "freedoms_of", "linear_scene", "unbalanced"]
+
+BALANCED = 1e-7
+"""Part of the forces that act by which a state may be off balance and still count as an equilibrium."""
+ROUNDED = 1e-9
+"""Part of the largest entry by which a stiffness may be off symmetric: what chains of differentiated poses leave."""
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Freedoms:
+    """The independent freedoms at a state.
+
+    Parameters
+    ----------
+    which
+        (k,) their places among the tree's n freedoms.
+    Z
+        (n, k) what they do to all: the identity on ``which``, zero for the rows of the constraints.
+    """
+
+    which: Index
+    Z: Array
+
+
+def freedoms_of(model: Dynamics, state: State) -> Freedoms:
+    """Independent freedoms, by pivoting in the mass metric."""
+    from scipy.linalg import qr, solve_triangular
+
+    found, n = model.constraints(state), model.layout.n
+    if not found.rank:
+        return Freedoms(np.arange(n), np.eye(n))
+    light = 1.0 / np.sqrt(np.diag(model.mass_matrix(state)))
+    factors: Any = qr(found.rows * light, mode="economic", pivoting=True)
+    upper, order, rank = np.asarray(factors[1]), np.asarray(factors[2], dtype=np.int64), found.rank
+    dependent, which = order[:rank], np.sort(order[rank:])
+    place = {int(j): i for i, j in enumerate(order[rank:])}
+    rest = -np.asarray(solve_triangular(upper[:rank, :rank], upper[:rank, rank:]), dtype=float)[
+        :, [place[int(j)] for j in which]
+    ]
+    Z = np.zeros((n, which.size))
+    Z[which, np.arange(which.size)] = 1.0
+    Z[dependent] = light[dependent][:, None] * rest / light[which]
+    return Freedoms(which, Z)
+
+
+def unbalanced(model: Dynamics, state: State, free: Freedoms, stiffness: Array) -> float:
+    """What of the forces is not balanced at rest in a state, relative to all that act; 0 where nothing acts.
+
+    Weights act at their arms, and all else counts with what ``stiffness`` (n, n) makes of it over 1 rad or m: forces
+    that balance each other may vanish one by one.
+    """
+    q, r, s = _split(model, state)
+    rest = model.unpack(np.concatenate([q, np.zeros_like(r), s]))
+    gravity, applied = model.gravity(rest), model.applied(rest)
+    terms = np.abs(applied) + np.abs(stiffness).sum(axis=1)
+    for name, body in model.scene.all_bodies():
+        arms = np.linalg.norm(model.jacobian(rest, name)[3:], axis=0)
+        terms += arms * body.mass * float(np.linalg.norm(model.scene.world.gravity))
+    left, terms = free.Z.T @ (applied - gravity), np.abs(free.Z.T) @ terms
+    return float(np.abs(left).max(initial=0.0) / (terms.max(initial=0.0) or 1.0))
+
+
+def linear_scene(
+    scene: Scene, state: State | None, inputs: Sequence[str] | None, outputs: Sequence[str] | None
+) -> StateSpace:
+    """See `ephs.linearize`."""
+    model = Dynamics(scene)
+    at = model.state0 if state is None else model.closed(state)
+    return _Linear(model, at, inputs, outputs).whole()
+
+
+@final
+class _Linear:
+    """One linearisation: what its parts share."""
+
+    def __init__(
+        self, model: Dynamics, state: State, inputs: Sequence[str] | None, outputs: Sequence[str] | None
+    ) -> None:
+        self.model, self.state = model, state
+        self.free = freedoms_of(model, state)
+        self.k, self.n = self.free.which.size, model.layout.n
+        _, self.r, _ = _split(model, state)
+        self.moving = bool(np.any(self.r))
+        self.nodes = [i for i, path in enumerate(model.layout.entropies) if tuple(path)[-3:-2] == ("thermal",)]
+        self.ad = self._ad()
+        self.turned = self._turned()
+        prescribed = {name for name, joint in model.scene.all_joints() if joint.motion is not None}
+        default = tuple(f"joints.{name}" for name in model.joints if name not in prescribed and self._dim(name))
+        self.inputs = default if inputs is None else tuple(inputs)
+        self.outputs = self.inputs if outputs is None else tuple(outputs)
+
+    # ---- the states --------------------------------------------------------------------------------------------
+
+    def _dim(self, joint: str) -> int:
+        return int(self.model.layout.freedoms[joint].size)
+
+    def _ad(self) -> Array:
+        """(n, n) ad_r, joint by joint."""
+        out = np.zeros((self.n, self.n))
+        for name, parts in self.model.layout.edges.items():
+            where, at = self.model.layout.freedoms[name], 0
+            for _, edge in parts:
+                own = where[at : at + edge.pair.dim]
+                at += edge.pair.dim
+                if own.size and own[0] < self.n:
+                    out[np.ix_(own, own)] = edge.pair.manifold.ad(self.r[own])
+        return out
+
+    def _turned(self) -> Array:
+        """(n, k) Y: how the dependent rates change with the configuration while the independent ones do not.
+
+        The rows G on the rates obey X_v(G r) = ¼ (b(v + r) − b(v − r)) + ½ G ad_v r with b(r) = Ġ r quadratic.
+        """
+        out = np.zeros((self.n, self.k))
+        found = self.model.constraints(self.state)
+        if not (self.moving and found.rank):
+            return out
+        q, r, s = _split(self.model, self.state)
+        size = max(1e-3, float(np.abs(r).max()))
+
+        def turning(rates: Array) -> Array:
+            return -self.model.constraints(self.model.unpack(np.concatenate([q, rates, s]))).target
+
+        change = np.zeros((found.rows.shape[0], self.k))
+        for j in range(self.k):
+            v = size * self.free.Z[:, j]
+            sym = 0.25 * (turning(v + r) - turning(v - r))
+            change[:, j] = (sym - 0.5 * found.rows @ (self.ad @ v)) / size
+        dependent = np.setdiff1d(np.arange(self.n), self.free.which)
+        out[dependent] = -np.linalg.lstsq(found.rows[:, dependent], change, rcond=1e-10)[0]
+        return out
+
+    # ---- the matrices ------------------------------------------------------------------------------------------
+
+    def whole(self) -> StateSpace:
+        """The linear system."""
+        Z, Y, E = self.free.Z, self.turned, self.free.which
+        by = self.model.derivatives(self.state)
+        A = np.zeros((2 * self.k + len(self.nodes),) * 2)
+        place, rate, warm = slice(0, self.k), slice(self.k, 2 * self.k), slice(2 * self.k, None)
+        A[place, place] = -(self.ad @ Z)[E]
+        A[place, rate] = np.eye(self.k)
+        A[rate, place] = (by.acceleration_q @ Z + by.acceleration_r @ Y)[E]
+        A[rate, rate] = (by.acceleration_r @ Z)[E]
+        A[rate, warm] = by.acceleration_s[E][:, self.nodes]
+        A[warm, place] = (by.entropy_q @ Z + by.entropy_r @ Y)[self.nodes]
+        A[warm, rate] = (by.entropy_r @ Z)[self.nodes]
+        A[warm, warm] = by.entropy_s[np.ix_(self.nodes, self.nodes)]
+        B, C, names_in, names_out = self._ports(by.acceleration_force)
+        structure, reason, A = self._structure(A, by)
+        return StateSpace(
+            self.model.scene.name, A, B, C, np.zeros((C.shape[0], B.shape[1])), self._names(), names_in, names_out,
+            structure, reason, MappingProxyType(self._shapes()),
+            MappingProxyType({str(path): value for path, value in self.model.states(self.state).items()}),
+            partial(_play, self),
+        )  # fmt: skip
+
+    def _ports(self, by_force: Array) -> tuple[Array, Array, tuple[str, ...], tuple[str, ...]]:
+        B, C, given, seen = [], [], [], []
+        for name in self.inputs:
+            jacobian, of_place = self._port(name)
+            if of_place:
+                raise OptionError("inputs", name, "a joint, a body or a marker")
+            force = by_force @ jacobian(self.state).T
+            B.append(np.vstack([np.zeros((self.k, force.shape[1])), force[self.free.which], self._still(force)]))
+            given += _numbered(name, force.shape[1])
+        for name in self.outputs:
+            jacobian, of_place = self._port(name)
+            C.append(self._seen(jacobian, of_place))
+            seen += _numbered(name, C[-1].shape[0])
+        size = 2 * self.k + len(self.nodes)
+        return (
+            np.hstack([np.zeros((size, 0)), *B]),
+            np.vstack([np.zeros((0, size)), *C]),
+            tuple(given),
+            tuple(seen),
+        )
+
+    def _still(self, force: Array) -> Array:
+        return np.zeros((len(self.nodes), force.shape[1]))
+
+    def _seen(self, jacobian: Callable[[State], Array], of_place: bool) -> Array:
+        """Rows of C of a displacement, or of a rate."""
+        here, warm = jacobian(self.state), np.zeros((jacobian(self.state).shape[0], len(self.nodes)))
+        if of_place:
+            return np.hstack([here @ self.free.Z, np.zeros((here.shape[0], self.k)), warm])
+        by_place = here @ self.turned
+        if self.moving:
+            by_place = by_place + self._along(lambda state: jacobian(state) @ self.r)
+        return np.hstack([by_place, here @ self.free.Z, warm])
+
+    def _along(self, function: Callable[[State], Array]) -> Array:
+        """The derivative of a function of the configuration along the freedoms, by differences of fourth order."""
+        columns = []
+        for column in self.free.Z.T:
+            at = {k: function(self.model.moved(self.state, 1e-3 * k * column)) for k in (-2, -1, 1, 2)}
+            columns.append((8.0 * (at[1] - at[-1]) - (at[2] - at[-2])) / 12e-3)
+        return np.array(columns).T.reshape(-1, self.k)
+
+    def _port(self, name: str) -> tuple[Callable[[State], Array], bool]:
+        """The Jacobian (d, n) of a port from the tree's rates, and whether its place is meant, not its rate."""
+        kind, _, rest = name.partition(".")
+        words = {"joints": ".coordinate", "bodies": ".position", "markers": ".position"}
+        scene, model = self.model.scene, self.model
+        known = {
+            "joints": [n for n in model.joints if self._dim(n)],
+            "bodies": [n for n, _ in scene.all_bodies()],
+            "markers": [n for n, marker in scene.all_markers() if marker.body != GROUND],
+        }
+        for suffix in ("", words.get(kind, "")):
+            own = rest.removesuffix(suffix) if rest.endswith(suffix) else rest
+            if own in known.get(kind, ()) and (own + suffix == rest):
+                if kind == "joints":
+                    return partial(self._joint, own), bool(suffix)
+                if kind == "markers":
+                    marker = dict(scene.all_markers())[own]
+                    return partial(_point, model, marker.body, marker.at), bool(suffix)
+                if suffix:
+                    return partial(_point, model, own, np.zeros(3)), True
+                return partial(_twist, model, own), False
+        every = [f"{key}.{n}" for key, found in known.items() for n in found]
+        raise OptionError("port", name, f"{did_you_mean(name, every, listing(every))}")
+
+    def _joint(self, name: str, state: State) -> Array:
+        """(d, n) a joint's rates by the tree's: some of them, or of a joint that closes a loop what they do to it."""
+        where = self.model.layout.freedoms[name]
+        if name not in self.model.cut or where[0] < self.n:
+            return np.eye(self.n)[where]
+        q, _, s = _split(self.model, state)
+        columns = [self.model.unpack(np.concatenate([q, unit, s])).rates[name] for unit in np.eye(self.n)]
+        return np.array(columns).T
+
+    # ---- energy and dissipation --------------------------------------------------------------------------------
+
+    def _structure(self, A: Array, by: Derivatives) -> tuple[PortHamiltonian | None, str, Array]:
+        """The structure, or why there is none; and A, which with a structure is (J − R) Q to rounding."""
+        if self.moving:
+            return None, "the mechanism moves in this state", A
+        off = unbalanced(self.model, self.state, self.free, by.force_q)
+        if off > BALANCED:
+            return None, f"{off:.1e} of the forces is not balanced in this state", A
+        k = self.k
+        place, rate, warm = slice(0, k), slice(k, 2 * k), slice(2 * k, None)
+        M = self.free.Z.T @ by.force_a @ self.free.Z
+        K, still = -M @ A[rate, place], np.linalg.inv(M)
+        if np.abs(K - K.T).max(initial=0.0) > ROUNDED * np.abs(K).max(initial=0.0):
+            return None, "the forces in this state have no potential", A
+        if np.abs(A[warm, place]).max(initial=0.0) > 0.0 or np.abs(A[rate, warm]).max(initial=0.0) > 0.0:
+            return None, "heat acts on the motion in this state", A
+        Q, J, R = np.zeros_like(A), np.zeros_like(A), np.zeros_like(A)
+        Q[place, place], Q[rate, rate] = 0.5 * (K + K.T), M
+        J[place, rate], J[rate, place] = still, -still
+        drag = A[rate, rate] @ still
+        J[rate, rate], R[rate, rate] = 0.5 * (drag - drag.T), -0.5 * (drag + drag.T)
+        if self.nodes:
+            heat = np.array([self._warming(i) for i in self.nodes])
+            Q[warm, warm] = np.diag(heat)
+            flow = -A[warm, warm] / heat
+            if np.abs(flow - flow.T).max() > ROUNDED * np.abs(flow).max():
+                return None, "the thermal nodes are not in equilibrium", A
+            R[warm, warm] = 0.5 * (flow + flow.T)
+        least = np.linalg.eigvalsh(R).min(initial=0.0)
+        if least < -ROUNDED * np.abs(R).max(initial=0.0):
+            return None, "what dissipates in this state is not a friction", A
+        return PortHamiltonian(J, R, Q), "", (J - R) @ Q
+
+    def _warming(self, entropy: int) -> float:
+        """dθ/ds of a thermal node in K²/J."""
+        path = self.model.layout.entropies[entropy]
+        node = dict(self.model.scene.all_thermal())[".".join([*path[1:-3:2], str(path[-2])])]
+        s = float(_split(self.model, self.state)[2][entropy])
+        return node.temperature * float(np.exp(s / node.capacity)) / node.capacity
+
+    # ---- names and shapes --------------------------------------------------------------------------------------
+
+    def _names(self) -> tuple[str, ...]:
+        """The names of the states: coordinates, rates, entropies."""
+        of: dict[int, tuple[str, str]] = {}
+        for name, where in self.model.layout.freedoms.items():
+            for i, at in enumerate(where.tolist()):
+                of[at] = name, f"[{i}]" if where.size > 1 else ""
+        chosen = [of[int(i)] for i in self.free.which]
+        return tuple(
+            [f"joints.{name}.{key}{number}" for key in ("coordinate", "rate") for name, number in chosen]
+            + [str(self.model.layout.entropies[i]) for i in self.nodes]
+        )
+
+    def _shapes(self) -> Mapping[str, Array]:
+        """What the states do to the places of joints and bodies."""
+        rest = np.zeros((self.n, self.k + len(self.nodes)))
+        whole = np.hstack([self.free.Z, rest])
+        model = self.model
+        out = {f"joints.{name}": self._joint(name, self.state) @ whole for name in model.joints if self._dim(name)}
+        out |= {f"bodies.{name}": model.jacobian(self.state, name) @ whole for name in model.bodies(self.state)}
+        warm = np.eye(2 * self.k + len(self.nodes))[2 * self.k :]
+        return out | {str(model.layout.entropies[i]): warm[j : j + 1] for j, i in enumerate(self.nodes)}
+
+
+def _point(model: Dynamics, body: str, at: Array, state: State) -> Array:
+    return model.jacobian(state, body, at)
+
+
+def _twist(model: Dynamics, body: str, state: State) -> Array:
+    return model.jacobian(state, body)
+
+
+def _split(model: Dynamics, state: State) -> tuple[Array, Array, Array]:
+    return model.layout.split(state.array)
+
+
+def _numbered(name: str, count: int) -> list[str]:
+    return [f"{name}[{i}]" for i in range(count)] if count > 1 else [name]
+
+
+def _play(linear: _Linear, t: Array, moved: Array) -> Solution:
+    """The mechanism along some displacements (frames, states) of the state."""
+    problem = problem_of_scene(linear.model.scene)
+    model = compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
+    rows: list[Row] = []
+    for row in moved:
+        at = linear.model.moved(linear.state, linear.free.Z @ row[: linear.k])
+        q, _, s = _split(linear.model, at)
+        at = linear.model.unpack(np.concatenate([q, linear.free.Z @ row[linear.k : 2 * linear.k], s]))
+        x = problem.descriptor.pack(linear.model.states(linear.model.closed(at)))
+        rows.append(Row(x, stored_energies(model, x), np.zeros(4)))
+    return replay(problem, t, rows, "mode")

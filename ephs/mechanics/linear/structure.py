@@ -1,0 +1,87 @@
+"""The energy and dissipation structure of a linear system: ẋ = (J − R) Q x + B u, y = Bᵀ Q x + D u."""
+
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from ephs.semantics.bundle import Array
+
+__all__ = ["Law", "PortHamiltonian", "laws_of"]
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Law:
+    """An equation with both of its sides; ``scale`` is the size of the terms that made them."""
+
+    name: str
+    left: Array
+    right: Array
+    scale: float
+
+    @property
+    def defect(self) -> float:
+        """The largest difference of the sides, relative to the terms'."""
+        return float(np.abs(self.left - self.right).max(initial=0.0)) / max(self.scale, float(np.finfo(float).tiny))
+
+    def holds(self, rounding: float = 1e-12) -> bool:
+        """Whether the sides agree to rounding."""
+        return self.defect <= rounding
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class PortHamiltonian:
+    """What makes a linear system port-Hamiltonian: ½ xᵀ Q x is the exergy about an equilibrium, to second order.
+
+    Parameters
+    ----------
+    J
+        (n, n) skew: reversible exchange.
+    R
+        (n, n) symmetric, not negative: dissipation of exergy is (Q x)ᵀ R (Q x).
+    Q
+        (n, n) symmetric: the Hessian of the exergy on what the constraints allow, stiffness of preloads included.
+    """
+
+    J: Array
+    R: Array
+    Q: Array
+
+    def exergy(self, x: Array) -> float:
+        """½ xᵀ Q x in J."""
+        return 0.5 * float(x @ self.Q @ x)
+
+    def dissipation(self, x: Array) -> float:
+        """(Q x)ᵀ R (Q x) in W, never negative."""
+        effort = self.Q @ x
+        return float(effort @ self.R @ effort)
+
+
+def laws_of(A: Array, B: Array, C: Array, D: Array, ph: PortHamiltonian, conjugate: bool) -> tuple[Law, ...]:
+    """The laws of the structure, both sides of each.
+
+    Parameters
+    ----------
+    conjugate
+        Whether the outputs are the inputs' power conjugates.
+    """
+    J, R, Q = ph.J, ph.R, ph.Q
+    least = np.asarray(np.linalg.eigvalsh(0.5 * (R + R.T)), dtype=float)
+    out = [
+        Law("A = (J − R) Q", A, (J - R) @ Q, _size((np.abs(J) + np.abs(R)) @ np.abs(Q))),
+        Law("J is skew", J, -J.T, _size(J) + _size(R)),
+        Law("R is symmetric", R, R.T, _size(J) + _size(R)),
+        Law("Q is symmetric", Q, Q.T, _size(Q)),
+        Law("R is not negative", np.minimum(least, 0.0), np.zeros_like(least), _size(J) + _size(R)),
+    ]
+    if conjugate:
+        gain = np.asarray(np.linalg.eigvalsh(D + D.T), dtype=float)
+        out.append(Law("C = Bᵀ Q", C, B.T @ Q, _size(np.abs(B.T) @ np.abs(Q))))
+        out.append(Law("D + Dᵀ is not negative", np.minimum(gain, 0.0), np.zeros_like(gain), _size(D)))
+    return tuple(out)
+
+
+def _size(matrix: Array) -> float:
+    return float(np.abs(matrix).max(initial=0.0))

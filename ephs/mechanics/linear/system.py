@@ -1,0 +1,224 @@
+"""A system linearised in its states.
+
+What its states may do, x = X ξ, is spanned by independent states, so that X is the identity on them. The balances then
+give ξ̇, with least-norm multipliers, whatever is redundant. States of the environment act on nothing and are left out.
+"""
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, final
+
+import numpy as np
+
+from ephs.mechanics.linear.pencil import Parts, Pencil, system_problem
+from ephs.mechanics.linear.statespace import StateSpace
+from ephs.mechanics.linear.structure import PortHamiltonian
+from ephs.mechanics.scene.errors import did_you_mean, listing
+from ephs.mechanics.solve.errors import OptionError, SimulationError, SolveError
+from ephs.mechanics.solve.model import Model
+from ephs.mechanics.solve.natural import stored_energies
+from ephs.mechanics.solve.problem import Problem
+from ephs.mechanics.solve.replay import replay
+from ephs.mechanics.solve.solution import Solution
+from ephs.mechanics.solve.sparse import Index
+from ephs.mechanics.solve.stepping import Row
+from ephs.semantics.bundle import Array, Reference
+from ephs.semantics.primitives import Storage
+from ephs.semantics.spaces import manifold
+from ephs.semantics.system import System
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+__all__ = ["linear_system"]
+
+RANK = 1e-10
+"""Singular values below this part of the largest count as zero."""
+NEGATIVE = 1e-9
+"""Part of the largest entry by which what must vanish, or not be negative, may be off: rounding of eliminations."""
+
+
+def linear_system(
+    system: System,
+    states: "Mapping[Any, ArrayLike] | None",
+    inputs: "Sequence[str] | Mapping[str, Any] | None",
+    outputs: Sequence[str] | None,
+    reference: Reference | None,
+    name: str = "system",
+) -> StateSpace:
+    """See `ephs.linearize`."""
+    if inputs is not None and not isinstance(inputs, Mapping):
+        raise OptionError("inputs", inputs, "{port: {'effort': e}} or {port: {'flow': f}}, of a system")
+    problem = system_problem(system, states, inputs, reference, name)
+    try:
+        return _Linear(Pencil(problem), problem.descriptor.pack(problem.initial)).whole(outputs)
+    except SolveError as error:
+        raise SimulationError(error.outcome, 0.0, error.path, error.equation, None) from error.cause
+
+
+@final
+class _Linear:
+    """One linearisation."""
+
+    def __init__(self, pencil: Pencil, x: Array) -> None:
+        self.pencil, self.x = pencil, x
+        d = pencil.problem.descriptor
+        self.z = pencil.unknowns(x)
+        self.parts = pencil.parts(x, self.z)
+        if held := pencil.differentiated(self.parts):
+            expected = "the other of effort and flow there: as it is, its derivative would act on the states"
+            raise OptionError("inputs", ", ".join(held), expected)
+        still = [
+            i for slot in d.components if isinstance(slot.primitive, Storage) and slot.primitive.environment
+            for state in slot.reads for i in range(state.rates.start, state.rates.stop)
+        ]  # fmt: skip
+        self.left_out = np.array(still, dtype=np.int64)
+        self.which = pencil.independent(self.parts, self.left_out)
+        self.X = pencil.span(self.parts, self.which, self.left_out)
+        self.k = self.which.size
+
+    def whole(self, outputs: Sequence[str] | None) -> StateSpace:
+        """The linear system."""
+        p, X, k, pencil = self.parts, self.X, self.k, self.pencil
+        rows, by_states, by_inputs = pencil.algebraic(p)
+        back = np.linalg.pinv(rows, rcond=RANK)  # efforts, multipliers, outer flows: a = by ξ and u, and W c
+        by = back @ np.hstack([by_states @ X, by_inputs])
+        W = _kernel(rows)
+        moving = np.hstack([X, np.eye(pencil.n_w)[:, self.left_out]])
+        acting = np.hstack([p.flow_efforts, p.flow_multipliers])
+        matrix = np.hstack([p.flow_rates @ moving, acting @ W])
+        right = np.hstack([-(p.flow_rates @ self._turning() + p.flow_states @ X), p.force]) - acting @ by
+        found = _solved(matrix[p.stored], right[p.stored], k)
+        whole = by + W @ found[moving.shape[1] :]
+        efforts, flows = whole[: pencil.n_e], whole[pencil.n_e + pencil.n_l :]
+        A, B = found[:k, :k], found[:k, k:]
+        names_in = self._names_in()
+        C, D, names_out = self._outputs(outputs, efforts, flows)
+        structure, reason = _structure(p, X, self.which, A)
+        if structure is not None:
+            A = (structure.J - structure.R) @ structure.Q
+        d = pencil.problem.descriptor
+        return StateSpace(
+            pencil.problem.name, A, B, C, D, self._names(), names_in, names_out, structure, reason,
+            MappingProxyType({str(slot.path): X[slot.rates] for slot in d.states if slot.quantity.space.dim}),
+            MappingProxyType({str(path): value.copy() for path, value in d.unpack(self.x).items()}),
+            partial(_play, pencil.problem, pencil.model, self.x, X),
+        )  # fmt: skip
+
+    def _turning(self) -> Array:
+        """(n_w, k) Ẋ + ad_w X: what a state that moves adds to the rates' changes δw = X ξ̇ + …"""
+        pencil, d = self.pencil, self.pencil.problem.descriptor
+        out, w = np.zeros_like(self.X), self.parts.rates
+        speed = float(np.abs(w).max(initial=0.0))
+        if speed <= 1e-12:
+            return out
+        for slot in d.states:
+            out[slot.rates] = manifold(slot.quantity.space).ad(w[slot.rates]) @ self.X[slot.rates]
+        if self.k + self.left_out.size < pencil.n_w:  # by differences of fourth order
+            h = 1e-3 / max(1.0, speed)
+            spans: dict[int, Array] = {}
+            for step in (-2, -1, 1, 2):
+                x = d.advance(self.x, step * h * w)
+                spans[step] = pencil.span(pencil.parts(x, pencil.unknowns(x)), self.which, self.left_out)
+            out += (8.0 * (spans[1] - spans[-1]) - (spans[2] - spans[-2])) / (12.0 * h)
+        return out
+
+    def _names(self) -> tuple[str, ...]:
+        names = [""] * self.pencil.n_w
+        for slot in self.pencil.problem.descriptor.states:
+            names[slot.rates] = _numbered(str(slot.path), slot.quantity.space.dim)
+        return tuple(names[int(i)] for i in self.which)
+
+    def _names_in(self) -> tuple[str, ...]:
+        ports = self.pencil.ports
+        return tuple(name for slot, _ in ports for name in _numbered(str(slot.path), slot.quantity.space.dim))
+
+    def _outputs(
+        self, wanted: Sequence[str] | None, efforts: Array, flows: Array
+    ) -> tuple[Array, Array, tuple[str, ...]]:
+        """C, D and names: of ports the power conjugate of what is prescribed there, of states their change."""
+        rows: dict[str, Array] = {}
+        at, width = 0, efforts.shape[1] - self.k
+        for slot, effort in self.pencil.ports:
+            dim = slot.quantity.space.dim
+            rows[str(slot.path)] = flows[at : at + dim] if effort else efforts[slot.efforts]
+            at += dim if effort else 0
+        ports = tuple(rows)
+        for slot in self.pencil.problem.descriptor.states:
+            rows.setdefault(str(slot.path), np.hstack([self.X[slot.rates], np.zeros((slot.quantity.space.dim, width))]))
+        for name in wanted or ():
+            if name not in rows:
+                raise OptionError("outputs", name, did_you_mean(name, rows, f"one of {listing(rows)}"))
+        chosen = ports if wanted is None else tuple(wanted)
+        whole = np.vstack([np.zeros((0, self.k + width)), *(rows[name] for name in chosen)])
+        names = tuple(numbered for name in chosen for numbered in _numbered(name, rows[name].shape[0]))
+        return whole[:, : self.k], whole[:, self.k :], names
+
+
+def _structure(p: Parts, X: Array, which: Index, A: Array) -> tuple[PortHamiltonian | None, str]:
+    """J, R and Q on the independent states, or why there are none.
+
+    Efforts that satisfy the conditions are e = V c, those of storages ε = P c with P = T V. Balances projected on V
+    have no multipliers; eliminating what P does not see of c leaves ẋ = 𝒥 ε on the range of P, and multipliers across
+    it, which Π, the projection onto the conditions along them, takes out.
+    """
+    size = np.abs(A).max(initial=0.0)
+    turned = max(np.abs(p.flow_states @ X).max(initial=0.0), np.abs(p.hold_states @ X).max(initial=0.0))
+    if turned > NEGATIVE * max(1.0, np.abs(p.flow_efforts).max(initial=0.0)):
+        return None, "exchange or dissipation depends on the state in this state"
+    if np.abs(p.Q - p.Q.T).max(initial=0.0) > NEGATIVE * np.abs(p.Q).max(initial=0.0):
+        return None, "a potential pushes a state on a group, where it has no Hessian"
+    V = _kernel(p.hold)
+    P, N = p.T @ V, V.T @ p.flow_efforts @ V
+    back, W = np.linalg.pinv(P, rcond=RANK), _kernel(P)
+    returned = W.T @ N @ W
+    inner = N - N @ W @ np.linalg.pinv(returned, rcond=RANK) @ W.T @ N
+    flow = -back.T @ inner @ back
+    across = np.hstack([_kernel(P.T), back.T @ N @ W @ _kernel(returned)])
+    held = across.T @ p.Q @ across
+    project = np.eye(len(X)) - across @ np.linalg.pinv(held, rcond=RANK) @ across.T @ p.Q
+    whole = (project @ flow @ project.T)[np.ix_(which, which)]
+    Q = X.T @ p.Q @ X
+    J, R, Q = 0.5 * (whole - whole.T), -0.5 * (whole + whole.T), 0.5 * (Q + Q.T)
+    if np.linalg.eigvalsh(R).min(initial=0.0) < -NEGATIVE * np.abs(whole).max(initial=0.0):
+        return None, "entropy is produced in this state"
+    if np.abs((J - R) @ Q - A).max(initial=0.0) > 1e-7 * max(size, 1e-300):
+        return None, "stored exergy does not determine what is dissipated in this state"
+    return PortHamiltonian(J, R, Q), ""
+
+
+def _kernel(matrix: Array) -> Array:
+    """An orthonormal basis (n, k) of what a matrix takes to zero."""
+    if not matrix.size:
+        return np.eye(matrix.shape[1])
+    _, sigma, vt = np.linalg.svd(matrix)
+    return vt[int(np.sum(sigma > RANK * sigma.max(initial=0.0))) :].T
+
+
+def _solved(matrix: Array, right: Array, count: int) -> Array:
+    """The solution of least norm; the first ``count`` unknowns must be determined.
+
+    Raises
+    ------
+    OptionError
+        They are not: efforts or rates are not determined by the equations.
+    """
+    size = np.maximum(np.abs(matrix).max(axis=1, initial=0.0), 1e-300)[:, None]
+    found = np.linalg.lstsq(matrix / size, right / size, rcond=1e-12)[0]
+    loose = _kernel(matrix / size)[:count]
+    off = np.abs(matrix @ found - right).max(initial=0.0)
+    if np.abs(loose).max(initial=0.0) > 1e-6 or off > 1e-6 * max(1.0, np.abs(right).max(initial=0.0)):
+        raise OptionError("model", "equations that do not determine its rates", "a system whose motion is determined")
+    return found
+
+
+def _numbered(name: str, count: int) -> list[str]:
+    return [f"{name}[{i}]" for i in range(count)] if count > 1 else [name] * count
+
+
+def _play(problem: Problem, model: Model, x: Array, X: Array, t: Array, moved: Array) -> Solution:
+    """The system along some displacements (frames, states) of the state."""
+    xs = [problem.descriptor.advance(x, X @ row) for row in moved]
+    rows = [Row(point, stored_energies(model, point), np.zeros(4)) for point in xs]
+    return replay(problem, t, rows, "mode")

@@ -1,0 +1,157 @@
+"""One problem and its neighbours in the parameters, and differences along them.
+
+Derivatives by a parameter are differences of fourth order over neighbours a thousandth of its size apart: exact for
+what is polynomial in it to that order, as equations of motion mostly are, and good to 1e-11 for what is not.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, final
+
+import numpy as np
+
+from ephs.mechanics.scene.errors import SceneError
+from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.scene.parameters import read, varied
+from ephs.mechanics.simulate import problem_of_scene, problem_of_system
+from ephs.mechanics.solve.errors import OptionError
+from ephs.mechanics.solve.problem import Problem
+from ephs.operad import Path
+from ephs.semantics.bundle import Array, Reference
+from ephs.semantics.errors import StructureError
+from ephs.semantics.system import System
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+__all__ = ["CENTRAL", "Family", "Parameter", "Stencil", "difference"]
+
+Stencil = tuple[tuple[int, float], ...]
+"""Multiples of a step, and their weights in a first derivative."""
+CENTRAL: Stencil = ((-2, 1.0 / 12.0), (-1, -2.0 / 3.0), (1, 2.0 / 3.0), (2, -1.0 / 12.0))
+FORWARD: Stencil = ((0, -25.0 / 12.0), (1, 4.0), (2, -3.0), (3, 4.0 / 3.0), (4, -0.25))
+RELATIVE = 1e-3
+"""A neighbour's distance, relative to the parameter, or absolute where that is zero."""
+SIGNED = ("position", "at", "at1", "at2", "coordinate", "rate", "rest", "drive", "gravity", "velocity")
+LEAST = 0.1
+"""What numbers of a scene that may have either sign count at least for, in m, rad, s, N: near zero they say nothing of
+their own size."""
+
+
+def difference(function: Callable[[int], Array], stencil: Stencil, step: float) -> Array:
+    """The derivative of function(multiple of the step)."""
+    return np.asarray(sum(weight * function(k) for k, weight in stencil) / step, dtype=float)
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A number of a model, or an initial value: its path, value, the distance of neighbours, where they are."""
+
+    path: str
+    value: float
+    step: float
+    stencil: Stencil
+
+
+@final
+class Family:
+    """A model with what determines its motion, and the same with other parameters.
+
+    Attributes
+    ----------
+    parameters
+        What is varied.
+    problem
+        The model's own.
+    """
+
+    def __init__(
+        self,
+        model: System | Scene,
+        paths: Sequence[str],
+        initial: "Mapping[str, ArrayLike] | None",
+        inputs: Mapping[str, Any] | None,
+        reference: Reference | None,
+    ) -> None:
+        if isinstance(paths, str) or not paths or len(set(paths)) < len(paths):
+            raise OptionError("parameters", paths, "one path or several, each once, as a list")
+        self.model, self._reference = model, reference
+        self._initial, self._inputs = dict(initial or {}), dict(inputs or {})
+        for path in paths:  # a drive that is zero has no port of its own
+            joint = path.removeprefix("joints.").rpartition(".drive")[0]
+            if path.startswith("joints.") and joint and f"joints.{joint}" not in self._inputs:
+                assert isinstance(model, Scene)
+                self._inputs[f"joints.{joint}"] = np.zeros(model.joint(joint).dim)
+        self._neighbours: dict[tuple[str, float], Problem] = {}
+        self.problem = self._made({})
+        self._states = {str(slot.path): slot for slot in self.problem.descriptor.states}
+        self.parameters = tuple(self._parameter(path) for path in paths)
+
+    def at(self, number: int, offset: float) -> Problem:
+        """The problem with one parameter elsewhere by an offset in its own unit."""
+        parameter = self.parameters[number]
+        return self._beside(parameter.path, parameter.value, offset)
+
+    def _beside(self, path: str, value: float, offset: float) -> Problem:
+        if (path, offset) not in self._neighbours:
+            self._neighbours[path, offset] = self._made({path: value + offset}) if offset else self.problem
+        return self._neighbours[path, offset]
+
+    def _parameter(self, path: str) -> Parameter:
+        value = self._read(path)
+        signed = isinstance(self.model, Scene) and path.partition("[")[0].endswith(SIGNED)
+        step = RELATIVE * max(abs(value) or 1.0, LEAST if signed else 0.0)
+        for stencil in (CENTRAL, FORWARD):
+            try:
+                for k, _ in stencil:
+                    self._beside(path, value, k * step)
+            except (SceneError, StructureError):
+                if stencil is FORWARD:
+                    raise
+                continue
+            return Parameter(path, value, step, stencil)
+        raise OptionError("parameters", path, "a number that may change")
+
+    def _read(self, path: str) -> float:
+        if isinstance(self.model, System):
+            stem, entry = _entry(path)
+            if stem in self._states:
+                values = self.problem.initial[Path.of(stem)]
+                if entry >= values.size or (entry < 0 and values.size != 1):
+                    raise OptionError("parameters", path, f"an entry of {values.size} numbers")
+                if self._states[stem].quantity.space.size != self._states[stem].quantity.space.dim:
+                    raise OptionError("parameters", path, "a state on a vector space")
+                return float(values[max(entry, 0)])
+        return read(self.model, path)
+
+    def _made(self, values: Mapping[str, float]) -> Problem:
+        if isinstance(self.model, Scene):
+            scene = varied(self.model, values, strict=False) if values else self.model
+            return problem_of_scene(scene, self._initial or None, self._inputs)
+        numbers, initial = dict(values), dict(self._initial)
+        for path in [p for p in values if _entry(p)[0] in getattr(self, "_states", {})]:
+            stem, entry = _entry(path)
+            state = np.array(self.problem.initial[Path.of(stem)])
+            state[max(entry, 0)] = numbers.pop(path)
+            initial[stem] = state
+        system = varied(self.model, numbers) if numbers else self.model
+        return problem_of_system(system, initial, self._inputs, self._reference)
+
+
+def _entry(path: str) -> tuple[str, int]:
+    """A path and the entry that its brackets choose, −1 where it has none."""
+    stem, bracket, entry = path.partition("[")
+    return stem, int(entry[:-1]) if bracket and entry[:-1].isdigit() else -1
+
+
+def same_shape(one: Array, other: Array, path: str) -> None:
+    """Refuse a neighbour that is built differently.
+
+    Raises
+    ------
+    OptionError
+        Its states are others: the parameter makes parts appear or vanish.
+    """
+    if one.shape != other.shape:
+        raise OptionError("parameters", path, "a number that leaves the model's structure as it is; start it off zero")

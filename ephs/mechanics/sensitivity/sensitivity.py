@@ -1,0 +1,193 @@
+"""`sensitivity`: how a motion changes with the model's numbers and initial values."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, final
+
+import numpy as np
+
+from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.sensitivity.family import Family, Parameter, difference
+from ephs.mechanics.sensitivity.readings import reading_of
+from ephs.mechanics.simulate import simulate
+from ephs.mechanics.solve.errors import OptionError, SimulationError, SolveError
+from ephs.mechanics.solve.replay import replay
+from ephs.mechanics.solve.solution import Solution
+from ephs.semantics.bundle import Array, Reference
+from ephs.semantics.system import System
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+__all__ = ["METHODS", "Sensitivity", "sensitivity"]
+
+METHODS = ("rk54", "rk87", "natural")
+NEAR = 1e-3
+"""How far readings are taken along a tangent, as states move."""
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Sensitivity:
+    """A motion and its derivatives by parameters.
+
+    Parameters
+    ----------
+    model
+        The scene or the system.
+    solution
+        The motion.
+    parameters
+        What it is differentiated by: path and value of each.
+    neighbour
+        The motion beside it: from a parameter's number and an offset in its unit, to first order.
+    offsets
+        (p,) the offsets over which readings are differenced.
+    """
+
+    model: System | Scene
+    solution: Solution
+    parameters: tuple[Parameter, ...]
+    neighbour: Callable[[int, float], Solution]
+    offsets: Array
+
+    @property
+    def t(self) -> Array:
+        """(n,) times in s."""
+        return self.solution.t
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """The parameters' paths, in the order of the last axis of every derivative."""
+        return tuple(parameter.path for parameter in self.parameters)
+
+    def __getitem__(self, name: str) -> Array:
+        """(n, …, p) the derivative of a reading: a state's path, ``joints.pin.coordinate``, ``bodies.rod.position``,
+        ``heat``; see `ephs.mechanics.sensitivity.readings`.
+
+        Raises
+        ------
+        OptionError
+            There is nothing of that name.
+        """
+        return self.of(reading_of(self.model, name))
+
+    def of(self, function: "Callable[[Solution], ArrayLike]") -> Array:
+        """(…, p) the derivative of anything that is read from a `Solution`: its final state, an integral over its
+        times, heat or work; numbers, or an array.
+
+        The function is differenced along the trajectory's tangents, to fourth order; it should be smooth.
+        """
+        columns: list[Array] = []
+        for number, parameter in enumerate(self.parameters):
+            step = float(self.offsets[number])
+            columns.append(
+                difference(
+                    lambda k, j=number, e=step: np.asarray(function(self.neighbour(j, k * e)), dtype=float),
+                    parameter.stencil,
+                    step,
+                )
+            )
+        return np.stack(columns, axis=-1)
+
+    def __repr__(self) -> str:
+        return f"Sensitivity of {self.solution.name} to {', '.join(self.paths)}: {len(self.solution)} instants"
+
+
+def sensitivity(
+    model: System | Scene,
+    parameters: Sequence[str],
+    until: float,
+    *,
+    t0: float = 0.0,
+    initial: "Mapping[str, ArrayLike] | None" = None,
+    method: str = "auto",
+    rtol: float = 1e-9,
+    atol: float = 1e-11,
+    step: float | None = None,
+    save_at: "ArrayLike | None" = None,
+    inputs: Mapping[str, Any] | None = None,
+    reference: Reference | None = None,
+) -> Sensitivity:
+    """The motion of a model with its derivatives by parameters: of the method's own discrete steps.
+
+    Lengths of steps are chosen by a run of `simulate` and then held, so that what is differentiated is a smooth
+    function of the parameters: the derivative is that of the computed motion, to about 1e-9.
+
+    Parameters
+    ----------
+    parameters
+        Paths of numbers: ``bodies.crank.mass``, ``bodies.crank.inertia[0]``, ``joints.pin.friction``,
+        ``joints.pin.coordinate`` (initial values of joints), ``joints.pin.frame1.position[0]``, ``osc.pe.k``, and of a
+        system initial values by the paths of its states, ``osc.pe.q``. See `ephs.mechanics.scene.parameters`.
+    method
+        ``"rk54"`` or ``"rk87"`` of scenes, with or without ``step``; ``"natural"`` of scenes and systems, with
+        ``step``. ``"auto"``: rk87 for scenes without a step, natural with one.
+    inputs
+        As for `simulate`; constant ones for natural.
+
+    Raises
+    ------
+    OptionError
+        The method has no tangent, or a path is none.
+    SimulationError
+        The run failed.
+    """
+    name = _method(model, method, step)
+    run: dict[str, Any] = {"t0": t0, "initial": initial, "method": name, "inputs": inputs, "reference": reference}
+    family = Family(model, parameters, initial, inputs, reference)
+    control: dict[str, Any] = {"step": step} if step is not None else {"rtol": rtol, "atol": atol}
+    times = None if save_at is None else np.atleast_1d(np.asarray(save_at, dtype=float))
+    grid = simulate(model, until, **run, **control).t
+    if times is not None and not (np.all(np.diff(times) > 0.0) and grid[0] <= times.min() and times.max() <= grid[-1]):
+        raise OptionError("save_at", save_at, f"ascending times in [{grid[0]:g}, {grid[-1]:g}] s")
+    try:
+        return _along(family, name, grid, times)
+    except SolveError as error:
+        raise SimulationError(error.outcome, float(grid[0]), error.path, error.equation, None) from error.cause
+
+
+def _method(model: System | Scene, method: str, step: float | None) -> str:
+    found = method
+    if method == "auto":
+        found = "natural" if step is not None or isinstance(model, System) else "rk87"
+    if found not in METHODS:
+        raise OptionError("method", method, f"one of auto, {', '.join(METHODS)}, which have tangents")
+    if found != "natural" and isinstance(model, System):
+        raise OptionError("method", method, f"natural: {found} is for scenes")
+    if found == "natural" and step is None:
+        raise OptionError("step", step, "a number of seconds: the tangent of natural is that of constant steps")
+    return found
+
+
+def _along(family: Family, method: str, grid: Array, times: Array | None) -> Sensitivity:
+    """The tangent along the steps of a grid; kept at its times, or at others, by shortened steps."""
+    t0 = float(grid[0])
+    if method == "natural":
+        from ephs.mechanics.sensitivity.implicit import NaturalTangent
+
+        stepper: Any = NaturalTangent(family, t0)
+    else:
+        from ephs.mechanics.sensitivity.explicit import ExplicitTangent
+
+        stepper = ExplicitTangent(family, t0, method)
+    point = stepper.start()
+    wanted = grid if times is None else times
+    kept: list[Any] = [point] if wanted[0] == t0 else []
+    for before, after in zip(grid[:-1].tolist(), grid[1:].tolist(), strict=True):
+        for when in wanted[(wanted > before) & (wanted < after)].tolist():
+            kept.append(stepper.step(point, when - before))
+        point = stepper.step(point, after - before)
+        if after in wanted:
+            kept.append(point)
+    solution = replay(family.problem, wanted, [stepper.row(p) for p in kept], method)
+
+    def neighbour(number: int, offset: float) -> Solution:
+        problem, rows = stepper.beside(number, offset, kept)
+        return replay(problem, wanted, rows, method)
+
+    offsets: list[float] = []
+    for j, parameter in enumerate(family.parameters):
+        size = max((stepper.size(p, j) for p in kept), default=0.0)
+        offsets.append(parameter.step if parameter.step * size <= 2.0 * NEAR else NEAR / size)
+    return Sensitivity(family.model, solution, family.parameters, neighbour, np.array(offsets))

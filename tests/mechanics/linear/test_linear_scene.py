@@ -1,0 +1,339 @@
+"""Scenes linearised: as differences of independent engines and of the motion itself say, with their laws."""
+
+import json
+from dataclasses import replace
+from importlib.util import find_spec
+from itertools import pairwise
+from pathlib import Path as File
+
+import mujoco
+import numpy as np
+import pytest
+import xarray
+from hypothesis import assume, given, settings
+
+import ephs
+from ephs.mechanics.scene.parameters import varied
+from ephs.testing import mechanisms
+from tests.mechanics.dynamics.drawn import moving
+from tests.mechanics.dynamics.mujoco_scenes import accelerations, scene_of, stripped
+
+
+def extrapolated(function, h=1e-2):
+    """The derivative at 0, by central differences extrapolated three times."""
+    table = [(function(d) - function(-d)) / (2.0 * d) for d in (h, h / 2, h / 4, h / 8)]
+    power = 4.0
+    while len(table) > 1:
+        table = [(power * b - a) / (power - 1.0) for a, b in pairwise(table)]
+        power *= 4.0
+    return table[0]
+
+
+@pytest.fixture(autouse=True)
+def without_a_log_file():
+    """Files of older versions make MuJoCo warn, into the working folder."""
+    mujoco.set_mju_user_warning(lambda text: None)
+    yield
+    mujoco.set_mju_user_warning(None)
+
+
+# ---- against differences and other engines -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "joint", "other", "body", "start"),
+    [("four-bar", "main", "knee", "coupler", (-0.4, 3.0)), ("slider-crank", "bearing", "wrist", "rod", (0.7, 12.0))],
+)
+def test_a_moving_loop_linearises_as_differences_say(name, joint, other, body, start):
+    """Of accelerations and of all that is put out, over states with the loop closed; one has a ball in its loop."""
+    scene = ephs.load(f"scenes/{name}.toml").with_state({joint: start[0]}, {joint: start[1]}, adjust=True)
+    outputs = [f"joints.{joint}", f"joints.{other}", f"joints.{joint}.coordinate", f"bodies.{body}"]
+    found = ephs.linearize(scene, outputs=[*outputs, f"bodies.{body}.position"])
+    assert found.states[:2] == (f"joints.{joint}.coordinate", f"joints.{joint}.rate")
+    here = scene.joint(joint)
+
+    def at(angle, rate):
+        moved = scene.with_state({joint: here.coordinate + angle}, {joint: here.rate + rate}, adjust=True)
+        model = ephs.dynamics(moved)
+        state, own = model.state0, model.bodies(model.state0)[body]
+        seen = [state.rates[joint], state.rates[other], state.coordinates[joint], own.twist, own.position]
+        return np.concatenate([model.acceleration(state)[joint], *seen])
+
+    expected = np.column_stack([extrapolated(lambda d: at(d, 0.0)), extrapolated(lambda d: at(0.0, d))])
+    assert np.abs(found.A[0, :2] - [0.0, 1.0]).max() < 1e-12
+    assert np.abs(found.A[1, :2] - expected[0]).max() < 1e-8 * np.abs(expected[0]).max()
+    assert np.abs(found.C[:, :2] - expected[1:]).max() < 1e-8 * max(1.0, np.abs(expected).max())
+
+
+def spinning_rod():
+    """A slider-crank whose rod is held by two balls, so that it may spin about itself: two freedoms, turning."""
+    scene = ephs.load("scenes/slider-crank.toml")
+    zero = np.zeros(3)
+    ball = replace(
+        scene.joints["wrist"], kind="spherical", friction=np.zeros((3, 3)), stiffness=zero, rest=zero, drive=zero,
+        coordinate=np.array([1.0, 0.0, 0.0, 0.0]), rate=zero,
+    )  # fmt: skip
+    return replace(scene, joints=scene.joints | {"wrist": ball})
+
+
+def test_dependent_rates_turn_with_a_rod_that_spins():
+    model = ephs.dynamics(spinning_rod())
+    array, rng = np.array(model.state0.array), np.random.default_rng(2)
+    first = array.size - model.layout.n - len(model.layout.entropies)
+    array[first : first + model.layout.n] += 5.0 * rng.standard_normal(model.layout.n)
+    turns_with_the_loop(model, model.closed(model.unpack(array)))
+
+
+@settings(max_examples=15)
+@given(drawn=moving(heat=False, springs=False, friction=False))
+def test_dependent_rates_turn_with_the_loop(drawn):
+    _, model, state, _ = drawn
+    assume(bool(model.cut))
+    turns_with_the_loop(model, state)
+
+
+def turns_with_the_loop(model, state):
+    """Y: of rates that keep the loop closed while the independent ones stay."""
+    whole = [name for name in model.freedoms if model.freedoms[name].size]
+    found = ephs.linearize(model.scene, state, inputs=[], outputs=[f"joints.{name}" for name in whole])
+    n, k = model.layout.n, len(found.states) // 2
+    order = np.concatenate([model.freedoms[name] for name in whole])
+    Y, Z = np.zeros((2, n, k))
+    Y[order], Z[order] = found.C[:, :k], found.C[:, k : 2 * k]
+    free = [int(np.flatnonzero((Z == unit).all(axis=1))[0]) for unit in np.eye(k)]
+    rest = np.setdiff1d(np.arange(n), free)
+    r = model.layout.split(state.array)[1]
+
+    def rates(v):
+        rows = model.constraints(model.moved(state, v)).rows
+        out = r.copy()
+        out[rest] = np.linalg.lstsq(rows[:, rest], -rows[:, free] @ r[free], rcond=1e-9)[0]
+        return out
+
+    for j in range(k):
+        expected = extrapolated(lambda h, j=j: rates(h * Z[:, j]))
+        assert np.abs(Y[:, j] - expected).max() < 1e-6 * max(1.0, np.abs(expected).max())
+
+
+@settings(max_examples=10)
+@given(drawn=moving(loops=False, heat=False, springs=False, friction=False, max_bodies=2))
+def test_a_moving_tree_linearises_as_its_flow_does(drawn):
+    """d/dt of the flow's derivative at t = 0, through joints on every group."""
+    _, model, state, _ = drawn
+    found = ephs.linearize(model.scene, state, outputs=[])
+    n, (_, r0, s0) = model.layout.n, model.layout.split(state.array)
+    edges = [(model.layout.elements[j], model.layout.freedoms[j], model.layout.edges[j]) for j in model.joints]
+
+    def difference(at, of):
+        """The state's increments from another: left-trivialised, then of rates."""
+        a, b = model.layout.split(at.array), model.layout.split(of.array)
+        out = np.zeros(2 * n)
+        for elements, freedoms, parts in edges:
+            where, to = 0, 0
+            for _, edge in parts:
+                own = elements[where : where + edge.pair.size]
+                out[freedoms[to : to + edge.pair.dim]] = edge.pair.manifold.increment(a[0][own], b[0][own])
+                where, to = where + edge.pair.size, to + edge.pair.dim
+        out[n:] = b[1] - a[1]
+        return out
+
+    def beside(x):
+        moved = model.layout.split(model.moved(state, x[:n]).array)
+        return model.unpack(np.concatenate([moved[0], r0 + x[n:], s0]))
+
+    def flow(h):
+        centre = model.step(state, h, "rk87") if h else state
+        columns = []
+        for unit in np.eye(2 * n):
+            ends = {k: model.step(beside(1e-3 * k * unit), h, "rk87") for k in (-2, -1, 1, 2)}
+            d = {k: difference(centre, end) for k, end in ends.items()}
+            columns.append((8.0 * (d[1] - d[-1]) - (d[2] - d[-2])) / 12e-3)
+        return np.array(columns).T
+
+    rough = [(flow(h) - flow(-h)) / (2.0 * h) for h in (4e-3, 2e-3)]
+    expected = (4.0 * rough[1] - rough[0]) / 3.0
+    assert np.abs(found.A - expected).max() < 1e-6 * max(1.0, np.abs(expected).max())
+
+
+def test_mujoco_differentiates_a_robot_alike():
+    """The accelerations of half_cheetah that mj_forward computes, differenced by all coordinates and rates."""
+    file = File(find_spec("gymnasium").submodule_search_locations[0]) / "envs/mujoco/assets/half_cheetah.xml"
+    model = stripped(mujoco.MjModel.from_xml_path(str(file)))
+    data, scene, rng = mujoco.MjData(model), scene_of(model), np.random.default_rng(4)
+    q, v = rng.uniform(-0.5, 0.5, model.nq), rng.uniform(-1.0, 1.0, model.nv)
+    names = [f"j{k}" for k in range(model.nv)]
+    dynamics = ephs.dynamics(scene)
+    state = dynamics.state(dict(zip(names, q, strict=True)), dict(zip(names, v, strict=True)))
+    found = ephs.linearize(scene, state, inputs=[f"joints.{name}" for name in names])
+
+    def acceleration(dq, dv, force):
+        data.qpos[:], data.qvel[:], data.qfrc_applied[:] = q + dq, v + dv, force
+        mujoco.mj_forward(model, data)
+        a = accelerations(model, data)
+        return np.array([a[name][0] for name in names])
+
+    n, unit = model.nv, np.eye(model.nv)
+
+    def column(i, of):
+        return extrapolated(lambda h: acceleration(*(h * (kind == of) * unit[i] for kind in range(3))))
+
+    blocks = [np.column_stack([column(i, of) for i in range(n)]) for of in range(3)]
+    order = [found.states.index(f"joints.{name}.coordinate") for name in names]
+    rates = [found.states.index(f"joints.{name}.rate") for name in names]
+    for expected, matrix in zip(
+        blocks, (found.A[np.ix_(rates, order)], found.A[np.ix_(rates, rates)], found.B[rates]), strict=True
+    ):
+        assert np.abs(matrix - expected).max() < 1e-7 * np.abs(expected).max()
+
+
+def test_forces_wrenches_and_markers_push_as_the_motion_says():
+    scene = ephs.load("scenes/four-bar.toml")
+    scene = replace(
+        scene, markers={"tip": ephs.mechanics.scene.model.Marker("tip", "coupler", np.array([0.1, 0.2, 0.0]))}
+    )
+    found = ephs.linearize(scene, inputs=["joints.pivot", "joints.knee", "bodies.coupler", "markers.tip"])
+    model = ephs.dynamics(scene)
+    free = found.states[1].split(".")[1]
+    still = model.acceleration(model.state0)[free]
+    for name in ("pivot", "knee"):
+        pushed = model.acceleration(model.state0, {name: 1.0})[free] - still
+        assert found.B[1, found.inputs.index(f"joints.{name}")] == pytest.approx(pushed[0], rel=1e-9)
+    wrench = found.B[1, [found.inputs.index(f"bodies.coupler[{i}]") for i in range(6)]]
+    turn = model.bodies(model.state0)["coupler"].rotation
+    for i in range(3):
+        own = turn.T @ np.eye(3)[i]
+        expected = wrench @ np.concatenate([np.cross([0.1, 0.2, 0.0], own), own])
+        assert found.B[1, found.inputs.index(f"markers.tip[{i}]")] == pytest.approx(expected, abs=1e-12)
+
+
+# ---- closed forms ------------------------------------------------------------------------------------------------
+
+
+def test_a_spring_loaded_four_bar_swings_as_its_energy_says():
+    """ω² = V''/M along the single freedom, from energies alone."""
+    scene = varied(ephs.load("scenes/four-bar.toml"), {"joints.main.drive": 0.0, "joints.main.friction": 0.0,
+                   "joints.pivot.friction": 0.0, "joints.knee.stiffness": 30.0})  # fmt: skip
+    rest = ephs.equilibrium(scene).model
+    found = ephs.linearize(rest, inputs=["joints.main"])
+    (mode,) = found.modes
+    angle = rest.joint("main").coordinate
+
+    def at(d, rate=0.0):
+        model = ephs.dynamics(rest.with_state({"main": angle + d}, {"main": [rate]}, adjust=True))
+        return model.energies(model.state0)
+
+    slope = extrapolated(lambda d: extrapolated(lambda e: at(d + e).potential, 0.02), 0.02)
+    omega = np.sqrt(slope / (2.0 * at(0.0, 1.0).kinetic))
+    assert mode.eigenvalue.real == 0.0 and mode.eigenvalue.imag == pytest.approx(omega, rel=1e-7)
+    assert mode.frequency == pytest.approx(omega / (2.0 * np.pi), rel=1e-7) and mode.damping == 0.0
+
+
+def test_a_heavy_body_on_a_ball_joint_swings_like_a_pendulum():
+    scene = ephs.equilibrium(ephs.load("scenes/heavy-top.toml")).model
+    body, arm = scene.body("top"), np.linalg.norm(scene.joint("tip").frame2[4:])
+    omega = np.sqrt(body.mass * 9.81 * arm / (body.inertia[0, 0] + body.mass * arm**2))
+    values = ephs.linearize(scene).eigenvalues
+    swinging = values[np.abs(values) > 1e-6]
+    assert np.abs(np.abs(swinging.imag) - omega).max() < 1e-9 * omega and np.all(swinging.real == 0.0)
+
+
+# ---- laws --------------------------------------------------------------------------------------------------------
+
+
+@settings(max_examples=25)
+@given(scene=mechanisms())
+def test_at_an_equilibrium_the_laws_hold(scene):
+    try:
+        rest = ephs.equilibrium(scene)
+    except ephs.SimulationError as error:  # what slides down a guide for ever
+        assert "no state in which nothing moves" in str(error)
+        return
+    model = ephs.dynamics(rest.model)
+    assert max((np.abs(a).max(initial=0.0) for a in model.acceleration(model.state0).values()), default=0.0) < 1e-6
+    found = ephs.linearize(rest.model)
+    assert found.structure is not None, found.reason
+    for law in found.laws:
+        assert law.holds(1e-11), (law.name, law.defect)
+    assert found.stable
+    rng = np.random.default_rng(1)
+    for x in rng.standard_normal((5, len(found.states))):
+        loss = float(x @ found.Q @ found.A @ x)
+        assert loss <= 1e-9 * np.abs(x) @ np.abs(found.Q) @ np.abs(found.A) @ np.abs(x)
+        assert found.structure.dissipation(x) >= -1e-9
+
+
+@pytest.mark.parametrize("name", ["chain", "heavy-top"])
+def test_without_friction_nothing_decays(name):
+    found = ephs.linearize(ephs.equilibrium(ephs.load(f"scenes/{name}.toml")).model)
+    assert not found.R.any()
+    assert np.all(found.eigenvalues.real == 0.0)
+
+
+@pytest.mark.parametrize("name", ["four-bar", "slider-crank"])
+def test_joint_coordinates_and_the_papers_states_have_the_same_modes(name):
+    """What the paper's states have beside them is constant: the constraints' integrals."""
+    scene = ephs.load(f"scenes/{name}.toml")
+    driven = next(joint for joint in scene.joints if np.any(scene.joint(joint).drive))
+    rest = ephs.equilibrium(varied(scene, {f"joints.{driven}.drive": 0.0})).model
+    found = ephs.linearize(rest).eigenvalues
+    paper = ephs.linearize(rest, form="paper").eigenvalues
+    moving = paper[np.abs(paper) > 1e-4 * np.abs(found).min()]
+    assert moving.size == found.size
+    assert np.abs(np.sort_complex(moving) - np.sort_complex(found)).max() < 1e-6 * np.abs(found).max()
+
+
+def test_a_state_that_is_no_equilibrium_says_why_it_has_no_structure():
+    scene = ephs.load("scenes/four-bar.toml")
+    assert "not balanced" in ephs.linearize(scene).reason
+    moving = scene.with_state({}, {"main": 1.0}, adjust=True)
+    assert "moves" in ephs.linearize(moving).reason
+
+
+# ---- films and files ---------------------------------------------------------------------------------------------
+
+
+def test_a_mode_plays_as_a_film_with_loops_closed():
+    rest = ephs.equilibrium(ephs.load("scenes/four-bar.toml")).model
+    found = ephs.linearize(rest)
+    film = found.film(0, amplitude=0.2, frames=21)
+    swing = np.ptp(film.joint("main").coordinate)
+    assert len(film) == 21 and film.constraint_error.max() < 1e-8
+    assert 0.3 < swing < 0.45
+    assert film.t[-1] == pytest.approx(1.0 / found.modes[0].frequency)
+    fading = found.film(found.modes[0], amplitude=0.2, periods=3.0, decay=True)
+    assert np.ptp(fading.joint("main").coordinate[-20:]) < swing
+    with pytest.raises(ephs.OptionError, match="mode"):
+        found.film(7)
+
+
+@pytest.mark.parametrize("suffix", ["json", "npz", "nc"])
+def test_matrices_are_saved(tmp_path, suffix):
+    found = ephs.linearize(ephs.equilibrium(ephs.load("scenes/chain.toml")).model)
+    file = tmp_path / f"chain.{suffix}"
+    found.save(file)
+    if suffix == "json":
+        data = json.loads(file.read_text())
+    elif suffix == "npz":
+        data = np.load(file)
+    else:
+        data = {key: value.values for key, value in xarray.load_dataset(file, engine="h5netcdf").items()}
+    for key in ("A", "B", "C", "D", "J", "R", "Q"):
+        assert np.array_equal(np.asarray(data[key]), getattr(found, key))
+    with pytest.raises(ephs.OptionError, match="ends in"):
+        found.save(tmp_path / "chain.mat")
+
+
+@pytest.mark.parametrize(
+    ("keys", "what"),
+    [({"inputs": ["joints.man"]}, "joints.main"), ({"outputs": ["bodies.crank.place"]}, "did you mean"),
+     ({"inputs": ["joints.main.coordinate"]}, "a joint"), ({"form": "tree"}, "reduced"),
+     ({"state": "rest"}, "equilibrium")],
+)  # fmt: skip
+def test_what_cannot_be_is_named(keys, what):
+    with pytest.raises(ephs.OptionError, match=what):
+        ephs.linearize(ephs.load("scenes/four-bar.toml"), **keys)
+
+
+def test_what_turns_for_ever_has_no_equilibrium():
+    with pytest.raises(ephs.SimulationError, match="constant drive"):
+        ephs.equilibrium(ephs.load("scenes/slider-crank.toml"))

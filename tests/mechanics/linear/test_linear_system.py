@@ -1,0 +1,149 @@
+"""Systems linearised: closed forms, differences of rates, and interconnection, with which linearising commutes."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+import ephs
+from ephs import Pattern
+from ephs import library as lib
+from ephs.mechanics.linear.pencil import Pencil, system_problem
+from ephs.testing import systems
+from examples import physics
+
+MASS = Pattern.from_text("q: displacement; p: momentum, exposed; pe(q); ke(p); pkc(q, p)")(
+    pe=lib.spring(k=1.5), ke=lib.point_mass(m=2.0), pkc=lib.pkc()
+)
+SHAKER = Pattern.from_text("q: displacement; p: momentum, exposed; s: entropy; pe(q); pkc(q, p); mf(p, s); env(s)")(
+    pe=lib.spring(k=0.7), pkc=lib.pkc(), mf=lib.friction(d=0.3), env=lib.environment()
+)
+
+
+def eigenvalues(matrix):
+    return np.sort_complex(np.linalg.eigvals(matrix))
+
+
+@settings(max_examples=40)
+@given(system=systems())
+def test_where_there_is_a_structure_its_laws_hold(system):
+    try:
+        found = ephs.linearize(system)
+    except (ephs.OptionError, ephs.SimulationError) as error:  # states that the outer inputs hold, or no motion
+        assert "derivative" in str(error) or "determine" in str(error) or "state" in str(error)
+        return
+    except ephs.AssemblyError as error:
+        assert "expected a number > 0" in str(error)  # a volume starts nowhere
+        return
+    for law in found.laws:
+        assert law.holds(2e-9), (law.name, law.defect)
+
+
+def test_rates_differ_as_the_matrix_says_away_from_equilibrium():
+    """A motor in motion: its coupling and its heat depend on the state."""
+    start = {"stator.coil.b": 0.3, "rotor.coil.b": 0.2, "rotor.mass.p": 0.1, "rotor.tc.s": 0.1}
+    inputs = {"q": {"effort": 1.0}}
+    found = ephs.linearize(physics.motor, start, inputs=inputs)
+    problem = system_problem(physics.motor, start, inputs, None)
+    pencil, x = Pencil(problem), problem.descriptor.pack(problem.initial)
+
+    def rates(step):
+        return pencil.unknowns(x + step)[: pencil.n_w]
+
+    columns = [
+        (8.0 * (rates(h) - rates(-h)) - (rates(2.0 * h) - rates(-2.0 * h))) / 12e-3 for h in 1e-3 * np.eye(x.size)
+    ]
+    assert np.abs(found.A - np.array(columns).T).max() < 1e-10
+    assert found.structure is None and "depends on the state" in found.reason
+
+
+def test_a_resonant_circuit_has_the_transfer_of_the_book():
+    """A voltage u on a capacitor, an inductor and a resistor in series: 1/(l s + r + 1/(c s))."""
+    r, coil, c = 0.4, 2.0, 0.5
+    series = Pattern.from_text(
+        "q: charge; b: flux_linkage, exposed; s: entropy; cap(q); coil(b); emc(q, b); res(b, s); env(s)"
+    )(cap=lib.capacitor(c=c), coil=lib.inductor(l=coil), emc=lib.emc(), res=lib.resistor(r=r), env=lib.environment())
+    found = ephs.linearize(series)
+    for s in (0.3j, 1j, 2.0 + 1j):
+        assert found.transfer(s)[0, 0] == pytest.approx(1.0 / (coil * s + r + 1.0 / (c * s)), rel=1e-12)
+    (mode,) = found.modes
+    assert abs(mode.eigenvalue) == pytest.approx(1.0 / np.sqrt(coil * c), rel=1e-12)
+    assert mode.damping == pytest.approx(0.5 * r * np.sqrt(c / coil), rel=1e-12)
+
+
+@pytest.mark.parametrize(("system", "omega"), [("springs", np.sqrt(1.5)), ("masses", np.sqrt(1.5))])
+def test_what_constraints_join_is_one_state(system, omega):
+    """Springs in series, masses on a rod: three storages, two states."""
+    found = ephs.linearize(getattr(physics, system))
+    assert found.A.shape == (2, 2)
+    assert found.eigenvalues.imag.max() == pytest.approx(omega, rel=1e-12) and np.all(found.eigenvalues.real == 0.0)
+
+
+def test_inductors_in_one_loop_carry_one_current():
+    """A junction without storage holds the states beside it: what is eliminated there constrains."""
+    loop = Pattern.from_text(
+        "q: charge; b1: flux_linkage; b2: flux_linkage; q0: charge;"
+        "l1(b=b1); l2(b=b2); c(q=q0); e1(q, b=b1); e2(q, b=b2); e0(q=q0, b=b1)"
+    )(l1=lib.inductor(l=1.0), l2=lib.inductor(l=3.0), c=lib.capacitor(c=0.25), e1=lib.emc(), e2=lib.emc(), e0=lib.emc())
+    found = ephs.linearize(loop)
+    assert found.structure is not None and all(law.holds() for law in found.laws)
+    assert found.A.shape == (2, 2)
+    assert found.eigenvalues.imag.max() == pytest.approx(1.0, rel=1e-12)
+
+
+def test_linearising_commutes_with_interconnecting():
+    """A mass whose force is given, and what its velocity drives: each linearised, then joined; or joined first."""
+    joined = Pattern.from_text("p: momentum; mass(p); shaker(p)")(mass=MASS, shaker=SHAKER)
+    one, two = ephs.linearize(MASS), ephs.linearize(SHAKER, inputs={"p": {"effort": 0.0}})
+    assert np.abs(one.D).max() == 0.0
+    # u₁ = −y₂, u₂ = y₁ = C₁ x₁
+    feedback = np.block([[one.A - one.B @ two.D @ one.C, -one.B @ two.C], [two.B @ one.C, two.A]])
+    whole = ephs.linearize(joined)
+    assert np.abs(eigenvalues(whole.A) - eigenvalues(feedback)).max() < 1e-12
+    order = [f"mass.{name}" for name in one.states] + [f"shaker.{name}" for name in two.states]
+    places = [whole.states.index(name) for name in order]
+    assert np.abs(whole.A[np.ix_(places, places)] - feedback).max() < 1e-12
+    # The structures join as well: exergies add, dissipation adds where the ports meet.
+    assert np.abs(whole.Q[np.ix_(places, places)] - np.diag([1.5, 0.5, 0.7])).max() < 1e-12
+    assert whole.R[places[1], places[1]] == pytest.approx(0.3)
+
+
+def test_flattening_changes_nothing():
+    found, flat = ephs.linearize(physics.lever), ephs.linearize(physics.lever.flatten())
+    assert found.states == flat.states and np.array_equal(found.A, flat.A)
+
+
+def test_a_gas_settles_and_swings_about_that():
+    rest = ephs.equilibrium(physics.cylinder, initial=physics.CYLINDER_START)
+    values = {str(path): float(value[0]) for path, value in rest.states.items()}
+    assert values["gas1.v"] == pytest.approx(0.5) and values["gas2.v"] == pytest.approx(0.5)
+    found = ephs.linearize(physics.cylinder, rest)
+    assert found.stable and all(law.holds() for law in found.laws)
+    pushed = found.film(len(found.modes) - 1, amplitude=0.05, frames=11)
+    assert np.ptp(pushed["gas1.v"] + pushed["gas2.v"]) < 1e-12 < np.ptp(pushed["gas1.v"])
+
+
+def test_a_spring_settles_under_its_load():
+    damped = Pattern.from_text("p: momentum, exposed; s: entropy; osc(p); mf(p, s); env(s)")(
+        osc=MASS, mf=lib.friction(d=0.2), env=lib.environment()
+    )
+    rest = ephs.equilibrium(damped, inputs={"p": {"flow": 3.0}})
+    values = {str(path): float(value[0]) for path, value in rest.states.items()}
+    assert values["osc.pe.q"] == pytest.approx(2.0, rel=1e-12) and abs(values["osc.ke.p"]) < 1e-12
+
+
+def test_what_only_falls_has_no_equilibrium():
+    falling = Pattern.from_text("q: displacement; p: momentum, exposed; pe(q); ke(p); pkc(q, p)")(
+        pe=ephs.storage({"q": ephs.quantity.displacement}, lambda q: -9.81 * q), ke=lib.point_mass(m=1.0), pkc=lib.pkc()
+    )
+    with pytest.raises(ephs.SimulationError, match="no state in which nothing moves"):
+        ephs.equilibrium(falling)
+
+
+@pytest.mark.parametrize(
+    ("keys", "what"),
+    [({"inputs": {"p": {"effort": 0.0}}}, "derivative"), ({"inputs": {"p": {"flow": lambda t: t}}}, "constants"),
+     ({"outputs": ["pe.p"]}, "did you mean"), ({"inputs": ["p"]}, "effort")],
+)  # fmt: skip
+def test_what_cannot_be_is_named(keys, what):
+    with pytest.raises(ephs.OptionError, match=what):
+        ephs.linearize(MASS, **keys)

@@ -1,0 +1,104 @@
+"""What a motion was computed with is found again in its record; with noise, within what the errors say."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import ephs
+from ephs.mechanics.scene.parameters import read, varied
+from tests.mechanics.sensitivity.test_sensitivity import oscillator
+
+FOUR_BAR = ("joints.pivot.friction", "bodies.rocker.inertia[2]", "joints.main.friction")
+DOUBLE = ("joints.j0.friction", "joints.j1.friction", "bodies.rod1.inertia[1]", "bodies.rod1.mass")
+STEPS = {"method": "rk87", "step": 0.025}
+
+
+def double_pendulum():
+    """Two links of the chain, damped."""
+    scene = ephs.load("scenes/chain.toml")
+    bodies = {name: body for name, body in scene.bodies.items() if name in ("rod0", "rod1")}
+    joints = {name: joint for name, joint in scene.joints.items() if name in ("j0", "j1")}
+    short = replace(scene, name="double-pendulum", bodies=bodies, joints=joints)
+    short = short.with_state({"j0": 1.0, "j1": -0.7})
+    return varied(short, {"joints.j0.friction": 0.3, "joints.j1.friction": 0.2})
+
+
+def record(scene, joints, until, count):
+    times = np.linspace(0.0, until, count)
+    motion = ephs.simulate(scene, until, method="rk87", save_at=times, rtol=1e-12, atol=1e-13)
+    return {"t": times} | {f"joints.{name}.coordinate": motion.joint(name).coordinate for name in joints}
+
+
+CASES = {
+    "double pendulum": (double_pendulum, DOUBLE, ("j0", "j1"), 0.6),
+    "four-bar": (lambda: ephs.load("scenes/four-bar.toml"), FOUR_BAR, ("main", "pivot"), 0.5),
+}
+
+
+@pytest.fixture(scope="module", params=CASES)
+def case(request):
+    make, paths, joints, until = CASES[request.param]
+    scene = make()
+    return scene, list(paths), record(scene, joints, until, 13)
+
+
+def test_a_motion_without_noise_gives_the_numbers_back(case):
+    scene, paths, data = case
+    start = {path: factor * read(scene, path) for path, factor in zip(paths, (1.5, 0.8, 1.4, 1.3), strict=False)}
+    found = ephs.fit(scene, data, paths, start=start, rtol=1e-9, atol=1e-11)
+    for path in paths:
+        assert found.values[path] == pytest.approx(read(scene, path), rel=1e-6)
+        assert read(found.model, path) == found.values[path]
+    assert found.converged and found.deviation < 1e-8
+    assert all(np.abs(values).max() < 1e-7 for values in found.residuals.values())
+
+
+def test_a_noisy_motion_gives_them_within_three_deviations(case):
+    scene, paths, data = case
+    rng, noise = np.random.default_rng(1), 1e-3
+    noisy = {
+        name: values if name == "t" else values + noise * rng.standard_normal(values.shape)
+        for name, values in data.items()
+    }
+    found = ephs.fit(scene, noisy, paths, sigma=dict.fromkeys(noisy, 2.0 * noise), **STEPS)
+    off = np.array([found.values[path] - read(scene, path) for path in paths])
+    errors = np.array([found.errors[path] for path in paths])
+    assert np.all(np.abs(off) < 3.0 * errors)
+    assert 0.3 < found.deviation < 0.7  # in units of sigma
+    tangent = ephs.sensitivity(found.model, paths, data["t"][-1], save_at=data["t"], **STEPS)
+    names = [name for name in data if name != "t"]
+    rows = np.concatenate([tangent[name].reshape(-1, len(paths)) for name in names])
+    left = np.concatenate([found.residuals[name].ravel() for name in names])
+    expected = left @ left / (left.size - len(paths)) * np.linalg.inv(rows.T @ rows)
+    assert np.abs(found.covariance / expected - 1.0).max() < 1e-3
+    assert np.sqrt(np.diag(found.covariance)) == pytest.approx(errors)
+
+
+def test_a_system_is_fitted_with_its_initial_value():
+    truth = ephs.simulate(oscillator(), 2.0, step=0.05, initial={"osc.pe.q": 1.0})
+    start = {"osc.pe.k": 1.0, "mf.d": 0.3, "osc.pe.q": 0.7}
+    data = {"t": truth.t, "osc.pe.q": np.where(np.arange(truth.t.size) % 3, truth["osc.pe.q"], np.nan)}
+    found = ephs.fit(oscillator(), data, list(start), start=start, step=0.05)
+    assert list(found.values.values()) == pytest.approx([1.5, 0.1, 1.0], rel=1e-9)
+    assert "osc.pe.k = 1.5" in str(found)
+
+
+def test_what_a_record_does_not_tell_has_no_error_bound():
+    """Mass and stiffness of an oscillator whose displacement alone is seen."""
+    truth = ephs.simulate(oscillator(), 1.0, step=0.1, initial={"osc.pe.q": 1.0})
+    data = {"t": truth.t, "osc.pe.q": truth["osc.pe.q"]}
+    found = ephs.fit(
+        oscillator(), data, ["osc.pe.k", "osc.ke.m", "mf.d"], initial={"osc.pe.q": 1.0}, step=0.1, max_evaluations=10
+    )
+    assert all(np.isinf(error) for error in found.errors.values())
+
+
+@pytest.mark.parametrize(
+    ("data", "what"),
+    [({"osc.pe.q": [0.0]}, "times t"), ({"t": [0.0, 1.0], "osc.pe.q": [0.0]}, "one row a time"),
+     ({"t": [0.0, 1.0], "osc.pe.q": [0.0, np.nan]}, "2 or more")],
+)  # fmt: skip
+def test_records_that_do_not_fit_are_refused(data, what):
+    with pytest.raises(ephs.OptionError, match=what):
+        ephs.fit(oscillator(), data, ["osc.pe.k", "mf.d"], step=0.5)

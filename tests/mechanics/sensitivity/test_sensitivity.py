@@ -1,0 +1,177 @@
+"""Sensitivities are the derivatives of the computed motion: as extrapolated differences of whole runs say."""
+
+import numpy as np
+import pytest
+
+import ephs
+from ephs import Pattern
+from ephs import library as lib
+from ephs.mechanics.scene.parameters import read, varied
+from ephs.mechanics.sensitivity.readings import reading_of
+
+GOOD = 1e-8
+"""What extrapolated differences of runs are good for, relative to the largest; 1e-7 is asked for."""
+
+
+def extrapolated(function, h):
+    """The derivative at 0, by central differences extrapolated twice."""
+    d = [(function(s) - function(-s)) / (2.0 * s) for s in (h, h / 2.0, h / 4.0)]
+    once = [(4.0 * d[1] - d[0]) / 3.0, (4.0 * d[2] - d[1]) / 3.0]
+    return (16.0 * once[1] - once[0]) / 15.0
+
+
+def reading(solution, name):
+    return reading_of(solution.scene or solution.system, name)(solution)
+
+
+def agrees(scene, paths, until, names, tolerance=GOOD, compared=None, **options):
+    """Compare each derivative with differences of whole runs: of the same steps, or of ones good to rounding."""
+    found = ephs.sensitivity(scene, paths, until, **options)
+    got = {name: found[name] for name in names}
+    run = compared or {"save_at": found.t} | options
+    for number, path in enumerate(paths):
+        value = read(scene, path)
+
+        def at(by, path=path, value=value):
+            motion = ephs.simulate(varied(scene, {path: value + by}, strict=False), until, **run)
+            return np.concatenate([reading(motion, name).ravel() for name in names])
+
+        expected = extrapolated(at, 1e-2 * (abs(value) if abs(value) > 1e-9 else 1.0))
+        mine = np.concatenate([got[name][..., number].ravel() for name in names])
+        start = 0
+        for name in names:
+            size = got[name][..., number].size
+            part = slice(start, start + size)
+            start += size
+            own = np.abs(reading(found.solution, name)).max() / max(abs(value), 1.0)
+            scale = max(np.abs(expected[part]).max(), 1e-3 * own)
+            assert np.abs(mine[part] - expected[part]).max() < tolerance * scale, (path, name)
+    return found
+
+
+@pytest.mark.parametrize("method", ["rk54", "rk87"])
+def test_constant_steps_of_explicit_methods_with_a_closed_loop(method):
+    scene = ephs.load("scenes/four-bar.toml")
+    paths = ["bodies.coupler.mass", "bodies.rocker.inertia[2]", "joints.main.friction", "joints.main.drive",
+             "joints.knee.frame1.position[0]", "joints.main.coordinate", "world.gravity[1]"]  # fmt: skip
+    names = ["joints.main.coordinate", "joints.knee.rate", "bodies.coupler.position", "heat", "work", "kinetic"]
+    step = 0.02 if method == "rk54" else 0.04
+    agrees(scene, paths, 0.16, names, method=method, step=step, compared={"method": method, "step": step})
+
+
+def test_chosen_steps_are_held():
+    """The derivative of a run whose steps were chosen is that of the motion itself, to the tolerances."""
+    scene = ephs.load("scenes/chain.toml")
+    paths = ["bodies.rod1.mass", "joints.j0.coordinate", "joints.j2.frame2.position[1]", "joints.j1.rate"]
+    names = ["joints.j3.coordinate", "joints.j0.rate", "bodies.rod3.velocity", "energy"]
+    exact = {"rtol": 1e-12, "atol": 1e-13}
+    times = np.linspace(0.0, 0.5, 4)
+    agrees(scene, paths, 0.5, names, 1e-7, {"method": "rk87", "save_at": times} | exact, save_at=times, **exact)
+
+
+def test_bodies_that_turn_freely():
+    """Of a body on a group: initial velocities, inertia, all left-trivialised."""
+    scene = ephs.load("scenes/heavy-top.toml")
+    paths = ["bodies.top.inertia[0]", "bodies.top.mass", "joints.tip.rate[1]"]
+    names = ["bodies.top.quaternion", "bodies.top.angular_velocity", "joints.tip.coordinate"]
+    agrees(scene, paths, 0.02, names, 1e-7, method="rk87", step=2e-3, compared={"method": "rk87", "step": 2e-3})
+
+
+@pytest.mark.parametrize("scene", ["four-bar", "slider-crank"])
+def test_natural_steps_of_scenes(scene):
+    paths = {
+        "four-bar": ["bodies.coupler.mass", "joints.main.friction", "joints.main.drive", "joints.main.coordinate"],
+        "slider-crank": [
+            "bodies.rod.mass",
+            "joints.bearing.friction",
+            "thermal.housing.capacity",
+            "joints.bearing.rate",
+        ],
+    }[scene]
+    joint = "main" if scene == "four-bar" else "bearing"
+    names = [f"joints.{joint}.coordinate", f"joints.{joint}.rate", "heat", "work", "potential"]
+    names += ["thermal.housing.temperature"] if scene == "slider-crank" else []
+    options = {"method": "natural", "step": 0.01}
+    agrees(ephs.load(f"scenes/{scene}.toml"), paths, 0.05, names, 1e-7, options, **options)
+
+
+def oscillator(k=1.5, d=0.1):
+    inner = Pattern.from_text("q: displacement; p: momentum, exposed; pe(q); ke(p); pkc(q, p)")
+    outer = Pattern.from_text("p: momentum; s: entropy; osc(p); mf(p, s); env(s)")
+    return outer(
+        osc=inner(pe=lib.spring(k=k), ke=lib.point_mass(m=2.0), pkc=lib.pkc()),
+        mf=lib.friction(d=d),
+        env=lib.environment(),
+    )
+
+
+def test_systems_by_components_and_initial_values():
+    """The natural method on a linear system is the midpoint rule: its derivative in closed form by matrices."""
+    found = ephs.sensitivity(oscillator(), ["osc.pe.k", "mf.d", "osc.pe.q"], 1.0, step=0.05, initial={"osc.pe.q": 1.0})
+
+    def motion(k, d, q):
+        a = np.array([[0.0, 0.5], [-k, -0.5 * d]])
+        one = np.linalg.solve(np.eye(2) - 0.025 * a, np.eye(2) + 0.025 * a)
+        states = [np.array([q, 0.0])]
+        for _ in range(20):
+            states.append(one @ states[-1])
+        return np.array(states)
+
+    at = np.array([1.5, 0.1, 1.0])
+    for i, unit in enumerate(np.eye(3)):
+        expected = extrapolated(lambda h, unit=unit: motion(*(at + h * unit)), 1e-2)
+        assert np.abs(found["osc.pe.q"][:, i] - expected[:, 0]).max() < 1e-10
+        assert np.abs(found["osc.ke.p"][:, i] - expected[:, 1]).max() < 1e-10
+
+
+def test_anything_read_from_a_solution_has_a_derivative():
+    """A mean, the end, an integral of heat: by the chain rule, what their parts say."""
+    found = ephs.sensitivity(oscillator(), ["osc.pe.k", "mf.d"], 1.0, step=0.05, initial={"osc.pe.q": 1.0})
+    q, dq = found.solution["osc.pe.q"], found["osc.pe.q"]
+    assert found.of(lambda sol: sol["osc.pe.q"][-1] ** 2) == pytest.approx(2.0 * q[-1] * dq[-1], rel=1e-9)
+    whole = found.of(lambda sol: np.trapezoid(sol["osc.pe.q"], sol.t))
+    assert whole == pytest.approx(np.trapezoid(dq, found.t, axis=0), rel=1e-9)
+    assert found["energy"] == pytest.approx(found["kinetic"] + found["potential"] + found["heat"], abs=1e-10)
+
+
+def test_energy_is_kept_whatever_the_parameters():
+    """The derivative of the balance: without friction energy changes as it does at the start."""
+    scene = ephs.load("scenes/chain.toml")
+    found = ephs.sensitivity(scene, ["bodies.rod2.mass", "joints.j1.coordinate"], 0.3, rtol=1e-12, atol=1e-13)
+    energy = found["energy"]
+    assert np.abs(energy - energy[0]).max() < 1e-8 * np.abs(energy).max()
+
+
+def test_a_friction_of_zero_has_a_derivative_from_above():
+    scene = ephs.load("scenes/chain.toml")
+    found = ephs.sensitivity(scene, ["joints.j0.friction"], 0.2, method="rk87", step=0.05)
+    values = [
+        ephs.simulate(varied(scene, {"joints.j0.friction": mu}), 0.2, method="rk87", step=0.05).joint("j0").rate[-1, 0]
+        for mu in (0.0, 1e-3, 2e-3, 3e-3, 4e-3)
+    ]
+    expected = np.dot([-25.0, 48.0, -36.0, 16.0, -3.0], values) / 12e-3
+    assert found["joints.j0.rate"][-1, 0, 0] == pytest.approx(expected, rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("keys", "what"),
+    [
+        ({"method": "radau"}, "rk54, rk87, natural"),
+        ({"method": "natural"}, "a number of seconds"),
+        ({"parameters": []}, "one path or several"),
+        ({"parameters": "bodies.crank.mass"}, "one path or several"),
+        ({"save_at": [0.2, 0.1]}, "ascending"),
+    ],
+)
+def test_what_cannot_be_is_named(keys, what):
+    given = {"parameters": ["bodies.crank.mass"], "until": 0.1} | keys
+    with pytest.raises(ephs.OptionError, match=what):
+        ephs.sensitivity(ephs.load("scenes/four-bar.toml"), **given)
+
+
+def test_unknown_readings_name_the_nearest():
+    found = ephs.sensitivity(oscillator(), ["osc.pe.k"], 0.1, step=0.05)
+    with pytest.raises(ephs.OptionError, match="did you mean"):
+        found["osc.pe.x"]
+    with pytest.raises(ephs.SceneError, match="did you mean"):
+        ephs.sensitivity(ephs.load("scenes/four-bar.toml"), ["bodies.crnk.mass"], 0.1)
