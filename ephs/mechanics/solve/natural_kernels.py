@@ -93,6 +93,28 @@ class Memory(NamedTuple):
 
 
 @kernel
+def reach(t, m):
+    """The flows that there could be at each effort, into m.dense, were the efforts as large as what they are known by.
+
+    The rate of a joint at rest is a difference of its bodies' twists, and so is known to the rounding of those.
+    """
+    n_rate, n_effort = t.counts[0], t.counts[1]
+    flow, whole = m.dense, m.step
+    for i in range(n_effort):
+        flow[i] = m.scale[n_rate + i]
+        whole[i] = 0.0
+    for k in range(t.row.shape[0]):
+        row, effort = t.row[k], t.column[k] - n_rate
+        entry = abs(m.data[k])
+        if row >= n_rate + n_effort and 0 <= effort < n_effort and entry > 0.0:
+            whole[effort] = max(whole[effort], m.scale[row] / entry)
+    for k in range(t.row.shape[0]):
+        at, effort = t.row[k] - n_rate, t.column[k] - n_rate
+        if 0 <= at < n_effort and 0 <= effort < n_effort:
+            flow[at] = max(flow[at], abs(m.data[k]) * whole[effort])
+
+
+@kernel
 def weigh(t, m):
     """Measure the effort of each storage, too, by the balances that it takes part in.
 
@@ -205,6 +227,7 @@ def evaluate(t, x, z, scal, inputs, m):
                 m.scale[unknown + j] = abs(z[row]) + abs(given)
             m.residual[row] -= flow
             m.scale[row] += abs(flow)
+    reach(t, m)
     # at rest no effort has a size of its own: what the flows change it by in a step is one
     for i in range(t.kind.shape[0]):
         if t.kind[i] == 2:
@@ -213,7 +236,7 @@ def evaluate(t, x, z, scal, inputs, m):
             for j in range(n):
                 effort = t.e_index[e_at + j]
                 if t.entropy[effort] == 0.0:
-                    power += m.scale[n_rate + effort] * abs(z[n_rate + effort])
+                    power += m.dense[effort] * abs(z[n_rate + effort])
             for j in range(n):
                 effort = t.e_index[e_at + j]
                 if t.entropy[effort] == 1.0 and power > 0.0:
