@@ -1,11 +1,11 @@
 """Models as scene files: the tables that the reader makes, written as TOML."""
 
 import json
-import os
 import re
 from collections.abc import Iterable, Mapping
 from os import PathLike
 from pathlib import Path
+from shutil import copyfile
 from typing import Any
 
 from ephs.mechanics.scene.errors import Fault, SceneError, fault
@@ -29,7 +29,8 @@ def convert(
     model
         A URDF, an MJCF or an SDF.
     scene
-        The scene file to write; meshes stay where they are, and are named relative to it.
+        The scene file to write. Meshes beside or below it stay where they are; others are copied into a folder of
+        theirs beside it, since scenes read nothing outside of their own.
     base, adjust, inertia
         As `ephs.load` takes them; the scene file says them from then on.
 
@@ -57,12 +58,27 @@ def convert(
     if tables is None:
         raise SceneError(str(model), faults)
     tables["assembly"] = {"adjust": adjust, "inertia": inertia}
-    away = Path(os.path.relpath(source.parent.resolve(), target.parent.resolve()))
-    for body in tables["bodies"].values():
-        for shape in body.get("shapes", ()):
-            if "mesh" in shape:
-                shape["mesh"] = (away / shape["mesh"]).as_posix()
+    _gather([shape for body in tables["bodies"].values() for shape in body.get("shapes", ())], source, target)
     target.write_text(toml_text(tables), encoding="utf-8")
+
+
+def _gather(shapes: Iterable[dict[str, Any]], source: Path, target: Path) -> None:
+    """Name meshes relative to the scene file; copy those that lie elsewhere."""
+    home = target.parent.resolve()
+    taken: dict[Path, Path] = {}
+    for shape in shapes:
+        if "mesh" not in shape:
+            continue
+        file = (source.parent / shape["mesh"]).resolve()
+        if not file.is_relative_to(home) and file not in taken:
+            folder = home / f"{target.stem}-meshes"
+            names = {path.name for path in taken.values()}
+            name = file.name if file.name not in names else f"{len(taken)}-{file.name}"
+            taken[file] = folder / name
+            if file.is_file():
+                folder.mkdir(exist_ok=True)
+                copyfile(file, taken[file])
+        shape["mesh"] = taken.get(file, file).relative_to(home).as_posix()
 
 
 def toml_text(tables: Mapping[str, Any]) -> str:

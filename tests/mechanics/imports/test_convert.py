@@ -48,11 +48,15 @@ def test_meshes_are_found_from_another_folder(write, tmp_path):
     visual = '<visual><geometry><mesh filename="package://robot/meshes/part.stl" scale="2 2 2"/></geometry></visual>'
     model = write(f'<robot name="r"><link name="a">{visual}</link></robot>')
     assert main(["convert", str(model), "-o", str(tmp_path / "far/away.toml")]) == 0
-    for scene in (ephs.load(model), ephs.load(tmp_path / "far/away.toml")):
+    assert main(["convert", str(model), "-o", str(tmp_path / "beside.toml")]) == 0
+    for scene, place in (
+        (ephs.load(model), "meshes/part.stl"),
+        (ephs.load(tmp_path / "beside.toml"), "meshes/part.stl"),
+        (ephs.load(tmp_path / "far/away.toml"), "far/away-meshes/part.stl"),  # scenes read nothing outside their folder
+    ):
         (shape,) = scene.body("a").shapes
-        assert Path(shape["mesh"]).resolve() == (tmp_path / "meshes/part.stl").resolve()
-        assert shape["scale"] == [2.0, 2.0, 2.0]
-    assert ".." in (tmp_path / "far/away.toml").read_text()
+        assert Path(shape["mesh"]).resolve() == (tmp_path / place).resolve()
+        assert Path(shape["mesh"]).read_text() == MESH and shape["scale"] == [2.0, 2.0, 2.0]
 
 
 def test_the_command_says_what_is_left_out_once(write, tmp_path, capsys):
