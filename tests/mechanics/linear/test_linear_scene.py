@@ -16,7 +16,7 @@ import ephs
 from ephs.mechanics.scene.parameters import varied
 from ephs.testing import mechanisms
 from tests.mechanics.dynamics.drawn import moving
-from tests.mechanics.dynamics.mujoco_scenes import accelerations, scene_of, stripped
+from tests.mechanics.dynamics.mujoco_scenes import accelerations, joints, stripped
 
 
 def extrapolated(function, h=1e-2):
@@ -155,19 +155,20 @@ def test_a_moving_tree_linearises_as_its_flow_does(drawn):
     assert np.abs(found.A - expected).max() < 1e-6 * max(1.0, np.abs(expected).max())
 
 
+@pytest.mark.filterwarnings("ignore::ephs.ModelWarning")
 def test_mujoco_differentiates_a_robot_alike():
     """The accelerations of half_cheetah that mj_forward computes, differenced by all coordinates and rates."""
     file = File(find_spec("gymnasium").submodule_search_locations[0]) / "envs/mujoco/assets/half_cheetah.xml"
     model = stripped(mujoco.MjModel.from_xml_path(str(file)))
-    data, scene, rng = mujoco.MjData(model), scene_of(model), np.random.default_rng(4)
+    data, scene, rng = mujoco.MjData(model), ephs.load(file), np.random.default_rng(4)
     q, v = rng.uniform(-0.5, 0.5, model.nq), rng.uniform(-1.0, 1.0, model.nv)
-    names = [f"j{k}" for k in range(model.nv)]
+    names = [name for name, *_ in joints(model)]
     dynamics = ephs.dynamics(scene)
     state = dynamics.state(dict(zip(names, q, strict=True)), dict(zip(names, v, strict=True)))
     found = ephs.linearize(scene, state, inputs=[f"joints.{name}" for name in names])
 
     def acceleration(dq, dv, force):
-        data.qpos[:], data.qvel[:], data.qfrc_applied[:] = q + dq, v + dv, force
+        data.qpos[:], data.qvel[:], data.qfrc_applied[:] = model.qpos0 + q + dq, v + dv, force
         mujoco.mj_forward(model, data)
         a = accelerations(model, data)
         return np.array([a[name][0] for name in names])
