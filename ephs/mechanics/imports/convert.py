@@ -69,7 +69,7 @@ def _gather(shapes: Iterable[dict[str, Any]], source: Path, target: Path) -> Non
     for shape in shapes:
         if "mesh" not in shape:
             continue
-        file = (source.parent / shape["mesh"]).resolve()
+        file: Path = (source.parent / shape["mesh"]).resolve()
         if not file.is_relative_to(home) and file not in taken:
             folder = home / f"{target.stem}-meshes"
             names = {path.name for path in taken.values()}
@@ -78,7 +78,7 @@ def _gather(shapes: Iterable[dict[str, Any]], source: Path, target: Path) -> Non
             if file.is_file():
                 folder.mkdir(exist_ok=True)
                 copyfile(file, taken[file])
-        shape["mesh"] = taken.get(file, file).relative_to(home).as_posix()
+        shape["mesh"] = (taken[file] if file in taken else file).relative_to(home).as_posix()
 
 
 def toml_text(tables: Mapping[str, Any]) -> str:

@@ -1,14 +1,16 @@
 """What is kept of every member, by name, and how it is read from a solution."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
+from ephs.mechanics.readout import freedoms_of
 from ephs.mechanics.scene.errors import did_you_mean, listing
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.solve.errors import OptionError
+from ephs.mechanics.solve.labels import POSE, WRENCH, Labels, labels_of
 from ephs.semantics.bundle import Array
 
 if TYPE_CHECKING:
@@ -19,17 +21,19 @@ __all__ = ["BOOKS", "JOINT", "Output", "outputs_of"]
 
 BOOKS = {
     "heat": "J", "work": "J", "kinetic": "J", "potential": "J", "energy": "J", "exergy": "J", "entropy": "J/K",
-    "entropy_production": "J/K", "energy_error": "J", "constraint_error": "",
+    "entropy_production": "J/K", "energy_error": "1", "constraint_error": "m, rad",
 }  # fmt: skip
 """Ledgers of the whole model, and their units."""
 JOINT = ("coordinate", "rate", "wrench")
-_BODY = {"position": "m", "quaternion": "", "velocity": "m/s", "angular_velocity": "rad/s"}
-_MARKER = {"position": "m", "velocity": "m/s"}
-_LABELS = {
-    "position": ("xyz", ("x", "y", "z")), "velocity": ("xyz", ("x", "y", "z")),
-    "angular_velocity": ("xyz", ("x", "y", "z")), "quaternion": ("quaternion", ("w", "x", "y", "z")),
-    "wrench": ("wrench", ("mx", "my", "mz", "fx", "fy", "fz")),
-}  # fmt: skip
+_AXES, _FOUR = ("x", "y", "z"), POSE.names[:4]
+_BODY = {
+    "position": Labels("axis", _AXES, ("m",) * 3),
+    "quaternion": Labels("quaternion", _FOUR, ("1",) * 4),
+    "velocity": Labels("axis", _AXES, ("m/s",) * 3),
+    "angular_velocity": Labels("axis", _AXES, ("rad/s",) * 3),
+}
+_MARKER = {key: _BODY[key] for key in ("position", "velocity")}
+_TEMPERATURE = Labels("", (), ("K",))
 
 
 @final
@@ -42,12 +46,12 @@ class Output:
     name
         ``joints.pin.rate``, ``bodies.crank.position``, ``thermal.housing.temperature``, ``markers.tip.position``, a
         ledger such as ``energy``, or the path of a state.
-    units
-        "" where it has none, or several.
+    labels
+        What its columns are called, and their units.
     """
 
     name: str
-    units: str
+    labels: Labels
 
     def read(self, solution: "Solution") -> Array:
         """(n,) or (n, d) of a solution with n instants."""
@@ -59,11 +63,6 @@ class Output:
         if solution.motion is not None and kind in _OF and what in _OF[kind] and thing:
             return np.asarray(getattr(getattr(motion, kind_of(kind))(thing), what))
         return solution[self.name]
-
-    def labels(self, size: int) -> tuple[str, tuple[str, ...] | None]:
-        """The dimension of an output of so many columns, and what its places are called."""
-        dim, labels = _LABELS.get(self.name.rpartition(".")[2], (f"{self.name}.place", None))
-        return (dim, labels) if labels is None or len(labels) == size else (f"{self.name}.place", None)
 
 
 _OF = {"joints": JOINT, "bodies": tuple(_BODY), "thermal": ("temperature",), "markers": tuple(_MARKER)}
@@ -96,22 +95,24 @@ def outputs_of(model: "Scene | System", names: Sequence[str] | None) -> tuple[Ou
     return tuple(Output(name, known[name]) for name in dict.fromkeys(names))
 
 
-def _known(model: "Scene | System") -> "list[tuple[str, str]]":
-    out: list[tuple[str, str]] = []
+def _known(model: "Scene | System") -> "Iterator[tuple[str, Labels]]":
+    system: Any = model
     if isinstance(model, Scene):
         from ephs.mechanics.build import scene_system
 
-        for name, joint in model.all_joints():
-            if joint.dim:
-                out += [(f"joints.{name}.{what}", "") for what in JOINT]
-        out += [(f"joints.{name}.{what}", "") for name, _ in model.implicit_joints() for what in JOINT]
-        for name, _ in model.all_bodies():
-            out += [(f"bodies.{name}.{what}", units) for what, units in _BODY.items()]
-        out += [(f"thermal.{name}.temperature", "K") for name, _ in model.all_thermal()]
-        for name, _ in model.all_markers():
-            out += [(f"markers.{name}.{what}", units) for what, units in _MARKER.items()]
         system = scene_system(model)
-    else:
-        system = model
-    out += list(BOOKS.items())
-    return out + [(str(slot.path), "") for slot in system.descriptor().states if slot.quantity.space.dim]
+        joints = [(name, joint) for name, joint in model.all_joints() if joint.dim]
+        for name, joint in [*joints, *model.implicit_joints()]:
+            labels = freedoms_of(joint)
+            yield f"joints.{name}.coordinate", labels
+            yield f"joints.{name}.rate", replace(labels, units=tuple(f"{unit}/s" for unit in labels.units))
+            yield f"joints.{name}.wrench", WRENCH
+        yield from ((f"bodies.{name}.{key}", labels) for name, _ in model.all_bodies() for key, labels in _BODY.items())
+        yield from ((f"thermal.{name}.temperature", _TEMPERATURE) for name, _ in model.all_thermal())
+        yield from (
+            (f"markers.{name}.{key}", labels) for name, _ in model.all_markers() for key, labels in _MARKER.items()
+        )
+    yield from ((name, Labels("", (), (unit,))) for name, unit in BOOKS.items())
+    for slot in system.descriptor().states:
+        if slot.quantity.space.dim:
+            yield str(slot.path), labels_of(slot.quantity)

@@ -201,14 +201,12 @@ def _table(job: Job, batches: Sequence[Batch], model: "System | Scene", seconds:
             whole[numbers] = values
         dims = (*axes.dims, "t")
         whole = whole.reshape(*axes.shape, instants, width)
-        attributes = {"units": output.units} if output.units else {}
+        attributes = {"units": output.labels.unit}
         if width == 1:
             variables[output.name] = (dims, whole[..., 0], attributes)
             continue
-        dim, labels = output.labels(width)
-        variables[output.name] = ((*dims, dim), whole, attributes)
-        if labels:
-            places[dim] = list(labels)
+        variables[output.name] = ((*dims, output.labels.dimension), whole, attributes)
+        places[output.labels.dimension] = list(output.labels.names)
     for name, values in (("status", status.astype(str)), ("steps", steps), ("rejected", rejected)):
         variables[name] = (axes.dims, values.reshape(axes.shape))
     coordinates = {

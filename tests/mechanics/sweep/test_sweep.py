@@ -140,7 +140,8 @@ def test_every_kind_of_method_and_of_output(method):
     mass = read(scene, "bodies.crank.mass")
     table = ephs.sweep(scene, {"bodies.crank.mass": [mass, 1.5 * mass]}, 0.05, save_at=TIMES, outputs=kept, **options)
     agree(scene, table, [{"bodies.crank.mass": 1}], 1e-9, **options)
-    assert list(table["quaternion"].values) == ["w", "x", "y", "z"] and table["xyz"].size == 3
+    assert list(table["quaternion"].values) == ["qw", "qx", "qy", "qz"] and table["axis"].size == 3
+    assert table["joints.wrist.coordinate"].attrs["units"] == "rad, m"
 
 
 # ---- nothing is lost -------------------------------------------------------------------------------------------------
