@@ -50,9 +50,8 @@ def cite(solution: Solution) -> str:
         Entries with an empty line between. A method of one's own adds none: its author knows its sources.
     """
     stats = solution.stats
-    methods = (str(stats.get("method")), str(stats.get("chosen")), *(str(s["to"]) for s in stats.get("switches", ())))
     used = [*ALWAYS]
-    for method in methods:
+    for method in str(stats.get("method")).split(", "):
         used += METHOD_SOURCES.get(method, ())
     used += FORM_SOURCES.get(str(stats.get("form")), ())
     entries = bibliography()
