@@ -16,6 +16,8 @@ extensions = [
 ]
 exclude_patterns = ["_build", ".jupyter_cache", "jupyter_execute"]
 
+default_role = "literal"  # names in docstrings stand between single backticks
+
 html_theme = "furo"
 html_title = "ephs"
 html_show_copyright = False
