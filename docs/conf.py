@@ -16,6 +16,8 @@ extensions = [
 ]
 exclude_patterns = ["_build", ".jupyter_cache", "jupyter_execute"]
 
+default_role = "literal"  # names in docstrings stand between single backticks
+
 html_theme = "furo"
 html_title = "ephs"
 html_show_copyright = False
@@ -27,7 +29,7 @@ mathjax_options = {"defer": "defer"}
 if not Path(__file__).parent.joinpath("../.build/static", mathjax_path).is_file():
     raise FileNotFoundError("MathJax is missing, build the pages with `make docs`")
 
-bibtex_bibfiles = ["references.bib"]
+bibtex_bibfiles = ["../ephs/mechanics/references.bib"]  # the file that ephs.cite reads
 myst_enable_extensions = ["dollarmath", "deflist"]
 myst_heading_anchors = 3
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from ephs.mechanics.check import check_model as check_model
+    from ephs.mechanics.citing import cite as cite
     from ephs.mechanics.dynamics import dynamics as dynamics
     from ephs.mechanics.linear import equilibrium as equilibrium
     from ephs.mechanics.linear import linearize as linearize
@@ -75,6 +76,7 @@ _HOMES = {
     "ephs.mechanics.scene": ("ModelWarning", "Scene", "SceneError", "SceneWarning"),
     "ephs.mechanics.scene.load": ("load",),
     "ephs.mechanics.check": ("check_model",),
+    "ephs.mechanics.citing": ("cite",),
     "ephs.mechanics.dynamics": ("dynamics",),
     "ephs.mechanics.linear": ("equilibrium", "linearize"),
     "ephs.mechanics.methods": ("register_method",),

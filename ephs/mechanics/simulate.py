@@ -75,7 +75,7 @@ def simulate(
         radau from where the problem shows itself stiff, for scenes, radau for systems on vector spaces. Or a
         `Method` of one's own.
     rtol, atol
-        Without ``step``: each state x is wanted to atol + rtol·|x|, atol in the state's own unit. Either may be
+        Without ``step``: each state x is wanted to ``atol + rtol·|x|``, atol in the state's own unit. Either may be
         a mapping from kinds of quantities or paths to numbers, ``"*"`` for all others.
     step
         The grid is t₀ + k·step, the last step shortened to end on ``until``. Without it rtol and atol steer.

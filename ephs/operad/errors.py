@@ -37,6 +37,7 @@ _TEXTS = {
     "no-filling": "the boxes {expected} want fillings, found none; give each box a system or a primitive",
     "rename": "there is no {what} named {found} to rename; the names are {expected}",
     "pair": "the kind of relative pose is {found!r}, expected one of {expected}",
+    "pair-known": "the kind {what} of pairs is known with dim, size and parameters {expected}, found {found}",
     "pair-parameters": "relative pose {what}: found the parameters {found}, expected {expected}",
     "parity": "quantity {what}: the parity is {found!r}, expected +1 (even under time reversal) or -1 (odd)",
     "space": "space {what}: found dim {found}, expected whole numbers dim >= 0 and size >= dim",

@@ -16,23 +16,22 @@ __all__ = [
     "Space",
     "interface_text",
     "known_quantity",
+    "name_pair",
     "quantity",
     "quantity_word",
 ]
 
 # Kind of pair: dimension of its subgroup of SE(3), numbers stored for an element, names of its parameters.
-_PAIRS: MappingProxyType[str, tuple[int, int, tuple[str, ...]]] = MappingProxyType(
-    {
-        "revolute": (1, 1, ()),
-        "prismatic": (1, 1, ()),
-        "screw": (1, 1, ("pitch",)),
-        "cylindrical": (2, 2, ()),
-        "planar": (3, 3, ()),
-        "spherical": (3, 4, ()),
-        "fixed": (0, 0, ()),
-        "free": (6, 7, ()),
-    }
-)
+_PAIRS: dict[str, tuple[int, int, tuple[str, ...]]] = {
+    "revolute": (1, 1, ()),
+    "prismatic": (1, 1, ()),
+    "screw": (1, 1, ("pitch",)),
+    "cylindrical": (2, 2, ()),
+    "planar": (3, 3, ()),
+    "spherical": (3, 4, ()),
+    "fixed": (0, 0, ()),
+    "free": (6, 7, ()),
+}
 _ENVIRONMENT = frozenset({"entropy", "volume", "amount"})
 
 
@@ -202,6 +201,28 @@ class Quantities:
         """The momentum conjugate to a relative pose; parameters and errors as there."""
         dim, _, values = _pair(kind, parameters)
         return Quantity("momentum", Space(kind + "*", dim, dim, values), -1)
+
+
+def name_pair(kind: str, dim: int, size: int, parameters: tuple[str, ...] = ()) -> None:
+    """Let `quantity` name the relative poses and joint momenta of a further kind of pair.
+
+    `ephs.semantics.spaces.register_pair` calls it; what is known already may be said again.
+
+    Parameters
+    ----------
+    dim, size
+        Of the subgroup of SE(3), and of the numbers stored for an element.
+    parameters
+        Names of its parameters.
+
+    Raises
+    ------
+    PatternError
+        The kind is known with other numbers.
+    """
+    known = _PAIRS.setdefault(kind, (dim, size, parameters))
+    if known != (dim, size, parameters):
+        raise PatternError("pair-known", found=(dim, size, parameters), expected=known, what=kind)
 
 
 def _pair(kind: str, parameters: dict[str, float]) -> tuple[int, int, tuple[tuple[str, float], ...]]:

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 
 from ephs.operad import PatternError, Quantity, Space, quantity
+from ephs.operad import quantities as table
 from ephs.testing import quantities
 
 WORDS = [f.name for f in dataclasses.fields(quantity)]
@@ -82,3 +83,16 @@ def test_a_wrong_quantity_is_refused(make, words):
     with pytest.raises(PatternError) as caught:
         make()
     assert all(word in str(caught.value) for word in words)
+
+
+def test_a_further_kind_of_pair_has_its_quantities(monkeypatch):
+    monkeypatch.setattr(table, "_PAIRS", dict(table._PAIRS))
+    with pytest.raises(PatternError, match="expected one of"):
+        quantity.relative_pose("table")
+    table.name_pair("table", 2, 2)
+    table.name_pair("table", 2, 2)  # saying it again changes nothing
+    assert quantity.relative_pose("table").space == Space("table", 2, 2)
+    assert quantity.joint_momentum("table").space == Space("table*", 2, 2)
+    assert table.quantity_word(quantity.relative_pose("table")) == ("relative_pose", ("table",), {})
+    with pytest.raises(PatternError, match="known with dim"):
+        table.name_pair("revolute", 2, 2)

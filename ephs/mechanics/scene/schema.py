@@ -213,13 +213,15 @@ class SceneFile(Entry):
     name: Text | None = Field(default=None, description="of the scene; default: the file's name")
     world: WorldEntry | None = Field(default=None, description="gravity and the reference environment")
     assembly: AssemblyEntry = Field(default=AssemblyEntry(), description="how the initial state is found")
-    bodies: dict[str, BodyEntry] = Field(default_factory=dict)
-    joints: dict[str, JointEntry] = Field(default_factory=dict)
-    springs: dict[str, SpringEntry] = Field(default_factory=dict)
-    thermal: dict[str, ThermalEntry] = Field(default_factory=dict)
-    conduction: dict[str, ConductionEntry] = Field(default_factory=dict)
-    markers: dict[str, MarkerEntry] = Field(default_factory=dict)
-    parts: dict[str, PartEntry] = Field(default_factory=dict)
+    bodies: dict[str, BodyEntry] = Field(default_factory=dict, description="rigid bodies, and frames without mass")
+    joints: dict[str, JointEntry] = Field(
+        default_factory=dict, description="between two bodies, or a body and the ground"
+    )
+    springs: dict[str, SpringEntry] = Field(default_factory=dict, description="springs and dampers between two points")
+    thermal: dict[str, ThermalEntry] = Field(default_factory=dict, description="what heat warms")
+    conduction: dict[str, ConductionEntry] = Field(default_factory=dict, description="how heat passes between them")
+    markers: dict[str, MarkerEntry] = Field(default_factory=dict, description="points on bodies")
+    parts: dict[str, PartEntry] = Field(default_factory=dict, description="other scene files as subsystems")
 
 
 SECTIONS: dict[str, type[Entry]] = {

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, TypeAlias, final
 
 import numpy as np
 
+from ephs.operad.quantities import name_pair
 from ephs.semantics.spaces import codes, groups
 from ephs.semantics.spaces import rotations as so3
 from ephs.semantics.spaces.errors import SpaceError
@@ -150,7 +151,7 @@ PAIRS: Mapping[str, PairEntry] = MappingProxyType(_ENTRIES)
 
 
 def register_pair(entry: PairEntry) -> None:
-    """Make a pair known: to `pair`, and its group as a space of the same name to `manifold`.
+    """Make a pair known: to `pair`, to `quantity`, to joints, and its group as a space of the same name to `manifold`.
 
     Raises
     ------
@@ -159,6 +160,12 @@ def register_pair(entry: PairEntry) -> None:
     """
     if entry.name in _ENTRIES:
         raise SpaceError("pair taken", name=entry.name)
+    if entry.group is None:
+        # How many freedoms a pair has does not depend on its parameters.
+        dim = size = np.shape(entry.basis(**dict.fromkeys(entry.parameters, 1.0)))[-1]
+    else:
+        dim, size = entry.group.dim, entry.group.size
+    name_pair(entry.name, dim, size, entry.parameters)
     register_manifold(entry.name, lambda space: Pair.from_space(space).manifold)
     _ENTRIES[entry.name] = entry
 

@@ -1,5 +1,8 @@
 """Lower pairs are subgroups of SE(3); every entry of the registry is held to it."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -173,7 +176,45 @@ def test_a_basis_of_the_wrong_shape_is_refused():
 
 def forget(name):
     """Take a pair out again, so that the registry's tests see the shipped ones only."""
+    from ephs.operad.quantities import _PAIRS
     from ephs.semantics.spaces.manifold import _FACTORIES
     from ephs.semantics.spaces.pairs import _ENTRIES
 
-    del _ENTRIES[name], _FACTORIES[name]
+    del _ENTRIES[name], _FACTORIES[name], _PAIRS[name]
+
+
+OWN_PAIR = """
+import math, tempfile
+from pathlib import Path
+import numpy as np
+import ephs
+from ephs.semantics.spaces import PairEntry, register_pair
+
+register_pair(PairEntry("table", "ℝ²", lambda: np.eye(6)[:, [3, 4]]))
+register_pair(PairEntry("ramp", "ℝ", lambda slope: np.array([[0, 0, 0, 1, 0, slope]]).T, parameters=("slope",)))
+assert ephs.quantity.relative_pose("ramp", slope=0.5).space.dim == 1
+file = Path(tempfile.mkdtemp()) / "puck.toml"
+file.write_text('''
+format = 1
+[bodies.puck]
+mass = 1.0
+inertia = [0.1, 0.1, 0.1]
+velocity = [1.0, 0.5, 0.0]
+[joints.top]
+type = "table"
+bodies = ["ground", "puck"]
+at = [0.0, 0.0, 0.0]
+axis = [0.0, 0.0, 1.0]
+friction = 0.2
+''')
+sol = ephs.simulate(ephs.load(file), 1.0, method="natural4", step=0.02)
+way = (1.0 - math.exp(-0.2)) / 0.2
+assert np.abs(sol.joint("top").coordinate[-1] - way * np.array([1.0, 0.5])).max() < 1e-9
+assert sol.energy_error.max() < 1e-13
+"""
+
+
+def test_a_pair_of_ones_own_makes_joints_and_scenes():
+    # In a process of its own: a pair that is known stays known.
+    done = subprocess.run([sys.executable, "-c", OWN_PAIR], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr

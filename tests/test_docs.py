@@ -1,0 +1,27 @@
+"""The pages say all public names, and are all reached."""
+
+import re
+from pathlib import Path
+
+import ephs
+from ephs import operad
+
+DOCS = Path(__file__).resolve().parents[1] / "docs"
+ROOMS = {"library", "mechanics", "operad", "quantity", "semantics", "show", "testing"}
+
+
+def test_the_list_of_names_is_whole():
+    listed = set(re.findall(r"^\.\. auto\w+:: ephs\.(\w+)$", (DOCS / "api.md").read_text("utf-8"), re.MULTILINE))
+    assert set(ephs.__all__) - ROOMS <= listed
+    assert {"library", "show", "testing"} <= listed and "Nesting" in operad.__all__
+
+
+def test_every_page_is_in_the_contents():
+    index = (DOCS / "index.md").read_text("utf-8")
+    entries = {line for block in re.findall(r"```\{toctree\}\n(.*?)```", index, re.DOTALL) for line in block.split()}
+    assert {page.stem for page in DOCS.glob("*.md")} - {"index"} <= entries
+
+
+def test_no_page_loads_from_a_network():
+    loading = re.compile(r'<(?:script|link|img)[^>]*(?:src|href)="https?:')
+    assert not [page.name for page in DOCS.glob("*.md") if loading.search(page.read_text("utf-8"))]
