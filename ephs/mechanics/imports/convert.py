@@ -78,7 +78,8 @@ def _gather(shapes: Iterable[dict[str, Any]], source: Path, target: Path) -> Non
             if file.is_file():
                 folder.mkdir(exist_ok=True)
                 copyfile(file, taken[file])
-        shape["mesh"] = (taken[file] if file in taken else file).relative_to(home).as_posix()
+        place: Path = taken.get(file, file)
+        shape["mesh"] = place.relative_to(home).as_posix()
 
 
 def toml_text(tables: Mapping[str, Any]) -> str:
