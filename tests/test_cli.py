@@ -39,6 +39,7 @@ class FakeSolution:
     """Stands for a Solution that ends at 0.25 s."""
 
     t = (0.0, 0.25)
+    scene = None
 
     def summary(self):
         return {"scene": "crank", "steps": 7, "max_energy_error": 3e-15, "work": None}
