@@ -24,7 +24,7 @@ REFERENCE = Reference()
 
 scene = ephs.load(Path(__file__).parents[1] / "scenes" / "slider-crank.toml")
 engine = scene_system(scene, driven=["cylinder"])
-SLIDING = "drives.cylinder"
+SLIDING, TURNING = "drives.cylinder", "drives.bearing"
 
 
 def air(volume: float) -> tuple[object, float]:
@@ -45,13 +45,14 @@ cylinder = Pattern(
         "s": junction(Q.entropy),
         "p": junction(Q.momentum),
         "p_r": junction(engine.interface[SLIDING].quantity),
+        "shaft": junction(engine.interface[TURNING].quantity, exposed=True),  # for a load
     },
     boxes={
         "above": {"v": "v1", "s": "s1"},
         "below": {"v": "v2", "s": "s2"},
         "piston": {"v1": "v2", "v2": "v1", "p": "p"},  # sliding outwards takes from what is above
         "rod": {"p": "p", "p_r": "p_r"},
-        "engine": {SLIDING: "p_r"},
+        "engine": {SLIDING: "p_r", TURNING: "shaft"},
         "head": {"s1": "s1", "s2": "s"},
         "sump": {"s1": "s2", "s2": "s"},
         "wall": {"s": "s"},
@@ -76,8 +77,8 @@ START = {
 
 
 def simulate(until: float = 2.0) -> ephs.Solution:
-    """The motion from the scene's initial state."""
-    return ephs.simulate(gas_engine, until, initial=START, step=2.5e-4)
+    """The motion from the scene's initial state, without a load."""
+    return ephs.simulate(gas_engine, until, initial=START, inputs={"shaft": {"flow": 0.0}}, step=2.5e-4)
 
 
 if __name__ == "__main__":
