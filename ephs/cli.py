@@ -161,13 +161,15 @@ def run(
 
 
 @app.command
-def check(scene: str, /, *, loading: Loading = AS_GIVEN) -> int:
+def check(scene: str, /, *, initial: list[str] | None = None, loading: Loading = AS_GIVEN) -> int:
     """Check the model, not the trajectory; exit code 1 if a law fails.
 
     Parameters
     ----------
     scene
         A scene file (.toml), a model (.urdf, .xml, .sdf), or FILE.py:NAME.
+    initial
+        Initial value of a state, PATH=NUMBER or PATH=NUMBER,NUMBER,...; may be given several times.
     """
     from rich.console import Console
     from rich.table import Table
@@ -177,7 +179,7 @@ def check(scene: str, /, *, loading: Loading = AS_GIVEN) -> int:
     with addressed(scene):
         from ephs.mechanics.check import check_model
 
-        report = check_model(model)
+        report = check_model(model, initial_values(initial or []))
     table = Table("law", "", "detail", title=scene, title_justify="left", box=None, pad_edge=False)
     for name, holds, detail in report.items:
         verdict = Text("holds", "green") if holds else Text("FAILS", "bold red")

@@ -16,7 +16,10 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
         "ephs run scenes/heavy-top.toml --until 1 --method natural --step 1e-3",
         "ephs run examples/oscillator.py:damped_oscillator --until 10 --initial osc.pe.q=1.0",
     ),
-    "check": ("ephs check scenes/four-bar.toml",),
+    "check": (
+        "ephs check scenes/four-bar.toml",
+        "ephs check examples/physics.py:cylinder --initial gas1.v=0.1 --initial gas2.v=0.9",
+    ),
     "draw": ("ephs draw scenes/slider-crank.toml -o pattern.svg", "ephs draw scenes/mbs.toml --flat -o flat.tex"),
     "equations": ("ephs equations scenes/mbs.toml", "ephs equations scenes/mbs.toml --form descriptor --latex"),
     "reduce": ("ephs reduce scenes/four-bar.toml",),

@@ -2,7 +2,7 @@
 
 The mechanism of scenes/slider-crank.toml is one box; the momentum of its cylinder joint is the port at which the piston
 meets it. Hot gas above the piston expands, air in the crankcase below is compressed, heat goes through the head, and
-friction warms the housing. The crank swings, comes to rest, and all exergy is gone.
+friction warms the housing. The crank swings to and fro on the two cushions, ever less.
 
     python examples/gas_engine.py
 """
@@ -84,6 +84,10 @@ def simulate(until: float = 2.0) -> ephs.Solution:
 if __name__ == "__main__":
     solution = simulate()
     exergy, entropy = solution.exergy, solution.entropy
-    print(f"volume above the piston: {1e6 * solution['above.v'].min():.1f} to {1e6 * solution['above.v'].max():.1f} cm³")
-    print(f"exergy falls from {exergy[0]:.3f} to {exergy[-1]:.3f} J, entropy grows by {entropy[-1] - entropy[0]:.4f} J/K")
+    print(
+        f"volume above the piston: {1e6 * solution['above.v'].min():.1f} to {1e6 * solution['above.v'].max():.1f} cm³"
+    )
+    print(
+        f"exergy falls from {exergy[0]:.3f} to {exergy[-1]:.3f} J, entropy grows by {entropy[-1] - entropy[0]:.4f} J/K"
+    )
     print(f"energy balanced to {solution.energy_error.max():.1e}")
