@@ -12,14 +12,16 @@ from pathlib import Path
 import numpy as np
 
 import ephs
+from ephs.mechanics.scene.parameters import varied
 
 ROOT = Path(__file__).parents[1]
-UNTIL, INSTANTS = 4.0, 120
+UNTIL, INSTANTS = 4.0, 240
+FRICTION = 0.35  # N m s/rad, in the bearing of the crank
 HALF = 0.45  # m, from the pin to the coupler's centre of mass
 VARIED = {
-    "joints.knee.frame1.position[0]": ("length of the coupler", "m", np.linspace(0.39, 0.51, 5), HALF),
-    "joints.pivot.frame1.position[0]": ("distance of the supports", "m", np.linspace(0.85, 1.05, 5), 0.0),
-    "joints.main.drive": ("torque on the crank", "N m", np.linspace(2.0, 6.0, 5), 0.0),
+    "joints.knee.frame1.position[0]": ("length of coupler", "m", np.linspace(0.39, 0.51, 5), HALF),
+    "joints.pivot.frame1.position[0]": ("distance of supports", "m", np.linspace(0.85, 1.05, 5), 0.0),
+    "joints.main.drive": ("torque on crank", "N m", np.linspace(4.0, 7.0, 4), 0.0),
 }  # path: words, unit, values, what is added for the reader
 OUTPUTS = ("bodies.crank.position", "bodies.coupler.position", "joints.main.rate", "heat")
 
@@ -27,6 +29,7 @@ OUTPUTS = ("bodies.crank.position", "bodies.coupler.position", "joints.main.rate
 def page() -> str:
     """The page's contents, without its frame."""
     scene = ephs.load(ROOT / "ephs" / "templates" / "four-bar.toml")
+    scene = varied(scene, {"joints.main.friction": FRICTION})
     times = np.linspace(0.0, UNTIL, INSTANTS + 1)
     vary = {path: values for path, (_, _, values, _) in VARIED.items()}
     table = ephs.sweep(scene, vary, UNTIL, save_at=times, outputs=OUTPUTS, method="rk87")
@@ -42,7 +45,7 @@ def page() -> str:
             {"words": words, "unit": unit, "values": (values + more).round(6).tolist()}
             for words, unit, values, more in VARIED.values()
         ],
-        "start": [2, 3, 2],
+        "start": [2, 3, 1],
         "times": times.round(4).tolist(),
         "points": millimetres.reshape(-1, INSTANTS + 1, 4).tolist(),
         "rate": table["joints.main.rate"].values.reshape(-1, INSTANTS + 1).round(2).tolist(),
@@ -63,16 +66,16 @@ _BODY = """
 <style>
 #fourbar{font:15px/1.5 system-ui,sans-serif;color:#1f2933;background:#fff;padding:.8rem;border-radius:8px}
 #fourbar .set{display:flex;flex-wrap:wrap;gap:.4rem 2rem;margin:.2rem 0 .8rem}
-#fourbar label{flex:1 1 13rem;display:block}
+#fourbar label{flex:1 1 15rem;display:block}
 #fourbar input{width:100%;accent-color:#4c78a8}
 #fourbar svg{width:100%;height:auto;display:block}
 #fourbar button{font:inherit;padding:.1rem .8rem;border:1px solid #9aa5b1;border-radius:6px;background:#f5f7fa}
-#fourbar output{font-variant-numeric:tabular-nums;font-weight:600}
+#fourbar output{font-variant-numeric:tabular-nums;font-weight:600;white-space:nowrap}
 #fourbar .read{display:flex;flex-wrap:wrap;gap:.3rem 1.6rem;align-items:center;font-variant-numeric:tabular-nums}
 </style>
 <div class="set"></div>
-<svg viewBox="-480 -460 1760 1500" role="img" aria-label="a four-bar linkage in motion"></svg>
-<svg viewBox="0 0 1000 190" role="img" aria-label="crank speed over time"></svg>
+<svg viewBox="-480 -840 1760 1220" role="img" aria-label="a four-bar linkage in motion"></svg>
+<svg viewBox="0 -26 1000 216" role="img" aria-label="crank speed over time"></svg>
 <div class="read"><button type="button">pause</button><span></span></div>
 <script>
 (function () {
@@ -103,8 +106,9 @@ _BODY = """
   make(stage, "line", {x1: -470, y1: 0, x2: 1270, y2: 0, stroke: "#e1e5ea", "stroke-width": 4});
   const ghost = make(stage, "polyline", {...line, stroke: "#e0912f", "stroke-width": 5, opacity: 0.45});
   const arc = make(stage, "polyline", {...line, stroke: "#5f9e6e", "stroke-width": 5, opacity: 0.45});
-  const bars = ["#4c78a8", "#e0912f", "#5f9e6e"].map(ink =>
-    make(stage, "line", {...line, stroke: ink, "stroke-width": 34, opacity: 0.92}));
+  const inks = ["#4c78a8", "#e0912f", "#5f9e6e"], bars = [];
+  for (const i of [1, 2, 0])  // the crank in front
+    bars[i] = make(stage, "line", {...line, stroke: inks[i], "stroke-width": 34, opacity: 0.92});
   const pins = [0, 1, 2, 3].map(k =>
     make(stage, "circle", {r: 13, fill: k % 3 ? "#fff" : "#1f2933", stroke: "#1f2933", "stroke-width": 6}));
   make(plot, "line", {x1: 60, y1: 160, x2: 980, y2: 160, stroke: "#9aa5b1"});
@@ -117,7 +121,7 @@ _BODY = """
   };
   words(60, 184, "0 s", "middle");
   words(980, 184, data.times[data.times.length - 1] + " s", "middle");
-  words(70, 24, "speed of the crank [rad/s]", "start");
+  words(60, -6, "speed of the crank [rad/s]", "start");
   const top = words(52, 30, "", "end");
   words(52, 165, "0", "end");
   const tracks = data.points[0].length;
