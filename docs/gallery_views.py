@@ -9,8 +9,8 @@ from gallery_pictures import View, moving_scene, moving_system, sliding
 from examples.gallery import UNTIL, entries
 
 ENTRIES = entries()
-SHORT = 8
-"""Equations that are set in formulas; more are folded away as text."""
+SHORT, FEW = 8, 3
+"""Equations that are set in formulas, more are folded away as text; boxes that are drawn opened."""
 
 FRONT = View(-90.0, 8.0)  # along y: for what moves in the plane x, z
 VIEWS = {
@@ -69,14 +69,13 @@ def shown(name: str) -> None:
     system = model if isinstance(model, System) else model.system()
     sol = entry.run(UNTIL)
     display(SVG(picture(name, sol)))
-    display(SVG(draw(system).svg))
+    display(SVG(draw(system, opened=len(system.fillings) <= FEW).svg))
     equations = system.equations()
     if len(equations) <= SHORT:
         display(equations)
     else:
         head = f"<summary>{len(equations)} equations, interface variables eliminated</summary>"
         display(HTML(f"<details>{head}<pre>{html.escape(str(equations))}</pre></details>"))
-    books = sol.ledger()
     made, gap = float(sol.entropy[-1] - sol.entropy[0]), float(sol.constraint_error.max())
     display(
         Markdown(
@@ -85,4 +84,4 @@ def shown(name: str) -> None:
             + f"; heat {sol.heat[-1]:.4g} J, work {sol.work[-1]:.4g} J, entropy made {made:.3g} J/K."
         )
     )
-    display(HTML(f"<pre>{html.escape(str(books))}</pre>"))
+    display(sol.ledger())
