@@ -40,7 +40,13 @@ def turned(quaternion: np.ndarray) -> np.ndarray:
 
 
 def faces(shape: Mapping[str, Any]) -> list[np.ndarray]:
-    """Faces of a shape, each (k, 3), corners counter-clockwise from outside."""
+    """Faces of a shape in its body, each (k, 3), corners counter-clockwise from outside."""
+    at = np.array(shape.get("position", [0.0, 0.0, 0.0]))
+    turn = turned(np.array([shape.get("rotation", [1.0, 0.0, 0.0, 0.0])]))[0]
+    return [face @ turn.T + at for face in _centred(shape)]
+
+
+def _centred(shape: Mapping[str, Any]) -> list[np.ndarray]:
     if "box" in shape:
         low, high = -0.5 * np.array(shape["box"]), 0.5 * np.array(shape["box"])
         found = []
@@ -125,9 +131,9 @@ def moving_scene(sol: Any, view: View | None = None) -> str:
     scene = sol.scene
     bodies = []
     for name, body in scene.all_bodies():
-        if body.shape:
-            motion = sol.body(name)
-            bodies.append((np.hstack([motion.quaternion, motion.position]), body.shape))
+        motion = sol.body(name)
+        for shape in body.shapes or filter(None, [body.shape]):
+            bodies.append((np.hstack([motion.quaternion, motion.position]), shape))
     ends = [
         np.stack([_point(sol, s.body1, s.at1), _point(sol, s.body2, s.at2)], axis=1) for _, s in scene.all_springs()
     ]

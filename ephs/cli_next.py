@@ -25,8 +25,8 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
     "reduce": ("ephs reduce scenes/four-bar.toml",),
     "animate": ("ephs animate out/slider-crank -o slider-crank.html",),
     "sweep": ("ephs sweep scenes/heavy-top.toml --vary bodies.top.mass=5:25:9 --until 1 -o out/sweep",),
-    "linearize": ("ephs linearize scenes/heavy-top.toml",),
-    "convert": ("ephs convert robot.urdf -o robot.toml",),
+    "linearize": ("ephs linearize scenes/four-bar.toml --at equilibrium",),
+    "convert": ("ephs convert examples/arm.urdf -o arm.toml",),
     "chart": (
         "ephs chart stability spin -o out/charts",
         "ephs chart work-precision scenes/four-bar.toml -o out/charts",
@@ -64,8 +64,8 @@ def welcome(app: Any) -> str:
     return "\n".join([
         *lines,
         "",
-        "SCENE is a scene file (.toml), a model (URDF, MJCF, SDF: .urdf, .xml, .sdf), or FILE.py:NAME, a System or Scene of",
-        "that name in a Python file of yours.",
+        "SCENE is a scene file (.toml), a model (URDF, MJCF, SDF: .urdf, .xml, .sdf), or FILE.py:NAME, a System",
+        "or Scene of that name in a Python file of yours.",
         "ephs COMMAND --help explains a command; ephs --install-completion teaches your shell their names.",
     ])  # fmt: skip
 

@@ -61,6 +61,14 @@ def _oscillator(name: str, text: str) -> Entry:
     return Entry(f"examples/oscillator.py:{name}", text, lambda: system, run, start)
 
 
+def _arm(text: str) -> Entry:
+    def model() -> Scene:
+        angles = {"shoulder": 0.6, "elbow": 1.1, "roll": 0.4, "bend": 0.7}
+        return ephs.load(ROOT / "examples" / "arm.urdf").with_state(coordinates=angles, rates={"waist": 1.5})
+
+    return Entry("examples/arm.urdf", text, model, lambda until: ephs.simulate(model(), until, step=2e-3))
+
+
 def _cylinder(text: str) -> Entry:
     from examples.physics import CYLINDER_START, cylinder
 
@@ -111,7 +119,7 @@ def entries() -> dict[str, Entry]:
         "Cardan shaft": _scene(
             "cardan-shaft", 1e-3, "Two hinges and a cross without mass; the driven shaft runs ahead and falls behind."
         ),
-        "robot arm": _scene("robot-arm", 2e-3, "Six hinges, let go: it falls through the friction of its gears."),
+        "robot arm": _arm("Six hinges, read from a URDF and let go: it falls through the friction of its gears."),
         "biped": _scene(
             "biped", 2e-3, "Two legs from one file, with a parallelogram each: three loops, three motions."
         ),
