@@ -3,11 +3,9 @@
 Exit codes: 0 done; 1 a law fails (``check``); 2 bad input; 3 the run failed part-way; 130 interrupted.
 """
 
-import json
 import math
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -17,7 +15,6 @@ from ephs.cli_animate import animate
 from ephs.cli_charts import charts
 from ephs.cli_input import (
     AS_GIVEN,
-    EXTRAS,
     TEXTS,
     BadInput,
     Loading,
@@ -27,8 +24,14 @@ from ephs.cli_input import (
     load_model,
     naming,
     noted,
+    say,
 )
 from ephs.cli_linear import linearizing
+from ephs.cli_nearest import did_you_mean
+from ephs.cli_new import news
+from ephs.cli_next import after, known_command, welcome, with_examples
+from ephs.cli_progress import progress_bar
+from ephs.cli_results import write_results
 from ephs.cli_sweep import sweeps
 
 if TYPE_CHECKING:
@@ -36,39 +39,7 @@ if TYPE_CHECKING:
 
 __all__ = ["main"]
 
-_NEXT = """\
-Exergetic port-Hamiltonian systems: compose physical models by pattern, simulate them, check both laws.
-
-  ephs run scenes/slider-crank.toml --until 5     simulate; writes out/slider-crank/report.html
-  ephs check scenes/slider-crank.toml             check the model: structure, laws, assembly, mobility
-  ephs draw scenes/slider-crank.toml -o a.svg     draw the interconnection pattern
-  ephs reduce scenes/slider-crank.toml            what a reduction takes out, and why it may
-  ephs equations scenes/slider-crank.toml         print the equations; --latex for a paper
-  ephs linearize scenes/four-bar.toml --at equilibrium
-                                                  state space, eigenvalues and modes
-  ephs sweep scenes/heavy-top.toml --vary bodies.top.mass=0.5:2:9 --until 1 -o out/sweep
-                                                  an ensemble in parallel, one table
-  ephs animate out/slider-crank -o a.html         one page with the moving mechanism, no network needed
-  ephs convert robot.urdf -o robot.toml           write a model in another format as a scene file
-  ephs chart stability -o out/charts              draw where which method fails; work-precision: its speed and error
-
-SCENE is a scene file (.toml), a model (URDF, MJCF, SDF: .urdf, .xml, .sdf), or FILE.py:NAME, a System or Scene of
-that name in a Python file of yours.
-ephs COMMAND --help explains a command."""
-
 _PICTURES = (".svg", ".tex", ".png")
-_FIGURES = {
-    "steps": ("steps", "d"),
-    "rejected": ("rejected steps", "d"),
-    "mobility": ("mobility", "d"),
-    "redundant_constraints": ("redundant constraints", "d"),
-    "max_energy_error": ("energy defect, relative", ".1e"),
-    "max_constraint_error": ("joint gap, m or rad", ".1e"),
-    "min_entropy_production": ("least entropy production, J/K a step", ".1e"),
-    "heat": ("heat, J", ".4g"),
-    "work": ("work, J", ".4g"),
-    "integrate_s": ("time stepping, s", ".2f"),
-}
 
 
 def _version() -> str:
@@ -81,6 +52,7 @@ app = App(
     name="ephs",
     help="Compose physical models by pattern, simulate them with both laws of thermodynamics exact.",
     version=_version,
+    help_format="plaintext",
     exit_on_error=False,
     result_action="return_value",
     suppress_keyboard_interrupt=False,
@@ -100,13 +72,15 @@ app.command(animate)
 app.command(charts)
 app.command(sweeps)
 app.command(linearizing)
+app.command(news)
+app.register_install_completion_command(help="Teach your shell the names of commands and options.")
 Positive = Annotated[float | None, Parameter(validator=_positive)]
 
 
 @app.default
 def _welcome() -> int:
     """Say what one can do next."""
-    print(_NEXT)
+    print(welcome(app))
     return 0
 
 
@@ -167,7 +141,7 @@ def run(
     if step is None:  # steps that are chosen may be long: pictures want more
         chosen["save_at"] = [until * k / KEPT for k in range(KEPT + 1)]
     try:
-        with addressed(scene, folder), _progress(name) as progress:
+        with addressed(scene, folder), progress_bar(name) as progress:
             solution = ephs.simulate(model, until, progress=progress, **chosen)
     except ephs.SimulationError as error:
         if error.partial is None:
@@ -187,13 +161,15 @@ def run(
 
 
 @app.command
-def check(scene: str, /, *, loading: Loading = AS_GIVEN) -> int:
+def check(scene: str, /, *, initial: list[str] | None = None, loading: Loading = AS_GIVEN) -> int:
     """Check the model, not the trajectory; exit code 1 if a law fails.
 
     Parameters
     ----------
     scene
         A scene file (.toml), a model (.urdf, .xml, .sdf), or FILE.py:NAME.
+    initial
+        Initial value of a state, PATH=NUMBER or PATH=NUMBER,NUMBER,...; may be given several times.
     """
     from rich.console import Console
     from rich.table import Table
@@ -203,7 +179,7 @@ def check(scene: str, /, *, loading: Loading = AS_GIVEN) -> int:
     with addressed(scene):
         from ephs.mechanics.check import check_model
 
-        report = check_model(model)
+        report = check_model(model, initial_values(initial or []))
     table = Table("law", "", "detail", title=scene, title_justify="left", box=None, pad_edge=False)
     for name, holds, detail in report.items:
         verdict = Text("holds", "green") if holds else Text("FAILS", "bold red")
@@ -287,7 +263,8 @@ def draw(
     import ephs
 
     if output.suffix not in _PICTURES:
-        raise BadInput(TEXTS["suffix"].format(found=output, expected=", ".join(_PICTURES)))
+        hint = did_you_mean(output.suffix, _PICTURES)
+        raise BadInput(TEXTS["suffix"].format(found=output, expected=", ".join(_PICTURES)) + hint)
     model = load_model(scene, loading)
     with addressed(scene, output):
         from ephs.show import draw as draw_pattern
@@ -327,6 +304,9 @@ def convert(
     return 0
 
 
+with_examples(app)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line on the words after the program's name, those of the process unless given.
 
@@ -335,6 +315,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from rich.console import Console
 
     try:
+        known_command(app, sys.argv[1:] if arguments is None else arguments)
         with noted(_complain):
             return int(app(arguments, error_console=Console(stderr=True)) or 0)
     except CycloptsError:
@@ -347,48 +328,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 130
 
 
-@contextmanager
-def _progress(name: str) -> Iterator[Callable[[float, float, Mapping[str, Any]], None]]:
-    """Show a bar with the time left, and what is compiled before, on a terminal only."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-    from ephs.mechanics.compiling import compiling
-
-    console = Console(stderr=True)
-    note = TextColumn("{task.fields[note]}")
-    columns = (TextColumn("{task.description}"), BarColumn(), note, TimeRemainingColumn())
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task(name, total=1.0, note="")
-
-        def progress(t: float, until: float, stats: Mapping[str, Any]) -> None:
-            steps = f", {stats['steps']} steps" if "steps" in stats else ""
-            bar.update(task, total=until, completed=t, note=f"t = {t:.3g} of {until:g} s{steps}")
-
-        def say(function: str) -> None:
-            bar.update(task, note=f"compiling {function}, kept for the next run" if function else "")
-
-        with compiling(say):
-            yield progress
-
-
 def _write(solution: "Solution", folder: Path) -> None:
-    """Write the result folder, the data before the pictures, and say where it lies."""
-    summary = solution.summary()
-    solution.save(folder / "solution.nc")
-    (folder / "summary.json").write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
-    for key, (label, form) in _FIGURES.items():
-        if summary.get(key) is not None:
-            print(f"{label:38}{summary[key]:>12{form}}")
-    try:
-        from ephs.show.report import write_report
-
-        print(f"report: {write_report(solution, folder)}")
-    except ModuleNotFoundError as error:
-        module = (error.name or "").partition(".")[0]
-        if module not in EXTRAS:
-            raise
-        _complain(TEXTS["no-report"].format(found=module, extra=EXTRAS[module]))
+    """Write the result folder and say what to look at next."""
+    report = write_results(solution, folder, _complain)
+    say("next:", *after(app, folder, moves=solution.scene is not None, report=report))
 
 
 def _complain(message: str) -> None:

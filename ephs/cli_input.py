@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any, Literal, final
 
 from cyclopts import Parameter
 
+from ephs.cli_nearest import beside, did_you_mean
+
 if TYPE_CHECKING:
     from ephs import Scene, System
 
@@ -92,7 +94,7 @@ def load_model(scene: str, loading: Loading = AS_GIVEN) -> "Scene | System":
     if scene.endswith(".py"):
         raise BadInput(TEXTS["no-name"].format(file=scene, name="name was given", found=scene))
     if not Path(scene).is_file():
-        raise BadInput(TEXTS["no-file"].format(found=scene))
+        raise BadInput(TEXTS["no-file"].format(found=scene) + beside(Path(scene)))
     options: dict[str, Any] = {"base": loading.base, "adjust": loading.adjust}
     if loading.inertia is not None:
         options["inertia"] = loading.inertia
@@ -104,7 +106,7 @@ def _from_python(file: Path, name: str) -> "Scene | System":
     import ephs
 
     if not file.is_file():
-        raise BadInput(TEXTS["no-file"].format(found=file))
+        raise BadInput(TEXTS["no-file"].format(found=file) + beside(file))
     sys.path.insert(0, str(file.parent.resolve()))  # as `python FILE.py` does, for modules beside the file
     try:
         names = runpy.run_path(str(file), run_name="__ephs__")
@@ -116,7 +118,8 @@ def _from_python(file: Path, name: str) -> "Scene | System":
     models = [key for key, value in names.items() if isinstance(value, (ephs.System, ephs.Scene))]
     if name not in names:
         found = ", ".join(models) or "no System and no Scene"
-        raise BadInput(TEXTS["no-name"].format(file=file, name=name or "name was given", found=found))
+        told = TEXTS["no-name"].format(file=file, name=name or "name was given", found=found)
+        raise BadInput(told + did_you_mean(name, models))
     if name not in models:
         raise BadInput(TEXTS["not-a-model"].format(file=file, name=name, found=type(names[name]).__name__))
     return names[name]

@@ -39,6 +39,7 @@ class FakeSolution:
     """Stands for a Solution that ends at 0.25 s."""
 
     t = (0.0, 0.25)
+    scene = None
 
     def summary(self):
         return {"scene": "crank", "steps": 7, "max_energy_error": 3e-15, "work": None}
@@ -234,7 +235,7 @@ def test_a_missing_extra_keeps_the_data(house, capsys, monkeypatch):
 @pytest.mark.parametrize(("ok", "code"), [(True, 0), (False, 1)])
 def test_check_prints_each_law_and_exits_by_the_verdict(house, capsys, monkeypatch, ok, code):
     items = [("power balance", True, "defect 1e-16"), ("energy [mf]", ok, "found 0.1")]
-    module = SimpleNamespace(check_model=lambda model: SimpleNamespace(items=items, ok=ok))
+    module = SimpleNamespace(check_model=lambda model, initial: SimpleNamespace(items=items, ok=ok))
     monkeypatch.setitem(sys.modules, "ephs.mechanics.check", module)
     assert cli.main(["check", "crank.toml"]) == code
     said = capsys.readouterr().out

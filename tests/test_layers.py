@@ -27,7 +27,12 @@ MAY_KNOW = {
     "ephs": {"ephs"},
 }
 # Doors for notebooks: a value shows itself by the room of pictures, which is loaded when it is asked to.
-DOORS = {"ephs.operad.pattern", "ephs.semantics.system", "ephs.mechanics.solve.solution"}
+DOORS = {
+    "ephs.operad.pattern",
+    "ephs.semantics.system",
+    "ephs.mechanics.scene.words",
+    "ephs.mechanics.solve.solution",
+}
 OPEN = {"ephs.cli", "ephs.cli_input", "ephs.plugin", "ephs.__main__", "ephs"}  # these stand above all rooms
 HEAVY = (
     "scipy",

@@ -1,6 +1,7 @@
 """Checks of a model, not of a trajectory: types, structure, assembly, laws, mobility."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +17,9 @@ from ephs.semantics.laws import Probe, system_law
 from ephs.semantics.report import CheckItem, CheckReport, check_structure
 from ephs.semantics.system import System
 
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
 __all__ = ["CheckItem", "CheckReport", "check_model"]
 
 LARGEST = 600
@@ -27,17 +31,22 @@ ROUNDING = 1e-13
 """Of the energies that are stored or could be: what rounding may change their sum by in these steps."""
 
 
-def check_model(model: System | Scene) -> CheckReport:
+def check_model(model: System | Scene, initial: Mapping[str, "ArrayLike"] | None = None) -> CheckReport:
     """Check a system or a scene in its initial state.
 
     A system's open ports are held at zero flow.
+
+    Parameters
+    ----------
+    initial
+        Values of states by path; a system's others at the identity, a scene's as it says.
     """
-    return CheckReport(tuple(_items(model)))
+    return CheckReport(tuple(_items(model, initial)))
 
 
-def _items(model: System | Scene) -> Iterator[CheckItem]:
+def _items(model: System | Scene, initial: Mapping[str, "ArrayLike"] | None) -> Iterator[CheckItem]:
     try:
-        problem = problem_of_scene(model) if isinstance(model, Scene) else _closed(model)
+        problem = problem_of_scene(model, initial) if isinstance(model, Scene) else _closed(model, initial)
     except SemanticsError as error:
         yield CheckItem("assembly", False, str(error))
         return
@@ -58,10 +67,10 @@ def _items(model: System | Scene) -> Iterator[CheckItem]:
     yield from _motion(problem)
 
 
-def _closed(system: System) -> Problem:
+def _closed(system: System, initial: Mapping[str, "ArrayLike"] | None) -> Problem:
     ports = [port for port, t in system.interface.items() if t.power]
     inputs = {str(port): {"flow": np.zeros(system.interface[port].quantity.space.dim)} for port in ports}
-    return problem_of_system(system, inputs=inputs)
+    return problem_of_system(system, initial, inputs)
 
 
 def _law(name: str, probe: Probe) -> CheckItem:

@@ -6,7 +6,7 @@ from typing import Any, final
 
 from ephs.mechanics.solve.control import Control, Policy, Proportional, Symmetric
 from ephs.mechanics.solve.driven import ComponentMethod
-from ephs.mechanics.solve.errors import OptionError
+from ephs.mechanics.solve.errors import OptionError, nearest_of
 from ephs.mechanics.solve.model import Model, compile_model
 from ephs.mechanics.solve.natural import Natural
 from ephs.mechanics.solve.problem import Problem
@@ -243,7 +243,8 @@ def chosen(name: str | Method, problem: Problem, *, step: float | None) -> tuple
     if name == "auto":
         return _for_all(problem, step)
     if not isinstance(name, Method) and name not in METHODS:
-        raise OptionError("method", name, f"one of auto, {', '.join(METHODS)}")
+        known = ("auto", *METHODS)
+        raise OptionError("method", name, f"one of {', '.join(known)}" + nearest_of(name, known))
     method = name if isinstance(name, Method) else METHODS[name]
     name = method.name
     if problem.scene is None and not method.systems:

@@ -13,7 +13,7 @@ from ephs.mechanics.redundancy import explain
 from ephs.mechanics.scene.document import scene_to_text
 from ephs.mechanics.scene.model import Marker, Scene
 from ephs.mechanics.solve.control import Control, Tolerance
-from ephs.mechanics.solve.errors import OptionError
+from ephs.mechanics.solve.errors import OptionError, nearest_of
 from ephs.mechanics.solve.events import events_of
 from ephs.mechanics.solve.integrate import Grid, integrate, solution_of
 from ephs.mechanics.solve.loop import integrate_stepwise
@@ -110,7 +110,7 @@ def simulate(
         An option is not known, or not possible with the method; a ValueError.
     """
     if form not in FORMS:
-        raise OptionError("form", form, f"one of {', '.join(FORMS)}")
+        raise OptionError("form", form, f"one of {', '.join(FORMS)}" + nearest_of(form, FORMS))
     if isinstance(model, Scene):
         if reference is not None:
             raise OptionError("reference", reference, "none: a scene's [world] has its own")
@@ -131,7 +131,8 @@ def simulate(
     unknown = [key for key in options or {} if key not in chosen_method.options]
     if unknown:
         known = ", ".join(chosen_method.options) or "none"
-        raise OptionError("options", unknown[0], f"options of {chosen_method.name}: {known}")
+        near = nearest_of(unknown[0], chosen_method.options)
+        raise OptionError("options", unknown[0], f"options of {chosen_method.name}: {known}{near}")
     times, watched = times_of(save_at, start, end), events_of(events)
     setting = Setting(problem, start, control, dict(options or {}))
     if chosen_method.many is not None and control.step is not None and not watched and end > start:

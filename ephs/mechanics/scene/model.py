@@ -330,19 +330,14 @@ class Scene:
                 yield name, free_joint(body)
 
     def __str__(self) -> str:
-        lines = [f"scene {self.name}" + (f" ({self.source})" if self.source else "")]
-        g, w = self.world.gravity, self.world
-        lines.append(f"  world: gravity [{g[0]:g}, {g[1]:g}, {g[2]:g}] m/s², {w.temperature:g} K, {w.pressure:g} Pa")
-        lines += [f"  body {name}: {body.mass:g} kg" for name, body in self.all_bodies()]
-        lines += [f"  joint {name}: {j.kind}, {j.body1} – {j.body2}" for name, j in self.all_joints()]
-        lines += [f"  spring {name}: {s.body1} – {s.body2}, {s.stiffness:g} N/m" for name, s in self.all_springs()]
-        lines += [f"  thermal {name}: {n.capacity:g} J/K at {n.temperature:g} K" for name, n in self.all_thermal()]
-        lines += [
-            f"  conduction {name}: {' – '.join(c.between)}, {c.conductance:g} W/K" for name, c in self.all_conduction()
-        ]
-        if self.adjusted is not None:
-            lines += ["  " + line for line in str(self.adjusted).splitlines()]
-        return "\n".join(lines)
+        from ephs.mechanics.scene.words import scene_text
+
+        return scene_text(self)
+
+    def _repr_html_(self) -> str:  # pyright: ignore[reportUnusedFunction] - notebooks call it
+        from ephs.mechanics.scene.words import scene_html
+
+        return scene_html(self)
 
     def _part_of(self, name: str) -> "tuple[Scene | None, str, str]":
         """The part that a dotted name leads into, or None; the path before the last name; the last name."""

@@ -65,20 +65,29 @@ class Entry:
 
     def __str__(self) -> str:
         """What happened from the first to the last instant, here and one level below."""
-        head = ("", "exergy stored", "supplied", "destroyed", "energy stored", "entropy stored", "made")
-        units = ("", "J", "J", "J", "J", "J/K", "J/K")
-        rows = [
-            (str(self.path) if self.path else "all", self),
-            *((f"  {name}", part) for name, part in self.parts.items()),
-        ]
-        cells = [head, units, *((name, *map(_number, entry.changes())) for name, entry in rows)]
-        widths = [max(len(row[i]) for row in cells) for i in range(len(head))]
+        cells = self.rows()
+        widths = [max(len(row[i]) for row in cells) for i in range(len(cells[0]))]
         return "\n".join(
             "  ".join(
                 cell.ljust(w) if i == 0 else cell.rjust(w) for i, (cell, w) in enumerate(zip(row, widths, strict=True))
             )
             for row in cells
         )
+
+    def _repr_html_(self) -> str:  # pyright: ignore[reportUnusedFunction] - notebooks call it
+        from ephs.mechanics.solve.tables import ledger_table
+
+        return ledger_table(self)
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """The same in cells: heads, units, then here and each part one level below."""
+        head = ("", "exergy stored", "supplied", "destroyed", "energy stored", "entropy stored", "made")
+        units = ("", "J", "J", "J", "J", "J/K", "J/K")
+        rows = [
+            (str(self.path) if self.path else "all", self),
+            *((f"  {name}", part) for name, part in self.parts.items()),
+        ]
+        return [head, units, *((name, *map(_number, entry.changes())) for name, entry in rows)]
 
     def changes(self) -> tuple[float, ...]:
         """From first to last: exergy stored, supplied, destroyed; energy stored; entropy stored, made."""

@@ -1,5 +1,6 @@
 """How a run can fail: named outcomes with time, component, equation, advice, and what was computed so far."""
 
+from collections.abc import Iterable
 from enum import StrEnum
 from typing import TYPE_CHECKING, final
 
@@ -7,7 +8,7 @@ if TYPE_CHECKING:
     from ephs.mechanics.solve.model import Model
     from ephs.mechanics.solve.solution import Solution
 
-__all__ = ["Interrupted", "OptionError", "Outcome", "SimulationError", "SolveError"]
+__all__ = ["Interrupted", "OptionError", "Outcome", "SimulationError", "SolveError", "nearest_of"]
 
 
 class Outcome(StrEnum):
@@ -62,6 +63,14 @@ class OptionError(ValueError):
 
     def __reduce__(self) -> tuple[object, ...]:
         return (OptionError, (self.key, self.found, self.expected))
+
+
+def nearest_of(found: object, known: Iterable[str]) -> str:
+    """A hint at the known word that a misspelled one is nearest to, to end a message with; nothing where none is."""
+    from difflib import get_close_matches
+
+    near = get_close_matches(str(found), list(known), n=1, cutoff=0.6)
+    return f"; did you mean {near[0]!r}?" if near else ""
 
 
 class SimulationError(RuntimeError):

@@ -18,6 +18,7 @@ from ephs.mechanics.solve.natural_kernels import IRREVERSIBLE
 from ephs.mechanics.solve.problem import Problem
 from ephs.mechanics.solve.record import Record, Recorder
 from ephs.mechanics.solve.solution import Solution
+from ephs.mechanics.solve.watching import Balance
 from ephs.operad import Quantity
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import Pair
@@ -89,6 +90,7 @@ def integrate(
     run = _Run(problem, grid, stepper, Recorder(d, grid.t0, x0, save_at, inside), begin, progress)
     with failures_of(run):
         run.recorder.start(stepper.energies(x0))
+        run.balance = Balance(problem, *run.recorder.latest)
         run.state = stepper.init(x0)
         stepper.prepare(run.state, grid.h)
         run.setup = time.perf_counter() - begin
@@ -159,6 +161,7 @@ class _Run:
     """One run in progress: where it stands, and what was kept."""
 
     state: NaturalState
+    balance: Balance
 
     def __init__(
         self,
@@ -172,6 +175,7 @@ class _Run:
         self.problem, self.grid, self.stepper, self.recorder = problem, grid, stepper, recorder
         self.begin, self.progress = begin, progress
         self.t, self.setup, self.steps, self.iterations, self.cut = grid.t0, 0.0, 0, 0, 0
+        self.looked = begin
 
     def full_steps(self, max_steps: int | None) -> None:
         """All steps of full length, in chunks that adapt to the time that they take."""
@@ -204,8 +208,11 @@ class _Run:
         self._record(times, chunk)
         if chunk.failure is not None:
             raise chunk.failure
-        if self.progress is not None:
-            self.progress(self.t, self.grid.until, self.stats())
+        due = end is not None or time.perf_counter() - self.looked > 0.5 * RESPONSE
+        if self.progress is not None and due:
+            error = self.balance.error(*self.recorder.latest)
+            self.looked = time.perf_counter()
+            self.progress(self.t, self.grid.until, {**self.stats(), "energy_error": error})
 
     def _record(self, times: Array, chunk: Chunk) -> None:
         if chunk.steps:

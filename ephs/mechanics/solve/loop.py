@@ -14,6 +14,7 @@ from ephs.mechanics.solve.problem import Problem, States
 from ephs.mechanics.solve.record import Record
 from ephs.mechanics.solve.solution import Solution
 from ephs.mechanics.solve.stepping import Attempt, Leg, Row, Span, Stepper
+from ephs.mechanics.solve.watching import Balance
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 
@@ -109,6 +110,7 @@ class _Run(Generic[S]):
         self.h = first_step(self.control, abs(self.until - self.t0))
         self.state = self.stepper.start(self.t0, self.sign * self.h)
         row = self.stepper.row(self.state)
+        self.balance = Balance(self.problem, row.x, row.energies, row.sums)
         if self.save_at is None or (self.save_at.size and self.save_at[0] == self.t0):
             self.rows.append((self.t0, self.state, 0.0))
             self.saved = 1
@@ -143,8 +145,8 @@ class _Run(Generic[S]):
                 self.saved += len(fresh)
                 self.t, self.steps, self.rejected, self.h = leg.time, counts.steps, counts.rejected, counts.h
                 self.shortest, self.longest, self.least = counts.shortest, counts.longest, counts.least
+                self.state = leg.state
             self._look()
-        self.state = leg.state
 
     def _advance_stepwise(self) -> None:
         control = self.control
@@ -215,7 +217,9 @@ class _Run(Generic[S]):
         now = time.perf_counter()
         if self.progress is not None and now - self.looked > RESPONSE:
             self.looked = now
-            self.progress(self.t, self.until, self.stats())
+            row = self.stepper.row(self.state)
+            error = self.balance.error(row.x, row.energies, row.sums)
+            self.progress(self.t, self.until, {**self.stats(), "energy_error": error})
 
     def _states(self, row: Row) -> Mapping[Path, Array]:
         return States(self.problem.descriptor.unpack(row.x))

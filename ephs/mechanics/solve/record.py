@@ -90,6 +90,12 @@ class Recorder:
         return Record(t, x, energies, ledgers)
 
     @property
+    def latest(self) -> tuple[Array, Array, Array]:
+        """States, energies and sums at the end of the last step, kept or not."""
+        _, x, energies, sums = self._last
+        return x[-1], energies[-1], sums[-1]
+
+    @property
     def least(self) -> float:
         """The least entropy production over all steps, kept or not, in J/K."""
         return float(self._least) if np.isfinite(self._least) else 0.0

@@ -113,6 +113,11 @@ class Solution:
         span = f"{self.t[0]:g} … {self.t[-1]:g} s, {len(self)} instants" if len(self) else "empty"
         return f"Solution of {self.name}: {span}, {len(self.states)} states"
 
+    def _repr_html_(self) -> str:  # pyright: ignore[reportUnusedFunction] - notebooks call it
+        from ephs.mechanics.solve.tables import solution_table
+
+        return solution_table(self)
+
     @property
     def events(self) -> tuple[Crossing, ...]:
         """The events that happened, in their order: name, time in s, states."""

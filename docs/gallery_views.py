@@ -1,0 +1,87 @@
+"""How the systems of the gallery are looked at: the moving picture of each, and all that the page shows of it."""
+
+import html
+from collections.abc import Callable
+from typing import Any
+
+from gallery_pictures import View, moving_scene, moving_system, sliding
+
+from examples.gallery import UNTIL, entries
+
+ENTRIES = entries()
+SHORT, FEW = 8, 3
+"""Equations that are set in formulas, more are folded away as text; boxes that are drawn opened."""
+
+FRONT = View(-90.0, 8.0)  # along y: for what moves in the plane x, z
+VIEWS = {
+    "heavy top": View(-50.0, 18.0),
+    "four-bar": View(-75.0, 62.0),
+    "N-four-bar": FRONT,
+    "biped": View(-68.0, 10.0),
+    "slider-crank": View(-80.0, 15.0),
+    "screw press": View(-60.0, 14.0),
+    "hot brake": View(-50.0, 20.0),
+}
+
+
+def picture(name: str, sol: Any) -> str:
+    """The moving picture of an entry, as SVG."""
+    if sol.scene is not None:
+        return moving_scene(sol, VIEWS.get(name))
+    return SYSTEMS[name](sol)
+
+
+def _oscillator(sol: Any) -> str:
+    return sliding(sol["osc.pe.q"], (0.5, 0.5, 0.5), seconds=float(sol.t[-1]), walls=(-2.2,), springs=True)
+
+
+def _cylinder(sol: Any) -> str:
+    return sliding(2.0 * sol["gas1.v"], (0.06, 0.6, 0.6), seconds=float(sol.t[-1]), walls=(0.0, 2.0), springs=False)
+
+
+def _engine(module: str) -> Callable[[Any], str]:
+    def show(sol: Any) -> str:
+        from importlib import import_module
+
+        return moving_system(sol, import_module(f"examples.{module}").scene, "engine", View(-80.0, 15.0))
+
+    return show
+
+
+SYSTEMS: dict[str, Callable[[Any], str]] = {
+    "oscillator": _oscillator,
+    "damped oscillator": _oscillator,
+    "two gases": _cylinder,
+    "motor and crank": _engine("motor_crank"),
+    "gas engine": _engine("gas_engine"),
+}
+
+
+def shown(name: str) -> None:
+    """Show a system on the page: what it is, its pattern, its equations, its motion, its balances."""
+    from IPython.display import HTML, SVG, Markdown, display
+
+    from ephs import System
+    from ephs.show import draw
+
+    entry = ENTRIES[name]
+    model = entry.model()
+    system = model if isinstance(model, System) else model.system()
+    sol = entry.run(UNTIL)
+    display(SVG(picture(name, sol)))
+    display(SVG(draw(system, opened=len(system.fillings) <= FEW).svg))
+    equations = system.equations()
+    if len(equations) <= SHORT:
+        display(equations)
+    else:
+        head = f"<summary>{len(equations)} equations, interface variables eliminated</summary>"
+        display(HTML(f"<details>{head}<pre>{html.escape(str(equations))}</pre></details>"))
+    made, gap = float(sol.entropy[-1] - sol.entropy[0]), float(sol.constraint_error.max())
+    display(
+        Markdown(
+            f"Energy balanced to {sol.energy_error.max():.1e}"
+            + (f", joints closed to {gap:.1e}" if gap else "")
+            + f"; heat {sol.heat[-1]:.4g} J, work {sol.work[-1]:.4g} J, entropy made {made:.3g} J/K."
+        )
+    )
+    display(sol.ledger())

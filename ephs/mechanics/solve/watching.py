@@ -1,0 +1,29 @@
+"""How far energy is out of balance while a run goes on: by its first row and those that are looked at."""
+
+from typing import final
+
+import numpy as np
+
+from ephs.mechanics.solve.ledger import ledgers
+from ephs.mechanics.solve.problem import Problem
+from ephs.mechanics.solve.record import Record
+from ephs.semantics.bundle import Array
+
+__all__ = ["Balance"]
+
+
+@final
+class Balance:
+    """The energy balance since a first row (states, energies, and the first four sums of a `Record`)."""
+
+    def __init__(self, problem: Problem, x: Array, energies: Array, sums: Array) -> None:
+        self._problem = problem
+        self._first = (x.copy(), energies.copy(), sums[:4].copy())
+        self._scale = 0.0
+
+    def error(self, x: Array, energies: Array, sums: Array) -> float:
+        """The defect now, relative to the largest K + |V − V₀| + |heat| + |work| that was seen."""
+        rows = [np.array(pair) for pair in zip(self._first, (x, energies, sums[:4]), strict=True)]
+        books = ledgers(self._problem, Record(np.zeros(2), rows[0], rows[1], np.pad(rows[2], ((0, 0), (0, 1)))))
+        self._scale = max(self._scale, books.scale)
+        return float(books.defect(mechanical=self._problem.scene is not None)[-1]) * books.scale / self._scale

@@ -1,0 +1,182 @@
+"""The first minutes: what one is told, what one is given to start from, and what a slip of the keys leads to."""
+
+import os
+import runpy
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import ephs
+from ephs import cli
+from ephs.cli_new import TEMPLATES
+from ephs.cli_next import EXAMPLES, commands
+from ephs.cli_progress import said_of
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+@pytest.fixture
+def here(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def made(like):
+    name = f"my-{like}"
+    assert cli.main(["new", name, "--like", like]) == 0
+    suffix = Path(TEMPLATES[like][0]).suffix
+    return f"{name}{suffix}:{like}" if suffix == ".py" else f"{name}{suffix}"
+
+
+@pytest.mark.parametrize("like", TEMPLATES)
+def test_what_new_writes_is_sound_and_runs(here, capsys, like):
+    model = made(like)
+    assert f"ephs run {model} --until 5" in capsys.readouterr().out
+    assert cli.main(["check", model]) == 0
+    if like == "oscillator":
+        system = runpy.run_path(model.partition(":")[0])["oscillator"]
+        solution = ephs.simulate(system, 0.5, initial={"spring.q": 1.0})
+    else:
+        solution = ephs.simulate(ephs.load(model), 0.5)
+    assert solution.energy_error.max() < 1e-6  # the tolerance where none is given
+    assert (solution.heat[-1] > 0.0) == (like not in ("double-pendulum", "spinning-body"))
+
+
+@pytest.mark.parametrize("like", TEMPLATES)
+def test_what_new_writes_names_itself_and_nothing_else(here, like):
+    text = Path(made(like).partition(":")[0]).read_text()
+    assert "NAME" not in text
+    assert f"my-{like}" in text
+
+
+def test_lengths_of_the_closed_loops_can_be_changed(here):
+    made("four-bar")
+    file = Path("my-four-bar.toml")
+    file.write_text(file.read_text().replace("position = [0.45,", "position = [0.5,"))
+    scene = ephs.load(file)
+    solution = ephs.simulate(scene, 0.1, step=0.01)
+    assert solution.constraint_error.max() < 1e-10
+
+
+def test_new_never_writes_over_a_file(here, capsys):
+    Path("taken.toml").write_text("mine")
+    assert cli.main(["new", "taken"]) == 2
+    assert "taken.toml: it exists" in capsys.readouterr().err
+    assert Path("taken.toml").read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        ("new a.json", [".json", ".toml"]),
+        ("new a.toml --like oscillator", [".toml", ".py", "oscillator"]),
+        ("new a --like four-bra", ["four-bra", "four-bar"]),
+        ("new", ["NAME"]),
+        ("new /", ["expected a name"]),
+        ("rnu a", ["ephs rnu", "did you mean ephs run?"]),
+        ("chart stabilty", ["ephs chart stabilty", "ephs chart stability?"]),
+        ("frobnicate", ["frobnicate", "run, check, draw"]),
+        ("a.toml", ["ephs run a.toml --until 5"]),
+        ("run scnee.toml --until 1", ["scnee.toml", 'did you mean "scene.toml"?']),
+        ("run scene --until 1", ["scene: no such file", 'did you mean "scene.toml"?']),
+        ("check mine.pi:model", ["no such file"]),
+        ("check mime.py:model", ["mime.py: no such file", 'did you mean "mine.py"?']),
+        ("check mine.py:modle", ["no modle in it", 'did you mean "model"?']),
+        ("draw scene.toml -o a.sgv", ["a.sgv", 'did you mean ".svg"?']),
+        ("run scene.toml --until 1 --method natral", ["natral", "did you mean 'natural'?"]),
+        ("run scene.toml --until 1 --form redced", ["redced", "reduced"]),
+        ("run scene.toml --utnil 1", ["--utnil", "--until"]),
+        ("--hlep", ["--hlep"]),
+    ],
+)
+def test_slips_are_met_with_the_nearest_name(here, capsys, words, expected):
+    made("spinning-body")
+    Path("my-spinning-body.toml").rename("scene.toml")
+    Path("mine.py").write_text("from ephs import library as lib\nfrom ephs import Pattern\n"
+                               "model = Pattern.from_text('s: entropy; env(s)')(env=lib.environment())\n")  # fmt: skip
+    capsys.readouterr()
+    assert cli.main(words.split()) == 2
+    said = capsys.readouterr().err
+    assert all(word in said for word in expected), said
+    assert "Traceback" not in said
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [({"method": "rk45"}, "'rk54'"), ({"form": "fodled"}, "'folded'"), ({"options": {"roh": 0.8}}, "'rho'")],
+)
+def test_slips_in_python_are_met_with_the_nearest_name(options, expected):
+    scene = ephs.load(ROOT / "scenes/mbs.toml")
+    with pytest.raises(ephs.OptionError, match=f"did you mean {expected}"):
+        ephs.simulate(scene, 1.0, step=0.1, **{"method": "alpha", **options})
+
+
+def every_command():
+    names = commands(cli.app)
+    return [*names, *(f"{name} {inner}" for name in names for inner in commands(cli.app[name]))]
+
+
+@pytest.mark.parametrize("command", every_command())
+def test_every_command_has_an_example_in_its_help(command, capsys):
+    assert cli.main([*command.split(), "--help"]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert all(example in said for example in EXAMPLES[command])
+
+
+@pytest.mark.parametrize("example", [line for name in every_command() for line in EXAMPLES[name]])
+def test_examples_are_calls_of_the_command_and_their_files_exist(example):
+    words = example.split()[1:]
+    bound = cli.app.parse_args(words, exit_on_error=False, print_error=False)
+    assert callable(bound[0])
+    for word in words:
+        if word.startswith(("scenes/", "examples/")):
+            assert (ROOT / word.partition(":")[0]).is_file()
+
+
+def test_alone_it_shows_every_command(capsys):
+    assert cli.main([]) == 0
+    said = capsys.readouterr().out
+    assert all(EXAMPLES[name][0] in said for name in commands(cli.app))
+    assert "ephs new my-pendulum" in said
+
+
+def test_a_run_says_what_to_look_at_next(here, capsys):
+    made("spinning-body")
+    assert cli.main(["run", "my-spinning-body.toml", "--until", "0.1"]) == 0
+    said = capsys.readouterr().out
+    for word in ("next:", "out/my-spinning-body/report.html", 'ephs.load_solution("out/my-spinning-body/solution.nc")'):
+        assert word in said
+
+
+@pytest.mark.parametrize("step", [None, 1e-3], ids=["chosen steps", "constant steps"])
+def test_progress_tells_steps_and_the_energy_error_so_far(step):
+    scene = ephs.load(ROOT / "scenes/slider-crank.toml")
+    seen = []
+    options = {"method": "natural", "step": step} if step else {"method": "rk87", "rtol": 1e-8}
+    sol = ephs.simulate(scene, 60.0 if step is None else 4.0, progress=lambda *now: seen.append(now), **options)
+    assert seen
+    worst = max(stats["energy_error"] for _, _, stats in seen)
+    assert 0.0 < worst <= 10.0 * sol.energy_error.max()
+    t, until, stats = seen[-1]
+    words = said_of(t, until, stats, 0.5)
+    assert f"{stats['steps']} steps, {stats['steps'] / 0.5:.3g}/s, energy error " in words
+
+
+def test_completion_is_written_for_a_shell(here, capsys):
+    assert cli.main(["--install-completion", "--shell", "bash", "--output", "completion.sh"]) == 0
+    script = Path("completion.sh").read_text()
+    assert all(name in script for name in ("sweep", "--until", "equations"))
+
+
+@pytest.mark.parametrize("words", [[], ["--help"], ["new", "--help"], ["rnu"], ["sweep", "--help"]], ids=" ".join)
+def test_what_is_said_first_loads_nothing_heavy(words):
+    script = (
+        f"import sys; from ephs.cli import main; main({words!r}); "
+        "print(*[n for n in ('numpy', 'numba', 'scipy', 'sympy', 'pydantic', 'ephs.mechanics') if n in sys.modules],"
+        " file=sys.stderr)"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, env=environment)
+    assert done.stderr.splitlines()[-1] == ""
