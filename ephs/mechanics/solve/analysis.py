@@ -21,6 +21,9 @@ __all__ = ["RANK", "Analysis", "analyse"]
 
 RANK = 1e-12
 """Singular values below this fraction of the largest count as zero in an implicit step."""
+HELD = 1e-8
+"""The same of as many directions as were dependent before: what depends by the mechanism's build is off by the rounding
+that the joints left out have gathered, and multipliers that fight it would grow without bound."""
 SHRUNK = 1e-6
 DEFECT = 1e-11
 """What a dropped equation may be violated by, relative to its terms; more asks for another rank decision."""
@@ -45,10 +48,11 @@ class Analysis:
     fill: int
 
 
-def analyse(model: Model, x: Array, z: Array, h: float) -> Analysis:
+def analyse(model: Model, x: Array, z: Array, h: float, before: Index | None = None) -> Analysis:
     """Decide rank and order at a state and unknowns.
 
     The pivots that it finds set the order's floor: a pivot that has shrunk to a millionth asks for another order.
+    ``before`` are the equations that were left out so far.
 
     Raises
     ------
@@ -61,7 +65,7 @@ def analyse(model: Model, x: Array, z: Array, h: float) -> Analysis:
     if status:
         raise SolveError.of_component(status, model, component)
     values = memory.data
-    dropped = dependent_rows(model, values)
+    dropped = dependent_rows(model, values, before)
     diagonal = np.arange(size) + t.row.size - size
     active = np.ones(t.row.size, dtype=bool)
     active[diagonal] = dropped == 1
@@ -96,8 +100,8 @@ def analyse(model: Model, x: Array, z: Array, h: float) -> Analysis:
     return Analysis(compiled, dropped, redundant, elimination.fill)
 
 
-def dependent_rows(model: Model, values: Array) -> Index:
-    """Marks constraint equations that depend on the others: (rows,) of 0 and 1.
+def dependent_rows(model: Model, values: Array, before: Index | None = None) -> Index:
+    """Marks constraint equations that depend on the others: (rows,) of 0 and 1; ``before``: those marked last time.
 
     Rows that share no effort cannot depend on each other, so that the rank is decided part by part.
     """
@@ -130,6 +134,9 @@ def dependent_rows(model: Model, values: Array) -> Index:
         sizes = np.zeros(members.size)
         sizes[: min(triangle.shape)] = np.abs(np.diag(triangle))
         rank = int(np.sum(sizes > RANK * sizes[0])) if sizes[0] > 0.0 else 0
+        if before is not None:
+            held = members.size - int(before[rows[members]].sum())
+            rank = min(rank, max(held, int(np.sum(sizes > HELD * sizes[0]))))
         out[rows[members[pivots[rank:]]]] = 1
     return out
 

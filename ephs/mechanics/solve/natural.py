@@ -20,6 +20,7 @@ from ephs.mechanics.solve.natural_kernels import (
     Memory,
     advance,
 )
+from ephs.mechanics.solve.sparse import Index
 from ephs.semantics.bundle import Array
 
 __all__ = ["Chunk", "Natural", "NaturalState", "guessed_efforts", "of_status", "stored_energies"]
@@ -109,6 +110,7 @@ class Natural:
         self.changes = 0
         self._memory: Memory = model.memory()
         self._unsettled = 0
+        self._dropped: Index | None = None
 
     def init(self, x: Array) -> NaturalState:
         """The state of the method at the states x; unknowns are guessed from the efforts there."""
@@ -207,7 +209,8 @@ class Natural:
 
     def _order(self, x: Array, z: Array, h: float) -> Analysis:
         if self.analysis is None:
-            self.analysis = analyse(self.model, x, z, h)
+            self.analysis = analyse(self.model, x, z, h, self._dropped)
+            self._dropped = self.analysis.dropped
             self.changes += 1
             self._memory = self._memory._replace(factors=np.zeros(self.analysis.fill))
         return self.analysis

@@ -71,6 +71,7 @@ class Natural4:
             small=np.zeros(200),
         )  # fmt: skip
         self._order: Order | None = None
+        self._dropped: Index | None = None
 
     def init(self, x: Array) -> NaturalState:
         """The state of the method at the states x; unknowns are guessed from the efforts there."""
@@ -148,7 +149,7 @@ class Natural4:
         status, component, memory = evaluate_at(model, x, z[0], h)
         if status:
             raise SolveError.of_component(status, model, component)
-        dropped = dependent_rows(model, memory.data)
+        dropped = self._dropped = dependent_rows(model, memory.data, self._dropped)
         s = self._scratch
         status, component = linearise(
             t,
