@@ -36,7 +36,7 @@ def sweep(
     until: float,
     output: Annotated[Path, Parameter(name=["--output", "-o"])],
     paired: bool = False,
-    keep: list[str] | None = None,
+    output_of: Annotated[list[str] | None, Parameter(name=["--output-of"])] = None,
     instants: int = 100,
     method: str | None = None,
     rtol: float | None = None,
@@ -60,8 +60,8 @@ def sweep(
         Folder for the table.
     paired
         Take the values of all paths together, the first with the first; else all are combined with all.
-    keep
-        Names of what is kept, such as joints.pin.rate or energy; may be given several times.
+    output_of
+        Names of what is put out, such as joints.pin.rate or energy; may be given several times.
     instants
         Parts into which the time is cut; results are kept at their ends.
     method
@@ -96,7 +96,7 @@ def sweep(
     with addressed(scene, output), _client(dask) as client, _progress() as progress:
         try:
             table = run(
-                model, values, until, save_at=until * np.arange(instants + 1) / instants, outputs=keep, paired=paired,
+                model, values, until, save_at=until * np.arange(instants + 1) / instants, outputs=output_of, paired=paired,
                 workers=workers, client=client, progress=progress, **options,
             )  # fmt: skip
         except SweepInterrupted as error:

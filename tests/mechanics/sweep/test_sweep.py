@@ -229,7 +229,7 @@ def test_the_command_writes_a_table(tmp_path, capsys):
     import xarray as xr
 
     words = ["sweep", str(CHAIN), "--vary", "bodies.rod1.mass=1:2:3", "--vary", "joints.j0.rate=0,1", "--until", "0.1"]
-    assert main([*words, "-o", str(tmp_path), "--keep", "energy", "--instants", "4"]) == 0
+    assert main([*words, "-o", str(tmp_path), "--output-of", "energy", "--instants", "4"]) == 0
     assert "6 members, 0 failed" in capsys.readouterr().out
     with xr.open_dataset(tmp_path / "sweep.nc", engine="h5netcdf") as table:
         assert dict(table.sizes) == {"bodies.rod1.mass": 3, "initial.joints.j0.rate": 2, "t": 5}
