@@ -96,8 +96,8 @@ def sweep(
     with addressed(scene, output), _client(dask) as client, _progress() as progress:
         try:
             table = run(
-                model, values, until, save_at=until * np.arange(instants + 1) / instants, outputs=output_of, paired=paired,
-                workers=workers, client=client, progress=progress, **options,
+                model, values, until, save_at=until * np.arange(instants + 1) / instants, outputs=output_of,
+                paired=paired, workers=workers, client=client, progress=progress, **options,
             )  # fmt: skip
         except SweepInterrupted as error:
             table, stopped = error.partial, True
