@@ -23,6 +23,10 @@ SPREAD = 1e-3
 """A block's scale is at least this fraction of the largest of its kind: e = 0 alone has no scale of its own."""
 
 
+TAKES_PART = 1e-3
+"""The least coefficient, relative to the largest, with which an effort takes part in a constraint; less is rounding."""
+
+
 class Tables(NamedTuple):
     """The model as arrays. Unknowns: rates, efforts, multipliers, outer flows; rows in the same order."""
 
@@ -99,15 +103,22 @@ def reach(t, m):
     The rate of a joint at rest is a difference of its bodies' twists, and so is known to the rounding of those.
     """
     n_rate, n_effort = t.counts[0], t.counts[1]
-    flow, whole = m.dense, m.step
+    flow, whole, largest = m.dense, m.step, m.pivot
     for i in range(n_effort):
         flow[i] = m.scale[n_rate + i]
         whole[i] = 0.0
+    for i in range(m.block.shape[0]):
+        m.block[i] = 0.0
+    for i in range(largest.shape[0]):
+        largest[i] = 0.0
+        m.block[t.block[i]] = max(m.block[t.block[i]], m.scale[i])
     for k in range(t.row.shape[0]):
-        row, effort = t.row[k], t.column[k] - n_rate
-        entry = abs(m.data[k])
-        if row >= n_rate + n_effort and 0 <= effort < n_effort and entry > 0.0:
-            whole[effort] = max(whole[effort], m.scale[row] / entry)
+        if 0 <= t.column[k] - n_rate < n_effort:
+            largest[t.row[k]] = max(largest[t.row[k]], abs(m.data[k]))
+    for k in range(t.row.shape[0]):
+        row, effort, entry = t.row[k], t.column[k] - n_rate, abs(m.data[k])
+        if row >= n_rate + n_effort and 0 <= effort < n_effort and entry > TAKES_PART * largest[row]:
+            whole[effort] = max(whole[effort], m.block[t.block[row]] / entry)
     for k in range(t.row.shape[0]):
         at, effort = t.row[k] - n_rate, t.column[k] - n_rate
         if 0 <= at < n_effort and 0 <= effort < n_effort:
@@ -120,13 +131,11 @@ def weigh(t, m):
 
     One that is zero, of a joint without stiffness, is known to the rounding of those, which is all its own size.
     """
-    n_rate, n_effort = t.counts[0], t.counts[1]
-    least = m.dense
+    n_rate, n_effort, least = t.counts[0], t.counts[1], m.dense
     for i in range(n_effort):
         least[i] = 1e300
     for k in range(t.row.shape[0]):
-        row, effort = t.row[k], t.column[k] - n_rate
-        entry = abs(m.data[k])
+        row, effort, entry = t.row[k], t.column[k] - n_rate, abs(m.data[k])
         if row >= n_rate and 0 <= effort < n_effort and entry > 0.0:
             least[effort] = min(least[effort], m.scale[row] / entry)
     for i in range(t.kind.shape[0]):
