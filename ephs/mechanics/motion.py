@@ -176,6 +176,7 @@ class SceneMotion:
         return self._solution[component_path("bodies", name) / "pe" / "q"]
 
     def coordinates(self, name: str) -> Array:
+        """(n, d) of a joint: of the pose of C2 in C1, in the axes of C1."""
         at = component_path("joints", name)
         if self._joints[name].middle is not None:
             parts = [self._solution[at / part / "pe" / "q_r"] for part in ("first", "second")]
@@ -354,6 +355,7 @@ class SceneMotion:
         return compose(poses, np.broadcast_to(offset, poses.shape))
 
     def chunks(self) -> Iterator[slice]:
+        """Instants that are treated together, which bounds the memory."""
         n = len(self._solution)
         size = max(1, CHUNK * MANY // max(MANY, len(self._joints)))
         for start in range(0, n, size):

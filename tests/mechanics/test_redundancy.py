@@ -20,6 +20,7 @@ from ephs.testing import mechanisms
 
 ROOT = Path(__file__).resolve().parents[2]
 SHIPPED = sorted([*(ROOT / "scenes").glob("*.toml"), *(ROOT / "benchmarks" / "scenes").glob("*.toml")])
+# Redundancy is searched in whole mechanisms, by singular values: what Hypothesis deems slow is meant here.
 calm = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 Z = (0.0, 0.0, 1.0)
 HEAD = 'format = 1\nname = "test"\n[world]\ngravity = [0.0, 0.0, -9.81]\n'

@@ -60,15 +60,18 @@ class _Made:
     def arrays(self) -> list[Array]:
         """All numbers that a run depends on, the start's last."""
         eq = self.equations
-        engine: Iterator[Any] = iter((*eq.engine, *eq.engine.forces, *eq.engine.closing))
-        tables = [a for a in engine if isinstance(a, np.ndarray) and a.dtype == np.float64]
+        tables = [a for a in self._tables() if a.dtype == np.float64]
         return [*tables, eq.drive, eq.wrench, eq.scal, self.start.q, self.start.r, self.start.s]
 
     def counts(self) -> list[Any]:
         """What has to be the same in all members."""
+        return [a for a in self._tables() if a.dtype != np.float64]
+
+    def _tables(self) -> list[Any]:
+        """Those of the engine, and those of the dense sweeps that careful steps take."""
         eq = self.equations
-        engine: Iterator[Any] = iter((*eq.engine, *eq.engine.forces, *eq.engine.closing))
-        return [a for a in engine if isinstance(a, np.ndarray) and a.dtype != np.float64]
+        every: Iterator[Any] = iter((*eq.engine, *eq.engine.forces, *eq.engine.closing, *eq.reduced.tables))
+        return [a for a in every if isinstance(a, np.ndarray)]
 
     def image(self) -> Array:
         """All numbers in one row."""
@@ -233,7 +236,7 @@ class Ensemble:
         made = _Made(equations, ReducedState(self._t0, q, r, s, np.zeros(0)))
         at = 0
         for array in made.arrays():
-            array.ravel()[:] = image[at : at + array.size]
+            array[...] = image[at : at + array.size].reshape(array.shape)
             at += array.size
         return ReducedState(self._t0, q, r, s, np.zeros(2 + len(equations.reduced.made)))
 

@@ -72,7 +72,8 @@ def sweep(
 
     Members are independent: each is what `ephs.simulate` gives of the model with its numbers, within rounding, and the
     same bit for bit whoever runs it. Members of a scene that differ in numbers only, by the explicit methods and with
-    constant inputs, share one set of compiled tables.
+    constant inputs, share one set of compiled tables, where outputs are coordinates and rates of joints that no loop is
+    cut at, heat and work.
 
     Parameters
     ----------

@@ -305,6 +305,7 @@ def test_without_mujoco_there_is_one_clear_error(write, monkeypatch, capsys):
         assert ephs.load(write(URDF)).name == "arm"  # which needs none
 
 
+# Every example writes its file anew: the folder may be the same for all.
 @settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_broken_texts_load_or_are_refused(data, tmp_path):

@@ -97,6 +97,7 @@ NAMES = st.text(
 )
 
 
+# Every example writes its file anew: the folder may be the same for all.
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     names=st.lists(

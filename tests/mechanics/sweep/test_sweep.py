@@ -119,6 +119,18 @@ def test_what_two_paths_change_together_is_built_in_full(tmp_path):
             assert np.allclose(ensemble.image(values), ensemble._built(values), rtol=1e-12, atol=1e-12)
 
 
+def test_careful_steps_of_a_member_have_its_own_numbers():
+    """Where constraints nearly repeat each other dense sweeps take over, which read other tables than the engine."""
+    scene = ephs.load(SCENES / "four-bar.toml")
+    axes = Axes.of({"bodies.coupler.mass": [0.5, 1.0, 2.0]}, paired=False)
+    ensemble = Ensemble(scene, axes, 0.0, 0.1, TIMES, {}, outputs_of(scene, ["heat"]))
+    equations, _ = ensemble._threads_own()
+    for (mass,) in axes.members[::-1]:
+        start = ensemble._fill(equations, ensemble.image(np.array([mass])))
+        alone = ephs.dynamics(varied(scene, {"bodies.coupler.mass": mass}))
+        assert np.abs(equations.mass(start.q, start.r) - alone.mass_matrix(alone.state0)).max() <= 1e-13
+
+
 def test_a_system_of_no_bodies_by_its_closed_form():
     stiffness = [1.0, 4.0, 9.0]
     table = ephs.sweep(OSCILLATOR, {"pe.k": stiffness}, 1.0, save_at=[0.0, 0.5, 1.0], method="natural4", step=0.01)
