@@ -3,27 +3,29 @@
 Exit codes: 0 done; 1 a law fails (``check``); 2 bad input; 3 the run failed part-way; 130 interrupted.
 """
 
-import math
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import App, CycloptsError, Parameter
 
 from ephs.cli_animate import animate
 from ephs.cli_charts import charts
 from ephs.cli_input import (
+    AS_CHOSEN,
     AS_GIVEN,
     TEXTS,
     BadInput,
     Loading,
+    Stepping,
     addressed,
     heard,
     initial_values,
     load_model,
     naming,
     noted,
+    positive,
     say,
 )
 from ephs.cli_linear import linearizing
@@ -63,18 +65,12 @@ KEPT = 500
 """Intervals at whose ends results are kept where steps are chosen."""
 
 
-def _positive(_type: object, value: float | None) -> None:
-    if value is not None and not (value > 0 and math.isfinite(value)):
-        raise ValueError(f"found {value:g}, expected a positive finite number")
-
-
 app.command(animate)
 app.command(charts)
 app.command(sweeps)
 app.command(linearizing)
 app.command(news)
 app.register_install_completion_command(help="Teach your shell the names of commands and options.")
-Positive = Annotated[float | None, Parameter(validator=_positive)]
 
 
 @app.default
@@ -89,12 +85,8 @@ def run(
     scene: str,
     /,
     *,
-    until: Annotated[float, Parameter(validator=_positive)],
-    method: str | None = None,
-    rtol: Positive = None,
-    atol: Positive = None,
-    step: Positive = None,
-    form: Literal["paper", "folded", "reduced"] | None = None,
+    until: Annotated[float, Parameter(validator=positive)],
+    stepping: Stepping = AS_CHOSEN,
     initial: list[str] | None = None,
     out: Path | None = None,
     loading: Loading = AS_GIVEN,
@@ -106,17 +98,7 @@ def run(
     scene
         A scene file (.toml), a model (.urdf, .xml, .sdf), or FILE.py:NAME.
     until
-        End of the simulated time, in seconds.
-    method
-        Integration method, for example natural.
-    rtol
-        Relative tolerance, for methods that choose their step.
-    atol
-        Absolute tolerance, for methods that choose their step.
-    step
-        Constant step size, in seconds; without it 501 even instants are kept.
-    form
-        Which form of the equations is integrated.
+        End of the simulated time, in seconds; without --step 501 even instants of it are kept.
     initial
         Initial value of a state, PATH=NUMBER or PATH=NUMBER,NUMBER,...; may be given several times.
     out
@@ -129,16 +111,10 @@ def run(
     folder = out or Path("out", name)
     with addressed(scene, folder):
         folder.mkdir(parents=True, exist_ok=True)
-    given = {
-        "initial": initial_values(initial or []),
-        "method": method,
-        "rtol": rtol,
-        "atol": atol,
-        "step": step,
-        "form": form,
-    }
-    chosen: dict[str, Any] = {key: value for key, value in given.items() if value is not None}
-    if step is None:  # steps that are chosen may be long: pictures want more
+    chosen = stepping.options()
+    if initial:
+        chosen["initial"] = initial_values(initial)
+    if stepping.step is None:  # steps that are chosen may be long: pictures want more
         chosen["save_at"] = [until * k / KEPT for k in range(KEPT + 1)]
     try:
         with addressed(scene, folder), progress_bar(name) as progress:

@@ -1,13 +1,14 @@
 """What the command line is given and gives: files to models, errors that speak to the user to clear texts, results."""
 
+import math
 import runpy
 import sys
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, final
+from typing import TYPE_CHECKING, Annotated, Any, Literal, final
 
 from cyclopts import Parameter
 
@@ -17,17 +18,20 @@ if TYPE_CHECKING:
     from ephs import Scene, System
 
 __all__ = [
+    "AS_CHOSEN",
     "AS_GIVEN",
     "EXTRAS",
     "TEXTS",
     "BadInput",
     "Loading",
+    "Stepping",
     "addressed",
     "heard",
     "initial_values",
     "load_model",
     "naming",
     "noted",
+    "positive",
     "say",
 ]
 
@@ -76,6 +80,56 @@ class Loading:
 
 
 AS_GIVEN = Loading()
+
+
+def positive(_type: object, value: float | None) -> None:
+    """Accept nothing, or a number above 0: a validator of options.
+
+    Raises
+    ------
+    ValueError
+        It is another number.
+    """
+    if value is not None and not (value > 0 and math.isfinite(value)):
+        raise ValueError(f"found {value:g}, expected a positive finite number")
+
+
+Positive = Annotated[float | None, Parameter(validator=positive)]
+
+
+@Parameter(name="*")
+@final
+@dataclass(frozen=True, slots=True)
+class Stepping:
+    """How time is stepped through.
+
+    Parameters
+    ----------
+    method
+        Integration method, for example natural.
+    rtol
+        Relative tolerance, for methods that choose their step.
+    atol
+        Absolute tolerance, for methods that choose their step.
+    step
+        Constant step size, in seconds.
+    form
+        Which form of the equations is integrated.
+    """
+
+    method: str | None = None
+    rtol: Positive = None
+    atol: Positive = None
+    step: Positive = None
+    form: Literal["paper", "folded", "reduced"] | None = None
+
+    def options(self) -> dict[str, Any]:
+        """What of it was given, as options of ``simulate``."""
+        values = ((field.name, getattr(self, field.name)) for field in fields(self))
+        return {name: value for name, value in values if value is not None}
+
+
+AS_CHOSEN = Stepping()
 
 
 def load_model(scene: str, loading: Loading = AS_GIVEN) -> "Scene | System":

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Parameter
 
-from ephs.cli_input import AS_GIVEN, BadInput, Loading, addressed, load_model, say
+from ephs.cli_input import AS_CHOSEN, AS_GIVEN, BadInput, Loading, Stepping, addressed, load_model, positive, say
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -18,7 +18,6 @@ __all__ = ["sweeps"]
 _TEXTS = {
     "vary": "--vary {found}: expected PATH=FROM:TO:COUNT or PATH=VALUE,VALUE,..., as in bodies.crank.mass=0.1:0.5:9",
     "none": "ephs sweep {file}: nothing is varied; expected --vary PATH=FROM:TO:COUNT, bodies.crank.mass=0.1:0.5:9",
-    "until": "--until {found}: expected a number of seconds above 0",
     "dask": "--dask {address}: {found}; start a scheduler there, then run again",
 }
 LISTED = 5
@@ -33,15 +32,12 @@ def sweep(
     /,
     *,
     vary: list[str] | None = None,
-    until: float,
+    until: Annotated[float, Parameter(validator=positive)],
     output: Annotated[Path, Parameter(name=["--output", "-o"])],
     paired: bool = False,
     output_of: Annotated[list[str] | None, Parameter(name=["--output-of"])] = None,
     instants: int = 100,
-    method: str | None = None,
-    rtol: float | None = None,
-    atol: float | None = None,
-    step: float | None = None,
+    stepping: Stepping = AS_CHOSEN,
     workers: int | None = None,
     dask: str | None = None,
     loading: Loading = AS_GIVEN,
@@ -64,14 +60,6 @@ def sweep(
         Names of what is put out, such as joints.pin.rate or energy; may be given several times.
     instants
         Parts into which the time is cut; results are kept at their ends.
-    method
-        Integration method, for example rk87.
-    rtol
-        Relative tolerance, for methods that choose their step.
-    atol
-        Absolute tolerance, for methods that choose their step.
-    step
-        Constant step size, in seconds.
     workers
         Threads; as many as there are cores unless given.
     dask
@@ -79,8 +67,6 @@ def sweep(
     """
     if not vary:
         raise BadInput(_TEXTS["none"].format(file=scene))
-    if not 0.0 < until < float("inf"):
-        raise BadInput(_TEXTS["until"].format(found=until))
     values = dict(_values(entry) for entry in vary)
     model = load_model(scene, loading)
     with addressed(scene, output):
@@ -90,14 +76,12 @@ def sweep(
     from ephs.mechanics.sweep.sweep import SweepInterrupted
     from ephs.mechanics.sweep.sweep import sweep as run
 
-    given = {"method": method, "rtol": rtol, "atol": atol, "step": step}
-    options: dict[str, Any] = {key: value for key, value in given.items() if value is not None}
     stopped = False
     with addressed(scene, output), _client(dask) as client, _progress() as progress:
         try:
             table = run(
                 model, values, until, save_at=until * np.arange(instants + 1) / instants, outputs=output_of,
-                paired=paired, workers=workers, client=client, progress=progress, **options,
+                paired=paired, workers=workers, client=client, progress=progress, **stepping.options(),
             )  # fmt: skip
         except SweepInterrupted as error:
             table, stopped = error.partial, True

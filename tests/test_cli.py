@@ -13,6 +13,8 @@ import pytest
 
 import ephs
 from ephs import cli
+from ephs.cli_linear import linearize
+from ephs.cli_sweep import sweep
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -314,8 +316,11 @@ def test_help_needs_neither_numpy_nor_the_rooms_below(command):
     assert done.stderr == "0\n"
 
 
-@pytest.mark.parametrize("command", [cli.run, cli.check, cli.draw, cli.convert, cli.Loading])
+@pytest.mark.parametrize(
+    "command", [cli.run, cli.check, cli.draw, cli.convert, sweep, linearize, cli.Loading, cli.Stepping]
+)
 def test_every_option_is_explained(command):
     documented = re.findall(r"^ {4}(\w+)$", command.__doc__, flags=re.MULTILINE)
-    options = [name for name in inspect.signature(command).parameters if name != "loading"]  # explained by itself
+    groups = ("loading", "stepping")  # explained by themselves
+    options = [name for name in inspect.signature(command).parameters if name not in groups]
     assert [name for name in documented if name != "Parameters"] == options

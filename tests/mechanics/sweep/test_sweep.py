@@ -255,6 +255,30 @@ def test_the_command_says_how_to_vary(entry, tmp_path, capsys):
     assert "expected PATH=FROM:TO:COUNT" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("option", ["--until", "--rtol", "--atol", "--step"])
+@pytest.mark.parametrize("value", ["0", "-1", "inf", "nan"])
+def test_the_command_refuses_what_is_not_positive(option, value, tmp_path, capsys):
+    given = {"--until": "1", option: value}
+    words = [word for pair in given.items() for word in pair]
+    assert main(["sweep", str(CHAIN), "--vary", "bodies.rod1.mass=1,2", "-o", str(tmp_path), *words]) == 2
+    said = capsys.readouterr().err
+    assert all(word in said for word in (option, f"found {value}", "positive finite")), said
+
+
+def test_the_command_passes_a_form_on(tmp_path):
+    import xarray as xr
+
+    words = ["sweep", str(CHAIN), "--vary", "bodies.rod1.mass=1,2", "--until", "0.1", "--instants", "2"]
+    forms = ("paper", "reduced")
+    steps = ["--method", "natural", "--step", "0.05", "--output-of", "joints.j0.coordinate"]
+    tables = []
+    for form in forms:
+        assert main([*words, *steps, "--form", form, "-o", str(tmp_path / form)]) == 0
+        with xr.open_dataset(tmp_path / form / "sweep.nc", engine="h5netcdf") as table:
+            tables.append(table["joints.j0.coordinate"].values)
+    np.testing.assert_allclose(tables[0], tables[1], rtol=1e-10)
+
+
 def test_a_job_travels_as_a_value():
     import pickle
 
