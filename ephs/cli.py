@@ -13,31 +13,26 @@ from cyclopts import App, CycloptsError, Parameter
 from ephs.cli_animate import animate
 from ephs.cli_charts import charts
 from ephs.cli_input import (
-    AS_CHOSEN,
     AS_GIVEN,
     TEXTS,
     BadInput,
     Loading,
-    Stepping,
     addressed,
+    complain,
     heard,
     initial_values,
     load_model,
-    naming,
     noted,
-    positive,
-    say,
 )
 from ephs.cli_linear import linearizing
 from ephs.cli_nearest import did_you_mean
 from ephs.cli_new import news
-from ephs.cli_next import after, known_command, welcome, with_examples
-from ephs.cli_progress import progress_bar
-from ephs.cli_results import write_results
+from ephs.cli_next import known_command, welcome, with_examples
+from ephs.cli_run import run
 from ephs.cli_sweep import sweeps
 
 if TYPE_CHECKING:
-    from ephs import Solution
+    pass
 
 __all__ = ["main"]
 
@@ -61,10 +56,7 @@ app = App(
 )
 
 
-KEPT = 500
-"""Intervals at whose ends results are kept where steps are chosen."""
-
-
+app.command(run)
 app.command(animate)
 app.command(charts)
 app.command(sweeps)
@@ -77,62 +69,6 @@ app.register_install_completion_command(help="Teach your shell the names of comm
 def _welcome() -> int:
     """Say what one can do next."""
     print(welcome(app))
-    return 0
-
-
-@app.command
-def run(
-    scene: str,
-    /,
-    *,
-    until: Annotated[float, Parameter(validator=positive)],
-    stepping: Stepping = AS_CHOSEN,
-    initial: list[str] | None = None,
-    out: Path | None = None,
-    loading: Loading = AS_GIVEN,
-) -> int:
-    """Simulate a scene and write its result folder.
-
-    Parameters
-    ----------
-    scene
-        A scene file (.toml), a model (.urdf, .xml, .sdf), or FILE.py:NAME.
-    until
-        End of the simulated time, in seconds; without --step 501 even instants of it are kept.
-    initial
-        Initial value of a state, PATH=NUMBER or PATH=NUMBER,NUMBER,...; may be given several times.
-    out
-        Result folder; out/NAME unless given.
-    """
-    import ephs
-
-    model = load_model(scene, loading)
-    name = model.name if isinstance(model, ephs.Scene) else scene.rpartition(":")[2]
-    folder = out or Path("out", name)
-    with addressed(scene, folder):
-        folder.mkdir(parents=True, exist_ok=True)
-    chosen = stepping.options()
-    if initial:
-        chosen["initial"] = initial_values(initial)
-    if stepping.step is None:  # steps that are chosen may be long: pictures want more
-        chosen["save_at"] = [until * k / KEPT for k in range(KEPT + 1)]
-    try:
-        with addressed(scene, folder), progress_bar(name) as progress:
-            solution = ephs.simulate(model, until, progress=progress, **chosen)
-    except ephs.SimulationError as error:
-        if error.partial is None:
-            raise BadInput(naming(scene, str(error))) from error
-        stopped = isinstance(error, ephs.Interrupted)
-        if stopped:
-            _complain(TEXTS["interrupted"].format(file=scene, at=f" at t = {error.partial.t[-1]:.6g} s"))
-        else:
-            _complain(TEXTS["failed"].format(file=scene, found=error))
-        with addressed(scene, folder):
-            _write(error.partial, folder)
-        _complain(f"saved what was computed: {folder}")
-        return 130 if stopped else 3
-    with addressed(scene, folder):
-        _write(solution, folder)
     return 0
 
 
@@ -292,23 +228,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     try:
         known_command(app, sys.argv[1:] if arguments is None else arguments)
-        with noted(_complain):
+        with noted(complain):
             return int(app(arguments, error_console=Console(stderr=True)) or 0)
     except CycloptsError:
         return 2
     except BadInput as error:
-        _complain(str(error))
+        complain(str(error))
         return 2
     except KeyboardInterrupt:
-        _complain("interrupted")
+        complain("interrupted")
         return 130
-
-
-def _write(solution: "Solution", folder: Path) -> None:
-    """Write the result folder and say what to look at next."""
-    report = write_results(solution, folder, _complain)
-    say("next:", *after(app, folder, moves=solution.scene is not None, report=report))
-
-
-def _complain(message: str) -> None:
-    print(message, file=sys.stderr)

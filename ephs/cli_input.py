@@ -24,8 +24,10 @@ __all__ = [
     "TEXTS",
     "BadInput",
     "Loading",
+    "Positive",
     "Stepping",
     "addressed",
+    "complain",
     "heard",
     "initial_values",
     "load_model",
@@ -268,6 +270,15 @@ def naming(scene: str, message: str) -> str:
 
 def say(*lines: str) -> None:
     """Print results, those after the first line indented."""
+    _print(lines, errors=False)
+
+
+def complain(*lines: str) -> None:
+    """Print to stderr what went otherwise than asked."""
+    _print(lines, errors=True)
+
+
+def _print(lines: Sequence[str], *, errors: bool) -> None:
     from rich.console import Console
 
-    Console(soft_wrap=True, highlight=False, markup=False).print("\n  ".join(lines))
+    Console(stderr=errors, soft_wrap=True, highlight=False, markup=False, emoji=False).print("\n  ".join(lines))

@@ -14,6 +14,7 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
     "run": (
         "ephs run scenes/slider-crank.toml --until 5",
         "ephs run scenes/heavy-top.toml --until 1 --method natural --step 1e-3",
+        "ephs run out/heavy-top --resume",
         "ephs run examples/oscillator.py:damped_oscillator --until 10 --initial osc.pe.q=1.0",
     ),
     "check": (
@@ -103,12 +104,12 @@ def known_command(app: Any, words: Sequence[str]) -> None:
         raise BadInput(_TEXTS["command"].format(found=found, near=f"{name} {near}".strip()))
 
 
-def after(app: Any, folder: Path, *, moves: bool, report: bool) -> list[str]:
+def after(folder: Path, *, moves: bool, report: bool) -> list[str]:
     """What to look at after a run whose results lie in a folder."""
     lines: list[str] = []
     if report:
         lines.append(f"{folder / 'report.html'}: plots, ledgers, the motion; open it in a browser")
-    if moves and "animate" in list(app):
+    if moves:
         lines.append(f"ephs animate {folder} -o {folder.name}.html: the motion alone, as a page")
     lines.append(f'sol = ephs.load_solution("{folder / "solution.nc"}"): everything, from Python')
     return lines

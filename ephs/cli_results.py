@@ -1,11 +1,10 @@
 """What a run leaves behind: the result folder, the data before the pictures, and what is said of it."""
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ephs.cli_input import EXTRAS, TEXTS, say
+from ephs.cli_input import EXTRAS, TEXTS, complain, say
 
 if TYPE_CHECKING:
     from ephs import Solution
@@ -26,11 +25,14 @@ _FIGURES = {
 }
 
 
-def write_results(solution: "Solution", folder: Path, complain: Callable[[str], None]) -> bool:
+def write_results(solution: "Solution", folder: Path) -> bool:
     """Write the result folder and say what came out; whether there is a report."""
+    from ephs.mechanics.solve.durable import durable
+
     summary = solution.summary()
     solution.save(folder / "solution.nc")
-    (folder / "summary.json").write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
+    with durable(folder / "summary.json") as temporary:
+        temporary.write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
     for key, (label, form) in _FIGURES.items():
         if summary.get(key) is not None:
             say(f"{label:38}{summary[key]:>12{form}}")

@@ -13,7 +13,9 @@ import pytest
 
 import ephs
 from ephs import cli
+from ephs.cli_input import Loading, Stepping
 from ephs.cli_linear import linearize
+from ephs.cli_run import run
 from ephs.cli_sweep import sweep
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -132,7 +134,7 @@ def test_run_passes_on_what_was_given_and_leaves_the_defaults_alone(house):
     assert house.load == ("crank.toml", {"base": "free", "adjust": True})
     _, until, options = house.simulate
     assert until == 2.0
-    assert {key: options[key] for key in options if key != "progress"} == {
+    assert {key: options[key] for key in options if key not in ("progress", "journal")} == {
         "method": "natural",
         "step": 0.01,
         "form": "paper",
@@ -316,9 +318,7 @@ def test_help_needs_neither_numpy_nor_the_rooms_below(command):
     assert done.stderr == "0\n"
 
 
-@pytest.mark.parametrize(
-    "command", [cli.run, cli.check, cli.draw, cli.convert, sweep, linearize, cli.Loading, cli.Stepping]
-)
+@pytest.mark.parametrize("command", [run, cli.check, cli.draw, cli.convert, sweep, linearize, Loading, Stepping])
 def test_every_option_is_explained(command):
     documented = re.findall(r"^ {4}(\w+)$", command.__doc__, flags=re.MULTILINE)
     groups = ("loading", "stepping")  # explained by themselves

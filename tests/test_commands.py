@@ -1,12 +1,17 @@
 """The commands on real models, from the file to the result folder."""
 
 import json
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
 
 import ephs
 from ephs.cli import main
+from ephs.mechanics.solve.journal import _FRAME, Journal
 
 ROOT = Path(__file__).resolve().parents[1]
 SPINNING = """format = 1
@@ -135,3 +140,75 @@ def test_animate_refuses_what_it_cannot_show(tmp_path, capsys, folder, page, wor
     assert main(["animate", str(tmp_path / folder), "-o", str(tmp_path / page)]) == 2
     said = capsys.readouterr().err
     assert words in said and "Traceback" not in said
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
+def test_an_interrupted_run_is_readable_and_goes_on_to_the_undisturbed_numbers(tmp_path, capsys, how):
+    scene, folder = ROOT / "scenes/slider-crank.toml", tmp_path / "out"
+    words = ["run", str(scene), "--until", "3", "--method", "natural", "--step", "1e-4", "--keep", "400", "--out"]
+    journal = folder / "run.journal"
+    process = subprocess.Popen([sys.executable, "-m", "ephs", *words, str(folder)], stderr=subprocess.PIPE, text=True)
+    while process.poll() is None and len(_entries(journal)) < 3:
+        time.sleep(0.02)
+    process.send_signal(how)
+    said = process.communicate()[1]
+    assert process.returncode == (130 if how == signal.SIGINT else -how)
+    if how == signal.SIGINT:
+        assert f"ephs run {folder} --resume" in said
+        assert len(ephs.load_solution(folder / "solution.nc")) > 1
+    there = ephs.load_solution(journal)
+    assert main(["run", str(folder), "--resume"]) == 0
+    assert main([*words, str(tmp_path / "whole")]) == 0
+    found, whole = (ephs.load_solution(tmp_path / name / "solution.nc") for name in ("out", "whole"))
+    assert 1 < len(there) < len(whole) == 401
+    for path, values in whole.states.items():
+        assert (found[path] == values).all()
+        assert (there[path] == values[: len(there)]).all()
+    assert (found.energy == whole.energy).all()
+    assert not journal.exists()
+    capsys.readouterr()
+    for resumed in (["run", str(folder), "--resume"], [*words, str(folder), "--resume"]):
+        assert main(resumed) == 0
+        assert "nothing is left to do" in capsys.readouterr().out
+
+
+def _entries(journal):
+    try:
+        size = journal.stat().st_size
+    except FileNotFoundError:
+        return []
+    with open(journal, "rb") as file:
+        found = []
+        while file.tell() + _FRAME.size <= size:
+            found.append(_FRAME.unpack(file.read(_FRAME.size))[1])
+            file.seek(found[-1], 1)
+        return found
+
+
+def test_a_journal_that_is_not_resumed_is_kept(tmp_path, capsys):
+    words = ["run", str(ROOT / "scenes/heavy-top.toml"), "--until", "0.01", "--out", str(tmp_path)]
+    (tmp_path / "run.journal").write_text("of hours")
+    assert main([*words, "--resume"]) == 2
+    assert "expected a journal" in capsys.readouterr().err
+    assert main(words) == 0
+    assert "run.journal.old" in capsys.readouterr().err
+    assert (tmp_path / "run.journal.old").read_text() == "of hours"
+
+
+def test_a_journal_runs_no_code(tmp_path, capsys):
+    """A result folder from a stranger may name a Python file: it is run only where the user names it."""
+    own = tmp_path / "own.py"
+    own.write_text(f"from pathlib import Path\nPath({str(tmp_path / 'ran')!r}).touch()\n")
+    heading = {"name": "x", "model": "", "run": {"form": "reduced", "inputs": None}}
+    Journal(tmp_path / "run.journal", {"scene": f"{own}:x", "asked": {"until": 1.0}}).open(heading).close()
+    assert main(["run", str(tmp_path), "--resume"]) == 2
+    assert f"ephs run {own}:x --until 1.0" in capsys.readouterr().err
+    assert not (tmp_path / "ran").exists()
+
+
+def test_resuming_what_is_not_there_is_bad_input(tmp_path, capsys):
+    assert main(["run", str(tmp_path), "--resume"]) == 2
+    assert "no run.journal in it" in capsys.readouterr().err
+    assert main(["run", str(ROOT / "scenes/heavy-top.toml")]) == 2
+    assert "--until is missing" in capsys.readouterr().err
+    assert main(["run", str(ROOT / "scenes/heavy-top.toml"), "--until", "1", "--keep", "0"]) == 2

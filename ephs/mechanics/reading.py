@@ -3,31 +3,75 @@
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path as File
+from typing import Any
 
 import numpy as np
 
 from ephs.mechanics.build import drive_ports, scene_inputs, wrench_port
+from ephs.mechanics.reduction.folded import folded_problem
 from ephs.mechanics.scene.document import scene_from_text
-from ephs.mechanics.simulate import problem_of_scene
+from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.simulate import problem_of_scene, problem_of_system
+from ephs.mechanics.solve.integrate import solution_of
+from ephs.mechanics.solve.journal import MAGIC, read_journal
 from ephs.mechanics.solve.problem import Problem, Signal
+from ephs.mechanics.solve.record import Rows
 from ephs.mechanics.solve.solution import Solution
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
+from ephs.semantics.system import System
 
 __all__ = ["load_solution"]
 
 
-def load_solution(path: str | File) -> Solution:
-    """Read a solution that `Solution.save` wrote; of a scene with everything that reads its motion.
+def load_solution(path: str | File, model: System | Scene | None = None) -> Solution:
+    """Read a solution that `Solution.save` wrote, or what the journal of a run holds so far.
+
+    Parameters
+    ----------
+    model
+        Of a journal, the system that ran; scenes are in it.
 
     Raises
     ------
     FileNotFoundError, ValueError
         There is no such file, or it is not a solution.
     """
+    file = File(path)
+    if not file.is_file():
+        raise FileNotFoundError(f"{file}: no such file")
+    with open(file, "rb") as opened:
+        if opened.read(len(MAGIC)) == MAGIC:
+            return _of_journal(file, model)
     from ephs.mechanics.solve.file import load
 
-    return load(path, _problem_again)
+    return load(file, _problem_again)
+
+
+def _of_journal(file: File, model: System | Scene | None) -> Solution:
+    found = read_journal(file)
+    run = found.heading["run"]
+    if model is None and not found.heading["model"]:
+        raise ValueError(f"{file}: a journal of {found.heading['name']}, a system; give it as model=")
+    model = model or scene_from_text(found.heading["model"])
+    if isinstance(model, Scene):
+        problem = problem_of_scene(model, None, {key: _known(given) for key, given in (run["inputs"] or {}).items()})
+    else:
+        sides = {port: {side: _known(x) for side, x in given.items()} for port, given in (run["inputs"] or {}).items()}
+        problem = problem_of_system(model, None, sides)
+    if run["form"] == "folded":
+        problem = folded_problem(problem)
+    record = found.rows or Rows().whole(problem.descriptor)
+    size, count = problem.descriptor.point_size, len(problem.descriptor.components)
+    rows = record.t.size
+    if (record.x.shape, record.energies.shape, record.ledgers.shape) != ((rows, size), (rows, count), (rows, 5)):
+        raise ValueError(f"{file}: its rows are not of {problem.name}; expected {size} states of {count} components")
+    return solution_of(problem, record, found.stats)
+
+
+def _known(given: Any) -> Any:
+    """An input as the journal knows it: of a function its name only, so no number."""
+    return np.nan if isinstance(given, str) else given
 
 
 def _problem_again(text: str, t: Array, inputs: Mapping[Path, Array]) -> Problem:

@@ -1,11 +1,13 @@
 """`simulate`: from a system or a scene to its motion."""
 
 from collections.abc import Callable, Mapping, Sequence
+from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ephs.mechanics.build import component_path, drive_ports, initial_state, scene_inputs, scene_system, wrench_port
+from ephs.mechanics.journaling import journaled
 from ephs.mechanics.methods import METHODS, Method, Setting, chosen
 from ephs.mechanics.motion import SceneMotion
 from ephs.mechanics.reduction.folded import folded_problem
@@ -16,6 +18,7 @@ from ephs.mechanics.solve.control import Control, Tolerance
 from ephs.mechanics.solve.errors import OptionError, nearest_of
 from ephs.mechanics.solve.events import events_of
 from ephs.mechanics.solve.integrate import Grid, integrate, solution_of
+from ephs.mechanics.solve.journal import Journal
 from ephs.mechanics.solve.loop import integrate_stepwise
 from ephs.mechanics.solve.problem import Problem, Signal
 from ephs.mechanics.solve.record import Record
@@ -60,6 +63,7 @@ def simulate(
     options: Mapping[str, Any] | None = None,
     reference: Reference | None = None,
     progress: Callable[[float, float, Mapping[str, Any]], None] | None = None,
+    journal: "Journal | str | PathLike[str] | None" = None,
 ) -> Solution:
     """Simulate a system or a scene.
 
@@ -99,6 +103,9 @@ def simulate(
         The reference environment of a system; a scene's world gives its own.
     progress
         Called as progress(t, until, stats) a few times a second.
+    journal
+        A file that receives the run while it goes on. Whatever ends the run, the same call goes on from there, to the
+        very numbers of a run that nothing disturbed; `load_solution` reads what it holds.
 
     Raises
     ------
@@ -135,26 +142,34 @@ def simulate(
         raise OptionError("options", unknown[0], f"options of {chosen_method.name}: {known}{near}")
     times, watched = times_of(save_at, start, end), events_of(events)
     setting = Setting(problem, start, control, dict(options or {}))
-    if chosen_method.many is not None and control.step is not None and not watched and end > start:
-        return integrate(
+    asked = {
+        "until": end, "t0": start, "method": chosen_method.name, "form": form, "rtol": rtol, "atol": atol,
+        "step": step, "min_step": min_step, "max_step": max_step, "max_steps": max_steps, "save_at": times,
+        "options": options, "inputs": inputs, "events": [event.name for event in watched],
+    }  # fmt: skip
+    with journaled(journal, problem, asked) as written:
+        if chosen_method.many is not None and control.step is not None and not watched and end > start:
+            return integrate(
+                problem,
+                Grid(start, end, control.step),
+                make=chosen_method.many,
+                save_at=times,
+                max_steps=max_steps,
+                progress=progress,
+                journal=written,
+            )
+        return integrate_stepwise(
             problem,
-            Grid(start, end, control.step),
-            make=chosen_method.many,
+            start,
+            end,
+            make=lambda: chosen_method.make(setting),
+            control=control,
+            events=watched,
             save_at=times,
-            max_steps=max_steps,
             progress=progress,
+            remarks={"auto": reason} if method == "auto" else {},
+            journal=written,
         )
-    return integrate_stepwise(
-        problem,
-        start,
-        end,
-        make=lambda: chosen_method.make(setting),
-        control=control,
-        events=watched,
-        save_at=times,
-        progress=progress,
-        remarks={"auto": reason} if method == "auto" else {},
-    )
 
 
 def _fits(form: str, method: Method) -> None:

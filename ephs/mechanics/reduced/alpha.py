@@ -16,6 +16,7 @@ from ephs.mechanics.reduced.jacobian import Jacobian
 from ephs.mechanics.reduced.method import ReducedMethod
 from ephs.mechanics.solve.control import Control
 from ephs.mechanics.solve.errors import OptionError, Outcome, SolveError
+from ephs.mechanics.solve.snapshot import Snapshot
 from ephs.mechanics.solve.stepping import Attempt
 
 __all__ = ["Alpha"]
@@ -96,6 +97,14 @@ class Alpha(ReducedMethod):
         estimate = np.concatenate([missed, np.zeros(n), np.zeros(ns)])
         error = float(np.max(np.abs(eq.along(estimate)) / (self.atol + self.rtol * eq.sizes(y0, y1)), initial=0.0))
         return Attempt(state, replace(closed, memory=(rates, mean1)), h, error, eq.least(state, closed))
+
+    def taken(self, state: ReducedState) -> Snapshot:
+        """Where the matrix was made."""
+        return {"jacobian": self.jacobian.snapshot(state)}
+
+    def take(self, own: Snapshot, state: ReducedState) -> None:
+        """Take along what `taken` said."""
+        self.jacobian.restore(own["jacobian"], state)
 
     def _solver(self, state: ReducedState, h: float) -> Any:
         eq = self.equations

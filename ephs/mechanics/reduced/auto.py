@@ -12,6 +12,7 @@ from ephs.mechanics.reduced.explicit import Explicit, tableau
 from ephs.mechanics.reduced.method import ReducedMethod
 from ephs.mechanics.solve.control import Control
 from ephs.mechanics.solve.errors import Outcome, SolveError
+from ephs.mechanics.solve.snapshot import Snapshot
 from ephs.mechanics.solve.stepping import Attempt, Leg, Span
 
 if TYPE_CHECKING:
@@ -70,9 +71,28 @@ class Auto(ReducedMethod):
         return self._explicit.many(span, LIMITS[self._explicit.name], self._switch)
 
     def _switch(self, t: float, h: float, reason: str) -> None:
+        self._go_implicit()
+        self.counts["switches"].append({"t": float(t), "to": "radau", "step": float(h), "reason": reason})
+
+    def _go_implicit(self) -> "Implicit":
         from ephs.mechanics.reduced.implicit import Implicit  # with its derivatives, which explicit runs do not need
 
         self._implicit = Implicit(self.equations, self.control)
         self.exponent = self._implicit.exponent
-        self.counts["switches"].append({"t": float(t), "to": "radau", "step": float(h), "reason": reason})
         self.name = f"{self._explicit.name}, radau"
+        return self._implicit
+
+    def taken(self, state: ReducedState) -> Snapshot:
+        """What its present method takes along, and how near it is to a switch."""
+        return {
+            "explicit": self._explicit.taken(state),
+            "implicit": self._implicit.snapshot(state) if self._implicit is not None else None,
+            "nearness": [self._held, self._free, self._failures],
+        }
+
+    def take(self, own: Snapshot, state: ReducedState) -> None:
+        """Take along what `taken` said."""
+        self._explicit.take(own["explicit"], state)
+        if own["implicit"] is not None:
+            self._go_implicit().restore(own["implicit"], state)
+        self._held, self._free, self._failures = own["nearness"]

@@ -57,6 +57,7 @@ from ephs.mechanics.reduced.equations import Equations, ReducedState
 from ephs.mechanics.reduced.method import ReducedMethod
 from ephs.mechanics.solve.control import Control, Proportional
 from ephs.mechanics.solve.errors import Outcome, SolveError
+from ephs.mechanics.solve.snapshot import Snapshot
 from ephs.mechanics.solve.stepping import Attempt, Counts, Leg, Span
 from ephs.semantics.bundle import Array
 
@@ -135,6 +136,16 @@ class Explicit(ReducedMethod):
             first[: eq.nv] = closed.r
             self._known = closed.q, first
         return Attempt(state, closed, h, error, eq.least(state, closed))
+
+    def taken(self, state: ReducedState) -> Snapshot:
+        """The rates at the state, where they are known, and how stiff the last step was."""
+        known = self._known[1] if self._known is not None and self._known[0] is state.q else None
+        return {"known": known, "stiffness": self.stiffness}
+
+    def take(self, own: Snapshot, state: ReducedState) -> None:
+        """Take along what `taken` said."""
+        self._known = None if own["known"] is None else (state.q, own["known"])
+        self.stiffness = own["stiffness"]
 
     def many(
         self, span: Span[ReducedState], limit: float = 0.0, left: Callable[[float, float, str], None] | None = None
@@ -287,6 +298,16 @@ class _March:
         (n, ·) rates, entropies and books; views of the memory."""
         count = int(self.control[C_ROWS])
         return self.memory.rows_t[:count], self.memory.rows_q[:count], self.memory.rows_y[:count]
+
+    def snapshot(self) -> Snapshot:
+        """Where it stands: the state, the rates there, and what chooses the steps."""
+        s = self.memory
+        return {"control": self.control, "q": s.q, "y": s.y, "rates": s.k[0]}
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go on from a snapshot."""
+        s = self.memory
+        self.control[:], s.q[:], s.y[:], s.k[0] = (snapshot[key] for key in ("control", "q", "y", "rates"))
 
     @property
     def counts(self) -> Counts:

@@ -15,6 +15,7 @@ from ephs.mechanics.reduced.method import ReducedMethod
 from ephs.mechanics.solve.control import Control
 from ephs.mechanics.solve.errors import Outcome, SolveError
 from ephs.mechanics.solve.radau import COEFFICIENTS, NODES, T_INVERSE, VALUES, T
+from ephs.mechanics.solve.snapshot import Snapshot
 from ephs.mechanics.solve.stepping import Attempt
 from ephs.semantics.bundle import Array
 
@@ -71,6 +72,22 @@ class Implicit(ReducedMethod):
         if not fast:
             self._renew(closed)
         return Attempt(state, closed, h, error, eq.least(state, closed))
+
+    def taken(self, state: ReducedState) -> Snapshot:
+        """The rates at the state, where the matrix was made, and the step for which it was factorised."""
+        return {
+            "known": self._known[1] if self._known is not None and self._known[0] is state.q else None,
+            "jacobian": self.jacobian.snapshot(state),
+            "step": self._solvers[0] if self._solvers is not None else None,
+        }
+
+    def take(self, own: Snapshot, state: ReducedState) -> None:
+        """Take along what `taken` said."""
+        self._known = None if own["known"] is None else (state.q, own["known"])
+        self.jacobian.restore(own["jacobian"], state)
+        self._solvers = None
+        if own["step"] is not None:
+            self._solve(state, own["step"])
 
     def _renew(self, state: ReducedState) -> None:
         self.jacobian.at(state, renew=True)

@@ -1,5 +1,6 @@
 """The Jacobian of the reduced form, exact, and kept while it serves."""
 
+from dataclasses import replace
 from typing import final
 
 import numpy as np
@@ -7,6 +8,7 @@ import numpy as np
 from ephs.mechanics.reduced.equations import Equations, ReducedState
 from ephs.mechanics.reduced.tables import SPRING
 from ephs.mechanics.reduced.tangent import Linearised
+from ephs.mechanics.solve.snapshot import Snapshot, like, parts
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.codes import VECTOR
 
@@ -25,12 +27,12 @@ class Jacobian:
         self.size = equations.nv + equations.n + equations.ns
         self.count = 0
         self._linear = Linearised(equations)
-        self._at: Array | None = None
+        self._at: ReducedState | None = None
         self._value = np.zeros((self.size, self.size))
 
     def fresh(self, state: ReducedState) -> bool:
         """Whether the matrix was made at this state."""
-        return self._at is state.q
+        return self._at is not None and self._at.q is state.q
 
     def at(self, state: ReducedState, *, renew: bool = False) -> Array:
         """The matrix (size, size), made anew where asked for or where there is none.
@@ -58,9 +60,21 @@ class Jacobian:
             if t.kind[i] != SPRING and t.code[i] != VECTOR:  # v̇ = dexp⁻¹(v) r turns with v: r + ½ [v, r] + …
                 where = slice(int(t.r_at[i]), int(t.r_at[i] + t.dim[i]))
                 value[where, where] -= 0.5 * edge.pair.manifold.ad(rates[where])
-        self._value, self._at = value, state.q
+        self._value, self._at = value, state
         self.count += 1
         return value
+
+    def snapshot(self, state: ReducedState) -> Snapshot:
+        """Where the matrix was made, and whether that is at ``state``."""
+        return {"made": parts(self._at), "fresh": self.fresh(state), "count": self.count}
+
+    def restore(self, snapshot: Snapshot, state: ReducedState) -> None:
+        """Make the matrix where it was made."""
+        self._at, found = None, snapshot["made"]
+        if found is not None:
+            made = like(state, found)
+            self.at(replace(made, q=state.q) if snapshot["fresh"] else made)
+        self.count = snapshot["count"]
 
     def _inputs(self, state: ReducedState) -> Array:
         """(n, size) what the inputs' dependence on the state adds to ∂ṙ/∂y."""

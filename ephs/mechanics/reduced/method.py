@@ -7,6 +7,7 @@ from typing import Any
 
 from ephs.mechanics.reduced.equations import Equations, ReducedState
 from ephs.mechanics.solve.control import Control
+from ephs.mechanics.solve.snapshot import Snapshot
 from ephs.mechanics.solve.stepping import Attempt, Leg, Row, Span
 
 __all__ = ["ReducedMethod"]
@@ -84,3 +85,21 @@ class ReducedMethod(ABC):
     def stats(self) -> dict[str, Any]:
         """Counts, for the solution's statistics."""
         return self.equations.stats() | self.counts
+
+    def snapshot(self, state: ReducedState) -> Snapshot | None:
+        """What it takes along from step to step besides its state, with its counts; None where it cannot say."""
+        own = self.taken(state)
+        return None if own is None else {"own": own, "counts": self.counts, "evaluations": self.equations.evaluations}
+
+    def restore(self, snapshot: Snapshot, state: ReducedState) -> None:
+        """Go on from a snapshot."""
+        self.take(snapshot["own"], state)
+        self.counts.update(snapshot["counts"])
+        self.equations.evaluations = snapshot["evaluations"]
+
+    def taken(self, state: ReducedState) -> Snapshot | None:
+        """None: a method of one's own that can be resumed says what it takes along, be it nothing: an empty mapping."""
+        return None
+
+    def take(self, own: Snapshot, state: ReducedState) -> None:  # noqa: B027 - of a method that takes nothing along
+        """Take along what `taken` said."""

@@ -20,6 +20,7 @@ from ephs.mechanics.reduced.tables import CUT
 from ephs.mechanics.reduced.tangent import Linearised
 from ephs.mechanics.solve.control import Control
 from ephs.mechanics.solve.errors import Outcome, SolveError
+from ephs.mechanics.solve.snapshot import Snapshot
 from ephs.mechanics.solve.stepping import Attempt
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.codes import VECTOR
@@ -89,6 +90,16 @@ class Variational(ReducedMethod):
             books[1] += float((push[: self._driven.size] + second) @ rates)
         self._guess = closed.q, closed.r + (closed.r - state.r) * 0.5
         return Attempt(state, closed, h, 0.0, eq.least(state, closed))
+
+    def taken(self, state: ReducedState) -> Snapshot:
+        """The matrix, and the guess of the next step."""
+        guess = self._guess[1] if self._guess is not None and self._guess[0] is state.q else None
+        return {"matrix": self._matrix, "guess": guess}
+
+    def take(self, own: Snapshot, state: ReducedState) -> None:
+        """Take along what `taken` said."""
+        self._matrix = own["matrix"]
+        self._guess = None if own["guess"] is None else (state.q, own["guess"])
 
     def _solved(
         self, state: ReducedState, h: float, momentum: Array, before: Array, xi: Array

@@ -7,6 +7,7 @@ from typing import Protocol, final
 import numpy as np
 
 from ephs.mechanics.solve.errors import OptionError, Outcome, SolveError
+from ephs.mechanics.solve.snapshot import Snapshot
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.descriptor import Descriptor
@@ -141,6 +142,14 @@ class Policy(Protocol):
         """(whether it is accepted, the length of the next one or of the next try); span is that of the whole run."""
         ...
 
+    def snapshot(self) -> Snapshot:
+        """What it remembers of the steps before."""
+        ...
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Remember what a snapshot says."""
+        ...
+
 
 @final
 class Proportional:
@@ -184,6 +193,14 @@ class Proportional:
         self._failed = False
         return True, h * min(most, max(0.3, factor))
 
+    def snapshot(self) -> Snapshot:
+        """What it remembers of the steps before."""
+        return {"before": float(self._before), "failed": self._failed}
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Remember what a snapshot says."""
+        self._before, self._failed = snapshot["before"], snapshot["failed"]
+
 
 @final
 class Symmetric:
@@ -218,3 +235,11 @@ class Symmetric:
             self._tries = 0
             return True, wanted
         return False, wanted
+
+    def snapshot(self) -> Snapshot:
+        """What it remembers of the steps before."""
+        return {"tries": self._tries}
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Remember what a snapshot says."""
+        self._tries = snapshot["tries"]

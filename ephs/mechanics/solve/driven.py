@@ -9,6 +9,7 @@ from ephs.mechanics.solve.errors import Outcome
 from ephs.mechanics.solve.model import Model
 from ephs.mechanics.solve.natural import Chunk, NaturalState
 from ephs.mechanics.solve.problem import Problem
+from ephs.mechanics.solve.snapshot import Snapshot
 from ephs.semantics.bundle import Array
 
 __all__ = ["ComponentMethod", "advance_driven", "advance_whole"]
@@ -49,6 +50,14 @@ class ComponentMethod(Protocol):
         self, state: NaturalState, h: float, steps: int, inputs: Array | None = None
     ) -> tuple[NaturalState, Chunk]:
         """Up to so many steps of h seconds."""
+        ...
+
+    def snapshot(self) -> Snapshot:
+        """What it takes along from step to step besides its state."""
+        ...
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go on from a snapshot."""
         ...
 
     def points(self, state: NaturalState, h: float, x: Array) -> list[Array]:

@@ -29,6 +29,7 @@ class Outcome(StrEnum):
     UNDETERMINED = "the motion is not determined"
     RESTLESS = "no state in which nothing moves"
     EVENT = "an event's function has no value"
+    UNWRITTEN = "the journal cannot be written"
     INTERRUPTED = "interrupted"
 
 
@@ -48,6 +49,7 @@ _ADVICE = {
     Outcome.UNDETERMINED: "add what determines it there: a storage, friction, or a constraint",
     Outcome.RESTLESS: "start nearer to one, or add what holds it: a spring, a stop of the drive, an environment",
     Outcome.EVENT: "see the exception above this one, or give a function that is a number everywhere",
+    Outcome.UNWRITTEN: "make room on the disk, then let the run go on with the same journal",
     Outcome.INTERRUPTED: "what was computed is in .partial",
 }
 _OF_KERNEL = {1: Outcome.TURN, 2: Outcome.TEMPERATURE, 3: Outcome.PYTHON, 4: Outcome.EXTENT, 5: Outcome.DOMAIN}

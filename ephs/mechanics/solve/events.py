@@ -8,6 +8,7 @@ import numpy as np
 
 from ephs.mechanics.solve.errors import OptionError, Outcome, SolveError
 from ephs.mechanics.solve.problem import States
+from ephs.mechanics.solve.snapshot import Snapshot
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 
@@ -138,6 +139,15 @@ class Watch:
             if self.events[i].stop:
                 return t
         return None
+
+    def snapshot(self) -> Snapshot:
+        """What has happened, and the functions' values."""
+        return {"before": self._before, "crossings": [crossing.record() for crossing in self.crossings]}
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go on from a snapshot."""
+        self._before = list(snapshot["before"])
+        self.crossings = [Crossing.of_record(record) for record in snapshot["crossings"]]
 
     @staticmethod
     def _locate(

@@ -1,7 +1,6 @@
 """Solutions as netCDF files."""
 
 import json
-import os
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 from pathlib import Path as File
@@ -11,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from ephs.mechanics.solve.dataset import FORMAT, Variable, dataset
+from ephs.mechanics.solve.durable import durable
 from ephs.mechanics.solve.labels import Labels, labels_of
 from ephs.mechanics.solve.ledger import Ledgers
 from ephs.mechanics.solve.problem import Problem
@@ -26,13 +26,8 @@ Inputs = Mapping[Path, Array]
 
 def save(solution: Solution, path: File, *, wrenches: bool) -> None:
     """Write a solution; an older file of that name stays whole until the new one is."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
+    with durable(path) as temporary:
         dataset(solution, wrenches=wrenches).to_netcdf(temporary, engine="h5netcdf")
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def load(path: str | File, problem_of: Callable[[str, Array, Inputs], Problem]) -> Solution:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ephs.mechanics.solve.driven import ComponentMethod, advance_driven, advance_whole
 from ephs.mechanics.solve.errors import Interrupted, OptionError, Outcome, SimulationError, SolveError
+from ephs.mechanics.solve.journal import Written
 from ephs.mechanics.solve.labels import labels_of
 from ephs.mechanics.solve.ledger import ledgers
 from ephs.mechanics.solve.model import Model, compile_model
@@ -17,6 +18,7 @@ from ephs.mechanics.solve.natural import Chunk, Natural, NaturalState
 from ephs.mechanics.solve.natural_kernels import IRREVERSIBLE
 from ephs.mechanics.solve.problem import Problem
 from ephs.mechanics.solve.record import Record, Recorder
+from ephs.mechanics.solve.snapshot import Snapshot, like, parts
 from ephs.mechanics.solve.solution import Solution
 from ephs.mechanics.solve.watching import Balance
 from ephs.operad import Quantity
@@ -73,8 +75,14 @@ def integrate(
     save_at: Array | None = None,
     max_steps: int | None = None,
     progress: Progress | None = None,
+    journal: Written | None = None,
 ) -> Solution:
     """Solve an initial value problem on a grid, forward in time, by a method that discretises component by component.
+
+    Parameters
+    ----------
+    journal
+        Where the run is written down, and what an earlier part of it left there.
 
     Raises
     ------
@@ -87,15 +95,16 @@ def integrate(
     model = compile_model(d, problem.reference, problem.inputs(grid.t0, problem.initial))
     stepper = make(model)
     inside = _Inside(problem, make, model)
-    run = _Run(problem, grid, stepper, Recorder(d, grid.t0, x0, save_at, inside), begin, progress)
+    run = _Run(problem, grid, stepper, Recorder(d, grid.t0, x0, save_at, inside), begin, progress, journal)
     with failures_of(run):
         run.recorder.start(stepper.energies(x0))
         run.balance = Balance(problem, *run.recorder.latest)
         run.state = stepper.init(x0)
         stepper.prepare(run.state, grid.h)
         run.setup = time.perf_counter() - begin
+        run.restore()
         run.full_steps(max_steps)
-        if grid.last:
+        if grid.last and run.t != grid.until:
             run.take(grid.last, 1, grid.until)
     return run.solution()
 
@@ -119,6 +128,16 @@ class _Inside:
         if chunk.failure is not None:
             raise chunk.failure
         return chunk.x[-1], chunk.energies[-1], chunk.ledgers[-1]
+
+    def snapshot(self) -> Snapshot | None:
+        """What it takes along from one time to the next."""
+        return None if self._method is None else self._method.snapshot()
+
+    def restore(self, snapshot: Snapshot | None) -> None:
+        """Go on from a snapshot."""
+        if snapshot is not None:
+            self._method = self._make(self._model)
+            self._method.restore(snapshot)
 
 
 class Run(Protocol):
@@ -171,9 +190,10 @@ class _Run:
         recorder: Recorder,
         begin: float,
         progress: Progress | None,
+        journal: Written | None,
     ) -> None:
         self.problem, self.grid, self.stepper, self.recorder = problem, grid, stepper, recorder
-        self.begin, self.progress = begin, progress
+        self.begin, self.progress, self.journal = begin, progress, journal
         self.t, self.setup, self.steps, self.iterations, self.cut = grid.t0, 0.0, 0, 0, 0
         self.looked = begin
 
@@ -213,6 +233,30 @@ class _Run:
             error = self.balance.error(*self.recorder.latest)
             self.looked = time.perf_counter()
             self.progress(self.t, self.grid.until, {**self.stats(), "energy_error": error})
+
+        if self.journal is not None and (self.t == self.grid.until or self.journal.due):
+            self.journal.write(self.recorder.rows.fresh(), self.snapshot(), self.stats())
+
+    def snapshot(self) -> Snapshot:
+        """Where the run stands."""
+        return {
+            "t": self.t,
+            "counts": [self.steps, self.iterations, self.cut],
+            "elapsed": time.perf_counter() - self.begin - self.setup,
+            "state": parts(self.state),
+            "method": self.stepper.snapshot(),
+            "recorder": self.recorder.snapshot(),
+        }
+
+    def restore(self) -> None:
+        """Go on from where the journal says that the run stood."""
+        found = self.journal.snapshot if self.journal is not None else None
+        if found is not None:
+            self.t, (self.steps, self.iterations, self.cut) = found["t"], found["counts"]
+            self.begin = time.perf_counter() - self.setup - found["elapsed"]
+            self.state = like(self.state, found["state"])
+            self.stepper.restore(found["method"])
+            self.recorder.restore(found["recorder"], self.journal.rows if self.journal is not None else None)
 
     def _record(self, times: Array, chunk: Chunk) -> None:
         if chunk.steps:

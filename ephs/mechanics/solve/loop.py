@@ -10,8 +10,10 @@ from ephs.mechanics.solve.control import Control, Policy
 from ephs.mechanics.solve.errors import OptionError, Outcome, SolveError
 from ephs.mechanics.solve.events import Crossing, Event, Watch
 from ephs.mechanics.solve.integrate import Grid, Progress, failures_of, solution_of
+from ephs.mechanics.solve.journal import Written
 from ephs.mechanics.solve.problem import Problem, States
-from ephs.mechanics.solve.record import Record
+from ephs.mechanics.solve.record import Record, Rows
+from ephs.mechanics.solve.snapshot import Snapshot, like, parts
 from ephs.mechanics.solve.solution import Solution
 from ephs.mechanics.solve.stepping import Attempt, Leg, Row, Span, Stepper
 from ephs.mechanics.solve.watching import Balance
@@ -24,6 +26,8 @@ S = TypeVar("S")
 RESPONSE = 0.1
 BURST = 2000
 """Steps in one compiled call at most, for progress and interruption."""
+BLOCK = 1024
+"""Rows that wait until they are made what is kept."""
 FIRST = 1e-4
 """Part of the time span that the first step takes: too long it is rejected, too short it grows fast."""
 FINAL = (Outcome.PYTHON, Outcome.UNSUITED, Outcome.EVENT, Outcome.INCONSISTENT)
@@ -41,6 +45,7 @@ def integrate_stepwise(
     save_at: Array | None = None,
     progress: Progress | None = None,
     remarks: Mapping[str, Any] | None = None,
+    journal: Written | None = None,
 ) -> Solution:
     """Solve an initial value problem, forward or backward in time.
 
@@ -50,6 +55,8 @@ def integrate_stepwise(
         Makes the method, and what chooses its steps; None: they are constant.
     remarks
         What else the statistics are to say.
+    journal
+        Where the run is written down, and what an earlier part of it left there.
 
     Raises
     ------
@@ -59,11 +66,12 @@ def integrate_stepwise(
     begin = time.perf_counter()
     if not (np.isfinite(until) and until != t0):
         raise OptionError("until", until, f"a time other than t0 = {t0!r} s")
-    run = _Run(problem, t0, until, *make(), control, events, save_at, progress, remarks or {}, begin)
+    run = _Run(problem, t0, until, *make(), control, events, save_at, progress, remarks or {}, begin, journal)
     with failures_of(run):
         run.start()
         run.setup = time.perf_counter() - begin
-        run.advance()
+        run.advance(run.restore())
+        run.write(end=True)
     return run.solution()
 
 
@@ -90,10 +98,11 @@ class _Run(Generic[S]):
         progress: Progress | None,
         remarks: Mapping[str, Any],
         begin: float,
+        journal: Written | None,
     ) -> None:
         self.problem, self.until, self.stepper, self.control = problem, until, stepper, control
         self.policy, self.events, self.progress, self.begin = policy, events, progress, begin
-        self.remarks = remarks
+        self.remarks, self.journal = remarks, journal
         self.t = self.t0 = t0
         self.sign = 1.0 if until > t0 else -1.0
         self.save_at = save_at
@@ -102,8 +111,11 @@ class _Run(Generic[S]):
         self.looked = begin
         self.least = np.inf
         self.shortest, self.longest = np.inf, 0.0
-        self.rows: list[tuple[float, S, float]] = []
+        self.pending: list[tuple[float, S, float]] = []
+        self.kept = Rows()
         self.watch: Watch | None = None
+        self.leg: Leg[S] | None = None
+        self.ended = False
 
     def start(self) -> None:
         """The initial state, and the first row."""
@@ -112,40 +124,50 @@ class _Run(Generic[S]):
         row = self.stepper.row(self.state)
         self.balance = Balance(self.problem, row.x, row.energies, row.sums)
         if self.save_at is None or (self.save_at.size and self.save_at[0] == self.t0):
-            self.rows.append((self.t0, self.state, 0.0))
+            self.pending.append((self.t0, self.state, 0.0))
             self.saved = 1
         self.stepper.prepare(self.state, self.sign * self.h)
         if self.events:
             self.watch = Watch(self.events, self.t0, self._states(row))
 
-    def advance(self) -> None:
-        """To the end, or to an event that stops the run: in compiled code as far as that goes, then step after step."""
-        if self.watch is None:
-            leg = self.stepper.many(
+    def advance(self, stood: Snapshot | None) -> None:
+        """To the end, or to an event that stops the run: in compiled code as far as that goes, then step after step.
+
+        ``stood`` is where the compiled part of an earlier run did, None where it was left.
+        """
+        if self.watch is None and (self.journal is None or self.journal.snapshot is None or stood is not None):
+            self.leg = self.stepper.many(
                 Span(
                     self.state, self.t0, self.until, self.h, self.control, self.policy, self.save_at, self.saved
                 )
             )  # fmt: skip
-            if leg is not None:
-                self._follow(leg)
-        self._advance_stepwise()
+            if self.leg is not None:
+                if stood is not None:
+                    self.leg.restore(stood)
+                self._follow(self.leg)
+                self.leg = None
+        if not self.ended:
+            self._advance_stepwise()
 
     def _follow(self, leg: Leg[S]) -> None:
         """Compiled steps until the end, or where they leave off."""
-        done = False
+        done, most = False, BURST
         while not (done or leg.left):
             if self.control.max_steps is not None and self.steps >= self.control.max_steps:
                 raise SolveError(Outcome.MANY, "", f"{self.control.max_steps}")
-            burst = BURST if self.control.max_steps is None else min(BURST, self.control.max_steps - self.steps)
+            burst = most if self.control.max_steps is None else min(most, self.control.max_steps - self.steps)
+            begin = time.perf_counter()
             try:
                 done = leg.advance(burst)
             finally:
                 fresh, counts = leg.rows(), leg.counts
-                self.rows += fresh
+                self.pending += fresh
                 self.saved += len(fresh)
                 self.t, self.steps, self.rejected, self.h = leg.time, counts.steps, counts.rejected, counts.h
                 self.shortest, self.longest, self.least = counts.shortest, counts.longest, counts.least
                 self.state = leg.state
+            spent = time.perf_counter() - begin
+            most = int(np.clip(most * np.clip(RESPONSE / max(spent, 1e-9), 0.5, 2.0), 1, BURST))
             self._look()
 
     def _advance_stepwise(self) -> None:
@@ -176,6 +198,7 @@ class _Run(Generic[S]):
                 if h == self.h or wanted < self.h:  # a step that was cut for the end says nothing of longer ones
                     self.h = max(min(wanted, control.most), min(control.least, h))
             if self._accept(attempt, self.until if h == rest and abs(attempt.h) == h else None):
+                self.ended = True
                 return
 
     def _shrink(self, h: float, cause: SolveError | None) -> None:
@@ -200,12 +223,12 @@ class _Run(Generic[S]):
         self.least = min(self.least, attempt.least)
         self.shortest, self.longest = min(self.shortest, abs(attempt.h)), max(self.longest, abs(attempt.h))
         if self.save_at is None:
-            self.rows.append((t, after, attempt.least))
+            self.pending.append((t, after, attempt.least))
         else:
             last = int(np.searchsorted(self.sign * self.save_at, self.sign * t, side="right"))
             for when in self.save_at[self.saved : last]:
                 found = after if when == t else self.stepper.inside(attempt, float(when))
-                self.rows.append((float(when), found, attempt.least))
+                self.pending.append((float(when), found, attempt.least))
             self.saved = last
         self.state, self.t = after, t
         self.steps += 1
@@ -213,7 +236,11 @@ class _Run(Generic[S]):
         return stopped is not None
 
     def _look(self) -> None:
-        """Tell the progress, from time to time."""
+        """Tell the progress and write the journal, from time to time."""
+        if self.journal is not None and self.journal.due:
+            self.write()
+        elif len(self.pending) >= BLOCK:
+            self._settle()
         now = time.perf_counter()
         if self.progress is not None and now - self.looked > RESPONSE:
             self.looked = now
@@ -247,12 +274,66 @@ class _Run(Generic[S]):
     def solution(self) -> Solution:
         """The solution so far."""
         stats = self.stats()
-        kept = self.stepper.rows([state for _, state, _ in self.rows])
-        count, size = len(self.problem.descriptor.components), self.problem.descriptor.point_size
-        record = Record(
-            np.array([t for t, _, _ in self.rows]),
-            np.array([row.x for row in kept]).reshape(-1, size),
-            np.array([row.energies for row in kept]).reshape(-1, count),
-            np.array([[*row.sums, least] for row, (_, _, least) in zip(kept, self.rows, strict=True)]).reshape(-1, 5),
-        )
-        return solution_of(self.problem, record, stats)
+        self._settle()
+        return solution_of(self.problem, self.kept.whole(self.problem.descriptor), stats)
+
+    def _settle(self) -> None:
+        """What is pending, as it is kept."""
+        if self.pending:
+            rows = self.stepper.rows([state for _, state, _ in self.pending])
+            self.kept.add(
+                Record(
+                    np.array([t for t, _, _ in self.pending]),
+                    np.array([row.x for row in rows]),
+                    np.array([row.energies for row in rows]),
+                    np.array([[*row.sums, least] for row, (_, _, least) in zip(rows, self.pending, strict=True)]),
+                )
+            )
+            self.pending.clear()
+
+    def write(self, *, end: bool = False) -> None:
+        """An entry in the journal, if there is one."""
+        if self.journal is not None:
+            self._settle()
+            self.ended = self.ended or end
+            self.journal.write(self.kept.fresh(), self.snapshot(), self.stats())
+
+    def snapshot(self) -> Snapshot | None:
+        """Where the run stands; None where its method cannot say."""
+        method = self.stepper.snapshot(self.state)
+        if method is None:
+            return None
+        return {
+            "t": self.t,
+            "h": self.h,
+            "counts": [self.steps, self.rejected, self.saved],
+            "lengths": [float(self.shortest), float(self.longest), float(self.least)],
+            "elapsed": time.perf_counter() - self.begin - self.setup,
+            "ended": self.ended,
+            "state": parts(self.state),
+            "method": method,
+            "policy": self.policy.snapshot() if self.policy is not None else None,
+            "watch": self.watch.snapshot() if self.watch is not None else None,
+            "leg": self.leg.snapshot() if self.leg is not None else None,
+        }
+
+    def restore(self) -> Snapshot | None:
+        """Go on from where the journal says that the run stood; where its compiled part did."""
+        found = self.journal.snapshot if self.journal is not None else None
+        if self.journal is None or found is None:
+            return None
+        self.t, self.h = found["t"], found["h"]
+        self.steps, self.rejected, self.saved = found["counts"]
+        self.shortest, self.longest, self.least = found["lengths"]
+        self.begin = time.perf_counter() - self.setup - found["elapsed"]
+        self.ended = found["ended"]
+        self.state = like(self.state, found["state"])
+        self.stepper.restore(found["method"], self.state)
+        if self.policy is not None:
+            self.policy.restore(found["policy"])
+        if self.watch is not None:
+            self.watch.restore(found["watch"])
+        self.pending.clear()
+        if self.journal.rows is not None:
+            self.kept.add(self.journal.rows, written=True)
+        return found["leg"]

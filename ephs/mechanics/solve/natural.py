@@ -20,10 +20,11 @@ from ephs.mechanics.solve.natural_kernels import (
     Memory,
     advance,
 )
+from ephs.mechanics.solve.snapshot import Snapshot, parts
 from ephs.mechanics.solve.sparse import Index
 from ephs.semantics.bundle import Array
 
-__all__ = ["Chunk", "Natural", "NaturalState", "guessed_efforts", "of_status", "stored_energies"]
+__all__ = ["Chunk", "Decided", "Natural", "NaturalState", "guessed_efforts", "of_status", "stored_energies"]
 
 SETTLING = 16
 """Steps after a change of order until the next: the values at the change itself may be exceptional."""
@@ -49,6 +50,17 @@ class NaturalState:
     z: Array
     previous: Array
     sums: Array
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Decided:
+    """Where an order of elimination was decided: states, unknowns, the step in s, the equations left out before."""
+
+    x: Array
+    z: Array
+    h: float
+    before: Index | None
 
 
 @final
@@ -111,6 +123,7 @@ class Natural:
         self._memory: Memory = model.memory()
         self._unsettled = 0
         self._dropped: Index | None = None
+        self._decided: Decided | None = None
 
     def init(self, x: Array) -> NaturalState:
         """The state of the method at the states x; unknowns are guessed from the efforts there."""
@@ -198,6 +211,24 @@ class Natural:
         """The equations that the method leaves out, in words."""
         return self.analysis.redundant if self.analysis is not None else ()
 
+    def snapshot(self) -> Snapshot:
+        """Where the present order of elimination was decided, and the equations left out before."""
+        return {
+            "decided": parts(self._decided) if self.analysis is not None else None,
+            "dropped": self._dropped,
+            "unsettled": self._unsettled,
+            "changes": self.changes,
+        }
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Decide the order as it was decided."""
+        self.analysis, found = None, snapshot["decided"]
+        if found is not None:
+            self._dropped = found["before"]
+            self._order(found["x"], found["z"], found["h"])
+        self._dropped, self._unsettled = snapshot["dropped"], snapshot["unsettled"]
+        self.changes = snapshot["changes"]
+
     def points(self, state: NaturalState, h: float, x: Array) -> list[Array]:
         """The state in the middle of a step from x, by the rates that ``state`` holds."""
         return self.stage_points(state, h, x)
@@ -209,6 +240,7 @@ class Natural:
 
     def _order(self, x: Array, z: Array, h: float) -> Analysis:
         if self.analysis is None:
+            self._decided = Decided(x.copy(), z.copy(), float(h), self._dropped)
             self.analysis = analyse(self.model, x, z, h, self._dropped)
             self._dropped = self.analysis.dropped
             self.changes += 1

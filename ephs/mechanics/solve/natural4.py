@@ -14,8 +14,9 @@ from ephs.mechanics.solve.errors import Outcome, SolveError
 from ephs.mechanics.solve.gauss_kernels import Groups, Scheme, Stages, gauss_advance, linearise
 from ephs.mechanics.solve.lu_kernels import factorise
 from ephs.mechanics.solve.model import Model, evaluate_at
-from ephs.mechanics.solve.natural import Chunk, NaturalState, guessed_efforts, of_status, stored_energies
+from ephs.mechanics.solve.natural import Chunk, Decided, NaturalState, guessed_efforts, of_status, stored_energies
 from ephs.mechanics.solve.natural_kernels import COMPONENT, DONE, Memory, Order
+from ephs.mechanics.solve.snapshot import Snapshot, parts
 from ephs.mechanics.solve.sparse import Index, order
 from ephs.semantics.bundle import Array
 from ephs.semantics.primitives import Kernel
@@ -72,6 +73,8 @@ class Natural4:
         )  # fmt: skip
         self._order: Order | None = None
         self._dropped: Index | None = None
+        self._decided: Decided | None = None
+        self._inputs = np.zeros(0)
 
     def init(self, x: Array) -> NaturalState:
         """The state of the method at the states x; unknowns are guessed from the efforts there."""
@@ -143,9 +146,27 @@ class Natural4:
         after = NaturalState(x, z, previous, sums)
         return after, Chunk(rows[:done], energies[:done], ledgers[:done], int(iterations), failure)
 
+    def snapshot(self) -> Snapshot:
+        """Where the present order of elimination was decided, and the equations left out before."""
+        return {
+            "decided": parts(self._decided) if self._order is not None else None,
+            "inputs": self._inputs,
+            "dropped": self._dropped,
+            "changes": self.changes,
+        }
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Decide the order as it was decided."""
+        self._order, found = None, snapshot["decided"]
+        if found is not None:
+            self._dropped = found["before"]
+            self._decide(found["x"], found["z"], found["h"], snapshot["inputs"])
+        self._dropped, self.changes = snapshot["dropped"], snapshot["changes"]
+
     def _decide(self, x: Array, z: Array, h: float, inputs: Array) -> None:
         """Rank of the constraints, and an order of elimination for all stages, at these values."""
         model, t, n = self.model, self.model.tables, self.model.unknowns
+        self._decided, self._inputs = Decided(x.copy(), z.copy(), float(h), self._dropped), inputs.copy()
         status, component, memory = evaluate_at(model, x, z[0], h)
         if status:
             raise SolveError.of_component(status, model, component)

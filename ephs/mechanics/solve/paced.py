@@ -10,6 +10,7 @@ from ephs.mechanics.solve.control import Control
 from ephs.mechanics.solve.driven import ComponentMethod, advance_driven
 from ephs.mechanics.solve.natural import NaturalState
 from ephs.mechanics.solve.problem import Problem
+from ephs.mechanics.solve.snapshot import Snapshot
 from ephs.mechanics.solve.stepping import Attempt, Row, Span
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import manifold
@@ -94,6 +95,15 @@ class Paced:
             "dependent_equations": len(self.method.redundant),
             "unknowns": self.method.model.unknowns,
         }
+
+    def snapshot(self, state: PacedState) -> Snapshot:
+        """What it takes along from step to step besides its state."""
+        return {"method": self.method.snapshot(), "iterations": self._iterations}
+
+    def restore(self, snapshot: Snapshot, state: PacedState) -> None:
+        """Go on from a snapshot."""
+        self.method.restore(snapshot["method"])
+        self._iterations = snapshot["iterations"]
 
     def _single(self, state: PacedState, h: float) -> tuple[PacedState, float]:
         inner, chunk = advance_driven(self.problem, self.method, state.inner, state.t, h)

@@ -20,6 +20,7 @@ from ephs.mechanics.solve.errors import Outcome, SolveError
 from ephs.mechanics.solve.model import compile_model
 from ephs.mechanics.solve.natural_kernels import IRREVERSIBLE
 from ephs.mechanics.solve.problem import Problem
+from ephs.mechanics.solve.snapshot import Snapshot, like, parts
 from ephs.mechanics.solve.stepping import Attempt, Row, Span
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import manifold
@@ -185,6 +186,25 @@ class Radau:
             "factorisations": self.factorisations,
             "unknowns": self.model.unknowns,
         }
+
+    def snapshot(self, state: RadauState) -> Snapshot:
+        """Where the matrices were made, and for which step they were factorised."""
+        made = self._current if self._matrices is not None else None
+        return {
+            "made": parts(made),
+            "here": made is state,
+            "step": self._solvers[0] if self._solvers is not None and made is not None else None,
+            "counts": [self.evaluations, self.factorisations, self.iterations],
+        }
+
+    def restore(self, snapshot: Snapshot, state: RadauState) -> None:
+        """Make the matrices where they were made."""
+        self._matrices, self._solvers, found = None, None, snapshot["made"]
+        if found is not None:
+            self._refresh(state if snapshot["here"] else like(state, found))
+            if snapshot["step"] is not None:
+                self._solve(snapshot["step"])
+        self.evaluations, self.factorisations, self.iterations = snapshot["counts"]
 
     def _solved(self, state: RadauState, h: float) -> tuple[Array, Array, int]:
         """Stages, the states at the end, and how many iterations that took."""

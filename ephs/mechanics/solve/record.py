@@ -1,18 +1,33 @@
 """What a run keeps: every step, or dense output at the times asked for."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import final
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Protocol, final
 
 import numpy as np
 
 from ephs.mechanics.solve.natural import Chunk
+from ephs.mechanics.solve.snapshot import Snapshot
 from ephs.semantics.bundle import Array
 from ephs.semantics.descriptor import Descriptor
 
-__all__ = ["Inside", "Record", "Recorder"]
+__all__ = ["Inside", "Record", "Recorder", "Rows", "joined"]
 
-Inside = Callable[[tuple[float, Array, Array, Array], float], tuple[Array, Array, Array]]
+
+class Inside(Protocol):
+    """Dense output: from (time, states, energies, ledgers) at a step's start to the same at a time within the step."""
+
+    def __call__(self, start: tuple[float, Array, Array, Array], when: float) -> tuple[Array, Array, Array]:
+        """States, energies and ledgers then."""
+        ...
+
+    def snapshot(self) -> Snapshot | None:
+        """What it takes along from one time to the next."""
+        ...
+
+    def restore(self, snapshot: Snapshot | None) -> None:
+        """Go on from a snapshot."""
+        ...
 
 
 @final
@@ -39,6 +54,39 @@ class Record:
     ledgers: Array
 
 
+def joined(records: Sequence[Record]) -> Record | None:
+    """One after the other as one; None of none."""
+    if len(records) < 2:
+        return records[0] if records else None
+    return Record(*(np.concatenate([getattr(r, f.name) for r in records]) for f in fields(Record)))
+
+
+@final
+class Rows:
+    """What was kept so far, block by block, and how much of it a journal has."""
+
+    def __init__(self) -> None:
+        self._blocks: list[Record] = []
+        self._written = 0
+
+    def add(self, record: Record, *, written: bool = False) -> None:
+        """Another block."""
+        self._blocks.append(record)
+        if written:
+            self._written = len(self._blocks)
+
+    def fresh(self) -> Record | None:
+        """What came since this was last asked for."""
+        found = joined(self._blocks[self._written :])
+        self._written = len(self._blocks)
+        return found
+
+    def whole(self, descriptor: Descriptor) -> Record:
+        """Everything."""
+        empty = np.zeros((0, descriptor.point_size)), np.zeros((0, len(descriptor.components))), np.zeros((0, 5))
+        return joined(self._blocks) or Record(np.zeros(0), *empty)
+
+
 class Recorder:
     """Collects chunks of steps.
 
@@ -56,14 +104,14 @@ class Recorder:
         self._d, self._t0, self._x0, self._inside = descriptor, t0, x0, inside
         self._save_at = None if save_at is None else np.asarray(save_at, dtype=float)
         self._next = 0
-        self._rows: list[tuple[Array, Array, Array, Array]] = []
+        self.rows = Rows()
         self._least = np.inf
 
     def start(self, energies: Array) -> None:
         """The row at t₀."""
         self._last = (np.array([self._t0]), self._x0[None, :], energies[None, :], np.zeros((1, 5)))
         if self._save_at is None or (self._save_at.size and self._save_at[0] == self._t0):
-            self._rows.append(self._last)
+            self.rows.add(Record(*self._last))
             self._next = 1
 
     def add(self, t: Array, chunk: Chunk) -> None:
@@ -71,23 +119,34 @@ class Recorder:
         self._least = min(self._least, float(chunk.ledgers[:, 4].min(initial=np.inf)))
         fresh = (t, chunk.x, chunk.energies, chunk.ledgers)
         if self._save_at is None:
-            self._rows.append(fresh)
+            self.rows.add(Record(*fresh))
         else:
             first = self._next
             self._next = int(np.searchsorted(self._save_at, t[-1], side="right"))
             wanted = self._save_at[first : self._next]
             if wanted.size:
                 whole = tuple(np.concatenate([a, b]) for a, b in zip(self._last, fresh, strict=True))
-                self._rows.append(self._between(wanted, *whole))
+                self.rows.add(Record(*self._between(wanted, *whole)))
         self._last = tuple(a[-1:] for a in fresh)
 
     def result(self) -> Record:
         """Everything kept so far."""
-        rows = self._rows or [
-            (np.zeros(0), self._x0[None, :][:0], np.zeros((0, len(self._d.components))), np.zeros((0, 5)))
-        ]
-        t, x, energies, ledgers = (np.concatenate(column) for column in zip(*rows, strict=True))
-        return Record(t, x, energies, ledgers)
+        return self.rows.whole(self._d)
+
+    def snapshot(self) -> Snapshot:
+        """Where it stands, without the rows."""
+        inside = self._inside.snapshot() if self._inside is not None else None
+        return {"next": self._next, "last": list(self._last), "least": float(self._least), "inside": inside}
+
+    def restore(self, snapshot: Snapshot, rows: Record | None) -> None:
+        """Where a recorder of the same run stood, and its rows."""
+        self._next, self._last = snapshot["next"], tuple(snapshot["last"])
+        self._least = snapshot["least"]
+        if self._inside is not None:
+            self._inside.restore(snapshot["inside"])
+        self.rows = Rows()
+        if rows is not None:
+            self.rows.add(rows, written=True)
 
     @property
     def latest(self) -> tuple[Array, Array, Array]:

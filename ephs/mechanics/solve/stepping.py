@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar, final
 
 from ephs.mechanics.solve.control import Control, Policy
+from ephs.mechanics.solve.snapshot import Snapshot
 from ephs.semantics.bundle import Array
 
 __all__ = ["Attempt", "Counts", "Leg", "Row", "Span", "Stepper"]
@@ -125,6 +126,14 @@ class Leg(Protocol[S]):
         """What it did so far."""
         ...
 
+    def snapshot(self) -> Snapshot:
+        """Where it stands, for `restore` of a leg of the same run."""
+        ...
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go on from a snapshot."""
+        ...
+
 
 class Stepper(Protocol[S]):
     """A method on one problem: it starts, steps, and says what is where. States are values with a time ``t``."""
@@ -171,4 +180,13 @@ class Stepper(Protocol[S]):
 
     def stats(self) -> dict[str, Any]:
         """Counts, for the solution's statistics."""
+        ...
+
+    def snapshot(self, state: S) -> Snapshot | None:
+        """What it takes along from step to step besides its state, where that is ``state``: from both a method made
+        anew takes the very same steps. None where it cannot say; a run that is resumed then begins anew."""
+        ...
+
+    def restore(self, snapshot: Snapshot, state: S) -> None:
+        """Go on from a snapshot."""
         ...

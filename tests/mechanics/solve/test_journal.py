@@ -1,0 +1,241 @@
+"""Journals: readable whatever ends the run, and what goes on from them is the undisturbed run, bit for bit."""
+
+import json
+import resource
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import ephs
+from ephs.mechanics.methods import METHODS
+from ephs.mechanics.reduced.method import ReducedMethod
+from ephs.mechanics.solve import journal
+from ephs.mechanics.solve.errors import Outcome
+from ephs.mechanics.solve.journal import read_journal
+
+ROOT = Path(__file__).resolve().parents[3]
+SCENE = ephs.load(ROOT / "scenes/slider-crank.toml")
+TIMES = np.linspace(0.0, 0.2, 23)
+LOOSE = {"rtol": 1e-4, "atol": 1e-6}
+RUNS = {
+    **{f"{name}, constant steps": {"method": name, "step": 0.01} for name, m in METHODS.items() if m.fixed},
+    **{f"{name}, chosen steps": {"method": name, **LOOSE} for name, m in METHODS.items() if m.adaptive},
+    **{f"{name}, at times": {"method": name, "step": 0.01, "save_at": TIMES} for name in ("natural", "natural4")},
+    **{f"{name}, at times": {"method": name, "save_at": TIMES, **LOOSE} for name in ("rk87", "radau", "auto")},
+    "auto": {**LOOSE},
+    "folded": {"form": "folded", "method": "natural", "step": 0.01},
+    "driven": {"method": "rk54", "inputs": {"joints.bearing": lambda t, state: 1e-3 * np.sin(9.0 * t)}, **LOOSE},
+    "driven, radau": {"method": "radau", "inputs": {"joints.bearing": lambda t: 1e-3 * np.sin(9.0 * t)}, **LOOSE},
+    "events": {"events": [lambda t, state: np.sin(40.0 * t)], **LOOSE},
+    "backward": {"t0": 0.2, "until": 0.1, "method": "rk87"},
+}
+
+
+def arrays(solution):
+    """Everything that a run gives but the time that it took."""
+    events = [[event.t for event in solution.events]] if solution.stats.get("events") else []
+    return [
+        solution.t,
+        *solution.states.values(),
+        solution.energy,
+        solution.heat,
+        solution.work,
+        *map(np.array, events),
+    ]
+
+
+def same(one, other):
+    return all(np.array_equal(a, b) for a, b in zip(arrays(one), arrays(other), strict=True))
+
+
+def simulate(model, options, **more):
+    options = {"until": 0.2, **options}
+    return ephs.simulate(model, options.pop("until"), **options, **more)
+
+
+@pytest.fixture
+def copies(monkeypatch, tmp_path):
+    """Every entry is written at once; what the journal was after each is kept."""
+    made: list[Path] = []
+    write = journal.Written.write
+
+    def copied(self, *entry):
+        write(self, *entry)
+        made.append(tmp_path / f"copy-{len(made)}")
+        shutil.copy(self._path, made[-1])
+
+    monkeypatch.setattr(journal, "EVERY", -1.0)
+    monkeypatch.setattr(journal.os, "fsync", lambda handle: None)
+    monkeypatch.setattr(journal.Written, "write", copied)
+    monkeypatch.setattr("ephs.mechanics.solve.integrate.LARGEST_CHUNK", 4)
+    monkeypatch.setattr("ephs.mechanics.solve.loop.BURST", 3)
+    return made
+
+
+@pytest.mark.parametrize("name", RUNS)
+def test_a_run_goes_on_from_any_entry_to_the_very_same_numbers(name, copies, tmp_path):
+    model = ephs.load(ROOT / "scenes/heavy-top.toml") if name == "backward" else SCENE
+    whole = simulate(model, RUNS[name])
+    assert same(simulate(model, RUNS[name], journal=tmp_path / "run.journal"), whole)
+    for copy in [copies[len(copies) // 3], copies[-2], copies[-1]]:
+        again = simulate(model, RUNS[name], journal=copy)
+        assert same(again, whole)
+        assert again.stats["steps"] == whole.stats["steps"]
+
+
+def test_a_system_goes_on_too(copies, tmp_path, damped):
+    for options in ({"method": "radau"}, {"method": "natural", "step": 0.01}, {"method": "natural4"}):
+        options |= {"initial": {"osc.pe.q": 1.0}, "until": 0.3}
+        copies.clear()
+        whole = simulate(damped, options)
+        simulate(damped, options, journal=tmp_path / options["method"])
+        assert same(simulate(damped, options, journal=copies[len(copies) // 2]), whole)
+        found = ephs.load_solution(copies[len(copies) // 2], damped)
+        assert same(found, simulate(damped, options | {"until": whole.t[-1], "save_at": found.t})) or (
+            np.array_equal(found.t, whole.t[: len(found)])
+            and np.array_equal(found["osc.pe.q"], whole["osc.pe.q"][: len(found)])
+        )
+
+
+class Restless(ReducedMethod):
+    """A method of one's own that does not say what it takes along."""
+
+    name, exponent = "restless", 2.0
+
+    def step(self, state, h):
+        from ephs.mechanics.reduced.explicit import Explicit, tableau
+
+        return Explicit(self.equations, self.control, tableau("rk54")).step(state, h)
+
+
+def test_a_method_that_cannot_say_where_it_stands_begins_anew(copies, tmp_path):
+    from ephs.mechanics.methods import Method, on_joints
+
+    method = Method("restless", 5, False, True, False, True, "one's own", on_joints(Restless))
+    options = {"method": method, "step": 0.02}
+    whole = simulate(SCENE, options)
+    simulate(SCENE, options, journal=tmp_path / "run.journal")
+    middle = copies[len(copies) // 2]
+    assert 0 < len(ephs.load_solution(middle)) < len(whole)
+    assert read_journal(middle).snapshot is None
+    assert same(simulate(SCENE, options, journal=middle), whole)
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """A journal of many entries, and the undisturbed run."""
+    file = tmp_path_factory.mktemp("journal") / "run.journal"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(journal, "EVERY", -1.0)
+        patch.setattr("ephs.mechanics.solve.integrate.LARGEST_CHUNK", 2)
+        return file, simulate(SCENE, RUNS["natural, constant steps"], journal=file)
+
+
+@settings(max_examples=25)
+@given(st.data())
+def test_any_beginning_of_a_journal_is_a_journal(written, data):
+    file, whole = written
+    text = file.read_bytes()
+    cut = file.with_name("cut.journal")
+    at = data.draw(st.integers(0, len(text)))
+    cut.write_bytes(text[:at])
+    again = simulate(SCENE, RUNS["natural, constant steps"], journal=cut)
+    assert same(again, whole)
+
+
+@settings(max_examples=25)
+@given(st.data())
+def test_what_is_damaged_is_not_read_and_what_stood_before_it_is(written, data):
+    file, whole = written
+    text = bytearray(file.read_bytes())
+    text[data.draw(st.integers(0, len(text) - 1))] ^= 1 << data.draw(st.integers(0, 7))
+    damaged = file.with_name("damaged.journal")
+    damaged.write_bytes(text)
+    try:
+        found = ephs.load_solution(damaged)
+    except ephs.OptionError as error:  # the heading is
+        assert "expected a journal" in str(error)
+        return
+    except ValueError as error:  # its first letters are
+        assert "not a netCDF file" in str(error)
+        return
+    assert np.array_equal(found.t, whole.t[: len(found)])
+    assert np.array_equal(found.energy, whole.energy[: len(found)])
+
+
+def test_another_runs_journal_is_refused_and_left_as_it_is(written):
+    file, _ = written
+    before = file.read_bytes()
+    options = RUNS["natural, constant steps"]
+    heavier = ephs.load(ROOT / "scenes/heavy-top.toml")
+    for model, more, key in ((SCENE, {"until": 0.3}, "until"), (SCENE, {"step": 0.02}, "step"), (heavier, {}, "model")):
+        with pytest.raises(ephs.OptionError, match=f"its {key} is"):
+            simulate(model, {**options, **more}, journal=file)
+    assert file.read_bytes() == before
+
+
+def test_a_file_that_is_no_journal_is_refused(tmp_path):
+    file = tmp_path / "run.journal"
+    file.write_text("my notes")
+    with pytest.raises(ephs.OptionError, match="expected a journal"):
+        simulate(SCENE, LOOSE, journal=file)
+    assert file.read_text() == "my notes"
+
+
+@pytest.mark.parametrize(
+    "payload",
+    [
+        b"[" * 100_000,
+        b"null",
+        json.dumps({"format": 1}).encode(),
+        json.dumps({"format": 1, "model": "", "run": {}, "note": {}}).encode(),
+        json.dumps({"format": 99}).encode(),
+    ],
+)
+def test_a_heading_that_somebody_made_is_refused_in_words(tmp_path, payload):
+    file = tmp_path / "run.journal"
+    file.write_bytes(journal._FRAME.pack(journal.MAGIC, len(payload), journal._digest(payload)) + payload)
+    with pytest.raises(ValueError, match="journal"):
+        ephs.load_solution(file)
+
+
+def test_a_journal_has_one_writer(tmp_path):
+    file = tmp_path / "run.journal"
+    first = journal.Journal(file).open({"name": "", "model": "", "run": {"form": "paper", "inputs": None}})
+    with pytest.raises(ephs.OptionError, match="no other run is writing"):
+        journal.Journal(file).open({"name": "", "model": "", "run": {"form": "paper", "inputs": None}})
+    first.close()
+
+
+def test_a_full_disk_ends_the_run_by_name_and_the_run_goes_on_when_there_is_room(tmp_path, monkeypatch):
+    monkeypatch.setattr(journal, "EVERY", -1.0)
+    options = RUNS["natural, constant steps"]
+    file = tmp_path / "run.journal"
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    whole = simulate(SCENE, options)
+    simulate(SCENE, options, journal=tmp_path / "other.journal")
+    room = (tmp_path / "other.journal").stat().st_size * 2 // 3
+    resource.setrlimit(resource.RLIMIT_FSIZE, (room, limits[1]))  # Python ignores the signal, and sees EFBIG
+    try:
+        with pytest.raises(ephs.SimulationError, match="make room") as failed:
+            simulate(SCENE, options, journal=file)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert failed.value.outcome is Outcome.UNWRITTEN
+    assert 0 < len(failed.value.partial) < len(whole)
+    assert same(simulate(SCENE, options, journal=file), whole)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_runs_killed_at_random_moments_go_on(tmp_path, seed):
+    """A process that is killed writes nothing more: 25 moments each."""
+    command = [sys.executable, str(Path(__file__).with_name("kill_runs.py")), str(tmp_path), "25", str(seed)]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "9 " in done.stdout
