@@ -29,7 +29,7 @@ __all__ = ["Grid", "Progress", "failures_of", "integrate", "solution_of"]
 
 RESPONSE = 0.1
 """Wanted seconds between two looks at progress and Ctrl-C."""
-LARGEST_CHUNK = 4096
+LARGEST_CHUNK = 1000
 
 Progress = Callable[[float, float, Mapping[str, Any]], None]
 

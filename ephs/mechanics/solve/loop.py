@@ -24,7 +24,7 @@ __all__ = ["first_step", "integrate_stepwise"]
 
 S = TypeVar("S")
 RESPONSE = 0.1
-BURST = 2000
+BURST = 1000
 """Steps in one compiled call at most, for progress and interruption."""
 BLOCK = 1024
 """Rows that wait until they are made what is kept."""
