@@ -144,7 +144,7 @@ def simulate(
     setting = Setting(problem, start, control, dict(options or {}))
     asked = {
         "until": end, "t0": start, "method": chosen_method.name, "form": form, "rtol": rtol, "atol": atol,
-        "step": step, "min_step": min_step, "max_step": max_step, "max_steps": max_steps, "save_at": times,
+        "step": step, "min_step": min_step, "max_step": max_step, "save_at": times,
         "options": options, "inputs": inputs, "events": [event.name for event in watched],
     }  # fmt: skip
     with journaled(journal, problem, asked) as written:
