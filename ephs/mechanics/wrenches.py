@@ -19,7 +19,7 @@ from ephs.mechanics.scene.model import GROUND, Body, Joint, Scene
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import pair
 
-__all__ = ["Hold", "Moving", "root_of", "transmitted", "wrenches"]
+__all__ = ["Hold", "Moving", "root_of", "signs_of", "transmitted", "wrenches"]
 
 RANK = 1e-9
 """Singular values of the joint equations in the mass metric below this fraction of the largest count as zero."""
@@ -53,7 +53,9 @@ class Hold:
     prescribed: bool
 
 
-def transmitted(holds: list[Hold], roots: Mapping[str, Array], forces: Mapping[str, Array]) -> list[Array]:
+def transmitted(
+    holds: list[Hold], roots: Mapping[str, Array], forces: Mapping[str, Array], signs: Mapping[str, Array]
+) -> list[Array]:
     """The multiplier (6,) of each joint at an instant, NaN in components that are statically indeterminate.
 
     Parameters
@@ -62,6 +64,8 @@ def transmitted(holds: list[Hold], roots: Mapping[str, Array], forces: Mapping[s
         Body -> (6, 6) symmetric root of the inverse of its inertia; bodies that are missing have no inertia.
     forces
         Body -> (6,) wrench in its own frame, inertial forces included.
+    signs
+        Body -> (6, 6) the signs of its inertia, of bodies that have a negative principal moment.
     """
     light = [name for name in forces if name not in roots]
     columns = {name: 6 * i for i, name in enumerate(forces if not light else [*roots, *light])}
@@ -84,9 +88,12 @@ def transmitted(holds: list[Hold], roots: Mapping[str, Array], forces: Mapping[s
     rank = int(np.sum(sigma > RANK * sigma[0])) if sigma.size else 0
     held, loose = u[:, :rank], np.abs(u[:, rank:]).max(axis=1, initial=0.0) > LOOSE
     moved, still = held.T @ matrix[:, :heavy], held.T @ matrix[:, heavy:]
-    k = still.shape[1]
-    system = np.block([[moved @ moved.T, -still], [still.T, np.zeros((k, k))]])
-    wanted = np.concatenate([moved @ pull[:heavy] + held.T @ right, pull[heavy:]])
+    k, signed = still.shape[1], moved.copy()
+    for name, sign in signs.items():
+        own = slice(columns[name], columns[name] + 6)
+        signed[:, own] = moved[:, own] @ sign
+    system = np.block([[signed @ moved.T, -still], [still.T, np.zeros((k, k))]])
+    wanted = np.concatenate([signed @ pull[:heavy] + held.T @ right, pull[heavy:]])
     values = held @ np.linalg.lstsq(system, wanted, rcond=1e-14)[0][:rank]
     return list(np.where(loose, np.nan, values).reshape(len(holds), 6))
 
@@ -126,6 +133,7 @@ def wrenches(scene: Scene, inputs: Inputs, motion: Moving) -> dict[str, Array]:
     """
     joints = dict(scene.all_joints())
     roots = {name: root_of(body) for name, body in scene.all_bodies() if body.mass > 0.0}
+    signs = signs_of(scene)
     loads = body_loads(scene, inputs, motion)
     pulls = {
         name: joint_load(j, inputs, motion.coordinates(name), motion.rates[name], motion.inclusion(name))
@@ -142,18 +150,29 @@ def wrenches(scene: Scene, inputs: Inputs, motion: Moving) -> dict[str, Array]:
                 sides = ((joint.body1, first[k]), (joint.body2, second[k]))
                 held = {body: block for body, block in sides if body != GROUND}
                 holds.append(Hold(held, basis[k], pulls[name][at.start + k], turn[k], joint.motion is not None))
-            found = transmitted(holds, roots, {name: load[at.start + k] for name, load in loads.items()})
+            found = transmitted(holds, roots, {name: load[at.start + k] for name, load in loads.items()}, signs)
             for (name, *_), value in zip(rows, found, strict=True):
                 out[name][at.start + k] = value
     return out
 
 
 def root_of(body: Body) -> Array:
-    """(6, 6) symmetric root of the inverse of a body's inertia."""
+    """(6, 6) symmetric root of the inverse of a body's inertia, its moments taken without their signs."""
     sigma, vectors = np.linalg.eigh(body.inertia)
     out = np.zeros((6, 6))
     out[:3, :3] = (vectors / np.sqrt(np.abs(sigma))) @ vectors.T
     out[3:, 3:] = np.eye(3) / np.sqrt(body.mass)
+    return out
+
+
+def signs_of(scene: Scene) -> dict[str, Array]:
+    """Body -> (6, 6) S with root · S · root the inverse of its inertia, of bodies with a negative principal moment."""
+    out: dict[str, Array] = {}
+    for name, body in scene.all_bodies():
+        sigma, vectors = np.linalg.eigh(body.inertia)
+        if body.mass > 0.0 and sigma[0] < 0.0:
+            out[name] = np.eye(6)
+            out[name][:3, :3] = (vectors * np.sign(sigma)) @ vectors.T
     return out
 
 

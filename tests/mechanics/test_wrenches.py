@@ -1,6 +1,7 @@
 """Joint wrenches from the bodies' equations alone are those of the whole descriptor form."""
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -71,3 +72,42 @@ def test_a_prescribed_motion_takes_the_force_that_it_needs(tmp_path):
     wrench = sol.joint("pin").wrench
     assert np.allclose(wrench[:, 2], 20.0 * 0.3 * np.cos(2.0 * sol.t), atol=1e-10)
     assert np.allclose(wrench[0, 3:], [-2.0 * 0.3 * 4.0, 20.0, 0.0], atol=1e-10)
+
+
+@pytest.mark.parametrize("kind", ["revolute", "cylindrical", "spherical"])
+@pytest.mark.filterwarnings("ignore::ephs.SceneWarning")
+def test_wrenches_of_bodies_with_a_negative_principal_moment_are_those_of_the_descriptor_form(kind, tmp_path):
+    """A scene may keep an inertia that no body has: its equations have a solution all the same."""
+    place = "" if kind == "spherical" else "axis = [0.0, 1.0, 0.2]"
+    text = f"""
+    format = 1
+    name = "odd"
+    [assembly]
+    inertia = "warn"
+    adjust = true
+    [bodies.rod]
+    mass = 1.0
+    inertia = [0.1, 0.2, -0.05]
+    position = [0.5, 0.1, 0.0]
+    angular_velocity = [0.3, 1.0, 0.2]
+    [bodies.bob]
+    mass = 0.7
+    inertia = [0.1, -0.02, 0.05]
+    position = [1.0, 0.3, -0.2]
+    angular_velocity = [0.0, 1.0, 0.5]
+    [joints.pin]
+    type = "{kind}"
+    bodies = ["ground", "rod"]
+    at = [0.0, 0.0, 0.0]
+    {place}
+    [joints.elbow]
+    type = "revolute"
+    bodies = ["rod", "bob"]
+    at = [0.8, 0.1, 0.0]
+    axis = [1.0, 1.0, 0.2]
+    """
+    (tmp_path / "odd.toml").write_text(text)
+    sol = ephs.simulate(ephs.load(tmp_path / "odd.toml"), 0.1, method="rk87", rtol=1e-9, atol=1e-9)
+    for name in ("pin", "elbow"):
+        found, expected = sol.joint(name).wrench[-1], of_descriptor(sol, name, len(sol) - 1)
+        assert np.abs(found - expected).max() < 1e-10 * np.abs(expected).max()
