@@ -1,7 +1,9 @@
 """Where boxes and junctions go: given points, else Graphviz' neato, else networkx; then small repairs."""
 
+import ctypes
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Generator, Iterator, Mapping
+from contextlib import contextmanager
 from importlib.util import find_spec
 from typing import Any
 
@@ -15,6 +17,8 @@ from ephs.show.graph import Graph
 GAP = 26.0
 CLEARANCE = 9.0
 GRID = 80.0
+ITERATIONS = 20000
+"""Of Graphviz at most: it tells when a layout takes more, and that of a large pattern does."""
 _OUTER = "\0"
 
 
@@ -84,7 +88,7 @@ def _neato(graph: Graph, start: int) -> Points:
         start=str(start),
         sep="+8",
         epsilon="0.02",
-        maxiter="20000",
+        maxiter=str(ITERATIONS),
     )
     for path, name in names.items():
         side = 2 * radii.get(path, 2.0) / 72
@@ -92,10 +96,28 @@ def _neato(graph: Graph, start: int) -> Points:
     for first, second in _edges(graph):
         length = (radii.get(first, 2.0) + radii.get(second, 2.0) + GAP) / 72
         net.add_edge(names[first], names[second], len=length)
-    net.layout(prog="neato")
+    with _errors_only():
+        net.layout(prog="neato")
     found: Any = net
     places = [str(found.get_node(names[path]).attr["pos"]).split(",") for path in radii]
     return np.array([(float(x), -float(y)) for x, y in places]).reshape(-1, 2)
+
+
+@contextmanager
+def _errors_only() -> Generator[None, None, None]:
+    """Graphviz without its warnings on stderr, as of a layout that is as good as it gets in so many iterations."""
+    from pygraphviz import graphviz
+
+    try:
+        least_told = ctypes.CDLL(graphviz._graphviz.__file__).agseterr  # pygraphviz itself has no word for it
+    except (AttributeError, OSError):
+        yield
+        return
+    before = least_told(1)
+    try:
+        yield
+    finally:
+        least_told(before)
 
 
 def _networkx(graph: Graph, start: int) -> Points:

@@ -208,6 +208,12 @@ def test_symbols_have_subscripts_and_words_have_none():
     assert subscripted("left_hip") == ("left_hip", "")
 
 
+def test_a_layout_that_takes_too_long_is_taken_without_a_word(monkeypatch, capfd):
+    monkeypatch.setattr("ephs.show.positions.ITERATIONS", 2)
+    assert place(flat()).boxes
+    assert "iterations" not in capfd.readouterr().err
+
+
 def test_given_positions_are_kept():
     points = {"pe": (0, 0), "pkc": (2, 0), "ke": (4, 1), "lp": (4, -1), "q": (1, 0), "p": (3, 0)}
     nodes = place(PICTURES["body"](), positions=points).nodes()
