@@ -84,7 +84,7 @@ _HOMES = {
     "ephs.mechanics.reading": ("load_solution",),
     "ephs.mechanics.simulate": ("simulate",),
     "ephs.mechanics.sensitivity": ("fit", "sensitivity"),
-    "ephs.mechanics.solve.errors": ("Interrupted", "OptionError", "SimulationError"),
+    "ephs.mechanics.solve.errors": ("Interrupted", "OptionError", "Outcome", "SimulationError"),
     "ephs.mechanics.solve.events": ("Event",),
     "ephs.mechanics.solve.solution": ("Solution",),
     "ephs.mechanics.sweep.sweep": ("SweepInterrupted", "sweep"),

@@ -139,11 +139,14 @@ def _simulate(model: "Scene | System", scene: str, folder: Path, asked: Mapping[
     except ephs.SimulationError as error:
         if error.partial is None:
             raise BadInput(naming(scene, str(error))) from error
-        stopped = isinstance(error, ephs.Interrupted)
+        stopped, begun = isinstance(error, ephs.Interrupted), len(error.partial.t) > 0
         if stopped:
-            complain(TEXTS["interrupted"].format(file=scene, at=f" at t = {error.partial.t[-1]:.6g} s"))
+            at = f" at t = {error.partial.t[-1]:.6g} s" if begun else ""
+            complain(TEXTS["interrupted"].format(file=scene, at=at))
         else:
             complain(TEXTS["failed"].format(file=scene, found=error))
+        if not begun:  # not even the first state could be set up
+            return 130 if stopped else 3
         with addressed(scene, folder):
             _write(error.partial, folder)
         complain(f"saved what was computed: {folder}")

@@ -9,14 +9,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 import ephs
-from ephs import cli
+from ephs import Outcome, cli
 from ephs.cli_input import Loading, Stepping
 from ephs.cli_linear import linearize
 from ephs.cli_run import run
 from ephs.cli_sweep import sweep
+from examples.failures import CASES, Case
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -324,3 +326,23 @@ def test_every_option_is_explained(command):
     groups = ("loading", "stepping")  # explained by themselves
     options = [name for name in inspect.signature(command).parameters if name not in groups]
     assert [name for name in documented if name != "Parameters"] == options
+
+
+@pytest.mark.parametrize(
+    ("number", "case"),
+    [(i, case) for i, case in enumerate(CASES) if not case.options() and case.step],
+    ids=lambda value: value.outcome.name if isinstance(value, Case) else str(value),
+)
+def test_a_run_that_fails_exits_with_3_says_why_and_saves_what_there_is(tmp_path, capsys, monkeypatch, number, case):
+    monkeypatch.setattr("ephs.show.report.write_report", lambda solution, folder: None)
+    file, out = tmp_path / "failing.py", tmp_path / "out"
+    file.write_text(f"from examples.failures import CASES\nmodel = CASES[{number}].model()\n")
+    words = ["--until", f"{case.until}", "--step", f"{case.step}", "--method", case.methods[0], "--out", str(out)]
+    assert cli.main(["run", f"{file}:model", *words]) == 3
+    said = capsys.readouterr().err
+    assert "t = " in said and case.outcome.value in said and case.outcome.advice in said
+    if "saved what was computed" in said:
+        solution = ephs.load_solution(out / "solution.nc")
+        assert len(solution) and all(np.isfinite(values).all() for values in solution.states.values())
+    else:
+        assert case.outcome in (Outcome.UNSUITED, Outcome.SINGULAR, Outcome.INCONSISTENT)

@@ -14,8 +14,9 @@ from ephs.mechanics.reduction.folded import folded_problem
 from ephs.mechanics.redundancy import explain
 from ephs.mechanics.scene.document import scene_to_text
 from ephs.mechanics.scene.model import Marker, Scene
-from ephs.mechanics.solve.control import Control, Tolerance
-from ephs.mechanics.solve.errors import OptionError, nearest_of
+from ephs.mechanics.signals import numbers_of, signal
+from ephs.mechanics.solve.control import Control, Tolerance, told_apart
+from ephs.mechanics.solve.errors import OptionError, failing_at, nearest_of, number_of
 from ephs.mechanics.solve.events import events_of
 from ephs.mechanics.solve.integrate import Grid, integrate, solution_of
 from ephs.mechanics.solve.journal import Journal
@@ -23,6 +24,7 @@ from ephs.mechanics.solve.loop import integrate_stepwise
 from ephs.mechanics.solve.problem import Problem, Signal
 from ephs.mechanics.solve.record import Record
 from ephs.mechanics.solve.solution import Solution
+from ephs.mechanics.solve.watching import guarded
 from ephs.operad import Path
 from ephs.semantics.bundle import POSITIVE, Array, Reference
 from ephs.semantics.checks import random_efforts
@@ -129,12 +131,15 @@ def simulate(
     _fits(form, chosen_method)
     if form == "folded":
         problem = folded_problem(problem)
-    start, end = float(t0), float(until)
+    start, end = number_of("t0", t0), number_of("until", until)
     if not (np.isfinite(start) and np.isfinite(end) and end != start):
         raise OptionError("until", until, f"a finite time other than t0 = {t0!r} s")
     if end < start:
         _reversible(problem, end)
     control = control_of(problem, rtol, atol, step, min_step, max_step, max_steps)
+    told_apart(start, end, control.step)
+    if options is not None and not isinstance(options, Mapping):
+        raise OptionError("options", options, "a mapping from names to values")
     unknown = [key for key in options or {} if key not in chosen_method.options]
     if unknown:
         known = ", ".join(chosen_method.options) or "none"
@@ -147,6 +152,9 @@ def simulate(
         "step": step, "min_step": min_step, "max_step": max_step, "save_at": times,
         "options": options, "inputs": inputs, "events": [event.name for event in watched],
     }  # fmt: skip
+    with failing_at(start):
+        problem.inputs(start, problem.initial)
+    told = guarded(progress)
     with journaled(journal, problem, asked) as written:
         if chosen_method.many is not None and control.step is not None and not watched and end > start:
             return integrate(
@@ -155,7 +163,7 @@ def simulate(
                 make=chosen_method.many,
                 save_at=times,
                 max_steps=max_steps,
-                progress=progress,
+                progress=told,
                 journal=written,
             )
         return integrate_stepwise(
@@ -166,7 +174,7 @@ def simulate(
             control=control,
             events=watched,
             save_at=times,
-            progress=progress,
+            progress=told,
             remarks={"auto": reason} if method == "auto" else {},
             journal=written,
         )
@@ -201,10 +209,10 @@ def control_of(
     return Control(
         relative,
         absolute,
-        None if step is None else float(step),
-        0.0 if min_step is None else float(min_step),
-        np.inf if max_step is None else float(max_step),
-        max_steps,
+        None if step is None else number_of("step", step),
+        0.0 if min_step is None else number_of("min_step", min_step),
+        np.inf if max_step is None else number_of("max_step", max_step),
+        None if max_steps is None else int(number_of("max_steps", max_steps, "a number > 0")),
     )
 
 
@@ -241,7 +249,9 @@ def problem_of_system(
         if not isinstance(given, Mapping) or len(given) != 1 or not set(given) <= {"effort", "flow"}:
             raise AssemblyError("input", port, found=given, expected="{'effort': f} or {'flow': f}")
         ((side, value),) = given.items()
-        signals[Path.of(port)] = signal(value, effort=side == "effort")
+        path = Path.of(port)
+        size = system.interface[path].quantity.space.dim if path in system.interface else None
+        signals[path] = signal(value, effort=side == "effort", name=str(path), size=size)
     state = system.state(initial)
     for slot in descriptor.states:
         if slot.quantity.kind in POSITIVE and not np.all(state[slot.path] > 0.0):
@@ -310,29 +320,6 @@ def _on_joints(problem: Problem) -> None:
                 raise AssemblyError("off-joint", path, found=off)
 
 
-def signal(value: Any, *, effort: bool) -> Signal:
-    """A signal from a constant, f(t), or f(t, state)."""
-    if not callable(value):
-        return Signal(np.atleast_1d(np.asarray(value, dtype=float)), effort)
-    function: Any = value
-    if _takes_state(function):
-        return Signal(function, effort)
-    return Signal(lambda t, _state: function(t), effort)
-
-
-def _takes_state(function: Callable[..., Any]) -> bool:
-    """Whether it wants a second argument: one that must be given, or is called state."""
-    import inspect
-
-    try:
-        parameters = inspect.signature(function).parameters.values()
-    except (TypeError, ValueError):  # functions in C tell no signature; those of mathematics take one argument
-        return False
-    places = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
-    given = [p for p in parameters if p.kind in places and (p.default is p.empty or p.name == "state")]
-    return len(given) >= 2 and not isinstance(function, np.ufunc)
-
-
 def _part(whole: Signal, where: slice) -> Signal:
     if whole.constant:
         return Signal(whole.at(0.0, {})[where])
@@ -351,12 +338,13 @@ def _scene_inputs(scene: Scene, inputs: Mapping[str, Any]) -> tuple[dict[str, Si
     joints, bodies, markers = dict(scene.all_joints()), dict(scene.all_bodies()), dict(scene.all_markers())
     for key, value in inputs.items():
         kind, _, name = key.partition(".")
-        given = signal(value, effort=False)
         if kind == "joints" and name in joints:
-            forces[name] = given
+            forces[name] = signal(value, effort=False, name=key, size=joints[name].dim)
         elif kind == "bodies" and name in bodies:
+            given = signal(value, effort=False, name=key, size=6)
             wrenches[name] = _sum(wrenches[name], given) if name in wrenches else given
         elif kind == "markers" and name in markers and markers[name].body in bodies:
+            given = signal(value, effort=False, name=key, size=3)
             body, push = markers[name].body, _at_marker(markers[name], given)
             wrenches[body] = _sum(wrenches[body], push) if body in wrenches else push
         else:
@@ -388,9 +376,14 @@ def times_of(save_at: "ArrayLike | None", t0: float, until: float) -> Array | No
     """
     if save_at is None:
         return None
-    times = np.atleast_1d(np.asarray(save_at, dtype=float))
+    times = numbers_of(save_at)
     forward = until > t0
-    if times.ndim != 1 or not np.all(np.isfinite(times)) or np.any(np.diff(times if forward else -times) <= 0.0):
+    if (
+        times is None
+        or times.ndim != 1
+        or not np.all(np.isfinite(times))
+        or np.any(np.diff(times if forward else -times) <= 0.0)
+    ):
         raise OptionError("save_at", save_at, "ascending times in s" if forward else "descending times in s")
     if times.size and not (min(t0, until) <= times.min() and times.max() <= max(t0, until)):
         raise OptionError("save_at", save_at, f"times in [{min(t0, until)!r}, {max(t0, until)!r}] s")

@@ -58,6 +58,7 @@ _TEXTS = {
         "storage there, or expose the junction as a power port to one"
     ),
     "state": "{path}: the initial value has shape {found}, expected {expected} ({quantity})",
+    "state-number": "{path}: the initial value is {found}, expected finite numbers ({quantity})",
     "positive": ("{path}: the initial {quantity} is {found}, expected a number > 0; give initial={{'{path}': …}}"),
     "open-joint": (
         "{path}: the initial states leave a joint open by {found:.1e} m or rad; give all states of one configuration, "

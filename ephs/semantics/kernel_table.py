@@ -110,12 +110,10 @@ def _callback(primitive: Primitive) -> Callback:
                 if sizes
                 else {}
             )
-            evaluate(
-                scal,
-                point,
-                dims,
-                [_view(p, s) for p, s in zip(pointers[3:9], _lengths(primitive, n, k, m), strict=True)],
-            )
+            views = [_view(p, s) for p, s in zip(pointers[3:9], _lengths(primitive, n, k, m), strict=True)]
+            evaluate(scal, point, dims, views)
+            if not all(np.isfinite(values).all() for values in views):
+                return DOMAIN
         except BaseException as error:
             errors.append(error)
             return RAISED

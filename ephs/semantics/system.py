@@ -147,7 +147,10 @@ class System:
             if path not in states:
                 raise AssemblyError("unknown-state", name, expected=_names(set(states)))
             space = states[path].space
-            array = np.atleast_1d(np.asarray(value, dtype=float))
+            try:
+                array = np.atleast_1d(np.asarray(value, dtype=float))
+            except (TypeError, ValueError):
+                raise AssemblyError("state-number", name, found=value, quantity=states[path].kind) from None
             if states[path].kind == "relative_pose" and array.shape == (space.dim,) != (space.size,):
                 array = Pair.from_space(space).element(array)  # as solutions give them
             if array.shape != (space.size,):
@@ -155,7 +158,7 @@ class System:
                     "state", name, found=array.shape, expected=(space.size,), quantity=states[path].kind
                 )
             if not np.all(np.isfinite(array)):
-                raise AssemblyError("state", name, found=array, expected="finite numbers", quantity=states[path].kind)
+                raise AssemblyError("state-number", name, found=array, quantity=states[path].kind)
             out[path] = manifold(space).normalise(array)
         return out
 

@@ -18,7 +18,7 @@ from ephs.mechanics.reduced.tables import CUT
 from ephs.mechanics.reduced.tangent import Linearised
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.simulate import problem_of_scene
-from ephs.mechanics.solve.errors import OptionError, SimulationError, SolveError
+from ephs.mechanics.solve.errors import OptionError, failing_at
 from ephs.mechanics.solve.problem import State as States
 from ephs.mechanics.solve.sparse import Index
 from ephs.operad import Path
@@ -69,7 +69,7 @@ class Dynamics:
         self._linear = Linearised(self._equations)
         self.layout = Layout.of(self._equations.reduced)
         self._links = Links(scene, self._equations)
-        with _failures():
+        with failing_at(0.0):
             start = self._equations.start(0.0)
         self.state0 = self._state(start)
 
@@ -147,7 +147,7 @@ class Dynamics:
         SimulationError
             The loops do not close near by.
         """
-        with _failures():
+        with failing_at(0.0):
             return self._state(self._equations.closed(self._reduced(state)))
 
     def bodies(self, state: State) -> dict[str, BodyState]:
@@ -201,7 +201,7 @@ class Dynamics:
         """
         q, r, s = self.layout.split(state.array)
         a = self.layout.vector("accelerations", accelerations)[: self.layout.n]
-        with _failures():
+        with failing_at(0.0):
             return self.layout.by_joint(self._linear.inverse(q, r, s, a))
 
     def mass_matrix(self, state: State) -> Array:
@@ -213,7 +213,7 @@ class Dynamics:
             A freedom moves no mass.
         """
         q, r, _ = self.layout.split(state.array)
-        with _failures():
+        with failing_at(0.0):
             return self._equations.mass(q, r)
 
     def bias(self, state: State, *, gravity: bool = True) -> Array:
@@ -229,7 +229,7 @@ class Dynamics:
     def applied(self, state: State) -> Array:
         """(n,) the generalised forces of the scene's drives, springs and friction on the tree's freedoms."""
         q, r, s = self.layout.split(state.array)
-        with _failures():
+        with failing_at(0.0):
             return self.bias(state) - self._linear.inverse(q, r, s, np.zeros(self.layout.n))
 
     def jacobian(self, state: State, body: str, point: ArrayLike | None = None) -> Array:
@@ -263,7 +263,7 @@ class Dynamics:
         """
         eq, t = self._equations, self._equations.reduced.tables
         q, r, s = self.layout.split(state.array)
-        with _failures():
+        with failing_at(0.0):
             target, rank = self._linear.targets(q, r, s)
             gaps, rows = eq.gaps(q, r)
         edges = eq.reduced.edges
@@ -315,7 +315,7 @@ class Dynamics:
             by_force = self._linear.mobility()
         if accelerations is not None:
             a = self.layout.vector("accelerations", accelerations)[:n]
-        with _failures():
+        with failing_at(0.0):
             self._linear.inverse(q, r, s, a)
             inverse = self._linear.columns(solve=False, fit=True)[:n]
         at_q, at_r, at_s = slice(0, n), slice(nv, nv + n), slice(nv + n, None)
@@ -339,7 +339,7 @@ class Dynamics:
         SimulationError
             The step has no solution.
         """
-        with _failures():
+        with failing_at(0.0):
             found = one_step(self._problem, self._equations, self._reduced(state), h, method)
             return self._state(found) if isinstance(found, ReducedState) else self._of_states(found)
 
@@ -361,7 +361,9 @@ class Dynamics:
     def _of_states(self, states: States) -> State:
         eq = self._equations
         q, r, s = PaperStates(eq.reduced, replace(self._problem, initial=states), eq.work).initial()
-        with _failures():  # momenta that some methods leave off the joints count by the nearest ones in the mass metric
+        with failing_at(
+            0.0
+        ):  # momenta that some methods leave off the joints count by the nearest ones in the mass metric
             mass = eq.mass(q, r)
             r = np.asarray(np.linalg.solve(mass, self._links.momenta(states)), dtype=float)
             return self._state(eq.closed(ReducedState(0.0, q, r, s, self._books())))
@@ -373,16 +375,7 @@ class Dynamics:
         before = drive.copy()
         drive += self.layout.vector("forces", forces or {})
         try:
-            with _failures():
+            with failing_at(0.0):
                 yield
         finally:
             drive[:] = before
-
-
-@contextmanager
-def _failures() -> Generator[None, None, None]:
-    """What fails inside the solver as an error for users."""
-    try:
-        yield
-    except SolveError as error:
-        raise SimulationError(error.outcome, 0.0, error.path, error.equation, None) from error.cause

@@ -15,7 +15,7 @@ from ephs.mechanics.linear.pencil import Parts, Pencil, system_problem
 from ephs.mechanics.linear.statespace import StateSpace
 from ephs.mechanics.linear.structure import PortHamiltonian
 from ephs.mechanics.scene.errors import did_you_mean, listing
-from ephs.mechanics.solve.errors import OptionError, SimulationError, SolveError
+from ephs.mechanics.solve.errors import OptionError, failing_at
 from ephs.mechanics.solve.model import Model
 from ephs.mechanics.solve.natural import stored_energies
 from ephs.mechanics.solve.problem import Problem
@@ -51,10 +51,8 @@ def linear_system(
     if inputs is not None and not isinstance(inputs, Mapping):
         raise OptionError("inputs", inputs, "{port: {'effort': e}} or {port: {'flow': f}}, of a system")
     problem = system_problem(system, states, inputs, reference, name)
-    try:
+    with failing_at(0.0):
         return _Linear(Pencil(problem), problem.descriptor.pack(problem.initial)).whole(outputs)
-    except SolveError as error:
-        raise SimulationError(error.outcome, 0.0, error.path, error.equation, None) from error.cause
 
 
 @final

@@ -9,13 +9,15 @@ from dataclasses import replace
 from typing import Any, final
 
 import numpy as np
-from scipy.linalg import lu_factor, lu_solve
+from scipy.linalg import lu_solve
 
 from ephs.mechanics.reduced.equations import Equations, ReducedState
 from ephs.mechanics.reduced.jacobian import Jacobian
 from ephs.mechanics.reduced.method import ReducedMethod
+from ephs.mechanics.reduced.naming import counted
 from ephs.mechanics.solve.control import Control
-from ephs.mechanics.solve.errors import OptionError, Outcome, SolveError
+from ephs.mechanics.solve.errors import OptionError, Outcome, SolveError, number_of
+from ephs.mechanics.solve.factors import factors
 from ephs.mechanics.solve.snapshot import Snapshot
 from ephs.mechanics.solve.stepping import Attempt
 
@@ -40,7 +42,7 @@ class Alpha(ReducedMethod):
     share = 1.0
 
     def __init__(self, equations: Equations, control: Control, rho: float = 0.8) -> None:
-        if not 0.0 <= rho <= 1.0:
+        if not 0.0 <= number_of("options['rho']", rho, "a number from 0 to 1") <= 1.0:
             raise OptionError("options['rho']", rho, "a number from 0 to 1")
         super().__init__(equations, control)
         self.jacobian = Jacobian(equations)
@@ -66,7 +68,7 @@ class Alpha(ReducedMethod):
         solver = self._solver(state, h)
         tree = np.arange(n)
         mean1, rates = mean.copy(), before.copy()
-        y1, last, moved = y0.copy(), np.inf, np.inf
+        y1, last, moved, worst = y0.copy(), np.inf, np.inf, np.zeros(2 * n + ns)
         for _ in range(ITERATIONS):
             y1[tree] = h * y0[rate] + h * h * ((0.5 - self._beta) * mean + self._beta * mean1)
             y1[n:nv] = 0.5 * h * (before[n:nv] + rates[n:nv])
@@ -81,13 +83,15 @@ class Alpha(ReducedMethod):
             mean1 -= change
             scale = self.atol + self.rtol * eq.sizes(y0, y1)
             parts = np.concatenate([self._beta * h * h * change, self._gamma * h * change, drift[fall]])
-            moved = float(np.max(np.abs(parts) / scale, initial=0.0))
+            worst = np.abs(parts) / scale
+            moved = float(np.max(worst, initial=0.0))
             if not np.isfinite(moved) or moved <= self._enough or (moved > 0.5 * last and moved <= self._rough):
                 break
             last = moved
         if not moved <= self._rough:
             if self.jacobian.fresh(state):
-                raise SolveError(Outcome.DIVERGED, "", "")
+                path, what = counted(eq.reduced, int(np.argmax(np.nan_to_num(worst, nan=np.inf))))
+                raise SolveError(Outcome.DIVERGED, path, f"{what} at the end of the step")
             self.jacobian.at(state, renew=True)
             self.counts["jacobians"] += 1
             return self.step(state, h)
@@ -111,4 +115,4 @@ class Alpha(ReducedMethod):
         whole = self.jacobian.at(state)
         rate = slice(eq.nv, eq.nv + eq.n)
         slope = self._beta * h * h * whole[rate, : eq.n] + self._gamma * h * whole[rate, rate]
-        return lu_factor((1.0 - self._m) * np.eye(eq.n) - (1.0 - self._f) * slope, check_finite=False)
+        return factors((1.0 - self._m) * np.eye(eq.n) - (1.0 - self._f) * slope)

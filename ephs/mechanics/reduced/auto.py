@@ -11,7 +11,8 @@ from ephs.mechanics.reduced.equations import Equations, ReducedState
 from ephs.mechanics.reduced.explicit import Explicit, tableau
 from ephs.mechanics.reduced.method import ReducedMethod
 from ephs.mechanics.solve.control import Control
-from ephs.mechanics.solve.errors import Outcome, SolveError
+from ephs.mechanics.solve.errors import SolveError
+from ephs.mechanics.solve.loop import FINAL
 from ephs.mechanics.solve.snapshot import Snapshot
 from ephs.mechanics.solve.stepping import Attempt, Leg, Span
 
@@ -51,7 +52,7 @@ class Auto(ReducedMethod):
             found = self._explicit.step(state, h)
         except SolveError as error:
             self._failures += 1
-            if self._failures > PATIENCE and error.outcome not in (Outcome.PYTHON, Outcome.UNSUITED):
+            if self._failures > PATIENCE and error.outcome not in FINAL:
                 self._switch(state.t, h, "its steps fail")
             raise
         if found.error <= 1.0:

@@ -6,6 +6,7 @@ from typing import final
 
 import numpy as np
 
+from ephs.mechanics.build import component_path
 from ephs.mechanics.reduced.given import Given
 from ephs.mechanics.reduced.loop_kernels import accelerate, constraint_rows, correct, loop_gaps, reduce_rows
 from ephs.mechanics.reduced.mechanism import Reduced
@@ -22,6 +23,9 @@ GAP = 1e-12
 CLOSED = 1e-10
 """Residuals above this cannot be accepted."""
 ROUNDS = 12
+SLIP = 1e-2
+"""Part of the rates by which constraints may be missed that are left out as repeating others: where they only nearly
+repeat them, a rate is missed by as much as the rank decision drops."""
 
 
 def unmoved(reduced: Reduced, freedom: int) -> SolveError:
@@ -30,7 +34,8 @@ def unmoved(reduced: Reduced, freedom: int) -> SolveError:
     link = int(np.flatnonzero(at <= freedom)[-1])
     edge, body = reduced.edges[link], reduced.bodies[link]
     name = f"joint {edge.name}" if edge.name else f"body {body}"
-    return SolveError(Outcome.UNDETERMINED, "", f"the rate of {name}, which moves no mass")
+    path = edge.path if edge.path is not None else component_path("bodies", str(body))
+    return SolveError(Outcome.UNDETERMINED, str(path), f"the rate of {name}, which moves no mass")
 
 
 @final
@@ -108,12 +113,38 @@ class Dense:
             correct(w, self._rank, -residual, change)
             q = moved(q, change)
         if not gap <= CLOSED:
-            raise SolveError(Outcome.DIVERGED, "", f"loops stay open by {gap:.1e} m or rad")
+            raise self.opened(residual, gap)
         self._reduce()
         target = -w.row[: self._m] @ r
         target[: motions.size] += motions
         correct(w, self._rank, target, change)
+        left = np.abs(w.row[: self._m] @ change - target)
+        if not left.max(initial=0.0) <= SLIP * max(
+            np.abs(r + change).max(initial=0.0), np.abs(motions).max(initial=0.0)
+        ):
+            raise self._contradicted(left, motions.size)
         return q, r + change
+
+    def opened(self, residual: Array, gap: float) -> SolveError:
+        """Which loop stays open, by the rows that `gaps` gives."""
+        rows = self.reduced.tables.rows[self._cut]
+        sizes = [
+            float(np.abs(part).max(initial=0.0)) for part in np.split(residual[-rows.sum() :], np.cumsum(rows)[:-1])
+        ]
+        edge = self.reduced.edges[self._cut[int(np.argmax(np.nan_to_num(sizes, nan=np.inf)))]]
+        found = f"the loop that {edge.name} closes stays open by {gap:.1e} m or rad"
+        return SolveError(Outcome.OPEN, str(edge.path or ""), found)
+
+    def _contradicted(self, left: Array, driven: int) -> SolveError:
+        """Which prescribed rate, or which loop, the others do not leave room for."""
+        worst = int(np.argmax(np.nan_to_num(left, nan=np.inf)))
+        if worst < driven:
+            places = np.flatnonzero(self.reduced.tables.driven)
+            link = int(np.flatnonzero(self.reduced.tables.r_at[: self.reduced.links] <= places[worst])[-1])
+            edge = self.reduced.edges[link]
+            return SolveError(Outcome.CONTRADICTION, str(edge.path or ""), f"the prescribed rate of {edge.name}")
+        failed = self.opened(left, 0.0)
+        return SolveError(Outcome.CONTRADICTION, failed.path, "the velocities of the loop that it closes")
 
     def back(self, change: Array) -> Array:
         """What takes a change of the rates (n,) back across the constraints, where loops were closed last."""

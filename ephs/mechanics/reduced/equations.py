@@ -19,6 +19,7 @@ from ephs.mechanics.engine.tables import Scheme
 from ephs.mechanics.reduced.dense import Dense, unmoved
 from ephs.mechanics.reduced.given import Given
 from ephs.mechanics.reduced.mechanism import reduce_scene
+from ephs.mechanics.reduced.naming import within
 from ephs.mechanics.reduced.paper import PaperStates
 from ephs.mechanics.reduced.table_kernels import stored_energies
 from ephs.mechanics.reduced.tables import SPRING, Workspace
@@ -170,7 +171,7 @@ class Equations:
     def refuse(self, status: int, component: int) -> None:
         """Raise what a compiled function reported, if it did."""
         if status == STILL and not np.all(np.isfinite(self.memory.work)):
-            raise SolveError(Outcome.DIVERGED, "", "the state has left the range of numbers")
+            raise SolveError(Outcome.RANGE, "", "the rates of the joints")
         if status == STILL:
             raise unmoved(self.reduced, int(component))
         if status:
@@ -190,8 +191,9 @@ class Equations:
         Raises
         ------
         SolveError
-            The loops do not close near by.
+            The loops do not close near by, or the state has left the range of numbers.
         """
+        within(self.reduced, state.q, state.r, state.s)
         if not (self.engine.cut.size or self.prescribed.size):
             return state
         if np.any(state.r[self._driven] != self.prescribed):  # all rates give way, in the mass metric
@@ -199,7 +201,7 @@ class Equations:
         q, r = np.array(state.q), np.array(state.r)
         status, gap = close(self.engine, self.memory, q, r, self._change, self._moved)
         if status == OPEN:
-            raise SolveError(Outcome.DIVERGED, "", f"loops stay open by {gap:.1e} m or rad")
+            raise self.dense.opened(self.dense.gaps(q, r)[0], gap)
         self._careful = status != 0
         if status != 0:
             return self._closed_carefully(state)

@@ -55,8 +55,9 @@ from ephs.mechanics.engine.tables import Scheme, State
 from ephs.mechanics.reduced import tableaux as t
 from ephs.mechanics.reduced.equations import Equations, ReducedState
 from ephs.mechanics.reduced.method import ReducedMethod
+from ephs.mechanics.reduced.naming import within
 from ephs.mechanics.solve.control import Control, Proportional
-from ephs.mechanics.solve.errors import Outcome, SolveError
+from ephs.mechanics.solve.errors import LARGEST, Outcome, SolveError
 from ephs.mechanics.solve.snapshot import Snapshot
 from ephs.mechanics.solve.stepping import Attempt, Counts, Leg, Span
 from ephs.semantics.bundle import Array
@@ -204,9 +205,11 @@ class _March:
         """
         eq, c = self.method.equations, self.control
         before = c[C_EVALUATIONS]
+        sound = c[C_T], self.memory.q.copy(), self.memory.y.copy()
         scheme = self.method.method.scheme
         found = march(eq.engine, eq.memory, scheme, self.memory, c, self.times, eq.drive, eq.wrench, eq.scal, steps)
         eq.evaluations += int(c[C_EVALUATIONS] - before)
+        self._hold(sound)
         self.method.stiffness = float(c[C_STIFF])
         if found == CAREFUL:
             self._step()
@@ -221,9 +224,35 @@ class _March:
             self._refused(int(found) - REFUSED)
         return found == DONE
 
+    def _hold(self, sound: tuple[float, Array, Array]) -> None:
+        """Give up what left the range of numbers; ``sound``: time, q and y before.
+
+        Raises
+        ------
+        SolveError
+            It names the joint.
+        """
+        eq, s, c = self.method.equations, self.memory, self.control
+        sizes = (np.abs(s.q), np.abs(s.y[eq.nv : eq.nv + eq.n + eq.ns]))
+        if all(size.max(initial=0.0) < LARGEST for size in sizes) and np.isfinite(s.y[eq.nv :]).all():
+            return
+        beyond = self._state(0.0, s.q, s.y[eq.nv :])
+        times, q, y = self.kept()
+        good = np.isfinite(y).all(axis=1)
+        good &= np.abs(np.hstack([q, y[:, : eq.n + eq.ns]])).max(axis=1, initial=0.0) < LARGEST
+        rows = int(np.argmin(good)) if not good.all() else good.size
+        c[C_ROWS] = rows
+        c[C_T], s.q[:], s.y[:] = sound
+        if rows:
+            c[C_T], s.q[:], s.y[eq.nv :] = times[rows - 1, 0], q[rows - 1], y[rows - 1]
+        within(eq.reduced, beyond.q, beyond.r, beyond.s)
+        raise SolveError(Outcome.RANGE, "", "heat, work or entropy made")
+
     def _refused(self, status: int) -> None:
         if status == OPEN:
-            raise SolveError(Outcome.DIVERGED, "", "loops stay open")
+            eq, (q, rest) = self.method.equations, (self.memory.q, self.memory.y[self.method.equations.nv :])
+            residual = eq.dense.gaps(q, rest[: eq.n])[0]
+            raise eq.dense.opened(residual, float(np.abs(residual).max(initial=0.0)))
         self.method.equations.refuse(status, int(self.control[C_COMPONENT]))
 
     def _step(self) -> None:

@@ -4,6 +4,9 @@ Its unknowns are the increments from a base that is moved, with the loops closed
 opened by rounding; each move starts IDA anew, at order 1. Needs the package scikit-sundae.
 """
 
+import os
+from collections.abc import Generator
+from contextlib import contextmanager
 from typing import Any, final
 
 import numpy as np
@@ -17,6 +20,8 @@ from ephs.semantics.bundle import Array
 
 __all__ = ["Ida"]
 
+LOG = "SUNLOGGER_ERROR_FILENAME"
+"""Where SUNDIALS writes errors to, if not to stderr: an environment variable, read when a solver is made."""
 FAR = 1.5
 """Increments beyond this on a group ask for another base, in rad or m."""
 OPEN = 10.0
@@ -49,7 +54,7 @@ class Ida(ReducedMethod):
         """One of IDA's steps, h seconds or less."""
         if self._last is not state.q or self._base is None:
             self._restart(state)
-        base = self._base
+        base, self._failure = self._base, None
         assert base is not None
         found = self._solver.step(state.t + h - base.t, method="onestep", tstop=state.t + h - base.t)
         if not found.success:
@@ -58,7 +63,7 @@ class Ida(ReducedMethod):
             raise SolveError(Outcome.DIVERGED, "", f"IDA: {found.message}")
         t, y = float(np.ravel(found.t)[-1]) + base.t, np.array(found.y[-1] if found.y.ndim > 1 else found.y)
         if t == state.t:
-            raise SolveError(Outcome.TINY, "", "IDA's step")
+            raise self._failure or SolveError(Outcome.TINY, "", "IDA's step")
         return self._attempt(state, y, t)
 
     def inside(self, attempt: Attempt[ReducedState], t: float) -> ReducedState:
@@ -96,5 +101,22 @@ class Ida(ReducedMethod):
                 self._failure = error
                 out[:] = np.nan
 
-        self._solver = self._make(residual, rtol=max(rtol, 1e-14), atol=np.maximum(atol, 1e-15), max_num_steps=100000)
-        self._solver.init_step(0.0, y0, eq.rates(state.t, state.q, y0))
+        first = eq.rates(state.t, state.q, y0)
+        with _unlogged():
+            self._solver = self._make(
+                residual, rtol=max(rtol, 1e-14), atol=np.maximum(atol, 1e-15), max_num_steps=100000
+            )
+            self._solver.init_step(0.0, y0, first)
+
+
+@contextmanager
+def _unlogged() -> Generator[None, None, None]:
+    """SUNDIALS made here writes no errors to stderr, which it would beside those that are raised."""
+    if LOG in os.environ:
+        yield
+        return
+    os.environ[LOG] = os.devnull
+    try:
+        yield
+    finally:
+        del os.environ[LOG]

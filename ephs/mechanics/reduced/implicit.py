@@ -7,13 +7,15 @@ y = (v, r, s), so that the same collocation serves joints on every group; heat a
 from typing import Any, final
 
 import numpy as np
-from scipy.linalg import lu_factor, lu_solve
+from scipy.linalg import lu_solve
 
 from ephs.mechanics.reduced.equations import Equations, ReducedState
 from ephs.mechanics.reduced.jacobian import Jacobian
 from ephs.mechanics.reduced.method import ReducedMethod
+from ephs.mechanics.reduced.naming import counted
 from ephs.mechanics.solve.control import Control
 from ephs.mechanics.solve.errors import Outcome, SolveError
+from ephs.mechanics.solve.factors import factors
 from ephs.mechanics.solve.radau import COEFFICIENTS, NODES, T_INVERSE, VALUES, T
 from ephs.mechanics.solve.snapshot import Snapshot
 from ephs.mechanics.solve.stepping import Attempt
@@ -97,8 +99,8 @@ class Implicit(ReducedMethod):
     def _solve(self, state: ReducedState, h: float) -> tuple[Any, Any]:
         if self._solvers is None or self._solvers[0] != h:
             matrix, unit = self.jacobian.at(state), np.eye(self.jacobian.size)
-            real = lu_factor(_RATE / h * unit - matrix, check_finite=False)
-            rest = lu_factor(1.0 / (complex(VALUES[1]) * h) * unit - matrix, check_finite=False)
+            real = factors(_RATE / h * unit - matrix)
+            rest = factors(1.0 / (complex(VALUES[1]) * h) * unit - matrix)
             self._solvers = h, real, rest
             self.counts["factorisations"] += 1
         return self._solvers[1], self._solvers[2]
@@ -112,7 +114,8 @@ class Implicit(ReducedMethod):
         real, rest = self._solve(state, h)
         allowed = self._allowed(y0, y0)
         stages, rates = np.zeros((3, size)), np.zeros((3, eq.size))
-        before = rate = moved = np.inf
+        worst, before = np.zeros(eq.counted.size), np.inf
+        rate = moved = np.inf
         for iteration in range(1, ITERATIONS + 1):
             for i, node in enumerate(NODES):
                 y = y0.copy()
@@ -124,7 +127,8 @@ class Implicit(ReducedMethod):
             change = np.real(
                 T @ np.array([lu_solve(real, np.real(defect[0]), check_finite=False), pair, np.conj(pair)])
             )
-            moved = float(np.max(np.abs(change[:, eq.counted]) / allowed, initial=0.0))
+            worst = np.max(np.abs(change[:, eq.counted]) / allowed, axis=0, initial=0.0)
+            moved = float(np.max(worst, initial=0.0))
             if not np.isfinite(moved):
                 break
             stages += change
@@ -139,7 +143,8 @@ class Implicit(ReducedMethod):
             before = moved
         if moved <= self._rough:  # near a change of rank the matrix is no good, and the iteration slow
             return stages, rates[:, size:], False
-        raise SolveError(Outcome.DIVERGED, "", "")
+        path, what = counted(eq.reduced, int(np.argmax(np.nan_to_num(worst, nan=np.inf))))
+        raise SolveError(Outcome.DIVERGED, path, f"{what} at the stages")
 
     def _closed(
         self, state: ReducedState, end: ReducedState, y0: Array, y1: Array, first: Array, stages: Array, h: float

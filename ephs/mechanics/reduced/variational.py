@@ -16,6 +16,7 @@ import numpy as np
 from ephs.mechanics.reduced.action_kernels import action_derivatives
 from ephs.mechanics.reduced.equations import Equations, ReducedState
 from ephs.mechanics.reduced.method import ReducedMethod
+from ephs.mechanics.reduced.naming import counted
 from ephs.mechanics.reduced.tables import CUT
 from ephs.mechanics.reduced.tangent import Linearised
 from ephs.mechanics.solve.control import Control
@@ -105,8 +106,8 @@ class Variational(ReducedMethod):
         self, state: ReducedState, h: float, momentum: Array, before: Array, xi: Array
     ) -> tuple[Array, Array, tuple[Array, Array, Array, Array, Array]]:
         """ξ, the impulses G⁰ᵀλ, and what the middle of the step gives, to rounding."""
-        m = self._rows
-        push, last = np.zeros(m), np.inf
+        eq, m, n = self.equations, self._rows, xi.size
+        push, last, residual = np.zeros(m), np.inf, np.zeros(n)
         middle = self._middle(state, h, xi)
         for iteration in range(ITERATIONS):
             residual = self._start(xi, h, middle) - momentum - before.T @ push
@@ -129,7 +130,8 @@ class Variational(ReducedMethod):
             middle = self._middle(state, h, xi)
             self.counts["iterations"] += 1
             last = worst
-        raise SolveError(Outcome.DIVERGED, "", "")
+        path, what = counted(eq.reduced, n + int(np.argmax(np.nan_to_num(np.abs(residual), nan=np.inf))))
+        raise SolveError(Outcome.DIVERGED, path, f"{what} in the middle of the step")
 
     def _start(self, xi: Array, h: float, middle: tuple[Array, Array, Array, Array, Array]) -> Array:
         """The momentum at the step's start that the middle of the step stands for."""

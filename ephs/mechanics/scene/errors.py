@@ -104,7 +104,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     "type": ("{what}", "mend the value"),
     "length": ("{what}", "give as many numbers as this"),
     "one freedom": ("a number", "a pair with one freedom takes one number"),
-    "finite": ("a finite number", "nan and inf are not allowed"),
+    "finite": ("a finite number", "nan, inf and numbers from 1e100 on are not allowed"),
     "range": ("{what}", "mend the value"),
     "name": ("a name without dots and blanks", "rename it"),
     "reserved": ("a name of your own", "{reserved} have a fixed meaning; rename it"),

@@ -6,12 +6,22 @@ numbers or lists here and brought to shape by `resolve`.
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema, WrapValidator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, WithJsonSchema, WrapValidator
 from pydantic_core import PydanticCustomError
 
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.0)]
-Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0.0)]
+LARGEST = 1e100
+"""Numbers from here on are none that can be reckoned with: products of three have no value."""
+
+
+def _bounded(value: float) -> float:
+    if not _finite(value):
+        raise PydanticCustomError("finite_number", "a finite number")
+    return value
+
+
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False), AfterValidator(_bounded)]
+NonNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.0), AfterValidator(_bounded)]
+Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0.0), AfterValidator(_bounded)]
 Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Quaternion = Annotated[list[Number], Field(min_length=4, max_length=4)]
 Text = Annotated[str, Field(strict=True, min_length=1)]
@@ -24,7 +34,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _finite(value: Any) -> bool:
-    return abs(float(value)) < float("inf")
+    return abs(float(value)) < LARGEST
 
 
 def _numbers(value: Any, handler: Any) -> Any:

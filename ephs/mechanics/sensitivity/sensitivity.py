@@ -9,8 +9,9 @@ import numpy as np
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.sensitivity.family import Family, Parameter, difference
 from ephs.mechanics.sensitivity.readings import reading_of
+from ephs.mechanics.signals import numbers_of
 from ephs.mechanics.simulate import simulate
-from ephs.mechanics.solve.errors import OptionError, SimulationError, SolveError
+from ephs.mechanics.solve.errors import OptionError, failing_at
 from ephs.mechanics.solve.replay import replay
 from ephs.mechanics.solve.solution import Solution
 from ephs.semantics.bundle import Array, Reference
@@ -137,14 +138,14 @@ def sensitivity(
     run: dict[str, Any] = {"t0": t0, "initial": initial, "method": name, "inputs": inputs, "reference": reference}
     family = Family(model, parameters, initial, inputs, reference)
     control: dict[str, Any] = {"step": step} if step is not None else {"rtol": rtol, "atol": atol}
-    times = None if save_at is None else np.atleast_1d(np.asarray(save_at, dtype=float))
+    times = None if save_at is None else numbers_of(save_at)
+    if save_at is not None and times is None:
+        raise OptionError("save_at", save_at, "ascending times in s")
     grid = simulate(model, until, **run, **control).t
     if times is not None and not (np.all(np.diff(times) > 0.0) and grid[0] <= times.min() and times.max() <= grid[-1]):
         raise OptionError("save_at", save_at, f"ascending times in [{grid[0]:g}, {grid[-1]:g}] s")
-    try:
+    with failing_at(float(grid[0])):
         return _along(family, name, grid, times)
-    except SolveError as error:
-        raise SimulationError(error.outcome, float(grid[0]), error.path, error.equation, None) from error.cause
 
 
 def _method(model: System | Scene, method: str, step: float | None) -> str:
@@ -175,9 +176,10 @@ def _along(family: Family, method: str, grid: Array, times: Array | None) -> Sen
     wanted = grid if times is None else times
     kept: list[Any] = [point] if wanted[0] == t0 else []
     for before, after in zip(grid[:-1].tolist(), grid[1:].tolist(), strict=True):
-        for when in wanted[(wanted > before) & (wanted < after)].tolist():
-            kept.append(stepper.step(point, when - before))
-        point = stepper.step(point, after - before)
+        with failing_at(before):
+            for when in wanted[(wanted > before) & (wanted < after)].tolist():
+                kept.append(stepper.step(point, when - before))
+            point = stepper.step(point, after - before)
         if after in wanted:
             kept.append(point)
     solution = replay(family.problem, wanted, [stepper.row(p) for p in kept], method)

@@ -12,7 +12,12 @@ from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.descriptor import Descriptor
 
-__all__ = ["Control", "Policy", "Proportional", "Symmetric", "Tolerance"]
+__all__ = ["Control", "Policy", "Proportional", "Symmetric", "Tolerance", "told_apart"]
+
+SHORTEST = 16.0
+"""Roundings of the time that a step has at least."""
+NEAREST = 1e6
+"""The same of a whole run, whose first steps are a small part of it."""
 
 
 @final
@@ -130,9 +135,25 @@ class Control:
         SolveError
             It is below the least that is allowed, or that rounding leaves: the cause, if there is one.
         """
-        if h < max(self.least, 16.0 * np.spacing(latest)):
+        if h < max(self.least, SHORTEST * np.spacing(latest)):
             raise cause or SolveError(Outcome.TINY, "", f"{h:.3g} s")
         return h
+
+
+def told_apart(t0: float, until: float, step: float | None) -> None:
+    """Refuse a run whose times rounding would not tell apart.
+
+    Raises
+    ------
+    OptionError
+        The end is too near to the start for the numbers that times are there, or the step is too short.
+    """
+    rounding = float(np.spacing(max(abs(t0), abs(until))))
+    if step is not None and step < SHORTEST * rounding:
+        expected = f"at least {SHORTEST * rounding:.3g} s: times up to {max(abs(t0), abs(until)):g} s are no finer"
+        raise OptionError("step", step, expected)
+    if abs(until - t0) < NEAREST * rounding:
+        raise OptionError("until", until, f"a time at least {NEAREST * rounding:.3g} s from t0 = {t0!r} s")
 
 
 class Policy(Protocol):

@@ -5,7 +5,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ephs.mechanics.solve.errors import Outcome
+from ephs.mechanics.solve.errors import LARGEST, Outcome, SolveError
 from ephs.mechanics.solve.model import Model
 from ephs.mechanics.solve.natural import Chunk, NaturalState
 from ephs.mechanics.solve.problem import Problem
@@ -79,6 +79,7 @@ def advance_whole(
     chunks: list[Chunk] = []
     while steps:
         state, chunk = method.advance(state, h, steps, inputs)
+        chunk = _finite(method.model, chunk)
         chunks.append(chunk)
         steps -= chunk.steps
         if chunk.failure is None or not cuts or chunk.failure.outcome not in _CURABLE:
@@ -100,6 +101,20 @@ def advance_whole(
         sum(chunk.iterations for chunk in chunks),
         chunks[-1].failure,
         sum(chunk.cut for chunk in chunks),
+    )
+
+
+def _finite(model: Model, chunk: Chunk) -> Chunk:
+    """The chunk up to the first step whose states are beyond the range of numbers, and that as its failure."""
+    sound = np.abs(chunk.x).max(axis=1, initial=0.0) < LARGEST
+    if sound.all():
+        return chunk
+    first = int(np.argmin(sound))
+    entry = int(np.argmin(np.abs(chunk.x[first]) < LARGEST))
+    state = next(s for s in model.descriptor.states if s.point.start <= entry < s.point.stop)
+    failure = SolveError(Outcome.RANGE, str(state.path), "")
+    return replace(
+        chunk, x=chunk.x[:first], energies=chunk.energies[:first], ledgers=chunk.ledgers[:first], failure=failure
     )
 
 

@@ -1,6 +1,7 @@
 """How a run can fail: named outcomes with time, component, equation, advice, and what was computed so far."""
 
-from collections.abc import Iterable
+from collections.abc import Generator, Iterable
+from contextlib import contextmanager
 from enum import StrEnum
 from typing import TYPE_CHECKING, final
 
@@ -8,19 +9,32 @@ if TYPE_CHECKING:
     from ephs.mechanics.solve.model import Model
     from ephs.mechanics.solve.solution import Solution
 
-__all__ = ["Interrupted", "OptionError", "Outcome", "SimulationError", "SolveError", "nearest_of"]
+__all__ = [
+    "LARGEST",
+    "Interrupted",
+    "OptionError",
+    "Outcome",
+    "SimulationError",
+    "SolveError",
+    "failing_at",
+    "nearest_of",
+    "number_of",
+    "solve_error_of",
+]
 
 
 class Outcome(StrEnum):
-    """What ended a run."""
+    """What ended a run, in words; `advice` says what to do."""
 
     DIVERGED = "the step's equations have no solution near by"
     SINGULAR = "the step's equations stay singular"
     CONTRADICTION = "a constraint contradicts the others"
+    OPEN = "a loop that does not close near by"
     TURN = "a rotation of π or more in one step"
     TEMPERATURE = "an absolute temperature that is not positive"
     EXTENT = "a length or a volume that is not positive"
     DOMAIN = "an energy or a flow that is not a finite number"
+    RANGE = "a state beyond the range of numbers"
     PYTHON = "a Python function of the model raised an exception"
     UNSUITED = "a state that the method cannot carry"
     INCONSISTENT = "an initial state that contradicts the constraints"
@@ -28,19 +42,29 @@ class Outcome(StrEnum):
     MANY = "more steps than are allowed"
     UNDETERMINED = "the motion is not determined"
     RESTLESS = "no state in which nothing moves"
+    INPUT = "an input's function has no value"
     EVENT = "an event's function has no value"
     UNWRITTEN = "the journal cannot be written"
+    PROGRESS = "the function that is told of progress raised an exception"
+    MEMORY = "more memory than there is"
     INTERRUPTED = "interrupted"
+
+    @property
+    def advice(self) -> str:
+        """What to do about it."""
+        return _ADVICE[self]
 
 
 _ADVICE = {
     Outcome.DIVERGED: "take a smaller step",
-    Outcome.SINGULAR: "take a smaller step, or start away from the singular configuration",
+    Outcome.SINGULAR: "take a smaller step, start elsewhere, or use natural, which leaves out what repeats",
     Outcome.CONTRADICTION: "check prescribed motions and initial values, or take a smaller step",
+    Outcome.OPEN: "take a smaller step, or check what is prescribed: the mechanism may be at the end of its travel",
     Outcome.TURN: "take a smaller step: h·|ω| must stay below π",
     Outcome.TEMPERATURE: "check initial temperatures and heat capacities, or take a smaller step",
     Outcome.EXTENT: "check initial values, or take a smaller step",
     Outcome.DOMAIN: "check initial values and the component's function there, or take a smaller step",
+    Outcome.RANGE: "check initial values and inputs, or take a smaller step",
     Outcome.PYTHON: "see the exception above this one",
     Outcome.UNSUITED: "use the method natural",
     Outcome.INCONSISTENT: "give initial values that satisfy the constraints",
@@ -48,10 +72,15 @@ _ADVICE = {
     Outcome.MANY: "raise max_steps, or loosen rtol and atol",
     Outcome.UNDETERMINED: "add what determines it there: a storage, friction, or a constraint",
     Outcome.RESTLESS: "start nearer to one, or add what holds it: a spring, a stop of the drive, an environment",
+    Outcome.INPUT: "see the exception above this one, or give a function of as many finite numbers as are wanted",
     Outcome.EVENT: "see the exception above this one, or give a function that is a number everywhere",
     Outcome.UNWRITTEN: "make room on the disk, then let the run go on with the same journal",
+    Outcome.PROGRESS: "see the exception above this one",
+    Outcome.MEMORY: "keep fewer times with save_at, or take longer steps",
     Outcome.INTERRUPTED: "what was computed is in .partial",
 }
+LARGEST = 1e150
+"""States beyond this have left the range of numbers: their squares are none."""
 _OF_KERNEL = {1: Outcome.TURN, 2: Outcome.TEMPERATURE, 3: Outcome.PYTHON, 4: Outcome.EXTENT, 5: Outcome.DOMAIN}
 
 
@@ -75,6 +104,20 @@ def nearest_of(found: object, known: Iterable[str]) -> str:
     return f"; did you mean {near[0]!r}?" if near else ""
 
 
+def number_of(key: str, given: object, expected: str = "a number of seconds") -> float:
+    """The number that was given as the option ``key``.
+
+    Raises
+    ------
+    OptionError
+        It is none.
+    """
+    try:
+        return float(given)  # pyright: ignore[reportArgumentType] - this is what is tried
+    except (TypeError, ValueError, OverflowError):
+        raise OptionError(key, given, expected) from None
+
+
 class SimulationError(RuntimeError):
     """A run that failed part-way.
 
@@ -88,7 +131,7 @@ class SimulationError(RuntimeError):
 
     def __init__(self, outcome: Outcome, time: float, path: str, equation: str, partial: "Solution | None") -> None:
         self.outcome, self.time, self.path, self.equation = outcome, time, path, equation
-        self.advice = _ADVICE[outcome]
+        self.advice = outcome.advice
         self.partial = partial
         where = f" at {path}" if path else ""
         what = f" ({equation})" if equation else ""
@@ -114,9 +157,29 @@ class SolveError(Exception):
         callback = model.callbacks.get(component)
         cause = callback.raised if callback else None
         outcome = _OF_KERNEL.get(status % 10, Outcome.DIVERGED)
-        return cls(outcome, str(model.path_of(component)), "", cause)
+        if outcome is Outcome.PYTHON and isinstance(cause, KeyboardInterrupt):
+            outcome = Outcome.INTERRUPTED
+        told = f"{type(cause).__name__}: {cause}" if outcome is Outcome.PYTHON and cause is not None else ""
+        return cls(outcome, str(model.path_of(component)), told, cause)
 
     @classmethod
     def undetermined(cls, model: "Model", unknown: int) -> "SolveError":
         """An unknown without equation."""
-        return cls(Outcome.UNDETERMINED, "", model.unknown_name(unknown))
+        return cls(Outcome.UNDETERMINED, model.row_path(unknown), model.unknown_name(unknown))
+
+
+def solve_error_of(error: Exception) -> SolveError:
+    """What went wrong in the arithmetic of a step: NumPy's and Python's own exceptions by the names of outcomes."""
+    if isinstance(error, SolveError):
+        return error
+    outcome = Outcome.RANGE if isinstance(error, ArithmeticError) else Outcome.SINGULAR
+    return SolveError(outcome, "", str(error), error)
+
+
+@contextmanager
+def failing_at(t: float) -> Generator[None, None, None]:
+    """What fails inside the solver at a time t in s becomes an error for users, without a partial solution."""
+    try:
+        yield
+    except SolveError as error:
+        raise SimulationError(error.outcome, t, error.path, error.equation, None) from error.cause

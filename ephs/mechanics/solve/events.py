@@ -53,8 +53,10 @@ class Event:
         """
         try:
             found = float(np.asarray(self.function(t, state), dtype=float).reshape(()))
+        except MemoryError:
+            raise
         except Exception as error:
-            raise SolveError(Outcome.EVENT, "", self.name, error) from error
+            raise SolveError(Outcome.EVENT, "", f"{self.name}: {type(error).__name__}: {error}", error) from error
         if not np.isfinite(found):
             raise SolveError(Outcome.EVENT, "", f"{self.name} = {found}")
         return found

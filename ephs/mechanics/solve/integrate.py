@@ -9,7 +9,7 @@ from typing import Any, Protocol, final
 import numpy as np
 
 from ephs.mechanics.solve.driven import ComponentMethod, advance_driven, advance_whole
-from ephs.mechanics.solve.errors import Interrupted, OptionError, Outcome, SimulationError, SolveError
+from ephs.mechanics.solve.errors import Interrupted, OptionError, Outcome, SimulationError, SolveError, solve_error_of
 from ephs.mechanics.solve.journal import Written
 from ephs.mechanics.solve.labels import labels_of
 from ephs.mechanics.solve.ledger import ledgers
@@ -155,8 +155,10 @@ class Run(Protocol):
 def failures_of(run: Run) -> Generator[None, None, None]:
     """Failures and interruptions inside become those of the run, with its time and partial solution."""
     try:
-        yield
-    except SolveError as error:
+        with np.errstate(all="ignore"):  # what leaves the range of numbers is an outcome, not a warning
+            yield
+    except (SolveError, ArithmeticError, np.linalg.LinAlgError) as raised:
+        error = solve_error_of(raised)
         failed = Interrupted if isinstance(error.cause, KeyboardInterrupt) else SimulationError
         told = [error.equation]
         if error.outcome in (Outcome.SINGULAR, Outcome.CONTRADICTION, Outcome.DIVERGED) and run.problem.dependences:
@@ -165,6 +167,8 @@ def failures_of(run: Run) -> Generator[None, None, None]:
         raise failed(error.outcome, run.t, error.path, equation, run.solution()) from error.cause
     except KeyboardInterrupt as error:
         raise Interrupted(Outcome.INTERRUPTED, run.t, "", "", run.solution()) from error
+    except MemoryError as error:
+        raise SimulationError(Outcome.MEMORY, run.t, "", str(error), run.solution()) from error
 
 
 def solution_of(problem: Problem, record: Record, stats: Mapping[str, Any]) -> Solution:

@@ -7,7 +7,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from ephs.mechanics.solve.control import Control, Policy
-from ephs.mechanics.solve.errors import OptionError, Outcome, SolveError
+from ephs.mechanics.solve.errors import OptionError, Outcome, SolveError, solve_error_of
 from ephs.mechanics.solve.events import Crossing, Event, Watch
 from ephs.mechanics.solve.integrate import Grid, Progress, failures_of, solution_of
 from ephs.mechanics.solve.journal import Written
@@ -30,7 +30,7 @@ BLOCK = 1024
 """Rows that wait until they are made what is kept."""
 FIRST = 1e-4
 """Part of the time span that the first step takes: too long it is rejected, too short it grows fast."""
-FINAL = (Outcome.PYTHON, Outcome.UNSUITED, Outcome.EVENT, Outcome.INCONSISTENT)
+FINAL = (Outcome.PYTHON, Outcome.UNSUITED, Outcome.INPUT, Outcome.EVENT, Outcome.INCONSISTENT, Outcome.INTERRUPTED)
 """What a shorter step does not mend."""
 
 
@@ -116,6 +116,7 @@ class _Run(Generic[S]):
         self.watch: Watch | None = None
         self.leg: Leg[S] | None = None
         self.ended = False
+        self.cause: SolveError | None = None  # why this step was refused when it was longer
 
     def start(self) -> None:
         """The initial state, and the first row."""
@@ -185,15 +186,17 @@ class _Run(Generic[S]):
             h = self.h if rest > 1.01 * self.h else rest if rest <= 1.0000001 * self.h or grid else 0.5 * rest
             try:
                 attempt = self.stepper.step(self.state, self.sign * h)
-            except SolveError as error:
-                if grid or error.outcome in FINAL:
-                    raise
-                self._shrink(0.25 * h, error)
+            except (SolveError, ArithmeticError, np.linalg.LinAlgError) as error:
+                failure = solve_error_of(error)
+                if grid or failure.outcome in FINAL:
+                    raise failure from error
+                self.cause = failure
+                self._shrink(0.25 * h, failure)
                 continue
             if self.policy:
                 accepted, wanted = self.policy.judge(h, attempt.error, abs(self.until - self.t0))
                 if not accepted:
-                    self._shrink(min(wanted, control.most), None)
+                    self._shrink(min(wanted, control.most), self.cause)
                     continue
                 if h == self.h or wanted < self.h:  # a step that was cut for the end says nothing of longer ones
                     self.h = max(min(wanted, control.most), min(control.least, h))
@@ -230,7 +233,7 @@ class _Run(Generic[S]):
                 found = after if when == t else self.stepper.inside(attempt, float(when))
                 self.pending.append((float(when), found, attempt.least))
             self.saved = last
-        self.state, self.t = after, t
+        self.state, self.t, self.cause = after, t, None
         self.steps += 1
         self._look()
         return stopped is not None

@@ -114,6 +114,16 @@ class Model:
             return f"the effort at junction {next(j for j in junctions if j.efforts.start <= at < j.efforts.stop).path}"
         return self.row_name(column).replace("the constraint of", "a multiplier of")
 
+    def row_path(self, row: int) -> str:
+        """The path of the state, junction or component that the equation of a row, or its unknown, belongs to."""
+        n_rate, n_effort = int(self.tables.counts[0]), int(self.tables.counts[1])
+        d, at = self.descriptor, row - n_rate - n_effort
+        if row < n_rate:
+            return str(next(s for s in d.states if s.rates.start <= row < s.rates.stop).path)
+        if at < 0:
+            return str(next(j for j in d.junctions if j.efforts.start <= row - n_rate < j.efforts.stop).path)
+        return next((str(s.path) for s in d.components if s.multiplier <= at < s.multiplier + s.multipliers), "")
+
     def row_name(self, row: int) -> str:
         """The equation of a row, in words."""
         n_rate, n_effort = int(self.tables.counts[0]), int(self.tables.counts[1])

@@ -3,12 +3,14 @@
 The state of the method is a value; advancing it is compiled, and gives one row of results a step.
 """
 
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import final
 
 import numpy as np
 
 from ephs.mechanics.solve.analysis import Analysis, analyse
+from ephs.mechanics.solve.blame import Blame
 from ephs.mechanics.solve.errors import Outcome, SolveError
 from ephs.mechanics.solve.model import Model, evaluate_at
 from ephs.mechanics.solve.natural_kernels import (
@@ -200,7 +202,10 @@ class Natural:
             elif status >= COMPONENT:
                 failure = SolveError.of_component(status, model, component)
             elif fresh and not taken:
-                failure = of_status(status)
+                blame = Blame(model, order.dropped)
+                failure = blame.contradicted(x, z, h) if status == INCONSISTENT else of_status(status)
+                if status == DIVERGED:
+                    failure = blame.diverged(self._memory.residual, self._memory.scale)
             else:
                 self.analysis, fresh, self._unsettled = None, True, SETTLING
         after = NaturalState(x, z, previous, sums)
@@ -255,12 +260,13 @@ class Natural:
 
 
 def guessed_efforts(model: Model, x: Array) -> Array:
-    """Unknowns at the states x: the efforts of storages, all else zero."""
+    """Unknowns at the states x: the efforts of storages, zero where one has none; all else zero."""
     d, n_rate = model.descriptor, int(model.tables.counts[0])
     z = np.zeros(model.unknowns)
     for slot in d.components:
         if slot.primitive.kind == "storage":
-            z[[n_rate + i for i in slot.efforts]] = slot.primitive.effort(d.point(slot, x), model.reference)
+            with suppress(Exception):
+                z[[n_rate + i for i in slot.efforts]] = slot.primitive.effort(d.point(slot, x), model.reference)
     return z
 
 

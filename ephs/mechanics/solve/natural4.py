@@ -8,14 +8,15 @@ from typing import final
 
 import numpy as np
 
-from ephs.mechanics.solve.analysis import DEFECT, SHRUNK, dependent_rows
+from ephs.mechanics.solve.analysis import DEFECT, SHRUNK, analyse, dependent_rows
+from ephs.mechanics.solve.blame import Blame
 from ephs.mechanics.solve.collocation import moments, values
 from ephs.mechanics.solve.errors import Outcome, SolveError
 from ephs.mechanics.solve.gauss_kernels import Groups, Scheme, Stages, gauss_advance, linearise
 from ephs.mechanics.solve.lu_kernels import factorise
 from ephs.mechanics.solve.model import Model, evaluate_at
 from ephs.mechanics.solve.natural import Chunk, Decided, NaturalState, guessed_efforts, of_status, stored_energies
-from ephs.mechanics.solve.natural_kernels import COMPONENT, DONE, Memory, Order
+from ephs.mechanics.solve.natural_kernels import COMPONENT, DIVERGED, DONE, INCONSISTENT, Memory, Order
 from ephs.mechanics.solve.snapshot import Snapshot, parts
 from ephs.mechanics.solve.sparse import Index, order
 from ephs.semantics.bundle import Array
@@ -140,7 +141,10 @@ class Natural4:
             elif status >= COMPONENT:
                 failure = SolveError.of_component(status, model, component)
             elif fresh and not taken:
-                failure = of_status(status)
+                blame = Blame(model, o.dropped[: model.unknowns])
+                failure = blame.contradicted(x, z[-1], h) if status == INCONSISTENT else of_status(status)
+                if status == DIVERGED:
+                    failure = blame.diverged(self._scratch.residual, self._scratch.scale)
             else:  # another order, at these values
                 self._order, fresh = None, True
         after = NaturalState(x, z, previous, sums)
@@ -204,7 +208,7 @@ class Natural4:
         try:
             found = order(_STAGES * n, rows[chosen], columns[chosen], entries)
         except RuntimeError as error:
-            raise SolveError(Outcome.SINGULAR, "", "") from error
+            raise self._singular(x, z, h) from error
         place = np.full(len(where), -1, dtype=np.int64)
         place[chosen] = found.place
         made = Order(
@@ -217,10 +221,18 @@ class Natural4:
         if not factorise(
             place, made.start, made.entry, made.diagonal, matrix, self._scratch.factors, s.dense, made.floor, ratio
         ):
-            raise SolveError(Outcome.SINGULAR, "", "")
+            raise self._singular(x, z, h)
         self._order = made._replace(floor=SHRUNK * ratio)
         self.redundant = tuple(model.row_name(int(row)) for row in np.flatnonzero(dropped))
         self.changes += 1
+
+    def _singular(self, x: Array, z: Array, h: float) -> SolveError:
+        """Why there is no order of elimination: an unknown without equation, or only these values."""
+        try:
+            analyse(self.model, x, z[0], h, self._dropped)
+        except SolveError as error:
+            return error
+        return SolveError(Outcome.SINGULAR, "", "")
 
 
 def _groups(model: Model) -> Groups:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Protocol, final
 
 import numpy as np
 
+from ephs.mechanics.solve.errors import Outcome, SolveError
 from ephs.operad import Path
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.descriptor import Descriptor, Input
@@ -49,10 +50,16 @@ class Signal:
         (dim,), or a function of the time in s and the states by path that gives it.
     effort
         True where the effort is prescribed.
+    name
+        What the user calls it.
+    size
+        How many numbers a function has to give; not checked where None.
     """
 
     value: Array | Callable[[float, State], Array]
     effort: bool = False
+    name: str = ""
+    size: int | None = None
 
     @property
     def constant(self) -> bool:
@@ -60,9 +67,27 @@ class Signal:
         return not callable(self.value)
 
     def at(self, t: float, state: State) -> Array:
-        """The value at a time and state, (dim,)."""
-        value = self.value(t, States(state)) if callable(self.value) else self.value
-        return np.atleast_1d(np.asarray(value, dtype=float))
+        """The value at a time and state, (dim,).
+
+        Raises
+        ------
+        SolveError
+            The function raised an exception, or gave something else than so many finite numbers.
+        """
+        if not callable(self.value):
+            return np.atleast_1d(np.asarray(self.value, dtype=float))
+        try:
+            given = self.value(t, States(state))
+            found = np.atleast_1d(np.asarray(given, dtype=float))
+        except (SolveError, MemoryError):
+            raise
+        except Exception as error:
+            raise SolveError(Outcome.INPUT, self.name, f"{type(error).__name__}: {error}", error) from error
+        if self.size is not None and found.shape != (self.size,):
+            raise SolveError(Outcome.INPUT, self.name, f"{found.size} numbers where {self.size} are wanted")
+        if not np.isfinite(found).all():
+            raise SolveError(Outcome.INPUT, self.name, f"it is {found.tolist()}")
+        return found
 
 
 class Motion(Protocol):

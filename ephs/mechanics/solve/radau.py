@@ -16,8 +16,9 @@ from scipy.sparse.linalg import splu
 from ephs.mechanics.solve.collocation import moments, values
 from ephs.mechanics.solve.continuous import Continuous, Matrices
 from ephs.mechanics.solve.control import Control
-from ephs.mechanics.solve.errors import Outcome, SolveError
+from ephs.mechanics.solve.errors import LARGEST, Outcome, SolveError
 from ephs.mechanics.solve.model import compile_model
+from ephs.mechanics.solve.natural import guessed_efforts
 from ephs.mechanics.solve.natural_kernels import IRREVERSIBLE
 from ephs.mechanics.solve.problem import Problem
 from ephs.mechanics.solve.snapshot import Snapshot, like, parts
@@ -110,19 +111,13 @@ class Radau:
             if manifold(slot.quantity.space).code != VECTOR:
                 found = f"it is on {slot.quantity.space}, radau wants vector spaces where there is no scene"
                 raise SolveError(Outcome.UNSUITED, str(slot.path), found)
-        z = np.zeros(self.model.unknowns)
-        for slot in d.components:
-            if slot.primitive.kind == "storage":
-                z[[self._rates + i for i in slot.efforts]] = slot.primitive.effort(
-                    d.point(slot, x), self.model.reference
-                )
+        z = guessed_efforts(self.model, x)
         start = RadauState(t, x.copy(), z, np.zeros(4 + len(d.components)))
         first, second = (self._solved(start, 1e-7 * h * part)[1] for part in (1.0, 0.5))
         jumps = [self._size(end - x, x) for end in (first, second)]
         if jumps[1] > 0.75 * jumps[0] and jumps[1] > 1.0:
             entry = int(np.argmax(np.abs(second - x) / (self.atol + self.rtol * np.abs(x))))
-            state = next(slot for slot in d.states if slot.point.start <= entry < slot.point.stop)
-            raise SolveError(Outcome.INCONSISTENT, str(state.path), "the constraints do not hold at the start")
+            raise SolveError(Outcome.INCONSISTENT, self._path(entry), "the constraints do not hold at the start")
         z = self._solved(start, 0.5e-7 * h)[0][-1]
         self._matrices = None
         return replace(start, z=z)
@@ -142,6 +137,8 @@ class Radau:
             The stages have no solution near by, or lie outside the domain of a component.
         """
         stages, x, iterations = self._solved(state, h)
+        if not np.abs(x).max(initial=0.0) < LARGEST:
+            raise SolveError(Outcome.RANGE, self._path(int(np.argmin(np.abs(x) < LARGEST))), "")
         powers, least = self._powers(state, h, stages)
         sums = state.sums + h * COEFFICIENTS[-1] @ powers
         end = RadauState(state.t + h, x, stages[-1].copy(), sums)
@@ -239,8 +236,8 @@ class Radau:
         if self._solvers is None or self._solvers[0] != h:
             m = self._matrices
             assert m is not None
-            real = _solver(m.unknowns + (h * GAMMA) * m.states)
-            rest = _solver(m.unknowns + (h * complex(VALUES[1])) * m.states)
+            real = _solver(m.unknowns + (h * GAMMA) * m.states, self.model.unknown_name)
+            rest = _solver(m.unknowns + (h * complex(VALUES[1])) * m.states, self.model.unknown_name)
             self._solvers = h, real, rest
             self.factorisations += 1
         return self._solvers[1], self._solvers[2]
@@ -249,7 +246,7 @@ class Radau:
         real, rest = self._solve(h)
         stages = np.tile(state.z, (3, 1))
         rates = self._rates
-        before = np.inf
+        parts, before = np.zeros((1, rates)), np.inf
         for iteration in range(1, ITERATIONS + 1):
             xs = state.x + h * COEFFICIENTS @ stages[:, :rates]
             found = np.array(
@@ -263,7 +260,8 @@ class Radau:
             pair = rest(turned[1])
             change = np.real(T @ np.array([real(np.real(turned[0])), pair, np.conj(pair)]))
             stages -= change
-            moved = self._size(h * COEFFICIENTS @ change[:, :rates], state.x)
+            parts = np.abs(h * COEFFICIENTS @ change[:, :rates]) / (self.atol + self.rtol * np.abs(state.x))
+            moved = float(np.max(parts, initial=0.0))
             if not np.isfinite(moved):
                 break
             # Rounding stops the iteration where the tolerances are beyond it.
@@ -272,7 +270,13 @@ class Radau:
             if iteration > 2 and moved > 2.0 * before:
                 break
             before = moved
-        raise SolveError(Outcome.DIVERGED, "", "")
+        entry = int(np.argmax(np.nan_to_num(parts.max(axis=0), nan=np.inf)))
+        raise SolveError(Outcome.DIVERGED, self._path(entry), "its rate at the stages")
+
+    def _path(self, entry: int) -> str:
+        """The state that an entry of x belongs to."""
+        states = self.model.descriptor.states
+        return str(next(slot.path for slot in states if slot.point.start <= entry < slot.point.stop))
 
     def _error(self, state: RadauState, h: float, stages: Array, x: Array) -> float:
         """The difference to the embedded method, filtered by the equations as the stiff part of it must be."""
@@ -291,13 +295,13 @@ class Radau:
         return float(np.max(np.abs(difference) / (self.atol + self.rtol * np.abs(x)), initial=0.0))
 
 
-def _solver(matrix: Any) -> Callable[[Array], Array]:
+def _solver(matrix: Any, name: Callable[[int], str]) -> Callable[[Array], Array]:
     if matrix.shape[0] <= DENSE:
         whole = matrix.toarray()
         factorise, solve = get_lapack_funcs(("getrf", "getrs"), (whole,))
         factors, pivots, info = factorise(whole, overwrite_a=True)
         if info > 0 or not np.isfinite(factors).all():
-            raise SolveError(Outcome.SINGULAR, "", "")
+            raise SolveError(Outcome.SINGULAR, "", name(info - 1) if info > 0 else "")
         return lambda right: solve(factors, pivots, right)[0]
     try:
         return splu(matrix.tocsc()).solve

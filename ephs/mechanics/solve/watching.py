@@ -1,15 +1,19 @@
-"""How far energy is out of balance while a run goes on: by its first row and those that are looked at."""
+"""What a run tells while it goes on: how far energy is out of balance, and what asks for it."""
 
-from typing import final
+from collections.abc import Callable, Mapping
+from typing import Any, final
 
 import numpy as np
 
+from ephs.mechanics.solve.errors import Outcome, SolveError
 from ephs.mechanics.solve.ledger import ledgers
 from ephs.mechanics.solve.problem import Problem
 from ephs.mechanics.solve.record import Record
 from ephs.semantics.bundle import Array
 
-__all__ = ["Balance"]
+__all__ = ["Balance", "guarded"]
+
+Told = Callable[[float, float, Mapping[str, Any]], None]
 
 
 @final
@@ -27,3 +31,18 @@ class Balance:
         books = ledgers(self._problem, Record(np.zeros(2), rows[0], rows[1], np.pad(rows[2], ((0, 0), (0, 1)))))
         self._scale = max(self._scale, books.scale)
         return float(books.defect(mechanical=self._problem.scene is not None)[-1]) * books.scale / self._scale
+
+
+def guarded(progress: Told | None) -> Told | None:
+    """A function that is told of progress, whose exceptions end the run by name and lose nothing."""
+    if progress is None:
+        return None
+    asked = progress
+
+    def tell(t: float, until: float, stats: Mapping[str, Any]) -> None:
+        try:
+            asked(t, until, stats)
+        except Exception as error:
+            raise SolveError(Outcome.PROGRESS, "", f"{type(error).__name__}: {error}", error) from error
+
+    return tell

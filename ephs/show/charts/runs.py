@@ -125,9 +125,10 @@ def attempt(
             raise KeyboardInterrupt from error
         ending, message = Ending.FAILED, str(error)
     except ephs.SimulationError as error:
-        ending, message = (Ending.REFUSED if error.outcome in _REFUSALS else Ending.FAILED), str(error)
-    except _TooLong as error:
-        ending, message = Ending.SLOW, str(error)
+        if isinstance(error.__cause__, _TooLong):
+            ending, message = Ending.SLOW, str(error.__cause__)
+        else:
+            ending, message = (Ending.REFUSED if error.outcome in _REFUSALS else Ending.FAILED), str(error)
     except Exception as error:  # a chart of failures outlives all of them, also those that speak to no user
         spoken = type(error).__module__.startswith("ephs.")
         ending, message = Ending.REFUSED, str(error) if spoken else f"{type(error).__name__}: {error}"

@@ -130,7 +130,7 @@ def test_bad_options_are_named(damped, options, names):
 @pytest.mark.parametrize(
     ("inputs", "names"),
     [(None, ("p", "open")), ({"p": 1.0}, ("p", "flow")), ({"p": {"force": 1.0}}, ("p", "effort")),
-     ({"p": {"flow": [1.0, 2.0]}}, ("p", "1 numbers"))],
+     ({"p": {"flow": [1.0, 2.0]}}, ("p", "1 finite number"))],
 )  # fmt: skip
 def test_open_ports_want_their_inputs(driven, inputs, names):
     with pytest.raises(ephs.AssemblyError) as caught:

@@ -1,0 +1,45 @@
+"""What numbers of the reduced form are to a user: the joints, bodies and entropies that they belong to."""
+
+import numpy as np
+
+from ephs.mechanics.build import component_path
+from ephs.mechanics.reduced.mechanism import Reduced
+from ephs.mechanics.solve.errors import LARGEST, Outcome, SolveError
+from ephs.semantics.bundle import Array
+
+__all__ = ["counted", "within"]
+
+
+def within(reduced: Reduced, q: Array, r: Array, s: Array) -> None:
+    """Hold elements, rates and entropies against the range of numbers.
+
+    Raises
+    ------
+    SolveError
+        It names what has left it.
+    """
+    if all(np.abs(values).max(initial=0.0) < LARGEST for values in (q, r, s)):
+        return
+    t = reduced.tables
+    for link in range(reduced.links):
+        for values, first, size in ((q, t.q_at, t.q_size), (r, t.r_at, t.dim)):
+            if not np.abs(values[int(first[link]) : int(first[link] + size[link])]).max(initial=0.0) < LARGEST:
+                raise SolveError(Outcome.RANGE, _path(reduced, link), "")
+    for path, value in zip(reduced.entropies, s, strict=True):
+        if not abs(value) < LARGEST:
+            raise SolveError(Outcome.RANGE, str(path), "")
+    raise SolveError(Outcome.RANGE, "", "")
+
+
+def counted(reduced: Reduced, entry: int) -> tuple[str, str]:
+    """Path and words for an entry of what counts in errors: the tree's increments, its rates, the entropies."""
+    n = reduced.freedoms
+    if entry >= 2 * n:
+        return str(reduced.entropies[entry - 2 * n]), "its entropy"
+    link = int(np.flatnonzero(reduced.tables.r_at[: reduced.links] <= entry % n)[-1])
+    return _path(reduced, link), "its position" if entry < n else "its rate"
+
+
+def _path(reduced: Reduced, link: int) -> str:
+    edge = reduced.edges[link]
+    return str(edge.path if edge.path is not None else component_path("bodies", str(reduced.bodies[link])))

@@ -1,0 +1,211 @@
+"""Every way to fail: the outcome, when, where, why, what to do, and what was computed until then."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import ephs
+from ephs import Outcome
+from ephs.mechanics.methods import METHODS, Method, on_joints
+from ephs.mechanics.reduced.explicit import Explicit, tableau
+from ephs.mechanics.reduced.method import ReducedMethod
+from ephs.mechanics.solve import factors, integrate, loop
+from ephs.mechanics.solve.errors import SolveError
+from examples.failing import oscillator, pendulum, scene
+from examples.failures import ALL, CASES, ELSEWHERE, Case, pushed, runs
+
+ROOT = Path(__file__).parents[2]
+
+
+def named(error: ephs.SimulationError) -> bool:
+    """Whether the path is that of a component, a state, a junction, a port, or of something in a scene."""
+    partial = error.partial
+    if not error.path or partial is None:
+        return not error.path
+    d = partial.problem.descriptor
+    known = {str(slot.path) for slots in (d.components, d.states, d.junctions, d.outer) for slot in slots}
+    return any(path == error.path or path.startswith(f"{error.path}.") for path in known)
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    """Progress is told at every step."""
+    for module in (integrate, loop):
+        monkeypatch.setattr(module, "RESPONSE", -1.0)
+
+
+@pytest.mark.usefixtures("asked")
+@pytest.mark.parametrize(
+    ("case", "method"),
+    list(runs()),
+    ids=lambda value: value if isinstance(value, str) else value.words.replace(" ", "-"),
+)
+def test_a_failure_says_what_when_where_why_and_keeps_what_there_is(case: Case, method: str, capfd):
+    with pytest.raises(ephs.SimulationError) as caught:
+        case.run(method)
+    error, partial = caught.value, caught.value.partial
+    assert error.outcome is case.outcome and isinstance(error, ephs.Interrupted) is (
+        case.outcome is Outcome.INTERRUPTED
+    )
+    assert case.within[0] <= error.time <= case.within[1]
+    assert re.fullmatch(case.path, error.path) and named(error)
+    assert re.search(case.equation, error.equation) if case.equation else not error.equation
+    assert (
+        error.advice == case.outcome.advice and str(error).endswith(error.advice) and case.outcome.value in str(error)
+    )
+    assert capfd.readouterr().err == ""
+    assert all(np.isfinite(values).all() for values in partial.states.values())
+    if len(partial):
+        assert partial.t[-1] == error.time
+    if len(partial) > 1 and case.step is not None and METHODS[method].fixed:
+        assert_prefix(case, method, partial)
+
+
+def assert_prefix(case: Case, method: str, partial: ephs.Solution) -> None:
+    """What is kept is what a run that ends there finds."""
+    whole = case.run(method, float(partial.t[-1]))
+    assert np.allclose(whole.t, partial.t, rtol=1e-14, atol=0.0)
+    for path, values in partial.states.items():
+        size = float(np.abs(values).max(initial=0.0))
+        assert np.allclose(whole[str(path)], values, rtol=0.0, atol=1e-9 * size)
+
+
+def test_every_outcome_has_its_case():
+    assert {case.outcome for case in CASES} ^ set(ELSEWHERE) == set(Outcome)
+    assert all(outcome.advice for outcome in Outcome)
+
+
+def test_what_only_falls_has_no_rest():
+    falling = oscillator(lambda q: -9.81 * q)
+    with pytest.raises(ephs.SimulationError) as caught:
+        ephs.equilibrium(falling)
+    assert caught.value.outcome is Outcome.RESTLESS and caught.value.advice and caught.value.equation
+    assert caught.value.partial is None
+
+
+def test_the_page_has_every_outcome():
+    page = (ROOT / "docs/failures.md").read_text("utf-8")
+    assert "for outcome in ephs.Outcome" in page and "from examples.failures import CASES" in page
+
+
+def test_auto_fails_by_the_same_names():
+    with pytest.raises(ephs.SimulationError) as caught:
+        ephs.simulate(pendulum(), 0.2, **pushed(ValueError("lost"))())
+    assert caught.value.outcome is Outcome.INPUT and caught.value.path == "joints.pin"
+
+
+@pytest.mark.parametrize("method", ALL)
+def test_an_input_that_has_no_value_to_begin_with_is_told_before_the_run(method):
+    step = {} if method == "ida" else {"step": 0.01}
+    with pytest.raises(
+        ephs.SimulationError, match=r"t = 2 s at joints\.pin: an input's function has no value"
+    ) as caught:
+        ephs.simulate(pendulum(), 3.0, t0=2.0, method=method, inputs={"joints.pin": lambda t: "much"}, **step)
+    assert caught.value.time == 2.0 and caught.value.partial is None
+
+
+@pytest.mark.parametrize(
+    ("given", "wanted"),
+    [
+        ({"until": "soon"}, "until is 'soon'"),
+        ({"t0": None}, "t0 is None"),
+        ({"step": [0.1, 0.2]}, r"step is \[0.1, 0.2\]"),
+        ({"min_step": "short"}, "min_step is 'short'"),
+        ({"max_steps": "many"}, "max_steps is 'many'"),
+        ({"options": 3}, "options is 3"),
+        ({"save_at": ["now"]}, r"save_at is \['now'\]"),
+        ({"save_at": [2.0]}, r"times in \[0.0, 1.0\]"),
+        ({"method": "alpha", "options": {"rho": "most"}}, "rho"),
+        ({"method": "alpha", "options": {"rho": 1.5}}, "a number from 0 to 1"),
+        ({"t0": 1e9, "until": 1e9 + 1.0, "step": 1e-9}, "step is 1e-09, expected at least 1.91e-06 s"),
+        ({"t0": 1e16, "until": 1e16 + 8.0}, "at least 2e\\+06 s from t0"),
+        ({"step": 1e-20}, "step is 1e-20, expected at least"),
+    ],
+)
+def test_options_that_are_none_are_refused_by_name(given, wanted):
+    with pytest.raises(ephs.OptionError, match=wanted):
+        ephs.simulate(pendulum(), given.pop("until", 1.0), **given)
+
+
+@pytest.mark.parametrize(
+    ("given", "wanted"),
+    [
+        ({"inputs": {"joints.pin": np.nan}}, "joints.pin: the input is nan, expected 1 finite number"),
+        ({"inputs": {"joints.pin": [1.0, 2.0]}}, "joints.pin: the input is"),
+        ({"inputs": {"bodies.rod": "much"}}, "bodies.rod: the input is much, expected 6 finite numbers"),
+        ({"initial": {"joints.pin.pe.q_r": "left"}}, "joints.pin.pe.q_r: the initial value is left"),
+        ({"initial": {"joints.pin.pe.q_r": np.inf}}, r"joints.pin.pe.q_r: the initial value is \[inf\]"),
+    ],
+)
+def test_values_that_are_none_are_refused_by_name(given, wanted):
+    with pytest.raises(ephs.AssemblyError, match=wanted):
+        ephs.simulate(pendulum(), 1.0, **given)
+
+
+@pytest.mark.parametrize("matrix", [np.zeros((2, 2)), np.full((2, 2), np.nan), np.array([[1.0, 1.0], [1.0, 1.0]]) + 0j])
+def test_a_matrix_without_factors_is_an_outcome_and_no_warning(matrix):
+    with pytest.raises(SolveError) as caught:
+        factors.factors(matrix)
+    assert caught.value.outcome is Outcome.SINGULAR
+
+
+def test_arithmetic_of_a_method_of_ones_own_fails_by_name():
+    class Wrong(ReducedMethod):
+        name, exponent = "wrong", 2.0
+
+        def step(self, state, h):
+            if state.t > 0.05:
+                np.linalg.inv(np.zeros((2, 2)))
+            return mine.step(state, h)
+
+    def make(equations, control):
+        nonlocal mine
+        mine = Explicit(equations, control, tableau("rk54"))
+        return Wrong(equations, control)
+
+    mine: object = None
+    method = Method("wrong", 5, False, True, False, True, "", on_joints(make))
+    with pytest.raises(ephs.SimulationError) as caught:
+        ephs.simulate(pendulum(), 1.0, step=0.01, method=method)
+    assert caught.value.outcome is Outcome.SINGULAR and caught.value.equation == "Singular matrix"
+    assert len(caught.value.partial) > 5
+
+
+@pytest.mark.parametrize("method", ["natural", "radau", "rk54"])
+@pytest.mark.parametrize("key", ["gravity", "mass", "position", "velocity", "at", "stiffness", "friction", "drive"])
+@pytest.mark.parametrize("value", ["9e99", "1e-300"])
+def test_numbers_at_the_edge_of_what_there_is_end_a_run_by_name_or_not_at_all(key, value, method):
+    numbers = {"gravity": "-9.81", "mass": "1.0", "position": "0.5", "velocity": "0.0", "at": "0.0"}
+    numbers |= {"stiffness": "1.0", "friction": "0.1", "drive": "0.1"} | {key: value}
+    try:
+        sol = ephs.simulate(swing(**numbers), 0.02, method=method, step=0.01)
+    except (ephs.SimulationError, ephs.SceneError, ephs.StructureError) as error:
+        assert str(error)
+    else:
+        assert all(np.isfinite(values).all() for values in sol.states.values())
+
+
+def swing(gravity, mass, position, velocity, at, stiffness, friction, drive) -> ephs.Scene:
+    """A rod on a pin that has everything."""
+    return scene(
+        f"""
+    [bodies.rod]
+    mass = {mass}
+    inertia = [0.1, 0.1, 0.01]
+    position = [{position}, 0.0, 0.0]
+    velocity = [0.0, 0.0, {velocity}]
+    [assembly]
+    adjust = true
+    [joints.pin]
+    type = "revolute"
+    bodies = ["ground", "rod"]
+    at = [{at}, 0.0, 0.0]
+    axis = [0.0, 1.0, 0.0]
+    stiffness = {stiffness}
+    friction = {friction}
+    drive = {drive}
+    """,
+        f"[world]\ngravity = [0.0, 0.0, {gravity}]\n",
+    )
