@@ -28,6 +28,8 @@ DEEP = 50
 """One in so many inputs has to run as well."""
 SILENT_S = 90.0
 """How long a process may be at one input before it counts as hanging."""
+STARTING_S = 1200.0
+"""… and at its first one, before which all that is compiled once is compiled."""
 RENEWED = 100_000
 """After so many inputs a fresh process goes on: what a long one has gathered would hide what one input takes."""
 
@@ -75,14 +77,15 @@ def _watch(seed: str, count: int, tally: Tally) -> None:
     said, spoken = tally["next"], time.monotonic()
     while tally["next"] < count:
         reader = subprocess.Popen(command, cwd=ROOT)
-        at, since = tally["next"], time.monotonic()
+        first = at = tally["next"]
+        since = time.monotonic()
         try:
             while reader.poll() is None:
                 time.sleep(0.2)
                 now = time.monotonic()
                 if tally["next"] != at:
                     at, since = tally["next"], now
-                elif now - since > SILENT_S:
+                elif now - since > (SILENT_S if at > first else STARTING_S):
                     reader.kill()
                 if now - spoken > 15.0:
                     print(_line(tally, count, (at - said) / (now - spoken)), flush=True)

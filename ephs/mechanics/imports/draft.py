@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from ephs.mechanics.scene.errors import Fault, legible
 from ephs.mechanics.scene.geometry import frame_rotation
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND
+from ephs.mechanics.scene.text import MESHES
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 
@@ -20,7 +21,6 @@ Array = NDArray[np.float64]
 LONGEST_NAME = 200
 WORLD = ""
 """How joints name the ground: as no link is called."""
-MESHES = (".stl", ".obj", ".ply", ".glb", ".off")
 _SCHEMES = ("package://", "model://", "file://")
 
 

@@ -126,6 +126,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     "unknown thermal": ('"environment" or a [thermal] name', "{hint}"),
     "unknown type": ("one of {known}", "{hint}"),
     "mesh": ("a file in the scene's folder or below", "move it there, and give its path from the scene file"),
+    "mesh kind": ("a mesh that ends in one of {known}", "convert it to one of these"),
     "both shapes": ("either shape or shapes", "take one of the two out"),
     "only mesh": ("no scale for a {kind}", "scale belongs to meshes only"),
     "shape": ("one of box, sphere, cylinder, mesh", "a shape has exactly one of these keys"),

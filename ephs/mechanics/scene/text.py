@@ -4,7 +4,10 @@ from pathlib import Path
 
 from ephs.mechanics.scene.errors import Fault, fault
 
-__all__ = ["file_text"]
+__all__ = ["MESHES", "file_text"]
+
+MESHES = (".stl", ".obj", ".ply", ".glb", ".off")
+"""Endings of files with a surface; of these, none unpacks an archive."""
 
 
 def file_text(path: Path, faults: list[Fault], key: str = "", most_mb: float = 10.0) -> str | None:
