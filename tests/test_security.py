@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import ephs
+from ephs.mechanics.imports import convert
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from tests.fuzz.seeds import LEG, MESH, MJCF, PENDULUM, SDF, URDF
 
@@ -174,6 +175,23 @@ def changed(source: Path, target: Path, change) -> None:
     target.write_bytes(source.read_bytes())
     with h5py.File(target, "r+") as file:
         file.attrs["model"] = change(file.attrs["model"])
+
+
+def test_copies_of_meshes_follow_no_links(tmp_path):
+    model = tmp_path / "robot" / "model.urdf"
+    write_all(tmp_path / "robot", {"model.urdf": URDF, "mesh.stl": MESH})
+    target = tmp_path / "robot" / "scenes" / "arm.toml"
+    (tmp_path / "precious").mkdir()
+    target.parent.mkdir()
+    (target.parent / "arm-meshes").symlink_to(tmp_path / "precious")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ephs.ModelWarning)
+        with pytest.raises(ephs.SceneError, match="no link"):
+            convert(model, target)
+        assert not list((tmp_path / "precious").iterdir())
+        (target.parent / "arm-meshes").unlink()
+        convert(model, target)
+    assert (target.parent / "arm-meshes" / "mesh.stl").read_bytes() == MESH
 
 
 # ---- result files ------------------------------------------------------------------------------------------------

@@ -19,7 +19,7 @@ def new_figure(width: float, height: float) -> "Figure":
     return figure
 
 
-def plain(words: str, most: int = 60) -> str:
+def plain(words: str, most: int = 36) -> str:
     """Words that come from a model, for a figure: a dollar sign starts no formula, long names leave room for lines."""
     short = words if len(words) <= most else f"{words[: most - 15]}…{words[-14:]}"
     return short.replace("$", r"\$")

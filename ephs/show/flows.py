@@ -116,6 +116,6 @@ def _side(axes: "Axes", bands: list[Band], total: float, *, left: bool) -> None:
         axes.fill_between(x, top - width, top, color=colours[band.kind], alpha=0.8, linewidth=0.0)
         verb = {"destroyed": " destroys", "storage": " gives" if left else " takes"}.get(band.kind, "")
         where = (-0.02, "right") if left else (1.02, "left")
-        label = f"{plain(band.name)}{verb}  {band.amount:.3g} J ({100.0 * width:.1f} %)"
+        label = f"{plain(band.name, 30)}{verb}  {band.amount:.3g} J ({100.0 * width:.1f} %)"
         axes.text(where[0], edge - 0.5 * slot, label, ha=where[1], va="center")
         edge, inner = edge - slot - GAP, inner - width

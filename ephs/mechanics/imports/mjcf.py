@@ -57,8 +57,9 @@ def read_mjcf(root: Any, draft: Draft) -> None:
     finally:
         mujoco.set_mju_user_warning(before)
     sizes = [float(np.abs(values).max(initial=0.0)) for values in _numbers(model, own)]
-    if not all(size <= LARGEST for size in sizes):
-        draft.faults.append(fault("large", "", "a compiled model with larger numbers, or none", most=LARGEST))
+    lengths = [np.linalg.norm(rows, axis=1) for rows in _directions(model)]
+    if not all(size <= LARGEST for size in sizes) or not all(np.all(np.abs(n - 1.0) < 0.1) for n in lengths):
+        draft.faults.append(fault("large", "", "a compiled model with other numbers, or none", most=LARGEST))
         return
     for text in said:
         draft.leave("what MuJoCo warns of", " ".join(text.split()))
@@ -85,6 +86,15 @@ def _numbers(model: Any, own: Inertias) -> Iterator[Any]:
         yield inertia
     for name in READ:
         yield getattr(model, name)
+
+
+def _directions(model: Any) -> Iterator[Any]:
+    """Rows that MuJoCo made unit vectors, unless their numbers were too large or too small for that."""
+    mujoco: Any = import_module("mujoco")
+    for name in ("body_quat", "body_iquat", "geom_quat", "site_quat", "mesh_quat"):
+        yield getattr(model, name)
+    yield model.jnt_axis[model.jnt_type >= int(mujoco.mjtJoint.mjJNT_SLIDE)]
+    yield model.eq_data[model.eq_type == int(mujoco.mjtEq.mjEQ_WELD), 6:10]
 
 
 def _own_inertias(spec: Any) -> list[tuple[Any, tuple[float, Any]]]:

@@ -80,6 +80,10 @@ TEXTS: dict[str, tuple[str, str]] = {
     ),
     # models in other formats
     "model suffix": ("a file that ends in .urdf, .xml or .sdf", "check the file's name"),
+    "link": (
+        "a place that is no link, for copies of meshes",
+        "take it away, or choose another name for the scene file",
+    ),
     "scene suffix": ("a file that ends in .toml", "choose another name for the scene file"),
     "size": ("at most {most:g} MB", "the file is text; meshes have files of their own"),
     "entities": ("XML without <!DOCTYPE and <!ENTITY", "take these declarations out, comments included"),

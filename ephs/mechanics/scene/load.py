@@ -15,7 +15,7 @@ import numpy as np
 from ephs.mechanics.scene import resolve, values
 from ephs.mechanics.scene.assembly import assemble
 from ephs.mechanics.scene.entries import Document, read_document, shown
-from ephs.mechanics.scene.errors import Fault, ModelWarning, SceneError, SceneWarning, fault
+from ephs.mechanics.scene.errors import Fault, ModelWarning, SceneError, SceneWarning, fault, legible
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Scene, World
 from ephs.mechanics.scene.moving import moved, spring_length
 from ephs.mechanics.scene.state import adjusted
@@ -208,7 +208,7 @@ def _parts(
         part = _read(file, world, stack, below)
         faults += [_seen_from_outside(f, key, entry.use) for f in below.faults]
         r.odd.extend(_seen_from_outside(f, key, entry.use) for f in below.odd)
-        r.left.extend(f"{key}: {line}" for line in below.left)
+        r.left.extend(f"{legible(key)}: {line}" for line in below.left)
         if part is not None:
             found[name] = moved(part, np.array(pose), world)
     return found, set(document.sections["parts"]) - set(found)
@@ -224,7 +224,7 @@ def _file_inside(file: Path, home: Path) -> Path | None:
 
 def _seen_from_outside(found: Fault, key: str, file: str) -> Fault:
     inner = f"{key}.{found.key}" if found.key else f"{key}.use"
-    return replace(found, key=inner, found=f"{found.found} (in {file})")
+    return replace(found, key=inner, found=f"{found.found} (in {legible(file)})")
 
 
 def _names(document: Document, parts: Mapping[str, Scene], lost: set[str]) -> resolve.Names:
