@@ -7,17 +7,19 @@ SCENE ?= slider-crank
 UNTIL ?= 5
 PYTEST := $(BIN)/python -m pytest
 CORES ?= 2
+COUNT ?= 100000
+SEED ?= 0
 
 # Threads of a linear-algebra library change the order of sums, and fight with the test workers.
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
 .DELETE_ON_ERROR:
-.PHONY: help demo test real lint types docs bench fuzz mutate mutants clean
+.PHONY: help demo test real lint types docs bench fuzz fuzz-inputs mutate mutants clean
 
 help:
 	@echo 'make demo   simulate scenes/$(SCENE).toml and write out/$(SCENE)/report.html'
-	@echo 'make test   run the tests; make lint, make types: style and types; make fuzz: the laws, for long; make mutate: what goes red when the code is broken; make mutants: the same for the operad, by mutmut'
+	@echo 'make test   run the tests; make lint, make types: style and types; make fuzz: the laws, for long; make fuzz-inputs COUNT=N: so many broken files; make mutate: what goes red when the code is broken; make mutants: the same for the operad, by mutmut'
 	@echo 'make real   fetch real robots (131 MB) and hold their import against Pinocchio'
 	@echo 'make docs   build docs/_build/html; make bench: measure; make clean: remove what was built'
 
@@ -48,6 +50,9 @@ types: $(VENV)/.installed-dev
 
 fuzz: $(VENV)/.installed-dev
 	$(PYTEST) -n $(CORES) --hypothesis-profile=fuzz
+
+fuzz-inputs: $(VENV)/.installed-dev
+	$(BIN)/python -m tests.fuzz $(COUNT) --seed $(SEED)
 
 mutate: $(VENV)/.installed-dev
 	$(BIN)/python -m tests.mutate

@@ -139,8 +139,10 @@ def _progress() -> Iterator[Callable[[int, int, int], None]]:
 
 
 def _write(table: "xr.Dataset", folder: Path) -> None:
+    from ephs.mechanics.solve.guard import named_for_file
+
     file = folder / "sweep.nc"
-    table.to_netcdf(file, engine="h5netcdf")
+    named_for_file(table).to_netcdf(file, engine="h5netcdf")
     members, failed, seconds = (table.attrs[key] for key in ("members", "failed", "seconds"))
     reasons = Counter(str(text) for text in table["status"].values.ravel() if text != "done")
     say(

@@ -11,7 +11,10 @@ from ephs.mechanics.build import drive_ports, scene_inputs, wrench_port
 from ephs.mechanics.reduction.folded import folded_problem
 from ephs.mechanics.scene.document import scene_from_text
 from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.scene.soundness import check_scene, meshes_within
 from ephs.mechanics.simulate import problem_of_scene, problem_of_system
+from ephs.mechanics.solve.errors import OptionError
+from ephs.mechanics.solve.guard import check_file
 from ephs.mechanics.solve.integrate import solution_of
 from ephs.mechanics.solve.journal import MAGIC, read_journal
 from ephs.mechanics.solve.problem import Problem, Signal
@@ -32,28 +35,52 @@ def load_solution(path: str | File, model: System | Scene | None = None) -> Solu
     model
         Of a journal, the system that ran; scenes are in it.
 
+    The file may come from anybody: it is read as data, and names no other files but meshes, which are drawn where they
+    lie in its folder, in the working folder, or below one of them.
+
+    Warns
+    -----
+    ModelWarning
+        Meshes lie elsewhere.
+
     Raises
     ------
     FileNotFoundError, ValueError
         There is no such file, or it is not a solution.
     """
     file = File(path)
-    if not file.is_file():
+    if file.exists() and not file.is_file():
+        raise ValueError(f"{file}: not a file")
+    if not file.exists():
         raise FileNotFoundError(f"{file}: no such file")
-    with open(file, "rb") as opened:
-        if opened.read(len(MAGIC)) == MAGIC:
-            return _of_journal(file, model)
+    homes = (file.resolve().parent, File.cwd())
+    try:
+        with open(file, "rb") as opened:
+            written_down = opened.read(len(MAGIC)) == MAGIC
+        found = _of_journal(file, model, homes) if written_down else _of_result(file, homes)
+        _check_states(found)
+    except OptionError:  # of a journal
+        raise
+    except Exception as error:  # what is broken on purpose may fail anywhere
+        if str(error).startswith(f"{file}: "):
+            raise
+        raise ValueError(f"{file}: not a solution of this program ({type(error).__name__}: {error})") from error
+    return found
+
+
+def _of_result(file: File, homes: tuple[File, ...]) -> Solution:
     from ephs.mechanics.solve.file import load
 
-    return load(file, _problem_again)
+    check_file(file)
+    return load(file, lambda text, t, inputs: _problem_again(text, t, inputs, homes))
 
 
-def _of_journal(file: File, model: System | Scene | None) -> Solution:
+def _of_journal(file: File, model: System | Scene | None, homes: tuple[File, ...]) -> Solution:
     found = read_journal(file)
     run = found.heading["run"]
     if model is None and not found.heading["model"]:
         raise ValueError(f"{file}: a journal of {found.heading['name']}, a system; give it as model=")
-    model = model or scene_from_text(found.heading["model"])
+    model = model or _scene(found.heading["model"], homes)
     if isinstance(model, Scene):
         problem = problem_of_scene(model, None, {key: _known(given) for key, given in (run["inputs"] or {}).items()})
     else:
@@ -74,9 +101,27 @@ def _known(given: Any) -> Any:
     return np.nan if isinstance(given, str) else given
 
 
-def _problem_again(text: str, t: Array, inputs: Mapping[Path, Array]) -> Problem:
-    """The problem of a scene, with inputs as they were at some instants."""
+def _check_states(found: Solution) -> None:
+    """Kernels trust the shapes of states."""
+    if found.problem is None:
+        return
+    for slot in found.problem.descriptor.states:
+        values, sizes = found.states[slot.path], {slot.quantity.space.size, slot.quantity.space.dim}
+        numbers = values.shape[1] if values.ndim == 2 else 1 if values.ndim == 1 else None
+        if len(values) != len(found.t) or numbers not in sizes or values.dtype != np.float64:
+            raise ValueError(f"state {slot.path} is {values.shape}, expected {len(found.t)} times {max(sizes)} numbers")
+
+
+def _scene(text: str, homes: tuple[File, ...]) -> Scene:
+    """The scene of a file that may come from anybody."""
     scene = scene_from_text(text)
+    check_scene(scene)
+    return meshes_within(scene, homes)
+
+
+def _problem_again(text: str, t: Array, inputs: Mapping[Path, Array], homes: tuple[File, ...]) -> Problem:
+    """The problem of a scene, with inputs as they were at some instants."""
+    scene = _scene(text, homes)
     forced = [f"joints.{name}" for name, j in scene.all_joints() if any(p in inputs for p, _ in drive_ports(j))]
     pushed = [f"bodies.{name}" for name, _ in scene.all_bodies() if wrench_port(name) in inputs]
     own = scene_inputs(scene)

@@ -94,11 +94,13 @@ class PatternError(ValueError):
 
 
 def _brief(word: object) -> object:
-    """The word of a message, its middle left out where it is long; what is no text, as text."""
+    """The word of a message, its middle left out where it is long; what would steer a terminal, escaped."""
     text = word if isinstance(word, str) else repr(word)
-    if len(text) <= _LONGEST:
+    if len(text) > _LONGEST:
+        text = word = f"{text[:120]}… ({len(text)} characters) …{text[-40:]}"
+    if text.isprintable():
         return word
-    return f"{text[:120]}… ({len(text)} characters) …{text[-40:]}"
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
 
 
 def _rebuild(

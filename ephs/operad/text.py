@@ -189,7 +189,7 @@ class _Reader:
             start = self.text.index("{", self.at)
             try:
                 described, self.at = json.JSONDecoder().raw_decode(self.text, start)
-            except (json.JSONDecodeError, RecursionError):
+            except (ValueError, RecursionError):  # no JSON, or a number of too many digits
                 self.refuse("{", "the object of a quantity, as in JSON")
             found = quantity_from(f"line {self.line}", {"quantity": described})
         else:

@@ -6,7 +6,7 @@ import numpy as np
 
 from ephs.mechanics.scene.errors import did_you_mean, listing
 from ephs.show.errors import ShowError
-from ephs.show.figures import new_figure
+from ephs.show.figures import new_figure, plain
 from ephs.show.palette import BLUE, GREEN, GREY, RED, dashes
 from ephs.show.plots import STYLE
 from ephs.show.series import thinned
@@ -55,7 +55,7 @@ def plot_wrenches(sol: Any, *joints: str) -> "Figure":
         grid = figure.subplots(len(chosen), 2, sharex=True, squeeze=False)
         for (left, right), name in zip(grid, chosen, strict=True):
             wrench = np.asarray(sol.joint(name).wrench, dtype=float)
-            _draw(left, t, wrench[:, 3:], f"{name}\nforce [N]")
+            _draw(left, t, wrench[:, 3:], f"{plain(name)}\nforce [N]")
             _draw(right, t, wrench[:, :3], "moment [N m]")
         for axes in grid[-1]:
             axes.set_xlabel("time [s]")
@@ -67,7 +67,7 @@ def plot_wrenches(sol: Any, *joints: str) -> "Figure":
         legend = {"loc": "outside upper right", "ncols": 3, "frameon": False, "fontsize": 8.0}
         figure.legend(handles, ["x", "y", "z, axes of C2"], **legend)
         rest = f" ({len(chosen)} of {len(known)} joints)" if len(chosen) < len(known) else ""
-        figure.suptitle(f"{sol.name}: joint wrenches{rest}", x=0.01, ha="left", fontsize=10.0)
+        figure.suptitle(plain(f"{sol.name}: joint wrenches{rest}"), x=0.01, ha="left", fontsize=10.0)
     return figure
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["new_figure"]
+__all__ = ["new_figure", "plain"]
 
 
 def new_figure(width: float, height: float) -> "Figure":
@@ -17,6 +17,12 @@ def new_figure(width: float, height: float) -> "Figure":
     figure = _kind()(figsize=(width, height), layout="constrained", facecolor="white")
     FigureCanvasAgg(figure)
     return figure
+
+
+def plain(words: str, most: int = 36) -> str:
+    """Words that come from a model, for a figure: a dollar sign starts no formula, long names leave room for lines."""
+    short = words if len(words) <= most else f"{words[: most - 15]}…{words[-14:]}"
+    return short.replace("$", r"\$")
 
 
 @cache

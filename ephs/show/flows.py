@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ephs.show.figures import new_figure
+from ephs.show.figures import new_figure, plain
 from ephs.show.palette import BLUE, GREEN, GREY, ORANGE, RED, SKY
 from ephs.show.plots import STYLE
 
@@ -72,7 +72,7 @@ def plot_exergy_flow(sol: Any, path: Any = ".") -> "Figure":
             axes.text(0.5, 0.5, f"{total:.4g} J", rotation=90, ha="center", va="center", color="white")
         else:
             axes.text(0.5, 0.5, "no exergy was turned over", ha="center", va="center")
-        where = "" if str(path) == "." else f" in {path}"
+        where = "" if str(path) == "." else plain(f" in {path}")
         axes.set_title(f"exergy{where}, {sol.t[0]:g} … {sol.t[-1]:g} s", loc="left")
     return figure
 
@@ -116,6 +116,6 @@ def _side(axes: "Axes", bands: list[Band], total: float, *, left: bool) -> None:
         axes.fill_between(x, top - width, top, color=colours[band.kind], alpha=0.8, linewidth=0.0)
         verb = {"destroyed": " destroys", "storage": " gives" if left else " takes"}.get(band.kind, "")
         where = (-0.02, "right") if left else (1.02, "left")
-        label = f"{band.name}{verb}  {band.amount:.3g} J ({100.0 * width:.1f} %)"
+        label = f"{plain(band.name, 30)}{verb}  {band.amount:.3g} J ({100.0 * width:.1f} %)"
         axes.text(where[0], edge - 0.5 * slot, label, ha=where[1], va="center")
         edge, inner = edge - slot - GAP, inner - width

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ephs.show.figures import new_figure
+from ephs.show.figures import new_figure, plain
 from ephs.show.palette import BLACK, BLUE, CYCLE, GREEN, GREY, ORANGE, PURPLE, RED, SKY, dashes
 from ephs.show.series import Array, scene_panels, state_panels, thinned
 
@@ -50,7 +50,7 @@ def plot_motion(sol: Any) -> "Figure":
             _line(each, sol, values, CYCLE[index % len(CYCLE)], label, dashes(index))
         if len(lines) > _MOST_NAMES:
             each.plot([], [], alpha=0.0, label=f"and {len(lines) - _MOST_NAMES} more")
-        each.set_ylabel(title)
+        each.set_ylabel(plain(title))
         _legend(each)
     return figure
 
@@ -134,7 +134,7 @@ def _panels(sol: Any, what: str, heights: list[float]) -> "tuple[Figure, list[Ax
         figure = new_figure(_WIDTH, 0.7 + _ROW * sum(heights))
         grid = figure.subplots(len(heights), 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": heights})
         axes: list[Axes] = list(grid[:, 0])
-        axes[0].set_title(f"{sol.name}: {what}", loc="left")
+        axes[0].set_title(plain(f"{sol.name}: {what}"), loc="left")
         axes[-1].set_xlabel("time [s]")
         t = _array(sol.t)
         if len(t) > 1 and t[-1] > t[0]:
@@ -144,7 +144,9 @@ def _panels(sol: Any, what: str, heights: list[float]) -> "tuple[Figure, list[Ax
 
 
 def _line(axes: "Axes", sol: Any, values: Array, colour: str, label: str | None, style: Any = "-") -> None:
-    axes.plot(*thinned(_array(sol.t), values), color=colour, linestyle=style, linewidth=1.4, label=label)
+    axes.plot(
+        *thinned(_array(sol.t), values), color=colour, linestyle=style, linewidth=1.4, label=label and plain(label)
+    )
 
 
 def _accounts(axes: "Axes", sol: Any, lines: list[_Line]) -> None:

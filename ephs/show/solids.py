@@ -1,5 +1,6 @@
 """Bodies as surfaces: their shape, their mesh, or the box of the same mass and inertia."""
 
+import io
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -10,11 +11,14 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+from ephs.mechanics.scene.text import MESHES
 from ephs.show.errors import ShowError
 from ephs.show.motion import Array, equivalent_box, rotate
 
 __all__ = ["Solid", "box", "cylinder", "held_at", "solid_of", "sphere"]
 
+MOST_MB = 100
+"""Largest mesh that is drawn."""
 SIDES = 28
 """Of a round solid."""
 
@@ -167,7 +171,12 @@ def _mesh(file: FilePath, scale: Any, body: Any, name: str) -> Solid:
     import trimesh
 
     try:
-        loaded: Any = trimesh.load_scene(str(file))
+        # From bytes, and by these endings: nothing else is read, neither what the file names nor what it packs.
+        kind = file.suffix.lower()
+        if kind not in MESHES or not file.is_file() or file.stat().st_size > MOST_MB * 1e6:
+            raise ValueError(f"no file of at most {MOST_MB} MB that ends in {', '.join(MESHES)}")
+        plain: dict[str, Any] = {"skip_materials": True} if kind in (".obj", ".glb") else {}
+        loaded: Any = trimesh.load_scene(io.BytesIO(file.read_bytes()), file_type=kind[1:], **plain)
         mesh: Any = loaded.to_mesh()
     except Exception as fault:  # readers of foreign files raise what they like
         return _stand_in(body, f"{name}: {file.name} cannot be read ({fault or type(fault).__name__})")

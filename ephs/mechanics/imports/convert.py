@@ -75,6 +75,8 @@ def _gather(shapes: Iterable[dict[str, Any]], source: Path, target: Path) -> Non
             names = {path.name for path in taken.values()}
             name = file.name if file.name not in names else f"{len(taken)}-{file.name}"
             taken[file] = folder / name
+            if taken[file].resolve() != taken[file]:
+                raise SceneError(str(source), [fault("link", "meshes", f"a link at {taken[file].name} or its folder")])
             if file.is_file():
                 folder.mkdir(exist_ok=True)
                 copyfile(file, taken[file])

@@ -7,9 +7,10 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ephs.mechanics.scene.errors import Fault
+from ephs.mechanics.scene.errors import Fault, legible
 from ephs.mechanics.scene.geometry import frame_rotation
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND
+from ephs.mechanics.scene.text import MESHES
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 
@@ -20,7 +21,6 @@ Array = NDArray[np.float64]
 LONGEST_NAME = 200
 WORLD = ""
 """How joints name the ground: as no link is called."""
-MESHES = (".stl", ".obj", ".ply", ".glb", ".off")
 _SCHEMES = ("package://", "model://", "file://")
 
 
@@ -40,14 +40,13 @@ class Draft:
         self._names: dict[str, str] = {WORLD: GROUND}
         self._joint_names: dict[str, str] = {}
         self._centres: dict[str, Array] = {WORLD: np.zeros(3)}
-        self._left: dict[str, list[str]] = {}
+        self._left: dict[str, dict[str, None]] = {}
         self._renamed: list[str] = []
+        self._alike: dict[str, int] = {}
 
     def leave(self, what: str, name: str) -> None:
         """Note what the scene does not have."""
-        names = self._left.setdefault(what, [])
-        if name not in names:
-            names.append(name)
+        self._left.setdefault(what, {})[name] = None
 
     def rename(self, name: str, other: str) -> None:
         """Note that something has another name in the scene."""
@@ -55,8 +54,8 @@ class Draft:
 
     def left(self) -> list[str]:
         """A line for each kind of what was left out, and one for names that scenes cannot have."""
-        lines = [f"not modelled: {what}: {', '.join(names)}" for what, names in self._left.items()]
-        renamed = [f"renamed, as scenes want it: {', '.join(self._renamed)}"] if self._renamed else []
+        lines = [f"not modelled: {what}: {', '.join(map(legible, names))}" for what, names in self._left.items()]
+        renamed = [f"renamed, as scenes want it: {', '.join(map(legible, self._renamed))}"] if self._renamed else []
         return lines + renamed
 
     def body(
@@ -82,7 +81,8 @@ class Draft:
 
     def frame_without_mass(self, name: str) -> str:
         """A body without mass between two joints; returns how it is known here."""
-        return self.body(name)
+        self.body(name)
+        return name
 
     def joint(
         self, name: str, kind: str, first: str, second: str, at1: Array, at2: Array, entries: Mapping[str, Any]
@@ -137,7 +137,10 @@ class Draft:
         world = {} if self.gravity is None else {"world": {"gravity": _plain(self.gravity)}}
         return {
             "format": 1,
-            "name": "".join("_" if c in "/\\" or not c.isprintable() else c for c in self.name).strip(". ") or "model",
+            "name": "".join("_" if c in "/\\" or not c.isprintable() else c for c in self.name[:LONGEST_NAME]).strip(
+                ". "
+            )
+            or "model",
             **world,
             "assembly": {"inertia": mode},
             "bodies": self._bodies,
@@ -158,10 +161,11 @@ class Draft:
             stem = "_" + stem[1:]
         if stem in (GROUND, ENVIRONMENT):
             stem += "_"
-        found, count = stem, 1
+        found, count = stem, self._alike.get(stem, 1)
         while found in taken:
             count += 1
             found = f"{stem[: LONGEST_NAME - 10]}_{count}"
+        self._alike[stem] = count
         if found != name:
             self.rename(name, found)
         return found

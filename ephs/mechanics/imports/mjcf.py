@@ -4,7 +4,7 @@ Source: the MuJoCo documentation, "XML Reference" and "Computation". Joints are 
 """
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from importlib import import_module
 from typing import Any
 
@@ -16,11 +16,17 @@ from ephs.mechanics.imports.mjcf_names import Names, noted
 from ephs.mechanics.imports.mjcf_shapes import shapes
 from ephs.mechanics.imports.mjcf_source import Source
 from ephs.mechanics.scene.errors import fault
+from ephs.mechanics.scene.schema import LARGEST
 from ephs.semantics.spaces import SE3
 
 __all__ = ["read_mjcf"]
 
 Inertias = dict[int, tuple[float, Any]]
+READ = (
+    *("body_mass", "body_inertia", "body_pos", "body_quat", "body_ipos", "body_iquat", "qpos0", "qpos_spring"),
+    *("jnt_pos", "jnt_axis", "jnt_stiffness", "dof_damping", "eq_data", "site_pos", "site_quat"),
+    *("geom_pos", "geom_quat", "geom_size", "mesh_pos", "mesh_quat", "mesh_scale"),
+)
 
 
 def read_mjcf(root: Any, draft: Draft) -> None:
@@ -44,12 +50,17 @@ def read_mjcf(root: Any, draft: Draft) -> None:
             given = _own_inertias(spec)
             model = spec.compile()
             own: Inertias = {int(body.id): inertia for body, inertia in given}
-    except (ValueError, mujoco.FatalError) as error:
+    except (ValueError, RuntimeError) as error:  # MuJoCo's own errors among them
         words = " ".join(str(error).split())
         draft.faults.append(fault("not compiled", "", f"that MuJoCo says: {words}"))
         return
     finally:
         mujoco.set_mju_user_warning(before)
+    sizes = [float(np.abs(values).max(initial=0.0)) for values in _numbers(model, own)]
+    lengths = [np.linalg.norm(rows, axis=1) for rows in _directions(model)]
+    if not all(size <= LARGEST for size in sizes) or not all(np.all(np.abs(n - 1.0) < 0.1) for n in lengths):
+        draft.faults.append(fault("large", "", "a compiled model with other numbers, or none", most=LARGEST))
+        return
     for text in said:
         draft.leave("what MuJoCo warns of", " ".join(text.split()))
     names = Names(model)
@@ -65,6 +76,25 @@ def read_mjcf(root: Any, draft: Draft) -> None:
         shapes(model, b, names.bodies[b], source, draft)
     loops(model, names, {thread.equality for thread in threads.values()}, draft)
     noted(model, names, draft)
+
+
+def _numbers(model: Any, own: Inertias) -> Iterator[Any]:
+    """All that is read of a compiled model."""
+    yield model.opt.gravity
+    for mass, inertia in own.values():
+        yield mass
+        yield inertia
+    for name in READ:
+        yield getattr(model, name)
+
+
+def _directions(model: Any) -> Iterator[Any]:
+    """Rows that MuJoCo made unit vectors, unless their numbers were too large or too small for that."""
+    mujoco: Any = import_module("mujoco")
+    for name in ("body_quat", "body_iquat", "geom_quat", "site_quat", "mesh_quat"):
+        yield getattr(model, name)
+    yield model.jnt_axis[model.jnt_type >= int(mujoco.mjtJoint.mjJNT_SLIDE)]
+    yield model.eq_data[model.eq_type == int(mujoco.mjtEq.mjEQ_WELD), 6:10]
 
 
 def _own_inertias(spec: Any) -> list[tuple[Any, tuple[float, Any]]]:

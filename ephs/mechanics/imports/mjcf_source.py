@@ -9,7 +9,7 @@ from typing import final
 from xml.etree.ElementTree import Element, tostring
 
 from ephs.mechanics.imports.draft import Draft
-from ephs.mechanics.imports.xml import read_tree
+from ephs.mechanics.imports.xml import MOST_LEVELS, numbers, read_tree
 from ephs.mechanics.scene.errors import fault
 
 __all__ = ["Source"]
@@ -24,7 +24,7 @@ _SECTIONS = {
     "extension": "plugins",
 }
 _SILENT = ("visual", "statistic", "custom", "keyframe", "size", "compiler-plugin")
-_ASSETS = ("texture", "material", "hfield", "skin")
+_ASSETS = ("texture", "material", "hfield", "skin", "model")
 _UNSUPPORTED = {
     "attach": "write the other model's bodies into this one",
     "flexcomp": "take it out: bodies are rigid",
@@ -33,6 +33,8 @@ _UNSUPPORTED = {
 _PAIRS = ("connect", "weld", "joint")
 _REFERENCES = ("material", "hfield", "texture")
 _MOST_INCLUDES = 100
+_MOST_COPIES = 10_000
+_MOST_PARAMETER = 100.0
 
 
 @final
@@ -52,7 +54,7 @@ class Source:
         self._read: set[Path] = set()
         self.assets: dict[str, bytes] = {}
         self._files: dict[str, str] = {}
-        self._include(root, draft.folder, 0)
+        self._include(root, draft.folder, 0, 0)
         if draft.faults:
             self.text = ""
             return
@@ -66,11 +68,15 @@ class Source:
         """The file, relative to the model's folder, of what MuJoCo knows by this name."""
         return self._files.get(asset, asset)
 
-    def _include(self, element: Element, folder: Path, depth: int) -> None:
+    def _include(self, element: Element, folder: Path, depth: int, level: int) -> None:
         """Put the content of the included files in their places."""
+        if level > MOST_LEVELS:
+            found = f"elements nested deeper than {MOST_LEVELS} levels"
+            self._draft.faults.append(fault("deep", "", found, most=MOST_LEVELS))
+            return
         for number, child in reversed(list(enumerate(element))):
             if child.tag != "include":
-                self._include(child, folder, depth)
+                self._include(child, folder, depth, level + 1)
                 continue
             name = child.get("file", "")
             key = f'include "{name}"'
@@ -85,7 +91,7 @@ class Source:
             self._read.add(file)
             inner = read_tree(file, self._draft.faults, key)
             if inner is not None:
-                self._include(inner, folder, depth + 1)
+                self._include(inner, folder, depth + 1, level)
                 for place, part in enumerate(inner):
                     element.insert(number + place, part)
 
@@ -95,6 +101,16 @@ class Source:
                 name = element.get("name") or element.get("model") or element.tag
                 what, hint = f"<{element.tag}>", _UNSUPPORTED[element.tag]
                 self._draft.faults.append(fault("not supported", element.tag, f'"{name}"', what=what, hint=hint))
+        if self._copies(root) > _MOST_COPIES:
+            self._draft.faults.append(fault("copies", "replicate", "more", most=_MOST_COPIES))
+
+    def _copies(self, element: Element) -> int:
+        """How many elements there are once those that are to be repeated are."""
+        inner = 1 + sum(map(self._copies, element))
+        if element.tag != "replicate":
+            return inner
+        count = numbers(element.get("count"), 1, "replicate.count", self._draft.faults)[0]
+        return int(min(inner * max(count, 1.0), 10.0 * _MOST_COPIES))
 
     def _strip(self, root: Element) -> None:
         for section in list(root):
@@ -134,6 +150,7 @@ class Source:
             for mesh in assets.findall("mesh"):
                 name = mesh.get("file")
                 if name is None:
+                    self._check_formula(mesh)
                     continue
                 mesh.set("name", mesh.get("name") or Path(name).stem)
                 path = Path(folders[-1] or "", name).as_posix() if folders else name
@@ -149,6 +166,20 @@ class Source:
                 self._files[known] = file.relative_to(self._draft.folder.resolve()).as_posix()
         for parent, child in [pair for pair in _geoms(root) if pair[1].get("mesh") in lost]:
             parent.remove(child)
+        for element in root.iter():  # whatever else names a file
+            if element.get("file") not in self.assets:
+                element.attrib.pop("file", None)
+
+    def _check_formula(self, mesh: Element) -> None:
+        """A mesh made by a formula may not be of any size."""
+        for word in (mesh.get("params") or "").split():
+            try:
+                small = abs(float(word)) <= _MOST_PARAMETER
+            except ValueError:  # MuJoCo says so
+                continue
+            if not small:
+                key = f"mesh {mesh.get('name', '')}.params"
+                self._draft.faults.append(fault("large", key, word, most=_MOST_PARAMETER))
 
 
 def _geoms(root: Element) -> Iterator[tuple[Element, Element]]:

@@ -109,7 +109,9 @@ def _ends(
     for end in ("parent", "child"):
         link = (joint.findtext(end) or "").strip()
         for _ in frames:  # a frame stands for the link that it is attached to
-            link = frames[link].get("attached_to", link) if link in frames and link not in links else link
+            if link not in frames or link in links:
+                break
+            link = frames[link].get("attached_to", link)
         if link == "world" and link not in links:
             ends.append(WORLD)
             continue

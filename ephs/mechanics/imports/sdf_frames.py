@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ephs.mechanics.imports.draft import pose
-from ephs.mechanics.imports.xml import numbers
+from ephs.mechanics.imports.xml import MOST_LEVELS, numbers
 from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing
 from ephs.semantics.spaces import SE3
 
@@ -31,6 +31,9 @@ class Frames:
         """The pose (7,) of a frame in the model."""
         if name in self._found:
             return self._found[name]
+        if len(waiting) > MOST_LEVELS:
+            self._faults.append(fault("deep", key, "frames relative to frames, and so on", most=MOST_LEVELS))
+            return self._found.setdefault(name, pose())
         if name in waiting or name not in self._elements:
             if name in waiting:
                 chain = " → ".join((*waiting[waiting.index(name) :], name))

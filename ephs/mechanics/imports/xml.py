@@ -8,6 +8,8 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from ephs.mechanics.scene.errors import Fault, fault
+from ephs.mechanics.scene.schema import LARGEST
+from ephs.mechanics.scene.text import file_text
 
 __all__ = ["numbers", "read_tree", "vector"]
 
@@ -21,20 +23,8 @@ def read_tree(path: Path, faults: list[Fault], key: str = "") -> Element | None:
 
     Document types and entities are refused before the parser runs: they can make a small file large, and name others.
     """
-    try:
-        size = path.stat().st_size / 1e6
-        if size > MOST_MB:
-            faults.append(fault("size", key, f"{size:.0f} MB", most=MOST_MB))
-            return None
-        text = path.read_bytes().decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        faults.append(fault("encoding", key, f"byte {error.start} that is none"))
-        return None
-    except FileNotFoundError:
-        faults.append(fault("no file", key, "no file of this name"))
-        return None
-    except OSError as error:
-        faults.append(fault("not readable", key, error.strerror or "an error of the system"))
+    text = file_text(path, faults, key, MOST_MB)
+    if text is None:
         return None
     if declared := _DECLARATION.search(text):
         line = text.count("\n", 0, declared.start()) + 1
@@ -71,7 +61,10 @@ def numbers(text: str | None, count: int, key: str, faults: list[Fault], default
         shown = text.strip() if len(text) <= 60 else text.strip()[:57] + "…"
         faults.append(fault("value", key, f'"{shown}"', what=_counted(count)))
         return given or [0.0] * count
-    return found
+    if max(map(abs, found)) > LARGEST:
+        faults.append(fault("large", key, f"{max(found, key=abs):g}", most=LARGEST))
+        return given or [0.0] * count
+    return [0.0 if abs(number) < 1.0 / LARGEST else number for number in found]
 
 
 def vector(

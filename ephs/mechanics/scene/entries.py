@@ -13,6 +13,7 @@ from pydantic import ValidationError
 
 from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing
 from ephs.mechanics.scene.schema import (
+    LARGEST,
     SECTIONS,
     AssemblyEntry,
     Entry,
@@ -23,6 +24,7 @@ from ephs.mechanics.scene.schema import (
     WorldEntry,
 )
 
+LONGEST_NAME = 200
 E = TypeVar("E", bound=Entry)
 
 # Neutral values for required keys that are missing or faulty.
@@ -102,6 +104,9 @@ def read_document(raw: Mapping[str, Any], default_name: str, faults: list[Fault]
     if not isinstance(name, str) or not name:
         faults.append(fault("type", "name", shown(name), what="a text in quotes"))
         name = default_name
+    if not name.isprintable() or {"/", "\\"} & set(name) or name in (".", "..") or len(name) > LONGEST_NAME:
+        faults.append(fault("scene name", "name", shown(name)))
+        name = "scene"
     world = validate(WorldEntry, raw["world"], "world", faults).entry if "world" in raw else None
     assembly = validate(AssemblyEntry, raw.get("assembly", {}), "assembly", faults).entry
     return Document(name, world, assembly, {key: _section(key, raw.get(key, {}), faults) for key in SECTIONS})
@@ -165,9 +170,12 @@ def _translate(model: type[Entry], key: str, item: Any) -> Fault:
     if code == "missing":
         what = owner.model_fields[str(location[-1])].description or "a value"
         return fault("missing", path, "nothing", what=what)
-    found = shown(item["input"])
-    if code == "finite_number":
+    value = item["input"]
+    found = shown(value)
+    if code == "finite_number" or (isinstance(value, float) and not math.isfinite(value)):
         return fault("finite", path, found)
+    if code in ("large", "less_than_equal") or context.get("ge") == -LARGEST:
+        return fault("large", path, found, most=LARGEST)
     if code in ("model_type", "dict_type", "model_attributes_type"):
         return fault("table", path, found)
     if code in _EXPECTED:

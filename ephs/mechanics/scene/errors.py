@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from heapq import nsmallest
 from typing import Any, final
 
 
@@ -69,6 +70,9 @@ TEXTS: dict[str, tuple[str, str]] = {
     "base": ('"fixed" or "free"', "say how the root of an imported model meets the ground"),
     "inertia mode": ('"strict", "warn" or "nearest"', "say what becomes of an impossible inertia"),
     "format": ("1", "write format = 1 as the first line"),
+    "long key": ("keys of at most {most} names", "no scene has tables nested so deeply"),
+    "outside scene": ("a file in the scene's own folder, or below it", "copy it there; nothing else is read"),
+    "many parts": ("at most {most} uses of parts, those of parts counted", "join some of them into one file"),
     "cycle": ("a scene that is no part of itself", "take one of these uses out: {chain}"),
     "world differs": (
         "{wanted}, that of the scene that uses it",
@@ -76,11 +80,16 @@ TEXTS: dict[str, tuple[str, str]] = {
     ),
     # models in other formats
     "model suffix": ("a file that ends in .urdf, .xml or .sdf", "check the file's name"),
+    "link": (
+        "a place that is no link, for copies of meshes",
+        "take it away, or choose another name for the scene file",
+    ),
     "scene suffix": ("a file that ends in .toml", "choose another name for the scene file"),
-    "size": ("at most {most:g} MB", "a model is text; meshes have files of their own"),
+    "size": ("at most {most:g} MB", "the file is text; meshes have files of their own"),
     "entities": ("XML without <!DOCTYPE and <!ENTITY", "take these declarations out, comments included"),
     "xml": ("well-formed XML", "mend the syntax at the place named"),
     "deep": ("at most {most} levels", "no model is nested so deeply"),
+    "copies": ("at most {most} elements, copies counted", "make fewer copies"),
     "root element": ("one of {known}", "check what the file holds"),
     "xacro": ("plain URDF", "expand the macros first: xacro FILE > MODEL.urdf"),
     "value": ("{what}", "mend the value"),
@@ -104,15 +113,24 @@ TEXTS: dict[str, tuple[str, str]] = {
     "type": ("{what}", "mend the value"),
     "length": ("{what}", "give as many numbers as this"),
     "one freedom": ("a number", "a pair with one freedom takes one number"),
-    "finite": ("a finite number", "nan, inf and numbers from 1e100 on are not allowed"),
+    "large": ("a number of at most {most:g} in size", "check the unit"),
+    "finite": ("a finite number", "nan and inf are not allowed"),
     "range": ("{what}", "mend the value"),
-    "name": ("a name without dots and blanks", "rename it"),
+    "name": (
+        "a name without dots and blanks, of at most 200 printable letters, the first no ~",
+        "rename it",
+    ),
+    "scene name": (
+        "a name that a folder can have: printable, of at most 200 letters, without / and \\",
+        "rename the scene: results are kept under its name",
+    ),
     "reserved": ("a name of your own", "{reserved} have a fixed meaning; rename it"),
     "collision": ("a name that is not taken by {other}", "rename one of them"),
     "unknown body": ('"ground" or a body', "{hint}"),
     "unknown thermal": ('"environment" or a [thermal] name', "{hint}"),
     "unknown type": ("one of {known}", "{hint}"),
     "mesh": ("a file in the scene's folder or below", "move it there, and give its path from the scene file"),
+    "mesh kind": ("a mesh that ends in one of {known}", "convert it to one of these"),
     "both shapes": ("either shape or shapes", "take one of the two out"),
     "only mesh": ("no scale for a {kind}", "scale belongs to meshes only"),
     "shape": ("one of box, sphere, cylinder, mesh", "a shape has exactly one of these keys"),
@@ -125,6 +143,10 @@ TEXTS: dict[str, tuple[str, str]] = {
     "inertia triangle": (
         "no principal moment above the sum of the two others",
         'mend the tensor, or set assembly.inertia = "warn"',
+    ),
+    "inertia singular": (
+        "positive principal moments",
+        'give it some inertia about every axis, or set assembly.inertia = "nearest"',
     ),
     "inertia kept": (
         "those of a distribution of mass",
@@ -191,23 +213,41 @@ TEXTS: dict[str, tuple[str, str]] = {
 }
 
 
+_LONGEST = 600
+_NEAR_LETTERS, _NEAR_NAMES = 80, 500
+
+
 def fault(code: str, key: str, found: object, **values: Any) -> Fault:
-    """The fault of this code, its texts filled with ``values``."""
+    """The fault of this code, its texts filled with ``values``; what files put into them stays readable and short."""
     expected, advice = TEXTS[code]
-    return Fault(key, str(found), expected.format(key=key, **values), advice.format(key=key, **values))
+    key = legible(key)
+    words = {name: legible(value) if isinstance(value, str) else value for name, value in values.items()}
+    return Fault(key, legible(str(found)), expected.format(key=key, **words), advice.format(key=key, **words))
+
+
+def legible(text: str) -> str:
+    """A text with its middle left out where it is long, and with escapes for what would steer a terminal."""
+    if len(text) > _LONGEST:
+        text = f"{text[:200]}… ({len(text)} letters) …{text[-60:]}"
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
 
 
 def did_you_mean(name: str, known: Iterable[str], otherwise: str) -> str:
-    """A hint at the nearest known name, or ``otherwise``."""
+    """A hint at the nearest known name, or ``otherwise``; among many names none is looked for."""
     from difflib import get_close_matches
 
-    near = get_close_matches(name, list(known), n=1, cutoff=0.6)
+    names = [other for other in known if len(other) <= _NEAR_LETTERS]
+    if len(name) > _NEAR_LETTERS or len(names) > _NEAR_NAMES:
+        return otherwise
+    near = get_close_matches(name, names, n=1, cutoff=0.6)
     return f'did you mean "{near[0]}"?' if near else otherwise
 
 
 def listing(names: Iterable[str], limit: int = 12) -> str:
     """The first names, for a message."""
-    known = sorted(names)
+    known = nsmallest(limit + 1, names)
     return ", ".join(known[:limit]) + (", …" if len(known) > limit else "") if known else "nothing"
 
 

@@ -39,11 +39,13 @@ def mass_and_inertia(
     if mass == 0.0 and strict and tensor.any():
         faults.append(fault("massless", where, shown(entry.inertia)))
         return mass, tensor
-    if not tensor.any() and (mass == 0.0 or strict):
+    if not tensor.any() and mass == 0.0:
         return mass, tensor
     moments = np.linalg.eigvalsh(tensor)
     wrong = _wrong(moments)
     if strict:
+        if not wrong and moments[0] <= 0.1 * TINY * moments[2]:
+            wrong = "inertia singular"
         if wrong:
             faults.append(fault(wrong, where, _text(moments)))
         return mass, tensor

@@ -3,6 +3,7 @@
 import re
 import tomllib
 import warnings
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from os import PathLike
@@ -14,23 +15,38 @@ import numpy as np
 from ephs.mechanics.scene import resolve, values
 from ephs.mechanics.scene.assembly import assemble
 from ephs.mechanics.scene.entries import Document, read_document, shown
-from ephs.mechanics.scene.errors import Fault, ModelWarning, SceneError, SceneWarning, fault
+from ephs.mechanics.scene.errors import Fault, ModelWarning, SceneError, SceneWarning, fault, legible
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Scene, World
 from ephs.mechanics.scene.moving import moved, spring_length
 from ephs.mechanics.scene.state import adjusted
+from ephs.mechanics.scene.text import file_text
+from ephs.operad import Path as Name
+from ephs.operad import PatternError
 
 MODELS = (".urdf", ".xml", ".sdf")
 """Endings of files in other formats, which are imported."""
+MOST_LEVELS = 50
+"""Names in a dotted key, and parts within parts."""
+MOST_PARTS = 2000
+"""Parts that a scene and its parts use, so that few files cannot stand for very many."""
+# The time that TOML's reader takes grows with the square of the names in a key.
+_NAME = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
+_LONG_KEY = re.compile(rf"(?<![\w-])(?:{_NAME}[ \t]*+\.[ \t]*+){{{MOST_LEVELS}}}")
 
 
 @final
 @dataclass(frozen=True, slots=True)
 class _Reading:
-    """How files are read, and what is found in them: faults, odd inertias, what a model says more than its scene."""
+    """How files are read, and what is found in them: faults, odd inertias, what a model says more than its scene.
+
+    ``home`` is the folder of the first file, outside of which none is read; ``files`` counts those that are.
+    """
 
     base: str
     adjust: bool
     inertia: str | None
+    home: Path
+    files: Counter[str] = field(default_factory=Counter)
     faults: list[Fault] = field(default_factory=list)
     odd: list[Fault] = field(default_factory=list)
     left: list[str] = field(default_factory=list)
@@ -61,7 +77,7 @@ def load(path: str | PathLike[str], base: str = "fixed", adjust: bool = False, i
     SceneError
         With every fault that was found.
     """
-    r = _Reading(base, adjust, inertia)
+    r = _Reading(base, adjust, inertia, Path(path).parent.resolve())
     if base not in ("fixed", "free"):
         r.faults.append(fault("base", "base", shown(base)))
     if inertia not in (None, "strict", "warn", "nearest"):
@@ -130,17 +146,22 @@ def _parse(path: Path, r: _Reading) -> Mapping[str, Any] | None:
     if path.suffix != ".toml":
         faults.append(fault("suffix", "", shown(path.suffix) if path.suffix else "a file without suffix"))
         return None
+    text = file_text(path, faults)
+    if text is None:
+        return None
+    if long := _LONG_KEY.search(text):
+        line = text.count("\n", 0, long.start()) + 1
+        faults.append(fault("long key", f"line {line}", f"{shown(long[0][:40])}…", most=MOST_LEVELS))
+        return None
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         line = re.search(r"at line (\d+)", str(error))
         faults.append(fault("syntax", f"line {line[1]}" if line else "end of file", str(error)))
-    except UnicodeDecodeError as error:
-        faults.append(fault("encoding", "", f"byte {error.start} that is none"))
-    except FileNotFoundError:
-        faults.append(fault("no file", "", "no file of this name"))
-    except OSError as error:
-        faults.append(fault("not readable", "", error.strerror or "an error of the system"))
+    except RecursionError:
+        faults.append(fault("deep", "", "tables and lists nested too deeply", most=MOST_LEVELS))
+    except ValueError as error:  # a whole number of too many digits
+        faults.append(fault("syntax", "", str(error)))
     return None
 
 
@@ -170,7 +191,15 @@ def _parts(
         pose = values.pose(entry.position, entry.rotation, key, faults)
         if not table.sound("use"):
             continue
-        file = path.parent / entry.use
+        file = _file_inside(path.parent / entry.use, r.home)
+        if file is None:
+            faults.append(fault("outside scene", f"{key}.use", shown(entry.use)))
+            continue
+        r.files["parts"] += 1
+        if r.files["parts"] > MOST_PARTS or len(stack) > MOST_LEVELS:
+            if r.files["parts"] == MOST_PARTS + 1 or len(stack) > MOST_LEVELS:
+                faults.append(fault("many parts", f"{key}.use", "one more", most=MOST_PARTS))
+            continue
         if file.resolve() in stack:
             chain = " → ".join(p.name for p in (*stack[stack.index(file.resolve()) :], file))
             faults.append(fault("cycle", f"{key}.use", shown(entry.use), chain=chain))
@@ -179,15 +208,23 @@ def _parts(
         part = _read(file, world, stack, below)
         faults += [_seen_from_outside(f, key, entry.use) for f in below.faults]
         r.odd.extend(_seen_from_outside(f, key, entry.use) for f in below.odd)
-        r.left.extend(f"{key}: {line}" for line in below.left)
+        r.left.extend(f"{legible(key)}: {line}" for line in below.left)
         if part is not None:
             found[name] = moved(part, np.array(pose), world)
     return found, set(document.sections["parts"]) - set(found)
 
 
+def _file_inside(file: Path, home: Path) -> Path | None:
+    """The file, if it lies in a folder or below once links are followed."""
+    try:
+        return file if file.resolve().is_relative_to(home) else None
+    except (OSError, ValueError, RuntimeError):  # a name that no file can have, links that lead in a circle
+        return None
+
+
 def _seen_from_outside(found: Fault, key: str, file: str) -> Fault:
     inner = f"{key}.{found.key}" if found.key else f"{key}.use"
-    return replace(found, key=inner, found=f"{found.found} (in {file})")
+    return replace(found, key=inner, found=f"{found.found} (in {legible(file)})")
 
 
 def _names(document: Document, parts: Mapping[str, Scene], lost: set[str]) -> resolve.Names:
@@ -197,13 +234,21 @@ def _names(document: Document, parts: Mapping[str, Scene], lost: set[str]) -> re
     return resolve.Names(bodies | set(sections["bodies"]), thermal | set(sections["thermal"]), lost)
 
 
+def _is_name(text: str) -> bool:
+    try:
+        Name([text])
+    except PatternError:
+        return False
+    return True
+
+
 def _check_names(document: Document, faults: list[Fault]) -> None:
     """Names are path components, and no path may mean two things."""
     held = {name for table in document.sections["joints"].values() for name in table.entry.bodies}
     for section, tables in document.sections.items():
         for name in tables:
             key = f"{section}.{name}"
-            if not name or "." in name or any(letter.isspace() for letter in name):
+            if not _is_name(name):
                 faults.append(fault("name", f'{section}."{name}"', shown(name)))
             elif name in (GROUND, ENVIRONMENT):
                 faults.append(fault("reserved", key, shown(name), reserved=f'"{GROUND}" and "{ENVIRONMENT}"'))

@@ -19,6 +19,7 @@ from ephs.mechanics.scene.inertia import mass_and_inertia
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Conduction, Marker, Spring, ThermalNode, World, frozen
 from ephs.mechanics.scene.placing import Place, resolve_place
 from ephs.mechanics.scene.schema import BodyEntry, JointEntry, ShapeEntry, SpringEntry
+from ephs.mechanics.scene.text import MESHES
 
 Array = NDArray[np.float64]
 
@@ -261,6 +262,15 @@ def _check_motion(entry: JointEntry, d: int, drive: Array, key: str, faults: lis
         faults.append(fault("motion and drive", key, "motion and drive"))
 
 
+def _mesh(name: str, folder: Path) -> Path | None:
+    """The file, if it lies in a folder or below once links are followed."""
+    try:
+        file = (folder / name).resolve()
+    except (OSError, ValueError, RuntimeError):  # a name that no file can have, links that lead in a circle
+        return None
+    return file if file.is_relative_to(folder.resolve()) else None
+
+
 def _shape(entry: ShapeEntry, key: str, folder: Path, faults: list[Fault]) -> Mapping[str, Any] | None:
     given = {name: value for name, value in entry.model_dump().items() if value is not None}
     kinds = [name for name in given if name not in ("position", "rotation", "scale")]
@@ -272,8 +282,10 @@ def _shape(entry: ShapeEntry, key: str, folder: Path, faults: list[Fault]) -> Ma
     if "rotation" in given:
         given["rotation"] = values.quaternion(given["rotation"], f"{key}.rotation", faults).tolist()
     if "mesh" in given:
-        file, home = (folder / given["mesh"]).resolve(), folder.resolve()
-        if not file.is_relative_to(home):
-            faults.append(fault("mesh", f"{key}.mesh", given["mesh"]))
+        file = _mesh(given["mesh"], folder)
+        if file is None:
+            faults.append(fault("mesh", f"{key}.mesh", shown(given["mesh"])))
+        elif file.suffix.lower() not in MESHES:
+            faults.append(fault("mesh kind", f"{key}.mesh", shown(given["mesh"]), known=", ".join(MESHES)))
         given["mesh"] = str(file)
     return given

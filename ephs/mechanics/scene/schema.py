@@ -4,24 +4,40 @@ One model a table. Values whose form depends on another key (a number, or one a 
 numbers or lists here and brought to shape by `resolve`.
 """
 
+import math
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, WithJsonSchema, WrapValidator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema, WrapValidator
 from pydantic_core import PydanticCustomError
 
-LARGEST = 1e100
-"""Numbers from here on are none that can be reckoned with: products of three have no value."""
+LARGEST = 1e50
+"""No number of a scene is larger in size, and those below its inverse count as 0: products of several stay finite."""
 
 
-def _bounded(value: float) -> float:
-    if not _finite(value):
-        raise PydanticCustomError("finite_number", "a finite number")
-    return value
+def _settled(value: Any) -> Any:
+    return 0.0 if isinstance(value, float) and -1.0 / LARGEST < value < 1.0 / LARGEST else value
 
 
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False), AfterValidator(_bounded)]
-NonNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.0), AfterValidator(_bounded)]
-Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0.0), AfterValidator(_bounded)]
+# Editors are told of the signs that numbers must have, not of sizes that nobody reaches.
+_NUMBER_SCHEMA: dict[str, Any] = {"type": "number"}
+Number = Annotated[
+    float,
+    BeforeValidator(_settled),
+    Field(strict=True, allow_inf_nan=False, ge=-LARGEST, le=LARGEST),
+    WithJsonSchema(_NUMBER_SCHEMA),
+]
+NonNegative = Annotated[
+    float,
+    BeforeValidator(_settled),
+    Field(strict=True, allow_inf_nan=False, ge=0.0, le=LARGEST),
+    WithJsonSchema(_NUMBER_SCHEMA | {"minimum": 0.0}),
+]
+Positive = Annotated[
+    float,
+    BeforeValidator(_settled),
+    Field(strict=True, allow_inf_nan=False, gt=0.0, le=LARGEST),
+    WithJsonSchema(_NUMBER_SCHEMA | {"exclusiveMinimum": 0.0}),
+]
 Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Quaternion = Annotated[list[Number], Field(min_length=4, max_length=4)]
 Text = Annotated[str, Field(strict=True, min_length=1)]
@@ -33,8 +49,11 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
-def _finite(value: Any) -> bool:
-    return abs(float(value)) < LARGEST
+def _check_sizes(entries: list[Any]) -> None:
+    if not all(-math.inf < entry < math.inf for entry in entries):
+        raise PydanticCustomError("finite_number", "a finite number")
+    if not all(-LARGEST <= entry <= LARGEST for entry in entries):
+        raise PydanticCustomError("large", "a number of moderate size")
 
 
 def _numbers(value: Any, handler: Any) -> Any:
@@ -42,9 +61,8 @@ def _numbers(value: Any, handler: Any) -> Any:
     entries = value if isinstance(value, list) else [value]
     if not all(_is_number(entry) for entry in entries):
         raise PydanticCustomError("numbers", "a number or a list of numbers")
-    if not all(_finite(entry) for entry in entries):
-        raise PydanticCustomError("finite_number", "a finite number")
-    return handler(value)
+    _check_sizes(entries)
+    return handler([_settled(entry) for entry in value] if isinstance(value, list) else _settled(value))
 
 
 def _matrix(value: Any, handler: Any) -> Any:
@@ -54,9 +72,8 @@ def _matrix(value: Any, handler: Any) -> Any:
     entries = [entry for row in value for entry in row]
     if not all(_is_number(entry) for entry in entries):
         raise PydanticCustomError("numbers", "a number, a list of numbers or a symmetric matrix")
-    if not all(_finite(entry) for entry in entries):
-        raise PydanticCustomError("finite_number", "a finite number")
-    return handler(value)
+    _check_sizes(entries)
+    return handler([[_settled(entry) for entry in row] for row in value])
 
 
 def _inertia(value: Any, handler: Any) -> Any:
@@ -66,7 +83,6 @@ def _inertia(value: Any, handler: Any) -> Any:
     return handler(value)
 
 
-_NUMBER_SCHEMA: dict[str, Any] = {"type": "number"}
 _LIST_SCHEMA: dict[str, Any] = {"type": "array", "items": {"type": "number"}}
 _ROWS_SCHEMA: dict[str, Any] = {"type": "array", "items": _LIST_SCHEMA}
 

@@ -11,6 +11,7 @@ import xarray as xr
 
 from ephs.mechanics.solve.dataset import FORMAT, Variable, dataset
 from ephs.mechanics.solve.durable import durable
+from ephs.mechanics.solve.guard import named_for_file, named_from_file
 from ephs.mechanics.solve.labels import Labels, labels_of
 from ephs.mechanics.solve.ledger import Ledgers
 from ephs.mechanics.solve.problem import Problem
@@ -27,7 +28,7 @@ Inputs = Mapping[Path, Array]
 def save(solution: Solution, path: File, *, wrenches: bool) -> None:
     """Write a solution; an older file of that name stays whole until the new one is."""
     with durable(path) as temporary:
-        dataset(solution, wrenches=wrenches).to_netcdf(temporary, engine="h5netcdf")
+        named_for_file(dataset(solution, wrenches=wrenches)).to_netcdf(temporary, engine="h5netcdf")
 
 
 def load(path: str | File, problem_of: Callable[[str, Array, Inputs], Problem]) -> Solution:
@@ -45,7 +46,7 @@ def load(path: str | File, problem_of: Callable[[str, Array, Inputs], Problem]) 
         raise FileNotFoundError(f"{file}: no such file")
     try:
         with xr.open_dataset(file, engine="h5netcdf") as opened:
-            data = opened.load()
+            data = named_from_file(opened.load())
     except OSError as error:
         raise ValueError(f"{file}: not a netCDF file ({error})") from error
     found = data.attrs.get("ephs_format")

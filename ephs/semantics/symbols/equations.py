@@ -14,7 +14,7 @@ from ephs.operad import Path, Quantity
 from ephs.semantics.symbols.algebra import Expr, sp, text_of
 from ephs.semantics.symbols.elimination import coefficient_of, eliminate, settled, tidy
 from ephs.semantics.symbols.voices import say
-from ephs.semantics.symbols.words import curved, operator
+from ephs.semantics.symbols.words import curved, escaped, operator
 from ephs.semantics.symbols.writer import Junction, Parts, Writer, parts_of
 from ephs.semantics.system import System
 
@@ -84,7 +84,7 @@ class Equations:
         for row in self.rows:
             if row.about != about:
                 about = row.about
-                spelled = about.replace("_", r"\_")
+                spelled = escaped(about, formula=False)
                 lines.append(rf"  \intertext{{{spelled}}}")
             lines.append(rf"  {self._tex(row.left)} &= {self._tex(row.right)} \\")
         return "\n".join([r"\begin{align*}", *lines, r"\end{align*}"])

@@ -9,7 +9,7 @@ from typing import Any, final
 from ephs.operad import Path, Quantity
 from ephs.semantics.symbols.algebra import Expr, sp
 
-__all__ = ["OPERATORS", "Words", "curved", "latex_name", "operator", "pairing", "plain"]
+__all__ = ["OPERATORS", "Words", "curved", "escaped", "latex_name", "operator", "pairing", "plain"]
 
 OPERATORS: dict[str, tuple[str, str]] = {
     "tangent": ("TL({0})", r"\mathrm{{T}}_e L_{{{0}}}"),
@@ -116,8 +116,7 @@ class Words:
 
     def port(self, path: Path, side: str, quantity: Quantity) -> Expr:
         """The flow (side f) or the effort (side e) of a port, or of a junction."""
-        escaped = str(path).replace("_", r"\_")
-        return self.symbol(f"{path}.{side}", rf"\mathtt{{{escaped}.{side}}}", scalar=plain(quantity))
+        return self.symbol(f"{path}.{side}", rf"\mathtt{{{escaped(str(path))}.{side}}}", scalar=plain(quantity))
 
     def multiplier(self, path: Path, number: int | None, *, scalar: bool) -> Expr:
         """A multiplier of a component."""
@@ -137,6 +136,11 @@ class Words:
         return self.symbol(text, latex, scalar=True, positive=positive)
 
 
+_SPELLED = {letter: f"\\{letter}" for letter in "{}_&%$#"} | {"<": "{<}"}  # pages take < for an element's start
+_IN_FORMULAS = {"\\": r"\backslash ", "~": r"\sim ", "^": r"\wedge "}
+_IN_TEXT = {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
+
+
 def latex_name(path: Path) -> str:
     r"""The name of a junction: ``joint.q_r`` is q_{r, \mathrm{joint}}."""
     *owner, last = path
@@ -144,15 +148,21 @@ def latex_name(path: Path) -> str:
     digits = len(base) - len(base.rstrip("0123456789"))
     if not index and digits and digits < len(base):
         base, index = base[:-digits], base[-digits:]
-    base = base if len(base) == 1 else rf"\mathit{{{base}}}"
-    subscripts = [index.replace("_", ",")] if index else []
+    base = escaped(base) if len(base) == 1 else rf"\mathit{{{escaped(base)}}}"
+    subscripts = [escaped(index.replace("_", ","))] if index else []
     if owner:
-        subscripts.append(rf"\mathrm{{{'.'.join(owner)}}}".replace("_", r"\_"))
+        subscripts.append(rf"\mathrm{{{escaped('.'.join(owner))}}}")
     return f"{base}_{{{', '.join(subscripts)}}}" if subscripts else base
 
 
 def _label(path: Path) -> str:
-    return rf"\mathrm{{{path}}}".replace("_", r"\_")
+    return rf"\mathrm{{{escaped(str(path))}}}"
+
+
+def escaped(name: str, *, formula: bool = True) -> str:
+    """A name for the inside of a formula, or for text beside it: whatever its letters, LaTeX sets and obeys none."""
+    spelled = _SPELLED | (_IN_FORMULAS if formula else _IN_TEXT)
+    return "".join(spelled.get(letter, letter) for letter in name)
 
 
 def _beside(name: str, subscript: str) -> str:

@@ -17,7 +17,7 @@ from ephs.show.charts.outcomes import Outcome
 from ephs.show.charts.peers import PEERS
 from ephs.show.charts.runs import Ending, Setting
 from ephs.show.charts.stability import Cell
-from ephs.show.figures import new_figure
+from ephs.show.figures import new_figure, plain
 from ephs.show.palette import BLACK, BLUE, GREEN, GREY, INK, ORANGE, PURPLE, RED, SKY
 from ephs.show.plots import STYLE
 
@@ -82,7 +82,7 @@ def draw_work_precision(points: Sequence[Point], title: str, folder: Path, name:
             right.plot([min(asked), max(asked)], [min(asked), max(asked)], color=GREY, linewidth=0.8, zorder=0.5)
             right.invert_xaxis()
         left.set_ylabel("error at the end [m, 1]")
-        left.set_title(title, loc="left")
+        left.set_title(plain(title), loc="left")
         _failures(right, series)
         handles, labels = left.get_legend_handles_labels()
         extra, said = middle.get_legend_handles_labels()

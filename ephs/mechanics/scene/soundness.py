@@ -1,0 +1,132 @@
+"""Scenes from result files: whether everything has the type, shape and size that the rest takes for granted.
+
+Scene files are checked as they are read, key by key; a result file holds what was a scene once, unless it was changed.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+from warnings import warn
+
+import numpy as np
+
+from ephs.mechanics.scene.errors import ModelWarning, legible
+from ephs.mechanics.scene.geometry import UNIVERSAL, coupling, joint_types
+from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Joint, Scene
+from ephs.operad import Path as Name
+
+__all__ = ["check_scene", "meshes_within"]
+
+
+def check_scene(scene: Scene) -> None:
+    """Look at everything of a scene.
+
+    Raises
+    ------
+    ValueError
+        Something is not what scenes have.
+    """
+    for name, sizes in _shapes(scene):
+        for key, (value, shape) in sizes.items():
+            array = np.asarray(value)
+            if array.shape != shape or array.dtype.kind not in "iuf" or not np.isfinite(array).all():
+                raise ValueError(f"{legible(name)}.{key} is {legible(str(value))}, expected finite numbers {shape}")
+    _check_names(scene)
+    bodies = {GROUND, *(name for name, _ in scene.all_bodies())}
+    nodes = {ENVIRONMENT, *(name for name, _ in scene.all_thermal())}
+    for kind, known, named in (
+        ("body", bodies, [end for _, j in (*scene.all_joints(), *scene.all_springs()) for end in (j.body1, j.body2)]),
+        ("body", bodies, [marker.body for _, marker in scene.all_markers()]),
+        ("thermal node", nodes, [each.heat for _, each in (*scene.all_joints(), *scene.all_springs())]),
+        ("thermal node", nodes, [end for _, each in scene.all_conduction() for end in each.between]),
+    ):
+        for name in named:
+            if name not in known:
+                raise ValueError(f"there is no {kind} {legible(str(name))}")
+
+
+def meshes_within(scene: Scene, homes: Iterable[Path]) -> Scene:
+    """The scene without the meshes that lie neither in one of these folders nor below."""
+    folders, lost = [home.resolve() for home in homes], list[str]()
+
+    def near(shape: Mapping[str, Any] | None) -> bool:
+        if not shape or "mesh" not in shape:
+            return True
+        file = Path(str(shape["mesh"])).resolve()
+        if any(file.is_relative_to(folder) for folder in folders):
+            return True
+        lost.append(str(file))
+        return False
+
+    def kept(scene: Scene) -> Scene:
+        bodies = {
+            name: replace(body, shape=body.shape if near(body.shape) else None, shapes=tuple(filter(near, body.shapes)))
+            for name, body in scene.bodies.items()
+        }
+        return replace(scene, bodies=bodies, parts={name: kept(part) for name, part in scene.parts.items()})
+
+    found = kept(scene)
+    if lost:
+        files = ", ".join(map(legible, sorted(set(lost))))
+        warn(f"meshes outside of the file's folder and the working folder are not drawn: {files}", ModelWarning, 2)
+    return found if lost else scene
+
+
+def _shapes(scene: Scene) -> Iterator[tuple[str, dict[str, tuple[Any, tuple[int, ...]]]]]:
+    """Every number with the shape that it ought to have."""
+    w = scene.world
+    yield "world", {"gravity": (w.gravity, (3,)), "temperature": (w.temperature, ()), "pressure": (w.pressure, ())}
+    for name, body in scene.all_bodies():
+        yield (
+            name,
+            {
+                "mass": (body.mass, ()),
+                "inertia": (body.inertia, (3, 3)),
+                "pose": (body.pose, (7,)),
+                "twist": (body.twist, (6,)),
+            },
+        )
+    for name, j in scene.all_joints():
+        if j.kind not in joint_types():
+            raise ValueError(f"joint {legible(name)} is of the kind {legible(str(j.kind))}")
+        yield name, _joint(j)
+    for name, s in scene.all_springs():
+        numbers = {"stiffness": s.stiffness, "length": s.length, "damping": s.damping}
+        yield name, {"at1": (s.at1, (3,)), "at2": (s.at2, (3,))} | {key: (x, ()) for key, x in numbers.items()}
+    for name, node in scene.all_thermal():
+        yield name, {"capacity": (node.capacity, ()), "temperature": (node.temperature, ())}
+    for name, conduction in scene.all_conduction():
+        yield name, {"conductance": (conduction.conductance, ())}
+    for name, marker in scene.all_markers():
+        yield name, {"at": (marker.at, (3,))}
+
+
+def _joint(j: Joint) -> dict[str, tuple[Any, tuple[int, ...]]]:
+    of = coupling(j.kind, float(j.pitch))
+    if (j.kind == UNIVERSAL) != (j.middle is not None):
+        raise ValueError(f"{legible(j.name)}.middle is {legible(str(j.middle))}; universal joints have one, no others")
+    d = of.dim
+    return {
+        "pitch": (j.pitch, ()),
+        "frame1": (j.frame1, (7,)),
+        "frame2": (j.frame2, (7,)),
+        "friction": (j.friction, (d, d)),
+        "stiffness": (j.stiffness, (d,)),
+        "rest": (j.rest, (d,)),
+        "drive": (j.drive, (d,)),
+        "rate": (j.rate, (d,)),
+        "coordinate": (j.coordinate, (of.size,)),
+        "motion": (0.0 if j.motion is None else j.motion, ()),
+        **({} if j.middle is None else {"middle": (j.middle, (7,))}),
+    }
+
+
+def _check_names(scene: Scene) -> None:
+    for things in (scene.bodies, scene.joints, scene.springs, scene.thermal, scene.conduction, scene.markers):
+        for name, thing in things.items():
+            if Name([name]) != (thing.name,):
+                raise ValueError(f"{legible(name)} is called {legible(str(thing.name))}")
+    for name, part in scene.parts.items():
+        Name([name])
+        _check_names(part)

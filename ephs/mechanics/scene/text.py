@@ -1,0 +1,36 @@
+"""The text of a file that nobody vouches for: a regular file of moderate size, in UTF-8."""
+
+from pathlib import Path
+
+from ephs.mechanics.scene.errors import Fault, fault
+
+__all__ = ["MESHES", "file_text"]
+
+MESHES = (".stl", ".obj", ".ply", ".glb", ".off")
+"""Endings of files with a surface; of these, none unpacks an archive."""
+
+
+def file_text(path: Path, faults: list[Fault], key: str = "", most_mb: float = 10.0) -> str | None:
+    """The text of a file, without a byte-order mark; None, with a fault at ``key``, where it has none.
+
+    What is no regular file is not opened: a pipe or a device might never end.
+    """
+    try:
+        if not path.exists():
+            faults.append(fault("no file", key, "no file of this name"))
+            return None
+        if not path.is_file():
+            faults.append(fault("not readable", key, "a folder" if path.is_dir() else "a pipe or a device"))
+            return None
+        size = path.stat().st_size / 1e6
+        if size > most_mb:
+            faults.append(fault("size", key, f"{size:.0f} MB", most=most_mb))
+            return None
+        return path.read_bytes().decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        faults.append(fault("encoding", key, f"byte {error.start} that is none"))
+    except OSError as error:
+        faults.append(fault("not readable", key, error.strerror or "an error of the system"))
+    except ValueError:  # a name with a zero byte
+        faults.append(fault("no file", key, "a name that no file can have"))
+    return None

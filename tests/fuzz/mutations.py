@@ -1,0 +1,280 @@
+"""One input from a seed and a number: a text, changed in its bytes, its tokens or its structure."""
+
+import json
+import re
+import tomllib
+from collections.abc import Callable, Iterator, MutableMapping, MutableSequence
+from copy import deepcopy
+from functools import cache
+from random import Random
+from typing import Any
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+from tests.fuzz.words import SPLINTERS, number, text, value
+
+__all__ = ["KINDS", "mutated"]
+
+KINDS = {"toml": 0.28, "json": 0.32, "text": 0.16, "urdf": 0.08, "sdf": 0.08, "xml": 0.08}
+"""How often a kind of input is drawn."""
+MOST = 100_000
+"""Bytes of an input: many small ones find more than few large ones."""
+TOKENS = re.compile(rb"[A-Za-z_][\w.-]*|[-+]?[\d.]+(?:[eE][-+]?\d+)?|\s+|.", re.DOTALL)
+
+
+def mutated(seed: int | str, count: int, texts: dict[str, list[str]]) -> tuple[str, bytes]:
+    """The kind and the bytes of input ``count``; the same for the same seed."""
+    random = Random(f"{seed}/{count}")
+    kind = random.choices(list(KINDS), list(KINDS.values()))[0]
+    source = random.choice(texts[kind])
+    other = random.choice(texts[kind])
+    if kind != "text" and random.random() < 0.7:
+        try:
+            found = STRUCTURES[kind](source, other, random)
+        except RecursionError:  # too deep to be written
+            found = None
+        found = None if found is not None and len(found) > MOST else found
+    else:
+        found = source.encode()
+    if found is None or kind == "text" or random.random() < 0.3:
+        found = _flat(found or source.encode(), other.encode(), random)
+    return kind, found[:MOST]
+
+
+def _times(random: Random) -> range:
+    """How many changes: mostly few, so that something of the input stays whole."""
+    return range(random.choice((1, 1, 1, 1, 2, 2, 3, 8)))
+
+
+# ---- bytes and tokens --------------------------------------------------------------------------------------------
+
+
+def _flat(found: bytes, other: bytes, random: Random) -> bytes:
+    if random.random() < 0.5:
+        data = bytearray(found)
+        for _ in _times(random):
+            at = random.randint(0, len(data))
+            match random.randint(0, 4):
+                case 0 if data:
+                    data[at % len(data)] = random.randint(0, 255)
+                case 1 if data:
+                    data[at % len(data)] ^= 1 << random.randint(0, 7)
+                case 2:
+                    data[at : at + random.randint(0, 30)] = random.choice(SPLINTERS)
+                case 3:
+                    end = at + random.randint(1, 200)
+                    data[at:at] = data[at:end] * random.choice((1, 1, 2, 50))
+                case _:
+                    data[at:] = other[random.randint(0, len(other)) :]
+        return bytes(data)
+    tokens = TOKENS.findall(found) or [b""]
+    others = TOKENS.findall(other) or [b""]
+    for _ in _times(random):
+        at, there = random.randrange(len(tokens)), random.randrange(len(tokens))
+        match random.randint(0, 6):
+            case 0:
+                tokens[at] = random.choice(tokens)
+            case 1:
+                tokens[at], tokens[there] = tokens[there], tokens[at]
+            case 2:
+                tokens[at] = str(number(random)).encode()
+            case 3:
+                tokens[at] = random.choice(SPLINTERS)
+            case 4:
+                tokens[at] = random.choice(others)
+            case 5:
+                tokens.insert(at, random.choice(others))
+            case _:
+                del tokens[at : at + random.randint(1, 5)]
+                tokens = tokens or [b""]
+    return b"".join(tokens)
+
+
+# ---- trees of tables and lists -----------------------------------------------------------------------------------
+
+
+def _places(tree: Any) -> Iterator[tuple[Any, Any]]:
+    """Every (holder, key) below a table or a list."""
+    waiting = [tree]
+    while waiting:
+        holder = waiting.pop()
+        if isinstance(holder, dict | list):
+            keys = list(holder) if isinstance(holder, dict) else list(range(len(holder)))
+            for key in keys:
+                yield holder, key
+                waiting.append(holder[key])
+
+
+def _rebuilt(tree: Any, other: Any, random: Random) -> Any:
+    for _ in _times(random):
+        places, others = list(_places(tree)), list(_places(other))
+        if not places:
+            return value(random)
+        holder, key = random.choice(places)
+        second, there = random.choice(places)
+        old = holder[key]
+        match random.randint(0, 13):
+            case 0:
+                del holder[key]
+            case 1 | 2:
+                holder[key] = value(random)
+            case 3 | 4:
+                holder[key] = _near(old, random)
+            case 5:
+                holder[key], second[there] = deepcopy(second[there]), deepcopy(old)
+            case 6:
+                holder[key] = deepcopy(second[there])
+            case 7 if others:
+                place, name = random.choice(others)
+                holder[key] = deepcopy(place[name])
+            case 8 if isinstance(holder, dict):
+                _renamed(holder, key, text(random) if random.random() < 0.5 else str(there))
+            case 9 if isinstance(holder, dict):
+                holder[text(random) if random.random() < 0.5 else str(there)] = deepcopy(old)
+            case 10:
+                for _ in range(random.choice((1, 1, 2, 20, 80))):
+                    holder[key] = [holder[key]] if random.random() < 0.5 else {"a": holder[key]}
+            case 11 if isinstance(old, list):
+                holder[key] = (old * random.choice((2, 3, 100)))[: random.choice((1, 2, 4, 5, 7, 200))]
+            case 12 if isinstance(old, dict):
+                for count in range(random.choice((2, 2, 5, 20))):
+                    holder[f"{key}{count}" if isinstance(holder, dict) else key] = deepcopy(old)
+            case _:
+                names = [k for place, k in places if isinstance(k, str) and isinstance(place[k], dict)]
+                holder[key] = random.choice(names) if names else text(random)
+    return tree
+
+
+def _near(old: Any, random: Random) -> Any:
+    """A value of the same type."""
+    if isinstance(old, bool) or old is None:
+        return random.choice((True, False))
+    if isinstance(old, int | float):
+        return random.choice((-old, 2 * old, old / 3 if abs(old) < 1e300 else 1.0, number(random), number(random)))
+    if isinstance(old, str):
+        return random.choice((text(random), old + text(random), old[:-1], old.upper()))
+    if isinstance(old, list):
+        return random.choice((old[::-1], old[:-1], old + old[-1:], [], [number(random) for _ in old]))
+    return random.choice(({}, dict(list(old.items())[:-1]), {"position": [number(random) for _ in range(3)]}))
+
+
+def _renamed(holder: MutableMapping[Any, Any], key: Any, new: str) -> None:
+    entries = [(new if name == key else name, entry) for name, entry in holder.items()]
+    holder.clear()
+    holder.update(entries)
+
+
+def toml(tree: Any) -> str:
+    """Tables as TOML, those below the first level within the line; what is no table or no TOML, as it comes."""
+    if not isinstance(tree, dict):
+        return f"format = {_inline(tree)}\n"
+    return "".join(f"{_quoted(key)} = {_inline(entry)}\n" for key, entry in tree.items())
+
+
+def _inline(entry: Any) -> str:
+    if isinstance(entry, dict):
+        return "{ " + ", ".join(f"{_quoted(key)} = {_inline(inner)}" for key, inner in entry.items()) + " }"
+    if isinstance(entry, list):
+        return "[" + ", ".join(map(_inline, entry)) + "]"
+    if isinstance(entry, bool):
+        return "true" if entry else "false"
+    return _quoted(entry) if isinstance(entry, str) else _digits(entry)
+
+
+def _quoted(word: Any) -> str:
+    return json.dumps(str(word), ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _digits(entry: Any) -> str:
+    return repr(entry) if isinstance(entry, float) or abs(entry) < 10**300 else "1" + "0" * 400
+
+
+@cache
+def _toml_tree(source: str) -> Any:
+    return tomllib.loads(source)
+
+
+def _of_toml(source: str, other: str, random: Random) -> bytes | None:
+    try:
+        tree, second = deepcopy(_toml_tree(source)), _toml_tree(other)
+    except tomllib.TOMLDecodeError:
+        return None
+    return toml(_rebuilt(tree, second, random)).encode("utf-8", "surrogatepass")
+
+
+def _of_json(source: str, other: str, random: Random) -> bytes | None:
+    tree = _rebuilt(json.loads(source), json.loads(other), random)
+    return json.dumps(tree, ensure_ascii=False).encode("utf-8", "surrogatepass")
+
+
+# ---- XML ---------------------------------------------------------------------------------------------------------
+
+
+def _of_xml(source: str, other: str, random: Random) -> bytes | None:
+    try:
+        root, second = ElementTree.fromstring(source), ElementTree.fromstring(other)
+    except ElementTree.ParseError:
+        return None
+    others = list(second.iter())
+    for _ in _times(random):
+        every = list(root.iter())
+        element, another = random.choice(every), random.choice(every)
+        parents = {child: parent for parent in every for child in parent}
+        match random.randint(0, 12):
+            case 0 | 1 | 2 if element.attrib:
+                name = random.choice(list(element.attrib))
+                element.set(name, _word(element.attrib[name], random))
+            case 3 if element.attrib:
+                del element.attrib[random.choice(list(element.attrib))]
+            case 4:
+                names = [name for each in (*every, *others) for name in each.attrib]
+                element.set(random.choice(names or ["name"]), _word("", random))
+            case 5 | 6:
+                element.text = _word(element.text or "", random)
+            case 7 if element in parents:
+                parents[element].remove(element)
+            case 8 if element in parents:
+                parents[element].insert(random.randint(0, 5), deepcopy(element))
+            case 9:
+                another.append(deepcopy(random.choice(others)))
+            case 10:
+                element.tag = random.choice((*every, *others)).tag if random.random() < 0.8 else "a"
+            case 11 if another.attrib and element.attrib:  # the name of something else
+                element.set(random.choice(list(element.attrib)), random.choice(list(another.attrib.values())))
+            case _:
+                _nested(element, random)
+    return ElementTree.tostring(root, encoding="unicode").encode("utf-8", "surrogatepass")
+
+
+def _word(old: str, random: Random) -> str:
+    """A text, or numbers in the place of numbers; XML has no control characters."""
+    words = old.split()
+    match random.randint(0, 3):
+        case 0 if words:
+            words[random.randrange(len(words))] = str(number(random))
+            found = " ".join(words)
+        case 1:
+            found = " ".join(str(number(random)) for _ in range(random.choice((1, 2, 3, 4, 6, 7, 300))))
+        case _:
+            found = text(random)
+    return re.sub(r"[\x00-\x08\x0b\x0c\x0e-\x1f]", "", found)
+
+
+def _nested(element: Element, random: Random) -> None:
+    """Put copies of an element's content into it, deeper and deeper."""
+    depth = random.choice((1, 3, 3, 20, 190, 300))
+    inner: MutableSequence[Any] = list(element)[:2] if depth < 20 else []
+    place = element
+    for _ in range(depth):
+        place = ElementTree.SubElement(place, element.tag, dict(element.attrib))
+        for child in inner:
+            place.append(deepcopy(child))
+
+
+STRUCTURES: dict[str, Callable[[str, str, Random], bytes | None]] = {
+    "toml": _of_toml,
+    "json": _of_json,
+    "urdf": _of_xml,
+    "sdf": _of_xml,
+    "xml": _of_xml,
+}
