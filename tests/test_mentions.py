@@ -16,6 +16,7 @@ TEXTS = [ROOT / f"{name}.md" for name in ("README", "CONTRIBUTING", "STYLE")] + 
 MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
 TARGETS = set(re.findall(r"^([a-z]+):", MAKEFILE, re.MULTILINE))
 HOUSE = "ephs|docs|tests|tests_real|benchmarks|examples|scenes"
+TOP = r"[A-Z]+\.md|Makefile|CITATION\.cff|pyproject\.toml"
 MADE = ("docs/_build",)
 """What is not in the tree, but made by a command that the text names."""
 WRONG = {"ephs rnu scenes/mbs.toml --until 1"}
@@ -60,7 +61,7 @@ def faults(text: str, folder: Path = ROOT) -> list[str]:
     links = re.findall(r"\]\(([\w./-]+)(?:#[\w-]+)?\)", text)
     found += [link for link in links if not (folder / link).exists()]
     for word in code_of(text):
-        path = re.fullmatch(rf"((?:{HOUSE})/[\w./-]+|[A-Z]+\.md|Makefile|CITATION\.cff|pyproject\.toml)(?:::?\w+)?", word)
+        path = re.fullmatch(rf"((?:{HOUSE})/[\w./-]+|{TOP})(?:::?\w+)?", word)
         if path and "NAME" not in path[1] and not path[1].startswith(MADE) and not (ROOT / path[1]).exists():
             found.append(path[1])
         name = re.fullmatch(r"(ephs(?:\.\w+)+)(?:\(.*\))?", word)
