@@ -1,7 +1,8 @@
 """``python -m benchmarks.quick [--update]``: the quick set, held against `baseline.json`.
 
 Every case is repeated in several processes, in an order that is drawn anew each time, so that what else the machine
-does falls on all alike; the least counts. What looks slower is measured once more, beside cases that do not, and named
+does falls on all alike. The processor's time is taken, which does not run while others have the processor; the least
+counts. What looks slower is measured once more, beside cases that do not, and named
 only if it looks so again. Exit code 0: nothing got slower. 1: something did, or could not be measured. 2: bad input.
 """
 
@@ -9,6 +10,7 @@ import gc
 import json
 import platform
 import random
+import resource
 import sys
 import time
 from collections.abc import Collection, Mapping, Sequence
@@ -28,7 +30,7 @@ HERE = Path(__file__).parent
 BASELINE, OUT = HERE / "baseline.json", HERE.parent / "out" / "bench.json"
 PROCESSES, ROUNDS = 4, 3
 BLOCK, LONG, FIRST = 0.04, 0.25, 1.0
-"""Seconds that a measurement takes at least: shorter work is repeated. Work longer than LONG is measured once a
+"""Seconds that a measurement takes at least, nearly: shorter work is repeated. Work longer than LONG is measured once a
 process, and done once before where that takes longer than FIRST, else twice."""
 LIMIT = 900.0
 """Seconds for a process; the first one of an installation compiles."""
@@ -64,18 +66,25 @@ def measure(names: Sequence[str], rounds: int, seed: int) -> dict[str, Any]:
         some = [name for name in works if number == 0 or once[name] < LONG]
         for name in draw.sample(some, len(some)):
             count = max(1, int(BLOCK / once[name]))
-            gc.collect()
-            gc.disable()
-            seconds = sum(works[name]() for _ in range(count)) / count
-            gc.enable()
-            found["seconds"].setdefault(name, []).append(seconds)
+            found["seconds"].setdefault(name, []).append(_took(works[name], count))
     return found
 
 
-def _took(work: Work) -> float:
-    begin = time.perf_counter()
-    work()
-    return time.perf_counter() - begin
+def _took(work: Work, count: int = 1) -> float:
+    """Seconds of a processor that work takes in the mean, its own processes included."""
+    gc.collect()
+    gc.disable()
+    begin = _spent()
+    for _ in range(count):
+        work()
+    spent = _spent() - begin
+    gc.enable()
+    return max(spent / count, 1e-9)
+
+
+def _spent() -> float:
+    ended = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return time.process_time() + ended.ru_utime + ended.ru_stime
 
 
 def look(names: Collection[str], seed: int = 0) -> tuple[dict[str, Timing], dict[str, dict[str, str]]]:

@@ -330,6 +330,7 @@ def _dissipates(mu: Array) -> bool:
     return not mu.any() or (np.array_equal(mu, mu.T) and float(np.linalg.eigvalsh(mu)[0]) >= 0.0)
 
 
+@cache
 def ground(of: Quantity = quantity.body_momentum) -> Reversible:
     """A frame that stands still: e = 0, f = λ; port p."""
     n = of.space.dim

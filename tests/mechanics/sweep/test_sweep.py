@@ -119,6 +119,17 @@ def test_what_two_paths_change_together_is_built_in_full(tmp_path):
             assert np.allclose(ensemble.image(values), ensemble._built(values), rtol=1e-12, atol=1e-12)
 
 
+@pytest.mark.parametrize("span", [(1.0, 2.0), (1.0, 1.0001), (0.01, 10.0)])
+@pytest.mark.parametrize("path", ["bodies.rod1.mass", "joints.j0.coordinate", "joints.j0.friction"])
+def test_three_members_say_what_all_of_a_path_are(path, span):
+    scene = ephs.load(CHAIN)
+    axes = Axes.of({path: np.linspace(*span, 20)}, paired=False)
+    ensemble = Ensemble(scene, axes, 0.0, 0.1, TIMES, {}, outputs_of(scene, None))
+    assert ensemble._courses  # a start is a number, too
+    for values in axes.members[::4]:
+        assert np.allclose(ensemble.image(values), ensemble._built(values), rtol=1e-12, atol=1e-12)
+
+
 def test_careful_steps_of_a_member_have_its_own_numbers():
     """Where constraints nearly repeat each other dense sweeps take over, which read other tables than the engine."""
     scene = ephs.load(SCENES / "four-bar.toml")
