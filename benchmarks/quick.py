@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks import process
-from benchmarks.memory import EVERYTHING, Timing, Verdict, compare, in_both, timing
+from benchmarks.verdict import EVERYTHING, Timing, Verdict, compare, in_both, timing
 from benchmarks.quick_cases import CASES, OTHERS, Work
 from ephs.show.charts.peer_scene import PeerError
 

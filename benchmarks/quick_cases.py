@@ -205,7 +205,7 @@ CASES: Mapping[str, Callable[[], Work]] = {
     "step the slider-crank, with friction and heat": _friction,
     "step a circuit of 200 cells": _ladder(500),
     "sweep 50 starts": _sweep("joints.j0.coordinate", 50),
-    "sweep 10 masses": _sweep("bodies.rod0.mass", 10),
+    "sweep 50 masses": _sweep("bodies.rod0.mass", 50),
     "flatten 10 000 boxes": _flatten,
     "order 3 000 boxes": _normal_form,
     "compare 100 boxes up to names": _isomorphism,

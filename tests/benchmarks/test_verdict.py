@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from benchmarks import quick
-from benchmarks.memory import EVERYTHING, SLOWER, Timing, compare, in_both, timing
+from benchmarks.verdict import EVERYTHING, SLOWER, Timing, compare, in_both, timing
 
 NAMES = [f"case {k}" for k in range(9)]
 seconds = st.floats(1e-6, 1e3)
