@@ -20,8 +20,8 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks import process
-from benchmarks.verdict import EVERYTHING, Timing, Verdict, compare, in_both, timing
 from benchmarks.quick_cases import CASES, OTHERS, Work
+from benchmarks.verdict import EVERYTHING, Timing, Verdict, compare, in_both, timing
 from ephs.show.charts.peer_scene import PeerError
 
 __all__ = ["main", "measure"]
