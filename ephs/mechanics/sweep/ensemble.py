@@ -8,6 +8,7 @@ members built in full; where they do not hold, every member is.
 
 import threading
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any, final
@@ -132,11 +133,11 @@ class Ensemble:
         if self._options.pop("form", "reduced") != "reduced" or set(self._options) - _STEERING:
             raise Unlike
         self._times = times_of(save_at, t0, until)
-        self._first = [float(found[0]) for found in axes.values]
+        self._last = [float(found[-1]) for found in axes.values]  # the first may be 0, where a part is missing
         self._lock = threading.Lock()
         self._own = threading.local()
         self._along: dict[tuple[int, float], Array] = {}
-        base = self._made(self._first)
+        base = self._made(self._last)
         if self._stepper(base.equations) is None:
             raise Unlike
         self._base, self._counts, self._sizes = base.image(), base.counts(), [a.size for a in base.arrays()]
@@ -169,22 +170,40 @@ class Ensemble:
     def _look(self) -> None:
         """See how paths change the image: each for itself, in straight lines, or all together."""
         values = self._axes.values
-        ends = [[self._one(i, float(end)) for end in (found.min(), found.max())] for i, found in enumerate(values)]
-        touched = [np.any([self._apart(end, self._base) for end in both], axis=0) for both in ends]
+        ends = [
+            (self._end(i, np.unique(found)), self._end(i, np.unique(found)[::-1])) for i, found in enumerate(values)
+        ]
+        touched = [np.any([self._apart(end, self._base) for _, end in both], axis=0) for both in ends]
         if any(np.any(one & other) for one, other in combinations(touched, 2)):
             self._whole = True
             return
         for i, (found, (low, high)) in enumerate(zip(values, ends, strict=True)):
             if np.unique(found).size > STRAIGHT:
-                course = self._course(i, float(found.min()), float(found.max()), low, high, touched[i])
+                course = self._course(i, low, high, touched[i])
                 inner = np.sort(found)[[found.size // 5, found.size // 2, (4 * found.size) // 5]]
                 if all(self._same(course(x), self._built(self._single(i, x))) for x in inner.tolist()):
                     self._courses[i] = course
         members = self._axes.members
         chosen = np.unique(np.linspace(0, len(members) - 1, 4).astype(int))
-        self._whole = not all(self._same(self.image(members[k]), self._built(members[k])) for k in chosen)
+        self._whole = not all(self._holds(members[k]) for k in chosen)
 
-    def _course(self, axis: int, low: float, high: float, first: Array, last: Array, touched: Array) -> _Course:
+    def _end(self, axis: int, values: Array) -> tuple[float, Array]:
+        """The first of some values whose member is like the others, and its image; the very first may not be."""
+        value = float(values[0])
+        with suppress(Unlike):
+            return value, self._one(axis, value)
+        value = float(values[min(1, values.size - 1)])
+        return value, self._one(axis, value)
+
+    def _holds(self, values: Array) -> bool:
+        """Whether a member is as it was put together, or has to be run on its own."""
+        try:
+            return self._same(self.image(values), self._built(values))
+        except Unlike:
+            return True
+
+    def _course(self, axis: int, least: tuple[float, Array], most: tuple[float, Array], touched: Array) -> _Course:
+        (low, first), (high, last) = least, most
         middle = 0.5 * (low + high)
         straight = _Course(low, middle, high, first, np.where(touched, last - first, 0.0), np.zeros_like(first))
         if low <= 0.0 <= high:
@@ -195,8 +214,9 @@ class Ensemble:
 
     def _one(self, axis: int, value: float) -> Array:
         """The image where one path alone is varied."""
-        if axis in self._courses:
-            return self._courses[axis](value)
+        course = self._courses.get(axis)
+        if course is not None and course.low <= value <= course.high:
+            return course(value)
         with self._lock:
             found = self._along.get((axis, value))
         if found is None:
@@ -206,7 +226,7 @@ class Ensemble:
         return found
 
     def _single(self, axis: int, value: float) -> Array:
-        return np.array([*self._first[:axis], value, *self._first[axis + 1 :]])
+        return np.array([*self._last[:axis], value, *self._last[axis + 1 :]])
 
     def _built(self, values: Array) -> Array:
         made = self._made(values.tolist())
@@ -262,7 +282,7 @@ class Ensemble:
 
     def _threads_own(self) -> tuple[Equations, Any]:
         if not getattr(self._own, "ready", None):
-            equations = self._made(self._first).equations
+            equations = self._made(self._last).equations
             equations.start(self._t0)
             self._own.ready = equations, self._stepper(equations)
         return self._own.ready
