@@ -158,6 +158,48 @@ def test_a_case_that_fails_is_not_passed_over(files, monkeypatch, capsys):
     assert "failed: case 9: ValueError: x" in capsys.readouterr().out
 
 
+def test_what_is_measured_is_the_time_that_work_takes(monkeypatch):
+    """On a clock that only the work moves."""
+    clock = [0.0]
+
+    def taking(seconds):
+        def work():
+            clock[0] += seconds
+
+        return lambda: work
+
+    def absent():
+        raise ImportError("no peer")
+
+    def broken():
+        raise ValueError("no scene")
+
+    cases = {"short": taking(0.001), "long": taking(2.0), "absent": absent, "broken": broken}
+    monkeypatch.setattr(quick, "CASES", cases)
+    monkeypatch.setattr(quick, "_spent", lambda: clock[0])
+    found = quick.measure(list(cases), 3, 0)
+    assert found["seconds"]["short"] == pytest.approx([0.001] * 3) and found["seconds"]["long"] == pytest.approx([2.0])
+    assert found["absent"] == {"absent": "no peer"} and found["failed"] == {"broken": "ValueError: no scene"}
+    assert quick.measure(list(cases), 0, 0)["seconds"] == {}
+
+
+def test_looks_gather_what_processes_measured(monkeypatch):
+    calls = []
+
+    def run(call, _limit, failed):
+        calls.append(call)
+        if len(calls) == 3:
+            return {**failed, "failure": "killed"}
+        rounds = [] if len(calls) == 1 else [float(len(calls)), 9.0]
+        return {**failed, "seconds": {"a": rounds} if rounds else {}}
+
+    monkeypatch.setattr(quick.process, "run", run)
+    timings, without = quick.look(["a"])
+    assert len(calls) == quick.PROCESSES + 1 and len(set(calls)) == len(calls)
+    assert timings == {"a": timing([[2.0], [4.0], [5.0]])}
+    assert without["failed"] == {"the process": "killed"}
+
+
 def test_bad_words_are_told(capsys):
     assert quick.main(["--updat"]) == 2
     assert "--updat: expected" in capsys.readouterr().err
