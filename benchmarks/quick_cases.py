@@ -3,11 +3,13 @@
 A case is made once a process, with everything compiled; called, it does its work.
 """
 
+import atexit
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import mkdtemp
 
 import numpy as np
 
@@ -34,6 +36,13 @@ RUNS = {
 }
 """Constant step and time in s of the methods on one window of four bars, so that steps cost more than setting up; those
 that are not here choose their steps."""
+
+
+def _folder() -> Path:
+    """A folder that is there as long as the process is."""
+    folder = Path(mkdtemp())
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
 
 
 def _shipped(name: str) -> ephs.Scene:
@@ -84,9 +93,9 @@ def _set_up(count: int) -> Callable[[], Work]:
 
 
 def _load() -> Work:
-    folder = TemporaryDirectory()
-    Path(folder.name, "chain.toml").write_text(families.text(CHAIN, 64), encoding="utf-8")
-    return lambda: ephs.load(Path(folder.name, "chain.toml"))
+    file = _folder() / "chain.toml"
+    file.write_text(families.text(CHAIN, 64), encoding="utf-8")
+    return lambda: ephs.load(file)
 
 
 def _sweep(path: str, count: int) -> Callable[[], Work]:
@@ -152,15 +161,14 @@ def _solution() -> ephs.Solution:
 def _report() -> Work:
     from ephs.show.report import write_report
 
-    solution, folder = _solution(), TemporaryDirectory()
-    return lambda: write_report(solution, folder.name)
+    solution, folder = _solution(), _folder()
+    return lambda: write_report(solution, folder)
 
 
 def _save() -> Work:
-    solution, folder = _solution(), TemporaryDirectory()
+    solution, file = _solution(), _folder() / "solution.nc"
 
     def work() -> None:
-        file = Path(folder.name) / "solution.nc"
         solution.save(file)
         ephs.load_solution(file)
 
