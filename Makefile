@@ -15,13 +15,13 @@ export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
 .DELETE_ON_ERROR:
-.PHONY: help demo test real lint types docs bench fuzz fuzz-inputs mutate mutants clean
+.PHONY: help demo test real lint types docs bench tables fuzz fuzz-inputs mutate mutants clean
 
 help:
 	@echo 'make demo   simulate scenes/$(SCENE).toml and write out/$(SCENE)/report.html'
 	@echo 'make test   run the tests; make lint, make types: style and types; make fuzz: the laws, for long; make fuzz-inputs COUNT=N: so many broken files; make mutate: what goes red when the code is broken; make mutants: the same for the operad, by mutmut'
 	@echo 'make real   fetch real robots (131 MB) and hold their import against Pinocchio'
-	@echo 'make docs   build docs/_build/html; make bench: measure; make clean: remove what was built'
+	@echo 'make docs   build docs/_build/html; make bench: what got slower than benchmarks/baseline.json; make tables: all benchmarks; make clean: remove what was built'
 
 # One stamp an extra: installing again is needed only when pyproject.toml has changed.
 $(BIN)/python:
@@ -61,6 +61,9 @@ mutants: $(VENV)/.installed-mutants
 	$(BIN)/mutmut run --max-children $(CORES)
 
 bench: $(VENV)/.installed-dev
+	$(BIN)/python -m benchmarks.quick
+
+tables: $(VENV)/.installed-dev
 	$(BIN)/python -m benchmarks
 
 # MathJax is fetched once and copied into the pages, which then need no network.

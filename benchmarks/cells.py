@@ -4,10 +4,7 @@ IDA (package scikit-sundae, if it is installed) solves the ladder's equations wr
 given; it is the nearest peer in kind. Each row is measured in a process of its own, after one that fills the caches.
 """
 
-import json
 import math
-import subprocess
-import sys
 import time
 from importlib.util import find_spec
 from pathlib import Path
@@ -16,10 +13,13 @@ from typing import Any
 import numpy as np
 
 import ephs
+from benchmarks.process import run
 from ephs import Pattern, System, junction
 from ephs import library as lib
 from ephs import quantity as Q
 
+LIMIT = 600.0
+"""Seconds for a row."""
 SIZES = (100, 1_000, 10_000)
 CHARGE, FLUX, RESISTANCE = 1e-6, 1e-3, 1.0  # farad, henry, ohm of a cell
 STEP, STEPS = 1e-6, 50
@@ -117,8 +117,8 @@ def contest(cells: int) -> dict[str, float]:
 
 
 def _run(call: str) -> dict[str, float]:
-    code = f"from benchmarks.cells import *; import json; print(json.dumps({call}))"
-    return json.loads(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout)
+    keys = ("build", "setup", "step", "energy", "ida", "natural", "ida error", "natural error")
+    return run(f"benchmarks.cells:{call}", LIMIT, dict.fromkeys(keys, math.nan))
 
 
 def table(_out: Path | None = None) -> str:

@@ -3,20 +3,21 @@
 Each row is measured in a process of its own, so that its peak memory is its own.
 """
 
-import json
 import math
 import resource
-import subprocess
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
 
+from benchmarks.process import run
+from benchmarks.report import exponent
 from ephs.operad import Nesting, Pattern, junction, quantity
 
 SIZES = (100, 1_000, 10_000, 100_000)
 DEPTHS = {"2": 2, "5": 5, "log₂ n": 0}
 SHAPES = ("chain", "tree")
+LIMIT = 600.0
+"""Seconds for a row."""
 STEPS = ("nest", "flatten", "normal form", "equality")
 
 
@@ -69,16 +70,14 @@ def measure(shape: str, boxes: int, depth: int) -> dict[str, float]:
 
 
 def _run(shape: str, boxes: int, depth: int) -> dict[str, float]:
-    code = f"from benchmarks.size import measure; import json; print(json.dumps(measure({shape!r}, {boxes}, {depth})))"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    return json.loads(done.stdout)
+    nothing = dict.fromkeys((*STEPS, "boxes", "ports", "peak"), math.nan)
+    return run(f"benchmarks.size:measure({shape!r}, {boxes}, {depth})", LIMIT, nothing)
 
 
-def exponent(rows: list[dict[str, float]], step: str) -> float:
-    """Slope of log(seconds) over log(ports) from 10³ boxes on, by least squares."""
-    points = [(math.log(row["ports"]), math.log(row[step])) for row in rows if row["boxes"] > 500]
-    x, y = (sum(values) / len(points) for values in zip(*points, strict=True))
-    return sum((a - x) * (b - y) for a, b in points) / sum((a - x) ** 2 for a, _ in points)
+def _slope(rows: list[dict[str, float]], step: str) -> float:
+    """Slope of log(seconds) over log(ports) from 10³ boxes on."""
+    large = [row for row in rows if row["boxes"] > 500]
+    return exponent([row["ports"] for row in large], [row[step] for row in large])
 
 
 def table(out: Path | None = None) -> str:
@@ -96,7 +95,7 @@ def table(out: Path | None = None) -> str:
                 lines.append(f"| {shape} | {name} | {counts} | {times} | {row['peak']:.0f} |")
     lines += ["", "| shape, levels | exponent of flatten | of normal form | of equality |", "| --- " * 4 + "|"]
     for name, rows in series.items():
-        slopes = " | ".join(f"{exponent(rows, step):.2f}" for step in STEPS[1:])
+        slopes = " | ".join(f"{_slope(rows, step):.2f}" for step in STEPS[1:])
         lines.append(f"| {name} | {slopes} |")
     if out is not None:
         _chart(series, out)

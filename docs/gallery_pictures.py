@@ -127,7 +127,7 @@ def moving(
 
 
 def moving_scene(sol: Any, view: View | None = None) -> str:
-    """The motion of a scene's solution: bodies with a shape, springs as lines, joints as dots."""
+    """The motion of a solution with a scene: bodies with a shape, springs as lines, joints as dots."""
     scene = sol.scene
     bodies = []
     for name, body in scene.all_bodies():
@@ -145,12 +145,6 @@ def moving_scene(sol: Any, view: View | None = None) -> str:
         if name != "ground"
     ]
     return moving(bodies, ends, [at for _, at in joints], links, view=view, seconds=float(sol.t[-1] - sol.t[0]))
-
-
-def moving_system(sol: Any, scene: Any, prefix: str, view: View | None = None) -> str:
-    """The motion of a scene's bodies inside a larger system, read from the states below a path."""
-    bodies = [(sol[f"{prefix}.bodies.{name}.pe.q"], body.shape) for name, body in scene.bodies.items() if body.shape]
-    return moving(bodies, view=view, seconds=float(sol.t[-1] - sol.t[0]))
 
 
 def sliding(place: np.ndarray, size: Sequence[float], *, seconds: float, walls: Sequence[float], springs: bool) -> str:

@@ -2,10 +2,13 @@
 
 import html
 from collections.abc import Callable
+from functools import partial
+from importlib import import_module
 from typing import Any
 
-from gallery_pictures import View, moving_scene, moving_system, sliding
+from gallery_pictures import View, moving_scene, sliding
 
+from ephs.mechanics.inside import Inside
 from examples.gallery import UNTIL, entries
 
 ENTRIES = entries()
@@ -39,21 +42,17 @@ def _cylinder(sol: Any) -> str:
     return sliding(2.0 * sol["gas1.v"], (0.06, 0.6, 0.6), seconds=float(sol.t[-1]), walls=(0.0, 2.0), springs=False)
 
 
-def _engine(module: str) -> Callable[[Any], str]:
-    def show(sol: Any) -> str:
-        from importlib import import_module
-
-        return moving_system(sol, import_module(f"examples.{module}").scene, "engine", View(-80.0, 15.0))
-
-    return show
+def _engine(module: str, sol: Any) -> str:
+    engine = Inside(sol, "engine", import_module(f"examples.{module}").scene)
+    return moving_scene(engine, VIEWS["slider-crank"])
 
 
 SYSTEMS: dict[str, Callable[[Any], str]] = {
     "oscillator": _oscillator,
     "damped oscillator": _oscillator,
     "two gases": _cylinder,
-    "motor and crank": _engine("motor_crank"),
-    "gas engine": _engine("gas_engine"),
+    "motor and crank": partial(_engine, "motor_crank"),
+    "gas engine": partial(_engine, "gas_engine"),
 }
 
 

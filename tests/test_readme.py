@@ -29,10 +29,3 @@ def test_a_failing_block_is_found_at_its_line():
         execute(text, "some.md")
     last = traceback.extract_tb(caught.tb)[-1]
     assert (last.filename, last.lineno) == ("some.md", 11)
-
-
-def test_links_lead_somewhere():
-    root = README.parent
-    for target in re.findall(r"`((?:docs|examples|scenes)/[\w./-]+|STYLE\.md|CITATION\.cff)`", README.read_text()):
-        built = target.startswith("docs/_build")
-        assert built or (root / target).exists(), target

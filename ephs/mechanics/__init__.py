@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from ephs.mechanics.bodies import body_pattern as body_pattern
     from ephs.mechanics.bodies import rigid_body as rigid_body
+    from ephs.mechanics.inside import Inside as Inside
     from ephs.mechanics.joints import joint as joint
     from ephs.mechanics.joints import joint_pattern as joint_pattern
     from ephs.mechanics.joints import mbs_pattern as mbs_pattern
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from ephs.mechanics.joints import universal_joint as universal_joint
 
 _HOME = {
+    "Inside": "ephs.mechanics.inside",
     "joint": "ephs.mechanics.joints",
     "body_pattern": "ephs.mechanics.bodies",
     "rigid_body": "ephs.mechanics.bodies",

@@ -1,4 +1,4 @@
-"""Pictures: of patterns, of motions, of ledgers. Knows all other rooms, and none of them knows it.
+"""Pictures: of patterns, of motions, of ledgers. Values show themselves by it, through doors.
 
 matplotlib, drawsvg, Graphviz and viser are imported where they are used, not here.
 """

@@ -2,13 +2,14 @@
 
 What a member's tables and start hold is its *image*: all their numbers in one row. Where the numbers that one path
 changes are none that another one does, the image of a member is put together from images along each path; where they
-follow a path's value in a straight line, two images say all others. Both are checked on members built in full; where
-they do not hold, every member is.
+follow a path's value in a straight line, or as its inverse does, three images say all others. Both are checked on
+members built in full; where they do not hold, every member is.
 """
 
 import threading
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any, final
 
@@ -35,7 +36,7 @@ __all__ = ["Ensemble", "Unlike"]
 AGREE = 1e-12
 """By which an image that was put together may differ from one that was built, relative to the number where above 1."""
 STRAIGHT = 12
-"""Values of one path above which it is looked whether two images say all others."""
+"""Values of one path above which it is looked whether three images say all others."""
 BURST = 100_000
 """Steps that a member may take in compiled code; one that needs more is run on its own, where it can be followed."""
 
@@ -79,6 +80,36 @@ class _Made:
 
 
 @final
+@dataclass(frozen=True, slots=True, eq=False)
+class _Course:
+    """How an image follows the value of one path, as α + β·value + γ/value, by three of its values.
+
+    Parameters
+    ----------
+    low, middle, high
+        The values.
+    first, slope
+        The image at ``low``, and by how much it is more at ``high``.
+    bend
+        By how much it is more at ``middle`` than on the straight line: what follows the inverse, as a mass does.
+    """
+
+    low: float
+    middle: float
+    high: float
+    first: Array
+    slope: Array
+    bend: Array
+
+    def __call__(self, value: float) -> Array:
+        out = self.first + (value - self.low) / (self.high - self.low) * self.slope
+        if not self.bend.any():
+            return out
+        most = (self.middle - self.low) * (self.high - self.middle) / self.middle
+        return out + (value - self.low) * (self.high - value) / value / most * self.bend
+
+
+@final
 class Ensemble:
     """The members of a sweep over one scene by explicit steps in compiled code.
 
@@ -102,17 +133,17 @@ class Ensemble:
         if self._options.pop("form", "reduced") != "reduced" or set(self._options) - _STEERING:
             raise Unlike
         self._times = times_of(save_at, t0, until)
-        self._first = [float(found[0]) for found in axes.values]
+        self._last = [float(found[-1]) for found in axes.values]  # the first may be 0, where a part is missing
         self._lock = threading.Lock()
         self._own = threading.local()
         self._along: dict[tuple[int, float], Array] = {}
-        base = self._made(self._first)
+        base = self._made(self._last)
         if self._stepper(base.equations) is None:
             raise Unlike
         self._base, self._counts, self._sizes = base.image(), base.counts(), [a.size for a in base.arrays()]
         self._reads = [_reading(base.equations, output) for output in outputs]
         self._whole = False
-        self._lines: dict[int, tuple[float, float, Array]] = {}
+        self._courses: dict[int, _Course] = {}
         self._look()
 
     # ---- images --------------------------------------------------------------------------------------------------
@@ -139,27 +170,53 @@ class Ensemble:
     def _look(self) -> None:
         """See how paths change the image: each for itself, in straight lines, or all together."""
         values = self._axes.values
-        ends = [[self._one(i, float(end)) for end in (found.min(), found.max())] for i, found in enumerate(values)]
-        touched = [np.any([self._apart(end, self._base) for end in both], axis=0) for both in ends]
+        ends = [
+            (self._end(i, np.unique(found)), self._end(i, np.unique(found)[::-1])) for i, found in enumerate(values)
+        ]
+        touched = [np.any([self._apart(end, self._base) for _, end in both], axis=0) for both in ends]
         if any(np.any(one & other) for one, other in combinations(touched, 2)):
             self._whole = True
             return
         for i, (found, (low, high)) in enumerate(zip(values, ends, strict=True)):
             if np.unique(found).size > STRAIGHT:
-                least, most = float(found.min()), float(found.max())
-                self._lines[i] = (least, most - least, np.where(touched[i], high - low, 0.0))
+                course = self._course(i, low, high, touched[i])
                 inner = np.sort(found)[[found.size // 5, found.size // 2, (4 * found.size) // 5]]
-                if not all(self._same(self._one(i, float(x)), self._built(self._single(i, float(x)))) for x in inner):
-                    del self._lines[i]
+                if all(self._same(course(x), self._built(self._single(i, x))) for x in inner.tolist()):
+                    self._courses[i] = course
         members = self._axes.members
         chosen = np.unique(np.linspace(0, len(members) - 1, 4).astype(int))
-        self._whole = not all(self._same(self.image(members[k]), self._built(members[k])) for k in chosen)
+        self._whole = not all(self._holds(members[k]) for k in chosen)
+
+    def _end(self, axis: int, values: Array) -> tuple[float, Array]:
+        """The first of some values whose member is like the others, and its image; the very first may not be."""
+        value = float(values[0])
+        with suppress(Unlike):
+            return value, self._one(axis, value)
+        value = float(values[min(1, values.size - 1)])
+        return value, self._one(axis, value)
+
+    def _holds(self, values: Array) -> bool:
+        """Whether a member is as it was put together, or has to be run on its own."""
+        try:
+            return self._same(self.image(values), self._built(values))
+        except Unlike:
+            return True
+
+    def _course(self, axis: int, least: tuple[float, Array], most: tuple[float, Array], touched: Array) -> _Course:
+        (low, first), (high, last) = least, most
+        middle = 0.5 * (low + high)
+        straight = _Course(low, middle, high, first, np.where(touched, last - first, 0.0), np.zeros_like(first))
+        if low <= 0.0 <= high:
+            return straight
+        between = self._built(self._single(axis, middle))
+        on = straight(middle)
+        return replace(straight, bend=np.where(self._apart(between, on), between - on, 0.0))
 
     def _one(self, axis: int, value: float) -> Array:
         """The image where one path alone is varied."""
-        if axis in self._lines:
-            least, span, slope = self._lines[axis]
-            return self._along[axis, least] + ((value - least) / span) * slope
+        course = self._courses.get(axis)
+        if course is not None and course.low <= value <= course.high:
+            return course(value)
         with self._lock:
             found = self._along.get((axis, value))
         if found is None:
@@ -169,7 +226,7 @@ class Ensemble:
         return found
 
     def _single(self, axis: int, value: float) -> Array:
-        return np.array([*self._first[:axis], value, *self._first[axis + 1 :]])
+        return np.array([*self._last[:axis], value, *self._last[axis + 1 :]])
 
     def _built(self, values: Array) -> Array:
         made = self._made(values.tolist())
@@ -225,7 +282,7 @@ class Ensemble:
 
     def _threads_own(self) -> tuple[Equations, Any]:
         if not getattr(self._own, "ready", None):
-            equations = self._made(self._first).equations
+            equations = self._made(self._last).equations
             equations.start(self._t0)
             self._own.ready = equations, self._stepper(equations)
         return self._own.ready

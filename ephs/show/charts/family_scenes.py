@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-import ephs
+from ephs.mechanics.scene.load import load
 from ephs.mechanics.scene.model import Scene, frozen
 from ephs.mechanics.scene.state import adjusted
 from ephs.show.charts.runs import Array
@@ -292,4 +292,4 @@ def _scene(
     with TemporaryDirectory() as folder:
         file = Path(folder, f"{name}.toml")
         file.write_text("\n".join(lines) + "\n", encoding="utf-8")
-        return replace(ephs.load(file), source=None)
+        return replace(load(file), source=None)

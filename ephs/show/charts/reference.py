@@ -8,9 +8,9 @@ from typing import Any, final
 
 import numpy as np
 
-import ephs
 from ephs.mechanics.methods import METHODS
 from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.solve.solution import Solution
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.show.charts.runs import Array, Ending, Setting, attempt
 from ephs.show.errors import ShowError
@@ -48,7 +48,7 @@ class Motion:
     turnover: float
 
     @staticmethod
-    def of(solution: ephs.Solution) -> "Motion":
+    def of(solution: Solution) -> "Motion":
         """The motion of a solution, at its times."""
         names = [name for name, _ in solution.scene.all_bodies()]
         bodies = [solution.body(name) for name in names]

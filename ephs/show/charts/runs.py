@@ -10,10 +10,12 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-import ephs
 from ephs.mechanics.methods import Method
 from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.simulate import simulate
+from ephs.mechanics.solve.errors import Interrupted, SimulationError
 from ephs.mechanics.solve.errors import Outcome as Failure
+from ephs.mechanics.solve.solution import Solution
 
 __all__ = ["MOST_STEPS", "Array", "Ending", "Run", "Setting", "attempt"]
 
@@ -55,7 +57,7 @@ class Setting:
 class Run:
     """A solution, or None; how the run ended, its message, and the wall time in s of everything."""
 
-    solution: ephs.Solution | None
+    solution: Solution | None
     ending: Ending
     message: str
     wall: float
@@ -110,7 +112,7 @@ def attempt(
     try:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")  # what overflows on its way to a failure is part of the failure
-            solution = ephs.simulate(
+            solution = simulate(
                 scene,
                 until,
                 method=method,
@@ -120,11 +122,11 @@ def attempt(
                 **setting.options(),
             )
         return Run(solution, Ending.DONE, "", watch.spent)
-    except ephs.Interrupted as error:
+    except Interrupted as error:
         if not watch.fired:
             raise KeyboardInterrupt from error
         ending, message = Ending.FAILED, str(error)
-    except ephs.SimulationError as error:
+    except SimulationError as error:
         if isinstance(error.__cause__, _TooLong):
             ending, message = Ending.SLOW, str(error.__cause__)
         else:

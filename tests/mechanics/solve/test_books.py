@@ -61,6 +61,7 @@ def test_a_dissipating_part_is_supplied_what_it_destroys(motor):
     assert not friction.energy.any()
     reference = 293.15
     assert np.allclose(friction.destroyed, reference * friction.made, rtol=1e-15)
+    assert np.array_equal(friction.entropy_supplied, -friction.made)  # it stores none
 
 
 def test_an_entry_prints_its_parts(motor):

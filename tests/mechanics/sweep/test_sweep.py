@@ -17,7 +17,7 @@ from ephs import quantity as Q
 from ephs.cli import main
 from ephs.mechanics.scene.parameters import names, read, varied
 from ephs.mechanics.sweep.axes import Axes
-from ephs.mechanics.sweep.ensemble import Ensemble
+from ephs.mechanics.sweep.ensemble import Ensemble, Unlike
 from ephs.mechanics.sweep.outputs import outputs_of
 from ephs.testing import mechanisms
 
@@ -117,6 +117,32 @@ def test_what_two_paths_change_together_is_built_in_full(tmp_path):
         ensemble = Ensemble(model, axes, 0.0, 0.1, TIMES, {}, outputs_of(model, None))
         for values in axes.members:
             assert np.allclose(ensemble.image(values), ensemble._built(values), rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("span", [(1.0, 2.0), (1.0, 1.0001), (0.01, 10.0)])
+@pytest.mark.parametrize("path", ["bodies.rod1.mass", "joints.j0.coordinate", "joints.j0.friction"])
+def test_three_members_say_what_all_of_a_path_are(path, span):
+    scene = ephs.load(CHAIN)
+    axes = Axes.of({path: np.linspace(*span, 20)}, paired=False)
+    ensemble = Ensemble(scene, axes, 0.0, 0.1, TIMES, {}, outputs_of(scene, None))
+    assert ensemble._courses  # a start is a number, too
+    for values in axes.members[::4]:
+        assert np.allclose(ensemble.image(values), ensemble._built(values), rtol=1e-12, atol=1e-12)
+
+
+def test_a_member_unlike_the_others_is_run_on_its_own():
+    """Without friction a part is missing, and with it a place in the tables."""
+    scene, friction = ephs.load(CHAIN), np.linspace(0.0, 0.5, 20)
+    axes = Axes.of({"joints.j0.friction": friction}, paired=False)
+    ensemble = Ensemble(scene, axes, 0.0, 0.1, TIMES, {}, outputs_of(scene, None))
+    assert ensemble._courses
+    with pytest.raises(Unlike):
+        ensemble.run(axes.members[0])
+    for values in axes.members[1::4]:
+        assert np.allclose(ensemble.image(values), ensemble._built(values), rtol=1e-12, atol=1e-12)
+    table = ephs.sweep(scene, {"joints.j0.friction": friction}, 0.1, save_at=TIMES, rtol=1e-7, atol=1e-7)
+    for k in (0, 1, 19):
+        agree(scene, table, [{"joints.j0.friction": k}], 1e-9, rtol=1e-7, atol=1e-7)
 
 
 def test_careful_steps_of_a_member_have_its_own_numbers():

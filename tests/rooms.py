@@ -1,0 +1,113 @@
+"""The rooms of the package, who may know whom, and who does, read from the imports of its files.
+
+`tests/test_layers.py` checks them; `docs/house.py` draws them.
+"""
+
+import ast
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+SOURCES = sorted((ROOT / "ephs").rglob("*.py"))
+
+STOREYS: tuple[tuple[frozenset[str], ...], ...] = tuple(
+    tuple(frozenset(f"ephs{room}" for room in rooms) for rooms in storey)
+    for storey in (
+        ([".operad"],),
+        ([".semantics.spaces"],),
+        ([".semantics", ".semantics.symbols"],),
+        ([".mechanics.solve"],),
+        ([".mechanics.scene", ".mechanics.imports"],),
+        ([".mechanics", ".mechanics.reduction", ".mechanics.reduced", ".mechanics.engine"],),
+        ([".mechanics.dynamics"], [".mechanics.sweep"]),
+        ([".mechanics.linear"], [".mechanics.sensitivity"]),
+        ([".show", ".show.charts"], [".testing"]),
+        ([""],),
+    )
+)
+"""From the ground up. Rooms that stand together know each other and all storeys below; no others."""
+DOORS = {
+    ("ephs.operad.pattern", "ephs.show"): "a pattern shows itself in notebooks",
+    ("ephs.semantics.system", "ephs.show"): "so does a system",
+    ("ephs.mechanics.scene.words", "ephs.show"): "so does a scene",
+    ("ephs.mechanics.solve.solution", "ephs.show"): "a solution plots and moves itself",
+    ("ephs.mechanics.scene.model", "ephs.mechanics"): "a scene makes its system",
+}
+"""Module, room above it: why it may know that. What is above is loaded when it is asked for."""
+PLACE = {room: (level, flat) for level, storey in enumerate(STOREYS) for flat in storey for room in flat}
+
+
+@dataclass(frozen=True, slots=True)
+class Import:
+    """One import: in a line of a module, what it brings in by its absolute name."""
+
+    module: str
+    line: int
+    target: str
+
+    @property
+    def rooms(self) -> tuple[str, str]:
+        """The rooms of both."""
+        return room_of(self.module), room_of(self.target)
+
+    @property
+    def upward(self) -> bool:
+        """Whether it leads to where the module has no business to be, but through a door."""
+        here, there = self.rooms
+        (level, flat), (height, other) = PLACE[here], PLACE[there]
+        return flat != other and height >= level
+
+    @property
+    def allowed(self) -> bool:
+        """Whether it leads down, or stays, or goes through a door."""
+        return not self.upward or (self.module, self.rooms[1]) in DOORS
+
+
+def module_name(file: Path) -> str:
+    """The dotted name of a file of the package."""
+    parts = file.relative_to(ROOT).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def within(module: str, room: str) -> bool:
+    """Whether a module is a room, or lies in it."""
+    return module == room or module.startswith(room + ".")
+
+
+def room_of(module: str) -> str:
+    """The innermost room that a module lies in."""
+    return max((room for room in PLACE if within(module, room)), key=len)
+
+
+def imported(source: str, module: str, is_package: bool = False) -> Iterator[Import]:
+    """Yield all that a module's text imports, lazily or for types only too."""
+    package = (module if is_package else module.rpartition(".")[0]).split(".")
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                yield Import(module, node.lineno, alias.name)
+        elif isinstance(node, ast.ImportFrom):
+            up = package[: len(package) - node.level + 1] if node.level else []
+            origin = ".".join([*up, *([node.module] if node.module else [])])
+            for alias in node.names:
+                # `from ephs import show` names a module, `from ephs import Pattern` a name of `ephs` itself.
+                inner = f"{origin}.{alias.name}"
+                path = ROOT.joinpath(*inner.split("."))
+                is_module = path.is_dir() or path.with_suffix(".py").is_file()
+                yield Import(module, node.lineno, inner if is_module else origin)
+        elif isinstance(node, ast.Call) and "import_module" in ast.unparse(node.func):
+            for argument in node.args[:1]:
+                if isinstance(argument, ast.Constant) and isinstance(argument.value, str):
+                    yield Import(module, node.lineno, argument.value)
+
+
+def imports_of(file: Path) -> list[Import]:
+    """What a file of the package imports."""
+    return list(imported(file.read_text(encoding="utf-8"), module_name(file), file.name == "__init__.py"))
+
+
+def house() -> list[Import]:
+    """Every import of the package that leads from one room to another."""
+    found = [one for file in SOURCES for one in imports_of(file) if within(one.target, "ephs")]
+    return [one for one in found if one.rooms[0] != one.rooms[1]]
