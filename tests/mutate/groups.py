@@ -1,0 +1,120 @@
+"""What is broken, in groups, and with which tests."""
+
+import random
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from tests.mutate.mutants import ROOT, Mutant, mutants_of
+from tests.mutate.named import breaks
+
+SPACES = "tests/semantics/spaces"
+MECHANICS = "tests/mechanics"
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Files, as patterns from the root, and the tests that ought to see what is broken in them."""
+
+    files: tuple[str, ...]
+    tests: tuple[str, ...]
+    without: tuple[str, ...] = ()
+
+    def paths(self) -> list[str]:
+        """The files, sorted."""
+        found = {f.relative_to(ROOT).as_posix() for pattern in self.files for f in ROOT.glob(pattern)}
+        left_out = {f.relative_to(ROOT).as_posix() for pattern in self.without for f in ROOT.glob(pattern)}
+        return sorted(found - left_out)
+
+    def mutants(self) -> list[Mutant]:
+        """All of them, file by file."""
+        return [mutant for path in self.paths() for mutant in mutants_of(path)] or breaks()
+
+
+PARTS = (
+    f"{MECHANICS}/test_components.py",
+    f"{MECHANICS}/test_models.py",
+    f"{MECHANICS}/test_variational.py",
+    f"{MECHANICS}/test_motions.py",
+)
+RUNS = (
+    f"{MECHANICS}/solve",
+    f"{MECHANICS}/reduced",
+    f"{MECHANICS}/engine",
+    f"{MECHANICS}/test_methods.py",
+    f"{MECHANICS}/test_motions.py",
+)
+
+GROUPS = {
+    "spaces": Group(
+        ("ephs/semantics/spaces/*.py",),
+        (SPACES, *PARTS),
+        # Compilation and its cache: `tests/semantics/spaces/test_jit.py` runs it in processes of its own.
+        ("ephs/semantics/spaces/jit.py", "ephs/semantics/spaces/errors.py"),
+    ),
+    "pairs": Group(
+        (
+            "ephs/mechanics/joints.py",
+            "ephs/mechanics/components.py",
+            "ephs/mechanics/directions.py",
+            "ephs/mechanics/kernels.py",
+            "ephs/mechanics/holonomic_kernels.py",
+            "ephs/mechanics/spring_kernels.py",
+            "ephs/mechanics/springs.py",
+        ),
+        (*PARTS, f"{SPACES}/test_pairs.py", f"{MECHANICS}/scene", f"{MECHANICS}/linear", f"{MECHANICS}/test_build.py"),
+    ),
+    "primitives": Group(
+        (
+            "ephs/semantics/primitives.py",
+            "ephs/semantics/structures.py",
+            "ephs/semantics/library.py",
+            "ephs/semantics/laws.py",
+            "ephs/semantics/kernels.py",
+            "ephs/semantics/natural.py",
+            "ephs/semantics/behaviour.py",
+            "ephs/semantics/constructors.py",
+        ),
+        ("tests/semantics", *PARTS),
+    ),
+    "integrators": Group(
+        (
+            "ephs/mechanics/solve/natural*.py",
+            "ephs/mechanics/solve/gauss_kernels.py",
+            "ephs/mechanics/solve/radau.py",
+            "ephs/mechanics/solve/collocation.py",
+            "ephs/mechanics/solve/control.py",
+            "ephs/mechanics/reduced/explicit.py",
+            "ephs/mechanics/reduced/tableaux.py",
+            "ephs/mechanics/reduced/alpha.py",
+            "ephs/mechanics/reduced/implicit.py",
+            "ephs/mechanics/reduced/variational.py",
+            "ephs/mechanics/reduced/*_kernels.py",
+            "ephs/mechanics/engine/march_kernels.py",
+        ),
+        (*RUNS, f"{MECHANICS}/dynamics", f"{MECHANICS}/test_components.py", f"{MECHANICS}/linear"),
+    ),
+    "reductions": Group(
+        (
+            "ephs/mechanics/reduction/*.py",
+            "ephs/mechanics/engine/build.py",
+            "ephs/mechanics/engine/closing.py",
+            "ephs/mechanics/engine/tables.py",
+            "ephs/mechanics/reduced/mechanism.py",
+            "ephs/mechanics/reduced/spanning.py",
+        ),
+        (f"{MECHANICS}/reduction", *RUNS, f"{MECHANICS}/dynamics"),
+    ),
+    "named": Group((), ("tests/operad", "tests/semantics", MECHANICS)),
+}
+
+
+def sample(mutants: Sequence[Mutant], count: int, seed: int) -> list[Mutant]:
+    """As equally many of each function as can be, drawn by a seed."""
+    of: dict[tuple[str, str], list[Mutant]] = {}
+    for mutant in mutants:
+        of.setdefault((mutant.file, mutant.function), []).append(mutant)
+    rng = random.Random(seed)
+    piles = [rng.sample(pile, len(pile)) for pile in of.values()]
+    rng.shuffle(piles)
+    drawn = [pile[turn] for turn in range(max(map(len, piles), default=0)) for pile in piles if turn < len(pile)]
+    return drawn[:count]
