@@ -7,6 +7,7 @@ SCENE ?= slider-crank
 UNTIL ?= 5
 PYTEST := $(BIN)/python -m pytest
 CORES ?= 2
+OF ?=
 
 # Threads of a linear-algebra library change the order of sums, and fight with the test workers.
 export OMP_NUM_THREADS := 1
@@ -17,7 +18,7 @@ export OPENBLAS_NUM_THREADS := 1
 
 help:
 	@echo 'make demo   simulate scenes/$(SCENE).toml and write out/$(SCENE)/report.html'
-	@echo 'make test   run the tests; make lint, make types: style and types; make fuzz: the laws, for long; make mutate: what goes red when the code is broken; make mutants: the same for the operad, by mutmut'
+	@echo 'make test   run the tests; make lint, make types: style and types; make fuzz: the laws, for long; make mutate: which breaks of the code no test sees (docs/mutation.md); make mutants: the same for the operad, by mutmut'
 	@echo 'make real   fetch real robots (131 MB) and hold their import against Pinocchio'
 	@echo 'make docs   build docs/_build/html; make bench: measure; make clean: remove what was built'
 
@@ -50,7 +51,7 @@ fuzz: $(VENV)/.installed-dev
 	$(PYTEST) -n $(CORES) --hypothesis-profile=fuzz
 
 mutate: $(VENV)/.installed-dev
-	$(BIN)/python -m tests.mutate
+	$(BIN)/python -m tests.mutate $(OF)
 
 mutants: $(VENV)/.installed-mutants
 	$(BIN)/mutmut run --max-children $(CORES)

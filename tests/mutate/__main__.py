@@ -103,8 +103,8 @@ def run(asked: argparse.Namespace, chosen: dict[str, list[Mutant]], known: dict[
 
 
 def limit(reached: Reach, tests: list[str]) -> float:
-    """Seconds after which a mutant counts as killed: some times what its tests take."""
-    return 30.0 + 4.0 * sum(reached.seconds[test] for test in tests)
+    """Seconds of a processor after which a mutant counts as killed: some times what its tests take."""
+    return 15.0 + 4.0 * sum(reached.seconds[test] for test in tests)
 
 
 if __name__ == "__main__":

@@ -30,19 +30,8 @@ class Group:
         return [mutant for path in self.paths() for mutant in mutants_of(path)] or breaks()
 
 
-PARTS = (
-    f"{MECHANICS}/test_components.py",
-    f"{MECHANICS}/test_models.py",
-    f"{MECHANICS}/test_variational.py",
-    f"{MECHANICS}/test_motions.py",
-)
-RUNS = (
-    f"{MECHANICS}/solve",
-    f"{MECHANICS}/reduced",
-    f"{MECHANICS}/engine",
-    f"{MECHANICS}/test_methods.py",
-    f"{MECHANICS}/test_motions.py",
-)
+PARTS = (f"{MECHANICS}/test_components.py", f"{MECHANICS}/test_models.py", f"{MECHANICS}/test_variational.py")
+RUNS = (f"{MECHANICS}/engine", f"{MECHANICS}/reduced", f"{MECHANICS}/solve", f"{MECHANICS}/test_methods.py")
 
 GROUPS = {
     "spaces": Group(
@@ -61,7 +50,7 @@ GROUPS = {
             "ephs/mechanics/spring_kernels.py",
             "ephs/mechanics/springs.py",
         ),
-        (*PARTS, f"{SPACES}/test_pairs.py", f"{MECHANICS}/scene", f"{MECHANICS}/linear", f"{MECHANICS}/test_build.py"),
+        (*PARTS, f"{SPACES}/test_pairs.py", f"{MECHANICS}/test_build.py"),
     ),
     "primitives": Group(
         (
@@ -91,7 +80,7 @@ GROUPS = {
             "ephs/mechanics/reduced/*_kernels.py",
             "ephs/mechanics/engine/march_kernels.py",
         ),
-        (*RUNS, f"{MECHANICS}/dynamics", f"{MECHANICS}/test_components.py", f"{MECHANICS}/linear"),
+        RUNS,
     ),
     "reductions": Group(
         (
@@ -102,7 +91,7 @@ GROUPS = {
             "ephs/mechanics/reduced/mechanism.py",
             "ephs/mechanics/reduced/spanning.py",
         ),
-        (f"{MECHANICS}/reduction", *RUNS, f"{MECHANICS}/dynamics"),
+        (f"{MECHANICS}/reduction", *RUNS),
     ),
     "named": Group((), ("tests/operad", "tests/semantics", MECHANICS)),
 }

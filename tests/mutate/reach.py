@@ -14,10 +14,10 @@ from typing import Any
 from tests.mutate.mutants import ROOT, Mutant
 from tests.mutate.server import forked, pytest_run
 
-EACH = 8.0
-"""Seconds that a test may take, watched, to be used at all."""
-FILE = 150.0
-"""Seconds after which no further test of a file is begun."""
+EACH = 4.0
+"""Seconds of a processor that a test may take, watched, to be used at all."""
+FILE = 60.0
+"""Seconds of a processor after which no further test of a file is begun."""
 
 
 class TooSlow(BaseException):
@@ -104,7 +104,7 @@ def _measured(name: str) -> dict[str, Any]:
         tell(plugin.found())
         return 0
 
-    _, told = forked(work, 4.0 * FILE)
+    _, told = forked(work, 2.0 * FILE)
     return told[0] if told else {"seconds": {}, "names": [], "lines": {}, "left out": ["all: the file takes too long"]}
 
 
@@ -115,10 +115,10 @@ class _Watch:
         self.watched = watched
         self.seconds: dict[str, float] = {}
         self.bad: set[str] = set()
-        self.end = time.monotonic() + FILE
+        self.end = time.process_time() + FILE
 
     def pytest_runtest_protocol(self, item: Any) -> None:
-        if time.monotonic() > self.end:
+        if time.process_time() > self.end:
             item.session.shouldstop = "no time is left for this file"
         self.watched.switch_context(item.nodeid)
         for module in [m for n, m in sys.modules.items() if n.startswith("ephs") and m is not None]:
@@ -131,10 +131,10 @@ class _Watch:
         inner = item.runtest
 
         def limited() -> None:
-            begin = time.perf_counter()
+            begin = time.process_time()
             with _limit(EACH):
                 inner()
-            self.seconds[item.nodeid] = round(time.perf_counter() - begin, 4)
+            self.seconds[item.nodeid] = round(time.process_time() - begin, 4)
 
         item.runtest = limited
 
@@ -164,10 +164,10 @@ def _limit(seconds: float) -> Iterator[None]:
     def over(*_: Any) -> None:
         raise TooSlow
 
-    before = signal.signal(signal.SIGALRM, over)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
+    before = signal.signal(signal.SIGPROF, over)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)

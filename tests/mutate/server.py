@@ -4,6 +4,7 @@ import contextlib
 import importlib.abc
 import importlib.machinery
 import json
+import math
 import os
 import resource
 import signal
@@ -23,12 +24,18 @@ HEAVY = (
     "scipy.sparse.linalg", "scipy.spatial.transform", "sympy.printing.pycode", "xarray",
 )  # fmt: skip
 MEMORY = 12 << 30
+"""Bytes that a process may use."""
+WAITING = 20.0
+"""How many times longer than its time on a processor a process may last."""
 
 
 def preload() -> None:
     """Load what all tests use, once."""
+    os.environ["HYPOTHESIS_NO_PLUGINS"] = "1"  # one of them is this package's
     for name in HEAVY:
         import_module(name)
+    if loaded := [name for name in sys.modules if name == "ephs" or name.startswith("ephs.")]:
+        raise RuntimeError(f"loaded before it is changed: {', '.join(loaded)}")
 
 
 class Changed(importlib.abc.MetaPathFinder):
@@ -56,7 +63,10 @@ class Changed(importlib.abc.MetaPathFinder):
 
 
 def forked(work: Callable[[Callable[[Any], None]], int], seconds: float) -> tuple[int | None, list[Any]]:
-    """Run work(tell) in a process of its own: (exit status, None after a time limit; what it told)."""
+    """Run work(tell) in a process of its own, so many seconds of a processor at most.
+
+    Returns the exit status, None where time was over, and what it told.
+    """
     read, write = os.pipe()
     sys.stdout.flush()
     child = os.fork()
@@ -66,6 +76,7 @@ def forked(work: Callable[[Callable[[Any], None]], int], seconds: float) -> tupl
         status = 70
         try:
             resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+            resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(seconds), math.ceil(seconds)))
             with os.fdopen(write, "w") as pipe, open(os.devnull, "w") as null:
                 os.dup2(null.fileno(), 1)
                 if not os.environ.get("MUTATE_LOUD"):
@@ -79,8 +90,10 @@ def forked(work: Callable[[Callable[[Any], None]], int], seconds: float) -> tupl
         finally:
             os._exit(status)
     os.close(write)
-    told, status = _listen(read, child, time.monotonic() + seconds)
-    return status, [json.loads(line) for line in told.splitlines()]
+    told, status = _listen(read, child, time.monotonic() + WAITING * seconds)
+    return None if status in (-signal.SIGXCPU, -signal.SIGKILL) else status, [
+        json.loads(line) for line in told.splitlines()
+    ]
 
 
 def _listen(read: int, child: int, end: float) -> tuple[str, int | None]:
@@ -133,6 +146,7 @@ def pytest_run(arguments: Sequence[str], plugins: Sequence[Any]) -> int:
     from tests.mutate.plain import install
 
     install()
+    import_module("ephs.plugin").register()
     return int(
         pytest.main(
             [
