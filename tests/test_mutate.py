@@ -112,7 +112,7 @@ def test_a_test_that_fails_kills_and_one_that_does_not_reach_lets_live():
     mutant = next(m for m in breaks() if "(mf)" in m.function)
     path = "tests/semantics/test_primitives.py"
     reached = Reach(
-        {f"{path}::a": 2.0, f"{path}::b": 1.0}, {mutant.file: {mutant.lines[0]: {f"{path}::a", f"{path}::b"}}}
+        {f"{path}::a": 2.0, f"{path}::b": 1.0}, {mutant.file: {mutant.lines[0]: {f"{path}::a", f"{path}::b"}}}, {}
     )
     assert reached.tests(mutant, 10.0, [path]) == [f"{path}::b", f"{path}::a"]
     assert reached.tests(mutant, 1.5, [path]) == [f"{path}::b"]

@@ -50,7 +50,7 @@ GROUPS = {
             "ephs/mechanics/spring_kernels.py",
             "ephs/mechanics/springs.py",
         ),
-        (*PARTS, f"{SPACES}/test_pairs.py", f"{MECHANICS}/test_build.py"),
+        (*PARTS, f"{SPACES}/test_pairs.py", f"{MECHANICS}/test_build.py", f"{MECHANICS}/test_redundancy.py"),
     ),
     "primitives": Group(
         (
@@ -71,7 +71,6 @@ GROUPS = {
             "ephs/mechanics/solve/gauss_kernels.py",
             "ephs/mechanics/solve/radau.py",
             "ephs/mechanics/solve/collocation.py",
-            "ephs/mechanics/solve/control.py",
             "ephs/mechanics/reduced/explicit.py",
             "ephs/mechanics/reduced/tableaux.py",
             "ephs/mechanics/reduced/alpha.py",
@@ -93,7 +92,17 @@ GROUPS = {
         ),
         (f"{MECHANICS}/reduction", *RUNS),
     ),
-    "named": Group((), ("tests/operad", "tests/semantics", MECHANICS)),
+    "named": Group(
+        (),
+        (
+            "tests/operad",
+            "tests/semantics",
+            *PARTS,
+            f"{MECHANICS}/reduced",
+            f"{MECHANICS}/imports",
+            f"{MECHANICS}/solve/test_books.py",
+        ),
+    ),
 }
 
 

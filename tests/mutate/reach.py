@@ -26,32 +26,41 @@ class TooSlow(BaseException):
 
 @dataclass(frozen=True, slots=True)
 class Reach:
-    """Seconds of each test that passes, and for each file the tests that reach each line."""
+    """Seconds of each test that passes, and for each file the tests that reach each line.
+
+    ``loading`` is the same of lines that run when the tests' file is loaded: what is made there all its tests may see.
+    """
 
     seconds: dict[str, float]
     lines: dict[str, dict[int, set[str]]]
+    loading: dict[str, dict[int, set[str]]]
 
     def tests(self, mutant: Mutant, budget: float, among: Iterable[str] = ("tests",)) -> list[str]:
         """The tests that reach a mutant's lines, quickest first, up to a sum of seconds.
 
-        What runs when modules are loaded has no test of its own: there it is all that reach the file.
+        What runs when the package's own modules are loaded has no test of its own: there it is all that reach the file.
         """
-        of = self.lines.get(mutant.file, {})
-        first, last = mutant.lines
-        found: set[str] = set().union(*(of.get(line, set()) for line in range(first, last + 1)))
-        if not found:
+        of, made = self.lines.get(mutant.file, {}), self.loading.get(mutant.file, {})
+        lines = range(mutant.lines[0], mutant.lines[1] + 1)
+        found: set[str] = set().union(*(of.get(line, set()) for line in lines))
+        if not found or mutant.function == "module":
             found = set().union(*of.values())
-        paths = tuple(among)
-        near = mutant.file.removeprefix("ephs/").rpartition("/")[0]
+        later: set[str] = set().union(*(made.get(line, set()) for line in lines)) - found
         chosen: list[str] = []
         total = 0.0
-        wanted = (t for t in found if any(t == p or t.startswith((p + "/", p + "::")) for p in paths))
-        for test in sorted(wanted, key=lambda t: (self.seconds[t] * (0.5 if f"tests/{near}/" in t else 1.0), t)):
+        for test in (*self._sorted(found, mutant, among), *self._sorted(later, mutant, among)):
             total += self.seconds[test]
             if total > budget and chosen:
                 break
             chosen.append(test)
         return chosen
+
+    def _sorted(self, tests: set[str], mutant: Mutant, among: Iterable[str]) -> list[str]:
+        """Those at paths, quickest first, such as lie where the mutant's own tests lie as if they took half as long."""
+        paths = tuple(among)
+        own = f"tests/{mutant.file.removeprefix('ephs/').rpartition('/')[0]}/"
+        inside = (test for test in tests if any(test.startswith((path + "/", path + "::")) for path in paths))
+        return sorted(inside, key=lambda t: (self.seconds[t] * (0.5 if own in t else 1.0), t))
 
 
 def digest(*files: Path) -> str:
@@ -74,6 +83,7 @@ def reach(paths: Iterable[str], folder: Path, say: Callable[[str], None], keep: 
     sources = "" if keep else digest(*sorted((ROOT / "ephs").rglob("*.py")))
     seconds: dict[str, float] = {}
     lines: dict[str, dict[int, set[str]]] = {}
+    loading: dict[str, dict[int, set[str]]] = {}
     folder.mkdir(parents=True, exist_ok=True)
     for file in dict.fromkeys(files_at(paths)):
         name = str(file.relative_to(ROOT))
@@ -89,7 +99,11 @@ def reach(paths: Iterable[str], folder: Path, say: Callable[[str], None], keep: 
             into = lines.setdefault(source, {})
             for line, tests in at.items():
                 into.setdefault(int(line), set()).update(names[i] for i in tests)
-    return Reach(seconds, lines)
+        for source, at in known.get("loading", {}).items():
+            into = loading.setdefault(source, {})
+            for line in at:
+                into.setdefault(line, set()).update(names)
+    return Reach(seconds, lines, loading)
 
 
 def _measured(name: str) -> dict[str, Any]:
@@ -105,7 +119,11 @@ def _measured(name: str) -> dict[str, Any]:
         return 0
 
     _, told = forked(work, 2.0 * FILE)
-    return told[0] if told else {"seconds": {}, "names": [], "lines": {}, "left out": ["all: the file takes too long"]}
+    return (
+        told[0]
+        if told
+        else {"seconds": {}, "names": [], "lines": {}, "loading": {}, "left out": ["all: the file takes too long"]}
+    )
 
 
 class _Watch:
@@ -150,13 +168,14 @@ class _Watch:
         names = sorted(good)
         number = {name: i for i, name in enumerate(names)}
         lines: dict[str, dict[int, list[int]]] = {}
+        loading: dict[str, list[int]] = {}
         for file in data.measured_files():
-            at = {
-                line: sorted(number[c] for c in contexts if c in number)
-                for line, contexts in data.contexts_by_lineno(file).items()
-            }
-            lines[str(Path(file).relative_to(ROOT))] = {line: tests for line, tests in at.items() if tests}
-        return {"seconds": good, "names": names, "lines": lines, "left out": sorted(self.bad)}
+            at = data.contexts_by_lineno(file)
+            name = str(Path(file).relative_to(ROOT))
+            reached = {line: sorted(number[c] for c in contexts if c in number) for line, contexts in at.items()}
+            lines[name] = {line: tests for line, tests in reached.items() if tests}
+            loading[name] = sorted(line for line, contexts in at.items() if "" in contexts)
+        return {"seconds": good, "names": names, "lines": lines, "loading": loading, "left out": sorted(self.bad)}
 
 
 @contextmanager
