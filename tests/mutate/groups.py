@@ -31,7 +31,15 @@ class Group:
 
 
 PARTS = (f"{MECHANICS}/test_components.py", f"{MECHANICS}/test_models.py", f"{MECHANICS}/test_variational.py")
-RUNS = (f"{MECHANICS}/engine", f"{MECHANICS}/reduced", f"{MECHANICS}/solve", f"{MECHANICS}/test_methods.py")
+RUNS = (
+    f"{MECHANICS}/test_stability_functions.py",
+    f"{MECHANICS}/engine",
+    f"{MECHANICS}/reduced",
+    f"{MECHANICS}/solve/test_lu.py",
+    f"{MECHANICS}/solve/test_radau.py",
+    f"{MECHANICS}/solve/test_integrate.py",
+    f"{MECHANICS}/test_methods.py",
+)
 
 GROUPS = {
     "spaces": Group(
@@ -90,7 +98,7 @@ GROUPS = {
             "ephs/mechanics/reduced/mechanism.py",
             "ephs/mechanics/reduced/spanning.py",
         ),
-        (f"{MECHANICS}/reduction", *RUNS),
+        (f"{MECHANICS}/reduction", f"{MECHANICS}/engine", f"{MECHANICS}/test_stability_functions.py"),
     ),
     "named": Group(
         (),

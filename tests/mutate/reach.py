@@ -14,9 +14,9 @@ from typing import Any
 from tests.mutate.mutants import ROOT, Mutant
 from tests.mutate.server import forked, pytest_run
 
-EACH = 4.0
+EACH = 3.0
 """Seconds of a processor that a test may take, watched, to be used at all."""
-FILE = 60.0
+FILE = 40.0
 """Seconds of a processor after which no further test of a file is begun."""
 
 
