@@ -33,6 +33,7 @@ def f(x: "tuple[int, 4]", n=2):
 
 class A:
     def g(self, y):
+        z, w = nb.carray(y, 2), nb.carray(work, 9)
         return y in (1.5, 0)
 '''
 
@@ -62,6 +63,7 @@ def test_each_kind_of_change_is_made():
         ("f", "order", "return cross(⟦x, i → i, x⟧), max(1e-9, n), True"),
         ("f", "extreme", "return cross(x, i), ⟦max → min⟧(1e-9, n), True"),
         ("f", "logic", "return cross(x, i), max(1e-9, n), ⟦True → False⟧"),
+        ("A.g", "length", "z, w = nb.carray(y, ⟦2 → 1⟧), nb.carray(work, 9)"),
         ("A.g", "comparison", "return y ⟦in → not in⟧ (1.5, 0)"),
         ("A.g", "constant", "return y in (⟦1.5 → 3.0⟧, 0)"),
         ("A.g", "constant", "return y in (1.5, ⟦0 → 1⟧)"),

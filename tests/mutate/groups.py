@@ -58,7 +58,13 @@ GROUPS = {
             "ephs/mechanics/spring_kernels.py",
             "ephs/mechanics/springs.py",
         ),
-        (*PARTS, f"{SPACES}/test_pairs.py", f"{MECHANICS}/test_build.py", f"{MECHANICS}/test_redundancy.py"),
+        (
+            *PARTS,
+            f"{SPACES}/test_pairs.py",
+            f"{MECHANICS}/test_build.py",
+            f"{MECHANICS}/test_joint_ports.py",
+            f"{MECHANICS}/test_redundancy.py",
+        ),
     ),
     "primitives": Group(
         (

@@ -181,6 +181,8 @@ def _inner(node: ast.AST) -> Iterator[ast.expr]:
     """Expressions directly inside, but those that others change, and texts."""
     if isinstance(node, ast.JoinedStr):
         return
+    if _is_view(node):
+        return  # its length is changed by the call itself
     for child in ast.iter_child_nodes(node):
         if isinstance(node, ast.Subscript) and child is node.slice:
             yield from _beside_constants(child)
@@ -246,6 +248,11 @@ def _changes(source: _Source, node: ast.expr) -> Iterator[tuple[str, int, int, b
             pass
 
 
+def _is_view(node: ast.AST) -> bool:
+    """Whether a kernel looks at memory here: a view that is too long is no mistake, one that is too short is."""
+    return isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "carray"
+
+
 def _is_text(node: ast.expr) -> bool:
     return isinstance(node, ast.Constant) and isinstance(node.value, str)
 
@@ -277,6 +284,10 @@ def _call(
     if name == "range" and args and not starred:
         stop = args[0] if len(args) == 1 else args[1]
         yield "range", *source.span(stop), b"(%b) - 1" % source.of(stop)
+    if _is_view(node) and getattr(args[0], "id", "") != "work":  # scratch memory is as long as it is
+        for length in ast.walk(args[1]):
+            if isinstance(length, ast.Constant) and length.value:
+                yield "length", *source.span(length), str(length.value - 1).encode()
     if name in EXTREMES:
         start, stop_at = source.span(function)
         yield "extreme", stop_at - len(name), stop_at, EXTREMES[name].encode()

@@ -45,10 +45,10 @@ class Reach:
         found: set[str] = set().union(*(of.get(line, set()) for line in lines))
         if not found or mutant.function == "module":
             found = set().union(*of.values())
-        later: set[str] = set().union(*(made.get(line, set()) for line in lines)) - found
+        found = found.union(*(made.get(line, set()) for line in lines))
         chosen: list[str] = []
         total = 0.0
-        for test in (*self._sorted(found, mutant, among), *self._sorted(later, mutant, among)):
+        for test in self._sorted(found, mutant, among):
             total += self.seconds[test]
             if total > budget and chosen:
                 break
