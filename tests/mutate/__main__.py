@@ -26,11 +26,11 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--seed", type=int, default=0, help="which ones")
     parser.add_argument("--all", action="store_true", help="all mutants of each group")
     parser.add_argument("--only", nargs="+", metavar="NAME", help="these mutants, whatever is known of them")
-    parser.add_argument("--again", action="store_true", help="those again that lived")
+    parser.add_argument("--again", action="store_true", help="those again that lived, and no others")
     parser.add_argument("--keep", action="store_true", help="take what tests reach from a measurement of older sources")
     parser.add_argument("--budget", type=float, default=BUDGET, help="seconds of tests for each mutant")
     parser.add_argument("--list", action="store_true", help="say which mutants there are, and make none")
-    parser.add_argument("--table", action="store_true", help="only add up what is known")
+    parser.add_argument("--table", action="store_true", help="only add up what is known of all")
     parser.add_argument("--results", type=Path, default=FOLDER / "results.jsonl", help="where verdicts are added")
     return parser.parse_args()
 
@@ -48,8 +48,9 @@ def main() -> int:
     known = verdicts(asked.results)
     if not asked.table:
         run(asked, chosen, known)
-    lived = {name: [m for m in mutants if _lives(m, known)] for name, mutants in chosen.items()}
-    print(table(chosen, known, explained()))
+    every = {name: GROUPS[name].mutants() for name in chosen}
+    lived = {name: [m for m in mutants if _lives(m, known)] for name, mutants in every.items()}
+    print(table(every, known, explained()))
     print(survivors(lived, explained()))
     return 1 if any(m.name not in explained() for mutants in lived.values() for m in mutants) else 0
 

@@ -1,8 +1,8 @@
 """What is broken, in groups, and with which tests."""
 
-import random
 from collections.abc import Sequence
 from dataclasses import dataclass
+from hashlib import sha256
 
 from tests.mutate.mutants import ROOT, Mutant, mutants_of
 from tests.mutate.named import breaks
@@ -121,12 +121,14 @@ GROUPS = {
 
 
 def sample(mutants: Sequence[Mutant], count: int, seed: int) -> list[Mutant]:
-    """As equally many of each function as can be, drawn by a seed."""
-    of: dict[tuple[str, str], list[Mutant]] = {}
-    for mutant in mutants:
-        of.setdefault((mutant.file, mutant.function), []).append(mutant)
-    rng = random.Random(seed)
-    piles = [rng.sample(pile, len(pile)) for pile in of.values()]
-    rng.shuffle(piles)
+    """As equally many of each function as can be, drawn by a seed; edits elsewhere do not change the draw."""
+
+    def lot(name: str) -> bytes:
+        return sha256(f"{seed} {name}".encode()).digest()
+
+    of: dict[str, list[Mutant]] = {}
+    for mutant in sorted(mutants, key=lambda m: lot(m.name)):
+        of.setdefault(f"{mutant.file} {mutant.function}", []).append(mutant)
+    piles = [of[function] for function in sorted(of, key=lot)]
     drawn = [pile[turn] for turn in range(max(map(len, piles), default=0)) for pile in piles if turn < len(pile)]
     return drawn[:count]
