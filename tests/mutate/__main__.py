@@ -14,7 +14,7 @@ from tests.mutate.server import preload, verdict
 from tests.mutate.table import survivors, table
 
 FOLDER = ROOT / ".build" / "mutate"
-BUDGET = 15.0
+BUDGET = 8.0
 """Seconds of tests, as they take unchanged and watched, that a mutant may live through."""
 
 

@@ -16,7 +16,7 @@ from tests.mutate.server import forked, pytest_run
 
 EACH = 3.0
 """Seconds of a processor that a test may take, watched, to be used at all."""
-FILE = 40.0
+FILE = 20.0
 """Seconds of a processor after which no further test of a file is begun."""
 
 
