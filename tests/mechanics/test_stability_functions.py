@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 import ephs
+from ephs import Pattern, junction, library
+from ephs import quantity as Q
 from ephs.mechanics.methods import METHODS
 from ephs.mechanics.reduced import tableaux
 
@@ -123,6 +125,57 @@ def test_the_variational_method_is_the_midpoint_rule_with_friction_in_the_middle
 def test_every_method_of_scenes_with_constant_steps_has_its_test():
     of_scenes = {name for name, m in METHODS.items() if m.scenes and m.fixed}
     assert of_scenes == {*FUNCTIONS, "alpha", "variational"}
+
+
+# ---- systems without bodies -------------------------------------------------------------------------------------
+
+MASS, SPRING, DRAG = 2.0, 3.0, 0.4
+SYSTEM = Pattern(
+    junctions={"q": junction(Q.displacement), "p": junction(Q.momentum), "s": junction(Q.entropy)},
+    boxes={
+        "pe": {"q": "q"}, "ke": {"p": "p"}, "pkc": {"q": "q", "p": "p"}, "mf": {"p": "p", "s": "s"}, "env": {"s": "s"},
+    },
+)(
+    pe=library.spring(k=SPRING), ke=library.point_mass(m=MASS), pkc=library.pkc(), mf=library.friction(d=DRAG),
+    env=library.environment(),
+)  # fmt: skip
+LINKED = Pattern(
+    junctions={name: junction(Q.momentum if name[0] == "p" else Q.displacement) for name in ("q", "p", "p2")},
+    boxes={"pe": {"q": "q"}, "ke": {"p": "p"}, "ke2": {"p": "p2"}, "pkc": {"q": "q", "p": "p"},
+           "link": {"p": "p", "p2": "p2"}},
+)(
+    pe=library.spring(k=SPRING), ke=library.point_mass(m=MASS), ke2=library.point_mass(m=MASS),
+    pkc=library.pkc(), link=library.rigid_link(),
+)  # fmt: skip
+START = {"pe.q": 0.3, "ke.p": -1.1}
+
+
+@pytest.mark.parametrize("method", [name for name, m in METHODS.items() if m.systems])
+@pytest.mark.parametrize(
+    ("system", "more", "matrix"),
+    [
+        (SYSTEM, {}, [[0.0, 1.0 / MASS], [-SPRING, -DRAG / MASS]]),
+        (LINKED, {"ke2.p": -1.1}, [[0.0, 1.0 / MASS], [-0.5 * SPRING, 0.0]]),
+    ],
+    ids=["friction", "constraint"],
+)
+def test_systems_take_the_same_steps(method, system, more, matrix):
+    h, steps = 0.1, 3
+    sol = ephs.simulate(system, steps * h, initial=START | more, method=method, step=h)
+    one = FUNCTIONS[method](h * np.array(matrix))
+    expected = [np.linalg.matrix_power(one, i) @ list(START.values()) for i in range(steps + 1)]
+    found = np.column_stack([np.ravel(sol[path]) for path in START])
+    assert np.abs(found - expected).max() <= (1e-9 if method == "radau" else 1e-12)
+    for path, value in more.items():
+        assert value == START["ke.p"]
+        assert np.abs(np.ravel(sol[path]) - found[:, 1]).max() <= 1e-12
+    # Newton's method has the exact matrix of what is linear; the heat is not
+    assert sol.stats["iterations"] <= (3 if method == "radau" else 2) * steps + 2
+    energy = 0.5 * SPRING * found[:, 0] ** 2 + 0.5 * (1 + len(more)) * found[:, 1] ** 2 / MASS
+    assert np.abs(sol.energy - sol.energy[0]).max() <= 1e-9 * energy[0]
+    made = (energy[0] - energy) / 293.15 if not more else 0.0 * energy
+    tolerance = 1e-12 if method == "natural" else 1e-7
+    assert np.abs(sol.entropy - sol.entropy[0] - made).max() <= tolerance
 
 
 # ---- the coefficients -------------------------------------------------------------------------------------------

@@ -38,7 +38,11 @@ RUNS = (
     f"{MECHANICS}/solve/test_lu.py",
     f"{MECHANICS}/solve/test_radau.py",
     f"{MECHANICS}/solve/test_integrate.py",
-    f"{MECHANICS}/test_methods.py",
+)
+
+DERIVATIVES = tuple(
+    f"ephs/mechanics/reduced/{name}_kernels.py"
+    for name in ("action", "action_tangent", "column", "dynamics", "jacobian", "tangent")
 )
 
 GROUPS = {
@@ -94,7 +98,9 @@ GROUPS = {
             "ephs/mechanics/engine/march_kernels.py",
         ),
         RUNS,
+        DERIVATIVES,
     ),
+    "derivatives": Group(DERIVATIVES, (f"{MECHANICS}/dynamics", *RUNS)),
     "reductions": Group(
         (
             "ephs/mechanics/reduction/*.py",

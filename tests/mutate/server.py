@@ -25,7 +25,10 @@ HEAVY = (
 )  # fmt: skip
 MEMORY = 12 << 30
 """Bytes that a process may use."""
-WAITING = 20.0
+EXAMPLES = 6
+SETTINGS = "_hypothesis_internal_use_settings"
+"""Where Hypothesis keeps a test's own settings."""
+WAITING = 6.0
 """How many times longer than its time on a processor a process may last."""
 
 
@@ -139,6 +142,19 @@ class Chosen:
             self.tell([report.nodeid, str(report.longrepr).strip().split("\n")[-1][:160]])
 
 
+class Fewer:
+    """A plug-in: of drawn examples only the first few, also where a test asks for more."""
+
+    def pytest_collection_modifyitems(self, items: list[Any]) -> None:
+        from hypothesis import settings
+
+        for item in items:
+            function = getattr(item, "obj", None)
+            if getattr(function, "is_hypothesis_test", False):
+                asked = getattr(function, SETTINGS, None) or settings.default
+                setattr(function, SETTINGS, settings(asked, max_examples=min(EXAMPLES, asked.max_examples)))
+
+
 def pytest_run(arguments: Sequence[str], plugins: Sequence[Any]) -> int:
     """Pytest on kernels in plain Python."""
     import pytest
@@ -159,7 +175,7 @@ def pytest_run(arguments: Sequence[str], plugins: Sequence[Any]) -> int:
                 *("-W", "ignore::pytest.PytestAssertRewriteWarning"),
                 *arguments,
             ],
-            plugins=list(plugins),
+            plugins=[Fewer(), *plugins],
         )
     )
 
