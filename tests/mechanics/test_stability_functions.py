@@ -172,7 +172,7 @@ def test_systems_take_the_same_steps(method, system, more, matrix):
     # Newton's method has the exact matrix of what is linear; the heat is not
     assert sol.stats["iterations"] <= (3 if method == "radau" else 2) * steps + 2
     energy = 0.5 * SPRING * found[:, 0] ** 2 + 0.5 * (1 + len(more)) * found[:, 1] ** 2 / MASS
-    assert np.abs(sol.energy - sol.energy[0]).max() <= 1e-9 * energy[0]
+    assert np.abs(sol.energy - sol.energy[0]).max() <= (1e-7 if method == "radau" else 1e-11) * energy[0]
     made = (energy[0] - energy) / 293.15 if not more else 0.0 * energy
     tolerance = 1e-12 if method == "natural" else 1e-7
     assert np.abs(sol.entropy - sol.entropy[0] - made).max() <= tolerance
