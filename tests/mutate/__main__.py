@@ -48,6 +48,7 @@ def main() -> int:
     known = verdicts(asked.results)
     if not asked.table:
         run(asked, chosen, known)
+        known = verdicts(asked.results)
     every = {name: GROUPS[name].mutants() for name in chosen}
     lived = {name: [m for m in mutants if _lives(m, known)] for name, mutants in every.items()}
     print(table(every, known, explained()))
@@ -80,27 +81,36 @@ def _lives(mutant: Mutant, known: dict[str, dict]) -> bool:
 
 
 def run(asked: argparse.Namespace, chosen: dict[str, list[Mutant]], known: dict[str, dict]) -> None:
-    """Make those that are not known yet, and add what is found to the file."""
-    preload()
+    """Make those that are not known yet, and add what is found to the file; a process for each group."""
     asked.results.parent.mkdir(parents=True, exist_ok=True)
     for name, mutants in chosen.items():
-        group = GROUPS[name]
-        todo = [
-            m for m in mutants if asked.only or key(m.name, m.change) not in known or (asked.again and _lives(m, known))
-        ]
-        if not todo:
-            continue
-        reached = reach(group.tests, FOLDER / "reach", lambda line: print(line, flush=True), keep=asked.keep)
-        for i, mutant in enumerate(todo, 1):
-            tests = reached.tests(mutant, asked.budget, group.tests)
-            entry = verdict(mutant, tests, limit(reached, tests)) | {"group": name}
-            known[key(mutant.name, mutant.change)] = entry
-            with asked.results.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(entry, ensure_ascii=False) + "\n")
-            word = (
-                f"killed by {entry['by'].rpartition('/')[2]}" if entry["killed"] else f"LIVES, {entry['tests']} tests"
-            )
-            print(f"{name} {i}/{len(todo)} {entry['seconds']:5.1f} s  {mutant.name}: {word}", flush=True)
+        if asked.again:
+            todo = [m for m in GROUPS[name].mutants() if _lives(m, known)]
+        else:
+            todo = [m for m in mutants if asked.only or key(m.name, m.change) not in known]
+        if todo:
+            sys.stdout.flush()
+            if (child := os.fork()) == 0:
+                make(asked, name, todo)
+                os._exit(0)
+            if os.waitpid(child, 0)[1] != 0:
+                raise SystemExit(f"{name}: the process of the group did not end well")
+
+
+def make(asked: argparse.Namespace, name: str, todo: list[Mutant]) -> None:
+    """Make the mutants of one group."""
+    group = GROUPS[name]
+    os.environ["NUMBA_DISABLE_JIT"] = "0" if group.compiled else "1"  # read when numba is loaded
+    preload()
+    folder = FOLDER / ("compiled" if group.compiled else "plain")
+    reached = reach(group.tests, folder, lambda line: print(line, flush=True), keep=asked.keep)
+    for i, mutant in enumerate(todo, 1):
+        tests = reached.tests(mutant, asked.budget, group.tests)
+        entry = verdict(mutant, tests, limit(reached, tests)) | {"group": name}
+        with asked.results.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(entry, ensure_ascii=False) + "\n")
+        word = f"killed by {entry['by'].rpartition('/')[2]}" if entry["killed"] else f"LIVES, {entry['tests']} tests"
+        print(f"{name} {i}/{len(todo)} {entry['seconds']:5.1f} s  {mutant.name}: {word}", flush=True)
 
 
 def limit(reached: Reach, tests: list[str]) -> float:
@@ -109,6 +119,6 @@ def limit(reached: Reach, tests: list[str]) -> float:
 
 
 if __name__ == "__main__":
-    for variable in ("NUMBA_DISABLE_JIT", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+    for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ[variable] = "1"
     sys.exit(main())

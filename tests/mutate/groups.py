@@ -13,11 +13,15 @@ MECHANICS = "tests/mechanics"
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Files, as patterns from the root, and the tests that ought to see what is broken in them."""
+    """Files, as patterns from the root, and the tests that ought to see what is broken in them.
+
+    Where no kernel is changed, tests can be run on compiled kernels: there ``compiled`` is true.
+    """
 
     files: tuple[str, ...]
     tests: tuple[str, ...]
     without: tuple[str, ...] = ()
+    compiled: bool = False
 
     def paths(self) -> list[str]:
         """The files, sorted."""
@@ -35,6 +39,7 @@ RUNS = (
     f"{MECHANICS}/test_stability_functions.py",
     f"{MECHANICS}/engine",
     f"{MECHANICS}/reduced",
+    f"{MECHANICS}/solve/test_collocation.py",
     f"{MECHANICS}/solve/test_lu.py",
     f"{MECHANICS}/solve/test_radau.py",
     f"{MECHANICS}/solve/test_integrate.py",
@@ -42,7 +47,7 @@ RUNS = (
 
 DERIVATIVES = tuple(
     f"ephs/mechanics/reduced/{name}_kernels.py"
-    for name in ("action", "action_tangent", "column", "dynamics", "jacobian", "tangent")
+    for name in ("action", "action_tangent", "column", "dynamics", "jacobian", "slope", "tangent")
 )
 
 GROUPS = {
@@ -85,8 +90,8 @@ GROUPS = {
     ),
     "integrators": Group(
         (
-            "ephs/mechanics/solve/natural*.py",
-            "ephs/mechanics/solve/gauss_kernels.py",
+            "ephs/mechanics/solve/natural.py",
+            "ephs/mechanics/solve/natural4.py",
             "ephs/mechanics/solve/radau.py",
             "ephs/mechanics/solve/collocation.py",
             "ephs/mechanics/reduced/explicit.py",
@@ -94,11 +99,20 @@ GROUPS = {
             "ephs/mechanics/reduced/alpha.py",
             "ephs/mechanics/reduced/implicit.py",
             "ephs/mechanics/reduced/variational.py",
-            "ephs/mechanics/reduced/*_kernels.py",
+        ),
+        (*RUNS, f"{MECHANICS}/test_methods.py"),
+        compiled=True,
+    ),
+    "kernels": Group(
+        (
+            "ephs/mechanics/solve/natural_kernels.py",
+            "ephs/mechanics/solve/gauss_kernels.py",
+            "ephs/mechanics/reduced/loop_kernels.py",
+            "ephs/mechanics/reduced/sweep_kernels.py",
+            "ephs/mechanics/reduced/table_kernels.py",
             "ephs/mechanics/engine/march_kernels.py",
         ),
         RUNS,
-        DERIVATIVES,
     ),
     "derivatives": Group(DERIVATIVES, (f"{MECHANICS}/dynamics", *RUNS)),
     "reductions": Group(

@@ -156,12 +156,13 @@ class Fewer:
 
 
 def pytest_run(arguments: Sequence[str], plugins: Sequence[Any]) -> int:
-    """Pytest on kernels in plain Python."""
+    """Pytest; on kernels in plain Python where they are not compiled."""
     import pytest
 
     from tests.mutate.plain import install
 
-    install()
+    if os.environ["NUMBA_DISABLE_JIT"] == "1":
+        install()
     import_module("ephs.plugin").register()
     return int(
         pytest.main(

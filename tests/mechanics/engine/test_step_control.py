@@ -65,6 +65,9 @@ def test_the_size_of_an_estimate_is_a_root_mean_square_and_that_of_two_their_ble
     expected = math.sqrt(one) * math.sqrt(one / (one + 0.01 * two))
     assert march.measure(fine, coarse, allowed, True) == pytest.approx(expected, rel=1e-14)
     assert march.measure(0.0 * fine, coarse, allowed, True) == 0.0
+    assert march.measure(fine[:1], coarse[:1], allowed[:1], False) == pytest.approx(
+        abs(fine[0] / allowed[0]), rel=1e-14
+    )
     assert march.measure(np.zeros(0), np.zeros(0), np.zeros(0), True) == 0.0
 
 
