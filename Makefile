@@ -9,6 +9,7 @@ PYTEST := $(BIN)/python -m pytest
 CORES ?= 2
 COUNT ?= 100000
 SEED ?= 0
+OF ?=
 
 # Threads of a linear-algebra library change the order of sums, and fight with the test workers.
 export OMP_NUM_THREADS := 1
@@ -19,7 +20,7 @@ export OPENBLAS_NUM_THREADS := 1
 
 help:
 	@echo 'make demo   simulate scenes/$(SCENE).toml and write out/$(SCENE)/report.html'
-	@echo 'make test   run the tests; make lint, make types: style and types; make fuzz: the laws, for long; make fuzz-inputs COUNT=N: so many broken files; make mutate: what goes red when the code is broken; make mutants: the same for the operad, by mutmut'
+	@echo 'make test   run the tests; make lint, make types: style and types; make fuzz: the laws, for long; make fuzz-inputs COUNT=N: so many broken files; make mutate: which breaks of the code no test sees (docs/mutation.md); make mutants: the same for the operad, by mutmut'
 	@echo 'make real   fetch real robots (131 MB) and hold their import against Pinocchio'
 	@echo 'make docs   build docs/_build/html; make bench: what got slower than benchmarks/baseline.json; make tables: all benchmarks; make clean: remove what was built'
 
@@ -55,7 +56,7 @@ fuzz-inputs: $(VENV)/.installed-dev
 	$(BIN)/python -m tests.fuzz $(COUNT) --seed $(SEED)
 
 mutate: $(VENV)/.installed-dev
-	$(BIN)/python -m tests.mutate
+	$(BIN)/python -m tests.mutate $(OF)
 
 mutants: $(VENV)/.installed-mutants
 	$(BIN)/mutmut run --max-children $(CORES)

@@ -153,8 +153,8 @@ def _units_within(space: Array) -> list[int]:
 
 
 def _pure(space: Array) -> int:
-    """How many independent pure forces and pure moments a space contains."""
-    return _null(space[:3]).shape[1] + _null(space[3:]).shape[1]
+    """How many independent pure forces a space contains; pure moments are the same about all places."""
+    return _null(space[:3]).shape[1]
 
 
 def _null(matrix: Array) -> Array:

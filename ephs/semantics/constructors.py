@@ -133,7 +133,7 @@ def transformer(ports: Ports, matrix: Matrix, *, name: str = "transformer") -> R
     interface = _interface(name, ports)
     bundle = Bundle.of(interface)
     if len(bundle.ports) < 2:
-        found = ", ".join(map(str, bundle.ports)) or "none"
+        found = ", ".join(map(str, bundle.ports))
         raise StructureError("parameter", name, key="ports", found=found, expected="two power ports or more")
     first = bundle.quantity(bundle.ports[0]).space.dim
     k = bundle.size - first

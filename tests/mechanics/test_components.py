@@ -42,11 +42,11 @@ def primitives():
         out[f"gravity {group}"] = components.gravity(np.array([1.0, -2.0, 3.0]), group)
         out[f"lie_poisson {group}"] = components.lie_poisson(group)
     for name, of in pairs().items():
-        stiffness = np.arange(1.0, of.dim + 1.0)
+        stiffness, rest = np.arange(1.0, of.dim + 1.0), np.linspace(0.1, 0.4, of.dim)
         if name in ("spherical", "free"):
-            stiffness[:3] = 2.0
+            stiffness[:3], rest[:3] = 2.0, 0.0
         factor = np.arange(1.0, of.dim**2 + 1.0).reshape(of.dim, of.dim) / 10.0
-        out[f"pair_spring {name}"] = components.pair_spring(of, stiffness, np.zeros(of.dim))
+        out[f"pair_spring {name}"] = components.pair_spring(of, stiffness, rest)
         out[f"holonomic {name}"] = components.holonomic(of)
         out[f"joint_friction {name}"] = components.joint_friction(of, factor @ factor.T)
     out["pkc"] = components.kinematic_coupling(Q.pose, Q.body_momentum, "q", "p")

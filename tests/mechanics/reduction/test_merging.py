@@ -71,6 +71,59 @@ def test_the_inertia_is_that_of_both():
     assert np.abs(whole[3:, 3:] - 3.0 * np.eye(3)).max() <= 1e-14
 
 
+def aside(seed):
+    """Two bodies that are joined rigidly, at frames that are turned and moved; where the second one is, seen from 1."""
+    rng = np.random.default_rng(seed)
+    frames = SE3.random(rng), SE3.random(rng)
+    bodies = {f"body{i}": rigid_body(float(i), [0.3, 0.4, 0.5], [0.3, -0.2, -9.81]) for i in (1, 2)}
+    joined = rewrite(mbs_pattern()(joint=joint("fixed", *frames), **bodies), (FOLD, DROP_FRICTION)).system
+    return joined, SE3.compose(frames[0], SE3.inverse(frames[1])), rng
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_potentials_of_merged_bodies_add_up_exactly_for_any_step(seed):
+    joined, x, rng = aside(seed)
+    parts = dict(joined.leaves())
+    one, two = (parts[Path.of(f"body{i}.pe")] for i in (1, 2))
+    whole = dict(rewrite(joined, (MERGE,)).system.leaves())[Path.of("body1.pe")]
+    q, pose, v = Path.of("q"), SE3.random(rng), rng.standard_normal(6)
+
+    def energy(at):
+        return one.energy({q: at}) + two.energy({q: SE3.compose(at, x)})
+
+    assert whole.energy({q: pose}) == pytest.approx(energy(pose), rel=1e-13)
+    rise = energy(SE3.retract(pose, v)) - energy(pose)
+    assert whole.discrete_effort({q: pose}, v, Reference()) @ v == pytest.approx(rise, rel=1e-11)
+    slope = [
+        (energy(SE3.retract(pose, 1e-6 * unit)) - energy(SE3.retract(pose, -1e-6 * unit))) / 2e-6 for unit in np.eye(6)
+    ]
+    assert np.abs(whole.energy_gradient({q: pose}) - slope).max() <= 1e-7
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_momenta_of_merged_bodies_are_taken_together_and_found_again(seed):
+    """p = p₁ + Ad*_{x⁻¹} p₂; back, both bodies have the twist of the one."""
+    joined, x, rng = aside(seed)
+    done = rewrite(joined, (MERGE,))
+    assert [site.rule for site in done.done] == [MERGE.name]
+    carried = SE3.adjoint(SE3.inverse(x))
+    p1, p2, q1, q2 = (Path.of(name) for name in ("body1.ke.p", "body2.ke.p", "body1.pe.q", "body2.pe.q"))
+    inertias = [np.diag([0.3, 0.4, 0.5, m, m, m]) for m in (1.0, 2.0)]
+    twist, pose = rng.standard_normal(6), SE3.random(rng)
+    start = {p1: inertias[0] @ twist, p2: inertias[1] @ carried @ twist, q1: pose, q2: SE3.compose(pose, x)}
+    start |= {path: np.zeros(0) for path in joined.states if path not in start}
+    merged = done.states.forward(start)
+    assert set(merged) == set(done.system.states) >= {p1, q1}
+    assert np.abs(merged[p1] - (start[p1] + carried.T @ start[p2])).max() <= 1e-13
+    assert np.array_equal(merged[q1], pose)
+    flipped = {**start, q2: np.concatenate([-start[q2][:4], start[q2][4:]])}
+    for before in (start, flipped):  # of both quaternions of a rotation the one that it had
+        found = done.states.back(done.states.forward(before), before)
+        assert set(found) == set(before)
+        for path, value in before.items():
+            assert np.abs(found[path] - value).max(initial=0.0) <= 1e-12, path
+
+
 @settings(max_examples=10)
 @given(seed=st.integers(0, 2**20))
 def test_the_order_of_merging_makes_no_difference(seed):

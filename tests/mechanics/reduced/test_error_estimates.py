@@ -1,0 +1,141 @@
+"""What methods estimate their errors to be, on a linear equation, against the formulas of their books."""
+
+import math
+
+import numpy as np
+import pytest
+
+import ephs
+from ephs.mechanics.methods import METHODS, Setting
+from ephs.mechanics.reduced import tableaux
+from ephs.mechanics.reduced.equations import Equations
+from ephs.mechanics.simulate import problem_of_scene
+from ephs.mechanics.solve.control import Control, Tolerance
+
+J, K, RATE = 0.5, 3.0, -1.1
+A = np.array([[0.0, 1.0], [-K / J, 0.0]])
+RTOL, ATOL = 1e-5, 1e-7
+SCENE = f"""format = 1
+name = "torsion"
+
+[world]
+gravity = [0.0, 0.0, 0.0]
+
+[bodies.disc]
+mass = 2.0
+inertia = [0.6, 0.7, {J}]
+angular_velocity = [0.0, 0.0, {RATE}]
+
+[joints.axle]
+type = "revolute"
+bodies = ["ground", "disc"]
+at = [0.0, 0.0, 0.0]
+axis = [0.0, 0.0, 1.0]
+stiffness = {K}
+"""
+Y = np.array([0.0, RATE])
+
+
+@pytest.fixture(scope="module")
+def equations(tmp_path_factory):
+    file = tmp_path_factory.mktemp("torsion") / "torsion.toml"
+    file.write_text(SCENE, encoding="utf-8")
+    scene = ephs.load(file)
+    return Equations(scene, problem_of_scene(scene), 0.0)
+
+
+def stepper(equations, method, **options):
+    control = Control(Tolerance(RTOL, {}), Tolerance(ATOL, {}), None, 0.0, math.inf, None)
+    made, _ = METHODS[method].make(Setting(equations.problem, 0.0, control, options, equations))
+    return made
+
+
+def relative(estimate, end):
+    """Relative to what is allowed: of an increment as if it were 1, of a rate by its size before and after."""
+    return estimate / (ATOL + RTOL * np.array([1.0, max(abs(RATE), abs(end))]))
+
+
+def mean_square(relative):
+    """With the environment's entropy, which stays as it is."""
+    return float(relative @ relative) / 3.0
+
+
+def stages(a, b, h):
+    """The rates at the stages of an explicit method, that at the end, and the end."""
+    k = [A @ Y]
+    for row in [*a, b]:
+        end = Y + h * sum(weight * rate for weight, rate in zip(row, k, strict=True))
+        k.append(A @ end)
+    return np.array(k), end
+
+
+@pytest.mark.parametrize("h", [0.02, 0.1])
+def test_of_order_five_it_is_the_root_mean_square_of_the_difference(equations, h):
+    k, end = stages(tableaux.A5, tableaux.B5, h)
+    attempt = stepper(equations, "rk54").step(equations.start(0.0), h)
+    expected = relative(h * np.array(tableaux.E5) @ k, end[1])
+    assert attempt.error == pytest.approx(math.sqrt(mean_square(expected)), rel=1e-6)
+    assert attempt.end.r[0] == pytest.approx(end[1], abs=1e-13)
+
+
+@pytest.mark.parametrize("h", [0.2, 0.5])
+def test_of_order_eight_two_estimates_are_blended(equations, h):
+    k, end = stages(tableaux.A8, tableaux.B8, h)
+    made = stepper(equations, "rk87")
+    attempt = made.step(equations.start(0.0), h)
+    fine, coarse = (relative(h * np.array(e) @ k, end[1]) for e in (tableaux.E8_5, tableaux.E8_3))
+    one, two = mean_square(fine), mean_square(coarse)
+    assert attempt.error == pytest.approx(one / math.sqrt(one + 0.01 * two), rel=1e-5)
+    # how fast the mode is that the last two stages differ in: at most A's norm in the scale of what is allowed
+    assert 0.0 < made.stiffness <= h * float(np.linalg.norm(A, 2))
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.5])
+def test_of_generalised_alpha_it_is_what_a_constant_acceleration_misses(equations, rho):
+    h, m, f = 0.01, (2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0)
+    gamma = 0.5 + f - m
+    beta = 0.25 * (0.5 + gamma) ** 2
+    first = A[1] @ Y
+    # (1 − m) a¹ + m a⁰ = (1 − f) y''¹ + f y''⁰ with Newmark's formulas, an equation for a¹
+    known = np.array([h * RATE + h * h * (0.5 - beta) * first, RATE + h * (1.0 - gamma) * first])
+    by = np.array([h * h * beta, h * gamma])
+    mean = ((1 - f) * A[1] @ known + f * first - m * first) / ((1 - m) - (1 - f) * A[1] @ by)
+    attempt = stepper(equations, "alpha", rho=rho).step(equations.start(0.0), h)
+    expected = abs(h * h * (beta - 1.0 / 6.0) * (mean - first)) / (ATOL + RTOL)
+    assert attempt.error == pytest.approx(expected, rel=1e-4)
+    assert attempt.end.r[0] == pytest.approx((known + by * mean)[1], abs=1e-8)
+
+
+@pytest.mark.parametrize("h", [0.02, 0.3])
+def test_of_radau_it_is_the_filtered_difference_to_the_embedded_method(equations, h):
+    """Hairer and Wanner, IV.8: (γ₀/h − A)⁻¹ (f(y⁰) + e₁z₁ + e₂z₂ + e₃z₃), again from there where it is too large."""
+    root = math.sqrt(6.0)
+    parts = [[360, 1800, 225], [1800, 360, 225], [36, 36, 9]]
+    c = np.array(
+        [
+            [88 - 7 * root, 296 - 169 * root, -2 + 3 * root],
+            [296 + 169 * root, 88 + 7 * root, -2 - 3 * root],
+            [16 - root, 16 + root, 1.0],
+        ]
+    ) / np.array(parts)
+    whole = np.eye(6) - h * np.kron(c, A)
+    z = np.linalg.solve(whole, h * np.kron(c @ np.ones(3), A @ Y)).reshape(3, 2)
+    gamma = 1.0 / ((6.0 + 81.0 ** (1 / 3) - 9.0 ** (1 / 3)) / 30.0)
+    embedded = np.array([-13.0 - 7.0 * root, -13.0 + 7.0 * root, -1.0]) / 3.0 @ z / h
+    matrix = gamma / h * np.eye(2) - A
+    found = np.linalg.solve(matrix, A @ Y + embedded)
+    end = (Y + z[2])[1]
+    if np.abs(relative(found, end)).max() > 1.0:
+        found = np.linalg.solve(matrix, A @ (Y + found) + embedded)
+    attempt = stepper(equations, "radau").step(equations.start(0.0), h)
+    assert attempt.error == pytest.approx(np.abs(relative(found, end)).max(), rel=1e-3)
+    assert attempt.end.r[0] == pytest.approx(end, abs=1e-7)
+
+
+def test_powers_of_the_step_with_which_estimates_fall(equations):
+    found = {}
+    for method, h in (("rk54", 0.05), ("rk87", 0.2), ("alpha", 0.005), ("radau", 0.02)):
+        made = stepper(equations, method)
+        one, two = (made.step(equations.start(0.0), part * h).error for part in (1.0, 0.5))
+        found[method] = (round(math.log2(one / two)), made.exponent)
+    assert found == {"rk54": (5, 5.0), "rk87": (8, 8.0), "alpha": (3, 3.0), "radau": (4, 4.0)}

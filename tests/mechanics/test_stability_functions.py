@@ -1,0 +1,227 @@
+"""One step of each method on a linear equation is its stability function of h A, in closed form.
+
+The equation is that of a disc on a torsion spring with friction, y' = A y with y = (angle from rest, rate).
+"""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+import ephs
+from ephs import Pattern, junction, library
+from ephs import quantity as Q
+from ephs.mechanics.methods import METHODS
+from ephs.mechanics.reduced import tableaux
+
+J, K, D = 0.5, 3.0, 0.4
+ANGLE, RATE = 0.3, -1.1
+A = np.array([[0.0, 1.0], [-K / J, -D / J]])
+Y = np.array([ANGLE, RATE])
+SCENE = f"""format = 1
+name = "torsion"
+
+[world]
+gravity = [0.0, 0.0, 0.0]
+
+[bodies.disc]
+mass = 2.0
+inertia = [0.6, 0.7, {J}]
+angular_velocity = [0.0, 0.0, {RATE}]
+
+[joints.axle]
+type = "revolute"
+bodies = ["ground", "disc"]
+at = [0.0, 0.0, 0.0]
+axis = [0.0, 0.0, 1.0]
+stiffness = {K}
+rest = {-ANGLE}
+friction = {D}
+"""
+
+
+def rational(top, bottom, z):
+    """A rational function of a matrix, by the coefficients of its numerator and denominator."""
+    over, under = (sum(c * np.linalg.matrix_power(z, k) for k, c in enumerate(cs)) for cs in (top, bottom))
+    return np.linalg.solve(under, over)
+
+
+def diagonal(numbers):
+    return rational([1.0, 0.5], [1.0, -0.5], numbers)
+
+
+def gauss(z):
+    """Padé (3, 3): three Gauss stages."""
+    return rational([1.0, 1 / 2, 1 / 10, 1 / 120], [1.0, -1 / 2, 1 / 10, -1 / 120], z)
+
+
+def radau(z):
+    """Padé (2, 3): Radau IIA with three stages."""
+    return rational([1.0, 2 / 5, 1 / 20], [1.0, -3 / 5, 3 / 20, -1 / 60], z)
+
+
+def explicit(a, b):
+    """1 + Σ z^(k+1) bᵀ Aᵏ 1."""
+    n = len(b)
+    matrix = np.zeros((n, n))
+    for i, row in enumerate(a, 1):
+        matrix[i, : len(row)] = row
+    weights = [float(np.array(b) @ np.linalg.matrix_power(matrix, k) @ np.ones(n)) for k in range(n)]
+    return lambda z: rational([1.0, *weights], [1.0], z)
+
+
+FUNCTIONS = {
+    "natural": diagonal,
+    "natural4": gauss,
+    "radau": radau,
+    "rk54": explicit(tableaux.A5, tableaux.B5),
+    "rk87": explicit(tableaux.A8, tableaux.B8),
+}
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory):
+    file = tmp_path_factory.mktemp("torsion") / "torsion.toml"
+    file.write_text(SCENE, encoding="utf-8")
+    return ephs.load(file)
+
+
+def states(scene, method, h, steps, **more):
+    sol = ephs.simulate(scene, steps * h, method=method, step=h, **more)
+    axle = sol.joint("axle")
+    return np.column_stack([np.ravel(axle.coordinate) + ANGLE, np.ravel(axle.rate)])
+
+
+@pytest.mark.parametrize("h", [0.05, 0.3])
+@pytest.mark.parametrize("method", FUNCTIONS)
+def test_a_step_is_the_stability_function(scene, method, h):
+    found = states(scene, method, h, 2)
+    step = FUNCTIONS[method](h * A)
+    for i, expected in enumerate((Y, step @ Y, step @ step @ Y)):
+        assert np.abs(found[i] - expected).max() <= 1e-11
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.6, 1.0])
+def test_generalised_alpha_is_its_recurrence(scene, rho):
+    """Chung and Hulbert's equations, solved as a linear system for angle, rate and mean acceleration."""
+    h, m, f = 0.05, (2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0)
+    gamma = 0.5 + f - m
+    beta = 0.25 * (0.5 + gamma) ** 2
+    stiff, damp = A[1]
+    new = np.array([[1.0, 0.0, -h * h * beta], [0.0, 1.0, -h * gamma], [-(1 - f) * stiff, -(1 - f) * damp, 1 - m]])
+    old = np.array([[1.0, h, h * h * (0.5 - beta)], [0.0, 1.0, h * (1 - gamma)], [f * stiff, f * damp, -m]])
+    y = np.array([*Y, A[1] @ Y])
+    expected = [Y]
+    for _ in range(3):
+        y = np.linalg.solve(new, old @ y)
+        expected.append(y[:2])
+    assert np.abs(states(scene, "alpha", h, 3, options={"rho": rho}) - expected).max() <= 1e-7
+
+
+def test_the_variational_method_is_the_midpoint_rule_with_friction_in_the_middle(scene):
+    assert np.abs(states(scene, "variational", 0.1, 1)[1] - diagonal(0.1 * A) @ Y).max() <= 1e-12
+
+
+def test_every_method_of_scenes_with_constant_steps_has_its_test():
+    of_scenes = {name for name, m in METHODS.items() if m.scenes and m.fixed}
+    assert of_scenes == {*FUNCTIONS, "alpha", "variational"}
+
+
+# ---- systems without bodies -------------------------------------------------------------------------------------
+
+MASS, SPRING, DRAG = 2.0, 3.0, 0.4
+SYSTEM = Pattern(
+    junctions={"q": junction(Q.displacement), "p": junction(Q.momentum), "s": junction(Q.entropy)},
+    boxes={
+        "pe": {"q": "q"}, "ke": {"p": "p"}, "pkc": {"q": "q", "p": "p"}, "mf": {"p": "p", "s": "s"}, "env": {"s": "s"},
+    },
+)(
+    pe=library.spring(k=SPRING), ke=library.point_mass(m=MASS), pkc=library.pkc(), mf=library.friction(d=DRAG),
+    env=library.environment(),
+)  # fmt: skip
+LINKED = Pattern(
+    junctions={name: junction(Q.momentum if name[0] == "p" else Q.displacement) for name in ("q", "p", "p2")},
+    boxes={"pe": {"q": "q"}, "ke": {"p": "p"}, "ke2": {"p": "p2"}, "pkc": {"q": "q", "p": "p"},
+           "link": {"p": "p", "p2": "p2"}},
+)(
+    pe=library.spring(k=SPRING), ke=library.point_mass(m=MASS), ke2=library.point_mass(m=MASS),
+    pkc=library.pkc(), link=library.rigid_link(),
+)  # fmt: skip
+START = {"pe.q": 0.3, "ke.p": -1.1}
+
+
+@pytest.mark.parametrize("method", [name for name, m in METHODS.items() if m.systems])
+@pytest.mark.parametrize(
+    ("system", "more", "matrix"),
+    [
+        (SYSTEM, {}, [[0.0, 1.0 / MASS], [-SPRING, -DRAG / MASS]]),
+        (LINKED, {"ke2.p": -1.1}, [[0.0, 1.0 / MASS], [-0.5 * SPRING, 0.0]]),
+    ],
+    ids=["friction", "constraint"],
+)
+def test_systems_take_the_same_steps(method, system, more, matrix):
+    h, steps = 0.1, 3
+    sol = ephs.simulate(system, steps * h, initial=START | more, method=method, step=h)
+    one = FUNCTIONS[method](h * np.array(matrix))
+    expected = [np.linalg.matrix_power(one, i) @ list(START.values()) for i in range(steps + 1)]
+    found = np.column_stack([np.ravel(sol[path]) for path in START])
+    assert np.abs(found - expected).max() <= (1e-9 if method == "radau" else 1e-12)
+    for path, value in more.items():
+        assert value == START["ke.p"]
+        assert np.abs(np.ravel(sol[path]) - found[:, 1]).max() <= 1e-12
+    # Newton's method has the exact matrix of what is linear; the heat is not
+    assert sol.stats["iterations"] <= (3 if method == "radau" else 2) * steps + 2
+    energy = 0.5 * SPRING * found[:, 0] ** 2 + 0.5 * (1 + len(more)) * found[:, 1] ** 2 / MASS
+    assert np.abs(sol.energy - sol.energy[0]).max() <= (1e-7 if method == "radau" else 1e-11) * energy[0]
+    made = (energy[0] - energy) / 293.15 if not more else 0.0 * energy
+    tolerance = 1e-12 if method == "natural" else 1e-7
+    assert np.abs(sol.entropy - sol.entropy[0] - made).max() <= tolerance
+
+
+# ---- the coefficients -------------------------------------------------------------------------------------------
+
+
+def _fraction(x):
+    """The rational number of small denominator next to a rounded one."""
+    return Fraction(x).limit_denominator(10**6)
+
+
+def _times(x, y):
+    return [a * b for a, b in zip(x, y, strict=True)]
+
+
+def test_the_coefficients_of_order_five_meet_the_conditions_of_their_orders_as_rational_numbers():
+    """Hairer, Nørsett and Wanner, table II.2.2; of the estimate's weights all up to order 4 vanish."""
+    weights = [_fraction(x) for x in tableaux.B5]
+    a = [[], *([_fraction(x) for x in row] for row in tableaux.A5), weights]
+    c = [*(_fraction(x) for x in tableaux.C5), Fraction(1)]
+    assert [sum(row, Fraction(0)) for row in a] == c
+
+    def through(values):
+        return [sum((x * v for x, v in zip(row, values, strict=False)), Fraction(0)) for row in a]
+
+    square, cube = _times(c, c), _times(c, _times(c, c))
+    inner = through(c)
+    trees = [
+        (1, [Fraction(1)] * len(c), 1), (2, c, 2), (3, square, 3), (3, inner, 6), (4, cube, 4),
+        (4, _times(c, inner), 8), (4, through(square), 12), (4, through(inner), 24), (5, _times(cube, c), 5),
+        (5, _times(square, inner), 10), (5, _times(inner, inner), 20), (5, _times(c, through(square)), 15),
+        (5, through(cube), 20), (5, _times(c, through(inner)), 30), (5, through(_times(c, inner)), 40),
+        (5, through(through(square)), 60), (5, through(through(inner)), 120),
+    ]  # fmt: skip
+    missed = []
+    for order, values, inverse in trees:
+        assert sum(_times(weights, values[:-1]), Fraction(0)) == Fraction(1, inverse)
+        left = sum(_times([_fraction(x) for x in tableaux.E5], values), Fraction(0))
+        missed += [order] if left else []
+    assert set(missed) == {5}
+
+
+def test_the_coefficients_of_order_eight_integrate_polynomials_and_their_estimates_vanish_on_them():
+    a, b, c = tableaux.A8, np.array(tableaux.B8), np.array(tableaux.C8)
+    assert np.allclose([0.0, *(sum(row) for row in a)], c, rtol=0, atol=1e-14)
+    ends = np.append(c, 1.0)
+    for k in range(8):
+        assert abs(b @ c**k - 1.0 / (k + 1)) <= 1e-14
+        assert abs(np.array(tableaux.E8_5) @ ends**k) <= 1e-14 or k >= 5
+        assert abs(np.array(tableaux.E8_3) @ ends**k) <= 1e-14 or k >= 3

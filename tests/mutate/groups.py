@@ -1,0 +1,154 @@
+"""What is broken, in groups, and with which tests."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from hashlib import sha256
+
+from tests.mutate.mutants import ROOT, Mutant, mutants_of
+from tests.mutate.named import breaks
+
+SPACES = "tests/semantics/spaces"
+MECHANICS = "tests/mechanics"
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Files, as patterns from the root, and the tests that ought to see what is broken in them.
+
+    Where no kernel is changed, tests can be run on compiled kernels: there ``compiled`` is true.
+    """
+
+    files: tuple[str, ...]
+    tests: tuple[str, ...]
+    without: tuple[str, ...] = ()
+    compiled: bool = False
+
+    def paths(self) -> list[str]:
+        """The files, sorted."""
+        found = {f.relative_to(ROOT).as_posix() for pattern in self.files for f in ROOT.glob(pattern)}
+        left_out = {f.relative_to(ROOT).as_posix() for pattern in self.without for f in ROOT.glob(pattern)}
+        return sorted(found - left_out)
+
+    def mutants(self) -> list[Mutant]:
+        """All of them, file by file."""
+        return [mutant for path in self.paths() for mutant in mutants_of(path)] or breaks()
+
+
+PARTS = (f"{MECHANICS}/test_components.py", f"{MECHANICS}/test_models.py", f"{MECHANICS}/test_variational.py")
+RUNS = (
+    f"{MECHANICS}/test_stability_functions.py",
+    f"{MECHANICS}/engine",
+    f"{MECHANICS}/reduced",
+    f"{MECHANICS}/solve/test_collocation.py",
+    f"{MECHANICS}/solve/test_lu.py",
+    f"{MECHANICS}/solve/test_radau.py",
+    f"{MECHANICS}/solve/test_integrate.py",
+)
+
+DERIVATIVES = tuple(
+    f"ephs/mechanics/reduced/{name}_kernels.py"
+    for name in ("action", "action_tangent", "column", "dynamics", "jacobian", "slope", "tangent")
+)
+
+GROUPS = {
+    "spaces": Group(
+        ("ephs/semantics/spaces/*.py",),
+        (SPACES, *PARTS),
+        # Compilation and its cache: `tests/semantics/spaces/test_jit.py` runs it in processes of its own.
+        ("ephs/semantics/spaces/jit.py", "ephs/semantics/spaces/errors.py"),
+    ),
+    "pairs": Group(
+        (
+            "ephs/mechanics/joints.py",
+            "ephs/mechanics/components.py",
+            "ephs/mechanics/directions.py",
+            "ephs/mechanics/kernels.py",
+            "ephs/mechanics/holonomic_kernels.py",
+            "ephs/mechanics/spring_kernels.py",
+            "ephs/mechanics/springs.py",
+        ),
+        (
+            *PARTS,
+            f"{SPACES}/test_pairs.py",
+            f"{MECHANICS}/test_build.py",
+            f"{MECHANICS}/test_joint_ports.py",
+            f"{MECHANICS}/test_redundancy.py",
+        ),
+    ),
+    "primitives": Group(
+        (
+            "ephs/semantics/primitives.py",
+            "ephs/semantics/structures.py",
+            "ephs/semantics/library.py",
+            "ephs/semantics/laws.py",
+            "ephs/semantics/kernels.py",
+            "ephs/semantics/natural.py",
+            "ephs/semantics/behaviour.py",
+            "ephs/semantics/constructors.py",
+        ),
+        ("tests/semantics", *PARTS),
+    ),
+    "integrators": Group(
+        (
+            "ephs/mechanics/solve/natural.py",
+            "ephs/mechanics/solve/natural4.py",
+            "ephs/mechanics/solve/radau.py",
+            "ephs/mechanics/solve/collocation.py",
+            "ephs/mechanics/reduced/explicit.py",
+            "ephs/mechanics/reduced/tableaux.py",
+            "ephs/mechanics/reduced/alpha.py",
+            "ephs/mechanics/reduced/implicit.py",
+            "ephs/mechanics/reduced/variational.py",
+        ),
+        (*RUNS, f"{MECHANICS}/test_methods.py"),
+        compiled=True,
+    ),
+    "kernels": Group(
+        (
+            "ephs/mechanics/solve/natural_kernels.py",
+            "ephs/mechanics/solve/gauss_kernels.py",
+            "ephs/mechanics/reduced/loop_kernels.py",
+            "ephs/mechanics/reduced/sweep_kernels.py",
+            "ephs/mechanics/reduced/table_kernels.py",
+            "ephs/mechanics/engine/march_kernels.py",
+        ),
+        RUNS,
+    ),
+    "derivatives": Group(DERIVATIVES, (f"{MECHANICS}/dynamics", *RUNS)),
+    "reductions": Group(
+        (
+            "ephs/mechanics/reduction/*.py",
+            "ephs/mechanics/engine/build.py",
+            "ephs/mechanics/engine/closing.py",
+            "ephs/mechanics/engine/tables.py",
+            "ephs/mechanics/reduced/mechanism.py",
+            "ephs/mechanics/reduced/spanning.py",
+        ),
+        (f"{MECHANICS}/reduction", f"{MECHANICS}/engine", f"{MECHANICS}/test_stability_functions.py"),
+    ),
+    "named": Group(
+        (),
+        (
+            "tests/operad",
+            "tests/semantics",
+            *PARTS,
+            f"{MECHANICS}/reduced",
+            f"{MECHANICS}/imports",
+            f"{MECHANICS}/solve/test_books.py",
+        ),
+    ),
+}
+
+
+def sample(mutants: Sequence[Mutant], count: int, seed: int) -> list[Mutant]:
+    """As equally many of each function as can be, drawn by a seed; edits elsewhere do not change the draw."""
+
+    def lot(name: str) -> bytes:
+        return sha256(f"{seed} {name}".encode()).digest()
+
+    of: dict[str, list[Mutant]] = {}
+    for mutant in sorted(mutants, key=lambda m: lot(m.name)):
+        of.setdefault(f"{mutant.file} {mutant.function}", []).append(mutant)
+    piles = [of[function] for function in sorted(of, key=lot)]
+    drawn = [pile[turn] for turn in range(max(map(len, piles), default=0)) for pile in piles if turn < len(pile)]
+    return drawn[:count]

@@ -1,0 +1,113 @@
+"""Breaks chosen by hand: each a misunderstanding that one could have of the theory, or a hole in the doors."""
+
+from dataclasses import dataclass
+
+from tests.mutate.mutants import ROOT, Mutant
+
+
+@dataclass(frozen=True, slots=True)
+class Break:
+    """One edit: in a file, a text that occurs once becomes another."""
+
+    file: str
+    old: str
+    new: str
+
+
+BREAKS = {
+    "left trivialisation": Break(
+        "ephs/semantics/symbols/programs.py", "[[-a, -b, -c], [w, -c, b]", "[[-a, -b, -c], [w, c, b]"
+    ),
+    "traced correction": Break("ephs/semantics/symbols/traced_kernels.py", "near += WEIGHT *", "near -= WEIGHT *"),
+    "traced slope": Break("ephs/semantics/symbols/traced_kernels.py", "0.5 * slope[at + q]", "slope[at + q]"),
+    "equations": Break(
+        "ephs/semantics/symbols/writer.py",
+        "parts.balances[writer.junction(path, port)] += expression",
+        "parts.balances[writer.junction(path, port)] -= expression",
+    ),
+    "reduced, turning frames": Break(
+        "ephs/mechanics/reduced/sweep_kernels.py",
+        "w.bias[i, k] = carried[k] + column[k]",
+        "w.bias[i, k] = carried[k] - column[k]",
+    ),
+    "reduced, cut joints": Break(
+        "ephs/mechanics/reduced/loop_kernels.py", "total[k] += turned[k]", "total[k] -= turned[k]"
+    ),
+    "reduced, heat": Break(
+        "ephs/mechanics/reduced/sweep_kernels.py", "s_rate[t.heat[i]] -= w.f[d]", "s_rate[t.heat[i]] += w.f[d]"
+    ),
+    "books": Break(
+        "ephs/mechanics/solve/books.py",
+        "self.exergy - self.exergy[:1] + self.destroyed",
+        "self.exergy - self.exergy[:1] - self.destroyed",
+    ),
+    "lp": Break("ephs/mechanics/components.py", "[-space.ad(unit).T @ x[p]", "[space.ad(unit).T @ x[p]"),
+    "lp, compiled": Break(
+        "ephs/mechanics/kernels.py",
+        "flow[3 + i] = u[j] * mean[3 + k] - u[k] * mean[3 + j]",
+        "flow[3 + i] = u[k] * mean[3 + j] - u[j] * mean[3 + k]",
+    ),
+    "o1": Break("ephs/mechanics/components.py", "np.hstack([-carried,", "np.hstack([carried,"),
+    "o1, not inverted": Break(
+        "ephs/mechanics/components.py",
+        "carried = SE3.adjoint(SE3.inverse(np.asarray(offset, dtype=float)))",
+        "carried = SE3.adjoint(np.asarray(offset, dtype=float))",
+    ),
+    "hc": Break(
+        "ephs/mechanics/components.py",
+        "np.hstack([SE3.adjoint(SE3.inverse(pose)), -np.eye(6), of.basis])",
+        "np.hstack([SE3.adjoint(SE3.inverse(pose)), np.eye(6), of.basis])",
+    ),
+    "hc, compiled": Break(
+        "ephs/mechanics/holonomic_kernels.py",
+        "side[i], mid[i], inner[i] = -0.5 * h * effort[6 + i], 0.5 * h * bi, h * ai",
+        "side[i], mid[i], inner[i] = 0.5 * h * effort[6 + i], 0.5 * h * bi, h * ai",
+    ),
+    "mf": Break(
+        "ephs/semantics/structures.py",
+        "out[:d, d] = out[d, :d] = -drag",
+        "out[:d, d] = out[d, :d] = drag",
+    ),
+    "mf, compiled": Break("ephs/semantics/kernels.py", "flow[d] = -power / theta", "flow[d] = power / theta"),
+    "substitution": Break(
+        "ephs/operad/substitution.py",
+        "        target[path] = kept = box / path\n",
+        "        target[path] = kept = path\n",
+    ),
+    "substitution, absorbed elsewhere": Break(
+        "ephs/operad/substitution.py",
+        "target[path] = outer.target[content.ports[path].junction]  # absorbed",
+        "target[path] = outer.target[min(content.ports.values(), key=lambda p: p.junction).junction]",
+    ),
+    "import, angles": Break(
+        "ephs/mechanics/imports/draft.py",
+        "SE3.compose(_turn(2, given[2]), _turn(1, given[1]))",
+        "SE3.compose(_turn(1, given[1]), _turn(2, given[2]))",
+    ),
+    "import, files outside": Break(
+        "ephs/mechanics/imports/draft.py", "file.is_relative_to(folder) and file.is_file()", "file.is_file()"
+    ),
+    "import, entities": Break(
+        "ephs/mechanics/imports/xml.py",
+        "if declared := _DECLARATION.search(text):",
+        "if declared := None:",
+    ),
+    "import, welds": Break("ephs/mechanics/imports/mjcf_links.py", "pose(data[3:6], data[6:10])", "pose(data[3:6])"),
+    "gluing": Break("ephs/semantics/relation.py", "outer_at[path] + i, -1.0))", "outer_at[path] + i, 1.0))"),
+}
+
+
+def breaks() -> list[Mutant]:
+    """The breaks as mutants, named by what is broken."""
+    return [_mutant(name, each) for name, each in BREAKS.items()]
+
+
+def _mutant(name: str, each: Break) -> Mutant:
+    text = (ROOT / each.file).read_bytes()
+    old, new = each.old.encode(), each.new.encode()
+    if text.count(old) != 1:
+        raise ValueError(f"{each.file}: {each.old!r} occurs {text.count(old)} times, expected once")
+    start = text.index(old)
+    lines = text.count(b"\n", 0, start) + 1, text.count(b"\n", 0, start + len(old.rstrip())) + 1
+    change = f"{each.old.strip()} → {each.new.strip()}"
+    return Mutant(each.file, f"({name})", "named", 1, start, start + len(old), new, lines, change)
