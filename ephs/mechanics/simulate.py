@@ -20,6 +20,7 @@ from ephs.mechanics.solve.loop import integrate_stepwise
 from ephs.mechanics.solve.problem import Problem, Signal
 from ephs.mechanics.solve.record import Record
 from ephs.mechanics.solve.solution import Solution
+from ephs.mechanics.solve.threads import in_one_thread
 from ephs.operad import Path
 from ephs.semantics.bundle import POSITIVE, Array, Reference
 from ephs.semantics.checks import random_efforts
@@ -40,6 +41,7 @@ OFF = 1e-3
 FORMS = ("paper", "folded", "reduced")
 
 
+@in_one_thread
 def simulate(
     model: System | Scene,
     until: float,
