@@ -1,4 +1,4 @@
-"""The same input gives the same result bit for bit: across processes, threads, workers, hash seeds, and how time passes."""
+"""The same input gives the same result bit for bit: across processes, threads, hash seeds, however fast the machine."""
 
 import json
 import os
@@ -8,7 +8,7 @@ from pathlib import Path
 from threading import Thread
 
 import pytest
-from threadpoolctl import threadpool_info
+from threadpoolctl import threadpool_info, threadpool_limits
 
 import ephs
 from ephs.mechanics.solve import integrate
@@ -30,19 +30,6 @@ def test_threads_and_hash_seeds_change_nothing():
     first, second = (json.loads(run.communicate()[0]) for run in (digests("1", "0"), digests("4", "4242")))
     assert len(first) >= 35
     assert {name for name in first if first[name] != second[name]} == set()
-
-
-@pytest.mark.parametrize(
-    "options", [{"method": "natural", "step": 0.01}, {"method": "rk54"}], ids=lambda o: o["method"]
-)
-def test_the_number_of_workers_changes_nothing(options):
-    scene = ephs.load(ROOT / "scenes/four-bar.toml")
-    vary = {"bodies.crank.mass": [0.5, 0.6, 0.7, 0.8]}
-    found = set()
-    for workers in (1, 2, 4):
-        table = ephs.sweep(scene, vary, until=0.05, workers=workers, **options)
-        found.add(digest({name: table[name].values for name in table.data_vars}))
-    assert len(found) == 1
 
 
 @pytest.mark.parametrize("method", ["natural", "natural4"])
@@ -70,7 +57,6 @@ def threads() -> set[int]:
 
 
 def test_linear_algebra_takes_one_thread_until_the_last_call_is_done():
-    before = threads()
     seen = []
 
     @in_one_thread
@@ -85,7 +71,8 @@ def test_linear_algebra_takes_one_thread_until_the_last_call_is_done():
         seen.append(threads())
         raise ValueError
 
-    with pytest.raises(ValueError):
-        outer()
+    with threadpool_limits(2, "blas"):
+        with pytest.raises(ValueError):
+            outer()
+        assert threads() == {2}
     assert seen == [{1}, {1}]
-    assert threads() == before
