@@ -12,6 +12,7 @@ from ephs.mechanics.solve.errors import SolveError
 from ephs.mechanics.solve.integrate import Grid, integrate
 from ephs.mechanics.solve.mobility import mobility
 from ephs.mechanics.solve.problem import Problem
+from ephs.mechanics.solve.threads import in_one_thread
 from ephs.semantics.errors import SemanticsError
 from ephs.semantics.laws import Probe, system_law
 from ephs.semantics.report import CheckItem, CheckReport, check_structure
@@ -31,6 +32,7 @@ ROUNDING = 1e-13
 """Of the energies that are stored or could be: what rounding may change their sum by in these steps."""
 
 
+@in_one_thread
 def check_model(model: System | Scene, initial: Mapping[str, "ArrayLike"] | None = None) -> CheckReport:
     """Check a system or a scene in its initial state.
 

@@ -18,6 +18,7 @@ from ephs.mechanics.scene.geometry import Coupling, coupling_of
 from ephs.mechanics.scene.model import GROUND, Joint, Scene
 from ephs.mechanics.solve.dataset import Variable
 from ephs.mechanics.solve.mobility import mobility
+from ephs.mechanics.solve.threads import in_one_thread
 from ephs.mechanics.wrenches import root_of, wrenches
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
@@ -221,6 +222,7 @@ class SceneMotion:
         return self._projected[1]
 
     @cached_property
+    @in_one_thread
     def _projected(self) -> tuple[dict[str, Array], dict[str, Array]]:
         """Twists nearest to the stored momenta in the mass metric that satisfy the joints, and the joints' rates."""
         n = len(self._solution)

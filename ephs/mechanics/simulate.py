@@ -24,6 +24,7 @@ from ephs.mechanics.solve.loop import integrate_stepwise
 from ephs.mechanics.solve.problem import Problem, Signal
 from ephs.mechanics.solve.record import Record
 from ephs.mechanics.solve.solution import Solution
+from ephs.mechanics.solve.threads import in_one_thread
 from ephs.mechanics.solve.watching import guarded
 from ephs.operad import Path
 from ephs.semantics.bundle import POSITIVE, Array, Reference
@@ -45,6 +46,7 @@ OFF = 1e-3
 FORMS = ("paper", "folded", "reduced")
 
 
+@in_one_thread
 def simulate(
     model: System | Scene,
     until: float,

@@ -16,6 +16,7 @@ import numpy as np
 
 from ephs.mechanics.loads import Inputs, Read, body_loads, joint_load
 from ephs.mechanics.scene.model import GROUND, Body, Joint, Scene
+from ephs.mechanics.solve.threads import in_one_thread
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import pair
 
@@ -123,6 +124,7 @@ class Moving(Read, Protocol):
         ...
 
 
+@in_one_thread
 def wrenches(scene: Scene, inputs: Inputs, motion: Moving) -> dict[str, Array]:
     """(n, 6) of every joint: λ on body 2 in the joint frame C2, NaN in components that are indeterminate.
 

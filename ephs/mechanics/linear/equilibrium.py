@@ -8,6 +8,7 @@ import numpy as np
 
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.solve.errors import OptionError, Outcome, SimulationError, SolveError
+from ephs.mechanics.solve.threads import in_one_thread
 from ephs.operad import Path
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.system import System
@@ -50,6 +51,7 @@ class Equilibrium:
     steps: int
 
 
+@in_one_thread
 def equilibrium(
     model: System | Scene,
     *,

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 from ephs.mechanics.linear.statespace import StateSpace
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.solve.errors import OptionError
+from ephs.mechanics.solve.threads import in_one_thread
 from ephs.semantics.bundle import Reference
 from ephs.semantics.system import System
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["linearize"]
 
 
+@in_one_thread
 def linearize(
     model: System | Scene,
     state: "State | Equilibrium | Mapping[str, ArrayLike] | str | None" = None,

@@ -6,11 +6,13 @@ from ephs.mechanics.reduction.rules import RULES
 from ephs.mechanics.reduction.steps import Reduction, Step, listed
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.simulate import problem_of_scene
+from ephs.mechanics.solve.threads import in_one_thread
 from ephs.semantics.system import System
 
 __all__ = ["reduce"]
 
 
+@in_one_thread
 def reduce(model: System | Scene) -> Reduction:
     """What a reduction takes out of a model, why it may, and how many unknowns are left after each step.
 

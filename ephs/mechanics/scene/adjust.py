@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ephs.mechanics.scene.kinematics import TOLERANCE, Link, elements, largest_gap, largest_slip
+from ephs.mechanics.solve.threads import in_one_thread
 from ephs.semantics.spaces import SE3
 
 Array = NDArray[np.float64]
@@ -37,6 +38,7 @@ def _least(values: Array) -> float:
     return 1e-9 * (float(values.max(initial=0.0)) or 1.0)
 
 
+@in_one_thread
 def close_loops(links: Sequence[Link], poses: Array, roots: Array, held: frozenset[str]) -> Array | None:
     """The nearest poses that satisfy every joint, the joints ``held`` at their coordinates; None where none
     is found."""
@@ -54,6 +56,7 @@ def close_loops(links: Sequence[Link], poses: Array, roots: Array, held: frozens
     return poses if largest_gap(free, poses, elements(free, poses)) < TOLERANCE else None
 
 
+@in_one_thread
 def project_velocities(
     links: Sequence[Link], poses: Array, twists: Array, roots: Array, held: frozenset[str]
 ) -> Array | None:

@@ -12,6 +12,7 @@ from ephs.mechanics.sensitivity.readings import reading_of
 from ephs.mechanics.sensitivity.sensitivity import Sensitivity, sensitivity
 from ephs.mechanics.solve.errors import OptionError
 from ephs.mechanics.solve.solution import Solution
+from ephs.mechanics.solve.threads import in_one_thread
 from ephs.semantics.bundle import Array
 from ephs.semantics.system import System
 
@@ -67,6 +68,7 @@ class Fit:
         return "\n".join(lines)
 
 
+@in_one_thread
 def fit(
     model: System | Scene,
     data: Mapping[str, "ArrayLike"],

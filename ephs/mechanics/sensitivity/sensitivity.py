@@ -14,6 +14,7 @@ from ephs.mechanics.simulate import simulate
 from ephs.mechanics.solve.errors import OptionError, failing_at
 from ephs.mechanics.solve.replay import replay
 from ephs.mechanics.solve.solution import Solution
+from ephs.mechanics.solve.threads import in_one_thread
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.system import System
 
@@ -95,6 +96,7 @@ class Sensitivity:
         return f"Sensitivity of {self.solution.name} to {', '.join(self.paths)}: {len(self.solution)} instants"
 
 
+@in_one_thread
 def sensitivity(
     model: System | Scene,
     parameters: Sequence[str],

@@ -2,8 +2,9 @@
 
 Numba files a compiled function under the source of the *file that defines it*. If a helper in another file
 changes, the caller is taken from the cache with the old helper inside. Here the cache of a file's kernels lies in a
-folder named by a fingerprint of the file, of all sources from which it imports, and theirs, and of the compiler's
-versions, so that a change starts new folders for what it can reach, and only for that.
+folder named by a fingerprint of the file, of all sources from which it imports, and theirs, of the compiler's
+versions, and of its settings, so that a change starts new folders for what it can reach, and only for that. Functions
+from outside of the package are compiled in every process: what they reach is not known.
 
 Rule for authors: whatever a kernel takes from other modules (helpers, constants) must come from a file that
 counts as a source: one whose text imports ``spaces.jit``, one with ``kernels`` in its name, or one in this
@@ -14,16 +15,17 @@ import hashlib
 import os
 import platform
 import re
-import tempfile
-import warnings
-from collections.abc import Callable, Generator
-from contextlib import contextmanager
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import Any, TypeVar, final
 
-IMPORT = re.compile(r"^\s*from (ephs[\w.]*) import \(?([^()\n]*)", re.MULTILINE)
+IMPORT = re.compile(r"^[ \t]*from (ephs[\w.]*) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
+SETTINGS = ("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "BOUNDSCHECK", "DEBUGINFO_DEFAULT", "USING_SVML")
+"""What Numba reads from the environment and what changes the code that it makes."""
+PACKAGE = Path(__file__).resolve().parents[2]
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
@@ -32,90 +34,72 @@ class KernelCacheWarning(UserWarning):
     """Compiled kernels cannot be kept on disk; every process compiles them anew."""
 
 
-def kernel_sources(package: Path | None = None) -> tuple[Path, ...]:
-    """All files of the package from which kernels are made, in a fixed order."""
-    here = Path(__file__).resolve().parent
-    root = here.parents[1] if package is None else package
-    return tuple(path for path in sorted(root.rglob("*.py")) if _is_source(path, here))
+@final
+@dataclass(frozen=True, slots=True)
+class _Source:
+    """What counts of a file, as it was when it was first asked for: that is what this process has imported."""
 
-
-def _is_source(path: Path, here: Path) -> bool:
-    if path.parent == here or "kernels" in path.name:
-        return True
-    content = path.read_bytes()
-    return b"spaces.jit" in content or b"spaces import jit" in content
+    digest: str
+    reached: frozenset[Path]
+    makes: bool
 
 
 @cache
-def _reached(path: Path) -> frozenset[Path]:
-    """The files of the package that a file imports directly."""
-    root = Path(__file__).resolve().parents[3]
+def _source(path: Path) -> _Source:
+    content = path.read_bytes()
+    inside = path.parent == PACKAGE / "semantics" / "spaces" or "kernels" in path.name
+    makes = inside or b"spaces.jit" in content or b"spaces import jit" in content
     found: set[Path] = set()
-    for module, names in IMPORT.findall(path.read_text(encoding="utf-8")):
-        at = root.joinpath(*module.split("."))
-        inside = [at / f"{name.strip().split(' ')[0]}.py" for name in names.split(",")]
-        found |= {file for file in (at.with_suffix(".py"), at / "__init__.py", *inside) if file.is_file()}
-    return frozenset(found)
+    for module, names in IMPORT.findall(content.decode()):
+        at = PACKAGE.parent.joinpath(*module.split("."))
+        words = [name.split() for name in re.sub(r"#[^\n]*", "", names).strip("()").split(",")]
+        within = [at / f"{name[0]}.py" for name in words if name]
+        found |= {file for file in (at.with_suffix(".py"), at / "__init__.py", *within) if file.is_file()}
+    return _Source(hashlib.sha256(content).hexdigest(), frozenset(found), makes)
+
+
+def is_source(path: Path) -> bool:
+    """Whether kernels are made from a file of the package."""
+    return _source(path).makes
 
 
 @cache
 def sources_of(path: Path) -> tuple[Path, ...]:
     """A file, the sources that it reaches by imports, and what these import directly, in a fixed order."""
-    here = Path(__file__).resolve().parent
     found, rest = {path}, [path]
     while rest:
-        for file in _reached(rest.pop()) - found:
+        for file in _source(rest.pop()).reached - found:
             found.add(file)
-            if _is_source(file, here):
+            if is_source(file):
                 rest.append(file)
     return tuple(sorted(found))
 
 
 @cache
 def fingerprint(path: Path | None = None) -> str:
-    """Name of the present state of a file's kernels, or of all: their sources, Numba, LLVM's binding, NumPy, Python."""
+    """Name of the present state of a file's kernels, or of those that reach no file: sources, versions, settings."""
     versions = [import_module(name).__version__ for name in ("numba", "llvmlite", "numpy")]
+    settings = [str(getattr(_numba().config, name, None)) for name in SETTINGS]
     digest = hashlib.sha256()
-    digest.update(repr((platform.python_implementation(), platform.python_version(), versions)).encode())
-    root = Path(__file__).resolve().parents[2]
-    for source in kernel_sources() if path is None else sources_of(path):
-        content = source.read_bytes()
-        digest.update(f"{source.relative_to(root).as_posix()}:{len(content)}:".encode())
-        digest.update(content)
+    digest.update(repr((platform.python_implementation(), platform.python_version(), versions, settings)).encode())
+    for source in () if path is None else sources_of(path):
+        digest.update(f"{source.relative_to(PACKAGE).as_posix()}:{_source(source).digest}:".encode())
     return digest.hexdigest()[:24]
 
 
 @cache
 def cache_folder(path: Path | None = None) -> Path | None:
-    """Folder of the compiled kernels of a file of the package, or of what is generated from all.
+    """Folder of the compiled kernels of a file of the package, or of those that reach no file. It need not exist.
 
-    None, after one warning, where it cannot be written. It lies below ``NUMBA_CACHE_DIR`` if that is set, else below
-    ``XDG_CACHE_HOME`` or ``~/.cache``.
+    It lies below ``NUMBA_CACHE_DIR`` if that is set, else below ``XDG_CACHE_HOME`` or ``~/.cache``. None where there is
+    no home.
     """
-    base = _base()
-    if base is None:
-        return None
-    folder = base / fingerprint(path)
-    folder.mkdir(parents=True, exist_ok=True)
-    return folder
-
-
-@cache
-def _base() -> Path | None:
     given = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
     try:
-        folder = (Path(given) if given else Path.home() / ".cache") / "ephs"
-        folder.mkdir(parents=True, exist_ok=True)
-        tempfile.TemporaryFile(dir=folder).close()
-    except (OSError, RuntimeError) as fault:
-        warnings.warn(
-            f"the folder for compiled kernels cannot be written ({fault}); every run compiles them anew. "
-            "Set XDG_CACHE_HOME to a folder that can be written.",
-            KernelCacheWarning,
-            stacklevel=2,
-        )
+        base = Path(given) if given else Path.home() / ".cache"
+    except RuntimeError:
         return None
-    return folder
+    return base.absolute() / "ephs" / fingerprint(path)
 
 
 def _numba() -> Any:
@@ -123,20 +107,14 @@ def _numba() -> Any:
     return import_module("numba")
 
 
-@contextmanager
-def _caching(function: Callable[..., Any]) -> Generator[bool, None, None]:
-    # Numba chooses a function's cache folder when it is decorated, from this setting, and keeps it.
-    # It refuses to cache what has no source file, such as functions typed at a prompt.
-    settings = _numba().config
-    file = Path(function.__code__.co_filename)
-    inside = file.resolve().is_relative_to(Path(__file__).resolve().parents[2])
-    folder = cache_folder(file.resolve() if inside else None) if file.is_file() else None
-    before = settings.CACHE_DIR
-    settings.CACHE_DIR = before if folder is None else str(folder)
-    try:
-        yield folder is not None
-    finally:
-        settings.CACHE_DIR = before
+def _kept(function: Callable[..., Any], dispatcher: Any, text: str | None) -> Any:
+    # Numba's own cache knows one file only, trusts what it finds there, and stops a run that cannot write.
+    file = Path(function.__code__.co_filename).resolve()
+    if text is not None or (file.is_relative_to(PACKAGE) and file.is_file()):
+        from ephs.semantics.spaces.keeping import KernelFiles
+
+        dispatcher._cache = KernelFiles(function, cache_folder(None if text is not None else file), text or "")
+    return dispatcher
 
 
 def compiling() -> bool:
@@ -148,8 +126,7 @@ def kernel(function: Function) -> Function:
     """Compile a function when first called: IEEE arithmetic, divisions as in NumPy, cached on disk."""
     if not compiling():
         return function
-    with _caching(function) as cached:
-        return _numba().njit(cache=cached, fastmath=False, error_model="numpy")(function)
+    return _kept(function, _numba().njit(fastmath=False, error_model="numpy")(function), None)
 
 
 def lean_kernel(function: Function) -> Function:
@@ -160,17 +137,18 @@ def lean_kernel(function: Function) -> Function:
     """
     if not compiling():
         return function
-    with _caching(function) as cached:
-        return _numba().njit(cache=cached, fastmath=False, error_model="numpy", nogil=True, _nrt=False)(function)
+    return _kept(function, _numba().njit(fastmath=False, error_model="numpy", nogil=True, _nrt=False)(function), None)
 
 
-def cfunc_kernel(signature: Any) -> Callable[[Function], Function]:
+def cfunc_kernel(signature: Any, text: str | None = None) -> Callable[[Function], Function]:
     """Compile a function at once, to be called through its ``address`` from other kernels; cached on disk.
 
     Parameters
     ----------
     signature
         A Numba signature, such as ``"void(int64, CPointer(float64))"``.
+    text
+        The source of a function that is in no file, and that takes nothing of the package.
 
     Without compilation the function itself is returned; it then has no address.
     """
@@ -178,7 +156,9 @@ def cfunc_kernel(signature: Any) -> Callable[[Function], Function]:
     def decorate(function: Function) -> Function:
         if not compiling():
             return function
-        with _caching(function) as cached:
-            return _numba().cfunc(signature, cache=cached, error_model="numpy")(function)
+        parsed = import_module("numba.core.sigutils").normalize_signature(signature)
+        made = import_module("numba.core.ccallback").CFunc(function, parsed, {}, {"error_model": "numpy"})
+        _kept(function, made, text).compile()
+        return made
 
     return decorate

@@ -5,12 +5,11 @@ number of instances.
 """
 
 import hashlib
-import importlib.util
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
-from pathlib import Path as File
+from types import ModuleType
 from typing import Any, final
 
 import numpy as np
@@ -152,7 +151,7 @@ def _plain(source: str) -> Callable[..., Any]:
     text = "\n".join(lines).replace(
         "def value(dims, scal, p, x0, v, e, lam, f, c, jac, work)", "def value(scal, p, x0, e, lam, f, c, jac)"
     )
-    return _unstored(text)
+    return _defined(text, {})
 
 
 @cache  # without a limit: a function that is dropped would leave its address behind in models
@@ -160,31 +159,12 @@ def address_of_source(source: str) -> tuple[int, Any]:
     """(address, what keeps it alive) of a program's compiled function; kept on disk where there is a cache."""
     from ephs.semantics.kernel_table import SIGNATURE
 
-    function = _stored(source) or _unstored(source)
-    compiled: Any = jit.cfunc_kernel(SIGNATURE)(function)
+    module = ModuleType("formula_" + hashlib.sha256(source.encode()).hexdigest()[:24])
+    sys.modules[module.__name__] = module  # by this name the compiler tells functions apart, and finds them again
+    compiled: Any = jit.cfunc_kernel(SIGNATURE, source)(_defined(source, module.__dict__))
     return int(compiled.address), compiled
 
 
-def _stored(source: str) -> Callable[..., Any] | None:
-    folder = jit.cache_folder()
-    if folder is None:
-        return None
-    name = "formula_" + hashlib.sha256(source.encode()).hexdigest()[:24]
-    file: File = folder / f"{name}.py"
-    if not file.is_file():
-        scratch = folder / f"{name}.{np.random.default_rng().integers(2**62):x}.tmp"
-        scratch.write_text(source, encoding="utf-8")
-        scratch.replace(file)  # another process may write the same text at the same time
-    spec = importlib.util.spec_from_file_location(name, file)
-    if spec is None or spec.loader is None:
-        return None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module  # where the compiler's cache looks for what it has kept
-    spec.loader.exec_module(module)
-    return module.value
-
-
-def _unstored(source: str) -> Callable[..., Any]:
-    names: dict[str, Any] = {}
+def _defined(source: str, names: dict[str, Any]) -> Callable[..., Any]:
     exec(compile(source, "<formula>", "exec"), names)  # the text is our own, written from expressions
     return names["value"]

@@ -1,0 +1,53 @@
+"""Linear algebra in one thread. With several, a library takes sums in another order, and the last digits are others."""
+
+from collections.abc import Callable
+from functools import wraps
+from importlib import import_module
+from threading import Lock
+from typing import Any, ParamSpec, TypeVar, final
+
+__all__ = ["in_one_thread"]
+
+Given = ParamSpec("Given")
+Made = TypeVar("Made")
+
+
+@final
+class _Limit:
+    """How many calls want one thread: the first of them sets it, the last sets back what was."""
+
+    __slots__ = ("_before", "_calls", "_lock")
+
+    def __init__(self) -> None:
+        self._calls, self._lock = 0, Lock()
+        self._before: Any = None
+
+    def __enter__(self) -> None:
+        with self._lock:
+            if self._calls == 0:
+                import_module("scipy.linalg")  # it brings a library of its own, which has to be there to be limited
+                self._before = import_module("threadpoolctl").threadpool_limits(1, "blas")
+            self._calls += 1
+
+    def __exit__(self, *_failure: object) -> None:
+        with self._lock:
+            self._calls -= 1
+            if self._calls == 0:
+                self._before.restore_original_limits()
+
+
+_LIMIT = _Limit()
+
+
+def in_one_thread(function: Callable[Given, Made]) -> Callable[Given, Made]:
+    """A function during whose calls linear algebra takes one thread, so that its results can be repeated bit for bit.
+
+    For functions that take long: to find the libraries takes a few milliseconds.
+    """
+
+    @wraps(function)
+    def limited(*arguments: Given.args, **keywords: Given.kwargs) -> Made:
+        with _LIMIT:
+            return function(*arguments, **keywords)
+
+    return limited

@@ -1,0 +1,78 @@
+"""The same input gives the same result bit for bit: across processes, threads, hash seeds, however fast the machine."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from threading import Thread
+
+import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
+
+import ephs
+from ephs.mechanics.solve import integrate
+from ephs.mechanics.solve.threads import in_one_thread
+from tests.repeat import contents, digest
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def digests(threads: str, seed: str) -> subprocess.Popen:
+    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+    environment = os.environ | dict.fromkeys(names, threads) | {"PYTHONHASHSEED": seed}
+    command = [sys.executable, "-m", "tests.repeat"]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment, cwd=ROOT)
+
+
+def test_threads_and_hash_seeds_change_nothing():
+    """One scene with heat, one with a loop, and a system with a function of one's own, by every method."""
+    first, second = (json.loads(run.communicate()[0]) for run in (digests("1", "0"), digests("4", "4242")))
+    assert len(first) >= 35
+    assert {name for name in first if first[name] != second[name]} == set()
+
+
+@pytest.mark.parametrize("method", ["natural", "natural4"])
+@pytest.mark.parametrize(
+    ("file", "until", "step"),
+    [
+        ("scenes/hot-brake.toml", 0.5, 0.01),
+        ("scenes/four-bar.toml", 0.5, 0.01),
+        ("benchmarks/scenes/four-bar-windows-1.toml", 2.0, 0.02),  # through configurations in which it can branch
+    ],
+)
+def test_how_fast_the_machine_is_changes_nothing(method, file, until, step, monkeypatch):
+    """Steps are taken many at a time, as many as the time that the last ones took allows."""
+    scene = ephs.load(ROOT / file)
+    found = set()
+    for largest, response in ((1, 0.1), (3, 0.1), (4096, 1e9)):
+        monkeypatch.setattr(integrate, "LARGEST_CHUNK", largest)
+        monkeypatch.setattr(integrate, "RESPONSE", response)
+        found.add(digest(contents(ephs.simulate(scene, until, method=method, step=step))))
+    assert len(found) == 1
+
+
+def threads() -> set[int]:
+    return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
+
+
+def test_linear_algebra_takes_one_thread_until_the_last_call_is_done():
+    seen = []
+
+    @in_one_thread
+    def inner():
+        seen.append(threads())
+
+    @in_one_thread
+    def outer():
+        other = Thread(target=inner)
+        other.start()
+        other.join()
+        seen.append(threads())
+        raise ValueError
+
+    with threadpool_limits(2, "blas"):
+        with pytest.raises(ValueError):
+            outer()
+        assert threads() == {2}
+    assert seen == [{1}, {1}]
