@@ -29,9 +29,9 @@ __all__ = ["main", "measure"]
 HERE = Path(__file__).parent
 BASELINE, OUT = HERE / "baseline.json", HERE.parent / "out" / "bench.json"
 PROCESSES, ROUNDS = 4, 3
-BLOCK, LONG, FIRST = 0.04, 0.25, 1.0
-"""Seconds that a measurement takes at least, nearly: shorter work is repeated. Work longer than LONG is measured once a
-process, and done once before where that takes longer than FIRST, else twice."""
+BLOCK, FIRST = 0.04, 1.0
+"""Seconds that a measurement takes at least, nearly: shorter work is repeated. Work is done twice before it is
+measured, but once where that took longer than FIRST."""
 LIMIT = 900.0
 """Seconds for a process; the first one of an installation compiles."""
 BESIDE = 3
@@ -62,9 +62,8 @@ def measure(names: Sequence[str], rounds: int, seed: int) -> dict[str, Any]:
         except Exception as error:  # one case does not keep the others from being measured
             found["failed"][name] = f"{type(error).__name__}: {error}"
     draw = random.Random(seed)
-    for number in range(rounds):
-        some = [name for name in works if number == 0 or once[name] < LONG]
-        for name in draw.sample(some, len(some)):
+    for _ in range(rounds):
+        for name in draw.sample(list(works), len(works)):
             count = max(1, int(BLOCK / once[name]))
             found["seconds"].setdefault(name, []).append(_took(works[name], count))
     return found

@@ -178,7 +178,9 @@ def test_what_is_measured_is_the_time_that_work_takes(monkeypatch):
     monkeypatch.setattr(quick, "CASES", cases)
     monkeypatch.setattr(quick, "_spent", lambda: clock[0])
     found = quick.measure(list(cases), 3, 0)
-    assert found["seconds"]["short"] == pytest.approx([0.001] * 3) and found["seconds"]["long"] == pytest.approx([2.0])
+    assert found["seconds"]["short"] == pytest.approx([0.001] * 3) and found["seconds"]["long"] == pytest.approx(
+        [2.0] * 3
+    )
     assert found["absent"] == {"absent": "no peer"} and found["failed"] == {"broken": "ValueError: no scene"}
     assert quick.measure(list(cases), 0, 0)["seconds"] == {}
 
