@@ -82,12 +82,13 @@ def tested(python: str, sdist: Path, folder: Path, tests: Sequence[str]) -> int:
     say = "import sysconfig; print(sysconfig.get_path('purelib'))"
     site = Path(subprocess.check_output([python, "-c", say], text=True).strip())
     (site / "tests-of-the-sdist.pth").write_text(f"{tree}\n")  # after what is installed, so that that is found first
-    origin = subprocess.check_output([python, "-c", "import ephs; print(ephs.__file__)"], text=True, cwd=folder).strip()
+    clean = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    ask = [python, "-c", "import ephs; print(ephs.__file__)"]
+    origin = subprocess.check_output(ask, text=True, cwd=folder, env=clean).strip()
     if not Path(origin).is_relative_to(site):
         print(f"ephs comes from {origin}, not from the environment", file=sys.stderr)
         return 1
     pytest = [str(Path(python).with_name("pytest")), "-q", "-o", "pythonpath=", *tests]
-    clean = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
     return subprocess.run(pytest, cwd=tree, env=clean).returncode
 
 
