@@ -76,7 +76,8 @@ dist: $(VENV)/.installed-release
 matrix: $(VENV)/.installed-release
 	$(BIN)/python -m tests.release matrix $(TESTS)
 
-smoke: $(VENV)/.installed-release
+smoke: $(VENV)/.installed-dev
+	@$(PIP) build uv || echo 'smoke: build and uv could not be installed'
 	$(BIN)/python -m tests.release smoke
 
 bench: $(VENV)/.installed-dev
