@@ -16,12 +16,13 @@ export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
 .DELETE_ON_ERROR:
-.PHONY: help demo test real lint types docs bench tables fuzz fuzz-inputs mutate mutants clean
+.PHONY: help demo test real lint types docs bench tables fuzz fuzz-inputs mutate mutants repeat dist matrix smoke clean
 
 help:
 	@echo 'make demo   simulate scenes/$(SCENE).toml and write out/$(SCENE)/report.html'
 	@echo 'make test   run the tests; make lint, make types: style and types; make fuzz: the laws, for long; make fuzz-inputs COUNT=N: so many broken files; make mutate: which breaks of the code no test sees (docs/mutation.md); make mutants: the same for the operad, by mutmut'
 	@echo 'make real   fetch real robots (131 MB) and hold their import against Pinocchio'
+	@echo 'make dist   wheel and sdist, tested as installed; make matrix: the tests under other Pythons and dependencies; make repeat: the same digits with nothing compiled yet'
 	@echo 'make docs   build docs/_build/html; make bench: what got slower than benchmarks/baseline.json; make tables: all benchmarks; make clean: remove what was built'
 
 # One stamp an extra: installing again is needed only when pyproject.toml has changed.
@@ -60,6 +61,24 @@ mutate: $(VENV)/.installed-dev
 
 mutants: $(VENV)/.installed-mutants
 	$(BIN)/mutmut run --max-children $(CORES)
+
+repeat: $(VENV)/.installed-dev
+	$(BIN)/python -m tests.repeat --cold
+
+# TESTS chooses what the jobs below run: make matrix TESTS=tests/operad
+TESTS ?= tests
+dist: $(VENV)/.installed-release
+	rm -rf dist
+	$(BIN)/python -m build --outdir dist
+	$(BIN)/python -m twine check --strict dist/*
+	$(BIN)/python -m tests.release wheel $(TESTS)
+
+matrix: $(VENV)/.installed-release
+	$(BIN)/python -m tests.release matrix $(TESTS)
+
+smoke: $(VENV)/.installed-dev
+	@$(PIP) build uv || echo 'smoke: build and uv could not be installed'
+	$(BIN)/python -m tests.release smoke
 
 bench: $(VENV)/.installed-dev
 	$(BIN)/python -m benchmarks.quick

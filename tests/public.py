@@ -6,6 +6,7 @@ Annotations are left out, since Python's versions print them differently.
 import ast
 import inspect
 from collections.abc import Iterator
+from enum import Enum
 from importlib import import_module
 from pathlib import Path
 from textwrap import dedent
@@ -62,8 +63,8 @@ def described(path: str, value: object) -> Iterator[str]:
         yield f"{path}{signature(value)}" if callable(value) else path
         return
     bases = ", ".join(base.__name__ for base in value.__bases__ if base is not object)
-    error = issubclass(value, BaseException)
-    yield f"class {path}{'' if error else signature(value)}{f': {bases}' if bases else ''}"
+    plain = issubclass(value, BaseException | Enum)
+    yield f"class {path}{'' if plain else signature(value)}{f': {bases}' if bases else ''}"
     for name in sorted(members(value)):
         member = inspect.getattr_static(value, name, None)
         if isinstance(member, staticmethod | classmethod):

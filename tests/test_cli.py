@@ -322,7 +322,7 @@ def test_help_needs_neither_numpy_nor_the_rooms_below(command):
 
 @pytest.mark.parametrize("command", [run, cli.check, cli.draw, cli.convert, sweep, linearize, Loading, Stepping])
 def test_every_option_is_explained(command):
-    documented = re.findall(r"^ {4}(\w+)$", command.__doc__, flags=re.MULTILINE)
+    documented = re.findall(r"^(\w+)$", inspect.getdoc(command), flags=re.MULTILINE)
     groups = ("loading", "stepping")  # explained by themselves
     options = [name for name in inspect.signature(command).parameters if name not in groups]
     assert [name for name in documented if name != "Parameters"] == options

@@ -11,7 +11,7 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import ephs
-from ephs.mechanics.solve import integrate
+from ephs.mechanics.solve import integrate, loop
 from ephs.mechanics.solve.threads import in_one_thread
 from tests.repeat import contents, digest
 
@@ -49,6 +49,17 @@ def test_how_fast_the_machine_is_changes_nothing(method, file, until, step, monk
         monkeypatch.setattr(integrate, "LARGEST_CHUNK", largest)
         monkeypatch.setattr(integrate, "RESPONSE", response)
         found.add(digest(contents(ephs.simulate(scene, until, method=method, step=step))))
+    assert len(found) == 1
+
+
+@pytest.mark.parametrize("method", ["rk54", "rk87"])
+def test_how_many_steps_a_compiled_call_takes_changes_nothing(method, monkeypatch):
+    scene = ephs.load(ROOT / "scenes/four-bar.toml")
+    found = set()
+    for burst, response in ((1, 0.1), (3, 0.1), (2000, 1e9)):
+        monkeypatch.setattr(loop, "BURST", burst)
+        monkeypatch.setattr(loop, "RESPONSE", response)
+        found.add(digest(contents(ephs.simulate(scene, 0.5, method=method))))
     assert len(found) == 1
 
 

@@ -1,0 +1,163 @@
+"""What is built, tested as it is installed: ``python -m tests.release wheel|matrix|smoke [what pytest is to run]``.
+
+``wheel``: the wheel and the sdist in dist/; what they hold, and the sdist's tests against the installed wheel.
+``matrix``: the same tests under each of `VERSIONS` that is found here, oldest and newest dependencies.
+``smoke``: commands of the wheel under another Python, with no extras and nothing compiled; a minute.
+
+It needs no more than the standard library, ``build`` and ``uv``, and says what it could not find.
+"""
+
+import os
+import subprocess
+import sys
+import tarfile
+import zipfile
+from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+ROOT = Path(__file__).resolve().parents[1]
+VERSIONS = (("3.11", "lowest-direct"), ("3.11", "highest"), ("3.12", "highest"), ("3.13", "highest"))
+DATA = (
+    "ephs/py.typed",
+    "ephs/operad/pattern.schema.json",
+    "ephs/mechanics/references.bib",
+    *(f"ephs/templates/{file.name}" for file in sorted((ROOT / "ephs/templates").iterdir()) if file.is_file()),
+)
+SMOKE = (
+    ("--version",),
+    ("new", "first"),
+    ("draw", "first.toml", "-o", "first.svg"),
+    ("equations", "first.toml"),
+)
+
+
+def uv(*arguments: object) -> subprocess.CompletedProcess[str]:
+    """Run uv, which finds interpreters and resolves versions."""
+    return subprocess.run([sys.executable, "-m", "uv", *map(str, arguments)], capture_output=True, text=True)
+
+
+def interpreter(version: str) -> str:
+    """The path of a Python, empty where there is none."""
+    found = uv("python", "find", "--no-python-downloads", "--system", version)
+    return found.stdout.strip() if found.returncode == 0 else ""
+
+
+def environment(python: str, folder: Path, wheel: Path, extras: str, resolution: str) -> str:
+    """Install the wheel into a new environment; its Python, or empty where that cannot be had."""
+    made = uv("venv", "--quiet", "--python", python, folder)
+    inside = str(folder / "bin" / "python")
+    requirement = f"{wheel}{extras}"
+    if made.returncode == 0:
+        made = uv("pip", "install", "--quiet", "--python", inside, "--resolution", resolution, requirement)
+    if made.returncode:
+        print(made.stderr, file=sys.stderr)
+    return "" if made.returncode else inside
+
+
+def built(folder: Path) -> tuple[Path, Path]:
+    """The wheel and the sdist, built into a folder unless they are there."""
+    if not list(folder.glob("*.whl")):
+        command = [sys.executable, "-m", "build", "--outdir", str(folder), str(ROOT)]
+        subprocess.run(command, check=True, capture_output=True)
+    (wheel,), (sdist,) = folder.glob("*.whl"), folder.glob("*.tar.gz")
+    return wheel, sdist
+
+
+def faults_of(wheel: Path) -> list[str]:
+    """What is missing in a wheel, or has no place there."""
+    names = set(zipfile.ZipFile(wheel).namelist())
+    sources = {file.relative_to(ROOT).as_posix() for file in (ROOT / "ephs").rglob("*.py")}
+    missing = [f"{name} is missing" for name in sorted({*sources, *DATA} - names)]
+    foreign = [f"{n} has no place there" for n in sorted(names) if not n.startswith("ephs/") and ".dist-info/" not in n]
+    licensed = any(name.endswith("licenses/LICENSE") for name in names)
+    return [*missing, *foreign, *([] if licensed else ["the licence is missing"])]
+
+
+def tested(python: str, sdist: Path, folder: Path, tests: Sequence[str]) -> int:
+    """Run an sdist's tests against the package that is installed; the exit code."""
+    with tarfile.open(sdist) as archive:
+        archive.extractall(folder, filter="data")
+    (tree,) = folder.iterdir()
+    say = "import sysconfig; print(sysconfig.get_path('purelib'))"
+    site = Path(subprocess.check_output([python, "-c", say], text=True).strip())
+    (site / "tests-of-the-sdist.pth").write_text(f"{tree}\n")  # after what is installed, so that that is found first
+    clean = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    ask = [python, "-c", "import ephs; print(ephs.__file__)"]
+    origin = subprocess.check_output(ask, text=True, cwd=folder, env=clean).strip()
+    if not Path(origin).is_relative_to(site):
+        print(f"ephs comes from {origin}, not from the environment", file=sys.stderr)
+        return 1
+    pytest = [str(Path(python).with_name("pytest")), "-q", "-o", "pythonpath=", *tests]
+    return subprocess.run(pytest, cwd=tree, env=clean).returncode
+
+
+def wheel_job(tests: Sequence[str]) -> int:
+    """The job ``wheel``."""
+    with TemporaryDirectory() as scratch:
+        wheel, sdist = built(ROOT / "dist")
+        faults = faults_of(wheel)
+        for file in (wheel, sdist):
+            print(f"{file.name}: {file.stat().st_size / 1000:.0f} kB")
+        print("\n".join(faults) or "the wheel holds the package and its data, and nothing else")
+        python = environment(sys.executable, Path(scratch, "env"), wheel, "[dev]", "highest")
+        return int(bool(faults) or not python or tested(python, sdist, Path(scratch, "tree"), tests))
+
+
+def matrix_job(tests: Sequence[str]) -> int:
+    """The job ``matrix``: 1 where a version fails."""
+    results: dict[str, str] = {}
+    with TemporaryDirectory() as scratch:
+        wheel, sdist = built(Path(scratch, "dist"))
+        for version, resolution in VERSIONS:
+            name = f"Python {version}, {'oldest' if resolution != 'highest' else 'newest'} dependencies"
+            folder = Path(scratch, f"{version}-{resolution}")
+            python = interpreter(version)
+            inside = python and environment(python, folder, wheel, "[dev]", resolution)
+            if not inside:
+                results[name] = "not installed" if python else "no interpreter found here: NOT TESTED"
+            else:
+                failed = tested(inside, sdist, Path(scratch, f"tree-{version}-{resolution}"), tests)
+                results[name] = "FAILED" if failed else "passed"
+    print("\n".join(f"{name}: {result}" for name, result in results.items()))
+    return int(any(result in ("FAILED", "not installed") for result in results.values()))
+
+
+def smoke_job() -> int:
+    """The job ``smoke``: 0 also where there is no other Python or no way to install."""
+    running = f"{sys.version_info.major}.{sys.version_info.minor}"
+    others = [version for version in ("3.13", "3.12", "3.11") if version != running and interpreter(version)]
+    if not others:
+        print("smoke: no other Python was found; nothing tested")
+        return 0
+    with TemporaryDirectory() as scratch:
+        try:
+            wheel, _ = built(Path(scratch, "dist"))
+        except subprocess.CalledProcessError:  # a build that is broken shows where the environment is made
+            print("smoke: the wheel could not be built; nothing tested")
+            return 0
+        python = environment(interpreter(others[0]), Path(scratch, "env"), wheel, "", "highest")
+        if not python:
+            print(f"smoke: nothing could be installed for Python {others[0]}; nothing tested")
+            return 0
+        plain = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"} | {"NUMBA_DISABLE_JIT": "1"}
+        for command in SMOKE:
+            done = subprocess.run(
+                [python, "-m", "ephs", *command], cwd=scratch, env=plain, capture_output=True, text=True
+            )
+            if done.returncode:
+                print(f"smoke: ephs {' '.join(command)} under Python {others[0]} ended with {done.returncode}")
+                print(done.stdout, done.stderr, sep="\n")
+                return 1
+    print(f"smoke: {len(SMOKE)} commands of the wheel ran under Python {others[0]}")
+    return 0
+
+
+def main() -> int:
+    """Do the job that is asked for."""
+    job, tests = sys.argv[1], sys.argv[2:] or ["tests"]
+    return smoke_job() if job == "smoke" else {"wheel": wheel_job, "matrix": matrix_job}[job](tests)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
