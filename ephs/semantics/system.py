@@ -17,6 +17,7 @@ from ephs.semantics.spaces import Pair, manifold
 
 if TYPE_CHECKING:
     from ephs.semantics.descriptor import Descriptor
+    from ephs.semantics.ledger import Ledger
     from ephs.semantics.relation import Relation
     from ephs.semantics.report import CheckReport
     from ephs.semantics.symbols.equations import Equations
@@ -161,6 +162,13 @@ class System:
                 raise AssemblyError("state-number", name, found=array, quantity=states[path].kind)
             out[path] = manifold(space).normalise(array)
         return out
+
+    @property
+    def ledger(self) -> "Ledger":
+        """Its books: who stores what at a state, and who makes entropy."""
+        from ephs.semantics.ledger import Ledger
+
+        return Ledger(self)
 
     def relation(self, reference: Reference | None = None, *, route: Literal["flat", "nested"] = "flat") -> "Relation":
         """The system's meaning: a relation between the rates of its states and its outer flows and efforts.

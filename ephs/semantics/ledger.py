@@ -1,0 +1,95 @@
+"""The books of a system at one state: who stores how much of what, and who makes entropy."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, final
+
+import numpy as np
+
+from ephs.operad import Path
+from ephs.semantics.bundle import Array, Reference
+from ephs.semantics.primitives import Irreversible, Storage
+
+if TYPE_CHECKING:
+    from ephs.semantics.system import System
+
+__all__ = ["Account", "Ledger"]
+
+State = Mapping[str, object]
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Account:
+    """What is stored: energy and exergy in J, up to a constant of each storage, entropy in J/K, volume in m³."""
+
+    energy: float
+    exergy: float
+    entropy: float
+    volume: float
+
+    def __add__(self, other: "Account") -> "Account":
+        return Account(
+            self.energy + other.energy,
+            self.exergy + other.exergy,
+            self.entropy + other.entropy,
+            self.volume + other.volume,
+        )
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Ledger:
+    """The books of a system. Calling it with a state gives the `Account` of each storage by its path.
+
+    Over a motion, energy changes by what is supplied at the outer ports, exergy by that less θ₀ times the entropy that
+    the `producers` make. A `Solution` has the same books over time: ``sol.ledger(path)``.
+    """
+
+    system: "System"
+
+    @property
+    def storages(self) -> tuple[Path, ...]:
+        """Components that store."""
+        return tuple(path for path, primitive in self.system.leaves() if isinstance(primitive, Storage))
+
+    @property
+    def producers(self) -> tuple[Path, ...]:
+        """Components that may make entropy."""
+        return tuple(path for path, primitive in self.system.leaves() if isinstance(primitive, Irreversible))
+
+    def __call__(self, state: State | None = None, reference: Reference | None = None) -> dict[Path, Account]:
+        """The account of each storage.
+
+        Parameters
+        ----------
+        state
+            Values of states by path; the others are at the identity of their space.
+
+        Raises
+        ------
+        AssemblyError
+            An unknown path, a wrong shape, or a number that is not finite.
+        """
+        values = self.system.state({str(path): value for path, value in (state or {}).items()})
+        given = reference or Reference()
+        return {
+            path: _account(primitive, {port: values[path / port] for port in primitive.bundle.ports}, given)
+            for path, primitive in self.system.leaves()
+            if isinstance(primitive, Storage)
+        }
+
+    def total(self, state: State | None = None, reference: Reference | None = None) -> Account:
+        """The accounts of all storages together, the environment's included."""
+        return sum(self(state, reference).values(), Account(0.0, 0.0, 0.0, 0.0))
+
+    def __str__(self) -> str:
+        stored = ", ".join(map(str, self.storages)) or "nothing"
+        return f"stored in {stored}; entropy is made by {', '.join(map(str, self.producers)) or 'nothing'}"
+
+
+def _account(storage: Storage, x: dict[Path, Array], reference: Reference) -> Account:
+    def held(kind: str) -> float:
+        return float(sum(np.sum(x[port]) for port, _, quantity in storage.bundle.items() if quantity.kind == kind))
+
+    return Account(storage.total_energy(x, reference), storage.exergy(x, reference), held("entropy"), held("volume"))

@@ -1,0 +1,61 @@
+"""The books of a system at a state are those of a solution there, and of its parts together."""
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import ephs
+from ephs import library as lib
+from ephs import quantity as Q
+from ephs.testing import systems
+
+HEATED = ephs.Pattern(
+    junctions={"q": ephs.junction(Q.displacement), "p": ephs.junction(Q.momentum), "s": ephs.junction(Q.entropy)},
+    boxes={
+        "pe": {"q": "q"},
+        "ke": {"p": "p"},
+        "pkc": {"q": "q", "p": "p"},
+        "mf": {"p": "p", "s": "s"},
+        "tc": {"s": "s"},
+    },
+)
+
+
+def test_the_books_at_a_state_are_those_of_a_solution_there():
+    system = HEATED(
+        pe=lib.spring(k=2.0), ke=lib.point_mass(m=0.5), pkc=lib.pkc(), mf=lib.friction(d=0.3),
+        tc=lib.thermal_capacity(c1=300.0, c2=2.0),
+    )  # fmt: skip
+    sol = ephs.simulate(system, 1.0, initial={"pe.q": 1.0}, step=0.1)
+    for i in range(len(sol)):
+        state = {path: values[i] for path, values in sol.states.items()}
+        found = system.ledger(state)
+        whole = system.ledger.total(state)
+        assert math.isclose(
+            whole.energy - system.ledger.total({"pe.q": 1.0}).energy, sol.energy[i] - sol.energy[0], abs_tol=1e-9
+        )
+        assert math.isclose(whole.entropy, sol.entropy[i], abs_tol=1e-12)
+        assert math.isclose(whole.exergy, sol.exergy[i], rel_tol=1e-12, abs_tol=1e-9)
+        for path, account in found.items():
+            assert math.isclose(account.energy, sol.ledgers.storages[path][i], rel_tol=1e-12, abs_tol=1e-12)
+    assert list(map(str, system.ledger.producers)) == ["mf"]
+    assert set(map(str, system.ledger.storages)) == {"pe", "ke", "tc"}
+    assert "entropy is made by mf" in str(system.ledger)
+
+
+@settings(max_examples=30)
+@given(st.data())
+def test_flattening_changes_no_book(data):
+    system = data.draw(systems())
+    assert system.flatten().ledger() == system.ledger()
+    assert system.ledger.total() == sum(system.ledger().values(), type(system.ledger.total())(0.0, 0.0, 0.0, 0.0))
+
+
+def test_an_unknown_state_is_refused():
+    with pytest.raises(ephs.AssemblyError, match="nobody"):
+        HEATED(
+            pe=lib.spring(k=1.0), ke=lib.point_mass(m=1.0), pkc=lib.pkc(), mf=lib.friction(d=1.0),
+            tc=lib.thermal_capacity(c1=300.0, c2=1.0),
+        ).ledger({"nobody": 1.0})  # fmt: skip
