@@ -188,6 +188,8 @@ def _inner(node: ast.AST) -> Iterator[ast.expr]:
             yield from _beside_constants(child)
         elif isinstance(node, ast.UnaryOp) and isinstance(child, ast.Constant):
             continue
+        elif isinstance(child, ast.keyword) and child.arg == "strict":
+            continue  # of zip: lengths are equal by construction
         elif isinstance(child, ast.expr):
             yield child
         elif isinstance(child, ast.comprehension | ast.keyword | ast.arguments | ast.Slice):
