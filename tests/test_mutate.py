@@ -70,6 +70,13 @@ def test_each_kind_of_change_is_made():
     ]
 
 
+def test_what_runs_when_a_module_is_loaded_is_told():
+    found = {(m.function, m.kind): m.loading for m in mutants_in("a.py", SOURCE.encode())}
+    assert found["module", "constant"] and not found["f", "sign"] and not found["A.g", "constant"]
+    text = b"class A:\n    x = 1.5\n    def f(self, y=2):\n        return 3\n"
+    assert [m.loading for m in mutants_in("a.py", text)] == [True, True, False]
+
+
 def test_every_change_is_python_and_is_one():
     same = ast.dump(ast.parse(SOURCE))
     for mutant in mutants_in("some/file.py", SOURCE.encode()):

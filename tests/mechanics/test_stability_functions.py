@@ -11,8 +11,11 @@ import pytest
 import ephs
 from ephs import Pattern, junction, library
 from ephs import quantity as Q
-from ephs.mechanics.methods import METHODS
+from ephs.mechanics.methods import METHODS, Setting
 from ephs.mechanics.reduced import tableaux
+from ephs.mechanics.simulate import problem_of_system
+from ephs.mechanics.solve.control import Control, Tolerance
+from ephs.mechanics.solve.model import compile_model
 
 J, K, D = 0.5, 3.0, 0.4
 ANGLE, RATE = 0.3, -1.1
@@ -171,11 +174,43 @@ def test_systems_take_the_same_steps(method, system, more, matrix):
         assert np.abs(np.ravel(sol[path]) - found[:, 1]).max() <= 1e-12
     # Newton's method has the exact matrix of what is linear; the heat is not
     assert sol.stats["iterations"] <= (3 if method == "radau" else 2) * steps + 2
+    if method != "radau":  # no step was cut, and the order of elimination was decided at the start
+        assert sol.stats["cut_steps"] == 0 and sol.stats["orders"] >= 1
     energy = 0.5 * SPRING * found[:, 0] ** 2 + 0.5 * (1 + len(more)) * found[:, 1] ** 2 / MASS
     assert np.abs(sol.energy - sol.energy[0]).max() <= (1e-7 if method == "radau" else 1e-11) * energy[0]
     made = (energy[0] - energy) / 293.15 if not more else 0.0 * energy
     tolerance = 1e-12 if method == "natural" else 1e-7
     assert np.abs(sol.entropy - sol.entropy[0] - made).max() <= tolerance
+
+
+def test_methods_have_the_orders_that_are_said_of_them():
+    problem = problem_of_system(SYSTEM, START)
+    model = compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
+    for name in ("natural", "natural4"):
+        assert METHODS[name].many(model).order == METHODS[name].order
+
+
+def test_the_estimate_of_radau_falls_with_the_power_that_it_says():
+    control = Control(Tolerance(1e-6, {}), Tolerance(1e-6, {}), None, 0.0, np.inf, None)
+    method, _ = METHODS["radau"].make(Setting(problem_of_system(SYSTEM, START), 0.0, control, {}))
+    start = method.start(0.0, 0.05)
+    one, two = (method.step(start, h) for h in (0.05, 0.025))
+    assert round(np.log2(one.error / two.error)) == method.exponent == 4.0
+    # dense output is the polynomial through the stages: of order 3 inside, and the step itself at its ends
+    for attempt in (one, two):
+        assert np.abs(method.inside(attempt, attempt.h).x - attempt.end.x).max() <= 1e-14
+        assert np.abs(method.inside(attempt, 0.0).x - start.x).max() <= 1e-14
+    inside = method.inside(one, 0.025)
+    assert inside.t == 0.025 and np.abs(inside.x - two.end.x).max() <= 1e-6
+    assert np.abs(inside.z - two.end.z).max() <= 1e-4
+    row = method.row(one.end)  # what is made by friction, and the energies of storages, each at its place
+    names = [str(slot.path) for slot in method.model.descriptor.components]
+    energies = dict(zip(names, row.energies, strict=True))
+    end = method.problem.descriptor.unpack(one.end.x)
+    at = {str(path): float(value[0]) for path, value in end.items()}
+    assert energies["pe"] == pytest.approx(0.5 * SPRING * at["pe.q"] ** 2, rel=1e-12)
+    assert energies["ke"] == pytest.approx(0.5 * at["ke.p"] ** 2 / MASS, rel=1e-12)
+    assert energies["mf"] == pytest.approx(row.sums[3], rel=1e-12) and energies["mf"] > 0.0
 
 
 # ---- the coefficients -------------------------------------------------------------------------------------------

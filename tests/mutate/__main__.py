@@ -26,7 +26,9 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--seed", type=int, default=0, help="which ones")
     parser.add_argument("--all", action="store_true", help="all mutants of each group")
     parser.add_argument("--only", nargs="+", metavar="NAME", help="these mutants, whatever is known of them")
-    parser.add_argument("--again", action="store_true", help="those again that lived, and no others")
+    parser.add_argument(
+        "--again", action="store_true", help="those again that lived and are not explained, and no others"
+    )
     parser.add_argument("--keep", action="store_true", help="take what tests reach from a measurement of older sources")
     parser.add_argument("--budget", type=float, default=BUDGET, help="seconds of tests for each mutant")
     parser.add_argument("--list", action="store_true", help="say which mutants there are, and make none")
@@ -85,7 +87,7 @@ def run(asked: argparse.Namespace, chosen: dict[str, list[Mutant]], known: dict[
     asked.results.parent.mkdir(parents=True, exist_ok=True)
     for name, mutants in chosen.items():
         if asked.again:
-            todo = [m for m in GROUPS[name].mutants() if _lives(m, known)]
+            todo = [m for m in GROUPS[name].mutants() if _lives(m, known) and m.name not in explained()]
         else:
             todo = [m for m in mutants if asked.only or key(m.name, m.change) not in known]
         if todo:

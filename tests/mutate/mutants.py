@@ -33,7 +33,8 @@ class Mutant:
     """One change of a file: the bytes from ``start`` to ``stop`` become others.
 
     ``name`` holds the file, the function, the kind of change and its number among those of that kind in the function;
-    ``lines`` are those of the statement's head, ``change`` says what becomes what.
+    ``lines`` are those of the statement's head, ``change`` says what becomes what, ``loading`` whether it runs when the
+    module is loaded.
     """
 
     file: str
@@ -45,6 +46,7 @@ class Mutant:
     new: bytes = field(repr=False)
     lines: tuple[int, int]
     change: str
+    loading: bool = False
 
     @property
     def name(self) -> str:
@@ -58,10 +60,11 @@ class Mutant:
 
 @dataclass(slots=True)
 class _Place:
-    """Where the walk is: the function's name, the lines of the statement, whether indices are constants here."""
+    """Where the walk is: the function's name, the lines of the statement, whether it runs when the module is loaded."""
 
     function: str
     lines: tuple[int, int]
+    loading: bool
 
 
 class _Source:
@@ -105,13 +108,24 @@ def mutants_in(file: str, text: bytes) -> list[Mutant]:
     """The mutants of a file that has this text."""
     source = _Source(text)
     for node in source.tree.body:
-        _statement(source, node, "module")
+        _statement(source, node, "module", True)
     numbers: dict[tuple[str, str], int] = {}
     out: list[Mutant] = []
     for place, kind, start, stop, new in source.found:
         number = numbers[place.function, kind] = numbers.get((place.function, kind), 0) + 1
         out.append(
-            Mutant(file, place.function, kind, number, start, stop, new, place.lines, _change(source, start, stop, new))
+            Mutant(
+                file,
+                place.function,
+                kind,
+                number,
+                start,
+                stop,
+                new,
+                place.lines,
+                _change(source, start, stop, new),
+                place.loading,
+            )
         )
     return out
 
@@ -125,16 +139,16 @@ def _change(source: _Source, start: int, stop: int, new: bytes) -> str:
     return " ".join(f"{before.decode()}⟦{old.decode()} → {new.decode()}⟧{after.decode()}".split())
 
 
-def _statement(source: _Source, node: ast.stmt, function: str) -> None:
+def _statement(source: _Source, node: ast.stmt, function: str, loading: bool) -> None:
     match node:
         case ast.FunctionDef() | ast.AsyncFunctionDef() | ast.ClassDef():
             inner = node.name if function == "module" else f"{function}.{node.name}"
-            place = _Place(inner, (node.lineno, node.body[0].lineno - 1))
+            place = _Place(inner, (node.lineno, node.body[0].lineno - 1), loading)
             if not isinstance(node, ast.ClassDef):
                 for default in [*node.args.defaults, *(d for d in node.args.kw_defaults if d is not None)]:
                     _expression(source, default, place)
             for child in node.body:
-                _statement(source, child, inner)
+                _statement(source, child, inner, loading and isinstance(node, ast.ClassDef))
             return
         case ast.Raise() | ast.Import() | ast.ImportFrom() | ast.Assert() | ast.Pass() | ast.Global():
             return
@@ -147,7 +161,7 @@ def _statement(source: _Source, node: ast.stmt, function: str) -> None:
     cases = getattr(node, "cases", [])
     bodies = [*blocks, *(h.body for h in handlers), *(c.body for c in cases)]
     last = min((body[0].lineno for body in bodies), default=(node.end_lineno or node.lineno) + 1) - 1
-    place = _Place(function, (node.lineno, max(last, node.lineno)))
+    place = _Place(function, (node.lineno, max(last, node.lineno)), loading)
     match node:
         case ast.AugAssign(op=ast.Add() | ast.Sub() as op):
             old = "+=" if isinstance(op, ast.Add) else "-="
@@ -167,7 +181,7 @@ def _statement(source: _Source, node: ast.stmt, function: str) -> None:
                 _expression(source, child.guard, place)
     for body in bodies:
         for child in body:
-            _statement(source, child, function)
+            _statement(source, child, function, loading)
 
 
 def _expression(source: _Source, node: ast.expr, place: _Place) -> None:
@@ -188,6 +202,8 @@ def _inner(node: ast.AST) -> Iterator[ast.expr]:
             yield from _beside_constants(child)
         elif isinstance(node, ast.UnaryOp) and isinstance(child, ast.Constant):
             continue
+        elif isinstance(child, ast.keyword) and child.arg == "strict":
+            continue  # of zip: lengths are equal by construction
         elif isinstance(child, ast.expr):
             yield child
         elif isinstance(child, ast.comprehension | ast.keyword | ast.arguments | ast.Slice):

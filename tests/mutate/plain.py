@@ -20,7 +20,7 @@ class Addresses:
         self.functions: dict[int, Callable[..., Any]] = {}
         self.kept: list[Any] = []  # a callback that is freed leaves its address behind
 
-    def cfunc_kernel(self, _signature: Any) -> Callable[[Callable[..., Any]], Any]:
+    def cfunc_kernel(self, _signature: Any, *_more: Any) -> Callable[[Callable[..., Any]], Any]:
         """In place of `ephs.semantics.spaces.jit.cfunc_kernel`."""
 
         def decorate(function: Callable[..., Any]) -> Any:

@@ -43,7 +43,7 @@ class Reach:
         of, made = self.lines.get(mutant.file, {}), self.loading.get(mutant.file, {})
         lines = range(mutant.lines[0], mutant.lines[1] + 1)
         found: set[str] = set().union(*(of.get(line, set()) for line in lines))
-        if not found or mutant.function == "module":
+        if not found or mutant.loading:
             found = set().union(*of.values())
         found = found.union(*(made.get(line, set()) for line in lines))
         chosen: list[str] = []

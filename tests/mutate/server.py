@@ -184,9 +184,10 @@ def pytest_run(arguments: Sequence[str], plugins: Sequence[Any]) -> int:
 def verdict(mutant: Mutant, tests: Sequence[str], seconds: float) -> dict[str, Any]:
     """Make the mutant, run the tests: killed by which and how, or survived."""
     begin = time.monotonic()
+    text = mutant.text((ROOT / mutant.file).read_bytes())
+    compile(text, mutant.file, "exec")  # fails where the file was edited since its mutants were listed
 
     def work(tell: Callable[[Any], None]) -> int:
-        text = mutant.text((ROOT / mutant.file).read_bytes())
         sys.meta_path.insert(0, Changed(mutant.file, text))
         files = list(dict.fromkeys(test.split("::")[0] for test in tests))
         return pytest_run(files, [Chosen(tests, tell)])

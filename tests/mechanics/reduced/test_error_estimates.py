@@ -139,3 +139,15 @@ def test_powers_of_the_step_with_which_estimates_fall(equations):
         one, two = (made.step(equations.start(0.0), part * h).error for part in (1.0, 0.5))
         found[method] = (round(math.log2(one / two)), made.exponent)
     assert found == {"rk54": (5, 5.0), "rk87": (8, 8.0), "alpha": (3, 3.0), "radau": (4, 4.0)}
+
+
+def test_matrices_are_kept_for_steps_of_one_length_and_made_anew_when_asked(equations):
+    made, start = stepper(equations, "radau"), equations.start(0.0)
+    for h, factorised in ((0.1, 1), (0.1, 1), (0.2, 2)):
+        made._solve(start, h)
+        assert made.counts["factorisations"] == factorised
+    before = made.jacobian.count
+    made._renew(start)
+    assert made.jacobian.count == made.counts["jacobians"] == before + 1
+    made._solve(start, 0.2)
+    assert made.counts["factorisations"] == 3

@@ -1,0 +1,115 @@
+"""The variational method on joints that do not commute: what its maps are, that steps go back, that momenta stay."""
+
+import math
+
+import numpy as np
+import pytest
+
+import ephs
+from ephs.mechanics.methods import METHODS, Setting
+from ephs.mechanics.reduced.equations import Equations
+from ephs.mechanics.simulate import problem_of_scene
+from ephs.mechanics.solve.control import Control, Tolerance
+
+SCENE = """format = 1
+name = "pair"
+
+[assembly]
+adjust = true
+
+[world]
+gravity = {gravity}
+
+[bodies.base]
+mass = 2.0
+inertia = [0.6, 0.7, 0.8, 0.05, -0.04, 0.03]
+position = [0.3, -0.2, 0.5]
+rotation = [0.5, 0.5, -0.5, 0.5]
+velocity = [1.0, -2.0, 3.0]
+angular_velocity = [0.4, 0.5, -0.6]
+
+[bodies.arm]
+mass = 1.0
+inertia = [0.3, 0.4, 0.5]
+position = [1.3, -0.2, 0.5]
+angular_velocity = [-0.7, 0.2, 0.9]
+
+[joints.wrist]
+type = "spherical"
+bodies = ["base", "arm"]
+at = [0.8, -0.2, 0.5]
+stiffness = {stiffness}
+"""
+
+
+def equations(folder, gravity, stiffness):
+    file = folder / "pair.toml"
+    file.write_text(SCENE.format(gravity=gravity, stiffness=stiffness), encoding="utf-8")
+    scene = ephs.load(file)
+    return Equations(scene, problem_of_scene(scene), 0.0)
+
+
+def stepper(eq, name):
+    control = Control(Tolerance(1e-12, {}), Tolerance(1e-12, {}), 0.1, 0.0, math.inf, None)
+    return METHODS[name].make(Setting(eq.problem, 0.0, control, {}, eq))[0]
+
+
+@pytest.fixture
+def heavy(tmp_path):
+    return equations(tmp_path, [0.1, 0.2, -9.81], 2.0)
+
+
+def momentum(eq, state):
+    """Of all bodies, about the origin and along the axes of the world."""
+    total = np.zeros(6)
+    row = eq.row(state).x
+    states = eq.problem.descriptor.unpack(row)
+    for body in ("base", "arm"):
+        pose, p = states[ephs.Path.of(f"bodies.{body}.pe.q")], states[ephs.Path.of(f"bodies.{body}.ke.p")]
+        turn = ephs.semantics.spaces.SE3.adjoint(ephs.semantics.spaces.SE3.inverse(pose)).T
+        total += turn @ p
+    return total
+
+
+def test_steps_go_back_to_where_they_began(heavy):
+    method, start = stepper(heavy, "variational"), heavy.start(0.0)
+    end = method.step(start, 0.05).end
+    again = method.step(end, -0.05).end
+    assert np.abs(end.q - start.q).max() > 1e-2
+    assert np.abs(again.q - start.q).max() <= 1e-12 and np.abs(again.r - start.r).max() <= 1e-11
+
+
+def test_a_step_misses_by_its_third_power(heavy):
+    start, missed = heavy.start(0.0), []
+    for h in (0.02, 0.01):
+        found = stepper(heavy, "variational").step(start, h).end
+        exact = stepper(heavy, "rk87").step(start, h).end
+        missed.append(max(np.abs(found.q - exact.q).max(), np.abs(found.r - exact.r).max()))
+    assert missed[0] / missed[1] == pytest.approx(8.0, rel=0.1)
+
+
+def test_momenta_are_kept_to_rounding_where_nothing_pulls(tmp_path):
+    eq = equations(tmp_path, [0.0, 0.0, 0.0], 2.0)
+    method, state = stepper(eq, "variational"), eq.start(0.0)
+    before = momentum(eq, state)
+    for _ in range(4):
+        state = method.step(state, 0.05).end
+    assert np.abs(momentum(eq, state) - before).max() <= 1e-12 * np.abs(before).max()
+
+
+def test_the_maps_of_momenta_are_inverse_and_begin_with_half_a_bracket(heavy):
+    method, rng = stepper(heavy, "variational"), np.random.default_rng(2)
+    xi, covector = 0.4 * rng.standard_normal(heavy.n), rng.standard_normal(heavy.n)
+    assert np.abs(method._untwisted(xi, method._turned(xi, covector)) - covector).max() <= 1e-12
+    assert np.abs(method._turned(xi, method._untwisted(xi, covector)) - covector).max() <= 1e-12
+    bracket = method._turning(covector)
+    for unit in np.eye(heavy.n):
+        change = (method._turned(1e-5 * unit, covector) - method._turned(-1e-5 * unit, covector)) / 2e-5
+        assert np.abs(change - 0.5 * bracket @ unit).max() <= 1e-9
+
+
+def test_work_is_counted(heavy):
+    method, state = stepper(heavy, "variational"), heavy.start(0.0)
+    method.step(method.step(state, 0.02).end, 0.02)
+    assert method.counts["jacobians"] >= 1
+    assert 2 <= method.counts["iterations"] <= 20

@@ -1,0 +1,34 @@
+"""The first count of unknowns is that of the compiled model, also where something is prescribed."""
+
+import pytest
+
+import ephs
+from ephs.mechanics.simulate import problem_of_scene
+from ephs.mechanics.solve.model import compile_model
+
+SCENE = """format = 1
+name = "driven"
+
+[bodies.wheel]
+mass = 2.0
+inertia = [0.6, 0.7, 0.8]
+angular_velocity = [0.0, 0.0, 1.0]
+
+[joints.axle]
+type = "revolute"
+bodies = ["ground", "wheel"]
+at = [0.0, 0.0, 0.0]
+axis = [0.0, 0.0, 1.0]
+{motion}
+"""
+
+
+@pytest.mark.parametrize("motion", ["", "motion = { rate = 1.0 }"])
+def test_the_first_step_begins_with_all_unknowns(motion, tmp_path):
+    file = tmp_path / "driven.toml"
+    file.write_text(SCENE.format(motion=motion), encoding="utf-8")
+    scene = ephs.load(file)
+    problem = problem_of_scene(scene)
+    model = compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
+    assert ephs.reduce(scene).before == model.unknowns
+    assert bool(motion) == bool(problem.prescribed)
