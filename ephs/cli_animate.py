@@ -55,5 +55,5 @@ def animate(
         raise BadInput(str(error)) from error
     with addressed(str(file), output):
         animated(sol, output, wrenches=wrenches, heat=heat, fps=fps, duration=duration)
-    Console().print(str(output), highlight=False, soft_wrap=True)
+    Console().print(str(output), highlight=False, markup=False, soft_wrap=True)
     return 0

@@ -178,6 +178,7 @@ def _short(text: str) -> str:
 def _status(name: str) -> Iterator[Callable[[str], None]]:
     """Show what is measured, on a terminal only."""
     from rich.console import Console
+    from rich.text import Text
 
-    with Console(stderr=True).status(name) as status:
-        yield lambda what: status.update(f"{name}: {what}")
+    with Console(stderr=True).status(Text(name)) as status:
+        yield lambda what: status.update(Text(f"{name}: {what}"))

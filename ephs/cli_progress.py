@@ -17,8 +17,13 @@ def progress_bar(name: str) -> Iterator[Callable[[float, float, Mapping[str, Any
     from ephs.mechanics.compiling import compiling
 
     console = Console(stderr=True)
-    note = TextColumn("{task.fields[note]}")
-    columns = (TextColumn("{task.description}"), BarColumn(bar_width=20), note, TimeRemainingColumn(compact=True))
+    note = TextColumn("{task.fields[note]}", markup=False)
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(bar_width=20),
+        note,
+        TimeRemainingColumn(compact=True),
+    )
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task(name, total=1.0, note="")
         begin = time.perf_counter()

@@ -353,6 +353,17 @@ def test_messages_steer_no_terminal(tmp_path):
     assert all(line.isprintable() for each in told for line in str(each.message).splitlines())
 
 
+def test_progress_obeys_no_name(monkeypatch):
+    from ephs.cli_charts import _status
+    from ephs.cli_progress import progress_bar
+
+    monkeypatch.setenv("FORCE_COLOR", "1")  # as on a terminal
+    with _status("[/b][link=x]") as note:
+        note("[/i]")
+    with progress_bar("[/b]") as progress:
+        progress(1.0, 2.0, {"steps": 1, "rejected": 0})
+
+
 # ---- what grows --------------------------------------------------------------------------------------------------
 
 

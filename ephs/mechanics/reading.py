@@ -56,7 +56,9 @@ def load_solution(path: str | File, model: System | Scene | None = None) -> Solu
     homes = (file.resolve().parent, File.cwd())
     try:
         with open(file, "rb") as opened:
-            written_down = opened.read(len(MAGIC)) == MAGIC
+            first = opened.read(len(MAGIC))
+        # Of a run that was stopped at once, the journal may have no letter yet.
+        written_down = first == MAGIC or (file.suffix == ".journal" and MAGIC.startswith(first))
         found = _of_journal(file, model, homes) if written_down else _of_result(file, homes)
         _check_states(found)
     except OptionError:  # of a journal

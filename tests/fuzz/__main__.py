@@ -26,7 +26,7 @@ MEMORY_DISK = Path("/dev/shm")
 FIELDS = ("next", "models", "errors", "defects", "deep", "seconds")
 DEEP = 50
 """One in so many inputs has to run as well."""
-SILENT_S = 90.0
+SILENT_S = 600.0
 """How long a process may be at one input before it counts as hanging."""
 STARTING_S = 1200.0
 """… and at its first one, before which all that is compiled once is compiled."""

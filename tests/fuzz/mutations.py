@@ -5,7 +5,7 @@ import re
 import tomllib
 from collections.abc import Callable, Iterator, MutableMapping, MutableSequence
 from copy import deepcopy
-from functools import cache
+from functools import lru_cache
 from random import Random
 from typing import Any
 from xml.etree import ElementTree
@@ -13,7 +13,7 @@ from xml.etree.ElementTree import Element
 
 from tests.fuzz.words import SPLINTERS, number, text, value
 
-__all__ = ["KINDS", "mutated"]
+__all__ = ["KINDS", "mutated", "mutated_again"]
 
 KINDS = {"toml": 0.28, "json": 0.32, "text": 0.16, "urdf": 0.08, "sdf": 0.08, "xml": 0.08}
 """How often a kind of input is drawn."""
@@ -26,8 +26,18 @@ def mutated(seed: int | str, count: int, texts: dict[str, list[str]]) -> tuple[s
     """The kind and the bytes of input ``count``; the same for the same seed."""
     random = Random(f"{seed}/{count}")
     kind = random.choices(list(KINDS), list(KINDS.values()))[0]
-    source = random.choice(texts[kind])
-    other = random.choice(texts[kind])
+    return kind, _changed(kind, random.choice(texts[kind]), random.choice(texts[kind]), random)
+
+
+def mutated_again(kind: str, data: bytes, texts: dict[str, list[str]], random: Random) -> bytes:
+    """An input, changed once more."""
+    try:
+        return _changed(kind, data.decode(), random.choice(texts[kind]), random)
+    except ValueError:  # no text, or no JSON any more
+        return _flat(data, random.choice(texts[kind]).encode(), random)[:MOST]
+
+
+def _changed(kind: str, source: str, other: str, random: Random) -> bytes:
     if kind != "text" and random.random() < 0.7:
         try:
             found = STRUCTURES[kind](source, other, random)
@@ -38,7 +48,7 @@ def mutated(seed: int | str, count: int, texts: dict[str, list[str]]) -> tuple[s
         found = source.encode()
     if found is None or kind == "text" or random.random() < 0.3:
         found = _flat(found or source.encode(), other.encode(), random)
-    return kind, found[:MOST]
+    return found[:MOST]
 
 
 def _times(random: Random) -> range:
@@ -189,7 +199,7 @@ def _digits(entry: Any) -> str:
     return repr(entry) if isinstance(entry, float) or abs(entry) < 10**300 else "1" + "0" * 400
 
 
-@cache
+@lru_cache(maxsize=500)
 def _toml_tree(source: str) -> Any:
     return tomllib.loads(source)
 

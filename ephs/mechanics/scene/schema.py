@@ -133,7 +133,9 @@ class ShapeEntry(Entry):
     cylinder: Annotated[list[Positive], Field(min_length=2, max_length=2)] | None = Field(
         default=None, description="radius and length along z, m"
     )
-    mesh: Text | None = Field(default=None, description="a mesh file, beside the scene file")
+    mesh: Text | None = Field(
+        default=None, description="a mesh file (.stl .obj .ply .glb .off) in the scene file's folder, or below"
+    )
     scale: Vector | None = Field(default=None, description="of a mesh, along its axes")
     position: Vector | None = Field(default=None, description="in the centre-of-mass frame, m")
     rotation: Quaternion | None = Field(default=None, description="likewise, unit quaternion [w, x, y, z]")
@@ -227,7 +229,7 @@ class MarkerEntry(Entry):
 class PartEntry(Entry):
     """``[parts.NAME]``"""
 
-    use: Text = Field(description="another scene file, beside this one")
+    use: Text = Field(description="another scene file or model, in the folder of the file that is read, or below")
     position: Vector = Field(default=[0.0, 0.0, 0.0], description="of the part's ground in this world, m")
     rotation: Quaternion = Field(default=[1.0, 0.0, 0.0, 0.0], description="unit quaternion [w, x, y, z]")
 
