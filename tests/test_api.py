@@ -111,7 +111,7 @@ PROMISED = {
 ATTRIBUTES = {
     "ephs.Pattern": "interface boxes junctions substitute rename __eq__ __call__ _repr_svg_",
     "ephs.Quantity": "kind space",
-    "ephs.System": "pattern",
+    "ephs.System": "pattern ledger",
     "ephs.Solution": "t energy exergy entropy stats __getitem__",
     "ephs.SimulationError": "partial",
     "ephs.semantics.subspace.Subspace": "projector",
@@ -125,7 +125,7 @@ QUANTITIES = (
     "joint_momentum"
 )
 COMMANDS = {
-    "run": "SCENE --until --method --rtol --atol --step --form --out --base --adjust",
+    "run": "SCENE --until --method --rtol --atol --step --form --out --resume --base --adjust",
     "check": "SCENE --base --adjust",
     "draw": "SCENE --flat -o --base --adjust",
     "equations": "SCENE --form --latex",
