@@ -145,9 +145,11 @@ def test_animate_refuses_what_it_cannot_show(tmp_path, capsys, folder, page, wor
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
 def test_an_interrupted_run_is_readable_and_goes_on_to_the_undisturbed_numbers(tmp_path, capsys, how):
     scene, folder = ROOT / "scenes/slider-crank.toml", tmp_path / "out"
-    words = ["run", str(scene), "--until", "3", "--method", "natural", "--step", "1e-4", "--keep", "400", "--out"]
+    words = ["run", str(scene), "--until", "5", "--method", "natural", "--step", "1e-4", "--keep", "400", "--out"]
     journal = folder / "run.journal"
-    process = subprocess.Popen([sys.executable, "-m", "ephs", *words, str(folder)], stderr=subprocess.PIPE, text=True)
+    listening = "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler); "  # also in background
+    command = [sys.executable, "-c", f"{listening}from ephs.cli import main; sys.exit(main(sys.argv[1:]))"]
+    process = subprocess.Popen([*command, *words, str(folder)], stderr=subprocess.PIPE, text=True)
     while process.poll() is None and len(_entries(journal)) < 3:
         time.sleep(0.02)
     process.send_signal(how)

@@ -10,6 +10,7 @@ from ephs.mechanics.build import component_path, drive_ports, initial_state, sce
 from ephs.mechanics.journaling import journaled
 from ephs.mechanics.methods import METHODS, Method, Setting, chosen
 from ephs.mechanics.motion import SceneMotion
+from ephs.mechanics.pace import longest_step
 from ephs.mechanics.reduction.folded import folded_problem
 from ephs.mechanics.redundancy import explain
 from ephs.mechanics.scene.document import scene_to_text
@@ -208,12 +209,16 @@ def control_of(
     states = [(slot.path, slot.quantity.kind) for slot in problem.descriptor.states]
     relative.known("rtol", states)
     absolute.known("atol", states)
+    least = 0.0 if min_step is None else number_of("min_step", min_step)
+    most = np.inf if max_step is None else number_of("max_step", max_step)
+    if problem.scene is not None and step is None:
+        most = min(most, max(longest_step(problem.scene), least))
     return Control(
         relative,
         absolute,
         None if step is None else number_of("step", step),
-        0.0 if min_step is None else number_of("min_step", min_step),
-        np.inf if max_step is None else number_of("max_step", max_step),
+        least,
+        most,
         None if max_steps is None else int(number_of("max_steps", max_steps, "a number > 0")),
     )
 

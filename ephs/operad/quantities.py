@@ -258,7 +258,7 @@ def known_quantity(word: str, arguments: tuple[str, ...] = (), **parameters: flo
     PatternError
         For an unknown kind of pair, or parameters that it does not have.
     """
-    if word in ("relative_pose", "joint_momentum") and len(arguments) == 1:
+    if word in ("relative_pose", "joint_momentum") and len(arguments) == 1 and "kind" not in parameters:
         return getattr(quantity, word)(arguments[0], **parameters)
     if arguments or parameters:
         return None

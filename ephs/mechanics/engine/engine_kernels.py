@@ -272,7 +272,8 @@ def driven_power(e, m, r):
             along = wrench[0]
         else:
             along = m.work[i, 29] * wrench[1] + m.work[i, 30] * wrench[2]
-        total += along * r[e.link[i, R_AT]] * e.link[i, FORWARD]
+        at = e.link[i, R_AT]  # what friction and springs do in the joint itself, the rest has to outweigh
+        total += (along * e.link[i, FORWARD] - m.force[at]) * r[at]
     return total
 
 

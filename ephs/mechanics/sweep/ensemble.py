@@ -17,6 +17,7 @@ import numpy as np
 
 from ephs.mechanics.build import component_path
 from ephs.mechanics.methods import Setting, chosen
+from ephs.mechanics.pace import longest_step
 from ephs.mechanics.reduced.auto import Auto
 from ephs.mechanics.reduced.equations import Equations, ReducedState
 from ephs.mechanics.reduced.explicit import Explicit
@@ -301,7 +302,7 @@ class Ensemble:
         """The method on these equations, None where it does not take many steps in one call."""
         given = self._options
         method, _ = chosen(given.get("method", "auto"), equations.problem, step=given.get("step"))
-        if method.many is not None:
+        if method.many is not None or longest_step(equations.problem.scene) < np.inf:  # each member has its own limit
             return None
         control = control_of(
             equations.problem, given.get("rtol", 1e-6), given.get("atol", 1e-9), given.get("step"),

@@ -34,7 +34,9 @@ print(caller(1.0), getattr(caller, "stats", None))
 def environment(folder, **more):
     """Of a process that imports from a folder and has a cache of its own there."""
     variables = {k: v for k, v in os.environ.items() if not k.startswith("NUMBA")}
-    return variables | {"PYTHONPATH": str(folder), "XDG_CACHE_HOME": str(folder / "cache")} | more
+    # Python's own compiled files are told apart by whole seconds and sizes, which are too coarse for these edits.
+    fixed = {"PYTHONPATH": str(folder), "XDG_CACHE_HOME": str(folder / "cache"), "PYTHONDONTWRITEBYTECODE": "1"}
+    return variables | fixed | more
 
 
 def run(code, folder, **more):

@@ -1,0 +1,78 @@
+"""Steps that are chosen follow what is prescribed, where no error tells how long they may be."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import ephs
+from ephs.mechanics.pace import TURN, longest_step
+from examples.failing import four_bar
+
+ROOT = Path(__file__).resolve().parents[2]
+SLIDE = """
+format = 1
+[world]
+gravity = [0.0, 0.0, 0.0]
+[bodies.a]
+mass = 1.0
+inertia = [1.0, 1.0, 1.0]
+position = [3.0, 0.0, 0.0]
+[bodies.b]
+mass = 1.0
+inertia = [1.0, 1.0, 1.0]
+position = [0.0, 4.0, 0.0]
+[joints.slide]
+type = "prismatic"
+bodies = ["ground", "a"]
+at = [3.0, 0.0, 0.0]
+axis = [1.0, 0.0, 0.0]
+motion = { rate = RATE }
+"""
+
+
+def test_a_joint_moves_by_a_tenth_of_a_turn_or_of_the_extent_at_most(tmp_path):
+    for rate, expected in (("-2.0", TURN * 5.0 / 2.0), ("0.0", np.inf)):
+        file = tmp_path / "slide.toml"
+        file.write_text(SLIDE.replace("RATE", rate))
+        assert longest_step(ephs.load(file)) == expected
+    assert longest_step(four_bar(2.5)) == TURN
+
+
+@pytest.mark.parametrize("method", ["rk54", "rk87"])
+def test_no_step_leaps_over_what_a_linkage_cannot_reach(method):
+    with pytest.raises(ephs.SimulationError) as failed:
+        ephs.simulate(four_bar(1.2), 6.0, method=method)
+    assert 4.0 < failed.value.time < 4.1
+
+
+@pytest.mark.parametrize("method", ["rk54", "rk87", "radau", "auto"])
+def test_the_work_of_what_is_prescribed_is_as_good_as_the_rest(method, tmp_path):
+    text = (ROOT / "scenes/slider-crank.toml").read_text()
+    file = tmp_path / "turned.toml"
+    file.write_text(text.replace("drive = 0.06", "motion = { rate = 10.0 }"))
+    scene = ephs.load(file)
+    sol = ephs.simulate(scene, 1.0, method=method)
+    assert sol.energy_error.max() < 1e-6
+    assert sol.stats["longest_step"] <= TURN / 10.0
+    assert ephs.simulate(scene, 0.1, method=method, max_step=0.003).stats["longest_step"] <= 0.003
+
+
+@pytest.mark.parametrize("joint", ["shoulder", "elbow"])
+@pytest.mark.parametrize("turned", [False, True], ids=["planar", "spatial"])
+def test_what_drives_a_joint_outweighs_friction_and_springs_in_it(joint, turned, tmp_path):
+    text = (ROOT / "ephs/templates/double-pendulum.toml").read_text()
+    more = "motion = { rate = 1.5 }\nrate = 1.5\nfriction = 0.4\nstiffness = 3.0\nrest = 0.2\n"
+    text = text.replace(f"[joints.{joint}]\n", f"[joints.{joint}]\n{more}")
+    if turned:  # the upper axis stands aslant of the lower one
+        text = text.replace(
+            "0.5], rotation = [0.7071067811865476, 0.0, 0.7071067811865476, 0.0] }\ncoordinate = 0.5",
+            "0.5], rotation = [0.8, 0.0, 0.6, 0.0] }\ncoordinate = 0.5",
+        )
+    file = tmp_path / "driven.toml"
+    file.write_text(text)
+    scene = ephs.load(file)
+    natural = ephs.simulate(scene, 1.0, method="natural", step=1e-3)
+    explicit = ephs.simulate(scene, 1.0, method="rk87", rtol=1e-10, atol=1e-12)
+    assert explicit.energy_error.max() < 1e-8
+    assert explicit.work[-1] == pytest.approx(natural.work[-1], rel=1e-4)
