@@ -16,6 +16,7 @@ import numpy as np
 
 from ephs.semantics.behaviour import Natural, Storing
 from ephs.semantics.bundle import Array, Reference
+from ephs.semantics.errors import SemanticsError
 from ephs.semantics.primitives import Kernel, Primitive, Reversible, Storage
 from ephs.semantics.spaces import manifold
 
@@ -77,7 +78,10 @@ def address_of(primitive: Primitive) -> tuple[int, tuple[float, ...], Callback |
 
 def _of_kernel(kernel: Kernel) -> tuple[int, tuple[float, ...]]:
     """Address and parameters, with those of what runs inside."""
-    own = int(_compiled(kernel.module, kernel.name).address)
+    try:
+        own = int(_compiled(kernel.module, kernel.name).address)
+    except AttributeError as error:
+        raise SemanticsError("uncompiled", kernel.name) from error
     if kernel.inner is not None:
         inner, numbers = _of_kernel(kernel.inner)
         return own, (float(inner), *kernel.parameters, *numbers)
