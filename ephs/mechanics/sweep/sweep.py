@@ -4,7 +4,7 @@ import os
 import time
 import uuid
 from collections.abc import Callable, Generator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPoolExecutor, wait
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -165,17 +165,32 @@ def _on_threads(job: Job, count: int, workers: int | None) -> Generator[Batch, N
 
 
 def _on_cluster(job: Job, count: int, client: Any) -> Generator[Batch, None, None]:
-    """On a Dask cluster, which gives the batches of a worker that is lost to others."""
+    """On a Dask cluster, which gives the batches of a worker that is lost to others.
+
+    Where what all batches share is lost with it, and results that nobody had fetched, these are asked for again.
+    """
     from distributed import as_completed
 
-    workers = max(1, sum(client.nthreads().values()))
-    shared = client.scatter(job, broadcast=True)
-    futures = [client.submit(_batch, shared, part, pure=False, retries=RETRIES) for part in _parts(count, workers)]
-    try:
-        for future in as_completed(futures):
-            yield future.result()
-    finally:
-        client.cancel([future for future in futures if not future.done()])
+    missing = dict(enumerate(_parts(count, max(1, sum(client.nthreads().values())))))
+    for attempt in range(RETRIES + 1):
+        shared = client.scatter(job, broadcast=True)
+        places = {
+            client.submit(_batch, shared, part, pure=False, retries=RETRIES): place for place, part in missing.items()
+        }
+        try:
+            for future in as_completed(places):
+                try:
+                    batch = future.result()
+                except CancelledError:
+                    if attempt == RETRIES:
+                        raise
+                    continue
+                del missing[places[future]]
+                yield batch
+        finally:
+            client.cancel([future for future in places if not future.done()])
+        if not missing:
+            return
 
 
 def _batch(job: Job, numbers: Index) -> Batch:

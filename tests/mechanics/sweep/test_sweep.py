@@ -3,6 +3,7 @@
 import json
 import os
 import signal
+from concurrent.futures import CancelledError, Future
 from pathlib import Path
 
 import numpy as np
@@ -236,6 +237,41 @@ def test_a_cluster_gives_the_same_and_a_worker_that_dies_loses_nothing():
 
         found = ephs.sweep(scene, vary, 0.2, save_at=[0.2], client=client, progress=kill).drop_attrs()
     assert killed and found.identical(expected)
+
+
+class Forgetful:
+    """Stands for a cluster that loses every other result of its first round, with what all batches share."""
+
+    def __init__(self):
+        self.rounds = self.asked = 0
+
+    def nthreads(self):
+        return {"a worker": 1}
+
+    def scatter(self, job, broadcast):
+        self.rounds += 1
+        return job
+
+    def submit(self, function, job, part, **_):
+        self.asked += 1
+        made = Future()
+        if self.rounds == 1 and self.asked % 2:
+            made.set_exception(CancelledError())
+        else:
+            made.set_result(function(job, part))
+        return made
+
+    def cancel(self, futures):
+        assert not futures
+
+
+def test_what_a_cluster_forgets_is_asked_for_again(monkeypatch):
+    monkeypatch.setattr("distributed.as_completed", list)
+    scene, client = ephs.load(CHAIN), Forgetful()
+    vary = {"joints.j0.rate": np.linspace(0.0, 1.0, 12)}
+    found = ephs.sweep(scene, vary, 0.1, save_at=[0.1], client=client)
+    assert found.drop_attrs().identical(ephs.sweep(scene, vary, 0.1, save_at=[0.1]).drop_attrs())
+    assert client.rounds == 2
 
 
 # ---- what is asked for -----------------------------------------------------------------------------------------------
