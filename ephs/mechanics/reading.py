@@ -88,6 +88,13 @@ def _of_journal(file: File, model: System | Scene | None, homes: tuple[File, ...
     else:
         sides = {port: {side: _known(x) for side, x in given.items()} for port, given in (run["inputs"] or {}).items()}
         problem = problem_of_system(model, None, sides)
+    sizes = {slot.path: slot.quantity.space.dim for slot in problem.descriptor.outer}
+    unknown = {
+        path: Signal(np.full(sizes[path], np.nan), given.effort)
+        for path, given in problem.signals.items()
+        if not given.constant
+    }
+    problem = replace(problem, signals={**problem.signals, **unknown})
     if run["form"] == "folded":
         problem = folded_problem(problem)
     record = found.rows or Rows().whole(problem.descriptor)
@@ -99,8 +106,8 @@ def _of_journal(file: File, model: System | Scene | None, homes: tuple[File, ...
 
 
 def _known(given: Any) -> Any:
-    """An input as the journal knows it: of a function its name only, so no number."""
-    return np.nan if isinstance(given, str) else given
+    """An input as the journal knows it: of a function its name only, so any function stands for it."""
+    return (lambda _: 0.0) if isinstance(given, str) else given
 
 
 def _check_states(found: Solution) -> None:

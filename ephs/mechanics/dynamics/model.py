@@ -363,7 +363,7 @@ class Dynamics:
         q, r, s = PaperStates(eq.reduced, replace(self._problem, initial=states), eq.work).initial()
         with failing_at(
             0.0
-        ):  # momenta that some methods leave off the joints count by the nearest ones in the mass metric
+        ):  # momenta off the joints, as some methods leave them, count by the nearest in the mass metric
             mass = eq.mass(q, r)
             r = np.asarray(np.linalg.solve(mass, self._links.momenta(states)), dtype=float)
             return self._state(eq.closed(ReducedState(0.0, q, r, s, self._books())))

@@ -66,7 +66,7 @@ def main(folder: Path, count: int, seed: int) -> int:
 
         if kind not in known:
             work(folder / f"first-{kind}.journal")
-            begin = time.perf_counter()
+            begin = time.perf_counter()  # how long a run takes here, so that the moments to kill it lie within it
             known[kind] = arrays(ephs.simulate(scene, 1.0, **options)), 1.5 * (time.perf_counter() - begin)
         whole, spent = known[kind]
         ended = killed_after(draw.uniform(0.0, spent), work)

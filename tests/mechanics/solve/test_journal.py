@@ -103,6 +103,17 @@ def test_a_system_goes_on_too(copies, tmp_path, damped):
         )
 
 
+@pytest.mark.parametrize("name", ["driven", "folded"])
+def test_a_journal_is_read_where_it_knows_of_inputs_the_names_only(name, tmp_path):
+    file = tmp_path / "run.journal"
+    whole = simulate(SCENE, RUNS[name], journal=file)
+    found = ephs.load_solution(file)
+    assert same(found, whole)
+    assert found.stats["steps"] == whole.stats["steps"]
+    inputs = [variable.values for variable in found.inputs.values()]
+    assert any(np.isnan(values).all() for values in inputs) == (name == "driven")
+
+
 class Restless(ReducedMethod):
     """A method of one's own that does not say what it takes along."""
 
