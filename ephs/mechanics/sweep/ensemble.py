@@ -302,7 +302,7 @@ class Ensemble:
         """The method on these equations, None where it does not take many steps in one call."""
         given = self._options
         method, _ = chosen(given.get("method", "auto"), equations.problem, step=given.get("step"))
-        if method.many is not None or ("step" not in given and longest_step(equations.problem.scene) < np.inf):
+        if method.many is not None or (given.get("step") is None and longest_step(equations.problem.scene) < np.inf):
             return None  # each member has its own limit
         control = control_of(
             equations.problem, given.get("rtol", 1e-6), given.get("atol", 1e-9), given.get("step"),

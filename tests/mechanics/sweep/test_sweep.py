@@ -146,6 +146,16 @@ def test_a_member_unlike_the_others_is_run_on_its_own():
         agree(scene, table, [{"joints.j0.friction": k}], 1e-9, rtol=1e-7, atol=1e-7)
 
 
+def test_members_of_what_is_prescribed_keep_its_longest_step(tmp_path):
+    text = (SCENES / "slider-crank.toml").read_text().replace("drive = 0.06", "motion = { rate = 10.0 }")
+    (tmp_path / "turned.toml").write_text(text)
+    scene = ephs.load(tmp_path / "turned.toml")
+    for options in ({}, {"method": "rk54", "step": 0.002}):
+        vary = {"joints.bearing.friction": [0.001, 0.004], "bodies.rod.mass": [0.15, 0.3]}
+        table = ephs.sweep(scene, vary, 0.05, save_at=TIMES, outputs=["work", "heat"], **options)
+        agree(scene, table, [dict(zip(table.status.dims, (1, 1), strict=True))], 1e-9, **options)
+
+
 def test_careful_steps_of_a_member_have_its_own_numbers():
     """Where constraints nearly repeat each other dense sweeps take over, which read other tables than the engine."""
     scene = ephs.load(SCENES / "four-bar.toml")
