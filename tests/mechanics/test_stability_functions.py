@@ -16,31 +16,13 @@ from ephs.mechanics.reduced import tableaux
 from ephs.mechanics.simulate import problem_of_system
 from ephs.mechanics.solve.control import Control, Tolerance
 from ephs.mechanics.solve.model import compile_model
+from tests.mechanics.torsion import torsion
 
 J, K, D = 0.5, 3.0, 0.4
 ANGLE, RATE = 0.3, -1.1
 A = np.array([[0.0, 1.0], [-K / J, -D / J]])
 Y = np.array([ANGLE, RATE])
-SCENE = f"""format = 1
-name = "torsion"
-
-[world]
-gravity = [0.0, 0.0, 0.0]
-
-[bodies.disc]
-mass = 2.0
-inertia = [0.6, 0.7, {J}]
-angular_velocity = [0.0, 0.0, {RATE}]
-
-[joints.axle]
-type = "revolute"
-bodies = ["ground", "disc"]
-at = [0.0, 0.0, 0.0]
-axis = [0.0, 0.0, 1.0]
-stiffness = {K}
-rest = {-ANGLE}
-friction = {D}
-"""
+SCENE = torsion(J, K, RATE, rest=-ANGLE, friction=D)
 
 
 def rational(top, bottom, z):

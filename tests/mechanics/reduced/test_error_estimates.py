@@ -11,28 +11,12 @@ from ephs.mechanics.reduced import tableaux
 from ephs.mechanics.reduced.equations import Equations
 from ephs.mechanics.simulate import problem_of_scene
 from ephs.mechanics.solve.control import Control, Tolerance
+from tests.mechanics.torsion import torsion
 
 J, K, RATE = 0.5, 3.0, -1.1
 A = np.array([[0.0, 1.0], [-K / J, 0.0]])
 RTOL, ATOL = 1e-5, 1e-7
-SCENE = f"""format = 1
-name = "torsion"
-
-[world]
-gravity = [0.0, 0.0, 0.0]
-
-[bodies.disc]
-mass = 2.0
-inertia = [0.6, 0.7, {J}]
-angular_velocity = [0.0, 0.0, {RATE}]
-
-[joints.axle]
-type = "revolute"
-bodies = ["ground", "disc"]
-at = [0.0, 0.0, 0.0]
-axis = [0.0, 0.0, 1.0]
-stiffness = {K}
-"""
+SCENE = torsion(J, K, RATE)
 Y = np.array([0.0, RATE])
 
 
