@@ -65,16 +65,16 @@ mutants: $(VENV)/.installed-mutants
 repeat: $(VENV)/.installed-dev
 	$(BIN)/python -m tests.repeat --cold
 
-# TESTS chooses what the jobs below run: make matrix TESTS=tests/operad
+# TESTS chooses what the jobs below run: make matrix TESTS=tests/operad ONLY="3.13-newest"
 TESTS ?= tests
 dist: $(VENV)/.installed-release
 	rm -rf dist
 	$(BIN)/python -m build --outdir dist
 	$(BIN)/python -m twine check --strict dist/*
-	$(BIN)/python -m tests.release wheel $(TESTS)
+	$(BIN)/python -m tests.release wheel $(TESTS) -n$(CORES)
 
 matrix: $(VENV)/.installed-release
-	$(BIN)/python -m tests.release matrix $(TESTS)
+	$(BIN)/python -m tests.release matrix $(TESTS) -n$(CORES) $(if $(ONLY),--only $(ONLY))
 
 smoke: $(VENV)/.installed-dev
 	@$(PIP) build uv || echo 'smoke: build and uv could not be installed'

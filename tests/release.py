@@ -7,6 +7,7 @@
 It needs no more than the standard library, ``build`` and ``uv``, and says what it could not find.
 """
 
+import argparse
 import os
 import subprocess
 import sys
@@ -17,7 +18,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 ROOT = Path(__file__).resolve().parents[1]
-VERSIONS = (("3.11", "lowest-direct"), ("3.11", "highest"), ("3.12", "highest"), ("3.13", "highest"))
+VERSIONS = {
+    "3.11-oldest": "lowest-direct",
+    "3.11-newest": "highest",
+    "3.12-newest": "highest",
+    "3.13-newest": "highest",
+}
+"""Python and its dependencies, and how uv resolves these."""
 DATA = (
     "ephs/py.typed",
     "ephs/operad/pattern.schema.json",
@@ -38,18 +45,24 @@ def uv(*arguments: object) -> subprocess.CompletedProcess[str]:
 
 
 def interpreter(version: str) -> str:
-    """The path of a Python, empty where there is none."""
+    """The path of a Python, empty where there is none: pyenv's, whose stand-ins on the path answer for one; uv's."""
+    pyenv = Path(os.environ.get("PYENV_ROOT") or Path.home() / ".pyenv")
+    if inside := sorted(pyenv.glob(f"versions/{version}.*/bin/python{version}")):
+        return str(inside[-1])
     found = uv("python", "find", "--no-python-downloads", "--system", version)
     return found.stdout.strip() if found.returncode == 0 else ""
 
 
-def environment(python: str, folder: Path, wheel: Path, extras: str, resolution: str) -> str:
-    """Install the wheel into a new environment; its Python, or empty where that cannot be had."""
+def environment(python: str, folder: Path, wheel: Path, extra: str, resolution: str = "highest") -> str:
+    """Install the wheel into a new environment; its Python, or empty where that cannot be had.
+
+    The oldest of what the wheel needs is taken only where it is named beside it: hence the requirements.
+    """
     made = uv("venv", "--quiet", "--python", python, folder)
     inside = str(folder / "bin" / "python")
-    requirement = f"{wheel}{extras}"
+    needs = [wheel, "-r", ROOT / "pyproject.toml", *(["--extra", extra] if extra else [])]
     if made.returncode == 0:
-        made = uv("pip", "install", "--quiet", "--python", inside, "--resolution", resolution, requirement)
+        made = uv("pip", "install", "--quiet", "--python", inside, "--resolution", resolution, *needs)
     if made.returncode:
         print(made.stderr, file=sys.stderr)
     return "" if made.returncode else inside
@@ -100,27 +113,36 @@ def wheel_job(tests: Sequence[str]) -> int:
         for file in (wheel, sdist):
             print(f"{file.name}: {file.stat().st_size / 1000:.0f} kB")
         print("\n".join(faults) or "the wheel holds the package and its data, and nothing else")
-        python = environment(sys.executable, Path(scratch, "env"), wheel, "[dev]", "highest")
+        python = environment(sys.executable, Path(scratch, "env"), wheel, "dev")
         return int(bool(faults) or not python or tested(python, sdist, Path(scratch, "tree"), tests))
 
 
-def matrix_job(tests: Sequence[str]) -> int:
+def matrix_job(tests: Sequence[str], only: Sequence[str]) -> int:
     """The job ``matrix``: 1 where a version fails."""
     results: dict[str, str] = {}
     with TemporaryDirectory() as scratch:
         wheel, sdist = built(Path(scratch, "dist"))
-        for version, resolution in VERSIONS:
-            name = f"Python {version}, {'oldest' if resolution != 'highest' else 'newest'} dependencies"
-            folder = Path(scratch, f"{version}-{resolution}")
-            python = interpreter(version)
-            inside = python and environment(python, folder, wheel, "[dev]", resolution)
+        for name in only:
+            python = interpreter(name.partition("-")[0])
+            inside = python and environment(python, Path(scratch, name), wheel, "dev", VERSIONS[name])
             if not inside:
                 results[name] = "not installed" if python else "no interpreter found here: NOT TESTED"
             else:
-                failed = tested(inside, sdist, Path(scratch, f"tree-{version}-{resolution}"), tests)
-                results[name] = "FAILED" if failed else "passed"
+                print(f"{name}: {versions(inside)}", flush=True)
+                results[name] = "FAILED" if tested(inside, sdist, Path(scratch, f"tree-{name}"), tests) else "passed"
+            print(f"{name}: {results[name]}", flush=True)
     print("\n".join(f"{name}: {result}" for name, result in results.items()))
     return int(any(result in ("FAILED", "not installed") for result in results.values()))
+
+
+def versions(python: str) -> str:
+    """What is installed of what ephs needs, a line."""
+    say = (
+        "import importlib.metadata as m, platform, re; "
+        "names = [re.match(r'[\\w-]+', r)[0] for r in m.requires('ephs') if 'extra' not in r]; "
+        "print(platform.python_version(), *(f'{n} {m.version(n)}' for n in names), sep=', ')"
+    )
+    return subprocess.check_output([python, "-c", say], text=True).strip()
 
 
 def smoke_job() -> int:
@@ -136,7 +158,7 @@ def smoke_job() -> int:
         except subprocess.CalledProcessError:  # a build that is broken shows where the environment is made
             print("smoke: the wheel could not be built; nothing tested")
             return 0
-        python = environment(interpreter(others[0]), Path(scratch, "env"), wheel, "", "highest")
+        python = environment(interpreter(others[0]), Path(scratch, "env"), wheel, "")
         if not python:
             print(f"smoke: nothing could be installed for Python {others[0]}; nothing tested")
             return 0
@@ -155,8 +177,15 @@ def smoke_job() -> int:
 
 def main() -> int:
     """Do the job that is asked for."""
-    job, tests = sys.argv[1], sys.argv[2:] or ["tests"]
-    return smoke_job() if job == "smoke" else {"wheel": wheel_job, "matrix": matrix_job}[job](tests)
+    parser = argparse.ArgumentParser(prog="python -m tests.release", description=__doc__)
+    parser.add_argument("job", choices=("wheel", "matrix", "smoke"))
+    parser.add_argument("tests", nargs="*", default=["tests"], help="what pytest is to run")
+    parser.add_argument("--only", nargs="+", choices=VERSIONS, default=list(VERSIONS), help="these of the matrix")
+    asked, options = parser.parse_known_args()  # what is not known here is pytest's: -n 2
+    tests = [*asked.tests, *options]
+    if asked.job == "smoke":
+        return smoke_job()
+    return wheel_job(tests) if asked.job == "wheel" else matrix_job(tests, asked.only)
 
 
 if __name__ == "__main__":
