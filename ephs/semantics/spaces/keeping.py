@@ -2,19 +2,25 @@
 
 Numba's dispatchers ask an object like this for what was compiled before, and give it what they compile. A file begins
 with the digest of the rest, and comes into being under its name in one move: what is cut short or spoilt is compiled
-anew and replaced, and processes that compile the same kernel at the same time replace a file by its like.
+anew and replaced, and processes that compile the same kernel at the same time replace a file by its like. Folders of
+earlier sources are removed when no process has used them for long.
 """
 
 # Numba's compiled functions have no types.
 # pyright: basic, reportPrivateImportUsage=false
 
 import hashlib
+import os
 import pickle
+import re
+import shutil
+import time
 import uuid
 import warnings
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any, final
 
@@ -26,6 +32,8 @@ from ephs.semantics.spaces.jit import KernelCacheWarning
 __all__ = ["DISK", "KernelFiles"]
 
 MARK = hashlib.sha256().digest_size
+UNUSED = 30 * 86400.0
+"""Seconds after which a folder that no process has used is removed."""
 
 
 @final
@@ -87,6 +95,7 @@ class KernelFiles:
             return None
         if hashlib.sha256(content[MARK:]).digest() != content[:MARK]:
             return None
+        _use(self._folder)
         found, payload = pickle.loads(content[MARK:])
         return CompileResult._rebuild(target_context, *payload) if found == key else None
 
@@ -102,7 +111,10 @@ class KernelFiles:
         file = self._file(self._folder, key)
         scratch = file.with_name(f"{file.name}.{uuid.uuid4().hex}.tmp")
         try:
+            if not self._folder.is_dir():
+                _prune(self._folder.parent)
             self._folder.mkdir(parents=True, exist_ok=True)
+            _use(self._folder)
             scratch.write_bytes(hashlib.sha256(body).digest() + body)
             scratch.replace(file)
         except OSError as fault:
@@ -121,3 +133,20 @@ class KernelFiles:
 
     def _file(self, folder: Path, key: tuple[Any, ...]) -> Path:
         return folder / f"{self._name}-{hashlib.sha256(repr(key).encode()).hexdigest()[:24]}.kernel"
+
+
+@cache
+def _use(folder: Path) -> None:
+    """Mark a folder as used, once in a process; one that can only be read stays as it is."""
+    with suppress(OSError):
+        os.utime(folder)
+
+
+@cache
+def _prune(base: Path) -> None:
+    """Remove the folders in which kernels lie that nobody has used for long, once in a process."""
+    with suppress(OSError):
+        for folder in base.iterdir():
+            named = re.fullmatch(r"[0-9a-f]{24}", folder.name) is not None
+            if named and not folder.is_symlink() and time.time() - folder.stat().st_mtime > UNUSED:
+                shutil.rmtree(folder, ignore_errors=True)

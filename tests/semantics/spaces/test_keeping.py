@@ -2,6 +2,7 @@
 
 import errno
 import os
+import time
 from pathlib import Path
 
 import numba
@@ -191,3 +192,20 @@ def test_addresses_of_this_process_are_not_kept(tmp_path):
     assert compiled(tmp_path, call)(4.0) == 2.0
     assert not list(tmp_path.iterdir())
     assert keeping.DISK.usable
+
+
+def test_folders_that_nobody_uses_are_removed_in_the_end(tmp_path):
+    folders = {name: tmp_path / (name * 24) for name in "abc"}
+    other = tmp_path / "formulas"
+    for folder in (folders["a"], folders["b"]):
+        assert compiled(folder)(4.0) == 2.0
+    other.mkdir()
+    old = time.time() - 2.0 * keeping.UNUSED
+    for folder in (folders["a"], folders["b"], other):
+        os.utime(folder, (old, old))
+    for once in (keeping._use, keeping._prune):  # as a later process
+        once.cache_clear()
+    assert compiled(folders["a"])(4.0) == 2.0  # used: it is as if it were new
+    assert folders["a"].stat().st_mtime > old
+    assert compiled(folders["c"])(4.0) == 2.0  # a new folder comes into being
+    assert {folder.name[0] for folder in tmp_path.iterdir()} == {"a", "c", "f"}
