@@ -77,6 +77,8 @@ def exponential(
         parameters=parameters,
         kernel=Kernel(KERNELS, "exponential", (c1, c2)),
         formula=formula,
+        # a random state of a small capacity is so cold or so hot that differences tell nothing
+        trusted=c1 > 0.0 and 0.0 < c2 < math.inf and 0.0 < c1 / c2 < math.inf,
     )
 
 

@@ -9,6 +9,7 @@ import json
 import mmap
 import os
 import re
+import signal
 import struct
 import subprocess
 import sys
@@ -26,7 +27,7 @@ MEMORY_DISK = Path("/dev/shm")
 FIELDS = ("next", "models", "errors", "defects", "deep", "seconds")
 DEEP = 50
 """One in so many inputs has to run as well."""
-SILENT_S = 600.0
+SILENT_S = 120.0
 """How long a process may be at one input before it counts as hanging."""
 STARTING_S = 1200.0
 """… and at its first one, before which all that is compiled once is compiled."""
@@ -73,8 +74,8 @@ def main() -> None:
 
 
 def _watch(seed: str, count: int, tally: Tally) -> None:
-    command = [sys.executable, "-m", "tests.fuzz", str(count), "--seed", seed, "--reader"]
-    said, spoken = tally["next"], time.monotonic()
+    command = [sys.executable, "-X", "faulthandler", "-m", "tests.fuzz", str(count), "--seed", seed, "--reader"]
+    said, spoken, died = tally["next"], time.monotonic(), -1
     while tally["next"] < count:
         reader = subprocess.Popen(command, cwd=ROOT)
         first = at = tally["next"]
@@ -86,7 +87,7 @@ def _watch(seed: str, count: int, tally: Tally) -> None:
                 if tally["next"] != at:
                     at, since = tally["next"], now
                 elif now - since > (SILENT_S if at > first else STARTING_S):
-                    reader.kill()
+                    reader.send_signal(signal.SIGABRT)  # it says where it hangs
                 if now - spoken > 15.0:
                     print(_line(tally, count, (at - said) / (now - spoken)), flush=True)
                     said, spoken = at, now
@@ -96,7 +97,10 @@ def _watch(seed: str, count: int, tally: Tally) -> None:
             sys.exit(130)
         if reader.returncode > 0:
             sys.exit("the reader failed at its own work")
-        if reader.returncode:
+        if reader.returncode and tally["next"] != died:  # once more: it may have been the machine's doing
+            died = tally["next"]
+            print(f"input {died}: the process died with {reader.returncode}; read again", flush=True)
+        elif reader.returncode:
             _died(seed, reader.returncode, tally)
     print(_line(tally, count, 0.0))
 
@@ -178,13 +182,13 @@ def _smaller(judge: Any, kind: str, data: bytes, signature: str, *, deep: bool) 
 def _keep(signature: str, kind: str, data: bytes, detail: str) -> None:
     CORPUS.mkdir(exist_ok=True)
     name = re.sub(r"\W+", "-", signature).strip("-").lower()[:80]
-    target = CORPUS / f"{name}.{kind}"
-    if not target.exists():
-        target.write_bytes(data)
-        notes = ROOT / "out" / "fuzz-inputs" / "found.jsonl"
-        with notes.open("a") as file:
-            file.write(json.dumps({"file": target.name, "detail": detail, "pid": os.getpid()}) + "\n")
-        print(f"found: {signature} ({target.name})", flush=True)
+    names = (CORPUS / f"{name}{number}.{kind}" for number in ("", *(f"-{i}" for i in range(2, 1000))))
+    target = next(path for path in names if not path.exists())  # what looks alike may be something else
+    target.write_bytes(data)
+    notes = ROOT / "out" / "fuzz-inputs" / "found.jsonl"
+    with notes.open("a") as file:
+        file.write(json.dumps({"file": target.name, "detail": detail, "pid": os.getpid()}) + "\n")
+    print(f"found: {signature} ({target.name})", flush=True)
 
 
 if __name__ == "__main__":

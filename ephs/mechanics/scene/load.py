@@ -223,7 +223,7 @@ def _file_inside(file: Path, home: Path) -> Path | None:
 
 
 def _seen_from_outside(found: Fault, key: str, file: str) -> Fault:
-    inner = f"{key}.{found.key}" if found.key else f"{key}.use"
+    inner = legible(f"{key}.{found.key}" if found.key else f"{key}.use")
     return replace(found, key=inner, found=f"{found.found} (in {legible(file)})")
 
 
