@@ -14,8 +14,6 @@ from tests.mutate.server import preload, verdict
 from tests.mutate.table import survivors, table
 
 FOLDER = ROOT / ".build" / "mutate"
-BUDGET = 8.0
-"""Seconds of tests, as they take unchanged and watched, that a mutant may live through."""
 
 
 def arguments() -> argparse.Namespace:
@@ -30,7 +28,7 @@ def arguments() -> argparse.Namespace:
         "--again", action="store_true", help="those again that lived and are not explained, and no others"
     )
     parser.add_argument("--keep", action="store_true", help="take what tests reach from a measurement of older sources")
-    parser.add_argument("--budget", type=float, default=BUDGET, help="seconds of tests for each mutant")
+    parser.add_argument("--budget", type=float, help="seconds of tests for each mutant, in place of the group's")
     parser.add_argument("--list", action="store_true", help="say which mutants there are, and make none")
     parser.add_argument("--table", action="store_true", help="only add up what is known of all")
     parser.add_argument("--results", type=Path, default=FOLDER / "results.jsonl", help="where verdicts are added")
@@ -105,9 +103,9 @@ def make(asked: argparse.Namespace, name: str, todo: list[Mutant]) -> None:
     os.environ["NUMBA_DISABLE_JIT"] = "0" if group.compiled else "1"  # read when numba is loaded
     preload()
     folder = FOLDER / ("compiled" if group.compiled else "plain")
-    reached = reach(group.tests, folder, lambda line: print(line, flush=True), keep=asked.keep)
+    reached = reach(group.tests, group.pace, folder, lambda line: print(line, flush=True), keep=asked.keep)
     for i, mutant in enumerate(todo, 1):
-        tests = reached.tests(mutant, asked.budget, group.tests)
+        tests = reached.tests(mutant, asked.budget or group.pace.budget, group.tests)
         entry = verdict(mutant, tests, limit(reached, tests)) | {"group": name}
         with asked.results.open("a", encoding="utf-8") as file:
             file.write(json.dumps(entry, ensure_ascii=False) + "\n")

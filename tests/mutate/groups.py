@@ -1,11 +1,12 @@
 """What is broken, in groups, and with which tests."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from hashlib import sha256
 
 from tests.mutate.mutants import ROOT, Mutant, mutants_of
 from tests.mutate.named import breaks
+from tests.mutate.reach import Pace
 
 SPACES = "tests/semantics/spaces"
 MECHANICS = "tests/mechanics"
@@ -15,13 +16,15 @@ MECHANICS = "tests/mechanics"
 class Group:
     """Files, as patterns from the root, and the tests that ought to see what is broken in them.
 
-    Where no kernel is changed, tests can be run on compiled kernels: there ``compiled`` is true.
+    Where no kernel is changed, tests can be run on compiled kernels: there ``compiled`` is true. ``pace``: how long
+    those tests may take.
     """
 
     files: tuple[str, ...]
     tests: tuple[str, ...]
     without: tuple[str, ...] = ()
     compiled: bool = False
+    pace: Pace = field(default_factory=Pace)
 
     def paths(self) -> list[str]:
         """The files, sorted."""
@@ -45,6 +48,8 @@ RUNS = (
     f"{MECHANICS}/solve/test_integrate.py",
 )
 
+LONG = Pace(each=10.0, file=90.0, budget=40.0)
+"""For what shows itself over many steps."""
 DERIVATIVES = tuple(
     f"ephs/mechanics/reduced/{name}_kernels.py"
     for name in ("action", "action_tangent", "column", "dynamics", "jacobian", "slope", "tangent")
@@ -100,8 +105,17 @@ GROUPS = {
             "ephs/mechanics/reduced/implicit.py",
             "ephs/mechanics/reduced/variational.py",
         ),
-        (*RUNS, f"{MECHANICS}/test_methods.py"),
+        (
+            *RUNS,
+            f"{MECHANICS}/solve/test_books.py",
+            f"{MECHANICS}/solve/test_journal.py",
+            f"{MECHANICS}/test_methods.py",
+            f"{MECHANICS}/test_outcomes.py",
+            f"{MECHANICS}/test_pace.py",
+            f"{MECHANICS}/test_variational.py",
+        ),
         compiled=True,
+        pace=LONG,
     ),
     "kernels": Group(
         (
@@ -112,9 +126,15 @@ GROUPS = {
             "ephs/mechanics/reduced/table_kernels.py",
             "ephs/mechanics/engine/march_kernels.py",
         ),
-        RUNS,
+        (
+            *RUNS,
+            f"{MECHANICS}/dynamics/test_dynamics.py",
+            f"{MECHANICS}/solve/test_natural_kernels.py",
+            f"{MECHANICS}/test_redundancy.py",
+        ),
+        pace=LONG,
     ),
-    "derivatives": Group(DERIVATIVES, (f"{MECHANICS}/dynamics", *RUNS)),
+    "derivatives": Group(DERIVATIVES, (f"{MECHANICS}/dynamics", *RUNS), pace=LONG),
     "reductions": Group(
         (
             "ephs/mechanics/reduction/*.py",
@@ -135,6 +155,7 @@ GROUPS = {
             f"{MECHANICS}/reduced",
             f"{MECHANICS}/imports",
             f"{MECHANICS}/solve/test_books.py",
+            f"{MECHANICS}/solve/test_journal.py",
         ),
     ),
 }

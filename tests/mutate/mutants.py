@@ -248,6 +248,9 @@ def _changes(source: _Source, node: ast.expr) -> Iterator[tuple[str, int, int, b
                 old, others = COMPARED[type(op)]
                 for new in others:
                     yield "comparison", *source.between(a, b, old), new.encode()
+        case ast.Subscript(value=ast.Attribute(attr="small"), slice=ast.Slice(upper=upper)):
+            if isinstance(upper, ast.Constant):  # scratch memory: a view that begins earlier is no mistake
+                yield "index", *source.span(upper), str(upper.value - 1).encode()
         case ast.Subscript(slice=index):
             yield from _indices(source, index)
         case ast.Attribute(value=value, attr="T"):

@@ -14,10 +14,18 @@ from typing import Any
 from tests.mutate.mutants import ROOT, Mutant
 from tests.mutate.server import forked, pytest_run
 
-EACH = 3.0
-"""Seconds of a processor that a test may take, watched, to be used at all."""
-FILE = 20.0
-"""Seconds of a processor after which no further test of a file is begun."""
+
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """Seconds of a processor that tests may take, unchanged and watched.
+
+    ``each``: a test, to be used at all; ``file``: after which no further test of a file is begun; ``budget``: all those
+    together that a mutant has to live through.
+    """
+
+    each: float = 3.0
+    file: float = 20.0
+    budget: float = 8.0
 
 
 class TooSlow(BaseException):
@@ -78,7 +86,7 @@ def files_at(paths: Iterable[str]) -> Iterator[Path]:
         yield from sorted(at.rglob("test_*.py")) if at.is_dir() else [at]
 
 
-def reach(paths: Iterable[str], folder: Path, say: Callable[[str], None], keep: bool = False) -> Reach:
+def reach(paths: Iterable[str], pace: Pace, folder: Path, say: Callable[[str], None], keep: bool = False) -> Reach:
     """Measure, or take from the folder what was measured of the same texts; ``keep``: of older sources, too."""
     sources = "" if keep else digest(*sorted((ROOT / "ephs").rglob("*.py")))
     seconds: dict[str, float] = {}
@@ -89,8 +97,11 @@ def reach(paths: Iterable[str], folder: Path, say: Callable[[str], None], keep: 
         name = str(file.relative_to(ROOT))
         stored = folder / (name.replace("/", ".") + ".json")
         known = json.loads(stored.read_text()) if stored.is_file() else {}
-        if known.get("test") != digest(file) or (sources and known.get("sources") != sources):
-            known = {"test": digest(file), "sources": sources, **_measured(name)}
+        allowed = [pace.each, pace.file]
+        if [known.get("test"), known.get("pace")] != [digest(file), allowed] or (
+            sources and known.get("sources") != sources
+        ):
+            known = {"test": digest(file), "pace": allowed, "sources": sources, **_measured(name, pace)}
             stored.write_text(json.dumps(known))
             say(f"{name}: {len(known['seconds'])} tests, left out {known['left out']}")
         seconds |= known["seconds"]
@@ -106,19 +117,19 @@ def reach(paths: Iterable[str], folder: Path, say: Callable[[str], None], keep: 
     return Reach(seconds, lines, loading)
 
 
-def _measured(name: str) -> dict[str, Any]:
+def _measured(name: str, pace: Pace) -> dict[str, Any]:
     def work(tell: Callable[[Any], None]) -> int:
         import coverage
 
         watched = coverage.Coverage(data_file=None, source=[str(ROOT / "ephs")])
         watched.start()
-        plugin = _Watch(watched)
+        plugin = _Watch(watched, pace)
         pytest_run([name, "--maxfail=100000"], [plugin])
         watched.stop()
         tell(plugin.found())
         return 0
 
-    _, told = forked(work, 2.0 * FILE)
+    _, told = forked(work, 2.0 * pace.file)
     return (
         told[0]
         if told
@@ -129,11 +140,12 @@ def _measured(name: str) -> dict[str, Any]:
 class _Watch:
     """A plug-in: a context and a time for each test; each begins with empty caches."""
 
-    def __init__(self, watched: Any) -> None:
+    def __init__(self, watched: Any, pace: Pace) -> None:
         self.watched = watched
+        self.pace = pace
         self.seconds: dict[str, float] = {}
         self.bad: set[str] = set()
-        self.end = time.process_time() + FILE
+        self.end = time.process_time() + pace.file
 
     def pytest_runtest_protocol(self, item: Any) -> None:
         if time.process_time() > self.end:
@@ -150,7 +162,7 @@ class _Watch:
 
         def limited() -> None:
             begin = time.process_time()
-            with _limit(EACH):
+            with _limit(self.pace.each):
                 inner()
             self.seconds[item.nodeid] = round(time.process_time() - begin, 4)
 

@@ -1,0 +1,114 @@
+"""Loops over dense matrices and over trees: rows, gaps, sizes and powers, with two joints that are driven."""
+
+import numpy as np
+import pytest
+
+import ephs
+from ephs.mechanics.reduced.equations import Equations
+from ephs.mechanics.reduced.loop_kernels import constraint_rows, loop_gaps, reduce_rows
+from ephs.mechanics.simulate import problem_of_scene
+
+BODY = """
+[bodies.{name}]
+mass = {mass}
+inertia = [{inertia}, {inertia}, {inertia}]
+position = [{x}, {y}, 0.0]
+"""
+JOINT = """
+[joints.{name}]
+type = "revolute"
+bodies = ["{first}", "{second}"]
+at = [{x}, {y}, 0.0]
+axis = [0.0, 0.0, 1.0]
+{more}
+"""
+POINTS = {"left": (0.0, 0.0), "knee": (-0.25, 0.433), "top": (0.6, 1.1), "elbow": (1.45, 0.433), "right": (1.2, 0.0)}
+BARS = {"crank": ("left", "knee"), "rod": ("knee", "top"), "link": ("top", "elbow"), "arm": ("elbow", "right")}
+BETWEEN = {
+    "left": ("ground", "crank", "motion = { rate = 0.7 }\nrate = 0.7\nfriction = 0.3"),
+    "right": ("ground", "arm", "motion = { rate = -0.4 }\nrate = -0.4"),
+    "knee": ("crank", "rod", "friction = 0.1"),
+    "top": ("rod", "link", "stiffness = 2.0"),
+    "elbow": ("link", "arm", ""),
+}
+
+
+def five_bar(folder, mass=1.0):
+    """Two cranks that are turned, and two rods between them, in a plane."""
+    text = 'format = 1\nname = "five-bar"\n[assembly]\nadjust = true\n[world]\ngravity = [0.0, -9.81, 0.0]\n'
+    for i, (name, (one, two)) in enumerate(BARS.items(), 1):
+        (x, y), (u, v) = POINTS[one], POINTS[two]
+        text += BODY.format(name=name, mass=mass * i, inertia=0.1 * mass * i, x=(x + u) / 2, y=(y + v) / 2)
+    for name, (first, second, more) in BETWEEN.items():
+        x, y = POINTS[name]
+        text += JOINT.format(name=name, first=first, second=second, x=x, y=y, more=more)
+    file = folder / f"five-bar-{mass}.toml"
+    file.write_text(text, encoding="utf-8")
+    scene = ephs.load(file)
+    return Equations(scene, problem_of_scene(scene), 0.0)
+
+
+@pytest.fixture(scope="module")
+def closed(tmp_path_factory):
+    equations = five_bar(tmp_path_factory.mktemp("five"))
+    return equations, equations.start(0.0)
+
+
+def test_rows_are_what_gaps_change_by(closed):
+    eq, state = closed
+    assert eq.n == 4 and len(eq.reduced.cut) == 1
+    residual, rows = eq.gaps(state.q, state.r)
+    assert np.abs(residual).max() <= 1e-12 and rows.shape == (2 + residual[2:].size, eq.n)
+    driven = np.flatnonzero(eq.reduced.tables.driven)
+    assert driven.size == 2 and np.array_equal(rows[:2], np.eye(eq.n)[driven])
+    for unit in np.eye(eq.n):
+        there, back = (eq.gaps(eq.moved(state.q, h * unit), state.r)[0] for h in (1e-5, -1e-5))
+        assert np.array_equal(there[:2], [0.0, 0.0])
+        assert np.abs((there - back) / 2e-5 - rows @ unit)[2:].max() <= 1e-9
+        assert np.abs(there).max() > 1e-6 * np.abs(rows[2:] @ unit).max()
+
+
+def test_sizes_of_rows_are_measured_by_inertia(closed, tmp_path):
+    """A row is measured in the mass metric: four times the mass, half the size; and no row is longer than its terms."""
+    found = []
+    for eq in (closed[0], five_bar(tmp_path, 4.0)):
+        state = eq.start(0.0)
+        eq.gaps(state.q, state.r)
+        t, w = eq.reduced.tables, eq.work
+        m = constraint_rows(t, w)
+        for i, j in enumerate(np.flatnonzero(t.driven)):
+            assert w.size[i] == pytest.approx(1.0 / w.factor[j, j], rel=1e-14)
+        turned = np.linalg.solve(np.tril(w.factor), w.row[:m].T)
+        found.append(np.array(w.size[:m]))
+        assert reduce_rows(w, m) == 4  # two prescribed, two of the loop in its plane
+        lengths = np.linalg.norm(turned, axis=0)
+        assert np.all(lengths <= 10.0 * found[-1]) and np.any(lengths > 1e-2 * found[-1])
+    assert np.abs(found[0] - 2.0 * found[1]).max() <= 1e-12 * found[0].max()
+
+
+def test_power_of_what_is_prescribed_is_the_change_of_energy(closed):
+    eq, state = closed
+    n, nv = eq.n, eq.nv
+    y = eq.vector(state)
+    engine = eq.rates(0.0, state.q, y)
+    dense = np.zeros(eq.size)
+    dense[:nv] = engine[:nv]
+    assert eq.dense.rates(np.array(state.q), y, eq.given, eq.scal, dense)[0] == 0
+    assert np.abs(dense - engine).max() <= 1e-9 * np.abs(engine).max()
+    h = 1e-4
+    energies = []
+    for by in (h, -h):
+        moved = eq.state(state, y + by * engine, by)
+        energies.append(eq.row(moved).energies[~np.isin(np.arange(eq.row(moved).energies.size), eq._makers)].sum())
+    change = (energies[0] - energies[1]) / (2.0 * h)
+    heat, work = engine[nv + n + eq.ns : nv + n + eq.ns + 2]
+    assert abs(work) > 0.1 and heat > 0.0
+    assert change == pytest.approx(work - heat, abs=1e-6)
+
+
+def test_gaps_are_counted_from_the_last_prescribed_joint_on(closed):
+    eq, state = closed
+    out = np.full(2 + int(eq.reduced.tables.rows.sum()), 9.0)
+    open_q = eq.moved(state.q, np.array([0.0, 0.0, 1e-3, 0.0]))
+    worst = loop_gaps(eq.reduced.tables, eq.work, eq.fitted(open_q, state.r), out)
+    assert np.array_equal(out[:2], [0.0, 0.0]) and worst == np.abs(out).max() > 1e-5
