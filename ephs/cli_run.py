@@ -1,5 +1,6 @@
 """`ephs run`: from a scene to its result folder, and on from where a run was interrupted."""
 
+import hashlib
 import json
 import os
 from collections.abc import Mapping
@@ -33,6 +34,8 @@ if TYPE_CHECKING:
 __all__ = ["run"]
 
 JOURNAL = "run.journal"
+RUN = "run.json"
+"""What was asked for, beside the results of a run that has reached its end."""
 KEPT = 500
 """Parts of the time at whose ends results are kept where steps are chosen."""
 _TEXTS = {
@@ -42,6 +45,8 @@ _TEXTS = {
     "ephs run {scene} --until {until!r} --out {file} --resume",
     "kept": f"{{found}} holds a run that did not end; it is kept as {JOURNAL}.old (--resume would go on with it)",
     "ended": "{folder}: that run has reached its end; nothing is left to do",
+    "other": "{folder}: its results are another run's, whose {key} was {found}; now it is {wanted}. "
+    "Take another --out, or leave out --resume and they are replaced",
     "again": "what was computed is kept; go on: ephs run {folder} --resume",
 }
 
@@ -93,7 +98,7 @@ def run(
         asked["initial"] = initial_values(initial)
     if stepping.step is None or keep is not None:  # steps that are chosen may be long: pictures want more
         asked["keep"] = keep or KEPT
-    if resume and not (folder / JOURNAL).exists() and _ended(folder, until):
+    if resume and not (folder / JOURNAL).exists() and _ended(folder, _identity(model, scene, asked)):
         say(_TEXTS["ended"].format(folder=folder))
         return 0
     if not resume and (folder / JOURNAL).exists():
@@ -155,16 +160,41 @@ def _simulate(model: "Scene | System", scene: str, folder: Path, asked: Mapping[
         return 130 if stopped else 3
     with addressed(scene, folder):
         _write(solution, folder)
+        whole = json.dumps(_identity(model, scene, asked), indent=1)
+        (folder / RUN).write_text(f"{whole}\n", encoding="utf-8")
         (folder / JOURNAL).unlink(missing_ok=True)
     return 0
 
 
-def _ended(folder: Path, until: float) -> bool:
-    """Whether the results in a folder reach the end that is wanted."""
+def _identity(model: "Scene | System", scene: str, asked: Mapping[str, Any]) -> dict[str, Any]:
+    """What tells a run from others; of code the name only."""
+    import ephs
+    from ephs.mechanics.scene.document import scene_to_text
+
+    text = scene_to_text(model) if isinstance(model, ephs.Scene) else scene
+    return json.loads(json.dumps({**asked, "model": hashlib.blake2b(text.encode(), digest_size=16).hexdigest()}))
+
+
+def _ended(folder: Path, wanted: Mapping[str, Any]) -> bool:
+    """Whether the results in a folder are those of this run, which has reached its end.
+
+    Raises
+    ------
+    BadInput
+        They are those of another run that reached the same end.
+    """
     try:
-        return json.loads((folder / "summary.json").read_text(encoding="utf-8"))["t_end"] == until
+        found = json.loads((folder / RUN).read_text(encoding="utf-8"))
+        reached = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["t_end"]
     except (OSError, ValueError, KeyError, TypeError):
         return False
+    if not isinstance(found, dict) or reached != wanted["until"]:
+        return False
+    for key in (*wanted, *found):
+        if found.get(key) != wanted.get(key):
+            told = {"folder": folder, "key": key, "found": found.get(key), "wanted": wanted.get(key)}
+            raise BadInput(_TEXTS["other"].format(**told))
+    return True
 
 
 def _write(solution: "Solution", folder: Path) -> None:

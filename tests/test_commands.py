@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -173,6 +174,25 @@ def test_an_interrupted_run_is_readable_and_goes_on_to_the_undisturbed_numbers(t
     for resumed in (["run", str(folder), "--resume"], [*words, str(folder), "--resume"]):
         assert main(resumed) == 0
         assert "nothing is left to do" in capsys.readouterr().out
+
+
+def test_results_of_another_run_are_not_taken_for_this_one(tmp_path, capsys):
+    scene = tmp_path / "top.toml"
+    shutil.copy(ROOT / "scenes/heavy-top.toml", scene)
+    words = ["run", str(scene), "--until", "0.01", "--out", str(tmp_path / "out"), "--resume"]
+    assert main(words) == main(words) == 0
+    assert "nothing is left to do" in capsys.readouterr().out
+    before = (tmp_path / "out/summary.json").read_bytes()
+    for more, key in ((["--method", "radau"], "method"), (["--rtol", "1e-5"], "rtol"), (["--keep", "7"], "keep")):
+        assert main([*words, *more]) == 2
+        assert f"another run's, whose {key} was" in capsys.readouterr().err
+    scene.write_text(scene.read_text().replace("mass = ", "mass = 1"))
+    assert main(words) == 2
+    assert "another run's, whose model was" in capsys.readouterr().err
+    assert (tmp_path / "out/summary.json").read_bytes() == before
+    words[3] = "0.02"
+    assert main(words) == 0  # a later end is another run
+    assert (tmp_path / "out/summary.json").read_bytes() != before
 
 
 def _entries(journal):
