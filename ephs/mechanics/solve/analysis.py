@@ -28,6 +28,11 @@ SHRUNK = 1e-6
 DEFECT = 1e-11
 """What a dropped equation may be violated by, relative to its terms; more asks for another rank decision."""
 
+NULL = 1e-12
+"""Singular values below this share of the largest are those of null vectors."""
+ALIKE = 1e-6
+"""Unknowns that null vectors move by the same but for this share are moved alike."""
+
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
@@ -179,9 +184,12 @@ def _compliance(model: Model, values: Array) -> Any:
 
 
 def _null_unknown(model: Model, chosen: Index, data: Array) -> int:
-    """The unknown that a null vector of the matrix moves most."""
+    """The first of the unknowns that null vectors of the matrix move most, whichever of them span its null space."""
     t, size = model.tables, model.unknowns
     matrix = np.zeros((size, size))
     np.add.at(matrix, (t.row[chosen], t.column[chosen]), data[chosen])
     matrix /= np.maximum(np.abs(matrix).max(axis=1, initial=0.0), 1e-300)[:, None]
-    return int(np.argmax(np.abs(np.linalg.svd(matrix)[2][-1])))
+    _, sizes, vectors = np.linalg.svd(matrix)
+    least = min(int(np.sum(sizes > NULL * sizes[0])), size - 1)
+    moved = np.linalg.norm(vectors[least:], axis=0)
+    return int(np.flatnonzero(moved >= (1.0 - ALIKE) * moved.max())[0])
