@@ -66,11 +66,11 @@ class Case:
     within: tuple[float, float] = (0.0, 0.0)
     options: Callable[[], Mapping[str, Any]] = dict
 
-    def run(self, method: str, until: float | None = None) -> ephs.Solution:
+    def run(self, method: str, until: float | None = None, **more: Any) -> ephs.Solution:
         """The run, which fails unless it ends before; such a one tells no progress."""
         step = {"step": self.step} if self.step is not None and METHODS[method].fixed else {}
         options = {key: value for key, value in self.options().items() if until is None or key != "progress"}
-        return ephs.simulate(self.model(), until or self.until, method=method, **step, **options)
+        return ephs.simulate(self.model(), until or self.until, method=method, **step, **options, **more)
 
 
 def late(raised: BaseException | float) -> Callable[[float], Any]:

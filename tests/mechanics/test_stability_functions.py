@@ -16,6 +16,7 @@ from ephs.mechanics.reduced import tableaux
 from ephs.mechanics.simulate import problem_of_system
 from ephs.mechanics.solve.control import Control, Tolerance
 from ephs.mechanics.solve.model import compile_model
+from ephs.mechanics.solve.radau import COEFFICIENTS, NODES
 from tests.mechanics.torsion import torsion
 
 J, K, D = 0.5, 3.0, 0.4
@@ -193,6 +194,24 @@ def test_the_estimate_of_radau_falls_with_the_power_that_it_says():
     assert energies["pe"] == pytest.approx(0.5 * SPRING * at["pe.q"] ** 2, rel=1e-12)
     assert energies["ke"] == pytest.approx(0.5 * at["ke.p"] ** 2 / MASS, rel=1e-12)
     assert energies["mf"] == pytest.approx(row.sums[3], rel=1e-12) and energies["mf"] > 0.0
+
+
+@pytest.mark.parametrize("h", [0.2, 0.5])
+def test_the_estimate_of_radau_is_the_filtered_defect_of_order_three(h):
+    """(I − h γ A)⁻¹ h (γ f(y⁰) + Σ dᵢ f(Yᵢ)), where γ and d integrate polynomials up to order 3."""
+    rtol = atol = 1e-6
+    control = Control(Tolerance(rtol, {}), Tolerance(atol, {}), None, 0.0, np.inf, None)
+    problem = problem_of_system(LINKED, START | {"ke2.p": -1.1})
+    method, _ = METHODS["radau"].make(Setting(problem, 0.0, control, {}))
+    attempt = method.step(method.start(0.0, h), h)
+    matrix, y = np.array([[0.0, 1.0 / MASS], [-0.5 * SPRING, 0.0]]), np.array(list(START.values()))
+    stages = np.linalg.solve(np.eye(6) - h * np.kron(COEFFICIENTS, matrix), np.tile(matrix @ y, 3)).reshape(3, 2)
+    gamma = (6.0 + 81.0 ** (1 / 3) - 9.0 ** (1 / 3)) / 30.0
+    weights = np.linalg.solve(np.vander(NODES, increasing=True).T, [1.0 - gamma, 1 / 2, 1 / 3]) - COEFFICIENTS[-1]
+    found = np.linalg.solve(np.eye(2) - h * gamma * matrix, h * (gamma * matrix @ y + weights @ stages))
+    end = y + h * COEFFICIENTS[-1] @ stages
+    expected = np.abs(found) / (atol + rtol * np.maximum(np.abs(y), np.abs(end)))
+    assert attempt.error == pytest.approx(expected.max(), rel=1e-4)
 
 
 # ---- the coefficients -------------------------------------------------------------------------------------------

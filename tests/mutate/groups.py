@@ -113,6 +113,7 @@ GROUPS = {
             f"{MECHANICS}/test_outcomes.py",
             f"{MECHANICS}/test_pace.py",
             f"{MECHANICS}/test_variational.py",
+            f"{MECHANICS}/test_work.py",
         ),
         compiled=True,
         pace=LONG,
@@ -129,6 +130,7 @@ GROUPS = {
         (
             *RUNS,
             f"{MECHANICS}/dynamics/test_dynamics.py",
+            f"{MECHANICS}/solve/test_gauss_kernels.py",
             f"{MECHANICS}/solve/test_natural_kernels.py",
             f"{MECHANICS}/test_redundancy.py",
         ),

@@ -20,6 +20,7 @@ from ephs.mechanics.solve.errors import OptionError, Outcome, SolveError, number
 from ephs.mechanics.solve.factors import factors
 from ephs.mechanics.solve.snapshot import Snapshot
 from ephs.mechanics.solve.stepping import Attempt
+from ephs.semantics.bundle import Array
 
 __all__ = ["Alpha"]
 
@@ -92,8 +93,7 @@ class Alpha(ReducedMethod):
             if self.jacobian.fresh(state):
                 path, what = counted(eq.reduced, int(np.argmax(np.nan_to_num(worst, nan=np.inf))))
                 raise SolveError(Outcome.DIVERGED, path, f"{what} at the end of the step")
-            self.jacobian.at(state, renew=True)
-            self.counts["jacobians"] += 1
+            self._matrix(state, renew=True)
             return self.step(state, h)
         y1[nv + n + ns :] = y0[nv + n + ns :] + 0.5 * h * (before + rates)[nv + n + ns :]
         closed = eq.closed(eq.state(state, y1, state.t + h))
@@ -110,9 +110,14 @@ class Alpha(ReducedMethod):
         """Take along what `taken` said."""
         self.jacobian.restore(own["jacobian"], state)
 
+    def _matrix(self, state: ReducedState, *, renew: bool = False) -> Array:
+        found = self.jacobian.at(state, renew=renew)
+        self.counts["jacobians"] = self.jacobian.count
+        return found
+
     def _solver(self, state: ReducedState, h: float) -> Any:
         eq = self.equations
-        whole = self.jacobian.at(state)
+        whole = self._matrix(state)
         rate = slice(eq.nv, eq.nv + eq.n)
         slope = self._beta * h * h * whole[rate, : eq.n] + self._gamma * h * whole[rate, rate]
         return factors((1.0 - self._m) * np.eye(eq.n) - (1.0 - self._f) * slope)

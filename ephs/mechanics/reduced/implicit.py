@@ -76,29 +76,31 @@ class Implicit(ReducedMethod):
         return Attempt(state, closed, h, error, eq.least(state, closed))
 
     def taken(self, state: ReducedState) -> Snapshot:
-        """The rates at the state, where the matrix was made, and the step for which it was factorised."""
+        """Where the matrix was made, and the step for which it was factorised."""
         return {
-            "known": self._known[1] if self._known is not None and self._known[0] is state.q else None,
             "jacobian": self.jacobian.snapshot(state),
             "step": self._solvers[0] if self._solvers is not None else None,
         }
 
     def take(self, own: Snapshot, state: ReducedState) -> None:
         """Take along what `taken` said."""
-        self._known = None if own["known"] is None else (state.q, own["known"])
         self.jacobian.restore(own["jacobian"], state)
         self._solvers = None
         if own["step"] is not None:
             self._solve(state, own["step"])
 
     def _renew(self, state: ReducedState) -> None:
-        self.jacobian.at(state, renew=True)
-        self.counts["jacobians"] = self.jacobian.count
+        self._matrix(state, renew=True)
         self._solvers = None
+
+    def _matrix(self, state: ReducedState, *, renew: bool = False) -> Array:
+        found = self.jacobian.at(state, renew=renew)
+        self.counts["jacobians"] = self.jacobian.count
+        return found
 
     def _solve(self, state: ReducedState, h: float) -> tuple[Any, Any]:
         if self._solvers is None or self._solvers[0] != h:
-            matrix, unit = self.jacobian.at(state), np.eye(self.jacobian.size)
+            matrix, unit = self._matrix(state), np.eye(self.jacobian.size)
             real = factors(_RATE / h * unit - matrix)
             rest = factors(1.0 / (complex(VALUES[1]) * h) * unit - matrix)
             self._solvers = h, real, rest

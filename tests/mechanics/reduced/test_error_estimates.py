@@ -66,6 +66,7 @@ def test_of_order_five_it_is_the_root_mean_square_of_the_difference(equations, h
 def test_of_order_eight_two_estimates_are_blended(equations, h):
     k, end = stages(tableaux.A8, tableaux.B8, h)
     made = stepper(equations, "rk87")
+    assert made.stiffness == 0.0  # nothing is known of it yet
     attempt = made.step(equations.start(0.0), h)
     fine, coarse = (relative(h * np.array(e) @ k, end[1]) for e in (tableaux.E8_5, tableaux.E8_3))
     one, two = mean_square(fine), mean_square(coarse)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import ephs
+from ephs.mechanics.methods import METHODS
 from ephs.mechanics.reduced.equations import Equations
 from ephs.mechanics.reduced.loop_kernels import constraint_rows, loop_gaps, reduce_rows
 from ephs.mechanics.simulate import problem_of_scene
@@ -44,14 +45,17 @@ def five_bar(folder, mass=1.0):
         text += JOINT.format(name=name, first=first, second=second, x=x, y=y, more=more)
     file = folder / f"five-bar-{mass}.toml"
     file.write_text(text, encoding="utf-8")
-    scene = ephs.load(file)
+    return ephs.load(file)
+
+
+def equations(scene):
     return Equations(scene, problem_of_scene(scene), 0.0)
 
 
 @pytest.fixture(scope="module")
 def closed(tmp_path_factory):
-    equations = five_bar(tmp_path_factory.mktemp("five"))
-    return equations, equations.start(0.0)
+    eq = equations(five_bar(tmp_path_factory.mktemp("five")))
+    return eq, eq.start(0.0)
 
 
 def test_rows_are_what_gaps_change_by(closed):
@@ -71,7 +75,7 @@ def test_rows_are_what_gaps_change_by(closed):
 def test_sizes_of_rows_are_measured_by_inertia(closed, tmp_path):
     """A row is measured in the mass metric: four times the mass, half the size; and no row is longer than its terms."""
     found = []
-    for eq in (closed[0], five_bar(tmp_path, 4.0)):
+    for eq in (closed[0], equations(five_bar(tmp_path, 4.0))):
         state = eq.start(0.0)
         eq.gaps(state.q, state.r)
         t, w = eq.reduced.tables, eq.work
@@ -112,3 +116,15 @@ def test_gaps_are_counted_from_the_last_prescribed_joint_on(closed):
     open_q = eq.moved(state.q, np.array([0.0, 0.0, 1e-3, 0.0]))
     worst = loop_gaps(eq.reduced.tables, eq.work, eq.fitted(open_q, state.r), out)
     assert np.array_equal(out[:2], [0.0, 0.0]) and worst == np.abs(out).max() > 1e-5
+
+
+@pytest.mark.parametrize("method", [name for name, m in METHODS.items() if m.scenes and m.fixed])
+def test_every_method_turns_what_is_prescribed_and_counts_its_work(method, tmp_path):
+    scene = five_bar(tmp_path)
+    sol = ephs.simulate(scene, 0.2, method=method, step=0.01)
+    best = ephs.simulate(scene, 0.2, method="rk87", rtol=1e-11, atol=1e-13, save_at=sol.t)
+    for name, rate in (("left", 0.7), ("right", -0.4)):
+        assert np.abs(np.ravel(sol.joint(name).coordinate) - rate * sol.t).max() <= 1e-9
+    assert sol.constraint_error.max() <= 1e-9
+    assert np.abs(sol.work - best.work).max() <= 2e-3 * np.abs(best.work).max()
+    assert np.abs(sol.energy - best.energy).max() <= 2e-3 * np.abs(best.energy - best.energy[0]).max()

@@ -5,6 +5,7 @@ import resource
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from ephs.mechanics.reduced.method import ReducedMethod
 from ephs.mechanics.solve import journal
 from ephs.mechanics.solve.errors import Outcome
 from ephs.mechanics.solve.journal import read_journal
+from examples.failures import runs
 
 ROOT = Path(__file__).resolve().parents[3]
 SCENE = ephs.load(ROOT / "scenes/slider-crank.toml")
@@ -54,6 +56,11 @@ def same(one, other):
     return all(np.array_equal(a, b) for a, b in zip(arrays(one), arrays(other), strict=True))
 
 
+def counts(solution):
+    """All that was counted, times apart."""
+    return {name: value for name, value in solution.stats.items() if not name.endswith("_s")}
+
+
 def simulate(model, options, **more):
     options = {"until": 0.2, **options}
     return ephs.simulate(model, options.pop("until"), **options, **more)
@@ -86,7 +93,7 @@ def test_a_run_goes_on_from_any_entry_to_the_very_same_numbers(name, copies, tmp
     for copy in [copies[len(copies) // 3], copies[-2], copies[-1]]:
         again = simulate(model, RUNS[name], journal=copy)
         assert same(again, whole)
-        assert again.stats["steps"] == whole.stats["steps"]
+        assert counts(again) == counts(whole)  # not one evaluation more, nor a matrix
 
 
 def test_a_system_goes_on_too(copies, tmp_path, damped):
@@ -95,12 +102,32 @@ def test_a_system_goes_on_too(copies, tmp_path, damped):
         copies.clear()
         whole = simulate(damped, options)
         simulate(damped, options, journal=tmp_path / options["method"])
-        assert same(simulate(damped, options, journal=copies[len(copies) // 2]), whole)
+        again = simulate(damped, options, journal=copies[len(copies) // 2])
+        assert same(again, whole) and counts(again) == counts(whole)
         found = ephs.load_solution(copies[len(copies) // 2], damped)
         assert same(found, simulate(damped, options | {"until": whole.t[-1], "save_at": found.t})) or (
             np.array_equal(found.t, whole.t[: len(found)])
             and np.array_equal(found["osc.pe.q"], whole["osc.pe.q"][: len(found)])
         )
+
+
+AGAIN = [
+    (case, name) for case, name in runs() if case.within[1] > 0.0 and case.outcome in (Outcome.RANGE, Outcome.DIVERGED)
+]
+
+
+@pytest.mark.parametrize(
+    ("case", "name"), AGAIN, ids=lambda value: value if isinstance(value, str) else value.words.replace(" ", "-")
+)
+def test_a_run_that_failed_fails_again_where_it_did(case, name, tmp_path):
+    errors, model = [], case.model()
+    for _ in range(2):
+        with pytest.raises(ephs.SimulationError) as failed:
+            replace(case, model=lambda: model).run(name, journal=tmp_path / "run.journal")
+        errors.append(failed.value)
+    one, two = errors
+    assert (one.outcome, one.time, one.path) == (two.outcome, two.time, two.path)
+    assert same(one.partial, two.partial) and counts(one.partial)["steps"] == counts(two.partial)["steps"]
 
 
 @pytest.mark.parametrize("name", ["driven", "folded"])

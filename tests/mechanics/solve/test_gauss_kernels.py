@@ -1,0 +1,82 @@
+"""Steps of order 4: energy, closed joints, the angular momentum about the vertical, and the power of their error."""
+
+import numpy as np
+import pytest
+
+import ephs
+from ephs.mechanics.simulate import problem_of_scene
+from ephs.mechanics.solve.model import compile_model
+from ephs.mechanics.solve.natural4 import Natural4
+from ephs.semantics.spaces import SE3
+
+TOP = """format = 1
+name = "top"
+
+[bodies.top]
+mass = 2.0
+inertia = [0.3, 0.4, 0.5]
+position = [0.3, 0.1, 0.4]
+rotation = [0.8, 0.0, 0.6, 0.0]
+angular_velocity = [1.0, 2.0, 3.0]
+
+[joints.tip]
+type = "spherical"
+bodies = ["ground", "top"]
+at = [0.0, 0.0, 0.0]
+
+[assembly]
+adjust = true
+"""
+
+
+@pytest.fixture(scope="module")
+def top(tmp_path_factory):
+    file = tmp_path_factory.mktemp("top") / "top.toml"
+    file.write_text(TOP, encoding="utf-8")
+    problem = problem_of_scene(ephs.load(file))
+    return problem, compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
+
+
+def end(top, h, steps):
+    """Pose, momentum and energy after some steps, and the number of iterations."""
+    problem, model = top
+    method = Natural4(model)
+    state, chunk = method.advance(method.init(problem.descriptor.pack(problem.initial)), h, steps)
+    assert chunk.failure is None and chunk.steps == steps
+    found = problem.descriptor.unpack(state.x)
+    pose, momentum = (found[ephs.Path.of(f"bodies.top.{part}")] for part in ("pe.q", "ke.p"))
+    return pose, momentum, float(method.energies(state.x).sum()), chunk.iterations
+
+
+def test_a_step_keeps_energy_and_the_tip_where_it_is(top):
+    problem, model = top
+    begin = problem.descriptor.unpack(problem.descriptor.pack(problem.initial))
+    first = begin[ephs.Path.of("bodies.top.pe.q")]
+    energy = float(Natural4(model).energies(problem.descriptor.pack(problem.initial)).sum())
+    tip = SE3.inverse(first)[4:]  # the origin, as the body sees it
+    for h in (0.1, -0.1):
+        pose, _, after, iterations = end(top, h, 1)
+        assert np.abs(pose - first).max() > 0.1
+        assert after == pytest.approx(energy, abs=1e-12 * max(1.0, abs(energy)))
+        assert np.abs(SE3.inverse(pose)[4:] - tip).max() <= 1e-13
+        assert iterations <= 12
+
+
+def test_the_error_of_a_step_falls_with_its_fifth_power(top):
+    coarse, fine, finest = (end(top, 0.08 / n, n) for n in (1, 2, 16))
+    for part in (0, 1):
+        ratio = np.linalg.norm(coarse[part] - finest[part]) / np.linalg.norm(fine[part] - finest[part])
+        assert 14.0 <= ratio <= 80.0, part
+
+
+def test_momentum_about_the_vertical_is_kept_to_the_order(top):
+    problem, _ = top
+    begin = problem.descriptor.unpack(problem.descriptor.pack(problem.initial))
+
+    def vertical(pose, momentum):
+        return (SE3.adjoint(SE3.inverse(pose)).T @ momentum)[2]
+
+    start = vertical(begin[ephs.Path.of("bodies.top.pe.q")], begin[ephs.Path.of("bodies.top.ke.p")])
+    missed = [abs(vertical(*end(top, h, 1)[:2]) - start) for h in (0.1, 0.05)]
+    assert missed[0] < 1e-4 * abs(start)
+    assert missed[1] <= missed[0] / 14.0 or missed[0] <= 1e-12 * abs(start)
