@@ -5,13 +5,12 @@ import os
 import subprocess
 import sys
 from functools import cache
-from pathlib import Path
 
 import pytest
 
 from ephs.semantics.spaces import jit
 
-ROOT = Path(__file__).resolve().parents[3]
+ROOT = jit.PACKAGE.parent  # where it is installed, which need not be beside the tests
 HELPER = """
 from ephs.semantics.spaces.jit import kernel
 @kernel
