@@ -3,6 +3,7 @@
 The equation is that of a disc on a torsion spring with friction, y' = A y with y = (angle from rest, rate).
 """
 
+import math
 from fractions import Fraction
 
 import numpy as np
@@ -13,6 +14,7 @@ from ephs import Pattern, junction, library
 from ephs import quantity as Q
 from ephs.mechanics.methods import METHODS, Setting
 from ephs.mechanics.reduced import tableaux
+from ephs.mechanics.reduced.explicit import tableau
 from ephs.mechanics.simulate import problem_of_system
 from ephs.mechanics.solve.control import Control, Tolerance
 from ephs.mechanics.solve.model import compile_model
@@ -203,6 +205,7 @@ def test_the_estimate_of_radau_is_the_filtered_defect_of_order_three(h):
     control = Control(Tolerance(rtol, {}), Tolerance(atol, {}), None, 0.0, np.inf, None)
     problem = problem_of_system(LINKED, START | {"ke2.p": -1.1})
     method, _ = METHODS["radau"].make(Setting(problem, 0.0, control, {}))
+    assert method.evaluations == method.factorisations == method.iterations == 0
     attempt = method.step(method.start(0.0, h), h)
     matrix, y = np.array([[0.0, 1.0 / MASS], [-0.5 * SPRING, 0.0]]), np.array(list(START.values()))
     stages = np.linalg.solve(np.eye(6) - h * np.kron(COEFFICIENTS, matrix), np.tile(matrix @ y, 3)).reshape(3, 2)
@@ -251,6 +254,16 @@ def test_the_coefficients_of_order_five_meet_the_conditions_of_their_orders_as_r
         left = sum(_times([_fraction(x) for x in tableaux.E5], values), Fraction(0))
         missed += [order] if left else []
     assert set(missed) == {5}
+
+
+@pytest.mark.parametrize(("name", "a", "b"), [("rk54", tableaux.A5, tableaux.B5), ("rk87", tableaux.A8, tableaux.B8)])
+def test_stability_functions_agree_with_the_exponential_up_to_the_order_that_is_said(name, a, b):
+    matrix = np.zeros((len(b), len(b)))
+    for i, row in enumerate(a, 1):
+        matrix[i, : len(row)] = row
+    found = [float(np.array(b) @ np.linalg.matrix_power(matrix, k) @ np.ones(len(b))) for k in range(len(b))]
+    off = [abs(math.factorial(k + 1) * x - 1.0) > 1e-10 for k, x in enumerate(found)]
+    assert off.index(True) == tableau(name).order
 
 
 def test_the_coefficients_of_order_eight_integrate_polynomials_and_their_estimates_vanish_on_them():

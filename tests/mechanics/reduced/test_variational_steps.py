@@ -1,6 +1,7 @@
 """The variational method on joints that do not commute: what its maps are, that steps go back, that momenta stay."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -113,3 +114,36 @@ def test_work_is_counted(heavy):
     method.step(method.step(state, 0.02).end, 0.02)
     assert method.counts["jacobians"] >= 1
     assert 2 <= method.counts["iterations"] <= 20
+
+
+@pytest.mark.parametrize("rest", [True, False])
+def test_the_matrix_of_a_step_is_its_derivative(heavy, rest):
+    """At rest exactly, as no increment bends it; else to first order in the increment."""
+    method, state = stepper(heavy, "variational"), heavy.start(0.0)
+    h = 0.1 if rest else 1e-3
+    if rest:
+        state = replace(state, r=np.zeros(heavy.n))
+    xi = h * state.r
+
+    def first(by):
+        return method._start(xi + by, h, method._middle(state, h, xi + by))
+
+    found = method._slope(state, h, xi, method._middle(state, h, xi))
+    expected = np.column_stack([(first(1e-5 * unit) - first(-1e-5 * unit)) / 2e-5 for unit in np.eye(heavy.n)])
+    scale = np.abs(expected).max()
+    assert np.abs(found - expected).max() <= (1e-9 if rest else 1e-5) * scale
+    force = method._middle(state, h, xi)[1]
+    assert not rest or np.abs(0.25 * h * method._turning(force)).max() > 1e-4 * scale
+
+
+def test_the_last_step_is_a_guess_of_the_next(heavy):
+    """Rates that go on changing as they did save iterations."""
+    taken = []
+    for forgetful in (False, True):
+        method, state = stepper(heavy, "variational"), heavy.start(0.0)
+        for _ in range(20):
+            state = method.step(state, 1e-3).end
+            if forgetful:
+                method._guess = None
+        taken.append(method.counts["iterations"])
+    assert taken[0] < taken[1]
