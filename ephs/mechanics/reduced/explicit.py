@@ -205,7 +205,7 @@ class _March:
         """
         eq, c = self.method.equations, self.control
         before = c[C_EVALUATIONS]
-        sound = c[C_T], self.memory.q.copy(), self.memory.y.copy()
+        sound = float(c[C_T])
         scheme = self.method.method.scheme
         found = march(eq.engine, eq.memory, scheme, self.memory, c, self.times, eq.drive, eq.wrench, eq.scal, steps)
         eq.evaluations += int(c[C_EVALUATIONS] - before)
@@ -224,8 +224,8 @@ class _March:
             self._refused(int(found) - REFUSED)
         return found == DONE
 
-    def _hold(self, sound: tuple[float, Array, Array]) -> None:
-        """Give up what left the range of numbers; ``sound``: time, q and y before.
+    def _hold(self, sound: float) -> None:
+        """Give up the rows that left the range of numbers; ``sound``: the time before.
 
         Raises
         ------
@@ -242,9 +242,7 @@ class _March:
         good &= np.abs(np.hstack([q, y[:, : eq.n + eq.ns]])).max(axis=1, initial=0.0) < LARGEST
         rows = int(np.argmin(good)) if not good.all() else good.size
         c[C_ROWS] = rows
-        c[C_T], s.q[:], s.y[:] = sound
-        if rows:
-            c[C_T], s.q[:], s.y[eq.nv :] = times[rows - 1, 0], q[rows - 1], y[rows - 1]
+        c[C_T] = times[rows - 1, 0] if rows else sound
         within(eq.reduced, beyond.q, beyond.r, beyond.s)
         raise SolveError(Outcome.RANGE, "", "heat, work or entropy made")
 
