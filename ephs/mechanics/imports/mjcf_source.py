@@ -32,6 +32,11 @@ _UNSUPPORTED = {
 }
 _PAIRS = ("connect", "weld", "joint")
 _REFERENCES = ("material", "hfield", "texture")
+# Attributes that hold names: a body may be called nan.
+_NAMES = {
+    *("name", "class", "childclass", "model", "file", "content_type", "material", "mesh", "hfield", "prefix", "target"),
+    *("body", "body1", "body2", "joint", "joint1", "joint2", "site", "site1", "site2", "geom", "geom1", "geom2"),
+}
 _MOST_INCLUDES = 100
 _MOST_COPIES = 10_000
 _MOST_PARAMETER = 100.0
@@ -61,6 +66,7 @@ class Source:
         draft.name = root.get("model") or draft.name
         self._refuse(root)
         self._strip(root)
+        self._refuse_none(root)
         self._meshes(root)
         self.text = tostring(root, encoding="unicode")
 
@@ -103,6 +109,13 @@ class Source:
                 self._draft.faults.append(fault("not supported", element.tag, f'"{name}"', what=what, hint=hint))
         if self._copies(root) > _MOST_COPIES:
             self._draft.faults.append(fault("copies", "replicate", "more", most=_MOST_COPIES))
+
+    def _refuse_none(self, root: Element) -> None:
+        """Numbers that are none: MuJoCo warns of them while it parses, and once in thousands of times never ends."""
+        for element in root.iter():
+            for key, value in element.items():
+                if key not in _NAMES and any(word.lower().lstrip("+-") == "nan" for word in value.split()):
+                    self._draft.faults.append(fault("finite", f"{element.tag}.{key}", f'"{value}"'))
 
     def _copies(self, element: Element) -> int:
         """How many elements there are once those that are to be repeated are."""

@@ -194,6 +194,7 @@ FAULTS = {
         "joints.j.thread_pitch",
         ["not 0"],
     ),
+    "nan, MJCF": ("xml", mjcf('<body name="nan" pos="0 NaN 0"/>'), "body.pos", ['"0 NaN 0"', "finite"]),
     "what MuJoCo does not know": ("xml", mjcf("<bodi/>"), "", ["MuJoCo says", "unrecognized element"]),
     "a body without mass": ("xml", mjcf('<body name="a"><joint/></body>'), "", ["MuJoCo says", "mass and inertia"]),
     "two bodies of a name": ("xml", mjcf('<body name="a"/><body name="a"/>'), "", ["MuJoCo says", "repeated name"]),
