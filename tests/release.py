@@ -31,6 +31,7 @@ DATA = (
     "ephs/mechanics/references.bib",
     *(f"ephs/templates/{file.name}" for file in sorted((ROOT / "ephs/templates").iterdir()) if file.is_file()),
 )
+PATIENCE_S = 300.0
 SMOKE = (
     ("--version",),
     ("new", "first"),
@@ -40,8 +41,12 @@ SMOKE = (
 
 
 def uv(*arguments: object) -> subprocess.CompletedProcess[str]:
-    """Run uv, which finds interpreters and resolves versions."""
-    return subprocess.run([sys.executable, "-m", "uv", *map(str, arguments)], capture_output=True, text=True)
+    """Run uv, which finds interpreters and resolves versions; 124 where a registry does not answer for long."""
+    command = [sys.executable, "-m", "uv", *map(str, arguments)]
+    try:
+        return subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S)
+    except subprocess.TimeoutExpired:
+        return subprocess.CompletedProcess(command, 124, "", f"uv took more than {PATIENCE_S:g} s")
 
 
 def interpreter(version: str) -> str:
