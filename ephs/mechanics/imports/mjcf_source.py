@@ -66,7 +66,7 @@ class Source:
         draft.name = root.get("model") or draft.name
         self._refuse(root)
         self._strip(root)
-        self._refuse_none(root)
+        self._refuse_nan(root)
         self._meshes(root)
         self.text = tostring(root, encoding="unicode")
 
@@ -110,7 +110,7 @@ class Source:
         if self._copies(root) > _MOST_COPIES:
             self._draft.faults.append(fault("copies", "replicate", "more", most=_MOST_COPIES))
 
-    def _refuse_none(self, root: Element) -> None:
+    def _refuse_nan(self, root: Element) -> None:
         """Numbers that are none: MuJoCo warns of them while it parses, and once in thousands of times never ends."""
         for element in root.iter():
             for key, value in element.items():
