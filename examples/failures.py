@@ -222,7 +222,7 @@ CASES = (
     ),
     Case(Outcome.UNSUITED, "a body's pose, for radau without a scene", tumbling, ("radau",), r"body\.pe\.q", "vector"),
     Case(
-        Outcome.INCONSISTENT, "velocities that a rigid link does not allow", linked, ("radau",), r"(ke|other)\.p",
+        Outcome.INCONSISTENT, "velocities that a rigid link does not allow", linked, SYSTEMS, r"(ke|other)\.p",
         "constraints", options=fixed(initial={"ke.p": 1.0}),
     ),
 )  # fmt: skip

@@ -20,6 +20,7 @@ from ephs.mechanics.solve.problem import Problem
 from ephs.mechanics.solve.record import Record, Recorder
 from ephs.mechanics.solve.snapshot import Snapshot, like, parts
 from ephs.mechanics.solve.solution import Solution
+from ephs.mechanics.solve.starting import check_start
 from ephs.mechanics.solve.watching import Balance
 from ephs.operad import Quantity
 from ephs.semantics.bundle import Array
@@ -99,6 +100,7 @@ def integrate(
     with failures_of(run):
         run.recorder.start(stepper.energies(x0))
         run.balance = Balance(problem, *run.recorder.latest)
+        check_start(problem, model, grid.h)
         run.state = stepper.init(x0)
         stepper.prepare(run.state, grid.h)
         run.setup = time.perf_counter() - begin

@@ -11,6 +11,7 @@ from ephs.mechanics.solve.driven import ComponentMethod, advance_driven
 from ephs.mechanics.solve.natural import NaturalState
 from ephs.mechanics.solve.problem import Problem
 from ephs.mechanics.solve.snapshot import Snapshot
+from ephs.mechanics.solve.starting import check_start
 from ephs.mechanics.solve.stepping import Attempt, Row, Span
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import manifold
@@ -48,7 +49,14 @@ class Paced:
         self._counted = _counted(problem)
 
     def start(self, t: float, h: float) -> PacedState:
-        """The initial state."""
+        """The initial state.
+
+        Raises
+        ------
+        SolveError
+            The states contradict the constraints.
+        """
+        check_start(self.problem, self.method.model, h)
         x = self.problem.descriptor.pack(self.problem.initial)
         energies = self.method.energies(x)
         return PacedState(t, self.method.init(x), Row(x, energies, np.zeros(4)))
