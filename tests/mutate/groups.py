@@ -136,7 +136,15 @@ GROUPS = {
         ),
         pace=LONG,
     ),
-    "derivatives": Group(DERIVATIVES, (f"{MECHANICS}/dynamics", *RUNS), pace=LONG),
+    "derivatives": Group(
+        DERIVATIVES,
+        (
+            f"{MECHANICS}/dynamics",
+            f"{MECHANICS}/reduced/test_error_estimates.py",
+            f"{MECHANICS}/reduced/test_variational_steps.py",
+        ),
+        pace=LONG,
+    ),
     "reductions": Group(
         (
             "ephs/mechanics/reduction/*.py",
