@@ -126,6 +126,15 @@ def test_powers_of_the_step_with_which_estimates_fall(equations):
     assert found == {"rk54": (5, 5.0), "rk87": (8, 8.0), "alpha": (3, 3.0), "radau": (4, 4.0)}
 
 
+@pytest.mark.parametrize("method", ["variational", "radau", "alpha", "rk54", "rk87"])
+@pytest.mark.parametrize("h", [0.02, -0.02])
+def test_a_step_ends_a_step_later(equations, method, h):
+    made = stepper(equations, method)
+    assert not any(count for name, count in made.counts.items() if name != "rho")
+    attempt = made.step(equations.start(0.5), h)
+    assert (attempt.start.t, attempt.end.t, attempt.h) == (0.5, 0.5 + h, h)
+
+
 def test_matrices_are_kept_for_steps_of_one_length_and_made_anew_when_asked(equations):
     made, start = stepper(equations, "radau"), equations.start(0.0)
     for h, factorised in ((0.1, 1), (0.1, 1), (0.2, 2)):
