@@ -109,6 +109,7 @@ GROUPS = {
             *RUNS,
             f"{MECHANICS}/solve/test_books.py",
             f"{MECHANICS}/solve/test_journal.py",
+            f"{MECHANICS}/reduction/test_folding.py",
             f"{MECHANICS}/test_methods.py",
             f"{MECHANICS}/test_outcomes.py",
             f"{MECHANICS}/test_pace.py",
