@@ -22,7 +22,7 @@ help:
 	@echo 'make demo   simulate scenes/$(SCENE).toml and write out/$(SCENE)/report.html'
 	@echo 'make test   run the tests; make lint, make types: style and types; make fuzz: the laws, for long; make fuzz-inputs COUNT=N: so many broken files; make mutate: which breaks of the code no test sees (docs/mutation.md); make mutants: the same for the operad, by mutmut'
 	@echo 'make real   fetch real robots (131 MB) and hold their import against Pinocchio'
-	@echo 'make dist   wheel and sdist, tested as installed; make matrix: the tests under other Pythons and dependencies; make smoke: the wheel under another Python, where there is one; make repeat: the same digits with nothing compiled yet'
+	@echo 'make dist   wheel and sdist, tested as installed; make matrix: the tests under other Pythons and dependencies; make smoke: the wheel under other Pythons, where there are any; make repeat: the same digits with nothing compiled yet'
 	@echo 'make docs   build docs/_build/html; make bench: what got slower than benchmarks/baseline.json; make tables: all benchmarks; make clean: remove what was built'
 
 # One stamp an extra: installing again is needed only when pyproject.toml has changed.
