@@ -43,8 +43,12 @@ SMOKE = (
 def uv(*arguments: object) -> subprocess.CompletedProcess[str]:
     """Run uv, which finds interpreters and resolves versions; 124 where a registry does not answer for long."""
     command = [sys.executable, "-m", "uv", *map(str, arguments)]
+    trusting = {
+        "UV_SYSTEM_CERTS": "1",
+        "UV_NATIVE_TLS": "1",
+    } | os.environ  # whom pip trusts; by its new and its old name
     try:
-        return subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S)
+        return subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, env=trusting)
     except subprocess.TimeoutExpired:
         return subprocess.CompletedProcess(command, 124, "", f"uv took more than {PATIENCE_S:g} s")
 
