@@ -106,6 +106,7 @@ def house(monkeypatch, tmp_path):
     }
     for name, value in names.items():
         monkeypatch.setattr(ephs, name, value, raising=False)
+    monkeypatch.setattr("ephs.mechanics.scene.document.scene_to_text", repr)
     monkeypatch.setitem(sys.modules, "ephs.show", SimpleNamespace(draw=draw))
     monkeypatch.setitem(sys.modules, "ephs.show.report", SimpleNamespace(write_report=write_report))
     monkeypatch.chdir(tmp_path)
