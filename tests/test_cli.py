@@ -124,7 +124,7 @@ def fails_with(error):
 def test_run_writes_the_result_folder(house, capsys):
     assert cli.main(["run", "crank.toml", "--until", "2"]) == 0
     folder = Path("out/crank")
-    assert sorted(file.name for file in folder.iterdir()) == ["report.html", "solution.nc", "summary.json"]
+    assert sorted(file.name for file in folder.iterdir()) == ["report.html", "run.json", "solution.nc", "summary.json"]
     assert json.loads((folder / "summary.json").read_text()) == FakeSolution().summary()
     said = capsys.readouterr()
     assert str(folder / "report.html") in said.out

@@ -28,13 +28,13 @@ def check_start(problem: Problem, model: Model, h: float) -> None:
     SolveError
         It names the state that jumps farthest.
     """
-    if problem.document:
+    if problem.document or not model.constraint_rows.size:
         return
     d = problem.descriptor
     x = d.pack(problem.initial)
     jumps: list[Array] = []
+    method = Natural(model)
     for instant in (INSTANT * h, 0.5 * INSTANT * h):
-        method = Natural(model)
         after, chunk = method.advance(method.init(x), instant, 1)
         if chunk.failure is not None:
             return
