@@ -20,7 +20,6 @@ from ephs.mechanics.solve.errors import OptionError, Outcome, SolveError, number
 from ephs.mechanics.solve.factors import factors
 from ephs.mechanics.solve.snapshot import Snapshot
 from ephs.mechanics.solve.stepping import Attempt
-from ephs.semantics.bundle import Array
 
 __all__ = ["Alpha"]
 
@@ -46,14 +45,14 @@ class Alpha(ReducedMethod):
         if not 0.0 <= number_of("options['rho']", rho, "a number from 0 to 1") <= 1.0:
             raise OptionError("options['rho']", rho, "a number from 0 to 1")
         super().__init__(equations, control)
-        self.jacobian = Jacobian(equations)
         self._m, self._f = (2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0)
         self._gamma = 0.5 + self._f - self._m
         self._beta = 0.25 * (0.5 + self._gamma) ** 2
         self._enough = 1e-4 if control.step is None else 1e-6
         # what is good enough where it gets no better: tolerances near rounding cannot be met a hundred times over
         self._rough = max(1e-2, ROUNDING / max(float(np.min(self.rtol, initial=1.0)), ROUNDING))
-        self.counts = {"iterations": 0, "jacobians": 0, "rho": rho}
+        self.counts = {"iterations": 0, "rho": rho}
+        self.jacobian = Jacobian(equations, self.counts)
 
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
         """One step of h seconds."""
@@ -93,7 +92,7 @@ class Alpha(ReducedMethod):
             if self.jacobian.fresh(state):
                 path, what = counted(eq.reduced, int(np.argmax(np.nan_to_num(worst, nan=np.inf))))
                 raise SolveError(Outcome.DIVERGED, path, f"{what} at the end of the step")
-            self._matrix(state, renew=True)
+            self.jacobian.at(state, renew=True)
             return self.step(state, h)
         y1[nv + n + ns :] = y0[nv + n + ns :] + 0.5 * h * (before + rates)[nv + n + ns :]
         closed = eq.closed(eq.state(state, y1, state.t + h))
@@ -110,14 +109,9 @@ class Alpha(ReducedMethod):
         """Take along what `taken` said."""
         self.jacobian.restore(own["jacobian"], state)
 
-    def _matrix(self, state: ReducedState, *, renew: bool = False) -> Array:
-        found = self.jacobian.at(state, renew=renew)
-        self.counts["jacobians"] = self.jacobian.count
-        return found
-
     def _solver(self, state: ReducedState, h: float) -> Any:
         eq = self.equations
-        whole = self._matrix(state)
+        whole = self.jacobian.at(state)
         rate = slice(eq.nv, eq.nv + eq.n)
         slope = self._beta * h * h * whole[rate, : eq.n] + self._gamma * h * whole[rate, rate]
         return factors((1.0 - self._m) * np.eye(eq.n) - (1.0 - self._f) * slope)

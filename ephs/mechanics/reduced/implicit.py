@@ -42,7 +42,6 @@ class Implicit(ReducedMethod):
 
     def __init__(self, equations: Equations, control: Control) -> None:
         super().__init__(equations, control)
-        self.jacobian = Jacobian(equations)
         if control.step is None:
             # As far as Newton's method is taken, relative to the tolerance: less than the method's own error.
             least = float(np.min(self.rtol, initial=1.0))
@@ -52,7 +51,8 @@ class Implicit(ReducedMethod):
             self._enough, self._rough = 1.0, 1e5
         self._solvers: tuple[float, Any, Any] | None = None
         self._known: tuple[Array, Array] | None = None
-        self.counts = {"iterations": 0, "factorisations": 0, "jacobians": 0}
+        self.counts = {"iterations": 0, "factorisations": 0}
+        self.jacobian = Jacobian(equations, self.counts)
 
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
         """One step of h seconds."""
@@ -90,17 +90,12 @@ class Implicit(ReducedMethod):
             self._solve(state, own["step"])
 
     def _renew(self, state: ReducedState) -> None:
-        self._matrix(state, renew=True)
+        self.jacobian.at(state, renew=True)
         self._solvers = None
-
-    def _matrix(self, state: ReducedState, *, renew: bool = False) -> Array:
-        found = self.jacobian.at(state, renew=renew)
-        self.counts["jacobians"] = self.jacobian.count
-        return found
 
     def _solve(self, state: ReducedState, h: float) -> tuple[Any, Any]:
         if self._solvers is None or self._solvers[0] != h:
-            matrix, unit = self._matrix(state), np.eye(self.jacobian.size)
+            matrix, unit = self.jacobian.at(state), np.eye(self.jacobian.size)
             real = factors(_RATE / h * unit - matrix)
             rest = factors(1.0 / (complex(VALUES[1]) * h) * unit - matrix)
             self._solvers = h, real, rest

@@ -1,7 +1,7 @@
 """The Jacobian of the reduced form, exact, and kept while it serves."""
 
 from dataclasses import replace
-from typing import final
+from typing import Any, final
 
 import numpy as np
 
@@ -20,12 +20,16 @@ RELATIVE = 2e-8
 
 @final
 class Jacobian:
-    """∂ẏ/∂y of y = (v, r, s) at v = 0: by tangents; of inputs that are functions, by differences of their values."""
+    """∂ẏ/∂y of y = (v, r, s) at v = 0: by tangents; of inputs that are functions, by differences of their values.
 
-    def __init__(self, equations: Equations) -> None:
+    With ``counts`` the matrices are counted there, as ``jacobians``.
+    """
+
+    def __init__(self, equations: Equations, counts: dict[str, Any] | None = None) -> None:
         self.equations = equations
         self.size = equations.nv + equations.n + equations.ns
-        self.count = 0
+        self._counts = {} if counts is None else counts
+        self._counts["jacobians"] = 0
         self._linear = Linearised(equations)
         self._at: ReducedState | None = None
         self._value = np.zeros((self.size, self.size))
@@ -61,12 +65,12 @@ class Jacobian:
                 where = slice(int(t.r_at[i]), int(t.r_at[i] + t.dim[i]))
                 value[where, where] -= 0.5 * edge.pair.manifold.ad(rates[where])
         self._value, self._at = value, state
-        self.count += 1
+        self._counts["jacobians"] += 1
         return value
 
     def snapshot(self, state: ReducedState) -> Snapshot:
         """Where the matrix was made, and whether that is at ``state``."""
-        return {"made": parts(self._at), "fresh": self.fresh(state), "count": self.count}
+        return {"made": parts(self._at), "fresh": self.fresh(state)}
 
     def restore(self, snapshot: Snapshot, state: ReducedState) -> None:
         """Make the matrix where it was made."""
@@ -74,7 +78,6 @@ class Jacobian:
         if found is not None:
             made = like(state, found)
             self.at(replace(made, q=state.q) if snapshot["fresh"] else made)
-        self.count = snapshot["count"]
 
     def _inputs(self, state: ReducedState) -> Array:
         """(n, size) what the inputs' dependence on the state adds to ∂ṙ/∂y."""

@@ -16,6 +16,8 @@ INSTANT = 1e-7
 """Part of a step in which nothing moves."""
 JUMP = 1e-6
 """Jumps below this share of the states of their kind are taken for rounding of what was given."""
+SMALL = 1e-6
+"""States of a kind that are all smaller, in its unit, count as of this size."""
 
 
 def check_start(problem: Problem, model: Model, h: float) -> None:
@@ -45,7 +47,7 @@ def check_start(problem: Problem, model: Model, h: float) -> None:
         flat = manifold(slot.quantity.space).code == VECTOR
         size = float(np.abs(x[slot.point]).max(initial=0.0)) if flat else 1.0
         sizes[slot.quantity.kind] = max(sizes.get(slot.quantity.kind, 0.0), size)
-    limits = np.array([JUMP * max(sizes[slot.quantity.kind], JUMP) for slot in d.states])
+    limits = np.array([JUMP * max(sizes[slot.quantity.kind], SMALL) for slot in d.states])
     share = np.where(jumps[1] > 0.75 * jumps[0], jumps[1] / limits, 0.0)
     if share.max(initial=0.0) > 1.0:
         path = str(d.states[int(np.argmax(share))].path)

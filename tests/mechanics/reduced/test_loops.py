@@ -69,11 +69,10 @@ def test_rows_are_what_gaps_change_by(closed):
         there, back = (eq.gaps(eq.moved(state.q, h * unit), state.r)[0] for h in (1e-5, -1e-5))
         assert np.array_equal(there[:2], [0.0, 0.0])
         assert np.abs((there - back) / 2e-5 - rows @ unit)[2:].max() <= 1e-9
-        assert np.abs(there).max() > 1e-6 * np.abs(rows[2:] @ unit).max()
 
 
 def test_sizes_of_rows_are_measured_by_inertia(closed, tmp_path):
-    """A row is measured in the mass metric: four times the mass, half the size; and no row is longer than its terms."""
+    """A row is measured in the mass metric: four times the mass, half the size."""
     found = []
     for eq in (closed[0], equations(five_bar(tmp_path, 4.0))):
         state = eq.start(0.0)
@@ -82,11 +81,8 @@ def test_sizes_of_rows_are_measured_by_inertia(closed, tmp_path):
         m = constraint_rows(t, w)
         for i, j in enumerate(np.flatnonzero(t.driven)):
             assert w.size[i] == pytest.approx(1.0 / w.factor[j, j], rel=1e-14)
-        turned = np.linalg.solve(np.tril(w.factor), w.row[:m].T)
         found.append(np.array(w.size[:m]))
         assert reduce_rows(w, m) == 4  # two prescribed, two of the loop in its plane
-        lengths = np.linalg.norm(turned, axis=0)
-        assert np.all(lengths <= 10.0 * found[-1]) and np.any(lengths > 1e-2 * found[-1])
     assert np.abs(found[0] - 2.0 * found[1]).max() <= 1e-12 * found[0].max()
 
 
@@ -120,11 +116,14 @@ def test_gaps_are_counted_from_the_last_prescribed_joint_on(closed):
 
 @pytest.mark.parametrize("method", [name for name, m in METHODS.items() if m.scenes and m.fixed])
 def test_every_method_turns_what_is_prescribed_and_counts_its_work(method, tmp_path):
-    scene = five_bar(tmp_path)
-    sol = ephs.simulate(scene, 0.2, method=method, step=0.01)
-    best = ephs.simulate(scene, 0.2, method="rk87", rtol=1e-11, atol=1e-13, save_at=sol.t)
-    for name, rate in (("left", 0.7), ("right", -0.4)):
-        assert np.abs(np.ravel(sol.joint(name).coordinate) - rate * sol.t).max() <= 1e-9
-    assert sol.constraint_error.max() <= 1e-9
-    assert np.abs(sol.work - best.work).max() <= 2e-3 * np.abs(best.work).max()
-    assert np.abs(sol.energy - best.energy).max() <= 2e-3 * np.abs(best.energy - best.energy[0]).max()
+    scene, missed = five_bar(tmp_path), []
+    best = ephs.simulate(scene, 0.2, method="rk87", rtol=1e-11, atol=1e-13, save_at=[0.2])
+    size = abs(best.work[-1])
+    for h in (0.02, 0.01):
+        sol = ephs.simulate(scene, 0.2, method=method, step=h)
+        for name, rate in (("left", 0.7), ("right", -0.4)):
+            assert np.abs(np.ravel(sol.joint(name).coordinate) - rate * sol.t).max() <= 1e-9
+        assert sol.constraint_error.max() <= 1e-9
+        missed.append([abs(sol.work[-1] - best.work[-1]), abs(sol.heat[-1] - best.heat[-1])])
+    for far, near in zip(*missed, strict=True):  # of order 2 at least, down to what the best run is good for
+        assert near <= max(0.3 * far, 1e-8 * size)

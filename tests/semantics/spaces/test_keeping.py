@@ -200,7 +200,7 @@ def test_folders_that_nobody_uses_are_removed_in_the_end(tmp_path):
     for folder in (folders["a"], folders["b"]):
         assert compiled(folder)(4.0) == 2.0
     other.mkdir()
-    old = time.time() - 2.0 * keeping.UNUSED
+    old = time.time() - 2.0 * keeping.UNUSED  # the age of folders; nothing is timed
     for folder in (folders["a"], folders["b"], other):
         os.utime(folder, (old, old))
     for once in (keeping._use, keeping._prune):  # as a later process
