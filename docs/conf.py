@@ -39,3 +39,4 @@ nb_execution_raise_on_error = True
 nb_execution_timeout = 300
 nb_merge_streams = True
 nb_ipywidgets_js = {}  # its default comes from a network
+nb_render_markdown_format = "myst"  # CommonMark has no tables
