@@ -41,7 +41,7 @@ _TEXTS = {
     "pair-parameters": "relative pose {what}: found the parameters {found}, expected {expected}",
     "parity": "quantity {what}: the parity is {found!r}, expected +1 (even under time reversal) or -1 (odd)",
     "space": "space {what}: found dim {found}, expected whole numbers dim >= 0 and size >= dim",
-    "json": "no pattern can be read: {where}: found {found}, expected {expected}",
+    "json": "no {what} can be read: {where}: found {found}, expected {expected}",
     "text": "no pattern can be read: line {where}: found {found}, expected {expected}",
     "parameter": "space {what}: the parameter {found} is not finite; expected a finite number",
 }
