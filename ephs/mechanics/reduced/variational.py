@@ -34,6 +34,10 @@ RANK = 1e-9
 """Singular values of the step's equations below this fraction of the largest count as zero."""
 FAR = 1e4
 """Residuals beyond this, relative to momenta or in m, are of an iteration that has gone astray."""
+STAGNANT = 1e-11
+"""An iteration whose residual stops falling below this has come to rounding."""
+ROUNDING = 1e-13
+"""Residuals below this do not ask for a new matrix: their fall is rounding's, and differs from machine to machine."""
 
 
 @final
@@ -118,9 +122,9 @@ class Variational(ReducedMethod):
             )
             if not worst < FAR:
                 break
-            if worst <= 4e-16 or (worst < 1e-11 and worst > 0.5 * last):
+            if worst <= 4e-16 or (worst < STAGNANT and worst > 0.5 * last):
                 return xi, push, middle
-            if self._matrix is None or (iteration > 3 and worst > 0.1 * last):
+            if self._matrix is None or (iteration > 3 and worst > max(0.1 * last, ROUNDING)):
                 self._matrix = self._slope(state, h, xi, middle)
             try:
                 change, impulse = _least(self._matrix, before, rows, -residual, -gap)
