@@ -26,6 +26,8 @@ CLASSES = (
     "ephs.mechanics.sensitivity.Fit",
     "ephs.mechanics.sensitivity.Sensitivity",
     "ephs.operad.Nesting",
+    "ephs.semantics.relations.LinearRelation",
+    "ephs.semantics.relations.StateClass",
     "ephs.semantics.spaces.Pair",
     "ephs.semantics.spaces.PairEntry",
     "ephs.semantics.subspace.Subspace",

@@ -16,7 +16,7 @@ STOREYS: tuple[tuple[frozenset[str], ...], ...] = tuple(
     for storey in (
         ([".operad"],),
         ([".semantics.spaces"],),
-        ([".semantics", ".semantics.symbols"],),
+        ([".semantics", ".semantics.relations", ".semantics.symbols"],),
         ([".mechanics.solve"],),
         ([".mechanics.scene", ".mechanics.imports"],),
         ([".mechanics", ".mechanics.reduction", ".mechanics.reduced", ".mechanics.engine"],),

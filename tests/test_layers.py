@@ -68,7 +68,7 @@ def test_an_import_upwards_is_seen(module, source):
     ("module", "source"),
     [
         ("ephs.operad.pattern", "from .names import Path\nimport json"),
-        ("ephs.semantics.system", "from ..operad import Pattern\nfrom .relation import Relation"),
+        ("ephs.semantics.system", "from ..operad import Pattern\nfrom .relations import Relation"),
         ("ephs.mechanics.bodies", "from .solve.model import Model"),
         ("ephs.mechanics.engine.build", "from ephs.mechanics.reduced.tables import Table"),
         ("ephs.operad.pattern", "def f():\n    from ephs.show import draw"),

@@ -7,5 +7,5 @@ from ephs.semantics.errors import StructureError as StructureError
 from ephs.semantics.primitives import Irreversible as Irreversible
 from ephs.semantics.primitives import Reversible as Reversible
 from ephs.semantics.primitives import Storage as Storage
-from ephs.semantics.relation import Relation as Relation
+from ephs.semantics.relations import Relation as Relation
 from ephs.semantics.system import System as System

@@ -169,7 +169,7 @@ def naturality(probe: Probe) -> Verdict:
     """Discretise, then compose = flatten, then discretise."""
     behaviour = Natural(probe.reference, probe.h)
     flat = solve_flat(probe.system, probe.state, behaviour, probe.inputs)
-    nested = solve_nested(probe.system, probe.state, behaviour, probe.inputs)
+    nested = solve_nested(probe.system, probe.state, behaviour, probe.inputs, probe.ports)
     if max(flat.residual, nested.residual) > UNSOLVED:
         return VACUOUS
     scale = max([1.0, *(float(np.abs(w).max(initial=0.0)) for w in flat.rates.values())])

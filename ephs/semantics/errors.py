@@ -73,6 +73,10 @@ _TEXTS = {
         "scene.with_state(rates=…)"
     ),
     "unknown-state": "{path}: no such state; the states are {expected}",
+    "unknown-port": "{path}: no such outer port; the outer ports are {expected}",
+    "references": (
+        "{path}: the relation is relative to {found}, the others to {expected}; take relations to one reference"
+    ),
     "unknown-parameter": "{path}: no number of a component of the library; {hint}",
     "missing-input": ("{path}: the outer port is open: give inputs={{'{path}': {{'flow': …}}}} or {{'effort': …}}"),
     "unknown-input": "{path}: no such outer power port; the open ports are {expected}",

@@ -3,7 +3,7 @@
 Each law is stated once, here. Tests, `System.check`, `ephs check` and `ephs.testing` run the same objects.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -11,10 +11,10 @@ from ephs.operad import ROOT, Path, Pattern
 from ephs.semantics import balances
 from ephs.semantics.bundle import Array, Bundle
 from ephs.semantics.checks import dirac
-from ephs.semantics.pattern_relation import pattern_relation
-from ephs.semantics.primitives import Point, Primitive, Reversible
+from ephs.semantics.primitives import Reversible
 from ephs.semantics.probe import Probe, SystemLaw, Verdict, random_probe
-from ephs.semantics.relation import LinearRelation, Sources, fold, read_point
+from ephs.semantics.relations import LinearRelation, Relation, pattern_relation
+from ephs.semantics.relations.base import BasePoint, place
 from ephs.semantics.subspace import Subspace
 from ephs.semantics.system import System
 
@@ -31,15 +31,18 @@ __all__ = [
 
 
 def _functoriality(probe: Probe) -> Verdict:
-    flat, nested = (
-        probe.system.relation(probe.reference, route=route).at(
-            {str(p): v for p, v in probe.state.items()}, probe.efforts
-        )
-        for route in ("flat", "nested")
-    )
+    one, other = (probe.system.relation(probe.reference, route=route) for route in ("flat", "nested"))
+    if one.classes != other.classes:
+        return Verdict(np.inf, 0.0, f"the states of the base are {_base(one)} and {_base(other)}")
+    flat, nested = (relation.at(probe.state, probe.ports, efforts=probe.efforts) for relation in (one, other))
     distance = flat.distance(nested)
-    detail = f"projectors of dimension {flat.dimension} differ by {distance:.1e}"
+    detail = f"{len(one.classes)} states; projectors of dimension {flat.dimension} differ by {distance:.1e}"
     return Verdict(distance, _rounding(flat.subspace, nested.subspace), detail)
+
+
+def _base(relation: Relation) -> str:
+    """The classes of a relation's states, as text."""
+    return " | ".join(" = ".join(map(str, (*each.ports, *each.stores, *each.readers))) for each in relation.classes)
 
 
 def _rounding(*subspaces: Subspace) -> float:
@@ -86,23 +89,13 @@ def isotropy(subspace: Subspace, form: Array) -> float:
     return float(np.abs(subspace.basis.T @ form @ subspace.basis).max(initial=0.0))
 
 
-def _points(probe: Probe) -> dict[Path, Point]:
-    """What each component reads, also where nobody stores it."""
-    found: dict[Path, Point] = {}
-
-    def leaf(path: Path, primitive: Primitive, sources: Sources) -> None:
-        found[path] = read_point(primitive, sources, probe.state)
-
-    def compose(_pattern: Pattern, _parts: Mapping[Path, None]) -> None:
-        return None
-
-    fold(probe.system, leaf, compose)
-    return found
-
-
 def _dirac(probe: Probe) -> Verdict:
     """The pattern with all reversible components: a Dirac structure on outer ports and those of the others."""
-    flat, points = probe.system.flatten(), _points(probe)
+    flat = probe.system.flatten()
+    states, contradiction = place(probe.system.relation(probe.reference).classes, probe.state, probe.ports)
+    if contradiction:
+        return Verdict(0.0, 0.0, contradiction)
+    point = BasePoint(states)
     whole, form = pattern_relation(flat.pattern), power_form(flat.pattern)
     kept: list[int] = []
     rows: list[Array] = []
@@ -117,7 +110,7 @@ def _dirac(probe: Probe) -> Verdict:
                 for port in primitive.bundle.ports
                 for i in range(layout.slice(port).start, layout.slice(port).stop)
             ]
-            annihilator = Subspace.from_kernel(dirac(*primitive.structure(points[box])).basis.T).basis.T
+            annihilator = Subspace.from_kernel(dirac(*primitive.structure(point.read(box, primitive))).basis.T).basis.T
             conditions = np.zeros((n, whole.ambient))
             conditions[:, [*order, *(n + i for i in order)]] = annihilator
             rows.append(conditions)
@@ -151,9 +144,11 @@ def _renaming(probe: Probe) -> Verdict:
     def new(path: Path) -> Path:
         return next(names[box] / path.relative_to(box) for box in boxes if box.is_prefix_of(path))
 
-    one = system.relation(probe.reference).at({str(p): v for p, v in probe.state.items()}, probe.efforts)
+    one = system.relation(probe.reference).at(probe.state, probe.ports, efforts=probe.efforts)
     two = renamed.relation(probe.reference).at(
-        {str(new(p)): v for p, v in probe.state.items()}, {new(p): e for p, e in probe.efforts.items()}
+        {new(p): v for p, v in probe.state.items()},
+        probe.ports,
+        efforts={new(p): e for p, e in probe.efforts.items()},
     )
     if one.empty and two.empty:
         return Verdict(0.0, 0.0, "both relations are empty")

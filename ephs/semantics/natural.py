@@ -17,9 +17,10 @@ from ephs.semantics.bundle import Array, Bundle, Reference
 from ephs.semantics.descriptor import Input
 from ephs.semantics.errors import SemanticsError
 from ephs.semantics.primitives import Primitive, Reversible
-from ephs.semantics.relation import Sources, fold, read_point
+from ephs.semantics.relations import relation_of
+from ephs.semantics.relations.base import BasePoint, StateClass, Values, place
 from ephs.semantics.spaces import manifold
-from ephs.semantics.system import System
+from ephs.semantics.system import System, fold
 
 __all__ = ["Solved", "solve_flat", "solve_nested", "step"]
 
@@ -99,15 +100,29 @@ class _Part:
 
 
 def solve_nested(
-    system: System, state: Mapping[Path, Array], behaviour: Continuous | Natural, inputs: Mapping[Path, Input]
+    system: System,
+    state: Values,
+    behaviour: Continuous | Natural,
+    inputs: Mapping[Path, Input],
+    ports: Values | None = None,
 ) -> Solved:
-    """Solve the hierarchical system as it stands: every box port of every level has its own flow and effort."""
+    """Solve the hierarchical system as it stands: every box port of every level has its own flow and effort.
+
+    States that nobody stores are as given in ``state`` or at outer ``ports``, and stay. Storages of one state have
+    one rate; where their values differ there is no solution, and the residual is infinite.
+    """
+    classes = relation_of(system, behaviour.reference, "nested").classes
+    states, contradiction = place(classes, state, ports or {})
+    if contradiction:
+        return Solved({}, {}, {}, {}, np.inf)
     unknowns = _Unknowns()
+    point = BasePoint(states)
+    shared = {path: each for each in classes for path in (*each.stores, *each.readers)}
     all_rates: dict[Path, slice] = {}  # read by closures, filled leaf by leaf
 
-    def leaf(path: Path, primitive: Primitive, sources: Sources) -> _Part:
-        local = behaviour.behaviour(primitive, read_point(primitive, sources, state))
-        return _leaf(path, primitive, local, sources, unknowns, all_rates)
+    def leaf(path: Path, primitive: Primitive) -> _Part:
+        local = behaviour.behaviour(primitive, point.read(path, primitive))
+        return _leaf(path, primitive, local, shared, unknowns, all_rates)
 
     part = fold(system, leaf, lambda pattern, parts: _glue(pattern, parts, unknowns))
 
@@ -116,6 +131,8 @@ def solve_nested(
         for port, (flow, effort) in part.ports.items():
             given = inputs[port]
             rows.append((z[effort] if given.effort else z[flow]) - given.value)
+        for each in classes:
+            rows.extend(z[all_rates[each.stores[0]]] - z[all_rates[other]] for other in each.stores[1:])
         return np.concatenate(rows) if rows else np.zeros(0)
 
     z, error = newton(residual, np.zeros(unknowns.size))
@@ -132,7 +149,7 @@ def _leaf(
     path: Path,
     primitive: Primitive,
     local: Storing | Relating,
-    sources: Sources,
+    shared: Mapping[Path, StateClass],
     unknowns: _Unknowns,
     all_rates: dict[Path, slice],
 ) -> _Part:
@@ -146,13 +163,13 @@ def _leaf(
         return _Part(ports, lambda z: [z[effort] - storing.effort(z[flow])], rates, {}, {})
     relating = local
     lam = unknowns.take(primitive.multipliers if isinstance(primitive, Reversible) else 0)
-    dims = {p: manifold(primitive.interface[p].quantity.space).dim for p in primitive.reads}
+    sources = {port: shared[path / port] for port in primitive.reads}
 
     def equations(z: Array) -> list[Array]:
-        read: dict[Path, Array] = {}
-        for port in primitive.reads:
-            source = sources[port]
-            read[port] = z[all_rates[source]] if source is not None else np.zeros(dims[port])
+        read = {
+            port: z[all_rates[source.stores[0]]] if source.stores else np.zeros(source.quantity.space.dim)
+            for port, source in sources.items()
+        }
         f, conditions = relating.relate(z[effort], z[lam], read)
         return [z[flow] - f, conditions]
 

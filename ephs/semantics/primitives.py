@@ -210,10 +210,10 @@ class Storage:
         return gradient + (defect / square) * step if square > 0.0 else gradient
 
     def compose(self, pattern: Pattern, fillings: "Mapping[Path, object]") -> object:
-        """Fill the boxes of a pattern: gives a System."""
-        from ephs.semantics.system import System
+        """Fill the boxes of a pattern: a system, or a relation where one of the fillings is one."""
+        from ephs.semantics.system import filled
 
-        return System.fill(pattern, fillings)
+        return filled(pattern, fillings)
 
 
 @final
@@ -264,10 +264,10 @@ class Reversible:
         return Bundle.of(self.interface)
 
     def compose(self, pattern: Pattern, fillings: "Mapping[Path, object]") -> object:
-        """Fill the boxes of a pattern: gives a System."""
-        from ephs.semantics.system import System
+        """Fill the boxes of a pattern: a system, or a relation where one of the fillings is one."""
+        from ephs.semantics.system import filled
 
-        return System.fill(pattern, fillings)
+        return filled(pattern, fillings)
 
 
 @final
@@ -322,10 +322,10 @@ class Irreversible:
                 raise StructureError("temperature", self.name, found=float(reference.temperature + e[where][0]))
 
     def compose(self, pattern: Pattern, fillings: "Mapping[Path, object]") -> object:
-        """Fill the boxes of a pattern: gives a System."""
-        from ephs.semantics.system import System
+        """Fill the boxes of a pattern: a system, or a relation where one of the fillings is one."""
+        from ephs.semantics.system import filled
 
-        return System.fill(pattern, fillings)
+        return filled(pattern, fillings)
 
 
 Primitive = Storage | Reversible | Irreversible

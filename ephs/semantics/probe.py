@@ -6,7 +6,7 @@ from typing import final
 
 import numpy as np
 
-from ephs.operad import Path
+from ephs.operad import Directory, Path, PortType
 from ephs.semantics.bundle import Array, Bundle, Reference
 from ephs.semantics.checks import random_point
 from ephs.semantics.descriptor import Input
@@ -23,10 +23,14 @@ class Probe:
 
     Parameters
     ----------
+    state
+        Values of the states of storages, and of those that are read and nobody stores.
     inputs
         What is prescribed at the outer power ports.
     efforts
         Arguments of the Onsager matrices by component, where a relation is taken at an instant.
+    ports
+        Values of states that outer ports show and nobody inside stores.
     """
 
     system: System
@@ -35,6 +39,7 @@ class Probe:
     efforts: Mapping[Path, Array] = field(default_factory=dict[Path, Array])
     reference: Reference = field(default_factory=Reference)
     h: float = 1e-2
+    ports: Mapping[Path, Array] = field(default_factory=dict[Path, Array])
 
 
 @final
@@ -67,7 +72,7 @@ class SystemLaw:
 
 
 def random_probe(system: System, seed: int = 0, *, reference: Reference | None = None, h: float = 1e-2) -> Probe:
-    """A probe at random states with random flows at the outer ports.
+    """A probe at random states with random flows at the outer ports; storages of one state have one value.
 
     The default reference has a pressure of the size of the temperature: beside 10⁵ Pa the velocities would be rounding.
     """
@@ -86,4 +91,14 @@ def random_probe(system: System, seed: int = 0, *, reference: Reference | None =
         port: Input(0.1 * rng.standard_normal(quantity.space.dim), False)
         for port, _, quantity in Bundle.of(system.interface).items()
     }
-    return Probe(system, state, inputs, efforts, reference or Reference(293.15, 300.0), h)
+    reference = reference or Reference(293.15, 300.0)
+    ports: dict[Path, Array] = {}
+    for each in system.relation(reference).classes:
+        if each.stores:
+            state |= dict.fromkeys(each.stores, state[each.name])
+            continue
+        layout = Bundle.of(Directory({each.name: PortType(each.quantity)}))
+        (ports if each.ports else state).update(
+            {(each.ports or (each.name,))[0]: random_point(layout, (each.name,), rng)[each.name]}
+        )
+    return Probe(system, state, inputs, efforts, reference, h, ports)

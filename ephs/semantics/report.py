@@ -1,11 +1,11 @@
 """What checking a system finds: its structure, whether it has equations, and the laws at random states."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple, final
 
 from ephs.operad import Path
-from ephs.semantics.bundle import Array, Reference
+from ephs.semantics.bundle import Reference
 from ephs.semantics.checks import check_irreversible, check_reversible, check_storage
 from ephs.semantics.errors import SemanticsError
 from ephs.semantics.laws import SYSTEM_LAWS, Probe, SystemLaw, random_probe
@@ -112,8 +112,7 @@ def _items(
 def _at(probe: Probe, state: Mapping[str, object] | None) -> Probe:
     if state is None:
         return probe
-    values: dict[Path, Array] = probe.system.state(state)
-    return Probe(probe.system, values, probe.inputs, probe.efforts, probe.reference, probe.h)
+    return replace(probe, state={**probe.state, **probe.system.state(state)})
 
 
 def _verdict(law: SystemLaw, probe: Probe) -> tuple[bool, float, str]:

@@ -3,9 +3,9 @@
 A system carries its states: isolated composites have no ports, and equality of relations on ports would be vacuous.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, final
+from typing import TYPE_CHECKING, Literal, Protocol, TypeVar, final
 
 import numpy as np
 
@@ -18,11 +18,13 @@ from ephs.semantics.spaces import Pair, manifold
 if TYPE_CHECKING:
     from ephs.semantics.descriptor import Descriptor
     from ephs.semantics.ledger import Ledger
-    from ephs.semantics.relation import Relation
+    from ephs.semantics.relations import Relation, Route
     from ephs.semantics.report import CheckReport
     from ephs.semantics.symbols.equations import Equations
 
-__all__ = ["Filling", "System"]
+__all__ = ["Filling", "System", "as_system", "filled", "fold", "read_state", "require_fillings"]
+
+T = TypeVar("T")
 
 
 @final
@@ -47,22 +49,14 @@ class System:
     fillings: Directory["Filling"]
 
     def __post_init__(self) -> None:
-        boxes, given = set(self.pattern.boxes), set(self.fillings)
-        if boxes != given:
-            raise SemanticsError("fillings", ROOT, expected=_names(boxes), found=_names(given))
-        for box, filling in self.fillings.items():
-            wanted = self.pattern.boxes[box].interface
-            if not _same_interface(wanted, filling.interface):
-                found, expected = _describe(filling.interface), _describe(wanted)
-                raise SemanticsError("interface", box, found=found, expected=expected)
+        require_fillings(self.pattern, self.fillings)
 
     @staticmethod
     def fill(pattern: Pattern, fillings: Mapping[Path, object]) -> "System":
         """Fill the boxes of a pattern."""
-        kinds = (System, Storage, Reversible, Irreversible)
         checked: dict[Path, Filling] = {}
         for box, filling in fillings.items():
-            if not isinstance(filling, kinds):
+            if not isinstance(filling, Filling):
                 raise TypeError(f"{box}: a filling is a System or a primitive, found {type(filling).__name__}")
             checked[box] = filling
         return System(pattern, Directory(checked))
@@ -72,9 +66,9 @@ class System:
         """Fill the boxes of a pattern, given by path or dotted name."""
         return System(pattern, Directory({Path.of(box): filling for box, filling in fillings.items()}))
 
-    def compose(self, pattern: Pattern, fillings: Mapping[Path, object]) -> "System":
-        """Fill the boxes of a pattern: gives a System."""
-        return System.fill(pattern, fillings)
+    def compose(self, pattern: Pattern, fillings: Mapping[Path, object]) -> "System | Relation":
+        """Fill the boxes of a pattern: a system, or a relation where one of the fillings is one."""
+        return filled(pattern, fillings)
 
     @property
     def kind(self) -> Literal["composite"]:
@@ -147,20 +141,7 @@ class System:
             path = Path.of(name)
             if path not in states:
                 raise AssemblyError("unknown-state", name, expected=_names(set(states)))
-            space = states[path].space
-            try:
-                array = np.atleast_1d(np.asarray(value, dtype=float))
-            except (TypeError, ValueError):
-                raise AssemblyError("state-number", name, found=value, quantity=states[path].kind) from None
-            if states[path].kind == "relative_pose" and array.shape == (space.dim,) != (space.size,):
-                array = Pair.from_space(space).element(array)  # as solutions give them
-            if array.shape != (space.size,):
-                raise AssemblyError(
-                    "state", name, found=array.shape, expected=(space.size,), quantity=states[path].kind
-                )
-            if not np.all(np.isfinite(array)):
-                raise AssemblyError("state-number", name, found=array, quantity=states[path].kind)
-            out[path] = manifold(space).normalise(array)
+            out[path] = read_state(path, states[path], value)
         return out
 
     @property
@@ -170,16 +151,16 @@ class System:
 
         return Ledger(self)
 
-    def relation(self, reference: Reference | None = None, *, route: Literal["flat", "nested"] = "flat") -> "Relation":
+    def relation(self, reference: Reference | None = None, *, route: "Route" = "flat") -> "Relation":
         """The system's meaning: a relation between the rates of its states and its outer flows and efforts.
 
         Parameters
         ----------
         route
-            ``"flat"`` flattens and assembles one square system of equations; ``"nested"`` composes the relations
-            of the subsystems level by level. They agree: this is what functoriality says.
+            ``"flat"`` flattens and eliminates all unknowns at once; ``"nested"`` composes the relations of the
+            subsystems level by level. They agree: this is what functoriality says.
         """
-        from ephs.semantics.relation import relation_of
+        from ephs.semantics.relations import relation_of
 
         return relation_of(self, reference or Reference(), route)
 
@@ -236,6 +217,82 @@ class System:
 
 
 Filling = System | Storage | Reversible | Irreversible
+
+
+def filled(pattern: Pattern, fillings: Mapping[Path, object]) -> "System | Relation":
+    """The pattern with its boxes filled: a system, or a relation where one of the fillings is one."""
+    from ephs.semantics.relations import Relation
+
+    for filling in fillings.values():
+        if isinstance(filling, Relation):
+            return filling.compose(pattern, fillings)
+    return System.fill(pattern, fillings)
+
+
+def as_system(filling: Filling) -> System:
+    """A primitive as the one box of an identity pattern; a system as it is."""
+    if isinstance(filling, System):
+        return filling
+    return System.fill(Pattern.identity(filling.interface), {ROOT: filling})
+
+
+def fold(
+    filling: Filling,
+    leaf: Callable[[Path, Primitive], T],
+    compose: Callable[[Pattern, Mapping[Path, T]], T],
+    path: Path = ROOT,
+) -> T:
+    """Evaluate from the inside, level by level: primitives at their full paths by ``leaf``, systems by ``compose``."""
+    if not isinstance(filling, System):
+        return leaf(path, filling)
+    return compose(
+        filling.pattern, {box: fold(each, leaf, compose, path / box) for box, each in filling.fillings.items()}
+    )
+
+
+class _Filling(Protocol):
+    @property
+    def interface(self) -> Interface: ...
+
+
+def require_fillings(pattern: Pattern, fillings: Mapping[Path, _Filling]) -> None:
+    """Refuse fillings that are not one of its interface for each box.
+
+    Raises
+    ------
+    SemanticsError
+        A box without filling, a filling without box, or an interface that does not match.
+    """
+    boxes, given = set(pattern.boxes), set(fillings)
+    if boxes != given:
+        raise SemanticsError("fillings", ROOT, expected=_names(boxes), found=_names(given))
+    for box, filling in fillings.items():
+        wanted = pattern.boxes[box].interface
+        if not _same_interface(wanted, filling.interface):
+            found, expected = _describe(filling.interface), _describe(wanted)
+            raise SemanticsError("interface", box, found=found, expected=expected)
+
+
+def read_state(path: Path, quantity: Quantity, value: object) -> Array:
+    """The value of a state, (size,), from what stands for it.
+
+    Raises
+    ------
+    AssemblyError
+        A wrong shape, or a number that is not finite.
+    """
+    space = quantity.space
+    try:
+        array = np.atleast_1d(np.asarray(value, dtype=float))
+    except (TypeError, ValueError):
+        raise AssemblyError("state-number", path, found=value, quantity=quantity.kind) from None
+    if quantity.kind == "relative_pose" and array.shape == (space.dim,) != (space.size,):
+        array = Pair.from_space(space).element(array)  # as solutions give them
+    if array.shape != (space.size,):
+        raise AssemblyError("state", path, found=array.shape, expected=(space.size,), quantity=quantity.kind)
+    if not np.all(np.isfinite(array)):
+        raise AssemblyError("state-number", path, found=array, quantity=quantity.kind)
+    return manifold(space).normalise(array)
 
 
 def _same_interface(wanted: Interface, found: Interface) -> bool:

@@ -18,10 +18,10 @@ from ephs.mechanics import (
 )
 from ephs.operad import Path
 from ephs.semantics import Reference, StructureError, System
-from ephs.semantics.relation import as_system
 from ephs.semantics.spaces import PAIRS, SE3, SO3xR3, pair
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.semantics.subspace import Subspace
+from ephs.semantics.system import as_system
 from tests.mechanics.mechanisms import GRAVITY, TwoBodies, kinds
 
 seeds = st.integers(0, 2**20)
@@ -146,7 +146,9 @@ def test_a_joint_means_its_equations(kind, seed):
     two = TwoBodies.draw(kind, seed)
     system = two.system.fillings[Path.of("joint")]
     for route in ("flat", "nested"):
-        relation = system.relation(route=route).at({"pe.q_r": two.x}, {Path.parse("mf"): np.append(two.u_r, 0.0)})
+        relation = system.relation(route=route).at(
+            {"pe.q_r": two.x}, efforts={Path.parse("mf"): np.append(two.u_r, 0.0)}
+        )
         assert relation.dimension - 1 == 12
         ours = _scaled(relation, two.of.dim)
         assert ours.distance(joint_by_hand(two)) <= 1e-12
@@ -194,7 +196,7 @@ def test_the_constraint_row_as_it_is_printed_is_another_relation(kind, seed):
 def test_the_flat_system_means_its_equations(kind, seed):
     """q̇ᵢ = uᵢ, ṗ₁ = ad*p₁ − dV₁ − Ad*Ad*λ, ṗ₂ = ad*p₂ − dV₂ + Ad*λ, q̇_r = u_r, ṡ = μ(u_r, u_r)/θ₀."""
     two = TwoBodies.draw(kind, seed)
-    relation = two.system.relation().at(two.state, two.efforts)
+    relation = two.system.relation().at(two.state, efforts=two.efforts)
     d = two.of.dim
     # λ is free up to Bᵀλ = −dV_r − μ u_r: 6 − d of it remain, beside the constant
     assert relation.dimension == 6 - d + 1
@@ -209,7 +211,7 @@ def test_the_flat_system_means_its_equations(kind, seed):
     }  # fmt: skip
     point = np.concatenate([*(np.atleast_1d(rates[str(path)]) for path, _ in relation.rates), [relation.unit]])
     assert relation.subspace.contains(point) <= 1e-12
-    nested = two.system.relation(route="nested").at(two.state, two.efforts)
+    nested = two.system.relation(route="nested").at(two.state, efforts=two.efforts)
     assert relation.distance(nested) <= 1e-12
 
 
@@ -273,7 +275,7 @@ def test_functions_of_the_user_mean_what_the_built_in_parts_mean(seed):
             ),
         },
     )  # fmt: skip
-    ours, theirs = (s.relation().at(two.state, two.efforts) for s in (own, two.system))
+    ours, theirs = (s.relation().at(two.state, efforts=two.efforts) for s in (own, two.system))
     assert ours.unit == pytest.approx(theirs.unit, rel=1e-9)
     scale = np.diag([*np.ones(ours.subspace.ambient - 1), ours.unit / theirs.unit])
     assert ours.subspace.distance(theirs.subspace.image(scale)) <= 1e-9

@@ -93,7 +93,7 @@ BREAKS = {
         "if declared := None:",
     ),
     "import, welds": Break("ephs/mechanics/imports/mjcf_links.py", "pose(data[3:6], data[6:10])", "pose(data[3:6])"),
-    "gluing": Break("ephs/semantics/relation.py", "outer_at[path] + i, -1.0))", "outer_at[path] + i, 1.0))"),
+    "gluing": Break("ephs/semantics/relations/linear.py", "outer_at[path] + i, -1.0))", "outer_at[path] + i, 1.0))"),
 }
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from ephs.operad import Pattern, PatternError
 from ephs.semantics import AssemblyError, library
-from ephs.semantics.pattern_relation import pattern_relation
+from ephs.semantics.relations import pattern_relation
 
 ALLOWED = {
     # case: (pattern, remarks, zero flows of ports in the layout of the pattern's relation)

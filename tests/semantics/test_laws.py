@@ -8,7 +8,7 @@ from ephs.operad import Path, Pattern, junction, quantity
 from ephs.semantics import Reference, System, library
 from ephs.semantics.laws import SYSTEM_LAWS, isotropy, power_form, random_probe
 from ephs.semantics.natural import step
-from ephs.semantics.pattern_relation import pattern_relation
+from ephs.semantics.relations import pattern_relation
 from ephs.testing import (
     check_entropy_production,
     check_functoriality,
@@ -44,7 +44,7 @@ def test_also_where_there_is_no_motion(data, seed):
 @given(systems(isolated=True), seeds)
 def test_isolated_systems_are_told_apart_by_their_rates(system, seed):
     probe = random_probe(system, seed)
-    relation = system.relation(probe.reference).at({str(p): v for p, v in probe.state.items()}, probe.efforts)
+    relation = system.relation(probe.reference).at(probe.state, probe.ports, efforts=probe.efforts)
     assert relation.ports == ()
     assert [path for path, _ in relation.rates] == sorted(system.states)
 
@@ -83,10 +83,10 @@ def test_names_of_boxes_mean_nothing(system, seed):
         system.pattern.rename(boxes=names), {names[box]: filling for box, filling in system.fillings.items()}
     )
     probe = random_probe(system, seed)
-    one = system.relation(probe.reference).at({str(p): v for p, v in probe.state.items()}, probe.efforts)
+    one = system.relation(probe.reference).at(probe.state, probe.ports, efforts=probe.efforts)
     two = renamed.relation(probe.reference).at(
         {f"z_{p}": v for p, v in probe.state.items()},
-        {Path.parse(f"z_{p}"): e for p, e in probe.efforts.items()},
+        efforts={Path.parse(f"z_{p}"): e for p, e in probe.efforts.items()},
     )
     assert [f"z_{path}" for path, _ in one.rates] == [str(path) for path, _ in two.rates]
     assert np.abs(one.projector - two.projector).max() <= 1e-12 or (one.empty and two.empty)

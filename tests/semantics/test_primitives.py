@@ -268,7 +268,7 @@ def test_what_one_makes_oneself_is_what_the_library_makes():
     }
     for name, primitive in mine.items():
         state = {str(port): 0.4 for port in primitive.reads}
-        from ephs.semantics.relation import as_system
+        from ephs.semantics.system import as_system
 
         ours = as_system(made(name)).relation().at(state)
         theirs = as_system(primitive).relation().at(state)

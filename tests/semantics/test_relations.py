@@ -5,8 +5,7 @@ import pytest
 
 from ephs.operad import Pattern, PatternError, junction, quantity
 from ephs.semantics import AssemblyError, Reference, SemanticsError, System, library, structures
-from ephs.semantics.pattern_relation import pattern_relation
-from ephs.semantics.relation import compose_linear
+from ephs.semantics.relations import compose_linear, pattern_relation
 
 Q = quantity
 
@@ -147,7 +146,7 @@ def test_a_junction_that_no_storage_gives_its_effort_is_accepted():
         env=library.environment(),
     )
     relation = system.relation().at(
-        {"m.p": 1.0}, {next(p for p, _ in system.leaves() if str(p) == "drag"): np.array([0.5, 0.0])}
+        {"m.p": 1.0}, efforts={next(p for p, _ in system.leaves() if str(p) == "drag"): np.array([0.5, 0.0])}
     )
     rate = dict(
         zip(

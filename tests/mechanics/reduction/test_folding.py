@@ -46,7 +46,7 @@ def same_relation(before, after, seed):
     efforts = {
         path: probe.efforts[path] for path, part in before.leaves() if kept.get(path) is part and path in probe.efforts
     }
-    one, other = (system.relation(probe.reference).at(state, efforts) for system in (before, after))
+    one, other = (system.relation(probe.reference).at(state, efforts=efforts) for system in (before, after))
     condition = max(10.0, one.subspace.condition, other.subspace.condition)
     assert one.distance(other) <= min(1e-6, 1e-13 * condition)
 

@@ -1,0 +1,174 @@
+"""The base of a relation: which ports share a state, and the points at which the relation can be asked.
+
+An interconnection identifies states. So the states of a composite are classes of outer ports, of storages' ports and
+of ports that components read, and the classes of its parts compose by a pushout: parts that show one state at two
+outer ports identify two states of their surroundings, whether or not they store it.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import final
+
+import numpy as np
+
+from ephs.operad import Path, Pattern, Quantity
+from ephs.operad.links import closure
+from ephs.semantics.bundle import Array, Reference
+from ephs.semantics.errors import AssemblyError
+from ephs.semantics.primitives import Point, Primitive, Storage
+from ephs.semantics.spaces import manifold
+from ephs.semantics.system import read_state
+
+__all__ = ["BasePoint", "StateClass", "Values", "component_classes", "glued_classes", "place", "sorted_classes"]
+
+Values = Mapping[str, object] | Mapping[Path, object] | Mapping[Path, Array]
+"""Values of states by path."""
+ROUNDING = 8.0 * float(np.finfo(float).eps)
+"""Rounding of a coordinate, relative to the largest one, up to which two values of a state are equal."""
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class StateClass:
+    """Ports that share one state, for which a point of the base has one value.
+
+    Parameters
+    ----------
+    quantity
+        The state's quantity, without frame.
+    ports
+        Outer ports, sorted.
+    stores
+        Ports of storages, each by the path of the component and its own, sorted.
+    readers
+        Ports of reversible and irreversible components that read the state, likewise.
+    """
+
+    quantity: Quantity
+    ports: tuple[Path, ...] = ()
+    stores: tuple[Path, ...] = ()
+    readers: tuple[Path, ...] = ()
+
+    @property
+    def name(self) -> Path:
+        """The least path: of a storage's port, of a reader's where nobody stores it, else of an outer port."""
+        return min(self.stores or self.readers or self.ports)
+
+    @property
+    def free(self) -> bool:
+        """Whether nobody stores it and no outer port shows it: the relation can be asked at each of its values."""
+        return not (self.stores or self.ports)
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class BasePoint:
+    """A point of the base, with what else determines the fibre over it.
+
+    Parameters
+    ----------
+    states
+        Value at each port of a component that stores or reads a state, by full path.
+    efforts
+        Arguments e of the Onsager matrices by component; zero where missing.
+    unit
+        Value of the coordinate that is constantly one.
+    """
+
+    states: Mapping[Path, Array]
+    efforts: Mapping[Path, Array] = field(default_factory=dict[Path, Array])
+    reference: Reference = field(default_factory=Reference)
+    unit: float = 1.0
+
+    def read(self, path: Path, primitive: Primitive) -> Point:
+        """The states that the component at this path reads, by its ports."""
+        return {port: self.states[path / port] for port in primitive.reads}
+
+
+def component_classes(primitive: Primitive) -> tuple[StateClass, ...]:
+    """The states of a primitive: each port has its own."""
+    stores, reads = isinstance(primitive, Storage), set(primitive.reads)
+    return tuple(
+        StateClass(
+            port_type.quantity.in_frame(None),
+            (port,),
+            (port,) if stores else (),
+            (port,) if port in reads and not stores else (),
+        )
+        for port, port_type in sorted(primitive.interface.items())
+    )
+
+
+def glued_classes(pattern: Pattern, parts: Mapping[Path, Sequence[StateClass]]) -> tuple[StateClass, ...]:
+    """The states of a composite, the pushout of those of its parts along the pattern; sorted by name.
+
+    A state that nobody stores or reads is left out where no outer port shows it: the relation does not depend on it.
+    """
+    found: list[StateClass] = []
+    joined: list[tuple[list[Path], StateClass]] = []  # junctions that a part's class is on
+    for box, classes in parts.items():
+        ports = pattern.boxes[box].ports
+        for each in classes:
+            stores, readers = (tuple(box / path for path in paths) for paths in (each.stores, each.readers))
+            named = StateClass(each.quantity, (), stores, readers)
+            if each.ports:
+                joined.append(([ports[port].junction for port in each.ports], named))
+            else:
+                found.append(named)
+    one = closure([*pattern.links, *(junctions for junctions, _ in joined)])
+    members: dict[frozenset[Path], list[StateClass]] = {}
+    for junctions, each in joined:
+        members.setdefault(one.get(junctions[0]) or frozenset(junctions[:1]), []).append(each)
+    for junctions, parts_of in members.items():
+        ports = tuple(sorted(path for path in junctions if pattern.junctions[path].exposed))
+        stores = tuple(sorted(path for each in parts_of for path in each.stores))
+        readers = tuple(sorted(path for each in parts_of for path in each.readers))
+        if ports or stores or readers:
+            found.append(StateClass(parts_of[0].quantity, ports, stores, readers))
+    return sorted_classes(found)
+
+
+def sorted_classes(classes: Sequence[StateClass]) -> tuple[StateClass, ...]:
+    """The classes in the order of their names."""
+    return tuple(sorted(classes, key=lambda each: each.name))
+
+
+def place(classes: Sequence[StateClass], state: Values, ports: Values) -> tuple[dict[Path, Array], str]:
+    """The value at each port that stores or reads a state, and what contradicts: empty where nothing does.
+
+    Parameters
+    ----------
+    state, ports
+        Values by a port of a component, or by an outer port, of a class; at the identity where none is given. Two
+        values of one class that differ contradict.
+
+    Raises
+    ------
+    AssemblyError
+        An unknown path, a wrong shape, or a number that is not finite.
+    """
+    inner = {path: each for each in classes for path in (*each.stores, *each.readers)}
+    outer = {path: each for each in classes for path in each.ports}
+    given: dict[Path, list[tuple[str, Array]]] = {}
+    for kind, known, values in (("state", inner, state), ("port", outer, ports)):
+        for name, value in values.items():
+            path = Path.of(name)
+            if path not in known:
+                expected = ", ".join(sorted(map(str, known))) or "none"
+                raise AssemblyError(f"unknown-{kind}", path, expected=expected)
+            each = known[path]
+            given.setdefault(each.name, []).append((f"{kind} {path}", read_state(path, each.quantity, value)))
+    states: dict[Path, Array] = {}
+    apart: list[str] = []
+    for each in classes:
+        values = given.get(each.name) or [("", manifold(each.quantity.space).identity())]
+        if not all(_equal(each.quantity, values[0][1], value) for _, value in values[1:]):
+            apart.append("one state has several values: " + "; ".join(f"{name} = {value}" for name, value in values))
+        states |= dict.fromkeys((*each.stores, *each.readers), values[0][1])
+    return states, "; ".join(apart)
+
+
+def _equal(quantity: Quantity, one: Array, other: Array) -> bool:
+    space = manifold(quantity.space)
+    size = max(1.0, float(np.abs(one).max(initial=0.0)))
+    return float(np.abs(space.increment(one, other)).max(initial=0.0)) <= ROUNDING * space.size * size
