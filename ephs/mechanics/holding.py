@@ -15,12 +15,10 @@ from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.state import Snapshot
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
+from ephs.semantics.spaces.rank import CONSTRAINT, rank_of
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 
-__all__ = ["RANK", "Hold", "Mechanism", "redundant"]
-
-RANK = 1e-9
-"""What remains of an orthonormal row beside the others counts as nothing below this."""
+__all__ = ["Hold", "Mechanism", "redundant"]
 
 
 @final
@@ -120,7 +118,7 @@ class Mechanism:
         return np.vstack([rotation @ wrenches[:3] + np.cross(at, force.T).T, force])
 
 
-def redundant(holds: Sequence[Hold], tolerance: float = RANK) -> list[Array]:
+def redundant(holds: Sequence[Hold], tolerance: float = CONSTRAINT) -> list[Array]:
     """Of each hold, coefficients (k, r) of the combinations that lie in the span of the holds before."""
     span = np.zeros((holds[0].rows.shape[1] if holds else 0, 0))
     out: list[Array] = []
@@ -140,4 +138,4 @@ def _annihilator(basis: Array) -> Array:
     if not basis.shape[1]:
         return np.eye(6)
     u, sigma, _ = np.linalg.svd(basis)
-    return u[:, int(np.sum(sigma > RANK * sigma[0])) :]
+    return u[:, rank_of(sigma, CONSTRAINT) :]

@@ -13,11 +13,10 @@ import numpy as np
 
 from ephs.mechanics.solve.sparse import Index
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.rank import CONSTRAINT
 
 __all__ = ["Held", "project", "project_dense"]
 
-RANK = 1e-9
-"""Singular values of the joint equations in the mass metric below this fraction of the largest count as zero."""
 SHIFT = 1e-12
 """Added to the diagonal of A Aᵀ, relative to its largest entry."""
 ROUNDS = 4
@@ -115,7 +114,7 @@ def _rate(joint: Held, twists: Array) -> Array:
 
 def project_dense(known: Array, unknown: Array, right: Array, twists: Array, roots: list[Array]) -> tuple[Array, Array]:
     """Twists nearest to the given ones in the mass metric with known·u + unknown·r = right, and such r."""
-    inverse_of_unknown = np.linalg.pinv(unknown, rcond=RANK) if unknown.shape[2] else np.zeros(unknown.shape).mT
+    inverse_of_unknown = np.linalg.pinv(unknown, rcond=CONSTRAINT) if unknown.shape[2] else np.zeros(unknown.shape).mT
     whitened = np.zeros_like(known)
     for i, root in enumerate(roots):
         where = slice(6 * i, 6 * i + 6)
@@ -125,7 +124,7 @@ def project_dense(known: Array, unknown: Array, right: Array, twists: Array, roo
     kept = whitened - unknown @ (inverse_of_unknown @ whitened)
     out = twists.copy()
     if roots:
-        shift = np.einsum("nij,nj->ni", np.linalg.pinv(kept, rcond=RANK), rest)
+        shift = np.einsum("nij,nj->ni", np.linalg.pinv(kept, rcond=CONSTRAINT), rest)
         for i, root in enumerate(roots):
             where = slice(6 * i, 6 * i + 6)
             out[:, where] -= shift[:, where] @ root

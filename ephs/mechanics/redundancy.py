@@ -15,17 +15,16 @@ from typing import final
 import numpy as np
 
 from ephs.mechanics.directions import Axes, Direction, Place, describe, enumerated, name_directions
-from ephs.mechanics.holding import RANK, Hold, Mechanism, redundant
+from ephs.mechanics.holding import Hold, Mechanism, redundant
 from ephs.mechanics.scene.adjust import close_loops
 from ephs.mechanics.scene.model import Scene
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.rank import CONSTRAINT, NEIGHBOUR, SPANNED, rank_of
 
 __all__ = ["Dependence", "dependences", "explain", "in_words", "indeterminate", "wrenches_in_words"]
 
-SPANNED = 1e-7
-"""What counts as nothing where it is known that something is spanned, and the question is by what."""
-AWAY, TRIALS, RANK_AWAY, NEAR = 0.02, 3, 1e-6, 0.2
-"""How far, how often, and with which tolerance neighbours are compared; how much a direction may turn up to there."""
+AWAY, TRIALS, NEAR = 0.02, 3, 0.2
+"""How far and how often neighbours are compared; how much a direction may turn up to there."""
 SHOWN = 3
 """How many clauses a text holds; the others are counted."""
 
@@ -123,7 +122,7 @@ def indeterminate(scene: Scene) -> dict[str, Array]:
     if not holds:
         return out
     u, sigma, _ = np.linalg.svd(np.vstack([hold.rows for hold in holds]))
-    free = u[:, int(np.sum(sigma > RANK * sigma[0])) :]
+    free = u[:, rank_of(sigma, CONSTRAINT) :]
     loads: dict[str, Array] = {}
     start = 0
     for hold in holds:
@@ -178,7 +177,7 @@ def _needed(before: Sequence[Hold], target: Array, lengths: Sequence[float]) -> 
 def _shares(holds: Sequence[Hold], target: Array) -> list[float] | None:
     """How much of each hold the target is made of; None where it is not in the span."""
     matrix = np.vstack([hold.rows for hold in holds]).T
-    weights = np.asarray(np.linalg.lstsq(matrix, target, rcond=RANK)[0])
+    weights = np.asarray(np.linalg.lstsq(matrix, target, rcond=CONSTRAINT)[0])
     if np.abs(matrix @ weights - target).max(initial=0.0) > SPANNED:
         return None
     cuts = np.cumsum([len(hold.rows) for hold in holds])[:-1]
@@ -224,7 +223,7 @@ def _nearby(of: Mechanism, holds: Sequence[Hold], found: Sequence[Array]) -> lis
         return None
     now, out = of.now, None
     _, sigma, vt = np.linalg.svd(np.vstack([hold.rows for hold in of.holds(now.poses, motions=False)]))
-    ways = vt[int(np.sum(sigma > RANK * sigma[0])) :]
+    ways = vt[rank_of(sigma, CONSTRAINT) :]
     links = [replace(link, coordinates=None) for link in now.links]
     rng = np.random.default_rng(0)
     for _ in range(TRIALS if len(ways) else 0):
@@ -233,7 +232,7 @@ def _nearby(of: Mechanism, holds: Sequence[Hold], found: Sequence[Array]) -> lis
         if closed is None:
             continue
         there = of.holds(closed)
-        spaces = redundant(there, RANK_AWAY)
+        spaces = redundant(there, NEIGHBOUR)
         if sum(space.shape[1] for space in spaces) < least:
             least = sum(space.shape[1] for space in spaces)
             out = [hold.wrenches @ space for hold, space in zip(there, spaces, strict=True)]

@@ -19,13 +19,9 @@ from ephs.mechanics.scene.model import GROUND, Body, Joint, Scene
 from ephs.mechanics.solve.threads import in_one_thread
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import pair
+from ephs.semantics.spaces.rank import CONSTRAINT, REGULAR, SPANNED, rank_of
 
 __all__ = ["Hold", "Moving", "root_of", "signs_of", "transmitted", "wrenches"]
-
-RANK = 1e-9
-"""Singular values of the joint equations in the mass metric below this fraction of the largest count as zero."""
-LOOSE = 1e-7
-"""What the joint equations leave a multiplier free by, from which on it counts as indeterminate."""
 
 
 @final
@@ -86,8 +82,8 @@ def transmitted(
         right[own] = hold.turning
         column += dim
     u, sigma, _ = np.linalg.svd(matrix)
-    rank = int(np.sum(sigma > RANK * sigma[0])) if sigma.size else 0
-    held, loose = u[:, :rank], np.abs(u[:, rank:]).max(axis=1, initial=0.0) > LOOSE
+    rank = rank_of(sigma, CONSTRAINT)
+    held, loose = u[:, :rank], np.abs(u[:, rank:]).max(axis=1, initial=0.0) > SPANNED
     moved, still = held.T @ matrix[:, :heavy], held.T @ matrix[:, heavy:]
     k, signed = still.shape[1], moved.copy()
     for name, sign in signs.items():
@@ -95,7 +91,7 @@ def transmitted(
         signed[:, own] = moved[:, own] @ sign
     system = np.block([[signed @ moved.T, -still], [still.T, np.zeros((k, k))]])
     wanted = np.concatenate([signed @ pull[:heavy] + held.T @ right, pull[heavy:]])
-    values = held @ np.linalg.lstsq(system, wanted, rcond=1e-14)[0][:rank]
+    values = held @ np.linalg.lstsq(system, wanted, rcond=REGULAR)[0][:rank]
     return list(np.where(loose, np.nan, values).reshape(len(holds), 6))
 
 

@@ -20,6 +20,7 @@ from ephs.semantics.primitives import Primitive, Reversible
 from ephs.semantics.relations import relation_of
 from ephs.semantics.relations.base import BasePoint, StateClass, Values, place
 from ephs.semantics.spaces import manifold
+from ephs.semantics.spaces.rank import CONSTRAINT
 from ephs.semantics.system import System, fold
 
 __all__ = ["Solved", "solve_flat", "solve_nested", "step"]
@@ -245,7 +246,7 @@ def newton(residual: Callable[[Array], Array], z: Array, *, iterations: int = 30
             up[i] += delta
             down[i] -= delta
             jacobian[:, i] = (residual(up) - residual(down)) / (2.0 * delta)
-        step = np.linalg.lstsq(jacobian, r, rcond=1e-9)[0]
+        step = np.linalg.lstsq(jacobian, r, rcond=CONSTRAINT)[0]
         share = 1.0
         new, r_new, error = _tried(residual, z - step)
         # far from the solution a whole step may lead away from it; near by rounding is all that is left

@@ -11,10 +11,9 @@ from typing import final
 import numpy as np
 
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.rank import ELIMINATION, rank_of
 
-__all__ = ["RANK_TOLERANCE", "Subspace"]
-
-RANK_TOLERANCE = 1e-10
+__all__ = ["Subspace"]
 
 
 @final
@@ -43,7 +42,7 @@ class Subspace:
         if not rows.size:
             return Subspace(np.eye(n))
         _, sigma, vt = np.linalg.svd(rows, full_matrices=True)
-        rank = int(np.sum(sigma > RANK_TOLERANCE * sigma[0]))
+        rank = rank_of(sigma, ELIMINATION)
         return Subspace(np.ascontiguousarray(vt[rank:].T), _condition(sigma, rank))
 
     @staticmethod
@@ -52,7 +51,7 @@ class Subspace:
         if not vectors.size:
             return Subspace(np.zeros((vectors.shape[0], 0)))
         u, sigma, _ = np.linalg.svd(vectors, full_matrices=False)
-        rank = int(np.sum(sigma > RANK_TOLERANCE * max(sigma[0], 1e-300)))
+        rank = rank_of(sigma, ELIMINATION)
         return Subspace(np.ascontiguousarray(u[:, :rank]), _condition(sigma, rank))
 
     @property
@@ -78,7 +77,7 @@ class Subspace:
         """The vectors of this subspace which also satisfy matrix z = 0."""
         product = matrix @ self.basis
         # a row that holds already leaves rounding, which must not be taken for an equation
-        left = np.linalg.norm(product, axis=1) > RANK_TOLERANCE * np.linalg.norm(matrix, axis=1)
+        left = np.linalg.norm(product, axis=1) > ELIMINATION * np.linalg.norm(matrix, axis=1)
         coefficients = Subspace.from_kernel(product[left])
         return Subspace(self.basis @ coefficients.basis, coefficients.condition)._after(self)
 

@@ -42,6 +42,7 @@ from ephs.mechanics.engine.tree_kernels import (
     outward,
 )
 from ephs.semantics.spaces import jit
+from ephs.semantics.spaces.rank import SPARSE
 from ephs.semantics.spaces.se3_kernels import (
     adjoint_apply,
     include,
@@ -51,8 +52,6 @@ from ephs.semantics.spaces.se3_kernels import (
 
 kernel = jit.lean_kernel
 
-NEAR = 1e-5
-"""Rows whose part off the others is below this, as a square in the mass metric, go to the careful elimination."""
 STILL, DEPENDENT = 20, 21
 """Statuses: a freedom moves no mass; rows are nearly dependent."""
 
@@ -310,7 +309,7 @@ def accelerate(e, m, q, r, s, drive, wrench, scal, r_rate, s_rate, made, powers)
     still = fold(e, m, q, m.force)
     if still != 0:
         return STILL, e.link[still - 1, R_AT]
-    if m.row_value.shape[0] > 0 and nearly_dependent(e.closing, m.row_value, m.largest, NEAR):
+    if m.row_value.shape[0] > 0 and nearly_dependent(e.closing, m.row_value, m.largest, SPARSE):
         return DEPENDENT, 0
     unfold(e, m, q, r_rate)
     if e.flag[2] == 1:

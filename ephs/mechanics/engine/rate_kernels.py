@@ -4,7 +4,7 @@
 # pyright: basic, reportPrivateImportUsage=false
 
 from ephs.mechanics.engine.closing_kernels import nearly_dependent
-from ephs.mechanics.engine.engine_kernels import DEPENDENT, NEAR, STILL, accelerate, fold, move, resolve
+from ephs.mechanics.engine.engine_kernels import DEPENDENT, STILL, accelerate, fold, move, resolve
 from ephs.mechanics.engine.inward_kernels import turned
 from ephs.mechanics.engine.row_kernels import cut_gaps, cut_poses, fit, seen
 from ephs.mechanics.engine.tree_kernels import (
@@ -22,6 +22,7 @@ from ephs.mechanics.engine.tree_kernels import (
 )
 from ephs.semantics.spaces import jit
 from ephs.semantics.spaces.codes import VECTOR
+from ephs.semantics.spaces.rank import SPARSE
 from ephs.semantics.spaces.se3_kernels import dexp_left_inv, retract
 
 kernel = jit.lean_kernel
@@ -103,7 +104,7 @@ def close(e, m, q, r, change, moved):
         gap = cut_gaps(e, m, q)
         if fold(e, m, q, m.zero) != 0:
             return STILL, gap
-        if nearly_dependent(e.closing, m.row_value, m.largest, NEAR):
+        if nearly_dependent(e.closing, m.row_value, m.largest, SPARSE):
             return DEPENDENT, gap
         if gap <= GAP or gap > 0.5 * before:
             break

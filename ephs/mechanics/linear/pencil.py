@@ -19,6 +19,7 @@ from ephs.mechanics.solve.problem import Problem
 from ephs.mechanics.solve.sparse import Index
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.primitives import Storage
+from ephs.semantics.spaces.rank import CONSTRAINT, ELIMINATION, REGULAR, rank_of
 from ephs.semantics.system import System
 
 if TYPE_CHECKING:
@@ -26,8 +27,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Parts", "Pencil", "system_problem"]
 
-RANK = 1e-10
-"""Singular values below this part of the largest count as zero."""
 NOTHING = 1e-12
 """Conditions below this part of the largest stiffness are rounding."""
 
@@ -126,7 +125,7 @@ class Pencil:
             rows = np.vstack([matrices.unknowns.toarray(), np.hstack([kept, np.zeros((len(kept), z.size - self.n_w))])])
             right = np.concatenate([residual, kept @ z[: self.n_w]])
             size = np.maximum(np.abs(rows).max(axis=1, initial=0.0), 1e-300)
-            step = np.linalg.lstsq(rows / size[:, None], right / size, rcond=1e-13)[0]
+            step = np.linalg.lstsq(rows / size[:, None], right / size, rcond=REGULAR)[0]
             z = z - step
             if np.abs(step).max(initial=0.0) <= 1e-12 * max(1e-6, float(np.abs(z).max(initial=0.0))):
                 return z
@@ -176,7 +175,7 @@ class Pencil:
     def _left(self, rows: Array) -> Array:
         """The left kernel of the equations without rates: what leaves conditions on states, and on inputs."""
         u, sigma, _ = np.linalg.svd(rows)
-        return u[:, int(np.sum(sigma > RANK * sigma.max(initial=1.0))) :]
+        return u[:, int(np.sum(sigma > ELIMINATION * sigma.max(initial=1.0))) :]
 
     def _conditions(self, parts: Parts) -> Array:
         """(c, n_w) what the states' changes must satisfy."""
@@ -206,7 +205,7 @@ class Pencil:
         weight = np.where(size > 0.0, stiff**-0.5, 1.0)
         factors: Any = qr(rows * weight, mode="economic", pivoting=True)
         order, diagonal = np.asarray(factors[2], dtype=np.int64), np.abs(np.diag(factors[1]))
-        rank = int(np.sum(diagonal > 1e-9 * diagonal.max(initial=0.0)))
+        rank = rank_of(diagonal, CONSTRAINT)
         return np.setdiff1d(np.sort(order[rank:]), left_out)
 
     def span(self, parts: Parts, which: Index, left_out: Index) -> Array:
@@ -217,7 +216,7 @@ class Pencil:
         rest = np.setdiff1d(np.arange(self.n_w), np.concatenate([which, left_out]))
         if rows.size and rest.size:
             size = np.maximum(np.abs(rows).max(axis=1, initial=0.0), 1e-300)[:, None]
-            X[rest] = -np.linalg.lstsq(rows[:, rest] / size, rows[:, which] / size, rcond=RANK)[0]
+            X[rest] = -np.linalg.lstsq(rows[:, rest] / size, rows[:, which] / size, rcond=ELIMINATION)[0]
         return X
 
     @property
@@ -255,7 +254,7 @@ class Pencil:
             columns[: self.n_w] = 1.0 / max(1.0, h)  # increments rather than rates: both of one size
             rows = rows * columns
             size = np.maximum(np.abs(rows).max(axis=1, initial=0.0), 1e-300)
-            step = columns * np.linalg.lstsq(rows / size[:, None], residual / size, rcond=1e-14)[0]
+            step = columns * np.linalg.lstsq(rows / size[:, None], residual / size, rcond=REGULAR)[0]
             if not np.isfinite(step).all():
                 return None
             z = z - step

@@ -29,6 +29,7 @@ from ephs.mechanics.solve.solution import Solution
 from ephs.mechanics.solve.sparse import Index
 from ephs.mechanics.solve.stepping import Row
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.rank import ELIMINATION
 
 __all__ = ["Freedoms", "freedoms_of", "linear_scene", "unbalanced"]
 
@@ -160,7 +161,7 @@ class _Linear:
             sym = 0.25 * (turning(v + r) - turning(v - r))
             change[:, j] = (sym - 0.5 * found.rows @ (self.ad @ v)) / size
         dependent = np.setdiff1d(np.arange(self.n), self.free.which)
-        out[dependent] = -np.linalg.lstsq(found.rows[:, dependent], change, rcond=1e-10)[0]
+        out[dependent] = -np.linalg.lstsq(found.rows[:, dependent], change, rcond=ELIMINATION)[0]
         return out
 
     # ---- the matrices ------------------------------------------------------------------------------------------

@@ -26,6 +26,7 @@ from ephs.mechanics.solve.stepping import Row
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.primitives import Storage
 from ephs.semantics.spaces import manifold
+from ephs.semantics.spaces.rank import ELIMINATION, IMPLICIT, rank_of
 from ephs.semantics.system import System
 
 if TYPE_CHECKING:
@@ -33,8 +34,6 @@ if TYPE_CHECKING:
 
 __all__ = ["linear_system"]
 
-RANK = 1e-10
-"""Singular values below this part of the largest count as zero."""
 NEGATIVE = 1e-9
 """Part of the largest entry by which what must vanish, or not be negative, may be off: rounding of eliminations."""
 
@@ -80,7 +79,7 @@ class _Linear:
         """The linear system."""
         p, X, k, pencil = self.parts, self.X, self.k, self.pencil
         rows, by_states, by_inputs = pencil.algebraic(p)
-        back = np.linalg.pinv(rows, rcond=RANK)  # efforts, multipliers, outer flows: a = by ξ and u, and W c
+        back = np.linalg.pinv(rows, rcond=ELIMINATION)  # efforts, multipliers, outer flows: a = by ξ and u, and W c
         by = back @ np.hstack([by_states @ X, by_inputs])
         W = _kernel(rows)
         moving = np.hstack([X, np.eye(pencil.n_w)[:, self.left_out]])
@@ -169,13 +168,13 @@ def _structure(p: Parts, X: Array, which: Index, A: Array) -> tuple[PortHamilton
         return None, "a potential pushes a state on a group, where it has no Hessian"
     V = _kernel(p.hold)
     P, N = p.T @ V, V.T @ p.flow_efforts @ V
-    back, W = np.linalg.pinv(P, rcond=RANK), _kernel(P)
+    back, W = np.linalg.pinv(P, rcond=ELIMINATION), _kernel(P)
     returned = W.T @ N @ W
-    inner = N - N @ W @ np.linalg.pinv(returned, rcond=RANK) @ W.T @ N
+    inner = N - N @ W @ np.linalg.pinv(returned, rcond=ELIMINATION) @ W.T @ N
     flow = -back.T @ inner @ back
     across = np.hstack([_kernel(P.T), back.T @ N @ W @ _kernel(returned)])
     held = across.T @ p.Q @ across
-    project = np.eye(len(X)) - across @ np.linalg.pinv(held, rcond=RANK) @ across.T @ p.Q
+    project = np.eye(len(X)) - across @ np.linalg.pinv(held, rcond=ELIMINATION) @ across.T @ p.Q
     whole = (project @ flow @ project.T)[np.ix_(which, which)]
     Q = X.T @ p.Q @ X
     J, R, Q = 0.5 * (whole - whole.T), -0.5 * (whole + whole.T), 0.5 * (Q + Q.T)
@@ -191,7 +190,7 @@ def _kernel(matrix: Array) -> Array:
     if not matrix.size:
         return np.eye(matrix.shape[1])
     _, sigma, vt = np.linalg.svd(matrix)
-    return vt[int(np.sum(sigma > RANK * sigma.max(initial=0.0))) :].T
+    return vt[rank_of(sigma, ELIMINATION) :].T
 
 
 def _solved(matrix: Array, right: Array, count: int) -> Array:
@@ -203,7 +202,7 @@ def _solved(matrix: Array, right: Array, count: int) -> Array:
         They are not: efforts or rates are not determined by the equations.
     """
     size = np.maximum(np.abs(matrix).max(axis=1, initial=0.0), 1e-300)[:, None]
-    found = np.linalg.lstsq(matrix / size, right / size, rcond=1e-12)[0]
+    found = np.linalg.lstsq(matrix / size, right / size, rcond=IMPLICIT)[0]
     loose = _kernel(matrix / size)[:count]
     off = np.abs(matrix @ found - right).max(initial=0.0)
     if np.abs(loose).max(initial=0.0) > 1e-6 or off > 1e-6 * max(1.0, np.abs(right).max(initial=0.0)):

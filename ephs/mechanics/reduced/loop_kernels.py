@@ -12,14 +12,10 @@ import math
 from ephs.mechanics.reduced.sweep_kernels import bracket, carry, forces, inertia_sweep, kinematics, lift, relative_twist
 from ephs.mechanics.reduced.tables import CUT
 from ephs.semantics.spaces import jit
+from ephs.semantics.spaces.rank import EXPLICIT, ROUNDED
 from ephs.semantics.spaces.se3_kernels import coadjoint_apply, include, pose_compose, pose_inverse, pose_log
 
 kernel = jit.lean_kernel
-RANK = 1e-4
-"""A constraint row whose part off the others is less than this, relative to the largest row, is left out. Generous on
-purpose: it carries explicit methods through singular configurations."""
-NOTHING = 1e-10
-"""A row of this size beside its own terms is rounding."""
 
 
 @kernel
@@ -116,7 +112,7 @@ def reduce_rows(w, m):
             w.scaled[a, i] = entry / w.factor[i, i]
             square += w.scaled[a, i] * w.scaled[a, i]
         # what cancels to rounding is no equation: the loop cannot open in this direction
-        w.triangle[a, a] = math.sqrt(square) if math.sqrt(square) > NOTHING * w.size[a] else 0.0
+        w.triangle[a, a] = math.sqrt(square) if math.sqrt(square) > ROUNDED * w.size[a] else 0.0
     largest = 0.0
     for a in range(m):
         largest = max(largest, w.triangle[a, a])
@@ -126,7 +122,7 @@ def reduce_rows(w, m):
         for a in range(j, m):
             if w.triangle[w.chosen[a], w.chosen[a]] > most:
                 best, most = a, w.triangle[w.chosen[a], w.chosen[a]]
-        if best < 0 or most <= RANK * largest:
+        if best < 0 or most <= EXPLICIT * largest:
             break
         w.chosen[j], w.chosen[best] = w.chosen[best], w.chosen[j]
         row = w.chosen[j]

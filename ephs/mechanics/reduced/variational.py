@@ -25,13 +25,12 @@ from ephs.mechanics.solve.snapshot import Snapshot
 from ephs.mechanics.solve.stepping import Attempt
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.codes import VECTOR
+from ephs.semantics.spaces.rank import CONSTRAINT
 from ephs.semantics.spaces.se3_kernels import dexp_left, dexp_left_inv
 
 __all__ = ["Variational"]
 
 ITERATIONS = 40
-RANK = 1e-9
-"""Singular values of the step's equations below this fraction of the largest count as zero."""
 FAR = 1e4
 """Residuals beyond this, relative to momenta or in m, are of an iteration that has gone astray."""
 STAGNANT = 1e-11
@@ -90,7 +89,7 @@ class Variational(ReducedMethod):
         if self._driven.size:  # the work of what is prescribed: its impulses at both ends of the step
             impulse = mass @ closed.r - after
             rows = eq.rows()
-            second = np.linalg.lstsq(rows.T, impulse, rcond=RANK)[0][: self._driven.size]
+            second = np.linalg.lstsq(rows.T, impulse, rcond=CONSTRAINT)[0][: self._driven.size]
             rates = closed.r[self._driven]
             books[1] += float((push[: self._driven.size] + second) @ rates)
         self._guess = closed.q, closed.r + (closed.r - state.r) * 0.5
@@ -226,5 +225,5 @@ def _least(matrix: Array, before: Array, rows: Array, first: Array, second: Arra
     size = float(np.abs(matrix).max())
     whole = np.block([[matrix / size, -before.T], [rows, np.zeros((m, m))]])
     right = np.concatenate([first / size, second])
-    found = np.asarray(np.linalg.lstsq(whole, right, rcond=RANK)[0], dtype=float)
+    found = np.asarray(np.linalg.lstsq(whole, right, rcond=CONSTRAINT)[0], dtype=float)
     return found[:n], size * found[n:]

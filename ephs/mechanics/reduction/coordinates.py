@@ -21,11 +21,9 @@ from ephs.mechanics.solve.model import compile_model
 from ephs.mechanics.solve.problem import Problem
 from ephs.mechanics.solve.sparse import Index
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.rank import ASSEMBLY, CONSTRAINT, rank_of
 
 __all__ = ["coordinate_steps", "cyclic", "loops", "mechanisms", "unread"]
-
-SAME, RANK = 1e-8, 1e-9
-"""What counts as nothing: of twists of size one, of singular values beside the largest."""
 
 
 @final
@@ -157,7 +155,7 @@ def cyclic(scene: Scene, reduced: Reduced, part: Part) -> Subgroup:
     if not free.shape[1] or not kept.shape[1]:
         return none
     left, sizes, _ = np.linalg.svd(np.linalg.qr(free)[0].T @ kept)
-    return Subgroup(np.linalg.qr(free)[0] @ left[:, : int(np.sum(sizes > 1.0 - SAME))])
+    return Subgroup(np.linalg.qr(free)[0] @ left[:, : int(np.sum(sizes > 1.0 - ASSEMBLY))])
 
 
 def unread(scene: Scene, reduced: Reduced) -> Index:
@@ -266,10 +264,10 @@ def _rank(reduced: Reduced, found: Sequence[Loop]) -> int:
             row[:, at[link] : at[link] + int(t.dim[link])] += sign * reduced.twists[link]
         within = loop.group.basis
         u, sizes, _ = np.linalg.svd(within.T @ reduced.twists[loop.edge], full_matrices=True)
-        out.append((within @ u[:, int(np.sum(sizes > SAME)) :]).T @ row)
+        out.append((within @ u[:, int(np.sum(sizes > ASSEMBLY)) :]).T @ row)
     matrix = np.vstack(out) if out else np.zeros((0, 1))
     sizes = np.linalg.svd(matrix, compute_uv=False)
-    return int(np.sum(sizes > RANK * sizes[0])) if sizes.size else 0
+    return rank_of(sizes, CONSTRAINT)
 
 
 def _separate(_scene: Scene, reduced: Reduced, before: int) -> Step | None:

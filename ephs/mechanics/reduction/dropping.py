@@ -15,6 +15,7 @@ from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.primitives import Irreversible, Primitive, Reversible, Storage
 from ephs.semantics.spaces import SE3
+from ephs.semantics.spaces.rank import CONSTRAINT, rank_of
 
 __all__ = ["DROP_FRICTION", "DROP_GYROSCOPIC", "DROP_JOINT", "DROP_POSE"]
 
@@ -297,7 +298,7 @@ def _moves(draft: Draft, momentum: Path) -> Array:
             span = _carried(joint, forward, span, rng)
         columns.append(span)
     u, sizes, _ = np.linalg.svd(np.hstack(columns))
-    return u[:, : int(np.sum(sizes > 1e-9 * sizes[0]))] if sizes.size and sizes[0] > 0.0 else np.zeros((6, 0))
+    return u[:, : rank_of(sizes, CONSTRAINT)] if sizes.size and sizes[0] > 0.0 else np.zeros((6, 0))
 
 
 def _carried(joint: Joint, forward: bool, span: Array, rng: np.random.Generator) -> Array:

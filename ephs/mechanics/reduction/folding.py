@@ -15,10 +15,10 @@ from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.primitives import Irreversible, Primitive, Reversible, Storage
 from ephs.semantics.pullback import Map, pull_back
+from ephs.semantics.spaces.rank import IMPLICIT
 
 __all__ = ["FOLD", "transformations"]
 
-SINGULAR = 1e-12
 NAME = "fold a transformer"
 
 
@@ -45,7 +45,7 @@ def _map(columns: Mapping[Path, Array], size: float, inner: Path) -> tuple[Array
     others = [j for j in columns if j != inner]
     if block.shape[0] != block.shape[1] or len(others) > 1:
         return None
-    if not np.linalg.svd(block, compute_uv=False)[-1] > SINGULAR * size:
+    if not np.linalg.svd(block, compute_uv=False)[-1] > IMPLICIT * size:
         return None
     if not others:
         return np.zeros((block.shape[0], 0)), None
@@ -91,7 +91,7 @@ def _idle(draft: Draft, box: Path) -> Site | None:
         return None
     columns = _columns(draft, box, primitive, found[1])
     size = float(np.abs(found[1]).max(initial=0.0))
-    if any(np.abs(block).max(initial=0.0) > SINGULAR * size for block in columns.values()):
+    if any(np.abs(block).max(initial=0.0) > IMPLICIT * size for block in columns.values()):
         return None
     if any(draft.junctions[j].exposed and {b for b, _ in draft.on(j)} == {box} for j in columns):
         return None  # an outer port must lie on something

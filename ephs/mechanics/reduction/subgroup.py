@@ -11,11 +11,9 @@ import numpy as np
 
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
+from ephs.semantics.spaces.rank import ASSEMBLY
 
 __all__ = ["Subgroup", "generated"]
-
-SAME = 1e-8
-"""Twists of size one that differ by less are the same: what scene files are held to."""
 
 
 @final
@@ -41,14 +39,14 @@ class Subgroup:
         """(3, k): an orthonormal basis of the translations in it."""
         turning = self.basis[:3]
         _, sizes, right = np.linalg.svd(turning, full_matrices=True)
-        rank = int(np.sum(sizes > SAME))
+        rank = int(np.sum(sizes > ASSEMBLY))
         return self.basis[3:] @ right[rank:].T
 
     @property
     def turning(self) -> Array:
         """(3, k): an orthonormal basis of the axes that it turns about."""
         left, sizes, _ = np.linalg.svd(self.basis[:3], full_matrices=False)
-        return left[:, sizes > SAME]
+        return left[:, sizes > ASSEMBLY]
 
     def pitch(self) -> float:
         """Advance in m/rad along its one axis of rotation, the translations that it has taken out."""
@@ -59,7 +57,7 @@ class Subgroup:
 
     def contains(self, twist: Array) -> bool:
         """Whether a twist (6,) of size about one lies in its algebra."""
-        return float(np.abs(twist - self.basis @ (self.basis.T @ twist)).max()) < SAME * max(
+        return float(np.abs(twist - self.basis @ (self.basis.T @ twist)).max()) < ASSEMBLY * max(
             1.0, float(np.abs(twist).max())
         )
 
@@ -69,7 +67,7 @@ class Subgroup:
         turns, shifts = self.turning.shape[1], self.translations.shape[1]
         if turns == 0:
             return ("1", "ℝ", "ℝ²", "ℝ³")[shifts]
-        if turns == 1 and shifts <= 2 and abs(self.pitch()) > SAME:
+        if turns == 1 and shifts <= 2 and abs(self.pitch()) > ASSEMBLY:
             return ("H", "H×ℝ", "H⋉ℝ²")[shifts]
         if turns == 1:
             return ("SO(2)", "SO(2)×ℝ", "SE(2)", "SE(2)×ℝ")[shifts]
@@ -83,13 +81,13 @@ def generated(twists: Array) -> Subgroup:
     while queue and basis.shape[1] < 6:
         twist = queue.pop(0)
         size = float(np.linalg.norm(twist))
-        if size <= SAME:
+        if size <= ASSEMBLY:
             continue
         rest = twist / size
         for _ in range(2):
             rest = rest - basis @ (basis.T @ rest)
         left = float(np.linalg.norm(rest))
-        if left <= SAME:
+        if left <= ASSEMBLY:
             continue
         new = rest / left
         queue += [SE3.ad(basis[:, i]) @ new for i in range(basis.shape[1])]

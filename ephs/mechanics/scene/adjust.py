@@ -14,12 +14,11 @@ from numpy.typing import NDArray
 from ephs.mechanics.scene.kinematics import TOLERANCE, Link, elements, largest_gap, largest_slip
 from ephs.mechanics.solve.threads import in_one_thread
 from ephs.semantics.spaces import SE3
+from ephs.semantics.spaces.rank import CONSTRAINT, LIGHT
 
 Array = NDArray[np.float64]
 
 ITERATIONS = 60
-# Singular values below this part of the largest are redundant constraints.
-RANK = 1e-9
 
 
 def mass_roots(masses: Array, inertias: Array) -> Array:
@@ -35,7 +34,7 @@ def mass_roots(masses: Array, inertias: Array) -> Array:
 
 
 def _least(values: Array) -> float:
-    return 1e-9 * (float(values.max(initial=0.0)) or 1.0)
+    return LIGHT * (float(values.max(initial=0.0)) or 1.0)
 
 
 @in_one_thread
@@ -116,7 +115,7 @@ def _row(link: Link, x: Array, forbidden: Array, roots: Array) -> Array:
 
 def _least_change(matrix: Array, target: Array) -> Array:
     """The shortest of the solutions that are best by least squares."""
-    return np.asarray(np.linalg.lstsq(matrix, target, rcond=RANK)[0], dtype=np.float64)
+    return np.asarray(np.linalg.lstsq(matrix, target, rcond=CONSTRAINT)[0], dtype=np.float64)
 
 
 def _steps(roots: Array, change: Array) -> Array:

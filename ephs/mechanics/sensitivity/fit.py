@@ -14,6 +14,7 @@ from ephs.mechanics.solve.errors import OptionError
 from ephs.mechanics.solve.solution import Solution
 from ephs.mechanics.solve.threads import in_one_thread
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.rank import ELIMINATION
 from ephs.semantics.system import System
 
 if TYPE_CHECKING:
@@ -223,7 +224,7 @@ def _covariance(jacobian: Array, deviation: float) -> tuple[Array, Array]:
     """Of the parameters, and standard errors; infinite along what the record does not determine."""
     size = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
     _, sigma, vt = np.linalg.svd(jacobian / size, full_matrices=False)
-    seen = sigma > 1e-10 * sigma.max(initial=0.0)
+    seen = sigma > ELIMINATION * sigma.max(initial=0.0)
     half = (vt[seen].T / sigma[seen]) / size[:, None]
     covariance = deviation**2 * half @ half.T
     lost = np.abs(vt[~seen]).max(axis=0, initial=0.0) > 1e-6

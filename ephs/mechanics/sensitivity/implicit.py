@@ -21,6 +21,7 @@ from ephs.mechanics.solve.stepping import Row
 from ephs.semantics.bundle import Array
 from ephs.semantics.primitives import Irreversible
 from ephs.semantics.spaces import manifold
+from ephs.semantics.spaces.rank import IMPLICIT
 
 __all__ = ["NaturalTangent"]
 
@@ -128,7 +129,7 @@ class NaturalTangent:
                 return np.asarray(np.linalg.solve(matrix / rows, right / rows), dtype=float)
             except np.linalg.LinAlgError:
                 pass
-        return np.asarray(np.linalg.lstsq(matrix / rows, right / rows, rcond=1e-12)[0], dtype=float)
+        return np.asarray(np.linalg.lstsq(matrix / rows, right / rows, rcond=IMPLICIT)[0], dtype=float)
 
     def _change(self, number: int, dx: Array, function: Callable[[_Side, float], Array]) -> Array:
         """The derivative of a function of (model, share of the tangent) by a parameter and along the tangent: at once,

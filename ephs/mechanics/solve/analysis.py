@@ -16,20 +16,14 @@ from ephs.mechanics.solve.model import Model, evaluate_at
 from ephs.mechanics.solve.natural_kernels import STORING, Order
 from ephs.mechanics.solve.sparse import Index, order
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.rank import FOLLOWED, IMPLICIT, REGULAR, rank_of
 
-__all__ = ["RANK", "Analysis", "analyse"]
+__all__ = ["Analysis", "analyse"]
 
-RANK = 1e-12
-"""Singular values below this fraction of the largest count as zero in an implicit step."""
-HELD = 1e-8
-"""The same of as many directions as were dependent before: what depends by the mechanism's build is off by the rounding
-that the joints left out have gathered, and multipliers that fight it would grow without bound."""
 SHRUNK = 1e-6
 DEFECT = 1e-11
 """What a dropped equation may be violated by, relative to its terms; more asks for another rank decision."""
 
-NULL = 1e-12
-"""Singular values below this share of the largest are those of null vectors."""
 ALIKE = 1e-6
 """Unknowns that null vectors move by the same but for this share are moved alike."""
 
@@ -138,10 +132,10 @@ def dependent_rows(model: Model, values: Array, before: Index | None = None) -> 
         triangle, pivots = factors
         sizes = np.zeros(members.size)
         sizes[: min(triangle.shape)] = np.abs(np.diag(triangle))
-        rank = int(np.sum(sizes > RANK * sizes[0])) if sizes[0] > 0.0 else 0
+        rank = rank_of(sizes, IMPLICIT)
         if before is not None:
             held = members.size - int(before[rows[members]].sum())
-            rank = min(rank, max(held, int(np.sum(sizes > HELD * sizes[0]))))
+            rank = min(rank, max(held, rank_of(sizes, FOLLOWED)))
         out[rows[members[pivots[rank:]]]] = 1
     return out
 
@@ -169,7 +163,7 @@ def _compliance(model: Model, values: Array) -> Any:
         places = t.jacobian[t.jacobian_at[i] : t.jacobian_at[i] + n * n]
         block = -np.where(places >= 0, values[places], 0.0).reshape(n, n)
         sigma, vectors = np.linalg.eigh(0.5 * (block + block.T)) if n > 1 else (block[0], np.ones((1, 1)))
-        if sigma[-1] > 0.0 and sigma[0] > 1e-14 * sigma[-1]:
+        if sigma[-1] > 0.0 and sigma[0] > REGULAR * sigma[-1]:
             index = t.e_index[t.e_at[i] : t.e_at[i] + n]
             rows.append(np.repeat(index, n))
             columns.append(np.tile(index, n))
@@ -190,6 +184,6 @@ def _null_unknown(model: Model, chosen: Index, data: Array) -> int:
     np.add.at(matrix, (t.row[chosen], t.column[chosen]), data[chosen])
     matrix /= np.maximum(np.abs(matrix).max(axis=1, initial=0.0), 1e-300)[:, None]
     _, sizes, vectors = np.linalg.svd(matrix)
-    least = min(int(np.sum(sizes > NULL * sizes[0])), size - 1)
+    least = min(rank_of(sizes, IMPLICIT), size - 1)
     moved = np.linalg.norm(vectors[least:], axis=0)
     return int(np.flatnonzero(moved >= (1.0 - ALIKE) * moved.max())[0])

@@ -14,11 +14,9 @@ from ephs.operad import Path
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.descriptor import ComponentSlot, Descriptor, Input
 from ephs.semantics.primitives import Irreversible, Reversible, Storage
+from ephs.semantics.spaces.rank import CONSTRAINT, ELIMINATION, IMPLICIT, SPANNED, rank_of
 
 __all__ = ["Instant", "Mobility", "instant", "mobility"]
-
-RANK = 1e-9
-"""Singular values below this fraction of the largest count as zero."""
 
 
 @final
@@ -144,7 +142,7 @@ def instant(
         {slot.path: solution[slot.rates] for slot in d.states},
         efforts,
         solution[lam],
-        np.abs(free[lam]).max(axis=1, initial=0.0) < 1e-7,
+        np.abs(free[lam]).max(axis=1, initial=0.0) < SPANNED,
         outer,
     )
 
@@ -152,7 +150,7 @@ def instant(
 def _least_norm(matrix: Array, right: Array) -> tuple[Array, Array]:
     """The solution of least norm, and a basis (n, k) of what may be added to it."""
     u, sigma, vt = np.linalg.svd(matrix, full_matrices=True)
-    rank = int(np.sum(sigma > 1e-12 * sigma[0])) if sigma.size else 0
+    rank = rank_of(sigma, IMPLICIT)
     return vt[:rank].T @ ((u[:, :rank].T @ right) / sigma[:rank]), vt[rank:].T
 
 
@@ -191,7 +189,7 @@ def _all_efforts(d: Descriptor, constraint: Array, stored: dict[int, float], giv
     out[places] = [known[int(i)] for i in places]
     others = np.setdiff1d(np.arange(d.effort_size), places)
     if others.size and constraint.size:
-        out[others] = np.linalg.lstsq(constraint[:, others], -constraint[:, places] @ out[places], rcond=1e-10)[0]
+        out[others] = np.linalg.lstsq(constraint[:, others], -constraint[:, places] @ out[places], rcond=ELIMINATION)[0]
     return out
 
 
@@ -262,4 +260,4 @@ def _rank(matrix: Array) -> int:
         return 0
     norms = np.linalg.norm(matrix, axis=1)
     sigma = np.linalg.svd(matrix / norms[:, None], compute_uv=False)
-    return int(np.sum(sigma > RANK * sigma[0]))
+    return rank_of(sigma, CONSTRAINT)

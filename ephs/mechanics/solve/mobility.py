@@ -12,12 +12,13 @@ from typing import final
 
 import numpy as np
 
-from ephs.mechanics.solve.instant import RANK, Mobility
+from ephs.mechanics.solve.instant import Mobility
 from ephs.mechanics.solve.sparse import Index
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.descriptor import Descriptor
 from ephs.semantics.primitives import Reversible
+from ephs.semantics.spaces.rank import CONSTRAINT
 
 __all__ = ["mobility"]
 
@@ -202,4 +203,4 @@ def _rank(group: list[tuple[Mapping[int, Array], Array]], dims: Index) -> int:
             matrix[row : row + size.size, at[free] : at[free] + block.shape[1]] = block / size[:, None]
         row += size.size
     sigma = np.linalg.svd(matrix, compute_uv=False)
-    return int(np.sum(sigma > RANK * max(float(sigma[0]), 1.0))) if sigma.size else 0
+    return int(np.sum(sigma > CONSTRAINT * max(float(sigma[0]), 1.0))) if sigma.size else 0

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import ephs
 from ephs.mechanics.methods import METHODS
-from ephs.mechanics.reduced.loop_kernels import RANK
+from ephs.semantics.spaces.rank import EXPLICIT
 from tests.mechanics.dynamics.drawn import moving
 
 SCENES = sorted((File(__file__).parents[3] / "scenes").glob("*.toml"))
@@ -38,13 +38,13 @@ def test_accelerations_solve_the_equations_of_motion(drawn):
     scaled = np.linalg.solve(root, constraints.rows.T).T
     left, sizes, right = np.linalg.svd(scaled, full_matrices=False)
     k = constraints.rank
-    assert np.all(sizes[k:] <= RANK * sizes.max(initial=0.0)) or k == 0
+    assert np.all(sizes[k:] <= EXPLICIT * sizes.max(initial=0.0)) or k == 0
     correction = right[:k].T @ (left[:, :k].T @ (constraints.target - constraints.rows @ free) / sizes[:k])
     expected = free + np.linalg.solve(root.T, correction)
     found = whole(model, model.acceleration(state, model.layout.by_joint(forces)))
     terms = np.abs(np.linalg.inv(mass)) @ (np.abs(pushed) + np.abs(model.bias(state)))
     tolerance = 100.0 * np.linalg.cond(mass) * EPS * max(1.0, terms.max(), np.abs(expected).max())
-    assert np.abs(found[:n] - expected).max(initial=0.0) <= tolerance / (RANK if k else 1.0)
+    assert np.abs(found[:n] - expected).max(initial=0.0) <= tolerance / (EXPLICIT if k else 1.0)
 
 
 @settings(max_examples=50)
