@@ -190,11 +190,12 @@ def point_spring(dims, scal, p, x0, v, e, lam, f, c, jac, work):
     energy[0], status = _point_spring(par, pose, step, effort, pull, local, end, turn)
     if status == 0 and _still(step):
         square = pose[4] ** 2 + pose[5] ** 2 + pose[6] ** 2
-        bent = par[0] * par[1] / (square * math.sqrt(square))
+        tight = par[1] / math.sqrt(square) if par[1] > 0.0 else 0.0
+        bent = par[0] * tight / square if par[1] > 0.0 else 0.0
         quat_rotate_back(pose[:4], pose[4:], local)
         slope[:, :] = 0.0
         for i in range(3):
-            slope[3 + i, 3 + i] = 0.5 * par[0] * (1.0 - par[1] / math.sqrt(square))
+            slope[3 + i, 3 + i] = 0.5 * par[0] * (1.0 - tight)
             for j in range(3):
                 slope[3 + i, 3 + j] += 0.5 * bent * local[i] * local[j]
         _half_cross(effort[3:], slope)
@@ -216,9 +217,9 @@ def _point_spring(par, pose, step, effort, pull, local, end, turn):
     retract(3, pose, step, end)
     before = math.sqrt(pose[4] ** 2 + pose[5] ** 2 + pose[6] ** 2)
     after = math.sqrt(end[4] ** 2 + end[5] ** 2 + end[6] ** 2)
-    if not before + after > 0.0:
+    if par[1] > 0.0 and not before + after > 0.0:
         return 0.0, 4
-    factor = par[0] * (1.0 - 2.0 * par[1] / (before + after))
+    factor = par[0] * (1.0 - 2.0 * par[1] / (before + after)) if par[1] > 0.0 else par[0]
     for i in range(3):
         pull[i] = 0.5 * factor * (pose[4 + i] + end[4 + i])
         effort[i] = 0.0
@@ -228,7 +229,10 @@ def _point_spring(par, pose, step, effort, pull, local, end, turn):
 
 
 def point_damper(dims, scal, p, x0, v, e, lam, f, c, jac, work):
-    """Dissipation with μ(q_r) = c n nᵀ, n = (0, Rᵀ r/|r|) at the midpoint; ports (p_r, s), reads q_r; p = c."""
+    """Dissipation with μ(q_r) = c n nᵀ, n = (0, Rᵀ r/|r|) at the midpoint; ports (p_r, s), reads q_r; p = c.
+
+    Where r = 0 every velocity υ changes the distance by |υ|: n is along it, and μ υ = c υ.
+    """
     par, pose, step, effort = nb.carray(p, 1), nb.carray(x0, 7), nb.carray(v, 6), nb.carray(e, 7)
     flow, slope = nb.carray(f, 7), nb.carray(jac, (7, 13))
     scratch = nb.carray(work, 64)
@@ -245,6 +249,8 @@ def point_damper(dims, scal, p, x0, v, e, lam, f, c, jac, work):
             slope[3 + i, 3 + j] = par[0] * axis[i] * axis[j]
         slope[6, 3 + i] = -2.0 * par[0] * rate * axis[i] / theta
     slope[6, 6] = par[0] * rate * rate / (theta * theta)
+    if middle[4] == 0.0 and middle[5] == 0.0 and middle[6] == 0.0:
+        return 0  # by r there is no derivative
     if _still(step):
         _damper_slope(par[0], theta, pose, effort, rate, axis, slope)
         return 0
@@ -294,9 +300,14 @@ def _damper(damping, theta, pose, step, effort, flow, half, middle, axis):
         half[i] = 0.5 * step[i]
     retract(3, pose, half, middle)
     length = math.sqrt(middle[4] ** 2 + middle[5] ** 2 + middle[6] ** 2)
-    if not length > 0.0:
-        return 4
-    quat_rotate_back(middle[:4], middle[4:], axis)
+    if length > 0.0:
+        quat_rotate_back(middle[:4], middle[4:], axis)
+    else:
+        length = math.sqrt(effort[3] ** 2 + effort[4] ** 2 + effort[5] ** 2)
+        for i in range(3):
+            axis[i] = effort[3 + i]
+        if length == 0.0:
+            length = 1.0
     rate = 0.0
     for i in range(3):
         axis[i] /= length

@@ -30,6 +30,8 @@ def point_spring(stiffness: float, length: float) -> Storage:
         return 0.5 * stiffness * (float(np.linalg.norm(x[q_r][4:])) - length) ** 2
 
     def pull(rotation: Array, mean: Array, lengths: float) -> Array:
+        if length == 0.0:
+            return rotation.T @ (stiffness * mean)
         if not lengths > 0.0:
             raise StructureError("parameter", "point_spring", key="distance", found=0.0, expected="> 0")
         return rotation.T @ (stiffness * (1.0 - 2.0 * length / lengths) * mean)
@@ -59,7 +61,7 @@ def point_spring(stiffness: float, length: float) -> Storage:
 def point_damper(damping: float) -> Irreversible:
     """Damping of the distance of two points, μ(q_r) = c n nᵀ with n = (0, Rᵀ r/|r|); ports p_r, s, reads q_r.
 
-    c in N s/m.
+    c in N s/m. Where r = 0 every velocity υ changes the distance by |υ|: n is along it, and μ υ = c υ.
     """
     q_r = Path.of("q_r")
     ports = {
@@ -70,6 +72,8 @@ def point_damper(damping: float) -> Irreversible:
 
     def resistance(x: Point, _u: Array, _theta: float) -> Array:
         r = x[q_r][4:]
+        if not r.any():
+            return damping * np.diag([0.0, 0.0, 0.0, 1.0, 1.0, 1.0])
         axis = quaternion_to_matrix(x[q_r][:4]).T @ (r / np.linalg.norm(r))
         n = np.concatenate([np.zeros(3), axis])
         return damping * np.outer(n, n)

@@ -346,9 +346,14 @@ class Equations:
             "form": "reduced",
             "evaluations": self.evaluations,
             "cut_joints": [edge.name for edge in self.reduced.cut],
-            "unknowns": self.reduced.unknowns,
+            "unknowns": self.unknowns,
             "paper_unknowns": self.model.unknowns,
         }
+
+    @property
+    def unknowns(self) -> int:
+        """Places and rates of the tree's freedoms, and a multiplier for each equation of a loop that is kept."""
+        return 2 * self.n + (int(self.engine.cut[:, 8].sum()) if self.engine.cut.size else 0)
 
     def states(self, state: ReducedState) -> dict[Path, Array]:
         """All states of the scene's system."""

@@ -291,11 +291,10 @@ def _cyclic(scene: Scene, reduced: Reduced, before: int) -> Step | None:
         pull += " but gravity, which sees neither turns about its direction nor shifts across it"
     said = [f"of {_called(part)}, {_motions(group)}" for part, group in found[:4]]
     said += [f"and of {len(found) - 4} more mechanisms"] if len(found) > 4 else []
-    count = sum(group.dim for _, group in found)
     reason = f"{pull}: {'; '.join(said)}; they follow by quadrature, and Jacobians leave out the columns of "
     reason += "joints that move in no other way"
     where = tuple(_called(part) for part, _ in found)
-    return Step("cyclic coordinates", Strength.TRAJECTORIES, where, reason, before, before - count)
+    return Step("cyclic coordinates", Strength.TRAJECTORIES, where, reason, before, before)
 
 
 def _forces(_scene: Scene, reduced: Reduced, before: int) -> Step | None:

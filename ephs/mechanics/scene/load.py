@@ -22,6 +22,7 @@ from ephs.mechanics.scene.state import adjusted
 from ephs.mechanics.scene.text import file_text
 from ephs.operad import Path as Name
 from ephs.operad import PatternError
+from ephs.semantics.spaces.rank import ASSEMBLY
 
 MODELS = (".urdf", ".xml", ".sdf")
 """Endings of files in other formats, which are imported."""
@@ -132,7 +133,7 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
         faults += [
             fault("same ends", f"springs.{name}", "both ends at the same point")
             for name, spring in springs.items()
-            if spring_length(scene, spring) < 1e-12
+            if spring_length(scene, spring) < ASSEMBLY * spring.length
         ]
     return None if faults else scene
 
