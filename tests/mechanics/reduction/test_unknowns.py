@@ -1,8 +1,11 @@
 """The first count of unknowns is that of the compiled model, also where something is prescribed."""
 
+from pathlib import Path
+
 import pytest
 
 import ephs
+from ephs.mechanics.reduced.equations import Equations
 from ephs.mechanics.simulate import problem_of_scene
 from ephs.mechanics.solve.model import compile_model
 
@@ -32,3 +35,13 @@ def test_the_first_step_begins_with_all_unknowns(motion, tmp_path):
     model = compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
     assert ephs.reduce(scene).before == model.unknowns
     assert bool(motion) == bool(problem.prescribed)
+
+
+@pytest.mark.parametrize(
+    "file", sorted((Path(__file__).parents[3] / "scenes").glob("*.toml")), ids=lambda file: file.stem
+)
+def test_the_last_step_ends_with_the_unknowns_of_a_run(file):
+    scene = ephs.load(file)
+    equations = Equations(scene, problem_of_scene(scene), 0.0)
+    equations.start(0.0)
+    assert ephs.reduce(scene).steps[-1].after == equations.stats()["unknowns"]
