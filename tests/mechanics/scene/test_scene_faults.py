@@ -220,7 +220,11 @@ FAULTS: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "spring heat": (BODY + SPRING + 'heat = "u"\n', "springs.s.heat", ("there are: nothing",)),
     "spring bodies": (BODY + SPRING.replace('"a"', '"q"'), "springs.s.bodies[1]", ('found "q"',)),
     "spring damping": (BODY + SPRING + "damping = -1.0\n", "springs.s.damping", ("not below 0",)),
-    "spring without length": (BODY + SPRING.replace("1.0", "0.0") + "length = 1.0\n", "springs.s", ("at the same point",)),
+    "spring without length": (
+        BODY + SPRING.replace("1.0", "0.0") + "length = 1.0\n",
+        "springs.s",
+        ("at the same point",),
+    ),
     "temperature": (THERMAL.replace("300.0", "0.0"), "thermal.t.temperature", ("found 0.0", "above 0")),
     "capacity": (THERMAL.replace("1.0", "-1.0"), "thermal.t.capacity", ("above 0",)),
     "world temperature": ("[world]\ntemperature = -3.0\n", "world.temperature", ("above 0",)),
