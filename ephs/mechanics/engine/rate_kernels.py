@@ -27,7 +27,7 @@ from ephs.semantics.spaces.se3_kernels import dexp_left_inv, retract
 
 kernel = jit.lean_kernel
 
-GAP, CLOSED, ROUNDS = 1e-13, 1e-8, 20
+GAP, CLOSED, ROUNDS = 1e-15, 1e-8, 20
 """Loops are closed to GAP where rounding lets them, and a state is refused where they stay open by CLOSED."""
 OPEN = 22
 """Status: loops do not close."""

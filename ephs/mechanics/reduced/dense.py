@@ -18,7 +18,7 @@ from ephs.semantics.bundle import Array
 
 __all__ = ["Dense", "unmoved"]
 
-GAP = 1e-12
+GAP = 1e-15
 """Position residuals to which loops are closed, in m and rad."""
 CLOSED = 1e-10
 """Residuals above this cannot be accepted."""

@@ -32,6 +32,7 @@ from ephs.mechanics.solve.stepping import Row
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.codes import VECTOR
+from ephs.semantics.spaces.rank import SPARSE
 
 __all__ = ["Equations", "ReducedState"]
 
@@ -65,6 +66,11 @@ class Equations:
     """The reduced form of one problem. It keeps scratch memory: use one for each thread.
 
     With ``pushed`` forces may be put into ``drive`` at every joint, not only where the problem has an input.
+
+    Attributes
+    ----------
+    careful
+        Whether the loops were closed last at constraints that nearly repeat each other.
     """
 
     def __init__(self, scene: Scene, problem: Problem, t0: float, *, pushed: bool = False) -> None:
@@ -78,7 +84,7 @@ class Equations:
         self._dense: Dense | None = None
         t = reduced.tables
         self._moving = [i for i in range(len(reduced.edges)) if t.kind[i] != SPRING]
-        self._careful = self._factored = False
+        self.careful = self._factored = False
         self._closed_at = np.zeros(0), np.zeros(0)
         self._q = np.zeros(reduced.coordinates)
         self.nv, self.n, self.ns = int(t.dim[self._moving].sum()), reduced.freedoms, len(reduced.entropies)
@@ -202,15 +208,24 @@ class Equations:
         status, gap = close(self.engine, self.memory, q, r, self._change, self._moved)
         if status == OPEN:
             raise self.dense.opened(self.dense.gaps(q, r)[0], gap)
-        self._careful = status != 0
+        self.careful = status != 0
         if status != 0:
             return self._closed_carefully(state)
         self._closed_at, self._factored = (q, r), True
         return ReducedState(state.t, q, r, state.s, state.books)
 
+    def separation(self) -> Array:
+        """Squared part of each loop constraint off those before it, relative to the largest constraint, (m,).
+
+        In the mass metric, where loops were closed last; not below what calls for care.
+        """
+        rows = self.memory.row_value
+        known = self._closed_at[0].size > 0 and not self.careful
+        return np.maximum(SPARSE, known * rows[:, 3] / max(rows[:, 2].max(initial=0.0), 1e-300))
+
     def _closed_carefully(self, state: ReducedState) -> ReducedState:
         """`closed`, for constraints that nearly repeat each other."""
-        self._careful = True
+        self.careful = True
         q, r = self.dense.closed(state.q, state.r, self.prescribed, self.moved)
         r[self._driven] = self.prescribed
         return ReducedState(state.t, q, r, state.s, state.books)
@@ -303,7 +318,7 @@ class Equations:
         if not (self.engine.cut.size or self.prescribed.size):
             return estimate
         out, change = np.array(estimate), np.zeros(self.n)
-        if not self._careful:
+        if not self.careful:
             q, r = self._closed_at
             if not self._factored:
                 close(self.engine, self.memory, q, r, self._change, self._moved)
@@ -369,7 +384,7 @@ class Equations:
         """
         state = self.closed(ReducedState(t, *self._paper.initial(), np.zeros(2 + len(self.reduced.made))))
         self._paper.check(state.q, state.r, state.s)
-        if self._careful:
+        if self.careful:
             self._without_repeated(state)
         return state
 

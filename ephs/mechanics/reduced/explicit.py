@@ -29,6 +29,7 @@ from ephs.mechanics.engine.march_kernels import (
     C_ORIGIN,
     C_REFUSALS,
     C_REJECTED,
+    C_ROUGH,
     C_ROWS,
     C_SAVED,
     C_SHARE,
@@ -45,6 +46,7 @@ from ephs.mechanics.engine.march_kernels import (
     REFUSED,
     SHORT,
     STIFF,
+    drift,
     judge,
     march,
     measure,
@@ -105,6 +107,9 @@ class Explicit(ReducedMethod):
     ----------
     stiffness
         h·|λ| of the fastest mode, as the last step showed it.
+    rough
+        Elements of the last step's start and end, each where constraints nearly repeat each other: rates there carry
+        rounding over the least singular value, so that drift says nothing.
     """
 
     def __init__(self, equations: Equations, control: Control, method: Tableau) -> None:
@@ -113,6 +118,7 @@ class Explicit(ReducedMethod):
         self.share = 0.5
         self._known: tuple[Array, Array] | None = None
         self.stiffness = 0.0
+        self.rough: tuple[Array, ...] = ()
 
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
         """One step of h seconds."""
@@ -131,6 +137,10 @@ class Explicit(ReducedMethod):
             for weights in ((scheme.error, scheme.coarse) if scheme.order8 else (scheme.error,))
         ]
         error = float(measure(estimates[0], estimates[-1], allowed, scheme.order8 == 1))
+        rough = any(q is state.q for q in self.rough)
+        if not (rough or eq.careful):
+            error = max(error, float(drift(end.r, closed.r, allowed)))
+        self.rough = (*((state.q,) if rough else ()), *((closed.q,) if eq.careful else ()))
         self.stiffness = float(stiffness(scheme, before, k, y1, h, eq.n, eq.nv, allowed))
         if closed is end and closed.q is not state.q:  # nothing was projected: the last rates are the next first ones
             first = k[-1].copy()
@@ -141,12 +151,13 @@ class Explicit(ReducedMethod):
     def taken(self, state: ReducedState) -> Snapshot:
         """The rates at the state, where they are known, and how stiff the last step was."""
         known = self._known[1] if self._known is not None and self._known[0] is state.q else None
-        return {"known": known, "stiffness": self.stiffness}
+        return {"known": known, "stiffness": self.stiffness, "rough": any(q is state.q for q in self.rough)}
 
     def take(self, own: Snapshot, state: ReducedState) -> None:
         """Take along what `taken` said."""
         self._known = None if own["known"] is None else (state.q, own["known"])
         self.stiffness = own["stiffness"]
+        self.rough = (state.q,) if own["rough"] else ()
 
     def many(
         self, span: Span[ReducedState], limit: float = 0.0, left: Callable[[float, float, str], None] | None = None
@@ -258,6 +269,7 @@ class _March:
         c, s, h = self.control, self.memory, float(self.control[C_TRIED])
         sign = 1.0 if c[C_END] >= 0.0 else -1.0
         state = self.state
+        self.method.rough = (state.q,) if c[C_ROUGH] else ()
         try:
             attempt = self.method.step(state, sign * h)
         except SolveError as error:
@@ -276,7 +288,7 @@ class _March:
         if c[C_SAVED] >= 0.0:
             last = int(np.searchsorted(self.times, after, side="right"))
             wanted = [
-                (when, attempt.end if when == after else self.method.step(state, sign * (when - now)).end)
+                (when, attempt.end if when == after else self.method.inside(attempt, state.t + sign * (when - now)))
                 for when in self.times[int(c[C_SAVED]) : last].tolist()
             ]
             c[C_SAVED] = last
@@ -287,6 +299,7 @@ class _March:
             c[C_ROWS] += 1.0
         s.q[:], s.y[:] = attempt.end.q, self.method.equations.vector(attempt.end)
         c[C_T], c[C_STEPS], c[C_FRESH] = after, c[C_STEPS] + 1.0, 0.0
+        c[C_ROUGH] = float(self.method.equations.careful)
         c[C_SHORTEST], c[C_LONGEST] = min(c[C_SHORTEST], h), max(c[C_LONGEST], h)
         c[C_LEAST] = min(c[C_LEAST], attempt.least)
 

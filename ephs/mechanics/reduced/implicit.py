@@ -51,6 +51,8 @@ class Implicit(ReducedMethod):
             self._enough, self._rough = 1.0, 1e5
         self._solvers: tuple[float, Any, Any] | None = None
         self._known: tuple[Array, Array] | None = None
+        # Off the constraints the exact matrix grows as one over this: an old one is wrong there by as much.
+        self._separation = self.equations.separation()
         self.counts = {"iterations": 0, "factorisations": 0}
         self.jacobian = Jacobian(equations, self.counts)
 
@@ -71,7 +73,7 @@ class Implicit(ReducedMethod):
         y1 = y0 + np.concatenate([stages[-1], h * (COEFFICIENTS[-1] @ made)])
         end = eq.state(state, y1, state.t + h)
         closed, error = self._closed(state, end, y0, y1, first, stages, h)
-        if not fast:
+        if not fast or self._turned():
             self._renew(closed)
         return Attempt(state, closed, h, error, eq.least(state, closed))
 
@@ -79,18 +81,25 @@ class Implicit(ReducedMethod):
         """Where the matrix was made, and the step for which it was factorised."""
         return {
             "jacobian": self.jacobian.snapshot(state),
+            "separation": self._separation,
             "step": self._solvers[0] if self._solvers is not None else None,
         }
 
     def take(self, own: Snapshot, state: ReducedState) -> None:
         """Take along what `taken` said."""
         self.jacobian.restore(own["jacobian"], state)
+        self._separation = own["separation"]
         self._solvers = None
         if own["step"] is not None:
             self._solve(state, own["step"])
 
+    def _turned(self) -> bool:
+        """Whether constraints have come nearer to repeating each other, or gone from it, since the matrix was made."""
+        return bool(np.any(np.abs(np.log2(self.equations.separation() / self._separation)) > 1.0))
+
     def _renew(self, state: ReducedState) -> None:
         self.jacobian.at(state, renew=True)
+        self._separation = self.equations.separation()
         self._solvers = None
 
     def _solve(self, state: ReducedState, h: float) -> tuple[Any, Any]:

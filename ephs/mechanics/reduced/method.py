@@ -7,10 +7,14 @@ from typing import Any
 
 from ephs.mechanics.reduced.equations import Equations, ReducedState
 from ephs.mechanics.solve.control import Control
+from ephs.mechanics.solve.errors import SolveError
 from ephs.mechanics.solve.snapshot import Snapshot
 from ephs.mechanics.solve.stepping import Attempt, Leg, Row, Span
 
 __all__ = ["ReducedMethod"]
+
+HALVINGS = 4
+"""How often a part of a step that fails is cut in two: the whole one succeeded."""
 
 
 class ReducedMethod(ABC):
@@ -67,8 +71,17 @@ class ReducedMethod(ABC):
         return None
 
     def inside(self, attempt: Attempt[ReducedState], t: float) -> ReducedState:
-        """A shorter step from the same start: dense output of full order."""
-        return self.step(attempt.start, t - attempt.start.t).end
+        """A shorter step from the same start, or several where that fails: dense output of full order."""
+        return self._part(attempt.start, t - attempt.start.t, HALVINGS)
+
+    def _part(self, state: ReducedState, h: float, halvings: int) -> ReducedState:
+        try:
+            return self.step(state, h).end
+        except SolveError:
+            if not halvings:
+                raise
+            middle = self._part(state, 0.5 * h, halvings - 1)
+            return self._part(middle, 0.5 * h, halvings - 1)
 
     def at(self, state: ReducedState, t: float) -> ReducedState:
         """The same state at a time that differs by rounding."""
