@@ -131,14 +131,19 @@ def driven() -> ephs.System:
     return pattern(pe=lib.spring(k=1.5), ke=lib.point_mass(m=1.0), pkc=lib.pkc())
 
 
-def cooled() -> ephs.System:
-    """A body of 300 K with friction, from which entropy can be drawn."""
+def chilled() -> ephs.System:
+    """A mass with friction, whose surroundings have a prescribed temperature."""
     pattern = Pattern(
         {"p": junction(Q.momentum), "s": junction(Q.entropy, exposed=True)},
-        {"ke": {"p": "p"}, "mf": {"p": "p", "s": "s"}, "hot": {"s": "s"}},
+        {"ke": {"p": "p"}, "mf": {"p": "p", "s": "s"}},
     )
-    hot = ephs.storage({"s": Q.entropy}, lambda s: 300.0 * s + 50.0 * s**2)
-    return pattern(ke=lib.point_mass(m=1.0), mf=lib.friction(d=0.1), hot=hot)
+    return pattern(ke=lib.point_mass(m=1.0), mf=lib.friction(d=0.1))
+
+
+def cooled() -> ephs.System:
+    """A body of 300 K whose energy is a model down to −2.9 J/K, from which entropy can be drawn."""
+    hot = ephs.storage({"s": Q.entropy}, lambda s: 300.0 * s + 50.0 * s**2, domain={"s": (-2.9, np.inf)})
+    return Pattern({"s": junction(Q.entropy, exposed=True)}, {"hot": {"s": "s"}})(hot=hot)
 
 
 def cylinder() -> ephs.System:

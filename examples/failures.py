@@ -15,6 +15,7 @@ from ephs.mechanics.methods import METHODS
 from examples.failing import (
     CORD,
     beyond,
+    chilled,
     cooled,
     cylinder,
     doubled,
@@ -162,8 +163,8 @@ CASES = (
         r"joints\.pin\.hc",
     ),
     Case(
-        Outcome.TEMPERATURE, "heat drawn from a body until it is at 0 K", cooled, SYSTEMS, "mf|hot",
-        within=(0.28, 0.3), options=fixed(inputs={"s": {"flow": -10.0}}),
+        Outcome.TEMPERATURE, "surroundings that are cooled to 0 K", chilled, SYSTEMS, "mf",
+        within=(0.28, 0.3), options=fixed(inputs={"s": {"effort": lambda t, x: [-1000.0 * t]}}, initial={"ke.p": 1.0}),
     ),
     Case(
         Outcome.EXTENT, "a spring that has no length to begin with", lambda: slide(CORD), ALL, r"springs\.cord.*",
@@ -176,6 +177,10 @@ CASES = (
     Case(
         Outcome.DOMAIN, "the square root of a negative number", lambda: oscillator(beyond), SYSTEMS, "pe",
         within=(0.3, 0.35), options=fixed(initial={"ke.p": 3.0}),
+    ),
+    Case(
+        Outcome.DOMAIN, "entropy drawn from a body beyond the domain of its energy", cooled, SYSTEMS, "hot",
+        within=(0.28, 0.3), options=fixed(inputs={"s": {"flow": -10.0}}),
     ),
     Case(
         Outcome.PYTHON, "an energy's function that raises an exception", lambda: oscillator(off), SYSTEMS, "pe",

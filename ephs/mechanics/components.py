@@ -14,10 +14,12 @@ from ephs.mechanics import notation
 from ephs.operad import Directory, Path, PortType, Quantity, quantity
 from ephs.semantics import formulas, structures
 from ephs.semantics.bundle import Array
+from ephs.semantics.checks import STATEMENTS
 from ephs.semantics.errors import StructureError
 from ephs.semantics.primitives import Formula, Irreversible, Kernel, Point, Reversible, Storage, power_ports
 from ephs.semantics.spaces import SE3, SO3, Pair, codes, manifold
 from ephs.semantics.spaces.rotations import quaternion_to_matrix, rotation_dexp
+from ephs.semantics.verdict import Condition, proved
 
 __all__ = [
     "frame_change",
@@ -89,6 +91,7 @@ def gravity(weight: Array, group: str = "SE3") -> Storage:
         discrete_gradient=discrete_gradient,
         parameters=(("weight", tuple(w.tolist())),),
         kernel=Kernel(KERNELS, "gravity" if turning else "direct_gravity", tuple(w.tolist())),
+        proof=lambda: proved("a pose is even; E reads the position alone, dE = (0, Rᵀ w)", *STATEMENTS["storage"]),
         trusted=True,
     )
 
@@ -117,6 +120,7 @@ def no_potential(of: Quantity, port: str) -> Storage:
         discrete_gradient=lambda _x, _v: np.zeros(n),
         kernel=Kernel(structures.KERNELS, "no_effort"),
         notation=notation.nothing,
+        proof=lambda: proved("E = 0", *STATEMENTS["storage"]),
         trusted=True,
     )
 
@@ -165,6 +169,10 @@ def pair_spring(of: Pair, stiffness: Array, rest: Array) -> Storage:
         discrete_gradient,
         (("stiffness", tuple(k.tolist())), ("rest", tuple(zero.tolist()))),
         kernel=Kernel(SPRINGS, "coordinate_spring", (float(of.code), *k.tolist(), *zero.tolist())),
+        proof=lambda: proved(
+            "poses are even, coordinates are of the rotation itself; d(½ k c²) = k c dc, and d(½ θ²) = θ n",
+            *STATEMENTS["storage"],
+        ),
         trusted=bool(np.all(np.isfinite(k)) and np.all(np.isfinite(zero))),
     )
 
@@ -218,9 +226,17 @@ def lie_poisson(group: str = "SE3") -> Reversible:
     name = "lie_poisson" if group == "SE3" else "direct_lie_poisson"
     kernel = Kernel(KERNELS, name)
     ports = power_ports(p=MOMENTA[group])
+
+    def proof() -> tuple[Condition, ...]:
+        from ephs.semantics.symbols.proofs import conditions_of
+
+        formula = Formula(lambda **x: structure({p: x["p"]}))
+        return conditions_of(Reversible("lie_poisson", ports, structure, reads=(p,), formula=formula, trusted=True))
+
     return Reversible(
-        "lie_poisson", ports, structure, reads=(p,), kernel=kernel, notation=notation.lie_poisson, trusted=True
-    )
+        "lie_poisson", ports, structure, reads=(p,), kernel=kernel, notation=notation.lie_poisson, proof=proof,
+        trusted=True,
+    )  # fmt: skip
 
 
 def frame_change(offset: Array, inner: str, outer: str) -> Reversible:
@@ -289,6 +305,10 @@ def holonomic(of: Pair) -> Reversible:
         6,
         kernel,
         notation=notation.holonomic,
+        proof=lambda: proved(
+            "L = 0, all efforts are odd, q_r is even, and C is made of Ad of a pose, which is even in its quaternion",
+            *STATEMENTS["reversible"],
+        ),
         trusted=True,
     )
 
@@ -340,7 +360,7 @@ def ground(of: Quantity = quantity.body_momentum) -> Reversible:
 def thermal_node(capacity: float, temperature: float) -> Storage:
     """Heat capacity C from temperature T₀ at s = 0: E = C T₀ (exp(s/C) − 1); port s. C in J/K, T₀ in K."""
     entries = (("capacity", float(capacity)), ("temperature", float(temperature)))
-    formula = Formula(formulas.thermal_node, ("capacity", "temperature"))
+    formula = Formula(formulas.thermal_node, ("capacity", "temperature"), formulas.thermal_node_slope)
     return structures.exponential("thermal_node", capacity * temperature, capacity, entries, formula)
 
 

@@ -8,10 +8,12 @@ from ephs.mechanics import notation
 from ephs.operad import Directory, Path, PortType, quantity
 from ephs.semantics import structures
 from ephs.semantics.bundle import Array
+from ephs.semantics.checks import STATEMENTS
 from ephs.semantics.errors import StructureError
 from ephs.semantics.primitives import Irreversible, Kernel, Point, Storage, power_ports
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import quaternion_to_matrix, rotation_dexp
+from ephs.semantics.verdict import proved
 
 __all__ = ["point_damper", "point_spring"]
 
@@ -55,6 +57,10 @@ def point_spring(stiffness: float, length: float) -> Storage:
         discrete_gradient,
         (("stiffness", stiffness), ("length", length)),
         kernel=Kernel(SPRINGS, "point_spring", (stiffness, length)),
+        proof=lambda: proved(
+            "a pose is even; E reads the position alone, dE = (0, Rᵀ k (1 − L/|r|) r)", *STATEMENTS["storage"]
+        ),
+        trusted=bool(np.isfinite(stiffness) and np.isfinite(length)),
     )
 
 
@@ -79,8 +85,15 @@ def point_damper(damping: float) -> Irreversible:
         return damping * np.outer(n, n)
 
     kernel = Kernel(SPRINGS, "point_damper", (damping,))
-    entries = (("damping", damping),)
+    entries, sound = (("damping", damping),), bool(0.0 <= damping < np.inf)
     made = structures.dissipation(
-        "point_damper", Directory(ports), resistance, reads=(q_r,), kernel=kernel, parameters=entries
+        "point_damper",
+        Directory(ports),
+        resistance,
+        reads=(q_r,),
+        kernel=kernel,
+        parameters=entries,
+        shown=(lambda: structures.dissipation_proof(Directory(ports), None)) if sound else None,
+        trusted=sound,
     )
     return replace(made, notation=notation.friction)

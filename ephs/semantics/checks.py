@@ -1,7 +1,7 @@
-"""The conditions under which a primitive is thermodynamically consistent, checked when it is made.
+"""The conditions under which a primitive is thermodynamically consistent, at one state and effort.
 
-Base points are drawn with a fixed seed, so that a wrong primitive is refused every time with the same witness.
-Conditions: Lohmayer, Capobianco, Leyendecker, section 2, with time-reversal parity as a further one.
+`search` looks for a state and effort where one fails, `symbols.proofs` shows that there is none. Conditions: Lohmayer,
+Capobianco, Leyendecker, section 2, with time-reversal parity as a further one.
 """
 
 from collections.abc import Iterator
@@ -10,27 +10,42 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ephs.operad import Path
-from ephs.semantics.bundle import POSITIVE, Array, Bundle, Reference
+from ephs.semantics.bundle import POSITIVE, Array, Bundle
 from ephs.semantics.errors import StructureError
-from ephs.semantics.spaces import codes, manifold
+from ephs.semantics.spaces import manifold
 from ephs.semantics.subspace import Subspace
+from ephs.semantics.trials import ROTATING, Trial
 
 if TYPE_CHECKING:
-    from ephs.semantics.primitives import Irreversible, Point, Reversible, Storage
+    from ephs.semantics.primitives import Irreversible, Point, Primitive, Reversible, Storage
 
 __all__ = [
-    "check_irreversible",
-    "check_reversible",
-    "check_storage",
+    "STATEMENTS",
+    "check_at",
+    "constant",
     "dirac",
     "random_efforts",
     "random_point",
 ]
 
-SAMPLES = 3
-# of the largest entry; evaluations of structure are a few hundred roundings deep at the most
 TOLERANCE = 1e-12
-EVENNESS = 1e-9  # of the energy, in which large terms may cancel
+"""Of the largest entry; evaluations of structure are a few hundred roundings deep at the most."""
+EVENNESS = 1e-9
+"""Of the energy, in which large terms may cancel."""
+ROUNDING = 1e-11
+"""Of an energy: what rounding leaves of the temperature that differences of it tell."""
+NEARER = (1.0, 1e-2, 1e-4, 1e-6, 1e-9, 0.0)
+"""Factors of a state whose temperature underflows: a state nearer to the identity tells its sign."""
+STATEMENTS: dict[str, tuple[str, ...]] = {
+    "storage": ("E(−ẋ) = E(ẋ)", "a rotation has one energy", "the gradient is dE", "∂E/∂s > 0"),
+    "environment": ("H = 0 and e = 0",),
+    "reversible": ("L + Lᵀ = 0", "environment quantities are conserved", "D(ϵx) = ϵD(x)", "a rotation has one D"),
+    "irreversible": (
+        "M − Mᵀ = 0", "M ⪰ 0", "M eᴱ = 0", "environment quantities but entropy are conserved", "M(ϵx, ϵe) = ϵ M ϵ",
+        "a rotation has one M",
+    ),
+}  # fmt: skip
+"""What is to hold, by the kind of primitive."""
 
 
 def random_point(
@@ -64,7 +79,7 @@ def _reversed(primitive_bundle: Bundle, x: "Point") -> dict[Path, Array]:
 def _opposite(bundle: Bundle, x: "Point") -> Iterator[tuple[Path, Array]]:
     """The states with a rotation, by the other one of its two quaternions."""
     for port in x:
-        if manifold(bundle.interface[port].quantity.space).code in (codes.SO3, codes.SE3, codes.SO3xR3):
+        if manifold(bundle.interface[port].quantity.space).code in ROTATING:
             yield port, np.concatenate([-x[port][:4], x[port][4:]])
 
 
@@ -72,87 +87,113 @@ def _odd(bundle: Bundle, port: Path) -> bool:
     return bundle.interface[port].quantity.parity < 0
 
 
-def _show(x: "Point") -> str:
-    return ", ".join(f"{p}={np.array2string(v, precision=3)}" for p, v in x.items()) or "none is read"
+def constant(primitive: "Primitive") -> bool:
+    """Whether the structure depends on nothing, so that one evaluation tells all."""
+    return primitive.kind == "reversible" and not primitive.reads
+
+
+def check_at(primitive: "Primitive", trial: Trial) -> None:
+    """Check all conditions on a primitive at a state and effort.
+
+    Raises
+    ------
+    StructureError
+        With the trial as its witness. A structure without a finite value there fails as ``"finite"``.
+    """
+    if primitive.kind == "irreversible":
+        _check_irreversible(primitive, trial)
+    elif primitive.kind == "reversible":
+        _check_reversible(primitive, trial)
+    elif primitive.kind == "storage":
+        _check_storage(primitive, trial)
+
+
+def _fail(
+    kind: str, primitive: "Primitive", trial: Trial, size: float, entry: tuple[int, ...] = (), **facts: object
+) -> StructureError:
+    witness = trial.witness(primitive, entry, size)
+    return StructureError(kind, primitive.name, found=size, entry=entry, witness=witness, **facts)
+
+
+def _require_finite(primitive: "Primitive", trial: Trial, what: str, matrix: Array) -> None:
+    if not np.all(np.isfinite(matrix)):
+        raise StructureError(
+            "finite", primitive.name, what=what, found=matrix.tolist(), witness=trial.witness(primitive)
+        )
 
 
 def _worst(defect: Array) -> tuple[int, ...]:
     return tuple(int(i) for i in np.unravel_index(int(np.argmax(np.abs(defect))), defect.shape))
 
 
-def check_storage(storage: "Storage") -> None:
+def _check_storage(storage: "Storage", trial: Trial) -> None:
     """E finite and even under time reversal, its gradient the differential, θ = ∂E/∂s > 0."""
-    if storage.environment:
-        return
-    rng = np.random.default_rng(20)
-    bundle, name = storage.bundle, storage.name
-    for _ in range(SAMPLES):
-        x, energy, gradient = _inside(storage, rng)
-        if gradient.shape != (bundle.size,):
-            raise StructureError("gradient-shape", name, found=gradient.shape, expected=(bundle.size,))
-        _require_finite(name, "the energy", np.array(energy), x)
-        _require_finite(name, "the gradient", gradient, x)
-        mirrored = float(storage.energy(_reversed(bundle, x)))
-        if not abs(energy - mirrored) <= EVENNESS * (abs(energy) + abs(mirrored)):
-            raise StructureError("even", name, found=mirrored, expected=energy, witness=_show(x))
-        for port, opposite in _opposite(bundle, x):
-            found = float(storage.energy({**x, port: opposite}))
-            if not abs(energy - found) <= EVENNESS * (abs(energy) + abs(found)):
-                raise StructureError("rotation-sign", name, what="the energy tells", port=port, witness=_show(x))
-        _check_gradient(storage, x, gradient, energy)
-        for port, where, quantity in bundle.items():
-            if quantity.kind == "entropy" and not gradient[where][0] > 0.0:
-                raise StructureError("cold", name, port=port, found=float(gradient[where][0]), witness=_show(x))
+    bundle, x = storage.bundle, trial.states
+    energy, gradient = float(storage.energy(x)), storage.energy_gradient(x)
+    if gradient.shape != (bundle.size,):
+        raise StructureError("gradient-shape", storage.name, found=gradient.shape, expected=(bundle.size,))
+    _require_finite(storage, trial, "the energy", np.array(energy))
+    _require_finite(storage, trial, "the gradient", gradient)
+    mirrored = float(storage.energy(_reversed(bundle, x)))
+    if np.isfinite(mirrored) and not abs(energy - mirrored) <= EVENNESS * (abs(energy) + abs(mirrored)):
+        raise _fail("even", storage, trial, mirrored, expected=energy)
+    for port, opposite in _opposite(bundle, x):
+        found = float(storage.energy({**x, port: opposite}))
+        if not abs(energy - found) <= EVENNESS * (abs(energy) + abs(found)):
+            raise _fail("rotation-sign", storage, trial, found, what="the energy tells", port=port)
+    _check_gradient(storage, trial, gradient, energy)
+    for port, where, quantity in bundle.items():
+        if quantity.kind == "entropy" and not gradient[where][0] > 0.0:
+            found = _temperature(storage, trial, where)
+            rounding = 0.0 if storage.gradient is not None else ROUNDING * abs(energy)
+            if not found > 0.0 and (found == 0.0 or found < -rounding):
+                raise _fail("cold", storage, trial, found, port=port)
 
 
-def _inside(storage: "Storage", rng: np.random.Generator) -> tuple[dict[Path, Array], float, Array]:
-    """A state where the energy neither overflows nor underflows: random, if need be near the identity."""
-    hot = storage.bundle.indicator("entropy") == 1.0
-    found: tuple[dict[Path, Array], float, Array] | None = None
-    x: dict[Path, Array] = {}
-    for size in (1.0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-9, 0.0):
-        x = random_point(storage.bundle, storage.bundle.ports, rng, size)
-        try:
-            energy, gradient = float(storage.energy(x)), storage.energy_gradient(x)
-        except (OverflowError, ZeroDivisionError):
-            continue
-        found = found or (x, energy, gradient)
-        if gradient.shape != hot.shape:
-            return found
-        if np.isfinite(energy) and np.all(np.isfinite(gradient)) and np.all(gradient[hot] != 0.0):
-            return x, energy, gradient
-    return found or (x, np.inf, np.zeros(hot.shape))
+def _temperature(storage: "Storage", trial: Trial, where: slice) -> float:
+    """∂E/∂s; where it underflows, at a state nearer to the identity."""
+    found = 0.0
+    for share in NEARER:
+        found = float(storage.energy_gradient(trial.nearer(storage, share).states)[where][0])
+        if found != 0.0:
+            break
+    return found
 
 
-def _require_finite(name: str, what: str, matrix: Array, x: "Point") -> None:
-    if not np.all(np.isfinite(matrix)):
-        raise StructureError("finite", name, what=what, found=matrix.tolist(), witness=_show(x))
-
-
-def _check_gradient(storage: "Storage", x: "Point", gradient: Array, energy: float) -> None:
+def _check_gradient(storage: "Storage", trial: Trial, gradient: Array, energy: float) -> None:
     """One random direction tells a wrong gradient; a central difference certifies about 1e-7 and no more."""
     if storage.gradient is None:
         return
-    rng = np.random.default_rng(21)
-    direction = rng.standard_normal(storage.bundle.size)
+    n = storage.bundle.size
+    if _slope_defect(storage, trial, gradient, energy, np.random.default_rng(21).standard_normal(n))[0] <= 1.0:
+        return
+    entries = [_slope_defect(storage, trial, gradient, energy, unit) for unit in np.eye(n)]
+    worst = max(range(n), key=lambda i: entries[i][0])
+    _, found, expected = entries[worst]
+    raise _fail("gradient", storage, trial, found, entry=(worst,), expected=expected)
+
+
+def _slope_defect(
+    storage: "Storage", trial: Trial, gradient: Array, energy: float, direction: Array
+) -> tuple[float, float, float]:
+    """The gradient along a direction against differences: how far beyond their error it is, both slopes."""
     best = (np.inf, 0.0, 0.0)  # of several lengths of the step: the energy may vary slowly, or fast
+    found = float(gradient @ direction)
     for length in (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-14):
         step = length * direction
         try:
-            there, back = (float(storage.energy(storage.retract(x, k * step))) for k in (1.0, -1.0))
-        except (OverflowError, ZeroDivisionError):
+            there, back = (float(storage.energy(storage.retract(trial.states, k * step))) for k in (1.0, -1.0))
+        except (ArithmeticError, ValueError):
             continue
-        expected, found = 0.5 * (there - back), float(gradient @ step)
+        expected = 0.5 * (there - back)
         slope = 1e-4 * float(np.abs(gradient) @ np.abs(step))
         rounding = 1e-14 * (abs(there) + abs(back) + abs(energy))
         if length < 1e-8 and rounding > slope:  # so short a step tells no gradient from another
             break
         if np.isfinite(expected):
-            best = min(best, (abs(expected - found) / max(slope + rounding, 1e-300), found, expected))
-    if not best[0] <= 1.0:
-        _, found, expected = best
-        entry = "(along a random direction)"
-        raise StructureError("gradient", storage.name, entry=entry, found=found, expected=expected, witness=_show(x))
+            off = abs(expected - found * length) / max(slope + rounding, 1e-300)
+            best = min(best, (off, found, expected / length))
+    return best if np.isfinite(best[0]) else (0.0, found, found)
 
 
 def dirac(skew: Array, constraint: Array) -> Subspace:
@@ -162,83 +203,98 @@ def dirac(skew: Array, constraint: Array) -> Subspace:
     return Subspace.from_kernel(kernel).project(range(2 * n))
 
 
-def check_reversible(reversible: "Reversible") -> None:
+def _apart(one: tuple[Array, Array], two: tuple[Array, Array]) -> float:
+    """How far two Dirac structures (L, C) are apart, relative to their entries: 0 where they are the same matrices."""
+    scales = [max(float(np.abs(a).max(initial=0.0)), 1e-300) for a in (one[0], one[1])]
+    same = [float(np.abs(a - b).max(initial=0.0)) / s for a, b, s in zip(one, two, scales, strict=True)]
+    same[1] = min(same[1], float(np.abs(one[1] + two[1]).max(initial=0.0)) / scales[1])
+    if max(same) <= 1e-9 or not one[1].size:
+        return max(same)
+    return dirac(*one).distance(dirac(*two))
+
+
+def _check_reversible(reversible: "Reversible", trial: Trial) -> None:
     """Isotropic and of full dimension, conserving each environment quantity, invariant under time reversal."""
-    rng = np.random.default_rng(22)
-    bundle, name = reversible.bundle, reversible.name
+    bundle, name, x = reversible.bundle, reversible.name, trial.states
     n, k, parity = bundle.size, reversible.multipliers, bundle.parity()
-    for _ in range(SAMPLES):
-        x = random_point(bundle, reversible.reads, rng)
-        skew, constraint = reversible.structure(x)
-        if skew.shape != (n, n):
-            raise StructureError("gyrator-shape", name, found=skew.shape, expected=(n, n))
-        if constraint.shape != (k, n):
-            raise StructureError("constraint-shape", name, found=constraint.shape, expected=(k, n))
-        _require_finite(name, "the matrix L", skew, x)
-        _require_finite(name, "the matrix C", constraint, x)
-        scale = float(np.abs(skew).max(initial=0.0))
-        defect = skew + skew.T
-        if not np.abs(defect).max(initial=0.0) <= TOLERANCE * scale:
-            entry = _worst(defect)
-            raise StructureError("isotropy", name, entry=entry, found=float(defect[entry]), witness=_show(x))
-        for kind in bundle.environment_kinds():
-            one = bundle.indicator(kind)
-            defect = np.concatenate([skew @ one, constraint @ one])
-            terms = np.concatenate([np.full(n, scale), np.abs(constraint).sum(axis=1)])
-            if not np.all(np.abs(defect) <= TOLERANCE * terms):
-                entry = _worst(defect / np.maximum(terms, 1e-300))
-                found = float(defect[entry])
-                raise StructureError("conservation", name, quantity=kind, entry=entry, found=found, witness=_show(x))
-        # (f, e) ∈ D(x) ⇔ (−ϵf, ϵe) ∈ D(ϵx)
-        here = dirac(skew, constraint)
-        there = dirac(*reversible.structure(_reversed(bundle, x)))
-        mirror = np.diag(np.concatenate([-parity, parity]))
-        found = here.image(mirror).distance(there)
-        if not found <= 1e-9:
-            raise StructureError("parity", name, found=found, witness=_show(x))
-        for port, opposite in _opposite(bundle, x):
-            found = here.distance(dirac(*reversible.structure({**x, port: opposite})))
-            if not found <= 1e-9:
-                raise StructureError("rotation-sign", name, what="the structure tells", port=port, witness=_show(x))
-
-
-def check_irreversible(irreversible: "Irreversible") -> None:
-    """Onsager symmetric, non-negative, conserving energy and each environment quantity but entropy, of even parity."""
-    rng = np.random.default_rng(23)
-    bundle, name, reference = irreversible.bundle, irreversible.name, Reference()
-    parity = bundle.parity()
-    for _ in range(SAMPLES):
-        x, e = random_point(bundle, irreversible.reads, rng), random_efforts(bundle, rng)
-        matrix = irreversible.matrix(x, e, reference)
-        if matrix.shape != (bundle.size, bundle.size):
-            expected = (bundle.size, bundle.size)
-            raise StructureError("onsager-shape", name, found=matrix.shape, expected=expected)
-        _require_finite(name, "the matrix M", matrix, x)
-        scale = float(np.abs(matrix).max(initial=0.0))
-        defect = matrix - matrix.T
-        if not np.abs(defect).max(initial=0.0) <= TOLERANCE * scale:
-            entry = _worst(defect)
-            raise StructureError("symmetry", name, entry=entry, found=float(defect[entry]), witness=_show(x))
-        least = float(np.linalg.eigvalsh(matrix).min(initial=0.0))
-        if not least >= -TOLERANCE * scale:
-            raise StructureError("definite", name, found=least, witness=_show(x))
-        energy_effort = e + bundle.intensive(reference)
-        terms = np.abs(matrix) @ np.abs(energy_effort)
-        defect = matrix @ energy_effort
+    skew, constraint = reversible.structure(x)
+    if skew.shape != (n, n):
+        raise StructureError("gyrator-shape", name, found=skew.shape, expected=(n, n))
+    if constraint.shape != (k, n):
+        raise StructureError("constraint-shape", name, found=constraint.shape, expected=(k, n))
+    _require_finite(reversible, trial, "the matrix L", skew)
+    _require_finite(reversible, trial, "the matrix C", constraint)
+    scale = float(np.abs(skew).max(initial=0.0))
+    defect = skew + skew.T
+    if not np.abs(defect).max(initial=0.0) <= TOLERANCE * scale:
+        entry = _worst(defect)
+        raise _fail("isotropy", reversible, trial, float(defect[entry]), entry=entry)
+    for kind in bundle.environment_kinds():
+        one = bundle.indicator(kind)
+        defect = np.concatenate([skew @ one, constraint @ one])
+        terms = np.concatenate([np.full(n, scale), np.abs(constraint).sum(axis=1)])
         if not np.all(np.abs(defect) <= TOLERANCE * terms):
             entry = _worst(defect / np.maximum(terms, 1e-300))
-            raise StructureError("energy", name, entry=entry, found=float(defect[entry]), witness=_show(x))
-        for kind in bundle.environment_kinds():
-            defect = matrix @ bundle.indicator(kind)
-            if kind != "entropy" and not np.abs(defect).max(initial=0.0) <= TOLERANCE * scale:
-                entry = _worst(defect)
-                found = float(defect[entry])
-                raise StructureError("conservation", name, quantity=kind, entry=entry, found=found, witness=_show(x))
-        mirrored = irreversible.matrix(_reversed(bundle, x), parity * e, reference)
-        found = float(np.abs(mirrored - parity[:, None] * matrix * parity[None, :]).max(initial=0.0))
+            raise _fail("conservation", reversible, trial, float(defect[entry]), quantity=kind, entry=entry)
+    # (f, e) ∈ D(x) ⇔ (−ϵf, ϵe) ∈ D(ϵx)
+    there = reversible.structure(_reversed(bundle, x))
+    found = _apart((-parity[:, None] * skew * parity, constraint * parity), there) if _finite(*there) else 0.0
+    if not found <= 1e-9:
+        raise _fail("parity", reversible, trial, found)
+    for port, opposite in _opposite(bundle, x):
+        found = _apart((skew, constraint), reversible.structure({**x, port: opposite}))
+        if not found <= 1e-9:
+            raise _fail("rotation-sign", reversible, trial, found, what="the structure tells", port=port)
+
+
+def _finite(*matrices: Array) -> bool:
+    return all(bool(np.all(np.isfinite(matrix))) for matrix in matrices)
+
+
+def _scaled(matrix: Array) -> Array:
+    """Rows and columns divided by the roots of the diagonal, so that quantities of unlike units are of one size."""
+    size = np.sqrt(np.abs(np.diag(matrix)))
+    size = np.where(size > 0.0, size, np.sqrt(np.abs(matrix).max(axis=1, initial=0.0)))
+    return 1.0 / np.where(size > 0.0, size, 1.0)
+
+
+def _check_irreversible(irreversible: "Irreversible", trial: Trial) -> None:
+    """Onsager symmetric, non-negative, conserving energy and each environment quantity but entropy, of even parity."""
+    bundle, name, x, e, reference = irreversible.bundle, irreversible.name, trial.states, trial.efforts, trial.reference
+    parity = bundle.parity()
+    matrix = irreversible.matrix(x, e, reference)
+    if matrix.shape != (bundle.size, bundle.size):
+        raise StructureError("onsager-shape", name, found=matrix.shape, expected=(bundle.size, bundle.size))
+    _require_finite(irreversible, trial, "the matrix M", matrix)
+    weight = _scaled(matrix)
+    even = weight[:, None] * matrix * weight
+    scale = float(np.abs(even).max(initial=0.0))
+    defect = even - even.T
+    if not np.abs(defect).max(initial=0.0) <= TOLERANCE * scale:
+        entry = _worst(defect)
+        raise _fail("symmetry", irreversible, trial, float(matrix[entry] - matrix[entry[::-1]]), entry=entry)
+    energy_effort = e + bundle.intensive(reference)
+    least = float(np.linalg.eigvalsh(even).min(initial=0.0))
+    if not least >= -TOLERANCE * scale:
+        raise _fail("definite", irreversible, trial, float(np.linalg.eigvalsh(matrix).min(initial=0.0)))
+    terms = np.abs(matrix) @ np.abs(energy_effort)
+    defect = matrix @ energy_effort
+    if not np.all(np.abs(defect) <= TOLERANCE * terms):
+        entry = _worst(defect / np.maximum(terms, 1e-300))
+        raise _fail("energy", irreversible, trial, float(defect[entry]), entry=entry)
+    for kind in bundle.environment_kinds():
+        one = bundle.indicator(kind)
+        defect = matrix @ one
+        if kind != "entropy" and not np.all(np.abs(defect) <= TOLERANCE * (np.abs(matrix) @ one)):
+            entry = _worst(defect)
+            raise _fail("conservation", irreversible, trial, float(defect[entry]), quantity=kind, entry=entry)
+    mirrored = irreversible.matrix(_reversed(bundle, x), parity * e, reference)
+    there = weight[:, None] * (parity[:, None] * mirrored * parity) * weight
+    found = float(np.abs(there - even).max(initial=0.0)) if _finite(mirrored) else 0.0
+    if not found <= TOLERANCE * scale:
+        raise _fail("parity", irreversible, trial, found)
+    for port, opposite in _opposite(bundle, x):
+        other = weight[:, None] * irreversible.matrix({**x, port: opposite}, e, reference) * weight
+        found = float(np.abs(other - even).max(initial=0.0))
         if not found <= TOLERANCE * scale:
-            raise StructureError("parity", name, found=found, witness=_show(x))
-        for port, opposite in _opposite(bundle, x):
-            found = float(np.abs(irreversible.matrix({**x, port: opposite}, e, reference) - matrix).max(initial=0.0))
-            if not found <= TOLERANCE * scale:
-                raise StructureError("rotation-sign", name, what="the matrix M tells", port=port, witness=_show(x))
+            raise _fail("rotation-sign", irreversible, trial, found, what="the matrix M tells", port=port)

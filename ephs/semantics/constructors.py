@@ -1,11 +1,13 @@
 """Primitives of one's own, from plain Python functions of the port variables.
 
-Their structure is checked when they are made. The functions are traced with SymPy: gradients, Jacobians, formulas and
-compiled kernels come from that, once for all primitives that differ in numbers only. A function that branches on its
-arguments or turns them into floats cannot be traced; it is then differenced, and called back in Python.
+Their structure is proved when they are made, or searched for counterexamples. The functions are traced with SymPy:
+gradients, Jacobians, formulas and compiled kernels come from that, once for all primitives that differ in numbers only.
+A function that branches on its arguments or turns them into floats cannot be traced; it is then differenced, and called
+back in Python.
 """
 
 import inspect
+import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -16,6 +18,7 @@ from ephs.operad import Directory, Interface, Path, PortType, Quantity
 from ephs.semantics import structures
 from ephs.semantics.bundle import Array, Bundle, Reference
 from ephs.semantics.checks import random_point
+from ephs.semantics.domains import Bounds, bounded, domain_of, inside
 from ephs.semantics.errors import StructureError
 from ephs.semantics.primitives import Formula, Irreversible, Kernel, Point, Reversible, Storage
 
@@ -30,6 +33,7 @@ def storage(
     energy: Callable[..., float],
     gradient: Callable[..., Any] | None = None,
     *,
+    domain: Bounds | None = None,
     name: str = "storage",
 ) -> Storage:
     """Storage of the energy E(x) at power ports.
@@ -43,6 +47,9 @@ def storage(
     gradient
         dE, left-trivialised: a sequence with an entry for each port, or (n,). Where None it is derived from the
         energy; by differences where that cannot be traced.
+    domain
+        Port name -> (least, greatest) number between which its states lie: the conditions are to hold there. A run that
+        leaves it ends by name. What has a domain is called back in Python.
 
     Raises
     ------
@@ -65,9 +72,11 @@ def storage(
         _takes(name, "gradient", gradient, tuple(interface))
     given = gradient
 
+    bounds = domain_of(name, interface, domain)
+
     def value(x: Point) -> float:
         with np.errstate(all="ignore"):  # what is not a number is found by its value
-            return _real(name, energy(**_named(x)))
+            return _real(name, energy(**_named(x))) if inside(bounds, x) else math.nan
 
     from ephs.semantics.symbols.forms import storage_form
     from ephs.semantics.symbols.tracing import Untraceable
@@ -76,19 +85,24 @@ def storage(
         form = storage_form(interface, energy)
     except Untraceable:
         form = None
-    derived = None if form is None else form.gradient
+
+    def slope(x: Point) -> Array:
+        return _flat(name, given(**_named(x)), n) if given is not None else np.full(n, np.nan)
+
+    derived = slope if given is not None else None if form is None else form.gradient
     return Storage(
         name,
         interface,
         energy=value,
-        gradient=derived if given is None else lambda x: _flat(name, given(**_named(x)), n),
+        gradient=bounded(derived, bounds, np.full(n, np.nan)) if derived is not None and bounds else derived,
         parameters=(("energy", _name(energy)),),
-        kernel=None if form is None else form.kernel,
-        formula=Formula(energy),
+        kernel=None if form is None or bounds else form.kernel,
+        formula=Formula(energy, gradient=gradient),
+        domain=bounds,
     )
 
 
-def gyrator(ports: Ports, matrix: Matrix, *, name: str = "gyrator") -> Reversible:
+def gyrator(ports: Ports, matrix: Matrix, *, domain: Bounds | None = None, name: str = "gyrator") -> Reversible:
     """Reversible f = L(x) e with L skew.
 
     Parameters
@@ -97,6 +111,8 @@ def gyrator(ports: Ports, matrix: Matrix, *, name: str = "gyrator") -> Reversibl
         Port name -> quantity; ``"~name"`` for a state port, which the matrix may read.
     matrix
         L (n, n) over the power ports in their order; or a function of the read states, by name, that gives it.
+    domain
+        Of the read states, as of a `storage`.
 
     Raises
     ------
@@ -109,18 +125,14 @@ def gyrator(ports: Ports, matrix: Matrix, *, name: str = "gyrator") -> Reversibl
         return structures.constant_structure(name, interface, _matrix(name, matrix, n, n), np.zeros((0, n)))
     given = matrix
     read = _reader(name, interface, given)
-    formula = Formula(_both(given, None))
-    return Reversible(
-        name,
-        interface,
-        lambda x: (_matrix(name, read(x), n, n), np.zeros((0, n))),
-        reads=_reads(interface),
-        kernel=_kernel(interface, formula, 0),
-        formula=formula,
-    )
+
+    def structure(x: Point) -> tuple[Array, Array]:
+        return _matrix(name, read(x), n, n), np.zeros((0, n))
+
+    return _reversible(name, interface, structure, Formula(_both(given, None)), 0, domain)
 
 
-def transformer(ports: Ports, matrix: Matrix, *, name: str = "transformer") -> Reversible:
+def transformer(ports: Ports, matrix: Matrix, *, domain: Bounds | None = None, name: str = "transformer") -> Reversible:
     """Reversible e₂ = g(x) e₁, f₁ = −g(x)* f₂ from the first power port to the others.
 
     Parameters
@@ -129,6 +141,8 @@ def transformer(ports: Ports, matrix: Matrix, *, name: str = "transformer") -> R
         Port name -> quantity; ``"~name"`` for a state port, which the matrix may read.
     matrix
         g (n₂, n₁); or a function of the read states, by name, that gives it.
+    domain
+        Of the read states, as of a `storage`.
     """
     interface = _interface(name, ports)
     bundle = Bundle.of(interface)
@@ -151,19 +165,20 @@ def transformer(ports: Ports, matrix: Matrix, *, name: str = "transformer") -> R
     def beside(**x: Any) -> Any:
         return np.hstack([-np.asarray(given(**x), dtype=object).reshape(k, first), right])
 
-    formula = Formula(_both(None, beside))
-    return Reversible(
-        name,
-        interface,
-        lambda x: (np.zeros((bundle.size, bundle.size)), whole(_matrix(name, read(x), k, first))),
-        reads=_reads(interface),
-        multipliers=k,
-        kernel=_kernel(interface, formula, k),
-        formula=formula,
-    )
+    def structure(x: Point) -> tuple[Array, Array]:
+        return np.zeros((bundle.size, bundle.size)), whole(_matrix(name, read(x), k, first))
+
+    return _reversible(name, interface, structure, Formula(_both(None, beside)), k, domain)
 
 
-def constraint(ports: Ports, matrix: Matrix, *, multipliers: int | None = None, name: str = "constraint") -> Reversible:
+def constraint(
+    ports: Ports,
+    matrix: Matrix,
+    *,
+    multipliers: int | None = None,
+    domain: Bounds | None = None,
+    name: str = "constraint",
+) -> Reversible:
     """Reversible f = C(x)* λ, 0 = C(x) e.
 
     Parameters
@@ -174,6 +189,8 @@ def constraint(ports: Ports, matrix: Matrix, *, multipliers: int | None = None, 
         C (k, n) over the power ports in their order; or a function of the read states, by name, that gives it.
     multipliers
         k; where None and the matrix is a function, its rows are counted at a random state.
+    domain
+        Of the read states, as of a `storage`.
     """
     interface = _interface(name, ports)
     n = Bundle.of(interface).size
@@ -185,19 +202,16 @@ def constraint(ports: Ports, matrix: Matrix, *, multipliers: int | None = None, 
     given = matrix
     read = _reader(name, interface, given)
     k = _rows(interface, read) if multipliers is None else multipliers
-    formula = Formula(_both(None, given))
-    return Reversible(
-        name,
-        interface,
-        lambda x: (zero, _matrix(name, read(x), k, n)),
-        reads=_reads(interface),
-        multipliers=k,
-        kernel=_kernel(interface, formula, k),
-        formula=formula,
-    )
+
+    def structure(x: Point) -> tuple[Array, Array]:
+        return zero, _matrix(name, read(x), k, n)
+
+    return _reversible(name, interface, structure, Formula(_both(None, given)), k, domain)
 
 
-def irreversible(ports: Ports, matrix: Callable[..., Any], *, name: str = "irreversible") -> Irreversible:
+def irreversible(
+    ports: Ports, matrix: Callable[..., Any], *, domain: Bounds | None = None, name: str = "irreversible"
+) -> Irreversible:
     """Irreversible f = M e / θ₀ with M symmetric, non-negative and without effect on energy, M eᴱ = 0.
 
     Parameters
@@ -207,6 +221,8 @@ def irreversible(ports: Ports, matrix: Callable[..., Any], *, name: str = "irrev
     matrix
         M (n, n) over the power ports in their order: a function of the *energy* efforts of the power ports (so of the
         absolute temperature at an entropy port, of −π at a volume port) and of the read states, by port name.
+    domain
+        Of energy efforts and read states by port name, as of a `storage`.
 
     Examples
     --------
@@ -222,14 +238,37 @@ def irreversible(ports: Ports, matrix: Callable[..., Any], *, name: str = "irrev
     interface = _interface(name, ports)
     bundle = Bundle.of(interface)
     _takes(name, "matrix", matrix, tuple(interface))
+    bounds, n = domain_of(name, interface, domain), bundle.size
 
     def evaluate(x: Point, e: Array, reference: Reference) -> Array:
-        energy = bundle.split(e + bundle.intensive(reference))
-        return _matrix(name, matrix(**_named({**energy, **x})), bundle.size, bundle.size)
+        given = {**bundle.split(e + bundle.intensive(reference)), **x}
+        return _matrix(name, matrix(**_named(given)), n, n) if inside(bounds, given) else np.full((n, n), np.nan)
 
     formula = Formula(matrix)
-    return Irreversible(
-        name, interface, evaluate, _reads(interface), kernel=_kernel(interface, formula, None), formula=formula
+    kernel = None if bounds else _kernel(interface, formula, None)
+    return Irreversible(name, interface, evaluate, _reads(interface), kernel=kernel, formula=formula, domain=bounds)
+
+
+def _reversible(
+    name: str,
+    interface: Interface,
+    structure: Callable[[Point], tuple[Array, Array]],
+    formula: Formula,
+    multipliers: int,
+    domain: Bounds | None,
+) -> Reversible:
+    """What reads states: as a formula where that can be traced."""
+    bounds, n = domain_of(name, interface, domain), Bundle.of(interface).size
+    nothing = np.full((n, n), np.nan), np.full((multipliers, n), np.nan)
+    return Reversible(
+        name,
+        interface,
+        bounded(structure, bounds, nothing) if bounds else structure,
+        reads=_reads(interface),
+        multipliers=multipliers,
+        kernel=None if bounds else _kernel(interface, formula, multipliers),
+        formula=formula,
+        domain=bounds,
     )
 
 
@@ -326,7 +365,8 @@ def _matrix(name: str, value: ArrayLike, rows: int, columns: int) -> Array:
         out = np.array(np.nan)
     if out.shape != (rows, columns) or not np.all(np.isfinite(out)):
         expected = f"finite numbers of shape ({rows}, {columns})"
-        raise StructureError("parameter", name, key="matrix", found=value, expected=expected)
+        kind = "parameter" if out.shape != (rows, columns) else "undefined"
+        raise StructureError(kind, name, key="matrix", found=value, expected=expected)
     return out
 
 

@@ -1,6 +1,9 @@
 """Errors of the semantics, with their texts in one table."""
 
-from typing import final
+from typing import TYPE_CHECKING, final
+
+if TYPE_CHECKING:
+    from ephs.semantics.trials import Witness
 
 __all__ = ["AssemblyError", "SemanticsError", "StructureError"]
 
@@ -11,41 +14,31 @@ _TEXTS = {
     ),
     "fillings": ("{path}: the boxes to fill are {expected}, the fillings given are {found}; fill each box once"),
     "interface": ("{path}: the filling's interface is {found}, the box wants {expected}; rename the filling's ports"),
-    "finite": "{path}: {what} is {found}, expected finite numbers (witness state {witness})",
-    "isotropy": ("{path}: not reversible: entry {entry} of L + Lᵀ is {found}, expected 0 (witness state {witness})"),
+    "finite": "{path}: {what} is {found}, expected finite numbers (witness: {witness})",
+    "undefined": "{path}: {key} is {found}, expected {expected}",
+    "isotropy": ("{path}: not reversible: entry {entry} of L + Lᵀ is {found}, expected 0 (witness: {witness})"),
     "gyrator-shape": "{path}: the matrix L is {found}, its ports want {expected}",
     "constraint-shape": "{path}: the matrix C is {found}, its ports want {expected}",
-    "conservation": (
-        "{path}: {quantity} is not conserved: entry {entry} is {found}, expected 0 (witness state {witness})"
-    ),
-    "parity": ("{path}: not invariant under time reversal: defect {found}, expected 0 (witness state {witness})"),
+    "conservation": ("{path}: {quantity} is not conserved: entry {entry} is {found}, expected 0 (witness: {witness})"),
+    "parity": ("{path}: not invariant under time reversal: defect {found}, expected 0 (witness: {witness})"),
     "onsager-shape": "{path}: the matrix M is {found}, its ports want {expected}",
-    "symmetry": (
-        "{path}: not Onsager symmetric: entry {entry} of M − Mᵀ is {found}, expected 0 (witness state {witness})"
-    ),
-    "definite": (
-        "{path}: M has the negative eigenvalue {found}; the second law expects none (witness state {witness})"
-    ),
-    "energy": (
-        "{path}: energy is not conserved: entry {entry} of M·eᴱ is {found}, expected 0 (witness state {witness})"
-    ),
-    "even": (
-        "{path}: the energy is not even under time reversal: {found} against {expected} (witness state {witness})"
-    ),
+    "symmetry": ("{path}: not Onsager symmetric: entry {entry} of M − Mᵀ is {found}, expected 0 (witness: {witness})"),
+    "definite": ("{path}: M has the negative eigenvalue {found}; the second law expects none (witness: {witness})"),
+    "energy": ("{path}: energy is not conserved: entry {entry} of M·eᴱ is {found}, expected 0 (witness: {witness})"),
+    "even": ("{path}: the energy is not even under time reversal: {found} against {expected} (witness: {witness})"),
     "rotation-sign": (
-        "{path}: {what} the quaternions q and −q of port {port} apart, which are one rotation (witness state "
+        "{path}: {what} the quaternions q and −q of port {port} apart, which are one rotation (witness: "
         "{witness}); use products of two of its entries, or a rotation matrix"
     ),
     "gradient-shape": "{path}: the gradient is {found}, its ports want {expected}",
     "gradient": (
-        "{path}: the gradient's entry {entry} is {found}, differences of the energy say {expected} (witness "
-        "state {witness})"
+        "{path}: the gradient's entry {entry} is {found}, differences of the energy say {expected} (witness: {witness})"
     ),
     "temperature": (
         "{path}: the absolute temperature is {found} K, expected > 0; check the state or the energy function"
     ),
     "cold": (
-        "{path}: the absolute temperature ∂E/∂{port} is {found} K, expected > 0 (witness state {witness}); check the "
+        "{path}: the absolute temperature ∂E/∂{port} is {found} K, expected > 0 (witness: {witness}); check the "
         "sign of the energy function"
     ),
     "rotation": "{path}: a rotation of π or more in one step; take a smaller step",
@@ -117,6 +110,14 @@ def _rebuild(cls: type[SemanticsError], kind: str, path: str, facts: dict[str, o
 @final
 class StructureError(SemanticsError):
     """A primitive whose data are not the structure that they claim to be."""
+
+    @property
+    def witness(self) -> "Witness | None":
+        """The smallest counterexample found: states, efforts, entry, size; None where a parameter is at fault."""
+        from ephs.semantics.trials import Witness
+
+        found = self.facts.get("witness")
+        return found if isinstance(found, Witness) else None
 
 
 @final

@@ -39,14 +39,30 @@ def thermal_capacity(s: Any, c1: Any, c2: Any) -> Any:
     return c1 * np.exp(s / c2)
 
 
+def thermal_capacity_slope(s: Any, c1: Any, c2: Any) -> Any:
+    """θ = c1/c2 exp(s/c2)."""
+    return [c1 / c2 * np.exp(s / c2)]
+
+
 def thermal_node(s: Any, capacity: Any, temperature: Any) -> Any:
     """E = C T₀ exp(s/C)."""
     return capacity * temperature * np.exp(s / capacity)
 
 
+def thermal_node_slope(s: Any, capacity: Any, temperature: Any) -> Any:
+    """θ = T₀ exp(s/C)."""
+    return [temperature * np.exp(s / capacity)]
+
+
 def ideal_gas(s: Any, v: Any, c1: Any, c2: Any, v0: Any, c: Any) -> Any:
     """E = c1 exp(s/c2) (v0/v)^(1/c)."""
     return c1 * np.exp(s / c2) * (v0 / v) ** (1 / c)
+
+
+def ideal_gas_slope(s: Any, v: Any, c1: Any, c2: Any, v0: Any, c: Any) -> Any:
+    """θ = E/c2, −π = −E/(c v)."""
+    energy = ideal_gas(s, v, c1, c2, v0, c)
+    return [energy / c2, -energy / (c * v)]
 
 
 def pkc() -> Any:

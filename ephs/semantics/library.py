@@ -70,7 +70,8 @@ def _scalar(name: str, port: str, of: Quantity, energy: Callable[..., object], *
     """E = ½ Q x² as a function of the state and the parameters, whose second difference is Q."""
     stiffness = float(energy(1.0, **parameters)) * 2.0  # pyright: ignore[reportArgumentType] - a number, of numbers
     formula = Formula(energy, tuple(parameters))
-    return quadratic(name, power_ports(**{port: of}), np.array([[stiffness]]), tuple(parameters.items()), formula)
+    matrix, ports = np.array([[stiffness]]), power_ports(**{port: of})
+    return quadratic(name, ports, matrix, tuple(parameters.items()), formula, trusted=True)
 
 
 def spring(*, k: float) -> Storage:
@@ -106,7 +107,7 @@ def inductor(*, l: float) -> Storage:  # noqa: E741 - the field's symbol
 def thermal_capacity(*, c1: float, c2: float) -> Storage:
     """Thermal capacity; port s: E = c1*exp(s/c2), temperature θ = E/c2."""
     _positive("thermal_capacity", c1=c1, c2=c2)
-    formula = Formula(formulas.thermal_capacity, ("c1", "c2"))
+    formula = Formula(formulas.thermal_capacity, ("c1", "c2"), formulas.thermal_capacity_slope)
     return exponential("thermal_capacity", c1, c2, (("c1", c1), ("c2", c2)), formula)
 
 
@@ -140,7 +141,7 @@ def ideal_gas(*, c1: float, c2: float, v0: float, c: float) -> Storage:
     interface = power_ports(s=quantity.entropy, v=quantity.volume)
     kernel = Kernel(KERNELS, "ideal_gas", (c1, c2, v0, c))
 
-    formula = Formula(formulas.ideal_gas, ("c1", "c2", "v0", "c"))
+    formula = Formula(formulas.ideal_gas, ("c1", "c2", "v0", "c"), formulas.ideal_gas_slope)
     return Storage(
         "ideal_gas",
         interface,
@@ -150,6 +151,7 @@ def ideal_gas(*, c1: float, c2: float, v0: float, c: float) -> Storage:
         parameters=parameters,
         kernel=kernel,
         formula=formula,
+        trusted=True,
     )
 
 
@@ -175,7 +177,7 @@ def _constant(name: str, interface: Interface, matrices: Callable[..., Structure
     left = np.zeros((n, n)) if skew is None else np.array(skew, dtype=float)
     right = np.zeros((0, n)) if constraint is None else np.array(constraint, dtype=float)
     formula = Formula(matrices, tuple(parameters))
-    return constant_structure(name, interface, left, right, tuple(parameters.items()), formula)
+    return constant_structure(name, interface, left, right, tuple(parameters.items()), formula, trusted=True)
 
 
 def pkc() -> Reversible:
@@ -214,7 +216,7 @@ def mkc() -> Reversible:
 
     formula = Formula(formulas.mkc)
     kernel = Kernel(KERNELS, "modulated_gyrator")
-    return Reversible("mkc", interface, structure, reads=(stator,), kernel=kernel, formula=formula)
+    return Reversible("mkc", interface, structure, reads=(stator,), kernel=kernel, formula=formula, trusted=True)
 
 
 def lever(*, r: float) -> Reversible:
@@ -266,8 +268,9 @@ def friction(*, d: float) -> Irreversible:
     _non_negative("friction", d=d)
     ports = power_ports(p=quantity.momentum, s=quantity.entropy)
     return dissipation(
-        "friction", ports, np.array([[d]]), parameters=(("d", d),), formula=Formula(formulas.friction, ("d",))
-    )
+        "friction", ports, np.array([[d]]), parameters=(("d", d),), formula=Formula(formulas.friction, ("d",)),
+        trusted=True,
+    )  # fmt: skip
 
 
 def rotational_friction(*, d: float) -> Irreversible:
@@ -283,6 +286,7 @@ def rotational_friction(*, d: float) -> Irreversible:
         np.array([[d]]),
         parameters=(("d", d),),
         formula=Formula(formulas.friction, ("d",)),
+        trusted=True,
     )
 
 
@@ -294,8 +298,9 @@ def resistor(*, r: float) -> Irreversible:
     _non_negative("resistor", r=r)
     ports = power_ports(b=quantity.flux_linkage, s=quantity.entropy)
     return dissipation(
-        "resistor", ports, np.array([[r]]), parameters=(("r", r),), formula=Formula(formulas.resistor, ("r",))
-    )
+        "resistor", ports, np.array([[r]]), parameters=(("r", r),), formula=Formula(formulas.resistor, ("r",)),
+        trusted=True,
+    )  # fmt: skip
 
 
 def heat_transfer(*, h: float) -> Irreversible:
@@ -312,4 +317,4 @@ def heat_transfer(*, h: float) -> Irreversible:
     ports = power_ports(s1=quantity.entropy, s2=quantity.entropy)
     formula = Formula(formulas.heat_transfer, ("h",))
     kernel = Kernel(KERNELS, "heat_transfer", (h,))
-    return Irreversible("heat_transfer", ports, matrix, (), (("h", h),), kernel, formula)
+    return Irreversible("heat_transfer", ports, matrix, (), (("h", h),), kernel, formula, trusted=True)

@@ -4,7 +4,6 @@ A primitive *is* its structure as data (an energy, a Dirac structure, an Onsager
 checks, the discrete relation and the compiled kernel all derive from that one object.
 """
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
@@ -13,18 +12,18 @@ from typing import Any, Literal, final
 import numpy as np
 
 from ephs.operad import Directory, Interface, Path, Pattern, PortType, Quantity
-from ephs.semantics.bundle import POSITIVE, Array, Bundle, Reference
+from ephs.semantics.bundle import Array, Bundle, Reference
 from ephs.semantics.errors import StructureError
 from ephs.semantics.spaces import manifold
+from ephs.semantics.verdict import Condition, StructureVerdict, examine
 
-__all__ = ["Formula", "Irreversible", "Kernel", "Point", "Primitive", "Reversible", "Storage"]
+__all__ = ["Domain", "Formula", "Irreversible", "Kernel", "Point", "Primitive", "Reversible", "Storage"]
 
 Point = Mapping[Path, Array]
 """States of the ports that a primitive reads: port -> (size,)."""
-NODE, WEIGHT = 0.5 * math.sqrt(0.6), 5.0 / 18.0
-"""Of Gauss' quadrature with three nodes on an interval: the outer nodes' distance from the middle, their weight."""
-ROUNDING = 8.0 * float(np.finfo(float).eps)
-"""Of a difference of energies, relative to them and to what the states' own rounding makes of the gradient."""
+Domain = tuple[tuple[Path, float, float], ...]
+"""Ports with the least and the largest number that their states may have."""
+Proof = Callable[[], tuple[Condition, ...]]
 
 
 @final
@@ -59,10 +58,13 @@ class Formula:
         A storage's gives E, a reversible component's (L, C), either of which may be None, an irreversible one's M.
     parameters
         Names among the primitive's own parameters that the function takes.
+    gradient
+        Of a storage whose gradient is written by hand: dE, left-trivialised, called like the function.
     """
 
     function: Callable[..., Any]
     parameters: tuple[str, ...] = ()
+    gradient: Callable[..., Any] | None = None
 
 
 @final
@@ -92,8 +94,13 @@ class Storage:
     notation
         How equations between vectors are written: a function of a `symbols.voices.Voice` that gives efforts by port,
         or (flows by port, conditions).
+    domain
+        (port, least, largest) of states that are kept between bounds: what is proved and searched is there.
+    proof
+        Shows the conditions, where that is not read off the formula; asked once, for the verdict.
     trusted
-        Skip the checks: what makes it accepts only parameters for which they hold. Tests run them all the same.
+        Give a verdict when it is asked for, and not when made: what makes it accepts only parameters for which the
+        conditions hold. Tests ask for the verdicts.
     """
 
     name: str
@@ -106,7 +113,10 @@ class Storage:
     kernel: Kernel | None = field(default=None, compare=False, repr=False)
     formula: Formula | None = field(default=None, compare=False, repr=False)
     notation: Callable[[Any], Any] | None = field(default=None, compare=False, repr=False)
+    domain: Domain = ()
+    proof: Proof | None = field(default=None, compare=False, repr=False)
     trusted: bool = field(default=False, compare=False, repr=False)
+    _verdict: StructureVerdict | None = field(default=None, init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         if self.trusted:
@@ -114,9 +124,18 @@ class Storage:
         for port, port_type in self.interface.items():
             if not port_type.power:
                 raise StructureError("storage-ports", self.name, found=str(port))
-        from ephs.semantics.checks import check_storage
+        _ = self.verdict
 
-        check_storage(self)
+    @property
+    def verdict(self) -> StructureVerdict:
+        """What is known of its structure: ``"proved"`` or ``"searched"``, with what was shown and how.
+
+        Raises
+        ------
+        StructureError
+            The structure is refuted, which a trusted one only says here.
+        """
+        return self._verdict or _examined(self)
 
     @property
     def kind(self) -> Literal["storage", "environment"]:
@@ -141,7 +160,9 @@ class Storage:
         """dE(x), left-trivialised, (n,)."""
         if self.gradient is not None:
             return np.asarray(self.gradient(x), dtype=float)
-        return _differences(self, x)
+        from ephs.semantics.differences import differences
+
+        return differences(self, x)
 
     def effort(self, x: Point, reference: Reference) -> Array:
         """e = dH(x), (n,); zero for the environment."""
@@ -156,7 +177,9 @@ class Storage:
         if self.discrete_gradient is not None:
             gradient = np.asarray(self.discrete_gradient(x0, v), dtype=float)
         else:
-            gradient = self._increments(x0, v)
+            from ephs.semantics.differences import increments
+
+            gradient = increments(self, x0, v)
         return gradient - self.bundle.intensive(reference)
 
     def exergy(self, x: Point, reference: Reference) -> float:
@@ -171,43 +194,6 @@ class Storage:
         if self.environment:
             return sum(float(x[p][0]) * reference.intensive(q) for p, _, q in self.bundle.items() if q.environment)
         return float(self.energy(x))
-
-    def _increments(self, x0: Point, v: Array) -> Array:
-        """The mean of the discrete gradients that move port after port, in the order of ports and in its reverse.
-
-        So quantities of unlike units are never compared, and the two states may be exchanged.
-        """
-        out = np.zeros(self.bundle.size)
-        spans = [where for _, where, _ in self.bundle.items()]
-        orders = (spans, spans[::-1]) if len(spans) > 1 else (spans,)
-        for order in orders:
-            done = np.zeros(self.bundle.size)
-            for where in order:
-                step = np.zeros(self.bundle.size)
-                step[where] = v[where]
-                out[where] += self._gonzalez(self.retract(x0, done), step, where) / len(orders)
-                done = done + step
-        return out
-
-    def _gonzalez(self, x0: Point, v: Array, where: slice) -> Array:
-        """The gradient at the midpoint, corrected along the increment v of one port.
-
-        The correction makes ⟨∇̄E|v⟩ the difference of energies. Over short increments that is all rounding; where the
-        quadrature of Gauss with three nodes agrees with it to rounding, the quadrature serves.
-        """
-        step = v[where]
-        square = float(step @ step)
-        low, gradient, high = (
-            self.energy_gradient(self.retract(x0, share * v))[where] for share in (0.5 - NODE, 0.5, 0.5 + NODE)
-        )
-        along = float(gradient @ step)
-        start, end = float(self.energy(x0)), float(self.energy(self.retract(x0, v)))
-        defect, near = end - start - along, WEIGHT * float((low + high - 2.0 * gradient) @ step)
-        port = next(port for port, place, _ in self.bundle.items() if place == where)
-        terms = float(np.abs(gradient).sum()) * float(np.abs(x0[port]).max(initial=0.0))
-        if abs(near - defect) <= ROUNDING * (abs(start) + abs(end) + terms):
-            defect = near
-        return gradient + (defect / square) * step if square > 0.0 else gradient
 
     def compose(self, pattern: Pattern, fillings: "Mapping[Path, object]") -> object:
         """Fill the boxes of a pattern: a system, or a relation where one of the fillings is one."""
@@ -230,8 +216,8 @@ class Reversible:
     discrete
         (C_h (k, n), F (k,)) from (h, x⁰, increments of the read states, e): the discrete constraint, with
         C_h e = F, used in place of C at the midpoint.
-    trusted
-        Skip the checks, as of a `Storage`.
+    domain, proof, trusted
+        As of a `Storage`; of an irreversible process a domain may bound energy efforts, too.
     """
 
     name: str
@@ -244,14 +230,19 @@ class Reversible:
     kernel: Kernel | None = field(default=None, compare=False, repr=False)
     formula: Formula | None = field(default=None, compare=False, repr=False)
     notation: Callable[[Any], Any] | None = field(default=None, compare=False, repr=False)
+    domain: Domain = ()
+    proof: Proof | None = field(default=None, compare=False, repr=False)
     trusted: bool = field(default=False, compare=False, repr=False)
+    _verdict: StructureVerdict | None = field(default=None, init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
-        if self.trusted:
-            return
-        from ephs.semantics.checks import check_reversible
+        if not self.trusted:
+            _ = self.verdict
 
-        check_reversible(self)
+    @property
+    def verdict(self) -> StructureVerdict:
+        """What is known of its structure, as of a `Storage`."""
+        return self._verdict or _examined(self)
 
     @property
     def kind(self) -> Literal["reversible"]:
@@ -279,8 +270,8 @@ class Irreversible:
     ----------
     matrix
         M (n, n) in the units of θ₀·f/e, from (states of ``reads``, e (n,), reference).
-    trusted
-        Skip the checks, as of a `Storage`.
+    domain, proof, trusted
+        As of a `Storage`; of an irreversible process a domain may bound energy efforts, too.
     """
 
     name: str
@@ -291,14 +282,19 @@ class Irreversible:
     kernel: Kernel | None = field(default=None, compare=False, repr=False)
     formula: Formula | None = field(default=None, compare=False, repr=False)
     notation: Callable[[Any], Any] | None = field(default=None, compare=False, repr=False)
+    domain: Domain = ()
+    proof: Proof | None = field(default=None, compare=False, repr=False)
     trusted: bool = field(default=False, compare=False, repr=False)
+    _verdict: StructureVerdict | None = field(default=None, init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
-        if self.trusted:
-            return
-        from ephs.semantics.checks import check_irreversible
+        if not self.trusted:
+            _ = self.verdict
 
-        check_irreversible(self)
+    @property
+    def verdict(self) -> StructureVerdict:
+        """What is known of its structure, as of a `Storage`."""
+        return self._verdict or _examined(self)
 
     @property
     def kind(self) -> Literal["irreversible"]:
@@ -331,6 +327,13 @@ class Irreversible:
 Primitive = Storage | Reversible | Irreversible
 
 
+def _examined(primitive: Primitive) -> StructureVerdict:
+    """The verdict, which the primitive keeps."""
+    verdict = examine(primitive)
+    object.__setattr__(primitive, "_verdict", verdict)
+    return verdict
+
+
 @cache
 def power_ports(**ports: Quantity) -> Interface:
     """An interface of power ports only."""
@@ -343,21 +346,3 @@ def midpoint(primitive: Primitive, x0: Point, v: Point) -> dict[Path, Array]:
         port: manifold(primitive.interface[port].quantity.space).retract(x0[port], 0.5 * v[port])
         for port in primitive.reads
     }
-
-
-def _differences(storage: Storage, x: Point) -> Array:
-    """dE by central differences of fourth order, in the trivialised directions: good to about 1e-12 of E's scale."""
-    bundle = storage.bundle
-    out = np.zeros(bundle.size)
-    for port, where, quantity in bundle.items():
-        size = 1e-3 * (float(np.abs(x[port]).max()) if quantity.kind in POSITIVE else 1.0)
-        for i in range(where.start, where.stop):
-            step = np.zeros(bundle.size)
-            step[i] = size
-            near, far = (
-                float(storage.energy(storage.retract(x, k * step)))
-                - float(storage.energy(storage.retract(x, -k * step)))
-                for k in (1.0, 2.0)
-            )
-            out[i] = (8.0 * near - far) / (12.0 * size)
-    return out

@@ -14,6 +14,7 @@ from ephs.operad import Directory, Interface, Path, PortType
 from ephs.semantics import structures
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.primitives import Irreversible, Kernel, Point, Reversible
+from ephs.semantics.verdict import Condition
 
 __all__ = ["Map", "pull_back", "pulled_ports"]
 
@@ -53,6 +54,13 @@ def pull_back(process: Reversible | Irreversible, maps: Mapping[Path, Map]) -> R
     # maps of mechanical ports leave the conserved quantities alone; all else the checks decide
     sound = not any(process.interface[port].quantity.environment for port in maps)
     entries = (*process.parameters, *((f"T {port}", tuple(m.matrix.ravel().tolist())) for port, m in maps.items()))
+
+    def carried() -> tuple[Condition, ...]:
+        inner = process.verdict.conditions
+        return tuple(Condition(c.statement, c.proved, f"{c.how}; seen through e' = T e") for c in inner)
+
+    proof = carried if sound else None
+
     if isinstance(process, Reversible) and not process.reads and process.discrete is None:
         skew, constraint = process.structure({})
         rows = constraint @ whole
@@ -65,7 +73,16 @@ def pull_back(process: Reversible | Irreversible, maps: Mapping[Path, Map]) -> R
         def matrix(x: Point, e: Array, reference: Reference) -> Array:
             return whole.T @ given.matrix(x, whole @ e, reference) @ whole
 
-        return Irreversible(process.name, interface, matrix, process.reads, entries, kernel, trusted=sound)
+        return Irreversible(
+            process.name,
+            interface,
+            matrix,
+            process.reads,
+            entries,
+            kernel,
+            proof=proof,
+            trusted=sound,
+        )
     inner = process
 
     def structure(x: Point) -> tuple[Array, Array]:
@@ -87,6 +104,7 @@ def pull_back(process: Reversible | Irreversible, maps: Mapping[Path, Map]) -> R
         entries,
         process.multipliers,
         kernel,
+        proof=proof,
         trusted=sound,
     )
 

@@ -6,10 +6,13 @@ from collections.abc import Callable
 import numpy as np
 
 from ephs.operad import Interface, Path, quantity
-from ephs.semantics.bundle import Array, Reference
-from ephs.semantics.primitives import Formula, Irreversible, Kernel, Point, Reversible, Storage, power_ports
+from ephs.semantics.bundle import Array, Bundle, Reference
+from ephs.semantics.checks import STATEMENTS
+from ephs.semantics.primitives import Formula, Irreversible, Kernel, Point, Proof, Reversible, Storage, power_ports
+from ephs.semantics.spaces import codes, manifold
+from ephs.semantics.verdict import Condition
 
-__all__ = ["KERNELS", "constant_structure", "coupling", "dissipation", "exponential", "quadratic"]
+__all__ = ["KERNELS", "constant_structure", "coupling", "dissipation", "dissipation_proof", "exponential", "quadratic"]
 
 KERNELS = "ephs.semantics.kernels"
 """The module of the compiled counterparts."""
@@ -50,7 +53,22 @@ def quadratic(
         parameters=parameters,
         kernel=Kernel(KERNELS, "quadratic", tuple(q.ravel())),
         formula=formula,
+        proof=lambda: _quadratic_proof(interface, q),
         trusted=trusted,
+    )
+
+
+def _quadratic_proof(interface: Interface, q: Array) -> tuple[Condition, ...]:
+    """The conditions on E = ½ xᵀ Q x, from the entries of Q; of what they do not show, none."""
+    bundle = Bundle.of(interface)
+    parity = bundle.parity()
+    even, turned, slope, hot = STATEMENTS["storage"]
+    plain = all(manifold(quantity.space).code == codes.VECTOR for _, _, quantity in bundle.items())
+    return (
+        Condition(even, not np.any(q[np.multiply.outer(parity, parity) < 0.0]), "Q joins states of one parity only"),
+        Condition(turned, plain, "none is read"),
+        Condition(slope, plain and np.array_equal(q, q.T) and bool(np.all(np.isfinite(q))), "Q is symmetric"),
+        Condition(hot, "entropy" not in bundle.environment_kinds(), "no entropy is stored"),
     )
 
 
@@ -124,6 +142,7 @@ def dissipation(
     kernel: Kernel | None = None,
     parameters: tuple[tuple[str, object], ...] = (),
     formula: Formula | None = None,
+    shown: Proof | None = None,
     trusted: bool = False,
 ) -> Irreversible:
     """Dissipation of a port's power into heat: p.f = μ u, s.f = −⟨u|μ u⟩/θ, with u = p.e and θ = θ₀ + s.e.
@@ -136,6 +155,8 @@ def dissipation(
         The dissipating power port, then the entropy port, then state ports that are read.
     resistance
         μ (d, d), symmetric and non-negative; or a function of (states read, u, θ).
+    shown
+        Proves the conditions where μ is a function.
     """
     d = next(iter(interface.values())).quantity.space.dim
 
@@ -149,6 +170,33 @@ def dissipation(
         out[d, d] = float(u @ drag) / theta
         return out
 
+    proof: Proof | None = shown
     if not callable(resistance):
-        kernel = Kernel(KERNELS, "dissipation", tuple(np.asarray(resistance, dtype=float).ravel()))
-    return Irreversible(name, interface, matrix, reads, parameters, kernel, formula, trusted=trusted)
+        mu = np.asarray(resistance, dtype=float)
+        kernel, proof = Kernel(KERNELS, "dissipation", tuple(mu.ravel())), lambda: dissipation_proof(interface, mu)
+    return Irreversible(
+        name, interface, matrix, reads, parameters, kernel, formula, proof=None if formula else proof, trusted=trusted
+    )
+
+
+def dissipation_proof(interface: Interface, mu: Array | None) -> tuple[Condition, ...]:
+    """The conditions on M = Bᵀ (μ/θ) B with B = [θ, −u], which has B eᴱ = θ u − u θ = 0: what is left concerns μ.
+
+    Parameters
+    ----------
+    mu
+        (d, d) constant; None where it is a function of the states that is known to be non-negative and even.
+    """
+    sound = mu is None or (np.array_equal(mu, mu.T) and bool(np.all(np.isfinite(mu))))
+    square = sound and (mu is None or not mu.any() or float(np.linalg.eigvalsh(mu)[0]) >= 0.0)
+    power, *_ = interface.values()
+    symmetric, definite, energy, conserving, mirrored, turned = STATEMENTS["irreversible"]
+    form = "M = Bᵀ (μ/θ) B with B = [θ, −u]"
+    return (
+        Condition(symmetric, sound, f"{form}, μ is symmetric"),
+        Condition(definite, square, f"{form}, μ ⪰ 0 and θ > 0"),
+        Condition(energy, sound, f"{form}, B eᴱ = 0"),
+        Condition(conserving, not power.quantity.environment, "there are none"),
+        Condition(mirrored, sound, "μ is even"),
+        Condition(turned, sound, "μ reads none" if mu is not None else "μ is even in quaternions"),
+    )

@@ -84,7 +84,8 @@ def reversibles(
     def structure(x: Point) -> tuple[Array, Array]:
         return (1.0 + 0.5 * np.cos(sum(float(v @ v) for v in x.values()))) * skew, constraint
 
-    return Reversible("random Dirac structure", interface, structure, used, multipliers=constraint.shape[0])
+    rows = constraint.shape[0]
+    return Reversible("random Dirac structure", interface, structure, used, multipliers=rows, trusted=True)
 
 
 @st.composite
@@ -108,7 +109,7 @@ def irreversibles(draw: st.DrawFn, interface: Interface, *, reads: tuple[Path, .
                 out += scale * strength[i, j] / (1.0 + abs(energy[i]) + abs(energy[j])) * np.outer(normal, normal)
         return out
 
-    return Irreversible("random Onsager structure", interface, matrix, used)
+    return Irreversible("random Onsager structure", interface, matrix, used, trusted=True)
 
 
 def _turning(interface: Interface, stiffness: float) -> Storage:
@@ -121,7 +122,7 @@ def _turning(interface: Interface, stiffness: float) -> Storage:
     def gradient(x: Point) -> Array:
         return 2.0 * stiffness * x[port][0] * x[port][1:]
 
-    return Storage("turning spring", interface, energy, gradient, parameters=(("k", stiffness),))
+    return Storage("turning spring", interface, energy, gradient, parameters=(("k", stiffness),), trusted=True)
 
 
 def _kept(bundle: Bundle) -> Array:
@@ -161,4 +162,5 @@ def _renamed(storage: Storage, interface: Interface) -> Storage:
         parameters=storage.parameters,
         environment=storage.environment,
         kernel=storage.kernel,
+        trusted=True,
     )

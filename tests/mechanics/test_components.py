@@ -2,7 +2,6 @@
 
 import ctypes
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,6 +17,7 @@ from ephs.semantics.behaviour import Natural
 from ephs.semantics.checks import dirac, random_efforts, random_point
 from ephs.semantics.kernel_table import EXTENT, OK, TEMPERATURE, TURN, address_of, prototype
 from ephs.semantics.laws import isotropy
+from ephs.semantics.search import search
 from ephs.semantics.spaces import PAIRS, SE3, pair
 from ephs.testing import mechanisms
 
@@ -336,10 +336,10 @@ def test_springs_on_rotation_vectors_are_isotropic_about_zero(stiffness, rest, k
 
 @settings(deadline=None, max_examples=30)
 @given(mechanisms())
-def test_what_is_trusted_passes_the_checks(scene):
+def test_what_is_trusted_is_proved_and_passes_the_checks(scene):
     for path, primitive in scene.system().leaves():
-        checked = replace(primitive, trusted=False)  # raises where a check fails
-        assert checked.trusted is False, path
+        assert primitive.verdict == "proved", f"{path}: {primitive.verdict.text}"
+        search(primitive, 5)  # raises where a check fails
 
 
 @pytest.mark.parametrize("mu", [[[1.0, 0.5], [0.0, 1.0]], [[1.0, 2.0], [2.0, 1.0]], [[-1.0, 0.0], [0.0, 1.0]]])

@@ -19,6 +19,7 @@ from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.primitives import Irreversible, Point, Reversible, Storage, power_ports
 from ephs.semantics.pullback import Map, pull_back
 from ephs.semantics.spaces import SE3
+from ephs.semantics.verdict import Condition
 
 __all__ = ["MERGE"]
 
@@ -157,6 +158,11 @@ class _Merge:
             gradient=lambda point: one.energy_gradient(point) + carried.T @ two.energy_gradient(there(point)),
             discrete_gradient=discrete,
             parameters=(("first", one.parameters), ("second", two.parameters), ("x", tuple(x.tolist()))),
+            proof=lambda: tuple(
+                Condition(a.statement, a.proved and b.proved, f"{a.how}; likewise of the second, carried by x")
+                for a, b in zip(one.verdict.conditions, two.verdict.conditions, strict=True)
+            ),
+            trusted=True,
         )
 
     def _forward(self, state: State) -> dict[Path, Array]:

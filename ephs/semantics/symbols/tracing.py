@@ -199,7 +199,8 @@ class Traced:
         raise Untraceable("the function needs the value of an argument")
 
     __bool__ = __float__ = __int__ = __complex__ = __index__ = _refuse
-    __lt__ = __le__ = __gt__ = __ge__ = _refuse
+    __lt__ = __le__ = __gt__ = __ge__ = __eq__ = __ne__ = _refuse
+    __hash__ = object.__hash__
 
     def __repr__(self) -> str:
         return f"Traced({self.expression})"

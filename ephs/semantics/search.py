@@ -1,0 +1,125 @@
+"""The search for a state and effort at which a structure fails, and the way from there to the simplest one.
+
+It needs no library: primitives are made inside of property tests, too, where no other may run. `ephs.testing` drives
+the same trials by Hypothesis.
+"""
+
+import random
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ephs.semantics.bundle import Reference
+from ephs.semantics.checks import check_at
+from ephs.semantics.errors import StructureError
+from ephs.semantics.trials import REFERENCES, Trial, chosen, coordinates, simpler, smallest, trial_of
+
+if TYPE_CHECKING:
+    from ephs.semantics.primitives import Primitive
+
+__all__ = ["COUNT", "failure", "search", "shrunk", "simplest"]
+
+COUNT = 400
+"""Trials of a structure that is not proved."""
+DEFINED = 40
+"""Trials in which a structure has to have a finite value once."""
+SHRINKS = 2000
+"""Trials on the way to the simplest counterexample, at most."""
+SHARES = (1.0, 1e-2, 1e-4, 1e-6, 1e-9, 0.0)
+"""How near to the identity to look where a structure has no finite values farther away."""
+UNDEFINED = ("finite", "undefined")
+"""Kinds of failure that say no more than that the structure has no value there."""
+
+
+def failure(primitive: "Primitive", where: Trial) -> StructureError | None:
+    """What fails there, or None."""
+    try:
+        with np.errstate(all="ignore"):  # what is not a number is found by its value
+            check_at(primitive, where)
+    except StructureError as error:
+        return error
+    except (ArithmeticError, ValueError) as error:
+        return StructureError(
+            "finite", primitive.name, what="the structure", found=f"{type(error).__name__}: {error}",
+            witness=where.witness(primitive),
+        )  # fmt: skip
+    return None
+
+
+def simplest(primitive: "Primitive") -> None:
+    """Check the simplest trial, where wrong shapes show; where it has no finite value, others.
+
+    Raises
+    ------
+    StructureError
+        It fails, or there are finite values nowhere.
+    """
+    found = failure(primitive, trial_of(primitive, *chosen(primitive, _first)))
+    if found is not None and found.kind not in UNDEFINED:
+        raise found
+    if found is not None:
+        search(primitive, DEFINED)
+
+
+def _first(_: int) -> int:
+    return 0
+
+
+def search(primitive: "Primitive", count: int) -> int:
+    """Try so many states and efforts, the simplest first; how many had finite values.
+
+    Raises
+    ------
+    StructureError
+        With the simplest counterexample found as its witness.
+    """
+    source = random.Random(20)
+    undefined: StructureError | None = None
+    defined = 0
+    for share in SHARES:
+        for number in range(count):
+            numbers, reference = chosen(primitive, source.randrange if number else _first)
+            found = failure(primitive, trial_of(primitive, numbers, reference).nearer(primitive, share))
+            if found is None:
+                defined += 1
+            elif found.kind in UNDEFINED:
+                undefined = undefined or found
+            else:
+                raise shrunk(primitive, numbers, reference, found)
+        if 8 * defined >= count:
+            return defined
+    if undefined is not None and not defined:
+        raise undefined
+    return defined
+
+
+def shrunk(
+    primitive: "Primitive", numbers: Sequence[float], reference: Reference, found: StructureError
+) -> StructureError:
+    """The same failure at the simplest numbers: each made simpler, as far as the structure still fails."""
+    where = coordinates(primitive)
+    numbers, left, changed = list(numbers), SHRINKS, True
+    for start in (REFERENCES[0], reference):
+        now = failure(primitive, trial_of(primitive, numbers, start))
+        if now is not None and now.kind == found.kind:
+            reference, found = start, now
+            break
+    for tried in smallest(where):
+        now = failure(primitive, trial_of(primitive, tried, reference))
+        if now is not None and now.kind == found.kind:
+            numbers, found = list(tried), now
+            break
+    while changed:
+        changed = False
+        for i, coordinate in enumerate(where):
+            for value in simpler(numbers[i], coordinate):
+                left -= 1
+                if left < 0:
+                    return found
+                tried = [*numbers[:i], value, *numbers[i + 1 :]]
+                now = failure(primitive, trial_of(primitive, tried, reference))
+                if now is not None and now.kind == found.kind:
+                    numbers, found, changed = tried, now, True
+                    break
+    return found

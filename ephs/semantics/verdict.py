@@ -1,0 +1,112 @@
+"""What is known of a primitive's structure: each condition is proved, or was searched for counterexamples in vain.
+
+A structure with a counterexample is refused: `StructureError`, with the smallest one found as its ``witness``.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, final
+
+if TYPE_CHECKING:
+    from ephs.semantics.primitives import Primitive
+
+__all__ = ["Condition", "StructureVerdict", "examine", "proved"]
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """A condition on a structure.
+
+    Parameters
+    ----------
+    statement
+        What holds, e.g. ``"L + Lᵀ = 0"``.
+    proved
+        For all states and efforts; else no counterexample was found.
+    how
+        By which argument, or where it was looked for.
+    """
+
+    statement: str
+    proved: bool
+    how: str
+
+    def __str__(self) -> str:
+        return f"{self.statement}: {'proved' if self.proved else 'searched'}, {self.how}"
+
+
+@final
+class StructureVerdict(str):
+    """``"proved"`` where all conditions are, else ``"searched"``; with the conditions.
+
+    Parameters
+    ----------
+    conditions
+        What was shown, and how.
+    """
+
+    __slots__ = ("conditions",)
+
+    conditions: tuple[Condition, ...]
+
+    def __new__(cls, conditions: Iterable[Condition]) -> "StructureVerdict":
+        found = tuple(conditions)
+        self = super().__new__(cls, "proved" if all(each.proved for each in found) else "searched")
+        self.conditions = found
+        return self
+
+    def __reduce__(self) -> tuple[type["StructureVerdict"], tuple[tuple[Condition, ...]]]:
+        return StructureVerdict, (self.conditions,)
+
+    @property
+    def open(self) -> tuple[Condition, ...]:
+        """The conditions that are not proved."""
+        return tuple(each for each in self.conditions if not each.proved)
+
+    @property
+    def text(self) -> str:
+        """The verdict with a line for each condition."""
+        return "\n".join([str(self), *(f"  {each}" for each in self.conditions)])
+
+
+def proved(how: str, *statements: str) -> tuple[Condition, ...]:
+    """Conditions that all hold by one argument."""
+    return tuple(Condition(statement, True, how) for statement in statements)
+
+
+def examine(primitive: "Primitive") -> StructureVerdict:
+    """Prove the conditions on a primitive; search for counterexamples of what is not proved.
+
+    Raises
+    ------
+    StructureError
+        There is a counterexample.
+    """
+    from ephs.semantics.search import COUNT, search
+
+    conditions = _proofs(primitive)
+    if all(each.proved for each in conditions):
+        return StructureVerdict(conditions)
+    tried = search(primitive, COUNT)
+    how = f"none of {tried} states and efforts contradicts it"
+    return StructureVerdict(each if each.proved else Condition(each.statement, False, how) for each in conditions)
+
+
+def _proofs(primitive: "Primitive") -> tuple[Condition, ...]:
+    """Each condition with its proof, or without one."""
+    from ephs.semantics.checks import STATEMENTS, constant
+    from ephs.semantics.search import simplest
+
+    if primitive.kind == "environment":
+        return proved("by definition of the reference environment", "H = 0 and e = 0")
+    if primitive.proof is not None:
+        return primitive.proof()
+    simplest(primitive)  # what fails here needs no symbols
+    if constant(primitive):
+        return proved("it is constant, and was evaluated", *STATEMENTS[primitive.kind])
+    if primitive.formula is None:
+        return tuple(Condition(statement, False, "") for statement in STATEMENTS[primitive.kind])
+    from ephs.semantics.symbols.proofs import conditions_of
+
+    return conditions_of(primitive)

@@ -1,0 +1,189 @@
+"""Wrong primitives, each wrong in one way, often in one place only: all are refused, with the place as the witness."""
+
+import math
+
+import numpy as np
+
+import ephs
+from ephs import quantity as Q
+from ephs.semantics import Irreversible, Reversible, Storage, structures
+from ephs.semantics.library import power_ports
+
+QP = {"q": Q.displacement, "p": Q.momentum}
+PS = {"p": Q.momentum, "s": Q.entropy}
+AB = {"a": Q.entropy, "b": Q.entropy}
+ONE = power_ports(q=Q.displacement)
+
+
+def conduct(k):
+    """Heat conduction with the coefficient k(a, b) of the two temperatures."""
+    return lambda: ephs.irreversible(AB, lambda a, b: k(a, b) * np.array([[b / a, -1.0], [-1.0, a / b]]))
+
+
+def drag(d):
+    """Friction with the coefficient d(p, s) of velocity and temperature."""
+    return lambda: ephs.irreversible(PS, lambda p, s: d(p, s) * np.array([[s, -p], [-p, p * p / s]]))
+
+
+def hidden(function):
+    """The same function, whose formula nobody sees."""
+    return lambda *x: function(*map(float, x))
+
+
+def twisted(bump):
+    """A gyrator whose skewness a function of the state breaks."""
+    return lambda: ephs.gyrator({**QP, "~x": Q.displacement}, lambda x: [[0.0, 1.0], [-1.0 + bump(x), 0.0]])
+
+
+def outer(n):
+    n = np.array(n)
+    return np.outer(n, n)
+
+
+def stored(port, of, energy, gradient=None):
+    return lambda: ephs.storage({port: of}, energy, gradient)
+
+
+ZOO = {
+    # ---- the second law ------------------------------------------------------------------------------------------
+    "conducts by a − b": (conduct(lambda a, b: a - b), "definite"),
+    "conducts by a − b, hidden": (conduct(hidden(lambda a, b: a - b)), "definite"),
+    "conducts by the sign of a − b": (conduct(lambda a, b: np.sign(a - b)), "definite"),
+    "conducts by the sign of a − b, hidden": (conduct(hidden(lambda a, b: math.copysign(1.0, a - b))), "definite"),
+    "conducts backward when almost equal": (
+        conduct(hidden(lambda a, b: -1.0 if 0.0 < abs(a - b) < 1e-4 * a else 1.0)), "definite"
+    ),
+    "conducts backward when hot": (conduct(lambda a, b: 500.0 - a), "definite"),
+    "conducts backward when cold": (conduct(lambda a, b: np.log(a * b)), "definite"),
+    "conducts backward from a half": (conduct(hidden(lambda a, b: -1.0 if a < 0.01 else 1.0)), "definite"),
+    "drives": (lambda: ephs.irreversible(PS, lambda p, s: [[-s, p], [p, -p * p / s]]), "definite"),
+    "drives around |v| = 4": (drag(lambda p, s: 1.0 - 2.0 * np.exp(-100.0 * (abs(p) - 4.0) ** 2)), "definite"),
+    "drives around |v| = 4, hidden": (drag(hidden(lambda p, s: -1.0 if 3.9 < abs(p) < 4.1 else 1.0)), "definite"),
+    "drives when fast": (drag(lambda p, s: 1.0 - 1e-8 * p**2), "definite"),
+    "drives when slow": (drag(lambda p, s: p**2 - 1e-4), "definite"),
+    "drives above a thousand kelvin": (drag(hidden(lambda p, s: 1.0 if s <= 1000.0 else -1.0)), "definite"),
+    "drives in small volumes": (
+        lambda: ephs.irreversible(
+            {**PS, "~v": Q.volume}, lambda p, s, v: (v - 0.2) * np.array([[s, -p], [-p, p * p / s]])
+        ), "definite",
+    ),
+    "drives where x is negative": (
+        lambda: ephs.irreversible(
+            {**PS, "~x": Q.displacement}, lambda p, s, x: x * np.array([[s, -p], [-p, p * p / s]])
+        ), "definite",
+    ),
+    "three bodies, one pair wrong": (
+        lambda: ephs.irreversible(
+            {"a": Q.entropy, "b": Q.entropy, "c": Q.entropy},
+            lambda a, b, c: outer([b, -a, 0 * c]) + outer([0 * a, c, -b]) - 1.5 * outer([c, 0 * b, -a]),
+        ), "definite",
+    ),
+    "made friction": (lambda: structures.dissipation("w", power_ports(**PS), np.array([[-1.0]])), "definite"),
+    # ---- symmetry and the first law ------------------------------------------------------------------------------
+    "not symmetric": (lambda: ephs.irreversible(PS, lambda p, s: [[s, -p], [0.0, p * p / s]]), "symmetry"),
+    "not symmetric when hot": (
+        lambda: ephs.irreversible(
+            AB, lambda a, b: [[b / a, -1.0], [-1.0 - (1.0 if a > 300.0 else 0.0), a / b]]
+        ), "symmetry",
+    ),
+    "loses energy": (lambda: ephs.irreversible(PS, lambda p, s: [[s, 0.0], [0.0, 0.0]]), "energy"),
+    "loses a tenth": (lambda: ephs.irreversible(PS, lambda p, s: [[s, -p], [-p, 1.1 * p * p / s]]), "energy"),
+    "loses energy at x = 3": (
+        lambda: ephs.irreversible(
+            {**PS, "~x": Q.displacement}, lambda p, s, x: [[s, -p], [-p, p * p / s + np.exp(-50.0 * (x - 3.0) ** 2)]]
+        ), "energy",
+    ),
+    "makes volume of heat": (
+        lambda: ephs.irreversible({"v": Q.volume, "s": Q.entropy}, lambda v, s: [[s * s, -s * v], [-s * v, v * v]]),
+        "conservation",
+    ),
+    "time's arrow": (
+        lambda: ephs.irreversible({**QP, "s": Q.entropy}, lambda p, q, s: outer([s, s, -p - q])), "parity"
+    ),
+    "friction with a direction": (drag(lambda p, s: 2.0 + np.tanh(p)), "parity"),
+    "friction tells quaternions apart": (
+        lambda: ephs.irreversible(
+            PS | {"~q": Q.pose}, lambda p, s, q: (2.0 + q[1]) * np.array([[s, -p], [-p, p * p / s]])
+        ), "rotation-sign",
+    ),
+    "a class of one's own": (
+        lambda: Irreversible("w", power_ports(**AB), lambda x, e, reference: np.diag([1.0, -1.0])), "definite"
+    ),
+    # ---- Dirac structures ----------------------------------------------------------------------------------------
+    "not skew": (lambda: ephs.gyrator(QP, [[0.0, 1.0], [1.0, 0.0]]), "isotropy"),
+    "a bump at x = 3": (twisted(lambda x: np.exp(-100.0 * (x - 3.0) ** 2)), "isotropy"),
+    "a bump at x = 3, hidden": (twisted(hidden(lambda x: 1e-3 if 2.99 < x < 3.01 else 0.0)), "isotropy"),
+    "not skew beyond a thousand": (twisted(hidden(lambda x: float(x > 1000.0))), "isotropy"),
+    "not skew for small negative x": (twisted(hidden(lambda x: float(-1e-3 < x < 0.0))), "isotropy"),
+    "creates entropy": (lambda: ephs.gyrator(PS, [[0.0, 1.0], [-1.0, 0.0]]), "conservation"),
+    "makes volume": (
+        lambda: ephs.gyrator({"v": Q.volume, "p": Q.momentum}, [[0.0, -1.0], [1.0, 0.0]]), "conservation"
+    ),
+    "creates entropy at x = 3": (
+        lambda: ephs.gyrator(
+            {**PS, "~x": Q.displacement}, lambda x: (x == 3.0) * np.array([[0.0, 1.0], [-1.0, 0.0]])
+        ), "conservation",
+    ),
+    "odd gyrator": (
+        lambda: ephs.gyrator({"p": Q.momentum, "b": Q.flux_linkage}, [[0.0, 1.0], [-1.0, 0.0]]), "parity"
+    ),
+    "gyrator of an even state": (
+        lambda: ephs.gyrator(
+            {"b": Q.flux_linkage, "p": Q.momentum, "~q": Q.displacement}, lambda q: [[0.0, q], [-q, 0.0]]
+        ), "parity",
+    ),
+    "constraint on entropy": (lambda: ephs.constraint(PS, [[0.0, 1.0]]), "conservation"),
+    "mixed constraint": (lambda: ephs.constraint(QP, [[1.0, 1.0]]), "parity"),
+    "doubles entropy": (lambda: ephs.transformer({"s": Q.entropy, "s2": Q.entropy}, [[2.0]]), "conservation"),
+    "odd transformer": (lambda: ephs.transformer(QP, [[1.0]]), "parity"),
+    "constraint tells quaternions apart": (
+        lambda: ephs.constraint({"p": Q.momentum, "p2": Q.momentum, "~q": Q.pose}, lambda q: [[1.0, q[1]]]),
+        "rotation-sign",
+    ),
+    "a Dirac structure of one's own": (
+        lambda: Reversible("w", power_ports(**QP), lambda x: (np.eye(2), np.zeros((0, 2)))), "isotropy"
+    ),
+    # ---- energies ------------------------------------------------------------------------------------------------
+    "odd energy": (stored("p", Q.momentum, lambda p: p), "even"),
+    "odd beyond a hundred": (stored("p", Q.momentum, lambda p: float(p) ** 2 + (p > 100.0)), "even"),
+    "odd magnetic energy": (stored("b", Q.flux_linkage, lambda b: b**2 + 0.01 * b**3), "even"),
+    "wrong gradient": (stored("q", Q.displacement, lambda q: q**2, lambda q: [q]), "gradient"),
+    "gradient wrong for q < 0": (stored("q", Q.displacement, lambda q: q**2, lambda q: [2.0 * abs(q)]), "gradient"),
+    "gradient wrong around q = 5": (
+        stored("q", Q.displacement, lambda q: q**4, lambda q: [4.0 * q**3 + np.exp(-9.0 * (q - 5.0) ** 2)]), "gradient"
+    ),
+    "a storage of one's own": (
+        lambda: Storage("w", ONE, lambda x: float((x[next(iter(x))] ** 2)[0]), lambda x: np.ones(1)), "gradient"
+    ),
+    "negative temperature": (stored("s", Q.entropy, lambda s: -np.exp(s)), "cold"),
+    "negative temperature for s < −3": (stored("s", Q.entropy, lambda s: 300.0 * s + 50.0 * s**2), "cold"),
+    "negative temperature for s < −3, hidden": (
+        stored("s", Q.entropy, lambda s: 300.0 * float(s) + 50.0 * float(s) ** 2), "cold"
+    ),
+    "negative temperature for s > 1000": (stored("s", Q.entropy, lambda s: s - s**2 / 2000.0), "cold"),
+    "temperature of zero": (stored("s", Q.entropy, lambda s: 3.0 + 0.0 * s), "cold"),
+    "gas that is cold when thin": (
+        lambda: ephs.storage({"s": Q.entropy, "v": Q.volume}, lambda s, v: np.exp(s) * (20.0 - v)), "cold"
+    ),
+    "energy tells quaternions apart": (stored("q", Q.pose, lambda q: q[1]), "rotation-sign"),
+    "quadratic energy that is not even": (
+        lambda: structures.quadratic("w", power_ports(**QP), np.array([[1.0, 1.0], [1.0, 1.0]]), ()), "even"
+    ),
+    "quadratic energy that is not symmetric": (
+        lambda: structures.quadratic(
+            "w", power_ports(q=Q.displacement, x=Q.charge), np.array([[1.0, 2.0], [0.0, 1.0]]), ()
+        ), "gradient",
+    ),
+    "energy without end": (stored("q", Q.displacement, lambda q: q / 0.0), "finite"),
+    "energy that is nowhere a number": (stored("q", Q.displacement, lambda q: np.sqrt(-1.0 - q * q)), "finite"),
+}  # fmt: skip
+"""Name -> (what makes it, which condition it breaks)."""
+
+MALFORMED = {
+    "not finite": (lambda: ephs.gyrator(QP, [[0.0, np.nan], [1.0, 0.0]]), "undefined"),
+    "wrong shape": (lambda: ephs.gyrator(QP, [[0.0]]), "parameter"),
+    "matrix of another size": (lambda: ephs.irreversible(PS, lambda p, s: [[s]]), "parameter"),
+    "complex energy": (stored("q", Q.displacement, lambda q: 1j * q), "parameter"),
+    "state port": (lambda: ephs.storage({"q": Q.displacement, "~p": Q.momentum}, lambda q: q**2), "storage-ports"),
+}  # fmt: skip
+"""What has no structure to be right or wrong."""
