@@ -1,5 +1,6 @@
 """Small models that run into trouble."""
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -129,6 +130,21 @@ def driven() -> ephs.System:
     """A mass on a spring, on which a force may act."""
     pattern = Pattern({**_OSCILLATOR, "p": junction(Q.momentum, exposed=True)}, _BOXES)
     return pattern(pe=lib.spring(k=1.5), ke=lib.point_mass(m=1.0), pkc=lib.pkc())
+
+
+def driving() -> ephs.System:
+    """A mass with friction that drives it at some speeds, which no search has found."""
+
+    def brake(p: float, s: float) -> Any:
+        d = 0.5 - 3.0 * math.exp(-(((abs(float(p)) - 7.75) / 0.03) ** 2))
+        return d * np.array([[s, -p], [-p, p * p / s]])
+
+    pattern = Pattern(
+        {"p": junction(Q.momentum), "s": junction(Q.entropy)},
+        {"ke": {"p": "p"}, "mf": {"p": "p", "s": "s"}, "env": {"s": "s"}},
+    )
+    mf = ephs.irreversible({"p": Q.momentum, "s": Q.entropy}, brake)
+    return pattern(ke=lib.point_mass(m=1.0), mf=mf, env=lib.environment())
 
 
 def chilled() -> ephs.System:

@@ -20,6 +20,7 @@ from examples.failing import (
     cylinder,
     doubled,
     driven,
+    driving,
     four_bar,
     frame,
     linked,
@@ -165,6 +166,10 @@ CASES = (
     Case(
         Outcome.TEMPERATURE, "surroundings that are cooled to 0 K", chilled, SYSTEMS, "mf",
         within=(0.28, 0.3), options=fixed(inputs={"s": {"effort": lambda t, x: [-1000.0 * t]}}, initial={"ke.p": 1.0}),
+    ),
+    Case(
+        Outcome.ENTROPY, "friction that drives in a narrow band of speeds", driving, SYSTEMS, "mf",
+        r"-\d.* J/K in the step to t = 0\.\d+ s", within=(0.04, 0.08), options=fixed(initial={"ke.p": 8.0}),
     ),
     Case(
         Outcome.EXTENT, "a spring that has no length to begin with", lambda: slide(CORD), ALL, r"springs\.cord.*",

@@ -15,9 +15,11 @@ import numpy as np
 from ephs.operad import Directory, Interface, Path, PortType, Quantity, quantity
 from ephs.semantics import formulas
 from ephs.semantics.bundle import Array, Reference
+from ephs.semantics.checks import STATEMENTS
 from ephs.semantics.errors import StructureError
 from ephs.semantics.primitives import Formula, Irreversible, Kernel, Point, Reversible, Storage, power_ports
 from ephs.semantics.structures import KERNELS, constant_structure, dissipation, exp, expm1, exponential, quadratic
+from ephs.semantics.verdict import Condition, proved
 
 __all__ = [
     "capacitor",
@@ -317,4 +319,9 @@ def heat_transfer(*, h: float) -> Irreversible:
     ports = power_ports(s1=quantity.entropy, s2=quantity.entropy)
     formula = Formula(formulas.heat_transfer, ("h",))
     kernel = Kernel(KERNELS, "heat_transfer", (h,))
-    return Irreversible("heat_transfer", ports, matrix, (), (("h", h),), kernel, formula, trusted=True)
+
+    def proof() -> tuple[Condition, ...]:
+        return proved("M = h/(θ₁θ₂) n nᵀ with n = (θ₂, −θ₁), n·eᴱ = 0", *STATEMENTS["irreversible"])
+
+    parameters = (("h", h),)
+    return Irreversible("heat_transfer", ports, matrix, (), parameters, kernel, formula, proof=proof, trusted=True)

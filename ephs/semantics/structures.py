@@ -174,9 +174,7 @@ def dissipation(
     if not callable(resistance):
         mu = np.asarray(resistance, dtype=float)
         kernel, proof = Kernel(KERNELS, "dissipation", tuple(mu.ravel())), lambda: dissipation_proof(interface, mu)
-    return Irreversible(
-        name, interface, matrix, reads, parameters, kernel, formula, proof=None if formula else proof, trusted=trusted
-    )
+    return Irreversible(name, interface, matrix, reads, parameters, kernel, formula, proof=proof, trusted=trusted)
 
 
 def dissipation_proof(interface: Interface, mu: Array | None) -> tuple[Condition, ...]:

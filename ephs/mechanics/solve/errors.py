@@ -32,6 +32,7 @@ class Outcome(StrEnum):
     OPEN = "a loop that does not close near by"
     TURN = "a rotation of π or more in one step"
     TEMPERATURE = "an absolute temperature that is not positive"
+    ENTROPY = "a component that destroys entropy"
     EXTENT = "a length or a volume that is not positive"
     DOMAIN = "an energy or a flow that is not a finite number"
     RANGE = "a state beyond the range of numbers"
@@ -62,6 +63,7 @@ _ADVICE = {
     Outcome.OPEN: "take a smaller step, or check what is prescribed: the mechanism may be at the end of its travel",
     Outcome.TURN: "take a smaller step: h·|ω| must stay below π",
     Outcome.TEMPERATURE: "check initial temperatures and heat capacities, or take a smaller step",
+    Outcome.ENTROPY: "mend the component's function there; if it is right, take a smaller step",
     Outcome.EXTENT: "check initial values, or take a smaller step",
     Outcome.DOMAIN: "check initial values and the component's function there, or take a smaller step",
     Outcome.RANGE: "check initial values and inputs, or take a smaller step",

@@ -17,6 +17,7 @@ from ephs.mechanics.solve.model import Model, compile_model
 from ephs.mechanics.solve.natural import Chunk, Natural, NaturalState
 from ephs.mechanics.solve.natural_kernels import IRREVERSIBLE
 from ephs.mechanics.solve.problem import Problem
+from ephs.mechanics.solve.production import Production
 from ephs.mechanics.solve.record import Record, Recorder
 from ephs.mechanics.solve.snapshot import Snapshot, like, parts
 from ephs.mechanics.solve.solution import Solution
@@ -100,6 +101,7 @@ def integrate(
     with failures_of(run):
         run.recorder.start(stepper.energies(x0))
         run.balance = Balance(problem, *run.recorder.latest)
+        run.production.start(*run.recorder.latest[:2])
         check_start(problem, model, grid.h)
         run.state = stepper.init(x0)
         stepper.prepare(run.state, grid.h)
@@ -202,6 +204,7 @@ class _Run:
         self.begin, self.progress, self.journal = begin, progress, journal
         self.t, self.setup, self.steps, self.iterations, self.cut = grid.t0, 0.0, 0, 0, 0
         self.looked = begin
+        self.production = Production(problem)
 
     def full_steps(self, max_steps: int | None) -> None:
         """All steps of full length, in chunks that adapt to the time that they take."""
@@ -231,7 +234,8 @@ class _Run:
             times = times - self.grid.h + h
         if end is not None and chunk.steps == count:
             times[-1] = end
-        self._record(times, chunk)
+        chunk = self.production.cut(times, chunk)
+        self._record(times[: chunk.steps], chunk)
         if chunk.failure is not None:
             raise chunk.failure
         due = end is not None or time.perf_counter() - self.looked > 0.5 * RESPONSE
@@ -263,6 +267,7 @@ class _Run:
             self.state = like(self.state, found["state"])
             self.stepper.restore(found["method"])
             self.recorder.restore(found["recorder"], self.journal.rows if self.journal is not None else None)
+            self.production.start(*self.recorder.latest[:2])
 
     def _record(self, times: Array, chunk: Chunk) -> None:
         if chunk.steps:

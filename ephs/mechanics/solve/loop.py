@@ -12,6 +12,7 @@ from ephs.mechanics.solve.events import Crossing, Event, Watch
 from ephs.mechanics.solve.integrate import Grid, Progress, failures_of, solution_of
 from ephs.mechanics.solve.journal import Written
 from ephs.mechanics.solve.problem import Problem, States
+from ephs.mechanics.solve.production import Production
 from ephs.mechanics.solve.record import Record, Rows
 from ephs.mechanics.solve.snapshot import Snapshot, like, parts
 from ephs.mechanics.solve.solution import Solution
@@ -124,6 +125,8 @@ class _Run(Generic[S]):
         self.state = self.stepper.start(self.t0, self.sign * self.h)
         row = self.stepper.row(self.state)
         self.balance = Balance(self.problem, row.x, row.energies, row.sums)
+        self.production = Production(self.problem, self.sign)
+        self.production.start(row.x, row.energies)
         if self.save_at is None or (self.save_at.size and self.save_at[0] == self.t0):
             self.pending.append((self.t0, self.state, 0.0))
             self.saved = 1
@@ -136,7 +139,8 @@ class _Run(Generic[S]):
 
         ``stood`` is where the compiled part of an earlier run did, None where it was left.
         """
-        if self.watch is None and (self.journal is None or self.journal.snapshot is None or stood is not None):
+        alone = self.watch is None and not self.production.active  # nothing has to be looked at in each step
+        if alone and (self.journal is None or self.journal.snapshot is None or stood is not None):
             self.leg = self.stepper.many(
                 Span(
                     self.state, self.t0, self.until, self.h, self.control, self.policy, self.save_at, self.saved
@@ -223,6 +227,9 @@ class _Run(Generic[S]):
             stopped = self.watch.step(self.t, t, self._states(self.stepper.row(after)), inside)
             if stopped is not None and stopped != t:
                 t, after = stopped, self.stepper.at(self.stepper.inside(attempt, stopped), stopped)
+        if self.production.active:
+            row = self.stepper.row(after)
+            self.production.step(t, row.x, row.energies)
         self.least = min(self.least, attempt.least)
         self.shortest, self.longest = min(self.shortest, abs(attempt.h)), max(self.longest, abs(attempt.h))
         if self.save_at is None:
@@ -332,6 +339,8 @@ class _Run(Generic[S]):
         self.ended = found["ended"]
         self.state = like(self.state, found["state"])
         self.stepper.restore(found["method"], self.state)
+        row = self.stepper.row(self.state)
+        self.production.start(row.x, row.energies)
         if self.policy is not None:
             self.policy.restore(found["policy"])
         if self.watch is not None:
