@@ -106,6 +106,7 @@ PROMISED = {
     "ephs.testing.check_functoriality": "system",
     "ephs.testing.check_power_balance": "system",
     "ephs.testing.check_entropy_production": "system",
+    "ephs.testing.check_primitive": "primitive",
     "ephs.testing.check_natural": "system",
 }
 ATTRIBUTES = {

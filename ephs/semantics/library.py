@@ -153,6 +153,9 @@ def ideal_gas(*, c1: float, c2: float, v0: float, c: float) -> Storage:
         parameters=parameters,
         kernel=kernel,
         formula=formula,
+        proof=lambda: proved(
+            "entropy and volume are even, θ = E/c2 and −π = −E/(c v), E > 0 and c2 > 0", *STATEMENTS["storage"]
+        ),
         trusted=True,
     )
 
@@ -218,7 +221,13 @@ def mkc() -> Reversible:
 
     formula = Formula(formulas.mkc)
     kernel = Kernel(KERNELS, "modulated_gyrator")
-    return Reversible("mkc", interface, structure, reads=(stator,), kernel=kernel, formula=formula, trusted=True)
+
+    def proof() -> tuple[Condition, ...]:
+        return proved("L = bs [[0, 1], [−1, 0]] with bs odd, both efforts odd", *STATEMENTS["reversible"])
+
+    return Reversible(
+        "mkc", interface, structure, reads=(stator,), kernel=kernel, formula=formula, proof=proof, trusted=True
+    )
 
 
 def lever(*, r: float) -> Reversible:

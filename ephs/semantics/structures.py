@@ -10,7 +10,7 @@ from ephs.semantics.bundle import Array, Bundle, Reference
 from ephs.semantics.checks import STATEMENTS
 from ephs.semantics.primitives import Formula, Irreversible, Kernel, Point, Proof, Reversible, Storage, power_ports
 from ephs.semantics.spaces import codes, manifold
-from ephs.semantics.verdict import Condition
+from ephs.semantics.verdict import Condition, proved
 
 __all__ = ["KERNELS", "constant_structure", "coupling", "dissipation", "dissipation_proof", "exponential", "quadratic"]
 
@@ -77,6 +77,10 @@ def exponential(
 ) -> Storage:
     """E = c1·(exp(s/c2) − 1): energies count from s = 0, so that small heats are not lost beside a large E."""
     port = Path.of("s")
+    sound = c1 > 0.0 and 0.0 < c2 < math.inf and 0.0 < c1 / c2 < math.inf
+
+    def proof() -> tuple[Condition, ...]:
+        return proved("an entropy is even, dE = θ = c1/c2 exp(s/c2), c1 > 0 and c2 > 0", *STATEMENTS["storage"])
 
     def gradient(x: Point) -> Array:
         return np.array([c1 / c2 * exp(float(x[port][0]) / c2)])
@@ -95,8 +99,9 @@ def exponential(
         parameters=parameters,
         kernel=Kernel(KERNELS, "exponential", (c1, c2)),
         formula=formula,
+        proof=proof if sound else None,
         # a random state of a small capacity is so cold or so hot that differences tell nothing
-        trusted=c1 > 0.0 and 0.0 < c2 < math.inf and 0.0 < c1 / c2 < math.inf,
+        trusted=sound,
     )
 
 

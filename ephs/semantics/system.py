@@ -212,7 +212,7 @@ class System:
                 lines.append(f"  {box}: " + str(filling).replace("\n", "\n  "))
             else:
                 values = ", ".join(f"{key}={value}" for key, value in filling.parameters)
-                lines.append(f"  {box}: {filling.name}({values})  [{filling.kind}]")
+                lines.append(f"  {box}: {filling.name}({values})  [{filling.kind}, {filling.verdict}]")
         return "\n".join(lines)
 
 

@@ -4,8 +4,8 @@ from ephs.testing.laws import check_operad_laws, law_inputs
 from ephs.testing.mechanisms import mechanisms
 from ephs.testing.patterns import fresh_names, interfaces, nestings, paths, patterns, quantities
 from ephs.testing.primitives import irreversibles, reversibles, storages
+from ephs.testing.structures import check_entropy_production, check_primitive
 from ephs.testing.systems import (
-    check_entropy_production,
     check_functoriality,
     check_natural,
     check_power_balance,
@@ -19,6 +19,7 @@ __all__ = [
     "check_natural",
     "check_operad_laws",
     "check_power_balance",
+    "check_primitive",
     "fillings",
     "fresh_names",
     "interfaces",

@@ -13,7 +13,6 @@ from ephs.semantics.system import Filling
 from ephs.testing.primitives import irreversibles, reversibles, storages
 
 __all__ = [
-    "check_entropy_production",
     "check_functoriality",
     "check_natural",
     "check_power_balance",
@@ -174,17 +173,6 @@ def check_power_balance(system: System, *, seed: int = 0, reference: Reference |
         With the law that fails, and how far.
     """
     _check(random_probe(system, seed, reference=reference), "power balance", "exergy balance", "conservation")
-
-
-def check_entropy_production(system: System, *, seed: int = 0, reference: Reference | None = None) -> None:
-    """Check that over a step from a random state no component destroys entropy, and that entropy is balanced.
-
-    Raises
-    ------
-    AssertionError
-        With the law that fails, and how far.
-    """
-    _check(random_probe(system, seed, reference=reference), "entropy production", "entropy balance")
 
 
 def check_natural(system: System, *, seed: int = 0, reference: Reference | None = None) -> None:

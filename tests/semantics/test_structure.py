@@ -2,19 +2,24 @@
 
 import math
 import pickle
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import ephs
+from ephs import Pattern, junction
 from ephs import quantity as Q
 from ephs.semantics import StructureError, library
-from ephs.semantics.symbols import proofs
 from ephs.semantics.symbols.proofs import conditions_of
 from ephs.semantics.verdict import Condition, StructureVerdict
+from ephs.testing import check_entropy_production, check_primitive
 from tests.semantics.test_primitives import ARGUMENTS, made
-from tests.semantics.zoo import MALFORMED, QP, ZOO, conduct, drag, hidden, outer
+from tests.semantics.zoo import AB, MALFORMED, QP, ZOO, conduct, drag, hidden, outer
 
 FAR = 5e4
 """Beyond it, numbers are not of human size."""
@@ -104,10 +109,15 @@ def test_the_formulas_of_the_library_are_proved_symbolically(name):
     assert all(condition.proved for condition in conditions_of(primitive)), primitive.verdict.text
 
 
-def test_a_kind_is_proved_once(monkeypatch):
-    assert made("ideal_gas").verdict == "proved"
-    monkeypatch.setattr(proofs, "trace", None)
-    assert library.ideal_gas(c1=3.0, c2=5.0, v0=7.0, c=2.5).verdict == "proved"
+def test_the_library_is_proved_without_symbols():
+    """Making and checking a system of library parts must not load SymPy."""
+    code = (
+        "import sys\nfrom ephs.semantics import library\n"
+        f"for name, arguments in {ARGUMENTS!r}.items():\n"
+        "    assert getattr(library, name)(**arguments).verdict == 'proved'\n"
+        "assert 'sympy' not in sys.modules and 'hypothesis' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def laminar(p, s):
@@ -179,3 +189,65 @@ def test_equal_and_unequal_are_not_asked_of_symbols():
     """Else a function that compares its argument to a number would be traced as if they differed."""
     assert ephs.storage({"q": Q.displacement}, lambda q: q**2 + (q == 3.0)).verdict == "searched"
     assert ephs.storage({"q": Q.displacement}, lambda q: q**2 + (q != 3.0)).verdict == "searched"
+
+
+# ---- for other people's suites ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["conducts by a − b, hidden", "drives around |v| = 4, hidden", "odd beyond a hundred"])
+def test_check_primitive_finds_what_is_trusted_wrongly(name, monkeypatch):
+    make, kind = ZOO[name]
+    expected = refused(make).witness
+    with monkeypatch.context() as context:
+        context.setattr("ephs.semantics.primitives.examine", lambda _: StructureVerdict([]))
+        primitive = make()
+    with pytest.raises(AssertionError, match=f"^{kind}: ") as caught:
+        check_primitive(primitive)
+    assert f"witness: {expected}" in str(caught.value)
+
+
+def test_check_primitive_gives_the_verdict():
+    assert check_primitive(library.friction(d=0.3), max_examples=20) == "proved"
+    assert check_primitive(HIDDEN["friction"](), max_examples=50) == "searched"
+
+
+@settings(max_examples=3)
+@given(st.sampled_from(["friction", "spring"]))
+def test_check_primitive_runs_inside_of_property_tests(name):
+    assert check_primitive(HIDDEN[name](), max_examples=20) == "searched"
+
+
+def forged():
+    """A conduction that passed its checks, and then changed its sign for a < b."""
+    honest = [True]
+
+    def matrix(a, b):
+        return (1.0 if honest[0] or float(a) >= float(b) else -1.0) * np.array([[b / a, -1.0], [-1.0, a / b]])
+
+    made = ephs.irreversible(AB, matrix)
+    honest[0] = False
+    return made
+
+
+def test_entropy_production_fails_with_the_temperatures_and_the_path():
+    pattern = Pattern(
+        {"a": junction(Q.entropy), "b": junction(Q.entropy)},
+        {"hot": {"s": "a"}, "cold": {"s": "b"}, "wall": {"a": "a", "b": "b"}},
+    )
+    body = library.thermal_capacity(c1=300.0, c2=1.0)
+    system = pattern(hot=body, cold=body, wall=forged())
+    with pytest.raises(AssertionError, match=r"entropy production: wall: .*negative.*witness: a = 1, b = 2"):
+        check_entropy_production(system)
+    check_entropy_production(pattern(hot=body, cold=body, wall=HIDDEN["radiation"]()))
+
+
+def test_printed_components_and_checks_say_the_verdict():
+    pattern = Pattern(
+        {"a": junction(Q.entropy), "b": junction(Q.entropy)},
+        {"hot": {"s": "a"}, "cold": {"s": "b"}, "wall": {"a": "a", "b": "b"}},
+    )
+    body = library.thermal_capacity(c1=300.0, c2=1.0)
+    system = pattern(hot=body, cold=body, wall=HIDDEN["radiation"]())
+    assert "[irreversible, searched]" in str(system) and "[storage, proved]" in str(system)
+    item = next(item for item in system.check().items if item.name == "structure")
+    assert item.ok and "2 of them proved" in item.detail and "watched in runs: wall" in item.detail
