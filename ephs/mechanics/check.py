@@ -53,7 +53,7 @@ def _items(model: System | Scene, initial: Mapping[str, "ArrayLike"] | None) -> 
         yield CheckItem("assembly", False, str(error))
         return
     system, d = problem.system, problem.descriptor
-    flat = d.system.pattern
+    flat = d.system.flatten().pattern
     remarks = "; ".join(map(str, flat.lint()))
     boxes, junctions = len(flat.boxes), len(flat.junctions)
     yield CheckItem("types", True, f"{boxes} boxes at {junctions} junctions" + (f"; {remarks}" if remarks else ""))

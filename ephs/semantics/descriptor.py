@@ -1,25 +1,26 @@
-"""The square descriptor form of a flat system, assembled without choosing causality.
+"""The square descriptor form of a system, assembled without choosing causality.
 
 Unknowns: the rate of every storage port, the effort of every power junction, the multipliers of the constraints, the
 flow of every outer port whose effort is prescribed. Equations: e = dH at the storages, flows sum to zero at every
 power junction, the constraints, e = input. So it is square for every pattern.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import final
 
 import numpy as np
 
-from ephs.operad import Path, Quantity
+from ephs.operad import ROOT, Path, Quantity
 from ephs.semantics.behaviour import Continuous, Natural, Relating, Storing
 from ephs.semantics.bundle import Array
 from ephs.semantics.errors import AssemblyError
+from ephs.semantics.numbering import Index, Numbering, bearing_junctions, number_flat, starts
 from ephs.semantics.primitives import Point, Primitive, Reversible, Storage
 from ephs.semantics.spaces import manifold
 from ephs.semantics.system import System
 
-__all__ = ["Descriptor", "Input", "assemble"]
+__all__ = ["Descriptor", "Input", "assemble", "descriptor_of"]
 
 
 @final
@@ -88,37 +89,107 @@ class Input:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Descriptor:
-    """Index tables of the descriptor form, and its plain evaluation."""
+    """The descriptor form of a system, and its plain evaluation.
+
+    Parameters
+    ----------
+    system
+        The system, nested or flat; slots have the paths of the flattened one, and are made when they are asked for.
+    numbering
+        Which component lies on which junctions and reads which states.
+    """
 
     system: System
-    states: tuple[StateSlot, ...]
-    junctions: tuple[JunctionSlot, ...]
-    components: tuple[ComponentSlot, ...]
+    numbering: Numbering
+    _states: tuple[StateSlot, ...] | None = field(default=None, init=False, repr=False)
+    _junctions: tuple[JunctionSlot, ...] | None = field(default=None, init=False, repr=False)
+    _components: tuple[ComponentSlot, ...] | None = field(default=None, init=False, repr=False)
 
     @property
-    def point_size(self) -> int:
-        """Length of the state vector."""
-        return sum(slot.quantity.space.size for slot in self.states)
+    def states(self) -> tuple[StateSlot, ...]:
+        """The states, storage by storage."""
+        if self._states is None:
+            object.__setattr__(self, "_states", tuple(self._state_slots()))
+        return self._states or ()
 
     @property
-    def rate_size(self) -> int:
-        """Number of rates."""
-        return sum(slot.quantity.space.dim for slot in self.states)
+    def junctions(self) -> tuple[JunctionSlot, ...]:
+        """The power junctions."""
+        if self._junctions is None:
+            n, outer = self.numbering, set(self.numbering.outer.tolist())
+            of: list[int] = n.junctions.tolist()
+            at: list[int] = self._efforts.tolist()
+            found = tuple(
+                JunctionSlot(path, n.quantities[of[i]], at[i], i in outer)
+                for i, path in enumerate(bearing_junctions(self.system.flatten()))
+            )
+            object.__setattr__(self, "_junctions", found)
+        return self._junctions or ()
 
     @property
-    def effort_size(self) -> int:
-        """Number of efforts."""
-        return sum(slot.quantity.space.dim for slot in self.junctions)
-
-    @property
-    def multiplier_size(self) -> int:
-        """Number of multipliers."""
-        return sum(slot.multipliers for slot in self.components)
+    def components(self) -> tuple[ComponentSlot, ...]:
+        """The components."""
+        if self._components is None:
+            object.__setattr__(self, "_components", tuple(self._component_slots()))
+        return self._components or ()
 
     @property
     def outer(self) -> tuple[JunctionSlot, ...]:
         """The exposed power junctions."""
-        return tuple(slot for slot in self.junctions if slot.exposed)
+        n, efforts = self.numbering, self._efforts
+        ports = [path for path, port in self.system.interface.items() if port.power]
+        return tuple(
+            JunctionSlot(path, n.quantities[n.junctions[i]], int(efforts[i]), True)
+            for path, i in zip(ports, n.outer.tolist(), strict=True)
+        )
+
+    @property
+    def point_size(self) -> int:
+        """Length of the state vector."""
+        return int(self.numbering.sizes(self.numbering.states).sum())
+
+    @property
+    def rate_size(self) -> int:
+        """Number of rates."""
+        return int(self.numbering.dims(self.numbering.states).sum())
+
+    @property
+    def effort_size(self) -> int:
+        """Number of efforts."""
+        return int(self.numbering.dims(self.numbering.junctions).sum())
+
+    @property
+    def multiplier_size(self) -> int:
+        """Number of multipliers."""
+        return int(self.numbering.multipliers.sum())
+
+    @property
+    def _efforts(self) -> Index:
+        """(junctions,) where the effort of each lies."""
+        return starts(self.numbering.dims(self.numbering.junctions))
+
+    def _state_slots(self) -> Iterator[StateSlot]:
+        at = rate = 0
+        for path, primitive in self.system.leaves():
+            if isinstance(primitive, Storage):
+                for port, _, quantity in primitive.bundle.items():
+                    yield StateSlot(path / port, quantity, at, rate)
+                    at += quantity.space.size
+                    rate += quantity.space.dim
+
+    def _component_slots(self) -> Iterator[ComponentSlot]:
+        n, states = self.numbering, self.states
+        dims, efforts = n.dims(n.junctions), self._efforts
+        at = list(zip(efforts[n.wires].tolist(), (efforts + dims)[n.wires].tolist(), strict=True))
+        multipliers = starts(n.multipliers).tolist()
+        reads: list[int] = n.reads.tolist()
+        wire = read = 0
+        for (path, primitive), multiplier in zip(self.system.leaves(), multipliers, strict=True):
+            wires, width = len(primitive.bundle.ports), len(primitive.reads)
+            index = tuple(i for first, last in at[wire : wire + wires] for i in range(first, last))
+            slots = tuple(states[i] for i in reads[read : read + width])
+            yield ComponentSlot(path, primitive, index, slots, multiplier)
+            wire, read = wire + wires, read + width
 
     def pack(self, state: Mapping[Path, Array]) -> Array:
         """The state vector (point_size,) from values by path."""
@@ -207,67 +278,28 @@ def _related(local: Relating, e: Array, lam: Array, read: Mapping[Path, Array]) 
     return local.relate(e, lam, read)
 
 
+def descriptor_of(system: System) -> Descriptor:
+    """The descriptor form of a system: what fills many boxes is numbered once, else the system is flattened.
+
+    Raises
+    ------
+    AssemblyError
+        As of `assemble`.
+    """
+    from ephs.semantics.kinds import number_by_kinds, repeats
+
+    while system.pattern.is_identity and isinstance(inner := system.fillings[ROOT], System):
+        system = inner
+    numbering = number_by_kinds(system) if repeats(system) else None
+    return assemble(system.flatten()) if numbering is None else Descriptor(system, numbering)
+
+
 def assemble(flat: System) -> Descriptor:
-    """Number the unknowns of a flat system.
+    """The descriptor form of a flat system, component by component: what any shorter way is held against.
 
     Raises
     ------
     AssemblyError
         A state stored twice, or read and stored nowhere.
     """
-    pattern = flat.pattern
-    junctions: list[JunctionSlot] = []
-    at = 0
-    bearing = {port.junction for box in pattern.boxes.values() for port in box.ports.values() if port.power}
-    for path, junction in pattern.junctions.items():
-        exposed = junction.exposed and junction.power
-        if path in bearing or exposed:
-            junctions.append(JunctionSlot(path, junction.quantity, at, exposed))
-            at += junction.quantity.space.dim
-    by_path = {slot.path: slot for slot in junctions}
-    states, provider = _states(flat)
-    components: list[ComponentSlot] = []
-    multiplier = 0
-    for path, primitive in flat.fillings.items():
-        assert not isinstance(primitive, System)
-        ports = pattern.boxes[path].ports
-        efforts: list[int] = []
-        for port, _, _ in primitive.bundle.items():
-            where = by_path[ports[port].junction].efforts
-            efforts.extend(range(where.start, where.stop))
-        reads: list[StateSlot] = []
-        for port in primitive.reads:
-            junction = ports[port].junction
-            slot = provider.get(_class_key(pattern.state_class(junction)))
-            if slot is None:
-                raise AssemblyError("unread-state", path, port=port, junction=junction)
-            reads.append(slot)
-        component = ComponentSlot(path, primitive, tuple(efforts), tuple(reads), multiplier)
-        multiplier += component.multipliers
-        components.append(component)
-    return Descriptor(flat, tuple(states), tuple(junctions), tuple(components))
-
-
-def _class_key(members: frozenset[Path]) -> Path:
-    return min(members)
-
-
-def _states(flat: System) -> tuple[list[StateSlot], dict[Path, StateSlot]]:
-    states: list[StateSlot] = []
-    provider: dict[Path, StateSlot] = {}
-    at = rate = 0
-    for path, primitive in flat.fillings.items():
-        if not isinstance(primitive, Storage):
-            continue
-        for port, _, quantity in primitive.bundle.items():
-            junction = flat.pattern.boxes[path].ports[port].junction
-            key = _class_key(flat.pattern.state_class(junction))
-            if key in provider:
-                found = f"{provider[key].path} and {path / port}"
-                raise AssemblyError("two-storages", path, junction=junction, found=found)
-            slot = StateSlot(path / port, quantity, at, rate)
-            provider[key] = slot
-            states.append(slot)
-            at += quantity.space.size
-            rate += quantity.space.dim
-    return states, provider
+    return Descriptor(flat, number_flat(flat))

@@ -14,7 +14,7 @@ import numpy as np
 from ephs.operad import ROOT, Path, Pattern
 from ephs.semantics.behaviour import Continuous, Natural, Relating, Storing
 from ephs.semantics.bundle import Array, Bundle, Reference
-from ephs.semantics.descriptor import Input
+from ephs.semantics.descriptor import Input, assemble
 from ephs.semantics.errors import SemanticsError
 from ephs.semantics.primitives import Primitive, Reversible
 from ephs.semantics.relations import relation_of
@@ -54,7 +54,7 @@ def solve_flat(
     system: System, state: Mapping[Path, Array], behaviour: Continuous | Natural, inputs: Mapping[Path, Input]
 ) -> Solved:
     """Solve the descriptor form of the flattened system for its unknowns, of least norm where they are not unique."""
-    d = system.descriptor()
+    d = assemble(system.flatten())
     x = d.pack(state)
     given = d.complete_inputs(inputs)
     z, residual = newton(lambda z: d.residual(behaviour, x, given, z), np.zeros(d.unknowns(given)))

@@ -165,10 +165,13 @@ class System:
         return relation_of(self, reference or Reference(), route)
 
     def descriptor(self) -> "Descriptor":
-        """The square descriptor form of the flattened system, assembled without choosing causality."""
-        from ephs.semantics.descriptor import assemble
+        """The square descriptor form, assembled without choosing causality.
 
-        return assemble(self.flatten())
+        A system that fills many boxes as one and the same object is numbered once, and all its copies by index maps.
+        """
+        from ephs.semantics.descriptor import descriptor_of
+
+        return descriptor_of(self)
 
     def equations(self, form: Literal["relation", "descriptor", "reduced"] = "reduced") -> "Equations":
         """The equations of the system, with the names of its junctions; as text, LaTeX, or SymPy's expressions.

@@ -156,19 +156,21 @@ def _compliance(model: Model, values: Array) -> Any:
     columns: list[Index] = []
     entries: list[Array] = []
     plain = np.ones(int(t.counts[1]), dtype=bool)
-    for i in np.flatnonzero(t.kind == STORING):
-        n = int(t.dims[i, 0])
+    storing = np.flatnonzero(t.kind == STORING)
+    for n in np.unique(t.dims[storing, 0]):
         if not n:  # of a fixed joint
             continue
-        places = t.jacobian[t.jacobian_at[i] : t.jacobian_at[i] + n * n]
-        block = -np.where(places >= 0, values[places], 0.0).reshape(n, n)
-        sigma, vectors = np.linalg.eigh(0.5 * (block + block.T)) if n > 1 else (block[0], np.ones((1, 1)))
-        if sigma[-1] > 0.0 and sigma[0] > REGULAR * sigma[-1]:
-            index = t.e_index[t.e_at[i] : t.e_at[i] + n]
-            rows.append(np.repeat(index, n))
-            columns.append(np.tile(index, n))
-            entries.append(((vectors * np.sqrt(sigma)) @ vectors.T).ravel())
-            plain[index] = False
+        these = storing[t.dims[storing, 0] == n]
+        places = t.jacobian[t.jacobian_at[these, None] + np.arange(n * n)]
+        block = -np.where(places >= 0, values[places], 0.0).reshape(-1, n, n)
+        sigma, vectors = np.linalg.eigh(0.5 * (block + block.swapaxes(1, 2)))
+        sound = (sigma[:, -1] > 0.0) & (sigma[:, 0] > REGULAR * sigma[:, -1])
+        index = t.e_index[t.e_at[these[sound], None] + np.arange(n)]
+        rows.append(np.repeat(index, n, axis=1).ravel())
+        columns.append(np.tile(index, (1, n)).ravel())
+        root = np.sqrt(sigma[sound])[:, None, :]
+        entries.append(((vectors[sound] * root) @ vectors[sound].swapaxes(1, 2)).ravel())
+        plain[index.ravel()] = False
     rest = np.flatnonzero(plain)
     whole = (
         np.concatenate([*entries, np.ones(rest.size)]),

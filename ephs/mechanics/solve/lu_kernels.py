@@ -72,19 +72,22 @@ def solve(rows, columns, start, column, diagonal, value, right, x, row):
 
 
 @kernel
-def fill(first, column, start, out, link):
+def fill(first, column, start, out, link, mark):
     """The pattern of L + U by rows, in this order of rows and columns without further pivoting.
 
     The rows of A, their diagonals included, are column[first[i]:first[i+1]], ascending. ``start`` (n + 1,) and ``out``
-    receive the pattern of the factors, ascending too; ``link`` (n + 1,) is scratch. Returns the number of entries, or
-    minus the row at which ``out`` was full, less one.
+    receive the pattern of the factors, ascending too; ``link`` (n + 1,) and ``mark`` (n,) are scratch. Returns the
+    number of entries, or minus the row at which ``out`` was full, less one.
     """
     n = start.shape[0] - 1
     count = 0
     start[0] = 0
+    mark[:] = -1
     for i in range(n):
-        # The row as a linked list in ascending order, n at its end.
+        # The row as a linked list in ascending order, n at its end; what is in it is marked.
         head = column[first[i]]
+        for p in range(first[i], first[i + 1]):
+            mark[column[p]] = i
         for p in range(first[i], first[i + 1] - 1):
             link[column[p]] = column[p + 1]
         link[column[first[i + 1] - 1]] = n
@@ -95,11 +98,12 @@ def fill(first, column, start, out, link):
             for q in range(start[k], start[k + 1]):
                 j = out[q]
                 if j > k:
-                    while link[here] < j:
-                        here = link[here]
-                    if link[here] != j:
+                    if mark[j] != i:
+                        while link[here] < j:
+                            here = link[here]
                         link[j] = link[here]
                         link[here] = j
+                        mark[j] = i
                     here = j
             k = link[k]
         k = head

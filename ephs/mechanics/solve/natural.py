@@ -25,6 +25,7 @@ from ephs.mechanics.solve.natural_kernels import (
 from ephs.mechanics.solve.snapshot import Snapshot, parts
 from ephs.mechanics.solve.sparse import Index
 from ephs.semantics.bundle import Array
+from ephs.semantics.numbering import spans
 
 __all__ = ["Chunk", "Decided", "Natural", "NaturalState", "guessed_efforts", "of_status", "stored_energies"]
 
@@ -262,8 +263,14 @@ class Natural:
 def guessed_efforts(model: Model, x: Array) -> Array:
     """Unknowns at the states x: the efforts of storages, zero where one has none; all else zero."""
     d, n_rate = model.descriptor, int(model.tables.counts[0])
-    z = np.zeros(model.unknowns)
-    for slot in d.components:
+    z, storages = np.zeros(model.unknowns), model.storages()
+    status, _, memory = evaluate_at(storages, x, z, 0.0)
+    if not status:
+        t = storages.tables
+        rates = t.read_w[spans(t.read_w_at, t.dims[:, 2])]
+        z[n_rate + t.e_index[spans(t.e_at, t.dims[:, 0])]] = -memory.residual[rates]
+        return z
+    for slot in d.components:  # one after the other, as one of them has no effort there
         if slot.primitive.kind == "storage":
             with suppress(Exception):
                 z[[n_rate + i for i in slot.efforts]] = slot.primitive.effort(d.point(slot, x), model.reference)

@@ -58,15 +58,17 @@ def order(n: int, row: Index, column: Index, value: Array) -> Elimination:
     scale_r, scale_c = _equilibrate(n, row, column, value)
     scaled = value * scale_r[row] * scale_c[column]
     pattern = sparse.csc_matrix((scaled, (row, column)), shape=(n, n))
-    best: Elimination | None = None
+    plans: list[_Plan] = []
     for choice in ("COLAMD", "MMD_AT_PLUS_A"):
         factor = splu(pattern, permc_spec=choice, diag_pivot_thresh=0.1, options={"SymmetricMode": choice != "COLAMD"})
         rows, columns = np.argsort(factor.perm_r).astype(np.int64), np.argsort(factor.perm_c).astype(np.int64)
-        found = _eliminate(n, row, column, rows, columns)
-        if best is None or found.fill < best.fill:
-            best = found
-    assert best is not None
-    return best
+        plans.append(_Plan.of(n, row, column, rows, columns))
+    room = 4 * row.size + n
+    while True:  # of two orders that fit into some room the better one; the other may fill a hundred times as much
+        found = [made for plan in plans if (made := plan.filled(room)) is not None]
+        if found:
+            return min(found, key=lambda made: made.fill)
+        room *= 2
 
 
 def _equilibrate(n: int, row: Index, column: Index, value: Array) -> tuple[Array, Array]:
@@ -83,26 +85,44 @@ def _equilibrate(n: int, row: Index, column: Index, value: Array) -> tuple[Array
     return scale_r, scale_c
 
 
-def _eliminate(n: int, row: Index, column: Index, rows: Index, columns: Index) -> Elimination:
-    """What rows and columns taken in the given order, without further pivoting, fill."""
-    to_row, to_column = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
-    to_row[rows], to_column[columns] = np.arange(n), np.arange(n)
-    # Places as single numbers, row by row, so that they sort and are found again.
-    given = to_row[row] * n + to_column[column]
-    own = np.arange(n) * n + np.arange(n)
-    places = np.unique(np.concatenate([given, own]))
-    first = np.searchsorted(places, np.arange(n + 1) * n).astype(np.int64)
-    start, link = np.zeros(n + 1, dtype=np.int64), np.zeros(n + 1, dtype=np.int64)
-    room = 4 * places.size
-    while True:
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class _Plan:
+    """Rows and columns in an order to be taken without further pivoting.
+
+    Parameters
+    ----------
+    places
+        Entries as single numbers, row · n + column in that order, ascending, with the diagonal.
+    own, given
+        The diagonal's places, and those of the matrix' entries.
+    """
+
+    rows: Index
+    columns: Index
+    places: Index
+    own: Index
+    given: Index
+
+    @staticmethod
+    def of(n: int, row: Index, column: Index, rows: Index, columns: Index) -> "_Plan":
+        to_row, to_column = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
+        to_row[rows], to_column[columns] = np.arange(n), np.arange(n)
+        given, own = to_row[row] * n + to_column[column], np.arange(n) * n + np.arange(n)
+        return _Plan(rows, columns, np.unique(np.concatenate([given, own])), own, given)
+
+    def filled(self, room: int) -> Elimination | None:
+        """The elimination, None where its factors do not fit into so many entries."""
+        n = self.rows.size
+        first = np.searchsorted(self.places, np.arange(n + 1) * n).astype(np.int64)
+        start, link, mark = (np.zeros(n + 1, dtype=np.int64) for _ in range(3))
         out = np.empty(room, dtype=np.int64)
-        count = fill(first, places % n, start, out, link)
-        if count >= 0:
-            break
-        room *= 2
-    flat = out[:count].copy()
-    filled = np.repeat(np.arange(n), np.diff(start)) * n + flat
-    return Elimination(
-        rows, columns, start, flat, np.searchsorted(filled, own).astype(np.int64),
-        np.searchsorted(filled, given).astype(np.int64),
-    )  # fmt: skip
+        count = fill(first, self.places % n, start, out, link, mark)
+        if count < 0:
+            return None
+        flat = out[:count].copy()
+        filled = np.repeat(np.arange(n), np.diff(start)) * n + flat
+        return Elimination(
+            self.rows, self.columns, start, flat, np.searchsorted(filled, self.own).astype(np.int64),
+            np.searchsorted(filled, self.given).astype(np.int64),
+        )  # fmt: skip

@@ -1,0 +1,285 @@
+"""The numbering of a nested system without flattening it: each kind of part once, its copies by index maps.
+
+Fillings that are one and the same object are of one kind. A kind is numbered on its own; a box that it fills adds its
+numbers to those of the level around, through a map of the kind's junctions and states to those of the level, and all
+boxes of one kind do so at once. The numbers are those of the flattened system.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ephs.operad import Path, Pattern, Quantity
+from ephs.semantics.numbering import Index, Interned, Numbering
+from ephs.semantics.primitives import Primitive, Storage
+from ephs.semantics.system import Filling, System
+
+__all__ = ["number_by_kinds", "repeats"]
+
+WORTH = 8
+"""Kinds are numbered from so many components for each different filling on: a kind costs as much as some components."""
+COMPONENTS, WIRES, READS, STATES, JUNCTIONS = range(5)
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Kind:
+    """A filling, numbered on its own.
+
+    Junctions and states of the outside have numbers behind its own: ``junctions.size + port`` is the junction of an
+    outer port, ``states.size + class`` the state of a class of outer ports that nothing inside stores.
+
+    Parameters
+    ----------
+    ports
+        The outer ports.
+    primitive, wires, reads, junctions, states
+        As of a `Numbering`.
+    bearing
+        (ports,) whether a component's power port lies on the port's junction, and it is a power port itself.
+    classes
+        (ports,) class of each outer port: ports of one class share their state.
+    stored
+        (classes,) the state inside that is the class', −1 where nothing inside stores it.
+    """
+
+    ports: tuple[Path, ...]
+    primitive: Index
+    wires: Index
+    reads: Index
+    junctions: Index
+    states: Index
+    bearing: NDArray[np.bool_]
+    classes: Index
+    stored: Index
+
+    @property
+    def first(self) -> Index:
+        """(classes,) one outer port of each class."""
+        return np.unique(self.classes, return_index=True)[1].astype(np.int64)
+
+    @property
+    def counts(self) -> Index:
+        """How many components, wires, reads, states and junctions there are inside."""
+        found = (self.primitive, self.wires, self.reads, self.states, self.junctions)
+        return np.array([numbers.size for numbers in found], dtype=np.int64)
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Copies:
+    """The boxes of a level that one kind fills.
+
+    Parameters
+    ----------
+    box
+        (copies,) their numbers in the order of the fillings.
+    at
+        (copies, ports) the junctions of the level on which their ports lie.
+    """
+
+    kind: Kind
+    box: Index
+    at: Index
+
+
+def number_by_kinds(system: System) -> Numbering | None:
+    """Number a system by its kinds.
+
+    Returns
+    -------
+    Numbering or None
+        That of the flattened system. None where a state is stored twice, or read and stored nowhere: to number the
+        flattened system says where.
+    """
+    kinds = _Kinds()
+    whole, outer = kinds.level(system, closed=True)
+    if not kinds.sound or (whole.reads >= whole.states.size).any():
+        return None
+    return Numbering(
+        tuple(kinds.primitives.values), tuple(kinds.quantities.values),
+        whole.primitive, whole.wires, whole.reads, whole.junctions, outer, whole.states,
+    )  # fmt: skip
+
+
+def repeats(system: System) -> bool:
+    """Whether so much of a system is the same that kinds are worth it."""
+    counts: dict[int, int] = {}
+    return _count(system, counts) >= WORTH * len(counts)
+
+
+def _count(filling: Filling, known: dict[int, int]) -> int:
+    """How many components there are; each different filling is looked at once."""
+    found = known.get(id(filling))
+    if found is None:
+        inner = filling.fillings.values() if isinstance(filling, System) else ()
+        found = sum(_count(part, known) for part in inner) if isinstance(filling, System) else 1
+        known[id(filling)] = found
+    return found
+
+
+@final
+class _Kinds:
+    """The kinds that were met, and whether each state that is read is stored once."""
+
+    def __init__(self) -> None:
+        self.primitives, self.quantities = Interned[Primitive](), Interned[Quantity]()
+        self.sound = True
+        self._known: dict[int, Kind] = {}
+
+    def of(self, filling: Filling) -> Kind:
+        """The kind of a filling."""
+        found = self._known.get(id(filling))
+        if found is None:
+            found = self.level(filling)[0] if isinstance(filling, System) else self._primitive(filling)
+            self._known[id(filling)] = found
+        return found
+
+    def _primitive(self, primitive: Primitive) -> Kind:
+        """A component: each outer port is a class of its own, and those of a storage are states."""
+        ports = tuple(primitive.interface)
+        bundle, place = primitive.bundle, {port: i for i, port in enumerate(ports)}
+        storing = isinstance(primitive, Storage)
+        stored = np.full(len(ports), -1)
+        if storing:
+            stored[[place[port] for port in bundle.ports]] = np.arange(len(bundle.ports))
+        states = [self.quantities.number(bundle.quantity(port)) for port in bundle.ports] if storing else []
+        reads = range(len(bundle.ports)) if storing else [place[port] for port in primitive.reads]
+        return Kind(
+            ports=ports,
+            primitive=_index([self.primitives.number_of_object(primitive)]),
+            wires=_index([place[port] for port in bundle.ports]),
+            reads=_index(reads),
+            junctions=_index([]),
+            states=_index(states),
+            bearing=np.array([primitive.interface[port].power for port in ports], dtype=np.bool_),
+            classes=np.arange(len(ports)),
+            stored=stored,
+        )
+
+    def level(self, system: System, *, closed: bool = False) -> tuple[Kind, Index]:
+        """A pattern and what fills it, numbered; and the junctions of its outer power ports.
+
+        Parameters
+        ----------
+        closed
+            Whether nothing is around: the outer ports' junctions are numbered among its own.
+        """
+        pattern, copies = system.pattern, self._copies(system)
+        start, total = _starts(system, copies)
+        exposed = np.array([j.exposed for j in pattern.junctions.values()], dtype=np.bool_)
+        power = exposed & np.array([j.power for j in pattern.junctions.values()], dtype=np.bool_)
+        bearing = np.zeros(exposed.size, dtype=np.bool_)
+        for c in copies:
+            bearing[c.at[:, c.kind.bearing]] = True
+        own = (bearing | power) if closed else (bearing & ~power)
+        inner = int(own.sum())
+        number = np.full(exposed.size, -1)
+        number[own] = np.arange(inner)
+        start[JUNCTIONS] += inner
+        total[JUNCTIONS] += inner
+        ports = np.flatnonzero(exposed)
+        outer = number[power]
+        if not closed:
+            number[ports] = np.where(power[ports], total[JUNCTIONS] + np.arange(ports.size), number[ports])
+        label = _labels(pattern, copies)
+        stores = self._stores(copies, start, label)
+        found, classes = np.unique(label[ports], return_inverse=True)
+        outside = np.full(exposed.size, -1)
+        outside[found] = total[STATES] + np.arange(found.size)
+        state = np.where(stores >= 0, stores, outside)[label]
+        arrays = [np.empty(int(count), dtype=np.int64) for count in total]
+        quantities = [j.quantity for j, mine in zip(pattern.junctions.values(), own, strict=True) if mine]
+        arrays[JUNCTIONS][:inner] = [self.quantities.number(quantity) for quantity in quantities]
+        for c in copies:
+            kind = c.kind
+            junctions = _map(start[JUNCTIONS, c.box], kind.junctions.size, number[c.at])
+            states = _map(start[STATES, c.box], kind.states.size, state[c.at[:, kind.first]])
+            blocks = (kind.primitive, junctions[:, kind.wires], states[:, kind.reads], kind.states, kind.junctions)
+            for i, block in enumerate(blocks):
+                arrays[i][start[i, c.box][:, None] + np.arange(block.shape[-1])] = block
+        self.sound = self.sound and not (arrays[READS] < 0).any()
+        kind = Kind(
+            tuple(pattern.interface), arrays[COMPONENTS], arrays[WIRES], arrays[READS], arrays[JUNCTIONS],
+            arrays[STATES], (bearing & power)[ports], classes.astype(np.int64), stores[found],
+        )  # fmt: skip
+        return kind, outer
+
+    def _copies(self, system: System) -> list[Copies]:
+        pattern = system.pattern
+        index = {path: i for i, path in enumerate(pattern.junctions)}
+        boxes: dict[int, list[int]] = {}
+        wiring: dict[int, list[list[int]]] = {}
+        kinds: dict[int, Kind] = {}
+        for number, (box, filling) in enumerate(system.fillings.items()):
+            same = id(filling)
+            if same not in kinds:
+                kinds[same], boxes[same], wiring[same] = self.of(filling), [], []
+            ports = pattern.boxes[box].ports
+            boxes[same].append(number)
+            wiring[same].append([index[ports[port].junction] for port in kinds[same].ports])
+        return [
+            Copies(kind, _index(boxes[same]), _index(wiring[same]).reshape(len(boxes[same]), len(kind.ports)))
+            for same, kind in kinds.items()
+        ]
+
+    def _stores(self, copies: list[Copies], start: Index, label: Index) -> Index:
+        """(labels,) the state that lives on the junctions of each label, −1 where none does."""
+        out = np.full(label.size, -1)
+        places: list[Index] = [_index([])]
+        states: list[Index] = [_index([])]
+        for c in copies:
+            storing = np.flatnonzero(c.kind.stored >= 0)
+            if storing.size:
+                places.append(label[c.at[:, c.kind.first[storing]]].ravel())
+                states.append((start[STATES, c.box][:, None] + c.kind.stored[storing]).ravel())
+        place, state = np.concatenate(places), np.concatenate(states)
+        out[place] = state
+        self.sound = self.sound and bool((out[place] == state).all())
+        return out
+
+
+def _starts(system: System, copies: list[Copies]) -> tuple[Index, Index]:
+    """(5, boxes) numbers before those of each box, and (5,) how many there are in all boxes."""
+    count = np.zeros((5, len(system.fillings)), dtype=np.int64)
+    for c in copies:
+        count[:, c.box] = c.kind.counts[:, None]
+    start = np.cumsum(count, axis=1) - count
+    number = {box: i for i, box in enumerate(system.fillings)}
+    order = _index([number[box] for box in system.pattern.boxes])  # junctions come in the pattern's order
+    start[JUNCTIONS, order] = np.cumsum(count[JUNCTIONS, order]) - count[JUNCTIONS, order]
+    return start, count.sum(axis=1)
+
+
+def _labels(pattern: Pattern, copies: list[Copies]) -> Index:
+    """(junctions,) equal for junctions that share their state, by links or by what fills the boxes."""
+    index = {path: i for i, path in enumerate(pattern.junctions)}
+    pairs = [(index[a], index[b]) for group in pattern.links for a, b in pairwise(group)]
+    for c in copies:
+        first = c.kind.first[c.kind.classes]
+        for port in np.flatnonzero(first != np.arange(first.size)):
+            pairs += zip(c.at[:, first[port]].tolist(), c.at[:, port].tolist(), strict=True)
+    leader = list(range(len(index)))
+
+    def find(i: int) -> int:
+        while leader[i] != i:
+            leader[i] = leader[leader[i]]
+            i = leader[i]
+        return i
+
+    for a, b in pairs:
+        leader[find(a)] = find(b)
+    return _index([find(i) for i in leader] if pairs else leader)
+
+
+def _map(start: Index, inner: int, outside: Index) -> Index:
+    """(copies, inner + outside) what a kind's numbers are on the level, copy by copy."""
+    return np.hstack([start[:, None] + np.arange(inner), outside])
+
+
+def _index(numbers: Sequence[int] | Sequence[Sequence[int]]) -> Index:
+    return np.array(numbers, dtype=np.int64)
