@@ -8,12 +8,16 @@ from hypothesis import strategies as st
 from ephs.mechanics import components
 from ephs.operad import Interface, Path
 from ephs.operad import quantity as quantities
-from ephs.semantics import Irreversible, Reference, Reversible, Storage, library, structures
+from ephs.semantics import Irreversible, Reference, Reversible, Storage, constructors, library, structures
 from ephs.semantics.bundle import Array, Bundle
 from ephs.semantics.primitives import Point
 from ephs.semantics.spaces import Pair
 
 __all__ = ["generators", "irreversibles", "reversibles", "storages"]
+
+
+READING = st.sampled_from((False, True, True, True))
+"""Whether a component reads the states that it can."""
 
 
 def generators() -> st.SearchStrategy[np.random.Generator]:
@@ -44,6 +48,8 @@ def storages(draw: st.DrawFn, interface: Interface) -> Storage:
         if quantity.kind == "relative_pose":
             pair = Pair.from_space(quantity.space)
             return _renamed(components.pair_spring(pair, np.full(pair.dim, 1.5), np.zeros(pair.dim)), interface)
+        if quantity.space.size == 1 and not quantity.environment and draw(st.booleans()):
+            return _quartic(interface, rng.uniform(0.5, 3.0), rng.uniform(0.1, 0.5))
     parity = bundle.parity()
     factor = rng.standard_normal((bundle.size, bundle.size))
     matrix = factor @ factor.T + np.eye(bundle.size)
@@ -77,12 +83,12 @@ def reversibles(
     side = float(draw(st.sampled_from(constrained)))
     constraint = rng.standard_normal((rows, n)) * (parity == side) @ keep
     constraint = constraint[np.linalg.norm(constraint, axis=1) > 0.1]
-    used = reads if reads and draw(st.booleans()) else ()
+    used = reads if reads and draw(READING) else ()
     if not used:
         return structures.constant_structure("random Dirac structure", interface, skew, constraint)
 
     def structure(x: Point) -> tuple[Array, Array]:
-        return (1.0 + 0.5 * np.cos(sum(float(v @ v) for v in x.values()))) * skew, constraint
+        return _scale(x) * skew, constraint
 
     rows = constraint.shape[0]
     return Reversible("random Dirac structure", interface, structure, used, multipliers=rows, trusted=True)
@@ -96,11 +102,11 @@ def irreversibles(draw: st.DrawFn, interface: Interface, *, reads: tuple[Path, .
     strength = np.abs(rng.standard_normal((bundle.size, bundle.size)))
     fixed = sum((bundle.indicator(kind) for kind in bundle.environment_kinds() if kind != "entropy"), np.zeros(1))
     moving = np.flatnonzero(np.broadcast_to(fixed, bundle.size) == 0.0)
-    used = reads if reads and draw(st.booleans()) else ()
+    used = reads if reads and draw(READING) else ()
 
     def matrix(x: Point, e: Array, reference: Reference) -> Array:
         energy = e + bundle.intensive(reference)
-        scale = 1.0 + 0.5 * np.cos(sum(float(v @ v) for v in x.values()))
+        scale = _scale(x)
         out = np.zeros((bundle.size, bundle.size))
         for i in moving:
             for j in moving[moving > i]:
@@ -110,6 +116,20 @@ def irreversibles(draw: st.DrawFn, interface: Interface, *, reads: tuple[Path, .
         return out
 
     return Irreversible("random Onsager structure", interface, matrix, used, trusted=True)
+
+
+def _scale(x: Point) -> float:
+    """A positive number that depends on each entry of the states, but not on signs: even, and of rotations."""
+    return 1.0 + 0.5 * float(np.cos(sum(float(np.arange(1.0, v.size + 1.0) @ v**2) for v in x.values())))
+
+
+def _quartic(interface: Interface, stiffness: float, hardening: float) -> Storage:
+    """A storage of one's own, from a function."""
+
+    def energy(**states: Any) -> Any:
+        return sum(0.5 * stiffness * x**2 + 0.25 * hardening * x**4 for x in states.values())
+
+    return constructors.storage({str(port): kind.quantity for port, kind in interface.items()}, energy, name="quartic")
 
 
 def _turning(interface: Interface, stiffness: float) -> Storage:

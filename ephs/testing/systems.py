@@ -1,15 +1,16 @@
 """Strategies for systems, and checks of their laws."""
 
 from collections.abc import Mapping
-from typing import Any
 
 from hypothesis import strategies as st
 from hypothesis.errors import InvalidArgument
 
-from ephs.operad import Directory, Nesting, Path, Pattern, PortType, Quantity, junction, quantity
+from ephs.operad import Interface, Nesting, Path, Quantity, Space, quantity
 from ephs.semantics import Irreversible, Reference, Reversible, Storage, System
 from ephs.semantics.laws import Probe, random_probe, system_law
+from ephs.semantics.spaces import codes, manifold
 from ephs.semantics.system import Filling
+from ephs.testing.levels import levels
 from ephs.testing.primitives import irreversibles, reversibles, storages
 
 __all__ = [
@@ -32,8 +33,9 @@ GROUPS = (
     (quantity.relative_pose("spherical"), quantity.joint_momentum("spherical"), quantity.entropy),
     (quantity.joint_momentum("planar"), quantity.displacement, quantity.entropy),
 )
+STRETCH, PULL = Quantity("stretch", Space("real", 1, 1), 1), Quantity("pull", Space("real", 1, 1), -1)
+OWN = ((STRETCH, PULL, quantity.entropy), (PULL, quantity.charge, quantity.entropy, STRETCH))
 """Quantities that have something to exchange: of either parity, and heat."""
-Ports = Mapping[str, PortType]
 
 
 @st.composite
@@ -44,8 +46,13 @@ def systems(
     max_junctions: int = 3,
     isolated: bool | None = None,
     groups: bool = True,
+    posed: bool = True,
 ) -> System:
-    """Hierarchical systems that have a motion: each state has one storage, at the level where its junction is inside.
+    """Hierarchical systems that have a motion: each state has one storage, at any level.
+
+    Among them are states that parts show to the levels around them or identify, that are read several levels away
+    from their storage, and that have several balances of flows, which are links of the flat pattern; components and
+    quantities of one's own.
 
     Parameters
     ----------
@@ -57,6 +64,8 @@ def systems(
         Whether there are no outer ports; either where None.
     groups
         Whether states on Lie groups occur beside real ones.
+    posed
+        Whether each state has one storage; else some have two, or none, and there is no motion but a relation.
 
     Raises
     ------
@@ -66,79 +75,36 @@ def systems(
     for name, value in (("max_depth", max_depth), ("max_junctions", max_junctions)):
         if value < 1:
             raise InvalidArgument(f"{name}={value}: expected at least 1")
-    pool = draw(st.sampled_from(SCALARS + GROUPS if groups else SCALARS))
+    pool = draw(st.sampled_from(SCALARS + OWN + (GROUPS if groups else ())))
     alone = draw(st.booleans()) if isolated is None else isolated
-    top = _levels(depth=max_depth, most=max_junctions, pool=pool, ports={}, open_count=0 if alone else 1)
-    return draw(top)
-
-
-@st.composite
-def _levels(
-    draw: st.DrawFn, *, depth: int, most: int, pool: tuple[Quantity, ...], ports: Ports, open_count: int
-) -> System:
-    """One level with the given outer ports; it stores the states of the junctions that it adds."""
-    junctions: dict[str, Any] = {
-        name: junction(port.quantity, exposed=True, power=port.power) for name, port in ports.items()
-    }
-    boxes: dict[str, dict[str, str]] = {}
-    parts: dict[str, Filling] = {}
-    count = draw(st.integers(1, most))
-    first = draw(st.integers(0, len(pool) - 1))
-    for i in range(count):
-        # neighbours of the pool, as junctions of one quantity only have little to exchange
-        name, drawn = f"j{i}", pool[(first + i) % len(pool)]
-        junctions[name] = junction(drawn, exposed=i < open_count)
-        interface = Directory({"x": PortType(drawn)})
-        boxes[f"store{i}"], parts[f"store{i}"] = {"x": name}, draw(storages(interface))
-    powers = [name for name, j in junctions.items() if j.power]
-    waiting = list(ports)
-    for i in range(draw(st.integers(1, 2))):
-        # every outer port needs something on it inside: the first box takes them all
-        names = waiting + draw(st.lists(st.sampled_from(powers), min_size=min(3, len(powers)), unique=True))
-        # now and then two ports of one box on one junction
-        names += draw(st.lists(st.sampled_from(powers), max_size=1))
-        waiting = []
-        read = draw(st.lists(st.sampled_from(sorted(junctions)), max_size=1))
-        wires: dict[str, str] = {}
-        content: dict[str, PortType] = {}
-        for k, name in enumerate([*names, *read]):
-            power = junctions[name].power and k < len(names)
-            wires[f"p{k}"] = name if power else f"~{name}"
-            content[f"p{k}"] = PortType(junctions[name].quantity, power)
-        box = f"box{i}"
-        boxes[box], parts[box] = wires, draw(_process(depth, most, pool, content))
-    return System.of(Pattern(junctions=junctions, boxes=boxes), parts)
-
-
-def _process(depth: int, most: int, pool: tuple[Quantity, ...], content: Ports) -> st.SearchStrategy[Filling]:
-    interface = Directory(dict(content))
-    reads = tuple(port for port, port_type in interface.items() if not port_type.power)
-    choices: list[st.SearchStrategy[Filling]] = [
-        # velocities only: a constraint on temperatures that an environment gives anyway leaves its flow undetermined
-        reversibles(interface, reads=reads, constrained=(-1,)),
-        irreversibles(interface, reads=reads),
-    ]
-    if depth > 1:
-        choices.append(_levels(depth=depth - 1, most=most, pool=pool, ports=content, open_count=0))
-    return st.one_of(choices)
+    count = 0 if alone else 1
+    return draw(levels(depth=max_depth, most=max_junctions, pool=pool, ports={}, open_count=count, posed=posed))
 
 
 @st.composite
 def fillings(draw: st.DrawFn, nesting: Nesting) -> System:
-    """Systems on a drawn nesting of patterns, well-posed or not: they have a relation, if not always a motion."""
-    flat = nesting.top_down()
-    stored: set[frozenset[Path]] = set()
+    """Systems on a drawn nesting of patterns, well-posed or not: they have a relation, if not always a motion.
+
+    States may be stored by several, by nobody, or outside only.
+    """
     leaves: dict[Path, Storage | Reversible | Irreversible] = {}
-    for box, content in flat.boxes.items():
+    for box, content in nesting.top_down().boxes.items():
         interface = content.interface
-        classes = [flat.state_class(port.junction) for port in content.ports.values()]
-        single = len(classes) == 1 and all(port.power for port in content.ports.values())
-        if single and classes[0] not in stored and draw(st.booleans()):
-            stored.add(classes[0])
+        reads = tuple(port for port, port_type in interface.items() if not port_type.power)
+        if _storable(interface) and draw(st.sampled_from((False, True, True))):
             leaves[box] = draw(storages(interface))
         else:
-            leaves[box] = draw(st.one_of(reversibles(interface), irreversibles(interface)))
+            leaves[box] = draw(st.one_of(reversibles(interface, reads=reads), irreversibles(interface, reads=reads)))
     return _filled(nesting, leaves, Path())
+
+
+def _storable(interface: Interface) -> bool:
+    """Whether `storages` has one for it."""
+    found = [port_type.quantity for port_type in interface.values()]
+    vectors = all(manifold(each.space).code == codes.VECTOR and not each.environment for each in found)
+    return all(port_type.power for port_type in interface.values()) and (
+        len(found) == 1 or (len(found) > 1 and vectors)
+    )
 
 
 def _filled(nesting: Nesting, leaves: Mapping[Path, Filling], path: Path) -> System:

@@ -85,13 +85,23 @@ GROUPS = {
             "ephs/semantics/primitives.py",
             "ephs/semantics/structures.py",
             "ephs/semantics/library.py",
-            "ephs/semantics/laws.py",
             "ephs/semantics/kernels.py",
             "ephs/semantics/natural.py",
             "ephs/semantics/behaviour.py",
             "ephs/semantics/constructors.py",
         ),
         ("tests/semantics", *PARTS),
+    ),
+    "relations": Group(
+        (
+            "ephs/semantics/relations/*.py",
+            "ephs/semantics/laws.py",
+            "ephs/semantics/subspace.py",
+        ),
+        tuple(
+            f"tests/semantics/test_{name}.py"
+            for name in ("base", "controls", "edge_cases", "laws", "relations", "subspace")
+        ),
     ),
     "integrators": Group(
         (

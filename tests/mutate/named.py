@@ -93,6 +93,40 @@ BREAKS = {
         "if declared := None:",
     ),
     "import, welds": Break("ephs/mechanics/imports/mjcf_links.py", "pose(data[3:6], data[6:10])", "pose(data[3:6])"),
+    "base, what a part identifies": Break(
+        "ephs/semantics/relations/base.py",
+        "one = closure([*pattern.links, *(junctions for junctions, _ in joined)])",
+        "one = closure(pattern.links)",
+    ),
+    "base, links of a level": Break(
+        "ephs/semantics/relations/base.py",
+        "one = closure([*pattern.links, *(junctions for junctions, _ in joined)])",
+        "one = closure(junctions for junctions, _ in joined)",
+    ),
+    "base, shown at every outer port of its class": Break(
+        "ephs/semantics/relations/base.py",
+        "for path in junctions if pattern.junctions[path].exposed))",
+        "for path in junctions if path == min(junctions) and pattern.junctions[path].exposed))",
+    ),
+    "base, diagonal": Break("ephs/semantics/relations/base.py", "if not all(_equal(", "if not any(_equal("),
+    "base, states that nobody stores": Break(
+        "ephs/semantics/relations/base.py",
+        "states |= dict.fromkeys((*each.stores, *each.readers), values[0][1])",
+        "states |= dict.fromkeys((*each.stores, *each.readers), values[0][1] if each.stores else 0.0 * values[0][1])",
+    ),
+    "steps, rates of a state stored twice": Break(
+        "ephs/semantics/natural.py",
+        "rows.extend(z[all_rates[each.stores[0]]] - z[all_rates[other]] for other in each.stores[1:])",
+        "rows.extend([])",
+    ),
+    "functoriality, tolerance": Break(
+        "ephs/semantics/laws.py", "return min(1e-6, 1e-13 * max(", "return max(1e-2, 1e-13 * max("
+    ),
+    "isotropy of everything": Break(
+        "ephs/semantics/laws.py",
+        "return float(np.abs(subspace.basis.T @ form @ subspace.basis).max(initial=0.0))",
+        "return 0.0",
+    ),
     "gluing": Break("ephs/semantics/relations/linear.py", "outer_at[path] + i, -1.0))", "outer_at[path] + i, 1.0))"),
 }
 

@@ -13,6 +13,9 @@ from ephs.semantics import AssemblyError, Reference, Relation, SemanticsError, S
 from ephs.semantics.behaviour import Natural
 from ephs.semantics.laws import random_probe, system_law
 from ephs.semantics.natural import solve_nested
+from ephs.semantics.relations.base import BasePoint
+from ephs.semantics.relations.flat import Flat
+from ephs.semantics.relations.linear import component_relation
 from ephs.semantics.spaces import SE3
 
 ROTATION = np.array([[0.0, -1.0], [1.0, 0.0]])
@@ -97,7 +100,9 @@ def test_a_state_stored_twice_has_a_relation_on_the_diagonal_only(case):
     apart = both(system, {str(first): 1.0, str(second): 2.0})
     assert apart.empty and apart.dimension == 0
     assert str(first) in apart.contradiction and str(second) in apart.contradiction
-    assert apart.rates == there.rates
+    assert apart.rates == there.rates and apart.subspace.ambient == there.subspace.ambient
+    (both_of,) = (each for each in system.relation().classes if len(each.stores) > 1)
+    assert both_of.name == min(first, second) and not both_of.free
     assert apart.distance(there) == there.distance(apart) == 1.0
 
 
@@ -111,6 +116,34 @@ def test_two_rotations_are_one_state_up_to_sign_and_rounding():
     other = np.concatenate([-one[:4], one[4:] * (1.0 + 2e-16)])
     assert not both(system, {"a.q": one, "b.q": other}).contradiction
     assert both(system, {"a.q": one, "b.q": SE3.retract(one, np.full(6, 1e-12))}).contradiction
+
+
+def test_values_are_equal_up_to_rounding_of_their_size():
+    system = TWICE["on one junction"]
+    for value, sign in ((1.0, 1.0), (0.0, 1.0), (1000.0, -1.0)):
+        near, far = (value + sign * k * np.finfo(float).eps * max(1.0, value) for k in (6.0, 12.0))
+        assert not both(system, {"s.q": value, "t.q": near}).contradiction
+        assert both(system, {"s.q": value, "t.q": far}).contradiction
+
+
+def test_the_routes_are_what_they_are_called():
+    system = OPEN(r=READER, **COIL)
+    assert system.relation(route="flat").fibre == Flat(system.flatten()) == system.relation().fibre
+    nested = system.relation(route="nested")
+    assert nested.fibre != Flat(system)
+    assert "fibre" not in repr(nested)
+    alone = component_relation(SPRING, ROOT, BasePoint({Path.of("q"): np.ones(1)}))
+    assert alone.unit == 1.0 and not alone.empty
+
+
+def test_relations_of_other_names_or_other_states_are_not_compared():
+    system = TWICE["on one junction"]
+    one = system.relation().at({"s.q": 1.0})
+    with pytest.raises(ValueError, match="differ in kind"):
+        one.distance(OPEN(r=READER, **COIL).relation().at())
+    lone = Pattern.from_text("j: displacement; s(q=j)")(s=SPRING).relation()
+    with pytest.raises(ValueError, match=r"constant coordinates are 2\.0 and 4\.0"):
+        lone.at({"s.q": 1.0}).distance(lone.at({"s.q": 2.0}))
 
 
 def test_a_state_that_an_outer_port_shows_has_its_value_from_there():
@@ -143,7 +176,13 @@ def test_a_state_shown_at_an_outer_power_port_has_a_value_from_there_too():
     spring = SPRING
     shown = Pattern.from_text("k: displacement, exposed; s(q=k)")(s=spring)
     assert both(shown, {"s.q": 2.0}).distance(both(shown, {}, {"k": 2.0})) <= 1e-15
-    assert both(shown, {"s.q": 2.0}, {"k": 1.0}).empty
+    apart = both(shown, {"s.q": 2.0}, {"k": 1.0})
+    assert apart.empty and apart.subspace.ambient == both(shown).subspace.ambient == 4
+    assert [str(each.name) for each in shown.relation().classes] == ["s.q"]
+    assert [(each.name, each.free) for each in as_relation(lib.pkc()).classes] == [
+        (Path.of("p"), False),
+        (Path.of("q"), False),
+    ]
 
 
 def test_storages_of_one_state_move_together_over_a_step():
@@ -152,13 +191,15 @@ def test_storages_of_one_state_move_together_over_a_step():
         "j: displacement; k: displacement; p: momentum; v: momentum; j ~ k; "
         "s(q=j); t(q=k); m(p); n(p=v); x(q=j, p); y(q=k, p=v)"
     )
-    parts = {"m": lib.point_mass(m=1.0), "n": lib.point_mass(m=1.0), "x": lib.pkc(), "y": lib.pkc()}
-    system = coupled(s=SPRING, t=SPRING, **parts)
+    parts = {"m": lib.point_mass(m=1.0), "x": lib.pkc(), "y": lib.pkc(), "s": SPRING, "t": SPRING}
+    even, uneven = (coupled(parts | {"n": lib.point_mass(m=m)}) for m in (1.0, 2.0))
     state = {"s.q": 1.0, "m.p": 0.5, "n.p": 0.5}
-    solved = solve_nested(system, state, Natural(Reference(), 0.01), {})
+    solved = solve_nested(even, state, Natural(Reference(), 0.01), {})
     assert solved.residual <= 1e-12
     assert solved.rates[Path.of("s.q")] == pytest.approx(solved.rates[Path.of("t.q")], abs=1e-12)
-    assert solve_nested(system, state | {"t.q": 1.1}, Natural(Reference(), 0.01), {}).residual == np.inf
+    # the springs would part, and no force holds them together
+    assert solve_nested(uneven, state, Natural(Reference(), 0.01), {}).residual > 1e-3
+    assert solve_nested(even, state | {"t.q": 1.1}, Natural(Reference(), 0.01), {}).residual == np.inf
 
 
 def test_a_relation_fills_a_box_beside_systems_and_primitives_in_any_order():
