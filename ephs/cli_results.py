@@ -36,6 +36,8 @@ def write_results(solution: "Solution", folder: Path) -> bool:
     for key, (label, form) in _FIGURES.items():
         if summary.get(key) is not None:
             say(f"{label:38}{summary[key]:>12{form}}")
+    if solution.scene is not None and solution.scene.adjusted is not None:
+        say(str(solution.scene.adjusted))
     try:
         from ephs.show.report import write_report
 

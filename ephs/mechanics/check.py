@@ -5,17 +5,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ephs.mechanics.own_units import in_own_units, mobility_of
 from ephs.mechanics.redundancy import dependences, in_words, indeterminate, wrenches_in_words
 from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.scene.state import Snapshot
 from ephs.mechanics.simulate import problem_of_scene, problem_of_system
 from ephs.mechanics.solve.errors import SolveError
 from ephs.mechanics.solve.integrate import Grid, integrate
-from ephs.mechanics.solve.mobility import mobility
 from ephs.mechanics.solve.problem import Problem
 from ephs.mechanics.solve.threads import in_one_thread
 from ephs.semantics.errors import SemanticsError
 from ephs.semantics.laws import Probe, system_law
 from ephs.semantics.report import CheckItem, CheckReport, check_structure
+from ephs.semantics.spaces.rank import ASSEMBLY
 from ephs.semantics.system import System
 
 if TYPE_CHECKING:
@@ -60,6 +62,8 @@ def _items(model: System | Scene, initial: Mapping[str, "ArrayLike"] | None) -> 
     yield check_structure(system)
     unknowns = d.unknowns(problem.inputs(0.0, problem.initial))
     yield CheckItem("assembly", True, f"{len(d.states)} states, {unknowns} equations for as many unknowns")
+    if problem.scene is not None and problem.scene.adjusted is not None:
+        yield CheckItem("adjusted", True, str(problem.scene.adjusted).removeprefix("adjusted: "))
     probe = Probe(system, problem.initial, reference=problem.reference)
     yield _law("Tellegen", probe)
     if d.rate_size + d.effort_size + d.multiplier_size <= LARGEST:
@@ -98,22 +102,27 @@ def _parts(problem: Problem) -> Iterator[CheckItem]:
 
 def _motion(problem: Problem) -> Iterator[CheckItem]:
     """Mobility, redundancy, closure, and the balances over some steps."""
-    found = mobility(problem.descriptor, problem.descriptor.pack(problem.initial), problem.prescribed)
+    own = in_own_units(problem)
+    found = mobility_of(problem)
     motions = f"{found.mobility or 'no'} independent motion{'s' if found.mobility != 1 else ''}"
     yield CheckItem("mobility", True, f"{motions} in this configuration")
     yield from _redundancy(problem, found.redundant)
     try:
-        start = integrate(problem, Grid(0.0, STEPS * STEP, STEP))
+        start = integrate(own, Grid(0.0, STEPS * STEP, STEP))
     except (SolveError, RuntimeError) as error:
         yield CheckItem("motion", False, str(error))
         return
     gap, slip = float(start.constraint_error[0]), float(start.velocity_error[0])
     if problem.scene is not None:
-        yield CheckItem("closure", gap < 1e-8, f"joints are closed to {gap:.1e} m or rad, velocities fit to {slip:.1e}")
+        now = Snapshot.of(problem.scene)
+        near = ASSEMBLY * now.scale(problem.scene.world.gravity).length
+        yield CheckItem("closure", gap < near, f"joints are closed to {gap:.1e} m or rad, velocities fit to {slip:.1e}")
+    elif problem.gaps is not None:
+        yield CheckItem("closure", gap < ASSEMBLY, f"joints are closed to {gap:.1e} m or rad")
     error, books = float(start.energy_error.max()), start.ledgers
     stored = float(np.max(np.sum([np.abs(energy) for energy in books.storages.values()], axis=0), initial=0.0))
     stored += _weight(problem.scene) if problem.scene is not None else 0.0
-    detail = f"energy over {STEPS} steps of {STEP:g} s is balanced to {error:.1e} of what moves"
+    detail = f"energy over {STEPS} steps of {STEP * own.seconds:g} s is balanced to {error:.1e} of what moves"
     balanced = error < 1e-10 or error * books.scale < ROUNDING * stored
     if error >= 1e-10 and balanced:  # next to nothing moves
         detail += f", {error * books.scale / stored:.1e} of what is stored or could be"

@@ -41,6 +41,7 @@ class Inside:
     def __init__(self, solution: "Solution", path: str | Path, scene: "Scene") -> None:
         self._solution, self._path, self.scene = solution, Path.of(path), scene
         self.t, self.name = solution.t, f"{solution.name}.{path}"
+        self.problem = None  # what acts on the mechanism is not a problem of its own
         self._motion = SceneMotion(scene, cast(Any, self))
         for name, _ in scene.all_bodies():
             self._motion.poses(name)

@@ -12,12 +12,12 @@ import numpy as np
 
 from ephs.mechanics.batch import adjoint_inverse, compose, inverse, rotations
 from ephs.mechanics.build import component_path
+from ephs.mechanics.own_motion import OwnMotion, own_motion
 from ephs.mechanics.projection import Held, project, project_dense
-from ephs.mechanics.readout import variables
+from ephs.mechanics.readout import summary, variables
 from ephs.mechanics.scene.geometry import Coupling, coupling_of
 from ephs.mechanics.scene.model import GROUND, Joint, Scene
 from ephs.mechanics.solve.dataset import Variable
-from ephs.mechanics.solve.mobility import mobility
 from ephs.mechanics.solve.threads import in_one_thread
 from ephs.mechanics.wrenches import root_of, wrenches
 from ephs.operad import Path
@@ -211,6 +211,10 @@ class SceneMotion:
 
     # ---- velocities --------------------------------------------------------------------------------------------
 
+    @cached_property
+    def _own(self) -> "OwnMotion | None":
+        return own_motion(self._solution, SceneMotion)
+
     @property
     def twists(self) -> dict[str, Array]:
         """(n, 6) by body."""
@@ -225,6 +229,8 @@ class SceneMotion:
     @in_one_thread
     def _projected(self) -> tuple[dict[str, Array], dict[str, Array]]:
         """Twists nearest to the stored momenta in the mass metric that satisfy the joints, and the joints' rates."""
+        if self._own is not None:
+            return self._own.velocities()
         n = len(self._solution)
         heavy = [name for name, body in self._bodies.items() if body.mass > 0.0]
         light = [name for name, body in self._bodies.items() if not body.mass > 0.0]
@@ -303,6 +309,8 @@ class SceneMotion:
 
     @cached_property
     def _wrenches(self) -> dict[str, Array]:
+        if self._own is not None:
+            return self._own.wrenches()
         return wrenches(self._scene, {path: given.values for path, given in self._solution.inputs.items()}, self)
 
     def variables(self, *, wrenches: bool) -> dict[str, Variable]:
@@ -367,31 +375,4 @@ class SceneMotion:
 
     def summary(self) -> dict[str, Any]:
         """Values at the end, mobility, and the number of redundant constraints."""
-        problem = self._solution.problem
-        out: dict[str, Any] = {}
-        if problem is not None:
-            found = mobility(problem.descriptor, problem.descriptor.pack(problem.initial), problem.prescribed)
-            out |= {"mobility": found.mobility, "redundant_constraints": found.redundant}
-        if not len(self._solution):
-            return out | {"bodies": {}, "joints": {}, "thermal": {}}
-        bodies = {name: self.body(name) for name in self._bodies}
-        joints = {name: self.joint(name) for name in [*self._joints, *self._implicit]}
-        return out | {
-            "bodies": {
-                name: {
-                    "position": body.position[-1].tolist(),
-                    "quaternion": body.quaternion[-1].tolist(),
-                    "velocity": body.velocity[-1].tolist(),
-                    "angular_velocity": body.angular_velocity[-1].tolist(),
-                }
-                for name, body in bodies.items()
-            },
-            "joints": {
-                name: {"coordinate": joint.coordinate[-1].tolist(), "rate": joint.rate[-1].tolist()}
-                for name, joint in joints.items()
-            },
-            "thermal": {
-                name: {"temperature": float(self.thermal(name).temperature[-1])}
-                for name, _ in self._scene.all_thermal()
-            },
-        }
+        return summary(self._scene, self._solution, self, [*self._joints, *self._implicit])

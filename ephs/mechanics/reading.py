@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ephs.mechanics.build import drive_ports, scene_inputs, wrench_port
+from ephs.mechanics.own_units import in_own_units
 from ephs.mechanics.reduction.folded import folded_problem
 from ephs.mechanics.scene.document import scene_from_text
 from ephs.mechanics.scene.model import Scene
@@ -84,10 +85,11 @@ def _of_journal(file: File, model: System | Scene | None, homes: tuple[File, ...
         raise ValueError(f"{file}: a journal of {found.heading['name']}, a system; give it as model=")
     model = model or _scene(found.heading["model"], homes)
     if isinstance(model, Scene):
-        problem = problem_of_scene(model, None, {key: _known(given) for key, given in (run["inputs"] or {}).items()})
+        inputs = {key: _known(given) for key, given in (run["inputs"] or {}).items()}
+        problem = in_own_units(problem_of_scene(model, None, inputs))
     else:
         sides = {port: {side: _known(x) for side, x in given.items()} for port, given in (run["inputs"] or {}).items()}
-        problem = problem_of_system(model, None, sides)
+        problem = problem_of_system(model, None, sides, assemble=False)
     sizes = {slot.path: slot.quantity.space.dim for slot in problem.descriptor.outer}
     unknown = {
         path: Signal(np.full(sizes[path], np.nan), given.effort)

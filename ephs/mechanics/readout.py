@@ -1,16 +1,20 @@
-"""A motion of a scene as labelled arrays: bodies, joints, thermal nodes, markers."""
+"""A motion of a scene as labelled arrays and in figures: bodies, joints, thermal nodes, markers."""
 
+from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any, Protocol
 
 import numpy as np
 
+from ephs.mechanics.own_units import mobility_of
 from ephs.mechanics.scene.geometry import coupling_of
 from ephs.mechanics.scene.model import Joint, Scene
 from ephs.mechanics.solve.dataset import Variable
 from ephs.mechanics.solve.labels import POSE, TWIST, WRENCH, Labels, freedoms
+from ephs.mechanics.solve.solution import Solution
 from ephs.semantics.bundle import Array
 
-__all__ = ["freedoms_of", "variables"]
+__all__ = ["freedoms_of", "summary", "variables"]
 
 AXIS = ("axis", ("x", "y", "z"))
 UNIVERSAL = Labels("universal", ("angle 1", "angle 2"), ("rad", "rad"))
@@ -78,3 +82,35 @@ def variables(scene: Scene, motion: Reading, *, wrenches: bool) -> dict[str, Var
 
 def _stack(values: list[Array], units: str, says: str, *axes: tuple[str, tuple[str, ...]]) -> Variable:
     return Variable(np.stack(values, axis=1), units, says, axes)
+
+
+def summary(scene: Scene, solution: Solution, motion: Any, joints: Sequence[str]) -> dict[str, Any]:
+    """Values at the end, mobility, and the number of redundant constraints; ``joints`` are all, implicit ones too."""
+    out: dict[str, Any] = {}
+    if solution.problem is not None:
+        found = mobility_of(solution.problem)
+        out |= {"mobility": found.mobility, "redundant_constraints": found.redundant}
+    if scene.adjusted is not None:
+        out["adjusted"] = asdict(scene.adjusted)
+    if not len(solution):
+        return out | {"bodies": {}, "joints": {}, "thermal": {}}
+    bodies = {name: motion.body(name) for name, _ in scene.all_bodies()}
+    turning = {name: motion.joint(name) for name in joints}
+    return out | {
+        "bodies": {
+            name: {
+                "position": body.position[-1].tolist(),
+                "quaternion": body.quaternion[-1].tolist(),
+                "velocity": body.velocity[-1].tolist(),
+                "angular_velocity": body.angular_velocity[-1].tolist(),
+            }
+            for name, body in bodies.items()
+        },
+        "joints": {
+            name: {"coordinate": joint.coordinate[-1].tolist(), "rate": joint.rate[-1].tolist()}
+            for name, joint in turning.items()
+        },
+        "thermal": {
+            name: {"temperature": float(motion.thermal(name).temperature[-1])} for name, _ in scene.all_thermal()
+        },
+    }

@@ -17,6 +17,7 @@ import numpy as np
 from ephs.mechanics.directions import Axes, Direction, Place, describe, enumerated, name_directions
 from ephs.mechanics.holding import Hold, Mechanism, redundant
 from ephs.mechanics.scene.adjust import close_loops
+from ephs.mechanics.scene.kinematics import Scale
 from ephs.mechanics.scene.model import Scene
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.rank import CONSTRAINT, NEIGHBOUR, SPANNED, rank_of
@@ -228,7 +229,8 @@ def _nearby(of: Mechanism, holds: Sequence[Hold], found: Sequence[Array]) -> lis
     rng = np.random.default_rng(0)
     for _ in range(TRIALS if len(ways) else 0):
         step = (rng.standard_normal(len(ways)) @ ways).reshape(-1, 6)
-        closed = close_loops(links, of.moved(step * (AWAY / np.abs(step).max())), now.roots(), frozenset())
+        there = of.moved(step * (AWAY / np.abs(step).max()))
+        closed = close_loops(links, there, now.roots(), frozenset(), Scale(of.length, 1.0))
         if closed is None:
             continue
         there = of.holds(closed)

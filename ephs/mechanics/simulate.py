@@ -6,15 +6,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ephs.mechanics.build import component_path, drive_ports, initial_state, scene_inputs, scene_system, wrench_port
+from ephs.mechanics.assembling import assembled, flat_joints
+from ephs.mechanics.build import drive_ports, initial_state, scene_inputs, scene_system, wrench_port
 from ephs.mechanics.journaling import journaled
 from ephs.mechanics.methods import METHODS, Method, Setting, chosen
 from ephs.mechanics.motion import SceneMotion
+from ephs.mechanics.own_units import in_own_units, seen_from
 from ephs.mechanics.pace import longest_step
+from ephs.mechanics.pushes import part_of, scene_signals, sum_of
 from ephs.mechanics.reduction.folded import folded_problem
 from ephs.mechanics.redundancy import explain
 from ephs.mechanics.scene.document import scene_to_text
-from ephs.mechanics.scene.model import Marker, Scene
+from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.signals import numbers_of, signal
 from ephs.mechanics.solve.control import Control, Tolerance, told_apart
 from ephs.mechanics.solve.errors import OptionError, failing_at, nearest_of, number_of
@@ -32,7 +35,6 @@ from ephs.semantics.bundle import POSITIVE, Array, Reference
 from ephs.semantics.checks import random_efforts
 from ephs.semantics.errors import AssemblyError
 from ephs.semantics.primitives import Irreversible
-from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.semantics.system import System
 
 if TYPE_CHECKING:
@@ -84,7 +86,8 @@ def simulate(
         radau from where the problem shows itself stiff, for scenes, radau for systems on vector spaces. Or a
         `Method` of one's own.
     rtol, atol
-        Without ``step``: each state x is wanted to ``atol + rtol·|x|``, atol in the state's own unit. Either may be
+        Without ``step``: each state x is wanted to ``atol + rtol·|x|``, atol in the state's own unit, of the
+        mechanism's own length, mass and time where these are far from 1 m, 1 kg and 1 s. Either may be
         a mapping from kinds of quantities or paths to numbers, ``"*"`` for all others.
     step
         The grid is t₀ + k·step, the last step shortened to end on ``until``. Without it rtol and atol steer.
@@ -126,7 +129,7 @@ def simulate(
     if isinstance(model, Scene):
         if reference is not None:
             raise OptionError("reference", reference, "none: a scene's [world] has its own")
-        problem = problem_of_scene(model, initial, inputs)
+        problem = in_own_units(problem_of_scene(model, initial, inputs))
     else:
         problem = problem_of_system(model, initial, inputs, reference)
     method_of = METHODS["natural4"] if method == "auto" and form != "reduced" and step is None else None
@@ -139,30 +142,30 @@ def simulate(
         raise OptionError("until", until, f"a finite time other than t0 = {t0!r} s")
     if end < start:
         _reversible(problem, end)
-    control = control_of(problem, rtol, atol, step, min_step, max_step, max_steps)
-    told_apart(start, end, control.step)
+    control, unit = control_of(problem, rtol, atol, step, min_step, max_step, max_steps), problem.seconds
+    told_apart(start / unit, end / unit, control.step)
     if options is not None and not isinstance(options, Mapping):
         raise OptionError("options", options, "a mapping from names to values")
-    unknown = [key for key in options or {} if key not in chosen_method.options]
-    if unknown:
+    if unknown := [key for key in options or {} if key not in chosen_method.options]:
         known = ", ".join(chosen_method.options) or "none"
         near = nearest_of(unknown[0], chosen_method.options)
         raise OptionError("options", unknown[0], f"options of {chosen_method.name}: {known}{near}")
     times, watched = times_of(save_at, start, end), events_of(events)
-    setting = Setting(problem, start, control, dict(options or {}))
+    setting = Setting(problem, start / unit, control, dict(options or {}))
     asked = {
         "until": end, "t0": start, "method": chosen_method.name, "form": form, "rtol": rtol, "atol": atol,
         "step": step, "min_step": min_step, "max_step": max_step, "save_at": times,
         "options": options, "inputs": inputs, "events": [event.name for event in watched],
     }  # fmt: skip
     with failing_at(start):
-        problem.inputs(start, problem.initial)
-    told = guarded(progress)
+        problem.inputs(start / unit, problem.initial)
+    watched, told = seen_from(problem, watched, guarded(progress))
+    times = None if times is None else times / unit
     with journaled(journal, problem, asked) as written:
         if chosen_method.many is not None and control.step is not None and not watched and end > start:
             return integrate(
                 problem,
-                Grid(start, end, control.step),
+                Grid(start / unit, end / unit, control.step),
                 make=chosen_method.many,
                 save_at=times,
                 max_steps=max_steps,
@@ -171,8 +174,8 @@ def simulate(
             )
         return integrate_stepwise(
             problem,
-            start,
-            end,
+            start / unit,
+            end / unit,
             make=lambda: chosen_method.make(setting),
             control=control,
             events=watched,
@@ -209,14 +212,15 @@ def control_of(
     states = [(slot.path, slot.quantity.kind) for slot in problem.descriptor.states]
     relative.known("rtol", states)
     absolute.known("atol", states)
-    least = 0.0 if min_step is None else number_of("min_step", min_step)
-    most = np.inf if max_step is None else number_of("max_step", max_step)
+    unit = problem.seconds
+    least = 0.0 if min_step is None else number_of("min_step", min_step) / unit
+    most = np.inf if max_step is None else number_of("max_step", max_step) / unit
     if problem.scene is not None and step is None:
         most = min(most, max(longest_step(problem.scene), least))
     return Control(
         relative,
         absolute,
-        None if step is None else number_of("step", step),
+        None if step is None else number_of("step", step) / unit,
         least,
         most,
         None if max_steps is None else int(number_of("max_steps", max_steps, "a number > 0")),
@@ -248,8 +252,12 @@ def problem_of_system(
     reference: Reference | None = None,
     *,
     name: str = "system",
+    assemble: bool = True,
 ) -> Problem:
-    """The initial value problem of a system."""
+    """The initial value problem of a system.
+
+    ``assemble``: bodies and joints whose poses are not given are put where the others want them.
+    """
     descriptor = system.descriptor()
     signals: dict[Path, Signal] = {}
     for port, given in (inputs or {}).items():
@@ -263,14 +271,18 @@ def problem_of_system(
     for slot in descriptor.states:
         if slot.quantity.kind in POSITIVE and not np.all(state[slot.path] > 0.0):
             raise AssemblyError("positive", slot.path, quantity=slot.quantity.kind, found=float(state[slot.path][0]))
-    return Problem(name, system, descriptor, state, signals, reference or Reference())
+    joints = flat_joints(descriptor)
+    if assemble and joints.links:
+        state = assembled(joints, state, {Path.of(path) for path in initial or {}})
+    gaps = joints.gaps if joints.links else None
+    return Problem(name, system, descriptor, state, signals, reference or Reference(), gaps=gaps)
 
 
 def problem_of_scene(
     scene: Scene, initial: Mapping[str, "ArrayLike"] | None = None, inputs: Mapping[str, Any] | None = None
 ) -> Problem:
     """The initial value problem of a scene."""
-    forces, wrenches = _scene_inputs(scene, inputs or {})
+    forces, wrenches = scene_signals(scene, inputs or {})
     system = scene_system(scene, driven=frozenset(forces), wrenches=frozenset(wrenches))
     state = initial_state(scene)
     if initial:
@@ -279,12 +291,12 @@ def problem_of_scene(
     signals = {path: Signal(given.value, given.effort) for path, given in scene_inputs(scene).items()}
     for name, force in forces.items():
         for port, where in drive_ports(scene.joint(name)):
-            extra = _part(force, where)
+            extra = part_of(force, where)
             if port in signals and signals[port].effort:
                 raise AssemblyError(
                     "input", f"joints.{name}", found="a force", expected="none: its motion is prescribed"
                 )
-            signals[port] = _sum(signals[port], extra) if port in signals else extra
+            signals[port] = sum_of(signals[port], extra) if port in signals else extra
     signals |= {wrench_port(body): wrench for body, wrench in wrenches.items()}
     world = scene.world
     problem = Problem(
@@ -318,59 +330,13 @@ def _on_joints(problem: Problem) -> None:
     motion = SceneMotion(problem.scene, solution_of(problem, once, {}))
     gap = float(motion.constraint_error()[0])
     if gap > OPEN:
-        raise AssemblyError("open-joint", problem.name, found=gap)
+        raise AssemblyError("open-joint", problem.name, found=f"{gap:.1e} m or rad")
     for path, value in motion.state(0).items():
         given = problem.initial[path]
         if value.shape == given.shape and path[-1] == "p":
             off = float(np.abs(value - given).max()) / max(1.0, float(np.abs(given).max()))
             if off > OFF:
                 raise AssemblyError("off-joint", path, found=off)
-
-
-def _part(whole: Signal, where: slice) -> Signal:
-    if whole.constant:
-        return Signal(whole.at(0.0, {})[where])
-    return Signal(lambda t, state: whole.at(t, state)[where])
-
-
-def _sum(one: Signal, other: Signal) -> Signal:
-    if one.constant and other.constant:
-        return Signal(one.at(0.0, {}) + other.at(0.0, {}))
-    return Signal(lambda t, state: one.at(t, state) + other.at(t, state))
-
-
-def _scene_inputs(scene: Scene, inputs: Mapping[str, Any]) -> tuple[dict[str, Signal], dict[str, Signal]]:
-    forces: dict[str, Signal] = {}
-    wrenches: dict[str, Signal] = {}
-    joints, bodies, markers = dict(scene.all_joints()), dict(scene.all_bodies()), dict(scene.all_markers())
-    for key, value in inputs.items():
-        kind, _, name = key.partition(".")
-        if kind == "joints" and name in joints:
-            forces[name] = signal(value, effort=False, name=key, size=joints[name].dim)
-        elif kind == "bodies" and name in bodies:
-            given = signal(value, effort=False, name=key, size=6)
-            wrenches[name] = _sum(wrenches[name], given) if name in wrenches else given
-        elif kind == "markers" and name in markers and markers[name].body in bodies:
-            given = signal(value, effort=False, name=key, size=3)
-            body, push = markers[name].body, _at_marker(markers[name], given)
-            wrenches[body] = _sum(wrenches[body], push) if body in wrenches else push
-        else:
-            known = (
-                [f"joints.{n}" for n in joints] + [f"bodies.{n}" for n in bodies] + [f"markers.{n}" for n in markers]
-            )
-            raise AssemblyError("unknown-input", key, expected=", ".join(known))
-    return forces, wrenches
-
-
-def _at_marker(marker: Marker, force: Signal) -> Signal:
-    """A force in world axes at a marker as a wrench in the body's frame."""
-    pose = component_path("bodies", marker.body) / "pe" / "q"
-
-    def wrench(t: float, state: Mapping[Path, Array]) -> Array:
-        own = quaternion_to_matrix(state[pose][:4]).T @ force.at(t, state)
-        return np.concatenate([np.cross(marker.at, own), own])
-
-    return Signal(wrench)
 
 
 def times_of(save_at: "ArrayLike | None", t0: float, until: float) -> Array | None:

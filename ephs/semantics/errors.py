@@ -58,7 +58,7 @@ _TEXTS = {
     "state-number": "{path}: the initial value is {found}, expected finite numbers ({quantity})",
     "positive": ("{path}: the initial {quantity} is {found}, expected a number > 0; give initial={{'{path}': …}}"),
     "open-joint": (
-        "{path}: the initial states leave a joint open by {found:.1e} m or rad; give all states of one configuration, "
+        "{path}: the initial states leave a joint open by {found}; give all states of one configuration, "
         "or scene.with_state(coordinates=…)"
     ),
     "off-joint": (

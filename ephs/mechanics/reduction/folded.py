@@ -1,6 +1,8 @@
 """The folded form of an initial value problem: fewer unknowns, the same steps, and all that the other one shows."""
 
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -25,12 +27,12 @@ def folded_problem(problem: Problem) -> Problem:
     places = {slot.path: slot.point for slot in paper.states}
     order = [i for slot in descriptor.states for i in range(places[slot.path].start, places[slot.path].stop)]
 
-    def shown(record: Record) -> tuple[Problem, Record]:
+    def shown(record: Record, stats: Mapping[str, Any]) -> tuple[Problem, Record, Mapping[str, Any]]:
         x = np.zeros_like(record.x)
         x[:, order] = record.x
         energies = np.zeros((record.energies.shape[0], len(paper.components)))
         energies[:, columns] = record.energies
-        return problem, replace(record, x=x, energies=energies)
+        return problem, replace(record, x=x, energies=energies), stats
 
     return replace(
         problem,

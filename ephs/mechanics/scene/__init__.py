@@ -4,14 +4,14 @@ The model of a scene is light; the reader, with its schema and assembly, lies in
 and is imported where it is used.
 """
 
+from ephs.mechanics.scene.adjustment import Adjustment as Adjustment
+from ephs.mechanics.scene.adjustment import Displacement as Displacement
 from ephs.mechanics.scene.errors import Fault as Fault
 from ephs.mechanics.scene.errors import ModelWarning as ModelWarning
 from ephs.mechanics.scene.errors import SceneError as SceneError
 from ephs.mechanics.scene.errors import SceneWarning as SceneWarning
-from ephs.mechanics.scene.model import Adjustment as Adjustment
 from ephs.mechanics.scene.model import Body as Body
 from ephs.mechanics.scene.model import Conduction as Conduction
-from ephs.mechanics.scene.model import Displacement as Displacement
 from ephs.mechanics.scene.model import Joint as Joint
 from ephs.mechanics.scene.model import Scene as Scene
 from ephs.mechanics.scene.model import Spring as Spring

@@ -11,10 +11,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ephs.mechanics.scene.kinematics import TOLERANCE, Link, elements, largest_gap, largest_slip
+from ephs.mechanics.scene.kinematics import Link, Scale, elements, largest_gap, largest_slip
 from ephs.mechanics.solve.threads import in_one_thread
 from ephs.semantics.spaces import SE3
-from ephs.semantics.spaces.rank import CONSTRAINT, LIGHT
+from ephs.semantics.spaces.rank import ASSEMBLY, CONSTRAINT, LIGHT
 
 Array = NDArray[np.float64]
 
@@ -38,26 +38,26 @@ def _least(values: Array) -> float:
 
 
 @in_one_thread
-def close_loops(links: Sequence[Link], poses: Array, roots: Array, held: frozenset[str]) -> Array | None:
+def close_loops(links: Sequence[Link], poses: Array, roots: Array, held: frozenset[str], scale: Scale) -> Array | None:
     """The nearest poses that satisfy every joint, the joints ``held`` at their coordinates; None where none
     is found."""
     poses = poses.copy()
     free = [_loose(link, held) for link in links]
     for _ in range(ITERATIONS):
         xs = elements(free, poses)
-        if largest_gap(free, poses, xs) < 0.01 * TOLERANCE:
+        if largest_gap(free, poses, xs, scale) < 0.01 * ASSEMBLY:
             break
-        matrix, errors = _constraints(free, poses, xs, roots, held)
+        matrix, errors = _constraints(free, poses, xs, roots, held, scale)
         steps = _steps(roots, _least_change(matrix, -errors))
         # Far from a solution, a full step may go round too far.
         steps /= max(1.0, float(np.abs(steps[:, :3]).max(initial=0.0)))
         poses = np.array([SE3.retract(q, v) for q, v in zip(poses, steps, strict=True)])
-    return poses if largest_gap(free, poses, elements(free, poses)) < TOLERANCE else None
+    return poses if largest_gap(free, poses, elements(free, poses), scale) < ASSEMBLY else None
 
 
 @in_one_thread
 def project_velocities(
-    links: Sequence[Link], poses: Array, twists: Array, roots: Array, held: frozenset[str]
+    links: Sequence[Link], poses: Array, twists: Array, roots: Array, held: frozenset[str], scale: Scale
 ) -> Array | None:
     """The nearest twists that satisfy every joint and every prescribed rate; None where they contradict
     each other.
@@ -68,7 +68,7 @@ def project_velocities(
     blocks, wanted = [], []
     for link, x in zip(links, xs, strict=True):
         fixed = link.rate if link.name in held else None if link.motion is None else np.array([link.motion])
-        forbidden = _complement(link, x) if fixed is None else np.eye(6)
+        forbidden = _across(link, x, scale) if fixed is None else scale.weights
         blocks.append(_row(link, x, forbidden, roots))
         wanted.append(
             forbidden.T @ (link.coupling.basis(x) @ fixed) if fixed is not None else np.zeros(forbidden.shape[1])
@@ -77,7 +77,11 @@ def project_velocities(
     start = np.concatenate([np.linalg.solve(root, u) for root, u in zip(roots, twists, strict=True)])
     change = _least_change(matrix, target - matrix @ start)
     found = _steps(roots, (start + change).reshape(-1, 6))
-    return found if largest_slip(links, found, xs) < TOLERANCE * max(1.0, float(np.abs(found).max())) else None
+    fastest = max((float(np.linalg.norm(u[:3])) for u in found), default=0.0)
+    fastest = max([fastest, *(float(np.linalg.norm(u[3:])) / scale.length for u in found)])
+    now = Scale(scale.length, max(scale.rate, fastest))
+    kept = [link if link.name in held else replace(link, rate=None) for link in links]
+    return found if largest_slip(kept, found, xs, now) < ASSEMBLY else None
 
 
 def _loose(link: Link, held: frozenset[str]) -> Link:
@@ -88,20 +92,22 @@ def _loose(link: Link, held: frozenset[str]) -> Link:
 
 
 def _constraints(
-    links: Sequence[Link], poses: Array, xs: Sequence[Array], roots: Array, held: frozenset[str]
+    links: Sequence[Link], poses: Array, xs: Sequence[Array], roots: Array, held: frozenset[str], scale: Scale
 ) -> tuple[Array, Array]:
     blocks, errors = [], []
     for link, x in zip(links, xs, strict=True):
-        forbidden = np.eye(6) if link.name in held else _complement(link, x)
+        forbidden = scale.weights if link.name in held else _across(link, x, scale)
         blocks.append(_row(link, x, forbidden, roots))
         errors.append(forbidden.T @ link.error(poses, x))
     return np.vstack(blocks), np.concatenate(errors)
 
 
-def _complement(link: Link, x: Array) -> Array:
-    """An orthonormal basis (6, 6 − d) of what the joint does not allow."""
-    basis = link.coupling.basis(x)
-    return np.linalg.svd(basis, full_matrices=True)[0][:, basis.shape[1] :] if basis.shape[1] else np.eye(6)
+def _across(link: Link, x: Array, scale: Scale) -> Array:
+    """(6, 6 − d) covectors that vanish on what the joint allows, orthonormal where lengths count in the scale's."""
+    basis = scale.weights @ link.coupling.basis(x)
+    if not basis.shape[1]:
+        return scale.weights
+    return scale.weights @ np.linalg.svd(basis, full_matrices=True)[0][:, basis.shape[1] :]
 
 
 def _row(link: Link, x: Array, forbidden: Array, roots: Array) -> Array:

@@ -7,7 +7,7 @@ unless the scene is adjusted.
 """
 
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TypeAlias
 
 import numpy as np
@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.geometry import body_twist
-from ephs.mechanics.scene.kinematics import TOLERANCE, Link, at
+from ephs.mechanics.scene.kinematics import Link, Scale, at
 from ephs.mechanics.scene.model import GROUND, IDENTITY_POSE, Body, Joint, Scene, frozen
 from ephs.mechanics.scene.resolve import BodyDraft, JointDraft
 from ephs.semantics.spaces import SE3
+from ephs.semantics.spaces.rank import ASSEMBLY
 
 Array = NDArray[np.float64]
 Bodies: TypeAlias = dict[str, Body]
@@ -26,7 +27,7 @@ Joints: TypeAlias = dict[str, Joint]
 
 
 def assemble(
-    drafts: Sequence[BodyDraft], joints: Sequence[JointDraft], parts: Mapping[str, Scene]
+    drafts: Sequence[BodyDraft], joints: Sequence[JointDraft], parts: Mapping[str, Scene], gravity: Array
 ) -> tuple[Bodies, Joints, list[Fault]]:
     """Bodies and joints in the initial state, and a fault for each joint that does not hold there.
 
@@ -44,8 +45,10 @@ def assemble(
         for i, d in enumerate(drafts)
     }
     slips = [link.slip(twists, x) for link, x in zip(links, xs, strict=True)]
+    masses = [(d.mass, d.inertia) for d in drafts] + [(body.mass, body.inertia) for _, body in others]
+    scale = Scale.of(links, poses, twists, gyration(masses), gravity)
     placed = {d.name: _joint(d, link, x, s[0]) for d, link, x, s in zip(joints, links, xs, slips, strict=True)}
-    return bodies, placed, measure(links, xs, poses, slips, names)
+    return bodies, placed, measure(links, xs, poses, slips, names, scale)
 
 
 def measure(
@@ -54,25 +57,32 @@ def measure(
     poses: Array,
     slips: Sequence[tuple[Array, Array]],
     names: Sequence[str],
+    scale: Scale,
 ) -> list[Fault]:
     """A fault for each joint that has a gap, a velocity that it does not allow, or another rate than it was
     given; ``slips`` are the links' own."""
     faults: list[Fault] = []
+    near, turn, slow = ASSEMBLY * scale.length, ASSEMBLY, ASSEMBLY * scale.rate
+    limit = f"{near:.2g} m and {turn:.2g} rad"
+    speeds = f"{slow * scale.length:.2g} m/s and {slow:.2g} rad/s"
     for link, x, (rate, residual) in zip(links, xs, slips, strict=True):
         who = " and ".join(names[b] for b in (link.body1, link.body2) if b >= 0)
         key = f"joints.{link.name}"
         distance, angle = link.gap(poses, x)
-        if max(distance, angle) > TOLERANCE:
-            faults.append(fault("gap", key, f"a gap of {distance:.3g} m and {angle:.3g} rad", who=who))
+        if distance > near or angle > turn:
+            found = f"a gap of {distance:.3g} m and {angle:.3g} rad"
+            faults.append(fault("gap", key, found, who=who, limit=limit))
             continue
-        spin, speed = float(np.linalg.norm(residual[:3])), float(np.linalg.norm(residual[3:]))
-        if max(spin, speed) > TOLERANCE:
+        spin, speed = _size(residual[:3]), _size(residual[3:])
+        off = None if link.rate is None else link.coupling.basis(x) @ (rate - link.rate)
+        apart = off is not None and (_size(off[:3]) > slow or _size(off[3:]) > slow * scale.length)
+        if spin > slow or speed > slow * scale.length:
             text = f"velocities that open it by {speed:.3g} m/s and {spin:.3g} rad/s"
-            faults.append(fault("velocity", key, text, who=who))
-        elif link.motion is not None and abs(rate[0] - link.motion) > TOLERANCE:
+            faults.append(fault("velocity", key, text, who=who, limit=speeds))
+        elif link.motion is not None and apart:
             text = f"a rate of {rate[0]:.9g}"
             faults.append(fault("motion differs", f"{key}.motion", text, motion=f"{link.motion:.9g}", who=who))
-        elif link.motion is None and link.rate is not None and np.abs(rate - link.rate).max(initial=0.0) > TOLERANCE:
+        elif link.rate is not None and apart:
             actual = _text(rate)
             faults.append(fault("rate differs", f"{key}.rate", _text(link.rate), actual=actual, who=who))
     return faults
@@ -191,6 +201,17 @@ def _joint(draft: JointDraft, link: Link, x: Array, rate: Array) -> Joint:
         rate=frozen(rate),
         middle=None if draft.place.middle is None else frozen(draft.place.middle),
     )
+
+
+def gyration(bodies: Iterable[tuple[float, Array]]) -> float:
+    """The largest radius of gyration in m of bodies with these masses and inertias (3, 3)."""
+    return max(
+        (float(np.sqrt(np.trace(inertia) / (2.0 * mass))) for mass, inertia in bodies if mass > 0.0), default=0.0
+    )
+
+
+def _size(vector: Array) -> float:
+    return float(np.linalg.norm(vector))
 
 
 def _text(rate: Array) -> str:

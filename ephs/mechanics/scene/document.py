@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from ephs.mechanics.scene.adjustment import Adjustment, Changed, Displacement
 from ephs.mechanics.scene.model import (
-    Adjustment,
     Body,
     Conduction,
-    Displacement,
     Joint,
     Marker,
     Scene,
@@ -89,5 +88,8 @@ def _scene(data: dict[str, Any]) -> Scene:
     adjusted = given["adjusted"]
     if adjusted is not None:
         moved = tuple(Displacement(**entry) for entry in adjusted["moved"])
-        given["adjusted"] = Adjustment(adjusted["gap"], adjusted["slip"], moved)
+        changed = tuple(
+            Changed(e["joint"], e["what"], tuple(e["given"]), tuple(e["taken"])) for e in adjusted.get("changed", ())
+        )
+        given["adjusted"] = Adjustment(adjusted["gap"], adjusted["slip"], moved, changed)
     return Scene(**given)

@@ -183,8 +183,8 @@ TEXTS: dict[str, tuple[str, str]] = {
     ),
     "same ends": ("two different points or nodes", "mend one of the two"),
     # assembly
-    "gap": ("a gap below 1e-8", "mend {who}, or set assembly.adjust = true"),
-    "velocity": ("a residual below 1e-8", "mend the velocities of {who}, or set assembly.adjust = true"),
+    "gap": ("gaps below {limit}", "mend {who}, or set assembly.adjust = true"),
+    "velocity": ("residuals below {limit}", "mend the velocities of {who}, or set assembly.adjust = true"),
     "rate differs": ("{actual}, that of the bodies", "take rate out, or mend the velocities of {who}"),
     "motion differs": (
         "{motion}, the prescribed rate",

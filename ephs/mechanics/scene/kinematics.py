@@ -19,7 +19,41 @@ from ephs.semantics.spaces import SE3
 
 Array = NDArray[np.float64]
 
-TOLERANCE = 1e-8
+
+@final
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """The mechanism's own length in m and rate in 1/s: gaps and velocities are measured in them."""
+
+    length: float
+    rate: float
+
+    @property
+    def weights(self) -> Array:
+        """(6, 6) diagonal: takes the lengths of twists as parts of the scale's."""
+        return np.diag([1.0] * 3 + [1.0 / self.length] * 3)
+
+    @staticmethod
+    def of(links: "Sequence[Link]", poses: Array, twists: Array, gyration: float, gravity: Array) -> "Scale":
+        """Of a configuration; ``gyration`` is the bodies' largest radius of gyration in m, gravity (3,) in m/s².
+
+        The length is the radius about the mechanism's centre within which its joints and bodies lie, at least the
+        radius of gyration; the rate is the fastest at which a body turns or crosses this length, a joint is driven,
+        or a pendulum of this length swings.
+        """
+        length = max(extent(links, poses)[1], gyration) or 1.0
+        turns = [float(np.linalg.norm(u[:3])) for u in twists] + [float(np.linalg.norm(u[3:])) / length for u in twists]
+        driven = [
+            abs(link.motion) / (1.0 if np.any(link.coupling.basis(link.coupling.identity())[:3]) else length)
+            for link in links
+            if link.motion is not None
+        ]
+        swing = float(np.sqrt(np.linalg.norm(gravity) / length))
+        return Scale(length, max([swing, *turns, *driven], default=0.0) or 1.0)
+
+
+ABSOLUTE = Scale(1.0, 1.0)
+"""Gaps in m and rad, velocities in m/s and rad/s."""
 
 
 @final
@@ -125,17 +159,26 @@ def elements(links: Sequence[Link], poses: Array) -> list[Array]:
     return [link.element(poses) for link in links]
 
 
-def largest_gap(links: Sequence[Link], poses: Array, xs: Sequence[Array]) -> float:
-    """The largest gap of any joint, m or rad."""
-    return max((max(link.gap(poses, x)) for link, x in zip(links, xs, strict=True)), default=0.0)
+def extent(links: Sequence[Link], poses: Array) -> tuple[Array, float]:
+    """The centre (3,) of the joints and bodies in m, and the radius about it within which they lie."""
+    points = np.array([*(link.second(poses)[4:] for link in links), *poses[:, 4:]]).reshape(-1, 3)
+    centre = points.mean(axis=0) if len(points) else np.zeros(3)
+    return centre, float(np.linalg.norm(points - centre, axis=1).max(initial=0.0))
 
 
-def largest_slip(links: Sequence[Link], twists: Array, xs: Sequence[Array]) -> float:
-    """The largest velocity residual of any joint, m/s or rad/s; prescribed rates count."""
+def largest_gap(links: Sequence[Link], poses: Array, xs: Sequence[Array], scale: Scale = ABSOLUTE) -> float:
+    """The largest gap of any joint: a part of the length, or rad."""
+    gaps = (link.gap(poses, x) for link, x in zip(links, xs, strict=True))
+    return max((max(distance / scale.length, angle) for distance, angle in gaps), default=0.0)
+
+
+def largest_slip(links: Sequence[Link], twists: Array, xs: Sequence[Array], scale: Scale = ABSOLUTE) -> float:
+    """The largest velocity residual of any joint, a part of the rate; wanted rates count."""
     found = 0.0
     for link, x in zip(links, xs, strict=True):
         rate, residual = link.slip(twists, x)
-        found = max(found, float(np.linalg.norm(residual[:3])), float(np.linalg.norm(residual[3:])))
-        if link.motion is not None:
-            found = max(found, abs(float(rate[0]) - link.motion))
+        wanted = link.rate if link.motion is None else np.array([link.motion])
+        for off in (residual, np.zeros(6) if wanted is None else link.coupling.basis(x) @ (rate - wanted)):
+            spin, speed = float(np.linalg.norm(off[:3])), float(np.linalg.norm(off[3:]))
+            found = max(found, spin / scale.rate, speed / (scale.length * scale.rate))
     return found

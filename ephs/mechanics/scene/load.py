@@ -18,7 +18,7 @@ from ephs.mechanics.scene.entries import Document, read_document, shown
 from ephs.mechanics.scene.errors import Fault, ModelWarning, SceneError, SceneWarning, fault, legible
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Scene, World
 from ephs.mechanics.scene.moving import moved, spring_length
-from ephs.mechanics.scene.state import adjusted
+from ephs.mechanics.scene.state import Asked, adjusted
 from ephs.mechanics.scene.text import file_text
 from ephs.operad import Path as Name
 from ephs.operad import PatternError
@@ -38,7 +38,8 @@ _LONG_KEY = re.compile(rf"(?<![\w-])(?:{_NAME}[ \t]*+\.[ \t]*+){{{MOST_LEVELS}}}
 @final
 @dataclass(frozen=True, slots=True)
 class _Reading:
-    """How files are read, and what is found in them: faults, odd inertias, what a model says more than its scene.
+    """How files are read, and what is found in them: faults, odd inertias, what a model says more than its scene,
+    and what is given of joints' states.
 
     ``home`` is the folder of the first file, outside of which none is read; ``files`` counts those that are.
     """
@@ -51,6 +52,7 @@ class _Reading:
     faults: list[Fault] = field(default_factory=list)
     odd: list[Fault] = field(default_factory=list)
     left: list[str] = field(default_factory=list)
+    asked: dict[str, Asked] = field(default_factory=dict)
 
 
 def load(path: str | PathLike[str], base: str = "fixed", adjust: bool = False, inertia: str | None = None) -> Scene:
@@ -113,7 +115,9 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
     markers = resolve.resolve_markers(document, names, faults)
     if faults:
         return None
-    placed, coupled, open_joints = assemble(bodies, [j for j in joints if j is not None], parts)
+    drafts = [j for j in joints if j is not None]
+    placed, coupled, open_joints = assemble(bodies, drafts, parts, world.gravity)
+    r.asked.update({j.name: Asked(j.coordinates if j.place.in_bodies else None, j.rate) for j in drafts})
     scene = Scene(
         document.name,
         world,
@@ -127,7 +131,7 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
         markers=markers,
     )
     if r.adjust:
-        scene, open_joints = adjusted(scene)
+        scene, open_joints = adjusted(scene, r.asked)
     faults += open_joints
     if not faults:
         faults += [
@@ -205,11 +209,12 @@ def _parts(
             chain = " → ".join(p.name for p in (*stack[stack.index(file.resolve()) :], file))
             faults.append(fault("cycle", f"{key}.use", shown(entry.use), chain=chain))
             continue
-        below = replace(r, faults=[], odd=[], left=[])
+        below = replace(r, faults=[], odd=[], left=[], asked={})
         part = _read(file, world, stack, below)
         faults += [_seen_from_outside(f, key, entry.use) for f in below.faults]
         r.odd.extend(_seen_from_outside(f, key, entry.use) for f in below.odd)
         r.left.extend(f"{legible(key)}: {line}" for line in below.left)
+        r.asked.update({f"{name}.{joint}": asked for joint, asked in below.asked.items()})
         if part is not None:
             found[name] = moved(part, np.array(pose), world)
     return found, set(document.sections["parts"]) - set(found)

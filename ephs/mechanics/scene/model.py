@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any, TypeVar, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ephs.mechanics.scene.adjustment import Adjustment
+
 if TYPE_CHECKING:
     from ephs.semantics import System
 
@@ -163,41 +165,6 @@ class Marker:
 
 
 @final
-@dataclass(frozen=True, slots=True)
-class Displacement:
-    """How far the assembly moved a body: m, rad, and the change of its velocity in m/s and rad/s."""
-
-    body: str
-    distance: float
-    angle: float
-    speed: float
-    spin: float
-
-
-@final
-@dataclass(frozen=True, slots=True)
-class Adjustment:
-    """What an adjusting assembly did: the gaps that it found and the bodies that it moved.
-
-    ``gap`` is the largest gap of a joint before (m or rad), ``slip`` the largest velocity residual (m/s or
-    rad/s).
-    """
-
-    gap: float
-    slip: float
-    moved: tuple[Displacement, ...]
-
-    def __str__(self) -> str:
-        lines = [f"adjusted: largest gap {self.gap:.3g}, largest velocity residual {self.slip:.3g}"]
-        for d in self.moved:
-            lines.append(
-                f"  {d.body}: moved {d.distance:.3g} m, {d.angle:.3g} rad; "
-                f"velocity changed {d.speed:.3g} m/s, {d.spin:.3g} rad/s"
-            )
-        return "\n".join(lines)
-
-
-@final
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
     """A mechanism in its world: bodies, joints, springs, thermal nodes, and parts, which are scenes
@@ -250,7 +217,7 @@ class Scene:
         Raises
         ------
         SceneError
-            A name is unknown, a value has the wrong length, or a loop does not close to 1e-8.
+            A name is unknown, a value has the wrong length, or a loop does not close to 1e-8 of the mechanism's length.
         """
         from ephs.mechanics.scene.state import with_state
 

@@ -116,7 +116,9 @@ class WorldEntry(Entry):
 class AssemblyEntry(Entry):
     """``[assembly]``"""
 
-    adjust: Flag = Field(default=False, description="take the nearest consistent state, and report it")
+    adjust: Flag = Field(
+        default=False, description="take the nearest consistent state with what is given of joints, and report it"
+    )
     inertia: Literal["strict", "warn", "nearest"] = Field(
         default="strict",
         description='"warn" accepts a physically impossible inertia, "nearest" takes the nearest possible one',

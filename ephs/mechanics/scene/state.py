@@ -8,14 +8,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ephs.mechanics.scene.adjust import close_loops, mass_roots, project_velocities
-from ephs.mechanics.scene.assembly import measure
+from ephs.mechanics.scene.adjustment import Adjustment, Changed, Displacement
+from ephs.mechanics.scene.assembly import gyration, measure
 from ephs.mechanics.scene.errors import Fault, SceneError, fault, unknown_name
 from ephs.mechanics.scene.geometry import body_twist, coupling_of
-from ephs.mechanics.scene.kinematics import TOLERANCE, Link, elements, largest_gap, largest_slip
-from ephs.mechanics.scene.model import GROUND, Adjustment, Body, Displacement, Joint, Scene, frozen
+from ephs.mechanics.scene.kinematics import Link, Scale, elements, largest_gap, largest_slip
+from ephs.mechanics.scene.model import GROUND, Body, Joint, Scene, frozen
 from ephs.mechanics.scene.tree import spanning_hops
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces import rotations as so3
+from ephs.semantics.spaces.rank import ASSEMBLY
 
 Array = NDArray[np.float64]
 
@@ -72,6 +74,11 @@ class Snapshot:
         inertias = np.array([body.inertia for body in self.bodies]).reshape(n, 3, 3)
         return mass_roots(np.array([body.mass for body in self.bodies]), inertias)
 
+    def scale(self, gravity: Array) -> Scale:
+        """The length and rate by which gaps and velocities are measured."""
+        radius = gyration((body.mass, body.inertia) for body in self.bodies)
+        return Scale.of(self.links, self.poses, self.twists, radius, gravity)
+
 
 def with_state(
     scene: Scene, coordinates: Mapping[str, ArrayLike], rates: Mapping[str, ArrayLike], adjust: bool
@@ -84,50 +91,100 @@ def with_state(
 
     before = [np.asarray(j.coordinate) for j in now.joints]
     poses, xs = _carry(links, now.poses, before)
-    if adjust and largest_gap(links, poses, xs) > TOLERANCE:
-        poses, xs = _carry_closed(links, now, before) or (poses, xs)
+    scale = now.scale(scene.world.gravity)
+    if adjust and largest_gap(links, poses, xs, scale) > ASSEMBLY:
+        poses, xs = _carry_closed(links, now, before, scale) or (poses, xs)
 
     twists = now.twists.copy()
     for hop in spanning_hops(links, len(poses), speeds):
         rate = speeds.get(hop.name, now.joints[hop.link].rate)
         link, x = links[hop.link], xs[hop.link]
         twists[hop.body] = link.move_second(twists, x, rate) if hop.forward else link.move_first(twists, x, rate)
-    if adjust and largest_slip(links, twists, xs) > TOLERANCE:
-        moved = project_velocities(links, poses, twists, now.roots(), frozenset(speeds))
+    scale = replace(now, poses=poses, twists=twists).scale(scene.world.gravity)
+    if adjust and largest_slip(links, twists, xs, scale) > ASSEMBLY:
+        moved = project_velocities(links, poses, twists, now.roots(), frozenset(speeds), scale)
         twists = twists if moved is None else moved
 
     slips = [link.slip(twists, x) for link, x in zip(links, xs, strict=True)]
-    faults = measure(links, xs, poses, slips, now.names)
+    scale = replace(now, poses=poses, twists=twists).scale(scene.world.gravity)
+    faults = measure(links, xs, poses, slips, now.names, scale)
     if faults:
         raise SceneError(where, faults)
     return rebuilt(scene, now, poses, twists, xs)
 
 
-def adjusted(scene: Scene) -> tuple[Scene, list[Fault]]:
-    """The nearest consistent state of a scene, with a report of what moved, if anything had to."""
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Asked:
+    """What a file gives of a joint's state: coordinates (d,) and rate (d,), None where it does not."""
+
+    coordinates: Array | None
+    rate: Array | None
+
+
+def adjusted(scene: Scene, asked: Mapping[str, Asked]) -> tuple[Scene, list[Fault]]:
+    """The nearest consistent state of a scene, with a report of what moved, if anything had to.
+
+    Prescribed motions, and coordinates and rates that are ``asked`` of joints, are kept, and the bodies' poses and
+    velocities give way; where they contradict each other, they give way, too, which the report says.
+    """
     now = Snapshot.of(scene)
-    xs = elements(now.links, now.poses)
-    gap, slip = largest_gap(now.links, now.poses, xs), largest_slip(now.links, now.twists, xs)
-    if max(gap, slip) <= TOLERANCE:
-        # Coordinates that were asked for give way to those of the bodies.
+    scale, roots = now.scale(scene.world.gravity), now.roots()
+    links = [_asked(link, asked.get(link.name)) for link in now.links]
+    xs = elements(links, now.poses)
+    gap, slip = largest_gap(links, now.poses, xs), largest_slip(links, now.twists, xs)
+    consistent = largest_gap(links, now.poses, xs, scale) <= ASSEMBLY
+    if consistent and largest_slip(links, now.twists, xs, scale) <= ASSEMBLY:
         return rebuilt(scene, now, now.poses, now.twists, xs), []
-    poses: Array | None = now.poses
-    if gap > TOLERANCE:
-        poses = close_loops(now.links, now.poses, now.roots(), frozenset())
+    poses = now.poses if consistent else _nearest(now, links, scale)
     if poses is None:
-        worst = max(zip(now.links, xs, strict=True), key=lambda pair: max(pair[0].gap(now.poses, pair[1])))[0]
+        worst = max(zip(links, xs, strict=True), key=lambda pair: max(pair[0].gap(now.poses, pair[1])))[0]
         who = " and ".join(now.names[b] for b in (worst.body1, worst.body2) if b >= 0)
         return scene, [fault("no assembly", f"joints.{worst.name}", f"a largest gap of {gap:.3g}", who=who)]
     given = np.array([_carried(u, q0, q1) for u, q0, q1 in zip(now.twists, now.poses, poses, strict=True)])
     twists: Array | None = given
-    if largest_slip(now.links, given, elements(now.links, poses)) > TOLERANCE:
-        twists = project_velocities(now.links, poses, given, now.roots(), frozenset())
+    here = [replace(link, coordinates=None) for link in links]
+    if largest_slip(here, given, elements(here, poses), scale) > ASSEMBLY:
+        held = frozenset(link.name for link in here if link.rate is not None)
+        twists = project_velocities(here, poses, given, roots, held, scale)
+        if twists is None and held:
+            twists = project_velocities(here, poses, given, roots, frozenset(), scale)
     if twists is None:
         return scene, [fault("no motion", "joints", f"a velocity residual of {slip:.3g}")]
-    moved = tuple(_displacements(now, poses, given, twists))
-    return replace(
-        rebuilt(scene, now, poses, twists, elements(now.links, poses)), adjusted=Adjustment(gap, slip, moved)
-    ), []
+    xs = elements(now.links, poses)
+    report = Adjustment(
+        gap, slip, tuple(_displacements(now, poses, given, twists)), tuple(_changes(links, xs, twists, scale))
+    )
+    return replace(rebuilt(scene, now, poses, twists, xs), adjusted=report), []
+
+
+def _asked(link: Link, asked: Asked | None) -> Link:
+    return link if asked is None else replace(link, coordinates=asked.coordinates, rate=asked.rate)
+
+
+def _nearest(now: Snapshot, links: Sequence[Link], scale: Scale) -> Array | None:
+    """The nearest poses that close all joints, those with coordinates at these; without, where these cannot be."""
+    roots, held = now.roots(), frozenset(link.name for link in links if link.coordinates is not None)
+    closed = close_loops(links, now.poses, roots, held, scale)
+    if closed is None and held:
+        closed = close_loops(now.links, now.poses, roots, frozenset(), scale)
+        if closed is not None:
+            there = replace(now, poses=closed)
+            carried = _carry_closed(links, there, elements(now.links, closed), scale)
+            closed = closed if carried is None else carried[0]
+    return closed
+
+
+def _changes(links: Sequence[Link], xs: Sequence[Array], twists: Array, scale: Scale) -> Iterable[Changed]:
+    for link, x in zip(links, xs, strict=True):
+        rate = link.slip(twists, x)[0]
+        for what, wanted, found, unit in (
+            ("coordinate", link.coordinates, link.coupling.coordinates(x), 1.0),
+            ("rate", link.rate, rate, scale.rate),
+        ):
+            size = max(unit, unit * scale.length)
+            if wanted is not None and np.abs(found - wanted).max(initial=0.0) > 100.0 * ASSEMBLY * size:
+                yield Changed(link.name, what, tuple(map(float, wanted)), tuple(map(float, found)))
 
 
 def rebuilt(scene: Scene, now: Snapshot, poses: Array, twists: Array, xs: Sequence[Array]) -> Scene:
@@ -185,7 +242,9 @@ def _carry(links: Sequence[Link], poses: Array, before: Sequence[Array]) -> tupl
     return poses, elements(links, poses)
 
 
-def _carry_closed(links: Sequence[Link], now: Snapshot, before: Sequence[Array]) -> tuple[Array, list[Array]] | None:
+def _carry_closed(
+    links: Sequence[Link], now: Snapshot, before: Sequence[Array], scale: Scale
+) -> tuple[Array, list[Array]] | None:
     """The same with every loop closed, in small steps so that the mechanism keeps its way of assembly."""
     held = frozenset(link.name for link in links if link.coordinates is not None)
     starts = [link.coupling.coordinates(x) for link, x in zip(links, before, strict=True)]
@@ -198,7 +257,7 @@ def _carry_closed(links: Sequence[Link], now: Snapshot, before: Sequence[Array])
             replace(k, near=x, coordinates=None if k.coordinates is None else a + (b - a) * (step / steps))
             for k, x, a, b in zip(links, xs, starts, ends, strict=True)
         ]
-        closed = close_loops(here, _carry(here, poses, xs)[0], roots, held)
+        closed = close_loops(here, _carry(here, poses, xs)[0], roots, held, scale)
         if closed is None:
             return None
         poses, xs = closed, elements(here, closed)

@@ -168,17 +168,17 @@ def failures_of(run: Run) -> Generator[None, None, None]:
         if error.outcome in (Outcome.SINGULAR, Outcome.CONTRADICTION, Outcome.DIVERGED) and run.problem.dependences:
             told.append(run.problem.dependences())
         equation = "; ".join(filter(None, told))
-        raise failed(error.outcome, run.t, error.path, equation, run.solution()) from error.cause
+        raise failed(error.outcome, run.t * run.problem.seconds, error.path, equation, run.solution()) from error.cause
     except KeyboardInterrupt as error:
-        raise Interrupted(Outcome.INTERRUPTED, run.t, "", "", run.solution()) from error
+        raise Interrupted(Outcome.INTERRUPTED, run.t * run.problem.seconds, "", "", run.solution()) from error
     except MemoryError as error:
-        raise SimulationError(Outcome.MEMORY, run.t, "", str(error), run.solution()) from error
+        raise SimulationError(Outcome.MEMORY, run.t * run.problem.seconds, "", str(error), run.solution()) from error
 
 
 def solution_of(problem: Problem, record: Record, stats: Mapping[str, Any]) -> Solution:
     """What was kept of a run, as users read it."""
-    if problem.shown is not None:
-        problem, record = problem.shown(record)
+    while problem.shown is not None:
+        problem, record, stats = problem.shown(record, stats)
     states = {slot.path: coordinates(slot.quantity, record.x[:, slot.point]) for slot in problem.descriptor.states}
     labels = {slot.path: labels_of(slot.quantity) for slot in problem.descriptor.states}
     return Solution(problem.name, record.t, states, ledgers(problem, record), dict(stats), problem, labels)

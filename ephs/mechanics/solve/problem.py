@@ -152,8 +152,14 @@ class Problem:
     document
         The scene as text, for solution files.
     shown
-        What was computed of this problem, as a record of the one that it was made from, which solutions are of; None
-        where none was.
+        What was computed of this problem, as a record with statistics of the one that it was made from, which
+        solutions are of; None where none was.
+    gaps
+        Makes of a solution (n,) the largest gap of a joint, m or rad, where no motion does.
+    given
+        Makes of its states those of the problem that it was made from; None where they are the same.
+    seconds
+        Its unit of time in s.
     remarks
         What the statistics of a run say of it: the form of its equations.
     """
@@ -168,7 +174,10 @@ class Problem:
     scene: Any = None
     document: str = ""
     dependences: Callable[[], str] | None = None
-    shown: "Callable[[Record], tuple[Problem, Record]] | None" = None
+    shown: "Callable[[Record, Mapping[str, Any]], tuple[Problem, Record, Mapping[str, Any]]] | None" = None
+    gaps: Callable[["Solution"], Array] | None = None
+    given: Callable[[State], State] | None = None
+    seconds: float = 1.0
     remarks: Mapping[str, Any] = field(default_factory=lambda: {"form": "paper"})
 
     def inputs(self, t: float, state: State) -> dict[Path, Input]:

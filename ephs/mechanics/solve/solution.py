@@ -178,6 +178,8 @@ class Solution:
     @cached_property
     def constraint_error(self) -> Array:
         """(n,) largest position residual of any joint, in m or rad; zero for systems without joints."""
+        if self.motion is None and self.problem is not None and self.problem.gaps is not None:
+            return self.problem.gaps(self)
         return np.zeros(len(self)) if self.motion is None else self.motion.constraint_error()
 
     @cached_property

@@ -17,6 +17,7 @@ import numpy as np
 
 from ephs.mechanics.build import component_path
 from ephs.mechanics.methods import Setting, chosen
+from ephs.mechanics.own_units import SI, Units
 from ephs.mechanics.pace import longest_step
 from ephs.mechanics.reduced.auto import Auto
 from ephs.mechanics.reduced.equations import Equations, ReducedState
@@ -56,6 +57,8 @@ class _Made:
 
     @staticmethod
     def of(scene: Scene, t0: float) -> "_Made":
+        if Units.of(scene) != SI:
+            raise Unlike(f"{scene.name} is solved in units of its own")
         equations = Equations(scene, problem_of_scene(scene), t0)
         return _Made(equations, equations.start(t0))
 

@@ -207,7 +207,7 @@ def four_bar_off(gap: float) -> Scene:
 
 def four_bar_back(gap: float) -> Scene:
     """The consistent state next to that of `four_bar_off`."""
-    return adjusted(four_bar_off(gap))[0]
+    return adjusted(four_bar_off(gap), {})[0]
 
 
 def _four_bar() -> Scene:

@@ -1,0 +1,56 @@
+"""What adjusting a scene did: which bodies moved, and what that was given could not be kept."""
+
+from dataclasses import dataclass
+from typing import final
+
+__all__ = ["Adjustment", "Changed", "Displacement"]
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Displacement:
+    """How far the assembly moved a body: m, rad, and the change of its velocity in m/s and rad/s."""
+
+    body: str
+    distance: float
+    angle: float
+    speed: float
+    spin: float
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Changed:
+    """A coordinate or rate that was given, and that contradicts others that were: ``taken`` is what it became."""
+
+    joint: str
+    what: str
+    given: tuple[float, ...]
+    taken: tuple[float, ...]
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Adjustment:
+    """What an adjusting assembly did: the gaps that it found, the bodies that it moved, what it could not keep.
+
+    ``gap`` is the largest gap of a joint before (m or rad), ``slip`` the largest velocity residual (m/s or
+    rad/s).
+    """
+
+    gap: float
+    slip: float
+    moved: tuple[Displacement, ...]
+    changed: tuple[Changed, ...] = ()
+
+    def __str__(self) -> str:
+        lines = [f"adjusted: largest gap {self.gap:.3g}, largest velocity residual {self.slip:.3g}"]
+        for d in self.moved:
+            lines.append(
+                f"  {d.body}: moved {d.distance:.3g} m, {d.angle:.3g} rad; "
+                f"velocity changed {d.speed:.3g} m/s, {d.spin:.3g} rad/s"
+            )
+        for c in self.changed:
+            given, taken = (", ".join(f"{value:.6g}" for value in values) for values in (c.given, c.taken))
+            lines.append(f"  {c.joint}: given {c.what} {given} contradicts others; {taken} is taken")
+        return "\n".join(lines)
