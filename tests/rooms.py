@@ -16,7 +16,7 @@ STOREYS: tuple[tuple[frozenset[str], ...], ...] = tuple(
     for storey in (
         ([".operad"],),
         ([".semantics.spaces"],),
-        ([".semantics", ".semantics.relations", ".semantics.symbols"],),
+        ([".semantics", ".semantics.algebra", ".semantics.relations", ".semantics.symbols"],),
         ([".mechanics.solve"],),
         ([".mechanics.scene", ".mechanics.imports"],),
         ([".mechanics", ".mechanics.reduction", ".mechanics.reduced", ".mechanics.engine"],),
@@ -29,6 +29,7 @@ STOREYS: tuple[tuple[frozenset[str], ...], ...] = tuple(
 """From the ground up. Rooms that stand together know each other and all storeys below; no others."""
 DOORS = {
     ("ephs.operad.pattern", "ephs.show"): "a pattern shows itself in notebooks",
+    ("ephs.operad.algebra", "ephs.semantics.algebra"): "the empty pattern that is called makes the empty system",
     ("ephs.semantics.system", "ephs.show"): "so does a system",
     ("ephs.mechanics.scene.words", "ephs.show"): "so does a scene",
     ("ephs.mechanics.solve.solution", "ephs.show"): "a solution plots and moves itself",

@@ -33,8 +33,12 @@ _TEXTS = {
     "filling-type": "box {box}: the filling is {found}, expected {expected}",
     "interface": "box {box}: the filling's interface does not match: {ports}. Found {found}, expected"
     " {expected}; rename ports with Pattern.rename, nothing is matched by type alone",
-    "not-a-filling": "box {what}: found {found}, expected a System or a primitive",
-    "no-filling": "the boxes {expected} want fillings, found none; give each box a system or a primitive",
+    "fillings": "box {box}: found fillings for {found}, expected one for each of {expected}; fill each box once",
+    "foreign": "box {box}: found {found}, expected an element of the algebra {expected}",
+    "not-an-element": "box {box}: found {found}, expected {expected} of an algebra, such as a System, a primitive or a"
+    " Relation; fill boxes with elements of an algebra of your own by pattern.apply(algebra, fillings)",
+    "mixed": "box {box}: the fillings are of several algebras, found {found}; expected {expected}; map them into one"
+    " algebra first",
     "rename": "there is no {what} named {found} to rename; the names are {expected}",
     "pair": "the kind of relative pose is {found!r}, expected one of {expected}",
     "pair-known": "the kind {what} of pairs is known with dim, size and parameters {expected}, found {found}",

@@ -4,74 +4,19 @@ Each law is stated once, here; tests and documentation run the same objects. The
 data, not up to isomorphism, because paths concatenate associatively and boxes are named.
 """
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
-from typing import Any, final
+from collections.abc import Mapping
+from typing import Any
 
+from ephs.operad.algebra_laws import ALGEBRA_LAWS, MAP_LAWS
 from ephs.operad.directory import Directory
+from ephs.operad.equations import Equation, Law
 from ephs.operad.names import ROOT, Path
 from ephs.operad.nesting import Nesting
 from ephs.operad.pattern import Pattern
 
-__all__ = ["LAWS", "Equation", "Law", "law"]
+__all__ = ["ALGEBRA_LAWS", "LAWS", "MAP_LAWS", "law"]
 
 Names = Mapping[Path, Path]
-
-
-@final
-@dataclass(frozen=True, slots=True)
-class Equation:
-    """Two sides that a law says are equal, and where they come from.
-
-    Printed, it shows both sides as trees; where they differ also the expression that makes it anew.
-    """
-
-    left: Any
-    right: Any
-    law: str = ""
-    inputs: tuple[object, ...] = ()
-
-    @property
-    def holds(self) -> bool:
-        """Whether the sides are equal."""
-        return bool(self.left == self.right)
-
-    @property
-    def replay(self) -> str:
-        """A Python expression that forms the equation again, given ``from ephs.operad import *``."""
-        return f"law({self.law!r})({', '.join(map(repr, self.inputs))})"
-
-    def __str__(self) -> str:
-        left, right = (str(side).replace("\n", "\n  ") for side in (self.left, self.right))
-        text = f"left\n  {left}\n{'=' if self.holds else '≠'} right\n  {right}"
-        return text if self.holds or not self.law else f"{self.law}\n{text}\nagain by\n  {self.replay}"
-
-
-@final
-@dataclass(frozen=True, slots=True)
-class Law:
-    """A law: its name, what it says, what it speaks of, and how to form both sides.
-
-    Parameters
-    ----------
-    name, statement
-        For people.
-    inputs
-        What the equation is formed of, in order: ``"f"``, ``"g"``, ``"h"`` patterns, ``"a"``, ``"b"``,
-        ``"c"`` names of boxes, ``"fillings"`` box -> pattern, ``"boxes"``, ``"junctions"``, ``"ports"`` old
-        name -> new name.
-    equation
-        Called with the inputs; gives the `Equation`.
-    """
-
-    name: str
-    statement: str
-    inputs: tuple[str, ...]
-    equation: Callable[..., Equation]
-
-    def __call__(self, *inputs: object) -> Equation:
-        """Form both sides."""
-        return replace(self.equation(*inputs), law=self.name, inputs=inputs)
 
 
 def _left_unit(g: Pattern) -> Equation:
@@ -176,11 +121,11 @@ LAWS: tuple[Law, ...] = (
 
 
 def law(name: str) -> Law:
-    """The law of this name.
+    """The law of this name, of patterns, algebras or their maps.
 
     Raises
     ------
     KeyError
         If there is none.
     """
-    return {each.name: each for each in LAWS}[name]
+    return {each.name: each for each in (*LAWS, *ALGEBRA_LAWS, *MAP_LAWS)}[name]

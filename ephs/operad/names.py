@@ -1,6 +1,6 @@
 """Paths: how boxes, junctions and ports are named, across all levels of nesting."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import TypeAlias, final
 
 from ephs.operad.errors import PatternError
@@ -76,6 +76,14 @@ class Path(tuple[str, ...]):
         if not prefix.is_prefix_of(self):
             raise PatternError("path", found=str(self), expected=f"a path that starts with {prefix}")
         return _trusted(self[len(prefix) :])
+
+    def moved(self, names: "Mapping[Path, Path]") -> "Path":
+        """The path with its shortest prefix that has a new name in the mapping replaced by that."""
+        for length in range(len(self) + 1):
+            new = names.get(_trusted(self[:length]))
+            if new is not None:
+                return _trusted((*new, *self[length:]))
+        return self
 
     def __str__(self) -> str:
         return ".".join(self) if self else "."

@@ -1,7 +1,8 @@
 """Nestings: trees of patterns whose interfaces fit, which stay shared until they are flattened."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import cast, final
+from typing import TYPE_CHECKING, TypeVar, cast, final
 
 from ephs.operad.collector import paused_collector
 from ephs.operad.directory import Directory, Entries
@@ -9,7 +10,12 @@ from ephs.operad.errors import PatternError
 from ephs.operad.names import Path, paths_text
 from ephs.operad.pattern import Pattern
 
+if TYPE_CHECKING:
+    from ephs.operad.algebra import Algebra
+
 __all__ = ["Nesting"]
+
+T = TypeVar("T")
 
 
 @final
@@ -81,6 +87,27 @@ class Nesting:
 
         with paused_collector():
             return flatten(self)
+
+    def fold(self, algebra: "Algebra[T]", leaves: "Mapping[Path, T] | Mapping[str, T]") -> T:
+        """The value in an algebra, level by level from the innermost patterns: fill, then compose.
+
+        Equal to ``nesting.flatten().apply(algebra, leaves)``: flatten, then fill.
+
+        Parameters
+        ----------
+        leaves
+            An element for each open box, by its path in the whole.
+
+        Raises
+        ------
+        PatternError
+            An open box without element, an element without box, what is no element, or an interface that differs; it
+            names the box by its path in the whole.
+        """
+        from ephs.operad.algebra import fold
+        from ephs.operad.wellformed import read_fillings
+
+        return fold(algebra, self, read_fillings(leaves, {}))
 
     def bottom_up(self) -> Pattern:
         """Flatten the children first, then substitute them; equal to `flatten`."""

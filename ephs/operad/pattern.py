@@ -9,12 +9,11 @@ where a state port is exposed.
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, final
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, final
 
 from ephs.operad.collector import paused_collector
 from ephs.operad.directory import Directory, Entries
-from ephs.operad.errors import PatternError
-from ephs.operad.names import ROOT, Path, PathLike, paths_text
+from ephs.operad.names import ROOT, Path, PathLike
 from ephs.operad.normal import NormalForm, normal_form
 from ephs.operad.parts import Box, Junction, Port
 from ephs.operad.quantities import Interface, PortType
@@ -22,20 +21,12 @@ from ephs.operad.quantities import Interface, PortType
 if TYPE_CHECKING:
     import networkx as nx
 
+    from ephs.operad.algebra import Algebra, Element
     from ephs.operad.isomorphism import Renaming
     from ephs.operad.lint import Diagnostic
 
-__all__ = ["Boxes", "Filling", "Pattern"]
-
-
-class Filling(Protocol):
-    """What can fill a box: it knows how to compose itself and its like along a pattern."""
-
-    def compose(self, pattern: "Pattern", fillings: Mapping[Path, object]) -> object:
-        """Fill the boxes of the pattern."""
-        ...
-
-
+__all__ = ["Boxes", "Pattern"]
+T = TypeVar("T")
 Boxes: TypeAlias = Entries[Entries[str | Port] | Box]
 """Box name -> port name -> junction name, ``"~name"`` for a state port; or box name -> `Box`."""
 
@@ -212,21 +203,32 @@ class Pattern:
 
     def __call__(
         self,
-        mapping: "Mapping[Path, Filling] | Mapping[str, Filling] | None" = None,
+        mapping: "Mapping[Path, Element] | Mapping[str, Element] | None" = None,
         /,
-        **fillings: "Filling",
+        **fillings: "Element",
     ) -> Any:
-        """Fill all boxes by systems or primitives, which gives a system; names as in `substitute`."""
+        """Fill all boxes, in the one of the fillings' algebras that holds all of them; names as in `substitute`.
+
+        Systems and primitives give a `System`; with a `Relation` among them, a `Relation`. The empty pattern, which
+        has no fillings to say it, gives the system without parts. Errors are those of `apply`.
+        """
+        from ephs.operad.algebra import call
         from ephs.operad.wellformed import read_fillings
 
-        given = read_fillings(mapping, fillings)
-        first = next(iter(given.values()), None)
-        if first is None:
-            raise PatternError("no-filling", found="none", expected=paths_text(self.boxes))
-        for box, filling in given.items():
-            if not callable(getattr(filling, "compose", None)):
-                raise PatternError("not-a-filling", what=str(box), found=type(filling).__name__)
-        return first.compose(self, given)
+        return call(self, read_fillings(mapping, fillings))
+
+    def apply(self, algebra: "Algebra[T]", fillings: "Mapping[Path, T] | Mapping[str, T]") -> "T":
+        """What the pattern makes of an element of an algebra for each box.
+
+        Raises
+        ------
+        PatternError
+            A box without filling, a filling without box, what is no element, or an interface that differs.
+        """
+        from ephs.operad.algebra import apply
+        from ephs.operad.wellformed import read_fillings
+
+        return apply(algebra, self, read_fillings(fillings, {}))
 
     def rename(
         self,
@@ -272,7 +274,7 @@ class Pattern:
         return isomorphism(self, other, fix_interface=fix_interface)
 
     def automorphisms(self, *, fix_interface: bool = False) -> int:
-        """The number of renamings of boxes, junctions and ports that leave the pattern as it is; 1 if it is rigid."""
+        """The number of renamings that leave the pattern as it is; 1 if it is rigid."""
         from ephs.operad.isomorphism import automorphisms
 
         return automorphisms(self, fix_interface=fix_interface)
@@ -280,8 +282,7 @@ class Pattern:
     def canonical_hash(self) -> str:
         """A digest that isomorphic patterns share, the same in every process.
 
-        Patterns with different digests are not isomorphic. The converse holds but for patterns so regular that
-        colour refinement does not tell them apart.
+        Others have others, but for patterns so regular that colour refinement does not tell them apart.
         """
         from ephs.operad.isomorphism import canonical_hash
 

@@ -7,12 +7,13 @@ from typing import final
 from ephs.operad.directory import Directory
 from ephs.operad.errors import PatternError
 from ephs.operad.links import closure
+from ephs.operad.matching import require_interface
 from ephs.operad.names import ROOT, Path, PathLike, paths_text
 from ephs.operad.nesting import Nesting
 from ephs.operad.normal import powered
 from ephs.operad.parts import Box, Junction, Port
 from ephs.operad.pattern import Pattern
-from ephs.operad.quantities import Interface, interface_text
+from ephs.operad.quantities import Interface
 from ephs.operad.wellformed import box_of, require_one_quantity
 
 __all__ = ["flatten", "substitute"]
@@ -42,7 +43,7 @@ def flatten(nesting: Nesting) -> Pattern:
             path = level.path / box if level.path else box
             child = level.nesting.children.get(box)
             if child is not None:
-                _require_interface(path, content.interface, child.pattern.interface)
+                require_interface(path, content.interface, child.pattern.interface)
                 while child.pattern.is_identity and child.children:
                     child = _through_identity(path, child)
             if child is None or child.pattern.is_identity:  # an identity changes nothing: its box keeps the name
@@ -149,7 +150,7 @@ def _through_identity(box: Path, nesting: Nesting) -> Nesting:
     """What fills an identity's box, in the frames of the identity's interface."""
     (child,) = nesting.children.values()
     interface = nesting.pattern.interface
-    _require_interface(box, interface, child.pattern.interface)
+    require_interface(box, interface, child.pattern.interface)
     return Nesting(_adopted(child.pattern, interface), child.children)
 
 
@@ -170,28 +171,3 @@ def _require_pattern(pattern: Pattern, box: Path, filling: object) -> Pattern:
         expected = "a Pattern; call the pattern to fill boxes with systems or primitives"
         raise PatternError("filling-type", box=box, found=type(filling).__name__, expected=expected)
     return filling
-
-
-def _require_interface(box: Path, wanted: Interface, given: Interface) -> None:
-    if wanted == given:
-        return
-    if faults := _differences(wanted, given):
-        found, expected = interface_text(given), interface_text(wanted)
-        first = min(wanted.keys() ^ given.keys() or _differing(wanted, given))
-        raise PatternError("interface", box=box, port=first, found=found, expected=expected, ports="; ".join(faults))
-
-
-def _differing(wanted: Interface, given: Interface) -> list[Path]:
-    return [
-        port
-        for port in sorted(wanted.keys() & given.keys())
-        if wanted[port].power != given[port].power or not wanted[port].quantity.matches(given[port].quantity)
-    ]
-
-
-def _differences(wanted: Interface, given: Interface) -> list[str]:
-    """The difference of two interfaces, port by port."""
-    faults = [f"missing {port}: {wanted[port]}" for port in sorted(wanted.keys() - given.keys())]
-    faults += [f"extra {port}: {given[port]}" for port in sorted(given.keys() - wanted.keys())]
-    changed = _differing(wanted, given)
-    return faults + [f"differing {port}: found {given[port]}, expected {wanted[port]}" for port in changed]

@@ -74,6 +74,10 @@ _TEXTS = {
     "missing-input": ("{path}: the outer port is open: give inputs={{'{path}': {{'flow': …}}}} or {{'effort': …}}"),
     "unknown-input": "{path}: no such outer power port; the open ports are {expected}",
     "input": "{path}: the input is {found}, expected {expected}",
+    "joined": "{path}: joined to {port}, found {found}, expected {expected}; only equal quantities share a state",
+    "units": "{path}: found {found}, expected {expected}",
+    "bounds": "{path}: the conductance is {found}, expected bounds {expected}",
+    "no-state": "{path}: the port shows the state {found}, expected {expected}",
     "rewrite": "{path}: {rule} would change what the system means: {found}",
 }
 

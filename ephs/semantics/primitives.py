@@ -7,15 +7,18 @@ checks, the discrete relation and the compiled kernel all derive from that one o
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
-from typing import Any, Literal, final
+from typing import TYPE_CHECKING, Any, Literal, final
 
 import numpy as np
 
-from ephs.operad import Directory, Interface, Path, Pattern, PortType, Quantity
+from ephs.operad import Algebra, Directory, Interface, Path, PortType, Quantity
 from ephs.semantics.bundle import Array, Bundle, Reference
 from ephs.semantics.errors import StructureError
 from ephs.semantics.spaces import manifold
 from ephs.semantics.verdict import Condition, StructureVerdict, examine
+
+if TYPE_CHECKING:
+    from ephs.semantics.system import Filling
 
 __all__ = ["Domain", "Formula", "Irreversible", "Kernel", "Point", "Primitive", "Reversible", "Storage"]
 
@@ -195,11 +198,12 @@ class Storage:
             return sum(float(x[p][0]) * reference.intensive(q) for p, _, q in self.bundle.items() if q.environment)
         return float(self.energy(x))
 
-    def compose(self, pattern: Pattern, fillings: "Mapping[Path, object]") -> object:
-        """Fill the boxes of a pattern: a system, or a relation where one of the fillings is one."""
-        from ephs.semantics.system import filled
+    @property
+    def algebra(self) -> "Algebra[Filling]":
+        """Primitives fill boxes as systems do."""
+        from ephs.semantics.algebra import systems
 
-        return filled(pattern, fillings)
+        return systems
 
 
 @final
@@ -254,11 +258,12 @@ class Reversible:
         """The layout of the fibre."""
         return Bundle.of(self.interface)
 
-    def compose(self, pattern: Pattern, fillings: "Mapping[Path, object]") -> object:
-        """Fill the boxes of a pattern: a system, or a relation where one of the fillings is one."""
-        from ephs.semantics.system import filled
+    @property
+    def algebra(self) -> "Algebra[Filling]":
+        """Primitives fill boxes as systems do."""
+        from ephs.semantics.algebra import systems
 
-        return filled(pattern, fillings)
+        return systems
 
 
 @final
@@ -317,11 +322,12 @@ class Irreversible:
             if quantity.kind == "entropy" and not reference.temperature + e[where][0] > 0.0:
                 raise StructureError("temperature", self.name, found=float(reference.temperature + e[where][0]))
 
-    def compose(self, pattern: Pattern, fillings: "Mapping[Path, object]") -> object:
-        """Fill the boxes of a pattern: a system, or a relation where one of the fillings is one."""
-        from ephs.semantics.system import filled
+    @property
+    def algebra(self) -> "Algebra[Filling]":
+        """Primitives fill boxes as systems do."""
+        from ephs.semantics.algebra import systems
 
-        return filled(pattern, fillings)
+        return systems
 
 
 Primitive = Storage | Reversible | Irreversible

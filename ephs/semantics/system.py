@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Literal, Protocol, TypeVar, final
 
 import numpy as np
 
-from ephs.operad import ROOT, Directory, Interface, Nesting, Path, Pattern, Quantity
+from ephs.operad import ROOT, Algebra, Directory, Interface, Nesting, Path, Pattern, Quantity
+from ephs.operad.matching import interfaces_match
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.errors import AssemblyError, SemanticsError
 from ephs.semantics.primitives import Irreversible, Primitive, Reversible, Storage
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from ephs.semantics.report import CheckReport
     from ephs.semantics.symbols.equations import Equations
 
-__all__ = ["Filling", "System", "as_system", "filled", "fold", "read_state", "require_fillings"]
+__all__ = ["Filling", "System", "as_system", "fold", "read_state", "require_fillings"]
 
 T = TypeVar("T")
 
@@ -52,23 +53,16 @@ class System:
         require_fillings(self.pattern, self.fillings)
 
     @staticmethod
-    def fill(pattern: Pattern, fillings: Mapping[Path, object]) -> "System":
-        """Fill the boxes of a pattern."""
-        checked: dict[Path, Filling] = {}
-        for box, filling in fillings.items():
-            if not isinstance(filling, Filling):
-                raise TypeError(f"{box}: a filling is a System or a primitive, found {type(filling).__name__}")
-            checked[box] = filling
-        return System(pattern, Directory(checked))
-
-    @staticmethod
     def of(pattern: Pattern, fillings: Mapping[str, "Filling"] | Mapping[Path, "Filling"]) -> "System":
         """Fill the boxes of a pattern, given by path or dotted name."""
         return System(pattern, Directory({Path.of(box): filling for box, filling in fillings.items()}))
 
-    def compose(self, pattern: Pattern, fillings: Mapping[Path, object]) -> "System | Relation":
-        """Fill the boxes of a pattern: a system, or a relation where one of the fillings is one."""
-        return filled(pattern, fillings)
+    @property
+    def algebra(self) -> "Algebra[Filling]":
+        """Of which algebra a system is an element."""
+        from ephs.semantics.algebra import systems
+
+        return systems
 
     @property
     def kind(self) -> Literal["composite"]:
@@ -222,21 +216,11 @@ class System:
 Filling = System | Storage | Reversible | Irreversible
 
 
-def filled(pattern: Pattern, fillings: Mapping[Path, object]) -> "System | Relation":
-    """The pattern with its boxes filled: a system, or a relation where one of the fillings is one."""
-    from ephs.semantics.relations import Relation
-
-    for filling in fillings.values():
-        if isinstance(filling, Relation):
-            return filling.compose(pattern, fillings)
-    return System.fill(pattern, fillings)
-
-
 def as_system(filling: Filling) -> System:
     """A primitive as the one box of an identity pattern; a system as it is."""
     if isinstance(filling, System):
         return filling
-    return System.fill(Pattern.identity(filling.interface), {ROOT: filling})
+    return System(Pattern.identity(filling.interface), Directory.unit(filling))
 
 
 def fold(
@@ -271,7 +255,7 @@ def require_fillings(pattern: Pattern, fillings: Mapping[Path, _Filling]) -> Non
         raise SemanticsError("fillings", ROOT, expected=_names(boxes), found=_names(given))
     for box, filling in fillings.items():
         wanted = pattern.boxes[box].interface
-        if not _same_interface(wanted, filling.interface):
+        if not interfaces_match(wanted, filling.interface):
             found, expected = _describe(filling.interface), _describe(wanted)
             raise SemanticsError("interface", box, found=found, expected=expected)
 
@@ -296,15 +280,6 @@ def read_state(path: Path, quantity: Quantity, value: object) -> Array:
     if not np.all(np.isfinite(array)):
         raise AssemblyError("state-number", path, found=array, quantity=quantity.kind)
     return manifold(space).normalise(array)
-
-
-def _same_interface(wanted: Interface, found: Interface) -> bool:
-    if set(wanted) != set(found):
-        return False
-    return all(
-        found[port].power == port_type.power and found[port].quantity.matches(port_type.quantity)
-        for port, port_type in wanted.items()
-    )
 
 
 def _describe(interface: Interface) -> str:

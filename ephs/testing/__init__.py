@@ -1,5 +1,6 @@
 """Hypothesis strategies and checks for suites that build on this package."""
 
+from ephs.testing.algebras import algebra_inputs, check_algebra, check_algebra_map
 from ephs.testing.laws import check_operad_laws, law_inputs
 from ephs.testing.mechanisms import mechanisms
 from ephs.testing.patterns import fresh_names, interfaces, nestings, paths, patterns, quantities
@@ -14,6 +15,9 @@ from ephs.testing.systems import (
 )
 
 __all__ = [
+    "algebra_inputs",
+    "check_algebra",
+    "check_algebra_map",
     "check_entropy_production",
     "check_functoriality",
     "check_natural",

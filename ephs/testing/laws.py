@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from ephs.operad import LAWS, Law, Path, Pattern
 from ephs.testing.patterns import fresh_paths, nestings, patterns
 
-__all__ = ["check_operad_laws", "law_inputs"]
+__all__ = ["check_operad_laws", "law_inputs", "renamings"]
 
 
 @st.composite
@@ -43,11 +43,11 @@ def law_inputs(draw: st.DrawFn, law: Law) -> tuple[object, ...]:
                 known["c"] = c = draw(st.sampled_from([box for box in f.boxes if box != a]))
                 known["h"] = draw(patterns(interface=f.boxes[c].interface))
             if "boxes" in wanted:
-                known["boxes"] = _renaming(draw, f.boxes, [*f.boxes, *f.junctions])
+                known["boxes"] = renamings(draw, f.boxes, [*f.boxes, *f.junctions])
             if "junctions" in wanted:
-                known["junctions"] = _renaming(draw, f.junctions, [*f.boxes, *f.junctions])
+                known["junctions"] = renamings(draw, f.junctions, [*f.boxes, *f.junctions])
             if "ports" in wanted:
-                known["ports"] = _renaming(draw, g.interface, [*g.boxes, *g.junctions])
+                known["ports"] = renamings(draw, g.interface, [*g.boxes, *g.junctions])
     else:
         known["g"] = draw(patterns())
     return tuple(known[name] for name in wanted)
@@ -59,7 +59,7 @@ def _fillings(draw: st.DrawFn, pattern: Pattern) -> dict[Path, Pattern]:
     return {box: draw(patterns(interface=pattern.boxes[box].interface)) for box in order[:count]}
 
 
-def _renaming(draw: st.DrawFn, names: Iterable[Path], taken: Iterable[Path]) -> dict[Path, Path]:
+def renamings(draw: st.DrawFn, names: Iterable[Path], taken: Iterable[Path]) -> dict[Path, Path]:
     """Swap names, and behind a choice give one of them a name that is new."""
     old = list(names)
     new = list(draw(st.permutations(old)))

@@ -47,18 +47,28 @@ def quantities(draw: st.DrawFn, *, frames: bool = True) -> Quantity:
 
 
 @st.composite
-def interfaces(draw: st.DrawFn, *, min_ports: int = 0, max_ports: int = 4, state_ports: bool = True) -> Interface:
+def interfaces(
+    draw: st.DrawFn,
+    *,
+    min_ports: int = 0,
+    max_ports: int = 4,
+    state_ports: bool = True,
+    of: st.SearchStrategy[Quantity] | None = None,
+) -> Interface:
     """Interfaces, the empty one included.
 
     Parameters
     ----------
+    of
+        Quantities of the ports; any where not given.
     state_ports
         Whether ports may be state ports.
     """
     _require(0 <= min_ports <= max_ports, f"min_ports={min_ports}, max_ports={max_ports}: expected 0 <= min <= max")
     names = fresh_paths(draw, draw(st.integers(min_ports, max_ports)), ())
     power = st.just(True) if not state_ports else st.booleans().map(lambda flag: not flag)
-    return Directory([(name, PortType(draw(quantities()), draw(power))) for name in names])
+    kinds = quantities() if of is None else of
+    return Directory([(name, PortType(draw(kinds), draw(power))) for name in names])
 
 
 @st.composite
@@ -72,6 +82,7 @@ def patterns(
     state_ports: bool = True,
     links: bool = True,
     identities: bool = True,
+    of: st.SearchStrategy[Quantity] | None = None,
 ) -> Pattern:
     """Patterns of every well-formed shape.
 
@@ -91,6 +102,8 @@ def patterns(
         Whether junctions may be linked.
     identities
         Whether identities are among them; they have one box.
+    of
+        Quantities of the junctions; any where not given.
 
     Raises
     ------
@@ -100,7 +113,8 @@ def patterns(
     _require(0 <= min_boxes <= max_boxes, f"min_boxes={min_boxes}, max_boxes={max_boxes}: expected 0 <= min <= max")
     _require(max_boxes > 0 or not interface, "an outer port needs an inner one: expected max_boxes >= 1")
     most = 3 if max_boxes else 0
-    outer = draw(interfaces(max_ports=most, state_ports=state_ports)) if interface is None else interface
+    kinds = quantities() if of is None else of
+    outer = draw(interfaces(max_ports=most, state_ports=state_ports, of=of)) if interface is None else interface
     has_state = any(not port.power for port in outer.values())
     unary = identities and min_boxes <= 1 <= max_boxes and (state_ports or not has_state)
     # Behind the highest of a few numbers, so that shrinking leaves it.
@@ -114,7 +128,7 @@ def patterns(
         present = [junction.quantity for junction in junctions.values()]
         # Half of them repeat a quantity, or few junctions could be linked.
         again = bool(present) and draw(st.booleans())
-        junctions[path] = Junction(draw(st.sampled_from(present) if again else quantities()))
+        junctions[path] = Junction(draw(st.sampled_from(present) if again else kinds))
     groups = _groups(draw, junctions) if links else []
     wires = _wires(draw, junctions, boxes, groups, state_ports)
     return Pattern(junctions, wires, groups)
@@ -171,7 +185,14 @@ def fresh_paths(draw: st.DrawFn, count: int, taken: Iterable[Path]) -> list[Path
 
 
 @st.composite
-def nestings(draw: st.DrawFn, *, max_depth: int = 3, interface: Interface | None = None, max_boxes: int = 3) -> Nesting:
+def nestings(
+    draw: st.DrawFn,
+    *,
+    max_depth: int = 3,
+    interface: Interface | None = None,
+    max_boxes: int = 3,
+    of: st.SearchStrategy[Quantity] | None = None,
+) -> Nesting:
     """Trees of patterns that fit into each other, of at most so many levels.
 
     Parameters
@@ -180,13 +201,16 @@ def nestings(draw: st.DrawFn, *, max_depth: int = 3, interface: Interface | None
         The outer interface; any if it is not given.
     max_boxes
         How many boxes a pattern may have.
+    of
+        Quantities of the junctions; any where not given.
     """
     _require(max_depth >= 1, f"max_depth={max_depth}: expected at least one level")
-    pattern = draw(patterns(interface=interface, max_boxes=max_boxes))
+    pattern = draw(patterns(interface=interface, max_boxes=max_boxes, of=of))
     children: dict[Path, Nesting] = {}
     for box, content in pattern.boxes.items():
         if max_depth > 1 and draw(st.booleans()):
-            children[box] = draw(nestings(max_depth=max_depth - 1, interface=content.interface, max_boxes=max_boxes))
+            inner = nestings(max_depth=max_depth - 1, interface=content.interface, max_boxes=max_boxes, of=of)
+            children[box] = draw(inner)
     return Nesting(pattern, children)
 
 

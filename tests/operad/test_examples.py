@@ -7,8 +7,13 @@ import pkgutil
 import pytest
 
 import ephs.operad
+import ephs.semantics.algebra
 
-MODULES = [f"ephs.operad.{found.name}" for found in pkgutil.iter_modules(ephs.operad.__path__)]
+MODULES = [
+    f"{room.__name__}.{found.name}"
+    for room in (ephs.operad, ephs.semantics.algebra)
+    for found in pkgutil.iter_modules(room.__path__)
+]
 
 
 @pytest.mark.parametrize("name", MODULES)

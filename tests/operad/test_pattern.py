@@ -8,6 +8,7 @@ from hypothesis import given
 
 from ephs.operad import (  # noqa: F401  # what repr writes is evaluated here
     ROOT,
+    Algebra,
     Box,
     Directory,
     Path,
@@ -205,10 +206,6 @@ REFUSED = {
         lambda: Pattern({"q": junction(Q)}, {"a": {"q": "q"}}).rename(boxes={"a": "q.a"}),
         {"kind": "p5", "box": "q.a", "junction": "q"},
     ),
-    "nothing to fill with": (
-        lambda: Pattern({"q": junction(Q)}, {"a": {"q": "q"}})(),
-        {"kind": "no-filling"},
-    ),
 }
 
 
@@ -296,17 +293,24 @@ def test_power_speaks_of_the_exposure_only():
     assert Pattern({"q": junction(Q, True, False)}, boxes) != Pattern({"q": junction(Q, True)}, boxes)
 
 
-def test_boxes_are_called_with_fillings_that_compose_themselves():
+def test_boxes_are_called_with_elements_of_an_algebra():
     calls = []
-
-    class Filling:
-        def compose(self, pattern, fillings):
-            calls.append((pattern, fillings))
-            return "system"
-
     f = Pattern({"q": junction(Q)}, {"a.b": {"q": "q"}, "c": {"q": "q"}})
-    one, two = Filling(), Filling()
-    assert f({"a.b": one}, c=two) == "system"
+
+    class Element:
+        interface = f.boxes["c"].interface
+
+        @property
+        def algebra(self):
+            return algebra
+
+    def compose(pattern, fillings):
+        calls.append((pattern, fillings))
+        return "composed"
+
+    algebra = Algebra("own", lambda element: getattr(element, "interface", None), compose)
+    one, two = Element(), Element()
+    assert f({"c": two}, **{"a.b": one}) == "composed"
     assert calls == [(f, {Path.parse("a.b"): one, Path.parse("c"): two})]
     with pytest.raises(PatternError, match="c is given twice"):
         f({"c": one}, c=two)

@@ -16,7 +16,7 @@ from typing import Literal, Protocol, TypeAlias, final
 
 import numpy as np
 
-from ephs.operad import ROOT, Directory, Interface, Path, Pattern
+from ephs.operad import ROOT, Algebra, Directory, Interface, Path, Pattern
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.errors import SemanticsError
 from ephs.semantics.primitives import Primitive, Storage
@@ -67,6 +67,13 @@ class Relation:
     classes: tuple[StateClass, ...]
     reference: Reference
     fibre: Fibre = field(repr=False)
+
+    @property
+    def algebra(self) -> "Algebra[Relation | Filling]":
+        """Of which algebra a relation is an element; systems and primitives stand in it for their relations."""
+        from ephs.semantics.algebra import relations
+
+        return relations
 
     def at(
         self,

@@ -1,0 +1,71 @@
+"""Laws and the equations that they form, as values."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from operator import eq
+from typing import Any, final
+
+__all__ = ["Equation", "Law"]
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Equation:
+    """Two sides that a law says are equal, and where they come from.
+
+    Printed, it shows both sides as trees; where they differ also the expression that makes it anew.
+
+    Parameters
+    ----------
+    same
+        What decides: equality of data, or an algebra's own equality or order.
+    """
+
+    left: Any
+    right: Any
+    law: str = ""
+    inputs: tuple[object, ...] = ()
+    same: Callable[[Any, Any], bool] = eq
+
+    @property
+    def holds(self) -> bool:
+        """Whether the sides are equal."""
+        return bool(self.same(self.left, self.right))
+
+    @property
+    def replay(self) -> str:
+        """A Python expression that forms the equation again, given ``from ephs.operad import *`` and its algebras."""
+        return f"law({self.law!r})({', '.join(map(repr, self.inputs))})"
+
+    def __str__(self) -> str:
+        left, right = (str(side).replace("\n", "\n  ") for side in (self.left, self.right))
+        text = f"left\n  {left}\n{'=' if self.holds else '≠'} right\n  {right}"
+        return text if self.holds or not self.law else f"{self.law}\n{text}\nagain by\n  {self.replay}"
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Law:
+    """A law: its name, what it says, what it speaks of, and how to form both sides.
+
+    Parameters
+    ----------
+    name, statement
+        For people.
+    inputs
+        What the equation is formed of, in order: ``"f"``, ``"g"``, ``"h"`` patterns, ``"a"``, ``"b"``,
+        ``"c"`` names of boxes, ``"fillings"`` box -> pattern, ``"boxes"``, ``"junctions"``, ``"ports"`` old
+        name -> new name. Laws of algebras also speak of an ``"algebra"``, ``"elements"`` of it by box, a ``"map"``,
+        and of a pattern equal to f that lists its parts in another order, ``"again"``.
+    equation
+        Called with the inputs; gives the `Equation`.
+    """
+
+    name: str
+    statement: str
+    inputs: tuple[str, ...]
+    equation: Callable[..., Equation]
+
+    def __call__(self, *inputs: object) -> Equation:
+        """Form both sides."""
+        return replace(self.equation(*inputs), law=self.name, inputs=inputs)

@@ -1,0 +1,131 @@
+"""Relations over their base: what systems mean physically, as an algebra, and the map that gives systems meaning."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import TypeAlias, final
+
+import numpy as np
+
+from ephs.operad import Algebra, AlgebraMap, Directory, Interface, Path, Pattern, PortType
+from ephs.operad.matching import interfaces_match
+from ephs.semantics.algebra.free import systems
+from ephs.semantics.bundle import Array, Bundle, Reference
+from ephs.semantics.checks import random_point
+from ephs.semantics.primitives import Irreversible, Primitive
+from ephs.semantics.relations import LinearRelation, Relation, relation_of
+from ephs.semantics.relations.base import BasePoint
+from ephs.semantics.subspace import Subspace
+from ephs.semantics.system import Filling
+
+__all__ = ["Meaning", "meaning_of_systems", "relation_for", "relations"]
+
+Meaning: TypeAlias = Relation | Filling
+"""A relation, or a system or primitive that stands for its own."""
+Values: TypeAlias = dict[Path, Array]
+SAMPLES = 3
+"""Points of the base at which two relations are compared."""
+
+
+def _interface(element: object) -> Interface | None:
+    return element.interface if isinstance(element, Meaning) else None
+
+
+def relation_for(element: Meaning) -> Relation:
+    """The relation that an element is or stands for, at the default reference."""
+    return element if isinstance(element, Relation) else relation_of(element, Reference(), "nested")
+
+
+def _compose(pattern: Pattern, parts: Mapping[Path, Meaning]) -> Meaning:
+    known = [part for part in parts.values() if isinstance(part, Relation)]
+    return (known or [relation_for(Pattern({}, {})())])[0].compose(pattern, parts)
+
+
+def _equal(left: Meaning, right: Meaning) -> bool:
+    """Same ports and base, and at points of it the same subspace, to the rounding of the eliminations."""
+    one, other = relation_for(left), relation_for(right)
+    if not interfaces_match(one.interface, other.interface) or one.reference != other.reference:
+        return False
+    if one.classes != other.classes or _arguments(one) != _arguments(other):
+        return False
+    rng = np.random.default_rng(0)
+    for _ in range(SAMPLES):
+        state, ports = _sample(one, rng)
+        # temperatures stay above zero
+        efforts = {path: rng.uniform(-1.0, 1.0, size) for path, size in _arguments(one)}
+        found, expected = (each.at(state, ports, efforts=efforts) for each in (one, other))
+        condition = max(10.0, found.subspace.condition, expected.subspace.condition)
+        if found.distance(expected) > min(1e-6, 1e-13 * condition):
+            return False
+    return True
+
+
+def _sample(relation: Relation, rng: np.random.Generator) -> tuple[Values, Values]:
+    """Random values of states inside, and of states at outer ports only."""
+    state: Values = {}
+    ports: Values = {}
+    for each in relation.classes:
+        layout = Bundle.of(Directory({each.name: PortType(each.quantity)}))
+        value = random_point(layout, (each.name,), rng)[each.name]
+        (state if each.stores or each.readers else ports)[each.name] = value
+    return state, ports
+
+
+def _arguments(relation: Relation) -> list[tuple[Path, int]]:
+    """The components whose structure depends on efforts, and on how many."""
+    leaves = relation.fibre.leaves()
+    return sorted((path, leaf.bundle.size) for path, leaf in leaves if isinstance(leaf, Irreversible))
+
+
+def _rename(element: Meaning, names: Mapping[Path, Path]) -> Meaning:
+    relation = relation_for(element)
+
+    def moved(paths: tuple[Path, ...]) -> tuple[Path, ...]:
+        return tuple(sorted(path.moved(names) for path in paths))
+
+    classes = (replace(each, stores=moved(each.stores), readers=moved(each.readers)) for each in relation.classes)
+    fibre = _Renamed(relation, Directory.trusted(dict(names)))
+    return replace(relation, classes=tuple(sorted(classes, key=lambda each: each.name)), fibre=fibre)
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class _Renamed:
+    """The fibres of a relation whose components have new names."""
+
+    relation: Relation
+    names: Directory[Path]
+
+    def leaves(self) -> Iterator[tuple[Path, Primitive]]:
+        for path, primitive in self.relation.fibre.leaves():
+            yield path.moved(self.names), primitive
+
+    def at(self, path: Path, point: BasePoint) -> LinearRelation:
+        states: Values = {}
+        efforts: Values = {}
+        for leaf, primitive in self.relation.fibre.leaves():
+            new, old = path / leaf.moved(self.names), path / leaf
+            for port in primitive.interface:
+                if new / port in point.states:
+                    states[old / port] = point.states[new / port]
+            if new in point.efforts:
+                efforts[old] = point.efforts[new]
+        found = self.relation.fibre.at(path, replace(point, states=states, efforts=efforts))
+        at, places = 0, dict[Path, range]()
+        for name, dim in found.rates:
+            places[name.moved(self.names)] = range(at, at + dim)
+            at += dim
+        rates = sorted((name, len(rows)) for name, rows in places.items())
+        order = [row for name, _ in rates for row in places[name]]
+        order += range(at, found.subspace.ambient)
+        subspace = Subspace(found.subspace.basis[order], found.subspace.condition)
+        return replace(found, rates=tuple(rates), subspace=subspace)
+
+
+relations: Algebra[Meaning] = Algebra("relations", _interface, _compose, _equal, _rename)
+"""Relations over their base; equal if they have one base, and the same fibres at points drawn from it."""
+
+
+def meaning_of_systems(reference: Reference | None = None) -> AlgebraMap[Filling, Meaning]:
+    """The map from systems to their relations, which flattens first."""
+    at = reference or Reference()
+    return AlgebraMap(systems, relations, lambda element: relation_of(element, at, "flat"), "meaning")
