@@ -31,7 +31,8 @@ from ephs.mechanics.solve.solution import Solution
 from ephs.mechanics.solve.threads import in_one_thread
 from ephs.mechanics.solve.watching import guarded
 from ephs.operad import Path
-from ephs.semantics.bundle import POSITIVE, Array, Reference
+from ephs.semantics import extents
+from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.checks import random_efforts
 from ephs.semantics.errors import AssemblyError
 from ephs.semantics.primitives import Irreversible
@@ -269,8 +270,10 @@ def problem_of_system(
         signals[path] = signal(value, effort=side == "effort", name=str(path), size=size)
     state = system.state(initial)
     for slot in descriptor.states:
-        if slot.quantity.kind in POSITIVE and not np.all(state[slot.path] > 0.0):
-            raise AssemblyError("positive", slot.path, quantity=slot.quantity.kind, found=float(state[slot.path][0]))
+        given, of = state[slot.path], slot.quantity
+        if not extents.inside(of, given):
+            found = float(given[0]) if given.size == 1 else given
+            raise AssemblyError("outside", slot.path, quantity=of.kind, found=found, expected=extents.expected(of))
     joints = flat_joints(descriptor)
     if assemble and joints.links:
         state = assembled(joints, state, {Path.of(path) for path in initial or {}})

@@ -5,10 +5,12 @@ A document is canonical: equal patterns have equal documents, in every process.
 
 import json
 from collections.abc import Mapping
+from math import inf, isfinite
 from pathlib import Path as FilePath
 from typing import Any, cast
 
 from ephs.operad.canonical import canonical
+from ephs.operad.charges import WHOLE, Domain
 from ephs.operad.parts import Junction
 from ephs.operad.pattern import Pattern
 from ephs.operad.quantities import PortType, Quantity, Space, known_quantity, quantity_word
@@ -55,12 +57,20 @@ def quantity_record(quantity: Quantity) -> dict[str, Any]:
     """A quantity as part of a document: its name, with arguments; or all that it is, where it has none."""
     frame = {} if quantity.frame is None else {"frame": quantity.frame}
     known = quantity_word(quantity)
-    if known is None:
-        space = quantity.space
-        described = {"name": space.name, "dim": space.dim, "size": space.size, "parameters": dict(space.parameters)}
-        return {"quantity": {"kind": quantity.kind, "space": described, "parity": quantity.parity}} | frame
+    if known is None or known[0] == "species":
+        return {"quantity": _described(quantity)} | frame
     word, arguments, parameters = known
     return {"quantity": word} | ({"pair": arguments[0]} if arguments else {}) | parameters | frame
+
+
+def _described(quantity: Quantity) -> dict[str, Any]:
+    space = quantity.space
+    place = {"name": space.name, "dim": space.dim, "size": space.size, "parameters": dict(space.parameters)}
+    bounds = [end if isfinite(end) else None for end in quantity.domain]
+    carried = {name: list(row) for name, row in quantity.charges}
+    said: dict[str, Any] = {"kind": quantity.kind, "space": place, "parity": quantity.parity}
+    said |= {"domain": bounds} if quantity.domain != WHOLE else {}
+    return said | ({"charges": carried} if carried else {}) | ({"unit": quantity.unit} if quantity.unit else {})
 
 
 def port_record(port: PortType) -> dict[str, Any]:
@@ -105,7 +115,7 @@ def quantity_from(where: str, record: Mapping[str, object]) -> Quantity:
         return found.in_frame(frame)
     if extra := sorted({"pair", "pitch"} & record.keys()):
         _READ.refuse(where, f"key {extra[0]}", "none beside a quantity that is described")
-    whole = _READ.record(f"{where}.quantity", given, {"kind", "space", "parity"}, set())
+    whole = _READ.record(f"{where}.quantity", given, {"kind", "space", "parity"}, {"domain", "charges", "unit"})
     at = f"{where}.quantity.space"
     space = _READ.record(at, whole["space"], {"name", "dim", "size"}, {"parameters"})
     values = _READ.mapping(f"{at}.parameters", space.get("parameters", {}))
@@ -116,7 +126,23 @@ def quantity_from(where: str, record: Mapping[str, object]) -> Quantity:
         _READ.text(f"{where}.quantity.kind", whole["kind"]),
         _READ.whole(f"{where}.quantity.parity", whole["parity"]),
     )
-    return Quantity(kind, place, parity, frame)
+    unit = _READ.text(f"{where}.quantity.unit", whole.get("unit", ""))
+    domain = _domain(f"{where}.quantity.domain", whole["domain"]) if "domain" in whole else WHOLE
+    at = f"{where}.quantity.charges"
+    charges = tuple((name, _row(f"{at}.{name}", row)) for name, row in _READ.mapping(at, whole.get("charges", {})))
+    return Quantity(kind, place, parity, frame, domain, charges, unit)
+
+
+def _domain(where: str, value: object) -> Domain:
+    ends = _READ.list(where, value)
+    if len(ends) != 2:
+        _READ.refuse(where, value, "two numbers, null where there is no end")
+    low, high = (None if end is None else _READ.number(where, end) for end in ends)
+    return (-inf if low is None else low, inf if high is None else high)
+
+
+def _row(where: str, value: object) -> tuple[float, ...]:
+    return tuple(_READ.number(where, number) for number in _READ.list(where, value))
 
 
 def _junction(where: str, value: object) -> Junction:

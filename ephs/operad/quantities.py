@@ -5,8 +5,10 @@ from math import isfinite
 from types import MappingProxyType
 from typing import TypeAlias, final
 
+from ephs.operad.charges import KINDS, PLAIN, POSITIVE, WHOLE, Charges, Domain, charges_of, require_domain
 from ephs.operad.directory import Directory
 from ephs.operad.errors import PatternError
+from ephs.operad.units import dimension
 
 __all__ = [
     "Interface",
@@ -32,7 +34,6 @@ _PAIRS: dict[str, tuple[int, int, tuple[str, ...]]] = {
     "fixed": (0, 0, ()),
     "free": (6, 7, ()),
 }
-_ENVIRONMENT = frozenset({"entropy", "volume", "amount"})
 
 
 @final
@@ -69,6 +70,9 @@ class Space:
         return f"{self.name}({values})" if values else self.name
 
 
+_REAL = Space("real", 1, 1)
+
+
 @final
 @dataclass(frozen=True, slots=True, repr=False)
 class Quantity:
@@ -85,31 +89,58 @@ class Quantity:
     frame
         Name of the frame in which it is given, to find ports connected across frames. It has no bearing on
         the semantics and is compared only where both sides carry one.
+    domain
+        Open interval of its numbers, such as (0, inf): states of vector spaces only, groups are as they are.
+    charges
+        What is conserved with it: pairs of a name and the amount of that in a unit of each number; a mapping will do.
+        Of a species the names are elements, so that the charges of several quantities are an element matrix. The
+        reference environment has an intensive value for each charge, as the temperature for ``"entropy"``, the
+        pressure for ``"volume"``, and potentials for all others.
+    unit
+        As ``"kg m²/s"``; empty where it is not said.
+
+    A scalar of a kind that the package knows has that kind's domain, charges and unit where it gives none.
 
     Raises
     ------
     PatternError
-        If the parity is neither +1 nor -1.
+        The parity is neither +1 nor -1, the domain is empty, a charge is not a number for each direction, or entropy
+        is carried by another kind than ``"entropy"``.
     """
 
     kind: str
     space: Space
     parity: int
     frame: str | None = None
+    domain: Domain = WHOLE
+    charges: Charges = ()
+    unit: str = ""
 
     def __post_init__(self) -> None:
         if self.parity not in (1, -1):
             raise PatternError("parity", found=self.parity, what=self.kind)
+        known = KINDS.get(self.kind, PLAIN) if self.space == _REAL else PLAIN
+        given = charges_of(self.kind, self.space.dim, self.charges)
+        object.__setattr__(self, "domain", known.domain if self.domain == WHOLE else self.domain)
+        object.__setattr__(self, "charges", given or known.charges)
+        object.__setattr__(self, "unit", self.unit or known.unit)
+        dimension(self.unit)
+        require_domain(self.kind, self.domain)
+        if self.space.name != "real" and (self.domain != WHOLE or self.charges):
+            expected = "neither a domain nor charges: they are of vector spaces, Space('real', n, n)"
+            raise PatternError("domain", what=self.kind, found=f"those of {self.space}", expected=expected)
 
     def matches(self, other: "Quantity") -> bool:
         """Whether ports of the two quantities may be connected.
 
         The frames decide only where both quantities carry one, so matching is transitive among quantities
-        which all carry a frame and among those without, not across.
+        which all carry a frame and among those without, not across. Units are compared by what they are made of.
         """
+        if self == other:
+            return True
         tagged = self.frame is not None and other.frame is not None
-        alike = (self.kind, self.space, self.parity) == (other.kind, other.space, other.parity)
-        return alike and (not tagged or self.frame == other.frame)
+        same = replace(other, frame=self.frame, unit=self.unit) == self
+        return same and dimension(self.unit) == dimension(other.unit) and (not tagged or self.frame == other.frame)
 
     def in_frame(self, frame: str | None) -> "Quantity":
         """The same quantity, given in the named frame."""
@@ -117,18 +148,41 @@ class Quantity:
 
     @property
     def environment(self) -> bool:
-        """Whether the reference environment has an intensive variable for it, as temperature for entropy."""
-        return self.kind in _ENVIRONMENT
+        """Whether it carries a charge: the reference environment has an intensive value for each."""
+        return bool(self.charges)
+
+    @property
+    def positive(self) -> bool:
+        """Whether its numbers are positive, all over its domain."""
+        return self.domain[0] >= 0.0
 
     def __str__(self) -> str:
-        return f"{self.kind} on {self.space}" + (f" in frame {self.frame}" if self.frame is not None else "")
+        plain = self.in_frame(None)
+        own = "" if quantity_word(plain) is not None else "".join(_own(plain))
+        return f"{self.kind} on {self.space}{own}" + (f" in frame {self.frame}" if self.frame is not None else "")
 
     def __repr__(self) -> str:
         word = _WORDS.get(self)
         if word is not None:
             return f"quantity.{word}"
-        frame = "" if self.frame is None else f", frame={self.frame!r}"
-        return f"Quantity({self.kind!r}, {self.space!r}, {self.parity!r}{frame})"
+        default = Quantity(self.kind, self.space, self.parity)
+        given = [
+            f", {name}={getattr(self, name)!r}".replace("inf", "float('inf')" if name == "domain" else "inf")
+            for name in ("frame", "domain", "charges", "unit")
+            if getattr(self, name) != getattr(default, name)
+        ]
+        return f"Quantity({self.kind!r}, {self.space!r}, {self.parity!r}{''.join(given)})"
+
+
+def _own(of: Quantity) -> list[str]:
+    """What tells a quantity of one's own from others, in words."""
+    low, high = of.domain
+    carried = ", ".join(f"{name} {', '.join(f'{n:g}' for n in row)}" for name, row in of.charges)
+    return [
+        f" in {of.unit}" if of.unit else "",
+        f" between {low:g} and {high:g}" if of.domain != WHOLE else "",
+        f" with {carried}" if carried else "",
+    ]
 
 
 @final
@@ -152,17 +206,15 @@ def interface_text(interface: Interface) -> str:
     return "{" + ", ".join(f"{port}: {interface[port]}" for port in sorted(interface)) + "}"
 
 
-_REAL = Space("real", 1, 1)
-
-
 @final
 @dataclass(frozen=True, slots=True, repr=False)
 class Quantities:
     """The quantities of this package by name; other ones are made with `Quantity`.
 
-    Scalars are real numbers. ``pose`` is a 7-vector [w, x, y, z, rx, ry, rz], ``body_momentum`` a 6-vector
-    (angular, linear) in the body frame; ``direct_pose`` and ``direct_momentum`` have the same numbers, but
-    the direct product SO(3) x R3 as their group.
+    Scalars are real numbers; volumes and amounts are positive. An ``amount`` is of nothing in particular, ``species``
+    are amounts of a substance. The volume of a ``liquid`` counts its pressure from the environment's. ``pose`` is a
+    7-vector [w, x, y, z, rx, ry, rz], ``body_momentum`` a 6-vector (angular, linear) in the body frame;
+    ``direct_pose`` and ``direct_momentum`` have the same numbers, but the direct product SO(3) x R3 as their group.
     """
 
     displacement: Quantity = Quantity("displacement", _REAL, 1)
@@ -173,10 +225,40 @@ class Quantities:
     flux_linkage: Quantity = Quantity("flux_linkage", _REAL, -1)
     entropy: Quantity = Quantity("entropy", _REAL, 1)
     volume: Quantity = Quantity("volume", _REAL, 1)
+    amount: Quantity = Quantity("amount", _REAL, 1)
+    magnetic_flux: Quantity = Quantity("magnetic_flux", _REAL, -1)
+    liquid: Quantity = Quantity("liquid", _REAL, 1)
+    pressure_impulse: Quantity = Quantity("pressure_impulse", _REAL, -1)
     pose: Quantity = Quantity("pose", Space("SE(3)", 6, 7), 1)
     body_momentum: Quantity = Quantity("momentum", Space("se(3)*", 6, 6), -1)
     direct_pose: Quantity = Quantity("pose", Space("SO(3)xR3", 6, 7), 1)
     direct_momentum: Quantity = Quantity("momentum", Space("so(3)xR3*", 6, 6), -1)
+
+    def species(self, name: str, /, **elements: float) -> Quantity:
+        """The amount of a substance in mol, which is made of so many atoms, or other units, of each element.
+
+        Parameters
+        ----------
+        name
+            Of the substance: isomers are species of their own.
+        **elements
+            Atoms by element; where there are none, the substance itself counts as one.
+
+        Examples
+        --------
+        >>> quantity.species("H2O", H=2, O=1).charges
+        (('H', (2.0,)), ('O', (1.0,)))
+
+        Raises
+        ------
+        PatternError
+            An element's number is not finite, or is zero.
+        """
+        made = elements or {name: 1.0}
+        if zero := [element for element, number in made.items() if number == 0.0]:
+            raise PatternError("charges", what=name, found=f"{zero[0]}: 0", expected="numbers other than zero")
+        rows = tuple((element, (number,)) for element, number in made.items())
+        return Quantity(f"amount of {name}", _REAL, 1, domain=POSITIVE, charges=rows, unit="mol")
 
     def relative_pose(self, kind: str, **parameters: float) -> Quantity:
         """The pose of the second joint frame in the first, an element of the pair's subgroup of SE(3).
@@ -242,6 +324,9 @@ def quantity_word(value: Quantity) -> tuple[str, tuple[str, ...], dict[str, floa
         return _WORDS[plain], (), {}
     space, pair = plain.space, plain.space.name.rstrip("*")
     values = dict(space.parameters)
+    if (name := plain.kind.removeprefix("amount of ")) != plain.kind:
+        elements = {element: row[0] for element, row in plain.charges if len(row) == 1}
+        return ("species", (name,), elements) if quantity.species(name, **elements) == plain else None
     if pair not in _PAIRS or set(values) != set(_PAIRS[pair][2]):
         return None
     for word, make in (("relative_pose", quantity.relative_pose), ("joint_momentum", quantity.joint_momentum)):
@@ -260,6 +345,8 @@ def known_quantity(word: str, arguments: tuple[str, ...] = (), **parameters: flo
     """
     if word in ("relative_pose", "joint_momentum") and len(arguments) == 1 and "kind" not in parameters:
         return getattr(quantity, word)(arguments[0], **parameters)
+    if word == "species" and len(arguments) == 1:
+        return quantity.species(arguments[0], **parameters)
     if arguments or parameters:
         return None
     return next((value for value, known in _WORDS.items() if known == word), None)

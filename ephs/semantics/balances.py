@@ -8,7 +8,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from ephs.operad import Path
+from ephs.operad import Path, Quantity
+from ephs.operad.charges import ENTROPY
 from ephs.semantics.behaviour import Natural
 from ephs.semantics.bundle import Array
 from ephs.semantics.natural import Solved, solve_flat, solve_nested
@@ -93,30 +94,34 @@ def entropy_balance(probe: Probe) -> Verdict:
     if solved.residual > UNSOLVED:
         return VACUOUS
     productions = list(_productions(probe, solved))
-    terms = [*_amounts(probe, solved, "entropy"), *(-probe.h * made for _, made, _ in productions)]
+    terms = [*_amounts(probe, solved, ENTROPY), *(-probe.h * made for _, made, _ in productions)]
     return _balance(probe, solved, terms, [probe.h * size for *_, size in productions], "entropy", "J/K")
 
 
 def conservation(probe: Probe) -> Verdict:
-    """Volumes and amounts change by what outer ports supply and by nothing else."""
+    """Volumes, atoms and all other charges change by what outer ports supply and by nothing else."""
     solved = _solved(probe)
-    kinds = {q.kind for q in probe.system.states.values() if q.environment and q.kind != "entropy"}
-    if not kinds:
+    charges = {charge for q in probe.system.states.values() for charge, _ in q.charges if charge != ENTROPY}
+    if not charges:
         return Verdict(0.0, 0.0, "no such state")
-    found = [_balance(probe, solved, _amounts(probe, solved, kind), [], kind, "in all") for kind in sorted(kinds)]
+    found = [_balance(probe, solved, _amounts(probe, solved, name), [], name, "in all") for name in sorted(charges)]
     return max(found, key=lambda verdict: verdict.defect - verdict.tolerance)
 
 
-def _amounts(probe: Probe, solved: Solved, kind: str) -> list[float]:
-    terms = [
-        probe.h * float(solved.rates[path][0])
-        for path, quantity in probe.system.states.items()
-        if quantity.kind == kind
-    ]
+def _amounts(probe: Probe, solved: Solved, charge: str) -> list[float]:
+    """Changes of a charge where it is stored, less what outer ports supply."""
+    terms: list[float] = []
+    for path, quantity in probe.system.states.items():
+        terms += [probe.h * amount for amount in _carried(quantity, charge, solved.rates[path])]
     for port, (flow, _) in solved.outer.items():
-        if probe.system.interface[port].quantity.kind == kind:
-            terms.append(-probe.h * float(flow[0]))
+        quantity = probe.system.interface[port].quantity
+        terms += [-probe.h * amount for amount in _carried(quantity, charge, flow)]
     return terms
+
+
+def _carried(quantity: Quantity, charge: str, flow: Array) -> list[float]:
+    row = dict(quantity.charges).get(charge, ())
+    return [number * float(entry) for number, entry in zip(row, flow, strict=False)]
 
 
 def entropy_production(probe: Probe) -> Verdict:
@@ -143,7 +148,7 @@ def _productions(probe: Probe, solved: Solved) -> Iterator[tuple[Path, float, fl
                 for port, s in zip(primitive.reads, slot.reads, strict=True)
             }
             effort = solved.efforts[slot.path]
-            hot = primitive.bundle.indicator("entropy")
+            hot = primitive.bundle.indicator(ENTROPY)
             made = -float(hot @ primitive.flow(middle, effort, probe.reference))
             terms = np.abs(primitive.matrix(middle, effort, probe.reference)) @ np.abs(effort)
             yield slot.path, made, float(hot @ terms) / probe.reference.temperature

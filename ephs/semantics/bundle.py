@@ -4,8 +4,8 @@ All fibres are left-trivialised, so a port of a quantity Q carries a flow and an
 whatever the state (Lohmayer, Capobianco, Leyendecker, section 2).
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import final
 
@@ -13,35 +13,54 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ephs.operad import Interface, Path, PortType, Quantity
+from ephs.operad.charges import ENTROPY, VOLUME
 
-__all__ = ["POSITIVE", "Array", "Bundle", "Reference"]
+__all__ = ["Array", "Bundle", "Reference"]
 
 Array = NDArray[np.float64]
 Span = slice
 """A range of indices: `slice`, whose own name a method of `Bundle` bears."""
-POSITIVE = ("volume", "amount")
-"""Kinds of quantity whose states are positive, so that steps are relative to them."""
 
 
 @final
 @dataclass(frozen=True, slots=True)
 class Reference:
-    """The reference environment: its absolute temperature θ₀ in K and its pressure π₀ in Pa."""
+    """The reference environment: its absolute temperature θ₀ in K, its pressure π₀ in Pa, its chemical potentials.
+
+    Parameters
+    ----------
+    potentials
+        μ₀ of each further charge in J a unit of it: of elements, in J/mol, so that the reference potential of a species
+        is the sum over its atoms, and no reaction changes it; 0 where it is not given.
+    """
 
     temperature: float = 293.15
     pressure: float = 101325.0
+    potentials: Mapping[str, float] = field(default_factory=dict[str, float], hash=False)
 
     def __post_init__(self) -> None:
         if not (self.temperature > 0.0 and np.isfinite(self.temperature)):
             raise ValueError(f"reference temperature is {self.temperature!r} K, expected a number > 0")
         if not (self.pressure >= 0.0 and np.isfinite(self.pressure)):
             raise ValueError(f"reference pressure is {self.pressure!r} Pa, expected a number ≥ 0")
+        for charge, value in self.potentials.items():
+            if charge in (ENTROPY, VOLUME):
+                raise ValueError(f"reference potential of {charge}: expected temperature=… and pressure=… in its place")
+            if not np.isfinite(value):
+                raise ValueError(f"reference potential of {charge} is {value!r} J, expected a finite number")
+        object.__setattr__(self, "potentials", dict(sorted(self.potentials.items())))
 
-    def intensive(self, quantity: Quantity) -> float:
-        """Energy effort of the quantity in the reference environment: θ₀, −π₀, 0 otherwise."""
-        if quantity.kind == "entropy":
-            return self.temperature
-        return -self.pressure if quantity.kind == "volume" else 0.0
+    def potential(self, charge: str) -> float:
+        """Intensive value of a charge: θ₀ of entropy, −π₀ of volume, μ₀ of others."""
+        given = {ENTROPY: self.temperature, VOLUME: -self.pressure}
+        return given[charge] if charge in given else self.potentials.get(charge, 0.0)
+
+    def intensive(self, quantity: Quantity) -> Array:
+        """Energy efforts of the quantity in the reference environment, (dim,): the potentials of what it carries."""
+        out = np.zeros(quantity.space.dim)
+        for charge, row in quantity.charges:
+            out += self.potential(charge) * np.array(row)
+        return out
 
 
 @final
@@ -77,20 +96,22 @@ class Bundle:
         """Cut a fibre vector into the ports' parts."""
         return {port: vector[where] for port, where, _ in self.items()}
 
-    def indicator(self, kind: str) -> Array:
-        """The constant covector 1_κ: one on every port of environment quantity κ, zero elsewhere."""
+    def indicator(self, charge: str) -> Array:
+        """The constant covector 1_κ: how much of the charge κ a unit at each port carries, zero where it is none."""
         out = np.zeros(self.size)
         for _, where, quantity in self.items():
-            if quantity.kind == kind:
-                out[where] = 1.0
+            for name, row in quantity.charges:
+                if name == charge:
+                    out[where] = row
         return out
 
-    def environment_kinds(self) -> tuple[str, ...]:
-        """The environment quantities that occur, each once."""
-        return tuple(dict.fromkeys(q.kind for _, _, q in self.items() if q.environment))
+    @property
+    def charges(self) -> tuple[str, ...]:
+        """The charges that occur, each once: rows of the element matrix, whose entries are the `indicator`s."""
+        return tuple(dict.fromkeys(name for _, _, quantity in self.items() for name, _ in quantity.charges))
 
     def intensive(self, reference: Reference) -> Array:
-        """What to add to the exergetic efforts to have the energy efforts eᴱ = e + θ₀1_s − π₀1_v."""
+        """What to add to the exergetic efforts to have the energy efforts eᴱ = e + θ₀1_s − π₀1_v + Σ μ₀1_κ."""
         out = np.zeros(self.size)
         for _, where, quantity in self.items():
             out[where] = reference.intensive(quantity)

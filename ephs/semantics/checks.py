@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ephs.operad import Path
-from ephs.semantics.bundle import POSITIVE, Array, Bundle
+from ephs.semantics.bundle import Array, Bundle
 from ephs.semantics.errors import StructureError
+from ephs.semantics.extents import into
 from ephs.semantics.spaces import manifold
 from ephs.semantics.subspace import Subspace
 from ephs.semantics.trials import ROTATING, Trial
@@ -59,7 +60,7 @@ def random_point(
         x = space.random(rng)
         if size != 1.0:
             x = space.retract(space.identity(), size * rng.standard_normal(space.dim))
-        out[port] = np.exp(0.3 * x) if quantity.kind in POSITIVE else x
+        out[port] = into(quantity, x)
     return out
 
 
@@ -229,10 +230,10 @@ def _check_reversible(reversible: "Reversible", trial: Trial) -> None:
     if not np.abs(defect).max(initial=0.0) <= TOLERANCE * scale:
         entry = _worst(defect)
         raise _fail("isotropy", reversible, trial, float(defect[entry]), entry=entry)
-    for kind in bundle.environment_kinds():
+    for kind in bundle.charges:
         one = bundle.indicator(kind)
         defect = np.concatenate([skew @ one, constraint @ one])
-        terms = np.concatenate([np.full(n, scale), np.abs(constraint).sum(axis=1)])
+        terms = np.concatenate([np.full(n, scale * np.abs(one).sum()), np.abs(constraint) @ np.abs(one)])
         if not np.all(np.abs(defect) <= TOLERANCE * terms):
             entry = _worst(defect / np.maximum(terms, 1e-300))
             raise _fail("conservation", reversible, trial, float(defect[entry]), quantity=kind, entry=entry)
@@ -282,10 +283,10 @@ def _check_irreversible(irreversible: "Irreversible", trial: Trial) -> None:
     if not np.all(np.abs(defect) <= TOLERANCE * terms):
         entry = _worst(defect / np.maximum(terms, 1e-300))
         raise _fail("energy", irreversible, trial, float(defect[entry]), entry=entry)
-    for kind in bundle.environment_kinds():
+    for kind in bundle.charges:
         one = bundle.indicator(kind)
         defect = matrix @ one
-        if kind != "entropy" and not np.all(np.abs(defect) <= TOLERANCE * (np.abs(matrix) @ one)):
+        if kind != "entropy" and not np.all(np.abs(defect) <= TOLERANCE * (np.abs(matrix) @ np.abs(one))):
             entry = _worst(defect)
             raise _fail("conservation", irreversible, trial, float(defect[entry]), quantity=kind, entry=entry)
     mirrored = irreversible.matrix(_reversed(bundle, x), parity * e, reference)

@@ -76,7 +76,7 @@ def storage(
 
     def value(x: Point) -> float:
         with np.errstate(all="ignore"):  # what is not a number is found by its value
-            return _real(name, energy(**_named(x))) if inside(bounds, x) else math.nan
+            return _real(name, _called(name, "the energy", energy, x)) if inside(bounds, x) else math.nan
 
     from ephs.semantics.symbols.forms import storage_form
     from ephs.semantics.symbols.tracing import Untraceable
@@ -87,7 +87,7 @@ def storage(
         form = None
 
     def slope(x: Point) -> Array:
-        return _flat(name, given(**_named(x)), n) if given is not None else np.full(n, np.nan)
+        return _flat(name, _called(name, "the gradient", given, x), n) if given is not None else np.full(n, np.nan)
 
     derived = slope if given is not None else None if form is None else form.gradient
     return Storage(
@@ -242,7 +242,11 @@ def irreversible(
 
     def evaluate(x: Point, e: Array, reference: Reference) -> Array:
         given = {**bundle.split(e + bundle.intensive(reference)), **x}
-        return _matrix(name, matrix(**_named(given)), n, n) if inside(bounds, given) else np.full((n, n), np.nan)
+        return (
+            _matrix(name, _called(name, "the matrix", matrix, given), n, n)
+            if inside(bounds, given)
+            else np.full((n, n), np.nan)
+        )
 
     formula = Formula(matrix)
     kernel = None if bounds else _kernel(interface, formula, None)
@@ -338,12 +342,28 @@ def _takes(name: str, key: str, function: object, ports: tuple[Path, ...]) -> No
 
 def _reader(name: str, interface: Interface, matrix: Callable[..., ArrayLike]) -> Callable[[Point], ArrayLike]:
     _takes(name, "matrix", matrix, _reads(interface))
-    return lambda x: matrix(**_named(x))
+    return lambda x: _called(name, "the matrix", matrix, x)
 
 
 def _rows(interface: Interface, read: Callable[[Point], ArrayLike]) -> int:
     x = random_point(Bundle.of(interface), _reads(interface), np.random.default_rng(24))
     return len(np.atleast_2d(np.asarray(read(x), dtype=float)))
+
+
+def _called(name: str, what: str, function: Callable[..., Any], values: Mapping[Path, Array]) -> Any:
+    """What a function of one's own gives; a logarithm of what is not positive names the state.
+
+    Raises
+    ------
+    StructureError
+        The function has no value there.
+    """
+    given = _named(values)
+    try:
+        return function(**given)
+    except ValueError as error:
+        witness = ", ".join(f"{port}={value}" for port, value in given.items()) or "none is read"
+        raise StructureError("domain", name, what=what, found=error, witness=witness) from error
 
 
 def _named(values: Mapping[Path, Array]) -> dict[str, Any]:

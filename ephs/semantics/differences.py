@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ephs.semantics.bundle import POSITIVE, Array
+from ephs.semantics.bundle import Array
+from ephs.semantics.extents import room
 
 if TYPE_CHECKING:
     from ephs.semantics.primitives import Point, Storage
@@ -62,7 +63,7 @@ def differences(storage: "Storage", x: "Point") -> Array:
     bundle = storage.bundle
     out = np.zeros(bundle.size)
     for port, where, quantity in bundle.items():
-        size = 1e-3 * (float(np.abs(x[port]).max()) if quantity.kind in POSITIVE else 1.0)
+        size = 1e-3 * room(quantity, x[port])
         for i in range(where.start, where.stop):
             step = np.zeros(bundle.size)
             step[i] = size

@@ -56,7 +56,11 @@ _TEXTS = {
     ),
     "state": "{path}: the initial value has shape {found}, expected {expected} ({quantity})",
     "state-number": "{path}: the initial value is {found}, expected finite numbers ({quantity})",
-    "positive": ("{path}: the initial {quantity} is {found}, expected a number > 0; give initial={{'{path}': …}}"),
+    "outside": ("{path}: the initial {quantity} is {found}, expected {expected}; give initial={{'{path}': …}}"),
+    "domain": (
+        "{path}: {what} has no value ({found}, witness state {witness}); declare the domain of a port's quantity, as "
+        "in Quantity(…, domain=(0.0, inf)), if states are limited to it"
+    ),
     "open-joint": (
         "{path}: the initial states leave a joint open by {found}; give all states of one configuration, "
         "or scene.with_state(coordinates=…)"

@@ -6,7 +6,7 @@ back in Python through the same signature, with a differenced Jacobian.
 """
 
 import ctypes
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
@@ -68,34 +68,43 @@ class Callback:
         return address or 0
 
 
-def address_of(primitive: Primitive) -> tuple[int, tuple[float, ...], Callback | None]:
-    """(address, parameters, callback or None) of a primitive's discrete relation."""
+def address_of(
+    primitive: Primitive, reference: Reference | None = None
+) -> tuple[int, tuple[float, ...], Callback | None]:
+    """(address, parameters, callback or None) of a primitive's discrete relation.
+
+    Parameters
+    ----------
+    reference
+        Whose potentials the parameters, or the callback, hold; temperature and pressure are arguments of kernels.
+    """
+    given = reference or Reference()
     if primitive.kernel is not None:
-        return *_of_kernel(primitive.kernel), None
-    callback = _callback(primitive)
+        return *_of_kernel(primitive.kernel, given), None
+    callback = _callback(primitive, given.potentials)
     return callback.address, (), callback
 
 
-def _of_kernel(kernel: Kernel) -> tuple[int, tuple[float, ...]]:
+def _of_kernel(kernel: Kernel, reference: Reference) -> tuple[int, tuple[float, ...]]:
     """Address and parameters, with those of what runs inside."""
     try:
         own = int(_compiled(kernel.module, kernel.name).address)
     except AttributeError as error:
         raise SemanticsError("uncompiled", kernel.name) from error
     if kernel.inner is not None:
-        inner, numbers = _of_kernel(kernel.inner)
-        return own, (float(inner), *kernel.parameters, *numbers)
+        inner, numbers = _of_kernel(kernel.inner, reference)
+        return own, (float(inner), *kernel.numbers(reference), *numbers)
     if kernel.source:
         from ephs.semantics.symbols.programs import address_of_source
 
-        return own, (float(address_of_source(kernel.source)[0]), *kernel.parameters)
-    return own, kernel.parameters
+        return own, (float(address_of_source(kernel.source)[0]), *kernel.numbers(reference))
+    return own, kernel.numbers(reference)
 
 
-def _callback(primitive: Primitive) -> Callback:
+def _callback(primitive: Primitive, potentials: Mapping[str, float]) -> Callback:
     sizes = [manifold(primitive.interface[p].quantity.space).size for p in primitive.reads]
     dims = [manifold(primitive.interface[p].quantity.space).dim for p in primitive.reads]
-    evaluate = _storage(primitive) if isinstance(primitive, Storage) else _relation(primitive)
+    evaluate = _storage(primitive, potentials) if isinstance(primitive, Storage) else _relation(primitive, potentials)
 
     errors: list[BaseException] = []
 
@@ -119,6 +128,8 @@ def _callback(primitive: Primitive) -> Callback:
             if not all(np.isfinite(values).all() for values in views):
                 return DOMAIN
         except BaseException as error:
+            if isinstance(error, SemanticsError) and error.kind == "domain":
+                return DOMAIN
             errors.append(error)
             return RAISED
         return OK
@@ -139,10 +150,10 @@ def _view(pointer: Any, size: int) -> Array:
 _Evaluate = Callable[[Array, dict[Any, Array], list[int], list[Array]], None]
 
 
-def _storage(storage: Storage) -> _Evaluate:
+def _storage(storage: Storage, potentials: Mapping[str, float]) -> _Evaluate:
     def evaluate(scal: Array, point: dict[Any, Array], _dims: list[int], views: list[Array]) -> None:
         v, effort, _, slope, energy, _ = views
-        reference = Reference(float(scal[1]), float(scal[2]))
+        reference = Reference(float(scal[1]), float(scal[2]), potentials)
 
         def at(step: Array) -> Array:
             return storage.discrete_effort(point, step, reference)
@@ -155,7 +166,7 @@ def _storage(storage: Storage) -> _Evaluate:
     return evaluate
 
 
-def _relation(primitive: Primitive) -> _Evaluate:
+def _relation(primitive: Primitive, potentials: Mapping[str, float]) -> _Evaluate:
     k = primitive.multipliers if isinstance(primitive, Reversible) else 0
     n = primitive.bundle.size
 
@@ -163,7 +174,7 @@ def _relation(primitive: Primitive) -> _Evaluate:
         v, e, lam, flow, condition, jacobian = views
         # h = 0 asks for the continuous relation: without a step the increments v are zero, of whatever length it is.
         h = float(scal[0]) or 1.0
-        local = Natural(Reference(float(scal[1]), float(scal[2])), h).behaviour(primitive, point)
+        local = Natural(Reference(float(scal[1]), float(scal[2]), potentials), h).behaviour(primitive, point)
         if isinstance(local, Storing):
             raise TypeError("a storage is not a relation")
 

@@ -1,12 +1,13 @@
 """The books of a system at one state: who stores how much of what, and who makes entropy."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, final
 
 import numpy as np
 
 from ephs.operad import Path
+from ephs.operad.charges import ENTROPY, VOLUME
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.primitives import Irreversible, Storage
 
@@ -21,19 +22,28 @@ State = Mapping[str, object]
 @final
 @dataclass(frozen=True, slots=True)
 class Account:
-    """What is stored: energy and exergy in J, up to a constant of each storage, entropy in J/K, volume in m³."""
+    """What is stored: energy and exergy in J, up to a constant of each storage, entropy in J/K, volume in m³.
+
+    Parameters
+    ----------
+    charges
+        Amounts of all other charges by name: of elements in mol.
+    """
 
     energy: float
     exergy: float
     entropy: float
     volume: float
+    charges: Mapping[str, float] = field(default_factory=dict[str, float])
 
     def __add__(self, other: "Account") -> "Account":
+        names = dict.fromkeys([*self.charges, *other.charges])
         return Account(
             self.energy + other.energy,
             self.exergy + other.exergy,
             self.entropy + other.entropy,
             self.volume + other.volume,
+            {name: self.charges.get(name, 0.0) + other.charges.get(name, 0.0) for name in names},
         )
 
 
@@ -89,7 +99,9 @@ class Ledger:
 
 
 def _account(storage: Storage, x: dict[Path, Array], reference: Reference) -> Account:
-    def held(kind: str) -> float:
-        return float(sum(np.sum(x[port]) for port, _, quantity in storage.bundle.items() if quantity.kind == kind))
-
-    return Account(storage.total_energy(x, reference), storage.exergy(x, reference), held("entropy"), held("volume"))
+    held: dict[str, float] = {ENTROPY: 0.0, VOLUME: 0.0}
+    for port, _, quantity in storage.bundle.items():
+        for name, row in quantity.charges:
+            held[name] = held.get(name, 0.0) + float(np.array(row) @ x[port])
+    entropy, volume = held.pop(ENTROPY), held.pop(VOLUME)
+    return Account(storage.total_energy(x, reference), storage.exergy(x, reference), entropy, volume, held)

@@ -40,6 +40,9 @@ class Kernel:
         Of the program that a traced primitive runs inside it; its address comes before the parameters.
     inner
         A kernel that this one calls: its address comes before the parameters, its own numbers after them.
+    potentials
+        Places among the parameters that hold reference potentials, each with what it is the potential of: amounts by
+        charge. They are zero until a reference environment is known.
     """
 
     module: str
@@ -47,6 +50,14 @@ class Kernel:
     parameters: tuple[float, ...] = ()
     source: str = ""
     inner: "Kernel | None" = None
+    potentials: tuple[tuple[int, tuple[tuple[str, float], ...]], ...] = ()
+
+    def numbers(self, reference: Reference) -> tuple[float, ...]:
+        """The parameters in a reference environment."""
+        out = list(self.parameters)
+        for place, carried in self.potentials:
+            out[place] = sum(amount * reference.potential(charge) for charge, amount in carried)
+        return tuple(out)
 
 
 @final
@@ -73,7 +84,7 @@ class Formula:
 @final
 @dataclass(frozen=True, slots=True)
 class Storage:
-    """Storage of energy: x = ξ, f = ξ̇, e = dH(ξ) with the exergy H = E − θ₀ Σs + π₀ Σv.
+    """Storage of energy: x = ξ, f = ξ̇, e = dH(ξ) with the exergy H = E − θ₀ Σs + π₀ Σv − Σ μ₀ n.
 
     Parameters
     ----------
@@ -189,14 +200,15 @@ class Storage:
         """H(x) in J, up to the constant of the energy."""
         if self.environment:
             return 0.0
-        states = [float(x[p][0]) * reference.intensive(q) for p, _, q in self.bundle.items() if q.environment]
-        return float(self.energy(x)) - sum(states)
+        return float(self.energy(x)) - self._exchanged(x, reference)
 
     def total_energy(self, x: Point, reference: Reference) -> float:
-        """E(x) in J; of the environment θ₀ s − π₀ v."""
-        if self.environment:
-            return sum(float(x[p][0]) * reference.intensive(q) for p, _, q in self.bundle.items() if q.environment)
-        return float(self.energy(x))
+        """E(x) in J; of the environment θ₀ s − π₀ v + Σ μ₀ n."""
+        return self._exchanged(x, reference) if self.environment else float(self.energy(x))
+
+    def _exchanged(self, x: Point, reference: Reference) -> float:
+        """What the environment would hold of its energy in place of the storage, θ₀ s − π₀ v + Σ μ₀ n, in J."""
+        return sum(float(reference.intensive(q) @ x[p]) for p, _, q in self.bundle.items() if q.environment)
 
     @property
     def algebra(self) -> "Algebra[Filling]":

@@ -51,7 +51,8 @@ def quadratic(
         gradient=lambda x: q @ vector(x),
         discrete_gradient=lambda x0, v: q @ (vector(x0) + 0.5 * v),
         parameters=parameters,
-        kernel=Kernel(KERNELS, "quadratic", tuple(q.ravel())),
+        # the kernel knows no reference environment
+        kernel=None if Bundle.of(interface).charges else Kernel(KERNELS, "quadratic", tuple(q.ravel())),
         formula=formula,
         proof=lambda: _quadratic_proof(interface, q),
         trusted=trusted,
@@ -68,7 +69,7 @@ def _quadratic_proof(interface: Interface, q: Array) -> tuple[Condition, ...]:
         Condition(even, not np.any(q[np.multiply.outer(parity, parity) < 0.0]), "Q joins states of one parity only"),
         Condition(turned, plain, "none is read"),
         Condition(slope, plain and np.array_equal(q, q.T) and bool(np.all(np.isfinite(q))), "Q is symmetric"),
-        Condition(hot, "entropy" not in bundle.environment_kinds(), "no entropy is stored"),
+        Condition(hot, "entropy" not in bundle.charges, "no entropy is stored"),
     )
 
 

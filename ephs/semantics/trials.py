@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 
 from ephs.operad import Path, Quantity
-from ephs.semantics.bundle import POSITIVE, Array, Reference
+from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.spaces import SO3, codes, manifold
 
 if TYPE_CHECKING:
@@ -123,8 +123,9 @@ def extent(primitive: "Primitive", port: Path, quantity: Quantity) -> tuple[floa
         if declared == port:
             return low, high
     reads = port in primitive.reads
-    positive = quantity.kind in POSITIVE if reads else quantity.kind == "entropy"
-    return (0.0, math.inf) if positive else (-math.inf, math.inf)
+    if reads:
+        return quantity.domain
+    return (0.0, math.inf) if quantity.kind == "entropy" else (-math.inf, math.inf)
 
 
 @final

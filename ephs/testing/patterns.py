@@ -5,7 +5,19 @@ from collections.abc import Iterable
 from hypothesis import strategies as st
 from hypothesis.errors import InvalidArgument
 
-from ephs.operad import Directory, Interface, Junction, Nesting, Path, Pattern, Port, PortType, Quantity, quantity
+from ephs.operad import (
+    Directory,
+    Interface,
+    Junction,
+    Nesting,
+    Path,
+    Pattern,
+    Port,
+    PortType,
+    Quantity,
+    Space,
+    quantity,
+)
 
 __all__ = ["fresh_names", "fresh_paths", "interfaces", "nestings", "paths", "patterns", "quantities"]
 
@@ -18,6 +30,12 @@ _KNOWN = (
     quantity.charge,
     quantity.flux_linkage,
     quantity.volume,
+    quantity.amount,
+    quantity.species("H2O", H=2, O=1),
+    quantity.magnetic_flux,
+    quantity.liquid,
+    quantity.pressure_impulse,
+    Quantity("dose", Space("real", 2, 2), 1, domain=(0.5, 4.0), charges=(("water", (1.0, 0.5)),), unit="mg"),
     quantity.pose,
     quantity.body_momentum,
     quantity.direct_pose,
@@ -36,7 +54,7 @@ def paths(draw: st.DrawFn, *, min_size: int = 1, max_size: int = 2) -> Path:
 
 @st.composite
 def quantities(draw: st.DrawFn, *, frames: bool = True) -> Quantity:
-    """The quantities of this package, joint quantities of any kind, with or without a frame."""
+    """The quantities of this package, joint quantities of any kind, one of our own, with or without a frame."""
     found = draw(st.sampled_from(_KNOWN))
     if draw(st.booleans()):
         kind = draw(st.sampled_from(_PAIRS))

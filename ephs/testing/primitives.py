@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from ephs.mechanics import components
 from ephs.operad import Interface, Path
 from ephs.operad import quantity as quantities
+from ephs.operad.charges import ENTROPY
 from ephs.semantics import Irreversible, Reference, Reversible, Storage, constructors, library, structures
 from ephs.semantics.bundle import Array, Bundle
 from ephs.semantics.primitives import Point
@@ -100,8 +101,8 @@ def irreversibles(draw: st.DrawFn, interface: Interface, *, reads: tuple[Path, .
     rng = draw(generators())
     bundle = Bundle.of(interface)
     strength = np.abs(rng.standard_normal((bundle.size, bundle.size)))
-    fixed = sum((bundle.indicator(kind) for kind in bundle.environment_kinds() if kind != "entropy"), np.zeros(1))
-    moving = np.flatnonzero(np.broadcast_to(fixed, bundle.size) == 0.0)
+    fixed = sum((np.abs(bundle.indicator(name)) for name in bundle.charges if name != ENTROPY), np.zeros(bundle.size))
+    moving = np.flatnonzero(fixed == 0.0)
     used = reads if reads and draw(READING) else ()
 
     def matrix(x: Point, e: Array, reference: Reference) -> Array:
@@ -146,12 +147,9 @@ def _turning(interface: Interface, stiffness: float) -> Storage:
 
 
 def _kept(bundle: Bundle) -> Array:
-    """The projector off the environment quantities, which reversible structures conserve."""
-    out = np.eye(bundle.size)
-    for kind in bundle.environment_kinds():
-        one = bundle.indicator(kind)
-        out = out - np.outer(one, one) / one.sum()
-    return out
+    """The projector off the charges, which reversible structures conserve."""
+    rows = np.array([bundle.indicator(name) for name in bundle.charges]).reshape(len(bundle.charges), bundle.size)
+    return np.eye(bundle.size) - np.linalg.pinv(rows) @ rows
 
 
 def _even(matrix: Array, parity: Array) -> Array:

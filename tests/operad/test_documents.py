@@ -72,6 +72,8 @@ def test_quantities_in_documents(q):
     [
         Quantity("spin", Space("SU(2)", 3, 4, (("ħ", 1.0545718e-34),)), -1, frame="lab bench"),
         Quantity("pose", Space("SE(3)", 6, 7), -1),
+        Quantity("strain", Space("real", 3, 3), 1, domain=(float("-inf"), 1.0), unit="1"),
+        quantity.species("Fe3+", **{"Fe": 1, "e-": -3}).in_frame("wall"),
         Quantity("relative_pose", Space("screw", 1, 1), 1),
         quantity.relative_pose("screw", pitch=-1e-300),
         quantity.joint_momentum("screw", pitch=0.1).in_frame("C₁"),
@@ -143,6 +145,13 @@ def test_what_is_no_text_is_refused(text):
 
 
 FINE = {"format": 1, "junctions": {"q": {"quantity": "displacement"}}, "boxes": {"a": {"x": "q"}}}
+
+
+def _own(**said):
+    plain = {"kind": "x", "space": {"name": "real", "dim": 1, "size": 1}, "parity": 1}
+    return FINE | {"junctions": {"q": {"quantity": plain | said}}}
+
+
 BROKEN = {
     "no object": ([], "document: found"),
     "no format": ({}, "no key format"),
@@ -177,6 +186,12 @@ BROKEN = {
         | {"junctions": {"q": {"quantity": {"kind": "x", "space": {"name": "r", "dim": 1, "size": 1}, "parity": 0}}}},
         "parity",
     ),
+    "domain of three": (_own(domain=[0, 1, 2]), "domain: found .*two numbers"),
+    "domain without length": (_own(domain=[1, 1]), "the domain is"),
+    "charges as a list": (_own(charges=["H"]), "charges: found"),
+    "charge of two": (_own(charges={"H": [1, 2]}), "1 finite number each"),
+    "charge as a word": (_own(charges={"H": ["two"]}), "charges.H: found two"),
+    "unit of nothing": (_own(unit="kg//s"), "the unit 'kg//s'"),
     "huge parameter": (
         FINE
         | {

@@ -9,6 +9,7 @@ from ephs.operad import PatternError, Quantity, Space, quantity
 from ephs.operad import quantities as table
 from ephs.testing import quantities
 
+ONE = Space("real", 1, 1)
 WORDS = [f.name for f in dataclasses.fields(quantity)]
 DIMS = {
     "revolute": (1, 1),
@@ -28,7 +29,7 @@ def test_quantities_are_values(first, second):
     assert first.matches(first)
     if first == second:
         assert hash(first) == hash(second) and first.matches(second)
-    alike = (first.kind, first.space, first.parity) == (second.kind, second.space, second.parity)
+    alike = first.in_frame(None) == second.in_frame(None)
     apart = None not in (first.frame, second.frame) and first.frame != second.frame
     assert first.matches(second) == (alike and not apart)
 
@@ -48,8 +49,8 @@ def test_no_two_known_quantities_match():
 @pytest.mark.parametrize("word", WORDS)
 def test_momenta_and_fluxes_are_odd(word):
     q = getattr(quantity, word)
-    assert q.parity == (-1 if "momentum" in word or "flux" in word else 1)
-    assert q.environment == (word in ("entropy", "volume"))
+    assert q.parity == (-1 if any(odd in word for odd in ("momentum", "flux", "impulse")) else 1)
+    assert q.environment == (word in ("entropy", "volume", "liquid"))
     assert repr(q) == f"quantity.{word}"
 
 
@@ -75,6 +76,20 @@ def test_screws_differ_by_pitch():
         (lambda: quantity.joint_momentum("screw"), ["screw", "none", "pitch"]),
         (lambda: quantity.relative_pose("revolute", pitch=1.0), ["revolute", "pitch", "none"]),
         (lambda: Quantity("x", Space("real", 1, 1), 0), ["x", "0", "+1"]),
+        (lambda: Quantity("x", ONE, 1, domain=(2.0, 1.0)), ["x", "2.0", "less"]),
+        (lambda: Quantity("x", ONE, 1, domain=(float("nan"), 1.0)), ["x", "nan"]),
+        (lambda: Quantity("x", ONE, 1, domain=None), ["x", "None", "two numbers"]),
+        (lambda: Quantity("x", Space("SO(3)", 3, 4), 1, domain=(0.0, 1.0)), ["x", "SO(3)", "vector spaces"]),
+        (lambda: Quantity("x", Space("SO(3)", 3, 4), 1, charges={"a": (1, 1, 1)}), ["x", "SO(3)", "vector spaces"]),
+        (lambda: Quantity("x", ONE, 1, charges={"a": (1, 2)}), ["x", "a: (1, 2)", "1 finite number each"]),
+        (lambda: Quantity("x", Space("real", 2, 2), 1, charges={"a": 1}), ["x", "a: 1", "2 finite numbers each"]),
+        (lambda: Quantity("x", ONE, 1, charges={"a": float("inf")}), ["x", "inf", "finite"]),
+        (lambda: Quantity("x", ONE, 1, charges={"a": "two"}), ["x", "two"]),
+        (lambda: Quantity("x", ONE, 1, charges=3), ["x", "3"]),
+        (lambda: Quantity("x", ONE, 1, charges={"entropy": 1}), ["x", "entropy"]),
+        (lambda: Quantity("entropy", ONE, 1, charges={"entropy": 2}), ["entropy", "2"]),
+        (lambda: Quantity("x", ONE, 1, unit="kg/"), ["kg/", "product"]),
+        (lambda: quantity.species("salt", Na=1, Cl=0), ["salt", "Cl: 0"]),
         (lambda: Space("real", -1, 1), ["real", "-1"]),
         (lambda: Space("real", 2, 1), ["real", "2", "1"]),
     ],
@@ -96,3 +111,33 @@ def test_a_further_kind_of_pair_has_its_quantities(monkeypatch):
     assert table.quantity_word(quantity.relative_pose("table")) == ("relative_pose", ("table",), {})
     with pytest.raises(PatternError, match="known with dim"):
         table.name_pair("revolute", 2, 2)
+
+
+def test_a_known_kind_brings_its_domain_charges_and_unit():
+    for word in WORDS:
+        q = getattr(quantity, word)
+        assert Quantity(q.kind, q.space, q.parity) == q
+    cold = Quantity("volume", ONE, 1, domain=(1.0, 2.0))
+    assert cold.charges == quantity.volume.charges and cold != quantity.volume and not cold.matches(quantity.volume)
+    assert Quantity("volume", Space("real", 3, 3), 1).charges == ()
+
+
+def test_charges_are_rows_of_an_element_matrix():
+    water, two = quantity.species("H2O", O=1, H=2), Quantity("gases", Space("real", 2, 2), 1, charges={"N": (2, 0)})
+    assert water.charges == (("H", (2.0,)), ("O", (1.0,))) and water.positive and water.unit == "mol"
+    assert water == quantity.species("H2O", H=2.0, O=1.0) != quantity.species("ice", H=2, O=1)
+    assert two.charges == (("N", (2.0, 0.0)),) and two.environment
+    assert quantity.species("He").charges == (("He", (1.0,)),)
+    assert Quantity("x", ONE, 1, charges={"a": 0.0}) == Quantity("x", ONE, 1)
+
+
+def test_what_tells_quantities_apart_is_said():
+    one, other = (Quantity("x", ONE, 1, charges={"a": k}, unit="bit", domain=(0.0, 1.0)) for k in (1, 2))
+    assert str(one) == "x on real in bit between 0 and 1 with a 1" != str(other)
+    assert str(quantity.volume) == "volume on real"
+
+
+@pytest.mark.parametrize(("unit", "alike"), [("N s", True), ("kg m s^-1", True), ("N", False), ("1", False)])
+def test_units_are_compared_by_what_they_are_made_of(unit, alike):
+    one, other = Quantity("push", ONE, -1, unit="kg m/s"), Quantity("push", ONE, -1, unit=unit)
+    assert one.matches(other) == other.matches(one) == alike

@@ -63,7 +63,7 @@ def _conditions(primitive, rng):
         subspace = dirac(skew, constraint)
         assert subspace.dimension == n
         assert isotropy(subspace, form) <= 1e-13
-        for kind in bundle.environment_kinds():
+        for kind in bundle.charges:
             terms = np.abs(skew) @ drawn + np.abs(constraint.T) @ np.abs(lam)
             assert abs(bundle.indicator(kind) @ f) <= 1e-13 * max(float(terms.sum()), 1e-300)
     elif primitive.kind == "irreversible":

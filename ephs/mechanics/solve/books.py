@@ -29,7 +29,7 @@ class Entry:
     path
         Where it is in the hierarchy; the root for the whole system.
     energy, exergy
-        Stored, in J; of the reference environment the energy θ₀ s − π₀ v, and no exergy.
+        Stored, in J; of the reference environment the energy θ₀ s − π₀ v + Σ μ₀ n, and no exergy.
     entropy, volume, momentum
         Stored, in J/K, m³, N s; momenta are those of point masses, which add up.
     made, destroyed

@@ -4,34 +4,19 @@ from dataclasses import dataclass
 from typing import final
 
 from ephs.operad import Quantity
+from ephs.operad.units import effort_unit, flow_unit
 from ephs.semantics.spaces import PAIRS, Pair
 
-__all__ = ["UNITS", "Labels", "freedoms", "labels_of", "power_labels"]
+__all__ = ["OWN", "Labels", "freedoms", "labels_of", "power_labels"]
 
-UNITS = {
-    "displacement": "m",
-    "momentum": "kg m/s",
-    "angle": "rad",
-    "angular_momentum": "kg m²/s",
-    "charge": "C",
-    "flux_linkage": "Wb",
-    "entropy": "J/K",
-    "volume": "m³",
-    "amount": "mol",
-}
-"""Of scalar quantities; quantities of one's own are in units of one's own."""
 OWN = "SI"
+"""Unit of a quantity that does not say its own."""
 _POWER = {
-    "m": ("m/s", "N"),
     "rad": ("rad/s", "N m"),
-    "kg m/s": ("N", "m/s"),
     "kg m²/s": ("N m", "rad/s"),
-    "C": ("A", "V"),
-    "Wb": ("V", "A"),
     "J/K": ("W/K", "K"),
-    "m³": ("m³/s", "Pa"),
 }
-"""Unit of a state -> units of its flow and effort."""
+"""Unit of a state -> units of its flow and effort, where the names of these say more than their dimension."""
 
 
 @final
@@ -78,7 +63,7 @@ def labels_of(quantity: Quantity) -> Labels:
         return Labels(f"{of.dimension} momentum", of.names, units)
     if (found := _WHOLE.get((quantity.kind, space.size))) is not None:
         return found
-    unit = UNITS.get(quantity.kind, OWN)
+    unit = quantity.unit or OWN
     if space.size == 1:
         return Labels("", (), (unit,))
     return Labels(f"{space.name} {space.size}", tuple(map(str, range(space.size))), (unit,) * space.size)
@@ -104,5 +89,9 @@ def power_labels(quantity: Quantity, *, effort: bool) -> Labels:
     of = labels_of(quantity)
     if of.dimension == "pose":  # flows of poses are twists
         return Labels("twist", TWIST.names, WRENCH.units if effort else TWIST.units)
-    units = tuple(_POWER.get(unit, (OWN, OWN))[effort] for unit in of.units)
+    units = tuple(OWN if unit == OWN else _power(unit)[effort] for unit in of.units)
     return Labels(of.dimension or quantity.kind, of.names or (quantity.kind,), units)
+
+
+def _power(unit: str) -> tuple[str, str]:
+    return _POWER.get(unit) or (flow_unit(unit), effort_unit(unit))

@@ -42,9 +42,9 @@ class Entry:
     counts: tuple[int, int, int, int, int]
 
 
-def entry_of(primitive: Primitive) -> Entry:
+def entry_of(primitive: Primitive, reference: Reference) -> Entry:
     """The entry of a primitive; its kernel is compiled if need be."""
-    address, numbers, callback = address_of(primitive)
+    address, numbers, callback = address_of(primitive, reference)
     kind = REVERSIBLE if isinstance(primitive, Reversible) else IRREVERSIBLE
     multipliers = primitive.multipliers if isinstance(primitive, Reversible) else 0
     bundle = primitive.bundle

@@ -9,6 +9,7 @@ import numpy as np
 from ephs.mechanics.solve.problem import Problem
 from ephs.mechanics.solve.record import Record
 from ephs.operad import Path
+from ephs.operad.charges import ENTROPY, VOLUME
 from ephs.semantics.bundle import Array
 from ephs.semantics.primitives import Irreversible, Storage
 
@@ -25,7 +26,7 @@ class Ledgers:
     kinetic, potential, thermal
         Energies in J of storages with momenta, with entropies or volumes, and of the others.
     environment
-        θ₀ s − π₀ v of the reference environment, in J.
+        θ₀ s − π₀ v + Σ μ₀ n of the reference environment, in J.
     exergy
         Σ H over the storages, in J.
     entropy
@@ -118,7 +119,7 @@ def ledgers(problem: Problem, record: Record) -> Ledgers:
         exchanged: Array | None = None  # most storages have no part in it: nothing is made for them
         for state in slot.reads:
             if state.quantity.environment:
-                share = reference.intensive(state.quantity) * record.x[:, state.point][:, 0]
+                share = record.x[:, state.point] @ reference.intensive(state.quantity)
                 exchanged = share if exchanged is None else exchanged + share
             values = record.x[:, state.point]
             if state.quantity.kind in amounts and values.shape[1] == 1:
@@ -134,7 +135,7 @@ def ledgers(problem: Problem, record: Record) -> Ledgers:
         energy = storages[slot.path] = record.energies[:, number]
         exergies[slot.path] = energy if exchanged is None else energy - exchanged
         exergy = exergy + exergies[slot.path]
-        if any(state.quantity.environment for state in slot.reads):
+        if any({ENTROPY, VOLUME} & dict(state.quantity.charges).keys() for state in slot.reads):
             thermal = thermal + energy
         elif any(state.quantity.parity < 0 for state in slot.reads):
             kinetic = kinetic + energy

@@ -159,7 +159,7 @@ def compile_model(
     given = d.complete_inputs(inputs)
     n_rate, n_effort, n_lam = d.rate_size, d.effort_size, d.multiplier_size
     size = d.unknowns(given)
-    each = [entry_of(primitive) for primitive in n.primitives]
+    each = [entry_of(primitive, reference) for primitive in n.primitives]
     counts = np.array([entry.counts for entry in each], dtype=np.int64).reshape(-1, 5)[n.primitive]
     kinds, numbers, reads = counts[:, 0], counts[:, 1], counts[:, 4]
     junction_dims, state_dims, state_sizes = n.dims(n.junctions), n.dims(n.states), n.sizes(n.states)
@@ -178,7 +178,8 @@ def compile_model(
         if (callback := entry.callback) is not None
         for i in np.flatnonzero(n.primitive == number)
     }
-    intensive = np.array([reference.intensive(q) for q in n.quantities])[n.junctions]
+    there = [reference.intensive(q) for q in n.quantities]
+    intensive = np.concatenate([np.zeros(0), *(there[i] for i in n.junctions)])
     entropy = np.array([float(q.kind == "entropy") for q in n.quantities])[n.junctions]
     codes = np.array([manifold(q.space).code for q in n.quantities], dtype=np.int64)[n.states]
     outer, input_at, at, unknown = [], [], 0, n_rate + n_effort + n_lam
@@ -206,7 +207,7 @@ def compile_model(
         jacobian=np.zeros(1, dtype=np.int64),
         jacobian_at=np.zeros(kinds.size, dtype=np.int64),
         states=np.stack([codes, point_at, state_sizes, rate_at, state_dims], axis=1),
-        intensive=np.repeat(intensive, junction_dims),
+        intensive=intensive,
         entropy=np.repeat(entropy, junction_dims),
         row=np.zeros(1, dtype=np.int64),
         column=np.zeros(1, dtype=np.int64),

@@ -29,12 +29,12 @@ class PortMotion:
     flow, effort
         (n, d) each, the flow into the system, the effort relative to the reference environment.
     intensive
-        What turns the effort into the energy effort: θ₀ at entropy ports, −π₀ at volume ports.
+        (d,) what turns the effort into the energy effort: θ₀ at entropy ports, −π₀ at volume ports, μ₀ of species.
     """
 
     flow: Array
     effort: Array
-    intensive: float
+    intensive: Array
 
     @property
     def power(self) -> Array:

@@ -1,17 +1,19 @@
 """Traced primitives: from a function of port variables to its formula, its derivatives and its compiled kernel."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, final
 
 import numpy as np
 
 from ephs.operad import Interface, Path
+from ephs.operad.charges import ENTROPY, VOLUME
 from ephs.semantics.bundle import Array, Bundle
 from ephs.semantics.primitives import Formula, Kernel, Point
 from ephs.semantics.spaces import manifold
 from ephs.semantics.symbols.algebra import Expr, sp
-from ephs.semantics.symbols.programs import PRESSURE, TEMPERATURE, Base, relation_program, storage_program
+from ephs.semantics.symbols.programs import TEMPERATURE, Base, intensive, potential, relation_program, storage_program
 from ephs.semantics.symbols.tracing import Trace, Untraceable, symbols_of, trace
 
 __all__ = ["StorageForm", "irreversible_kernel", "reversible_kernel", "stacked", "storage_form"]
@@ -19,7 +21,6 @@ __all__ = ["StorageForm", "irreversible_kernel", "reversible_kernel", "stacked",
 KERNELS = "ephs.semantics.symbols.traced_kernels"
 LARGEST = 16
 """How many numbers a storage's states may have: a traced kernel lays out its scratch for so many."""
-_HEAT = {"entropy": 1.0, "volume": 2.0}
 
 
 @final
@@ -56,12 +57,21 @@ def storage_form(interface: Interface, energy: Callable[..., Any]) -> StorageFor
 
     layout = [float(len(bundle.ports))]
     at = 0
-    for (code, x), (_, where, quantity) in zip(base, bundle.items(), strict=True):
-        kind = _HEAT.get(quantity.kind, 0.0)
-        layout += [float(code), float(at), float(len(x)), float(where.start), float(where.stop - where.start), kind]
+    for (code, x), (_, where, _) in zip(base, bundle.items(), strict=True):
+        layout += [float(code), float(at), float(len(x)), float(where.start), float(where.stop - where.start)]
         at += len(x)
-    kernel = Kernel(KERNELS, "storage", (*layout, *traced.parameters.values()), program.source)
+    shifts = [*bundle.indicator(ENTROPY).tolist(), *(0.0 - bundle.indicator(VOLUME)).tolist(), *[0.0] * n]
+    places = {len(layout) + 2 * n + i: carried for i, carried in _carried(bundle).items()}
+    entries = (*layout, *shifts, *traced.parameters.values())
+    kernel = Kernel(KERNELS, "storage", entries, program.source, potentials=tuple(places.items()))
     return StorageForm(gradient, kernel)
+
+
+def _carried(bundle: Bundle) -> dict[int, tuple[tuple[str, float], ...]]:
+    """Effort -> how much a unit there carries of the charges that have a potential."""
+    rows = {charge: bundle.indicator(charge) for charge in bundle.charges if charge not in (ENTROPY, VOLUME)}
+    found = {i: tuple((charge, float(row[i])) for charge, row in rows.items() if row[i]) for i in range(bundle.size)}
+    return {i: carried for i, carried in found.items() if carried}
 
 
 def reversible_kernel(interface: Interface, reads: tuple[Path, ...], formula: Formula, multipliers: int) -> Kernel:
@@ -86,19 +96,24 @@ def irreversible_kernel(interface: Interface, reads: tuple[Path, ...], formula: 
     energy: dict[str, Any] = {}
     efforts: list[Expr] = []
     exergy: list[Expr] = []
+    # the reference potentials of an effort are one number to the program
+    potentials = {i: sp.Symbol(f"mu_{i}", real=True) for i in _carried(bundle)}
     for port, where, quantity in bundle.items():
         mine = tuple(sp.symbols(f"e_{where.start}:{where.stop}", real=True))
-        base_effort = {"entropy": TEMPERATURE, "volume": -PRESSURE}.get(quantity.kind, sp.Integer(0))
+        unnamed = {potential(charge): 0 for charge, _ in quantity.charges}
+        shifts = [
+            entry.subs(unnamed) + potentials.get(where.start + i, 0) for i, entry in enumerate(intensive(quantity))
+        ]
         efforts += mine
         exergy += mine
-        shifted = tuple(symbol + base_effort for symbol in mine)
+        shifted = tuple(symbol + shift for symbol, shift in zip(mine, shifts, strict=True))
         energy[str(port)] = shifted[0] if len(shifted) == 1 else shifted
     traced = trace(formula.function, {**energy, **states})
     if traced.outputs.shape != (n, n):
         raise Untraceable(f"the matrix is {traced.outputs.shape}")
     matrix = sp.Matrix(n, n, list(traced.outputs.flat))
     flows = tuple(matrix * sp.Matrix(n, 1, exergy) / TEMPERATURE)
-    return _relation(interface, reads, base, traced, (flows, ()), (tuple(efforts), ()))
+    return _relation(interface, reads, base, traced, (flows, ()), (tuple(efforts), ()), potentials)
 
 
 def stacked(formula: Formula, n: int, multipliers: int) -> Callable[..., Any]:
@@ -133,11 +148,12 @@ def _relation(
     traced: Trace,
     outputs: tuple[tuple[Expr, ...], tuple[Expr, ...]],
     unknowns: tuple[tuple[Expr, ...], tuple[Expr, ...]],
+    potentials: Mapping[int, Expr] = MappingProxyType({}),
 ) -> Kernel:
     bundle = Bundle.of(interface)
     if any(len(x) > LARGEST for _, x in base):
         raise Untraceable("a state of more than sixteen numbers")
-    program = relation_program(*outputs, tuple(traced.parameters), base, *unknowns)
+    program = relation_program(*outputs, (*potentials.values(), *traced.parameters), base, *unknowns)
     hot = [float(where.start) for _, where, quantity in bundle.items() if quantity.kind == "entropy"]
     if not any(TEMPERATURE in entry.free_symbols for entry in outputs[0]):
         hot = []  # a reversible relation divides by no temperature
@@ -147,5 +163,8 @@ def _relation(
         dim = manifold(interface[port].quantity.space).dim
         layout += [float(code), float(at), float(len(x)), float(first), float(dim)]
         at, first = at + len(x), first + dim
-    numbers = (*layout, *hot, *traced.parameters.values())
-    return Kernel(KERNELS, "relation", numbers, program.source)
+    first = len(layout) + len(hot)
+    carried = _carried(bundle)
+    places = tuple((first + number, carried[i]) for number, i in enumerate(potentials))
+    numbers = (*layout, *hot, *[0.0] * len(potentials), *traced.parameters.values())
+    return Kernel(KERNELS, "relation", numbers, program.source, potentials=places)

@@ -3,7 +3,7 @@
 Numbers in a formula stand for all of their sign; where the conditions rest on their values, these are taken exactly.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -209,7 +209,7 @@ def _reversible(key: Any, outputs: Symbols, n: int) -> Findings:
     parity = sp.diag(*map(int, bundle.parity()))
     isotropic, conserving, mirrored, turned = STATEMENTS["reversible"]
     zero = [sp.Integer(0)]
-    units = [sp.Matrix(n, 1, list(map(int, bundle.indicator(kind)))) for kind in bundle.environment_kinds()]
+    units = [sp.Matrix(n, 1, weights(bundle.indicator(kind))) for kind in bundle.charges]
     lost = [entry for one in units for entry in [*(skew * one), *(constraint * one)]]
     change = _reversed(bundle.interface, ports)
     there = sp.Matrix(_changed(list(outputs), change)).reshape(len(outputs) // n, n) if outputs else sp.Matrix(0, n, [])
@@ -225,6 +225,11 @@ def _reversible(key: Any, outputs: Symbols, n: int) -> Findings:
         (mirrored, SYMBOLIC if even and rows else ""),
         (turned, blind),
     )
+
+
+def weights(row: Iterable[float]) -> list[Expr]:
+    """Numbers of a charge, whole ones as such."""
+    return [sp.Integer(int(number)) if float(number).is_integer() else sp.nsimplify(float(number)) for number in row]
 
 
 def _rows_alike(one: Expr, two: Expr) -> bool:
@@ -245,8 +250,8 @@ def _irreversible(key: Any, outputs: Symbols, efforts: Symbols) -> Findings:
     matrix = sp.Matrix(n, n, list(outputs))
     parity = sp.diag(*map(int, bundle.parity()))
     symmetric, definite, energy, conserving, mirrored, turned = STATEMENTS["irreversible"]
-    kinds = [kind for kind in bundle.environment_kinds() if kind != "entropy"]
-    lost = [entry for kind in kinds for entry in matrix * sp.Matrix(n, 1, list(map(int, bundle.indicator(kind))))]
+    kinds = [kind for kind in bundle.charges if kind != "entropy"]
+    lost = [entry for kind in kinds for entry in matrix * sp.Matrix(n, 1, weights(bundle.indicator(kind)))]
     zero = [sp.Integer(0)]
     change = _reversed(bundle.interface, ports)
     change |= {effort: sign * effort for effort, sign in zip(efforts, map(int, bundle.parity()), strict=True)}

@@ -61,14 +61,15 @@ def storage(dims, scal, p, x0, v, e, lam, f, c, jac, work):
 
     The correction makes ⟨∇̄E|v⟩ the difference of energies. Over short increments that is all rounding; where the
     quadrature of Gauss with three nodes agrees with it to rounding, the quadrature serves.
-    p = address, number of ports, (code, point at, size, increment at, dim, κ) of each, numbers; κ = 1 for entropies, 2
-    for volumes.
+    p = address, number of ports, (code, point at, size, increment at, dim) of each, for all efforts how many θ₀, then
+    π₀, are taken off, and the other reference potentials; numbers.
     """
     n, points = dims[0], dims[3]
     head = nb.carray(p, 2)
     address, ports = int(head[0]), int(head[1])
-    layout = nb.carray(p, 2 + 6 * ports)
-    numbers = nb.carray(p, 3 + 6 * ports)[2 + 6 * ports :]
+    shifts = 2 + 5 * ports
+    layout = nb.carray(p, shifts + 3 * n)
+    numbers = nb.carray(p, shifts + 3 * n + 1)[shifts + 3 * n :]
     reference, d = nb.carray(scal, 3), nb.carray(dims, 4)
     start, step = nb.carray(x0, points), nb.carray(v, n)
     effort, slope, energy = nb.carray(e, n), nb.carray(f, n * n), nb.carray(c, 1)
@@ -88,9 +89,9 @@ def storage(dims, scal, p, x0, v, e, lam, f, c, jac, work):
         before = value[0]
         for number in range(ports):
             port = number if order == 0 else ports - 1 - number
-            code, at, size = int(layout[2 + 6 * port]), int(layout[3 + 6 * port]), int(layout[4 + 6 * port])
-            first = int(layout[5 + 6 * port])
-            last = first + int(layout[6 + 6 * port])
+            code, at, size = int(layout[2 + 5 * port]), int(layout[3 + 5 * port]), int(layout[4 + 5 * port])
+            first = int(layout[5 + 5 * port])
+            last = first + int(layout[6 + 5 * port])
             for i in range(first, last):
                 scaled[i] = 0.5 * step[i]
             retract(code, here[at : at + size], scaled[first:last], middle[at : at + size])
@@ -157,8 +158,8 @@ def storage(dims, scal, p, x0, v, e, lam, f, c, jac, work):
                         entry += share if i == j else 0.0
                     moved = first <= j < last
                     for other in range(number):
-                        begin = int(layout[5 + 6 * (other if order == 0 else ports - 1 - other)])
-                        end = begin + int(layout[6 + 6 * (other if order == 0 else ports - 1 - other)])
+                        begin = int(layout[5 + 5 * (other if order == 0 else ports - 1 - other)])
+                        end = begin + int(layout[6 + 5 * (other if order == 0 else ports - 1 - other)])
                         moved = moved or begin <= j < end
                     if moved:
                         slope[i * n + j] += weight * entry
@@ -169,21 +170,17 @@ def storage(dims, scal, p, x0, v, e, lam, f, c, jac, work):
                 here[i] = middle[i] = there[i]
         energy[0] = before
     for column in range(ports):  # a port moved earlier enters by its whole increment
-        code, first = int(layout[2 + 6 * column]), int(layout[5 + 6 * column])
-        last = first + int(layout[6 + 6 * column])
+        code, first = int(layout[2 + 5 * column]), int(layout[5 + 5 * column])
+        last = first + int(layout[6 + 5 * column])
         for i in range(n):
             if not first <= i < last:
                 _turn(code, step, 1.0, first, last, slope[i * n : i * n + n], spare)
     good = math.isfinite(energy[0])
-    for port in range(ports):
-        kind, first = int(layout[7 + 6 * port]), int(layout[5 + 6 * port])
-        if kind == 1:
-            if effort[first] <= 0.0:
-                return 2
-            effort[first] -= reference[1]
-        elif kind == 2:
-            effort[first] += reference[2]
     for i in range(n):
+        hot, wide, other = layout[shifts + i], layout[shifts + n + i], layout[shifts + 2 * n + i]
+        if hot > 0.0 and effort[i] <= 0.0:
+            return 2
+        effort[i] -= hot * reference[1] + wide * reference[2] + other
         good = good and math.isfinite(effort[i])
     return 0 if good else 5
 

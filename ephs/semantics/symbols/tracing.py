@@ -14,7 +14,6 @@ from typing import Any, final
 import numpy as np
 
 from ephs.operad import Quantity
-from ephs.semantics.bundle import POSITIVE
 from ephs.semantics.symbols.algebra import Expr, sp
 
 __all__ = ["Trace", "Traced", "Untraceable", "symbols_of", "trace"]
@@ -84,9 +83,9 @@ def trace(function: Callable[..., Any], arguments: Mapping[str, Any]) -> Trace:
 
 def symbols_of(name: str, quantity: Quantity, size: int) -> tuple[Expr, ...]:
     """Symbols for the numbers of a port's state."""
-    if size == 1:
-        return (sp.Symbol(name, real=True, positive=True if quantity.kind in POSITIVE else None),)
-    return tuple(sp.Symbol(f"{name}_{i}", real=True) for i in range(size))
+    positive = True if quantity.positive else None
+    names = (name,) if size == 1 else tuple(f"{name}_{i}" for i in range(size))
+    return tuple(sp.Symbol(each, real=True, positive=positive) for each in names)
 
 
 def _wrapped(value: Any, met: dict[Expr, float]) -> Any:

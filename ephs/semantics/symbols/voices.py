@@ -14,7 +14,7 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.primitives import Irreversible, Primitive, Reversible, Storage
 from ephs.semantics.symbols.algebra import Expr, sp
 from ephs.semantics.symbols.forms import stacked
-from ephs.semantics.symbols.programs import PRESSURE, TEMPERATURE
+from ephs.semantics.symbols.programs import TEMPERATURE, intensive
 from ephs.semantics.symbols.tracing import Untraceable, trace
 from ephs.semantics.symbols.words import Words, curved, latex_name, operator, pairing, plain
 
@@ -146,7 +146,8 @@ def formula_text(primitive: Primitive) -> str:
 
 
 def _intensive(quantity: Quantity) -> Expr:
-    return {"entropy": TEMPERATURE, "volume": -PRESSURE}.get(quantity.kind, sp.Integer(0))
+    """Of a number; vectors that carry charges are written by name."""
+    return intensive(quantity)[0] if plain(quantity) else sp.Integer(0)
 
 
 def _gradient(voice: Voice, storage: Storage, *, numbers: bool) -> dict[Path, Expr]:

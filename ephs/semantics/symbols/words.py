@@ -106,8 +106,8 @@ class Words:
 
     def state(self, junction: Path, quantity: Quantity) -> Expr:
         """The state of a junction."""
-        positive = quantity.kind in ("volume", "amount")
-        return self.symbol(str(junction), latex_name(junction), scalar=plain(quantity), positive=positive)
+        scalar = plain(quantity)
+        return self.symbol(str(junction), latex_name(junction), scalar=scalar, positive=quantity.positive)
 
     def rate(self, junction: Path, quantity: Quantity) -> Expr:
         """Its derivative by time."""

@@ -1,0 +1,102 @@
+"""What the numbers of a state may be, and what is conserved with them: domains, charges, and those of known kinds."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import inf, isfinite
+from types import MappingProxyType
+from typing import TypeAlias, cast, final
+
+from ephs.operad.errors import PatternError
+
+__all__ = [
+    "ENTROPY",
+    "KINDS",
+    "PLAIN",
+    "POSITIVE",
+    "VOLUME",
+    "WHOLE",
+    "Charges",
+    "Domain",
+    "Kind",
+    "charges_of",
+    "require_domain",
+]
+
+Domain: TypeAlias = tuple[float, float]
+"""An open interval, in which each number of a state lies."""
+Charges: TypeAlias = tuple[tuple[str, tuple[float, ...]], ...]
+"""Name of a conserved charge -> how much of it a unit of each number of the state carries; sorted by name."""
+WHOLE: Domain = (-inf, inf)
+POSITIVE: Domain = (0.0, inf)
+ENTROPY, VOLUME = "entropy", "volume"
+"""The charges whose reference values are the temperature and the pressure of the environment."""
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """What scalars of a kind have where they do not say otherwise."""
+
+    unit: str = ""
+    domain: Domain = WHOLE
+    charges: Charges = ()
+
+
+PLAIN = Kind()
+KINDS: Mapping[str, Kind] = MappingProxyType(
+    {
+        "displacement": Kind("m"),
+        "momentum": Kind("kg m/s"),
+        "angle": Kind("rad"),
+        "angular_momentum": Kind("kg m²/s"),
+        "charge": Kind("C"),
+        "flux_linkage": Kind("Wb"),
+        "magnetic_flux": Kind("Wb"),
+        "entropy": Kind("J/K", charges=((ENTROPY, (1.0,)),)),
+        "volume": Kind("m³", POSITIVE, ((VOLUME, (1.0,)),)),
+        "liquid": Kind("m³", POSITIVE, (("liquid", (1.0,)),)),
+        "pressure_impulse": Kind("Pa s"),
+        "amount": Kind("mol", POSITIVE),
+    }
+)
+"""The kinds of scalars that the package knows."""
+
+
+def charges_of(kind: str, dim: int, given: object) -> Charges:
+    """The charges as a quantity keeps them, from pairs or a mapping; the number of a scalar may stand alone.
+
+    Raises
+    ------
+    PatternError
+        A charge is not ``dim`` finite numbers, or entropy is carried by what is not of that kind.
+    """
+    expected = f"a name and {dim} finite number{'s' * (dim != 1)} each"
+    try:
+        pairs = dict(cast("Mapping[str, object]", given))
+    except (TypeError, ValueError):
+        raise PatternError("charges", what=kind, found=given, expected=expected) from None
+    out: list[tuple[str, tuple[float, ...]]] = []
+    for name, value in pairs.items():
+        numbers = cast("Sequence[float]", value if isinstance(value, Sequence) else (value,))
+        try:
+            row = tuple(float(number) for number in numbers)
+        except (TypeError, ValueError):
+            row = ()
+        if len(row) != dim or not all(map(isfinite, row)):
+            raise PatternError("charges", what=kind, found=f"{name}: {value!r}", expected=expected)
+        if any(row):
+            out.append((name, row))
+    found = tuple(sorted(out))
+    if found and (kind == ENTROPY or ENTROPY in dict(found)) and (kind, found) != (ENTROPY, KINDS[ENTROPY].charges):
+        expected = "entropy, once, and nothing else of the kind 'entropy'; and no entropy of other kinds"
+        raise PatternError("charges", what=kind, found=dict(found), expected=expected)
+    return found
+
+
+def require_domain(kind: str, domain: object) -> None:
+    """Refuse what is no open interval."""
+    match domain:
+        case (float() | int() as low, float() | int() as high) if low < high:
+            return
+        case _:
+            raise PatternError("domain", what=kind, found=domain, expected="two numbers, the first less than the other")

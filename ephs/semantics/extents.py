@@ -1,0 +1,42 @@
+"""The domains of quantities at work: whether a state lies inside, random states inside, how far steps may go."""
+
+import math
+
+import numpy as np
+
+from ephs.operad import Quantity
+from ephs.semantics.bundle import Array
+
+__all__ = ["expected", "inside", "into", "room"]
+
+
+def inside(quantity: Quantity, x: Array) -> bool:
+    """Whether all numbers of a state lie in the quantity's domain."""
+    low, high = quantity.domain
+    return bool(np.all((x > low) & (x < high)))
+
+
+def into(quantity: Quantity, x: Array) -> Array:
+    """Random numbers of size one, moved into the domain: positive ones spread about 1, others about the middle."""
+    low, high = quantity.domain
+    if math.isinf(low) and math.isinf(high):
+        return x
+    if math.isinf(high):
+        return low + np.exp(0.3 * x)
+    if math.isinf(low):
+        return high - np.exp(0.3 * x)
+    return low + (high - low) * (0.5 + 0.5 * np.tanh(0.3 * x))
+
+
+def room(quantity: Quantity, x: Array) -> float:
+    """A length beside which steps from the state are short: how far the domain's ends are, 1 where there are none."""
+    ends = np.concatenate([np.abs(x - end) for end in quantity.domain if math.isfinite(end)] or [np.ones(1)])
+    return float(ends.min())
+
+
+def expected(quantity: Quantity) -> str:
+    """The domain in words, for messages."""
+    low, high = quantity.domain
+    if math.isinf(high):
+        return f"a number > {low:g}"
+    return f"a number < {high:g}" if math.isinf(low) else f"a number between {low:g} and {high:g}"
