@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ephs.operad import Path, Pattern, Quantity
-from ephs.semantics.numbering import Index, Interned, Numbering
+from ephs.semantics.numbering import Index, Interned, Numbering, Parts
 from ephs.semantics.primitives import Primitive, Storage
 from ephs.semantics.system import Filling, System
 
@@ -45,6 +45,8 @@ class Kind:
         (ports,) class of each outer port: ports of one class share their state.
     stored
         (classes,) the state inside that is the class', −1 where nothing inside stores it.
+    parts
+        The kinds that fill its boxes, each with (copies, 5) the numbers before those of each copy.
     """
 
     ports: tuple[Path, ...]
@@ -56,11 +58,17 @@ class Kind:
     bearing: NDArray[np.bool_]
     classes: Index
     stored: Index
+    parts: "tuple[tuple[Kind, Index], ...]" = ()
 
     @property
     def first(self) -> Index:
         """(classes,) one outer port of each class."""
         return np.unique(self.classes, return_index=True)[1].astype(np.int64)
+
+    @property
+    def composite(self) -> bool:
+        """Whether more than one component is inside."""
+        return self.primitive.size > 1
 
     @property
     def counts(self) -> Index:
@@ -97,13 +105,40 @@ def number_by_kinds(system: System) -> Numbering | None:
         flattened system says where.
     """
     kinds = _Kinds()
-    whole, outer = kinds.level(system, closed=True)
-    if not kinds.sound or (whole.reads >= whole.states.size).any():
+    try:
+        whole, outer = kinds.level(system, closed=True)
+    except _NotStoredOnce:
         return None
     return Numbering(
         tuple(kinds.primitives.values), tuple(kinds.quantities.values),
-        whole.primitive, whole.wires, whole.reads, whole.junctions, outer, whole.states,
+        whole.primitive, whole.wires, whole.reads, whole.junctions, outer, whole.states, _parts(whole),
     )  # fmt: skip
+
+
+def _parts(whole: Kind) -> tuple[Parts, ...]:
+    """All copies of each composite kind, those inside others before them."""
+    order: dict[int, Kind] = {}
+
+    def visit(kind: Kind) -> None:
+        if id(kind) not in order:
+            for inner, _ in kind.parts:
+                visit(inner)
+            order[id(kind)] = kind
+
+    visit(whole)
+    first: dict[int, list[Index]] = {key: [] for key in order}
+    first[id(whole)].append(np.zeros((1, 5), dtype=np.int64))
+    found: list[Parts] = []
+    for key, kind in reversed(order.items()):
+        start = np.concatenate(first[key])
+        for inner, before in kind.parts:
+            first[id(inner)].append((start[:, None, :] + before).reshape(-1, 5))
+
+        def inside(what: int, start: Index = start, kind: Kind = kind) -> Index:
+            return start[:, what, None] + np.arange(int(kind.counts[what]))
+
+        found.append(Parts(inside(STATES), inside(JUNCTIONS), inside(COMPONENTS)))
+    return tuple(found[:0:-1])  # without the whole
 
 
 def repeats(system: System) -> bool:
@@ -122,13 +157,16 @@ def _count(filling: Filling, known: dict[int, int]) -> int:
     return found
 
 
+class _NotStoredOnce(Exception):
+    """A state is stored twice, or read and stored nowhere."""
+
+
 @final
 class _Kinds:
-    """The kinds that were met, and whether each state that is read is stored once."""
+    """The kinds that were met."""
 
     def __init__(self) -> None:
         self.primitives, self.quantities = Interned[Primitive](), Interned[Quantity]()
-        self.sound = True
         self._known: dict[int, Kind] = {}
 
     def of(self, filling: Filling) -> Kind:
@@ -202,10 +240,13 @@ class _Kinds:
             blocks = (kind.primitive, junctions[:, kind.wires], states[:, kind.reads], kind.states, kind.junctions)
             for i, block in enumerate(blocks):
                 arrays[i][start[i, c.box][:, None] + np.arange(block.shape[-1])] = block
-        self.sound = self.sound and not (arrays[READS] < 0).any()
+        read = arrays[READS]
+        if (read < 0).any() or (closed and (read >= total[STATES]).any()):
+            raise _NotStoredOnce
         kind = Kind(
             tuple(pattern.interface), arrays[COMPONENTS], arrays[WIRES], arrays[READS], arrays[JUNCTIONS],
             arrays[STATES], (bearing & power)[ports], classes.astype(np.int64), stores[found],
+            tuple((c.kind, start[:, c.box].T) for c in copies if c.kind.composite),
         )  # fmt: skip
         return kind, outer
 
@@ -239,7 +280,8 @@ class _Kinds:
                 states.append((start[STATES, c.box][:, None] + c.kind.stored[storing]).ravel())
         place, state = np.concatenate(places), np.concatenate(states)
         out[place] = state
-        self.sound = self.sound and bool((out[place] == state).all())
+        if (out[place] != state).any():
+            raise _NotStoredOnce
         return out
 
 

@@ -12,10 +12,26 @@ from ephs.semantics.errors import AssemblyError
 from ephs.semantics.primitives import Primitive, Reversible, Storage
 from ephs.semantics.system import System
 
-__all__ = ["Index", "Interned", "Numbering", "bearing_junctions", "number_flat", "spans", "starts", "sums"]
+__all__ = ["Index", "Interned", "Numbering", "Parts", "bearing_junctions", "number_flat", "spans", "starts", "sums"]
 
 Index = NDArray[np.int64]
 T = TypeVar("T", bound=Hashable)
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Parts:
+    """The copies of one kind of subsystem, by the numbers of what is inside.
+
+    Parameters
+    ----------
+    states, junctions, components
+        (copies, …) copy by copy in the same order.
+    """
+
+    states: Index
+    junctions: Index
+    components: Index
 
 
 @final
@@ -39,6 +55,8 @@ class Numbering:
         (outer ports,) their junctions.
     states
         (states,) quantity of each; they come in the order of the storages and their ports.
+    parts
+        The subsystems that it was numbered by, innermost first; none of a flat system.
     """
 
     primitives: tuple[Primitive, ...]
@@ -49,6 +67,7 @@ class Numbering:
     junctions: Index
     outer: Index
     states: Index
+    parts: tuple[Parts, ...] = ()
 
     def dims(self, numbers: Index) -> Index:
         """Dimensions of the fibres over so many quantities."""
@@ -143,11 +162,8 @@ def number_flat(flat: System) -> Numbering:
             reads.append(state)
     of = [quantities.number(pattern.junctions[path].quantity) for path in number]
     outer = [i for path, i in number.items() if pattern.junctions[path].exposed and pattern.junctions[path].power]
-    return Numbering(
-        tuple(primitives.values),
-        tuple(quantities.values),
-        *(np.array(numbers, dtype=np.int64) for numbers in (order, wires, reads, of, outer, states)),
-    )
+    index = [np.array(numbers, dtype=np.int64) for numbers in (order, wires, reads, of, outer, states)]
+    return Numbering(tuple(primitives.values), tuple(quantities.values), *index, parts=())
 
 
 def _states(flat: System, quantities: Interned[Quantity]) -> tuple[list[int], dict[Path, int]]:

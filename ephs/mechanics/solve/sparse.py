@@ -55,7 +55,7 @@ def order(n: int, row: Index, column: Index, value: Array) -> Elimination:
     from scipy import sparse
     from scipy.sparse.linalg import splu
 
-    scale_r, scale_c = _equilibrate(n, row, column, value)
+    scale_r, scale_c = equilibrate(n, row, column, value)
     scaled = value * scale_r[row] * scale_c[column]
     pattern = sparse.csc_matrix((scaled, (row, column)), shape=(n, n))
     plans: list[_Plan] = []
@@ -71,7 +71,7 @@ def order(n: int, row: Index, column: Index, value: Array) -> Elimination:
         room *= 2
 
 
-def _equilibrate(n: int, row: Index, column: Index, value: Array) -> tuple[Array, Array]:
+def equilibrate(n: int, row: Index, column: Index, value: Array) -> tuple[Array, Array]:
     """Powers of two that bring the largest entry of each row and column near one."""
     magnitude = np.abs(value)
     scale_r, scale_c = np.ones(n), np.ones(n)
