@@ -30,6 +30,7 @@ STOREYS: tuple[tuple[frozenset[str], ...], ...] = tuple(
 DOORS = {
     ("ephs.operad.pattern", "ephs.show"): "a pattern shows itself in notebooks",
     ("ephs.operad.algebra", "ephs.semantics.algebra"): "the empty pattern that is called makes the empty system",
+    ("ephs.semantics.catalogue", "ephs.mechanics"): "documents of systems name parts of mechanics",
     ("ephs.semantics.system", "ephs.show"): "so does a system",
     ("ephs.mechanics.scene.words", "ephs.show"): "so does a scene",
     ("ephs.mechanics.solve.solution", "ephs.show"): "a solution plots and moves itself",

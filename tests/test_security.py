@@ -58,7 +58,9 @@ def read(path):
     try:
         with warnings.catch_warnings(record=True):
             warnings.simplefilter("always")
-            if path.suffix == ".json":
+            if path.name.startswith("system"):
+                ephs.System.from_json(path.read_bytes())
+            elif path.suffix == ".json":
                 ephs.Pattern.from_json(path.read_bytes())
             elif path.suffix == ".text":
                 ephs.Pattern.from_text(path.read_text())
@@ -130,6 +132,10 @@ def hostile(secret: Path) -> dict[str, str]:
         "uri.sdf": SDF.replace("</model>", f"<include><uri>file://{away}/model.sdf</uri></include></model>"),
         "plugin.sdf": SDF.replace("</model>", f'<plugin name="p" filename="{away}/lib.so"/></model>'),
         "code.json": json.dumps({"format": 1, "junctions": {}, "boxes": {}, "links": [[code]]}),
+        "system-code.json": json.dumps({"format": 1, "parts": [{"part": code, "ports": [], "parameters": {}}]}),
+        "system-term.json": json.dumps(
+            {"format": 1, "parts": [{"storage": code, "ports": [["q", {"quantity": "charge"}]], "energy": [code, "q"]}]}
+        ),
         "code.text": f'q: {{"kind": "{code}", "space": {{"name": "R", "dim": 1, "size": 1}}, "parity": 1}}; a(q)',
     }
 
@@ -142,6 +148,7 @@ def test_hostile_files_reach_nothing(tmp_path, solution):
         "a.sdf": SDF,
         "a.xml": MJCF,
     }
+    good["system.json"] = ephs.mechanics.rigid_body(1.0, [1.0, 1.0, 1.0]).to_json()
     good |= {"bad.urdf": "<robot/>", "a.json": "{}", "a.text": "q: angle; a(q)", "mesh.stl": MESH}
     write_all(tmp_path / "good", good)
     write_all(tmp_path / "secret", {"leg.toml": LEG, "mesh.stl": MESH, "model.xml": MJCF, "lib.so": b"no library"})
@@ -161,6 +168,7 @@ def test_hostile_files_reach_nothing(tmp_path, solution):
     )
     found, seen = json.loads(run.stdout.splitlines()[-1])
     read = {name for name, outcome in found.items() if outcome == "model"}
+    assert {found[name] for name in ("system-code.json", "system-term.json")} == {"error"}
     assert {"mesh.urdf", "mesh.xml", "model.xml", "plugin.sdf", "code.toml", "mesh.nc"} <= read
     assert {found[name] for name in ("use.toml", "up.toml", "linked.toml", "device.toml", "include.xml")} == {
         "SceneError"

@@ -82,6 +82,10 @@ _TEXTS = {
     "units": "{path}: found {found}, expected {expected}",
     "bounds": "{path}: the conductance is {found}, expected bounds {expected}",
     "no-state": "{path}: the port shows the state {found}, expected {expected}",
+    "unwritten": (
+        "{path}: {name} cannot be written: found {found}, expected a part of the library or a formula that can be "
+        "traced"
+    ),
     "rewrite": "{path}: {rule} would change what the system means: {found}",
 }
 

@@ -5,7 +5,7 @@ A system carries its states: isolated composites have no ports, and equality of 
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, Protocol, TypeVar, final
+from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeVar, final
 
 import numpy as np
 
@@ -196,6 +196,44 @@ class System:
         from ephs.semantics.report import check_system
 
         return check_system(self, reference, state=state)
+
+    def to_dict(self) -> "dict[str, Any]":
+        """The system as nested dictionaries of text and numbers: patterns, library parts, formulas as data.
+
+        Raises
+        ------
+        SemanticsError
+            A component is no part of the library, and its formula cannot be traced; the message says which.
+        """
+        from ephs.semantics.documents import to_dict
+
+        return to_dict(self)
+
+    @staticmethod
+    def from_dict(document: Mapping[str, object]) -> "System":
+        """Read a document made by `to_dict`, or by hand. No code is run; primitives are checked like any others.
+
+        Raises
+        ------
+        PatternError
+            For what is no document, or no system; the message says at which key.
+        """
+        from ephs.semantics.documents import from_dict
+
+        return from_dict(document)
+
+    def to_json(self) -> str:
+        """The document as JSON text, by the schema ``ephs/semantics/system.schema.json``; errors as of `to_dict`."""
+        from ephs.semantics.documents import to_json
+
+        return to_json(self)
+
+    @staticmethod
+    def from_json(text: str | bytes) -> "System":
+        """Read JSON text; errors as of `from_dict`."""
+        from ephs.semantics.documents import from_json
+
+        return from_json(text)
 
     def _repr_svg_(self) -> str:  # pyright: ignore[reportUnusedFunction] - notebooks call it
         from ephs.show import draw

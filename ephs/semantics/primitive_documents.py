@@ -1,0 +1,272 @@
+"""Primitives as parts of documents: library parts by name and numbers, others by their formula."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, cast
+
+import numpy as np
+
+from ephs.operad import Directory, Interface, Path, PortType
+from ephs.operad.documents import port_from, port_record
+from ephs.operad.errors import PatternError
+from ephs.operad.reading import Reader
+from ephs.semantics import constructors, structures
+from ephs.semantics.bundle import Array, Bundle, Reference
+from ephs.semantics.catalogue import find_part, part_of
+from ephs.semantics.checks import random_efforts, random_point
+from ephs.semantics.errors import SemanticsError
+from ephs.semantics.primitives import Formula, Irreversible, Point, Primitive, Reversible, Storage
+from ephs.semantics.symbols.algebra import sp
+from ephs.semantics.symbols.forms import reversible_kernel, stacked
+from ephs.semantics.symbols.terms import Matrix, Structure, Term, Written, record, term_from, term_of
+from ephs.semantics.symbols.tracing import Untraceable, symbols_of, trace
+
+__all__ = ["primitive_from", "primitive_record"]
+
+KINDS = ("part", "storage", "reversible", "irreversible")
+AGREEMENT = 1e-9
+"""Largest relative difference of a primitive from what is read of its document: rounding of formulas of 10⁴ terms."""
+_FAULTS = (ArithmeticError, LookupError, TypeError, ValueError)
+
+
+def primitive_record(path: Path, primitive: Primitive) -> dict[str, Any]:
+    """A primitive as part of a document.
+
+    Raises
+    ------
+    SemanticsError
+        It is no part of the library, and has no formula that can be traced, written and read back.
+    """
+    ports = [[str(port), port_record(kind)] for port, kind in primitive.interface.items()]
+    part = part_of(primitive)
+    if part is not None:
+        numbers = {name: _plain(path, primitive, value) for name, value in primitive.parameters}
+        return {"part": part.word, "ports": ports, "parameters": numbers}
+    try:
+        entry = {primitive.kind: primitive.name, "ports": ports} | _formula(primitive)
+        again = primitive_from(Reader("system"), str(path), entry)
+    except (Untraceable, PatternError) as error:
+        raise SemanticsError("unwritten", path, name=primitive.name, found=str(error)) from None
+    if again != primitive or not _agree(primitive, again):
+        found = "a formula that does not say what the component does"
+        raise SemanticsError("unwritten", path, name=primitive.name, found=found)
+    return entry
+
+
+def primitive_from(reader: Reader, where: str, value: object) -> Primitive:
+    """Read a primitive; the inverse of `primitive_record`.
+
+    Raises
+    ------
+    PatternError
+        What is no primitive, with its place.
+    """
+    found = dict(reader.mapping(where, value))
+    kinds = [kind for kind in KINDS if kind in found]
+    if len(kinds) != 1:
+        reader.refuse(where, f"the keys {', '.join(sorted(found)) or 'none'}", f"one of {', '.join(KINDS)}")
+    kind = kinds[0]
+    name = reader.text(f"{where}.{kind}", found[kind])
+    read = {"part": _part, "storage": _storage, "reversible": _reversible, "irreversible": _irreversible}[kind]
+    keys = {"part": {"parameters"}, "storage": {"energy"}, "reversible": set[str](), "irreversible": {"M"}}[kind]
+    more = {"storage": {"function"}, "reversible": {"L", "C"}}.get(kind, set())
+    reader.record(where, found, {kind, "ports"} | keys, more)
+    ports = _ports(reader, f"{where}.ports", found["ports"])
+    make = read(reader, where, name, ports, found)
+    try:
+        made = make()
+    except PatternError:
+        raise
+    except _FAULTS as error:  # numbers of which no such part can be made
+        reader.refuse(where, str(error), f"a {kind} that can be made")
+    if list(made.interface.items()) != list(ports.items()):
+        expected = ", ".join(f"{port}: {kind}" for port, kind in made.interface.items())
+        reader.refuse(f"{where}.ports", ", ".join(f"{port}: {kind}" for port, kind in ports.items()), expected)
+    return made
+
+
+def _ports(reader: Reader, where: str, value: object) -> Interface:
+    pairs: list[tuple[str, PortType]] = []
+    for i, pair in enumerate(reader.list(where, value)):
+        at = f"{where}[{i}]"
+        both = reader.list(at, pair)
+        if len(both) != 2:
+            reader.refuse(at, f"{len(both)} entries", "a name and a quantity")
+        pairs.append((reader.text(f"{at}[0]", both[0]), port_from(f"{at}[1]", both[1])))
+    return Directory(pairs, what=where)
+
+
+Make = Callable[[], Primitive]
+Entry = Mapping[str, object]
+
+
+def _part(reader: Reader, where: str, word: str, ports: Interface, found: Entry) -> Make:
+    part = find_part(word)
+    if part is None:
+        reader.refuse(f"{where}.part", word, "the name of a library part")
+    at = f"{where}.parameters"
+    numbers = {name: _number(reader, f"{at}.{name}", value) for name, value in reader.mapping(at, found["parameters"])}
+
+    def make() -> Primitive:
+        made = part.make(ports, numbers)
+        if dict(made.parameters) != numbers:
+            named = ", ".join(f"{name}={value}" for name, value in made.parameters) or "none"
+            reader.refuse(at, ", ".join(sorted(numbers)) or "none", named)
+        return made
+
+    return make
+
+
+def _storage(reader: Reader, where: str, name: str, ports: Interface, found: Entry) -> Make:
+    function = reader.text(f"{where}.function", found.get("function", "energy"))
+    names = {str(port): kind.quantity.space.size for port, kind in ports.items()}
+    term = term_from(reader, f"{where}.energy", found["energy"], names)
+    return lambda: constructors.storage(_named(ports), Written(term, function), name=name)
+
+
+def _reversible(reader: Reader, where: str, name: str, ports: Interface, found: Entry) -> Make:
+    n, reads = Bundle.of(ports).size, _reads(ports)
+    names = {str(port): ports[port].quantity.space.size for port in reads}
+    skew, constraint = (
+        _matrix(reader, f"{where}.{key}", found[key], names, n) if key in found else None for key in ("L", "C")
+    )
+    if skew is not None and len(skew.rows) != n:
+        reader.refuse(f"{where}.L", f"{len(skew.rows)} rows", f"{n}")
+    zero, k = np.zeros((n, n)), 0 if constraint is None else len(constraint.rows)
+
+    def structure(x: Point) -> tuple[Array, Array]:
+        values = {str(port): float(v[0]) if v.size == 1 else v for port, v in x.items()}
+        upper = zero if skew is None else np.array(skew(**values), dtype=float)
+        lower = [] if constraint is None else constraint(**values)
+        return upper.reshape(n, n), np.array(lower, dtype=float).reshape(k, n)
+
+    def make() -> Primitive:
+        if all(part is None or part.numbers for part in (skew, constraint)):
+            return structures.constant_structure(name, ports, *structure({}))
+        formula = Formula(Structure(skew, constraint))
+        try:
+            kernel = reversible_kernel(ports, reads, formula, k)
+        except Untraceable:
+            kernel = None
+        return Reversible(name, ports, structure, reads=reads, multipliers=k, kernel=kernel, formula=formula)
+
+    return make
+
+
+def _irreversible(reader: Reader, where: str, name: str, ports: Interface, found: Entry) -> Make:
+    n = Bundle.of(ports).size
+    spaces = {port: (kind.power, kind.quantity.space) for port, kind in ports.items()}
+    names = {str(port): space.dim if power else space.size for port, (power, space) in spaces.items()}
+    matrix = _matrix(reader, f"{where}.M", found["M"], names, n)
+    return lambda: constructors.irreversible(_named(ports), matrix, name=name)
+
+
+def _matrix(reader: Reader, where: str, value: object, names: Mapping[str, int], columns: int) -> Matrix:
+    rows: list[tuple[Term, ...]] = []
+    for i, row in enumerate(reader.list(where, value)):
+        entries = reader.list(f"{where}[{i}]", row)
+        if len(entries) != columns:
+            reader.refuse(f"{where}[{i}]", f"{len(entries)} entries", f"{columns}")
+        rows.append(tuple(term_from(reader, f"{where}[{i}][{j}]", each, names) for j, each in enumerate(entries)))
+    return Matrix(tuple(rows))
+
+
+def _reads(ports: Interface) -> tuple[Path, ...]:
+    return tuple(port for port, kind in ports.items() if not kind.power)
+
+
+def _named(ports: Interface) -> dict[str, Any]:
+    """The ports as constructors take them."""
+    return {f"{'' if kind.power else '~'}{port}": kind.quantity for port, kind in ports.items()}
+
+
+def _number(reader: Reader, where: str, value: object) -> object:
+    if isinstance(value, str):
+        return value
+    if isinstance(value, list | tuple):
+        entries = reader.list(where, cast("object", value))
+        return tuple(reader.finite(f"{where}[{i}]", entry) for i, entry in enumerate(entries))
+    return reader.finite(where, value)
+
+
+def _plain(path: Path, primitive: Primitive, value: object) -> object:
+    """A parameter as JSON has it."""
+    entries = cast("tuple[object, ...]", value) if isinstance(value, tuple) else (value,)
+    if not all(isinstance(each, str) or (isinstance(each, int | float) and np.isfinite(each)) for each in entries):
+        raise SemanticsError("unwritten", path, name=primitive.name, found=f"the parameter {value}")
+    return list(entries) if isinstance(value, tuple) else value
+
+
+def _formula(primitive: Primitive) -> dict[str, Any]:
+    """What defines a primitive, in terms of its ports."""
+    if primitive.formula is None:
+        raise Untraceable("a primitive without a formula")
+    function, numbers = primitive.formula.function, dict(primitive.parameters)
+    given = {name: numbers[name] for name in primitive.formula.parameters}
+    match primitive:
+        case Storage():
+            if isinstance(function, Written):
+                return {"energy": record(function.term), "function": function.name}
+            names = dict.fromkeys(map(str, primitive.interface), True)
+            energy: Any = _terms(primitive, function, given, names).item()
+            return {"energy": record(energy), "function": str(getattr(function, "__name__", type(function).__name__))}
+        case Reversible():
+            names = {str(port): True for port in primitive.reads}
+            if isinstance(function, Structure):
+                parts = {"L": function.skew, "C": function.constraint}
+                return {key: _rows(part.rows) for key, part in parts.items() if part is not None}
+            n, k = primitive.bundle.size, primitive.multipliers
+            both = _terms(primitive, stacked(primitive.formula, n, k), given, names)
+            return {"L": _rows(both[:n])} | ({"C": _rows(both[n:])} if k else {})
+        case Irreversible():
+            if isinstance(function, Matrix):
+                return {"M": _rows(function.rows)}
+            names = {str(port): not kind.power for port, kind in primitive.interface.items()}
+            n = primitive.bundle.size
+            return {"M": _rows(_terms(primitive, function, given, names).reshape(n, n))}
+
+
+def _rows(rows: Any) -> list[list[Any]]:
+    return [[record(entry) for entry in row] for row in rows]
+
+
+def _terms(
+    primitive: Primitive, function: Callable[..., Any], numbers: Mapping[str, object], names: Mapping[str, bool]
+) -> "np.ndarray[Any, np.dtype[np.object_]]":
+    """The terms of what a function gives; of each named port it takes the state, or the effort where that is False."""
+    arguments: dict[str, Any] = dict(numbers)
+    values: dict[Any, Term] = {}
+    for number, (name, state) in enumerate(names.items()):
+        quantity = primitive.interface[name].quantity
+        size = quantity.space.size if state else quantity.space.dim
+        symbols = (
+            symbols_of(f"x_{number}", quantity, size) if state else tuple(sp.symbols(f"e_{number}_:{size}", real=True))
+        )
+        arguments[name] = symbols[0] if size == 1 else symbols
+        values |= {s: name if size == 1 else ("entry", name, i) for i, s in enumerate(symbols)}
+    traced = trace(function, arguments)
+    values |= traced.parameters
+    out = np.empty(traced.outputs.shape, dtype=object)
+    for index, entry in np.ndenumerate(traced.outputs):
+        out[index] = term_of(entry, values)
+    return out
+
+
+def _agree(one: Primitive, two: Primitive) -> bool:
+    """Whether two primitives say the same at some states and efforts."""
+    return all(
+        bool(np.allclose(a, b, rtol=AGREEMENT, atol=AGREEMENT * float(np.abs(a).max(initial=0.0)), equal_nan=True))
+        for seed in range(3)
+        for a, b in zip(_said(one, seed), _said(two, seed), strict=True)
+    )
+
+
+def _said(primitive: Primitive, seed: int) -> tuple[Array, ...]:
+    rng, bundle = np.random.default_rng(seed), primitive.bundle
+    x = random_point(bundle, primitive.reads, rng)
+    match primitive:
+        case Storage():
+            return np.array([primitive.energy(x)]), primitive.energy_gradient(x)
+        case Reversible():
+            return primitive.structure(x)
+        case Irreversible():
+            return (primitive.matrix(x, random_efforts(bundle, rng), Reference()),)

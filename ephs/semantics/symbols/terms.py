@@ -1,0 +1,258 @@
+"""Formulas as data: expression trees of a closed list of operations, written from traces and evaluated without code.
+
+A term is a number, the name of a scalar port, or a tuple of an operation's name and its arguments;
+``("entry", "q", 3)`` is a number of the port q. In a document tuples are lists.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import reduce
+from operator import add, mul
+from types import MappingProxyType
+from typing import Any, TypeAlias, cast, final
+
+import numpy as np
+
+from ephs.operad.reading import Reader
+from ephs.semantics.symbols.algebra import Expr, sp
+from ephs.semantics.symbols.tracing import Traced, Untraceable
+
+__all__ = ["DEPTH", "NODES", "OPERATIONS", "Matrix", "Structure", "Term", "Written", "record", "term_from", "term_of"]
+
+Term: TypeAlias = "float | str | tuple[Any, ...]"
+DEPTH, NODES = 50, 10_000
+"""How deep a term may be, and how many numbers, names and operations it may have."""
+
+
+def _sum(*terms: Any) -> Any:
+    return reduce(add, terms)
+
+
+def _product(*factors: Any) -> Any:
+    return reduce(mul, factors)
+
+
+def _minus(first: Any, *second: Any) -> Any:
+    return first - second[0] if second else -first
+
+
+def _quotient(a: Any, b: Any) -> Any:
+    return a / b
+
+
+def _power(a: Any, b: Any) -> Any:
+    return a**b
+
+
+def _sign(a: Any) -> Any:
+    return a.sign() if isinstance(a, Traced) else np.sign(a)  # NumPy asks objects for no sign
+
+
+OPERATIONS: Mapping[str, tuple[int, int, Callable[..., Any]]] = MappingProxyType(
+    {
+        "+": (1, NODES, _sum),
+        "*": (1, NODES, _product),
+        "-": (1, 2, _minus),
+        "/": (2, 2, _quotient),
+        "^": (2, 2, _power),
+        "abs": (1, 1, np.absolute),
+        "atan2": (2, 2, np.arctan2),
+        "acos": (1, 1, np.arccos),
+        "acosh": (1, 1, np.arccosh),
+        "asin": (1, 1, np.arcsin),
+        "asinh": (1, 1, np.arcsinh),
+        "atan": (1, 1, np.arctan),
+        "atanh": (1, 1, np.arctanh),
+    }
+    | {name: (1, 1, getattr(np, name)) for name in ("cos", "cosh", "exp", "log", "sin", "sinh", "sqrt", "tan", "tanh")}
+    | {"sign": (1, 1, _sign)}
+)
+"""Least and largest number of arguments, and the function, of each operation but ``entry``."""
+
+
+def _value(term: Term, x: Mapping[str, Any]) -> Any:
+    if isinstance(term, str):
+        return x[term]
+    if not isinstance(term, tuple):
+        return term
+    word, *arguments = term
+    if word == "entry":
+        return x[arguments[0]][arguments[1]]
+    found = OPERATIONS[word][2](*(_value(each, x) for each in arguments))
+    if isinstance(found, Traced) and found.expression.is_number:
+        return float(found.expression)  # before SymPy makes exact numbers of any size out of such
+    return found
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Written:
+    """A function of numbers, arrays or symbols, by name: the value of a term.
+
+    Parameters
+    ----------
+    name
+        What the function is called.
+    """
+
+    term: Term
+    name: str = "energy"
+
+    @property
+    def __name__(self) -> str:
+        return self.name
+
+    def __call__(self, **x: Any) -> Any:
+        """The value."""
+        return _value(self.term, x)
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Matrix:
+    """A matrix of terms as a function, with rows of equal length."""
+
+    rows: tuple[tuple[Term, ...], ...]
+
+    @property
+    def numbers(self) -> bool:
+        """Whether it depends on nothing."""
+        return all(isinstance(entry, float) for row in self.rows for entry in row)
+
+    def __call__(self, **x: Any) -> list[list[Any]]:
+        """The values."""
+        return [[_value(entry, x) for entry in row] for row in self.rows]
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Structure:
+    """L and C of a Dirac structure as one function, either of which may be left out."""
+
+    skew: Matrix | None
+    constraint: Matrix | None
+
+    def __call__(self, **x: Any) -> tuple[list[list[Any]] | None, list[list[Any]] | None]:
+        """The values."""
+        return self.skew and self.skew(**x), self.constraint and self.constraint(**x)
+
+
+def term_of(expression: Expr, values: Mapping[Expr, Term]) -> Term:
+    """The term of a SymPy expression.
+
+    Parameters
+    ----------
+    values
+        Symbol -> the term that it stands for: a port's name or entry, or a number.
+
+    Raises
+    ------
+    Untraceable
+        A function that is not among the operations, or a term that is too deep or too large.
+    """
+    left = NODES
+
+    def written(entry: Expr, depth: int) -> Term:
+        nonlocal left
+        left -= 1
+        if depth > DEPTH or left < 0:
+            raise Untraceable(f"a formula of more than {DEPTH} levels or {NODES} numbers, names and operations")
+        if entry in values:
+            return values[entry]
+        if entry.is_Number or entry.is_NumberSymbol:
+            if not entry.is_finite:
+                raise Untraceable(f"the number {entry}")
+            return float(entry)
+        word = _WORDS.get(entry.func)
+        if word is None:
+            raise Untraceable(f"the function {entry.func.__name__}")
+        arguments = sorted(entry.args, key=sp.default_sort_key) if word in "+*" else entry.args
+        return (word, *(written(argument, depth + 1) for argument in arguments))
+
+    return written(sp.sympify(expression), 1)
+
+
+_WORDS: Mapping[Any, str] = MappingProxyType(
+    {sp.Add: "+", sp.Mul: "*", sp.Pow: "^", sp.Abs: "abs", sp.atan2: "atan2"}
+    | {
+        getattr(sp, name): name
+        for name in (
+            *("acos", "acosh", "asin", "asinh", "atan", "atanh"),
+            *("cos", "cosh", "exp", "log", "sign", "sin", "sinh", "tan", "tanh"),
+        )
+    }
+)
+
+
+def record(term: Term) -> Any:
+    """A term as part of a document."""
+    if isinstance(term, tuple):
+        word, *arguments = term
+        return [word, *(record(argument) if word != "entry" else argument for argument in arguments)]
+    return term
+
+
+@final
+@dataclass(slots=True)
+class _Budget:
+    """How many numbers, names and operations a formula may still have."""
+
+    left: int
+
+
+def term_from(reader: Reader, where: str, value: object, names: Mapping[str, int]) -> Term:
+    """Read a term; the inverse of `record`.
+
+    Parameters
+    ----------
+    names
+        Name of each port that may occur -> how many numbers its value has.
+
+    Raises
+    ------
+    PatternError
+        What is no term, with its place, or one too deep or too large.
+    """
+    return _term(reader, where, value, names, _Budget(NODES), 1)
+
+
+def _term(reader: Reader, where: str, value: object, names: Mapping[str, int], budget: _Budget, depth: int) -> Term:
+    budget.left -= 1
+    if depth > DEPTH or budget.left < 0:
+        reader.refuse(where, "more", f"at most {DEPTH} levels, and {NODES} numbers, names and operations in a formula")
+    if isinstance(value, str):
+        if names.get(value) != 1:
+            known = ", ".join(name for name, size in names.items() if size == 1) or "none"
+            reader.refuse(where, value, f"the name of a port of one number: {known}")
+        return value
+    if not isinstance(value, list | tuple):
+        return reader.finite(where, value)
+    word, *arguments = reader.list(where, cast("object", value)) or [None]
+    if word == "entry":
+        return _entry(reader, where, arguments, names)
+    known = OPERATIONS.get(word) if isinstance(word, str) else None
+    if known is None:
+        reader.refuse(f"{where}[0]", word, f"an operation: entry, {', '.join(sorted(OPERATIONS))}")
+    assert isinstance(word, str)
+    least, most, _ = known
+    if not least <= len(arguments) <= most:
+        reader.refuse(
+            where, f"{len(arguments)} arguments of {word}", str(least) if least == most else f"{least} or more"
+        )
+    inner = (
+        _term(reader, f"{where}[{i}]", argument, names, budget, depth + 1) for i, argument in enumerate(arguments, 1)
+    )
+    return (word, *inner)
+
+
+def _entry(reader: Reader, where: str, arguments: list[object], names: Mapping[str, int]) -> Term:
+    if len(arguments) != 2:
+        reader.refuse(where, f"{len(arguments)} arguments of entry", "the name of a port, and a number from 0 on")
+    name, number = reader.text(f"{where}[1]", arguments[0]), reader.whole(f"{where}[2]", arguments[1])
+    size = names.get(name, 0)
+    if size < 2:
+        known = ", ".join(each for each, n in names.items() if n > 1) or "none"
+        reader.refuse(f"{where}[1]", name, f"the name of a port of several numbers: {known}")
+    if not 0 <= number < size:
+        reader.refuse(f"{where}[2]", number, f"a whole number from 0 to {size - 1}")
+    return ("entry", name, number)
