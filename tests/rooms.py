@@ -15,6 +15,7 @@ STOREYS: tuple[tuple[frozenset[str], ...], ...] = tuple(
     tuple(frozenset(f"ephs{room}" for room in rooms) for rooms in storey)
     for storey in (
         ([".operad"],),
+        ([".operad.rewriting"],),
         ([".semantics.spaces"],),
         ([".semantics", ".semantics.algebra", ".semantics.relations", ".semantics.symbols"],),
         ([".mechanics.solve"],),

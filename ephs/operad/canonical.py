@@ -4,11 +4,11 @@ from itertools import count
 
 from ephs.operad.directory import Directory
 from ephs.operad.names import Path
-from ephs.operad.normal import StateClass
+from ephs.operad.normal import NormalForm, StateClass
 from ephs.operad.parts import Junction, Port
 from ephs.operad.pattern import Pattern
 
-__all__ = ["canonical", "rank"]
+__all__ = ["canonical", "from_normal", "rank"]
 
 
 def canonical(pattern: Pattern) -> Pattern:
@@ -19,7 +19,11 @@ def canonical(pattern: Pattern) -> Pattern:
     """
     if pattern.is_identity:
         return Pattern.identity(sorted(pattern.interface.items()))
-    form = pattern.normal_form
+    return from_normal(pattern.normal_form)
+
+
+def from_normal(form: NormalForm) -> Pattern:
+    """The canonical pattern of a normal form."""
     junctions = {path: Junction(j.quantity, j.exposed) for path, j in form.junctions.items()}
     wires: dict[Path, dict[Path, Port]] = {box: {} for box in sorted(form.boxes)}
     for path, junction in form.junctions.items():

@@ -4,22 +4,27 @@ A document is canonical: equal patterns have equal documents, in every process.
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from math import inf, isfinite
 from pathlib import Path as FilePath
 from typing import Any, cast
 
 from ephs.operad.canonical import canonical
 from ephs.operad.charges import WHOLE, Domain
-from ephs.operad.parts import Junction
+from ephs.operad.errors import PatternError
+from ephs.operad.names import Path
+from ephs.operad.parts import Box, Junction
 from ephs.operad.pattern import Pattern
 from ephs.operad.quantities import PortType, Quantity, Space, known_quantity, quantity_word
 from ephs.operad.reading import Reader
 
 __all__ = [
     "SCHEMA_FILE",
+    "contents_from",
+    "contents_record",
     "from_dict",
     "from_json",
+    "pattern_within",
     "port_from",
     "port_record",
     "quantity_from",
@@ -39,13 +44,20 @@ def to_dict(pattern: Pattern) -> dict[str, Any]:
     form = canonical(pattern)
     if form.is_identity:
         return {"format": FORMAT, "identity": {str(p): port_record(t) for p, t in form.interface.items()}}
-    junctions = {
+    return {"format": FORMAT} | contents_record(form.junctions, form.boxes, form.links)
+
+
+def contents_record(
+    junctions: Mapping[Path, Junction], boxes: Mapping[Path, Box], links: Iterable[frozenset[Path]]
+) -> dict[str, Any]:
+    """Junctions, boxes and links as part of a document, in the order in which they are given."""
+    nodes = {
         str(path): quantity_record(j.quantity) | ({"exposed": "power" if j.power else "state"} if j.exposed else {})
-        for path, j in form.junctions.items()
+        for path, j in junctions.items()
     }
-    boxes = {str(b): {str(p): str(port) for p, port in box.ports.items()} for b, box in form.boxes.items()}
-    links = sorted([str(path) for path in sorted(group)] for group in form.links)
-    return {"format": FORMAT, "junctions": junctions, "boxes": boxes} | ({"links": links} if links else {})
+    wires = {str(b): {str(p): str(port) for p, port in box.ports.items()} for b, box in boxes.items()}
+    groups = sorted([str(path) for path in sorted(group)] for group in links)
+    return {"junctions": nodes, "boxes": wires} | ({"links": groups} if groups else {})
 
 
 def to_json(pattern: Pattern) -> str:
@@ -93,11 +105,27 @@ def from_dict(document: Mapping[str, object]) -> Pattern:
             [(name, port_from(f"identity.{name}", port)) for name, port in _READ.mapping("identity", found["identity"])]
         )
     _READ.record("document", found, {"format", "junctions", "boxes"}, {"links"})
-    junctions = [
-        (name, _junction(f"junctions.{name}", j)) for name, j in _READ.mapping("junctions", found["junctions"])
-    ]
-    boxes = [(name, dict(_wires(f"boxes.{name}", ports))) for name, ports in _READ.mapping("boxes", found["boxes"])]
-    return Pattern(junctions, boxes, _links(found.get("links", [])))
+    return Pattern(*contents_from(found))
+
+
+def contents_from(
+    found: Mapping[str, object], where: str = ""
+) -> tuple[list[tuple[str, Junction]], list[tuple[str, dict[str, str]]], list[list[str]]]:
+    """Read junctions, boxes and links, as a `Pattern` takes them; `where` goes before the places of messages."""
+    junctions, boxes = (_READ.mapping(f"{where}{key}", found[key]) for key in ("junctions", "boxes"))
+    return (
+        [(name, _junction(f"{where}junctions.{name}", junction)) for name, junction in junctions],
+        [(name, dict(_wires(f"{where}boxes.{name}", ports))) for name, ports in boxes],
+        _links(f"{where}links", found.get("links", [])),
+    )
+
+
+def pattern_within(reader: Reader, where: str, value: object) -> Pattern:
+    """Read a pattern that is part of another document."""
+    try:
+        return from_dict(cast("Mapping[str, object]", value))
+    except PatternError as error:
+        reader.refuse(where, str(error), "a pattern")
 
 
 def quantity_from(where: str, record: Mapping[str, object]) -> Quantity:
@@ -163,8 +191,8 @@ def _wires(where: str, value: object) -> list[tuple[str, str]]:
     return [(name, _READ.text(f"{where}.{name}", wire)) for name, wire in _READ.mapping(where, value)]
 
 
-def _links(value: object) -> list[list[str]]:
+def _links(where: str, value: object) -> list[list[str]]:
     return [
-        [_READ.text(f"links[{i}][{k}]", name) for k, name in enumerate(_READ.list(f"links[{i}]", group))]
-        for i, group in enumerate(_READ.list("links", value))
+        [_READ.text(f"{where}[{i}][{k}]", name) for k, name in enumerate(_READ.list(f"{where}[{i}]", group))]
+        for i, group in enumerate(_READ.list(where, value))
     ]

@@ -50,6 +50,12 @@ _TEXTS = {
     "charges": "quantity {what}: found the charges {found}, expected {expected}",
     "json": "no {what} can be read: {where}: found {found}, expected {expected}",
     "text": "no pattern can be read: line {where}: found {found}, expected {expected}",
+    "rule": "the rule {what!r} is none: found {found}, expected {expected}",
+    "match": "the rule {what!r} does not match: found {found}, expected {expected}",
+    "identification": "the rule {what!r} cannot be applied: found {found}, expected {expected}",
+    "dangling": "the rule {what!r} cannot be applied: found that {found}; expected {expected}",
+    "bare": "the rule {what!r} cannot be applied: found that {found}; expected {expected}",
+    "derivation": "the derivation is none: found {found}, expected {expected}",
     "parameter": "space {what}: the parameter {found} is not finite; expected a finite number",
 }
 

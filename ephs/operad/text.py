@@ -17,16 +17,17 @@ import json
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import NoReturn, final
+from typing import NoReturn, TypeAlias, final
 
+from ephs.operad.directory import Directory
 from ephs.operad.documents import quantity_from, quantity_record
 from ephs.operad.errors import PatternError
-from ephs.operad.names import MOST_NAMES, ROOT, Path
+from ephs.operad.names import MOST_NAMES, ROOT, Path, PathLike
 from ephs.operad.parts import Junction, Port
 from ephs.operad.pattern import Pattern
 from ephs.operad.quantities import PortType, Quantity, known_quantity, quantity_word
 
-__all__ = ["from_text", "to_text"]
+__all__ = ["from_text", "statements", "to_text"]
 
 _BARE = re.compile(r"[\w+\-*/'^]+")
 _TOKEN = re.compile(r"[ \t\r\f\v]*(?:#[^\n]*)?(\n|[;:,()~@=.]|\"(?:[^\"\\\n]|\\.)*\"|\{|[\w+\-*/'^]+|\S|$)")
@@ -73,37 +74,29 @@ def _quantity_text(quantity: Quantity) -> str:
     return f"{word}({', '.join(given)}){frame}" if given else f"{word}{frame}"
 
 
+Statements: TypeAlias = tuple[list[tuple[PathLike, Junction]], list[tuple[PathLike, Directory[Port]]], list[list[Path]]]
+"""Junctions, boxes and links, as a `Pattern` takes them."""
+
+
 def from_text(text: str) -> Pattern:
     """Read the compact form; see `Pattern.from_text`."""
-    if not isinstance(text, str):  # pyright: ignore[reportUnnecessaryIsInstance]  # user input
-        raise PatternError("text", where="1", found=type(text).__name__, expected="text")
     reader = _Reader(text)
-    junctions: list[tuple[Path, Junction]] = []
-    boxes: list[tuple[Path, list[tuple[Path, Port]]]] = []
-    links: list[list[Path]] = []
-    while (token := reader.peek()) != "":
-        if token in ("\n", ";"):
-            reader.take()
-            continue
-        path = reader.path()
-        match reader.take():
-            case ":":
-                junctions.append((path, reader.junction()))
-            case "(":
-                boxes.append((path, reader.ports()))
-            case "~":
-                links.append(reader.link(path))
-            case other:
-                reader.refuse(other, '":" of a junction, "(" of a box or "~" of a link')
-        if reader.peek() not in ("\n", ";", ""):
-            reader.refuse(reader.take(), "the end of the line")
+    junctions, boxes, links = reader.statements()
     if any(box == ROOT for box, _ in boxes):
         return _identity(reader, junctions, boxes, links)
-    # Pairs all the way: what is written twice must be seen.
-    from ephs.operad.directory import Directory
+    return Pattern(*_wired(junctions, boxes, links))
 
-    wires = [(box, Directory(ports, what=f"ports of box {box}")) for box, ports in boxes]
-    return Pattern(junctions, wires, links)
+
+def statements(text: str) -> Statements:
+    """Read the compact form of what need not be a whole pattern."""
+    return _wired(*_Reader(text).statements())
+
+
+def _wired(
+    junctions: list[tuple[Path, Junction]], boxes: list[tuple[Path, list[tuple[Path, Port]]]], links: list[list[Path]]
+) -> Statements:
+    """Pairs all the way: what is written twice must be seen."""
+    return [*junctions], [(box, Directory(ports, what=f"ports of box {box}")) for box, ports in boxes], links
 
 
 def _identity(
@@ -129,6 +122,35 @@ class _Reader:
     text: str
     at: int = 0
     line: int = 1
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.text, str):  # pyright: ignore[reportUnnecessaryIsInstance]  # user input
+            raise PatternError("text", where="1", found=type(self.text).__name__, expected="text")
+
+    def statements(
+        self,
+    ) -> tuple[list[tuple[Path, Junction]], list[tuple[Path, list[tuple[Path, Port]]]], list[list[Path]]]:
+        """All that is stated: junctions, boxes, links."""
+        junctions: list[tuple[Path, Junction]] = []
+        boxes: list[tuple[Path, list[tuple[Path, Port]]]] = []
+        links: list[list[Path]] = []
+        while (token := self.peek()) != "":
+            if token in ("\n", ";"):
+                self.take()
+                continue
+            path = self.path()
+            match self.take():
+                case ":":
+                    junctions.append((path, self.junction()))
+                case "(":
+                    boxes.append((path, self.ports()))
+                case "~":
+                    links.append(self.link(path))
+                case other:
+                    self.refuse(other, '":" of a junction, "(" of a box or "~" of a link')
+            if self.peek() not in ("\n", ";", ""):
+                self.refuse(self.take(), "the end of the line")
+        return junctions, boxes, links
 
     def peek(self) -> str:
         found = _TOKEN.match(self.text, self.at)

@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from pathlib import Path as FilePath
 from typing import Any, cast
 
-from ephs.operad import ROOT, Directory, Path, Pattern
-from ephs.operad.errors import PatternError
+from ephs.operad import ROOT, Directory, Path
+from ephs.operad.documents import pattern_within
 from ephs.operad.names import MOST_NAMES
 from ephs.operad.reading import Reader
 from ephs.semantics.errors import SemanticsError
@@ -92,10 +92,7 @@ def _system(
 ) -> tuple[System, tuple[int, int]]:
     """A system of parts that are made already; its levels and primitives."""
     found = _READ.record(where, value, {"pattern", "fillings"}, set())
-    try:
-        pattern = Pattern.from_dict(cast("Mapping[str, object]", found["pattern"]))
-    except PatternError as error:
-        _READ.refuse(f"{where}.pattern", str(error), "a pattern")
+    pattern = pattern_within(_READ, f"{where}.pattern", found["pattern"])
     fillings: dict[Path, Filling] = {}
     levels, count = 1, 0
     for box, number in _READ.mapping(f"{where}.fillings", found["fillings"]):
