@@ -27,7 +27,7 @@ from ephs.operad.parts import Junction, Port
 from ephs.operad.pattern import Pattern
 from ephs.operad.quantities import PortType, Quantity, known_quantity, quantity_word
 
-__all__ = ["from_text", "statements", "to_text"]
+__all__ = ["from_text", "quantity_from_text", "quantity_text", "statements", "to_text"]
 
 _BARE = re.compile(r"[\w+\-*/'^]+")
 _TOKEN = re.compile(r"[ \t\r\f\v]*(?:#[^\n]*)?(\n|[;:,()~@=.]|\"(?:[^\"\\\n]|\\.)*\"|\{|[\w+\-*/'^]+|\S|$)")
@@ -60,10 +60,11 @@ def _port_text(name: Path, port: Port) -> str:
 
 def _junction_text(junction: Junction) -> str:
     role = "" if not junction.exposed else ", exposed" if junction.power else ", exposed as state"
-    return f"{_quantity_text(junction.quantity)}{role}"
+    return f"{quantity_text(junction.quantity)}{role}"
 
 
-def _quantity_text(quantity: Quantity) -> str:
+def quantity_text(quantity: Quantity) -> str:
+    """A quantity in the compact form, with its frame."""
     frame = "" if quantity.frame is None else f" @ {_quoted(quantity.frame)}"
     known = quantity_word(quantity)
     if known is None:
@@ -90,6 +91,13 @@ def from_text(text: str) -> Pattern:
 def statements(text: str) -> Statements:
     """Read the compact form of what need not be a whole pattern."""
     return _wired(*_Reader(text).statements())
+
+
+def quantity_from_text(text: str) -> Quantity:
+    """Read a quantity in the compact form; the inverse of `quantity_text`."""
+    reader = _Reader(text)
+    found = reader.quantity()
+    return found if reader.peek() == "" else reader.refuse(reader.take(), "the end of the quantity")
 
 
 def _wired(
