@@ -70,7 +70,8 @@ def _maker(primitive: Primitive, parts: Iterable[Part]) -> Part | None:
         except (ArithmeticError, LookupError, TypeError, ValueError):
             continue  # another part of the same name
         alike = type(made) is type(primitive) and list(made.interface) == list(primitive.interface)
-        if alike and all(_same(getattr(made, f.name), getattr(primitive, f.name)) for f in fields(made)):
+        names = [each.name for each in fields(made) if each.init]
+        if alike and all(_same(getattr(made, name), getattr(primitive, name)) for name in names):
             return part
     return None
 
