@@ -83,6 +83,7 @@ GROUPS = {
     "primitives": Group(
         (
             "ephs/semantics/primitives.py",
+            "ephs/semantics/differences.py",
             "ephs/semantics/structures.py",
             "ephs/semantics/library.py",
             "ephs/semantics/kernels.py",

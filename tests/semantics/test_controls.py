@@ -164,6 +164,23 @@ def test_power_that_is_not_conserved_or_too_many_freedoms_fail_for_patterns(monk
     assert not verdict.holds and words in verdict.detail
 
 
+def test_a_wrong_dimension_is_told_with_the_right_one(monkeypatch):
+    alone = as_system(lib.spring(k=1.0))
+    monkeypatch.setattr(laws, "pattern_relation", lambda pattern: Subspace(np.eye(4)))
+    assert system_law("Tellegen")(random_probe(alone)) == Verdict(np.inf, 0.0, ".: dimension 4, expected 2")
+
+
+def test_tolerances_grow_with_the_condition_of_eliminations_only():
+    verdict = system_law("functoriality")(random_probe(FLAT))
+    assert verdict.tolerance == pytest.approx(1e-12, rel=1e-12)
+    assert 1e-12 < system_law("functoriality")(random_probe(system())).tolerance < 1e-9
+
+
+def test_boxes_are_renamed_beside_junctions_that_are_called_boxes():
+    named = Pattern.from_text("box1: displacement; boxer: displacement; a(q=box1); b(q=boxer)")
+    assert system_law("renaming")(random_probe(named(a=lib.spring(k=1.0), b=lib.spring(k=2.0)))).holds
+
+
 def test_isotropy_is_the_largest_value_of_the_form():
     form = np.array([[0.0, 1.0], [1.0, 0.0]])
     assert isotropy(Subspace(np.eye(2)), form) == 1.0

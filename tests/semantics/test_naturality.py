@@ -44,7 +44,7 @@ START = np.array([1.0, 0.5])
 
 
 @pytest.mark.parametrize("gradient", GRADIENTS)
-@settings(max_examples=6)
+@settings(max_examples=4)
 @given(system=systems(max_depth=2, max_junctions=2), seed=st.integers(0, 2**16))
 def test_flatten_then_discretise_is_discretise_then_compose(gradient, system, seed):
     probe = random_probe(system, seed)
