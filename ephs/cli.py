@@ -1,6 +1,7 @@
 """The command line: parses, calls, prints.
 
-Exit codes: 0 done; 1 a law fails (``check``); 2 bad input; 3 the run failed part-way; 130 interrupted.
+Exit codes: 0 done; 1 a law fails (``check``); 2 bad input; 3 the run failed part-way; 4 its result
+does not pass its audit; 130 interrupted.
 """
 
 import sys

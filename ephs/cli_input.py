@@ -50,6 +50,7 @@ TEXTS = {
     "python -m pip install 'ephs[{extra}]' and run again (the solution is saved)",
     "out": "{file}: {found}; choose another folder or file",
     "failed": "{file}: the run failed: {found}",
+    "audit": "{file}: {found}",
     "interrupted": "{file}: interrupted{at}",
 }
 EXTRAS = {"matplotlib": "viz", "pygraphviz": "viz", "viser": "viz", "mujoco": "models", "distributed": "cluster"}

@@ -5,7 +5,7 @@ import json
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
@@ -61,6 +61,7 @@ def run(
     initial: list[str] | None = None,
     out: Path | None = None,
     resume: bool = False,
+    audit: Literal["fail", "warn", "off"] = "fail",
     loading: Loading = AS_GIVEN,
 ) -> int:
     """Simulate a scene and write its result folder.
@@ -81,11 +82,13 @@ def run(
         Result folder; out/NAME unless given.
     resume
         Go on where a run into this folder was interrupted.
+    audit
+        What findings of the run's audit become: exit code 4, lines on stderr only, or an entry in the summary only.
     """
     import ephs
 
     if resume and Path(scene).is_dir():
-        return _run_on(Path(scene))
+        return _run_on(Path(scene), audit)
     if until is None:
         raise BadInput(_TEXTS["until"].format(file=scene))
     model = load_model(scene, loading)
@@ -105,10 +108,10 @@ def run(
         with addressed(scene, folder):
             os.replace(folder / JOURNAL, folder / f"{JOURNAL}.old")
         complain(_TEXTS["kept"].format(found=folder / JOURNAL))
-    return _simulate(model, scene, folder, asked)
+    return _simulate(model, scene, folder, asked, audit)
 
 
-def _run_on(folder: Path) -> int:
+def _run_on(folder: Path, audit: str) -> int:
     """Go on with the run whose result folder this is; its model is in the journal."""
     from ephs.mechanics.scene.document import scene_from_text
     from ephs.mechanics.solve.journal import read_journal
@@ -124,10 +127,10 @@ def _run_on(folder: Path) -> int:
     note = heading["note"]
     if not heading["model"]:
         raise BadInput(_TEXTS["own"].format(file=folder, scene=note["scene"], until=note["asked"]["until"]))
-    return _simulate(scene_from_text(heading["model"]), note["scene"], folder, note["asked"])
+    return _simulate(scene_from_text(heading["model"]), note["scene"], folder, note["asked"], audit)
 
 
-def _simulate(model: "Scene | System", scene: str, folder: Path, asked: Mapping[str, Any]) -> int:
+def _simulate(model: "Scene | System", scene: str, folder: Path, asked: Mapping[str, Any], audit: str) -> int:
     """Simulate as asked, journal and all; the exit code."""
     import ephs
     from ephs.mechanics.solve.journal import Journal
@@ -140,7 +143,7 @@ def _simulate(model: "Scene | System", scene: str, folder: Path, asked: Mapping[
     name = model.name if isinstance(model, ephs.Scene) else scene.rpartition(":")[2]
     try:
         with addressed(scene, folder), progress_bar(name) as progress:
-            solution = ephs.simulate(model, until, progress=progress, journal=journal, **options)
+            solution = ephs.simulate(model, until, progress=progress, journal=journal, audit="off", **options)
     except ephs.SimulationError as error:
         if error.partial is None:
             raise BadInput(naming(scene, str(error))) from error
@@ -163,7 +166,10 @@ def _simulate(model: "Scene | System", scene: str, folder: Path, asked: Mapping[
         whole = json.dumps(_identity(model, scene, asked), indent=1)
         (folder / RUN).write_text(f"{whole}\n", encoding="utf-8")
         (folder / JOURNAL).unlink(missing_ok=True)
-    return 0
+    findings = solution.audit.findings if audit != "off" else ()
+    for finding in findings:
+        complain(TEXTS["audit"].format(file=scene, found=finding))
+    return 4 if findings and audit == "fail" else 0
 
 
 def _identity(model: "Scene | System", scene: str, asked: Mapping[str, Any]) -> dict[str, Any]:

@@ -18,6 +18,7 @@ from ephs.cli_input import Loading, Stepping
 from ephs.cli_linear import linearize
 from ephs.cli_run import run
 from ephs.cli_sweep import sweep
+from ephs.mechanics.solve.findings import Audit, Finding
 from examples.failures import CASES, Case
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -46,6 +47,7 @@ class FakeSolution:
 
     t = (0.0, 0.25)
     scene = None
+    audit = Audit()
 
     def summary(self):
         return {"scene": "crank", "steps": 7, "max_energy_error": 3e-15, "work": None}
@@ -121,6 +123,18 @@ def fails_with(error):
     return fail
 
 
+@pytest.mark.parametrize(
+    ("policy", "code", "said"), [((), 4, 1), (("--audit", "warn"), 0, 1), (("--audit", "off"), 0, 0)]
+)
+def test_a_run_that_does_not_pass_its_audit_is_saved_and_exits_with_4(house, monkeypatch, capsys, policy, code, said):
+    finding = Finding("energy", 0.5, 1e-9, 0.25, "joints.pin", "take a smaller step")
+    monkeypatch.setattr(FakeSolution, "audit", Audit((finding,)))
+    assert cli.main(["run", "crank.toml", "--until", "2", *policy]) == code
+    folder = Path("out/crank")
+    assert sorted(file.name for file in folder.iterdir()) == ["report.html", "run.json", "solution.nc", "summary.json"]
+    assert capsys.readouterr().err.splitlines().count(f"crank.toml: {finding}") == said
+
+
 def test_run_writes_the_result_folder(house, capsys):
     assert cli.main(["run", "crank.toml", "--until", "2"]) == 0
     folder = Path("out/crank")
@@ -137,7 +151,7 @@ def test_run_passes_on_what_was_given_and_leaves_the_defaults_alone(house):
     assert house.load == ("crank.toml", {"base": "free", "adjust": True})
     _, until, options = house.simulate
     assert until == 2.0
-    assert {key: options[key] for key in options if key not in ("progress", "journal")} == {
+    assert {key: options[key] for key in options if key not in ("progress", "journal", "audit")} == {
         "method": "natural",
         "step": 0.01,
         "form": "paper",

@@ -2,9 +2,14 @@
 
 import numpy as np
 
+from ephs.mechanics.scene.geometry import Coupling
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces import codes
 
-__all__ = ["adjoint_inverse", "compose", "inverse", "rotations", "turned"]
+__all__ = ["adjoint_inverse", "compose", "gap", "included", "inverse", "product", "rotations", "turned"]
+
+SERIES = 0.01
+"""Angle θ in rad below which (θ − sin θ)/θ³ is its series up to θ⁴: the next term, θ⁶/362880, is below rounding."""
 
 
 def rotations(q: Array) -> Array:
@@ -20,11 +25,69 @@ def rotations(q: Array) -> Array:
 
 
 def compose(a: Array, b: Array) -> Array:
-    """(n, 7) products of poses."""
-    aw, av, bw, bv = a[:, :1], a[:, 1:4], b[:, :1], b[:, 1:4]
-    w = aw * bw - np.sum(av * bv, axis=1, keepdims=True)
-    v = aw * bv + bw * av + _cross(av, bv)
-    return np.concatenate([w, v, a[:, 4:] + turned(a, b[:, 4:])], axis=1)
+    """(n, 7) products of poses; either may be of one row."""
+    return product(a.T, b.T).T
+
+
+def product(a: Array, b: Array) -> Array:
+    """(7, ...) products of poses (7, ...), an axis of b.ndim - a.ndim more where b has one."""
+    aw, ax, ay, az = a[:4]
+    bw, bx, by, bz = b[:4]
+    first = aw * bw - ax * bx - ay * by - az * bz
+    out = np.empty((7, *first.shape))
+    out[0] = first
+    out[1] = aw * bx + bw * ax + ay * bz - az * by
+    out[2] = aw * by + bw * ay + az * bx - ax * bz
+    out[3] = aw * bz + bw * az + ax * by - ay * bx
+    np.add(a[4:], _turned(a, b[4:]), out=out[4:])
+    return out
+
+
+def gap(a: Array, b: Array) -> tuple[Array, Array]:
+    """Angle in rad, of small ones, and distance in m between poses (7, ...)."""
+    sign = np.where(np.sum(a[:4] * b[:4], axis=0) < 0.0, -1.0, 1.0)
+    turn, way = a[:4] - sign * b[:4], a[4:] - b[4:]
+    return 2.0 * np.sqrt(np.sum(turn * turn, axis=0)), np.sqrt(np.sum(way * way, axis=0))
+
+
+def included(coupling: Coupling, coordinates: Array) -> Array:
+    """(n, 7) poses of C2 in C1 at a joint's coordinates (n, d)."""
+    pair = coupling.pair
+    if coupling.middle is not None:
+        first, second = (_displaced(pair.basis, x[:, None]) for x in coordinates.T)
+        return compose(compose(first, coupling.middle[None]), second)
+    if pair.code in (codes.SO3, codes.SE3, codes.SE2):
+        angular, linear = np.zeros((2, coordinates.shape[0], 3))
+        spatial = pair.code != codes.SE2
+        angular[:, 0 if spatial else 2 :] = coordinates[:, : 3 if spatial else 1]
+        rest = coordinates[:, 3 if spatial else 1 :]
+        linear[:, : rest.shape[1]] = rest
+        return np.concatenate([_turns(angular), linear], axis=1)
+    return _displaced(pair.basis, coordinates)
+
+
+def _displaced(basis: Array, x: Array) -> Array:
+    """(n, 7) exponentials of the twists ``basis @ x`` of coordinates (n, d)."""
+    if not basis[[0, 1, 3, 4]].any():  # along and about the third axis
+        out = np.zeros((x.shape[0], 7))
+        half = 0.5 * (x @ basis[2])
+        out[:, 0], out[:, 3], out[:, 6] = np.cos(half), np.sin(half), x @ basis[5]
+        return out
+    angular, linear = x @ basis[:3].T, x @ basis[3:].T
+    angle = np.sqrt(np.einsum("ni,ni->n", angular, angular))[:, None]
+    small = angle < SERIES
+    safe = np.where(small, 1.0, angle)
+    square = angle * angle
+    third = np.where(small, (1.0 - square * (0.05 - square / 840.0)) / 6.0, (safe - np.sin(safe)) / safe**3)
+    across = _cross(angular.T, linear.T).T
+    moved = linear + 0.5 * np.sinc(0.5 * angle / np.pi) ** 2 * across + third * _cross(angular.T, across.T).T
+    return np.concatenate([_turns(angular), moved], axis=1)
+
+
+def _turns(angular: Array) -> Array:
+    """(n, 4) quaternions of rotation vectors (n, 3)."""
+    half = 0.5 * np.sqrt(np.einsum("ni,ni->n", angular, angular))
+    return np.concatenate([np.cos(half)[:, None], 0.5 * np.sinc(half / np.pi)[:, None] * angular], axis=1)
 
 
 def inverse(a: Array) -> Array:
@@ -36,8 +99,13 @@ def inverse(a: Array) -> Array:
 
 def turned(a: Array, v: Array) -> Array:
     """(n, 3) vectors turned by poses."""
-    twice = 2.0 * _cross(a[:, 1:4], v)
-    return v + a[:, :1] * twice + _cross(a[:, 1:4], twice)
+    return _turned(a.T, v.T).T
+
+
+def _turned(a: Array, v: Array) -> Array:
+    """(3, ...) vectors turned by poses (7, ...)."""
+    twice = 2.0 * _cross(a[1:4], v)
+    return v + a[0] * twice + _cross(a[1:4], twice)
 
 
 def adjoint_inverse(a: Array) -> Array:
@@ -53,5 +121,6 @@ def adjoint_inverse(a: Array) -> Array:
 
 
 def _cross(a: Array, b: Array) -> Array:
-    """(n, 3) row by row; NumPy's own costs several times as much."""
-    return a[:, [1, 2, 0]] * b[:, [2, 0, 1]] - a[:, [2, 0, 1]] * b[:, [1, 2, 0]]
+    """(3, ...) products; NumPy's own costs several times as much."""
+    (ax, ay, az), (bx, by, bz) = a, b
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])

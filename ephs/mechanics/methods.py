@@ -64,6 +64,11 @@ class Method:
         Makes, for a compiled model, what takes many constant steps in one compiled call; None where there is no such.
     forms
         Forms of the equations that it takes besides the least, which is what ``"reduced"`` asks for.
+    lawful
+        Whether every step keeps the energy balance to rounding, whatever its length.
+    undamped
+        Of a method that damps nothing at infinity: makes, for a compiled model, what estimates the error of its
+        constant steps; None of others.
     """
 
     name: str
@@ -77,6 +82,8 @@ class Method:
     options: tuple[str, ...] = ()
     many: Callable[[Model], ComponentMethod] | None = None
     forms: tuple[str, ...] = ()
+    lawful: bool = False
+    undamped: Callable[[Model], ComponentMethod] | None = None
 
 
 def on_joints(make: Callable[..., Any]) -> Callable[[Setting], tuple[Stepper[Any], Policy | None]]:
@@ -196,6 +203,8 @@ for _method in (
         _component_wise(Natural),
         many=Natural,
         forms=("paper", "folded"),
+        lawful=True,
+        undamped=Natural,
     ),
     Method(
         "natural4",
@@ -208,8 +217,20 @@ for _method in (
         _component_wise(_of_order_4),
         many=_of_order_4,
         forms=("paper", "folded"),
+        lawful=True,
+        undamped=_of_order_4,
     ),
-    Method("variational", 2, False, True, False, True, "symplectic, momentum maps exact", on_joints(_variational)),
+    Method(
+        "variational",
+        2,
+        False,
+        True,
+        False,
+        True,
+        "symplectic, momentum maps exact",
+        on_joints(_variational),
+        undamped=Natural,
+    ),
     Method("radau", 5, True, True, True, True, "Radau IIA, stiff", _radau),
     Method("alpha", 2, True, True, False, True, "generalised-α, damps what is fast", on_joints(_alpha), ("rho",)),
     Method("rk54", 5, True, True, False, True, "Dormand and Prince, explicit", on_joints(_tableau("rk54"))),

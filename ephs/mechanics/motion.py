@@ -10,13 +10,15 @@ from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
-from ephs.mechanics.batch import adjoint_inverse, compose, inverse, rotations
+from ephs.mechanics.batch import adjoint_inverse, compose, included, rotations
 from ephs.mechanics.build import component_path
+from ephs.mechanics.gaps import open_by
 from ephs.mechanics.own_motion import OwnMotion, own_motion
 from ephs.mechanics.projection import Held, project, project_dense
 from ephs.mechanics.readout import summary, variables
 from ephs.mechanics.scene.geometry import Coupling, coupling_of
 from ephs.mechanics.scene.model import GROUND, Joint, Scene
+from ephs.mechanics.scene.state import Snapshot
 from ephs.mechanics.solve.dataset import Variable
 from ephs.mechanics.solve.threads import in_one_thread
 from ephs.mechanics.wrenches import root_of, wrenches
@@ -173,7 +175,7 @@ class SceneMotion:
     def poses(self, name: str) -> Array:
         """(n, 7) of a body, or of the ground."""
         if name == GROUND:
-            return np.tile(SE3.identity(), (len(self._solution), 1))
+            return np.broadcast_to(SE3.identity(), (len(self._solution), 7))
         return self._solution[component_path("bodies", name) / "pe" / "q"]
 
     def coordinates(self, name: str) -> Array:
@@ -188,13 +190,18 @@ class SceneMotion:
 
     def constraint_error(self) -> Array:
         """(n,) largest distance or angle between where a joint's coordinates and its bodies put the frame C2."""
-        worst = np.zeros(len(self._solution))
-        for name, joint in self._joints.items():
-            first = compose(self._frame(joint.body1, joint.frame1), self.inclusion(name))
-            gap = compose(inverse(self._frame(joint.body2, joint.frame2)), first)
-            angle = 2.0 * np.linalg.norm(gap[:, 1:4], axis=1)  # small angles; half turns still show
-            worst = np.maximum(worst, np.maximum(angle, np.linalg.norm(gap[:, 4:], axis=1)))
-        return worst
+        if not self._joints:
+            return np.zeros(len(self._solution))
+        return np.max(open_by(self._joints, self, self.chunks()), axis=(0, 1), initial=0.0)
+
+    def gaps(self, every: int) -> dict[Path, Array]:
+        """Per joint the residual of its position at every so many instants: rad, or a part of the mechanism's length.
+
+        The last instant is the first of these.
+        """
+        angles, distances = open_by(self._joints, self, [slice(None, None, -every)])
+        worst = np.maximum(angles, distances / Snapshot.of(self._scene).scale(self._scene.world.gravity).length)
+        return {component_path("joints", name): row for name, row in zip(self._joints, worst, strict=True)}
 
     def velocity_error(self) -> Array:
         """(n,) largest component of any joint's velocity residual."""
@@ -354,15 +361,7 @@ class SceneMotion:
 
     @cached_property
     def _inclusions(self) -> dict[str, Array]:
-        out: dict[str, Array] = {}
-        for name, coupling in self._couplings.items():
-            rows = [coupling.include(coupling.element(row)) for row in self.coordinates(name)]
-            out[name] = np.array(rows).reshape(len(self._solution), 7)
-        return out
-
-    def _frame(self, body: str, offset: Array) -> Array:
-        poses = self.poses(body)
-        return compose(poses, np.broadcast_to(offset, poses.shape))
+        return {name: included(coupling, self.coordinates(name)) for name, coupling in self._couplings.items()}
 
     def chunks(self) -> Iterator[slice]:
         """Instants that are treated together, which bounds the memory."""

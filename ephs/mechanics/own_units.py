@@ -161,6 +161,8 @@ def _stats(stats: Mapping[str, Any], units: Units, factors: Mapping[Path, Array]
             out[key] *= units.time
     if "least_production" in out:
         out["least_production"] *= units.energy
+    if "work_apart" in out:
+        out["work_apart"], out["work_apart_at"] = out["work_apart"] * units.energy, out["work_apart_at"] * units.time
     if "events" in out:
         out["events"] = [
             {

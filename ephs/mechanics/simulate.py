@@ -19,9 +19,11 @@ from ephs.mechanics.redundancy import explain
 from ephs.mechanics.scene.document import scene_to_text
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.signals import numbers_of, signal
+from ephs.mechanics.solve.audit import Bounds
 from ephs.mechanics.solve.control import Control, Tolerance, told_apart
 from ephs.mechanics.solve.errors import OptionError, failing_at, nearest_of, number_of
 from ephs.mechanics.solve.events import events_of
+from ephs.mechanics.solve.findings import POLICIES, judged
 from ephs.mechanics.solve.integrate import Grid, integrate, solution_of
 from ephs.mechanics.solve.journal import Journal
 from ephs.mechanics.solve.loop import integrate_stepwise
@@ -72,6 +74,7 @@ def simulate(
     reference: Reference | None = None,
     progress: Callable[[float, float, Mapping[str, Any]], None] | None = None,
     journal: "Journal | str | PathLike[str] | None" = None,
+    audit: str = "fail",
 ) -> Solution:
     """Simulate a system or a scene.
 
@@ -115,9 +118,14 @@ def simulate(
     journal
         A file that receives the run while it goes on. Whatever ends the run, the same call goes on from there, to the
         very numbers of a run that nothing disturbed; `load_solution` reads what it holds.
+    audit
+        What findings of the run's audit become: ``"fail"`` an `AuditError`, ``"warn"`` an `AuditWarning`, ``"off"``
+        nothing but the record in ``sol.audit`` and the summary.
 
     Raises
     ------
+    AuditError
+        The run reached its end, and its result breaks a law; ``.partial`` is the whole solution.
     SimulationError
         The run failed part-way; ``.partial`` is the solution up to there.
     SemanticsError
@@ -127,6 +135,8 @@ def simulate(
     """
     if form not in FORMS:
         raise OptionError("form", form, f"one of {', '.join(FORMS)}" + nearest_of(form, FORMS))
+    if audit not in POLICIES:
+        raise OptionError("audit", audit, f"one of {', '.join(POLICIES)}" + nearest_of(audit, POLICIES))
     if isinstance(model, Scene):
         if reference is not None:
             raise OptionError("reference", reference, "none: a scene's [world] has its own")
@@ -162,9 +172,10 @@ def simulate(
         problem.inputs(start / unit, problem.initial)
     watched, told = seen_from(problem, watched, guarded(progress))
     times = None if times is None else times / unit
+    bounds = Bounds.of(control, step, lawful=chosen_method.lawful, undamped=chosen_method.undamped)
     with journaled(journal, problem, asked) as written:
         if chosen_method.many is not None and control.step is not None and not watched and end > start:
-            return integrate(
+            solution = integrate(
                 problem,
                 Grid(start / unit, end / unit, control.step),
                 make=chosen_method.many,
@@ -172,19 +183,23 @@ def simulate(
                 max_steps=max_steps,
                 progress=told,
                 journal=written,
+                bounds=bounds,
             )
-        return integrate_stepwise(
-            problem,
-            start / unit,
-            end / unit,
-            make=lambda: chosen_method.make(setting),
-            control=control,
-            events=watched,
-            save_at=times,
-            progress=told,
-            remarks={"auto": reason} if method == "auto" else {},
-            journal=written,
-        )
+        else:
+            solution = integrate_stepwise(
+                problem,
+                start / unit,
+                end / unit,
+                make=lambda: chosen_method.make(setting),
+                control=control,
+                events=watched,
+                save_at=times,
+                progress=told,
+                remarks={"auto": reason} if method == "auto" else {},
+                journal=written,
+                bounds=bounds,
+            )
+    return judged(solution, audit)
 
 
 def _fits(form: str, method: Method) -> None:

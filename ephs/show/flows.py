@@ -32,7 +32,8 @@ class Band(NamedTuple):
 def exergy_bands(sol: Any, path: Any = ".", first: int = 0, last: int = -1) -> list[Band]:
     """The sources and sinks of a system or subsystem between two instants; both sides add up to the same.
 
-    Sources are storages that gave exergy, and supply; sinks are storages that took it, delivery, and destruction.
+    Sources are storages that gave exergy, and supply; sinks are storages that took it, delivery, and destruction. What
+    steps made or lost of the whole is the defect, on the side where it counts.
     """
     entry = sol.ledger(path)
     bands: list[Band] = []
@@ -50,6 +51,9 @@ def exergy_bands(sol: Any, path: Any = ".", first: int = 0, last: int = -1) -> l
     supplied = change(entry.exergy_supplied)
     if supplied:
         bands.append(Band("supplied" if supplied > 0.0 else "delivered", abs(supplied), supplied > 0.0, "boundary"))
+    defect = change(entry.exergy_defect)
+    if defect:
+        bands.append(Band("defect of the steps", abs(defect), defect > 0.0, "defect"))
     return _merged(bands)
 
 
@@ -103,6 +107,7 @@ def _side(axes: "Axes", bands: list[Band], total: float, *, left: bool) -> None:
         "destroyed": RED,
         "boundary": ORANGE if left else GREEN,
         "others": GREY,
+        "defect": GREY,
     }
     slots = [max(band.amount / total, SLOT) for band in bands]
     edge, inner = 0.5 + 0.5 * (sum(slots) + GAP * (len(bands) - 1)), 1.0

@@ -133,7 +133,23 @@ def _summary(summary: dict[str, Any]) -> str:
     if isinstance(unknowns, dict):
         shown = f"{_number(unknowns.get('paper'))} as flattened, {_number(unknowns.get('used'))} used"
         rows.append(f"<tr><th>Unknowns</th><td>{shown}</td></tr>")
-    return f"<h2>Summary</h2><table><tbody>{''.join(rows)}</tbody></table>"
+    return f"<h2>Summary</h2><table><tbody>{''.join(rows)}</tbody></table>{_audit(summary)}"
+
+
+def _audit(summary: dict[str, Any]) -> str:
+    findings: list[dict[str, Any]] = summary.get("audit", {}).get("findings", [])
+    if not findings:
+        return ""
+    rows = "".join(
+        f"<tr><th>{html.escape(found['law'])}</th><td>{_number(found['size'])}</td><td>{_number(found['allowed'])}</td>"
+        f"<td>{_number(found['at'])}</td><td>{html.escape(found['path'])}</td><td>{html.escape(found['advice'])}</td></tr>"
+        for found in findings
+    )
+    head = "".join(f"<th>{words}</th>" for words in ("law", "found", "allowed", "at [s]", "where", "what to do"))
+    return (
+        "<h2>The result does not pass its audit</h2>"
+        f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>'
+    )
 
 
 def _final(summary: dict[str, Any]) -> str:

@@ -18,6 +18,7 @@ from ephs.mechanics.engine.rate_kernels import OPEN, across, advance, close, der
 from ephs.mechanics.engine.tables import Scheme
 from ephs.mechanics.reduced.dense import Dense, unmoved
 from ephs.mechanics.reduced.given import Given
+from ephs.mechanics.reduced.led import Led
 from ephs.mechanics.reduced.mechanism import reduce_scene
 from ephs.mechanics.reduced.naming import within
 from ephs.mechanics.reduced.paper import PaperStates
@@ -95,6 +96,7 @@ class Equations:
         self.curved = np.array([int(t.r_at[i]) + j for i in groups for j in range(int(t.dim[i]))], dtype=int)
         self.counted = np.r_[np.arange(self.n), self.nv : self.nv + self.n + self.ns]
         number = {slot.path: i for i, slot in enumerate(problem.descriptor.components)}
+        self.led = Led(problem, moved=bool(driven))
         self._makers = np.array([number[path] for path in reduced.made], dtype=int)
         self.scal = model.scal(0.0)
         self.given = Given(scene, problem, reduced, self.nv)
@@ -256,10 +258,6 @@ class Equations:
         """Position residuals of loops at q, zeros for prescribed joints before them; and the rows (m, n) there."""
         return self.dense.gaps(q, r)
 
-    def gap(self, state: ReducedState) -> float:
-        """By how much the loops are open, in m or rad."""
-        return float(np.abs(self.dense.gaps(state.q, state.r)[0]).max(initial=0.0))
-
     def fitted(self, q: Array, r: Array) -> Array:
         """q with the cut joints' elements nearest to where their bodies put them; leaves the dense sweep at q."""
         return self.dense.fitted(q, r)
@@ -345,8 +343,8 @@ class Equations:
         self.refuse(*stored_energies(self.model.tables, self.scal, self._stored, x, energies))
         out: list[Row] = []
         for state, point, energy in zip(states, x, energies, strict=True):
+            heat, work = state.books[0], self.led.work(state.t, energy, state.books)
             energy[self._makers] = state.books[2:]
-            heat, work = state.books[0], state.books[1]
             out.append(Row(point, energy, np.array([heat, work, work, state.books[2:].sum()])))
         return out
 
@@ -363,6 +361,7 @@ class Equations:
             "cut_joints": [edge.name for edge in self.reduced.cut],
             "unknowns": self.unknowns,
             "paper_unknowns": self.model.unknowns,
+            **self.led.stats(),
         }
 
     @property
@@ -383,6 +382,7 @@ class Equations:
             The initial states contradict the joints.
         """
         state = self.closed(ReducedState(t, *self._paper.initial(), np.zeros(2 + len(self.reduced.made))))
+        self.led.start(self.row(state).energies)
         self._paper.check(state.q, state.r, state.s)
         if self.careful:
             self._without_repeated(state)

@@ -79,7 +79,7 @@ class Ida(ReducedMethod):
         assert self._base is not None
         free = eq.state(self._base, y, t)
         closed = eq.closed(free)
-        moved = eq.gap(free) if closed is not free else 0.0
+        moved = float(np.abs(eq.gaps(free.q, free.r)[0]).max(initial=0.0)) if closed is not free else 0.0
         self._last = closed.q
         if np.max(np.abs(y[eq.curved]), initial=0.0) > FAR or moved > OPEN * float(np.min(self.rtol)):
             self._base = None

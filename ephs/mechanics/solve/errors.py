@@ -47,6 +47,7 @@ class Outcome(StrEnum):
     EVENT = "an event's function has no value"
     UNWRITTEN = "the journal cannot be written"
     PROGRESS = "the function that is told of progress raised an exception"
+    UNLAWFUL = "the result does not pass its audit"
     MEMORY = "more memory than there is"
     INTERRUPTED = "interrupted"
 
@@ -78,6 +79,7 @@ _ADVICE = {
     Outcome.EVENT: "see the exception above this one, or give a function that is a number everywhere",
     Outcome.UNWRITTEN: "make room on the disk, then let the run go on with the same journal",
     Outcome.PROGRESS: "see the exception above this one",
+    Outcome.UNLAWFUL: 'the whole solution is in .partial; audit="warn" returns it with a warning',
     Outcome.MEMORY: "keep fewer times with save_at, or take longer steps",
     Outcome.INTERRUPTED: "what was computed is in .partial",
 }

@@ -8,6 +8,7 @@ from typing import Any, Protocol, final
 
 import numpy as np
 
+from ephs.mechanics.solve.audit import Bounds, audit
 from ephs.mechanics.solve.driven import ComponentMethod, advance_driven, advance_whole
 from ephs.mechanics.solve.errors import Interrupted, OptionError, Outcome, SimulationError, SolveError, solve_error_of
 from ephs.mechanics.solve.journal import Written
@@ -18,7 +19,7 @@ from ephs.mechanics.solve.natural import Chunk, Natural, NaturalState
 from ephs.mechanics.solve.natural_kernels import IRREVERSIBLE
 from ephs.mechanics.solve.problem import Problem
 from ephs.mechanics.solve.production import Production
-from ephs.mechanics.solve.record import Record, Recorder
+from ephs.mechanics.solve.record import Record, Recorder, joined
 from ephs.mechanics.solve.snapshot import Snapshot, like, parts
 from ephs.mechanics.solve.solution import Solution
 from ephs.mechanics.solve.starting import check_start
@@ -26,8 +27,9 @@ from ephs.mechanics.solve.watching import Balance
 from ephs.operad import Quantity
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import Pair
+from ephs.semantics.spaces.codes import VECTOR
 
-__all__ = ["Grid", "Progress", "failures_of", "integrate", "solution_of"]
+__all__ = ["Grid", "Progress", "audited", "failures_of", "integrate", "solution_of"]
 
 RESPONSE = 0.1
 """Wanted seconds between two looks at progress and Ctrl-C."""
@@ -78,6 +80,7 @@ def integrate(
     max_steps: int | None = None,
     progress: Progress | None = None,
     journal: Written | None = None,
+    bounds: Bounds | None = None,
 ) -> Solution:
     """Solve an initial value problem on a grid, forward in time, by a method that discretises component by component.
 
@@ -85,6 +88,8 @@ def integrate(
     ----------
     journal
         Where the run is written down, and what an earlier part of it left there.
+    bounds
+        What the audit of the run allows; None: there is none.
 
     Raises
     ------
@@ -97,7 +102,7 @@ def integrate(
     model = compile_model(d, problem.reference, problem.inputs(grid.t0, problem.initial))
     stepper = make(model)
     inside = _Inside(problem, make, model)
-    run = _Run(problem, grid, stepper, Recorder(d, grid.t0, x0, save_at, inside), begin, progress, journal)
+    run = _Run(problem, grid, stepper, Recorder(d, grid.t0, x0, save_at, inside), begin, progress, journal, bounds)
     with failures_of(run):
         run.recorder.start(stepper.energies(x0))
         run.balance = Balance(problem, *run.recorder.latest)
@@ -175,6 +180,26 @@ def failures_of(run: Run) -> Generator[None, None, None]:
         raise SimulationError(Outcome.MEMORY, run.t * run.problem.seconds, "", str(error), run.solution()) from error
 
 
+def audited(
+    problem: Problem, record: Record, stats: Mapping[str, Any], bounds: Bounds | None, ends: list[Record]
+) -> Solution:
+    """What was kept of a run, with the audit of the run from its start to where it stands.
+
+    Parameters
+    ----------
+    ends
+        The first and the last row, kept or not; nothing where there is none.
+    """
+    solution = whole = solution_of(problem, record, stats)
+    if bounds is None or not ends:
+        return solution
+    first, last = ends
+    if not (len(solution) and record.t[0] == first.t[0] and record.t[-1] == last.t[0]):
+        whole = solution_of(problem, joined([first, record, last]) or record, stats)
+    solution.stats = {**solution.stats, "audit": audit(whole, bounds).record()}
+    return solution
+
+
 def solution_of(problem: Problem, record: Record, stats: Mapping[str, Any]) -> Solution:
     """What was kept of a run, as users read it."""
     while problem.shown is not None:
@@ -199,9 +224,10 @@ class _Run:
         begin: float,
         progress: Progress | None,
         journal: Written | None,
+        bounds: Bounds | None,
     ) -> None:
         self.problem, self.grid, self.stepper, self.recorder = problem, grid, stepper, recorder
-        self.begin, self.progress, self.journal = begin, progress, journal
+        self.begin, self.progress, self.journal, self.bounds = begin, progress, journal, bounds
         self.t, self.setup, self.steps, self.iterations, self.cut = grid.t0, 0.0, 0, 0, 0
         self.looked = begin
         self.production = Production(problem)
@@ -295,12 +321,15 @@ class _Run:
 
     def solution(self) -> Solution:
         """The solution so far."""
-        return solution_of(self.problem, self.recorder.result(), self.stats())
+        recorder = self.recorder
+        return audited(self.problem, recorder.result(), self.stats(), self.bounds, recorder.ends())
 
 
 def coordinates(quantity: Quantity, x: Array) -> Array:
     """States (n, size) as users read them: scalars (n,), relative poses as the pair's coordinates (n, d)."""
     if quantity.kind == "relative_pose":
         pair = Pair.from_space(quantity.space)
+        if pair.manifold.code == VECTOR:
+            return x
         return np.array([pair.coordinates(row) for row in x]).reshape(x.shape[0], pair.dim)
     return x[:, 0] if x.shape[1] == 1 else x

@@ -6,10 +6,11 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
+from ephs.mechanics.solve.audit import Bounds
 from ephs.mechanics.solve.control import Control, Policy
 from ephs.mechanics.solve.errors import OptionError, Outcome, SolveError, solve_error_of
 from ephs.mechanics.solve.events import Crossing, Event, Watch
-from ephs.mechanics.solve.integrate import Grid, Progress, failures_of, solution_of
+from ephs.mechanics.solve.integrate import Grid, Progress, audited, failures_of
 from ephs.mechanics.solve.journal import Written
 from ephs.mechanics.solve.problem import Problem, States
 from ephs.mechanics.solve.production import Production
@@ -47,6 +48,7 @@ def integrate_stepwise(
     progress: Progress | None = None,
     remarks: Mapping[str, Any] | None = None,
     journal: Written | None = None,
+    bounds: Bounds | None = None,
 ) -> Solution:
     """Solve an initial value problem, forward or backward in time.
 
@@ -58,6 +60,8 @@ def integrate_stepwise(
         What else the statistics are to say.
     journal
         Where the run is written down, and what an earlier part of it left there.
+    bounds
+        What the audit of the run allows; None: there is none.
 
     Raises
     ------
@@ -67,7 +71,7 @@ def integrate_stepwise(
     begin = time.perf_counter()
     if not (np.isfinite(until) and until != t0):
         raise OptionError("until", until, f"a time other than t0 = {t0!r} s")
-    run = _Run(problem, t0, until, *make(), control, events, save_at, progress, remarks or {}, begin, journal)
+    run = _Run(problem, t0, until, *make(), control, events, save_at, progress, remarks or {}, begin, journal, bounds)
     with failures_of(run):
         run.start()
         run.setup = time.perf_counter() - begin
@@ -100,10 +104,11 @@ class _Run(Generic[S]):
         remarks: Mapping[str, Any],
         begin: float,
         journal: Written | None,
+        bounds: Bounds | None,
     ) -> None:
         self.problem, self.until, self.stepper, self.control = problem, until, stepper, control
         self.policy, self.events, self.progress, self.begin = policy, events, progress, begin
-        self.remarks, self.journal = remarks, journal
+        self.remarks, self.journal, self.bounds = remarks, journal, bounds
         self.t = self.t0 = t0
         self.sign = 1.0 if until > t0 else -1.0
         self.save_at = save_at
@@ -117,13 +122,14 @@ class _Run(Generic[S]):
         self.watch: Watch | None = None
         self.leg: Leg[S] | None = None
         self.ended = False
+        self.first: Row | None = None
         self.cause: SolveError | None = None  # why this step was refused when it was longer
 
     def start(self) -> None:
         """The initial state, and the first row."""
         self.h = first_step(self.control, abs(self.until - self.t0))
         self.state = self.stepper.start(self.t0, self.sign * self.h)
-        row = self.stepper.row(self.state)
+        row = self.first = self.stepper.row(self.state)
         self.balance = Balance(self.problem, row.x, row.energies, row.sums)
         self.production = Production(self.problem, self.sign)
         self.production.start(row.x, row.energies)
@@ -285,20 +291,22 @@ class _Run(Generic[S]):
         """The solution so far."""
         stats = self.stats()
         self._settle()
-        return solution_of(self.problem, self.kept.whole(self.problem.descriptor), stats)
+        ends = self._ends()
+        stats |= {**self.stepper.stats(), **self.remarks}  # what rows tell, too
+        return audited(self.problem, self.kept.whole(self.problem.descriptor), stats, self.bounds, ends)
+
+    def _ends(self) -> list[Record]:
+        """The first and the last row, kept or not; none of a run that did not start."""
+        if self.first is None:
+            return []
+        rows = ((self.t0, self.first), (self.t, self.stepper.row(self.state)))
+        return [_record([t], [row], [0.0]) for t, row in rows]
 
     def _settle(self) -> None:
         """What is pending, as it is kept."""
         if self.pending:
             rows = self.stepper.rows([state for _, state, _ in self.pending])
-            self.kept.add(
-                Record(
-                    np.array([t for t, _, _ in self.pending]),
-                    np.array([row.x for row in rows]),
-                    np.array([row.energies for row in rows]),
-                    np.array([[*row.sums, least] for row, (_, _, least) in zip(rows, self.pending, strict=True)]),
-                )
-            )
+            self.kept.add(_record([t for t, _, _ in self.pending], rows, [least for _, _, least in self.pending]))
             self.pending.clear()
 
     def write(self, *, end: bool = False) -> None:
@@ -349,3 +357,13 @@ class _Run(Generic[S]):
         if self.journal.rows is not None:
             self.kept.add(self.journal.rows, written=True)
         return found["leg"]
+
+
+def _record(times: list[float], rows: list[Row], least: list[float]) -> Record:
+    """Rows at some times, with the least production in the step before each."""
+    return Record(
+        np.array(times),
+        np.array([row.x for row in rows]),
+        np.array([row.energies for row in rows]),
+        np.array([[*row.sums, production] for row, production in zip(rows, least, strict=True)]),
+    )

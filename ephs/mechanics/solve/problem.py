@@ -117,6 +117,11 @@ class Motion(Protocol):
         """(n,) largest position residual of any joint, in m or rad."""
         ...
 
+    def gaps(self, every: int) -> Mapping[Path, Array]:
+        """Per joint the residual of its position at every so many instants, the last one first: rad, or a part of the
+        mechanism's length."""
+        ...
+
     def velocity_error(self) -> Array:
         """(n,) largest residual of the reported velocities, in m/s or rad/s."""
         ...

@@ -106,10 +106,11 @@ class Recorder:
         self._next = 0
         self.rows = Rows()
         self._least = np.inf
+        self._first: tuple[Array, Array, Array, Array] | None = None
 
     def start(self, energies: Array) -> None:
         """The row at t₀."""
-        self._last = (np.array([self._t0]), self._x0[None, :], energies[None, :], np.zeros((1, 5)))
+        self._first = self._last = (np.array([self._t0]), self._x0[None, :], energies[None, :], np.zeros((1, 5)))
         if self._save_at is None or (self._save_at.size and self._save_at[0] == self._t0):
             self.rows.add(Record(*self._last))
             self._next = 1
@@ -147,6 +148,12 @@ class Recorder:
         self.rows = Rows()
         if rows is not None:
             self.rows.add(rows, written=True)
+
+    def ends(self) -> list[Record]:
+        """The first row and that at the end of the last step, kept or not; none of a run that did not start."""
+        if self._first is None:
+            return []
+        return [Record(*self._first), Record(*self._last)]
 
     @property
     def latest(self) -> tuple[Array, Array, Array]:

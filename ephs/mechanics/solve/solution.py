@@ -12,6 +12,7 @@ import numpy as np
 from ephs.mechanics.solve.books import Entry, entry_of
 from ephs.mechanics.solve.dataset import Variable, sampled_inputs
 from ephs.mechanics.solve.events import Crossing
+from ephs.mechanics.solve.findings import Audit
 from ephs.mechanics.solve.labels import Labels
 from ephs.mechanics.solve.ledger import Ledgers
 from ephs.mechanics.solve.problem import Motion, Problem
@@ -122,6 +123,11 @@ class Solution:
     def events(self) -> tuple[Crossing, ...]:
         """The events that happened, in their order: name, time in s, states."""
         return tuple(map(Crossing.of_record, self.stats.get("events", ())))
+
+    @cached_property
+    def audit(self) -> Audit:
+        """What the audit of the run found; nothing of a solution without one."""
+        return Audit.of_record(self.stats.get("audit", Audit().record()))
 
     @cached_property
     def inputs(self) -> Mapping[Path, Variable]:
@@ -285,6 +291,7 @@ class Solution:
             "min_entropy_production": float(self.stats["least_production"]),
             "heat": float(np.sum(self.heat[last])),
             "work": float(np.sum(self.work[last])),
+            "audit": self.audit.record(),
         }
         if self.motion is not None:
             out |= self.motion.summary()

@@ -307,6 +307,8 @@ class Ensemble:
         method, _ = chosen(given.get("method", "auto"), equations.problem, step=given.get("step"))
         if method.many is not None or (given.get("step") is None and longest_step(equations.problem.scene) < np.inf):
             return None  # each member has its own limit
+        if equations.led.holds:  # its work is no sum of rows
+            return None
         control = control_of(
             equations.problem, given.get("rtol", 1e-6), given.get("atol", 1e-9), given.get("step"),
             given.get("min_step"), given.get("max_step"), given.get("max_steps"),

@@ -6,6 +6,7 @@ import pytest
 import ephs
 from ephs.show.flows import exergy_bands
 from examples import oscillator, physics
+from examples.failing import pendulum
 
 START = {"stator.tc.s": 1.0, "rotor.tc.s": 1.0, "stator.coil.b": 0.3}
 
@@ -104,3 +105,18 @@ def test_a_prescribed_velocity_needs_the_force_of_newton():
     assert np.allclose(force, 2.0 * np.cos(sol.t) + 3.0 * sol["pe.q"], atol=1e-6)
     with pytest.raises(KeyError, match="no such outer power port; the ports are p"):
         sol.port("q")
+
+
+def test_the_defect_of_steps_is_no_supply():
+    """Nothing reaches a falling brake from outside; what explicit steps lose of its energy is their defect."""
+    sol = ephs.simulate(pendulum(6.0, "friction = 2.0"), 1.0, method="rk54", rtol=1e-4)
+    whole = sol.ledger()
+    assert not sol.work.any()
+    assert not whole.energy_supplied.any()
+    assert np.abs(whole.exergy_supplied).max() <= 1e-15 * np.abs(whole.exergy).max()
+    assert np.array_equal(whole.defect, sol.energy - sol.energy[0])
+    assert np.abs(whole.defect).max() > 1e-9
+    assert np.allclose(whole.exergy_defect, whole.defect, atol=1e-12)
+    parts = np.sum([part.energy_supplied for part in whole.parts.values()], axis=0)
+    assert np.allclose(parts, whole.energy_supplied + whole.defect, atol=1e-12)
+    assert "defect" in str(whole)

@@ -1,0 +1,240 @@
+"""The audit of a run: each law finds what breaks it, and nothing else; policies; what is recorded."""
+
+import pickle
+import warnings
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import ephs
+from ephs import library as lib
+from ephs.mechanics.methods import METHODS
+from ephs.mechanics.scene.state import Snapshot
+from ephs.mechanics.solve.audit import CLOSED, COARSE, LAWFUL, LAWS, LEAST, PRODUCTION, Bounds, audit
+from ephs.mechanics.solve.control import Control, Tolerance
+from ephs.mechanics.solve.findings import Audit, Finding
+from ephs.mechanics.solve.resolution import step_error
+from examples.failing import oscillator, pendulum
+
+BRAKE = "friction = 20.0"
+TIGHT = Bounds(LAWFUL, COARSE, LEAST, step=0.005)
+
+
+def brake(rate: float = 6.0) -> ephs.Scene:
+    """A rod on a pin with much friction."""
+    return pendulum(rate, BRAKE)
+
+
+@pytest.fixture(scope="module")
+def sound() -> ephs.Solution:
+    """A run of brake and pendulum that keeps every law."""
+    return ephs.simulate(brake(), 0.2, method="natural", step=0.005)
+
+
+def bent(sol: ephs.Solution, **books) -> ephs.Solution:
+    """The solution with other books."""
+    return ephs.Solution(sol.name, sol.t, sol.states, replace(sol.ledgers, **books), sol.stats, sol.problem, sol.labels)
+
+
+def kick(values, size: float):
+    """The values with one that is off, in the middle."""
+    out = np.array(values)
+    out[len(out) // 2] += size
+    return out
+
+
+def opened(sol: ephs.Solution, by: float) -> ephs.Solution:
+    """The solution with its rod apart from the pin at one instant."""
+    states = dict(sol.states)
+    pose = next(path for path in states if str(path) == "bodies.rod.pe.q")
+    states[pose] = states[pose].copy()
+    states[pose][10, 4] += by
+    return ephs.Solution(sol.name, sol.t, states, sol.ledgers, sol.stats, sol.problem, sol.labels)
+
+
+def broken(law: str, sol: ephs.Solution, times: float) -> ephs.Solution:
+    """The solution with one law broken by so many times what is allowed."""
+    books = sol.ledgers
+    entropies = float(np.max(sum(np.abs(s - s[0]) for s in books.entropies.values()) + books.made))
+    if law == "energy":
+        return bent(sol, kinetic=kick(books.kinetic, times * LAWFUL * books.scale))
+    if law == "entropy":
+        least = -times * PRODUCTION * entropies
+        return ephs.Solution(
+            sol.name, sol.t, sol.states, books, {**sol.stats, "least_production": least}, sol.problem, sol.labels
+        )
+    if law == "constraint":
+        length = Snapshot.of(sol.scene).scale(sol.scene.world.gravity).length
+        return opened(sol, times * CLOSED * length)
+    path, held = next((path, s) for path, s in books.entropies.items() if np.ptp(s))
+    return bent(sol, entropies={**books.entropies, path: held + np.linspace(0.0, times * LEAST * entropies, len(held))})
+
+
+@pytest.mark.parametrize("law", [name for name in LAWS if name != "accuracy"])
+def test_each_law_finds_what_breaks_it_and_nothing_else(law, sound):
+    assert audit(sound, TIGHT).passed
+    assert audit(broken(law, sound, 0.5), TIGHT).passed
+    (found,) = audit(broken(law, sound, 2.0), TIGHT).findings
+    assert found.law == law
+    assert found.size == pytest.approx(2.0 * found.allowed, rel=0.2)
+    assert found.advice == LAWS[law].advice[0]
+    assert 0.0 <= found.at <= sound.t[-1]
+
+
+def test_a_total_entropy_that_falls_is_found_though_every_component_makes_some(sound):
+    books = sound.ledgers
+    fallen = bent(sound, entropy=books.entropy - 1e-3 * np.ptp(books.entropy) * (sound.t > 0.1))
+    (found,) = audit(fallen, TIGHT).findings
+    assert found.law == "entropy"
+    assert found.at == pytest.approx(0.105)
+
+
+def test_findings_say_where(sound):
+    (gap,) = audit(opened(sound, 1e-3), TIGHT).findings
+    assert (gap.path, gap.at) == ("joints.pin", sound.t[10])
+    (unbalanced,) = audit(broken("energy", sound, 1e3), TIGHT).findings
+    assert unbalanced.at == pytest.approx(0.1)
+
+
+def test_what_is_no_number_does_not_pass_and_can_be_written(sound):
+    (found,) = audit(bent(sound, kinetic=kick(sound.kinetic, np.nan)), TIGHT).findings
+    assert found.law == "energy"
+    assert np.isfinite(found.size)
+
+
+@pytest.mark.parametrize(
+    ("lawful", "step", "rtol", "energy", "accuracy"),
+    [
+        (True, 0.1, 1e-6, LAWFUL, COARSE),
+        (True, None, 1e-6, LAWFUL, 1e-4),
+        (False, 0.1, 1e-6, COARSE, COARSE),
+        (False, None, 1e-6, 1e-4, 1e-4),
+        (False, None, 1e-13, LEAST, LEAST),
+    ],
+)
+def test_what_is_allowed_follows_from_method_and_steps(lawful, step, rtol, energy, accuracy):
+    control = Control(Tolerance(rtol, {}), Tolerance(1e-9, {}), step, 0.0, np.inf, None)
+    bounds = Bounds.of(control, step, lawful=lawful)
+    assert (bounds.energy, bounds.accuracy, bounds.step) == (pytest.approx(energy), pytest.approx(accuracy), step)
+
+
+def test_a_run_beyond_stability_does_not_end_well():
+    with pytest.raises(ephs.AuditError) as caught:
+        ephs.simulate(brake(), 2.0, method="rk54", step=0.1)
+    error = caught.value
+    assert isinstance(error, ephs.SimulationError)
+    assert error.outcome is ephs.Outcome.UNLAWFUL
+    assert error.partial.t[-1] == 2.0  # the whole solution
+    assert [finding.law for finding in error.findings] == ["energy"]
+    assert error.findings == error.partial.audit.findings
+    assert pickle.loads(pickle.dumps(error.findings)) == error.findings
+    assert error.partial.summary()["audit"] == {
+        "passed": False,
+        "findings": [error.partial.audit.record()["findings"][0]],
+    }
+    with pytest.warns(ephs.AuditWarning, match="energy: .* is allowed"):
+        warned = ephs.simulate(brake(), 2.0, method="rk54", step=0.1, audit="warn")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        kept = ephs.simulate(brake(), 2.0, method="rk54", step=0.1, audit="off")
+        fine = ephs.simulate(brake(), 2.0, method="rk54", step=0.01)
+    assert warned.audit == kept.audit == error.partial.audit
+    assert fine.audit.passed
+    assert fine.summary()["audit"] == {"passed": True, "findings": []}
+
+
+@pytest.mark.parametrize("times", [[2.0], [1.9, 2.0], [0.0, 2.0], []])
+@pytest.mark.parametrize("method", ["rk54", "alpha"])
+def test_instants_that_are_kept_hide_nothing(times, method):
+    sol = ephs.simulate(brake(), 2.0, method=method, step=0.1, save_at=times, audit="off")
+    assert len(sol) == len(times)
+    assert [finding.law for finding in sol.audit.findings] == ["energy"]
+
+
+def test_instants_that_are_kept_hide_nothing_of_systems():
+    sol = ephs.simulate(oscillator(), 1.0, step=0.1, save_at=[1.0])
+    assert sol.audit.passed
+
+
+def test_an_unknown_policy_is_refused():
+    with pytest.raises(ephs.OptionError, match="audit is 'fial', expected one of fail, warn, off; did you mean 'fail'"):
+        ephs.simulate(brake(), 1.0, audit="fial")
+
+
+def test_the_audit_is_kept_with_the_solution(tmp_path):
+    sol = ephs.simulate(brake(), 2.0, method="rk54", step=0.1, audit="off")
+    sol.save(tmp_path / "sol.nc")
+    assert ephs.load_solution(tmp_path / "sol.nc").audit == sol.audit
+
+
+def test_a_solution_without_audit_passes_and_prints():
+    assert str(Audit()) == "passed"
+    finding = Finding("energy", 0.5, 1e-9, 0.25, "joints.pin", "take a smaller step")
+    assert str(Audit((finding,))) == "energy: 0.5 where 1e-09 is allowed, t = 0.25 s at joints.pin; take a smaller step"
+    assert Audit.of_record(Audit((finding,)).record()) == Audit((finding,))
+
+
+def test_heat_that_conducts_is_no_finding():
+    """Nothing moves: the scale is that of the energies exchanged."""
+    hot = lib.thermal_capacity(c1=293.15, c2=1.0)
+    system = ephs.Pattern(
+        junctions={"a": ephs.junction(ephs.quantity.entropy), "b": ephs.junction(ephs.quantity.entropy)},
+        boxes={"one": {"s": "a"}, "other": {"s": "b"}, "bridge": {"s1": "a", "s2": "b"}},
+    )(one=hot, other=hot, bridge=lib.heat_transfer(h=0.5))
+    for options in ({"method": "radau"}, {"step": 0.05}):
+        sol = ephs.simulate(system, 1.0, initial={"one.s": 0.1}, **options)
+        assert sol.audit.passed, sol.audit
+
+
+def test_reports_show_findings():
+    from ephs.show.report import _summary
+
+    sol = SimpleNamespace(audit=Audit((Finding("entropy", 1.0, 1e-12, 0.5, "joints.pin", "take a smaller step"),)))
+    page = _summary({"audit": sol.audit.record()})
+    assert "does not pass its audit" in page
+    assert "joints.pin" in page
+    assert "audit" not in _summary({"audit": Audit().record()})
+
+
+def test_what_stands_still_passes_though_all_of_it_is_rounding():
+    """A pendulum that hangs, with friction: velocities, heat and entropies are rounding."""
+    scene = pendulum(0.0, BRAKE)
+    hanging = scene.with_state(coordinates={"pin": 0.5 * np.pi})
+    for options in ({"method": "natural", "step": 0.01}, {"method": "rk54"}, {"method": "radau"}):
+        sol = ephs.simulate(hanging, 1.0, **options)
+        assert sol.kinetic.max() < 1e-12
+        assert sol.audit.passed, sol.audit
+
+
+@pytest.mark.parametrize(
+    ("method", "truth"), [("natural", False), ("natural4", False), ("variational", False), ("radau", True)]
+)
+def test_a_balance_that_hides_an_unresolved_brake_is_found(method, truth):
+    """The rod stops at once; steps of 2 ms that damp nothing let it go on for long, in perfect balance."""
+    scene = pendulum(6.0, "friction = 1e5")
+    options = {"step": 0.002} if not truth else {}
+    sol = ephs.simulate(scene, 0.1, method=method, audit="off", **options)
+    if truth:
+        assert sol.audit.passed
+        assert abs(sol.joint("pin").rate[-1, 0]) < 1e-3
+        return
+    assert sol.energy_error.max() < 1e-9
+    assert abs(sol.joint("pin").rate[-1, 0]) > 0.1
+    (found,) = sol.audit.findings
+    assert (found.law, found.path.partition(".")[0]) in {("accuracy", "bodies"), ("accuracy", "joints")}
+    needed = float(found.advice.split()[4])
+    assert needed < 1e-4
+    short = ephs.simulate(scene, 20 * needed, method=method, step=needed)
+    assert short.audit.passed
+
+
+@pytest.mark.parametrize(("method", "order", "step"), [("natural", 2, 0.1), ("natural4", 4, 0.4)])
+def test_the_estimate_is_that_of_an_oscillation(method, order, step):
+    """Of an oscillator at hω a method of order p errs by C (hω)ᵖ of what it moves, or less."""
+    start, make = {"pe.q": 1.0, "ke.p": 1.0}, METHODS[method].undamped
+    runs = {h: ephs.simulate(oscillator(), 3.0, initial=start, method=method, step=h) for h in (step, 0.5 * step)}
+    sizes = [step_error(sol, make, h).size for h, sol in runs.items()]
+    assert sizes[0] / sizes[1] >= 0.8 * 2.0**order
+    assert sizes[0] < 0.01
