@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from itertools import pairwise
 from typing import Any, TypeAlias
 
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
 from ephs.operad import (
@@ -142,7 +142,13 @@ def _again(draw: st.DrawFn, f: Pattern) -> Pattern:
 def _check(law: Law, inputs: st.SearchStrategy[tuple[object, ...]], max_examples: int) -> None:
     # whole patterns are drawn and composed: what Hypothesis deems slow and large is meant
     calm = [HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.large_base_example]
-    limits = settings(max_examples=max_examples, deadline=None, database=None, suppress_health_check=calm)
+    limits = settings(
+        max_examples=max_examples,
+        deadline=None,
+        database=None,
+        phases=[Phase.generate, Phase.shrink],
+        suppress_health_check=calm,
+    )
 
     def holds(drawn: tuple[object, ...]) -> None:
         equation = law(*drawn)

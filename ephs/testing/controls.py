@@ -64,6 +64,10 @@ def _substitution(f: Pattern, parts: Mapping[Path, Any]) -> Filled:
     return _doubled(f, parts, min(f.boxes), f.junctions if len(f.boxes) == 1 else ())
 
 
+def _levels(f: Pattern, parts: Mapping[Path, Any]) -> Filled:
+    return _identity(f, parts) if f.is_identity else _substitution(f, parts)
+
+
 def _nullary(f: Pattern, parts: Mapping[Path, Any]) -> Filled:
     if f.is_identity or all(box.ports for box in f.boxes.values()):
         return f, parts
@@ -105,7 +109,7 @@ _SPOILS: dict[str, Callable[[Pattern, Mapping[Path, Any]], Filled]] = {
     "kept interface": _kept_interface,
     "identity": _identity,
     "substitution": _substitution,
-    "levels": _substitution,
+    "levels": _levels,
     "nullary": _nullary,
     "presentation": _presentation,
     "equivariance in names of boxes": _boxes,

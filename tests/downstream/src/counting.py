@@ -1,5 +1,25 @@
 """Counts what patterns are made of; the sort of thing that one builds on a modelling library."""
 
+from dataclasses import dataclass, replace
+
+from ephs.operad import Algebra, AlgebraMap, Interface
+
+
+@dataclass(frozen=True)
+class Boxes:
+    """How many boxes there are inside."""
+
+    interface: Interface
+    count: int
+
+
+BOXES = Algebra(
+    "boxes",
+    lambda element: element.interface if isinstance(element, Boxes) else None,
+    lambda pattern, parts: Boxes(pattern.interface, sum(part.count for part in parts.values())),
+)
+TWICE = AlgebraMap(BOXES, BOXES, lambda element: replace(element, count=2 * element.count), "twice")
+
 
 def boxes(pattern) -> int:
     """How many boxes."""

@@ -3,6 +3,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ephs.testing import (
+    check_algebra,
+    check_algebra_map,
     check_entropy_production,
     check_functoriality,
     check_natural,
@@ -79,3 +81,11 @@ def test_the_discrete_functor(system):
 
 def test_the_laws_of_patterns():
     check_operad_laws(max_examples=5)
+
+
+def test_an_algebra_and_a_map_of_ones_own():
+    def leaf(interface):
+        return st.integers(0, 3).map(lambda count: counting.Boxes(interface, count))
+
+    check_algebra(counting.BOXES, leaf, max_examples=5)
+    check_algebra_map(counting.TWICE, leaf, max_examples=5)
