@@ -9,14 +9,17 @@ from ephs.mechanics.solve.errors import Outcome, SolveError
 from ephs.mechanics.solve.natural import Chunk
 from ephs.mechanics.solve.problem import Problem
 from ephs.semantics.bundle import Array
-from ephs.semantics.primitives import Irreversible
+from ephs.semantics.primitives import Irreversible, Point, Storage
 
 __all__ = ["Production"]
 
 SHARE = 1e-12
 """Of the entropies exchanged and made in a step: a production that is less negative is rounding."""
 ROUNDING = 8.0 * float(np.finfo(float).eps)
-"""Of the entropy made so far, from which the production of a step is a difference."""
+"""Of the entropy made so far, from which the production of a step is a difference; and of the heat capacities: what
+changes temperatures by their rounding."""
+DECADES = range(-12, 13)
+"""Of entropies in J/K, among which a capacity is looked for."""
 
 
 @final
@@ -43,6 +46,7 @@ class Production:
         hot = [slot.point.start for slot in problem.descriptor.states if slot.quantity.kind == "entropy"]
         self._entropies = np.array(hot, dtype=int)
         self.active = bool(watched)
+        self._still = ROUNDING * _capacity(problem) if watched else 0.0
 
     def start(self, x: Array, energies: Array) -> None:
         """The states and the entropies made, (point_size,) and (components,), from which the next step starts."""
@@ -78,10 +82,34 @@ class Production:
         made = self._sign * (energies[self._watched] - made_before[self._watched])
         exchanged = float(np.abs(x[self._entropies] - before[self._entropies]).sum())
         exchanged += float(np.abs(energies[self._makers] - made_before[self._makers]).sum())
-        allowed = SHARE * exchanged + ROUNDING * np.abs(energies[self._watched])
+        allowed = SHARE * exchanged + ROUNDING * np.abs(energies[self._watched]) + self._still
         excess = made + allowed
         worst = int(np.argmin(excess))
         if excess[worst] >= 0.0:
             return None
         size = f"{made[worst]:.3g} J/K in the step to t = {t:.9g} s"
         return SolveError(Outcome.ENTROPY, str(self._paths[worst]), size)
+
+
+def _capacity(problem: Problem) -> float:
+    """Sum of the heat capacities ds/d(log θ) of what stores entropy, at the initial states, in J/K."""
+    d = problem.descriptor
+    x, total = d.pack(problem.initial), 0.0
+    for slot in d.components:
+        storage = slot.primitive
+        if not isinstance(storage, Storage) or storage.environment:
+            continue
+        point = d.point(slot, x)
+        for _, where, quantity in storage.bundle.items():
+            if quantity.kind == "entropy":
+                total += next(filter(None, (_share(storage, point, where, 10.0**k) for k in DECADES)), 0.0)
+    return total
+
+
+def _share(storage: Storage, point: Point, where: slice, step: float) -> float:
+    """The capacity by a difference over an entropy in J/K; 0 where that changes the temperature too little, or ends."""
+    v = np.zeros(storage.bundle.size)
+    v[where] = step
+    before, after = (float(storage.energy_gradient(x)[where][0]) for x in (point, storage.retract(point, v)))
+    ratio = abs(np.log(after / before)) if before > 0.0 and np.isfinite(after) and after > 0.0 else 0.0
+    return step / ratio if ratio > 1e-3 else 0.0

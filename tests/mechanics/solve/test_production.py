@@ -1,0 +1,108 @@
+"""The entropy that searched components make is looked at in every step; a destruction beyond rounding is a fault."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import ephs
+from ephs import Pattern, junction, library
+from ephs import quantity as Q
+from ephs.mechanics.methods import METHODS
+from ephs.mechanics.simulate import problem_of_system
+from ephs.mechanics.solve.errors import Outcome, SolveError
+from ephs.mechanics.solve.production import Production
+from examples.failing import driving
+
+SYSTEMS = [method.name for method in METHODS.values() if method.systems]
+
+
+def walls(*parts):
+    """Two bodies of 300 K with these between them."""
+    names = [f"wall{i}" for i in range(len(parts))]
+    pattern = Pattern(
+        {"a": junction(Q.entropy), "b": junction(Q.entropy)},
+        {"hot": {"s": "a"}, "cold": {"s": "b"}} | {name: {"a": "a", "b": "b"} for name in names},
+    )
+    body = library.thermal_capacity(c1=300.0, c2=1.0)
+    return pattern(hot=body, cold=body, **dict(zip(names, parts, strict=True)))
+
+
+def hidden(a, b):
+    a, b = float(a), float(b)
+    return 2.0 * np.array([[b / a, -1.0], [-1.0, a / b]])
+
+
+def seen(a, b):
+    return 2.0 * np.array([[b / a, -1.0], [-1.0, a / b]])
+
+
+def conduction(matrix):
+    return ephs.irreversible({"a": Q.entropy, "b": Q.entropy}, matrix)
+
+
+def watch(system, sign=1.0):
+    """The watch, and how many states and components there are, at rest with nothing made so far."""
+    problem = problem_of_system(system, None)
+    found = Production(problem, sign)
+    d = problem.descriptor
+    x, energies = d.pack(problem.initial), np.zeros(len(d.components))
+    found.start(x, energies)
+    at = {str(slot.path): i for i, slot in enumerate(d.components)}
+    return found, SimpleNamespace(x=x, energies=energies, at=at)
+
+
+def test_what_is_proved_is_not_watched():
+    assert not watch(walls(conduction(seen)))[0].active
+    assert watch(walls(conduction(seen), conduction(hidden)))[0].active
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_destruction_beyond_rounding_names_the_component_and_the_size(sign):
+    found, run = watch(walls(conduction(seen), conduction(hidden)), sign)
+    proved, searched = run.at["wall0"], run.at["wall1"]
+    moved = run.x + 1e-3
+    run.energies[proved] = -sign  # not looked at
+    found.step(0.1, moved, run.energies)
+    worse = run.energies.copy()
+    worse[searched] -= sign * 1e-17  # of 2e-3 J/K exchanged, rounding
+    found.step(0.2, moved + 1e-3, worse)
+    bad = worse.copy()
+    bad[searched] -= sign * 1e-9
+    with pytest.raises(SolveError) as caught:
+        found.step(0.3, moved + 2e-3, bad)
+    assert (caught.value.outcome, caught.value.path) == (Outcome.ENTROPY, "wall1")
+    assert "-1e-09 J/K in the step to t = 0.3 s" in caught.value.equation
+
+
+@pytest.mark.parametrize("method", SYSTEMS)
+def test_a_run_in_equilibrium_is_none_that_destroys_entropy(method):
+    """Rounding makes and destroys next to nothing."""
+    solution = ephs.simulate(walls(conduction(hidden)), 1.0, method=method, step=0.1)
+    assert solution.t[-1] == 1.0
+
+
+@pytest.mark.parametrize("method", SYSTEMS)
+def test_the_steps_before_are_kept(method):
+    with pytest.raises(ephs.SimulationError) as caught:
+        ephs.simulate(driving(), 1.0, method=method, step=1e-4, initial={"ke.p": 7.75})
+    assert caught.value.path == "mf" and caught.value.time == caught.value.partial.t[-1] == 0.0
+
+
+def test_domains_are_bounds_of_ports():
+    energy = {"ports": {"s": Q.entropy}, "energy": lambda s: 300.0 * s + 50.0 * s**2}
+    body = ephs.storage(**energy, domain={"s": (-2.9, np.inf)})
+    assert body.verdict == "proved" and body.kernel is None
+    (port,) = body.bundle.ports
+    assert np.isnan(body.energy({port: np.array([-2.95])})) and np.isnan(body.energy_gradient({port: np.array([-3.0])}))
+    with pytest.raises(ephs.StructureError, match="witness: s = -3"):
+        ephs.storage(**energy, domain={"s": (-3.5, np.inf)})
+    for wrong in ({"x": (0.0, 1.0)}, {"s": (1.0, 1.0)}):
+        with pytest.raises(ephs.StructureError, match="parameter domain of"):
+            ephs.storage(**energy, domain=wrong)
+    slow = ephs.irreversible(
+        {"p": Q.momentum, "s": Q.entropy},
+        lambda p, s: (1.0 - 0.01 * p * p) * np.array([[s, -p], [-p, p * p / s]]),
+        domain={"p": (-9.0, 9.0)},
+    )
+    assert slow.verdict == "proved"
