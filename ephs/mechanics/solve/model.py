@@ -178,8 +178,9 @@ def compile_model(
         if (callback := entry.callback) is not None
         for i in np.flatnonzero(n.primitive == number)
     }
-    there = [reference.intensive(q) for q in n.quantities]
-    intensive = np.concatenate([np.zeros(0), *(there[i] for i in n.junctions)])
+    there = np.concatenate([np.zeros(0), *(reference.intensive(q) for q in n.quantities)])
+    there_at = starts(np.array([q.space.dim for q in n.quantities], dtype=np.int64))
+    intensive = there[spans(there_at[n.junctions], junction_dims)]
     entropy = np.array([float(q.kind == "entropy") for q in n.quantities])[n.junctions]
     codes = np.array([manifold(q.space).code for q in n.quantities], dtype=np.int64)[n.states]
     outer, input_at, at, unknown = [], [], 0, n_rate + n_effort + n_lam
