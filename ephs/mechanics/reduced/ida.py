@@ -56,7 +56,11 @@ class Ida(ReducedMethod):
             self._restart(state)
         base, self._failure = self._base, None
         assert base is not None
-        found = self._solver.step(state.t + h - base.t, method="onestep", tstop=state.t + h - base.t)
+        self._base = None  # until this step is taken: the solver cannot go back
+        try:
+            found = self._solver.step(state.t + h - base.t, method="onestep", tstop=state.t + h - base.t)
+        except RuntimeError as error:
+            raise self._failure or SolveError(Outcome.DIVERGED, "", f"IDA: {error}") from error
         if not found.success:
             if self._failure is not None:
                 raise self._failure
@@ -64,7 +68,7 @@ class Ida(ReducedMethod):
         t, y = float(np.ravel(found.t)[-1]) + base.t, np.array(found.y[-1] if found.y.ndim > 1 else found.y)
         if t == state.t:
             raise self._failure or SolveError(Outcome.TINY, "", "IDA's step")
-        return self._attempt(state, y, t)
+        return self._attempt(state, base, y, t)
 
     def inside(self, attempt: Attempt[ReducedState], t: float) -> ReducedState:
         """The state at a time within a step, by a run of its own from the step's start."""
@@ -74,15 +78,14 @@ class Ida(ReducedMethod):
             state = own.step(state, t - state.t).end
         return state
 
-    def _attempt(self, state: ReducedState, y: Array, t: float) -> Attempt[ReducedState]:
+    def _attempt(self, state: ReducedState, base: ReducedState, y: Array, t: float) -> Attempt[ReducedState]:
         eq = self.equations
-        assert self._base is not None
-        free = eq.state(self._base, y, t)
+        free = eq.state(base, y, t)
         closed = eq.closed(free)
         moved = float(np.abs(eq.gaps(free.q, free.r)[0]).max(initial=0.0)) if closed is not free else 0.0
         self._last = closed.q
-        if np.max(np.abs(y[eq.curved]), initial=0.0) > FAR or moved > OPEN * float(np.min(self.rtol)):
-            self._base = None
+        if np.max(np.abs(y[eq.curved]), initial=0.0) <= FAR and moved <= OPEN * float(np.min(self.rtol)):
+            self._base = base
         return Attempt(state, closed, t - state.t, 0.0, eq.least(state, closed))
 
     def _restart(self, state: ReducedState) -> None:

@@ -12,7 +12,7 @@ import math
 from ephs.mechanics.reduced.sweep_kernels import bracket, carry, forces, inertia_sweep, kinematics, lift, relative_twist
 from ephs.mechanics.reduced.tables import CUT
 from ephs.semantics.spaces import jit
-from ephs.semantics.spaces.rank import EXPLICIT, ROUNDED
+from ephs.semantics.spaces.rank import EXPLICIT, REGULAR, ROUNDED
 from ephs.semantics.spaces.se3_kernels import coadjoint_apply, include, pose_compose, pose_inverse, pose_log
 
 kernel = jit.lean_kernel
@@ -99,9 +99,58 @@ def row_biases(t, w):
 
 
 @kernel
-def reduce_rows(w, m):
-    """Orthonormalise the rows in the mass metric, largest remainder first; returns the rank."""
+def _equilibrate(w, m):
+    """The rows with columns, then rows, scaled to size one, into w.plain; a row that is nothing stays nothing."""
     n = w.mass.shape[0]
+    for i in range(n):
+        most = 0.0
+        for a in range(m):
+            most = max(most, abs(w.row[a, i]))
+        for a in range(m):
+            w.plain[a, i] = w.row[a, i] / most if most > 0.0 else 0.0
+    for a in range(m):
+        square = 0.0
+        for i in range(n):
+            square += w.plain[a, i] * w.plain[a, i]
+        for i in range(n):
+            w.plain[a, i] = w.plain[a, i] / math.sqrt(square) if square > 0.0 else 0.0
+
+
+@kernel
+def _remainder(w, m, j):
+    """Largest remainder of the rows from the j-th chosen one on, once those before it are out, of equilibrated rows.
+
+    The rows before the j-th are orthonormalised in w.plain on the way.
+    """
+    n, largest = w.mass.shape[0], 0.0
+    for c in range(m):
+        row, square = w.chosen[c], 0.0
+        for _ in range(2):
+            for b in range(min(c, j)):
+                base, part = w.chosen[b], 0.0
+                for i in range(n):
+                    part += w.plain[row, i] * w.plain[base, i]
+                for i in range(n):
+                    w.plain[row, i] -= part * w.plain[base, i]
+        for i in range(n):
+            square += w.plain[row, i] * w.plain[row, i]
+        if c < j:
+            for i in range(n):
+                w.plain[row, i] = w.plain[row, i] / math.sqrt(square) if square > 0.0 else 0.0
+        elif w.triangle[row, row] > 0.0:
+            largest = max(largest, math.sqrt(square))
+    return largest
+
+
+@kernel
+def reduce_rows(w, m):
+    """Orthonormalise the rows in the mass metric, largest remainder first; returns the rank.
+
+    A row counts as repeating others where little is left of it in the mass metric and in that of the equilibrated
+    rates: in the first alone a constraint between heavy bodies looks small beside one that moves light ones.
+    """
+    n = w.mass.shape[0]
+    _equilibrate(w, m)
     for a in range(m):
         w.chosen[a] = a
         square = 0.0
@@ -122,7 +171,7 @@ def reduce_rows(w, m):
         for a in range(j, m):
             if w.triangle[w.chosen[a], w.chosen[a]] > most:
                 best, most = a, w.triangle[w.chosen[a], w.chosen[a]]
-        if best < 0 or most <= EXPLICIT * largest:
+        if best < 0 or most <= REGULAR * largest or (most <= EXPLICIT * largest and _remainder(w, m, j) <= EXPLICIT):
             break
         w.chosen[j], w.chosen[best] = w.chosen[best], w.chosen[j]
         row = w.chosen[j]

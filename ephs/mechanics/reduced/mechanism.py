@@ -77,7 +77,7 @@ class Reduced:
             "pose": (links, 7), "inner": (links, 7), "twist": (links, 6), "bias": (links, 6), "load": (links, 6),
             "composite": (links, 6, 6), "motion": (edges, 6, 6), "relative": (edges, 7), "rate": (edges, 6),
             "mass": (n, n), "factor": (n, n), "force": (n,), "row": (m, n), "size": (m,), "target": (m,),
-            "scaled": (m, n),
+            "scaled": (m, n), "plain": (m, n),
             "triangle": (m, m), "step": (max(n, m),), "temperature": (max(t.node.size, 1),), "multiplier": (m,),
             "small": (512,), "matrix": (6, 6), "scratch": (2048,), "e": (16,), "f": (256,), "c": (16,), "jac": (512,),
         }  # fmt: skip
