@@ -104,6 +104,10 @@ GROUPS = {
             for name in ("base", "controls", "edge_cases", "laws", "relations", "subspace")
         ),
     ),
+    "algebras": Group(
+        ("ephs/semantics/algebra/*.py",),
+        ("tests/semantics/algebra",),
+    ),
     "integrators": Group(
         (
             "ephs/mechanics/solve/natural.py",
