@@ -150,11 +150,12 @@ class _Prepared:
         return self._alone(values)
 
     def _alone(self, values: Array) -> tuple[list[Array] | None, str, int, int]:
-        """By `simulate`, which tells what failed, when and where."""
+        """By `simulate`, which tells what failed, when and where; findings of the audit are a member's status."""
         job = self.job
         try:
             model = varied(self.model, dict(zip(job.axes.paths, values.tolist(), strict=True)))
-            solution = simulate(model, job.until, t0=job.t0, save_at=job.save_at, **job.options)
+            options = {**job.options, "audit": "off"}
+            solution = simulate(model, job.until, t0=job.t0, save_at=job.save_at, **options)
         except Interrupted:
             raise KeyboardInterrupt from None
         except SimulationError as error:
@@ -165,4 +166,5 @@ class _Prepared:
         read = [np.asarray(output.read(solution)) for output in job.outputs]
         stats = solution.stats
         columns = [row.reshape(len(solution), -1) for row in read]
-        return columns, DONE, int(stats["steps"]), int(stats["rejected"])
+        status = DONE if solution.audit.passed else str(solution.audit)
+        return columns, status, int(stats["steps"]), int(stats["rejected"])

@@ -119,6 +119,7 @@ def attempt(
                 save_at=times,
                 max_steps=max_steps,
                 progress=watch,
+                audit="off",  # errors are measured against a reference
                 **setting.options(),
             )
         return Run(solution, Ending.DONE, "", watch.spent)

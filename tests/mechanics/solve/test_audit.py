@@ -238,3 +238,11 @@ def test_the_estimate_is_that_of_an_oscillation(method, order, step):
     sizes = [step_error(sol, make, h).size for h, sol in runs.items()]
     assert sizes[0] / sizes[1] >= 0.8 * 2.0**order
     assert sizes[0] < 0.01
+
+
+def test_members_of_a_sweep_say_what_was_found():
+    scene = brake()
+    data = ephs.sweep(scene, {"joints.pin.friction": [0.1, 20.0]}, 2.0, method="rk54", step=0.1, workers=1)
+    fine, wrong = data["status"].values.tolist()
+    assert fine == "done"
+    assert wrong.startswith("energy: ")
