@@ -200,6 +200,8 @@ def _formula(primitive: Primitive) -> dict[str, Any]:
     """What defines a primitive, in terms of its ports."""
     if primitive.formula is None:
         raise Untraceable("a primitive without a formula")
+    if primitive.domain:
+        raise Untraceable("a domain, for which documents have no word")
     function, numbers = primitive.formula.function, dict(primitive.parameters)
     given = {name: numbers[name] for name in primitive.formula.parameters}
     match primitive:

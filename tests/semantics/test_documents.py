@@ -216,6 +216,7 @@ def differing():
     "primitive, words",
     [
         (lambda: ephs.storage({"q": Q.displacement}, branching), "needs the value of an argument"),
+        (lambda: ephs.storage({"q": Q.displacement}, lambda q: q**2, domain={"q": (-1.0, 1.0)}), "found a domain"),
         (differing, "does not say what the component does"),
         (lambda: joint("revolute", potential=lambda x: x[0] ** 2).fillings["pe"], "without a formula"),
     ],
