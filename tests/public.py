@@ -11,7 +11,7 @@ from importlib import import_module
 from pathlib import Path
 from textwrap import dedent
 
-MODULES = ("ephs", "ephs.library", "ephs.mechanics", "ephs.testing", "ephs.show")
+MODULES = ("ephs", "ephs.library", "ephs.library.chemistry", "ephs.mechanics", "ephs.testing", "ephs.show")
 VALUES = ("ephs.quantity",)
 CLASSES = (
     "ephs.mechanics.dynamics.Dynamics",
@@ -67,7 +67,7 @@ def named(path: str) -> object:
 
 
 def _home(module: str) -> str:
-    return "ephs.semantics.library" if module == "ephs.library" else module
+    return module.replace("ephs.library", "ephs.semantics.library")
 
 
 def described(path: str, value: object) -> Iterator[str]:

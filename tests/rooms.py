@@ -17,7 +17,7 @@ STOREYS: tuple[tuple[frozenset[str], ...], ...] = tuple(
         ([".operad"],),
         ([".operad.rewriting"],),
         ([".semantics.spaces"],),
-        ([".semantics", ".semantics.algebra", ".semantics.relations", ".semantics.symbols"],),
+        ([".semantics", ".semantics.library", ".semantics.algebra", ".semantics.relations", ".semantics.symbols"],),
         ([".mechanics.solve"],),
         ([".mechanics.scene", ".mechanics.imports"],),
         ([".mechanics", ".mechanics.reduction", ".mechanics.reduced", ".mechanics.engine"],),

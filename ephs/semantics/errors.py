@@ -75,6 +75,10 @@ _TEXTS = {
         "{path}: the relation is relative to {found}, the others to {expected}; take relations to one reference"
     ),
     "unknown-parameter": "{path}: no number of a component of the library; {hint}",
+    "elements": (
+        "{path}: {equation} does not conserve {element}: {found} of it in a reaction, expected 0; mend the equation or "
+        "the elements of the species"
+    ),
     "missing-input": ("{path}: the outer port is open: give inputs={{'{path}': {{'flow': …}}}} or {{'effort': …}}"),
     "unknown-input": "{path}: no such outer power port; the open ports are {expected}",
     "input": "{path}: the input is {found}, expected {expected}",

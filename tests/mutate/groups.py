@@ -85,7 +85,7 @@ GROUPS = {
             "ephs/semantics/primitives.py",
             "ephs/semantics/differences.py",
             "ephs/semantics/structures.py",
-            "ephs/semantics/library.py",
+            "ephs/semantics/library/__init__.py",
             "ephs/semantics/kernels.py",
             "ephs/semantics/natural.py",
             "ephs/semantics/behaviour.py",

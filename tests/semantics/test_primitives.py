@@ -14,7 +14,16 @@ from ephs.semantics.checks import dirac, random_efforts, random_point
 from ephs.semantics.laws import isotropy
 from ephs.testing import interfaces, irreversibles, reversibles, storages
 
+GASES = (
+    library.chemistry.Species("A", {"X": 1}, energy=1e3, entropy=10.0, capacity=20.0),
+    library.chemistry.Species("B", {"X": 2}, energy=-2e3, entropy=15.0, capacity=45.0),
+)
 ARGUMENTS = {
+    "coil": {"turns": 40.0}, "conduit": {}, "ideal_mixture": {"species": GASES}, "inertance": {"i": 2e5},
+    "laminar_leak": {"c": 1e-3}, "magnetic_series": {}, "orifice": {"c": 1e-2, "transition": 0.5},
+    "pipe_loss": {"r": 2.0, "k": 3.0}, "reaction": {"equation": "2 A = B", "species": GASES, "k": 1e-3},
+    "reluctance": {"r": 4.0}, "saturating_inductor": {"l": 0.3, "knee": 0.5}, "tank": {"area": 2.0, "density": 1e3},
+    "saturating_reluctance": {"r": 4.0, "knee": 0.5}, "winding": {"turns": 40.0},
     "capacitor": {"c": 0.3}, "emc": {}, "environment": {}, "friction": {"d": 0.2}, "heat_transfer": {"h": 3.0},
     "ideal_gas": {"c1": 2.0, "c2": 1.5, "v0": 1.0, "c": 1.5}, "inductor": {"l": 0.4}, "lever": {"r": 2.5}, "mkc": {},
     "piston": {"a": 0.02}, "pkc": {}, "point_mass": {"m": 2.0}, "resistor": {"r": 5.0}, "rigid_link": {},

@@ -14,7 +14,9 @@ from typing import Any, final
 import numpy as np
 
 from ephs.operad import Quantity
+from ephs.semantics.special import sinhc
 from ephs.semantics.symbols.algebra import Expr, sp
+from ephs.semantics.symbols.functions import Sinhc
 
 __all__ = ["Trace", "Traced", "Untraceable", "symbols_of", "trace"]
 
@@ -203,6 +205,11 @@ class Traced:
 
     def __repr__(self) -> str:
         return f"Traced({self.expression})"
+
+
+@sinhc.register
+def _(z: Traced) -> Traced:
+    return Traced(Sinhc(z.expression), z.met)
 
 
 def _mathematics() -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""The library of scalar physics: springs, masses, circuits, gases, friction, heat.
+"""The library of scalar physics: springs, masses, circuits, gases, friction, heat; chemistry, magnetics, hydraulics.
 
 Parameters by keyword, SI units; flows into the component are positive. Each function makes one primitive, whose
 matrices are the ones that are checked, simulated and shown. Sources: the component library of EPHS.jl for the sign
@@ -16,53 +16,60 @@ from ephs.operad import Directory, Interface, Path, PortType, Quantity, quantity
 from ephs.semantics import formulas
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.checks import STATEMENTS
-from ephs.semantics.errors import StructureError
+from ephs.semantics.library import chemistry as chemistry
+from ephs.semantics.library.chemistry import ideal_mixture, reaction
+from ephs.semantics.library.hydraulics import conduit, inertance, laminar_leak, orifice, pipe_loss, tank
+from ephs.semantics.library.made import finite, non_negative, positive
+from ephs.semantics.library.magnetics import (
+    coil,
+    magnetic_series,
+    reluctance,
+    saturating_inductor,
+    saturating_reluctance,
+    winding,
+)
 from ephs.semantics.primitives import Formula, Irreversible, Kernel, Point, Reversible, Storage, power_ports
 from ephs.semantics.structures import KERNELS, constant_structure, dissipation, exp, expm1, exponential, quadratic
 from ephs.semantics.verdict import Condition, proved
 
 __all__ = [
     "capacitor",
+    "coil",
+    "conduit",
     "emc",
     "environment",
     "friction",
     "heat_transfer",
     "ideal_gas",
+    "ideal_mixture",
     "inductor",
+    "inertance",
+    "laminar_leak",
     "lever",
+    "magnetic_series",
     "mkc",
+    "orifice",
+    "pipe_loss",
     "piston",
     "pkc",
     "point_mass",
+    "reaction",
+    "reluctance",
     "resistor",
     "rigid_link",
     "rotational_friction",
     "rotor",
+    "saturating_inductor",
+    "saturating_reluctance",
     "series_springs",
     "spring",
+    "tank",
     "thermal_capacity",
+    "winding",
 ]
 
 Structure = tuple[Sequence[Sequence[Any]] | None, Sequence[Sequence[Any]] | None]
 """L and C, either of which may be left out."""
-
-
-def _positive(path: str, **parameters: float) -> None:
-    for key, value in parameters.items():
-        if not (math.isfinite(value) and value > 0.0):
-            raise StructureError("parameter", path, key=key, found=value, expected="a number > 0")
-
-
-def _finite(path: str, **parameters: float) -> None:
-    for key, value in parameters.items():
-        if not math.isfinite(value):
-            raise StructureError("parameter", path, key=key, found=value, expected="a finite number")
-
-
-def _non_negative(path: str, **parameters: float) -> None:
-    for key, value in parameters.items():
-        if not (math.isfinite(value) and value >= 0.0):
-            raise StructureError("parameter", path, key=key, found=value, expected="a number ≥ 0")
 
 
 # ---- storage ---------------------------------------------------------------------------------------------------
@@ -78,44 +85,44 @@ def _scalar(name: str, port: str, of: Quantity, energy: Callable[..., object], *
 
 def spring(*, k: float) -> Storage:
     """Spring of stiffness k in N/m; port q: E = k*q**2/2."""
-    _positive("spring", k=k)
+    positive("spring", k=k)
     return _scalar("spring", "q", quantity.displacement, formulas.spring, k=k)
 
 
 def point_mass(*, m: float) -> Storage:
     """Point mass of m kg; port p: E = p**2/(2*m)."""
-    _positive("point_mass", m=m)
+    positive("point_mass", m=m)
     return _scalar("point_mass", "p", quantity.momentum, formulas.point_mass, m=m)
 
 
 def rotor(*, j: float) -> Storage:
     """Rotor of inertia j in kg m²; port p, an angular momentum: E = p**2/(2*j)."""
-    _positive("rotor", j=j)
+    positive("rotor", j=j)
     return _scalar("rotor", "p", quantity.angular_momentum, formulas.rotor, j=j)
 
 
 def capacitor(*, c: float) -> Storage:
     """Capacitor of c farad; port q, a charge: E = q**2/(2*c)."""
-    _positive("capacitor", c=c)
+    positive("capacitor", c=c)
     return _scalar("capacitor", "q", quantity.charge, formulas.capacitor, c=c)
 
 
 def inductor(*, l: float) -> Storage:  # noqa: E741 - the field's symbol
     """Inductor of l henry; port b, a flux linkage: E = b**2/(2*l)."""
-    _positive("inductor", l=l)
+    positive("inductor", l=l)
     return _scalar("inductor", "b", quantity.flux_linkage, formulas.inductor, l=l)
 
 
 def thermal_capacity(*, c1: float, c2: float) -> Storage:
     """Thermal capacity; port s: E = c1*exp(s/c2), temperature θ = E/c2."""
-    _positive("thermal_capacity", c1=c1, c2=c2)
+    positive("thermal_capacity", c1=c1, c2=c2)
     formula = Formula(formulas.thermal_capacity, ("c1", "c2"), formulas.thermal_capacity_slope)
     return exponential("thermal_capacity", c1, c2, (("c1", c1), ("c2", c2)), formula)
 
 
 def ideal_gas(*, c1: float, c2: float, v0: float, c: float) -> Storage:
     """Ideal gas; ports s, v: E = c1*(v0/v)**(1/c)*exp(s/c2), θ = ∂E/∂s, π = −∂E/∂v."""
-    _positive("ideal_gas", c1=c1, c2=c2, v0=v0, c=c)
+    positive("ideal_gas", c1=c1, c2=c2, v0=v0, c=c)
     s, v = Path.of("s"), Path.of("v")
 
     def energy(x: Point) -> float:
@@ -161,11 +168,18 @@ def ideal_gas(*, c1: float, c2: float, v0: float, c: float) -> Storage:
 
 
 @cache
-def environment() -> Storage:
-    """The reference environment; port s: e = 0, and its entropy integrates the flow."""
+def environment(**ports: Quantity) -> Storage:
+    """The reference environment; port s: e = 0, and its entropy integrates the flow.
+
+    Parameters
+    ----------
+    **ports
+        Other ports in place of s: volumes of the atmosphere, species of an inexhaustible supply, at the environment's
+        pressure and potentials.
+    """
     return Storage(
         "environment",
-        power_ports(s=quantity.entropy),
+        power_ports(**(ports or {"s": quantity.entropy})),
         energy=lambda x: 0.0,
         environment=True,
         kernel=Kernel(KERNELS, "no_effort"),
@@ -235,7 +249,7 @@ def lever(*, r: float) -> Reversible:
 
     C = [[-r, 1]].
     """
-    _finite("lever", r=r)
+    finite("lever", r=r)
     interface = power_ports(q1=quantity.displacement, q2=quantity.displacement)
     return _constant("lever", interface, formulas.lever, r=r)
 
@@ -263,7 +277,7 @@ def piston(*, a: float) -> Reversible:
 
     L = [[0, 0, -a], [0, 0, a], [a, -a, 0]].
     """
-    _positive("piston", a=a)
+    positive("piston", a=a)
     interface = power_ports(v1=quantity.volume, v2=quantity.volume, p=quantity.momentum)
     return _constant("piston", interface, formulas.piston, a=a)
 
@@ -276,7 +290,7 @@ def friction(*, d: float) -> Irreversible:
 
     M = [[d*s, -d*p], [-d*p, d*p**2/s]], of the energy efforts: p the velocity, s the temperature.
     """
-    _non_negative("friction", d=d)
+    non_negative("friction", d=d)
     ports = power_ports(p=quantity.momentum, s=quantity.entropy)
     return dissipation(
         "friction", ports, np.array([[d]]), parameters=(("d", d),), formula=Formula(formulas.friction, ("d",)),
@@ -289,7 +303,7 @@ def rotational_friction(*, d: float) -> Irreversible:
 
     M = [[d*s, -d*p], [-d*p, d*p**2/s]], of the energy efforts: p the angular velocity, s the temperature.
     """
-    _non_negative("rotational_friction", d=d)
+    non_negative("rotational_friction", d=d)
     ports = power_ports(p=quantity.angular_momentum, s=quantity.entropy)
     return dissipation(
         "rotational_friction",
@@ -306,7 +320,7 @@ def resistor(*, r: float) -> Irreversible:
 
     M = [[r*s, -b*r], [-b*r, b**2*r/s]], of the energy efforts: b the current, s the temperature.
     """
-    _non_negative("resistor", r=r)
+    non_negative("resistor", r=r)
     ports = power_ports(b=quantity.flux_linkage, s=quantity.entropy)
     return dissipation(
         "resistor", ports, np.array([[r]]), parameters=(("r", r),), formula=Formula(formulas.resistor, ("r",)),
@@ -319,7 +333,7 @@ def heat_transfer(*, h: float) -> Irreversible:
 
     M = [[h*s2/s1, -h], [-h, h*s1/s2]], of the temperatures.
     """
-    _non_negative("heat_transfer", h=h)
+    non_negative("heat_transfer", h=h)
 
     def matrix(_x: Point, e: Array, reference: Reference) -> Array:
         first, second = reference.temperature + e

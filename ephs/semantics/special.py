@@ -1,0 +1,30 @@
+"""Functions beyond the elementary ones, for numbers and symbols alike."""
+
+import math
+from functools import singledispatch
+from typing import Any
+
+import numpy as np
+
+__all__ = ["SHORT", "log_mean", "sinhc"]
+
+SHORT = 1e-2
+"""Below this a series serves, whose first term left out is below rounding: z⁸/9!."""
+
+
+@singledispatch
+def sinhc(z: Any) -> Any:
+    """sinh(z)/z, smooth and positive: 1 at z = 0, infinite where it overflows."""
+    x = float(z)
+    if abs(x) < SHORT:
+        return 1.0 + x * x / 6.0 * (1.0 + x * x / 20.0 * (1.0 + x * x / 42.0))
+    return math.sinh(x) / x if abs(x) < 709.0 else math.inf
+
+
+def log_mean(log_a: Any, log_b: Any) -> Any:
+    """The logarithmic mean (a − b)/(ln a − ln b) of two positive numbers, from their logarithms; a where a = b.
+
+    It lies between the geometric and the arithmetic mean: √(ab) sinh(z)/z with z = (ln a − ln b)/2. With it a net rate
+    a − b is a non-negative factor times the difference of the logarithms, which is a difference of potentials.
+    """
+    return np.exp((log_a + log_b) / 2) * sinhc((log_a - log_b) / 2)

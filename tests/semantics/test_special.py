@@ -1,0 +1,66 @@
+"""Functions beyond the elementary ones: the same for numbers, symbols and compiled programs."""
+
+import math
+
+import mpmath
+import numpy as np
+import pytest
+import sympy as sp
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ephs.semantics.special import SHORT, log_mean, sinhc
+from ephs.semantics.symbols.algebra import python_code
+from ephs.semantics.symbols.functions import Sinhc, SinhcSlope
+from ephs.semantics.symbols.tracing import trace
+
+EPS = float(np.finfo(float).eps)
+Z = sp.Symbol("z", real=True)
+SIZES = st.one_of(
+    st.floats(-30.0, 30.0), st.floats(-2 * SHORT, 2 * SHORT), st.sampled_from([0.0, 1e-300, SHORT, -SHORT])
+)
+
+
+def exact(z, slope):
+    """With digits to spare: the slope loses two thirds of them where z is small."""
+    with mpmath.workdps(60):
+        x = mpmath.mpf(z)
+        if abs(x) < 1e-15:
+            return float(x / 3) if slope else 1.0
+        return float((mpmath.cosh(x) - mpmath.sinh(x) / x) / x if slope else mpmath.sinh(x) / x)
+
+
+@given(SIZES)
+def test_numbers_symbols_and_code_agree(z):
+    value = sinhc(z)
+    assert value == pytest.approx(exact(z, False), rel=16 * EPS)
+    assert eval(python_code(Sinhc(Z)), {"math": math, "z": z}) == value
+    slope = eval(python_code(SinhcSlope(Z)), {"math": math, "z": z})
+    # cosh z − sinh(z)/z loses as much as it is smaller than its terms, at most by 3/SHORT²
+    assert slope == pytest.approx(exact(z, True), rel=16 * EPS * 3.0 / SHORT**2, abs=1e-300)
+
+
+def test_symbols_know_values_signs_and_derivatives():
+    assert Sinhc(sp.Integer(0)) == 1 and SinhcSlope(sp.Integer(0)) == 0
+    assert Sinhc(-Z) == Sinhc(Z) and SinhcSlope(-Z) == -SinhcSlope(Z)
+    assert Sinhc(Z).is_positive and sp.Symbol("w").is_real is None and Sinhc(sp.Symbol("w")).is_positive is None
+    assert sp.diff(Sinhc(3 * Z), Z) == 3 * SinhcSlope(3 * Z)
+    for z in (0.3, 4.0):
+        twice = sp.diff(Sinhc(Z), Z, 2).subs(Z, z).evalf()
+        assert float(twice) == pytest.approx(float(sp.diff(sp.sinh(Z) / Z, Z, 2).subs(Z, z)), rel=1e-12)
+    traced = trace(lambda a: sinhc(2.0 * a), {"a": Z})
+    assert traced.numbered.item() == Sinhc(2 * Z) and "sinhc" in sp.latex(Sinhc(Z))
+
+
+@given(st.floats(-50.0, 50.0), st.floats(-50.0, 50.0))
+def test_the_logarithmic_mean_lies_between_the_others(a, b):
+    mean = log_mean(a, b)
+    assert math.exp(0.5 * (a + b)) * (1 - 8 * EPS) <= mean <= 0.5 * (math.exp(a) + math.exp(b)) * (1 + 64 * EPS)
+    # and makes differences of differences of logarithms
+    assert mean * (a - b) == pytest.approx(
+        math.exp(a) - math.exp(b), rel=1e-13, abs=64 * EPS * max(math.exp(a), math.exp(b))
+    )
+
+
+def test_what_overflows_is_infinite():
+    assert sinhc(800.0) == math.inf and log_mean(0.0, 0.0) == 1.0
