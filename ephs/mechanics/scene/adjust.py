@@ -102,6 +102,12 @@ def _constraints(
     return np.vstack(blocks), np.concatenate(errors)
 
 
+def across_rows(link: Link, x: Array, roots: Array, scale: Scale) -> tuple[Array, Array]:
+    """Covectors (6, k) that vanish on what the joint allows, and their rows (k, 6 n) on all bodies' twists by roots."""
+    across = _across(link, x, scale)
+    return across, _row(link, x, across, roots)
+
+
 def _across(link: Link, x: Array, scale: Scale) -> Array:
     """(6, 6 − d) covectors that vanish on what the joint allows, orthonormal where lengths count in the scale's."""
     basis = scale.weights @ link.coupling.basis(x)

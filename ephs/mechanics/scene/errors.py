@@ -190,6 +190,10 @@ TEXTS: dict[str, tuple[str, str]] = {
         "{motion}, the prescribed rate",
         "mend the velocities of {who}, or set assembly.adjust = true",
     ),
+    "nearly movable": (
+        "one that moves with gaps below {limit} of its length, or does not move",
+        "align the axes of its joints, or leave out what holds it",
+    ),
     "no assembly": (
         "positions that close every loop",
         "no consistent state is near; mend the positions of {who}",

@@ -16,6 +16,7 @@ from ephs.mechanics.scene import resolve, values
 from ephs.mechanics.scene.assembly import assemble
 from ephs.mechanics.scene.entries import Document, read_document, shown
 from ephs.mechanics.scene.errors import Fault, ModelWarning, SceneError, SceneWarning, fault, legible
+from ephs.mechanics.scene.meant import as_meant
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Scene, World
 from ephs.mechanics.scene.moving import moved, spring_length
 from ephs.mechanics.scene.state import Asked, adjusted
@@ -88,7 +89,10 @@ def load(path: str | PathLike[str], base: str = "fixed", adjust: bool = False, i
     scene = _read(Path(path), None, (), r) if not r.faults else None
     if scene is None or r.faults:
         raise SceneError(str(path), r.faults)
-    for kind, lines in ((SceneWarning, r.odd), (ModelWarning, r.left)):
+    scene, said, r.faults[:] = as_meant(scene)
+    if r.faults:
+        raise SceneError(str(path), r.faults)
+    for kind, lines in ((SceneWarning, [*r.odd, *filter(None, [said])]), (ModelWarning, r.left)):
         if lines:
             warnings.warn("\n  ".join([str(path) + ":", *map(str, lines)]), kind, stacklevel=2)
     return scene

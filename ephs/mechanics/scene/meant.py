@@ -1,0 +1,160 @@
+"""Mechanisms that are movable but for what files round off: the movable mechanism is meant.
+
+The axes of a planar four-bar that are parallel to nine digits lock it, if taken at their word: its constraints are of
+full rank by 1e-9. Decided by theory: singular values that are small but not rounding belong to motions along which the
+joints hardly open. Where they stay closed to the tolerance of assembly along a finite motion, the mechanism is movable,
+and the joints' frames are moved, by less than that, to where it is so exactly; that is said. Where they open by more,
+but far less than the motion, methods would disagree: those that decide rank generously would move it, others lock it.
+It is refused. Where they open with the motion, it is a mechanism near a singular configuration, and as it is.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ephs.mechanics.scene.adjust import across_rows, project_velocities
+from ephs.mechanics.scene.errors import Fault, fault
+from ephs.mechanics.scene.kinematics import Link, Scale, elements, largest_gap
+from ephs.mechanics.scene.model import Joint, Scene, frozen
+from ephs.mechanics.scene.state import Snapshot, rebuilt
+from ephs.mechanics.solve.threads import in_one_thread
+from ephs.semantics.spaces import SE3
+from ephs.semantics.spaces.rank import ASSEMBLY, EXPLICIT, REGULAR, rank_of
+
+Array = NDArray[np.float64]
+
+STRIDE, STRIDES = 0.2, 5
+"""Steps of the finite motion that is tried, in rad or parts of the mechanism's length, and their number each way."""
+LARGEST = 60
+"""Bodies beyond which a scene is taken at its word: the decision costs the third power of their number."""
+ROUNDS = 4
+ROUNDING = 10.0 * REGULAR
+"""Singular values of a mechanism that moves exactly, beside the largest: of some tens of rows, 8 n ε."""
+
+
+@in_one_thread
+def as_meant(scene: Scene) -> tuple[Scene, str, list[Fault]]:
+    """The scene with the frames of its joints where they let it move, what was done in words, and what is refused."""
+    now = Snapshot.of(scene)
+    if len(now.bodies) > LARGEST or len(now.links) <= len(now.bodies):  # no loop
+        return scene, "", []
+    scale, links = now.scale(scene.world.gravity), now.links
+    _, sigma, vt = np.linalg.svd(_matrix(links, now.poses, scale), full_matrices=True)
+    low, high = rank_of(sigma, EXPLICIT), rank_of(sigma, ROUNDING)
+    if low == high:
+        return scene, "", []
+    there = [c for way in vt[low:high] for sign in (1.0, -1.0) for c in _followed(links, now.poses, sign * way, scale)]
+    if not there:
+        return scene, "", []
+    opened = max(largest_gap(links, poses, elements(links, poses), scale) for poses in there)
+    moved = _movable(links, [now.poses, *there], scale) if opened <= ASSEMBLY else None
+    if moved is None:
+        worst = _stiffest(links, now.poses, vt[low:high], scale)
+        text = f"a mechanism that moves if its joints open by {opened:.1g} of its length, {scale.length:.3g} m"
+        return scene, "", [fault("nearly movable", f"joints.{worst}", text, limit=f"{ASSEMBLY:.0g}")]
+    exact, poses = moved
+    xs = elements(exact, poses)
+    twists = project_velocities(exact, poses, now.twists, now.roots(), frozenset(), scale)
+    shifts = [SE3.log(SE3.compose(SE3.inverse(a.frame2), b.frame2)) for a, b in zip(links, exact, strict=True)]
+    by = float(np.abs(shifts).max())
+    frames = {link.name: link.frame2 for link in exact}
+    out = rebuilt(_framed(scene, "", frames), now, poses, now.twists if twists is None else twists, xs)
+    return out, f"joint frames are moved by up to {by:.1g} m or rad, so that the mechanism moves as it is meant to", []
+
+
+def _matrix(links: Sequence[Link], poses: Array, scale: Scale) -> Array:
+    """What joints forbid, on all bodies' twists, lengths as parts of the mechanism's."""
+    return np.vstack([rows for _, rows in _rows(links, poses, scale)])
+
+
+def _rows(links: Sequence[Link], poses: Array, scale: Scale) -> Iterator[tuple[Array, Array]]:
+    """By joint the covectors (6, k) on its relative twist, and their rows on the bodies."""
+    unit = np.diag([1.0] * 3 + [scale.length] * 3)
+    roots = np.tile(unit, (len(poses), 1, 1))
+    for link, x in zip(links, elements(links, poses), strict=True):
+        yield across_rows(link, x, roots, scale)
+
+
+def _followed(links: Sequence[Link], poses: Array, way: Array, scale: Scale) -> list[Array]:
+    """Configurations along a motion of which the joints allow nearly all, as close as they can be had."""
+    out: list[Array] = []
+    for _ in range(STRIDES):
+        poses = _stepped(poses, STRIDE / np.abs(way).max() * way, scale)
+        for _ in range(ROUNDS + 2):
+            poses = _stepped(poses, -_solved(links, poses, scale), scale)
+        if largest_gap(links, poses, elements(links, poses), scale) > EXPLICIT * STRIDE:
+            break  # at the end of its travel, or never movable
+        _, sigma, vt = np.linalg.svd(_matrix(links, poses, scale), full_matrices=True)
+        rest = vt[rank_of(sigma, EXPLICIT) :]
+        ahead = rest.T @ (rest @ way)
+        out.append(poses)
+        if not np.linalg.norm(ahead) > 0.1 * np.linalg.norm(way):
+            break
+        way = ahead
+    return out
+
+
+def _solved(links: Sequence[Link], poses: Array, scale: Scale) -> Array:
+    """The change that closes joints best, along all that they clearly forbid."""
+    errors = _errors(links, poses, scale)
+    return np.asarray(np.linalg.lstsq(_matrix(links, poses, scale), errors, rcond=EXPLICIT)[0])
+
+
+def _errors(links: Sequence[Link], poses: Array, scale: Scale) -> Array:
+    xs = elements(links, poses)
+    return np.concatenate([
+        covectors.T @ link.error(poses, x)
+        for link, x, (covectors, _) in zip(links, xs, _rows(links, poses, scale), strict=True)
+    ])  # fmt: skip
+
+
+def _stepped(poses: Array, change: Array, scale: Scale) -> Array:
+    steps = change.reshape(-1, 6) * np.array([1.0] * 3 + [scale.length] * 3)
+    return np.array([SE3.normalise(SE3.retract(q, v)) for q, v in zip(poses, steps, strict=True)])
+
+
+def _movable(links: Sequence[Link], configurations: list[Array], scale: Scale) -> tuple[tuple[Link, ...], Array] | None:
+    """Links whose second frames let all these configurations close, and the first of these, closed; None without."""
+    n, m = configurations[0].shape[0], len(links)
+    unit = np.array([1.0] * 3 + [scale.length] * 3)
+    for _ in range(ROUNDS):
+        blocks: list[Array] = []
+        errors: list[Array] = []
+        for k, poses in enumerate(configurations):
+            for j, (covectors, rows) in enumerate(_rows(links, poses, scale)):
+                block = np.zeros((rows.shape[0], 6 * m + 6 * n * len(configurations)))
+                block[:, 6 * j : 6 * j + 6] = covectors.T * unit
+                block[:, 6 * m + 6 * n * k : 6 * m + 6 * n * (k + 1)] = rows
+                blocks.append(block)
+            errors.append(_errors(links, poses, scale))
+        change = -np.linalg.lstsq(np.vstack(blocks), np.concatenate(errors), rcond=EXPLICIT)[0]
+        links = tuple(
+            replace(link, frame2=SE3.normalise(SE3.retract(link.frame2, unit * step)))
+            for link, step in zip(links, change[: 6 * m].reshape(m, 6), strict=True)
+        )
+        shifts = change[6 * m :].reshape(len(configurations), -1)
+        configurations = [_stepped(poses, shift, scale) for poses, shift in zip(configurations, shifts, strict=True)]
+    gaps = [largest_gap(links, poses, elements(links, poses), scale) for poses in configurations]
+    sigma = np.linalg.svd(_matrix(links, configurations[0], scale), compute_uv=False)
+    if max(gaps) > 10.0 * ROUNDING or rank_of(sigma, EXPLICIT) != rank_of(sigma, ROUNDING):
+        return None
+    return tuple(links), configurations[0]
+
+
+def _stiffest(links: Sequence[Link], poses: Array, ways: Array, scale: Scale) -> str:
+    """The joint that such motions open most."""
+    opened = [float(np.abs(rows @ ways.T).max(initial=0.0)) for _, rows in _rows(links, poses, scale)]
+    return links[int(np.argmax(opened))].name
+
+
+def _framed(scene: Scene, path: str, frames: dict[str, Array]) -> Scene:
+    def joint(j: Joint) -> Joint:
+        return replace(j, frame2=frozen(frames[path + j.name]))
+
+    return replace(
+        scene,
+        joints={name: joint(j) for name, j in scene.joints.items()},
+        parts={name: _framed(part, f"{path}{name}.", frames) for name, part in scene.parts.items()},
+    )
