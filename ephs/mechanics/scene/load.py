@@ -72,7 +72,7 @@ def load(path: str | PathLike[str], base: str = "fixed", adjust: bool = False, i
     Warns
     -----
     SceneWarning
-        Once, of all inertias that were kept or replaced.
+        Once, of all inertias that were kept or replaced, and of frames that were moved so that loops can move.
     ModelWarning
         Once, of all that a model says and its scene does not.
 

@@ -45,7 +45,8 @@ def as_meant(scene: Scene) -> tuple[Scene, str, list[Fault]]:
     low, high = rank_of(sigma, EXPLICIT), rank_of(sigma, ROUNDING)
     if low == high:
         return scene, "", []
-    there = [c for way in vt[low:high] for sign in (1.0, -1.0) for c in _followed(links, now.poses, sign * way, scale)]
+    ways = [sign * way for way in vt[low:high] for sign in (1.0, -1.0)]
+    there = [poses for way in ways for poses in _followed(links, now.poses, way, low, scale)]
     if not there:
         return scene, "", []
     opened = max(largest_gap(links, poses, elements(links, poses), scale) for poses in there)
@@ -77,22 +78,29 @@ def _rows(links: Sequence[Link], poses: Array, scale: Scale) -> Iterator[tuple[A
         yield across_rows(link, x, roots, scale)
 
 
-def _followed(links: Sequence[Link], poses: Array, way: Array, scale: Scale) -> list[Array]:
-    """Configurations along a motion of which the joints allow nearly all, as close as they can be had."""
+def _followed(links: Sequence[Link], poses: Array, way: Array, rank: int, scale: Scale) -> list[Array]:
+    """Configurations along a motion of which the joints allow nearly all, as close as they can be had.
+
+    It ends where the mechanism goes back as its joints close, where they stay open, or where more than ``rank``
+    equations count: there it was near a singular configuration.
+    """
     out: list[Array] = []
+    unit = np.array([1.0] * 3 + [scale.length] * 3)
     for _ in range(STRIDES):
+        start = poses
         poses = _stepped(poses, STRIDE / np.abs(way).max() * way, scale)
         for _ in range(ROUNDS + 2):
             poses = _stepped(poses, -_solved(links, poses, scale), scale)
-        if largest_gap(links, poses, elements(links, poses), scale) > EXPLICIT * STRIDE:
-            break  # at the end of its travel, or never movable
         _, sigma, vt = np.linalg.svd(_matrix(links, poses, scale), full_matrices=True)
-        rest = vt[rank_of(sigma, EXPLICIT) :]
-        ahead = rest.T @ (rest @ way)
-        out.append(poses)
-        if not np.linalg.norm(ahead) > 0.1 * np.linalg.norm(way):
+        moves = [SE3.log(SE3.compose(SE3.inverse(a), b)) / unit for a, b in zip(start, poses, strict=True)]
+        opened = largest_gap(links, poses, elements(links, poses), scale) > EXPLICIT * STRIDE
+        if opened or rank_of(sigma, EXPLICIT) > rank or not np.abs(moves).max() > 0.5 * STRIDE:
             break
-        way = ahead
+        out.append(poses)
+        rest = vt[rank:]
+        way = rest.T @ (rest @ way)
+        if not np.abs(way).max() > 0.1 * np.abs(vt[rank]).max():
+            break
     return out
 
 

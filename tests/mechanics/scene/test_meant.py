@@ -1,0 +1,145 @@
+"""A mechanism that is movable but for rounding is movable, by every method and for checks; in between it is refused."""
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import ephs
+from ephs.mechanics.methods import METHODS
+from ephs.mechanics.own_units import mobility_of
+from ephs.mechanics.scene.load import load
+from ephs.mechanics.scene.meant import as_meant
+from ephs.mechanics.simulate import problem_of_scene
+
+PINS = {"a": (0.0, 0.0), "b": (0.3, 0.8), "c": (1.5, 1.1), "d": (1.2, 0.0)}
+BODIES = {"crank": "ab", "coupler": "bc", "rocker": "cd"}
+JOINTS = {"a": ("ground", "crank"), "b": ("crank", "coupler"), "c": ("coupler", "rocker"), "d": ("ground", "rocker")}
+EACH = pytest.mark.parametrize("name", [name for name, method in METHODS.items() if method.scenes])
+
+
+def tilted(delta, size=1.0, pins=PINS):
+    """A planar four-bar, the axis of one pin tilted."""
+    lines = ["format = 1", 'name = "tilted"', "[world]", "gravity = [0.0, -9.81, 0.0]"]
+    for name, (one, two) in BODIES.items():
+        x, y = 0.5 * size * (np.array(pins[one]) + np.array(pins[two]))
+        inertia = float(0.1 * size**2)
+        lines += [f"[bodies.{name}]", "mass = 1.0", f"inertia = [{inertia!r}, {inertia!r}, {inertia!r}]"]
+        lines += [f"position = [{float(x)!r}, {float(y)!r}, 0.0]"]
+    for name, (one, two) in JOINTS.items():
+        x, y = (size * value for value in pins[name])
+        tilt = delta if name == "b" else 0.0
+        lines += [f"[joints.{name}]", 'type = "revolute"', f'bodies = ["{one}", "{two}"]', f"at = [{x!r}, {y!r}, 0.0]"]
+        lines += [f"axis = [{float(np.sin(tilt))!r}, 0.0, {float(np.cos(tilt))!r}]"]
+    return "\n".join(lines)
+
+
+def read(delta, tmp_path, size=1.0, pins=PINS):
+    file = tmp_path / "tilted.toml"
+    file.write_text(tilted(delta, size, pins), encoding="utf-8")
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        scene = load(file)
+    return scene, "".join(str(each.message) for each in said)
+
+
+def swung(scene, name):
+    method = METHODS[name]
+    steps = {"step": 0.01} if method.fixed else {"rtol": 1e-8, "atol": 1e-11}
+    sol = ephs.simulate(scene, 0.2, method=name, save_at=[0.0, 0.2], **steps)
+    assert sol.constraint_error.max() < 1e-12
+    return float(sol.joint("a").coordinate[-1, 0])
+
+
+@pytest.fixture(scope="module")
+def straight(tmp_path_factory):
+    scene, said = read(0.0, tmp_path_factory.mktemp("straight"))
+    assert not said
+    return scene
+
+
+@pytest.fixture(scope="module")
+def rounded(tmp_path_factory):
+    found = [read(delta, tmp_path_factory.mktemp("rounded")) for delta in (1e-12, 1e-9)]
+    assert all("joint frames are moved by up to" in said for _, said in found)
+    return [scene for scene, _ in found]
+
+
+@EACH
+def test_what_is_movable_but_for_rounding_moves_by_every_method(name, straight, rounded):
+    there = swung(straight, name)
+    for scene in rounded:
+        assert swung(scene, name) == pytest.approx(there, rel=1e-7)
+
+
+@pytest.mark.parametrize("delta", [1e-12, 1e-9])
+@pytest.mark.parametrize("size", [1e-6, 1.0, 1e5])
+def test_checks_see_one_freedom_and_three_repeated_constraints(delta, size, tmp_path):
+    found = mobility_of(problem_of_scene(read(delta, tmp_path, size)[0]))
+    assert (found.mobility, found.redundant) == (1, 3)
+
+
+@pytest.mark.parametrize("delta", [1e-7, 1e-6, 1e-5])
+@pytest.mark.parametrize("size", [1e-6, 1.0, 1e5])
+def test_what_moves_with_larger_gaps_is_refused_by_all(delta, size, tmp_path):
+    with pytest.raises(ephs.SceneError, match="a mechanism that moves if its joints open by"):
+        read(delta, tmp_path, size)
+
+
+def test_what_is_clearly_locked_is_taken_at_its_word(tmp_path):
+    scene, said = read(1e-3, tmp_path)
+    assert not said
+    assert mobility_of(problem_of_scene(scene)).mobility == 0
+
+
+STRETCHED = """format = 1
+name = "stretched"
+[bodies.left]
+mass = 1.0
+inertia = [0.1, 0.1, 0.1]
+position = [0.5, {half}, 0.0]
+rotation = {up}
+[bodies.right]
+mass = 1.0
+inertia = [0.1, 0.1, 0.1]
+position = [1.5, {half}, 0.0]
+rotation = {down}
+"""
+
+
+@pytest.mark.parametrize("height", [1e-9, 1e-6])
+def test_a_truss_that_moves_to_first_order_only_is_no_mechanism(height, tmp_path):
+    """Two bars, all but in line between two pins of the ground."""
+    half = 0.5 * float(np.arcsin(height))
+    up, down = ([float(np.cos(half)), 0.0, 0.0, sign * float(np.sin(half))] for sign in (1.0, -1.0))
+    text = STRETCHED.format(half=0.5 * height, up=up, down=down)
+    far = 2.0 * float(np.sqrt(1.0 - height**2))
+    pins = {
+        "a": ("ground", "left", 0.0, 0.0),
+        "b": ("left", "right", 0.5 * far, height),
+        "c": ("ground", "right", far, 0.0),
+    }
+    for name, (one, two, x, y) in pins.items():
+        text += f'[joints.{name}]\ntype = "revolute"\nbodies = ["{one}", "{two}"]\nat = [{x!r}, {y!r}, 0.0]\n'
+        text += "axis = [0.0, 0.0, 1.0]\n"
+    file = tmp_path / "stretched.toml"
+    file.write_text(text, encoding="utf-8")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        load(file)
+
+
+@pytest.mark.parametrize("off", [1e-3, 1e-6, 1e-9])
+def test_a_four_bar_near_alignment_is_left_as_it_is(off, tmp_path):
+    """All links are 1 m, and all but in line, where it could change into its other branch."""
+    x, y = float(np.cos(off)), float(np.sin(off))
+    scene, said = read(0.0, tmp_path, pins={"a": (0.0, 0.0), "b": (x, y), "c": (1.0 + x, y), "d": (1.0, 0.0)})
+    assert not said
+    assert mobility_of(problem_of_scene(scene)).mobility in (1, 2)
+
+
+def test_scenes_that_move_exactly_are_left_as_they_are():
+    for file in sorted((Path(__file__).parents[3] / "scenes").glob("*.toml")):
+        scene = ephs.load(file)
+        assert as_meant(scene) == (scene, "", [])
