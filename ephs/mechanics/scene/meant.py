@@ -107,7 +107,7 @@ def _followed(links: Sequence[Link], poses: Array, way: Array, rank: int, scale:
 def _solved(links: Sequence[Link], poses: Array, scale: Scale) -> Array:
     """The change that closes joints best, along all that they clearly forbid."""
     errors = _errors(links, poses, scale)
-    return np.asarray(np.linalg.lstsq(_matrix(links, poses, scale), errors, rcond=EXPLICIT)[0])
+    return np.asarray(np.linalg.lstsq(_matrix(links, poses, scale), errors, rcond=EXPLICIT)[0], dtype=np.float64)
 
 
 def _errors(links: Sequence[Link], poses: Array, scale: Scale) -> Array:
@@ -137,7 +137,8 @@ def _movable(links: Sequence[Link], configurations: list[Array], scale: Scale) -
                 block[:, 6 * m + 6 * n * k : 6 * m + 6 * n * (k + 1)] = rows
                 blocks.append(block)
             errors.append(_errors(links, poses, scale))
-        change = -np.linalg.lstsq(np.vstack(blocks), np.concatenate(errors), rcond=EXPLICIT)[0]
+        found = np.linalg.lstsq(np.vstack(blocks), np.concatenate(errors), rcond=EXPLICIT)[0]
+        change: Array = -np.asarray(found, dtype=np.float64)
         links = tuple(
             replace(link, frame2=SE3.normalise(SE3.retract(link.frame2, unit * step)))
             for link, step in zip(links, change[: 6 * m].reshape(m, 6), strict=True)
