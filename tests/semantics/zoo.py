@@ -59,6 +59,7 @@ ZOO = {
     "drives": (lambda: ephs.irreversible(PS, lambda p, s: [[-s, p], [p, -p * p / s]]), "definite"),
     "drives around |v| = 4": (drag(lambda p, s: 1.0 - 2.0 * np.exp(-100.0 * (abs(p) - 4.0) ** 2)), "definite"),
     "drives around |v| = 4, hidden": (drag(hidden(lambda p, s: -1.0 if 3.9 < abs(p) < 4.1 else 1.0)), "definite"),
+    "drives the more the faster": (drag(lambda p, s: -(1.0 + p**2)), "definite"),
     "drives when fast": (drag(lambda p, s: 1.0 - 1e-8 * p**2), "definite"),
     "drives when slow": (drag(lambda p, s: p**2 - 1e-4), "definite"),
     "drives above a thousand kelvin": (drag(hidden(lambda p, s: 1.0 if s <= 1000.0 else -1.0)), "definite"),
