@@ -107,7 +107,7 @@ def stability(*families: str, output: Output, until: float = UNTIL, quick: bool 
     chosen = _named({name: _family(name, until) for name in families or _all()})
     with addressed(str(output), output):
         output.mkdir(parents=True, exist_ok=True)
-    from ephs.show.charts import draw_stability, write_cells
+    from ephs.show.charts import SILENT, draw_stability, write_cells
     from ephs.show.charts import stability as measured
 
     cells = []
@@ -118,6 +118,8 @@ def stability(*families: str, output: Output, until: float = UNTIL, quick: bool 
             cells += found
         counts = Counter(cell.outcome.value for cell in found)
         say(f"{family.name}: {', '.join(f'{n} {outcome}' for outcome, n in counts.items())}", *map(str, files))
+    silent = sum(cell.outcome in SILENT for cell in cells)
+    say(f"silent failures, wrong and neither refused nor flagged: {silent} of {len(cells)}")
     with addressed(str(output), output):
         say("messages and errors:", *map(str, write_cells(cells, output, "stability")))
     return 0

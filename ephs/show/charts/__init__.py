@@ -7,6 +7,7 @@ from ephs.show.charts.families import FAMILIES as FAMILIES
 from ephs.show.charts.families import Family as Family
 from ephs.show.charts.measure import Point as Point
 from ephs.show.charts.measure import work_precision as work_precision
+from ephs.show.charts.outcomes import SILENT as SILENT
 from ephs.show.charts.outcomes import Outcome as Outcome
 from ephs.show.charts.reference import Reference as Reference
 from ephs.show.charts.reference import shipped_reference as shipped_reference
@@ -16,6 +17,7 @@ from ephs.show.charts.stability import stability as stability
 
 __all__ = [
     "FAMILIES",
+    "SILENT",
     "Cell",
     "Family",
     "Outcome",

@@ -38,6 +38,7 @@ _FILLS = {
     Outcome.DAMPED: SKY,
     Outcome.REFUSED: "#d1d5db",
     Outcome.DIVERGED: RED,
+    Outcome.FLAGGED: ORANGE,
     Outcome.UNKNOWN: "#ffffff",
 }
 _SIGNS = {
@@ -46,6 +47,7 @@ _SIGNS = {
     Outcome.DAMPED: "damped",
     Outcome.REFUSED: "–",
     Outcome.DIVERGED: "diverged",
+    Outcome.FLAGGED: "flagged",
     Outcome.UNKNOWN: "?",
 }
 _DPI = 150

@@ -7,7 +7,7 @@ import numpy as np
 from ephs.show.charts.reference import Motion
 from ephs.show.charts.runs import Array
 
-__all__ = ["ACCURATE", "BOUND", "ENERGY", "KEPT", "Outcome", "horizon", "judge"]
+__all__ = ["ACCURATE", "BOUND", "ENERGY", "KEPT", "SILENT", "Outcome", "horizon", "judge"]
 
 ACCURATE = 1e-2
 """Largest error of an accurate run, relative to the size of mechanism and motion, or of a rotation matrix's entry."""
@@ -31,6 +31,7 @@ class Outcome(StrEnum):
     ``DAMPED``: besides, energy was lost that no ledger has, or the extent of the motion is less than `KEPT`.
     ``REFUSED``: the method stopped and said why, or took too long.
     ``DIVERGED``: the method said nothing, and the result is not finite, beyond `BOUND`, or its energy beyond `BLOWN`.
+    ``FLAGGED``: the result is not accurate, or not known to be, and the run's audit has a finding.
     ``UNKNOWN``: a result that is finite, with nothing to compare it with.
     """
 
@@ -40,7 +41,12 @@ class Outcome(StrEnum):
     DAMPED = "damped"
     REFUSED = "refused"
     DIVERGED = "diverged"
+    FLAGGED = "flagged"
     UNKNOWN = "not known"
+
+
+SILENT = frozenset({Outcome.WRONG_BUT_BOUNDED, Outcome.ENERGY_DRIFT, Outcome.DAMPED, Outcome.DIVERGED})
+"""Wrong results without a word: the run succeeded, and its audit found nothing."""
 
 
 def judge(found: Motion, true: Motion) -> tuple[Outcome, float]:

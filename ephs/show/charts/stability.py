@@ -9,7 +9,7 @@ import numpy as np
 from ephs.mechanics.methods import METHODS, Method
 from ephs.mechanics.scene.model import Scene
 from ephs.show.charts.families import Family
-from ephs.show.charts.outcomes import ACCURATE, Outcome, horizon, judge
+from ephs.show.charts.outcomes import ACCURATE, SILENT, Outcome, horizon, judge
 from ephs.show.charts.reference import Motion, Reference, resting_reference, tight_reference
 from ephs.show.charts.runs import Array, Ending, Run, Setting, attempt
 from ephs.show.charts.specimens import SPECIMENS
@@ -41,7 +41,7 @@ class Cell:
     horizon
         The last time in s up to which the error was small; NaN where there is no result.
     message
-        What the method told its user.
+        The error, or the findings of the audit where the result is not accurate.
     reference, cross_check
         What it was compared with, and how well that is known.
     """
@@ -94,6 +94,9 @@ def stability(
             for setting, run in _runs(scene, method, steps, times, limit):
                 found = None if run.solution is None else Motion.of(run.solution)
                 outcome, error, held = _outcome(found, truth)
+                said = run.message or why
+                if outcome in SILENT | {Outcome.UNKNOWN} and run.solution is not None and not run.solution.audit.passed:
+                    outcome, said = Outcome.FLAGGED, str(run.solution.audit)
                 cells.append(
                     Cell(
                         family.name,
@@ -104,7 +107,7 @@ def stability(
                         error,
                         held,
                         run.wall,
-                        run.message or why,
+                        said,
                         "none" if truth is None else truth.source,
                         np.nan if truth is None else truth.cross_check,
                     )
