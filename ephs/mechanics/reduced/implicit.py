@@ -70,7 +70,8 @@ class Implicit(ReducedMethod):
                 raise
             self._renew(state)
             stages, made, fast = self._stages(state, y0, h)
-        y1 = y0 + np.concatenate([stages[-1], h * (COEFFICIENTS[-1] @ made)])
+        # entropies are quadratures, as what is made: sums of both agree to rounding, not to Newton's last change
+        y1 = y0 + np.concatenate([stages[-1, : eq.nv + eq.n], h * (COEFFICIENTS[-1] @ made)])
         end = eq.state(state, y1, state.t + h)
         closed, error = self._closed(state, end, y0, y1, first, stages, h)
         if not fast or self._turned():
@@ -115,7 +116,7 @@ class Implicit(ReducedMethod):
         return self.atol + self.rtol * self.equations.sizes(y0, y1)
 
     def _stages(self, state: ReducedState, y0: Array, h: float) -> tuple[Array, Array, bool]:
-        """(increments of (v, r, s) at the stages, rates of heat, work and what is made there, Newton was fast)."""
+        """(increments of (v, r, s) at the stages, rates of entropies and books there, Newton was fast)."""
         eq, size = self.equations, self.jacobian.size
         real, rest = self._solve(state, h)
         allowed = self._allowed(y0, y0)
@@ -143,12 +144,12 @@ class Implicit(ReducedMethod):
                 if rate >= 1.0 and moved > max(10.0 * self._enough, self._rough):
                     break
             if moved <= self._enough or (iteration > 1 and moved * rate <= self._enough * (1.0 - min(rate, 0.9))):
-                return stages, rates[:, size:], iteration <= 2 or rate < FAST
+                return stages, rates[:, eq.nv + eq.n :], iteration <= 2 or rate < FAST
             if iteration > 2 and rate > 0.5 and moved <= self._rough:  # rounding is all that is left
-                return stages, rates[:, size:], False
+                return stages, rates[:, eq.nv + eq.n :], False
             before = moved
         if moved <= self._rough:  # near a change of rank the matrix is no good, and the iteration slow
-            return stages, rates[:, size:], False
+            return stages, rates[:, eq.nv + eq.n :], False
         path, what = counted(eq.reduced, int(np.argmax(np.nan_to_num(worst, nan=np.inf))))
         raise SolveError(Outcome.DIVERGED, path, f"{what} at the stages")
 

@@ -246,3 +246,12 @@ def test_members_of_a_sweep_say_what_was_found():
     fine, wrong = data["status"].values.tolist()
     assert fine == "done"
     assert wrong.startswith("energy: ")
+
+
+@pytest.mark.parametrize("rtol", [1e-4, 1e-8])
+def test_entropies_of_radau_are_sums_of_what_is_made(rtol):
+    sol = ephs.simulate(brake(), 2.0, method="radau", rtol=rtol)
+    books = sol.ledgers
+    rounding = 8.0 * len(sol) * np.finfo(float).eps * books.made[-1]
+    assert np.abs(books.entropy - books.entropy[0] - books.made).max() <= rounding
+    assert np.diff(books.entropy).min() >= -rounding
