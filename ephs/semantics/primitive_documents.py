@@ -1,6 +1,7 @@
 """Primitives as parts of documents: library parts by name and numbers, others by their formula."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import asdict, fields
 from typing import Any, cast
 
 import numpy as np
@@ -13,7 +14,8 @@ from ephs.semantics import constructors, structures
 from ephs.semantics.bundle import Array, Bundle, Reference
 from ephs.semantics.catalogue import find_part, part_of
 from ephs.semantics.checks import random_efforts, random_point
-from ephs.semantics.errors import SemanticsError
+from ephs.semantics.errors import SemanticsError, StructureError
+from ephs.semantics.library.chemistry import Species
 from ephs.semantics.primitives import Formula, Irreversible, Point, Primitive, Reversible, Storage
 from ephs.semantics.symbols.algebra import sp
 from ephs.semantics.symbols.forms import reversible_kernel, stacked
@@ -104,7 +106,7 @@ def _part(reader: Reader, where: str, word: str, ports: Interface, found: Entry)
     if part is None:
         reader.refuse(f"{where}.part", word, "the name of a library part")
     at = f"{where}.parameters"
-    numbers = {name: _number(reader, f"{at}.{name}", value) for name, value in reader.mapping(at, found["parameters"])}
+    numbers = {name: _parameter(reader, f"{at}.{name}", v) for name, v in reader.mapping(at, found["parameters"])}
 
     def make() -> Primitive:
         made = part.make(ports, numbers)
@@ -179,21 +181,43 @@ def _named(ports: Interface) -> dict[str, Any]:
     return {f"{'' if kind.power else '~'}{port}": kind.quantity for port, kind in ports.items()}
 
 
-def _number(reader: Reader, where: str, value: object) -> object:
+def _parameter(reader: Reader, where: str, value: object) -> object:
     if isinstance(value, str):
         return value
     if isinstance(value, list | tuple):
         entries = reader.list(where, cast("object", value))
-        return tuple(reader.finite(f"{where}[{i}]", entry) for i, entry in enumerate(entries))
+        made = [(f"{where}[{i}]", entry) for i, entry in enumerate(entries)]
+        if any(isinstance(entry, Mapping) for entry in entries):
+            return tuple(_species(reader, at, entry) for at, entry in made)
+        return tuple(reader.finite(at, entry) for at, entry in made)
     return reader.finite(where, value)
+
+
+def _species(reader: Reader, where: str, value: object) -> Species:
+    """A substance; the inverse of what `_plain` writes of one."""
+    found = dict(reader.mapping(where, value))
+    numbers = {field.name for field in fields(Species)} - {"name", "elements"}
+    reader.record(where, found, {"name", "elements"}, numbers)
+    elements = {
+        key: reader.finite(f"{where}.elements.{key}", n)
+        for key, n in reader.mapping(f"{where}.elements", found["elements"])
+    }
+    given = {key: reader.finite(f"{where}.{key}", found[key]) for key in numbers & found.keys()}
+    try:
+        return Species(reader.text(f"{where}.name", found["name"]), tuple(elements.items()), **given)
+    except StructureError as error:
+        reader.refuse(where, str(error), "a substance that there can be")
 
 
 def _plain(path: Path, primitive: Primitive, value: object) -> object:
     """A parameter as JSON has it."""
-    entries = cast("tuple[object, ...]", value) if isinstance(value, tuple) else (value,)
-    if not all(isinstance(each, str) or (isinstance(each, int | float) and np.isfinite(each)) for each in entries):
+    if isinstance(value, tuple):
+        return [_plain(path, primitive, entry) for entry in cast("tuple[object, ...]", value)]
+    if isinstance(value, Species):
+        return asdict(value) | {"elements": dict(value.elements)}
+    if not (isinstance(value, str) or (isinstance(value, int | float) and np.isfinite(value))):
         raise SemanticsError("unwritten", path, name=primitive.name, found=f"the parameter {value}")
-    return list(entries) if isinstance(value, tuple) else value
+    return value
 
 
 def _formula(primitive: Primitive) -> dict[str, Any]:

@@ -46,12 +46,12 @@ class Subspace:
         return Subspace(np.ascontiguousarray(vt[rank:].T), _condition(sigma, rank))
 
     @staticmethod
-    def from_span(vectors: Array) -> "Subspace":
-        """The span of the columns of vectors (n, r)."""
+    def from_span(vectors: Array, usual: float = 0.0) -> "Subspace":
+        """The span of the columns of vectors (n, r); what is small beside the usual size is rounding, too."""
         if not vectors.size:
             return Subspace(np.zeros((vectors.shape[0], 0)))
         u, sigma, _ = np.linalg.svd(vectors, full_matrices=False)
-        rank = rank_of(sigma, ELIMINATION)
+        rank = rank_of(sigma, ELIMINATION, usual)
         return Subspace(np.ascontiguousarray(u[:, :rank]), _condition(sigma, rank))
 
     @property
@@ -71,7 +71,7 @@ class Subspace:
 
     def project(self, kept: Iterable[int]) -> "Subspace":
         """Keep some coordinates: ∃ the others. The rank is decided on an orthonormal basis, so it is well scaled."""
-        return Subspace.from_span(self.basis[list(kept), :])._after(self)
+        return Subspace.from_span(self.basis[list(kept), :], 1.0)._after(self)
 
     def restrict(self, matrix: Array) -> "Subspace":
         """The vectors of this subspace which also satisfy matrix z = 0."""

@@ -19,13 +19,12 @@ from ephs.mechanics.solve.natural_kernels import measure
 from ephs.mechanics.solve.sparse import equilibrate
 from ephs.semantics.bundle import Array
 from ephs.semantics.numbering import Index, starts
+from ephs.semantics.spaces.rank import IMPLICIT
 
 __all__ = ["condensed", "solved_by_parts"]
 
 SOUND = 1e-6
 """A pivot is used if it is at least this part of its row's largest entry, in every copy."""
-NULL = 1e-13
-"""Singular values below this part of the largest are zero in what parts leave."""
 DENSE = 400
 """Equations up to which what parts leave is solved densely."""
 STALLED, SOLVED, MOST = 1e-11, 4e-16, 40
@@ -123,9 +122,9 @@ class _System:
             return found
         matrix = np.zeros((rows.size, columns.size))
         np.add.at(matrix, at, self.value)
-        if rows.size and np.linalg.cond(matrix) < 1.0 / NULL:  # small unknowns keep their digits beside large ones
+        if rows.size and np.linalg.cond(matrix) < 1.0 / IMPLICIT:  # small unknowns keep their digits beside large ones
             return np.linalg.solve(matrix, self.right[rows]).astype(float)
-        return np.asarray(np.linalg.lstsq(matrix, self.right[rows], rcond=NULL)[0], dtype=float)
+        return np.asarray(np.linalg.lstsq(matrix, self.right[rows], rcond=IMPLICIT)[0], dtype=float)
 
 
 @final

@@ -80,7 +80,9 @@ def conduit() -> Reversible:
 def laminar_leak(*, c: float) -> Irreversible:
     """Flow of c·Δp through a narrow gap, c in m³/(s Pa); ports v1, v2, s: v1.f = c·(v1.e − v2.e) = −v2.f.
 
-    Hagen and Poiseuille: c = π r⁴/(8 η l). The heat c·Δp² goes to s. M = c/θ n nᵀ, n = (θ, −θ, v2 − v1).
+    Hagen and Poiseuille: c = π r⁴/(8 η l). The heat c·Δp² goes to s, θ = θ₀ + s.e.
+    M = [[c*s, -c*s, c*(-v1 + v2)], [-c*s, c*s, -c*(-v1 + v2)], [c*(-v1 + v2), -c*(-v1 + v2), c*(-v1 + v2)**2/s]], of
+    the energy efforts.
     """
     non_negative("laminar_leak", c=c)
     ports = power_ports(v1=quantity.liquid, v2=quantity.liquid, s=quantity.entropy)
@@ -100,6 +102,8 @@ def orifice(*, c: float, transition: float) -> Irreversible:
 
 def pipe_loss(*, r: float, k: float = 0.0) -> Irreversible:
     """Loss of pressure along a pipe; ports g, s: g.f = (r + k·|Q|)·Q with the flow Q = g.e; the heat goes to s.
+
+    M = [[s*(k*Abs(g) + r), g*(-k*Abs(g) - r)], [g*(-k*Abs(g) - r), g**2*(k*Abs(g) + r)/s]], of the energy efforts.
 
     Parameters
     ----------

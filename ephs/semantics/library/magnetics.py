@@ -32,24 +32,25 @@ def saturating_linkage(b: Any, l: Any, knee: Any) -> Any:  # noqa: E741 - the fi
 
 
 def reluctance(*, r: float) -> Storage:
-    """Magnetic path of reluctance r in 1/H; port m, a flux: E = r*m**2/2, F = r*m."""
+    """Magnetic path of reluctance r in 1/H; port m, a flux: E = m**2*r/2, F = r*m."""
     positive("reluctance", r=r)
     return _stored("reluctance", "m", quantity.magnetic_flux, linear, r=r)
 
 
 def saturating_reluctance(*, r: float, knee: float) -> Storage:
-    """Magnetic path that saturates above a flux of ``knee`` Wb; port m: E = r*knee**2*(cosh(m/knee) - 1).
+    """Magnetic path that saturates above a flux of ``knee`` Wb; port m.
 
-    F = r*knee*sinh(m/knee): of reluctance r in 1/H for small fluxes.
+    E = 2*knee**2*r*sinh(m/(2*knee))**2, F = r*knee*sinh(m/knee): of reluctance r in 1/H for small fluxes.
     """
     positive("saturating_reluctance", r=r, knee=knee)
     return _stored("saturating_reluctance", "m", quantity.magnetic_flux, saturating, r=r, knee=knee)
 
 
 def saturating_inductor(*, l: float, knee: float) -> Storage:  # noqa: E741 - the field's symbol
-    """Coil whose core saturates above a flux linkage of ``knee`` Wb; port b: E = knee**2/l*(cosh(b/knee) - 1).
+    """Coil whose core saturates above a flux linkage of ``knee`` Wb; port b.
 
-    The current is knee/l*sinh(b/knee): of inductance l in H for small flux linkages.
+    E = 2*knee**2*sinh(b/(2*knee))**2/l. The current is knee/l*sinh(b/knee): of inductance l in H for small flux
+    linkages.
     """
     positive("saturating_inductor", l=l, knee=knee)
     return _stored("saturating_inductor", "b", quantity.flux_linkage, saturating_linkage, l=l, knee=knee)

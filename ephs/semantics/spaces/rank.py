@@ -61,6 +61,6 @@ LIGHT = 1e-9
 """Mass of what has none, beside the heaviest body, where a metric must be one."""
 
 
-def rank_of(sizes: NDArray[Any], part: float) -> int:
-    """How many of these sizes, singular values or pivots (k,), exceed a part of the largest."""
-    return int(np.sum(sizes > part * sizes.max())) if sizes.size and sizes.max() > 0.0 else 0
+def rank_of(sizes: NDArray[Any], part: float, usual: float = 0.0) -> int:
+    """How many of these sizes, singular values or pivots (k,), exceed a part of the largest and of a usual size."""
+    return int(np.sum(sizes > part * max(sizes.max(), usual))) if sizes.size and sizes.max() > 0.0 else 0
