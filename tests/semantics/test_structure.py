@@ -109,11 +109,19 @@ def test_the_formulas_of_the_library_are_proved_symbolically(name):
     assert all(condition.proved for condition in conditions_of(primitive)), primitive.verdict.text
 
 
+BY_SYMBOLS = (
+    "ideal_mixture", "inertance", "laminar_leak", "orifice", "pipe_loss", "reaction", "reluctance", "saturating_inductor",
+    "saturating_reluctance", "tank",
+)  # fmt: skip
+"""Parts that are proved from their formula, when somebody asks."""
+TRUSTED = {name: given for name, given in ARGUMENTS.items() if name not in BY_SYMBOLS}
+
+
 def test_the_library_is_proved_without_symbols():
     """Making and checking a system of library parts must not load SymPy."""
     code = (
-        "import sys\nfrom ephs.semantics import library\nfrom ephs.semantics.library.chemistry import Species\n"
-        f"for name, arguments in {ARGUMENTS!r}.items():\n"
+        "import sys\nfrom ephs.semantics import library\n"
+        f"for name, arguments in {TRUSTED!r}.items():\n"
         "    assert getattr(library, name)(**arguments).verdict == 'proved'\n"
         "assert 'sympy' not in sys.modules and 'hypothesis' not in sys.modules"
     )

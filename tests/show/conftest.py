@@ -84,11 +84,11 @@ class FakeSolution:
         """One storage that gives its exergy to one friction."""
         rest = np.exp(-self.t)
         nothing = np.zeros_like(self.t)
-        store = Entry(Path.of("store"), rest, rest, nothing, nothing, nothing, nothing, nothing)
-        friction = Entry(Path.of("friction"), *[nothing] * 5, (1.0 - rest) / 300.0, 1.0 - rest)
+        store = Entry(Path.of("store"), rest, rest, *[nothing] * 7)
+        friction = Entry(Path.of("friction"), *[nothing] * 5, (1.0 - rest) / 300.0, 1.0 - rest, nothing, nothing)
         made, lost = friction.made, friction.destroyed
         parts = {"store": store, "friction": friction}
-        return Entry(Path.of(path), rest, rest, nothing, nothing, nothing, made, lost, parts)
+        return Entry(Path.of(path), rest, rest, nothing, nothing, nothing, made, lost, nothing, nothing, parts)
 
     def body(self, name: str) -> Any:
         return self.body_records[name]
