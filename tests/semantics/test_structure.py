@@ -110,8 +110,8 @@ def test_the_formulas_of_the_library_are_proved_symbolically(name):
 
 
 BY_SYMBOLS = (
-    "ideal_mixture", "inertance", "laminar_leak", "orifice", "pipe_loss", "reaction", "reluctance", "saturating_inductor",
-    "saturating_reluctance", "tank",
+    "ideal_mixture", "inertance", "laminar_leak", "orifice", "pipe_loss", "reaction", "reluctance",
+    "saturating_inductor", "saturating_reluctance", "tank",
 )  # fmt: skip
 """Parts that are proved from their formula, when somebody asks."""
 TRUSTED = {name: given for name, given in ARGUMENTS.items() if name not in BY_SYMBOLS}
