@@ -99,32 +99,16 @@ def row_biases(t, w):
 
 
 @kernel
-def _equilibrate(w, m):
-    """The rows with columns, then rows, scaled to size one, into w.plain; a row that is nothing stays nothing."""
-    n = w.mass.shape[0]
-    for i in range(n):
-        most = 0.0
-        for a in range(m):
-            most = max(most, abs(w.row[a, i]))
-        for a in range(m):
-            w.plain[a, i] = w.row[a, i] / most if most > 0.0 else 0.0
-    for a in range(m):
-        square = 0.0
-        for i in range(n):
-            square += w.plain[a, i] * w.plain[a, i]
-        for i in range(n):
-            w.plain[a, i] = w.plain[a, i] / math.sqrt(square) if square > 0.0 else 0.0
-
-
-@kernel
 def _remainder(w, m, j):
-    """Largest remainder of the rows from the j-th chosen one on, once those before it are out, of equilibrated rows.
-
-    The rows before the j-th are orthonormalised in w.plain on the way.
-    """
-    n, largest = w.mass.shape[0], 0.0
+    """Largest remainder of the rows from the j-th chosen one on, once those before it are out, relative to the largest
+    row: of the rows as they are, without masses. They are orthonormalised in w.plain."""
+    n, size, largest = w.mass.shape[0], 0.0, 0.0
     for c in range(m):
         row, square = w.chosen[c], 0.0
+        for i in range(n):
+            w.plain[row, i] = w.row[row, i]
+            square += w.plain[row, i] * w.plain[row, i]
+        size = max(size, math.sqrt(square))
         for _ in range(2):
             for b in range(min(c, j)):
                 base, part = w.chosen[b], 0.0
@@ -132,6 +116,7 @@ def _remainder(w, m, j):
                     part += w.plain[row, i] * w.plain[base, i]
                 for i in range(n):
                     w.plain[row, i] -= part * w.plain[base, i]
+        square = 0.0
         for i in range(n):
             square += w.plain[row, i] * w.plain[row, i]
         if c < j:
@@ -139,18 +124,17 @@ def _remainder(w, m, j):
                 w.plain[row, i] = w.plain[row, i] / math.sqrt(square) if square > 0.0 else 0.0
         elif w.triangle[row, row] > 0.0:
             largest = max(largest, math.sqrt(square))
-    return largest
+    return largest / size if size > 0.0 else 0.0
 
 
 @kernel
 def reduce_rows(w, m):
     """Orthonormalise the rows in the mass metric, largest remainder first; returns the rank.
 
-    A row counts as repeating others where little is left of it in the mass metric and in that of the equilibrated
-    rates: in the first alone a constraint between heavy bodies looks small beside one that moves light ones.
+    A row counts as repeating others where little is left of it both in the mass metric and without masses: in the first
+    alone a constraint between heavy bodies looks small beside one that moves light ones.
     """
     n = w.mass.shape[0]
-    _equilibrate(w, m)
     for a in range(m):
         w.chosen[a] = a
         square = 0.0

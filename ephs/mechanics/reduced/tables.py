@@ -64,7 +64,7 @@ class Workspace(NamedTuple):
     size: Array  # (m,): what the rows could be if nothing cancelled, in the mass metric
     target: Array  # (m,)
     scaled: Array  # (m, n): rows in the mass metric, orthonormalised
-    plain: Array  # (m, n): rows with rates and rows scaled to size one
+    plain: Array  # (m, n): rows without masses, orthonormalised
     triangle: Array  # (m, m)
     chosen: Index  # (m,)
     step: Array  # (n,)
