@@ -1,4 +1,4 @@
-"""Units: what is known of the units of the states at ports, as linear equations between exponents of base units.
+"""Units of the states at ports, as linear equations between exponents of base units.
 
 A port's state has a unit X; then its flow has X/s, and its effort J/X. So one unknown a port is enough.
 """
@@ -10,35 +10,24 @@ from typing import Any, TypeAlias, final
 
 from ephs.operad import Algebra, Interface, Path, Pattern, Quantity
 from ephs.operad.names import PathLike
+from ephs.operad.units import dimension
 from ephs.semantics.algebra.elimination import Row, eliminated, reduced
 from ephs.semantics.errors import SemanticsError
 
-__all__ = ["STATE_UNITS", "Unit", "Units", "units"]
+__all__ = ["Unit", "Units", "units"]
 
 Unit: TypeAlias = Mapping[str, int | Fraction]
 """Exponents of base units, such as ``{"kg": 1, "m": 1, "s": -1}``."""
 Powers: TypeAlias = Mapping[Path, int] | Mapping[str, int]
 """Port -> power of the unit of its state."""
 BASE = ("kg", "m", "s", "A", "K", "mol")
-JOULE = {"kg": 1, "m": 2, "s": -2}
-STATE_UNITS: Mapping[str, Unit] = {
-    "displacement": {"m": 1},
-    "momentum": {"kg": 1, "m": 1, "s": -1},
-    "angle": {},
-    "angular_momentum": {"kg": 1, "m": 2, "s": -1},
-    "charge": {"A": 1, "s": 1},
-    "flux_linkage": {"kg": 1, "m": 2, "s": -2, "A": -1},
-    "entropy": {"kg": 1, "m": 2, "s": -2, "K": -1},
-    "volume": {"m": 3},
-    "amount": {"mol": 1},
-}
-"""By the kind of a scalar quantity; states of other quantities, such as poses, have entries of several units."""
+"""Their order in texts; words of one's own come after them."""
 
 
 @final
 @dataclass(frozen=True, slots=True)
 class Units:
-    """What is known of the units at the ports of an interface.
+    """Linear equations between the units at the ports of an interface.
 
     Parameters
     ----------
@@ -74,7 +63,12 @@ class Units:
             unit = _unit(of.quantity)
             if unit is not None:
                 rows.append({(0, port): 1} | _constants(unit))
+        own = {str(name) for row in rows for rank, name in row if rank}
+        words = (*BASE, *sorted(own.difference(BASE)))
         for powers, unit in equations:
+            unknown = sorted(unit.keys() - set(words))
+            if unknown:
+                raise SemanticsError("units", unknown[0], found=unknown[0], expected=", ".join(words))
             rows.append({(0, Path.of(port)): power for port, power in powers.items()} | _constants(unit))
         return _made(interface, reduced(rows, _order))
 
@@ -104,13 +98,11 @@ _CONTRADICTION: tuple[Row[tuple[int, Path | str]], ...] = ((((1, "1"), Fraction(
 
 
 def _unit(quantity: Quantity) -> Unit | None:
-    return STATE_UNITS.get(quantity.kind) if quantity.space.name == "real" else None
+    """The quantity's own unit, None where it has none: states such as poses have entries of several units."""
+    return dict(dimension(quantity.unit)) if quantity.unit else None
 
 
 def _constants(unit: Unit) -> dict[tuple[int, Path | str], Any]:
-    unknown = sorted(unit.keys() - set(BASE))
-    if unknown:
-        raise SemanticsError("units", unknown[0], found=unknown[0], expected=", ".join(BASE))
     return {(1, name): -power for name, power in unit.items()}
 
 
@@ -125,7 +117,8 @@ def _made(interface: Interface, rows: list[dict[tuple[int, Path | str], Fraction
 
 
 def _text(unit: Mapping[str, Fraction]) -> str:
-    words = (name if unit[name] == 1 else f"{name}^{unit[name]}" for name in BASE if unit.get(name))
+    names = (*BASE, *sorted(unit.keys() - set(BASE)))
+    words = (name if unit[name] == 1 else f"{name}^{unit[name]}" for name in names if unit.get(name))
     return " ".join(words) or "1"
 
 

@@ -91,6 +91,15 @@ def test_units_follow_through_parts_that_do_not_know_them():
     assert Units.of(ports(p=Q.momentum, a=Q.angle)).unit("a") == "1"
 
 
+def test_a_quantity_of_ones_own_brings_its_unit():
+    """The unit that a quantity states is the one that is used, whatever words it is written in."""
+    bits = Quantity("data", Space("real", 1, 1), 1, unit="bit")
+    length = Quantity("reach", Space("real", 1, 1), 1, unit="J/N")
+    assert Units.of(ports(b=bits)).unit("b") == "bit"
+    assert Units.of(ports(l=LEVEL, b=bits), [({"l": 1, "b": -1}, {"bit": 1, "m": -1})]).unit("l") == "m^-1 bit^2"
+    assert Units.of(ports(r=length)).unit("r") == "m"
+
+
 def test_the_smallest_identification_that_travels_upwards():
     """A part that joins two of its ports joins what they are on."""
     part = Corelation.of(ports(a=Q.displacement, b=Q.displacement), [("a", "b")])
