@@ -22,6 +22,8 @@ __all__ = [
     "SCHEMA_FILE",
     "contents_from",
     "contents_record",
+    "domain_from",
+    "domain_record",
     "from_dict",
     "from_json",
     "pattern_within",
@@ -78,10 +80,9 @@ def quantity_record(quantity: Quantity) -> dict[str, Any]:
 def _described(quantity: Quantity) -> dict[str, Any]:
     space = quantity.space
     place = {"name": space.name, "dim": space.dim, "size": space.size, "parameters": dict(space.parameters)}
-    bounds = [end if isfinite(end) else None for end in quantity.domain]
     carried = {name: list(row) for name, row in quantity.charges}
     said: dict[str, Any] = {"kind": quantity.kind, "space": place, "parity": quantity.parity}
-    said |= {"domain": bounds} if quantity.domain != WHOLE else {}
+    said |= {"domain": domain_record(quantity.domain)} if quantity.domain != WHOLE else {}
     return said | ({"charges": carried} if carried else {}) | ({"unit": quantity.unit} if quantity.unit else {})
 
 
@@ -155,13 +156,25 @@ def quantity_from(where: str, record: Mapping[str, object]) -> Quantity:
         _READ.whole(f"{where}.quantity.parity", whole["parity"]),
     )
     unit = _READ.text(f"{where}.quantity.unit", whole.get("unit", ""))
-    domain = _domain(f"{where}.quantity.domain", whole["domain"]) if "domain" in whole else WHOLE
+    domain = domain_from(f"{where}.quantity.domain", whole["domain"]) if "domain" in whole else WHOLE
     at = f"{where}.quantity.charges"
     charges = tuple((name, _row(f"{at}.{name}", row)) for name, row in _READ.mapping(at, whole.get("charges", {})))
     return Quantity(kind, place, parity, frame, domain, charges, unit)
 
 
-def _domain(where: str, value: object) -> Domain:
+def domain_record(domain: Domain) -> list[float | None]:
+    """The two ends of a domain as JSON has them: null where there is none."""
+    return [end if isfinite(end) else None for end in domain]
+
+
+def domain_from(where: str, value: object) -> Domain:
+    """Read the two ends of a domain; the inverse of `domain_record`.
+
+    Raises
+    ------
+    PatternError
+        They are not two numbers, with its place.
+    """
     ends = _READ.list(where, value)
     if len(ends) != 2:
         _READ.refuse(where, value, "two numbers, null where there is no end")

@@ -7,7 +7,7 @@ import numpy as np
 from ephs.operad import Quantity
 from ephs.semantics.bundle import Array
 
-__all__ = ["expected", "inside", "into", "room"]
+__all__ = ["between", "expected", "inside", "into", "room"]
 
 
 def inside(quantity: Quantity, x: Array) -> bool:
@@ -18,7 +18,11 @@ def inside(quantity: Quantity, x: Array) -> bool:
 
 def into(quantity: Quantity, x: Array) -> Array:
     """Random numbers of size one, moved into the domain: positive ones spread about 1, others about the middle."""
-    low, high = quantity.domain
+    return between(*quantity.domain, x)
+
+
+def between(low: float, high: float, x: Array) -> Array:
+    """Random numbers of size one, moved between two ends."""
     if math.isinf(low) and math.isinf(high):
         return x
     if math.isinf(high):

@@ -7,14 +7,16 @@ from typing import Any, cast
 import numpy as np
 
 from ephs.operad import Directory, Interface, Path, PortType
-from ephs.operad.documents import port_from, port_record
+from ephs.operad.documents import domain_from, domain_record, port_from, port_record
 from ephs.operad.errors import PatternError
 from ephs.operad.reading import Reader
 from ephs.semantics import constructors, structures
 from ephs.semantics.bundle import Array, Bundle, Reference
 from ephs.semantics.catalogue import find_part, part_of
 from ephs.semantics.checks import random_efforts, random_point
+from ephs.semantics.domains import Bounds, bounded, domain_of
 from ephs.semantics.errors import SemanticsError, StructureError
+from ephs.semantics.extents import between
 from ephs.semantics.library.chemistry import Species
 from ephs.semantics.primitives import Formula, Irreversible, Point, Primitive, Reversible, Storage
 from ephs.semantics.symbols.algebra import sp
@@ -45,6 +47,8 @@ def primitive_record(path: Path, primitive: Primitive) -> dict[str, Any]:
         return {"part": part.word, "ports": ports, "parameters": numbers}
     try:
         entry = {primitive.kind: primitive.name, "ports": ports} | _formula(primitive)
+        if primitive.domain:
+            entry["domain"] = {str(port): domain_record((low, high)) for port, low, high in primitive.domain}
         again = primitive_from(Reader("system"), str(path), entry)
     except (Untraceable, PatternError) as error:
         raise SemanticsError("unwritten", path, name=primitive.name, found=str(error)) from None
@@ -68,12 +72,13 @@ def primitive_from(reader: Reader, where: str, value: object) -> Primitive:
         reader.refuse(where, f"the keys {', '.join(sorted(found)) or 'none'}", f"one of {', '.join(KINDS)}")
     kind = kinds[0]
     name = reader.text(f"{where}.{kind}", found[kind])
+    domain: Bounds = _bounds(reader, f"{where}.domain", found.pop("domain", {})) if kind != "part" else {}
     read = {"part": _part, "storage": _storage, "reversible": _reversible, "irreversible": _irreversible}[kind]
     keys = {"part": {"parameters"}, "storage": {"energy"}, "reversible": set[str](), "irreversible": {"M"}}[kind]
     more = {"storage": {"function"}, "reversible": {"L", "C"}}.get(kind, set())
     reader.record(where, found, {kind, "ports"} | keys, more)
     ports = _ports(reader, f"{where}.ports", found["ports"])
-    make = read(reader, where, name, ports, found)
+    make = read(reader, where, name, ports, found, domain)
     try:
         made = make()
     except PatternError:
@@ -101,7 +106,7 @@ Make = Callable[[], Primitive]
 Entry = Mapping[str, object]
 
 
-def _part(reader: Reader, where: str, word: str, ports: Interface, found: Entry) -> Make:
+def _part(reader: Reader, where: str, word: str, ports: Interface, found: Entry, _: Bounds) -> Make:
     part = find_part(word)
     if part is None:
         reader.refuse(f"{where}.part", word, "the name of a library part")
@@ -118,14 +123,14 @@ def _part(reader: Reader, where: str, word: str, ports: Interface, found: Entry)
     return make
 
 
-def _storage(reader: Reader, where: str, name: str, ports: Interface, found: Entry) -> Make:
+def _storage(reader: Reader, where: str, name: str, ports: Interface, found: Entry, domain: Bounds) -> Make:
     function = reader.text(f"{where}.function", found.get("function", "energy"))
     names = {str(port): kind.quantity.space.size for port, kind in ports.items()}
     term = term_from(reader, f"{where}.energy", found["energy"], names)
-    return lambda: constructors.storage(_named(ports), Written(term, function), name=name)
+    return lambda: constructors.storage(_named(ports), Written(term, function), domain=domain, name=name)
 
 
-def _reversible(reader: Reader, where: str, name: str, ports: Interface, found: Entry) -> Make:
+def _reversible(reader: Reader, where: str, name: str, ports: Interface, found: Entry, domain: Bounds) -> Make:
     n, reads = Bundle.of(ports).size, _reads(ports)
     names = {str(port): ports[port].quantity.space.size for port in reads}
     skew, constraint = (
@@ -142,9 +147,13 @@ def _reversible(reader: Reader, where: str, name: str, ports: Interface, found: 
         return upper.reshape(n, n), np.array(lower, dtype=float).reshape(k, n)
 
     def make() -> Primitive:
-        if all(part is None or part.numbers for part in (skew, constraint)):
+        bounds = domain_of(name, ports, domain)
+        if not bounds and all(part is None or part.numbers for part in (skew, constraint)):
             return structures.constant_structure(name, ports, *structure({}))
         formula = Formula(Structure(skew, constraint))
+        if bounds:
+            inner = bounded(structure, bounds, (np.full((n, n), np.nan), np.full((k, n), np.nan)))
+            return Reversible(name, ports, inner, reads=reads, multipliers=k, formula=formula, domain=bounds)
         try:
             kernel = reversible_kernel(ports, reads, formula, k)
         except Untraceable:
@@ -154,12 +163,16 @@ def _reversible(reader: Reader, where: str, name: str, ports: Interface, found: 
     return make
 
 
-def _irreversible(reader: Reader, where: str, name: str, ports: Interface, found: Entry) -> Make:
+def _irreversible(reader: Reader, where: str, name: str, ports: Interface, found: Entry, domain: Bounds) -> Make:
     n = Bundle.of(ports).size
     spaces = {port: (kind.power, kind.quantity.space) for port, kind in ports.items()}
     names = {str(port): space.dim if power else space.size for port, (power, space) in spaces.items()}
     matrix = _matrix(reader, f"{where}.M", found["M"], names, n)
-    return lambda: constructors.irreversible(_named(ports), matrix, name=name)
+    return lambda: constructors.irreversible(_named(ports), matrix, domain=domain, name=name)
+
+
+def _bounds(reader: Reader, where: str, value: object) -> Bounds:
+    return {port: domain_from(f"{where}.{port}", ends) for port, ends in reader.mapping(where, value)}
 
 
 def _matrix(reader: Reader, where: str, value: object, names: Mapping[str, int], columns: int) -> Matrix:
@@ -224,8 +237,6 @@ def _formula(primitive: Primitive) -> dict[str, Any]:
     """What defines a primitive, in terms of its ports."""
     if primitive.formula is None:
         raise Untraceable("a primitive without a formula")
-    if primitive.domain:
-        raise Untraceable("a domain, for which documents have no word")
     function, numbers = primitive.formula.function, dict(primitive.parameters)
     given = {name: numbers[name] for name in primitive.formula.parameters}
     match primitive:
@@ -288,11 +299,18 @@ def _agree(one: Primitive, two: Primitive) -> bool:
 
 def _said(primitive: Primitive, seed: int) -> tuple[Array, ...]:
     rng, bundle = np.random.default_rng(seed), primitive.bundle
-    x = random_point(bundle, primitive.reads, rng)
+    x, e = random_point(bundle, primitive.reads, rng), random_efforts(bundle, rng)
+    efforts, intensive = bundle.split(e), bundle.split(bundle.intensive(Reference()))  # views of e
+    for port, low, high in primitive.domain:
+        numbers = between(low, high, rng.standard_normal(bundle.interface[port].quantity.space.dim))
+        if port in x:
+            x[port] = numbers
+        else:
+            efforts[port][:] = numbers - intensive[port]
     match primitive:
         case Storage():
             return np.array([primitive.energy(x)]), primitive.energy_gradient(x)
         case Reversible():
             return primitive.structure(x)
         case Irreversible():
-            return (primitive.matrix(x, random_efforts(bundle, rng), Reference()),)
+            return (primitive.matrix(x, e, Reference()),)

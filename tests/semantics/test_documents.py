@@ -199,6 +199,36 @@ def test_a_component_of_the_same_name_is_not_taken_for_the_library_s():
         alone(forged).to_json()
 
 
+BOUNDED = {
+    "storage": lambda: ephs.storage({"q": Q.displacement}, lambda q: q**2, domain={"q": (-1.0, 2.5)}),
+    "gyrator": lambda: ephs.gyrator(
+        {"q": Q.displacement, "p": Q.momentum, "~a": Q.displacement},
+        lambda a: [[0, 1 + a], [-1 - a, 0]],
+        domain={"a": (2.0, np.inf)},
+    ),
+    "irreversible": lambda: ephs.irreversible(
+        {"p": Q.momentum, "s": Q.entropy},
+        lambda p, s: np.array([[s, -p], [-p, p * p / s]]),
+        domain={"p": (3.0, 4.0)},
+    ),
+}
+
+
+@pytest.mark.parametrize("make", BOUNDED.values(), ids=BOUNDED)
+def test_domains_are_written_and_read_back(make):
+    primitive = make()
+    system = alone(primitive)
+    text = system.to_json()
+    VALID.validate(json.loads(text))
+    (found,) = System.from_json(text).fillings.values()
+    assert found.domain == primitive.domain != ()
+    assert System.from_json(text) == system
+    assert all(np.all(np.isfinite(part)) for seed in range(3) for part in _said(found, seed))
+    broken = text.replace("null", "1.0") if "null" in text else text.replace(str(found.domain[0][2]), '"x"')
+    with pytest.raises((PatternError, SemanticsError), match="domain"):
+        System.from_json(broken)
+
+
 def branching(q):
     return q**2 if q > 0 else 2 * q**2
 
@@ -216,7 +246,6 @@ def differing():
     "primitive, words",
     [
         (lambda: ephs.storage({"q": Q.displacement}, branching), "needs the value of an argument"),
-        (lambda: ephs.storage({"q": Q.displacement}, lambda q: q**2, domain={"q": (-1.0, 1.0)}), "found a domain"),
         (differing, "does not say what the component does"),
         (lambda: joint("revolute", potential=lambda x: x[0] ** 2).fillings["pe"], "without a formula"),
     ],
