@@ -99,6 +99,8 @@ def flat_joints(d: Descriptor) -> FlatJoints:
         if slot.primitive.name != "holonomic":
             continue
         first = {str(port): slot.efforts[w.start] for port, w, _ in slot.primitive.bundle.items() if w.stop > w.start}
+        if not {"p_j1", "p_j2"} <= first.keys():  # a reduction dropped the end that rests
+            continue
         ends = [frames.get(first[port], (first[port], SE3.identity())) for port in ("p_j1", "p_j2")]
         if any(momentum not in body for momentum, _ in ends):
             continue
