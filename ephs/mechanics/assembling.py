@@ -96,7 +96,8 @@ def flat_joints(d: Descriptor) -> FlatJoints:
     links: list[Link] = []
     relative: list[Path] = []
     for slot in d.components:
-        if slot.primitive.name != "holonomic":
+        kernel = slot.primitive.kernel
+        if kernel is None or kernel.name != "holonomic":  # others have offsets folded in by a reduction
             continue
         first = {str(port): slot.efforts[w.start] for port, w, _ in slot.primitive.bundle.items() if w.stop > w.start}
         if not {"p_j1", "p_j2"} <= first.keys():  # a reduction dropped the end that rests
