@@ -233,7 +233,8 @@ def _check_reversible(reversible: "Reversible", trial: Trial) -> None:
     for kind in bundle.charges:
         one = bundle.indicator(kind)
         defect = np.concatenate([skew @ one, constraint @ one])
-        terms = np.concatenate([np.full(n, scale * np.abs(one).sum()), np.abs(constraint) @ np.abs(one)])
+        scales = np.concatenate([np.full(n, scale), np.abs(constraint).max(axis=1, initial=0.0)])
+        terms = scales * np.abs(one).sum()
         if not np.all(np.abs(defect) <= TOLERANCE * terms):
             entry = _worst(defect / np.maximum(terms, 1e-300))
             raise _fail("conservation", reversible, trial, float(defect[entry]), quantity=kind, entry=entry)

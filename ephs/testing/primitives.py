@@ -79,10 +79,10 @@ def reversibles(
     n, parity = bundle.size, bundle.parity()
     keep = _kept(bundle)
     skew = rng.standard_normal((n, n))
-    skew = keep @ _odd(skew - skew.T, parity) @ keep
+    skew = _cleared(keep @ _odd(skew - skew.T, parity) @ keep)
     rows = draw(st.integers(0, 1 if n > 1 and draw(st.booleans()) else 0))
     side = float(draw(st.sampled_from(constrained)))
-    constraint = rng.standard_normal((rows, n)) * (parity == side) @ keep
+    constraint = _cleared(rng.standard_normal((rows, n)) * (parity == side) @ keep)
     constraint = constraint[np.linalg.norm(constraint, axis=1) > 0.1]
     used = reads if reads and draw(READING) else ()
     if not used:
@@ -150,6 +150,11 @@ def _kept(bundle: Bundle) -> Array:
     """The projector off the charges, which reversible structures conserve."""
     rows = np.array([bundle.indicator(name) for name in bundle.charges]).reshape(len(bundle.charges), bundle.size)
     return np.eye(bundle.size) - np.linalg.pinv(rows) @ rows
+
+
+def _cleared(matrix: Array) -> Array:
+    """A projected matrix of entries of order one without what rounding left where it should be zero."""
+    return np.where(np.abs(matrix) > 1e-12, matrix, 0.0)
 
 
 def _even(matrix: Array, parity: Array) -> Array:

@@ -3,7 +3,7 @@
 import functools
 
 import pytest
-from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import HealthCheck, Phase, find, given, settings
 
 from ephs.semantics import AssemblyError, Storage, System
 from ephs.testing import fillings, nestings, systems
@@ -66,7 +66,7 @@ REACH = {
     "systems": {
         "three levels": 40, "outer ports": 20, "links of the flat pattern": 15, "a component reads": 40,
         "friction reads": 20, "read below its storage": 20, "read two levels below": 5, "read above its storage": 5,
-        "read two levels above": 2, "a component of one's own": 15, "a quantity of one's own": 8, "a relative pose": 3,
+        "a component of one's own": 15, "a quantity of one's own": 8, "a relative pose": 3,
         "equations": DRAWN,
     },
     "systems in two levels": {
@@ -84,6 +84,10 @@ STRATEGIES = {
     "systems that are not posed": systems(posed=False),
     "fillings": nestings().flatmap(fillings),
 }
+
+
+RARE = {"systems": "read two levels above"}
+"""Facts of so few of those drawn that a search has to find one."""
 
 
 @functools.cache
@@ -107,3 +111,9 @@ def test_so_many_of_those_drawn_have_it(strategy):
     assert len(drawn(strategy)) == DRAWN
     counts = {fact: sum(bool(FACTS[fact](system)) for system in drawn(strategy)) for fact in REACH[strategy]}
     assert not {fact: count for fact, count in counts.items() if count < REACH[strategy][fact]}, counts
+
+
+@pytest.mark.parametrize("strategy", RARE)
+def test_a_search_finds_what_is_rare(strategy):
+    limits = settings(max_examples=20 * DRAWN, database=None, deadline=None, phases=[Phase.generate])
+    assert find(STRATEGIES[strategy], FACTS[RARE[strategy]], settings=limits) is not None
