@@ -28,6 +28,8 @@ VERSIONS = {
 DATA = (
     "ephs/py.typed",
     "ephs/operad/pattern.schema.json",
+    "ephs/operad/rewriting/derivation.schema.json",
+    "ephs/semantics/system.schema.json",
     "ephs/mechanics/references.bib",
     *(f"ephs/templates/{file.name}" for file in sorted((ROOT / "ephs/templates").iterdir()) if file.is_file()),
 )

@@ -181,7 +181,7 @@ def test_hostile_files_reach_nothing(tmp_path, solution):
 
 def _finds_libraries(event: str, what: str) -> bool:
     """Whether this is how threads of linear algebra are limited: by a look at the libraries that are loaded."""
-    return what == "/proc/self/maps" or (event.startswith("ctypes.") and "secret" not in what)
+    return event == "open" and what == "/proc/self/maps"
 
 
 def changed(source: Path, target: Path, change) -> None:

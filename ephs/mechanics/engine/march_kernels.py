@@ -29,7 +29,8 @@ DRIFT = 1e-2
 """Share of a step's drift off the constraints that counts as its error.
 
 Closing the loops takes the drift out along normals at the step's end. Near a change of rank normals turn fast: there a
-stage's drift has a part along the motion, 1e-4 to 1e-2 of it in chains of four-bars, that the embedded formula misses.
+stage's drift has a part along the motion that the embedded formula misses. Tried on rows of one to ten four-bars: with
+1e-3 errors of 100 tolerances are left at 1e-9, with 1e-1 steps become many times more.
 """
 
 

@@ -9,7 +9,7 @@ from benchmarks.families import scene
 
 GRAVITY, SPEED = 9.81, -1.0
 TIMES = np.linspace(0.0, 10.0, 41)
-"""Cranks pass through alignment with the ground six times."""
+"""Cranks pass through alignment with the ground many times."""
 
 
 def angles(windows: int):
