@@ -42,9 +42,9 @@ FOLLOWED = 1e-8
 """The same in later steps, of as many equations as were dependent before: what depends by build is off by the rounding
 that the joints left out have gathered, and multipliers that fight it would grow without bound."""
 EXPLICIT = 1e-4
-"""Rank in explicit steps, in the mass metric and without masses. Generous, since multipliers grow like its inverse near alignment:
-measured on a four-bar through three alignments, errors are 2e-9 with 1e-2, 6e-10 with 1e-3 and 1e-4, 3e-7 with 1e-6,
-and with 1e-8 steps diverge."""
+"""Rank in explicit steps, in the mass metric and without masses. Generous, since multipliers grow like its inverse near
+alignment: measured on a four-bar through three alignments, errors are 2e-9 with 1e-2, 6e-10 with 1e-3 and 1e-4, 3e-7
+with 1e-6, and with 1e-8 steps diverge."""
 SPARSE = 1e-5
 """Squares in the mass metric below this go from the sparse elimination, which squares, to the dense one, which decides
 by `EXPLICIT`; its square is well below this, so that the sparse one never decides a rank."""
