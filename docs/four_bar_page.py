@@ -57,7 +57,7 @@ def page() -> str:
 
 def whole() -> str:
     """One self-contained page."""
-    head = '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>A four-bar to play with</title></head>'
+    head = '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>Interactive four-bar</title></head>'
     return f"{head}<body style='background:#fff;max-width:52rem;margin:2rem auto'>{page()}</body></html>\n"
 
 

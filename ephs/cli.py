@@ -134,7 +134,7 @@ def equations(
 
 @app.command
 def reduce(scene: str, /, *, loading: Loading = AS_GIVEN) -> int:
-    """List what the reduction takes out, why it may, and how many unknowns are left.
+    """List the eliminated variables, the justification, and the unknowns that remain.
 
     Parameters
     ----------

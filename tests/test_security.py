@@ -1,4 +1,4 @@
-"""Files from strangers are data: reading them opens nothing outside their folder, starts nothing, runs nothing."""
+"""Untrusted files are data: reading them opens nothing outside their folder, starts nothing, runs nothing."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""The reductions of coordinates, in words: what the form in joint coordinates leaves out of a scene, and why it may.
+"""Reductions to joint coordinates in words: the variables that they eliminate, and the justification.
 
 They are done where that form is made; here each is found from the same tables, and said.
 """

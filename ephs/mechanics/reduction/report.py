@@ -14,7 +14,7 @@ __all__ = ["reduce"]
 
 @in_one_thread
 def reduce(model: System | Scene) -> Reduction:
-    """What a reduction takes out of a model, why it may, and how many unknowns are left after each step.
+    """Variables eliminated from a model, the justification, and the unknowns left after each step.
 
     Rewrites of the system come first; of a scene the reductions of coordinates follow, down to the form that
     ``form="reduced"`` integrates.

@@ -1,4 +1,4 @@
-"""What a reduction took out, why it may, and how many unknowns were left: a value that prints itself as a table."""
+"""Eliminated variables, justification and remaining unknowns of a reduction: a value that prints itself as a table."""
 
 import textwrap
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""The text of a file that nobody vouches for: a regular file of moderate size, in UTF-8."""
+"""Untrusted text file: regular, of moderate size, in UTF-8."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Result files that nobody vouches for: looked at before they are read, and names that netCDF cannot hold."""
+"""Untrusted result files: checks before reading, and names that netCDF cannot hold."""
 
 import re
 from pathlib import Path as File

@@ -19,7 +19,7 @@ __all__ = ["Ledgers", "ledgers"]
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Ledgers:
-    """Books of a motion, all (n,).
+    """Ledgers of a motion, all (n,).
 
     Parameters
     ----------

@@ -46,7 +46,7 @@ class Outcome(StrEnum):
 
 
 SILENT = frozenset({Outcome.WRONG_BUT_BOUNDED, Outcome.ENERGY_DRIFT, Outcome.DAMPED, Outcome.DIVERGED})
-"""Wrong results without a word: the run succeeded, and its audit found nothing."""
+"""Silent failures: the run succeeded, its audit found nothing, and the result is wrong."""
 
 
 def judge(found: Motion, true: Motion) -> tuple[Outcome, float]:
