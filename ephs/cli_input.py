@@ -1,4 +1,4 @@
-"""What the command line is given and gives: files to models, errors that speak to the user to clear texts, results."""
+"""Input and output of the command line: files to models, user errors to clear texts, results."""
 
 import math
 import runpy
@@ -64,7 +64,7 @@ class BadInput(Exception):
 @final
 @dataclass(frozen=True, slots=True)
 class Loading:
-    """How files become scenes.
+    """Options for reading files as scenes.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ Positive = Annotated[float | None, Parameter(validator=positive)]
 @final
 @dataclass(frozen=True, slots=True)
 class Stepping:
-    """How time is stepped through.
+    """Options of time stepping.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ class Stepping:
     form: Literal["paper", "folded", "reduced"] | None = None
 
     def options(self) -> dict[str, Any]:
-        """What of it was given, as options of ``simulate``."""
+        """Options that were given, as keywords of ``simulate``."""
         values = ((field.name, getattr(self, field.name)) for field in fields(self))
         return {name: value for name, value in values if value is not None}
 
@@ -247,7 +247,7 @@ def heard() -> Iterator[None]:
 
 
 def initial_values(entries: Sequence[str]) -> dict[str, list[float]] | None:
-    """What PATH=NUMBER,NUMBER,... says; None where nothing is said.
+    """Values of PATH=NUMBER,NUMBER,...; None where none are given.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What a misspelled word may have meant."""
+"""Nearest spelling of a word."""
 
 from collections.abc import Iterable
 from pathlib import Path

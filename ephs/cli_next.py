@@ -1,4 +1,4 @@
-"""What one can do next: examples for every command, the nearest one to a misspelled one, and what a run leads to."""
+"""Suggestions of the command line: an example of every command, the nearest spelling, next steps after a run."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -52,7 +52,7 @@ def commands(app: Any) -> list[str]:
 
 
 def welcome(app: Any) -> str:
-    """What can be done next: for every command an example, and what it does."""
+    """An example and a description of every command."""
     lines = [
         "Exergetic port-Hamiltonian systems: compose physical models by pattern, simulate them, check both laws.",
         "Begin with a scene of your own: ephs new my-pendulum, then ephs run my-pendulum.toml --until 5.",
@@ -105,7 +105,7 @@ def known_command(app: Any, words: Sequence[str]) -> None:
 
 
 def after(folder: Path, *, moves: bool, report: bool) -> list[str]:
-    """What to look at after a run whose results lie in a folder."""
+    """Suggested commands after a run, for its result folder."""
     lines: list[str] = []
     if report:
         lines.append(f"{folder / 'report.html'}: plots, ledgers, the motion; open it in a browser")

@@ -1,4 +1,4 @@
-"""What a run leaves behind: the result folder, the data before the pictures, and what is said of it."""
+"""Results of a run: the folder, the data before the pictures, and the messages."""
 
 import json
 from pathlib import Path

@@ -35,7 +35,7 @@ __all__ = ["run"]
 
 JOURNAL = "run.journal"
 RUN = "run.json"
-"""What was asked for, beside the results of a run that has reached its end."""
+"""Request of a run, kept beside the results of a run that has reached its end."""
 KEPT = 500
 """Parts of the time at whose ends results are kept where steps are chosen."""
 _TEXTS = {
@@ -173,7 +173,7 @@ def _simulate(model: "Scene | System", scene: str, folder: Path, asked: Mapping[
 
 
 def _identity(model: "Scene | System", scene: str, asked: Mapping[str, Any]) -> dict[str, Any]:
-    """What tells a run from others; of code the name only."""
+    """Identity of a run; of code the name only."""
     import ephs
     from ephs.mechanics.scene.document import scene_to_text
 

@@ -1,4 +1,4 @@
-"""What Hypothesis calls when it is imported, so that ``from_type(Pattern)`` works in other people's suites.
+"""Hypothesis plug-in: ``from_type(Pattern)`` works in the test suites of users.
 
 It stands apart from `ephs.testing`: that imports Hypothesis, which then calls this before `ephs.testing` is whole.
 """

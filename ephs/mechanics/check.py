@@ -141,7 +141,7 @@ def _weight(scene: Scene) -> float:
 
 
 def _redundancy(problem: Problem, count: int) -> Iterator[CheckItem]:
-    """Which constraints depend on which; of a system without a scene, only how many do."""
+    """Dependent constraints; of a system without a scene, only their number."""
     if problem.scene is None:
         detail = f"{count} of the constraint equations depend on others"
         if count:

@@ -1,4 +1,4 @@
-"""What to cite for a run: entries of the packaged bibliography, by the method and the form that were used."""
+"""References to cite for a run: entries of the packaged bibliography, by the method and the form used."""
 
 import re
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""What each joint holds: its wrenches about one point, and the rows that they make of the constraints on the twists.
+"""Constraint wrenches of each joint about one point, and their rows on the twists.
 
 What a joint holds are the wrenches W that do no work on its freedoms, WᵀB = 0. Seen about one point and in one set of
 axes, a wrench on body 2 and its reaction on body 1 make a row (−w, w).
@@ -24,7 +24,7 @@ __all__ = ["Hold", "Mechanism", "redundant"]
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Hold:
-    """What a joint holds, or what its prescribed motion does.
+    """Constraint of a joint, or of its prescribed motion.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ class Mechanism:
         return Mechanism(now, centre, length or 1.0)
 
     def holds(self, poses: Array, *, motions: bool = True) -> list[Hold]:
-        """What every joint holds in a configuration, then the prescribed motions."""
+        """Constraints of all joints in a configuration, then of the prescribed motions."""
         pairs = list(zip(self.now.links, elements(self.now.links, poses), strict=True))
         out = [self._hold(link, poses, x) for link, x in pairs]
         if motions:

@@ -43,7 +43,7 @@ def journaled(
 
 
 def heading_of(problem: Problem, asked: Mapping[str, Any]) -> dict[str, Any]:
-    """What a journal says of a run first: only the same run, by the same programs, goes on to the same numbers.
+    """Heading of a journal: only the same run, by the same programs, goes on to the same numbers.
 
     Functions among the options are told by their names; whether they do the same, nobody can know.
     """

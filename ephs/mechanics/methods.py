@@ -20,7 +20,7 @@ __all__ = ["METHODS", "Method", "Setting", "on_joints", "register_method"]
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Setting:
-    """What a method is made for.
+    """Class of problems of a method.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class Setting:
 @final
 @dataclass(frozen=True, slots=True)
 class Method:
-    """What one must know of a method to choose it, and how it is made.
+    """Properties of a method for its choice, and its constructor.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ class Method:
 
 
 def on_joints(make: Callable[..., Any]) -> Callable[[Setting], tuple[Stepper[Any], Policy | None]]:
-    """What makes a method on the reduced form of a scene, from ``make(equations, control, **options)``.
+    """Constructor of a method on the reduced form of a scene, from ``make(equations, control, **options)``.
 
     Its steps follow proportional-integral control by its ``exponent`` and its ``share``.
     """
@@ -250,7 +250,7 @@ def _for_scenes(setting: Setting) -> tuple[Stepper[Any], Policy | None]:
 
 
 AUTO = Method("auto", 8, True, False, False, True, "rk54 or rk87, radau where stiff", _for_scenes)
-"""What `auto` is for scenes that the reduced form serves."""
+"""Method behind `auto` for scenes in joint coordinates."""
 
 
 def chosen(name: str | Method, problem: Problem, *, step: float | None) -> tuple[Method, str]:

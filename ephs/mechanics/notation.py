@@ -1,4 +1,4 @@
-"""How the primitives of rigid-body mechanics are written in printed equations: with Ad, ad*, inclusions.
+"""Notation of the primitives of rigid-body mechanics in printed equations: with Ad, ad*, inclusions.
 
 Each function takes a `Voice` and gives efforts by port for a storage, (flows by port, conditions) for a process.
 Operators are those of Lohmayer, Capobianco, Leyendecker, sections 3 to 5, with the corrections of the errata.

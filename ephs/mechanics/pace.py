@@ -1,4 +1,4 @@
-"""How far a step may go where its error does not say it."""
+"""Step limit for prescribed motions."""
 
 from typing import TYPE_CHECKING
 

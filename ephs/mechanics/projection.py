@@ -26,7 +26,7 @@ ROUNDS = 4
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Held:
-    """What a joint holds at n instants: Σ rows[body] · twist + basis · rate = 0, where a prescribed rate is ``rate``.
+    """Constraint of a joint at n instants: Σ rows[body] · twist + basis · rate = 0, a prescribed rate being ``rate``.
 
     Parameters
     ----------

@@ -46,7 +46,7 @@ def freedoms_of(joint: Joint) -> Labels:
 
 
 def variables(scene: Scene, motion: Reading, *, wrenches: bool) -> dict[str, Variable]:
-    """What a motion shows, under ``body_position``, ``coordinate:JOINT`` and the like."""
+    """Arrays of a motion, under ``body_position``, ``coordinate:JOINT`` and the like."""
     out: dict[str, Variable] = {}
     bodies, joints = [name for name, _ in scene.all_bodies()], [name for name, _ in scene.all_joints()]
     nodes, markers = [name for name, _ in scene.all_thermal()], [name for name, _ in scene.all_markers()]

@@ -1,4 +1,4 @@
-"""Which constraints depend on which, and which joint wrenches are unique: a mechanism in one configuration.
+"""Dependent constraints and unique joint wrenches of a mechanism in one configuration.
 
 A direction that a joint holds is redundant where its row of the constraints lies in the span of the joints before. The
 wrenches that balance each other at every body, the left null space of all rows, are what is statically indeterminate.
@@ -25,9 +25,9 @@ from ephs.semantics.spaces.rank import CONSTRAINT, NEIGHBOUR, SPANNED, rank_of
 __all__ = ["Dependence", "dependences", "explain", "in_words", "indeterminate", "wrenches_in_words"]
 
 AWAY, TRIALS, NEAR = 0.02, 3, 0.2
-"""How far and how often neighbours are compared; how much a direction may turn up to there."""
+"""Distance and number of neighbouring configurations compared, and the turn of a direction allowed up to there."""
 SHOWN = 3
-"""How many clauses a text holds; the others are counted."""
+"""Limit on the clauses of a text; further ones are counted."""
 
 
 @final
@@ -60,7 +60,7 @@ class Dependence:
 
     @property
     def what(self) -> str:
-        """Which joints are repeated in which directions, in words."""
+        """Redundant joints and their directions, in words."""
         lasting = [d for d in self.directions if d not in self.passing]
         if self.here == len(self.directions):
             return f"{enumerated(self.on)} in this configuration: {describe(self.directions)}"
@@ -71,7 +71,7 @@ class Dependence:
 
 
 def dependences(scene: Scene) -> tuple[Dependence, ...]:
-    """What repeats what in the scene's state, joint by joint in the scene's order.
+    """Redundancies in the scene's state, joint by joint in the scene's order.
 
     The numbers of directions add up to the number of constraint equations that depend on others.
     """
@@ -140,7 +140,7 @@ def indeterminate(scene: Scene) -> dict[str, Array]:
 
 
 def wrenches_in_words(found: Mapping[str, Array]) -> str:
-    """Which joints' wrenches are unique, and which components of the others are not, as `indeterminate` found."""
+    """Joints with unique wrenches, and the indeterminate components of the others, as `indeterminate` found."""
     groups: dict[tuple[bool, ...], list[str]] = {}
     for name, free in found.items():
         if free.any():
@@ -199,7 +199,7 @@ def _loop_lengths(before: Sequence[Hold], hold: Hold) -> list[float]:
 
 
 def _distances(holds: Sequence[Hold], start: int) -> dict[int, float]:
-    """How many holds lie between a body and each that can be reached from it."""
+    """Number of joints between a body and each body reachable from it."""
     beside: dict[int, list[int]] = {}
     for hold in holds:
         beside.setdefault(hold.body1, []).append(hold.body2)

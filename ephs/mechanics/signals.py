@@ -1,4 +1,4 @@
-"""What users give as inputs, as signals: constants, functions of time, functions of time and state."""
+"""Inputs as signals: constants, functions of time, functions of time and state."""
 
 from collections.abc import Callable
 from typing import Any
@@ -33,7 +33,7 @@ def signal(value: Any, *, effort: bool, name: str, size: int | None) -> Signal:
 
 
 def numbers_of(value: Any) -> Array | None:
-    """What was given as an array of numbers, None where it is none."""
+    """Input as an array of numbers, None where it is none."""
     try:
         return np.atleast_1d(np.asarray(value, dtype=float))
     except (TypeError, ValueError):

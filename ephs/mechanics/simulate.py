@@ -217,7 +217,7 @@ def control_of(
     max_step: float | None,
     max_steps: int | None,
 ) -> Control:
-    """How the steps of a problem are chosen.
+    """Control of the steps of a problem.
 
     Raises
     ------

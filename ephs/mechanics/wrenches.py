@@ -1,4 +1,4 @@
-"""What the joints of a mechanism transmit, from its bodies' equations of motion alone.
+"""Joint wrenches of a mechanism, from its bodies' equations of motion alone.
 
 The constraints A u + B u_r = 0 of all joints, differentiated once, and the balances of bodies and of massless joints,
 

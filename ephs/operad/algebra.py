@@ -146,7 +146,7 @@ class AlgebraMap(Generic[S, T]):
 
 
 class Element(Protocol):
-    """What can fill a box when a pattern is called: it says of which algebra it is."""
+    """Filling of a box when a pattern is called: it names its algebra."""
 
     @property
     def algebra(self) -> Algebra[Any]:

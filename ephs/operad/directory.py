@@ -13,7 +13,7 @@ T_co = TypeVar("T_co", covariant=True)
 S = TypeVar("S")
 
 Entries: TypeAlias = Mapping[Path, T] | Mapping[str, T] | Iterable[tuple[PathLike, T]]
-"""What a directory is made from: a mapping, or pairs, from path or dotted name to value."""
+"""Source of a directory: a mapping, or pairs, from path or dotted name to value."""
 
 
 @final

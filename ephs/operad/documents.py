@@ -87,7 +87,7 @@ def _described(quantity: Quantity) -> dict[str, Any]:
 
 
 def port_record(port: PortType) -> dict[str, Any]:
-    """What a port is, as part of a document."""
+    """Type of a port, as part of a document."""
     return quantity_record(port.quantity) | ({} if port.power else {"exposed": "state"})
 
 

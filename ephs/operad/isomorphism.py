@@ -80,7 +80,7 @@ def isomorphism(first: Pattern, second: Pattern, *, fix_interface: bool) -> Rena
 
 
 def automorphisms(pattern: Pattern, *, fix_interface: bool) -> int:
-    """How many renamings leave the pattern as it is; see `Pattern.automorphisms`.
+    """Number of renamings that leave the pattern as it is; see `Pattern.automorphisms`.
 
     By orbits and stabilisers: fix one node after the other, and multiply by the number of places that it could take.
     """

@@ -72,7 +72,7 @@ class Path(tuple[str, ...]):
         return other[: len(self)] == tuple(self)
 
     def relative_to(self, prefix: "Path") -> "Path":
-        """What continues the prefix: ``prefix / path.relative_to(prefix) == path``."""
+        """Remainder after the prefix: ``prefix / path.relative_to(prefix) == path``."""
         if not prefix.is_prefix_of(self):
             raise PatternError("path", found=str(self), expected=f"a path that starts with {prefix}")
         return _trusted(self[len(prefix) :])

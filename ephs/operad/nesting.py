@@ -67,12 +67,12 @@ class Nesting:
 
     @property
     def depth(self) -> int:
-        """How many levels there are."""
+        """Number of levels."""
         return 1 + max((child.depth for child in self.children.values()), default=0)
 
     @property
     def size(self) -> int:
-        """How many boxes it has when it is flattened."""
+        """Number of boxes of the flat pattern."""
         return len(self.pattern.boxes) + sum(child.size - 1 for child in self.children.values())
 
     def flatten(self) -> Pattern:

@@ -1,4 +1,4 @@
-"""What patterns are made of: junctions, ports and boxes."""
+"""Parts of a pattern: junctions, ports and boxes."""
 
 from dataclasses import dataclass
 from typing import final

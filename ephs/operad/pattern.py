@@ -156,7 +156,7 @@ class Pattern:
 
     @property
     def normal_form(self) -> NormalForm:
-        """What decides equality; computed once."""
+        """Key of equality; computed once."""
         found = self._normal
         if found is None:
             with paused_collector():
@@ -218,7 +218,7 @@ class Pattern:
         return call(self, read_fillings(mapping, fillings))
 
     def apply(self, algebra: "Algebra[T]", fillings: "Mapping[Path, T] | Mapping[str, T]") -> "T":
-        """What the pattern makes of an element of an algebra for each box.
+        """Value of the pattern in an algebra at an element for each box.
 
         Raises
         ------
@@ -363,7 +363,7 @@ class Pattern:
         return from_text(text)
 
     def lint(self) -> "list[Diagnostic]":
-        """What is legitimate but hardly ever meant: open-circuit ports, linked power balances."""
+        """Warnings for legitimate but rarely intended structure: open-circuit ports, linked power balances."""
         from ephs.operad.lint import diagnose
 
         return diagnose(self)

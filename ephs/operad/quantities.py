@@ -175,7 +175,7 @@ class Quantity:
 
 
 def _own(of: Quantity) -> list[str]:
-    """What tells a quantity of one's own from others, in words."""
+    """Difference of a user's quantity from others, in words."""
     low, high = of.domain
     carried = ", ".join(f"{name} {', '.join(f'{n:g}' for n in row)}" for name, row in of.charges)
     return [
@@ -188,7 +188,7 @@ def _own(of: Quantity) -> list[str]:
 @final
 @dataclass(frozen=True, slots=True)
 class PortType:
-    """What a port is: its quantity, and whether it bears power or only shares its state."""
+    """Type of a port: its quantity, and whether it bears power or only shares its state."""
 
     quantity: Quantity
     power: bool = True

@@ -60,7 +60,7 @@ def flatten(nesting: Nesting) -> Pattern:
 @final
 @dataclass(frozen=True, slots=True)
 class _Whole:
-    """What the flattened pattern is made of, as it grows."""
+    """Parts of the flattened pattern under construction."""
 
     junctions: dict[Path, Junction]
     boxes: dict[Path, Box]
@@ -147,7 +147,7 @@ def _redirected(ports: Mapping[Path, Port], moved: Mapping[Path, Path]) -> Direc
 
 
 def _through_identity(box: Path, nesting: Nesting) -> Nesting:
-    """What fills an identity's box, in the frames of the identity's interface."""
+    """Filling of an identity's box, in the frames of the identity's interface."""
     (child,) = nesting.children.values()
     interface = nesting.pattern.interface
     require_interface(box, interface, child.pattern.interface)

@@ -20,7 +20,7 @@ T = TypeVar("T")
 @final
 @dataclass(frozen=True, slots=True)
 class Translation(Generic[T]):
-    """What a pattern or a diagram became.
+    """Result of a translation.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def box_name(box: Path) -> str:
 
 
 def lost_of(pattern: Pattern) -> list[str]:
-    """What undirected wiring diagrams and hypergraphs have no word for: state ports, and states that are shared."""
+    """Features without a counterpart in undirected wiring diagrams and hypergraphs: state ports, and shared states."""
     lost = [
         f"port {box}.{name} reads the state of junction {port.junction} and bears no power"
         for box, content in pattern.boxes.items()

@@ -1,4 +1,4 @@
-"""What makes data a pattern: reading what the user wrote, and the conditions P1 to P5."""
+"""Well-formed patterns: reading of user input, and the conditions P1 to P5."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any, cast
@@ -91,7 +91,7 @@ def read_links(links: Iterable[Iterable[PathLike]], junctions: Mapping[Path, Jun
 
 
 def read_fillings(mapping: Mapping[Any, Any] | None, named: Mapping[str, Any]) -> dict[Path, Any]:
-    """What is put into boxes, by path: a mapping, and keywords for names without dots."""
+    """Fillings of boxes by path: a mapping, and keywords for names without dots."""
     pairs = cast("list[tuple[PathLike, object]]", [*(mapping or {}).items(), *named.items()])
     out: dict[Path, Any] = {}
     for name, filling in pairs:

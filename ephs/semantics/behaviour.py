@@ -1,4 +1,4 @@
-"""What a primitive imposes on its own port variables: in continuous time, or over one step.
+"""Relation of a primitive between its port variables: in continuous time, or over one step.
 
 The pattern glues either in the same way; this is why discretising commutes with composing.
 """

@@ -111,7 +111,7 @@ class Bundle:
         return tuple(dict.fromkeys(name for _, _, quantity in self.items() for name, _ in quantity.charges))
 
     def intensive(self, reference: Reference) -> Array:
-        """What to add to the exergetic efforts to have the energy efforts eᴱ = e + θ₀1_s − π₀1_v + Σ μ₀1_κ."""
+        """Difference from the exergetic efforts to the energy efforts eᴱ = e + θ₀1_s − π₀1_v + Σ μ₀1_κ."""
         out = np.zeros(self.size)
         for _, where, quantity in self.items():
             out[where] = reference.intensive(quantity)

@@ -46,7 +46,7 @@ STATEMENTS: dict[str, tuple[str, ...]] = {
         "a rotation has one M",
     ),
 }  # fmt: skip
-"""What is to hold, by the kind of primitive."""
+"""Conditions by the kind of primitive."""
 
 
 def random_point(
@@ -205,7 +205,7 @@ def dirac(skew: Array, constraint: Array) -> Subspace:
 
 
 def _apart(one: tuple[Array, Array], two: tuple[Array, Array]) -> float:
-    """How far two Dirac structures (L, C) are apart, relative to their entries: 0 where they are the same matrices."""
+    """Distance of two Dirac structures (L, C), relative to their entries: 0 where the matrices are equal."""
     scales = [max(float(np.abs(a).max(initial=0.0)), 1e-300) for a in (one[0], one[1])]
     same = [float(np.abs(a - b).max(initial=0.0)) / s for a, b, s in zip(one, two, scales, strict=True)]
     same[1] = min(same[1], float(np.abs(one[1] + two[1]).max(initial=0.0)) / scales[1])

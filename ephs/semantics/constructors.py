@@ -261,7 +261,7 @@ def _reversible(
     multipliers: int,
     domain: Bounds | None,
 ) -> Reversible:
-    """What reads states: as a formula where that can be traced."""
+    """Function of states, as a formula where it can be traced."""
     bounds, n = domain_of(name, interface, domain), Bundle.of(interface).size
     nothing = np.full((n, n), np.nan), np.full((multipliers, n), np.nan)
     return Reversible(
@@ -351,7 +351,7 @@ def _rows(interface: Interface, read: Callable[[Point], ArrayLike]) -> int:
 
 
 def _called(name: str, what: str, function: Callable[..., Any], values: Mapping[Path, Array]) -> Any:
-    """What a function of one's own gives; a logarithm of what is not positive names the state.
+    """Value of a user's function; a logarithm of a non-positive state names the state.
 
     Raises
     ------

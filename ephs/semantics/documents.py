@@ -22,7 +22,7 @@ __all__ = ["SCHEMA_FILE", "from_dict", "from_json", "to_dict", "to_json"]
 FORMAT = 1
 SCHEMA_FILE = FilePath(__file__).with_name("system.schema.json")
 LARGEST = 10_000_000
-"""How many primitives a system may have, those of parts that are used again counted again."""
+"""Limit on the number of primitives of a system, reused parts counted at each use."""
 _READ = Reader("system")
 
 

@@ -46,7 +46,7 @@ def _base(relation: Relation) -> str:
 
 
 def _rounding(*subspaces: Subspace) -> float:
-    """What projectors may differ by: 1e-13 times the condition of the eliminations; those of other relations differ by
+    """Tolerance for projectors: 1e-13 times the condition of the eliminations; those of other relations differ by
     a tenth and more."""
     return min(1e-6, 1e-13 * max(10.0, *(subspace.condition for subspace in subspaces)))
 

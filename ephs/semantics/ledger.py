@@ -22,7 +22,7 @@ State = Mapping[str, object]
 @final
 @dataclass(frozen=True, slots=True)
 class Account:
-    """What is stored: energy and exergy in J, up to a constant of each storage, entropy in J/K, volume in m³.
+    """Stored energy and exergy in J, up to a constant of each storage, entropy in J/K, volume in m³.
 
     Parameters
     ----------

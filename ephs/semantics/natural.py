@@ -29,7 +29,7 @@ __all__ = ["Solved", "solve_flat", "solve_nested", "step"]
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Solved:
-    """What solves a relation.
+    """Solution of a relation.
 
     Parameters
     ----------

@@ -234,7 +234,7 @@ def _plain(path: Path, primitive: Primitive, value: object) -> object:
 
 
 def _formula(primitive: Primitive) -> dict[str, Any]:
-    """What defines a primitive, in terms of its ports."""
+    """Definition of a primitive in terms of its ports."""
     if primitive.formula is None:
         raise Untraceable("a primitive without a formula")
     function, numbers = primitive.formula.function, dict(primitive.parameters)

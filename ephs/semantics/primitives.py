@@ -142,7 +142,7 @@ class Storage:
 
     @property
     def verdict(self) -> StructureVerdict:
-        """What is known of its structure: ``"proved"`` or ``"searched"``, with what was shown and how.
+        """Verdict on its structure: ``"proved"`` or ``"searched"``, with the conditions and their proofs.
 
         Raises
         ------
@@ -153,7 +153,7 @@ class Storage:
 
     @property
     def kind(self) -> Literal["storage", "environment"]:
-        """Which of the kinds of primitive this is."""
+        """Kind of primitive."""
         return "environment" if self.environment else "storage"
 
     @property
@@ -207,7 +207,7 @@ class Storage:
         return self._exchanged(x, reference) if self.environment else float(self.energy(x))
 
     def _exchanged(self, x: Point, reference: Reference) -> float:
-        """What the environment would hold of its energy in place of the storage, θ₀ s − π₀ v + Σ μ₀ n, in J."""
+        """Energy of the same states at the environment's intensities, θ₀ s − π₀ v + Σ μ₀ n, in J."""
         return sum(float(reference.intensive(q) @ x[p]) for p, _, q in self.bundle.items() if q.environment)
 
     @property
@@ -257,12 +257,12 @@ class Reversible:
 
     @property
     def verdict(self) -> StructureVerdict:
-        """What is known of its structure, as of a `Storage`."""
+        """Verdict on its structure, as of a `Storage`."""
         return self._verdict or _examined(self)
 
     @property
     def kind(self) -> Literal["reversible"]:
-        """Which of the kinds of primitive this is."""
+        """Kind of primitive."""
         return "reversible"
 
     @property
@@ -310,12 +310,12 @@ class Irreversible:
 
     @property
     def verdict(self) -> StructureVerdict:
-        """What is known of its structure, as of a `Storage`."""
+        """Verdict on its structure, as of a `Storage`."""
         return self._verdict or _examined(self)
 
     @property
     def kind(self) -> Literal["irreversible"]:
-        """Which of the kinds of primitive this is."""
+        """Kind of primitive."""
         return "irreversible"
 
     @property

@@ -45,7 +45,7 @@ class Probe:
 @final
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """How far a law is from holding, and how far rounding may put it."""
+    """Defect of a law, and the bound of its rounding."""
 
     defect: float
     tolerance: float

@@ -24,7 +24,7 @@ KERNELS = "ephs.semantics.pullback_kernels"
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Map:
-    """How the efforts at a port come from those at another: e' = matrix e.
+    """Map of the efforts at a port from those at another: e' = matrix e.
 
     Parameters
     ----------

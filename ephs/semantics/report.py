@@ -1,4 +1,4 @@
-"""What checking a system finds: its structure, whether it has equations, and the laws at random states."""
+"""Check report of a system: structure, equations, and laws at random states."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace

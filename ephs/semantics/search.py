@@ -27,13 +27,13 @@ DEFINED = 40
 SHRINKS = 2000
 """Trials on the way to the simplest counterexample, at most."""
 SHARES = (1.0, 1e-2, 1e-4, 1e-6, 1e-9, 0.0)
-"""How near to the identity to look where a structure has no finite values farther away."""
+"""Shares of the distance to the identity, tried where a structure has no finite values farther away."""
 UNDEFINED = ("finite", "undefined")
 """Kinds of failure that say no more than that the structure has no value there."""
 
 
 def failure(primitive: "Primitive", where: Trial) -> StructureError | None:
-    """What fails there, or None."""
+    """Failure at that point, or None."""
     try:
         with np.errstate(all="ignore"):  # what is not a number is found by its value
             check_at(primitive, where)

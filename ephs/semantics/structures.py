@@ -1,4 +1,4 @@
-"""What primitives are made of: quadratic and exponential energies, constant Dirac structures, dissipation."""
+"""Structures of primitives: quadratic and exponential energies, constant Dirac structures, dissipation."""
 
 import math
 from collections.abc import Callable

@@ -66,7 +66,7 @@ class System:
 
     @property
     def kind(self) -> Literal["composite"]:
-        """Which kind of filling this is."""
+        """Kind of filling."""
         return "composite"
 
     @property

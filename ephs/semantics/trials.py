@@ -89,7 +89,7 @@ class Trial:
     reference: Reference
 
     def witness(self, primitive: "Primitive", entry: tuple[int, ...] = (), size: float = 0.0) -> Witness:
-        """What to tell of it."""
+        """Text for a message."""
         efforts: dict[str, float | tuple[float, ...]] = {}
         if primitive.kind == "irreversible":
             energy = self.efforts + primitive.bundle.intensive(self.reference)

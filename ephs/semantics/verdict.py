@@ -1,4 +1,4 @@
-"""What is known of a primitive's structure: each condition is proved, or was searched for counterexamples in vain.
+"""Verdict on a primitive's structure: each condition is proved, or was searched for counterexamples in vain.
 
 A structure with a counterexample is refused: `StructureError`, with the smallest one found as its ``witness``.
 """

@@ -104,7 +104,7 @@ def animate(
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class _Stage:
-    """What is played."""
+    """Film that is played."""
 
     joints: dict[str, Any]
     springs: dict[str, Any]
@@ -168,7 +168,7 @@ class _Stage:
         return str(recording.as_html())
 
     def legend(self) -> str:
-        """What arrows and colours mean, and which meshes are missing, in a corner of the page."""
+        """Legend of arrows and colours, and missing meshes, in a corner of the page."""
         rows: list[str] = []
         if self.loads is not None:
             for kind, unit in (("force", "N"), ("moment", "N m")):
@@ -249,7 +249,7 @@ class _Stage:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class _Warm:
-    """What is drawn of a thermal node: the property that is its colour, and that colour when cold."""
+    """Appearance of a thermal node: the property that is its colour, and that colour when cold."""
 
     node: str
     drawn: Any

@@ -41,7 +41,7 @@ class Drawing:
 
     @property
     def faults(self) -> list[str]:
-        """What is wrong with the picture, in words; empty for author-placed and for small patterns."""
+        """Faults of the picture, in words; empty for author-placed and for small patterns."""
         return faults(self.placement)
 
     def save(self, path: str | FilePath) -> FilePath:

@@ -1,4 +1,4 @@
-"""What joints transmit: forces and moments over time."""
+"""Joint forces and moments over time."""
 
 from typing import TYPE_CHECKING, Any
 

@@ -221,14 +221,14 @@ def blots(placement: Placement) -> list[str]:
 
 
 def faults(placement: Placement) -> list[str]:
-    """What is wrong with the picture, in words: wires through foreign nodes, names on something."""
+    """Faults of the picture, in words: wires through foreign nodes, names on something."""
     through = [f"{wire} runs through {node}" for wire, node in trespasses(placement)]
     through += [f"{one} overlaps {other}" for one, other in overlaps(placement)]
     return through + [f"the name {name} lies on a wire, a node or another name" for name in blots(placement)]
 
 
 def crossings(placement: Placement) -> int:
-    """How many pairs of wires cross each other away from a common end."""
+    """Number of pairs of wires that cross each other away from a common end."""
     count = 0
     for index, first in enumerate(placement.wires):
         for second in placement.wires[index + 1 :]:

@@ -1,4 +1,4 @@
-"""What a picture of a pattern is about: nodes with sizes and edges, before anything has a place."""
+"""Graph of a pattern's picture: nodes with sizes and edges, before layout."""
 
 import itertools
 from collections.abc import Iterable, Mapping

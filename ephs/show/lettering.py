@@ -18,7 +18,7 @@ Place = tuple[Point, str, float]
 @final
 @dataclass(frozen=True, slots=True)
 class Sheet:
-    """What lettering has to keep off: discs, rows (x, y, radius), line pieces, and the lettering set before.
+    """Obstacles of lettering: discs, rows (x, y, radius), line pieces, and the lettering set before.
 
     `bounds` is the outer rectangle as left, top, right, bottom, if there is one already.
     """

@@ -1,4 +1,4 @@
-"""What moves, as plain arrays: poses of bodies at the frames of a film, extents, a place for the camera."""
+"""Motion as plain arrays: poses of bodies at the frames of a film, extents, a place for the camera."""
 
 import math
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What an animation can show beside the motion: forces and moments of joints as arrows, warmth as glow."""
+"""Overlays of an animation: forces and moments of joints as arrows, warmth as glow."""
 
 from dataclasses import dataclass
 from typing import Any, final

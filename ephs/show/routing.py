@@ -18,7 +18,7 @@ def straight(start: Point, end: Point, obstacles: Points) -> bool:
 
 
 def visible(start: Point, ends: Points, obstacles: Points) -> NDArray[np.bool_]:
-    """Which of the points `ends` (n, 2) can be reached straight, clear of all obstacles, rows (x, y, radius)."""
+    """Points of `ends` (n, 2) that can be reached straight, clear of all obstacles, rows (x, y, radius)."""
     if not len(obstacles):
         return np.ones(len(ends), dtype=bool)
     between = distances(obstacles[None, :, :2], np.array(start, dtype=float), ends[:, None, :])

@@ -1,4 +1,4 @@
-"""How bodies, joints and springs look in space."""
+"""Shapes of bodies, joints and springs in space."""
 
 import math
 from typing import Any

@@ -121,7 +121,7 @@ _SPOILS: dict[str, Callable[[Pattern, Mapping[Path, Any]], Filled]] = {
 @final
 @dataclass(frozen=True, slots=True)
 class LawCell:
-    """What was found of a law and an algebra.
+    """Result of a law for an algebra.
 
     Parameters
     ----------

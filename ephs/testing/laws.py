@@ -1,4 +1,4 @@
-"""What the laws of the operad speak of, as strategies; and a check of all of them."""
+"""Strategies for the laws of the operad, and a check of all laws."""
 
 from collections.abc import Callable, Iterable
 

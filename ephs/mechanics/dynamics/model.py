@@ -233,7 +233,7 @@ class Dynamics:
             return self.bias(state) - self._linear.inverse(q, r, s, np.zeros(self.layout.n))
 
     def jacobian(self, state: State, body: str, point: ArrayLike | None = None) -> Array:
-        """What the tree's rates do to a body.
+        """Jacobian from the tree's rates to a body's twist.
 
         Parameters
         ----------

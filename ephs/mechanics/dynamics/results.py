@@ -1,4 +1,4 @@
-"""What the dynamics of a mechanism give: states of bodies, constraints, energies, derivatives."""
+"""Results of the dynamics functions: states of bodies, constraints, energies, derivatives."""
 
 from dataclasses import dataclass
 from typing import final

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 LONGEST_NAME = 200
 WORLD = ""
-"""How joints name the ground: as no link is called."""
+"""Name of the ground in joints: no link has it."""
 _SCHEMES = ("package://", "model://", "file://")
 
 

@@ -1,4 +1,4 @@
-"""What URDF and SDF have in common: named elements, joints with a kind, links that joints name, inertia by entries."""
+"""Common elements of URDF and SDF: named elements, joints with a kind, links that joints name, inertia by entries."""
 
 from collections.abc import Callable, Iterable, Mapping
 from xml.etree.ElementTree import Element

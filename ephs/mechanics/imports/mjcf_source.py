@@ -118,7 +118,7 @@ class Source:
                     self._draft.faults.append(fault("finite", f"{element.tag}.{key}", f'"{value}"'))
 
     def _copies(self, element: Element) -> int:
-        """How many elements there are once those that are to be repeated are."""
+        """Number of elements after repetition."""
         inner = 1 + sum(map(self._copies, element))
         if element.tag != "replicate":
             return inner

@@ -70,7 +70,7 @@ def read_pose(element: Element, key: str, faults: list[Fault]) -> Array:
 
 
 def _default(element: Element) -> str:
-    """What a pose is relative to where it does not say so: a joint's child, what a frame is attached to, the model."""
+    """Default reference of a pose: a joint's child, the frame that it is attached to, the model."""
     if element.tag == "joint":
         child = (element.findtext("child") or "").strip()
         return MODEL if child == "world" else child

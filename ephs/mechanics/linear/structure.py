@@ -33,7 +33,7 @@ class Law:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class PortHamiltonian:
-    """What makes a linear system port-Hamiltonian: ½ xᵀ Q x is the exergy about an equilibrium, to second order.
+    """Port-Hamiltonian structure of a linear system: ½ xᵀ Q x is the exergy about an equilibrium, to second order.
 
     Parameters
     ----------

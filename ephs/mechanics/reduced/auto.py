@@ -84,7 +84,7 @@ class Auto(ReducedMethod):
         return self._implicit
 
     def taken(self, state: ReducedState) -> Snapshot:
-        """What its present method takes along, and how near it is to a switch."""
+        """Memory of its present method, and its distance to a switch."""
         return {
             "explicit": self._explicit.taken(state),
             "implicit": self._implicit.snapshot(state) if self._implicit is not None else None,

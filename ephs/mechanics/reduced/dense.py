@@ -126,7 +126,7 @@ class Dense:
         return q, r + change
 
     def opened(self, residual: Array, gap: float) -> SolveError:
-        """Which loop stays open, by the rows that `gaps` gives."""
+        """Loop that stays open, by the rows that `gaps` gives."""
         rows = self.reduced.tables.rows[self._cut]
         sizes = [
             float(np.abs(part).max(initial=0.0)) for part in np.split(residual[-rows.sum() :], np.cumsum(rows)[:-1])
@@ -136,7 +136,7 @@ class Dense:
         return SolveError(Outcome.OPEN, str(edge.path or ""), found)
 
     def _contradicted(self, left: Array, driven: int) -> SolveError:
-        """Which prescribed rate, or which loop, the others do not leave room for."""
+        """Prescribed rate or loop that contradicts the others."""
         worst = int(np.argmax(np.nan_to_num(left, nan=np.inf)))
         if worst < driven:
             places = np.flatnonzero(self.reduced.tables.driven)
@@ -147,7 +147,7 @@ class Dense:
         return SolveError(Outcome.CONTRADICTION, failed.path, "the velocities of the loop that it closes")
 
     def back(self, change: Array) -> Array:
-        """What takes a change of the rates (n,) back across the constraints, where loops were closed last."""
+        """Correction of a change of the rates (n,) across the constraints, where loops were closed last."""
         out = np.zeros(change.size)
         correct(self.work, self._rank, -self.work.row[: self._m] @ change, out)
         return out

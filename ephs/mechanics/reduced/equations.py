@@ -38,7 +38,7 @@ from ephs.semantics.spaces.rank import SPARSE
 __all__ = ["Equations", "ReducedState"]
 
 ASIDE = 0.1
-"""How far, in rad or m, a mechanism is moved to see which of its constraints repeat others wherever it is."""
+"""Displacement, in rad or m, that finds the constraints which repeat others in every configuration."""
 
 
 @final
@@ -299,7 +299,7 @@ class Equations:
         return component_path("bodies", str(self.reduced.bodies[link])) / "pe" / "q", "pose"
 
     def sizes(self, y0: Array, y1: Array) -> Array:
-        """What a relative tolerance is relative to: for increments 1 rad or m, for rates the joint's as a whole."""
+        """Reference of a relative tolerance: for increments 1 rad or m, for rates the joint's as a whole."""
         size = np.maximum(np.abs(y0), np.abs(y1))[self.counted]
         size[: self.n] = 1.0
         for i in range(self.reduced.links):
@@ -330,11 +330,11 @@ class Equations:
         return out
 
     def row(self, state: ReducedState) -> Row:
-        """What is kept of a state."""
+        """Record of a state."""
         return self.rows_of([state])[0]
 
     def rows_of(self, states: Sequence[ReducedState]) -> list[Row]:
-        """What is kept of many states."""
+        """Records of many states."""
         if not states:
             return []
         q, r, s = zip(*((state.q, state.r, state.s) for state in states), strict=True)

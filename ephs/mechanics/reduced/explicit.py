@@ -320,7 +320,7 @@ class _March:
         return ReducedState(t, q.copy(), rest[:n].copy(), rest[n : n + ns].copy(), rest[n + ns :].copy())
 
     def rows(self) -> list[tuple[float, ReducedState, float]]:
-        """What was kept since the last call: time, state, the step's least production."""
+        """Records since the last call: time, state, the step's least production."""
         sign = 1.0 if self.control[C_END] >= 0.0 else -1.0
         out: list[tuple[float, ReducedState, float]] = []
         for row, (times, q, y) in enumerate(zip(*self.kept(), strict=True)):
@@ -351,7 +351,7 @@ class _March:
 
     @property
     def counts(self) -> Counts:
-        """What it did so far."""
+        """Statistics so far."""
         c = self.control
         return Counts(
             int(c[C_STEPS]), int(c[C_REJECTED]), float(c[C_SHORTEST]), float(c[C_LONGEST]), float(c[C_LEAST]),

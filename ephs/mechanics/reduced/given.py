@@ -1,4 +1,4 @@
-"""What is given from outside: forces on joints and wrenches on bodies, put where the sweeps read them."""
+"""External inputs: forces on joints and wrenches on bodies, in the arrays that the sweeps read."""
 
 from collections.abc import Mapping
 from typing import Any, final

@@ -60,7 +60,7 @@ class Reduced:
 
     @property
     def coordinates(self) -> int:
-        """How many numbers the joints' elements are stored as."""
+        """Number of reals that store the joints' elements."""
         return sum(int(size) for size, kind in zip(self.tables.q_size, self.tables.kind, strict=True) if kind != SPRING)
 
     @property
@@ -232,7 +232,7 @@ def _tables(
 
 
 def _length(edges: list[Edge]) -> float:
-    """How far joints are from their bodies' centres, on the average: what makes rotations comparable to distances."""
+    """Mean distance of joints from their bodies' centres: the length that makes rotations comparable to distances."""
     far = [float(np.linalg.norm(offset[4:])) for edge in edges for offset in (edge.offset1, edge.offset2)]
     return float(np.mean([x for x in far if x > 0.0])) if any(x > 0.0 for x in far) else 1.0
 

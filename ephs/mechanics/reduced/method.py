@@ -1,4 +1,4 @@
-"""What every method on the reduced form is: a step, and around it what the time loop asks for."""
+"""Base of the methods on the reduced form: a step, and the contract of the time loop around it."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ from ephs.mechanics.solve.stepping import Attempt, Leg, Row, Span
 __all__ = ["ReducedMethod"]
 
 HALVINGS = 4
-"""How often a part of a step that fails is cut in two: the whole one succeeded."""
+"""Number of halvings of a failing part of a step whose whole succeeded."""
 
 
 class ReducedMethod(ABC):
@@ -88,11 +88,11 @@ class ReducedMethod(ABC):
         return replace(state, t=t)
 
     def row(self, state: ReducedState) -> Row:
-        """What is kept of it."""
+        """Record of a state."""
         return self.equations.row(state)
 
     def rows(self, states: Sequence[ReducedState]) -> list[Row]:
-        """What is kept of many."""
+        """Records of many states."""
         return self.equations.rows_of(states)
 
     def stats(self) -> dict[str, Any]:
@@ -100,7 +100,7 @@ class ReducedMethod(ABC):
         return self.equations.stats() | self.counts
 
     def snapshot(self, state: ReducedState) -> Snapshot | None:
-        """What it takes along from step to step besides its state, with its counts; None where it cannot say."""
+        """Memory from step to step besides the state, with its counts; None where it is unknown."""
         own = self.taken(state)
         return None if own is None else {"own": own, "counts": self.counts, "evaluations": self.equations.evaluations}
 

@@ -1,4 +1,4 @@
-"""What numbers of the reduced form are to a user: the joints, bodies and entropies that they belong to."""
+"""Joints, bodies and entropies of the components of the reduced form."""
 
 import numpy as np
 

@@ -1,1 +1,1 @@
-"""What a scene does not need: rewrites of its model, each with its condition, its strength and its reason in words."""
+"""Rewrites of a scene's model, each with its condition, its strength and its reason in words."""

@@ -73,7 +73,7 @@ class Loop:
 
     @property
     def rows(self) -> int:
-        """How many equations the loop imposes."""
+        """Number of equations of the loop."""
         return self.group.dim - self.freedoms
 
 

@@ -62,7 +62,7 @@ def _places(draft: Draft) -> Iterator[tuple[Path, ...]]:
 
 
 def _folds(draft: Draft, box: Path) -> Iterator["_Fold"]:
-    """What a box may fold: the junctions at which it determines the effort."""
+    """Junctions that a box may fold: those at which it determines the effort."""
     primitive = draft.fillings.get(box)
     found = None if primitive is None else _determining(primitive)
     if found is None or not isinstance(primitive, Reversible):
@@ -199,7 +199,7 @@ class _Fold:
 
 
 def _ends(draft: Draft, start: Path) -> int:
-    """How many of the junctions that determine one another's efforts cannot be folded; that of no effort is one."""
+    """Number of junctions in a cycle of efforts that cannot be folded; that of no effort is one."""
     seen, queue, ends, still = {start}, [start], 0, False
     while queue:
         here = queue.pop()

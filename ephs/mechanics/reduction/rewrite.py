@@ -22,7 +22,7 @@ State = Mapping[Path, Array]
 
 
 class Strength(StrEnum):
-    """What a rewrite leaves as it is."""
+    """Strength of a rewrite."""
 
     RELATION = "same relation"
     """At every state, all that the kept variables may be."""
@@ -39,7 +39,7 @@ def _same(state: State) -> dict[Path, Array]:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class StateMap:
-    """How states go to and fro.
+    """Map of states in both directions.
 
     Parameters
     ----------

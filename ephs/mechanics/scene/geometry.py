@@ -1,4 +1,4 @@
-"""How a joint couples two frames: the pairs and the universal joint behind one small interface, and poses
+"""Coupling of two frames by a joint: the pairs and the universal joint behind one small interface, and poses
 from axes.
 
 Poses are 7-vectors ``[w, x, y, z, rx, ry, rz]``; every twist is left-trivialised.
@@ -42,12 +42,12 @@ class Coupling:
 
     @property
     def size(self) -> int:
-        """How many numbers an element is stored as."""
+        """Number of reals that store an element."""
         return self.pair.size if self.middle is None else 2
 
     @property
     def turning(self) -> range:
-        """Which coordinates make up a rotation vector."""
+        """Coordinates that form a rotation vector."""
         return range(3) if self.middle is None and self.pair.code in (SO3_CODE, SE3_CODE) else range(0)
 
     def identity(self) -> Array:

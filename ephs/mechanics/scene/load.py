@@ -39,7 +39,7 @@ _LONG_KEY = re.compile(rf"(?<![\w-])(?:{_NAME}[ \t]*+\.[ \t]*+){{{MOST_LEVELS}}}
 @final
 @dataclass(frozen=True, slots=True)
 class _Reading:
-    """How files are read, and what is found in them: faults, odd inertias, what a model says more than its scene,
+    """Reading of files, and findings in them: faults, impossible inertias, elements of a model without a counterpart,
     and what is given of joints' states.
 
     ``home`` is the folder of the first file, outside of which none is read; ``files`` counts those that are.

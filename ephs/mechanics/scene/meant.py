@@ -66,7 +66,7 @@ def as_meant(scene: Scene) -> tuple[Scene, str, list[Fault]]:
 
 
 def _matrix(links: Sequence[Link], poses: Array, scale: Scale) -> Array:
-    """What joints forbid, on all bodies' twists, lengths as parts of the mechanism's."""
+    """Constraint rows of the joints on all bodies' twists, lengths relative to the mechanism's."""
     return np.vstack([rows for _, rows in _rows(links, poses, scale)])
 
 

@@ -1,4 +1,4 @@
-"""What is there: a scene with every default, frame and coordinate resolved to numbers.
+"""Resolved scene: every default, frame and coordinate as numbers.
 
 Poses are 7-vectors ``[w, x, y, z, rx, ry, rz]``; twists are 6-vectors (angular, linear) in the body's own
 frame. All arrays are read-only. Nothing here knows of files; `load` makes these values from them.

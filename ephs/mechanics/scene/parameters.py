@@ -104,7 +104,7 @@ class _Place:
         raise _unknown(scene, path)
 
     def entry(self, values: Array, scene: Scene) -> Any:
-        """What of the field's array is meant: an index, or a slice for all of it where one number stands for all."""
+        """Part of the field's array: an index, or a slice for all of it where one number stands for all."""
         if values.ndim == len(self.index) and all(i < n for i, n in zip(self.index, values.shape, strict=True)):
             return self.index
         if values.ndim == 2 and len(self.index) == 1 and self.index[0] < len(values):

@@ -64,7 +64,7 @@ class JointDraft:
     rate: Array | None
 
     def coupling(self) -> Coupling:
-        """What the joint allows."""
+        """Motions that the joint allows."""
         return coupling(self.kind, self.pitch, self.place.middle)
 
 

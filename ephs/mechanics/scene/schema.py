@@ -100,7 +100,7 @@ Inertia = Annotated[
 
 
 class Entry(BaseModel):
-    """What every table has in common: unknown keys are faults."""
+    """Base of all tables: unknown keys are faults."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 

@@ -116,7 +116,7 @@ def with_state(
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Asked:
-    """What a file gives of a joint's state: coordinates (d,) and rate (d,), None where it does not."""
+    """State of a joint by the file: coordinates (d,) and rate (d,), None where not given."""
 
     coordinates: Array | None
     rate: Array | None

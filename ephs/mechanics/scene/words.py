@@ -10,7 +10,7 @@ __all__ = ["scene_html", "scene_text"]
 
 
 def scene_text(scene: "Scene") -> str:
-    """What is there, a line each."""
+    """Contents of a scene, a line each."""
     lines = [f"scene {scene.name}" + (f" ({scene.source})" if scene.source else "")]
     g, w = scene.world.gravity, scene.world
     lines.append(f"  world: gravity [{g[0]:g}, {g[1]:g}, {g[2]:g}] m/s², {w.temperature:g} K, {w.pressure:g} Pa")

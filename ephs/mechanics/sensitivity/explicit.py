@@ -22,7 +22,7 @@ from ephs.semantics.bundle import Array
 __all__ = ["ExplicitTangent"]
 
 SMALL = 1e-3
-"""How far along a tangent states are taken, in rad, m, or relative to the rates."""
+"""Step along a tangent, in rad, m, or relative to the rates."""
 
 
 @final
@@ -180,11 +180,11 @@ class ExplicitTangent:
     # ---- what is kept ------------------------------------------------------------------------------------------
 
     def size(self, point: Point, number: int) -> float:
-        """How far a unit of a parameter moves the state."""
+        """Change of the state by a unit of a parameter."""
         return float(max(np.abs(point.q[number]).max(initial=0.0), np.abs(point.y[number]).max(initial=0.0)))
 
     def row(self, point: Point) -> Row:
-        """What is kept of a state."""
+        """Record of a state."""
         return self.equations.row(point.state)
 
     def beside(self, number: int, offset: float, points: list[Point]) -> tuple[Problem, list[Row]]:

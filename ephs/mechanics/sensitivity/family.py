@@ -34,7 +34,7 @@ RELATIVE = 1e-3
 """A neighbour's distance, relative to the parameter, or absolute where that is zero."""
 SIGNED = ("position", "at", "at1", "at2", "coordinate", "rate", "rest", "drive", "gravity", "velocity")
 LEAST = 0.1
-"""What numbers of a scene that may have either sign count at least for, in m, rad, s, N: near zero they say nothing of
+"""Least magnitudes for numbers of a scene with either sign, in m, rad, s, N: near zero they say nothing of
 their own size."""
 
 

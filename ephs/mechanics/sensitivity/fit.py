@@ -149,7 +149,7 @@ def fit(
 
 @final
 class _Record:
-    """What was recorded, as one vector."""
+    """Recorded values as one vector."""
 
     def __init__(self, model: System | Scene, data: Mapping[str, "ArrayLike"], sigma: Mapping[str, float]) -> None:
         if "t" not in data or len(data) < 2:

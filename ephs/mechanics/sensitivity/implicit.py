@@ -26,7 +26,7 @@ from ephs.semantics.spaces.rank import IMPLICIT
 __all__ = ["NaturalTangent"]
 
 SMALL = 1e-3
-"""How far along a tangent states are taken, relative to them where they are large."""
+"""Step along a tangent, relative to states where they are large."""
 
 
 @final
@@ -164,11 +164,11 @@ class NaturalTangent:
     # ---- what is kept ------------------------------------------------------------------------------------------
 
     def size(self, point: Point, number: int) -> float:
-        """How far a unit of a parameter moves the state."""
+        """Change of the state by a unit of a parameter."""
         return float(np.abs(point.x[number]).max(initial=0.0))
 
     def row(self, point: Point) -> Row:
-        """What is kept of a state."""
+        """Record of a state."""
         return self._row(self.side.model, point.state.x, point.state.sums)
 
     def beside(self, number: int, offset: float, points: list[Point]) -> tuple[Problem, list[Row]]:

@@ -1,4 +1,4 @@
-"""What of a solution is read, by name: for derivatives and for recorded motions."""
+"""Readings of a solution by name: for derivatives and for recorded motions."""
 
 from collections.abc import Callable
 
@@ -16,7 +16,7 @@ Reading = Callable[[Solution], Array]
 
 
 def reading_of(model: System | Scene, name: str) -> Reading:
-    """What reads a name from a solution of a model: the names are those of `ephs.sweep`'s outputs, a state's path,
+    """Reader of a name from a solution of a model: the names are those of `ephs.sweep`'s outputs, a state's path,
     ``joints.pin.coordinate``, ``bodies.rod.position``, ``markers.tip.velocity``, ``thermal.housing.temperature``,
     ``heat``; brackets choose an entry: ``joints.pin.coordinate[0]``.
 

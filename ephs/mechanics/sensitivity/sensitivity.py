@@ -25,7 +25,7 @@ __all__ = ["METHODS", "Sensitivity", "sensitivity"]
 
 METHODS = ("rk54", "rk87", "natural")
 NEAR = 1e-3
-"""How far readings are taken along a tangent, as states move."""
+"""Step of readings along a tangent, as states move."""
 
 
 @final

@@ -22,7 +22,7 @@ __all__ = ["Analysis", "analyse"]
 
 SHRUNK = 1e-6
 DEFECT = 1e-11
-"""What a dropped equation may be violated by, relative to its terms; more asks for another rank decision."""
+"""Tolerance for a dropped equation, relative to its terms; more asks for another rank decision."""
 
 ALIKE = 1e-6
 """Unknowns that null vectors move by the same but for this share are moved alike."""

@@ -1,4 +1,4 @@
-"""Which equation a step failed at: the one that is left farthest from zero, by its component and in words."""
+"""Report of the equation with the largest residual at a failed step, by its component and in words."""
 
 from typing import final
 
@@ -26,7 +26,7 @@ class Blame:
         self.model, self._dropped = model, dropped == 1
 
     def diverged(self, residual: Array, scale: Array) -> SolveError:
-        """What an iteration that came to nothing left farthest from zero; (stages, rows) or (rows,) each."""
+        """Equation with the largest residual of a failed iteration; (stages, rows) or (rows,) each."""
         size = self.model.unknowns
         with np.errstate(all="ignore"):
             worst = np.abs(residual.reshape(-1, size)) / self._scales(scale.reshape(-1, size).max(axis=0))
@@ -34,7 +34,7 @@ class Blame:
         return self._of(Outcome.DIVERGED, ratio)
 
     def contradicted(self, x: Array, z: Array, h: float) -> SolveError:
-        """Which of the equations that were left out does not hold at a solution of the others."""
+        """Omitted equation that a solution of the others violates."""
         status, _, memory = evaluate_at(self.model, x, z, h)
         if status:
             return SolveError(Outcome.CONTRADICTION, "", "")

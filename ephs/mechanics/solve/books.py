@@ -71,7 +71,7 @@ class Entry:
         return self.entropy - self.entropy[:1] - self.made
 
     def __str__(self) -> str:
-        """What happened from the first to the last instant, here and one level below."""
+        """Totals from the first to the last instant, here and one level below."""
         cells = self.rows()
         widths = [max(len(row[i]) for row in cells) for i in range(len(cells[0]))]
         return "\n".join(

@@ -102,7 +102,7 @@ def _inner_unknowns(model: Model) -> list[Index]:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class _System:
-    """What is left of the equations: entries, and right sides of all rows."""
+    """Condensed equations: entries, and right sides of all rows."""
 
     row: Index
     column: Index

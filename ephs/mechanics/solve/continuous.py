@@ -73,7 +73,7 @@ class Continuous:
         return Matrices(whole(unknowns), whole(states))
 
     def powers(self, x: Array, z: Array, inputs: Array) -> tuple[Array, float]:
-        """What flows into the ledgers, per second, (4 + components,): heat, energy, exergy supplied, entropy made, and
+        """Rates of the ledgers, per second, (4 + components,): heat, energy, exergy supplied, entropy made, and
         the entropy made by each component; and the least entropy production of a component in W/K."""
         self._evaluate(x, z, self._still, inputs)
         sums = np.zeros(4 + self.model.tables.kind.size)

@@ -1,4 +1,4 @@
-"""How steps are chosen: tolerances by quantity, limits, and the controllers."""
+"""Step control: tolerances by quantity, limits, and the controllers."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -91,7 +91,7 @@ class Tolerance:
 @final
 @dataclass(frozen=True, slots=True)
 class Control:
-    """How steps are chosen.
+    """Step control.
 
     Parameters
     ----------
@@ -157,14 +157,14 @@ def told_apart(t0: float, until: float, step: float | None) -> None:
 
 
 class Policy(Protocol):
-    """What a step's estimated error, relative to what is allowed, makes of the step."""
+    """Verdict on a step by its estimated error relative to the tolerance."""
 
     def judge(self, h: float, error: float, span: float) -> tuple[bool, float]:
         """(whether it is accepted, the length of the next one or of the next try); span is that of the whole run."""
         ...
 
     def snapshot(self) -> Snapshot:
-        """What it remembers of the steps before."""
+        """Memory of earlier steps."""
         ...
 
     def restore(self, snapshot: Snapshot) -> None:
@@ -215,7 +215,7 @@ class Proportional:
         return True, h * min(most, max(0.3, factor))
 
     def snapshot(self) -> Snapshot:
-        """What it remembers of the steps before."""
+        """Memory of earlier steps."""
         return {"before": float(self._before), "failed": self._failed}
 
     def restore(self, snapshot: Snapshot) -> None:
@@ -258,7 +258,7 @@ class Symmetric:
         return False, wanted
 
     def snapshot(self) -> Snapshot:
-        """What it remembers of the steps before."""
+        """Memory of earlier steps."""
         return {"tries": self._tries}
 
     def restore(self, snapshot: Snapshot) -> None:

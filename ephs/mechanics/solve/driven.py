@@ -53,7 +53,7 @@ class ComponentMethod(Protocol):
         ...
 
     def snapshot(self) -> Snapshot:
-        """What it takes along from step to step besides its state."""
+        """Memory from step to step besides the state."""
         ...
 
     def restore(self, snapshot: Snapshot) -> None:

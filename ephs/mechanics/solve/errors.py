@@ -1,4 +1,4 @@
-"""How a run can fail: named outcomes with time, component, equation, advice, and what was computed so far."""
+"""Failures of a run: named outcomes with time, component, equation, advice, and the partial solution."""
 
 from collections.abc import Generator, Iterable
 from contextlib import contextmanager
@@ -24,7 +24,7 @@ __all__ = [
 
 
 class Outcome(StrEnum):
-    """What ended a run, in words; `advice` says what to do."""
+    """Cause that ended a run, in words; `advice` says what to do."""
 
     DIVERGED = "the step's equations have no solution near by"
     SINGULAR = "the step's equations stay singular"
@@ -53,7 +53,7 @@ class Outcome(StrEnum):
 
     @property
     def advice(self) -> str:
-        """What to do about it."""
+        """Advice for the user."""
         return _ADVICE[self]
 
 
@@ -157,7 +157,7 @@ class SolveError(Exception):
 
     @classmethod
     def of_component(cls, status: int, model: "Model", component: int) -> "SolveError":
-        """What a component's kernel reported."""
+        """Outcome by the status of a component's kernel."""
         callback = model.callbacks.get(component)
         cause = callback.raised if callback else None
         outcome = _OF_KERNEL.get(status % 10, Outcome.DIVERGED)
@@ -173,7 +173,7 @@ class SolveError(Exception):
 
 
 def solve_error_of(error: Exception) -> SolveError:
-    """What went wrong in the arithmetic of a step: NumPy's and Python's own exceptions by the names of outcomes."""
+    """Arithmetic errors of a step: NumPy's and Python's own exceptions by the names of outcomes."""
     if isinstance(error, SolveError):
         return error
     outcome = Outcome.RANGE if isinstance(error, ArithmeticError) else Outcome.SINGULAR
@@ -182,7 +182,7 @@ def solve_error_of(error: Exception) -> SolveError:
 
 @contextmanager
 def failing_at(t: float) -> Generator[None, None, None]:
-    """What fails inside the solver at a time t in s becomes an error for users, without a partial solution."""
+    """A failure inside the solver at a time t in s as an error for users, without a partial solution."""
     try:
         yield
     except SolveError as error:

@@ -143,7 +143,7 @@ class Watch:
         return None
 
     def snapshot(self) -> Snapshot:
-        """What has happened, and the functions' values."""
+        """Events so far, and the functions' values."""
         return {"before": self._before, "crossings": [crossing.record() for crossing in self.crossings]}
 
     def restore(self, snapshot: Snapshot) -> None:

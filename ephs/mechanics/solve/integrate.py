@@ -139,7 +139,7 @@ class _Inside:
         return chunk.x[-1], chunk.energies[-1], chunk.ledgers[-1]
 
     def snapshot(self) -> Snapshot | None:
-        """What it takes along from one time to the next."""
+        """Memory from one time to the next."""
         return None if self._method is None else self._method.snapshot()
 
     def restore(self, snapshot: Snapshot | None) -> None:
@@ -183,7 +183,7 @@ def failures_of(run: Run) -> Generator[None, None, None]:
 def audited(
     problem: Problem, record: Record, stats: Mapping[str, Any], bounds: Bounds | None, ends: list[Record]
 ) -> Solution:
-    """What was kept of a run, with the audit of the run from its start to where it stands.
+    """Kept part of a run, with the audit from its start to the present time.
 
     Parameters
     ----------
@@ -201,7 +201,7 @@ def audited(
 
 
 def solution_of(problem: Problem, record: Record, stats: Mapping[str, Any]) -> Solution:
-    """What was kept of a run, as users read it."""
+    """Kept part of a run, as a solution."""
     while problem.shown is not None:
         problem, record, stats = problem.shown(record, stats)
     states = {slot.path: coordinates(slot.quantity, record.x[:, slot.point]) for slot in problem.descriptor.states}
@@ -302,7 +302,7 @@ class _Run:
             self.t = float(times[-1])
 
     def stats(self) -> dict[str, Any]:
-        """What the run did so far."""
+        """Statistics of the run so far."""
         return {
             "method": self.stepper.name,
             **self.problem.remarks,

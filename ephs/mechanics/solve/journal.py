@@ -36,7 +36,7 @@ _DTYPES = ("<f8", "<i8", "|b1", "<c16")
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Contents:
-    """What a journal holds.
+    """Content of a journal.
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ class Written:
 
 
 def read_journal(path: str | os.PathLike[str]) -> Contents:
-    """What a journal holds, as far as it was written.
+    """Content of a journal, as far as it was written.
 
     Raises
     ------
@@ -252,7 +252,7 @@ def _same(path: Path, found: Mapping[str, Any], wanted: Mapping[str, Any]) -> No
 
 
 def _flat(value: Any, key: str = "") -> dict[str, Any]:
-    """What is in nested mappings, by dotted keys."""
+    """Entries of nested mappings by dotted keys."""
     if not isinstance(value, dict):
         return {key: value}
     return {k: v for name, item in value.items() for k, v in _flat(item, f"{key}.{name}" if key else name).items()}

@@ -1,4 +1,4 @@
-"""What the numbers of a state are called, and their units."""
+"""Names and units of the components of a state."""
 
 from dataclasses import dataclass
 from typing import final
@@ -53,7 +53,7 @@ _WHOLE = {
 
 
 def labels_of(quantity: Quantity) -> Labels:
-    """What the components of a state are called, as solutions give it: relative poses in the joint's coordinates."""
+    """Names of the components of a state in solutions: relative poses in the joint's coordinates."""
     space = quantity.space
     if quantity.kind == "relative_pose" and space.name in PAIRS:
         return freedoms(Pair.from_space(space))
@@ -85,7 +85,7 @@ def freedoms(of: Pair) -> Labels:
 
 
 def power_labels(quantity: Quantity, *, effort: bool) -> Labels:
-    """What the components of a flow or an effort at a port are called."""
+    """Names of the components of a flow or an effort at a port."""
     of = labels_of(quantity)
     if of.dimension == "pose":  # flows of poses are twists
         return Labels("twist", TWIST.names, WRENCH.units if effort else TWIST.units)

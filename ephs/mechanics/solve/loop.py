@@ -33,7 +33,7 @@ BLOCK = 1024
 FIRST = 1e-4
 """Part of the time span that the first step takes: too long it is rejected, too short it grows fast."""
 FINAL = (Outcome.PYTHON, Outcome.UNSUITED, Outcome.INPUT, Outcome.EVENT, Outcome.INCONSISTENT, Outcome.INTERRUPTED)
-"""What a shorter step does not mend."""
+"""Failures that a shorter step does not mend."""
 
 
 def integrate_stepwise(
@@ -268,7 +268,7 @@ class _Run(Generic[S]):
         return States(self.problem.descriptor.unpack(row.x))
 
     def stats(self) -> dict[str, Any]:
-        """What the run did so far."""
+        """Statistics of the run so far."""
         least = float(self.least) if np.isfinite(self.least) else 0.0
         crossings: list[Crossing] = self.watch.crossings if self.watch else []
         return {
@@ -303,7 +303,7 @@ class _Run(Generic[S]):
         return [_record([t], [row], [0.0]) for t, row in rows]
 
     def _settle(self) -> None:
-        """What is pending, as it is kept."""
+        """Pending part, as it is kept."""
         if self.pending:
             rows = self.stepper.rows([state for _, state, _ in self.pending])
             self.kept.add(_record([t for t, _, _ in self.pending], rows, [least for _, _, least in self.pending]))

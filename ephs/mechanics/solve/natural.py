@@ -286,5 +286,5 @@ def stored_energies(model: Model, x: Array) -> Array:
 
 
 def of_status(status: int) -> SolveError:
-    """What the compiled loop reported of a step as a whole."""
+    """Outcome of a step as a whole by the compiled loop's status."""
     return SolveError(_OUTCOMES[status], "", "")

@@ -87,11 +87,11 @@ class Paced:
         return replace(state, t=t)
 
     def rows(self, states: Sequence[PacedState]) -> list[Row]:
-        """What is kept of many."""
+        """Records of many states."""
         return [self.row(state) for state in states]
 
     def row(self, state: PacedState) -> Row:
-        """What is kept of it."""
+        """Record of a state."""
         return state.kept
 
     def stats(self) -> dict[str, Any]:
@@ -105,7 +105,7 @@ class Paced:
         }
 
     def snapshot(self, state: PacedState) -> Snapshot:
-        """What it takes along from step to step besides its state."""
+        """Memory from step to step besides the state."""
         return {"method": self.method.snapshot(), "iterations": self._iterations}
 
     def restore(self, snapshot: Snapshot, state: PacedState) -> None:

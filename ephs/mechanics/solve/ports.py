@@ -1,4 +1,4 @@
-"""What an outer port carried: flow, effort, power, by the continuous relations at each kept instant."""
+"""Flow, effort and power at an outer port, by the continuous relations at each kept instant."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, final

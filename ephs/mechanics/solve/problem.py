@@ -1,4 +1,4 @@
-"""What a solver is given: a system, its initial states, what is prescribed at its outer ports, and its surroundings."""
+"""Problem of a solver: a system, its initial states, inputs at its outer ports, and its surroundings."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -127,11 +127,11 @@ class Motion(Protocol):
         ...
 
     def summary(self) -> dict[str, Any]:
-        """What it adds to the summary."""
+        """Additions to the summary."""
         ...
 
     def variables(self, *, wrenches: bool) -> "dict[str, Variable]":
-        """What it adds to labelled arrays."""
+        """Additions to labelled arrays."""
         ...
 
 

@@ -166,11 +166,11 @@ class Radau:
         return replace(state, t=t)
 
     def rows(self, states: Sequence[RadauState]) -> list[Row]:
-        """What is kept of many."""
+        """Records of many states."""
         return [self.row(state) for state in states]
 
     def row(self, state: RadauState) -> Row:
-        """What is kept of it."""
+        """Record of a state."""
         energies = self.equations.energies(state.x, state.z, self.inputs(state.t, state.x))
         return Row(state.x, np.where(self._makers, state.sums[4:], energies), state.sums[:4])
 
@@ -217,7 +217,7 @@ class Radau:
         return stages, state.x + h * COEFFICIENTS[-1] @ stages[:, : self._rates], iterations
 
     def _powers(self, state: RadauState, h: float, stages: Array) -> tuple[Array, float]:
-        """What flows into the ledgers at the stages, per second, (3, 4 + components); and the least entropy production
+        """Rates of the ledgers at the stages, per second, (3, 4 + components); and the least entropy production
         of a component at a stage, times the step."""
         xs = state.x + h * COEFFICIENTS @ stages[:, : self._rates]
         found = [

@@ -1,4 +1,4 @@
-"""What a run keeps: every step, or dense output at the times asked for."""
+"""Recording of a run: every step, or dense output at the times asked for."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -22,7 +22,7 @@ class Inside(Protocol):
         ...
 
     def snapshot(self) -> Snapshot | None:
-        """What it takes along from one time to the next."""
+        """Memory from one time to the next."""
         ...
 
     def restore(self, snapshot: Snapshot | None) -> None:
@@ -63,7 +63,7 @@ def joined(records: Sequence[Record]) -> Record | None:
 
 @final
 class Rows:
-    """What was kept so far, block by block, and how much of it a journal has."""
+    """Kept instants, block by block, and the number that a journal has."""
 
     def __init__(self) -> None:
         self._blocks: list[Record] = []
@@ -76,7 +76,7 @@ class Rows:
             self._written = len(self._blocks)
 
     def fresh(self) -> Record | None:
-        """What came since this was last asked for."""
+        """Instants since the last call."""
         found = joined(self._blocks[self._written :])
         self._written = len(self._blocks)
         return found

@@ -29,7 +29,7 @@ EACH, MOST = 150, 6
 STILL = 1e-6
 """Part of the gross energies below which a run of such steps moves nothing."""
 SHORTER = 16
-"""How often a step is divided by four to find one that would do."""
+"""Number of divisions of a step by four in the search for one that resolves the motion."""
 ROUNDED = 1e4 * float(np.finfo(float).eps)
 """Part of the energies that differences of solved steps have lost to rounding."""
 

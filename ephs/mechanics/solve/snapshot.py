@@ -19,7 +19,7 @@ def parts(value: Any) -> Any:
 
 
 def like(template: V, found: Any) -> V:
-    """What `parts` took apart, of the class of ``template``."""
+    """Object of the class of ``template`` from the parts that `parts` gave."""
     if is_dataclass(template):
         whole = {field.name: like(getattr(template, field.name), found[field.name]) for field in fields(template)}
         return type(template)(**whole)

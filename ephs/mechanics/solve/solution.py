@@ -126,12 +126,12 @@ class Solution:
 
     @cached_property
     def audit(self) -> Audit:
-        """What the audit of the run found; nothing of a solution without one."""
+        """Findings of the audit; empty for a solution without one."""
         return Audit.of_record(self.stats.get("audit", Audit().record()))
 
     @cached_property
     def inputs(self) -> Mapping[Path, Variable]:
-        """What was prescribed at each outer port, with names and units: ``.values`` (n, d)."""
+        """Prescribed values at each outer port, with names and units: ``.values`` (n, d)."""
         if self._inputs is not None or self.problem is None:
             return self._inputs or {}
         return sampled_inputs(self.problem, self.t, self.state_at if self.motion is None else self.motion.state)

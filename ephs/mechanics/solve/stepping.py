@@ -1,4 +1,4 @@
-"""What the time loop asks of a method: steps one a call, or many; what a step and what is kept are."""
+"""Contract between the time loop and a method: steps one a call, or many; steps and records."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ S = TypeVar("S")
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Row:
-    """What is kept at one instant.
+    """Record of one instant.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class Attempt(Generic[S]):
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Span(Generic[S]):
-    """What is left of a run: from a state to a time, by steps of which the next one is h seconds long.
+    """Remainder of a run: from a state to a time, by steps of which the next one is h seconds long.
 
     ``save_at`` are the times to keep, of which ``saved`` are kept already; None: every step. Without a ``policy`` steps
     are constant.
@@ -108,7 +108,7 @@ class Leg(Protocol[S]):
         ...
 
     def rows(self) -> list[tuple[float, S, float]]:
-        """What was kept since the last call: time, state, the least production in its step."""
+        """Records since the last call: time, state, the least production in its step."""
         ...
 
     @property
@@ -123,7 +123,7 @@ class Leg(Protocol[S]):
 
     @property
     def counts(self) -> Counts:
-        """What it did so far."""
+        """Statistics so far."""
         ...
 
     def snapshot(self) -> Snapshot:
@@ -159,7 +159,7 @@ class Stepper(Protocol[S]):
         ...
 
     def many(self, span: Span[S]) -> Leg[S] | None:
-        """What takes many steps in one compiled call; None where there is no such, or where inputs must be asked."""
+        """Compiled run of many steps; None where there is none, or where inputs must be evaluated in Python."""
         ...
 
     def inside(self, attempt: Attempt[S], t: float) -> S:
@@ -171,11 +171,11 @@ class Stepper(Protocol[S]):
         ...
 
     def row(self, state: S) -> Row:
-        """What is kept of it."""
+        """Record of a state."""
         ...
 
     def rows(self, states: Sequence[S]) -> list[Row]:
-        """What is kept of many."""
+        """Records of many states."""
         ...
 
     def stats(self) -> dict[str, Any]:
@@ -183,7 +183,7 @@ class Stepper(Protocol[S]):
         ...
 
     def snapshot(self, state: S) -> Snapshot | None:
-        """What it takes along from step to step besides its state, where that is ``state``: from both a method made
+        """Memory from step to step besides the state ``state``: from both a method made
         anew takes the very same steps. None where it cannot say; a run that is resumed then begins anew."""
         ...
 

@@ -25,7 +25,7 @@ def table(title: str, head: Sequence[str], rows: Iterable[Sequence[str]]) -> str
 
 
 def solution_table(solution: "Solution") -> str:
-    """What a run did, in a few lines: time, steps, balances."""
+    """Summary of a run in a few lines: time, steps, balances."""
     if not len(solution):
         return table(repr(solution), (), ())
     made = float(solution.entropy[-1] - solution.entropy[0])

@@ -14,7 +14,7 @@ Made = TypeVar("Made")
 
 @final
 class _Limit:
-    """How many calls want one thread: the first of them sets it, the last sets back what was."""
+    """Number of calls that want one thread: the first sets it, the last restores the former number."""
 
     __slots__ = ("_before", "_calls", "_lock")
 

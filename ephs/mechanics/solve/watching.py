@@ -1,4 +1,4 @@
-"""What a run tells while it goes on: how far energy is out of balance, and what asks for it."""
+"""Progress of a run: the defect of its energy balance, and the callback for it."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, final

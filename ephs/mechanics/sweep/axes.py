@@ -1,4 +1,4 @@
-"""What a sweep varies: paths, their values, and the members that these make."""
+"""Axes of a sweep: paths, their values, and the resulting members."""
 
 import re
 from collections.abc import Mapping
@@ -66,7 +66,7 @@ class Axes:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """How the members are arranged."""
+        """Arrangement of the members."""
         return (self.values[0].size,) if self.paired else tuple(found.size for found in self.values)
 
     @property
@@ -76,7 +76,7 @@ class Axes:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What the paths are called in the table, where a joint's coordinate is that at any time, not the initial."""
+        """Names of the paths in the table, in which a joint's coordinate is that at any time, not the initial one."""
         initial = [
             path.startswith("joints.") and re.search(r"\.(coordinate|rate)[\[\]\d]*$", path) for path in self.paths
         ]

@@ -69,7 +69,7 @@ class _Made:
         return [*tables, eq.drive, eq.wrench, eq.scal, self.start.q, self.start.r, self.start.s]
 
     def counts(self) -> list[Any]:
-        """What has to be the same in all members."""
+        """Structure that all members share."""
         return [a for a in self._tables() if a.dtype != np.float64]
 
     def _tables(self) -> list[Any]:
@@ -86,7 +86,7 @@ class _Made:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class _Course:
-    """How an image follows the value of one path, as α + β·value + γ/value, by three of its values.
+    """Dependence of an image on the value of one path, as α + β·value + γ/value, by three of its values.
 
     Parameters
     ----------
@@ -323,7 +323,7 @@ _CHOSEN: Any = True
 
 
 def _reading(equations: Equations, output: Output) -> Any:
-    """How an output is read from rows of elements and of rates, entropies and books.
+    """Reader of an output from rows of elements and of rates, entropies and ledgers.
 
     Raises
     ------

@@ -58,7 +58,7 @@ class Batch:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Job:
-    """What is to be run.
+    """Specification of a run.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ class Job:
 
     @staticmethod
     def document(model: "Scene | System") -> "str | System":
-        """How a job holds a model."""
+        """Form in which a job holds a model."""
         return scene_to_text(model) if isinstance(model, Scene) else model
 
     def run(self, numbers: Index) -> Batch:

@@ -1,4 +1,4 @@
-"""What is kept of every member, by name, and how it is read from a solution."""
+"""Outputs of every member by name, and their readers."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -69,7 +69,7 @@ _OF = {"joints": JOINT, "bodies": tuple(_BODY), "thermal": ("temperature",), "ma
 
 
 def kind_of(kind: str) -> str:
-    """How a solution calls what a scene file has under a heading."""
+    """Names in a solution by headings of a scene file."""
     return {"joints": "joint", "bodies": "body", "thermal": "thermal", "markers": "marker"}[kind]
 
 

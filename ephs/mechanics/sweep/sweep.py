@@ -35,7 +35,7 @@ BATCHES = 16
 MOST = 256
 """Members in a batch at most."""
 RETRIES = 5
-"""How often the members of a worker that was lost are run anew."""
+"""Number of retries for members of a lost worker."""
 _OPTIONS = ("method", "rtol", "atol", "step", "min_step", "max_step", "max_steps", "form", "inputs", "options",
             "reference")  # fmt: skip
 

@@ -15,7 +15,7 @@ __all__ = ["Cost", "cost", "counting"]
 @final
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """How large a part is.
+    """Size of a part.
 
     Parameters
     ----------

@@ -42,7 +42,7 @@ def _subtract(row: dict[C, Fraction], factor: Fraction, other: Mapping[C, Fracti
 def eliminated(
     rows: Iterable[Mapping[C, Any]], kept: Iterable[C], order: Callable[[C], Any]
 ) -> list[dict[C, Fraction]]:
-    """What the equations say of the kept unknowns alone: ∃ the others, in reduced form."""
+    """Equations in the kept unknowns alone: ∃ the others, in reduced form."""
     stay = set(kept)
     first = reduced(rows, lambda key: (key in stay, order(key)))
     return [row for row in first if row.keys() <= stay]

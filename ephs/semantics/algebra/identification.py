@@ -78,4 +78,4 @@ def _base(element: Meaning) -> Corelation:
 
 
 base: AlgebraMap[Meaning, Corelation] = AlgebraMap(relations, corelations, _base, "base")
-"""What a relation says of states at its outer ports: which of them are one."""
+"""Identification of the states at a relation's outer ports."""

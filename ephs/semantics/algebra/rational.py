@@ -13,7 +13,7 @@ __all__ = ["Coordinate", "ExactRelation", "Number", "behaviour", "exact_relation
 Number: TypeAlias = int | Fraction
 Kind: TypeAlias = Literal["effort", "flow", "one", "rate", "state", "before", "after"]
 Coordinate: TypeAlias = tuple[Kind, Path, int]
-"""What a number is, of which port or state, and its place in a vector; ``("one", ROOT, 0)`` is constantly one."""
+"""Key of an unknown: its kind, port or state, and its place in a vector; ``("one", ROOT, 0)`` is constantly one."""
 ONE: Coordinate = ("one", ROOT, 0)
 
 
@@ -149,7 +149,7 @@ def _behaviour(element: ExactRelation) -> ExactRelation:
 behaviour: AlgebraMap[ExactRelation, ExactRelation] = AlgebraMap(
     exact_relations, exact_relations, _behaviour, "behaviour"
 )
-"""What can be seen at the ports at one instant: states and rates eliminated."""
+"""Relation at the ports at one instant: states and rates eliminated."""
 
 
 def midpoint(h: Number) -> AlgebraMap[ExactRelation, ExactRelation]:

@@ -31,7 +31,7 @@ Route: TypeAlias = Literal["flat", "nested"]
 
 
 class Fibre(Protocol):
-    """How the subspace over a point of the base is found."""
+    """Subspace over a point of the base."""
 
     def leaves(self) -> Iterator[tuple[Path, Primitive]]:
         """The primitives with their full paths."""

@@ -65,7 +65,7 @@ class Pair:
 
     @property
     def size(self) -> int:
-        """How many numbers an element is stored as."""
+        """Number of reals that store an element."""
         return self.manifold.size
 
     @staticmethod

@@ -119,7 +119,7 @@ def equations_of(system: System, form: Form) -> Equations:
 
 
 def _moving(writer: Writer, junction: Path, quantity: Quantity, flow: Expr) -> Expr:
-    """What the derivative of a state by time is, from its left-trivialised flow."""
+    """Time derivative of a state from its left-trivialised flow."""
     if curved(quantity):
         return operator("tangent", writer.words.state(junction, quantity)) * flow
     return flow

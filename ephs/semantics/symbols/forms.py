@@ -20,7 +20,7 @@ __all__ = ["StorageForm", "irreversible_kernel", "reversible_kernel", "stacked",
 
 KERNELS = "ephs.semantics.symbols.traced_kernels"
 LARGEST = 16
-"""How many numbers a storage's states may have: a traced kernel lays out its scratch for so many."""
+"""Limit on the numbers in a storage's states, the scratch length of a traced kernel."""
 
 
 @final

@@ -47,7 +47,7 @@ def rational(expression: Expr) -> Expr:
 
 
 def sign_shown(expression: Expr, bounds: Bounds, *, strict: bool) -> str:
-    """How an expression is shown to be ≥ 0, or > 0; empty where it is not."""
+    """Proof that an expression is ≥ 0, or > 0; empty where there is none."""
     expression = sp.sympify(expression)
     if _by_signs(expression, strict):
         return "by the signs of its terms"
@@ -128,7 +128,7 @@ def _by_roots(expression: Expr, strict: bool) -> bool:
 
 
 def squares_shown(matrix: Expr, bounds: Bounds) -> str:
-    """How a symmetric matrix is shown to be a non-negative combination of squares; empty where it is not.
+    """Proof that a symmetric matrix is a non-negative combination of squares; empty where there is none.
 
     M = Σ d v vᵀ by elimination along the diagonal, each d ≥ 0. Where a pivot may be 0 the rest holds on a dense set,
     and so everywhere if M is continuous.

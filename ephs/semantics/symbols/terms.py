@@ -21,7 +21,7 @@ __all__ = ["DEPTH", "NODES", "OPERATIONS", "Matrix", "Structure", "Term", "Writt
 
 Term: TypeAlias = "float | str | tuple[Any, ...]"
 DEPTH, NODES = 50, 10_000
-"""How deep a term may be, and how many numbers, names and operations it may have."""
+"""Limits on the depth of a term and on its numbers, names and operations."""
 
 
 def _sum(*terms: Any) -> Any:
@@ -195,7 +195,7 @@ def record(term: Term) -> Any:
 @final
 @dataclass(slots=True)
 class _Budget:
-    """How many numbers, names and operations a formula may still have."""
+    """Remaining allowance of numbers, names and operations of a formula."""
 
     left: int
 

@@ -29,7 +29,7 @@ class Untraceable(TypeError):
 @final
 @dataclass(frozen=True, slots=True)
 class Trace:
-    """What a function says of symbols.
+    """Value of a function at symbols.
 
     Parameters
     ----------
@@ -225,7 +225,7 @@ def _mathematics() -> dict[str, Any]:
 _BY_IDENTITY = {id(getattr(math, name)): replacement for name, replacement in _mathematics().items()}
 _MODULE = types.SimpleNamespace(**{**vars(math), **_mathematics()})
 DEPTH = 8
-"""How many functions deep `math` is looked for."""
+"""Depth of nested functions to which `math` is searched for."""
 
 
 def _symbolic(function: Callable[..., Any], depth: int = 0) -> Callable[..., Any]:

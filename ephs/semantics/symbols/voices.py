@@ -1,4 +1,4 @@
-"""What a component says of its own port variables, in symbols: efforts of storages, flows and conditions of processes.
+"""Symbolic relation of a component between its port variables: efforts of storages, flows and conditions of processes.
 
 A component of numbers is traced from its formula. One between vectors is written in blocks, or by its own `notation`.
 """
@@ -108,7 +108,7 @@ def say(voice: Voice) -> Said:
 
 
 def formula_symbols(primitive: Primitive, parameter: Callable[[str], Expr], arguments: Mapping[str, Expr]) -> Any:
-    """What the formula of a primitive gives of symbols: an array of expressions, numbers in place.
+    """Formula of a primitive at symbols: an array of expressions, with numbers filled in.
 
     Raises
     ------
@@ -259,7 +259,7 @@ def _unknown(voice: Voice) -> Said:
 
 
 def _noted(voice: Voice, notation: Callable[[Any], Any]) -> Said:
-    """What a component's own notation says: efforts by port; or flows by port, and conditions."""
+    """Relation by a component's own notation: efforts by port; or flows by port, and conditions."""
     said = notation(voice)
     if isinstance(voice.primitive, Storage):
         return Said(efforts={Path.of(port): sp.sympify(entry) for port, entry in said.items()})

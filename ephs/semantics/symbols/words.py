@@ -1,4 +1,4 @@
-"""How formulas are written: symbols with a name in text and one in LaTeX, and operators between spaces.
+"""Notation of formulas: symbols with a name in text and one in LaTeX, and operators between spaces.
 
 Scalars commute. Vectors and the linear operators before them do not, so that SymPy's products read like compositions:
 ``Ad(o1^-1) lambda``. Both kinds print themselves, as text and as LaTeX.

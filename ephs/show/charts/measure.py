@@ -185,7 +185,7 @@ def _end(motion: Motion) -> Motion:
 
 
 def _more(repeats: int, wall: float, limit: float) -> int:
-    """How many more runs: none where one alone took most of the time that there is."""
+    """Number of further runs: none where one alone took most of the time that there is."""
     return 0 if wall > limit / 4.0 else repeats - 1
 
 

@@ -1,4 +1,4 @@
-"""What became of a run, decided by thresholds against a motion that counts as true."""
+"""Outcome of a run, decided by thresholds against a reference motion."""
 
 from enum import StrEnum
 
@@ -23,7 +23,7 @@ _NO_ENERGY = 1e-9
 
 
 class Outcome(StrEnum):
-    """What became of a run.
+    """Outcome of a run.
 
     ``ACCURATE``: the error at the end is at most `ACCURATE`.
     ``WRONG_BUT_BOUNDED``: the error is larger, and nothing of what follows shows.
@@ -83,7 +83,7 @@ def _lost(found: Motion, true: Motion) -> bool:
 
 
 def _extent(motion: Motion) -> float:
-    """How far positions and rotations go in the second half of the time."""
+    """Extent of positions and rotations in the second half of the time."""
     half = slice(len(motion.t) // 2, None)
     spread: Array = np.ptp(motion.position[half], axis=0) / motion.length
     turned: Array = np.ptp(motion.rotation[half], axis=0)

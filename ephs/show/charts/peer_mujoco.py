@@ -20,7 +20,7 @@ IMPEDANCE = 'solimp="0.9999 0.9999 0.001 0.5 2"'
 
 
 def integrator(method: str) -> Callable[[Scene, float], Go]:
-    """What makes runs with one of MuJoCo's integrators."""
+    """Runner with one of MuJoCo's integrators."""
 
     def build(scene: Scene, until: float) -> Go:
         mujoco: Any = import_module("mujoco")

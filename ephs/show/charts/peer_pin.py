@@ -26,7 +26,7 @@ FEW = 2
 
 
 def integrator(method: str, *, proximal: float = TIGHT) -> Callable[[Scene, float], Go]:
-    """What makes runs of Pinocchio's accelerations under a method of `scipy.integrate.solve_ivp`."""
+    """Runner of Pinocchio's accelerations under a method of `scipy.integrate.solve_ivp`."""
 
     def build(scene: Scene, until: float) -> Go:
         from scipy.integrate import solve_ivp

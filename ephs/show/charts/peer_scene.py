@@ -64,7 +64,7 @@ class Branch:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class PeerScene:
-    """What a peer builds.
+    """Model of a peer.
 
     Parameters
     ----------

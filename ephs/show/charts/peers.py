@@ -24,7 +24,7 @@ class Peer:
     build: Callable[[Scene, float], Go]
 
     def prepare(self, scene: Scene, until: float) -> Go:
-        """What runs the scene with a setting and a time limit in s.
+        """Runner of the scene with a setting and a time limit in s.
 
         Raises
         ------

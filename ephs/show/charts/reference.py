@@ -1,4 +1,4 @@
-"""What measured motions are compared with: states from a file, or a run with tight tolerances."""
+"""References for measured motions: states from a file, or a run with tight tolerances."""
 
 import json
 from collections.abc import Iterator
@@ -70,7 +70,7 @@ class Motion:
 
     @property
     def length(self) -> float:
-        """How far bodies are from their common centre, over all times, in m; 1 where they all stay in one point."""
+        """Largest distance of bodies from their common centre, over all times, in m; 1 where it is zero."""
         size = float(np.linalg.norm(self.position - self.centre, axis=-1).max())
         return size if size > 1e-9 else 1.0
 

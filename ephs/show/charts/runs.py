@@ -28,7 +28,7 @@ _REFUSALS = (Failure.UNSUITED, Failure.INCONSISTENT, Failure.UNDETERMINED, Failu
 
 
 class Ending(StrEnum):
-    """How a run ended."""
+    """End of a run."""
 
     DONE = "done"
     REFUSED = "refused"  # at every setting
@@ -39,7 +39,7 @@ class Ending(StrEnum):
 @final
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """What steers a run: a tolerance, rtol = atol, or a constant step in s."""
+    """Setting of a run: a tolerance, rtol = atol, or a constant step in s."""
 
     kind: str
     value: float

@@ -23,7 +23,7 @@ SOLVED, DIFFERENCE, ITERATIONS = 1e-12, 1e-7, 20
 
 
 class _OnLoops(ReducedMethod):
-    """What both share: generalised forces and rows of the loops at given coordinates and rates."""
+    """Common base: generalised forces and rows of the loops at given coordinates and rates."""
 
     exponent = 3.0
 
