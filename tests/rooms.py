@@ -16,6 +16,7 @@ STOREYS: tuple[tuple[frozenset[str], ...], ...] = tuple(
     for storey in (
         ([".operad"],),
         ([".operad.rewriting"],),
+        ([".semantics.stage"],),
         ([".semantics.spaces"],),
         ([".semantics", ".semantics.library", ".semantics.algebra", ".semantics.relations", ".semantics.symbols"],),
         ([".mechanics.solve"],),

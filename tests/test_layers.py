@@ -11,6 +11,7 @@ HEAVY = (
     "scipy",
     "networkx",
     "numba",
+    "llvmlite",
     "sympy",
     "pydantic",
     "xarray",

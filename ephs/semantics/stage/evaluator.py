@@ -1,0 +1,253 @@
+"""The evaluator: elementary functions, choices and control of the staged language, whatever a number is."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from functools import wraps
+from typing import Any, Concatenate, Final, Literal, ParamSpec, TypeAlias, TypeVar, cast, final
+
+from ephs.semantics.stage.errors import StageError
+from ephs.semantics.stage.memory import Held, Variable
+from ephs.semantics.stage.numbers import Condition, Count, Integer, Number, Real, Truth
+
+__all__ = ["FUNCTIONS", "Evaluator", "Function", "Interpreted", "known", "staged"]
+
+Function: TypeAlias = Literal["sqrt", "absolute", "floor", "sin", "cos", "exp", "log", "atan2", "copysign"]
+FUNCTIONS: Final[dict[Function, int]] = {
+    "sqrt": 1,
+    "absolute": 1,
+    "floor": 1,
+    "sin": 1,
+    "cos": 1,
+    "exp": 1,
+    "log": 1,
+    "atan2": 2,
+    "copysign": 2,
+}
+"""Functions that every evaluator has, and how many real arguments they take."""
+Value = TypeVar("Value")
+Parameters = ParamSpec("Parameters")
+
+
+class Evaluator(ABC):
+    """What a staged function is run with: its first argument, named `on`."""
+
+    @abstractmethod
+    def _function(self, name: Function, *arguments: Real) -> Real:
+        """Evaluate a function of the table `FUNCTIONS`."""
+
+    @abstractmethod
+    def _choose(self, truth: Condition, one: Any, other: Any) -> Any:
+        """Choose between two reals, two integers or two truths."""
+
+    @abstractmethod
+    def _both(self, one: Truth, other: Truth) -> Truth:
+        """Return the conjunction; at least one is a condition."""
+
+    @abstractmethod
+    def _negate(self, truth: Condition) -> Truth:
+        """Return the negation."""
+
+    @abstractmethod
+    def _same(self, one: Integer, other: Integer) -> Truth:
+        """Compare two integers, at least one of which is not known."""
+
+    @abstractmethod
+    def real(self, integer: Integer) -> Real:
+        """Return an integer as a real number."""
+
+    @abstractmethod
+    def integer(self, real: Real) -> Integer:
+        """Return a real number, rounded towards zero, as an integer; 0 where it is not a number."""
+
+    @abstractmethod
+    def scale(self, real: Real, power: Integer) -> Real:
+        """Return real · 2ᵖ, exact but for underflow and overflow; −1022 ≤ p ≤ 1023."""
+
+    @abstractmethod
+    def loop(self, count: Integer, body: Callable[[Integer], None], start: Integer = 0, down: bool = False) -> None:
+        """Call `body(i)` for i = start … count − 1, or down from count − 1."""
+
+    @abstractmethod
+    def when(self, truth: Truth, yes: Callable[[], None], no: Callable[[], None] | None = None) -> None:
+        """Call `yes()` or `no()`."""
+
+    @abstractmethod
+    def repeat(self, body: Callable[[], Truth]) -> None:
+        """Call `body()` until it returns true, at least once."""
+
+    @abstractmethod
+    def variable(self, value: Real) -> Variable[Real]:
+        """Return a real variable with its first value."""
+
+    @abstractmethod
+    def counter(self, value: Integer) -> Variable[Integer]:
+        """Return an integer variable with its first value."""
+
+    @abstractmethod
+    def _call(self, on: "Evaluator", function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+        """Call a function decorated by `staged`, with `on` as its evaluator."""
+
+    @final
+    def sqrt(self, x: Real) -> Real:
+        """Square root; not a number below zero."""
+        return self._function("sqrt", x)
+
+    @final
+    def absolute(self, x: Real) -> Real:
+        """Absolute value."""
+        return self._function("absolute", x)
+
+    @final
+    def floor(self, x: Real) -> Real:
+        """Largest whole number not above x, as a real number."""
+        return self._function("floor", x)
+
+    @final
+    def sin(self, x: Real) -> Real:
+        """Sine, x in rad."""
+        return self._function("sin", x)
+
+    @final
+    def cos(self, x: Real) -> Real:
+        """Cosine, x in rad."""
+        return self._function("cos", x)
+
+    @final
+    def exp(self, x: Real) -> Real:
+        """Exponential function."""
+        return self._function("exp", x)
+
+    @final
+    def log(self, x: Real) -> Real:
+        """Natural logarithm; −∞ at zero, not a number below."""
+        return self._function("log", x)
+
+    @final
+    def atan2(self, y: Real, x: Real) -> Real:
+        """Angle of (x, y) in rad, −π … π."""
+        return self._function("atan2", y, x)
+
+    @final
+    def copysign(self, x: Real, sign: Real) -> Real:
+        """Return |x| with the sign of `sign`."""
+        return self._function("copysign", x, sign)
+
+    @final
+    def minimum(self, a: Real, b: Real) -> Real:
+        """Return the smaller; `a` where they cannot be compared."""
+        return self.select(b < a, b, a)
+
+    @final
+    def maximum(self, a: Real, b: Real) -> Real:
+        """Return the larger; `a` where they cannot be compared."""
+        return self.select(b > a, b, a)
+
+    @final
+    def select(self, truth: Truth, one: Value, other: Value) -> Value:
+        """Choose one of two values, also entry by entry of lists; both have been evaluated."""
+        if not isinstance(truth, Condition):
+            return one if truth else other
+        if isinstance(one, list | tuple) and isinstance(other, list | tuple):
+            entries: list[Any] = [
+                self.select(truth, a, b) for a, b in zip(cast("list[Any]", one), cast("list[Any]", other), strict=True)
+            ]
+            return cast("Value", entries if isinstance(one, list) else tuple(entries))
+        return self._choose(truth, one, other)
+
+    @final
+    def both(self, one: Truth, other: Truth) -> Truth:
+        """Logical and; both have been evaluated."""
+        if not isinstance(one, Condition):
+            return other if one else False
+        if not isinstance(other, Condition):
+            return one if other else False
+        return self._both(one, other)
+
+    @final
+    def either(self, one: Truth, other: Truth) -> Truth:
+        """Logical or; both have been evaluated."""
+        return self.negate(self.both(self.negate(one), self.negate(other)))
+
+    @final
+    def negate(self, truth: Truth) -> Truth:
+        """Logical not."""
+        return self._negate(truth) if isinstance(truth, Condition) else not truth
+
+    @final
+    def same(self, one: Integer, other: Integer) -> Truth:
+        """Tell whether two integers are equal."""
+        return self._same(one, other) if isinstance(one, Count) or isinstance(other, Count) else one == other
+
+    @final
+    def call(self, function: Callable[..., Any], *arguments: Any) -> Any:
+        """Call a function as one of its own, as the decorator `staged` does."""
+        return self._call(self, function, arguments)
+
+
+def staged(
+    function: Callable[Concatenate[Evaluator, Parameters], Value],
+) -> Callable[Concatenate[Evaluator, Parameters], Value]:
+    """Make a function one of its own in machine code, emitted once per signature; elsewhere a plain call.
+
+    Its arguments and results are numbers, memory, lists, tuples and frozen dataclasses of these, and known values.
+    """
+
+    @wraps(function)
+    def called(on: Evaluator, *args: Parameters.args, **kwargs: Parameters.kwargs) -> Value:
+        if kwargs:
+            raise StageError("parameters", expected="arguments by position", found=", ".join(kwargs))
+        return on.call(function, *args)
+
+    return called
+
+
+class Interpreted(Evaluator):
+    """Control by Python: conditions are known, or refuse."""
+
+    @abstractmethod
+    def _known(self, truth: Condition) -> bool:
+        """Return the one answer of a condition, or raise."""
+
+    @final
+    def loop(self, count: Integer, body: Callable[[Integer], None], start: Integer = 0, down: bool = False) -> None:
+        assert isinstance(count, int)
+        assert isinstance(start, int)
+        for index in range(count - 1, start - 1, -1) if down else range(start, count):
+            body(index)
+
+    @final
+    def when(self, truth: Truth, yes: Callable[[], None], no: Callable[[], None] | None = None) -> None:
+        if self._known(truth) if isinstance(truth, Condition) else truth:
+            yes()
+        elif no is not None:
+            no()
+
+    @final
+    def repeat(self, body: Callable[[], Truth]) -> None:
+        while True:
+            truth = body()
+            if self._known(truth) if isinstance(truth, Condition) else truth:
+                return
+
+    @final
+    def variable(self, value: Real) -> Variable[Real]:
+        entries: list[Real] = [value]
+        return Variable(Held(entries))
+
+    @final
+    def counter(self, value: Integer) -> Variable[Integer]:
+        entries: list[Integer] = [value]
+        return Variable(Held(entries))
+
+    @final
+    def _same(self, one: Integer, other: Integer) -> Truth:
+        raise StageError("operand", what="on.same", left=type(one).__name__, right=type(other).__name__)
+
+    @final
+    def _call(self, on: Evaluator, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+        return function(on, *arguments)
+
+
+def known(*numbers: Real) -> bool:
+    """Tell whether all numbers are known while staging."""
+    return not any(isinstance(number, Number) for number in numbers)

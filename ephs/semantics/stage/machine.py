@@ -1,0 +1,359 @@
+"""Staging to machine code: run with symbols, a function writes the LLVM function that it means."""
+
+from collections.abc import Callable, Generator, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Any, Final, cast, final
+
+from ephs.semantics.stage.emission import IntegerPointer, RealPointer, Symbol, TruthSymbol, WholeSymbol, Writer
+from ephs.semantics.stage.errors import StageError
+from ephs.semantics.stage.evaluator import Evaluator, Function, known
+from ephs.semantics.stage.memory import Variable
+from ephs.semantics.stage.numbers import Condition, Integer, Real, Truth
+from ephs.semantics.stage.plain import elementary
+from ephs.semantics.stage.records import Record
+
+__all__ = ["Machine"]
+
+_INTRINSIC: Final[dict[Function, str]] = {
+    "sqrt": "sqrt",
+    "absolute": "fabs",
+    "floor": "floor",
+    "sin": "sin",
+    "cos": "cos",
+    "exp": "exp",
+    "log": "log",
+    "copysign": "copysign",
+}
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class _Emitted:
+    """A staged function that stands in the module: its name and the form of its result."""
+
+    name: str
+    returns: str
+    form: Any
+
+
+class Machine(Evaluator):
+    """The evaluator that writes a module of LLVM functions.
+
+    Parameters
+    ----------
+    width
+        Members side by side in a real number.
+    """
+
+    def __init__(self, width: int = 1) -> None:
+        self.width = width
+        self._functions: list[str] = []
+        self._declared: dict[str, None] = {}
+        self._emitted: dict[object, _Emitted | None] = {}
+        self._writers: list[Writer] = []
+
+    @property
+    def text(self) -> str:
+        """The module's assembly text."""
+        return "\n\n".join([*self._declared, *self._functions]) + "\n"
+
+    @property
+    def to(self) -> Writer:
+        """The function that is being written."""
+        return self._writers[-1]
+
+    @contextmanager
+    def _writing(self, name: str) -> Generator[Writer]:
+        writer = Writer(name, self.width)
+        self._writers.append(writer)
+        try:
+            yield writer
+        finally:
+            self._writers.pop()
+
+    def define(
+        self, name: str, parameters: list[str], body: Callable[[Writer], object], linkage: str = ""
+    ) -> tuple[str, Any]:
+        """Write a function and return the type and the form of its result."""
+        with self._writing(name) as to:
+            result = body(to)
+            leaves: list[tuple[str, str]] = []
+            form = _flat(to, result, lambda kind, operand: leaves.append((kind, operand)))
+            if not leaves:
+                returns, last = "void", "ret void"
+            elif len(leaves) == 1:
+                (returns, operand), *_ = leaves
+                last = f"ret {returns} {operand}"
+            else:
+                returns, value = f"{{ {', '.join(kind for kind, _ in leaves)} }}", "poison"
+                for place, (kind, operand) in enumerate(leaves):
+                    value = to.let(f"insertvalue {returns} {value}, {kind} {operand}, {place}")
+                last = f"ret {returns} {value}"
+            to.do(last)
+            head = f"define {linkage}{returns} @{name}({', '.join(parameters)}) {{\nentry:"
+            self._functions.append("\n".join([head, *to.slots, *to.lines, "}"]))
+        return returns, form
+
+    def declare(self, text: str) -> None:
+        """Declare a function of elsewhere."""
+        self._declared[f"declare {text}"] = None
+
+    # Functions of real numbers
+
+    def _function(self, name: Function, *arguments: Real) -> Real:
+        if known(*arguments):
+            return float(elementary(name, *cast("tuple[float, ...]", arguments)))
+        to = self.to
+        operands = [to.of_real(one) for one in arguments]
+        if name in _INTRINSIC:
+            vector = "" if self.width == 1 else f"v{self.width}"
+            called = f"@llvm.{_INTRINSIC[name]}.{vector}f64"
+            self.declare(f"{to.real} {called}({', '.join([to.real] * len(operands))})")
+            return Symbol(to, to.let(f"call {to.real} {called}({', '.join(f'{to.real} {x}' for x in operands)})"))
+        self.declare(f"double @{name}({', '.join(['double'] * len(operands))})")
+        return Symbol(to, self._each(to, name, operands))
+
+    def _each(self, to: Writer, name: str, operands: list[str]) -> str:
+        """Call a function of scalars for one member after the other."""
+        if self.width == 1:
+            return to.let(f"call double @{name}({', '.join(f'double {x}' for x in operands)})")
+        value = "poison"
+        for member in range(self.width):
+            taken = [to.let(f"extractelement {to.real} {x}, i64 {member}") for x in operands]
+            one = to.let(f"call double @{name}({', '.join(f'double {x}' for x in taken)})")
+            value = to.let(f"insertelement {to.real} {value}, double {one}, i64 {member}")
+        return value
+
+    def real(self, integer: Integer) -> Real:
+        if isinstance(integer, int):
+            return float(integer)
+        to = self.to
+        operand = to.of_integer(integer, wide=self.width > 1)
+        return Symbol(to, to.let(f"sitofp {to.typed('i64')} {operand} to {to.real}"))
+
+    def integer(self, real: Real) -> Integer:
+        to = self.to
+        vector = "" if self.width == 1 else f"v{self.width}"
+        called = f"@llvm.fptosi.sat.{vector}i64.{vector}f64"
+        self.declare(f"{to.typed('i64')} {called}({to.real})")
+        return WholeSymbol(to, to.let(f"call {to.typed('i64')} {called}({to.real} {to.of_real(real)})"), self.width > 1)
+
+    def scale(self, real: Real, power: Integer) -> Real:
+        to = self.to
+        kind, operand = to.typed("i64"), to.of_integer(power, wide=self.width > 1)
+        biased = to.let(f"add {kind} {operand}, {to.of_integer(1023, wide=self.width > 1)}")
+        shifted = to.let(f"shl {kind} {biased}, {to.of_integer(52, wide=self.width > 1)}")
+        return real * Symbol(to, to.let(f"bitcast {kind} {shifted} to {to.real}"))
+
+    # Conditions
+
+    def _choose(self, truth: Condition, one: Any, other: Any) -> Any:
+        to = self.to
+        chosen, wide = self._truth(truth)
+        if isinstance(one, bool | Condition):
+            spread = wide or any(isinstance(side, TruthSymbol) and side.wide for side in (one, other))
+            a, b = (self._of_truth(side, spread) for side in (one, other))
+            kind = to.typed("i1") if spread else "i1"
+            return TruthSymbol(
+                to, to.let(f"select {'i1' if not wide else kind} {chosen}, {kind} {a}, {kind} {b}"), spread
+            )
+        if (
+            isinstance(one, WholeSymbol)
+            or isinstance(other, WholeSymbol)
+            or (isinstance(one, int) and isinstance(other, int))
+        ):
+            spread = wide or any(isinstance(side, WholeSymbol) and side.wide for side in (one, other))
+            kind = to.typed("i64") if spread else "i64"
+            a, b = to.of_integer(one, spread), to.of_integer(other, spread)
+            return WholeSymbol(
+                to, to.let(f"select {to.typed('i1') if wide else 'i1'} {chosen}, {kind} {a}, {kind} {b}"), spread
+            )
+        a, b = to.of_real(one), to.of_real(other)
+        return Symbol(to, to.let(f"select {to.typed('i1') if wide else 'i1'} {chosen}, {to.real} {a}, {to.real} {b}"))
+
+    def _truth(self, truth: object) -> tuple[str, bool]:
+        assert isinstance(truth, TruthSymbol)
+        self.to.own(truth.writer)
+        return truth.name, truth.wide
+
+    def _of_truth(self, truth: Truth, wide: bool) -> str:
+        if isinstance(truth, TruthSymbol):
+            name, spread = self._truth(truth)
+            return name if spread or not wide else self.to.spread(name, "i1")
+        text = "true" if truth else "false"
+        return self.to.constant(text, "i1") if wide else text
+
+    def _both(self, one: Truth, other: Truth) -> Truth:
+        to, wide = self.to, any(isinstance(side, TruthSymbol) and side.wide for side in (one, other))
+        a, b = self._of_truth(one, wide), self._of_truth(other, wide)
+        return TruthSymbol(to, to.let(f"and {to.typed('i1') if wide else 'i1'} {a}, {b}"), wide)
+
+    def _negate(self, truth: Condition) -> Truth:
+        to, (name, wide) = self.to, self._truth(truth)
+        return TruthSymbol(
+            to, to.let(f"xor {to.typed('i1') if wide else 'i1'} {name}, {self._of_truth(True, wide)}"), wide
+        )
+
+    def _same(self, one: Integer, other: Integer) -> Truth:
+        to, wide = self.to, any(isinstance(side, WholeSymbol) and side.wide for side in (one, other))
+        a, b = to.of_integer(one, wide), to.of_integer(other, wide)
+        return TruthSymbol(to, to.let(f"icmp eq {to.typed('i64') if wide else 'i64'} {a}, {b}"), wide)
+
+    def _single(self, truth: Truth, what: str) -> str:
+        """Return the operand of a condition that is the same for all members."""
+        if isinstance(truth, TruthSymbol) and truth.wide:
+            raise StageError("undecided", what=what, found="for all members")
+        return self._of_truth(truth, wide=False)
+
+    # Control
+
+    def loop(self, count: Integer, body: Callable[[Integer], None], start: Integer = 0, down: bool = False) -> None:
+        to = self.to
+        first, last = to.of_integer(start), to.of_integer(count)
+        head, inner, out = to.label(), to.label(), to.label()
+        before = to.block
+        to.go(head)
+        to.begin(head)
+        index, following = to.fresh(), to.fresh()
+        to.do("")
+        place = len(to.lines) - 1
+        to.fork(to.let(f"icmp slt i64 {index}, {last}"), inner, out)
+        to.begin(inner)
+        if down:
+            # start + count − 1 − index runs from count − 1 to start.
+            ends = to.let(f"add i64 {first}, {last}")
+            body(WholeSymbol(to, to.let(f"sub i64 {to.let(f'sub i64 {ends}, 1')}, {index}")))
+        else:
+            body(WholeSymbol(to, index))
+        to.do(f"{following} = add nsw i64 {index}, 1")
+        to.lines[place] = f"  {index} = phi i64 [ {first}, %{before} ], [ {following}, %{to.block} ]"
+        to.go(head)
+        to.begin(out)
+
+    def when(self, truth: Truth, yes: Callable[[], None], no: Callable[[], None] | None = None) -> None:
+        if not isinstance(truth, Condition):
+            if truth:
+                yes()
+            elif no is not None:
+                no()
+            return
+        to = self.to
+        one, other, out = to.label(), to.label(), to.label()
+        to.fork(self._single(truth, "on.when"), one, out if no is None else other)
+        to.begin(one)
+        yes()
+        to.go(out)
+        if no is not None:
+            to.begin(other)
+            no()
+            to.go(out)
+        to.begin(out)
+
+    def repeat(self, body: Callable[[], Truth]) -> None:
+        to = self.to
+        inner, out = to.label(), to.label()
+        to.go(inner)
+        to.begin(inner)
+        truth = body()
+        to.fork(self._single(truth, "on.repeat"), out, inner)
+        to.begin(out)
+
+    def variable(self, value: Real) -> Variable[Real]:
+        to = self.to
+        at = RealPointer(to, to.slot(to.real))
+        at.store(0, value)
+        return Variable(at)
+
+    def counter(self, value: Integer) -> Variable[Integer]:
+        to = self.to
+        at = IntegerPointer(to, to.slot("i64"))
+        at.store(0, value)
+        return Variable(at)
+
+    # Functions of their own
+
+    def _call(self, on: Evaluator, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+        to = self.to
+        passed: list[tuple[str, str]] = []
+        form = _flat(to, arguments, lambda kind, operand: passed.append((kind, operand)))
+        key = (function, id(on), form, tuple(kind for kind, _ in passed))
+        emitted = self._emitted.get(key)
+        if emitted is None:
+            if key in self._emitted:
+                raise StageError("recursion", found=function.__qualname__)
+            self._emitted[key] = None
+            emitted = self._emitted[key] = self._emit(on, function, form, [kind for kind, _ in passed])
+        operands = ", ".join(f"{kind} {operand}" for kind, operand in passed)
+        call = f"call fastcc {emitted.returns} @{emitted.name}({operands})"
+        if emitted.returns == "void":
+            to.do(call)
+            return _shaped(to, emitted.form, iter(()))
+        value = to.let(call)
+        if not emitted.returns.startswith("{"):
+            return _shaped(to, emitted.form, iter((value,)))
+        return _shaped(to, emitted.form, (to.let(f"extractvalue {emitted.returns} {value}, {k}") for k in range(10**9)))
+
+    def _emit(self, on: Evaluator, function: Callable[..., Any], form: Any, kinds: list[str]) -> _Emitted:
+        name = f"{function.__name__}.{len(self._emitted)}"
+        names = [f"%a{place}" for place in range(len(kinds))]
+
+        def body(to: Writer) -> object:
+            return function(on, *_shaped(to, form, iter(names)))
+
+        parameters = [f"{kind} {name}" for kind, name in zip(kinds, names, strict=True)]
+        returns, form = self.define(name, parameters, body, "internal fastcc ")
+        return _Emitted(name, returns, form)
+
+
+def _flat(to: Writer, value: Any, leaf: Callable[[str, str], None]) -> Any:
+    """Hand over the operands in a value, and return its form: a hashable picture with holes for them."""
+    match value:
+        case Symbol():
+            leaf(to.real, to.of_real(value))
+            return (Symbol,)
+        case WholeSymbol():
+            leaf(to.typed("i64") if value.wide else "i64", to.of_integer(value))
+            return (WholeSymbol, value.wide)
+        case TruthSymbol():
+            to.own(value.writer)
+            leaf(to.typed("i1") if value.wide else "i1", value.name)
+            return (TruthSymbol, value.wide)
+        case RealPointer() | IntegerPointer():
+            to.own(value.writer)
+            leaf("ptr", value.name)
+            return (type(value),)
+        case list() | tuple():
+            entries = cast("list[Any]", value)
+            return (list if isinstance(value, list) else tuple, *(_flat(to, entry, leaf) for entry in entries))
+        case Variable():
+            return (Variable, _flat(to, cast("Variable[Any]", value).cells, leaf))
+        case Record():
+            parts = (value.integers, value.integer_start, value.reals, value.real_start)
+            return (Record, type(value), *(_flat(to, part, leaf) for part in parts))
+        case _ if is_dataclass(value) and not isinstance(value, type):
+            parts = [getattr(value, field.name) for field in fields(value)]
+            return (is_dataclass, type(value), *(_flat(to, part, leaf) for part in parts))
+        case float():
+            return (float, float(value).hex())
+        case _:
+            return (None, type(value), value)
+
+
+def _shaped(to: Writer, form: Any, leaves: Iterator[str]) -> Any:
+    """Return the value of a form, its holes filled."""
+    kind, *rest = form
+    if kind is Symbol:
+        return Symbol(to, next(leaves))
+    if kind is WholeSymbol or kind is TruthSymbol:
+        return kind(to, next(leaves), rest[0])
+    if kind is RealPointer or kind is IntegerPointer:
+        return kind(to, next(leaves))
+    if kind is list or kind is tuple:
+        parts: list[Any] = [_shaped(to, part, leaves) for part in rest]
+        return parts if kind is list else tuple(parts)
+    if kind is Variable:
+        return Variable[Any](_shaped(to, rest[0], leaves))
+    if kind is Record or kind is is_dataclass:
+        return rest[0](*[_shaped(to, part, leaves) for part in rest[1:]])
+    return float.fromhex(rest[0]) if kind is float else rest[1]

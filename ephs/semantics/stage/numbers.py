@@ -1,0 +1,259 @@
+"""Abstract numbers: real numbers, integers and conditions that a staged function computes with.
+
+A real number is a Python float, which is known while staging, or a `Number`, whose value only its evaluator knows.
+Operators work on both and drop what a known number makes idle: x + 0, x − 0, x · 1 and x / 1 are x, x · 0 and
+0 / x are 0. So columns of zeros vanish from a program by themselves. The rules hold for finite x, and up to the
+sign of a zero.
+"""
+
+from abc import ABC, abstractmethod
+from typing import Literal, NoReturn, TypeAlias, Union, final
+
+from ephs.semantics.stage.errors import StageError
+
+__all__ = ["Condition", "Count", "Integer", "Number", "Operation", "Order", "Real", "Truth"]
+
+Real: TypeAlias = Union[float, "Number"]
+"""A real number, known or not."""
+Integer: TypeAlias = Union[int, "Count"]
+"""An integer, known or not."""
+Truth: TypeAlias = Union[bool, "Condition"]
+"""A truth value, known or not."""
+Operation: TypeAlias = Literal["+", "-", "*", "/"]
+IntegerOperation: TypeAlias = Literal["+", "-", "*", "//", "%"]
+Order: TypeAlias = Literal["<", "<=", ">", ">="]
+
+
+class Condition:
+    """A truth value that is not known while staging."""
+
+    __slots__ = ()
+
+    @final
+    def __bool__(self) -> bool:
+        raise StageError("branch", what="a Python statement (if, while, and, or, not, min, max, assert)")
+
+
+class _Unknown:
+    """What cannot become a number of Python."""
+
+    __slots__ = ()
+
+    @final
+    def __float__(self) -> NoReturn:
+        raise StageError("number", what="float(…) or a function of math", advice="take on.sqrt, on.sin, …")
+
+    @final
+    def __int__(self) -> NoReturn:
+        raise StageError("number", what="int(…)", advice="take on.integer(…)")
+
+    @final
+    def __index__(self) -> NoReturn:
+        raise StageError("number", what="a Python list or range", advice="take a Vector or Integers, and on.loop(…)")
+
+    @final
+    def __pow__(self, power: object) -> NoReturn:
+        raise StageError("number", what="**", advice="write products, or on.exp and on.log")
+
+    @final
+    def __abs__(self) -> NoReturn:
+        raise StageError("number", what="abs(…)", advice="take on.absolute(…)")
+
+    @final
+    def __eq__(self, other: object) -> NoReturn:
+        raise StageError("equality")
+
+    @final
+    def __ne__(self, other: object) -> NoReturn:
+        raise StageError("equality")
+
+    __hash__ = object.__hash__
+
+
+class Number(_Unknown, ABC):
+    """A real number whose value its evaluator knows."""
+
+    __slots__ = ()
+    __array_ufunc__ = None  # A number of NumPy on the left leaves operators to this class.
+
+    @abstractmethod
+    def _apply(self, operation: Operation, left: Real, right: Real) -> Real:
+        """Apply an operation; at least one side is of this class."""
+
+    @abstractmethod
+    def _order(self, order: Order, left: Real, right: Real) -> Truth:
+        """Compare; at least one side is of this class."""
+
+    @abstractmethod
+    def _negative(self) -> Real:
+        """Return −x."""
+
+    @final
+    def _binary(self, operation: Operation, left: object, right: object) -> Real:
+        other = right if left is self else left
+        if not isinstance(other, float | int) and type(other) is not type(self):
+            raise StageError("operand", what=operation, left=type(left).__name__, right=type(right).__name__)
+        assert isinstance(left, float | int | Number)
+        assert isinstance(right, float | int | Number)
+        return self._apply(operation, left, right)
+
+    @final
+    def __add__(self, other: Real) -> Real:
+        return self if _is(other, 0.0) else self._binary("+", self, other)
+
+    @final
+    def __radd__(self, other: Real) -> Real:
+        return self if _is(other, 0.0) else self._binary("+", other, self)
+
+    @final
+    def __sub__(self, other: Real) -> Real:
+        return self if _is(other, 0.0) else self._binary("-", self, other)
+
+    @final
+    def __rsub__(self, other: Real) -> Real:
+        return self._negative() if _is(other, 0.0) else self._binary("-", other, self)
+
+    @final
+    def __mul__(self, other: Real) -> Real:
+        if _is(other, 0.0):
+            return 0.0
+        return self if _is(other, 1.0) else self._binary("*", self, other)
+
+    @final
+    def __rmul__(self, other: Real) -> Real:
+        if _is(other, 0.0):
+            return 0.0
+        return self if _is(other, 1.0) else self._binary("*", other, self)
+
+    @final
+    def __truediv__(self, other: Real) -> Real:
+        return self if _is(other, 1.0) else self._binary("/", self, other)
+
+    @final
+    def __rtruediv__(self, other: Real) -> Real:
+        return 0.0 if _is(other, 0.0) else self._binary("/", other, self)
+
+    @final
+    def __neg__(self) -> Real:
+        return self._negative()
+
+    @final
+    def __pos__(self) -> Real:
+        return self
+
+    @final
+    def __lt__(self, other: Real) -> Truth:
+        return self._compare("<", other)
+
+    @final
+    def __le__(self, other: Real) -> Truth:
+        return self._compare("<=", other)
+
+    @final
+    def __gt__(self, other: Real) -> Truth:
+        return self._compare(">", other)
+
+    @final
+    def __ge__(self, other: Real) -> Truth:
+        return self._compare(">=", other)
+
+    @final
+    def _compare(self, order: Order, other: object) -> Truth:
+        if not isinstance(other, float | int) and type(other) is not type(self):
+            raise StageError("operand", what=order, left=type(self).__name__, right=type(other).__name__)
+        assert isinstance(other, float | int | Number)
+        return self._order(order, self, other)
+
+
+def _is(other: object, value: float) -> bool:
+    return isinstance(other, float | int) and other == value
+
+
+class Count(_Unknown, ABC):
+    """An integer whose value its evaluator knows; // and % round down, as in Python."""
+
+    __slots__ = ()
+
+    @abstractmethod
+    def _apply(self, operation: IntegerOperation, left: Integer, right: Integer) -> Integer:
+        """Apply an operation; at least one side is of this class."""
+
+    @abstractmethod
+    def _order(self, order: Order, left: Integer, right: Integer) -> Truth:
+        """Compare; at least one side is of this class."""
+
+    @final
+    def _binary(self, operation: IntegerOperation, left: object, right: object) -> Integer:
+        other = right if left is self else left
+        if not isinstance(other, int) and type(other) is not type(self):
+            raise StageError("operand", what=operation, left=type(left).__name__, right=type(right).__name__)
+        assert isinstance(left, int | Count)
+        assert isinstance(right, int | Count)
+        return self._apply(operation, left, right)
+
+    @final
+    def __add__(self, other: Integer) -> Integer:
+        return self if _is(other, 0) else self._binary("+", self, other)
+
+    @final
+    def __radd__(self, other: Integer) -> Integer:
+        return self if _is(other, 0) else self._binary("+", other, self)
+
+    @final
+    def __sub__(self, other: Integer) -> Integer:
+        return self if _is(other, 0) else self._binary("-", self, other)
+
+    @final
+    def __rsub__(self, other: Integer) -> Integer:
+        return self._binary("-", other, self)
+
+    @final
+    def __mul__(self, other: Integer) -> Integer:
+        return 0 if _is(other, 0) else self if _is(other, 1) else self._binary("*", self, other)
+
+    @final
+    def __rmul__(self, other: Integer) -> Integer:
+        return 0 if _is(other, 0) else self if _is(other, 1) else self._binary("*", other, self)
+
+    @final
+    def __floordiv__(self, other: Integer) -> Integer:
+        return self if _is(other, 1) else self._binary("//", self, other)
+
+    @final
+    def __rfloordiv__(self, other: Integer) -> Integer:
+        return self._binary("//", other, self)
+
+    @final
+    def __mod__(self, other: Integer) -> Integer:
+        return self._binary("%", self, other)
+
+    @final
+    def __rmod__(self, other: Integer) -> Integer:
+        return self._binary("%", other, self)
+
+    @final
+    def __neg__(self) -> Integer:
+        return self._binary("-", 0, self)
+
+    @final
+    def __lt__(self, other: Integer) -> Truth:
+        return self._compare("<", other)
+
+    @final
+    def __le__(self, other: Integer) -> Truth:
+        return self._compare("<=", other)
+
+    @final
+    def __gt__(self, other: Integer) -> Truth:
+        return self._compare(">", other)
+
+    @final
+    def __ge__(self, other: Integer) -> Truth:
+        return self._compare(">=", other)
+
+    @final
+    def _compare(self, order: Order, other: object) -> Truth:
+        if not isinstance(other, int) and type(other) is not type(self):
+            raise StageError("operand", what=order, left=type(self).__name__, right=type(other).__name__)
+        assert isinstance(other, int | Count)
+        return self._order(order, self, other)

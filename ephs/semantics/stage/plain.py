@@ -1,0 +1,87 @@
+"""Plain evaluation: real numbers are floats with IEEE arithmetic, which makes it the oracle of all others."""
+
+import math
+from collections.abc import Callable
+from typing import Any, Final, cast, final
+
+import numpy as np
+
+from ephs.semantics.stage.evaluator import Function, Interpreted
+from ephs.semantics.stage.numbers import Condition, Integer, Real, Truth
+
+__all__ = ["PLAIN", "Plain", "elementary"]
+
+
+def _guarded(function: Callable[..., float]) -> Callable[..., float]:
+    """Return not a number, or an infinity, where Python raises."""
+
+    def guarded(x: float) -> float:
+        try:
+            return function(x)
+        except OverflowError:
+            return math.inf
+        except ValueError:
+            return -math.inf if x == 0.0 else math.nan
+
+    return guarded
+
+
+def _floor(x: float) -> float:
+    return float(np.floor(x))
+
+
+_TABLE: Final[dict[Function, Callable[..., float]]] = {
+    "sqrt": _guarded(math.sqrt),
+    "absolute": math.fabs,
+    "floor": _floor,
+    "sin": _guarded(math.sin),
+    "cos": _guarded(math.cos),
+    "exp": _guarded(math.exp),
+    "log": _guarded(math.log),
+    "atan2": math.atan2,
+    "copysign": math.copysign,
+}
+
+
+def elementary(name: Function, *arguments: float) -> float:
+    """Evaluate a function of floats as the machine does."""
+    return np.float64(_TABLE[name](*arguments))
+
+
+@final
+class Plain(Interpreted):
+    """Evaluation with floats; division by zero and overflow follow IEEE where `numpy.errstate` lets them."""
+
+    def _function(self, name: Function, *arguments: Real) -> Real:
+        return elementary(name, *cast("tuple[float, ...]", arguments))
+
+    def _known(self, truth: Condition) -> bool:
+        return bool(truth)
+
+    def _choose(self, truth: Condition, one: Any, other: Any) -> Any:
+        return one if truth else other
+
+    def _both(self, one: Truth, other: Truth) -> Truth:
+        return bool(one) and bool(other)
+
+    def _negate(self, truth: Condition) -> Truth:
+        return not truth
+
+    def real(self, integer: Integer) -> Real:
+        return np.float64(cast("int", integer))
+
+    def integer(self, real: Real) -> Integer:
+        value = cast("float", real)
+        if math.isnan(value):
+            return 0
+        return int(value) if abs(value) < 2.0**63 else _edge(value)
+
+    def scale(self, real: Real, power: Integer) -> Real:
+        return cast("float", real) * np.float64(math.ldexp(1.0, cast("int", power)))
+
+
+def _edge(value: float) -> int:
+    return 2**63 - 1 if value > 0.0 else -(2**63)
+
+
+PLAIN: Final = Plain()

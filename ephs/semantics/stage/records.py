@@ -1,0 +1,251 @@
+"""Tables of records with named fields: rows of integers in one array, of real numbers in another."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from math import prod
+from typing import Any, ClassVar, Generic, Self, TypeVar, cast, final, overload
+
+import numpy as np
+
+from ephs.semantics.stage.errors import StageError
+from ephs.semantics.stage.memory import ArrayIntegers, ArrayReals, IntegerCells, RealCells, inside
+from ephs.semantics.stage.numbers import Integer, Real
+
+__all__ = [
+    "IntegerField",
+    "IntegersField",
+    "MatrixField",
+    "RealField",
+    "Record",
+    "Table",
+    "VectorField",
+    "integer",
+    "integers",
+    "real",
+    "reals",
+]
+
+
+class _Field:
+    """A named place in a record, its offset fixed when the class is made."""
+
+    __slots__ = ("name", "offset", "shape")
+
+    def __init__(self, shape: tuple[int, ...]) -> None:
+        self.name, self.shape, self.offset = "", shape, 0
+
+    @final
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+    @final
+    def _nested(self, load: Callable[[int], Any]) -> list[Any]:
+        """Return lists of the shape, filled in order."""
+
+        def rows(shape: tuple[int, ...], first: int) -> Any:
+            if not shape:
+                return load(first)
+            step = prod(shape[1:])
+            return [rows(shape[1:], first + k * step) for k in range(shape[0])]
+
+        return rows(self.shape, self.offset)
+
+    @final
+    def _entries(self, value: object, shape: tuple[int, ...]) -> Iterator[Any]:
+        """Yield the numbers of lists of the shape, in order."""
+        if not shape:
+            yield value
+            return
+        if not isinstance(value, list | tuple) or len(cast("list[Any]", value)) != shape[0]:
+            found = len(cast("list[Any]", value)) if isinstance(value, list | tuple) else type(value).__name__
+            raise StageError("shape", field=self.name, expected=self.shape, found=found)
+        for entry in cast("list[Any]", value):
+            yield from self._entries(entry, shape[1:])
+
+
+@final
+class RealField(_Field):
+    """One real number of a record."""
+
+    @overload
+    def __get__(self, row: None, owner: type) -> Self: ...
+    @overload
+    def __get__(self, row: "Record", owner: type) -> Real: ...
+    def __get__(self, row: "Record | None", owner: type) -> "Self | Real":
+        return self if row is None else row.reals.load(row.real_start + self.offset)
+
+    def __set__(self, row: "Record", value: Real) -> None:
+        row.reals.store(row.real_start + self.offset, value)
+
+
+@final
+class IntegerField(_Field):
+    """One integer of a record."""
+
+    @overload
+    def __get__(self, row: None, owner: type) -> Self: ...
+    @overload
+    def __get__(self, row: "Record", owner: type) -> Integer: ...
+    def __get__(self, row: "Record | None", owner: type) -> "Self | Integer":
+        return self if row is None else row.integers.load(row.integer_start + self.offset)
+
+    def __set__(self, row: "Record", value: Integer) -> None:
+        row.integers.store(row.integer_start + self.offset, value)
+
+
+@final
+class IntegersField(_Field):
+    """Integers of a record."""
+
+    @overload
+    def __get__(self, row: None, owner: type) -> Self: ...
+    @overload
+    def __get__(self, row: "Record", owner: type) -> list[Integer]: ...
+    def __get__(self, row: "Record | None", owner: type) -> "Self | list[Integer]":
+        return self if row is None else self._nested(lambda at: row.integers.load(row.integer_start + at))
+
+    def __set__(self, row: "Record", value: Sequence[Integer]) -> None:
+        for place, entry in enumerate(self._entries(value, self.shape)):
+            row.integers.store(row.integer_start + (self.offset + place), entry)
+
+
+@final
+class VectorField(_Field):
+    """Real numbers of a record, as a list."""
+
+    @overload
+    def __get__(self, row: None, owner: type) -> Self: ...
+    @overload
+    def __get__(self, row: "Record", owner: type) -> list[Real]: ...
+    def __get__(self, row: "Record | None", owner: type) -> "Self | list[Real]":
+        return self if row is None else self._nested(lambda at: row.reals.load(row.real_start + at))
+
+    def __set__(self, row: "Record", value: Sequence[Real]) -> None:
+        for place, entry in enumerate(self._entries(value, self.shape)):
+            row.reals.store(row.real_start + (self.offset + place), entry)
+
+
+@final
+class MatrixField(_Field):
+    """Real numbers of a record, as a list of rows."""
+
+    @overload
+    def __get__(self, row: None, owner: type) -> Self: ...
+    @overload
+    def __get__(self, row: "Record", owner: type) -> list[list[Real]]: ...
+    def __get__(self, row: "Record | None", owner: type) -> "Self | list[list[Real]]":
+        return self if row is None else self._nested(lambda at: row.reals.load(row.real_start + at))
+
+    def __set__(self, row: "Record", value: Sequence[Sequence[Real]]) -> None:
+        for place, entry in enumerate(self._entries(value, self.shape)):
+            row.reals.store(row.real_start + (self.offset + place), entry)
+
+
+def real() -> RealField:
+    """Declare one real number of a record, or a real argument of a program."""
+    return RealField(())
+
+
+def integer() -> IntegerField:
+    """Declare one integer of a record, or an integer argument of a program."""
+    return IntegerField(())
+
+
+def integers(size: int) -> IntegersField:
+    """Declare integers of a record."""
+    return IntegersField((size,))
+
+
+@overload
+def reals(rows: int) -> VectorField:
+    """Declare a list of real numbers."""
+
+
+@overload
+def reals(rows: int, columns: int) -> MatrixField:
+    """Declare a list of rows of real numbers."""
+
+
+def reals(rows: int, columns: int | None = None) -> VectorField | MatrixField:
+    """Declare real numbers of a record: a list, or a list of rows."""
+    return VectorField((rows,)) if columns is None else MatrixField((rows, columns))
+
+
+class Record:
+    """A row of a table: subclass it with fields, `mass = real()`, `rotation = reals(3, 3)`, `parent = integer()`."""
+
+    __slots__ = ("integer_start", "integers", "real_start", "reals")
+    integers: IntegerCells
+    integer_start: Integer
+    reals: RealCells
+    real_start: Integer
+    integer_width: ClassVar[int] = 0
+    real_width: ClassVar[int] = 0
+
+    def __init_subclass__(cls) -> None:
+        cls.integer_width = cls.real_width = 0
+        for field in (field for field in vars(cls).values() if isinstance(field, _Field)):
+            if isinstance(field, IntegerField | IntegersField):
+                field.offset, cls.integer_width = cls.integer_width, cls.integer_width + prod(field.shape)
+            else:
+                field.offset, cls.real_width = cls.real_width, cls.real_width + prod(field.shape)
+
+    @final
+    def __init__(self, integers: IntegerCells, integer_start: Integer, reals: RealCells, real_start: Integer) -> None:
+        object.__setattr__(self, "integers", integers)
+        object.__setattr__(self, "integer_start", integer_start)
+        object.__setattr__(self, "reals", reals)
+        object.__setattr__(self, "real_start", real_start)
+
+    @final
+    def __setattr__(self, name: str, value: object) -> None:
+        field = getattr(type(self), name, None)
+        if not isinstance(field, _Field):
+            fields = [key for key, field in vars(type(self)).items() if isinstance(field, _Field)]
+            raise StageError("field", record=type(self).__name__, found=name, expected=", ".join(fields))
+        object.__setattr__(self, name, value)
+
+    @final
+    def __getattr__(self, name: str) -> Any:
+        fields = [key for key, field in vars(type(self)).items() if isinstance(field, _Field)]
+        raise StageError("field", record=type(self).__name__, found=name, expected=", ".join(fields))
+
+    @final
+    @classmethod
+    def table(cls, size: int) -> "Table[Self]":
+        """Return a table of `size` rows of zeros in NumPy arrays of its own."""
+        return Table(
+            cls,
+            ArrayIntegers(np.zeros(size * cls.integer_width, dtype=np.int64)),
+            ArrayReals(np.zeros(size * cls.real_width)),
+            size,
+        )
+
+
+Row = TypeVar("Row", bound=Record)
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Table(Generic[Row]):
+    """Rows of one class of records: their integers in one array, their real numbers in another.
+
+    Attributes
+    ----------
+    record
+        The class of the rows.
+    integers, reals
+        Where the numbers live, row after row.
+    size
+        How many rows.
+    """
+
+    record: type[Row]
+    integers: IntegerCells
+    reals: RealCells
+    size: Integer
+
+    def __getitem__(self, index: Integer) -> Row:
+        inside(index, self.size, f"a table of {self.record.__name__}")
+        record = self.record
+        return record(self.integers, index * record.integer_width, self.reals, index * record.real_width)

@@ -1,0 +1,228 @@
+"""One function, run with floats and as machine code: the same bits."""
+
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ephs.semantics.stage import (
+    Entry,
+    Evaluator,
+    Integer,
+    Integers,
+    Matrix,
+    Program,
+    Real,
+    Record,
+    StageError,
+    Table,
+    Vector,
+    indices,
+    integer,
+    matrix,
+    real,
+    reals,
+    staged,
+    table,
+    vector,
+)
+
+
+class Link(Record):
+    parent = integer()
+    rotation = reals(3, 3)
+    offset = reals(3)
+    mass = real()
+
+
+@staged
+def cross(on: Evaluator, a: list[Real], b: list[Real]) -> list[Real]:
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+
+
+def solve(on: Evaluator, a: Matrix, x: Vector, pivots: Integers) -> Integer:
+    """LU with partial pivoting; the number of exchanges."""
+    n, exchanges = x.size, on.counter(0)
+
+    def eliminate(k: Integer) -> None:
+        best, at = on.variable(on.absolute(a[k, k])), on.counter(k)
+
+        def search(i: Integer) -> None:
+            size = on.absolute(a[i, k])
+
+            def take() -> None:
+                best.value, at.value = size, i
+
+            on.when(size > best.value, take)
+
+        on.loop(n, search, start=k + 1)
+        pivot = pivots[k] = at.value
+
+        def exchange() -> None:
+            exchanges.value = exchanges.value + 1
+
+            def column(j: Integer) -> None:
+                upper, lower = a[k, j], a[pivot, j]
+                a[k, j], a[pivot, j] = lower, upper
+
+            on.loop(n, column)
+            upper, lower = x[k], x[pivot]
+            x[k], x[pivot] = lower, upper
+
+        on.when(on.negate(on.same(pivot, k)), exchange)
+
+        def below(i: Integer) -> None:
+            factor = a[i, k] / a[k, k]
+
+            def column(j: Integer) -> None:
+                a[i, j] = a[i, j] - factor * a[k, j]
+
+            on.loop(n, column, start=k + 1)
+            x[i] = x[i] - factor * x[k]
+
+        on.loop(n, below, start=k + 1)
+
+    def back(i: Integer) -> None:
+        total, row = on.variable(x[i]), a.row(i)
+
+        def column(j: Integer) -> None:
+            total.value = total.value - row[j] * x[j]
+
+        on.loop(n, column, start=i + 1)
+        x[i] = total.value / row[i]
+
+    on.loop(n, eliminate)
+    on.loop(n, back, down=True)
+    return exchanges.value
+
+
+def swing(on: Evaluator, links: Table[Link], angles: Vector, out: Vector, scale: Real) -> Real:
+    """Points of a tree of links, by rotation about z; the total of the masses."""
+    total = on.variable(0.0)
+
+    def outward(i: Integer) -> None:
+        link = links[i]
+        c, s = on.cos(angles[i]), on.sin(angles[i])
+        turned = [c * link.offset[0] - s * link.offset[1], s * link.offset[0] + c * link.offset[1], link.offset[2]]
+        turned = [row[0] * turned[0] + row[1] * turned[1] + row[2] * turned[2] for row in link.rotation]
+        turned = cross(on, turned, cross(on, [0.0, 0.0, 1.0], turned))
+        place = out.part(3 * i, 3)
+
+        def above() -> None:
+            before = out.part(3 * link.parent, 3)
+            for k in range(3):
+                place[k] = before[k] + turned[k] * scale
+
+        def root() -> None:
+            for k in range(3):
+                place[k] = turned[k] * scale
+
+        on.when(link.parent >= 0, above, root)
+        link.mass = on.maximum(link.mass, on.select(angles[i] < 0.0, 1.5, 0.5))
+        total.value = total.value + link.mass
+
+    on.loop(links.size, outward)
+    return total.value
+
+
+def newton(on: Evaluator, x: Real) -> Real:
+    """The square root by iteration."""
+    root, steps = on.variable(x), on.counter(0)
+
+    def step() -> Any:
+        root.value = (root.value + x / root.value) / 2.0
+        steps.value = steps.value + 1
+        return on.either(on.absolute(root.value * root.value - x) <= 1e-14 * x, steps.value >= 60)
+
+    on.repeat(step)
+    return root.value
+
+
+def whole(on: Evaluator, i: Integer, j: Integer) -> Integer:
+    return (i // j) * 1000 + i % j
+
+
+PROGRAM = Program(
+    "tried",
+    solve=Entry(solve, a=matrix(), x=vector(), pivots=indices()),
+    swing=Entry(swing, links=table(Link), angles=vector(), out=vector(), scale=real()),
+    newton=Entry(newton, x=real()),
+    whole=Entry(whole, i=integer(), j=integer()),
+)
+
+
+@pytest.fixture(params=["compiled", "plain"])
+def run(request):
+    return PROGRAM.compiled() if request.param == "compiled" else PROGRAM.plain()
+
+
+@pytest.mark.parametrize("n", [1, 2, 7, 20])
+def test_equations_are_solved_with_the_same_bits(n):
+    draw = np.random.default_rng(n)
+    matrix, right = draw.normal(size=(n, n)), draw.normal(size=n)
+    found = []
+    for calls in (PROGRAM.compiled(), PROGRAM.plain()):
+        a, x, pivots = matrix.copy(), right.copy(), np.zeros(n, dtype=np.int64)
+        found.append((calls["solve"](a, x, pivots), a, x, pivots))
+    for one, other in zip(*found, strict=True):
+        assert np.array_equal(one, other)
+    scale = np.abs(matrix) @ np.abs(found[0][2])
+    assert np.all(np.abs(matrix @ found[0][2] - right) <= 10 * np.linalg.cond(matrix) * np.finfo(float).eps * scale)
+
+
+def test_records_are_read_and_written_with_the_same_bits():
+    draw = np.random.default_rng(1)
+    found = []
+    numbers = draw.normal(size=5 * Link.real_width), draw.normal(size=5)
+    for calls in (PROGRAM.compiled(), PROGRAM.plain()):
+        links = Link.table(5)
+        links.reals.array[:] = numbers[0]
+        for i in range(5):
+            links[i].parent = (i - 1) // 2 if i else -1
+            links[i].rotation = np.eye(3).tolist()
+        out = np.zeros(15)
+        found.append((calls["swing"](links, numbers[1], out, 0.7), links.reals.array, out))
+    for one, other in zip(*found, strict=True):
+        assert np.array_equal(one, other)
+    assert found[0][0] == sum(links[i].mass for i in range(5))
+
+
+@pytest.mark.parametrize("x", [2.0, 1e-8, 3e9])
+def test_a_loop_ends_when_its_condition_holds(run, x):
+    assert abs(run["newton"](x) - x**0.5) <= 4 * np.finfo(float).eps * x**0.5
+
+
+@pytest.mark.parametrize("i", [-7, -6, 0, 6, 7])
+@pytest.mark.parametrize("j", [-3, 2, 3])
+def test_integers_divide_as_in_python(run, i, j):
+    assert run["whole"](i, j) == (i // j) * 1000 + i % j
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        ((np.eye(2), np.ones(2)), "solve: takes 3 arguments"),
+        ((np.eye(2, dtype=np.float32), np.ones(2), np.zeros(2, int)), "argument a is an array of float32"),
+        ((np.eye(4)[:, ::2], np.ones(2), np.zeros(2, int)), "argument a is a non-contiguous"),
+        ((np.eye(2), np.ones((2, 1)), np.zeros(2, int)), "argument x is an array of float64 of shape (2, 1)"),
+        ((np.eye(2), np.ones(2), np.zeros(2)), "argument pivots"),
+        ((shared := np.eye(2), shared[1], np.zeros(2, int)), "arguments a and x share memory"),
+    ],
+)
+def test_wrong_arguments_are_named(run, arguments, text):
+    with pytest.raises(StageError, match=re.escape(text)):
+        run["solve"](*arguments)
+
+
+def test_an_index_outside_is_seen_in_plain_evaluation():
+    with pytest.raises(StageError, match="index 9 of a vector, expected 0 … 2"):
+        Program("outside", read=Entry(lambda on, x: x[9], x=vector())).plain()["read"](np.ones(3))
+
+
+def test_a_python_condition_on_a_symbol_is_named():
+    def signed(on, x):
+        return 1.0 if x < 0.0 else 2.0
+
+    with pytest.raises(StageError, match=r"signed, test_programs.py:\d+: a condition"):
+        Program("wrong", signed=Entry(signed, x=real())).compiled()
