@@ -31,6 +31,7 @@ DATA = (
     "ephs/operad/rewriting/derivation.schema.json",
     "ephs/semantics/system.schema.json",
     "ephs/mechanics/references.bib",
+    *(f"ephs/show/assets/{file.name}" for file in sorted((ROOT / "ephs/show/assets").iterdir())),
     *(f"ephs/templates/{file.name}" for file in sorted((ROOT / "ephs/templates").iterdir()) if file.is_file()),
 )
 PATIENCE_S = 300.0

@@ -7,11 +7,19 @@ other system alike.
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ephs.show.figures import new_figure, plain
-from ephs.show.palette import BLACK, BLUE, CYCLE, GREEN, GREY, ORANGE, PURPLE, RED, SKY, dashes
-from ephs.show.series import Array, scene_panels, state_panels, thinned
+from ephs.show.palette import GREY, RED, dashes
+from ephs.show.panels import (
+    Curve,
+    Panel,
+    constraint_panels,
+    energy_panels,
+    entropy_panels,
+    exergy_panels,
+    motion_panels,
+)
+from ephs.show.series import Array, thinned
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,156 +44,112 @@ STYLE = {
     "axes.formatter.useoffset": False,
     "axes.formatter.limits": (-4, 4),
 }
-_Line = tuple[str, NDArray[np.float64], str]
 
 
 def plot_motion(sol: Any) -> "Figure":
     """Joint coordinates, positions of the centres of mass and temperatures; for any other system, its states."""
-    panels = scene_panels(sol) if sol.scene is not None else state_panels(sol)
-    panels = panels or {"state": []}
-    figure, axes = _panels(sol, "motion" if sol.scene is not None else "states", [1.0] * len(panels))
-    for each, (title, lines) in zip(axes, panels.items(), strict=True):
-        for index, (name, values) in enumerate(lines):
-            label = name if index < _MOST_NAMES else None
-            _line(each, sol, values, CYCLE[index % len(CYCLE)], label, dashes(index))
-        if len(lines) > _MOST_NAMES:
-            each.plot([], [], alpha=0.0, label=f"and {len(lines) - _MOST_NAMES} more")
-        each.set_ylabel(plain(title))
+    panels = motion_panels(sol)
+    figure, axes = _panels(sol, "motion" if sol.scene is not None else "states", panels)
+    for each, panel in zip(axes, panels, strict=True):
+        _curves(each, sol, panel)
+        if len(panel.curves) > _MOST_NAMES:
+            each.plot([], [], alpha=0.0, label=f"and {len(panel.curves) - _MOST_NAMES} more")
         _legend(each)
     return figure
 
 
 def plot_energy(sol: Any) -> "Figure":
-    """The ledger of energy, and the defect of its balance relative to what was turned over."""
-    figure, axes = _panels(sol, "energy", [1.7, 1.0])
-    heat, work = _array(sol.heat), _array(sol.work)
-    if sol.kinetic is not None and sol.potential is not None:
-        kinetic, potential = _array(sol.kinetic), _array(sol.potential)
-        potential = potential - potential[0]
-        lines: list[_Line] = [
-            ("kinetic", kinetic, BLUE),
-            ("potential (change)", potential, GREEN),
-            ("heat", heat, RED),
-            ("work supplied", work, ORANGE),
-            ("sum less work", kinetic + potential + heat - work, BLACK),
-        ]
-    else:
-        energy = _array(sol.energy)
-        lines = [
-            ("energy (change)", energy - energy[0], BLACK),
-            ("heat", heat, RED),
-            ("work supplied", work, ORANGE),
-        ]
-    _accounts(axes[0], sol, lines)
-    axes[0].set_ylabel("energy [J]")
+    """The ledger of energy, and the defect of its balance relative to the energy turned over."""
+    ledger, defect = panels = energy_panels(sol)
+    figure, axes = _panels(sol, "energy", panels)
+    _curves(axes[0], sol, ledger)
     _legend(axes[0])
-    _residual(axes[1], sol, [("defect", _array(sol.energy_error), PURPLE)], "relative defect [1]")
+    _residual(axes[1], sol, defect)
     return figure
 
 
 def plot_exergy(sol: Any) -> "Figure":
-    """Exergy that there is, that was supplied as work, and that was destroyed."""
-    figure, axes = _panels(sol, "exergy", [1.7])
-    exergy, work = _array(sol.exergy), _array(sol.work)
-    destroyed = exergy[0] + work - exergy
-    lines: list[_Line] = [("exergy (change)", exergy - exergy[0], BLUE), ("work supplied", work, ORANGE)]
-    _accounts(axes[0], sol, [*lines, ("destroyed", destroyed, RED)])
-    axes[0].set_ylabel("exergy [J]")
+    """Stored exergy, the work supplied, and destroyed exergy."""
+    panels = exergy_panels(sol)
+    figure, axes = _panels(sol, "exergy", panels)
+    _curves(axes[0], sol, panels[0])
     _legend(axes[0])
     return figure
 
 
 def plot_entropy(sol: Any) -> "Figure":
-    """Entropy gained since the start, and what each step produced; a negative production is marked."""
-    figure, axes = _panels(sol, "entropy", [1.3, 1.0])
-    entropy, production = _array(sol.entropy), _array(sol.entropy_production)
-    _line(axes[0], sol, entropy - entropy[0], BLUE, None)
-    axes[0].set_ylabel("entropy (change) [J/K]")
-    # Where there is an entry for the start too, nothing was produced before it.
-    production = production[1:] if len(production) == len(sol.t) else production
-    t = _array(sol.t)[len(sol.t) - len(production) :]
-    axes[1].plot(*thinned(t, production), color=GREEN)
+    """Entropy gained since the start, and the least production in each step; a negative production is marked."""
+    gained, produced = panels = entropy_panels(sol)
+    figure, axes = _panels(sol, "entropy", panels)
+    _line(axes[0], sol, gained.curves[0], None)
+    _line(axes[1], sol, produced.curves[0], None)
     axes[1].axhline(0.0, color=GREY, linewidth=0.7)
-    negative = production < 0
+    production = produced.curves[0].values
+    t, negative = _times(sol, production), production < 0
     if negative.any():
         axes[1].plot(t[negative], production[negative], "x", color=RED, markersize=4, label="negative")
         _legend(axes[1])
-    axes[1].set_ylabel("least produced [J/K a step]")
     return figure
 
 
 def plot_constraints(sol: Any) -> "Figure":
     """Largest residual of the joints at each time, of positions and of velocities."""
-    figure, axes = _panels(sol, "constraints", [1.0, 1.0])
-    _residual(axes[0], sol, [("position", _array(sol.constraint_error), BLUE)], "position [m, rad]")
-    _residual(axes[1], sol, [("velocity", _array(sol.velocity_error), SKY)], "velocity [m/s, rad/s]")
+    panels = constraint_panels(sol)
+    figure, axes = _panels(sol, "constraints", panels)
+    for each, panel in zip(axes, panels, strict=True):
+        _residual(each, sol, panel)
     return figure
 
 
-def _array(values: Any) -> Array:
-    return np.asarray(values, dtype=float)
+def _times(sol: Any, values: Array) -> Array:
+    return np.asarray(sol.t, dtype=float)[len(sol.t) - len(values) :]
 
 
-def _panels(sol: Any, what: str, heights: list[float]) -> "tuple[Figure, list[Axes]]":
+def _panels(sol: Any, what: str, panels: list[Panel]) -> "tuple[Figure, list[Axes]]":
     from matplotlib import rc_context
 
     style: Any = STYLE
+    heights = [panel.height for panel in panels]
     with rc_context(style):
         figure = new_figure(_WIDTH, 0.7 + _ROW * sum(heights))
         grid = figure.subplots(len(heights), 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": heights})
         axes: list[Axes] = list(grid[:, 0])
         axes[0].set_title(plain(f"{sol.name}: {what}"), loc="left")
         axes[-1].set_xlabel("time [s]")
-        t = _array(sol.t)
+        for each, panel in zip(axes, panels, strict=True):
+            each.set_ylabel(plain(panel.title))
+        t = np.asarray(sol.t, dtype=float)
         if len(t) > 1 and t[-1] > t[0]:
             axes[0].set_xlim(float(t[0]), float(t[-1]))
         figure.align_ylabels(axes)
     return figure, axes
 
 
-def _line(axes: "Axes", sol: Any, values: Array, colour: str, label: str | None, style: Any = "-") -> None:
-    axes.plot(
-        *thinned(_array(sol.t), values), color=colour, linestyle=style, linewidth=1.4, label=label and plain(label)
-    )
+def _curves(axes: "Axes", sol: Any, panel: Panel) -> None:
+    for index, curve in enumerate(panel.curves):
+        _line(axes, sol, curve, curve.name if index < _MOST_NAMES else None, dashes(index))
 
 
-def _accounts(axes: "Axes", sol: Any, lines: list[_Line]) -> None:
-    """The entries of a ledger, without those that nothing was ever booked on (but never without the first)."""
-    booked = [line for index, line in enumerate(lines) if index == 0 or np.any(line[1] != 0.0)]
-    for index, (name, values, colour) in enumerate(booked):
-        _line(axes, sol, values, colour, name, dashes(index))
+def _line(axes: "Axes", sol: Any, curve: Curve, label: str | None, style: Any = "-") -> None:
+    t, values = thinned(_times(sol, curve.values), curve.values)
+    axes.plot(t, values, color=curve.colour, linestyle=style, linewidth=1.4, label=label and plain(label))
 
 
-def _residual(axes: "Axes", sol: Any, lines: list[_Line], title: str) -> None:
-    """Sizes on a logarithmic axis; what is zero throughout is said in words."""
-    t = _array(sol.t)
+def _residual(axes: "Axes", sol: Any, panel: Panel) -> None:
+    """Sizes on a logarithmic axis; a residual of zero throughout is said in words."""
     shown = False
-    for name, values, colour in lines:
-        size = np.where(np.abs(values) > 0, np.abs(values), np.nan)
+    for curve in panel.curves:
+        size = np.where(np.abs(curve.values) > 0, np.abs(curve.values), np.nan)
         if np.isfinite(size).any():
             shown = True
             marker = "." if np.isfinite(size).sum() < 60 else ""
-            axes.plot(
-                *thinned(t[len(t) - len(size) :], size),
-                color=colour,
-                label=name,
-                linewidth=1.1,
-                marker=marker,
-            )
+            t, values = thinned(_times(sol, size), size)
+            axes.plot(t, values, color=curve.colour, label=curve.name, linewidth=1.1, marker=marker)
     axes.set_yscale("log")
-    axes.set_ylabel(title)
     if not shown:
         axes.set_ylim(1e-17, 1e-15)
-        axes.text(
-            0.5,
-            0.5,
-            "zero throughout",
-            transform=axes.transAxes,
-            ha="center",
-            va="center",
-            color=GREY,
-            size=9,
-        )
+        middle: Any = {"transform": axes.transAxes, "ha": "center", "va": "center", "color": GREY, "size": 9}
+        axes.text(0.5, 0.5, "zero throughout", **middle)
         return
     low, high = axes.get_ylim()
     if high / low < 100.0:

@@ -1,19 +1,19 @@
-"""One page about one run: figures in words, the pattern, the plots, the motion. It needs no network."""
+"""One page about one run: the motion, plots, balances in words, figures, the pattern. It needs no network."""
 
 import html
-import io
 import re
+from importlib.resources import files
 from importlib.util import find_spec
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from ephs.show.animation import animate
+from ephs.show.balances import balances
 from ephs.show.drawing import draw
-from ephs.show.flows import plot_exergy_flow
-from ephs.show.plots import plot_constraints, plot_energy, plot_entropy, plot_exergy, plot_motion
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from ephs.show.panels import constraint_panels, energy_panels, entropy_panels, exergy_panels, motion_panels
+from ephs.show.signals import Group, packed
 
 _ROWS = (
     ("method", "Method", ""),
@@ -39,37 +39,13 @@ _FINAL = (
     ("joints", "rate", "rate [rad/s, m/s]"),
     ("thermal", "temperature", "temperature [K]"),
 )
-_PLOTS = (
-    ("Motion", plot_motion),
-    ("Energy", plot_energy),
-    ("Exergy", plot_exergy),
-    ("Where exergy went", plot_exergy_flow),
-    ("Entropy", plot_entropy),
-    ("Constraints", plot_constraints),
-)
-_STYLE = """
-:root{color-scheme:light}
-body{margin:0 auto;max-width:60rem;padding:2.5rem 1.5rem 4rem;background:#fff;color:#1a1a1a;
- font:16px/1.55 Charter,'Bitstream Charter','Source Serif 4',Georgia,serif}
-h1{font-size:1.9rem;line-height:1.2;margin:0 0 .3rem}
-h2{font-size:1.2rem;margin:2.6rem 0 .8rem;padding-top:.7rem;border-top:1px solid #dfe3e8}
-p.lead{color:#6b7280;margin:0 0 1.6rem}
-table{border-collapse:collapse;font-size:.94rem;font-variant-numeric:tabular-nums}
-th,td{padding:.22rem 1.4rem .22rem 0;text-align:left;vertical-align:baseline;border-bottom:1px solid #eef0f3}
-th{font-weight:normal;color:#4b5563}
-thead th{font-weight:600;color:#1a1a1a}
-.wide{overflow-x:auto}
-figure{margin:0 0 1.6rem}
-svg{max-width:100%;height:auto}
-@media print{iframe{display:none}}
-"""
 
 
 def write_report(sol: Any, directory: str | FilePath) -> FilePath:
     """Write ``report.html`` about a solution into a folder, which is made if need be.
 
-    The page holds everything in itself: the summary with units, the pattern's picture, plots of motion, energy, exergy,
-    entropy and constraint residuals and, for a scene, the animation.
+    The page holds everything in itself: for a scene the animation; plots that zoom, show values and follow the
+    animation, of signals that are picked from a list; the balances in words; the summary with units; the pattern.
 
     Returns
     -------
@@ -79,14 +55,22 @@ def write_report(sol: Any, directory: str | FilePath) -> FilePath:
     folder = FilePath(directory)
     folder.mkdir(parents=True, exist_ok=True)
     summary: dict[str, Any] = sol.summary()
-    sections = [_summary(summary), _final(summary), _pattern(sol), _animation(sol), *_plots(sol)]
+    sections = [
+        _audit(summary),
+        _animation(sol),
+        _plots(sol),
+        balances(sol, summary),
+        _summary(summary),
+        _final(summary),
+        _pattern(sol),
+    ]
     name = html.escape(str(sol.name))
     page = "\n".join(
         [
             "<!DOCTYPE html>",
             '<html lang="en">',
             f'<head><meta charset="utf-8"><meta name="viewport" content="width=device-width"><title>{name}</title>',
-            f'<link rel="icon" href="data:,"><style>{_STYLE}</style></head>',
+            f'<link rel="icon" href="data:,"><style>{_asset("report.css")}{_asset("uplot.css")}</style></head>',
             f'<body><h1>{name}</h1><p class="lead">{_lead(sol, summary)}</p>',
             *[section for section in sections if section],
             "</body></html>",
@@ -133,7 +117,7 @@ def _summary(summary: dict[str, Any]) -> str:
     if isinstance(unknowns, dict):
         shown = f"{_number(unknowns.get('paper'))} as flattened, {_number(unknowns.get('used'))} used"
         rows.append(f"<tr><th>Unknowns</th><td>{shown}</td></tr>")
-    return f"<h2>Summary</h2><table><tbody>{''.join(rows)}</tbody></table>{_audit(summary)}"
+    return f"<h2>Summary</h2><table><tbody>{''.join(rows)}</tbody></table>"
 
 
 def _audit(summary: dict[str, Any]) -> str:
@@ -187,24 +171,34 @@ def _animation(sol: Any) -> str:
         return ""
     if find_spec("viser") is None:
         return (
-            "<h2>Animation</h2><p>There is no animation here, because the package viser is not installed; "
+            "<h2>Motion</h2><p>There is no animation here, because the package viser is not installed; "
             "install it with <code>pip install 'ephs[viz]'</code> and write the report again.</p>"
         )
-    return f"<h2>Animation</h2>{animate(sol, heat=any(True for _ in sol.scene.all_thermal())).frame()}"
+    frame = animate(sol, heat=any(True for _ in sol.scene.all_thermal())).frame()
+    times = f'data-start="{float(sol.t[0])!r}" data-end="{float(sol.t[-1])!r}"'
+    return f"<h2>Motion</h2>{frame.replace('<iframe ', f'<iframe {times} ', 1)}"
 
 
-def _plots(sol: Any) -> list[str]:
-    return [f"<h2>{title}</h2><figure>{_svg(plot(sol), title)}</figure>" for title, plot in _PLOTS]
+def _plots(sol: Any) -> str:
+    groups = [
+        Group("Motion" if sol.scene is not None else "States", motion_panels(sol), shown=True),
+        Group("Energy", energy_panels(sol), shown=True),
+        Group("Exergy", exergy_panels(sol), shown=False),
+        Group("Entropy", entropy_panels(sol), shown=False),
+        Group("Constraints", constraint_panels(sol), shown=False),
+    ]
+    data = packed(np.asarray(sol.t, dtype=float), groups)
+    return (
+        "<h2>Signals</h2><p>Drag across a plot to zoom into a span of time, double-click to see all of it.</p>"
+        '<div id="signals-box"><nav id="picker"><input type="search" id="find" placeholder="find a signal"></nav>'
+        '<div id="plots"></div></div>'
+        f'<script type="application/json" id="signals">{data}</script>'
+        f"<script>{_asset('uplot.js')}</script><script>{_asset('report.js')}</script>"
+    )
 
 
-def _svg(figure: "Figure", salt: str) -> str:
-    from matplotlib import rc_context
-
-    stream = io.StringIO()
-    # The salt makes the ids of each plot its own, and the same at every writing.
-    with rc_context({"svg.hashsalt": f"ephs {salt}", "svg.fonttype": "path"}):
-        figure.savefig(stream, format="svg", metadata={"Date": None})
-    return _inline(stream.getvalue())
+def _asset(name: str) -> str:
+    return files("ephs.show").joinpath("assets", name).read_text(encoding="utf-8")
 
 
 def _inline(picture: str) -> str:

@@ -1,5 +1,6 @@
 """Pages as a browser shows them that has no network: something is seen, it moves, and nothing is asked for."""
 
+import json
 import time
 
 import numpy as np
@@ -55,6 +56,42 @@ def test_the_report_plays_without_a_network(crank, tmp_path):
         tab.evaluate("document.querySelector('iframe').scrollIntoView()")
         tab.until("document.querySelector('iframe').contentDocument.querySelector('canvas') !== null")
         assert [url for url in tab.requests if not url.startswith(LOCAL)] == []
+        assert tab.complaints == []
+
+
+def test_plots_are_picked_zoomed_and_follow_the_motion(crank, tmp_path):
+    with opened(write_report(crank, tmp_path)) as tab:
+        tab.until("document.querySelectorAll('#plots canvas').length > 2")
+        count = "document.querySelectorAll('#plots figure').length"
+        legend = "[...document.querySelectorAll('#plots .u-label')].map(each => each.textContent).join()"
+        before = tab.evaluate(count)
+        assert "least production" not in tab.evaluate(legend)
+        pick = "[...document.querySelectorAll('#picker label')].find(each => each.textContent === 'least production')"
+        tab.evaluate(f"{pick}.querySelector('input').click()")
+        assert tab.evaluate(count) == before + 1 and "least production" in tab.evaluate(legend)
+        tab.evaluate(f"{pick}.querySelector('input').click()")
+        assert tab.evaluate(count) == before
+        search = "document.getElementById('find')"
+        tab.evaluate(f"{search}.value = 'energy kin'; {search}.dispatchEvent(new Event('input'))")
+        shown = "[...document.querySelectorAll('#picker label:not([hidden])')].map(each => each.textContent).join()"
+        assert tab.evaluate(shown) == "kinetic"
+        # a drag over one plot zooms all of them
+        tab.evaluate("document.querySelector('#plots figure').scrollIntoView()")
+        left, top, width = tab.evaluate(
+            "(({left, top, width}) => [left, top, width])(document.querySelector('.u-over').getBoundingClientRect())"
+        )
+        moves = (("mouseMoved", 0.2, 0), ("mousePressed", 0.2, 1), ("mouseMoved", 0.6, 1), ("mouseReleased", 0.6, 0))
+        spans = "uPlot.sync('time').plots.map(({scales}) => scales.x.max - scales.x.min)"
+        assert np.allclose(tab.evaluate(spans), 2.0)
+        for kind, share, buttons in moves:
+            place = {"x": left + share * width, "y": top + 20.0}
+            button = "left" if kind != "mouseMoved" or buttons else "none"
+            tab.call("Input.dispatchMouseEvent", type=kind, button=button, buttons=buttons, clickCount=1, **place)
+            tab.picture()
+        tab.until(f"{spans}.every(span => Math.abs(span - 0.8) < 0.05)")
+        # the line of the animation's time moves over the plots
+        picture = "document.querySelector('#plots canvas').toDataURL()"
+        tab.until(f"{picture} !== {json.dumps(tab.evaluate(picture))}")
         assert tab.complaints == []
 
 
