@@ -25,20 +25,20 @@ def balances(sol: Any, summary: dict[str, Any]) -> str:
     least = float(np.min(entropy_panels(sol)[1].curves[0].values, initial=np.inf))
     bands = exergy_bands(sol)
     destroyed = sum(band.amount for band in bands if band.kind == "destroyed" and not band.source)
-    sentences = [
-        f"<strong>Energy.</strong> Drives and inputs did {number(work)} J of work; friction and damping made {number(heat)} J of "
-        f"heat; the energy of the whole, heat included, changed by {number(stored)} J. The balance closes to "
+    sentences = {
+        "Energy": f"Drives and inputs did {number(work)} J of work; friction and damping made {number(heat)} J of heat; "
+        f"the energy of the whole, heat included, changed by {number(stored)} J. The balance closes to "
         f"{number(float(np.abs(sol.energy_error).max()))} of the energy turned over.",
-        f"<strong>Exergy.</strong> The exergy of the whole changed by {number(float(exergy[-1] - exergy[0]))} J; "
-        f"{number(destroyed)} J were destroyed.",
-        f"<strong>Entropy.</strong> The entropy grew by {number(float(entropy[-1] - entropy[0]))} J/K. No component produced "
-        f"less than {number(least)} J/K in a step.",
-    ]
+        "Exergy": f"The exergy of the whole changed by {number(float(exergy[-1] - exergy[0]))} J; {number(destroyed)} J "
+        "were destroyed.",
+        "Entropy": f"The entropy grew by {number(float(entropy[-1] - entropy[0]))} J/K. No component produced less than "
+        f"{number(least)} J/K in a step.",
+    }
     if summary.get("max_constraint_error") is not None and sol.scene is not None:
-        sentences.append(
-            f"<strong>Constraints.</strong> Joints hold to {number(float(summary['max_constraint_error']))} (m, rad) in position."
-        )
-    return f"<h2>Balances</h2>{''.join(f'<p>{each}</p>' for each in sentences)}{_flow(bands)}"
+        residual = number(float(summary["max_constraint_error"]))
+        sentences["Constraints"] = f"Joints hold to {residual} (m, rad) in position."
+    words = "".join(f"<p><strong>{title}.</strong> {text}</p>" for title, text in sentences.items())
+    return f"<h2>Balances</h2>{words}{_flow(bands)}"
 
 
 def number(value: float) -> str:
