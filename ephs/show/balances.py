@@ -26,13 +26,13 @@ def balances(sol: Any, summary: dict[str, Any]) -> str:
     bands = exergy_bands(sol)
     destroyed = sum(band.amount for band in bands if band.kind == "destroyed" and not band.source)
     sentences = {
-        "Energy": f"Drives and inputs did {number(work)} J of work; friction and damping made {number(heat)} J of heat; "
-        f"the energy of the whole, heat included, changed by {number(stored)} J. The balance closes to "
+        "Energy": f"Drives and inputs did {number(work)} J of work; friction and damping made {number(heat)} J of "
+        f"heat; the energy of the whole, heat included, changed by {number(stored)} J. The balance closes to "
         f"{number(float(np.abs(sol.energy_error).max()))} of the energy turned over.",
-        "Exergy": f"The exergy of the whole changed by {number(float(exergy[-1] - exergy[0]))} J; {number(destroyed)} J "
-        "were destroyed.",
-        "Entropy": f"The entropy grew by {number(float(entropy[-1] - entropy[0]))} J/K. No component produced less than "
-        f"{number(least)} J/K in a step.",
+        "Exergy": f"The exergy of the whole changed by {number(float(exergy[-1] - exergy[0]))} J; "
+        f"{number(destroyed)} J were destroyed.",
+        "Entropy": f"The entropy grew by {number(float(entropy[-1] - entropy[0]))} J/K. No component produced less "
+        f"than {number(least)} J/K in a step.",
     }
     if summary.get("max_constraint_error") is not None and sol.scene is not None:
         residual = number(float(summary["max_constraint_error"]))
