@@ -1,5 +1,6 @@
 """One function, many evaluations: functions over abstract numbers, staged to machine code."""
 
+from ephs.semantics.stage.duals import Duals as Duals
 from ephs.semantics.stage.errors import StageError as StageError
 from ephs.semantics.stage.evaluator import Evaluator as Evaluator
 from ephs.semantics.stage.evaluator import staged as staged

@@ -24,6 +24,9 @@ TEXTS: Final = {
     "parameters": "{where}: takes {expected}, found {found}.",
     "argument": "{where}: argument {argument} is {found}, expected {expected}.",
     "overlap": "{where}: arguments {argument} and {other} share memory; give arrays of their own.",
+    "passive": "{where}: a number with a derivative is stored where derivatives are not kept; "
+    "make that argument active.",
+    "active": "{where}: found {found} to differentiate by, expected some of {expected}.",
     "entries": "program {where}: found {found}, expected at least one function, each under a Python name.",
     "machine": "{where}: LLVM refuses the program: {found}",
     "undecided": "{where}: {what} depends on a condition that has no single answer {found}; write on.select(…).",

@@ -6,7 +6,7 @@ from functools import wraps
 from typing import Any, Concatenate, Final, Literal, ParamSpec, TypeAlias, TypeVar, cast, final
 
 from ephs.semantics.stage.errors import StageError
-from ephs.semantics.stage.memory import Held, Variable
+from ephs.semantics.stage.memory import Held, IntegerCells, RealCells, Variable, Vector
 from ephs.semantics.stage.numbers import Condition, Count, Integer, Number, Real, Truth
 
 __all__ = ["FUNCTIONS", "Evaluator", "Function", "Interpreted", "known", "staged"]
@@ -76,16 +76,38 @@ class Evaluator(ABC):
         """Call `body()` until it returns true, at least once."""
 
     @abstractmethod
-    def variable(self, value: Real) -> Variable[Real]:
-        """Return a real variable with its first value."""
+    def _reals(self, size: int) -> RealCells:
+        """Return cells of this function's own, with nothing in them."""
 
     @abstractmethod
-    def counter(self, value: Integer) -> Variable[Integer]:
-        """Return an integer variable with its first value."""
+    def _wholes(self, size: int) -> IntegerCells:
+        """Return cells for integers of this function's own, with nothing in them."""
 
     @abstractmethod
     def _call(self, on: "Evaluator", function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
         """Call a function decorated by `staged`, with `on` as its evaluator."""
+
+    @final
+    def variable(self, value: Real) -> Variable[Real]:
+        """Return a real variable with its first value."""
+        made = Variable(self._reals(1))
+        made.value = value
+        return made
+
+    @final
+    def counter(self, value: Integer) -> Variable[Integer]:
+        """Return an integer variable with its first value."""
+        made = Variable(self._wholes(1))
+        made.value = value
+        return made
+
+    @final
+    def scratch(self, size: int) -> Vector:
+        """Return `size` zeros in memory that lives as long as the call of the function."""
+        made = Vector(self._reals(size), 0, size)
+        for place in range(size):
+            made[place] = 0.0
+        return made
 
     @final
     def sqrt(self, x: Real) -> Real:
@@ -230,14 +252,14 @@ class Interpreted(Evaluator):
                 return
 
     @final
-    def variable(self, value: Real) -> Variable[Real]:
-        entries: list[Real] = [value]
-        return Variable(Held(entries))
+    def _reals(self, size: int) -> RealCells:
+        entries: list[Real] = [0.0] * size
+        return Held(entries)
 
     @final
-    def counter(self, value: Integer) -> Variable[Integer]:
-        entries: list[Integer] = [value]
-        return Variable(Held(entries))
+    def _wholes(self, size: int) -> IntegerCells:
+        entries: list[Integer] = [0] * size
+        return Held(entries)
 
     @final
     def _same(self, one: Integer, other: Integer) -> Truth:

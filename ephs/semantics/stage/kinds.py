@@ -6,10 +6,11 @@ from typing import Any, Final, Literal, TypeAlias, cast, final
 
 import numpy as np
 
-from ephs.semantics.stage.memory import ArrayIntegers, ArrayReals, Integers, Matrix, Vector
+from ephs.semantics.stage.duals import Dual, DualCells
+from ephs.semantics.stage.memory import ArrayIntegers, ArrayReals, Integers, Matrix, RealCells, Vector
 from ephs.semantics.stage.records import Record, Table
 
-__all__ = ["INTEGER", "REAL", "Atom", "Kind", "described", "indices", "matrix", "table", "vector"]
+__all__ = ["INTEGER", "REAL", "Atom", "Kind", "described", "dual", "indices", "matrix", "table", "vector"]
 
 Atom: TypeAlias = Literal["reals", "integers", "real", "integer"]
 """What an argument is made of: an array of floats or of integers, a float, an integer."""
@@ -112,6 +113,38 @@ def table(record: type[Record]) -> Kind:
         split,
         lambda parts: Table(record, *parts),
     )
+
+
+def dual(kind: Kind, directions: int, active: bool) -> Kind:
+    """Return the kind of an argument of dual numbers: a value and its slopes, or, not active, a constant."""
+
+    def split(value: Any) -> tuple[Any, ...] | None:
+        match value:
+            case (values, slopes) if (parts := kind.split(values)) is not None:
+                size = sum(part.size for part, atom in zip(parts, kind.atoms, strict=True) if atom == "reals")
+                size = directions * (size + kind.atoms.count("real"))
+                fits = isinstance(slopes, np.ndarray) and _array(slopes.reshape(-1), np.float64, (size,))
+                return (*parts, cast("Any", slopes)) if fits and slopes.flags.c_contiguous else None
+            case _:
+                return None
+
+    def join(parts: list[Any]) -> Any:
+        slopes: RealCells | None = parts[len(kind.atoms)] if active else None
+        made: list[Any] = []
+        for part, atom in zip(parts, kind.atoms, strict=False):
+            if atom == "reals":
+                made.append(DualCells(part, slopes, directions))
+            elif atom == "real":
+                rates = tuple(0.0 if slopes is None else slopes.load(k) for k in range(directions))
+                made.append(Dual(part, rates))
+            else:
+                made.append(part)
+        return kind.join(made)
+
+    if not active or not {"reals", "real"}.intersection(kind.atoms):
+        return Kind(kind.expected, kind.atoms, kind.split, join)
+    shape = "of its shape" if directions == 1 else f"of its shape and {directions} directions after it"
+    return Kind(f"a pair: {kind.expected}, and its slopes, float64 {shape}", (*kind.atoms, "reals"), split, join)
 
 
 def described(value: Any) -> str:

@@ -8,7 +8,7 @@ from typing import Any, Final, cast, final
 from ephs.semantics.stage.emission import IntegerPointer, RealPointer, Symbol, TruthSymbol, WholeSymbol, Writer
 from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.evaluator import Evaluator, Function, known
-from ephs.semantics.stage.memory import Variable
+from ephs.semantics.stage.memory import IntegerCells, RealCells, Variable
 from ephs.semantics.stage.numbers import Condition, Integer, Real, Truth
 from ephs.semantics.stage.plain import elementary
 from ephs.semantics.stage.records import Record
@@ -259,17 +259,11 @@ class Machine(Evaluator):
         to.fork(self._single(truth, "on.repeat"), out, inner)
         to.begin(out)
 
-    def variable(self, value: Real) -> Variable[Real]:
-        to = self.to
-        at = RealPointer(to, to.slot(to.real))
-        at.store(0, value)
-        return Variable(at)
+    def _reals(self, size: int) -> RealCells:
+        return RealPointer(self.to, self.to.slot(f"[{size} x {self.to.real}]"))
 
-    def counter(self, value: Integer) -> Variable[Integer]:
-        to = self.to
-        at = IntegerPointer(to, to.slot("i64"))
-        at.store(0, value)
-        return Variable(at)
+    def _wholes(self, size: int) -> IntegerCells:
+        return IntegerPointer(self.to, self.to.slot(f"[{size} x i64]"))
 
     # Functions of their own
 
@@ -277,7 +271,7 @@ class Machine(Evaluator):
         to = self.to
         passed: list[tuple[str, str]] = []
         form = _flat(to, arguments, lambda kind, operand: passed.append((kind, operand)))
-        key = (function, id(on), form, tuple(kind for kind, _ in passed))
+        key = (function, on, form, tuple(kind for kind, _ in passed))
         emitted = self._emitted.get(key)
         if emitted is None:
             if key in self._emitted:

@@ -4,17 +4,18 @@ import ctypes
 import inspect
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, wraps
 from itertools import pairwise
 from types import MappingProxyType
 from typing import Any, Final, cast, final
 
 import numpy as np
 
+from ephs.semantics.stage.duals import Duals
 from ephs.semantics.stage.emission import IntegerPointer, RealPointer, Symbol, TruthSymbol, WholeSymbol, Writer
 from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.evaluator import Evaluator
-from ephs.semantics.stage.kinds import INTEGER, REAL, Atom, Kind, described
+from ephs.semantics.stage.kinds import INTEGER, REAL, Atom, Kind, described, dual
 from ephs.semantics.stage.llvm import Library, compile_text, load
 from ephs.semantics.stage.machine import Machine
 from ephs.semantics.stage.memory import ArrayIntegers, ArrayReals
@@ -82,6 +83,32 @@ class Entry:
                 )
             parts += found
         return parts
+
+    def tangent(self, *active: str, directions: int = 1) -> "Entry":
+        """Return this function with exact derivatives along directions.
+
+        Parameters
+        ----------
+        *active
+            The arguments that have derivatives, read or written; each is given as a pair: the argument, and an array
+            of its slopes, of its shape, and the number of directions after it where there are several.
+        directions
+            How many derivatives are computed at once.
+
+        Raises
+        ------
+        StageError
+            An argument is not there. Later: a number with a derivative is stored in memory that is not active.
+        """
+        if unknown := [name for name in active if name not in self.kinds]:
+            raise StageError("active", where=self.name, found=", ".join(unknown), expected=", ".join(self.kinds))
+
+        @wraps(self.function)
+        def run(on: Evaluator, *arguments: Any) -> Any:
+            return self.function(Duals(on, directions), *arguments)
+
+        kinds = {name: dual(kind, directions, name in active) for name, kind in self.kinds.items()}
+        return Entry(run, **kinds)
 
     def run(self, on: Evaluator, parts: Iterator[Any]) -> Any:
         """Run the function with arguments made of cells and numbers."""

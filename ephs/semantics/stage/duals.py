@@ -1,0 +1,221 @@
+"""Dual numbers over any evaluator: the exact derivative along directions, computed beside the value."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Final, TypeAlias, final
+
+from ephs.semantics.stage.errors import StageError
+from ephs.semantics.stage.evaluator import Evaluator, Function
+from ephs.semantics.stage.memory import Cells, IntegerCells, RealCells
+from ephs.semantics.stage.numbers import Condition, Integer, Number, Operation, Order, Real, Truth
+
+__all__ = ["Dual", "DualCells", "Duals"]
+
+Ruled: TypeAlias = tuple[Real, tuple[Real, ...]]
+"""The value of a function, and its derivative by each argument."""
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Dual(Number):
+    """A value, and its derivative along each direction."""
+
+    value: Real
+    slopes: tuple[Real, ...]
+
+    def _split(self, number: Real) -> tuple[Real, tuple[Real, ...]]:
+        if isinstance(number, Dual):
+            return number.value, number.slopes
+        return number, (0.0,) * len(self.slopes)
+
+    def _apply(self, operation: Operation, left: Real, right: Real) -> Real:
+        (a, da), (b, db) = self._split(left), self._split(right)
+        pairs = list(zip(da, db, strict=True))
+        match operation:
+            case "+":
+                return Dual(a + b, tuple(_plus(x, y) for x, y in pairs))
+            case "-":
+                return Dual(a - b, tuple(_plus(x, -y) for x, y in pairs))
+            case "*":
+                return Dual(a * b, tuple(_plus(_times(x, b), _times(y, a)) for x, y in pairs))
+            case "/":
+                quotient = a / b
+                return Dual(quotient, tuple(_over(_plus(x, -_times(y, quotient)), b) for x, y in pairs))
+
+    def _order(self, order: Order, left: Real, right: Real) -> Truth:
+        (a, _), (b, _) = self._split(left), self._split(right)
+        return _ORDERS[order](a, b)
+
+    def _negative(self) -> Real:
+        return Dual(-self.value, tuple(-slope for slope in self.slopes))
+
+
+def _nought(slope: Real) -> bool:
+    """Tell whether a slope is known to be zero, whatever it is multiplied by: a constant."""
+    return type(slope) is float and slope == 0.0
+
+
+def _plus(one: Real, other: Real) -> Real:
+    return other if _nought(one) else one if _nought(other) else one + other
+
+
+def _times(slope: Real, factor: Real) -> Real:
+    return 0.0 if _nought(slope) else slope * factor
+
+
+def _over(slope: Real, divisor: Real) -> Real:
+    return 0.0 if _nought(slope) else slope / divisor
+
+
+_ORDERS: Final[dict[Order, Callable[[Real, Real], Truth]]] = {
+    "<": lambda a, b: a < b,
+    "<=": lambda a, b: a <= b,
+    ">": lambda a, b: a > b,
+    ">=": lambda a, b: a >= b,
+}
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class DualCells(Cells[Real]):
+    """Cells of dual numbers: of values, and of the slopes of each value in a row.
+
+    Attributes
+    ----------
+    values, slopes
+        Where they live. Without slopes the numbers are constants, and only constants are stored.
+    directions
+        How many slopes a value has.
+    """
+
+    values: RealCells
+    slopes: RealCells | None
+    directions: int
+
+    def load(self, index: Integer) -> Real:
+        """Return the number at an index."""
+        value, slopes = self.values.load(index), self.slopes
+        if slopes is None:
+            return Dual(value, (0.0,) * self.directions)
+        first = index * self.directions
+        return Dual(value, tuple(slopes.load(first + k) for k in range(self.directions)))
+
+    def store(self, index: Integer, value: Real) -> None:
+        """Keep a number at an index."""
+        slopes: tuple[Real, ...] = (0.0,) * self.directions
+        if isinstance(value, Dual):
+            value, slopes = value.value, value.slopes
+        self.values.store(index, value)
+        for k, slope in enumerate(slopes):
+            if self.slopes is not None:
+                self.slopes.store(index * self.directions + k, slope)
+            elif isinstance(slope, Number) or slope != 0.0:
+                raise StageError("passive")
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Duals(Evaluator):
+    """Evaluation with dual numbers of another evaluator's numbers.
+
+    Attributes
+    ----------
+    base
+        The evaluator of values and slopes.
+    directions
+        How many derivatives are computed at once.
+    """
+
+    base: Evaluator
+    directions: int = 1
+
+    def dual(self, number: Real) -> Dual:
+        """Return a number as a dual one, a constant without slopes."""
+        return number if isinstance(number, Dual) else Dual(number, (0.0,) * self.directions)
+
+    def cells(self, values: RealCells, slopes: RealCells | None = None) -> RealCells:
+        """Return cells of dual numbers."""
+        return DualCells(values, slopes, self.directions)
+
+    def _function(self, name: Function, *arguments: Real) -> Real:
+        numbers = [self.dual(number) for number in arguments]
+        value, factors = _RULES[name](self.base, [number.value for number in numbers])
+        slopes: tuple[Real, ...] = (0.0,) * self.directions
+        for factor, number in zip(factors, numbers, strict=True):
+            slopes = tuple(_plus(s, _times(n, factor)) for s, n in zip(slopes, number.slopes, strict=True))
+        return Dual(value, slopes)
+
+    def scale(self, real: Real, power: Integer) -> Real:
+        x = self.dual(real)
+        return Dual(self.base.scale(x.value, power), tuple(self.base.scale(slope, power) for slope in x.slopes))
+
+    def _choose(self, truth: Condition, one: Any, other: Any) -> Any:
+        if not isinstance(one, Dual) and not isinstance(other, Dual):
+            return self.base.select(truth, one, other)
+        a, b = self.dual(one), self.dual(other)
+        return Dual(self.base.select(truth, a.value, b.value), self.base.select(truth, a.slopes, b.slopes))
+
+    def _both(self, one: Truth, other: Truth) -> Truth:
+        return self.base.both(one, other)
+
+    def _negate(self, truth: Condition) -> Truth:
+        return self.base.negate(truth)
+
+    def _same(self, one: Integer, other: Integer) -> Truth:
+        return self.base.same(one, other)
+
+    def real(self, integer: Integer) -> Real:
+        return self.dual(self.base.real(integer))
+
+    def integer(self, real: Real) -> Integer:
+        return self.base.integer(self.dual(real).value)
+
+    def loop(self, count: Integer, body: Callable[[Integer], None], start: Integer = 0, down: bool = False) -> None:
+        self.base.loop(count, body, start, down)
+
+    def when(self, truth: Truth, yes: Callable[[], None], no: Callable[[], None] | None = None) -> None:
+        self.base.when(truth, yes, no)
+
+    def repeat(self, body: Callable[[], Truth]) -> None:
+        self.base.repeat(body)
+
+    def _reals(self, size: int) -> RealCells:
+        return self.cells(self.base._reals(size), self.base._reals(size * self.directions))
+
+    def _wholes(self, size: int) -> IntegerCells:
+        return self.base._wholes(size)
+
+    def _call(self, on: Evaluator, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+        return self.base._call(on, function, arguments)
+
+
+def _atan2(on: Evaluator, x: Sequence[Real]) -> Ruled:
+    square = x[0] * x[0] + x[1] * x[1]
+    return on.atan2(x[0], x[1]), (x[1] / square, -x[0] / square)
+
+
+def _sqrt(on: Evaluator, x: Sequence[Real]) -> Ruled:
+    root = on.sqrt(x[0])
+    return root, (0.5 / root,)
+
+
+def _exp(on: Evaluator, x: Sequence[Real]) -> Ruled:
+    power = on.exp(x[0])
+    return power, (power,)
+
+
+def _copysign(on: Evaluator, x: Sequence[Real]) -> Ruled:
+    return on.copysign(x[0], x[1]), (on.copysign(1.0, x[0]) * on.copysign(1.0, x[1]), 0.0)
+
+
+_RULES: Final[dict[Function, Callable[[Evaluator, Sequence[Real]], Ruled]]] = {
+    "sqrt": _sqrt,
+    "absolute": lambda on, x: (on.absolute(x[0]), (on.copysign(1.0, x[0]),)),
+    "floor": lambda on, x: (on.floor(x[0]), (0.0,)),
+    "sin": lambda on, x: (on.sin(x[0]), (on.cos(x[0]),)),
+    "cos": lambda on, x: (on.cos(x[0]), (-on.sin(x[0]),)),
+    "exp": _exp,
+    "log": lambda on, x: (on.log(x[0]), (1.0 / x[0],)),
+    "atan2": _atan2,
+    "copysign": _copysign,
+}

@@ -1,0 +1,163 @@
+"""Dual numbers: derivatives by rules, compared with a second evaluation in complex numbers."""
+
+import cmath
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ephs.semantics.stage import (
+    PLAIN,
+    Duals,
+    Entry,
+    Program,
+    Record,
+    StageError,
+    integer,
+    matrix,
+    real,
+    reals,
+    staged,
+    table,
+    vector,
+)
+from ephs.semantics.stage.duals import Dual
+from ephs.semantics.stage.evaluator import FUNCTIONS
+
+EPSILON = np.finfo(float).eps
+COMPLEX = {
+    "sqrt": cmath.sqrt,
+    "absolute": lambda x: x if x.real > 0 else -x,
+    "floor": lambda x: complex(np.floor(x.real)),
+    "sin": cmath.sin,
+    "cos": cmath.cos,
+    "exp": cmath.exp,
+    "log": cmath.log,
+    "atan2": lambda y, x: cmath.atan(y / x),
+    "copysign": lambda x, s: (x if x.real > 0 else -x) * np.copysign(1.0, s.real),
+}
+"""The functions continued to complex numbers: the imaginary part of f(x + ih) is h·f′."""
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+@given(data=st.data())
+def test_every_function_has_its_derivative(name, data):
+    count = FUNCTIONS[name]
+    low = 0.01 if name in ("sqrt", "log") else -5.0
+    points = [data.draw(st.floats(low, 5.0).filter(lambda x: abs(x) > 0.01)) for _ in range(count)]
+    slopes = [data.draw(st.integers(-200, 200)) / 100 for _ in range(count)]
+    number = getattr(Duals(PLAIN), name)(*(Dual(x, (s,)) for x, s in zip(points, slopes, strict=True)))
+    step = 1e-100
+    expected = COMPLEX[name](*(complex(x, step * s) for x, s in zip(points, slopes, strict=True))).imag / step
+    assert abs(number.slopes[0] - expected) <= 32 * EPSILON * sum(abs(s) for s in slopes) * (200 + abs(expected))
+
+
+class Point(Record):
+    kind = integer()
+    place = reals(2)
+    weight = real()
+
+
+@staged
+def product(on, a, b):
+    return a * b / (1.0 + a * a)
+
+
+def run(on, x, a, points, gain, out):
+    """All that memory offers, in one function."""
+    total = on.variable(0.0)
+    local = on.scratch(2)
+
+    def body(i):
+        point = points[i]
+        local[0] = point.place[0] * x[i]
+        total.value = total.value + product(on, local[0], a[i, 1]) * gain
+        on.when(x[i] > 0.0, lambda: out.part(1, 2).__setitem__(0, on.sin(x[i] * gain)))
+        point.weight = on.select(x[i] > 0.5, x[i] * x[i], 3.0 * point.place[1] + on.real(point.kind))
+
+    on.loop(points.size, body)
+    out[0] = total.value
+
+
+PROGRAM = Program(
+    "sloped",
+    value=(entry := Entry(run, x=vector(), a=matrix(), points=table(Point), gain=real(), out=vector())),
+    tangent=entry.tangent("x", "a", "points", "gain", "out"),
+    three=entry.tangent("x", "a", "points", "gain", "out", directions=3),
+    part=entry.tangent("x", "points", "out"),
+)
+
+
+def drawn(seed):
+    draw = np.random.default_rng(seed)
+    points = Point.table(4)
+    points.reals.array[:] = draw.normal(size=12)
+    points.integers.array[:] = 2
+    return [draw.normal(size=4), draw.normal(size=(4, 2)), points, draw.normal(), np.zeros(3)]
+
+
+def results(calls, name, arguments, slopes=None):
+    x, a, points, gain, out = arguments
+    table = Point.table(4)
+    table.reals.array[:], table.integers.array[:] = points.reals.array, points.integers.array
+    values = [x, a, table, gain, out.copy()]
+    if slopes is None:
+        calls[name](*values)
+        return np.r_[values[4], table.reals.array]
+    rates = [np.array(slope) for slope in slopes]
+    calls[name](*zip(values, rates, strict=True))
+    return values[4], table.reals.array, rates[4], rates[2]
+
+
+def tangent_slopes(draw, directions):
+    shape = [4, 8, 12, 1, 3]
+    return [draw.normal(size=(n, directions)) * (k < 4) for k, n in enumerate(shape)]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_slopes_are_the_same_in_machine_code_and_for_one_direction_or_three(seed):
+    arguments, slopes = drawn(seed), tangent_slopes(np.random.default_rng(seed), 3)
+    compiled, plain = (results(calls, "three", arguments, slopes) for calls in (PROGRAM.compiled(), PROGRAM.plain()))
+    for one, other in zip(compiled, plain, strict=True):
+        assert np.array_equal(one, other)
+    for direction in range(3):
+        alone = results(PROGRAM.compiled(), "tangent", arguments, [s[:, direction] for s in slopes])
+        assert np.array_equal(alone[0], compiled[0])
+        assert np.array_equal(alone[2], compiled[2].reshape(3, 3)[:, direction])
+        assert np.array_equal(alone[3], compiled[3].reshape(12, 3)[:, direction])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_slopes_agree_with_differences(seed):
+    """A central difference is good for the cube root of the rounding, squared."""
+    arguments, slopes = drawn(seed), [s[:, 0] for s in tangent_slopes(np.random.default_rng(seed), 1)]
+    *values, out, rates = results(PROGRAM.compiled(), "tangent", arguments, slopes)
+    step, found = 6e-6, []
+    for sign in (1.0, -1.0):
+        x, a, points, gain, zero = arguments
+        moved = Point.table(4)
+        moved.integers.array[:] = 2
+        moved.reals.array[:] = points.reals.array + sign * step * slopes[2]
+        shifted = [x + sign * step * slopes[0], a + sign * step * slopes[1].reshape(4, 2), moved]
+        found.append(results(PROGRAM.compiled(), "value", [*shifted, gain + sign * step * slopes[3][0], zero]))
+    assert np.array_equal(np.r_[values[0], values[1]], results(PROGRAM.compiled(), "value", arguments))
+    assert np.allclose(np.r_[out, rates], (found[0] - found[1]) / (2 * step), rtol=0, atol=1e-8)
+
+
+def test_a_slope_that_nobody_keeps_is_named():
+    with pytest.raises(StageError, match=r"run.*, test_duals.py:\d+: a number with a derivative is stored where"):
+        Program("lost", lost=entry.tangent("x", "points")).compiled()
+
+
+def test_an_argument_that_is_not_there_is_named():
+    with pytest.raises(StageError, match="found y to differentiate by, expected some of x, a, points, gain, out"):
+        entry.tangent("y")
+
+
+def test_second_derivatives_are_duals_of_duals():
+    inner, outer = Duals(PLAIN), Duals(Duals(PLAIN))
+    x = Dual(Dual(0.3, (1.0,)), (Dual(1.0, (0.0,)),))
+    assert inner.base is PLAIN
+    twice = outer.sin(x * x).slopes[0].slopes[0]
+    assert abs(twice - (2 * np.cos(0.09) - 4 * 0.09 * np.sin(0.09))) <= 8 * EPSILON * 3
