@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from ephs.mechanics.solve.solution import Solution
 
-__all__ = ["FORMAT", "Variable", "dataset", "sampled_inputs"]
+__all__ = ["FORMAT", "TIME", "Content", "Variable", "content", "dataset", "sampled_inputs"]
 
 FORMAT = 3
 _LEDGERS = {
@@ -62,6 +62,16 @@ class Variable:
     says: str
     axes: tuple[tuple[str, tuple[str, ...]], ...] = field(default=())
 
+    @property
+    def dimensions(self) -> tuple[str, ...]:
+        """Names of all axes."""
+        return ("t", *(axis for axis, _ in self.axes))
+
+    @property
+    def attributes(self) -> dict[str, str]:
+        """Its unit and meaning under the names of the CF conventions."""
+        return {"units": self.units, "long_name": self.says}
+
     @classmethod
     def of(cls, values: Array, labels: Labels, says: str) -> "Variable":
         """Of a state's values."""
@@ -69,19 +79,30 @@ class Variable:
         return cls(values, labels.unit, says, axes)
 
 
-def dataset(solution: "Solution", *, wrenches: bool = True) -> "xr.Dataset":
-    """States under ``state:PATH``, ledgers under their names, inputs under ``input:PORT``, and what is derived."""
-    import xarray as xr
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Content:
+    """A solution as arrays over time: variables by name, instants in s, attributes."""
 
+    t: Array
+    variables: dict[str, Variable]
+    attributes: dict[str, Any]
+
+    @property
+    def axes(self) -> dict[str, tuple[str, ...]]:
+        """Names of the entries of each axis but the time."""
+        return {axis: names for variable in self.variables.values() for axis, names in variable.axes}
+
+
+TIME = {"units": "s", "long_name": "time"}
+"""Attributes of the instants."""
+
+
+def content(solution: "Solution", *, wrenches: bool = True) -> Content:
+    """States under ``state:PATH``, ledgers under their names, inputs under ``input:PORT``, and derived arrays."""
     variables = dict(_variables(solution))
     if solution.motion is not None:
         variables |= solution.motion.variables(wrenches=wrenches)
-    coordinates: dict[str, Any] = {"t": ("t", solution.t, {"units": "s", "long_name": "time"})}
-    entries: dict[str, Any] = {}
-    for name, variable in variables.items():
-        coordinates |= {axis: (axis, np.array(names, dtype=object)) for axis, names in variable.axes}
-        attributes = {"units": variable.units, "long_name": variable.says}
-        entries[name] = (("t", *[axis for axis, _ in variable.axes]), variable.values, attributes)
     attributes = {
         "ephs_format": FORMAT,
         "name": solution.name,
@@ -89,7 +110,20 @@ def dataset(solution: "Solution", *, wrenches: bool = True) -> "xr.Dataset":
         "stats": json.dumps(dict(solution.stats)),
         "model": solution.problem.document if solution.problem is not None else "",
     }
-    return xr.Dataset(entries, coordinates, attributes)
+    return Content(solution.t, variables, attributes)
+
+
+def dataset(solution: "Solution", *, wrenches: bool = True) -> "xr.Dataset":
+    """The `content` of a solution as labelled arrays."""
+    import xarray as xr
+
+    found = content(solution, wrenches=wrenches)
+    coordinates: dict[str, Any] = {"t": ("t", found.t, TIME)}
+    coordinates |= {axis: (axis, np.array(names, dtype=object)) for axis, names in found.axes.items()}
+    entries = {
+        name: (variable.dimensions, variable.values, variable.attributes) for name, variable in found.variables.items()
+    }
+    return xr.Dataset(entries, coordinates, found.attributes)
 
 
 def _variables(solution: "Solution") -> Iterable[tuple[str, Variable]]:

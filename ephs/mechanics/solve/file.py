@@ -4,20 +4,22 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 from pathlib import Path as File
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
-from ephs.mechanics.solve.dataset import FORMAT, Variable, dataset
+from ephs.mechanics.solve.dataset import FORMAT, TIME, Variable, content
 from ephs.mechanics.solve.durable import durable
-from ephs.mechanics.solve.guard import named_for_file, named_from_file
+from ephs.mechanics.solve.guard import name_for_file, named_from_file
 from ephs.mechanics.solve.labels import Labels, labels_of
 from ephs.mechanics.solve.ledger import Ledgers
 from ephs.mechanics.solve.problem import Problem
 from ephs.mechanics.solve.solution import Solution
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["load", "save"]
 
@@ -27,8 +29,22 @@ Inputs = Mapping[Path, Array]
 
 def save(solution: Solution, path: File, *, wrenches: bool) -> None:
     """Write a solution; an older file of that name stays whole until the new one is."""
-    with durable(path) as temporary:
-        named_for_file(dataset(solution, wrenches=wrenches)).to_netcdf(temporary, engine="h5netcdf")
+    import h5netcdf
+    import h5py
+
+    found = content(solution, wrenches=wrenches)
+    text = h5py.string_dtype()
+    with durable(path) as temporary, h5netcdf.File(temporary, "w") as file:
+        file.dimensions = {"t": found.t.size, **{name_for_file(axis): len(names) for axis, names in found.axes.items()}}
+        for axis, names in found.axes.items():
+            file.create_variable(name_for_file(axis), (name_for_file(axis),), data=np.array(names, object), dtype=text)
+        file.create_variable("t", ("t",), data=found.t).attrs.update(TIME)
+        for name, variable in found.variables.items():
+            dimensions = tuple(map(name_for_file, variable.dimensions))
+            values = np.asarray(variable.values)
+            written = file.create_variable(name_for_file(name), dimensions, data=values, dtype=values.dtype)
+            written.attrs.update(variable.attributes)
+        file.attrs.update(found.attributes)
 
 
 def load(path: str | File, problem_of: Callable[[str, Array, Inputs], Problem]) -> Solution:
@@ -41,6 +57,8 @@ def load(path: str | File, problem_of: Callable[[str, Array, Inputs], Problem]) 
     ValueError
         The file is not a solution of this program.
     """
+    import xarray as xr
+
     file = File(path)
     if not file.exists():
         raise FileNotFoundError(f"{file}: no such file")
@@ -77,7 +95,7 @@ def load(path: str | File, problem_of: Callable[[str, Array, Inputs], Problem]) 
     )
 
 
-def _ledgers(groups: Mapping[str, Mapping[Path, xr.DataArray]], temperature: float) -> Ledgers:
+def _ledgers(groups: "Mapping[str, Mapping[Path, xr.DataArray]]", temperature: float) -> Ledgers:
     """Ledgers by path are groups; a single ledger stands under its name alone."""
     books: dict[str, Any] = {}
     for field in fields(Ledgers):
@@ -87,7 +105,7 @@ def _ledgers(groups: Mapping[str, Mapping[Path, xr.DataArray]], temperature: flo
     return Ledgers(**{**books, "temperature": temperature})
 
 
-def _labels(variable: xr.DataArray) -> Labels:
+def _labels(variable: "xr.DataArray") -> Labels:
     units = str(variable.attrs.get("units", "SI"))
     if variable.ndim == 1:
         return Labels("", (), (units,))
@@ -97,7 +115,7 @@ def _labels(variable: xr.DataArray) -> Labels:
     return Labels(dimension, tuple(names), tuple(each if len(each) == size else each * size) or ("1",))
 
 
-def _variable(variable: xr.DataArray) -> Variable:
+def _variable(variable: "xr.DataArray") -> Variable:
     return Variable.of(variable.values, _labels(variable), str(variable.attrs["long_name"]))
 
 

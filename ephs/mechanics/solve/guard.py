@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["check_file", "named_for_file", "named_from_file"]
+__all__ = ["check_file", "name_for_file", "named_for_file", "named_from_file"]
 
 MOST = 200
 """A file may hold this many times the numbers that it has room for: more is no data, but an attack on memory."""
@@ -64,8 +64,13 @@ def _faults(opened: Any, most: int) -> str:
 
 
 def named_for_file(data: "xr.Dataset") -> "xr.Dataset":
-    """The data with names that netCDF can hold: in paths, ``/`` is written ``%2F``, and ``%`` is ``%25``."""
-    return data.rename({name: str(name).replace("%", "%25").replace("/", "%2F") for name in _names(data)})
+    """The data with names that netCDF can hold."""
+    return data.rename({name: name_for_file(str(name)) for name in _names(data)})
+
+
+def name_for_file(name: str) -> str:
+    """A name that netCDF can hold: in paths, ``/`` is written ``%2F``, and ``%`` is ``%25``."""
+    return name.replace("%", "%25").replace("/", "%2F")
 
 
 def _names(data: "xr.Dataset") -> set[Any]:
