@@ -1,8 +1,9 @@
 """Families of scenes of any size: chains of bars with revolute or spherical joints, and rows of four-bar windows.
 
 A chain of n bars of 1 m hangs from the ground with its first joint at 1 rad, the k-th at 0.3·cos(k) rad, at rest. Axes
-of revolute joints lie alternately in y and x of the bar before. n windows are n + 1 upright cranks, n couplers on top,
-all of 1 m and 1 kg, that move at 1 m/s: they pass configurations in which their constraints lose rank.
+of revolute joints lie alternately in y and x of the bar before, those of planar chains all in y. n windows are n + 1
+upright cranks, n couplers on top, all of 1 m and 1 kg, that move at 1 m/s: they pass configurations in which their
+constraints lose rank.
 """
 
 from collections.abc import Callable, Sequence
@@ -66,12 +67,12 @@ def _product(p: Array, q: Array) -> Array:
     return np.concatenate([[p[0] * q[0] - p[1:] @ q[1:]], p[0] * q[1:] + q[0] * p[1:] + np.cross(p[1:], q[1:])])
 
 
-def _chain(kind: str, count: int) -> list[str]:
-    lines = _head(f"{kind}-chain-{count}", (0.0, 0.0, -9.81))
+def _chain(kind: str, count: int, *, planar: bool = False) -> list[str]:
+    lines = _head(f"{'planar' if planar else kind}-chain-{count}", (0.0, 0.0, -9.81))
     joints: list[str] = []
     q, end = np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3)
     for k in range(count):
-        own = np.array([1.0, 0.0, 0.0] if k % 2 else [0.0, 1.0, 0.0])
+        own = np.array([1.0, 0.0, 0.0] if k % 2 and not planar else [0.0, 1.0, 0.0])
         axis = None if kind == "spherical" else _turned(q, own)
         half = 0.5 * (0.3 * np.cos(k) if k else 1.0)
         q = _product(q, np.concatenate([[np.cos(half)], np.sin(half) * own]))
@@ -99,6 +100,7 @@ def _windows(count: int) -> list[str]:
 
 FAMILIES: dict[str, Callable[[int], list[str]]] = {
     "revolute-chain": lambda count: _chain("revolute", count),
+    "planar-chain": lambda count: _chain("revolute", count, planar=True),
     "spherical-chain": lambda count: _chain("spherical", count),
     "four-bar-windows": _windows,
 }

@@ -21,7 +21,7 @@ STOREYS: tuple[tuple[frozenset[str], ...], ...] = tuple(
         ([".semantics", ".semantics.library", ".semantics.algebra", ".semantics.relations", ".semantics.symbols"],),
         ([".mechanics.solve"],),
         ([".mechanics.scene", ".mechanics.imports"],),
-        ([".mechanics", ".mechanics.reduction", ".mechanics.reduced", ".mechanics.engine"],),
+        ([".mechanics", ".mechanics.reduction", ".mechanics.reduced", ".mechanics.engine", ".mechanics.tree"],),
         ([".mechanics.dynamics"], [".mechanics.sweep"]),
         ([".mechanics.linear"], [".mechanics.sensitivity"]),
         ([".show", ".show.charts"], [".testing"]),

@@ -1,0 +1,1 @@
+"""Mechanisms in joint coordinates: the sweeps over a tree of links, each stated once as a staged function."""

@@ -1,0 +1,357 @@
+"""Memory that a class of mechanisms needs: which fields of its records vary, are constant, or affect nothing.
+
+A program that is looped over links is run once with numbers that know only what they depend on. Fields that every link
+sets to the same known number are constants of the class: the third dimension of planar mechanisms, the zero columns of
+revolute joints. Fields from which nothing follows that the program returns need not be computed. Constants are assumed
+first and confirmed by runs until nothing changes (sparse conditional constant propagation, through memory).
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar, final
+
+from ephs.semantics.stage import Evaluator, Integer, Real, Record, Truth, Variable, Vector
+from ephs.semantics.stage.evaluator import Function
+from ephs.semantics.stage.memory import IntegerCells, RealCells
+from ephs.semantics.stage.numbers import Condition, Count, IntegerOperation, Number, Operation, Order
+
+__all__ = ["NO_INTEGERS", "Compact", "LaidOut", "Layout", "Survey", "layout_of"]
+
+Row = TypeVar("Row", bound=Record)
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """Where the fields of a record live.
+
+    Attributes
+    ----------
+    constants
+        Offset of a field's entry in the record -> its value in all rows.
+    columns
+        Offset -> column of a matrix with as many rows; entries in neither mapping affect nothing.
+    """
+
+    constants: Mapping[int, float]
+    columns: Mapping[int, int]
+
+    @property
+    def width(self) -> int:
+        """Columns of the matrix."""
+        return len(self.columns)
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class LaidOut(RealCells):
+    """The real numbers of one row of a record with a layout."""
+
+    layout: Layout
+    cells: RealCells
+    start: Integer
+
+    def load(self, index: Integer) -> Real:
+        assert isinstance(index, int)
+        column = self.layout.columns.get(index)
+        return self.layout.constants.get(index, 0.0) if column is None else self.cells.load(self.start + column)
+
+    def store(self, index: Integer, value: Real) -> None:
+        assert isinstance(index, int)
+        column = self.layout.columns.get(index)
+        if column is not None:
+            self.cells.store(self.start + column, value)
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Compact(Generic[Row]):
+    """Rows of a record of real numbers, kept as a layout says."""
+
+    record: type[Row]
+    layout: Layout
+    memory: Vector
+
+    def __getitem__(self, i: Integer) -> Row:
+        cells = LaidOut(self.layout, self.memory.cells, self.memory.start + i * self.layout.width)
+        return self.record(NO_INTEGERS, 0, cells, 0)
+
+
+@final
+class _NoIntegers(IntegerCells):
+    """A record without integers."""
+
+    def load(self, index: Integer) -> Integer:
+        raise IndexError(index)
+
+    def store(self, index: Integer, value: Integer) -> None:
+        raise IndexError(index)
+
+
+NO_INTEGERS = _NoIntegers()
+
+
+# ---- the survey ---------------------------------------------------------------------------------------------------
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class _Trace(Number):
+    """A number of which nothing is known but the entries that it depends on, as bits."""
+
+    on: int
+
+    def _apply(self, operation: Operation, left: Real, right: Real) -> Real:
+        return _Trace(_bits(left) | _bits(right))
+
+    def _order(self, order: Order, left: Real, right: Real) -> Truth:
+        return _TraceTruth(_bits(left) | _bits(right))
+
+    def _negative(self) -> Real:
+        return self
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class _TraceTruth(Condition):
+    """A condition of which nothing is known but what it depends on."""
+
+    on: int
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class _TraceCount(Count):
+    """An integer of which nothing is known but what it depends on."""
+
+    on: int = 0
+
+    def _apply(self, operation: IntegerOperation, left: Integer, right: Integer) -> Integer:
+        return _TraceCount(_bits(left) | _bits(right))
+
+    def _order(self, order: Order, left: Integer, right: Integer) -> Truth:
+        return _TraceTruth(_bits(left) | _bits(right))
+
+
+def _bits(*values: object) -> int:
+    found = 0
+    for value in values:
+        found |= value.on if isinstance(value, _Trace | _TraceTruth | _TraceCount) else 0
+    return found
+
+
+class _Entries:
+    """What is known of the entries of memory and of variables: constants assumed, values written, dependences."""
+
+    def __init__(self) -> None:
+        self.assumed: dict[int, float | None] = {}
+        self.written: dict[int, float | None] = {}
+        self.follows: dict[int, int] = {}
+        self.live = 0
+
+    def load(self, entry: int) -> Real:
+        value = self.assumed.get(entry, 0.0)
+        return _Trace(1 << entry) if value is None else value
+
+    def store(self, entry: int, value: Real, why: int) -> None:
+        known = None if isinstance(value, Number) else float(value)
+        before = self.written.get(entry, self.assumed.get(entry, known))
+        self.written[entry] = known if before == known else None
+        self.follows[entry] = self.follows.get(entry, 0) | _bits(value) | why
+
+    def settled(self) -> bool:
+        """Take what was written as what is assumed next; whether that was so already."""
+        found = self.assumed | self.written
+        settled, self.assumed, self.written = found == self.assumed, found, {}
+        return settled
+
+    def needed(self) -> int:
+        """Entries on which results depend, as bits."""
+        found, fresh = 0, self.live
+        while fresh:
+            entry = fresh.bit_length() - 1
+            found |= 1 << entry
+            fresh = (fresh | self.follows.get(entry, 0)) & ~found
+        return found
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class _SurveyedReals(RealCells):
+    """Real numbers of a record, all rows as one; those of arguments and results have no entries."""
+
+    on: "Survey"
+    entries: bool
+
+    def load(self, index: Integer) -> Real:
+        assert isinstance(index, int) or not self.entries
+        return self.on.entries.load(index) if self.entries and isinstance(index, int) else _Trace(0)
+
+    def store(self, index: Integer, value: Real) -> None:
+        if self.entries and isinstance(index, int):
+            self.on.entries.store(index, value, self.on.why)
+        else:
+            self.on.entries.live |= _bits(value) | self.on.why
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class _SurveyedIntegers(IntegerCells):
+    """Integers of which nothing is known."""
+
+    def load(self, index: Integer) -> Integer:
+        return _TraceCount()
+
+    def store(self, index: Integer, value: Integer) -> None: ...
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class _HeldReal(RealCells):
+    """A real variable: an entry beyond the record's, which is never taken for constant."""
+
+    on: "Survey"
+    entry: int
+
+    def load(self, index: Integer) -> Real:
+        return _Trace(1 << self.entry)
+
+    def store(self, index: Integer, value: Real) -> None:
+        self.on.hold(self.entry, value)
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class _HeldInteger(IntegerCells):
+    """An integer variable."""
+
+    on: "Survey"
+    entry: int
+
+    def load(self, index: Integer) -> Integer:
+        return _TraceCount(1 << self.entry)
+
+    def store(self, index: Integer, value: Integer) -> None:
+        self.on.hold(self.entry, value)
+
+
+@final
+class Survey(Evaluator):
+    """Evaluation that follows constants and dependences through the memory of one record with so many entries."""
+
+    def __init__(self, width: int) -> None:
+        self.width, self.entries, self.why, self._variables = width, _Entries(), 0, 0
+
+    def begin(self) -> None:
+        """Start a run: variables are numbered anew."""
+        self._variables = 0
+
+    def memory(self) -> RealCells:
+        """The record's entries."""
+        return _SurveyedReals(self, entries=True)
+
+    def outside(self) -> Vector:
+        """An argument, or a place for results."""
+        return Vector(_SurveyedReals(self, entries=False), 0, _TraceCount())
+
+    def integers(self) -> IntegerCells:
+        """Integers of arguments."""
+        return _SurveyedIntegers()
+
+    def returned(self, value: object) -> None:
+        """Take a value as a result."""
+        self.entries.live |= _bits(value)
+
+    def _function(self, name: Function, *arguments: Real) -> Real:
+        return _Trace(_bits(*arguments))
+
+    def _choose(self, truth: Condition, one: Any, other: Any) -> Any:
+        if isinstance(one, bool | _TraceTruth):
+            return _TraceTruth(_bits(truth, one, other))
+        if isinstance(one, _TraceCount | int) and isinstance(other, _TraceCount | int):
+            return _TraceCount(_bits(truth, one, other))
+        if not isinstance(one, Number) and not isinstance(other, Number) and one == other:
+            return one
+        return _Trace(_bits(truth, one, other))
+
+    def _both(self, one: Truth, other: Truth) -> Truth:
+        return _TraceTruth(_bits(one, other))
+
+    def _negate(self, truth: Condition) -> Truth:
+        return truth
+
+    def _same(self, one: Integer, other: Integer) -> Truth:
+        return _TraceTruth(_bits(one, other))
+
+    def real(self, integer: Integer) -> Real:
+        return float(integer) if isinstance(integer, int) else _Trace(_bits(integer))
+
+    def integer(self, real: Real) -> Integer:
+        return _TraceCount(_bits(real))
+
+    def scale(self, real: Real, power: Integer) -> Real:
+        return _Trace(_bits(real, power))
+
+    @contextmanager
+    def _because(self, reason: object) -> Iterator[None]:
+        before, self.why = self.why, self.why | _bits(reason)
+        try:
+            yield
+        finally:
+            self.why = before
+
+    def loop(self, count: Integer, body: Callable[[Integer], None], start: Integer = 0, down: bool = False) -> None:
+        with self._because(count), self._because(start):
+            body(_TraceCount())
+
+    def when(self, truth: Truth, yes: Callable[[], None], no: Callable[[], None] | None = None) -> None:
+        with self._because(truth):
+            if isinstance(truth, Condition) or truth:
+                yes()
+            if no is not None and (isinstance(truth, Condition) or not truth):
+                no()
+
+    def repeat(self, body: Callable[[], Truth]) -> None:
+        reason = body()
+        with self._because(reason):
+            body()
+
+    def variable(self, value: Real) -> Variable[Real]:
+        held = Variable[Real](_HeldReal(self, self._fresh()))
+        held.value = value
+        return held
+
+    def counter(self, value: Integer) -> Variable[Integer]:
+        held = Variable[Integer](_HeldInteger(self, self._fresh()))
+        held.value = value
+        return held
+
+    def _fresh(self) -> int:
+        self._variables += 1
+        return self.width + self._variables - 1
+
+    def hold(self, entry: int, value: object) -> None:
+        """Let an entry of a variable follow a value."""
+        self.entries.follows[entry] = self.entries.follows.get(entry, 0) | _bits(value) | self.why
+
+    def _call(self, on: Evaluator, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+        return function(on, *arguments)
+
+
+def layout_of(width: int, run: Callable[[Survey], None]) -> Layout:
+    """The layout of a record with so many entries that a program needs.
+
+    run(survey) evaluates all its entry functions, with ``survey.memory()`` as the record's numbers.
+    """
+    survey = Survey(width)
+    while True:
+        survey.begin()
+        survey.entries.follows, survey.entries.live = {}, 0
+        run(survey)
+        if survey.entries.settled():
+            break
+    found, needed = survey.entries.assumed, survey.entries.needed()
+    varying = [k for k in range(width) if found.get(k, 0.0) is None and needed >> k & 1]
+    constants = {k: value for k, value in found.items() if k < width and value is not None}
+    return Layout(constants, {k: column for column, k in enumerate(varying)})

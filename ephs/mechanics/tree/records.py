@@ -1,0 +1,181 @@
+"""A tree of links as the sweeps see it: constants of each link, what the sweeps keep of it, kinds of joints."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol, TypeVar, final
+
+from ephs.semantics.stage import Evaluator, Integer, Real, Record, integer, real, reals
+
+__all__ = ["Joint", "Link", "Links", "State", "States", "Tree"]
+
+Row = TypeVar("Row")
+
+
+class Link(Record):
+    """Constants of a link, in the frame at its tree joint; parents come first, the ground is the row after the last.
+
+    Attributes
+    ----------
+    parent
+        Row of the parent.
+    kind
+        Number of the joint in `Tree.joints`.
+    q_at, r_at
+        Where the joint's element and rates start.
+    sense
+        1 where the joint is walked from its first to its second body, else −1; elements of abelian pairs take it.
+    rotation, place
+        The joint's first frame in the parent's frame.
+    shift
+        Angle in rad of a revolute joint's first frame about z, beyond `rotation`.
+    mass, moment, inertia
+        In kg, kg m, and kg m² about the frame's origin (upper triangle).
+    """
+
+    parent = integer()
+    kind = integer()
+    q_at = integer()
+    r_at = integer()
+    sense = real()
+    shift = real()
+    rotation = reals(3, 3)
+    place = reals(3)
+    mass = real()
+    moment = reals(3)
+    inertia = reals(6)
+
+
+class State(Record):
+    """What the sweeps keep of a link, in its frame.
+
+    Attributes
+    ----------
+    rotation, place
+        The link's frame in its parent's.
+    turn, at
+        The link's frame in the world.
+    twist, bias
+        Twist (ω, υ), and the acceleration at ṙ = 0, in which gravity is.
+    load
+        Wrench that the link and what it carries need beyond inertia · change.
+    angular, mixed, linear
+        Articulated inertia [[A, C], [Cᵀ, M]]: upper triangles of A and M, rows of C.
+    gain, inverse, push
+        D⁻¹Uᵀ, D⁻¹ (upper triangle) and D⁻¹(τ − SᵀP) of the joint.
+    change
+        Acceleration beyond the bias.
+    """
+
+    rotation = reals(3, 3)
+    place = reals(3)
+    turn = reals(3, 3)
+    at = reals(3)
+    twist = reals(6)
+    bias = reals(6)
+    load = reals(6)
+    angular = reals(6)
+    mixed = reals(3, 3)
+    linear = reals(6)
+    gain = reals(6, 6)
+    inverse = reals(21)
+    push = reals(6)
+    change = reals(6)
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """A kind of joints: a subgroup of SE(3), known while a program is staged.
+
+    Attributes
+    ----------
+    code, size
+        The group, and how many numbers an element has.
+    basis
+        Columns (d, 6) of B, orthogonal.
+    backward
+        Walked from its second to its first body, in a group that is not abelian: its element is inverted.
+    driven
+        Its motion is prescribed.
+    """
+
+    code: int
+    size: int
+    basis: tuple[tuple[float, ...], ...]
+    backward: bool = False
+    driven: bool = False
+
+    @property
+    def dim(self) -> int:
+        """How many freedoms it has."""
+        return len(self.basis)
+
+    @property
+    def revolute(self) -> bool:
+        """It turns about z, and that is all."""
+        return self.basis == ((0.0, 0.0, 1.0, 0.0, 0.0, 0.0),)
+
+    @property
+    def units(self) -> dict[int, int]:
+        """Entries of a twist that are freedoms by themselves -> number of the freedom."""
+        return {column.index(1.0): j for j, column in enumerate(self.basis) if sorted(column) == [0.0] * 5 + [1.0]}
+
+
+class Links(Protocol):
+    """Constants of links, by row."""
+
+    def of(self, i: Integer, kind: int | None) -> Link:
+        """Row i, which is known to have the kind of joint with this number."""
+        ...
+
+
+class States(Protocol):
+    """Memory of links and the ground, by row."""
+
+    def __getitem__(self, i: Integer, /) -> State: ...
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Tree:
+    """A mechanism without loops.
+
+    Attributes
+    ----------
+    joints
+        The kinds of joints in it.
+    size
+        How many links; row `size` of the states is the ground's.
+    gravity
+        (3,) in the ground's frame.
+    """
+
+    joints: tuple[Joint, ...]
+    size: Integer
+    links: Links
+    states: States
+    gravity: list[Real]
+
+    def each(self, on: Evaluator, body: Callable[[Integer], None], *, down: bool = False) -> None:
+        """Call body(i) for all links, parents first, or last; written out where their number is known."""
+        if isinstance(self.size, int):
+            for i in range(self.size - 1, -1, -1) if down else range(self.size):
+                body(i)
+        else:
+            on.loop(self.size, body, down=down)
+
+    def visit(self, on: Evaluator, i: Integer, body: Callable[[Joint, Link], None]) -> None:
+        """Call body(joint, link) of link i with the kind of its joint, which is then known."""
+        kind = self.links.of(i, None).kind
+
+        def among(first: int) -> None:
+            if first == len(self.joints) - 1:
+                body(self.joints[first], self.links.of(i, first))
+            else:
+                on.when(
+                    on.same(kind, first),
+                    lambda: body(self.joints[first], self.links.of(i, first)),
+                    lambda: among(first + 1),
+                )
+
+        among(0)
