@@ -1,6 +1,7 @@
 """One function, many evaluations: functions over abstract numbers, staged to machine code."""
 
 from ephs.semantics.stage.duals import Duals as Duals
+from ephs.semantics.stage.entries import Entry as Entry
 from ephs.semantics.stage.errors import StageError as StageError
 from ephs.semantics.stage.evaluator import Evaluator as Evaluator
 from ephs.semantics.stage.evaluator import staged as staged
@@ -16,7 +17,6 @@ from ephs.semantics.stage.numbers import Integer as Integer
 from ephs.semantics.stage.numbers import Real as Real
 from ephs.semantics.stage.numbers import Truth as Truth
 from ephs.semantics.stage.plain import PLAIN as PLAIN
-from ephs.semantics.stage.programs import Entry as Entry
 from ephs.semantics.stage.programs import Program as Program
 from ephs.semantics.stage.records import Record as Record
 from ephs.semantics.stage.records import Table as Table

@@ -185,6 +185,13 @@ class Duals(Evaluator):
     def _wholes(self, size: int) -> IntegerCells:
         return self.base._wholes(size)
 
+    def _constants(self, values: list[Any], whole: bool) -> Cells[Any]:
+        constants = self.base._constants(values, whole)
+        return constants if whole else self.cells(constants)
+
+    def _rehearse(self, body: Callable[[], None]) -> None:
+        self.base._rehearse(body)
+
     def _call(self, on: Evaluator, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
         return self.base._call(on, function, arguments)
 

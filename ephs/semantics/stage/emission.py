@@ -98,6 +98,15 @@ class Writer:
         self.lines.append(f"{label}:")
         self.block = label
 
+    def copy(self) -> tuple[int, int, str]:
+        """Return where the text is now."""
+        return len(self.lines), len(self.slots), self.block
+
+    def restore(self, place: tuple[int, int, str]) -> None:
+        """Forget what was written since."""
+        lines, slots, self.block = place
+        del self.lines[lines:], self.slots[slots:]
+
     def own(self, writer: "Writer") -> None:
         """Refuse numbers of another function."""
         if writer is not self:
@@ -109,6 +118,10 @@ class Writer:
             self.own(value.writer)
             return value.name
         return self.constant(_hexadecimal(_plain(value)), "double")
+
+    def of_constant(self, value: float, whole: bool) -> str:
+        """Return the operand of one known number, whatever the number of members."""
+        return str(_whole(int(value))) if whole else _hexadecimal(float(value))
 
     def of_integer(self, value: Integer, wide: bool = False) -> str:
         """Return the operand of an integer, one for each member where `wide`."""
@@ -223,23 +236,29 @@ class TruthSymbol(Condition):
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class RealPointer(RealCells):
-    """Real numbers in the memory of the machine, those of all members side by side."""
+    """Real numbers in the memory of the machine: those of all members side by side, or shared by them."""
 
     writer: Writer
     name: str
+    shared: bool = False
 
-    def _at(self, index: Integer) -> str:
+    def _at(self, kind: str, index: Integer) -> str:
         to = self.writer
-        return to.let(f"getelementptr inbounds {to.real}, ptr {self.name}, i64 {to.of_integer(index)}")
+        return to.let(f"getelementptr inbounds {kind}, ptr {self.name}, i64 {to.of_integer(index)}")
 
     def load(self, index: Integer) -> Real:
-        to = self.writer
-        return Symbol(to, to.let(f"load {to.real}, ptr {self._at(index)}, align 8"))
+        """Return the number at an index."""
+        to, kind = self.writer, "double" if self.shared else self.writer.real
+        found = to.let(f"load {kind}, ptr {self._at(kind, index)}, align 8")
+        return Symbol(to, to.spread(found, "double") if self.shared else found)
 
     def store(self, index: Integer, value: Real) -> None:
+        """Keep a number at an index."""
         to = self.writer
+        if self.shared and to.width > 1:
+            raise StageError("shared")
         operand = to.of_real(value)
-        to.do(f"store {to.real} {operand}, ptr {self._at(index)}, align 8")
+        to.do(f"store {to.real} {operand}, ptr {self._at(to.real, index)}, align 8")
 
 
 @final

@@ -26,7 +26,10 @@ TEXTS: Final = {
     "overlap": "{where}: arguments {argument} and {other} share memory; give arrays of their own.",
     "passive": "{where}: a number with a derivative is stored where derivatives are not kept; "
     "make that argument active.",
-    "active": "{where}: found {found} to differentiate by, expected some of {expected}.",
+    "unknown": "{where}: has no argument {found}, expected some of {expected}.",
+    "shared": "{where}: numbers that differ between members are stored in memory that they share.",
+    "unrolled": "{where}: {what} is not known while unrolling; give the numbers that it depends on, or hand the array "
+    "over as an argument.",
     "entries": "program {where}: found {found}, expected at least one function, each under a Python name.",
     "machine": "{where}: LLVM refuses the program: {found}",
     "undecided": "{where}: {what} depends on a condition that has no single answer {found}; write on.select(…).",

@@ -6,7 +6,7 @@ from functools import wraps
 from typing import Any, Concatenate, Final, Literal, ParamSpec, TypeAlias, TypeVar, cast, final
 
 from ephs.semantics.stage.errors import StageError
-from ephs.semantics.stage.memory import Held, IntegerCells, RealCells, Variable, Vector
+from ephs.semantics.stage.memory import Cells, Held, IntegerCells, RealCells, Variable, Vector
 from ephs.semantics.stage.numbers import Condition, Count, Integer, Number, Real, Truth
 
 __all__ = ["FUNCTIONS", "Evaluator", "Function", "Interpreted", "known", "staged"]
@@ -86,6 +86,14 @@ class Evaluator(ABC):
     @abstractmethod
     def _call(self, on: "Evaluator", function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
         """Call a function decorated by `staged`, with `on` as its evaluator."""
+
+    @abstractmethod
+    def _constants(self, values: list[Any], whole: bool) -> Cells[Any]:
+        """Return cells that hold known integers or real numbers, to be read only."""
+
+    @abstractmethod
+    def _rehearse(self, body: Callable[[], None]) -> None:
+        """Run a body without effect on the program."""
 
     @final
     def variable(self, value: Real) -> Variable[Real]:
@@ -227,7 +235,7 @@ class Interpreted(Evaluator):
     """Control by Python: conditions are known, or refuse."""
 
     @abstractmethod
-    def _known(self, truth: Condition) -> bool:
+    def _known(self, truth: Condition, what: str) -> bool:
         """Return the one answer of a condition, or raise."""
 
     @final
@@ -239,7 +247,7 @@ class Interpreted(Evaluator):
 
     @final
     def when(self, truth: Truth, yes: Callable[[], None], no: Callable[[], None] | None = None) -> None:
-        if self._known(truth) if isinstance(truth, Condition) else truth:
+        if self._known(truth, "on.when") if isinstance(truth, Condition) else truth:
             yes()
         elif no is not None:
             no()
@@ -248,7 +256,7 @@ class Interpreted(Evaluator):
     def repeat(self, body: Callable[[], Truth]) -> None:
         while True:
             truth = body()
-            if self._known(truth) if isinstance(truth, Condition) else truth:
+            if self._known(truth, "on.repeat") if isinstance(truth, Condition) else truth:
                 return
 
     @final
@@ -262,8 +270,12 @@ class Interpreted(Evaluator):
         return Held(entries)
 
     @final
-    def _same(self, one: Integer, other: Integer) -> Truth:
-        raise StageError("operand", what="on.same", left=type(one).__name__, right=type(other).__name__)
+    def _constants(self, values: list[Any], whole: bool) -> Cells[Any]:
+        return Held(values)
+
+    @final
+    def _rehearse(self, body: Callable[[], None]) -> None:
+        body()
 
     @final
     def _call(self, on: Evaluator, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:

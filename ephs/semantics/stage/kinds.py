@@ -14,6 +14,8 @@ __all__ = ["INTEGER", "REAL", "Atom", "Kind", "described", "dual", "indices", "m
 
 Atom: TypeAlias = Literal["reals", "integers", "real", "integer"]
 """What an argument is made of: an array of floats or of integers, a float, an integer."""
+Shape: TypeAlias = tuple[int | None, ...]
+"""A shape, None where any size will do."""
 
 
 @final
@@ -28,18 +30,19 @@ class Kind:
     atoms
         What it is handed over as.
     split
-        Returns the atoms of a value, arrays and numbers; None where the value is not of this kind.
+        Returns the atoms of a value, arrays and numbers; None where the value is not of this kind. Arrays of real
+        numbers, and real numbers, have a shape of members after their own.
     join
         Returns the argument that cells and numbers make.
     """
 
     expected: str
     atoms: tuple[Atom, ...]
-    split: Callable[[Any], tuple[Any, ...] | None]
+    split: Callable[[Any, Shape], tuple[Any, ...] | None]
     join: Callable[[list[Any]], Any]
 
 
-def _array(value: Any, dtype: type[np.generic], shape: tuple[int | None, ...]) -> bool:
+def _array(value: Any, dtype: type[np.generic], shape: Shape) -> bool:
     """Tell whether a value is a contiguous array of a type and a shape."""
     if not isinstance(value, np.ndarray):
         return False
@@ -54,11 +57,13 @@ def _is_integer(value: Any) -> bool:
     return isinstance(value, int | np.integer)
 
 
-def _of_real(value: Any) -> tuple[Any, ...] | None:
+def _of_real(value: Any, trail: Shape) -> tuple[Any, ...] | None:
+    if trail:
+        return (value,) if _array(value, np.float64, trail) else None
     return (float(cast("float", value)),) if isinstance(value, float | int) or _is_integer(value) else None
 
 
-def _of_integer(value: Any) -> tuple[Any, ...] | None:
+def _of_integer(value: Any, _: Shape) -> tuple[Any, ...] | None:
     return (int(cast("int", value)),) if _is_integer(value) else None
 
 
@@ -71,7 +76,7 @@ def vector(size: int | None = None) -> Kind:
     return Kind(
         f"a contiguous array of float64 of shape ({'n' if size is None else size},)",
         ("reals", "integer"),
-        lambda value: (value, len(value)) if _array(value, np.float64, (size,)) else None,
+        lambda value, trail: (value, len(value)) if _array(value, np.float64, (size, *trail)) else None,
         lambda parts: Vector(parts[0], 0, parts[1] if size is None else size),
     )
 
@@ -81,7 +86,7 @@ def indices(size: int | None = None) -> Kind:
     return Kind(
         f"a contiguous array of int64 of shape ({'n' if size is None else size},)",
         ("integers", "integer"),
-        lambda value: (value, len(value)) if _array(value, np.int64, (size,)) else None,
+        lambda value, _: (value, len(value)) if _array(value, np.int64, (size,)) else None,
         lambda parts: Integers(parts[0], 0, parts[1] if size is None else size),
     )
 
@@ -91,7 +96,7 @@ def matrix(columns: int | None = None) -> Kind:
     return Kind(
         f"a contiguous array of float64 of shape (m, {'n' if columns is None else columns})",
         ("reals", "integer", "integer"),
-        lambda value: (value, *value.shape) if _array(value, np.float64, (None, columns)) else None,
+        lambda value, trail: (value, *value.shape[:2]) if _array(value, np.float64, (None, columns, *trail)) else None,
         lambda parts: Matrix(parts[0], 0, parts[1], parts[2] if columns is None else columns),
     )
 
@@ -99,10 +104,12 @@ def matrix(columns: int | None = None) -> Kind:
 def table(record: type[Record]) -> Kind:
     """Describe an argument that is a table of records."""
 
-    def split(value: Any) -> tuple[Any, ...] | None:
+    def split(value: Any, trail: Shape) -> tuple[Any, ...] | None:
         match value:
-            case Table(record=kind, integers=ArrayIntegers(whole), reals=ArrayReals(real), size=size):
-                return (whole, real, size) if kind is record else None
+            case Table(record=kind, integers=ArrayIntegers(whole), reals=ArrayReals(real), size=int(size)):
+                fits = _array(whole, np.int64, (size * record.integer_width,))
+                fits = fits and _array(real, np.float64, (size * record.real_width, *trail))
+                return (whole, real, size) if fits and kind is record else None
             case _:
                 return None
 
@@ -118,13 +125,15 @@ def table(record: type[Record]) -> Kind:
 def dual(kind: Kind, directions: int, active: bool) -> Kind:
     """Return the kind of an argument of dual numbers: a value and its slopes, or, not active, a constant."""
 
-    def split(value: Any) -> tuple[Any, ...] | None:
+    def split(value: Any, trail: Shape) -> tuple[Any, ...] | None:
         match value:
-            case (values, slopes) if (parts := kind.split(values)) is not None:
-                size = sum(part.size for part, atom in zip(parts, kind.atoms, strict=True) if atom == "reals")
-                size = directions * (size + kind.atoms.count("real"))
-                fits = isinstance(slopes, np.ndarray) and _array(slopes.reshape(-1), np.float64, (size,))
-                return (*parts, cast("Any", slopes)) if fits and slopes.flags.c_contiguous else None
+            case (values, slopes) if (parts := kind.split(values, trail)) is not None:
+                array = cast("np.ndarray[Any, np.dtype[Any]]", slopes)
+                numbers = [part for part, atom in zip(parts, kind.atoms, strict=True) if atom in ("reals", "real")]
+                members = np.shape(numbers[0])[-1:] if trail else ()
+                shape = (*np.shape(array)[: np.ndim(array) - len(members)], *members)
+                fits = _array(array, np.float64, shape) and array.size == directions * sum(map(np.size, numbers))
+                return (*parts, array) if fits else None
             case _:
                 return None
 

@@ -8,7 +8,7 @@ from typing import Any, Final, cast, final
 from ephs.semantics.stage.emission import IntegerPointer, RealPointer, Symbol, TruthSymbol, WholeSymbol, Writer
 from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.evaluator import Evaluator, Function, known
-from ephs.semantics.stage.memory import IntegerCells, RealCells, Variable
+from ephs.semantics.stage.memory import Cells, IntegerCells, RealCells, Variable
 from ephs.semantics.stage.numbers import Condition, Integer, Real, Truth
 from ephs.semantics.stage.plain import elementary
 from ephs.semantics.stage.records import Record
@@ -51,12 +51,14 @@ class Machine(Evaluator):
         self._functions: list[str] = []
         self._declared: dict[str, None] = {}
         self._emitted: dict[object, _Emitted | None] = {}
+        self._tables: dict[str, str] = {}
         self._writers: list[Writer] = []
 
     @property
     def text(self) -> str:
         """The module's assembly text."""
-        return "\n\n".join([*self._declared, *self._functions]) + "\n"
+        tables = [f"{name} = private unnamed_addr constant {text}" for text, name in self._tables.items()]
+        return "\n\n".join([*tables, *self._declared, *self._functions]) + "\n"
 
     @property
     def to(self) -> Writer:
@@ -265,6 +267,21 @@ class Machine(Evaluator):
     def _wholes(self, size: int) -> IntegerCells:
         return IntegerPointer(self.to, self.to.slot(f"[{size} x i64]"))
 
+    def _constants(self, values: list[Any], whole: bool) -> Cells[Any]:
+        to, kind = self.to, "i64" if whole else "double"
+        texts = ", ".join(f"{kind} {to.of_constant(value, whole)}" for value in values)
+        text = f"[{len(values)} x {kind}] [{texts}]"
+        name = self._tables.setdefault(text, f"@table.{len(self._tables)}")
+        return IntegerPointer(to, name) if whole else RealPointer(to, name, shared=True)
+
+    def _rehearse(self, body: Callable[[], None]) -> None:
+        place, functions = self.to.copy(), len(self._functions)
+        known = dict(self._declared), dict(self._tables), dict(self._emitted)
+        body()
+        self.to.restore(place)
+        del self._functions[functions:]
+        self._declared, self._tables, self._emitted = known
+
     # Functions of their own
 
     def _call(self, on: Evaluator, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
@@ -316,7 +333,7 @@ def _flat(to: Writer, value: Any, leaf: Callable[[str, str], None]) -> Any:
         case RealPointer() | IntegerPointer():
             to.own(value.writer)
             leaf("ptr", value.name)
-            return (type(value),)
+            return (type(value), value.shared) if isinstance(value, RealPointer) else (IntegerPointer,)
         case list() | tuple():
             entries = cast("list[Any]", value)
             return (list if isinstance(value, list) else tuple, *(_flat(to, entry, leaf) for entry in entries))
@@ -342,7 +359,7 @@ def _shaped(to: Writer, form: Any, leaves: Iterator[str]) -> Any:
     if kind is WholeSymbol or kind is TruthSymbol:
         return kind(to, next(leaves), rest[0])
     if kind is RealPointer or kind is IntegerPointer:
-        return kind(to, next(leaves))
+        return kind(to, next(leaves), *rest)
     if kind is list or kind is tuple:
         parts: list[Any] = [_shaped(to, part, leaves) for part in rest]
         return parts if kind is list else tuple(parts)

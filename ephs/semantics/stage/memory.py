@@ -94,7 +94,9 @@ class ArrayReals(RealCells):
         return self.array[cast("int", index)]
 
     def store(self, index: Integer, value: Real) -> None:
-        self.array[cast("int", index)] = cast("float", value)
+        if not isinstance(value, float | int):
+            raise StageError("shared")
+        self.array[cast("int", index)] = value
 
 
 @final

@@ -55,7 +55,7 @@ class Plain(Interpreted):
     def _function(self, name: Function, *arguments: Real) -> Real:
         return elementary(name, *cast("tuple[float, ...]", arguments))
 
-    def _known(self, truth: Condition) -> bool:
+    def _known(self, truth: Condition, what: str) -> bool:
         return bool(truth)
 
     def _choose(self, truth: Condition, one: Any, other: Any) -> Any:
@@ -66,6 +66,9 @@ class Plain(Interpreted):
 
     def _negate(self, truth: Condition) -> Truth:
         return not truth
+
+    def _same(self, one: Integer, other: Integer) -> Truth:
+        return one == other
 
     def real(self, integer: Integer) -> Real:
         return np.float64(cast("int", integer))

@@ -212,12 +212,12 @@ class Record:
 
     @final
     @classmethod
-    def table(cls, size: int) -> "Table[Self]":
-        """Return a table of `size` rows of zeros in NumPy arrays of its own."""
+    def table(cls, size: int, members: int | None = None) -> "Table[Self]":
+        """Return a table of `size` rows of zeros in NumPy arrays of its own; real numbers for so many members."""
         return Table(
             cls,
             ArrayIntegers(np.zeros(size * cls.integer_width, dtype=np.int64)),
-            ArrayReals(np.zeros(size * cls.real_width)),
+            ArrayReals(np.zeros((size * cls.real_width, *([] if members is None else [members])))),
             size,
         )
 

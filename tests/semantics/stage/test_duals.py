@@ -151,7 +151,7 @@ def test_a_slope_that_nobody_keeps_is_named():
 
 
 def test_an_argument_that_is_not_there_is_named():
-    with pytest.raises(StageError, match="found y to differentiate by, expected some of x, a, points, gain, out"):
+    with pytest.raises(StageError, match="has no argument y, expected some of x, a, points, gain, out"):
         entry.tangent("y")
 
 

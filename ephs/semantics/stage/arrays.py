@@ -1,0 +1,151 @@
+"""Evaluation with NumPy arrays as numbers: many members at once, an operation for all of them at a time."""
+
+import operator
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final, cast, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ephs.semantics.stage.errors import StageError
+from ephs.semantics.stage.evaluator import Function, Interpreted
+from ephs.semantics.stage.memory import Cells
+from ephs.semantics.stage.numbers import (
+    Condition,
+    Count,
+    Integer,
+    IntegerOperation,
+    Number,
+    Operation,
+    Order,
+    Real,
+    Truth,
+)
+
+__all__ = ["ARRAYS", "Arrays", "Batch", "BatchCells"]
+
+_OPERATIONS: Final[dict[str, Callable[[Any, Any], Any]]] = {
+    "+": operator.add,
+    "-": operator.sub,
+    "*": operator.mul,
+    "/": lambda a, b: a / b,
+    "//": lambda a, b: a // b,
+    "%": operator.mod,
+    "<": operator.lt,
+    "<=": operator.le,
+    ">": operator.gt,
+    ">=": operator.ge,
+}
+_FUNCTIONS: Final[dict[Function, Callable[..., Any]]] = {
+    "sqrt": np.sqrt,
+    "absolute": np.abs,
+    "floor": np.floor,
+    "sin": np.sin,
+    "cos": np.cos,
+    "exp": np.exp,
+    "log": np.log,
+    "atan2": np.arctan2,
+    "copysign": np.copysign,
+}
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Batch(Number):
+    """A real number of each member."""
+
+    values: NDArray[np.float64]
+
+    def _apply(self, operation: Operation, left: Real, right: Real) -> Real:
+        return Batch(_OPERATIONS[operation](_of(left), _of(right)))
+
+    def _order(self, order: Order, left: Real, right: Real) -> Truth:
+        return Mask(_OPERATIONS[order](_of(left), _of(right)))
+
+    def _negative(self) -> Real:
+        return Batch(-self.values)
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class BatchCount(Count):
+    """An integer of each member."""
+
+    values: NDArray[np.int64]
+
+    def _apply(self, operation: IntegerOperation, left: Integer, right: Integer) -> Integer:
+        return BatchCount(_OPERATIONS[operation](_of(left), _of(right)))
+
+    def _order(self, order: Order, left: Integer, right: Integer) -> Truth:
+        return Mask(_OPERATIONS[order](_of(left), _of(right)))
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Mask(Condition):
+    """A truth value of each member."""
+
+    values: NDArray[np.bool]
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class BatchCells(Cells[Real]):
+    """Cells in a NumPy array whose last axis counts members."""
+
+    array: NDArray[np.float64]
+
+    def load(self, index: Integer) -> Real:
+        """Return the numbers at an index."""
+        return Batch(self.array[cast("int", index)].copy())
+
+    def store(self, index: Integer, value: Real) -> None:
+        """Keep numbers at an index."""
+        self.array[cast("int", index)] = _of(value)
+
+
+def _of(value: object) -> Any:
+    return value.values if isinstance(value, Batch | BatchCount | Mask) else value
+
+
+@final
+class Arrays(Interpreted):
+    """Evaluation of all members at once; what differs between them is chosen by `select`, not by `when`."""
+
+    def _function(self, name: Function, *arguments: Real) -> Real:
+        return Batch(_FUNCTIONS[name](*map(_of, arguments)))
+
+    def _known(self, truth: Condition, what: str) -> bool:
+        raise StageError("undecided", what=what, found="for all members")
+
+    def _choose(self, truth: Condition, one: Any, other: Any) -> Any:
+        values = cast("Any", np.where(_of(truth), _of(one), _of(other)))
+        kinds: dict[str, Callable[[Any], Any]] = {"f": Batch, "i": BatchCount, "b": Mask}
+        return kinds[values.dtype.kind](values)
+
+    def _both(self, one: Truth, other: Truth) -> Truth:
+        return Mask(np.logical_and(_of(one), _of(other)))
+
+    def _negate(self, truth: Condition) -> Truth:
+        return Mask(np.logical_not(_of(truth)))
+
+    def _same(self, one: Integer, other: Integer) -> Truth:
+        return Mask(np.equal(_of(one), _of(other)))
+
+    def real(self, integer: Integer) -> Real:
+        return (
+            Batch(integer.values.astype(np.float64)) if isinstance(integer, BatchCount) else float(cast("int", integer))
+        )
+
+    def integer(self, real: Real) -> Integer:
+        values = np.trunc(np.nan_to_num(_of(real), posinf=np.inf, neginf=-np.inf))
+        large = np.abs(values) >= 2.0**63
+        edges = np.where(values > 0.0, np.int64(2**63 - 1), np.int64(-(2**63)))
+        return BatchCount(np.where(large, edges, np.where(large, 0.0, values).astype(np.int64)))
+
+    def scale(self, real: Real, power: Integer) -> Real:
+        return Batch(_of(real) * np.ldexp(1.0, _of(power)))
+
+
+ARRAYS: Final = Arrays()

@@ -1,0 +1,143 @@
+"""Entry functions of programs: a staged function, the kinds of its arguments, and what may be derived from both."""
+
+from collections.abc import Callable, Iterator
+from functools import wraps
+from inspect import Parameter, Signature, signature
+from typing import Any, final
+
+from ephs.semantics.stage.duals import Duals
+from ephs.semantics.stage.errors import StageError
+from ephs.semantics.stage.evaluator import Evaluator
+from ephs.semantics.stage.kinds import INTEGER, REAL, Atom, Kind, described, dual
+from ephs.semantics.stage.records import IntegerField, RealField
+from ephs.semantics.stage.unrolled import Unrolled
+
+__all__ = ["Entry"]
+
+
+@final
+class Entry:
+    """A function of a program, and the kinds of its arguments.
+
+    Parameters
+    ----------
+    function
+        A staged function. Its result is None, a real number, an integer or a condition.
+    **kinds
+        Its arguments after the evaluator, in order: `real()`, `integer()`, `vector()`, `indices()`, `matrix()`,
+        `table(Record)`.
+    """
+
+    def __init__(self, function: Callable[..., Any], **kinds: Kind | RealField | IntegerField) -> None:
+        self.function = function
+        self.kinds = {
+            name: kind if isinstance(kind, Kind) else REAL if isinstance(kind, RealField) else INTEGER
+            for name, kind in kinds.items()
+        }
+        names = list(signature(function).parameters)[1:]
+        if names != list(kinds):
+            raise StageError(
+                "parameters", where=self.name, expected=", ".join(names) or "none", found=", ".join(kinds) or "none"
+            )
+
+    @property
+    def name(self) -> str:
+        """The function's name, for errors."""
+        return getattr(self.function, "__qualname__", repr(self.function))
+
+    @property
+    def atoms(self) -> list[tuple[str, Atom]]:
+        """The atoms of all arguments, each with the name of its argument."""
+        return [(name, atom) for name, kind in self.kinds.items() for atom in kind.atoms]
+
+    def split(self, arguments: tuple[Any, ...], trail: Callable[[str], tuple[int | None, ...]]) -> list[Any]:
+        """Return the atoms of arguments, checked; `trail` says what shape follows that of an argument's numbers."""
+        if len(arguments) != len(self.kinds):
+            expected = f"{len(self.kinds)} arguments ({', '.join(self.kinds)})"
+            raise StageError("parameters", where=self.name, expected=expected, found=len(arguments))
+        parts: list[Any] = []
+        for (name, kind), value in zip(self.kinds.items(), arguments, strict=True):
+            found = kind.split(value, trail(name))
+            if found is None:
+                members = f", and {trail(name)} members after it" if trail(name) else ""
+                raise StageError(
+                    "argument",
+                    where=self.name,
+                    argument=name,
+                    found=described(value),
+                    expected=kind.expected + members,
+                )
+            parts += found
+        return parts
+
+    def run(self, on: Evaluator, parts: Iterator[Any]) -> Any:
+        """Run the function with arguments made of cells and numbers."""
+        return self.function(on, *[kind.join([next(parts) for _ in kind.atoms]) for kind in self.kinds.values()])
+
+    def tangent(self, *active: str, directions: int = 1) -> "Entry":
+        """Return this function with exact derivatives along directions.
+
+        Parameters
+        ----------
+        *active
+            The arguments that have derivatives, read or written; each is given as a pair: the argument, and an array
+            of its slopes, of its shape, and the number of directions after it where there are several.
+        directions
+            How many derivatives are computed at once.
+
+        Raises
+        ------
+        StageError
+            An argument is not there. Later: a number with a derivative is stored in memory that is not active.
+        """
+        self._known(active)
+
+        @wraps(self.function)
+        def run(on: Evaluator, *arguments: Any) -> Any:
+            return self.function(Duals(on, directions), *arguments)
+
+        return Entry(run, **{name: dual(kind, directions, name in active) for name, kind in self.kinds.items()})
+
+    def given(self, **values: Any) -> "Entry":
+        """Return this function for some arguments given while staging, unrolled over what they say.
+
+        Loops whose bounds are known are unrolled, and what is known to be zero vanishes. Arrays that are given start
+        with the numbers that they hold and live in registers: what the function writes to them is not seen outside.
+
+        Parameters
+        ----------
+        **values
+            The arguments that are given; a call does not take them.
+
+        Raises
+        ------
+        StageError
+            An argument is not there, or not of its kind.
+        """
+        self._known(tuple(values))
+        parts: dict[str, tuple[Any, ...]] = {}
+        for name, value in values.items():
+            kind, found = self.kinds[name], self.kinds[name].split(value, ())
+            if found is None:
+                what = described(value)
+                raise StageError("argument", where=self.name, argument=name, found=what, expected=kind.expected)
+            parts[name] = found
+
+        def run(on: Evaluator, *arguments: Any) -> Any:
+            unrolled, others = Unrolled(on), iter(arguments)
+            return self.function(
+                unrolled,
+                *[
+                    kind.join([unrolled.held(part) for part in parts[name]]) if name in parts else next(others)
+                    for name, kind in self.kinds.items()
+                ],
+            )
+
+        names = [name for name in self.kinds if name not in parts]
+        run.__qualname__ = self.name
+        run.__signature__ = Signature([Parameter(name, Parameter.POSITIONAL_OR_KEYWORD) for name in ("on", *names)])
+        return Entry(run, **{name: self.kinds[name] for name in names})
+
+    def _known(self, names: tuple[str, ...]) -> None:
+        if unknown := [name for name in names if name not in self.kinds]:
+            raise StageError("unknown", where=self.name, found=", ".join(unknown), expected=", ".join(self.kinds))

@@ -1,0 +1,195 @@
+"""Evaluation with intervals, rounded outwards: bounds of what a function computes on a box."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final, final
+
+from ephs.semantics.stage.errors import StageError
+from ephs.semantics.stage.evaluator import Function, Interpreted
+from ephs.semantics.stage.numbers import Condition, Integer, Number, Operation, Order, Real, Truth
+
+__all__ = ["INTERVALS", "Interval", "Intervals"]
+
+_ULPS: Final = 4
+"""Roundings by which elementary functions may be wrong."""
+_FAR: Final = 1e6
+"""Beyond it sine and cosine are only known to be from −1 to 1."""
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Interval(Number):
+    """A real number from `low` to `high`, both included."""
+
+    low: float
+    high: float
+
+    def _apply(self, operation: Operation, left: Real, right: Real) -> Real:
+        (a, b), (c, d) = _of(left), _of(right)
+        match operation:
+            case "+":
+                return _out((a + c, b + d))
+            case "-":
+                return _out((a - d, b - c))
+            case "*":
+                return _out([_times(x, y) for x in (a, b) for y in (c, d)])
+            case "/":
+                if c < 0.0 < d or c == d == 0.0:
+                    return _WHOLE
+                inverse = (1.0 / d if d else -math.inf, 1.0 / c if c else math.inf)
+                if c and d:
+                    return _out([_over(x, y) for x in (a, b) for y in (c, d)])
+                return _out([_times(x, y) for x in (a, b) for y in inverse], ulps=2)
+
+    def _order(self, order: Order, left: Real, right: Real) -> Truth:
+        if order in (">", ">="):
+            left, right = right, left
+        (a, b), (c, d) = _of(left), _of(right)
+        if order in ("<", ">"):
+            return True if b < c else False if a >= d else Undecided()
+        return True if b <= c else False if a > d else Undecided()
+
+    def _negative(self) -> Real:
+        return Interval(-self.high, -self.low)
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Undecided(Condition):
+    """A condition that holds in some points of the box and not in others."""
+
+
+def _of(number: Real) -> tuple[float, float]:
+    if isinstance(number, Interval):
+        return number.low, number.high
+    assert isinstance(number, float | int)
+    return number, number
+
+
+def _times(a: float, b: float) -> float:
+    return 0.0 if a == 0.0 or b == 0.0 else a * b
+
+
+def _over(a: float, b: float) -> float:
+    return math.copysign(0.0, a) if math.isinf(b) else a / b
+
+
+def _out(values: list[float] | tuple[float, ...], ulps: int = 1) -> Interval:
+    """Return the hull of values, wider by what rounding may have taken."""
+    if any(math.isnan(value) for value in values):
+        return _WHOLE
+    low, high = min(values), max(values)
+    for _ in range(ulps):
+        low, high = math.nextafter(low, -math.inf), math.nextafter(high, math.inf)
+    return Interval(low, high)
+
+
+_WHOLE: Final = Interval(-math.inf, math.inf)
+
+
+def _clipped(interval: Interval, least: float, most: float = math.inf) -> Interval:
+    return Interval(min(max(interval.low, least), most), max(min(interval.high, most), least))
+
+
+def _sqrt(low: float, high: float) -> Interval:
+    return _WHOLE if high < 0.0 else _clipped(_out((math.sqrt(max(low, 0.0)), math.sqrt(high))), 0.0)
+
+
+def _absolute(low: float, high: float) -> Interval:
+    return Interval(0.0 if low <= 0.0 <= high else min(abs(low), abs(high)), max(abs(low), abs(high)))
+
+
+def _exp(low: float, high: float) -> Interval:
+    values = [math.exp(x) if x < 709.0 else math.inf for x in (low, high)]
+    return _clipped(_out((min(values[0], 1.7e308), values[1]), _ULPS), 0.0)
+
+
+def _log(low: float, high: float) -> Interval:
+    if high <= 0.0:
+        return _WHOLE
+    return _out((math.log(low) if low > 0.0 else -math.inf, math.log(high)), _ULPS)
+
+
+def _wave(low: float, high: float, peak: float) -> Interval:
+    """Bound the cosine of x − peak."""
+    if max(abs(low), abs(high)) > _FAR:
+        return Interval(-1.0, 1.0)
+    turn, near = 2.0 * math.pi, 1e-9
+    top = math.floor((high - peak + near) / turn) >= math.ceil((low - peak - near) / turn)
+    bottom = math.floor((high - peak + math.pi + near) / turn) >= math.ceil((low - peak + math.pi - near) / turn)
+    of = math.sin if peak else math.cos
+    ends = _out((of(low), of(high)), _ULPS)
+    return _clipped(Interval(-1.0 if bottom else ends.low, 1.0 if top else ends.high), -1.0, 1.0)
+
+
+def _atan2(y: tuple[float, float], x: tuple[float, float]) -> Interval:
+    if x[0] <= 0.0 and y[0] <= 0.0 <= y[1]:
+        return _out((-math.pi, math.pi))
+    return _out([math.atan2(b, a) for a in x for b in y], _ULPS)
+
+
+def _copysign(x: tuple[float, float], sign: tuple[float, float]) -> Interval:
+    size = _absolute(*x)
+    if sign[0] > 0.0:
+        return size
+    return Interval(-size.high, -size.low if sign[1] < 0.0 else size.high)
+
+
+_ONE: Final[dict[Function, Callable[[float, float], Interval]]] = {
+    "sqrt": _sqrt,
+    "absolute": _absolute,
+    "floor": lambda low, high: Interval(math.floor(low), math.floor(high)),
+    "sin": lambda low, high: _wave(low, high, math.pi / 2.0),
+    "cos": lambda low, high: _wave(low, high, 0.0),
+    "exp": _exp,
+    "log": _log,
+}
+_TWO: Final[dict[Function, Callable[[tuple[float, float], tuple[float, float]], Interval]]] = {
+    "atan2": _atan2,
+    "copysign": _copysign,
+}
+
+
+@final
+class Intervals(Interpreted):
+    """Evaluation with intervals; a condition that is not decided chooses both."""
+
+    def _function(self, name: Function, *arguments: Real) -> Real:
+        return _ONE[name](*_of(*arguments)) if name in _ONE else _TWO[name](*(_of(x) for x in arguments))
+
+    def _known(self, truth: Condition, what: str) -> bool:
+        raise StageError("undecided", what=what, found="on the box")
+
+    def _choose(self, truth: Condition, one: Any, other: Any) -> Any:
+        if isinstance(one, bool | Condition):
+            return Undecided()
+        if not isinstance(one, Number) and not isinstance(other, Number) and isinstance(one, int):
+            raise StageError("undecided", what="an integer", found="on the box")
+        (a, b), (c, d) = _of(one), _of(other)
+        return Interval(min(a, c), max(b, d))
+
+    def _both(self, one: Truth, other: Truth) -> Truth:
+        return Undecided()
+
+    def _negate(self, truth: Condition) -> Truth:
+        return Undecided()
+
+    def _same(self, one: Integer, other: Integer) -> Truth:
+        return one == other
+
+    def real(self, integer: Integer) -> Real:
+        return float(integer)
+
+    def integer(self, real: Real) -> Integer:
+        low, high = _of(real)
+        if not (math.isfinite(low) and math.isfinite(high)) or int(low) != int(high):
+            raise StageError("undecided", what="on.integer", found="on the box")
+        return int(low)
+
+    def scale(self, real: Real, power: Integer) -> Real:
+        low, high = _of(real)
+        return _out((math.ldexp(low, int(power)), math.ldexp(high, int(power))))
+
+
+INTERVALS: Final = Intervals()
