@@ -11,8 +11,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar, final
 
-from ephs.semantics.stage import Evaluator, Integer, Real, Record, Truth, Variable, Vector
+from ephs.semantics.stage import Evaluator, Integer, Real, Record, Truth, Vector
 from ephs.semantics.stage.evaluator import Function
+from ephs.semantics.stage.kinds import Atom, Kind
 from ephs.semantics.stage.memory import IntegerCells, RealCells
 from ephs.semantics.stage.numbers import Condition, Count, IntegerOperation, Number, Operation, Order
 
@@ -209,7 +210,7 @@ class _SurveyedIntegers(IntegerCells):
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class _HeldReal(RealCells):
-    """A real variable: an entry beyond the record's, which is never taken for constant."""
+    """A function's own real numbers: one entry beyond the record's, which is never taken for constant."""
 
     on: "Survey"
     entry: int
@@ -224,7 +225,7 @@ class _HeldReal(RealCells):
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class _HeldInteger(IntegerCells):
-    """An integer variable."""
+    """A function's own integers, likewise."""
 
     on: "Survey"
     entry: int
@@ -251,13 +252,15 @@ class Survey(Evaluator):
         """The record's entries."""
         return _SurveyedReals(self, entries=True)
 
-    def outside(self) -> Vector:
-        """An argument, or a place for results."""
-        return Vector(_SurveyedReals(self, entries=False), 0, _TraceCount())
-
-    def integers(self) -> IntegerCells:
-        """Integers of arguments."""
-        return _SurveyedIntegers()
+    def argument(self, kind: Kind) -> Any:
+        """An argument of a kind, of which nothing is known; what is written to it is a result."""
+        makers: dict[Atom, Callable[[], Any]] = {
+            "reals": lambda: _SurveyedReals(self, entries=False),
+            "integers": _SurveyedIntegers,
+            "real": lambda: _Trace(0),
+            "integer": _TraceCount,
+        }
+        return kind.join([makers[atom]() for atom in kind.atoms])
 
     def returned(self, value: object) -> None:
         """Take a value as a result."""
@@ -317,22 +320,18 @@ class Survey(Evaluator):
         with self._because(reason):
             body()
 
-    def variable(self, value: Real) -> Variable[Real]:
-        held = Variable[Real](_HeldReal(self, self._fresh()))
-        held.value = value
-        return held
+    def _reals(self, size: int) -> RealCells:
+        return _HeldReal(self, self._fresh())
 
-    def counter(self, value: Integer) -> Variable[Integer]:
-        held = Variable[Integer](_HeldInteger(self, self._fresh()))
-        held.value = value
-        return held
+    def _wholes(self, size: int) -> IntegerCells:
+        return _HeldInteger(self, self._fresh())
 
     def _fresh(self) -> int:
         self._variables += 1
         return self.width + self._variables - 1
 
     def hold(self, entry: int, value: object) -> None:
-        """Let an entry of a variable follow a value."""
+        """Let a function's own numbers follow a value."""
         self.entries.follows[entry] = self.entries.follows.get(entry, 0) | _bits(value) | self.why
 
     def _call(self, on: Evaluator, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:

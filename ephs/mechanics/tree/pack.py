@@ -33,11 +33,14 @@ class Class:
         Of each kind, what its links have in common: offset in `Link` and the value, 0, 1 or −1.
     gravity
         What gravity's components are known to be, 0, or None.
+    planar
+        All moves parallel to the plane of x and y.
     """
 
     joints: tuple[Joint, ...]
     constants: tuple[tuple[tuple[int, float], ...], ...]
     gravity: tuple[float | None, ...]
+    planar: bool
 
 
 @final
@@ -79,7 +82,7 @@ def packed(engine: Engine) -> Packed:
     constants = tuple(tuple(sorted(_constants(numbers[kinds == k]).items())) for k in range(len(joints)))
     gravity = np.array(engine.gravity, dtype=float)
     known = tuple(0.0 if x == 0.0 else None for x in gravity.tolist())
-    return Packed(Class(tuple(joints), constants, known), links, gravity)
+    return Packed(Class(tuple(joints), constants, known, planar), links, gravity)
 
 
 def _joint(engine: Engine, i: int) -> Joint:

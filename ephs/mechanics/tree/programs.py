@@ -1,30 +1,44 @@
 """Looped programs of the sweeps, specialised by what a class of mechanisms has in common."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from typing import final
+from typing import Any, Final, final
 
-from ephs.mechanics.tree.accelerations import accelerations
+from ephs.mechanics.tree import closing
+from ephs.mechanics.tree.accelerations import accelerate_outward, accelerations, no_force
+from ephs.mechanics.tree.closing import Rows
+from ephs.mechanics.tree.inward import inward, load_inward
 from ephs.mechanics.tree.needs import NO_INTEGERS, Compact, LaidOut, Layout, Survey, layout_of
+from ephs.mechanics.tree.outward import outward
 from ephs.mechanics.tree.pack import Class
-from ephs.mechanics.tree.records import Joint, Link, State, Tree
+from ephs.mechanics.tree.records import Joint, Link, State, States, Tree
+from ephs.mechanics.tree.spreading import driven_power, spread
 from ephs.semantics.stage import (
     Entry,
     Evaluator,
     Integer,
+    Integers,
     Matrix,
     Program,
     Real,
-    Table,
     Vector,
+    indices,
     integer,
     matrix,
-    table,
+    real,
     vector,
 )
 from ephs.semantics.stage.memory import IntegerCells, RealCells
 
-__all__ = ["Sweeps", "sweeps"]
+__all__ = ["FREE", "GENERAL", "PLACE", "Sweeps", "sweeps"]
+
+PLACE: Final = 24
+"""Numbers of a link that rows and forces read: R and p in the world, twist, bias."""
+FREE: Final = ("accelerations", "evaluations")
+"""Entry functions for trees on which nothing but gravity and forces on the rates act."""
+GENERAL: Final = ("move", "fold", "unfold", "resolve", "spread", "power", "dependent")
+"""Entry functions for mechanisms with loops, wrenches on links or prescribed motions."""
 
 
 @final
@@ -43,76 +57,6 @@ class _Links:
 
 
 @final
-class Sweeps:
-    """The sweeps of a class of mechanisms as a program.
-
-    Attributes
-    ----------
-    width
-        Numbers of memory that a link takes; the ground takes as many.
-    program
-        accelerations(links, memory, gravity, q, r, force, rate): ṙ into rate under the forces on the rates; 0, or 1 + a
-        link whose joint moves no mass. evaluations(links, memory, gravity, q, r, rates, repeats): the same of many
-        states by rows without forces; what a benchmark calls.
-    """
-
-    def __init__(self, kind: Class) -> None:
-        self._class = kind
-        width = Link.real_width
-        self._constants = tuple(
-            Layout(dict(known), {k: k for k in range(width) if k not in dict(known)}) for known in kind.constants
-        )
-        self._layout = layout_of(State.real_width, self._survey)
-        self.width = self._layout.width
-        arrays = {"links": table(Link), "memory": vector(), "gravity": vector(3)}
-        self.program = Program(
-            "sweeps",
-            accelerations=Entry(self._accelerations, **arrays, q=vector(), r=vector(), force=vector(), rate=vector()),
-            evaluations=Entry(self._evaluations, **arrays, q=matrix(), r=matrix(), rates=matrix(), repeats=integer()),
-        )
-
-    def _tree(self, links: _Links, size: Integer, memory: Vector, layout: Layout, gravity: Vector) -> Tree:
-        known = [gravity[k] if value is None else value for k, value in enumerate(self._class.gravity)]
-        return Tree(self._class.joints, size, links, Compact(State, layout, memory), known)
-
-    def _survey(self, survey: Survey) -> None:
-        outside = survey.outside()
-        links = _Links(self._constants, survey.integers(), outside.cells)
-        states = _Whole(survey.memory())
-        known = [outside[0] if value is None else value for value in self._class.gravity]
-        tree = Tree(self._class.joints, outside.size, links, states, known)
-        survey.returned(self._run(survey, tree, outside, outside, outside, outside))
-
-    def _run(self, on: Evaluator, tree: Tree, q: Vector, r: Vector, force: Vector | None, rate: Vector) -> Integer:
-        def given(i: Integer, joint: Joint, link: Link) -> list[Real]:
-            return [0.0 if force is None else force[link.r_at + j] for j in range(joint.dim)]
-
-        return accelerations(on, tree, q, r, rate, given)
-
-    def _accelerations(
-        self, on: Evaluator, links: Table[Link], memory: Vector, gravity: Vector, q: Vector, r: Vector, force: Vector,
-        rate: Vector,
-    ) -> Integer:  # fmt: skip
-        rows = _Links(self._constants, links.integers, links.reals)
-        tree = self._tree(rows, links.size, memory, self._layout, gravity)
-        return self._run(on, tree, q, r, force, rate)
-
-    def _evaluations(
-        self, on: Evaluator, links: Table[Link], memory: Vector, gravity: Vector, q: Matrix, r: Matrix, rates: Matrix,
-        repeats: Integer,
-    ) -> None:  # fmt: skip
-        rows = _Links(self._constants, links.integers, links.reals)
-        tree = self._tree(rows, links.size, memory, self._layout, gravity)
-        on.loop(
-            repeats,
-            lambda _: on.loop(q.rows, lambda k: _ignore(self._run(on, tree, q.row(k), r.row(k), None, rates.row(k)))),
-        )
-
-
-def _ignore(value: object) -> None: ...
-
-
-@final
 @dataclass(frozen=True, slots=True, eq=False)
 class _Whole:
     """Memory of a survey: all rows are one."""
@@ -123,7 +67,231 @@ class _Whole:
         return State(NO_INTEGERS, 0, self.cells, 0)
 
 
+MECHANISM: Final[dict[str, Any]] = {
+    "size": integer(), "integers": indices(), "reals": vector(), "memory": vector(), "gravity": vector(3),
+}  # fmt: skip
+"""A mechanism, as all entry functions take it: how many links, their integers and numbers, memory, gravity."""
+ROWS: Final[dict[str, Any]] = {
+    "at": indices(), "slot": indices(), "row": indices(), "flat": indices(), "value": matrix(4), "entry": vector(),
+    "covector": matrix(6), "along": matrix(12),
+}  # fmt: skip
+"""The rows of its loops: see `ephs.mechanics.tree.closing.Rows`."""
+
+
+@final
+class Sweeps:
+    """The sweeps of a class of mechanisms as a program.
+
+    Parameters
+    ----------
+    kind
+        The class.
+    general
+        Loops, wrenches on links and prescribed motions are there; else a tree under forces on its rates.
+
+    Attributes
+    ----------
+    width
+        Numbers of memory that a link takes; the ground takes as many.
+    program
+        The entry functions of `FREE` or `GENERAL`.
+    """
+
+    def __init__(self, kind: Class, *, general: bool) -> None:
+        self._class = kind
+        self._zeros = (0, 1, 5) if kind.planar else ()
+        self._constants = tuple(
+            Layout(dict(known), {k: k for k in range(Link.real_width) if k not in dict(known)})
+            for known in kind.constants
+        )
+        entries = self._general() if general else self._free()
+        self._layout: Layout | None = None
+        self._layout = layout_of(State.real_width, lambda survey: self._survey(survey, entries))
+        self.width = self._layout.width
+        self.program = Program("sweeps", **entries)
+
+    def _survey(self, survey: Survey, entries: dict[str, Entry]) -> None:
+        self._states: States | None = _Whole(survey.memory())
+        for entry in entries.values():
+            survey.returned(entry.function(survey, *(survey.argument(kind) for kind in entry.kinds.values())))
+        self._states = None
+
+    def _tree(self, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector) -> Tree:
+        known = [gravity[k] if value is None else value for k, value in enumerate(self._class.gravity)]
+        states = self._states
+        if states is None:
+            assert self._layout is not None
+            states = Compact(State, self._layout, memory)
+        return Tree(self._class.joints, size, _Links(self._constants, integers.cells, reals.cells), states, known)
+
+    def _rows(
+        self, at: Integers, slot: Integers, row: Integers, flat: Integers, value: Matrix, entry: Vector,
+        covector: Matrix, along: Matrix,
+    ) -> Rows:  # fmt: skip
+        whole = Vector(covector.cells, covector.start, covector.rows * 6)
+        return Rows(at, slot, row, flat, value, entry, whole, along, self._zeros)
+
+    # ---- trees on which nothing but gravity and forces on the rates act ------------------------------------------
+
+    def _free(self) -> dict[str, Entry]:
+        def given(force: Vector) -> Callable[[Integer, Joint, Link], list[Real]]:
+            return lambda i, joint, link: [force[link.r_at + j] for j in range(joint.dim)]
+
+        def accelerate(
+            on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector, q: Vector,
+            r: Vector, force: Vector, rate: Vector,
+        ) -> Integer:  # fmt: skip
+            tree = self._tree(size, integers, reals, memory, gravity)
+            return accelerations(on, tree, q, r, rate, given(force))
+
+        def evaluations(
+            on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector, q: Matrix,
+            r: Matrix, rates: Matrix, repeats: Integer,
+        ) -> None:  # fmt: skip
+            tree = self._tree(size, integers, reals, memory, gravity)
+
+            def one(k: Integer) -> None:
+                accelerations(on, tree, q.row(k), r.row(k), rates.row(k))
+
+            on.loop(repeats, lambda _: on.loop(q.rows, one))
+
+        return {
+            "accelerations": Entry(
+                accelerate, **MECHANISM, q=vector(), r=vector(), force=vector(), rate=vector()
+            ),
+            "evaluations": Entry(
+                evaluations, **MECHANISM, q=matrix(), r=matrix(), rates=matrix(), repeats=integer()
+            ),
+        }  # fmt: skip
+
+    # ---- mechanisms with loops, wrenches on links, prescribed motions --------------------------------------------
+
+    def _general(self) -> dict[str, Entry]:
+        def move(
+            on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector, q: Vector,
+            r: Vector, places: Matrix,
+        ) -> None:  # fmt: skip
+            tree = self._tree(size, integers, reals, memory, gravity)
+            outward(on, tree, q, r)
+
+            def show(i: Integer) -> None:
+                state = tree.states[i]
+                turn = [x for row in state.turn for x in row]
+                for k, x in enumerate([*turn, *state.at, *state.twist, *state.bias]):
+                    places[i, k] = x
+
+            on.loop(size + 1, show)
+
+        def fold(
+            on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector,
+            at: Integers, slot: Integers, row: Integers, flat: Integers, value: Matrix, entry: Vector,
+            covector: Matrix, along: Matrix, q: Vector, force: Vector, wrench: Matrix,
+        ) -> Integer:  # fmt: skip
+            tree = self._tree(size, integers, reals, memory, gravity)
+            rows, fault = self._rows(at, slot, row, flat, value, entry, covector, along), on.counter(0)
+
+            def given(i: Integer, joint: Joint, link: Link) -> list[Real]:
+                return [force[link.r_at + j] for j in range(joint.dim)]
+
+            def one(i: Integer) -> None:
+                state = tree.states[i]
+                state.load = [x - wrench[i, k] for k, x in enumerate(state.load)]
+                closing.eliminate(on, rows, i, state)
+                closing.eliminate_load(on, rows, i, state)
+                inward(on, tree, i, fault)
+                load_inward(on, tree, q, given, i)
+                closing.carry(on, tree, rows, i)
+                closing.carry_load(on, tree, rows, i)
+
+            tree.each(on, one, down=True)
+            closing.eliminate(on, rows, size, None)
+            closing.eliminate_load(on, rows, size, None)
+            return fault.value
+
+        def outwards(on: Evaluator, tree: Tree, rows: Rows, q: Vector, rate: Vector, change: Matrix) -> None:
+            closing.multipliers(on, rows, tree.size, None)
+
+            def one(i: Integer) -> None:
+                closing.push(on, tree, rows, i)
+                accelerate_outward(on, tree, q, rate, i)
+                closing.multipliers(on, rows, i, tree.states[i])
+
+            tree.each(on, one)
+            _show_changes(on, tree, change)
+
+        def unfold(
+            on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector,
+            at: Integers, slot: Integers, row: Integers, flat: Integers, value: Matrix, entry: Vector,
+            covector: Matrix, along: Matrix, q: Vector, rate: Vector, change: Matrix,
+        ) -> None:  # fmt: skip
+            tree = self._tree(size, integers, reals, memory, gravity)
+            outwards(on, tree, self._rows(at, slot, row, flat, value, entry, covector, along), q, rate, change)
+
+        def resolve(
+            on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector,
+            at: Integers, slot: Integers, row: Integers, flat: Integers, value: Matrix, entry: Vector,
+            covector: Matrix, along: Matrix, q: Vector, rate: Vector, change: Matrix,
+        ) -> None:  # fmt: skip
+            tree = self._tree(size, integers, reals, memory, gravity)
+            rows = self._rows(at, slot, row, flat, value, entry, covector, along)
+
+            def unloaded(i: Integer) -> None:
+                tree.states[i].load = [0.0] * 6
+
+            def one(i: Integer) -> None:
+                closing.eliminate_load(on, rows, i, tree.states[i])
+                load_inward(on, tree, q, no_force, i)
+                closing.carry_load(on, tree, rows, i)
+
+            on.loop(size, unloaded)
+            tree.each(on, one, down=True)
+            closing.eliminate_load(on, rows, size, None)
+            outwards(on, tree, rows, q, rate, change)
+
+        def spread_out(
+            on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector, q: Vector,
+            x: Vector, change: Matrix,
+        ) -> None:  # fmt: skip
+            tree = self._tree(size, integers, reals, memory, gravity)
+            spread(on, tree, q, x)
+            _show_changes(on, tree, change)
+
+        def power(
+            on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector,
+            at: Integers, slot: Integers, row: Integers, flat: Integers, value: Matrix, entry: Vector,
+            covector: Matrix, along: Matrix, q: Vector, r: Vector, force: Vector,
+        ) -> Real:  # fmt: skip
+            tree = self._tree(size, integers, reals, memory, gravity)
+            rows = self._rows(at, slot, row, flat, value, entry, covector, along)
+            return driven_power(on, tree, rows, q, r, force)
+
+        def dependent(
+            on: Evaluator, at: Integers, slot: Integers, row: Integers, flat: Integers, value: Matrix, entry: Vector,
+            covector: Matrix, along: Matrix, largest: Vector, limit: Real,
+        ) -> Integer:  # fmt: skip
+            rows = self._rows(at, slot, row, flat, value, entry, covector, along)
+            return on.select(closing.dependent(on, rows, largest, limit), 1, 0)
+
+        return {
+            "move": Entry(move, **MECHANISM, q=vector(), r=vector(), places=matrix(PLACE)),
+            "fold": Entry(fold, **MECHANISM, **ROWS, q=vector(), force=vector(), wrench=matrix(6)),
+            "unfold": Entry(unfold, **MECHANISM, **ROWS, q=vector(), rate=vector(), change=matrix(6)),
+            "resolve": Entry(resolve, **MECHANISM, **ROWS, q=vector(), rate=vector(), change=matrix(6)),
+            "spread": Entry(spread_out, **MECHANISM, q=vector(), x=vector(), change=matrix(6)),
+            "power": Entry(power, **MECHANISM, **ROWS, q=vector(), r=vector(), force=vector()),
+            "dependent": Entry(dependent, **ROWS, largest=vector(), limit=real()),
+        }
+
+
+def _show_changes(on: Evaluator, tree: Tree, change: Matrix) -> None:
+    def show(i: Integer) -> None:
+        for k, x in enumerate(tree.states[i].change):
+            change[i, k] = x
+
+    on.loop(tree.size, show)
+
+
 @cache
-def sweeps(kind: Class) -> Sweeps:
-    """The program of a class, made once."""
-    return Sweeps(kind)
+def sweeps(kind: Class, *, general: bool = False) -> Sweeps:
+    """The program of a class, made once; it lives as long as the process, since tables keep its addresses."""
+    return Sweeps(kind, general=general)

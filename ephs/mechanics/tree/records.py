@@ -178,4 +178,5 @@ class Tree:
                     lambda: among(first + 1),
                 )
 
-        among(0)
+        if self.joints:
+            among(0)

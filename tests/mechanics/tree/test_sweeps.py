@@ -44,7 +44,8 @@ class Tree:
         links, rate = self.packed.links, np.zeros(self.equations.n)
         memory = np.zeros((links.size + 1) * self.sweeps.width)
         state = self.q, self.r, self.force
-        return rate, calls["accelerations"](links, memory, self.packed.gravity, *state, rate)
+        tables = links.size, links.integers.array, links.reals.array, memory, self.packed.gravity
+        return rate, calls["accelerations"](*tables, *state, rate)
 
     def unrolled(self, calls):
         """The same of the program that is written out."""
