@@ -1,15 +1,17 @@
 """Inputs as signals: constants, functions of time, functions of time and state."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
-from ephs.mechanics.solve.problem import Signal
+from ephs.mechanics.solve.errors import OptionError, nearest_of
+from ephs.mechanics.solve.probe import Asked
+from ephs.mechanics.solve.problem import Problem, Signal, State, States
 from ephs.semantics.bundle import Array
 from ephs.semantics.errors import AssemblyError
 
-__all__ = ["numbers_of", "signal"]
+__all__ = ["asked_of", "jumps_of", "numbers_of", "signal", "takes_state"]
 
 
 def signal(value: Any, *, effort: bool, name: str, size: int | None) -> Signal:
@@ -27,7 +29,7 @@ def signal(value: Any, *, effort: bool, name: str, size: int | None) -> Signal:
             raise AssemblyError("input", name, found=value, expected=expected)
         return Signal(found, effort, name, size)
     function: Any = value
-    if _takes_state(function):
+    if takes_state(function):
         return Signal(function, effort, name, size)
     return Signal(lambda t, _state: function(t), effort, name, size)
 
@@ -40,7 +42,53 @@ def numbers_of(value: Any) -> Array | None:
         return None
 
 
-def _takes_state(function: Callable[..., Any]) -> bool:
+def jumps_of(jumps: Any, names: Iterable[str], t0: float, until: float) -> Array:
+    """(n,) ascending times in s at which inputs jump, from a sequence, or from sequences by the input's name.
+
+    Raises
+    ------
+    OptionError
+        They are not in order, not within the run, or of something that is no input.
+    """
+    known = list(names)
+    if jumps is not None and isinstance(jumps, Mapping):
+        for name in jumps:
+            if name not in known:
+                expected = f"inputs: {', '.join(known) or 'none is given'}{nearest_of(str(name), known)}"
+                raise OptionError("jumps", name, expected)
+        parts = [jumps_of(jumps[name], known, t0, until) for name in jumps]
+        return np.unique(np.concatenate([np.zeros(0), *parts]))
+    times = np.zeros(0) if jumps is None else numbers_of(jumps)
+    first, last = min(t0, until), max(t0, until)
+    if times is None or times.ndim != 1 or not np.all(np.isfinite(times)) or np.any(np.diff(times) <= 0.0):
+        raise OptionError("jumps", jumps, "ascending times in s")
+    if times.size and not (first <= times[0] and times[-1] <= last):
+        raise OptionError("jumps", jumps, f"times in [{first!r}, {last!r}] s")
+    return times
+
+
+def asked_of(problem: Problem, inputs: Mapping[str, Any]) -> list[Asked]:
+    """The functions among the inputs that a user gave, by time and states of the problem as it is solved."""
+    found: list[Asked] = []
+    for name, given in inputs.items():
+        values = given.values() if isinstance(given, Mapping) else [given]
+        found += [_asked(problem, name, value) for value in values if callable(value)]
+    return found
+
+
+def _asked(problem: Problem, name: str, function: Callable[..., Any]) -> Asked:
+    seconds, given = problem.seconds, problem.given
+    if not takes_state(function):
+        return Asked(name, lambda t, _state: function(t * seconds), False)
+
+    def value(t: float, state: State | None) -> Any:
+        assert state is not None
+        return function(t * seconds, States(state if given is None else given(state)))
+
+    return Asked(name, value, True)
+
+
+def takes_state(function: Callable[..., Any]) -> bool:
     """Whether it wants a second argument: one that must be given, or is called state."""
     import inspect
 

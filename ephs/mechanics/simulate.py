@@ -18,8 +18,9 @@ from ephs.mechanics.reduction.folded import folded_problem
 from ephs.mechanics.redundancy import explain
 from ephs.mechanics.scene.document import scene_to_text
 from ephs.mechanics.scene.model import Scene
-from ephs.mechanics.signals import numbers_of, signal
+from ephs.mechanics.signals import asked_of, jumps_of, numbers_of, signal
 from ephs.mechanics.solve.audit import Bounds
+from ephs.mechanics.solve.breakpoints import Breakpoints
 from ephs.mechanics.solve.control import Control, Tolerance, told_apart
 from ephs.mechanics.solve.errors import OptionError, failing_at, nearest_of, number_of
 from ephs.mechanics.solve.events import events_of
@@ -69,6 +70,7 @@ def simulate(
     save_at: "ArrayLike | None" = None,
     form: str = "reduced",
     inputs: Mapping[str, Any] | None = None,
+    jumps: "ArrayLike | Mapping[str, ArrayLike] | None" = None,
     events: Sequence[Any] | None = None,
     options: Mapping[str, Any] | None = None,
     reference: Reference | None = None,
@@ -111,6 +113,9 @@ def simulate(
         ``{port: {"effort": f}}`` or ``{"flow": f}`` at outer ports; of a scene also ``{"joints.pin": f}``, a
         generalised force on u_r, ``{"bodies.crank": f}``, a wrench in the body frame, and ``{"markers.tip": f}``, a
         force in world axes; f a constant, f(t), or f(t, state).
+    jumps
+        Ascending times in s at which inputs jump, or a mapping from inputs to such times: steps end there, and go on
+        from the other side. Functions are searched for others; see `ephs.mechanics.solve.probe`.
     reference
         The reference environment of a system; a scene's world gives its own.
     progress
@@ -162,21 +167,24 @@ def simulate(
         near = nearest_of(unknown[0], chosen_method.options)
         raise OptionError("options", unknown[0], f"options of {chosen_method.name}: {known}{near}")
     times, watched = times_of(save_at, start, end), events_of(events)
-    setting = Setting(problem, start / unit, control, dict(options or {}))
+    declared = jumps_of(jumps, inputs or {}, start, end)
     asked = {
         "until": end, "t0": start, "method": chosen_method.name, "form": form, "rtol": rtol, "atol": atol,
         "step": step, "min_step": min_step, "max_step": max_step, "save_at": times,
-        "options": options, "inputs": inputs, "events": [event.name for event in watched],
+        "options": options, "inputs": inputs, "jumps": jumps, "events": [event.name for event in watched],
     }  # fmt: skip
     with failing_at(start):
         problem.inputs(start / unit, problem.initial)
+    breakpoints = Breakpoints(start / unit, end / unit, declared / unit, asked_of(problem, inputs or {}))
+    seen = breakpoints.of(problem)
+    setting = Setting(seen, start / unit, control, dict(options or {}))
     watched, told = seen_from(problem, watched, guarded(progress))
     times = None if times is None else times / unit
     bounds = Bounds.of(control, step, lawful=chosen_method.lawful, undamped=chosen_method.undamped)
     with journaled(journal, problem, asked) as written:
         if chosen_method.many is not None and control.step is not None and not watched and end > start:
             solution = integrate(
-                problem,
+                seen,
                 Grid(start / unit, end / unit, control.step),
                 make=chosen_method.many,
                 save_at=times,
@@ -184,10 +192,11 @@ def simulate(
                 progress=told,
                 journal=written,
                 bounds=bounds,
+                breakpoints=breakpoints,
             )
         else:
             solution = integrate_stepwise(
-                problem,
+                seen,
                 start / unit,
                 end / unit,
                 make=lambda: chosen_method.make(setting),
@@ -198,6 +207,7 @@ def simulate(
                 remarks={"auto": reason} if method == "auto" else {},
                 journal=written,
                 bounds=bounds,
+                breakpoints=breakpoints,
             )
     return judged(solution, audit)
 

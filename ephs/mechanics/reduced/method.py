@@ -87,6 +87,10 @@ class ReducedMethod(ABC):
         """The same state at a time that differs by rounding."""
         return replace(state, t=t)
 
+    def anew(self, state: ReducedState) -> ReducedState:
+        """The same state as one to start from: without memory, and none that a method has met before."""
+        return replace(state, q=state.q.copy(), memory=())
+
     def row(self, state: ReducedState) -> Row:
         """Record of a state."""
         return self.equations.row(state)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, final
 
 import numpy as np
 
+from ephs.mechanics.solve.breakpoints import MOST_FOUND
 from ephs.mechanics.solve.control import Control
 from ephs.mechanics.solve.driven import ComponentMethod
 from ephs.mechanics.solve.findings import Audit, Finding
@@ -180,6 +181,14 @@ def _ledger(solution: "Solution", bounds: Bounds) -> Iterator[Breach]:
         yield Breach(abs(float(rest[worst])) / scale, rounding, worst, path)
 
 
+def _input(solution: "Solution", _bounds: Bounds) -> Iterator[Breach]:
+    """Inputs are smooth but for some jumps."""
+    found = solution.stats.get("jumps", {}).get("found", ())
+    if found:
+        last = int(np.argmin(np.abs(solution.t - found[-1]["t"])))
+        yield Breach(float(len(found)), 0.0, last, Path.of(found[-1]["input"]))
+
+
 def _exchanged(solution: "Solution", kind: str) -> tuple[float, float]:
     """The largest amount of a kind that was made and exchanged, and the rounding of what is stored, relative to it."""
     books = solution.ledgers
@@ -273,6 +282,14 @@ LAWS: Mapping[str, Law] = {
         _ledger,
         lambda bounds: bounds.ledger,
         ("take a smaller step", "lower rtol"),
+    ),
+    "input": Law(
+        "inputs are smooth but for some jumps: functions of time are searched for these",
+        "jumps that were found; the search ends with more",
+        f"{MOST_FOUND}",
+        _input,
+        lambda _: float(MOST_FOUND),
+        ("say in jumps where it jumps, or give a function that is smooth", "say in jumps where it jumps, or smooth it"),
     ),
 }
 """The laws by name."""

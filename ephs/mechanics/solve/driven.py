@@ -12,7 +12,7 @@ from ephs.mechanics.solve.problem import Problem
 from ephs.mechanics.solve.snapshot import Snapshot
 from ephs.semantics.bundle import Array
 
-__all__ = ["ComponentMethod", "advance_driven", "advance_whole"]
+__all__ = ["ComponentMethod", "advance_driven", "advance_whole", "started"]
 
 ROUNDS = 12
 CUTS = 6
@@ -67,6 +67,11 @@ class ComponentMethod(Protocol):
     def stage_points(self, state: NaturalState, h: float, x: Array) -> list[Array]:
         """The states at the nodes of the step from x that led to ``state``."""
         ...
+
+
+def started(method: ComponentMethod, x: Array, sums: Array) -> NaturalState:
+    """The state of a method that starts at the states x, with what was counted before."""
+    return replace(method.init(x), sums=sums)
 
 
 def advance_whole(

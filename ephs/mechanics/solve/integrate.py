@@ -9,7 +9,8 @@ from typing import Any, Protocol, final
 import numpy as np
 
 from ephs.mechanics.solve.audit import Bounds, audit
-from ephs.mechanics.solve.driven import ComponentMethod, advance_driven, advance_whole
+from ephs.mechanics.solve.breakpoints import Breakpoints
+from ephs.mechanics.solve.driven import ComponentMethod, advance_driven, advance_whole, started
 from ephs.mechanics.solve.errors import Interrupted, OptionError, Outcome, SimulationError, SolveError, solve_error_of
 from ephs.mechanics.solve.journal import Written
 from ephs.mechanics.solve.labels import labels_of
@@ -17,7 +18,7 @@ from ephs.mechanics.solve.ledger import ledgers
 from ephs.mechanics.solve.model import Model, compile_model
 from ephs.mechanics.solve.natural import Chunk, Natural, NaturalState
 from ephs.mechanics.solve.natural_kernels import IRREVERSIBLE
-from ephs.mechanics.solve.problem import Problem
+from ephs.mechanics.solve.problem import Problem, States
 from ephs.mechanics.solve.production import Production
 from ephs.mechanics.solve.record import Record, Recorder, joined
 from ephs.mechanics.solve.snapshot import Snapshot, like, parts
@@ -81,6 +82,7 @@ def integrate(
     progress: Progress | None = None,
     journal: Written | None = None,
     bounds: Bounds | None = None,
+    breakpoints: Breakpoints | None = None,
 ) -> Solution:
     """Solve an initial value problem on a grid, forward in time, by a method that discretises component by component.
 
@@ -90,6 +92,8 @@ def integrate(
         Where the run is written down, and what an earlier part of it left there.
     bounds
         What the audit of the run allows; None: there is none.
+    breakpoints
+        Where inputs jump, and steps end; None: nowhere.
 
     Raises
     ------
@@ -102,7 +106,10 @@ def integrate(
     model = compile_model(d, problem.reference, problem.inputs(grid.t0, problem.initial))
     stepper = make(model)
     inside = _Inside(problem, make, model)
-    run = _Run(problem, grid, stepper, Recorder(d, grid.t0, x0, save_at, inside), begin, progress, journal, bounds)
+    run = _Run(
+        problem, grid, stepper, Recorder(d, grid.t0, x0, save_at, inside), begin, progress, journal, bounds,
+        breakpoints or Breakpoints(grid.t0, grid.until),
+    )  # fmt: skip
     with failures_of(run):
         run.recorder.start(stepper.energies(x0))
         run.balance = Balance(problem, *run.recorder.latest)
@@ -114,7 +121,7 @@ def integrate(
         run.restore()
         run.full_steps(max_steps)
         if grid.last and run.t != grid.until:
-            run.take(grid.last, 1, grid.until)
+            run.to(grid.until, grid.last)
     return run.solution()
 
 
@@ -131,8 +138,7 @@ class _Inside:
             self._method = self._make(self._model)
         t, x, energies, ledgers = start
         made = np.where(self._model.tables.kind == IRREVERSIBLE, energies, 0.0)
-        fresh = self._method.init(x)
-        state = NaturalState(x, fresh.z, fresh.previous, np.concatenate([ledgers[:4], made]))
+        state = started(self._method, x, np.concatenate([ledgers[:4], made]))
         _, chunk = advance_driven(self._problem, self._method, state, t, when - t)
         if chunk.failure is not None:
             raise chunk.failure
@@ -225,7 +231,9 @@ class _Run:
         progress: Progress | None,
         journal: Written | None,
         bounds: Bounds | None,
+        breakpoints: Breakpoints,
     ) -> None:
+        self.breakpoints = breakpoints
         self.problem, self.grid, self.stepper, self.recorder = problem, grid, stepper, recorder
         self.begin, self.progress, self.journal, self.bounds = begin, progress, journal, bounds
         self.t, self.setup, self.steps, self.iterations, self.cut = grid.t0, 0.0, 0, 0, 0
@@ -237,15 +245,39 @@ class _Run:
         whole = self.grid.whole
         if max_steps is not None and whole + bool(self.grid.last) > max_steps:
             raise OptionError("max_steps", max_steps, f"at least the grid's {whole + bool(self.grid.last)} steps")
-        size = 16 if self.problem.constant else 1
-        while self.steps < whole:
-            count = min(size, whole - self.steps)
+        alone = self.problem.constant and not self.breakpoints.active
+        size = 16 if alone else 1
+        while self.done < whole:
+            count = min(size, whole - self.done)
             before = time.perf_counter()
-            done = self.steps + count
-            self.take(self.grid.h, count, self.grid.until if done == whole and not self.grid.last else None)
+            done = self.done + count
+            end = self.grid.until if done == whole and not self.grid.last else None
+            if alone:
+                self.take(self.grid.h, count, end)
+            else:
+                self.to(self.grid.time(done) if end is None else end, self.grid.h)
             spent = time.perf_counter() - before
-            if self.problem.constant:
+            if alone:
                 size = int(np.clip(size * np.clip(RESPONSE / max(spent, 1e-9), 0.5, 4.0), 1, LARGEST_CHUNK))
+
+    @property
+    def done(self) -> int:
+        """Steps of the grid that are taken, in parts or not."""
+        return self.steps - self.breakpoints.split
+
+    def to(self, target: float, h: float) -> None:
+        """One step of the grid of h seconds, in parts where inputs jump within it."""
+        grid, first = self.grid, self.done
+        while self.done == first:
+            at = self.t
+            end = self.breakpoints.end(at, target - at, lambda: States(self.problem.descriptor.unpack(self.state.x)))
+            whole = end - target >= -1e-9 * grid.h  # a jump at the grid's time, to rounding, divides no step
+            jump = end != grid.until and end - target <= 1e-9 * grid.h
+            regular = abs(target - at - h) <= 1e-9 * grid.h and whole
+            self.take(h if regular else min(end, target) - at, 1, end if jump else target)
+            if jump:
+                self.state = started(self.stepper, self.state.x, self.state.sums)
+                self.breakpoints.enter(end, split=not whole)
 
     def take(self, h: float, count: int, end: float | None) -> None:
         """Some steps of one length; ``end`` is their exact end where the grid would round it."""
@@ -255,16 +287,14 @@ class _Run:
             self.state, chunk = advance_driven(self.problem, self.stepper, self.state, self.t, h)
         self.iterations += chunk.iterations
         self.cut += chunk.cut
-        times = np.array([self.grid.time(self.steps + k + 1) for k in range(chunk.steps)])
-        if h != self.grid.h:
-            times = times - self.grid.h + h
+        times = np.array([self.grid.time(self.done + k + 1) for k in range(chunk.steps)])
         if end is not None and chunk.steps == count:
             times[-1] = end
         chunk = self.production.cut(times, chunk)
         self._record(times[: chunk.steps], chunk)
         if chunk.failure is not None:
             raise chunk.failure
-        due = end is not None or time.perf_counter() - self.looked > 0.5 * RESPONSE
+        due = self.t == self.grid.until or time.perf_counter() - self.looked > 0.5 * RESPONSE
         if self.progress is not None and due:
             error = self.balance.error(*self.recorder.latest)
             self.looked = time.perf_counter()
@@ -282,6 +312,7 @@ class _Run:
             "state": parts(self.state),
             "method": self.stepper.snapshot(),
             "recorder": self.recorder.snapshot(),
+            "breakpoints": self.breakpoints.snapshot(),
         }
 
     def restore(self) -> None:
@@ -291,6 +322,7 @@ class _Run:
             self.t, (self.steps, self.iterations, self.cut) = found["t"], found["counts"]
             self.begin = time.perf_counter() - self.setup - found["elapsed"]
             self.state = like(self.state, found["state"])
+            self.breakpoints.restore(found["breakpoints"])
             self.stepper.restore(found["method"])
             self.recorder.restore(found["recorder"], self.journal.rows if self.journal is not None else None)
             self.production.start(*self.recorder.latest[:2])
@@ -313,6 +345,7 @@ class _Run:
             "orders": self.stepper.changes,
             "dependent_equations": len(self.stepper.redundant),
             "unknowns": self.stepper.model.unknowns,
+            **self.breakpoints.stats(),
             "setup_s": self.setup,
             "integrate_s": time.perf_counter() - self.begin - self.setup,
             "step": self.grid.h,

@@ -7,6 +7,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from ephs.mechanics.solve.audit import Bounds
+from ephs.mechanics.solve.breakpoints import Breakpoints
 from ephs.mechanics.solve.control import Control, Policy
 from ephs.mechanics.solve.errors import OptionError, Outcome, SolveError, solve_error_of
 from ephs.mechanics.solve.events import Crossing, Event, Watch
@@ -49,6 +50,7 @@ def integrate_stepwise(
     remarks: Mapping[str, Any] | None = None,
     journal: Written | None = None,
     bounds: Bounds | None = None,
+    breakpoints: Breakpoints | None = None,
 ) -> Solution:
     """Solve an initial value problem, forward or backward in time.
 
@@ -62,6 +64,8 @@ def integrate_stepwise(
         Where the run is written down, and what an earlier part of it left there.
     bounds
         What the audit of the run allows; None: there is none.
+    breakpoints
+        Where inputs jump, and steps end; None: nowhere.
 
     Raises
     ------
@@ -71,7 +75,10 @@ def integrate_stepwise(
     begin = time.perf_counter()
     if not (np.isfinite(until) and until != t0):
         raise OptionError("until", until, f"a time other than t0 = {t0!r} s")
-    run = _Run(problem, t0, until, *make(), control, events, save_at, progress, remarks or {}, begin, journal, bounds)
+    run = _Run(
+        problem, t0, until, *make(), control, events, save_at, progress, remarks or {}, begin, journal, bounds,
+        breakpoints or Breakpoints(t0, until),
+    )  # fmt: skip
     with failures_of(run):
         run.start()
         run.setup = time.perf_counter() - begin
@@ -105,7 +112,9 @@ class _Run(Generic[S]):
         begin: float,
         journal: Written | None,
         bounds: Bounds | None,
+        breakpoints: Breakpoints,
     ) -> None:
+        self.breakpoints = breakpoints
         self.problem, self.until, self.stepper, self.control = problem, until, stepper, control
         self.policy, self.events, self.progress, self.begin = policy, events, progress, begin
         self.remarks, self.journal, self.bounds = remarks, journal, bounds
@@ -145,7 +154,8 @@ class _Run(Generic[S]):
 
         ``stood`` is where the compiled part of an earlier run did, None where it was left.
         """
-        alone = self.watch is None and not self.production.active  # nothing has to be looked at in each step
+        # nothing has to be looked at in each step
+        alone = self.watch is None and not self.production.active and not self.breakpoints.active
         if alone and (self.journal is None or self.journal.snapshot is None or stood is not None):
             self.leg = self.stepper.many(
                 Span(
@@ -187,13 +197,17 @@ class _Run(Generic[S]):
         while self.t != self.until:
             if control.max_steps is not None and self.steps >= control.max_steps:
                 raise SolveError(Outcome.MANY, "", f"{control.max_steps}")
-            rest = abs(self.until - self.t)
             if grid:
-                self.h = min(grid.time(self.steps + 1) - abs(self.t - self.t0), rest)
-                if rest - self.h <= 1e-9 * grid.h:
-                    self.h = rest
+                self.h = grid.time(self.steps - self.breakpoints.split + 1) - abs(self.t - self.t0)
+            end = self.breakpoints.end(self.t, self.h, lambda: self._states(self.stepper.row(self.state)))
+            rest = abs(end - self.t)
+            if grid and rest - self.h <= 1e-9 * grid.h:
+                self.h, whole = rest, rest - self.h >= -1e-9 * grid.h
+            else:
+                whole = True
             # No sliver is left for a last step.
             h = self.h if rest > 1.01 * self.h else rest if rest <= 1.0000001 * self.h or grid else 0.5 * rest
+            cut = end != self.until and h < self.h
             try:
                 attempt = self.stepper.step(self.state, self.sign * h)
             except (SolveError, ArithmeticError, np.linalg.LinAlgError) as error:
@@ -205,14 +219,18 @@ class _Run(Generic[S]):
                 continue
             if self.policy:
                 accepted, wanted = self.policy.judge(h, attempt.error, abs(self.until - self.t0))
-                if not accepted:
+                if not accepted and not (cut and wanted > h):
                     self._shrink(min(wanted, control.most), self.cause)
                     continue
-                if h == self.h or wanted < self.h:  # a step that was cut for the end says nothing of longer ones
+                # a step that was cut for an end says nothing of longer ones
+                if h == self.h or wanted < (min(self.h, 2.0 * h) if cut else self.h):
                     self.h = max(min(wanted, control.most), min(control.least, h))
-            if self._accept(attempt, self.until if h == rest and abs(attempt.h) == h else None):
+            if self._accept(attempt, end if h == rest and abs(abs(attempt.h) - h) <= self.breakpoints.near else None):
                 self.ended = True
                 return
+            if self.t == end != self.until:
+                self.state = self.stepper.anew(self.state)
+                self.breakpoints.enter(end, split=not whole)
 
     def _shrink(self, h: float, cause: SolveError | None) -> None:
         self.rejected += 1
@@ -222,7 +240,7 @@ class _Run(Generic[S]):
         """Keep a step; whether an event ends the run with it."""
         t = self.t + attempt.h if end is None else end
         if end is None and self.policy is None:
-            t = self.t0 + self.sign * (self.steps + 1) * float(self.control.step or 0.0)
+            t = self.t0 + self.sign * (self.steps - self.breakpoints.split + 1) * float(self.control.step or 0.0)
         after = self.stepper.at(attempt.end, t)
         stopped = None
         if self.watch:
@@ -281,6 +299,7 @@ class _Run(Generic[S]):
             **({"step": self.control.step} if self.policy is None else {}),
             **self.stepper.stats(),
             **self.remarks,
+            **self.breakpoints.stats(),
             "setup_s": self.setup,
             "integrate_s": time.perf_counter() - self.begin - self.setup,
             "least_production": least,
@@ -332,6 +351,7 @@ class _Run(Generic[S]):
             "method": method,
             "policy": self.policy.snapshot() if self.policy is not None else None,
             "watch": self.watch.snapshot() if self.watch is not None else None,
+            "breakpoints": self.breakpoints.snapshot(),
             "leg": self.leg.snapshot() if self.leg is not None else None,
         }
 
@@ -346,6 +366,7 @@ class _Run(Generic[S]):
         self.begin = time.perf_counter() - self.setup - found["elapsed"]
         self.ended = found["ended"]
         self.state = like(self.state, found["state"])
+        self.breakpoints.restore(found["breakpoints"])
         self.stepper.restore(found["method"], self.state)
         row = self.stepper.row(self.state)
         self.production.start(row.x, row.energies)

@@ -7,7 +7,7 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.solve.control import Control
-from ephs.mechanics.solve.driven import ComponentMethod, advance_driven
+from ephs.mechanics.solve.driven import ComponentMethod, advance_driven, started
 from ephs.mechanics.solve.natural import NaturalState
 from ephs.mechanics.solve.problem import Problem
 from ephs.mechanics.solve.snapshot import Snapshot
@@ -85,6 +85,10 @@ class Paced:
     def at(self, state: PacedState, t: float) -> PacedState:
         """The same state at a time that differs by rounding."""
         return replace(state, t=t)
+
+    def anew(self, state: PacedState) -> PacedState:
+        """The same state as one to start from: unknowns are guessed afresh."""
+        return replace(state, inner=started(self.method, state.inner.x, state.inner.sums))
 
     def rows(self, states: Sequence[PacedState]) -> list[Row]:
         """Records of many states."""

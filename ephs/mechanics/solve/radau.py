@@ -165,6 +165,10 @@ class Radau:
         """The same state at a time that differs by rounding."""
         return replace(state, t=t)
 
+    def anew(self, state: RadauState) -> RadauState:
+        """The same state as one to start from; what it holds of the step before is a first guess only."""
+        return replace(state)
+
     def rows(self, states: Sequence[RadauState]) -> list[Row]:
         """Records of many states."""
         return [self.row(state) for state in states]

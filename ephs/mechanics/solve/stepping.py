@@ -170,6 +170,10 @@ class Stepper(Protocol[S]):
         """The same state at a time that differs by rounding."""
         ...
 
+    def anew(self, state: S) -> S:
+        """The same state as one to start from, where inputs jump: what is known of rates before it says nothing."""
+        ...
+
     def row(self, state: S) -> Row:
         """Record of a state."""
         ...

@@ -36,7 +36,7 @@ MOST = 256
 """Members in a batch at most."""
 RETRIES = 5
 """Number of retries for members of a lost worker."""
-_OPTIONS = ("method", "rtol", "atol", "step", "min_step", "max_step", "max_steps", "form", "inputs", "options",
+_OPTIONS = ("method", "rtol", "atol", "step", "min_step", "max_step", "max_steps", "form", "inputs", "jumps", "options",
             "reference")  # fmt: skip
 
 

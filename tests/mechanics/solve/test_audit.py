@@ -13,6 +13,7 @@ from ephs import library as lib
 from ephs.mechanics.methods import METHODS
 from ephs.mechanics.scene.state import Snapshot
 from ephs.mechanics.solve.audit import CLOSED, COARSE, LAWFUL, LAWS, LEAST, PRODUCTION, Bounds, audit
+from ephs.mechanics.solve.breakpoints import MOST_FOUND
 from ephs.mechanics.solve.control import Control, Tolerance
 from ephs.mechanics.solve.findings import Audit, Finding
 from ephs.mechanics.solve.resolution import step_error
@@ -65,6 +66,10 @@ def broken(law: str, sol: ephs.Solution, times: float) -> ephs.Solution:
         return ephs.Solution(
             sol.name, sol.t, sol.states, books, {**sol.stats, "least_production": least}, sol.problem, sol.labels
         )
+    if law == "input":
+        found = [{"t": 0.1, "input": "joints.pin"}] * int(times * MOST_FOUND)
+        stats = {**sol.stats, "jumps": {"declared": 0, "found": found, "divided_steps": 0}}
+        return ephs.Solution(sol.name, sol.t, sol.states, books, stats, sol.problem, sol.labels)
     if law == "constraint":
         length = Snapshot.of(sol.scene).scale(sol.scene.world.gravity).length
         return opened(sol, times * CLOSED * length)

@@ -34,6 +34,19 @@ RUNS = {
     "folded": {"form": "folded", "method": "natural", "step": 0.01},
     "driven": {"method": "rk54", "inputs": {"joints.bearing": lambda t, state: 1e-3 * np.sin(9.0 * t)}, **LOOSE},
     "driven, radau": {"method": "radau", "inputs": {"joints.bearing": lambda t: 1e-3 * np.sin(9.0 * t)}, **LOOSE},
+    **{
+        f"jumping, {method}{step}": {"method": method, "inputs": {"joints.bearing": lambda t: 1e-3 * (t < 0.1)}}
+        | {"jumps": [0.055]}
+        | step
+        | (LOOSE if not step else {})
+        for method, step in (
+            ("rk54", {}),
+            ("radau", {}),
+            ("natural4", {}),
+            ("alpha", {"step": 0.01}),
+            ("natural", {"step": 0.01}),
+        )
+    },
     "events": {"events": [lambda t, state: np.sin(40.0 * t)], **LOOSE},
     "backward": {"t0": 0.2, "until": 0.1, "method": "rk87"},
 }
