@@ -8,6 +8,7 @@ from typing import Any, Final, cast, final
 import numpy as np
 from numpy.typing import NDArray
 
+from ephs.semantics.stage.elementary import COMPOSED
 from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.evaluator import Function, Interpreted
 from ephs.semantics.stage.memory import Cells
@@ -37,15 +38,10 @@ _OPERATIONS: Final[dict[str, Callable[[Any, Any], Any]]] = {
     ">": operator.gt,
     ">=": operator.ge,
 }
-_FUNCTIONS: Final[dict[Function, Callable[..., Any]]] = {
+_EXACT: Final[dict[Function, Callable[..., Any]]] = {
     "sqrt": np.sqrt,
     "absolute": np.abs,
     "floor": np.floor,
-    "sin": np.sin,
-    "cos": np.cos,
-    "exp": np.exp,
-    "log": np.log,
-    "atan2": np.arctan2,
     "copysign": np.copysign,
 }
 
@@ -114,7 +110,9 @@ class Arrays(Interpreted):
     """Evaluation of all members at once; what differs between them is chosen by `select`, not by `when`."""
 
     def _function(self, name: Function, *arguments: Real) -> Real:
-        return Batch(_FUNCTIONS[name](*map(_of, arguments)))
+        if name in COMPOSED:
+            return COMPOSED[name](self, *arguments)
+        return Batch(_EXACT[name](*map(_of, arguments)))
 
     def _known(self, truth: Condition, what: str) -> bool:
         raise StageError("undecided", what=what, found="for all members")

@@ -5,6 +5,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, fields, is_dataclass
 from typing import Any, Final, cast, final
 
+from ephs.semantics.stage.elementary import COMPOSED
 from ephs.semantics.stage.emission import IntegerPointer, RealPointer, Symbol, TruthSymbol, WholeSymbol, Writer
 from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.evaluator import Evaluator, Function, known
@@ -19,10 +20,6 @@ _INTRINSIC: Final[dict[Function, str]] = {
     "sqrt": "sqrt",
     "absolute": "fabs",
     "floor": "floor",
-    "sin": "sin",
-    "cos": "cos",
-    "exp": "exp",
-    "log": "log",
     "copysign": "copysign",
 }
 
@@ -106,26 +103,13 @@ class Machine(Evaluator):
     def _function(self, name: Function, *arguments: Real) -> Real:
         if known(*arguments):
             return float(elementary(name, *cast("tuple[float, ...]", arguments)))
-        to = self.to
-        operands = [to.of_real(one) for one in arguments]
-        if name in _INTRINSIC:
-            vector = "" if self.width == 1 else f"v{self.width}"
-            called = f"@llvm.{_INTRINSIC[name]}.{vector}f64"
-            self.declare(f"{to.real} {called}({', '.join([to.real] * len(operands))})")
-            return Symbol(to, to.let(f"call {to.real} {called}({', '.join(f'{to.real} {x}' for x in operands)})"))
-        self.declare(f"double @{name}({', '.join(['double'] * len(operands))})")
-        return Symbol(to, self._each(to, name, operands))
-
-    def _each(self, to: Writer, name: str, operands: list[str]) -> str:
-        """Call a function of scalars for one member after the other."""
-        if self.width == 1:
-            return to.let(f"call double @{name}({', '.join(f'double {x}' for x in operands)})")
-        value = "poison"
-        for member in range(self.width):
-            taken = [to.let(f"extractelement {to.real} {x}, i64 {member}") for x in operands]
-            one = to.let(f"call double @{name}({', '.join(f'double {x}' for x in taken)})")
-            value = to.let(f"insertelement {to.real} {value}, double {one}, i64 {member}")
-        return value
+        if name in COMPOSED:
+            return COMPOSED[name](self, *arguments)
+        to, vector = self.to, "" if self.width == 1 else f"v{self.width}"
+        called = f"@llvm.{_INTRINSIC[name]}.{vector}f64"
+        self.declare(f"{to.real} {called}({', '.join([to.real] * len(arguments))})")
+        operands = ", ".join(f"{to.real} {to.of_real(one)}" for one in arguments)
+        return Symbol(to, to.let(f"call {to.real} {called}({operands})"))
 
     def real(self, integer: Integer) -> Real:
         if isinstance(integer, int):

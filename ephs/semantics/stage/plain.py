@@ -6,46 +6,27 @@ from typing import Any, Final, cast, final
 
 import numpy as np
 
+from ephs.semantics.stage.elementary import COMPOSED
 from ephs.semantics.stage.evaluator import Function, Interpreted
 from ephs.semantics.stage.numbers import Condition, Integer, Real, Truth
 
 __all__ = ["PLAIN", "Plain", "elementary"]
 
 
-def _guarded(function: Callable[..., float]) -> Callable[..., float]:
-    """Return not a number, or an infinity, where Python raises."""
-
-    def guarded(x: float) -> float:
-        try:
-            return function(x)
-        except OverflowError:
-            return math.inf
-        except ValueError:
-            return -math.inf if x == 0.0 else math.nan
-
-    return guarded
-
-
-def _floor(x: float) -> float:
-    return float(np.floor(x))
-
-
-_TABLE: Final[dict[Function, Callable[..., float]]] = {
-    "sqrt": _guarded(math.sqrt),
-    "absolute": math.fabs,
-    "floor": _floor,
-    "sin": _guarded(math.sin),
-    "cos": _guarded(math.cos),
-    "exp": _guarded(math.exp),
-    "log": _guarded(math.log),
-    "atan2": math.atan2,
-    "copysign": math.copysign,
+_EXACT: Final[dict[Function, Callable[..., float]]] = {
+    "sqrt": np.sqrt,
+    "absolute": np.abs,
+    "floor": np.floor,
+    "copysign": np.copysign,
 }
 
 
 def elementary(name: Function, *arguments: float) -> float:
     """Evaluate a function of floats as the machine does."""
-    return np.float64(_TABLE[name](*arguments))
+    with np.errstate(all="ignore"):
+        numbers = [np.float64(argument) for argument in arguments]
+        found = _EXACT[name](*numbers) if name in _EXACT else COMPOSED[name](PLAIN, *numbers)
+    return np.float64(found)
 
 
 @final

@@ -1,4 +1,4 @@
-"""Coefficients of the staged elementary functions, made anew in 60 digits: ``python -m tests.semantics.stage.coefficients``.
+"""Coefficients of the staged elementary functions in 60 digits: ``python -m tests.semantics.stage.coefficients``.
 
 Each polynomial interpolates at Chebyshev points of the interval in which it is used, which is within a small factor of
 the best one.
