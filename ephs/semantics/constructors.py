@@ -1,9 +1,9 @@
 """Primitives of one's own, from plain Python functions of the port variables.
 
-Their structure is proved when they are made, or searched for counterexamples. The functions are traced with SymPy:
-gradients, Jacobians, formulas and compiled kernels come from that, once for all primitives that differ in numbers only.
-A function that branches on its arguments or turns them into floats cannot be traced; it is then differenced, and called
-back in Python.
+Their structure is proved when they are made, or searched for counterexamples. The functions are recorded once:
+gradients, discrete gradients, Jacobians, printed formulas and machine code come from that, once for all primitives that
+differ in numbers only. A function that branches on its arguments or turns them into floats cannot be recorded; it is
+then differenced, and called back in Python.
 """
 
 import inspect
@@ -20,7 +20,7 @@ from ephs.semantics.bundle import Array, Bundle, Reference
 from ephs.semantics.checks import random_point
 from ephs.semantics.domains import Bounds, bounded, domain_of, inside
 from ephs.semantics.errors import StructureError
-from ephs.semantics.primitives import Formula, Irreversible, Kernel, Point, Reversible, Storage
+from ephs.semantics.primitives import Domain, Formula, Irreversible, Kernel, Point, Reversible, Storage
 
 __all__ = ["constraint", "gyrator", "irreversible", "storage", "transformer"]
 
@@ -46,10 +46,10 @@ def storage(
         E in J, called with the ports' states by name: floats where scalar, else arrays.
     gradient
         dE, left-trivialised: a sequence with an entry for each port, or (n,). Where None it is derived from the
-        energy; by differences where that cannot be traced.
+        energy; by differences where that cannot be recorded.
     domain
         Port name -> (least, greatest) number between which its states lie: the conditions are to hold there. A run that
-        leaves it ends by name. What has a domain is called back in Python.
+        leaves it ends by name.
 
     Raises
     ------
@@ -78,11 +78,11 @@ def storage(
         with np.errstate(all="ignore"):  # what is not a number is found by its value
             return _real(name, _called(name, "the energy", energy, x)) if inside(bounds, x) else math.nan
 
-    from ephs.semantics.symbols.forms import storage_form
-    from ephs.semantics.symbols.tracing import Untraceable
+    from ephs.semantics.derive.forms import storage_form
+    from ephs.semantics.derive.recording import Untraceable
 
     try:
-        form = storage_form(interface, energy)
+        form = storage_form(interface, energy, bounds)
     except Untraceable:
         form = None
 
@@ -95,8 +95,9 @@ def storage(
         interface,
         energy=value,
         gradient=bounded(derived, bounds, np.full(n, np.nan)) if derived is not None and bounds else derived,
+        discrete_gradient=None if form is None else form.discrete_gradient,
         parameters=(("energy", _name(energy)),),
-        kernel=None if form is None or bounds else form.kernel,
+        kernel=None if form is None else form.kernel,
         formula=Formula(energy, gradient=gradient),
         domain=bounds,
     )
@@ -249,7 +250,7 @@ def irreversible(
         )
 
     formula = Formula(matrix)
-    kernel = None if bounds else _kernel(interface, formula, None)
+    kernel = _kernel(interface, formula, None, bounds)
     return Irreversible(name, interface, evaluate, _reads(interface), kernel=kernel, formula=formula, domain=bounds)
 
 
@@ -270,7 +271,7 @@ def _reversible(
         bounded(structure, bounds, nothing) if bounds else structure,
         reads=_reads(interface),
         multipliers=multipliers,
-        kernel=None if bounds else _kernel(interface, formula, multipliers),
+        kernel=_kernel(interface, formula, multipliers, bounds),
         formula=formula,
         domain=bounds,
     )
@@ -285,16 +286,16 @@ def _both(skew: Callable[..., Any] | None, constraint: Callable[..., Any] | None
     return structure
 
 
-def _kernel(interface: Interface, formula: Formula, multipliers: int | None) -> Kernel | None:
+def _kernel(interface: Interface, formula: Formula, multipliers: int | None, bounds: Domain) -> Kernel | None:
     """The kernel of a reversible structure with so many multipliers, or of an irreversible one; None if untraced."""
-    from ephs.semantics.symbols.forms import irreversible_kernel, reversible_kernel
-    from ephs.semantics.symbols.tracing import Untraceable
+    from ephs.semantics.derive.forms import irreversible_kernel, reversible_kernel
+    from ephs.semantics.derive.recording import Untraceable
 
     reads = _reads(interface)
     try:
         if multipliers is None:
-            return irreversible_kernel(interface, reads, formula)
-        return reversible_kernel(interface, reads, formula, multipliers)
+            return irreversible_kernel(interface, reads, formula, bounds)
+        return reversible_kernel(interface, reads, formula, multipliers, bounds)
     except Untraceable:
         return None
 

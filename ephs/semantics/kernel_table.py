@@ -87,6 +87,10 @@ def address_of(
 
 def _of_kernel(kernel: Kernel, reference: Reference) -> tuple[int, tuple[float, ...]]:
     """Address and parameters, with those of what runs inside."""
+    if kernel.relation is not None:
+        from ephs.semantics.derive.relations import compiled
+
+        return compiled(kernel.relation).address, kernel.numbers(reference)
     try:
         own = int(_compiled(kernel.module, kernel.name).address)
     except AttributeError as error:
@@ -94,10 +98,6 @@ def _of_kernel(kernel: Kernel, reference: Reference) -> tuple[int, tuple[float, 
     if kernel.inner is not None:
         inner, numbers = _of_kernel(kernel.inner, reference)
         return own, (float(inner), *kernel.numbers(reference), *numbers)
-    if kernel.source:
-        from ephs.semantics.symbols.programs import address_of_source
-
-        return own, (float(address_of_source(kernel.source)[0]), *kernel.numbers(reference))
     return own, kernel.numbers(reference)
 
 

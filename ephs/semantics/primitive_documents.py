@@ -14,13 +14,13 @@ from ephs.semantics import constructors, structures
 from ephs.semantics.bundle import Array, Bundle, Reference
 from ephs.semantics.catalogue import find_part, part_of
 from ephs.semantics.checks import random_efforts, random_point
+from ephs.semantics.derive.forms import reversible_kernel, stacked
 from ephs.semantics.domains import Bounds, bounded, domain_of
 from ephs.semantics.errors import SemanticsError, StructureError
 from ephs.semantics.extents import between
 from ephs.semantics.library.chemistry import Species
 from ephs.semantics.primitives import Formula, Irreversible, Point, Primitive, Reversible, Storage
 from ephs.semantics.symbols.algebra import sp
-from ephs.semantics.symbols.forms import reversible_kernel, stacked
 from ephs.semantics.symbols.terms import Matrix, Structure, Term, Written, record, term_from, term_of
 from ephs.semantics.symbols.tracing import Untraceable, symbols_of, trace
 
@@ -151,14 +151,14 @@ def _reversible(reader: Reader, where: str, name: str, ports: Interface, found: 
         if not bounds and all(part is None or part.numbers for part in (skew, constraint)):
             return structures.constant_structure(name, ports, *structure({}))
         formula = Formula(Structure(skew, constraint))
-        if bounds:
-            inner = bounded(structure, bounds, (np.full((n, n), np.nan), np.full((k, n), np.nan)))
-            return Reversible(name, ports, inner, reads=reads, multipliers=k, formula=formula, domain=bounds)
         try:
-            kernel = reversible_kernel(ports, reads, formula, k)
+            kernel = reversible_kernel(ports, reads, formula, k, bounds)
         except Untraceable:
             kernel = None
-        return Reversible(name, ports, structure, reads=reads, multipliers=k, kernel=kernel, formula=formula)
+        inner = structure
+        if bounds:
+            inner = bounded(structure, bounds, (np.full((n, n), np.nan), np.full((k, n), np.nan)))
+        return Reversible(name, ports, inner, reads=reads, multipliers=k, kernel=kernel, formula=formula, domain=bounds)
 
     return make
 

@@ -18,6 +18,7 @@ from ephs.semantics.spaces import manifold
 from ephs.semantics.verdict import Condition, StructureVerdict, examine
 
 if TYPE_CHECKING:
+    from ephs.semantics.derive.relations import Relation
     from ephs.semantics.system import Filling
 
 __all__ = ["Domain", "Formula", "Irreversible", "Kernel", "Point", "Primitive", "Reversible", "Storage"]
@@ -32,12 +33,12 @@ Proof = Callable[[], tuple[Condition, ...]]
 @final
 @dataclass(frozen=True, slots=True)
 class Kernel:
-    """Names the compiled counterpart of a primitive's discrete relation: a function in a module, and its numbers.
+    """The compiled counterpart of a primitive's discrete relation: a function in a module, or derived; its numbers.
 
     Parameters
     ----------
-    source
-        Of the program that a traced primitive runs inside it; its address comes before the parameters.
+    relation
+        Derived from the primitive's function; the module has no name then.
     inner
         A kernel that this one calls: its address comes before the parameters, its own numbers after them.
     potentials
@@ -48,7 +49,7 @@ class Kernel:
     module: str
     name: str
     parameters: tuple[float, ...] = ()
-    source: str = ""
+    relation: "Relation | None" = None
     inner: "Kernel | None" = None
     potentials: tuple[tuple[int, tuple[tuple[str, float], ...]], ...] = ()
 

@@ -16,10 +16,14 @@ class Break:
 
 BREAKS = {
     "left trivialisation": Break(
-        "ephs/semantics/symbols/programs.py", "[[-a, -b, -c], [w, -c, b]", "[[-a, -b, -c], [w, c, b]"
+        "ephs/semantics/symbols/calculus.py", "[[-a, -b, -c], [w, -c, b]", "[[-a, -b, -c], [w, c, b]"
     ),
-    "traced correction": Break("ephs/semantics/symbols/traced_kernels.py", "near += WEIGHT *", "near -= WEIGHT *"),
-    "traced slope": Break("ephs/semantics/symbols/traced_kernels.py", "0.5 * slope[at + q]", "slope[at + q]"),
+    "slope of a product": Break(
+        "ephs/semantics/derive/slopes.py", "a.slopes, b.mean, b.slopes, a.mean", "a.slopes, b.start, b.slopes, a.end"
+    ),
+    "derivative of a quotient": Break(
+        "ephs/semantics/derive/partials.py", "a.slopes, 1.0, b.slopes, -value", "a.slopes, 1.0, b.slopes, value"
+    ),
     "equations": Break(
         "ephs/semantics/symbols/writer.py",
         "parts.balances[writer.junction(path, port)] += expression",

@@ -12,12 +12,12 @@ import numpy as np
 from ephs.operad import Interface, Path, Quantity
 from ephs.semantics.bundle import Bundle
 from ephs.semantics.checks import STATEMENTS
+from ephs.semantics.derive.forms import stacked
 from ephs.semantics.primitives import Irreversible, Primitive, Reversible, Storage
 from ephs.semantics.spaces import manifold
 from ephs.semantics.symbols.algebra import Expr, sp
 from ephs.semantics.symbols.bounds import Interval
-from ephs.semantics.symbols.forms import stacked
-from ephs.semantics.symbols.programs import trivialised
+from ephs.semantics.symbols.calculus import trivialised
 from ephs.semantics.symbols.signs import sign_shown, squares_shown, vanishes
 from ephs.semantics.symbols.tracing import Trace, Untraceable, trace
 from ephs.semantics.trials import ROTATING, extent

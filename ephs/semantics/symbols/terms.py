@@ -14,8 +14,8 @@ from typing import Any, TypeAlias, cast, final
 import numpy as np
 
 from ephs.operad.reading import Reader
+from ephs.semantics.derive.recording import Recorded, Untraceable
 from ephs.semantics.symbols.algebra import Expr, sp
-from ephs.semantics.symbols.tracing import Traced, Untraceable
 
 __all__ = ["DEPTH", "NODES", "OPERATIONS", "Matrix", "Structure", "Term", "Written", "record", "term_from", "term_of"]
 
@@ -45,7 +45,7 @@ def _power(a: Any, b: Any) -> Any:
 
 
 def _sign(a: Any) -> Any:
-    return a.sign() if isinstance(a, Traced) else np.sign(a)  # NumPy asks objects for no sign
+    return a.sign() if isinstance(a, Recorded) else np.sign(a)  # NumPy asks objects for no sign
 
 
 OPERATIONS: Mapping[str, tuple[int, int, Callable[..., Any]]] = MappingProxyType(
@@ -78,10 +78,7 @@ def _value(term: Term, x: Mapping[str, Any]) -> Any:
     word, *arguments = term
     if word == "entry":
         return x[arguments[0]][arguments[1]]
-    found = OPERATIONS[word][2](*(_value(each, x) for each in arguments))
-    if isinstance(found, Traced) and found.expression.is_number:
-        return float(found.expression)  # before SymPy makes exact numbers of any size out of such
-    return found
+    return OPERATIONS[word][2](*(_value(each, x) for each in arguments))
 
 
 @final

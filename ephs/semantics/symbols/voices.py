@@ -11,10 +11,10 @@ import numpy as np
 
 from ephs.operad import Path, Quantity
 from ephs.semantics.bundle import Array
+from ephs.semantics.derive.forms import stacked
 from ephs.semantics.primitives import Irreversible, Primitive, Reversible, Storage
 from ephs.semantics.symbols.algebra import Expr, sp
-from ephs.semantics.symbols.forms import stacked
-from ephs.semantics.symbols.programs import TEMPERATURE, intensive
+from ephs.semantics.symbols.calculus import TEMPERATURE, intensive
 from ephs.semantics.symbols.tracing import Untraceable, trace
 from ephs.semantics.symbols.words import Words, curved, latex_name, operator, pairing, plain
 

@@ -8,7 +8,7 @@ from ephs.operad import Path, Quantity
 from ephs.semantics.errors import AssemblyError
 from ephs.semantics.primitives import Primitive, Storage
 from ephs.semantics.symbols.algebra import Expr, sp
-from ephs.semantics.symbols.programs import PRESSURE, TEMPERATURE
+from ephs.semantics.symbols.calculus import PRESSURE, TEMPERATURE
 from ephs.semantics.symbols.voices import Said, Voice, say
 from ephs.semantics.symbols.words import Words, plain
 from ephs.semantics.system import System

@@ -16,9 +16,8 @@ from ephs.mechanics import components
 from ephs.operad import Path
 from ephs.semantics import Reference
 from ephs.semantics.checks import random_point
+from ephs.semantics.derive.forms import storage_form
 from ephs.semantics.spaces import manifold
-from ephs.semantics.symbols.forms import storage_form
-from ephs.semantics.symbols.programs import storage_program
 from ephs.semantics.symbols.tracing import Untraceable, trace
 from ephs.semantics.symbols.voices import formula_text
 from tests.semantics.test_primitives import ARGUMENTS
@@ -103,12 +102,8 @@ def test_functions_that_differ_in_numbers_share_one_program():
         return ephs.storage({"q": Q.displacement}, lambda q: k * abs(q) ** power + np.cos(k * q))
 
     one, other, third = spring(1.5, 4), spring(2.25, 4), spring(1.5, 2)
-    assert one.kernel.source == other.kernel.source != third.kernel.source
+    assert one.kernel.relation == other.kernel.relation != third.kernel.relation
     assert one.kernel.parameters != other.kernel.parameters
-    before = storage_program.cache_info().misses
-    for k in np.linspace(1.1, 1.9, 20):
-        spring(k, 4)
-    assert storage_program.cache_info().misses == before
 
 
 SPACES = {
@@ -228,7 +223,7 @@ def test_leaving_the_domain_of_a_function_is_reported(energy, outcome):
 def test_states_too_large_for_a_kernel_are_called_back():
     from ephs import Quantity, Space
 
-    wide = Quantity("field", Space("real", 20, 20), 1)
+    wide = Quantity("field", Space("real", 40, 40), 1)
     storage = ephs.storage({"x": wide}, lambda x: 0.5 * x @ x)
     reading = ephs.gyrator(
         {"q": Q.displacement, "p": Q.momentum, "~x": wide},
@@ -236,5 +231,5 @@ def test_states_too_large_for_a_kernel_are_called_back():
     )
     assert storage.kernel is None
     assert reading.kernel is None
-    x = {Path.of("x"): np.arange(20.0)}
-    assert np.allclose(storage.energy_gradient(x), np.arange(20.0), atol=1e-8)
+    x = {Path.of("x"): np.arange(40.0)}
+    assert np.allclose(storage.energy_gradient(x), np.arange(40.0), atol=1e-8)

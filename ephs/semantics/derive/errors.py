@@ -1,0 +1,30 @@
+"""The one exception of this room and the texts that it carries."""
+
+from typing import Final, final
+
+__all__ = ["DeriveError"]
+
+TEXTS: Final = {
+    "compared": "a number over a step is compared ({order}); an energy does not branch: write abs(…), or a function of "
+    "its own for each case.",
+    "jumps": "the function {function} jumps, so there is no slope over a step; an energy is continuous.",
+    "coordinates": "states of the group with code {code} are not known here; expected one of {expected}.",
+}
+
+
+@final
+class DeriveError(TypeError):
+    """A function of which something cannot be derived.
+
+    Parameters
+    ----------
+    fault
+        The key of the text.
+    **details
+        What the text names.
+    """
+
+    def __init__(self, fault: str, /, **details: object) -> None:
+        super().__init__(TEXTS[fault].format(**details))
+        self.fault: str = fault
+        self.details: dict[str, object] = details

@@ -1,0 +1,179 @@
+"""Elements from plain functions: their tapes, gradients for Python, and relations in machine code."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, final
+
+import numpy as np
+
+from ephs.operad import Interface, Path
+from ephs.operad.charges import ENTROPY, VOLUME
+from ephs.semantics.bundle import Array, Bundle
+from ephs.semantics.derive import relations
+from ephs.semantics.derive.recording import Untraceable, record
+from ephs.semantics.derive.relations import Port
+from ephs.semantics.primitives import Domain, Formula, Kernel, Point
+from ephs.semantics.spaces import manifold
+from ephs.semantics.stage.plain import PLAIN
+
+__all__ = ["StorageForm", "irreversible_kernel", "reversible_kernel", "stacked", "storage_form"]
+
+LARGEST = 32
+"""How many numbers states and efforts may have together: a relation is written out, every derivative for itself."""
+WITHOUT_SLOPE = ("sign", "sinhc")
+"""Functions that jump, or have no rule for their slope between two arguments."""
+Carried = dict[int, tuple[tuple[str, float], ...]]
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class StorageForm:
+    """A recorded energy: its gradient and discrete gradient for Python, its relation."""
+
+    gradient: Callable[[Point], Array]
+    discrete_gradient: Callable[[Point, Array], Array]
+    kernel: Kernel
+
+
+def storage_form(interface: Interface, energy: Callable[..., Any], domain: Domain = ()) -> StorageForm:
+    """Record an energy of the states of power ports.
+
+    Raises
+    ------
+    Untraceable
+        It needs numbers, or has more states than a relation is written out for.
+    """
+    bundle = Bundle.of(interface)
+    ports = bundle.ports
+    found = record(energy, _arguments(interface, ports))
+    if len(found.tape.outputs) != 1 or found.tape.inputs > LARGEST:
+        raise Untraceable(f"an energy is one number, of states with at most {LARGEST}")
+    steep = [name for name, _, _ in found.tape.operations if name in WITHOUT_SLOPE]
+    if steep:
+        raise Untraceable(f"an energy with {steep[0]}(…) has no discrete gradient")
+    carried = _carried(bundle)
+    bounds = _numbers(interface, ports, domain)
+    hot = tuple(int(i) for i in np.flatnonzero(bundle.indicator(ENTROPY) > 0.0))
+    relation = relations.Storage(found.tape, _ports(interface, ports), _reference(bundle), hot, tuple(carried), bounds)
+
+    def discrete(x: Point, v: Array) -> Array:
+        numbers = [entry for port in ports for entry in x[port]]
+        parameters = [np.float64(value) for value in found.parameters]
+        with np.errstate(all="ignore"):
+            try:
+                return np.array(relation.slopes(PLAIN, numbers, list(v), parameters)[0], dtype=float)
+            except ArithmeticError:  # of two numbers of the formula, as 1/0
+                return np.full(bundle.size, np.nan)
+
+    return StorageForm(
+        lambda x: discrete(x, np.zeros(bundle.size)), discrete, _kernel("storage", relation, carried, found.parameters)
+    )
+
+
+def reversible_kernel(
+    interface: Interface, reads: tuple[Path, ...], formula: Formula, multipliers: int, domain: Domain = ()
+) -> Kernel:
+    """Record f = L(x) e + C(x)ᵀ λ, 0 = C(x) e.
+
+    Raises
+    ------
+    Untraceable
+        As `storage_form`.
+    """
+    n = Bundle.of(interface).size
+    found = record(stacked(formula, n, multipliers), _arguments(interface, reads))
+    _limited(found.tape.inputs + n + multipliers)
+    relation = relations.Reversible(found.tape, _ports(interface, reads), _numbers(interface, reads, domain))
+    return _kernel("relation", relation, {}, found.parameters)
+
+
+def irreversible_kernel(interface: Interface, reads: tuple[Path, ...], formula: Formula, domain: Domain = ()) -> Kernel:
+    """Record f = M(x, eᴱ) e / θ₀.
+
+    Raises
+    ------
+    Untraceable
+        As `storage_form`.
+    """
+    bundle = Bundle.of(interface)
+    n = bundle.size
+    spans = {str(port): where for port, where, _ in bundle.items()}
+    efforts = {port: 0 if where.stop - where.start == 1 else where.stop - where.start for port, where in spans.items()}
+    states = _arguments(interface, reads)
+    found = record(formula.function, {**efforts, **states})
+    if found.tape.shape != (n, n):
+        raise Untraceable(f"the matrix is {found.tape.shape}, expected {(n, n)}")
+    _limited(found.tape.inputs)
+    takes = [(True, i) for where in spans.values() for i in range(where.start, where.stop)]
+    takes += [(False, i) for i in range(sum(max(size, 1) for size in states.values()))]
+    hot = tuple(where.start for _, where, quantity in bundle.items() if quantity.kind == "entropy")
+    carried = _carried(bundle)
+    mine = [bound for bound in domain if bound[0] not in reads]
+    bounds = tuple(
+        (i, low, high) for port, low, high in mine for i in range(spans[str(port)].start, spans[str(port)].stop)
+    )
+    relation = relations.Irreversible(
+        found.tape, tuple(takes), _ports(interface, reads), _reference(bundle), hot, tuple(carried),
+        _numbers(interface, reads, domain), bounds,
+    )  # fmt: skip
+    return _kernel("relation", relation, carried, found.parameters)
+
+
+def stacked(formula: Formula, n: int, multipliers: int) -> Callable[..., Any]:
+    """The two matrices of a reversible structure as one: L (n, n) above C (k, n)."""
+    function, k = formula.function, multipliers
+
+    def both(**x: Any) -> Any:
+        skew, constraint = function(**x)
+        upper = np.zeros((n, n)) if skew is None else np.asarray(skew, dtype=object)
+        lower = np.zeros((k, n)) if constraint is None else np.asarray(constraint, dtype=object)
+        return np.vstack([upper.reshape(n, n), lower.reshape(k, n)]).astype(object)
+
+    return both
+
+
+def _limited(numbers: int) -> None:
+    if numbers > LARGEST:
+        raise Untraceable(f"states and efforts have {numbers} numbers, expected at most {LARGEST}")
+
+
+def _kernel(name: str, relation: relations.Relation, carried: Carried, parameters: Sequence[float]) -> Kernel:
+    """The relation with its numbers: reference potentials first, known when the environment is."""
+    numbers = (*[0.0] * len(carried), *parameters)
+    return Kernel("", name, numbers, relation, potentials=tuple(enumerate(carried.values())))
+
+
+def _arguments(interface: Interface, ports: Sequence[Path]) -> dict[str, int]:
+    sizes = {str(port): manifold(interface[port].quantity.space).size for port in ports}
+    return {port: 0 if size == 1 else size for port, size in sizes.items()}
+
+
+def _ports(interface: Interface, ports: Sequence[Path]) -> tuple[Port, ...]:
+    out: list[Port] = []
+    for port in ports:
+        space = manifold(interface[port].quantity.space)
+        out.append(Port(space.code, space.size, space.dim, bool(interface[port].quantity.positive)))
+    return tuple(out)
+
+
+def _numbers(interface: Interface, ports: Sequence[Path], domain: Domain) -> tuple[tuple[int, float, float], ...]:
+    """The bounds of each number of the states."""
+    at, first = 0, dict[Path, range]()
+    for port in ports:
+        size = manifold(interface[port].quantity.space).size
+        first[port] = range(at, at + size)
+        at += size
+    return tuple((i, low, high) for port, low, high in domain if port in first for i in first[port])
+
+
+def _reference(bundle: Bundle) -> tuple[tuple[float, float], ...]:
+    """How much θ₀, and how much π₀, there is in each effort of the environment."""
+    hot, wide = bundle.indicator(ENTROPY), bundle.indicator(VOLUME)
+    return tuple((float(a), 0.0 - float(b)) for a, b in zip(hot, wide, strict=True))
+
+
+def _carried(bundle: Bundle) -> Carried:
+    """Effort -> how much a unit there carries of the charges that have a potential."""
+    rows = {charge: bundle.indicator(charge) for charge in bundle.charges if charge not in (ENTROPY, VOLUME)}
+    found = {i: tuple((charge, float(row[i])) for charge, row in rows.items() if row[i]) for i in range(bundle.size)}
+    return {i: carried for i, carried in found.items() if carried}

@@ -1,0 +1,223 @@
+"""Elementary functions beyond those of every evaluator, and the slope of each between two arguments.
+
+A rule gives f(x), and (f(b) − f(a))/(b − a), which is f'(a) where b = a, without a difference in which digits cancel:
+by addition theorems, and by series where quotients of small numbers would appear. Series end where the next term is
+below rounding. What has no rule of its own is composed of what has.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final, final
+
+from ephs.semantics.stage.evaluator import Evaluator
+from ephs.semantics.stage.numbers import Real
+
+__all__ = ["COMPOSED", "FUNCTIONS", "Rule", "angle_ratio", "polynomial", "root_cosine", "root_sine"]
+
+NEAR: Final = 0.5
+"""Up to this size of the argument series serve."""
+LARGE: Final = 709.0
+"""Beyond this the exponential overflows."""
+Value = Callable[[Evaluator, Real], Real]
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """A function of one number and its slope between two."""
+
+    value: Value
+    slope: Callable[[Evaluator, Real, Real], Real]
+
+
+def polynomial(coefficients: Sequence[float], x: Real) -> Real:
+    """Σ cₖ xᵏ, the constant first."""
+    total: Real = coefficients[-1]
+    for coefficient in reversed(coefficients[:-1]):
+        total = total * x + coefficient
+    return total
+
+
+def _even(terms: int, divisor: Callable[[int], float], sign: float) -> tuple[float, ...]:
+    return tuple(sign**k / divisor(k) for k in range(terms))
+
+
+_SINC = _even(9, lambda k: float(math.factorial(2 * k + 1)), -1.0)
+_SINHC = _even(9, lambda k: float(math.factorial(2 * k + 1)), 1.0)
+_COS = _even(9, lambda k: float(math.factorial(2 * k)), -1.0)
+_ATANC = _even(28, lambda k: 2.0 * k + 1.0, -1.0)
+_ATANHC = _even(28, lambda k: 2.0 * k + 1.0, 1.0)
+
+
+def _joined(on: Evaluator, x: Real, series: Value, closed: Value, other: float) -> Real:
+    """The series where |x| < 1/2, else the closed form; `other` keeps the closed form away from zero."""
+    near = on.absolute(x) < NEAR
+    return on.select(near, series(on, x), closed(on, on.select(near, other, x)))
+
+
+def sinc(on: Evaluator, x: Real) -> Real:
+    """sin(x)/x."""
+    return _joined(on, x, lambda _, x: polynomial(_SINC, x * x), lambda on, x: on.sin(x) / x, 1.0)
+
+
+def sinhc(on: Evaluator, x: Real) -> Real:
+    """sinh(x)/x."""
+
+    def closed(on: Evaluator, x: Real) -> Real:
+        large = on.exp(x)
+        return 0.5 * (large - 1.0 / large) / x
+
+    return _joined(on, x, lambda _, x: polynomial(_SINHC, x * x), closed, 1.0)
+
+
+def angle_ratio(on: Evaluator, x: Real) -> Real:
+    """atan(x)/x."""
+    return _joined(on, x, lambda _, x: polynomial(_ATANC, x * x), lambda on, x: on.atan2(x, 1.0) / x, 1.0)
+
+
+def root_sine(on: Evaluator, square: Real) -> Real:
+    """sin(√x)/√x of x ≥ 0, with derivatives at 0, too."""
+    near = square < NEAR
+    root = on.sqrt(on.select(near, 1.0, square))
+    return on.select(near, polynomial(_SINC, square), on.sin(root) / root)
+
+
+def root_cosine(on: Evaluator, square: Real) -> Real:
+    """cos(√x) of x ≥ 0, with derivatives at 0, too."""
+    near = square < NEAR
+    return on.select(near, polynomial(_COS, square), on.cos(on.sqrt(on.select(near, 1.0, square))))
+
+
+def sinh(on: Evaluator, x: Real) -> Real:
+    """Hyperbolic sine."""
+    return x * sinhc(on, x)
+
+
+def cosh(on: Evaluator, x: Real) -> Real:
+    """Hyperbolic cosine."""
+    large = on.exp(on.absolute(x))
+    return 0.5 * (large + 1.0 / large)
+
+
+def tanh(on: Evaluator, x: Real) -> Real:
+    """Hyperbolic tangent."""
+    fall = -expm1(on, -2.0 * on.absolute(x))
+    return on.select(x < 0.0, -1.0, 1.0) * fall / (2.0 - fall)
+
+
+def expm1(on: Evaluator, x: Real) -> Real:
+    """exp(x) − 1."""
+    near = on.absolute(x) < NEAR
+    half = 0.5 * on.select(near, x, 0.0)
+    return on.select(near, x * on.exp(half) * sinhc(on, half), on.exp(x) - 1.0)
+
+
+def log1p(on: Evaluator, x: Real) -> Real:
+    """ln(1 + x) = 2 artanh(x/(2 + x))."""
+    near = on.absolute(x) < NEAR
+    part = on.select(near, x, 0.0)
+    part = part / (2.0 + part)
+    return on.select(near, 2.0 * part * polynomial(_ATANHC, part * part), on.log(1.0 + x))
+
+
+def atan(on: Evaluator, x: Real) -> Real:
+    """Angle whose tangent is x."""
+    return on.atan2(x, 1.0)
+
+
+def asinh(on: Evaluator, x: Real) -> Real:
+    """Area whose hyperbolic sine is x."""
+    size = on.absolute(x)
+    square = size * size
+    return on.select(x < 0.0, -1.0, 1.0) * log1p(on, size + square / (1.0 + on.sqrt(1.0 + square)))
+
+
+def _of_logarithm(on: Evaluator, a: Real, b: Real) -> Real:
+    """(ln b − ln a)/(b − a) = artanh(z)/z · 2/(a + b) with z = (b − a)/(a + b), where that is small."""
+    whole = a + b
+    part = (b - a) / whole
+    near = on.absolute(part) < NEAR
+    far = (on.log(b) - on.log(a)) / on.select(near, 1.0, b - a)
+    return on.select(near, 2.0 * polynomial(_ATANHC, on.select(near, part * part, 0.0)) / whole, far)
+
+
+def _of_angle(on: Evaluator, a: Real, b: Real) -> Real:
+    """(atan b − atan a)/(b − a), by the tangent of the difference."""
+    below = 1.0 + a * b
+    wide = below <= 0.5 * on.absolute(b - a)
+    far = (on.atan2(b, 1.0) - on.atan2(a, 1.0)) / on.select(wide, b - a, 1.0)
+    below = on.select(wide, 1.0, below)
+    return on.select(wide, far, angle_ratio(on, on.select(wide, 0.0, (b - a) / below)) / below)
+
+
+def _of_tanh(on: Evaluator, a: Real, b: Real) -> Real:
+    """sinh(b − a)/((b − a) cosh a cosh b)."""
+    return sinhc(on, b - a) / (cosh(on, a) * cosh(on, b))
+
+
+def _of_asinh(on: Evaluator, a: Real, b: Real) -> Real:
+    """By the logarithm of x + √(1 + x²), of −a and −b where they are negative on the whole."""
+    sign = on.select(a + b < 0.0, -1.0, 1.0)
+    a, b = sign * a, sign * b
+    one, other = on.sqrt(1.0 + a * a), on.sqrt(1.0 + b * b)
+    return _of_logarithm(on, a + one, b + other) * (1.0 + (a + b) / (one + other))
+
+
+def _of_absolute(on: Evaluator, a: Real, b: Real) -> Real:
+    """(a + b)/(|a| + |b|); 0 at the kink."""
+    below = on.absolute(a) + on.absolute(b)
+    kink = below <= 0.0
+    return on.select(kink, 0.0, (a + b) / on.select(kink, 1.0, below))
+
+
+FUNCTIONS: Final[Mapping[str, Rule]] = MappingProxyType(
+    {
+        "sqrt": Rule(lambda on, x: on.sqrt(x), lambda on, a, b: 1.0 / (on.sqrt(a) + on.sqrt(b))),
+        "absolute": Rule(lambda on, x: on.absolute(x), _of_absolute),
+        "sin": Rule(lambda on, x: on.sin(x), lambda on, a, b: on.cos(0.5 * (a + b)) * sinc(on, 0.5 * (b - a))),
+        "cos": Rule(lambda on, x: on.cos(x), lambda on, a, b: -(on.sin(0.5 * (a + b)) * sinc(on, 0.5 * (b - a)))),
+        "exp": Rule(lambda on, x: on.exp(x), lambda on, a, b: on.exp(0.5 * (a + b)) * sinhc(on, 0.5 * (b - a))),
+        "log": Rule(lambda on, x: on.log(x), _of_logarithm),
+        "sinh": Rule(sinh, lambda on, a, b: cosh(on, 0.5 * (a + b)) * sinhc(on, 0.5 * (b - a))),
+        "cosh": Rule(cosh, lambda on, a, b: sinh(on, 0.5 * (a + b)) * sinhc(on, 0.5 * (b - a))),
+        "tanh": Rule(tanh, _of_tanh),
+        "expm1": Rule(expm1, lambda on, a, b: on.exp(0.5 * (a + b)) * sinhc(on, 0.5 * (b - a))),
+        "log1p": Rule(log1p, lambda on, a, b: _of_logarithm(on, 1.0 + a, 1.0 + b)),
+        "atan": Rule(atan, _of_angle),
+        "asinh": Rule(asinh, _of_asinh),
+    }
+)
+"""Functions with a rule."""
+
+
+def tan(on: Evaluator, x: Real) -> Real:
+    """Tangent."""
+    return on.sin(x) / on.cos(x)
+
+
+def asin(on: Evaluator, x: Real) -> Real:
+    """Angle whose sine is x."""
+    return on.atan2(x, on.sqrt((1.0 - x) * (1.0 + x)))
+
+
+def acos(on: Evaluator, x: Real) -> Real:
+    """Angle whose cosine is x."""
+    return on.atan2(on.sqrt((1.0 - x) * (1.0 + x)), x)
+
+
+def acosh(on: Evaluator, x: Real) -> Real:
+    """Area whose hyperbolic cosine is x."""
+    return on.log(x + on.sqrt((x - 1.0) * (x + 1.0)))
+
+
+def atanh(on: Evaluator, x: Real) -> Real:
+    """Area whose hyperbolic tangent is x."""
+    return 0.5 * on.log((1.0 + x) / (1.0 - x))
+
+
+COMPOSED: Final[Mapping[str, Value]] = MappingProxyType(
+    {"tan": tan, "asin": asin, "acos": acos, "acosh": acosh, "atanh": atanh, "sinhc": sinhc}
+)
+"""Functions without one."""

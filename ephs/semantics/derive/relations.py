@@ -1,0 +1,352 @@
+"""The discrete relation of an element from its tape: efforts of a storage over a step, flows and conditions of others.
+
+They have the arguments of `ephs.semantics.kernel_table`. The Jacobian comes from the same function, run with numbers
+that know their partial derivatives.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, Final, TypeAlias, final
+
+from ephs.semantics.derive.charts import moved, over
+from ephs.semantics.derive.partials import Partial, Partials, raised
+from ephs.semantics.derive.slopes import Slopes, lifted
+from ephs.semantics.derive.tape import Tape, evaluate
+from ephs.semantics.stage.evaluator import Evaluator
+from ephs.semantics.stage.kinds import Atom, Kind
+from ephs.semantics.stage.memory import Integers, Vector
+from ephs.semantics.stage.numbers import Integer, Real, Truth
+from ephs.semantics.stage.programs import Call, Entry, Program
+
+__all__ = ["Irreversible", "Port", "Relation", "Reversible", "Storage", "compiled", "program", "sizes"]
+
+OK: Final = 0
+TEMPERATURE: Final = 2
+EXTENT: Final = 4
+DOMAIN: Final = 5
+HUGE: Final = 1.7976931348623157e308
+Numbers: TypeAlias = Sequence[Real]
+Bounds: TypeAlias = tuple[tuple[int, float, float], ...]
+"""Which number, its least and its greatest value."""
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Port:
+    """A port whose state is read.
+
+    Parameters
+    ----------
+    code, size, dim
+        Of its group: how many numbers a point and an increment have.
+    positive
+        Whether its state is a positive number, such as a volume.
+    """
+
+    code: int
+    size: int
+    dim: int
+    positive: bool = False
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Storage:
+    """The effort of a storage over a step: the slope of its energy, less the effort of the environment.
+
+    Parameters
+    ----------
+    energy
+        Tape of E, of the numbers of all states.
+    reference
+        (n,) how much θ₀, and how much π₀, there is in each effort of the environment.
+    hot
+        Efforts that are temperatures, which are to be positive.
+    potentials
+        Efforts that have a reference potential besides; these are the first numbers among the parameters.
+    domain
+        (number of the states, least, greatest) between which both ends are to lie.
+    """
+
+    energy: Tape
+    ports: tuple[Port, ...]
+    reference: tuple[tuple[float, float], ...]
+    hot: tuple[int, ...] = ()
+    potentials: tuple[int, ...] = ()
+    domain: Bounds = ()
+
+    @property
+    def dimensions(self) -> tuple[int, int, int, int]:
+        """How many efforts, conditions, increments and numbers of states there are."""
+        n = sum(port.dim for port in self.ports)
+        return n, 0, n, sum(port.size for port in self.ports)
+
+    @property
+    def numbers(self) -> int:
+        """How many parameters there are."""
+        return len(self.potentials) + self.energy.parameters
+
+    def slopes(self, on: Evaluator, x: Numbers, v: Numbers, parameters: Numbers) -> tuple[list[Real], Real, list[Real]]:
+        """∇̄E (n,), the energy at the end, and the states there, from the parameters of the energy."""
+        states: list[Real] = []
+        at = first = 0
+        for port in self.ports:
+            states += over(on, port.code, x[at : at + port.size], v[first : first + port.dim], first)
+            at, first = at + port.size, first + port.dim
+        given = [lifted(each) for each in parameters]
+        found = lifted(evaluate(Slopes(on), self.energy, states, given)[0])
+        return [found.slopes.get(i, 0.0) for i in range(first)], found.end, [lifted(each).end for each in states]
+
+    def stage(self, on: Evaluator, a: "Arguments") -> Integer:
+        """Write efforts, their derivatives by the step, and the energy."""
+        n, _, _, size = self.dimensions
+        x, p = [a.x0[i] for i in range(size)], [a.p[i] for i in range(self.numbers)]
+        step = [Partial(a.v[i], {i: 1.0}) for i in range(n)]
+        start, numbers = [raised(each) for each in x], [raised(each) for each in p[len(self.potentials) :]]
+        efforts, energy, end = self.slopes(Partials(on), start, step, numbers)
+        good = _finite(on, [raised(energy).value])
+        good = on.both(good, _inside(on, self.domain, x))
+        good = on.both(good, _inside(on, self.domain, [raised(each).value for each in end]))
+        cold: Truth = False
+        for i, effort in enumerate(efforts):
+            value, slopes = raised(effort).value, raised(effort).slopes
+            for j in range(n):
+                a.f[i * n + j] = slopes.get(j, 0.0)
+            hot, wide = self.reference[i]
+            if i in self.hot:
+                cold = on.either(cold, value <= 0.0)
+            if i in self.potentials:
+                value = value - p[self.potentials.index(i)]
+            value = value - hot * a.scal[1] - wide * a.scal[2]
+            a.e[i] = value
+            good = on.both(good, _finite(on, [value]))
+        a.c[0] = raised(energy).value
+        empty: Truth = False
+        at = first = 0
+        for port in self.ports:
+            if port.positive:
+                for i in range(port.dim):
+                    ends = on.minimum(x[at + i], x[at + i] + a.v[first + i])
+                    empty = on.either(empty, ends <= 0.0)
+            at, first = at + port.size, first + port.dim
+        return on.select(empty, EXTENT, on.select(cold, TEMPERATURE, on.select(good, OK, DOMAIN)))
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Reversible:
+    """Flows f = L(x) e + C(x)ᵀ λ and conditions C(x) e at the middle of the step.
+
+    Parameters
+    ----------
+    structure
+        Tape of L (n, n) above C (k, n), of the numbers of the states that are read.
+    ports
+        Those that are read.
+    domain
+        As of a `Storage`, at the middle of the step.
+    """
+
+    structure: Tape
+    ports: tuple[Port, ...]
+    domain: Bounds = ()
+
+    @property
+    def dimensions(self) -> tuple[int, int, int, int]:
+        """How many efforts, conditions, increments and numbers of states there are."""
+        rows, n = self.structure.shape
+        return n, rows - n, sum(port.dim for port in self.ports), sum(port.size for port in self.ports)
+
+    @property
+    def numbers(self) -> int:
+        """How many parameters there are."""
+        return self.structure.parameters
+
+    def stage(self, on: Evaluator, a: "Arguments") -> Integer:
+        """Write flows, conditions and their derivatives by efforts, multipliers and increments."""
+        n, k, _, _ = self.dimensions
+        partials = Partials(on)
+        p, x, e, lam = _given(partials, self, a)
+        rows = evaluate(partials, self.structure, x, p)
+        values: list[Real] = []
+        for i in range(n):
+            flow = _dot(rows[i * n : i * n + n], e)
+            values.append(flow + _dot([rows[(n + j) * n + i] for j in range(k)], lam))
+        values += [_dot(rows[i * n : i * n + n], e) for i in range(n, n + k)]
+        good = on.both(_written(on, self, a, values), _inside(on, self.domain, [raised(each).value for each in x]))
+        return on.select(good, OK, DOMAIN)
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Irreversible:
+    """Flows f = M(x, eᴱ) e/θ₀ at the middle of the step.
+
+    Parameters
+    ----------
+    matrix
+        Tape of M (n, n), of the energy efforts and of the numbers of the states that are read, in the order of `takes`.
+    takes
+        Of the tape's inputs: (True, which effort) or (False, which number of the states).
+    ports
+        Those that are read.
+    reference, hot, potentials
+        As of a `Storage`.
+    domain, between
+        Bounds of the numbers of the states, and of the energy efforts, at the middle of the step.
+    """
+
+    matrix: Tape
+    takes: tuple[tuple[bool, int], ...]
+    ports: tuple[Port, ...]
+    reference: tuple[tuple[float, float], ...]
+    hot: tuple[int, ...] = ()
+    potentials: tuple[int, ...] = ()
+    domain: Bounds = ()
+    between: Bounds = ()
+
+    @property
+    def dimensions(self) -> tuple[int, int, int, int]:
+        """How many efforts, conditions, increments and numbers of states there are."""
+        n = len(self.reference)
+        return n, 0, sum(port.dim for port in self.ports), sum(port.size for port in self.ports)
+
+    @property
+    def numbers(self) -> int:
+        """How many parameters there are."""
+        return len(self.potentials) + self.matrix.parameters
+
+    def stage(self, on: Evaluator, a: "Arguments") -> Integer:
+        """Write flows and their derivatives by efforts and increments."""
+        n, _, _, _ = self.dimensions
+        partials = Partials(on)
+        p, x, e, _ = _given(partials, self, a)
+        energy: list[Real] = []
+        cold: Truth = False
+        for i, (hot, wide) in enumerate(self.reference):
+            shift: Real = raised(hot * a.scal[1] + wide * a.scal[2])
+            if i in self.potentials:
+                shift = shift + p[self.potentials.index(i)]
+            energy.append(e[i] + shift)
+            if i in self.hot:
+                cold = on.either(cold, raised(energy[i]).value <= 0.0)
+        inputs = [energy[i] if effort else x[i] for effort, i in self.takes]
+        rows = evaluate(partials, self.matrix, inputs, p[len(self.potentials) :])
+        theta = raised(a.scal[1])
+        values = [_dot(rows[i * n : i * n + n], e) / theta for i in range(n)]
+        good = on.both(_written(on, self, a, values), _inside(on, self.domain, [raised(each).value for each in x]))
+        good = on.both(good, _inside(on, self.between, [raised(each).value for each in energy]))
+        return on.select(cold, TEMPERATURE, on.select(good, OK, DOMAIN))
+
+
+Relation: TypeAlias = Storage | Reversible | Irreversible
+
+
+def _given(
+    on: Partials, relation: Reversible | Irreversible, a: "Arguments"
+) -> tuple[list[Real], list[Real], list[Real], list[Real]]:
+    """Parameters, states at the middle, efforts and multipliers, with directions (e, λ, v)."""
+    n, k, m, size = relation.dimensions
+    e: list[Real] = [Partial(a.e[i], {i: 1.0}) for i in range(n)]
+    lam: list[Real] = [Partial(a.lam[i], {n + i: 1.0}) for i in range(k)]
+    half: list[Real] = [Partial(0.5 * a.v[i], {n + k + i: 0.5}) for i in range(m)]
+    start: list[Real] = [raised(a.x0[i]) for i in range(size)]
+    x: list[Real] = []
+    at = first = 0
+    for port in relation.ports:
+        x += moved(on, port.code, start[at : at + port.size], half[first : first + port.dim])
+        at, first = at + port.size, first + port.dim
+    return [raised(a.p[i]) for i in range(relation.numbers)], x, e, lam
+
+
+def _written(on: Evaluator, relation: Relation, a: "Arguments", values: Numbers) -> Truth:
+    """Store flows, conditions and their derivatives; whether all values are finite."""
+    n, k, m, _ = relation.dimensions
+    width = n + k + m
+    for i, entry in enumerate(values):
+        found = raised(entry)
+        if i < n:
+            a.f[i] = found.value
+        else:
+            a.c[i - n] = found.value
+        for j in range(width):
+            a.jac[i * width + j] = found.slopes.get(j, 0.0)
+    return _finite(on, [raised(entry).value for entry in values])
+
+
+def _finite(on: Evaluator, values: Numbers) -> Truth:
+    good: Truth = True
+    for value in values:
+        good = on.both(good, on.absolute(value) <= HUGE)
+    return good
+
+
+def _inside(on: Evaluator, bounds: Bounds, values: Numbers) -> Truth:
+    good: Truth = True
+    for i, low, high in bounds:
+        good = on.both(good, on.both(values[i] > low, values[i] < high))
+    return good
+
+
+def _dot(a: Numbers, b: Numbers) -> Real:
+    total: Real = 0.0
+    for x, y in zip(a, b, strict=True):
+        total = total + x * y
+    return total
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Arguments:
+    """The arguments of a relation after the first, which are dimensions that it knows."""
+
+    scal: Vector
+    p: Vector
+    x0: Vector
+    v: Vector
+    e: Vector
+    lam: Vector
+    f: Vector
+    c: Vector
+    jac: Vector
+    work: Vector
+
+
+def _pointer(atom: Atom, size: int) -> Kind:
+    """An argument that is the address of so many numbers."""
+
+    def join(parts: list[Any]) -> Vector | Integers:
+        return Vector(parts[0], 0, size) if atom == "reals" else Integers(parts[0], 0, size)
+
+    def split(value: Any) -> tuple[Any, ...] | None:
+        return (value,) if len(value) == size else None
+
+    return Kind(f"an array of {size} numbers", (atom,), split, join)
+
+
+def sizes(relation: Relation) -> dict[str, int]:
+    """How many numbers each argument after the first has."""
+    n, k, m, size = relation.dimensions
+    stores = isinstance(relation, Storage)
+    f, c, jac = (n * n, 1, 0) if stores else (n, k, (n + k) * (n + k + m))
+    p = relation.numbers
+    return {"scal": 3, "p": p, "x0": size, "v": m, "e": n, "lam": k, "f": f, "c": c, "jac": jac, "work": 0}
+
+
+@cache
+def program(relation: Relation) -> Program:
+    """The program of a relation; its entry `value` has the signature of `ephs.semantics.kernel_table`."""
+
+    def value(on: Evaluator, dims: Any, scal: Any, p: Any, x0: Any, v: Any, e: Any, lam: Any, f: Any, c: Any,
+              jac: Any, work: Any) -> Integer:  # fmt: skip
+        return relation.stage(on, Arguments(scal, p, x0, v, e, lam, f, c, jac, work))
+
+    kinds = {name: _pointer("reals", size) for name, size in sizes(relation).items()}
+    return Program("element", value=Entry(value, dims=_pointer("integers", 4), **kinds))
+
+
+@cache
+def compiled(relation: Relation) -> Call:
+    """The relation in machine code; its `address` is good as long as the result lives, which is kept here."""
+    return program(relation).compiled()["value"]

@@ -1,0 +1,179 @@
+"""Tapes: a plain Python function of numbers, recorded once, and run with any number in their place.
+
+A function that is called with recorded values in place of numbers leaves a list of operations. Numbers that meet a
+recorded value become parameters, but 0 and ±1, which shape formulas; so functions that differ in numbers only leave
+the same tape, and share what is made of it. What branches on its arguments, or turns them into floats, leaves none.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final, TypeVar, final
+
+import numpy as np
+
+from ephs.semantics.derive.functions import COMPOSED, FUNCTIONS
+from ephs.semantics.derive.slopes import Slope, Slopes
+from ephs.semantics.stage.evaluator import Evaluator
+from ephs.semantics.stage.numbers import Real
+
+__all__ = ["OPERATIONS", "Operation", "Tape", "evaluate"]
+
+T = TypeVar("T")
+Operation = tuple[str, tuple[int, ...], float]
+"""The name of an operation, the places of its arguments on the tape, a number: of ``"input"`` and ``"parameter"`` which
+one, of ``"constant"`` its value, of ``"power"`` the exponent, a multiple of 1/4."""
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Tape:
+    """What a function does.
+
+    Parameters
+    ----------
+    operations
+        Each refers to earlier ones.
+    outputs
+        Places of the results, with the shape of what the function returns.
+    inputs, parameters
+        How many numbers go in.
+    """
+
+    operations: tuple[Operation, ...]
+    outputs: tuple[int, ...]
+    shape: tuple[int, ...]
+    inputs: int
+    parameters: int
+
+    def run(
+        self,
+        table: Mapping[str, Callable[..., T]],
+        constant: Callable[[float], T],
+        inputs: Sequence[T],
+        parameters: Sequence[T],
+    ) -> list[T]:
+        """The results in terms of other numbers.
+
+        Parameters
+        ----------
+        table
+            Name of an operation -> function of its arguments; of ``"power"`` also of the exponent.
+        """
+        values: list[T] = []
+        for name, places, number in self.operations:
+            if name == "input":
+                values.append(inputs[int(number)])
+            elif name == "parameter":
+                values.append(parameters[int(number)])
+            elif name == "constant":
+                values.append(constant(number))
+            elif name == "power":
+                values.append(table[name](values[places[0]], number))
+            else:
+                values.append(table[name](*(values[i] for i in places)))
+        return [values[i] for i in self.outputs]
+
+
+def evaluate(on: Evaluator, tape: Tape, inputs: Sequence[Real], parameters: Sequence[Real]) -> list[Real]:
+    """Run a tape with the numbers of an evaluator."""
+
+    def bound(operation: Callable[..., Real]) -> Callable[..., Real]:
+        return lambda *arguments: operation(on, *arguments)
+
+    table = {name: bound(OPERATIONS[name]) for name in {each[0] for each in tape.operations} if name in OPERATIONS}
+    return tape.run(table, lambda number: number, inputs, parameters)
+
+
+def _function(name: str) -> Callable[[Evaluator, Real], Real]:
+    rule = FUNCTIONS[name]
+
+    def function(on: Evaluator, x: Real) -> Real:
+        return on.along(x, rule) if isinstance(on, Slopes) and isinstance(x, Slope) else rule.value(on, x)
+
+    return function
+
+
+def _whole(x: Real, n: int) -> Real:
+    """xⁿ by squaring, n ≥ 1."""
+    out: Real | None = None
+    while n:
+        if n & 1:
+            out = x if out is None else out * x
+        n >>= 1
+        x = x * x if n else x
+    return 1.0 if out is None else out
+
+
+def _power(on: Evaluator, x: Real, exponent: float) -> Real:
+    """Powers by quarters: products, quotients and roots."""
+    if exponent == 0.0:
+        return 1.0
+    quarters = round(4.0 * abs(exponent))
+    whole, rest = divmod(quarters, 4)
+    out: Real | None = _whole(x, whole) if whole else None
+    if rest:
+        root = on.sqrt(x)
+        part = {1: lambda: on.sqrt(root), 2: lambda: root, 3: lambda: root * on.sqrt(root)}[rest]()
+        out = part if out is None else out * part
+    assert out is not None
+    return out if exponent > 0.0 else 1.0 / out
+
+
+def _sign(on: Evaluator, x: Real) -> Real:
+    return on.select(x > 0.0, 1.0, on.select(x < 0.0, -1.0, x))
+
+
+def _operations() -> Mapping[str, Callable[..., Real]]:
+    one: dict[str, Callable[[Evaluator, Real], Real]] = {"negative": lambda _, a: -a, "sign": _sign}
+    one |= {name: _function(name) for name in FUNCTIONS}
+    two: dict[str, Callable[[Evaluator, Real, Real], Real]] = {
+        "+": lambda _, a, b: a + b,
+        "-": lambda _, a, b: a - b,
+        "*": lambda _, a, b: a * b,
+        "/": lambda _, a, b: a / b,
+        "exponential": lambda on, a, b: on.exp(b * on.log(a)),
+        "atan2": lambda on, a, b: on.atan2(a, b),
+    }
+    power: dict[str, Callable[[Evaluator, Real, float], Real]] = {"power": _power}
+    return MappingProxyType(one | dict(COMPOSED) | two | power)
+
+
+OPERATIONS: Final = _operations()
+"""What each operation is with the numbers of an evaluator."""
+
+
+def quarter(value: object) -> float | None:
+    """An exponent that shapes the formula: a whole number of quarters."""
+    if isinstance(value, int | float | np.integer):
+        number = float(value)  # pyright: ignore[reportUnknownArgumentType]
+        if math.isfinite(number) and (4.0 * number).is_integer() and abs(number) <= 64.0:
+            return number
+    return None
+
+
+@final
+class Recorder:
+    """Writes a tape; equal operations are written once."""
+
+    def __init__(self) -> None:
+        self.operations: list[Operation] = []
+        self.parameters: list[float] = []
+        self._places: dict[Operation, int] = {}
+
+    def place(self, name: str, arguments: tuple[int, ...] = (), number: float = 0.0) -> int:
+        """Where an operation is on the tape."""
+        operation = name, arguments, number
+        found = self._places.get(operation)
+        if found is None:
+            found = self._places[operation] = len(self.operations)
+            self.operations.append(operation)
+        return found
+
+    def number(self, value: float) -> int:
+        """A number that meets a recorded value."""
+        if value in (0.0, 1.0, -1.0):
+            return self.place("constant", (), value)
+        self.parameters.append(value)
+        return self.place("parameter", (), float(len(self.parameters) - 1))
