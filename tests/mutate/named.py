@@ -21,8 +21,8 @@ BREAKS = {
     "slope of a product": Break(
         "ephs/semantics/derive/slopes.py", "a.slopes, b.mean, b.slopes, a.mean", "a.slopes, b.start, b.slopes, a.end"
     ),
-    "derivative of a quotient": Break(
-        "ephs/semantics/derive/partials.py", "a.slopes, 1.0, b.slopes, -value", "a.slopes, 1.0, b.slopes, value"
+    "slope of a quotient": Break(
+        "ephs/semantics/derive/slopes.py", "a.slopes, 1.0, b.slopes, -mean", "a.slopes, 1.0, b.slopes, mean"
     ),
     "equations": Break(
         "ephs/semantics/symbols/writer.py",

@@ -104,7 +104,7 @@ def cosh(on: Evaluator, x: Real) -> Real:
 def tanh(on: Evaluator, x: Real) -> Real:
     """Hyperbolic tangent."""
     fall = -expm1(on, -2.0 * on.absolute(x))
-    return on.select(x < 0.0, -1.0, 1.0) * fall / (2.0 - fall)
+    return on.copysign(1.0, x) * fall / (2.0 - fall)
 
 
 def expm1(on: Evaluator, x: Real) -> Real:
@@ -131,7 +131,7 @@ def asinh(on: Evaluator, x: Real) -> Real:
     """Area whose hyperbolic sine is x."""
     size = on.absolute(x)
     square = size * size
-    return on.select(x < 0.0, -1.0, 1.0) * log1p(on, size + square / (1.0 + on.sqrt(1.0 + square)))
+    return on.copysign(1.0, x) * log1p(on, size + square / (1.0 + on.sqrt(1.0 + square)))
 
 
 def _of_logarithm(on: Evaluator, a: Real, b: Real) -> Real:
@@ -159,7 +159,7 @@ def _of_tanh(on: Evaluator, a: Real, b: Real) -> Real:
 
 def _of_asinh(on: Evaluator, a: Real, b: Real) -> Real:
     """By the logarithm of x + √(1 + x²), of −a and −b where they are negative on the whole."""
-    sign = on.select(a + b < 0.0, -1.0, 1.0)
+    sign = on.copysign(1.0, a + b)
     a, b = sign * a, sign * b
     one, other = on.sqrt(1.0 + a * a), on.sqrt(1.0 + b * b)
     return _of_logarithm(on, a + one, b + other) * (1.0 + (a + b) / (one + other))

@@ -10,9 +10,9 @@ from functools import cache
 from typing import Any, Final, TypeAlias, final
 
 from ephs.semantics.derive.charts import moved, over
-from ephs.semantics.derive.partials import Partial, Partials, raised
 from ephs.semantics.derive.slopes import Slopes, lifted
 from ephs.semantics.derive.tape import Tape, evaluate
+from ephs.semantics.stage.duals import Dual, Duals
 from ephs.semantics.stage.evaluator import Evaluator
 from ephs.semantics.stage.kinds import Atom, Kind
 from ephs.semantics.stage.memory import Integers, Vector
@@ -102,17 +102,19 @@ class Storage:
         """Write efforts, their derivatives by the step, and the energy."""
         n, _, _, size = self.dimensions
         x, p = [a.x0[i] for i in range(size)], [a.p[i] for i in range(self.numbers)]
-        step = [Partial(a.v[i], {i: 1.0}) for i in range(n)]
-        start, numbers = [raised(each) for each in x], [raised(each) for each in p[len(self.potentials) :]]
-        efforts, energy, end = self.slopes(Partials(on), start, step, numbers)
-        good = _finite(on, [raised(energy).value])
+        duals = Duals(on, n)
+        step = [_along(a.v[i], n, i) for i in range(n)]
+        start, numbers = [duals.dual(each) for each in x], [duals.dual(each) for each in p[len(self.potentials) :]]
+        efforts, energy, end = self.slopes(duals, start, step, numbers)
+        good = _finite(on, [duals.dual(energy).value])
         good = on.both(good, _inside(on, self.domain, x))
-        good = on.both(good, _inside(on, self.domain, [raised(each).value for each in end]))
+        good = on.both(good, _inside(on, self.domain, [duals.dual(each).value for each in end]))
         cold: Truth = False
         for i, effort in enumerate(efforts):
-            value, slopes = raised(effort).value, raised(effort).slopes
+            found = duals.dual(effort)
+            value = found.value
             for j in range(n):
-                a.f[i * n + j] = slopes.get(j, 0.0)
+                a.f[i * n + j] = found.slopes[j]
             hot, wide = self.reference[i]
             if i in self.hot:
                 cold = on.either(cold, value <= 0.0)
@@ -121,7 +123,7 @@ class Storage:
             value = value - hot * a.scal[1] - wide * a.scal[2]
             a.e[i] = value
             good = on.both(good, _finite(on, [value]))
-        a.c[0] = raised(energy).value
+        a.c[0] = duals.dual(energy).value
         empty: Truth = False
         at = first = 0
         for port in self.ports:
@@ -165,8 +167,8 @@ class Reversible:
 
     def stage(self, on: Evaluator, a: "Arguments") -> Integer:
         """Write flows, conditions and their derivatives by efforts, multipliers and increments."""
-        n, k, _, _ = self.dimensions
-        partials = Partials(on)
+        n, k, m, _ = self.dimensions
+        partials = Duals(on, n + k + m)
         p, x, e, lam = _given(partials, self, a)
         rows = evaluate(partials, self.structure, x, p)
         values: list[Real] = []
@@ -174,7 +176,9 @@ class Reversible:
             flow = _dot(rows[i * n : i * n + n], e)
             values.append(flow + _dot([rows[(n + j) * n + i] for j in range(k)], lam))
         values += [_dot(rows[i * n : i * n + n], e) for i in range(n, n + k)]
-        good = on.both(_written(on, self, a, values), _inside(on, self.domain, [raised(each).value for each in x]))
+        good = on.both(
+            _written(partials, self, a, values), _inside(on, self.domain, [partials.dual(each).value for each in x])
+        )
         return on.select(good, OK, DOMAIN)
 
 
@@ -219,60 +223,67 @@ class Irreversible:
 
     def stage(self, on: Evaluator, a: "Arguments") -> Integer:
         """Write flows and their derivatives by efforts and increments."""
-        n, _, _, _ = self.dimensions
-        partials = Partials(on)
+        n, _, m, _ = self.dimensions
+        partials = Duals(on, n + m)
         p, x, e, _ = _given(partials, self, a)
         energy: list[Real] = []
         cold: Truth = False
         for i, (hot, wide) in enumerate(self.reference):
-            shift: Real = raised(hot * a.scal[1] + wide * a.scal[2])
+            shift: Real = partials.dual(hot * a.scal[1] + wide * a.scal[2])
             if i in self.potentials:
                 shift = shift + p[self.potentials.index(i)]
             energy.append(e[i] + shift)
             if i in self.hot:
-                cold = on.either(cold, raised(energy[i]).value <= 0.0)
+                cold = on.either(cold, partials.dual(energy[i]).value <= 0.0)
         inputs = [energy[i] if effort else x[i] for effort, i in self.takes]
         rows = evaluate(partials, self.matrix, inputs, p[len(self.potentials) :])
-        theta = raised(a.scal[1])
+        theta = partials.dual(a.scal[1])
         values = [_dot(rows[i * n : i * n + n], e) / theta for i in range(n)]
-        good = on.both(_written(on, self, a, values), _inside(on, self.domain, [raised(each).value for each in x]))
-        good = on.both(good, _inside(on, self.between, [raised(each).value for each in energy]))
+        good = on.both(
+            _written(partials, self, a, values), _inside(on, self.domain, [partials.dual(each).value for each in x])
+        )
+        good = on.both(good, _inside(on, self.between, [partials.dual(each).value for each in energy]))
         return on.select(cold, TEMPERATURE, on.select(good, OK, DOMAIN))
 
 
 Relation: TypeAlias = Storage | Reversible | Irreversible
 
 
+def _along(value: Real, directions: int, direction: int, slope: float = 1.0) -> Dual:
+    """A number that changes with one direction."""
+    return Dual(value, tuple(slope if i == direction else 0.0 for i in range(directions)))
+
+
 def _given(
-    on: Partials, relation: Reversible | Irreversible, a: "Arguments"
+    on: Duals, relation: Reversible | Irreversible, a: "Arguments"
 ) -> tuple[list[Real], list[Real], list[Real], list[Real]]:
     """Parameters, states at the middle, efforts and multipliers, with directions (e, λ, v)."""
     n, k, m, size = relation.dimensions
-    e: list[Real] = [Partial(a.e[i], {i: 1.0}) for i in range(n)]
-    lam: list[Real] = [Partial(a.lam[i], {n + i: 1.0}) for i in range(k)]
-    half: list[Real] = [Partial(0.5 * a.v[i], {n + k + i: 0.5}) for i in range(m)]
-    start: list[Real] = [raised(a.x0[i]) for i in range(size)]
+    e: list[Real] = [_along(a.e[i], n + k + m, i) for i in range(n)]
+    lam: list[Real] = [_along(a.lam[i], n + k + m, n + i) for i in range(k)]
+    half: list[Real] = [_along(0.5 * a.v[i], n + k + m, n + k + i, 0.5) for i in range(m)]
+    start: list[Real] = [on.dual(a.x0[i]) for i in range(size)]
     x: list[Real] = []
     at = first = 0
     for port in relation.ports:
         x += moved(on, port.code, start[at : at + port.size], half[first : first + port.dim])
         at, first = at + port.size, first + port.dim
-    return [raised(a.p[i]) for i in range(relation.numbers)], x, e, lam
+    return [on.dual(a.p[i]) for i in range(relation.numbers)], x, e, lam
 
 
-def _written(on: Evaluator, relation: Relation, a: "Arguments", values: Numbers) -> Truth:
+def _written(on: Duals, relation: Relation, a: "Arguments", values: Numbers) -> Truth:
     """Store flows, conditions and their derivatives; whether all values are finite."""
     n, k, m, _ = relation.dimensions
     width = n + k + m
     for i, entry in enumerate(values):
-        found = raised(entry)
+        found = on.dual(entry)
         if i < n:
             a.f[i] = found.value
         else:
             a.c[i - n] = found.value
         for j in range(width):
-            a.jac[i * width + j] = found.slopes.get(j, 0.0)
-    return _finite(on, [raised(entry).value for entry in values])
+            a.jac[i * width + j] = found.slopes[j]
+    return _finite(on.base, [on.dual(entry).value for entry in values])
 
 
 def _finite(on: Evaluator, values: Numbers) -> Truth:

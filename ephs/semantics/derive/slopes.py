@@ -14,11 +14,13 @@ from typing import Any, Final, final
 
 from ephs.semantics.derive.errors import DeriveError
 from ephs.semantics.derive.functions import FUNCTIONS, Rule, angle_ratio
-from ephs.semantics.derive.partials import Entries, combined
 from ephs.semantics.stage.evaluator import Evaluator, Function, Interpreted
 from ephs.semantics.stage.numbers import Condition, Integer, Number, Operation, Order, Real, Truth
 
-__all__ = ["Slope", "Slopes"]
+__all__ = ["Slope", "Slopes", "lifted"]
+
+Entries = Mapping[int, Real]
+"""Place of an increment -> the slope along it; none where there is no dependence."""
 
 
 @final
@@ -76,6 +78,14 @@ def _quotient(a: Slope, b: Slope) -> Slope:
     slopes = combined(a.slopes, 1.0, b.slopes, -mean)
     below = b.mean
     return Slope(start, end, {i: s / below for i, s in slopes.items()})
+
+
+def combined(one: Entries, by: Real, other: Entries, too: Real) -> Entries:
+    """Entries of one times a number plus those of another times a number."""
+    out = {i: s * by for i, s in one.items()}
+    for i, s in other.items():
+        out[i] = out[i] + s * too if i in out else s * too
+    return out
 
 
 _OPERATIONS: Final[Mapping[Operation, Callable[[Slope, Slope], Slope]]] = {

@@ -1,0 +1,271 @@
+"""Laws of elements that are stated as one function: exact energies over steps, exact Jacobians, the same bits."""
+
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import ephs
+from ephs import quantity as Q
+from ephs.semantics.checks import random_efforts, random_point
+from ephs.semantics.derive.functions import COMPOSED, FUNCTIONS
+from ephs.semantics.derive.recording import Untraceable, record
+from ephs.semantics.derive.relations import compiled, program, sizes
+from ephs.semantics.derive.slopes import Slope, Slopes
+from ephs.semantics.derive.tape import OPERATIONS, evaluate
+from ephs.semantics.spaces import codes, manifold
+from ephs.semantics.stage import PLAIN
+
+EPS = np.finfo(float).eps
+seeds = st.integers(0, 2**20)
+
+ENERGIES = {
+    "number": ({"q": Q.displacement}, lambda q: 0.3 * q**4 + np.sin(q) + abs(q) ** 3),
+    "two": (
+        {"a": Q.displacement, "b": Q.charge},
+        lambda a, b: np.exp(a / 3) * (2 + np.cos(b)) ** 1.7 + np.log(4 + a * a),
+    ),
+    "gas": ({"s": Q.entropy, "v": Q.volume}, lambda s, v: 5.0 * np.exp(s / 3.0) * (2.0 / v) ** 0.7),
+    "vector": ({"p": Q.body_momentum}, lambda p: 0.5 * (p @ p) + p[0] ** 2 * p[5] ** 2 / (1 + p[1] ** 2)),
+    "planar": ({"q": Q.relative_pose("planar")}, lambda q: np.sin(q[0]) * q[1] - q[2] ** 3),
+    "rotation": ({"q": Q.relative_pose("spherical")}, lambda q: q[0] * q[1] + q[2] ** 2),
+    "pose": (
+        {"q": Q.pose},
+        lambda q: 0.5 * (np.sqrt(q[4] ** 2 + q[5] ** 2 + q[6] ** 2) - 0.7) ** 2 + q[5] * q[1] * q[0],
+    ),
+    "direct": ({"q": Q.direct_pose}, lambda q: q[4] ** 2 * q[0] ** 2 + np.arctan2(q[6], 9.0 + q[5])),
+}
+RELATIONS = {
+    "drag": ephs.irreversible(
+        {"p": Q.momentum, "s": Q.entropy}, lambda p, s: abs(p) * np.array([[s, -p], [-p, p * p / s]])
+    ),
+    "conduction": ephs.irreversible(
+        {"a": Q.entropy, "b": Q.entropy, "~q": Q.displacement},
+        lambda a, b, q: 2.0 * (1.0 + np.tanh(q) ** 2) * np.array([[b / a, -1.0], [-1.0, a / b]]),
+    ),
+    "turning": ephs.gyrator(
+        {"x": Q.displacement, "p": Q.momentum, "~q": Q.pose},
+        lambda q: (1.0 - 2.0 * (q[1] ** 2 + q[2] ** 2)) * np.array([[0.0, -1.0], [1.0, 0.0]]),
+    ),
+    "rod": ephs.constraint(
+        {"p1": Q.momentum, "p2": Q.momentum, "~x": Q.relative_pose("planar")},
+        lambda x: [[np.cos(x[0]), np.sin(x[0]) + x[1] * x[2]]],
+    ),
+}
+
+
+def arguments(relation, primitive, rng, length):
+    """Random arguments of a relation: a dict of arrays, in order."""
+    bundle = primitive.bundle
+    point = random_point(bundle, primitive.reads, rng)
+    a = {name: np.zeros(size) for name, size in sizes(relation).items()}
+    a["scal"][:] = 0.01, 300.0, 1e-3
+    a["p"][:] = primitive.kernel.parameters
+    a["x0"][:] = np.concatenate([point[port] for port in primitive.reads]) if primitive.reads else []
+    a["v"][:] = length * rng.standard_normal(a["v"].size)
+    if primitive.kind != "storage":
+        a["e"][:], a["lam"][:] = random_efforts(bundle, rng), rng.standard_normal(a["lam"].size)
+    return a, point
+
+
+def run(function, relation, a):
+    """The status, and the arguments as the function leaves them."""
+    out = {name: values.copy() for name, values in a.items()}
+    return function(np.array(relation.dimensions), *out.values()), out
+
+
+def made(name):
+    ports, energy = ENERGIES[name]
+    return ephs.storage(ports, energy), energy
+
+
+def moved(storage, point, v):
+    """x·exp(v) and the energy there, by the groups of `ephs.semantics.spaces`."""
+    there = storage.retract(point, v)
+    return there, float(storage.energy(there))
+
+
+@pytest.mark.parametrize("name", ENERGIES)
+@given(seed=seeds, length=st.sampled_from([1.0, 1e-3, 1e-7, 1e-12]))
+def test_the_effort_along_the_step_is_the_difference_of_energies(name, seed, length):
+    storage, _ = made(name)
+    a, point = arguments(storage.kernel.relation, storage, np.random.default_rng(seed), 0.3 * length)
+    status, out = run(compiled(storage.kernel.relation), storage.kernel.relation, a)
+    before, (_, after) = storage.energy(point), moved(storage, point, a["v"])
+    effort = out["e"] + storage.bundle.intensive(ephs.Reference(300.0, 1e-3))
+    scale = abs(before) + abs(after) + np.abs(effort) @ np.abs(a["v"]) + 1.0
+    assert status == 0
+    assert abs(effort @ a["v"] - (after - before)) <= 300 * EPS * scale
+    assert abs(out["c"][0] - after) <= 300 * EPS * scale
+
+
+def test_the_gradient_in_the_middle_misses_the_difference():
+    """The law above fails on what holds for quadratic energies only."""
+    storage, energy = made("number")
+    (port,) = storage.reads
+    x, v = 0.4, 0.9
+    middle = storage.energy_gradient({port: np.array([x + 0.5 * v])})[0]
+    assert abs(middle * v - (energy(x + v) - energy(x))) > 1e-3
+
+
+@pytest.mark.parametrize("name", ENERGIES)
+@given(seed=seeds)
+def test_the_ends_of_a_step_may_be_exchanged(name, seed):
+    storage, _ = made(name)
+    _, point = arguments(storage.kernel.relation, storage, rng := np.random.default_rng(seed), 0.0)
+    v = 0.3 * rng.standard_normal(storage.bundle.size)
+    there, _ = moved(storage, point, v)
+    one, two = storage.discrete_gradient(point, v), storage.discrete_gradient(there, -v)
+    assert np.abs(one - two).max() <= 1e4 * EPS * (1.0 + np.abs(one).max())
+
+
+SINGLE = [*FUNCTIONS, "tan", "asin", "acos", "atanh"]
+EXACT = {"absolute": abs, "asin": mpmath.asin, "acos": mpmath.acos, "atan": mpmath.atan}
+
+
+@pytest.mark.parametrize("name", SINGLE)
+@given(a=st.floats(0.05, 0.9), share=st.floats(1e-12, 0.05), sign=st.sampled_from([-1.0, 1.0]))
+def test_slopes_of_functions_are_difference_quotients_without_cancellation(name, a, share, sign):
+    """Against 60 digits: a difference quotient in floats would be off by ε/share."""
+    if name in ("sqrt", "log"):
+        sign = 1.0
+    start, end = np.float64(sign * a), np.float64(sign * (a + share))
+    with np.errstate(all="ignore"):
+        found = OPERATIONS[name](Slopes(PLAIN), Slope(start, end, {0: 1.0}))
+    with mpmath.workdps(60):
+        function = EXACT.get(name) or getattr(mpmath, name)
+        one, two = (function(mpmath.mpf(float(x))) for x in (start, end))
+        expected = float((two - one) / (mpmath.mpf(float(end)) - mpmath.mpf(float(start)))) if start != end else None
+    if expected is not None:
+        assert abs(found.slopes[0] - expected) <= 100 * EPS * max(1.0, abs(expected)) / (1.0 - a)
+    assert abs(found.start - float(one)) <= 20 * EPS * (1.0 + abs(float(one))) / (1.0 - a)
+
+
+def test_every_function_is_tried():
+    assert set(SINGLE) | {"acosh", "sinhc"} == set(FUNCTIONS) | set(COMPOSED)
+
+
+ALL = {name: made(name)[0] for name in ENERGIES} | RELATIONS
+
+
+@pytest.mark.parametrize("name", ALL)
+@given(seed=seeds)
+def test_floats_and_machine_code_give_the_same_bits(name, seed):
+    primitive = ALL[name]
+    relation = primitive.kernel.relation
+    a, _ = arguments(relation, primitive, np.random.default_rng(seed), 0.3)
+    one = run(compiled(relation), relation, a)
+    two = run(program(relation).plain()["value"], relation, a)
+    assert one[0] == two[0] == 0
+    for argument, values in one[1].items():
+        assert np.array_equal(values, two[1][argument]), argument
+
+
+@pytest.mark.parametrize("name", ALL)
+@given(seed=seeds)
+def test_jacobians_are_derivatives(name, seed):
+    primitive = ALL[name]
+    relation = primitive.kernel.relation
+    a, _ = arguments(relation, primitive, np.random.default_rng(seed), 0.1)
+    call = compiled(relation)
+    n, k, m, _ = relation.dimensions
+    stores = primitive.kind == "storage"
+    groups = (("v", n),) if stores else (("e", n), ("lam", k), ("v", m))
+    place = [(argument, i) for argument, size in groups for i in range(size)]
+    rows = ("e",) if stores else ("f", "c")
+    found = run(call, relation, a)[1]["f" if stores else "jac"].reshape(-1, len(place))
+    for j, (argument, i) in enumerate(place):
+        values = a[argument]
+        h = 1e-5 * max(1.0, abs(values[i]))
+        kept, ends = values[i], []
+        for sign in (1.0, -1.0):
+            values[i] = kept + sign * h
+            out = run(call, relation, a)[1]
+            ends.append(np.concatenate([out[row] for row in rows]))
+        values[i] = kept
+        slope = (ends[0] - ends[1]) / (2.0 * h)
+        # a difference carries ε/h of the values, and h² of third derivatives
+        assert np.abs(found[:, j] - slope).max() <= 1e-8 * (1.0 + np.abs(ends[0]).max() + np.abs(found).max())
+
+
+@pytest.mark.parametrize("name", ["drag", "conduction"])
+@given(seed=seeds)
+def test_processes_keep_energy_and_make_entropy(name, seed):
+    primitive = RELATIONS[name]
+    relation = primitive.kernel.relation
+    a, _ = arguments(relation, primitive, np.random.default_rng(seed), 0.3)
+    _, out = run(compiled(relation), relation, a)
+    energy = a["e"] + primitive.bundle.intensive(ephs.Reference(300.0, 1e-3))
+    terms = np.abs(energy) @ np.abs(out["f"])
+    assert abs(energy @ out["f"]) <= 16 * EPS * terms
+    assert a["e"] @ out["f"] >= -16 * EPS * terms
+
+
+@pytest.mark.parametrize("name", ["turning", "rod"])
+@given(seed=seeds)
+def test_reversible_relations_exchange_power_and_lose_none(name, seed):
+    primitive = RELATIONS[name]
+    relation = primitive.kernel.relation
+    a, _ = arguments(relation, primitive, np.random.default_rng(seed), 0.3)
+    _, out = run(compiled(relation), relation, a)
+    power, terms = a["e"] @ out["f"] - a["lam"] @ out["c"], np.abs(a["e"]) @ np.abs(out["f"])
+    assert abs(power) <= 16 * EPS * (terms + np.abs(a["lam"]) @ np.abs(out["c"]))
+
+
+@pytest.mark.parametrize("code", [codes.SO3, codes.SE3, codes.SE2, codes.SO3xR3])
+@given(seed=seeds, length=st.sampled_from([1e-9, 1e-4, 0.1, 1.0]))
+def test_points_over_a_step_are_those_of_the_groups(code, seed, length):
+    """The ends by other code; their difference by the slopes."""
+    from ephs.semantics.derive.charts import moved as retracted
+    from ephs.semantics.derive.charts import over
+
+    space = next(
+        manifold(q.space) for q in (Q.pose, Q.direct_pose, Q.relative_pose("planar"), Q.relative_pose("spherical"))
+        if manifold(q.space).code == code
+    )  # fmt: skip
+    rng = np.random.default_rng(seed)
+    x, v = space.random(rng), length * rng.standard_normal(space.dim)
+    numbers = over(PLAIN, code, list(x), list(v), 0)
+    size = 1.0 + np.abs(x).max()
+    there = space.retract(x, v)
+    if code != codes.SE2 and there[:4] @ [float(number.end) for number in numbers[:4]] < 0.0:
+        there[:4] *= -1.0  # the same rotation
+    for number, start, end, other in zip(numbers, x, there, retracted(PLAIN, code, list(x), list(v)), strict=True):
+        change = sum(slope * v[i] for i, slope in number.slopes.items())
+        assert number.start == start
+        assert abs(number.end - end) + abs(other - end) <= 60 * EPS * size
+        assert abs(change - (number.end - number.start)) <= 60 * EPS * size
+
+
+def test_a_domain_bounds_both_ends_of_a_step():
+    storage = ephs.storage({"q": Q.displacement}, lambda q: q * q, domain={"q": (-1.0, 1.0)})
+    relation = storage.kernel.relation
+    for x, v, status in ((0.5, 0.4, 0), (0.5, 0.6, 5), (1.5, -1.0, 5)):
+        a = {name: np.zeros(size) for name, size in sizes(relation).items()}
+        a["scal"][:], a["x0"][:], a["v"][:] = (0.01, 300.0, 0.0), x, v
+        assert run(compiled(relation), relation, a)[0] == status
+
+
+@pytest.mark.parametrize(
+    ("function", "why"),
+    [
+        (lambda q: q if q > 0.0 else -q, "needs the value of an argument"),
+        (lambda q: float(q), "needs the value of an argument"),
+        (lambda q: np.maximum(q, 0.0), "needs the value of an argument"),
+        (lambda q: 1j * q, "no real number"),
+    ],
+)
+def test_what_cannot_be_recorded_names_its_line(function, why):
+    with pytest.raises(Untraceable, match=why) as caught:
+        record(function, {"q": 0})
+    assert "test_relations.py:" in str(caught.value)
+
+
+def test_a_function_leaves_one_tape_whatever_its_numbers():
+    def tape(k):
+        return record(lambda q: k * abs(q) ** 3 + np.cos(k * q), {"q": 0})
+
+    assert tape(1.5).tape == tape(2.5).tape
+    assert tape(1.5).parameters == (1.5, 1.5)
+    assert evaluate(PLAIN, tape(2.0).tape, [0.5], [2.0, 3.0])[0] == 2.0 * 0.5**3 + np.cos(1.5)
