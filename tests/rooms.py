@@ -18,6 +18,7 @@ STOREYS: tuple[tuple[frozenset[str], ...], ...] = tuple(
         ([".operad.rewriting"],),
         ([".semantics.stage"],),
         ([".semantics.spaces"],),
+        ([".semantics.derive"],),
         ([".semantics", ".semantics.library", ".semantics.algebra", ".semantics.relations", ".semantics.symbols"],),
         ([".mechanics.solve"],),
         ([".mechanics.scene", ".mechanics.imports"],),

@@ -78,8 +78,8 @@ def storage(
         with np.errstate(all="ignore"):  # what is not a number is found by its value
             return _real(name, _called(name, "the energy", energy, x)) if inside(bounds, x) else math.nan
 
-    from ephs.semantics.derive.forms import storage_form
     from ephs.semantics.derive.recording import Untraceable
+    from ephs.semantics.forms import storage_form
 
     try:
         form = storage_form(interface, energy, bounds)
@@ -288,8 +288,8 @@ def _both(skew: Callable[..., Any] | None, constraint: Callable[..., Any] | None
 
 def _kernel(interface: Interface, formula: Formula, multipliers: int | None, bounds: Domain) -> Kernel | None:
     """The kernel of a reversible structure with so many multipliers, or of an irreversible one; None if untraced."""
-    from ephs.semantics.derive.forms import irreversible_kernel, reversible_kernel
     from ephs.semantics.derive.recording import Untraceable
+    from ephs.semantics.forms import irreversible_kernel, reversible_kernel
 
     reads = _reads(interface)
     try:

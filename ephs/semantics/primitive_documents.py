@@ -14,10 +14,10 @@ from ephs.semantics import constructors, structures
 from ephs.semantics.bundle import Array, Bundle, Reference
 from ephs.semantics.catalogue import find_part, part_of
 from ephs.semantics.checks import random_efforts, random_point
-from ephs.semantics.derive.forms import reversible_kernel, stacked
 from ephs.semantics.domains import Bounds, bounded, domain_of
 from ephs.semantics.errors import SemanticsError, StructureError
 from ephs.semantics.extents import between
+from ephs.semantics.forms import reversible_kernel, stacked
 from ephs.semantics.library.chemistry import Species
 from ephs.semantics.primitives import Formula, Irreversible, Point, Primitive, Reversible, Storage
 from ephs.semantics.symbols.algebra import sp

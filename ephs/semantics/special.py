@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from ephs.semantics.derive.recording import Recorded
+
 __all__ = ["SHORT", "log_mean", "sinhc"]
 
 SHORT = 1e-2
@@ -19,6 +21,11 @@ def sinhc(z: Any) -> Any:
     if abs(x) < SHORT:
         return 1.0 + x * x / 6.0 * (1.0 + x * x / 20.0 * (1.0 + x * x / 42.0))
     return math.sinh(x) / x if abs(x) < 709.0 else math.inf
+
+
+@sinhc.register
+def _(z: Recorded) -> Recorded:
+    return z.sinhc()
 
 
 def log_mean(log_a: Any, log_b: Any) -> Any:

@@ -13,7 +13,6 @@ from typing import Any, Final, final
 import numpy as np
 
 from ephs.semantics.derive.tape import Recorder, Tape, quarter
-from ephs.semantics.special import sinhc
 
 __all__ = ["Recorded", "Recording", "Untraceable", "record"]
 
@@ -210,11 +209,6 @@ class Recorded:
 
     def __repr__(self) -> str:
         return f"Recorded({self.place})"
-
-
-@sinhc.register
-def _(z: Recorded) -> Recorded:
-    return z.sinhc()
 
 
 def _mathematics() -> dict[str, Any]:

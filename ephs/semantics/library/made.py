@@ -39,7 +39,7 @@ def stored(
     name: str, interface: Interface, energy: Callable[..., Any], numbers: Mapping[str, float], **said: object
 ) -> Storage:
     """A storage of an energy of the ports' states and the numbers, by name; ``said`` are further parameters."""
-    from ephs.semantics.derive.forms import storage_form
+    from ephs.semantics.forms import storage_form
 
     def whole(**states: Any) -> Any:
         return energy(**states, **numbers)
@@ -65,7 +65,7 @@ def dissipated(
     name: str, interface: Interface, matrix: Callable[..., Any], numbers: Mapping[str, float], **said: object
 ) -> Irreversible:
     """A process of M, a function of energy efforts, states that are read, and the numbers, by name."""
-    from ephs.semantics.derive.forms import irreversible_kernel
+    from ephs.semantics.forms import irreversible_kernel
 
     bundle = Bundle.of(interface)
     reads = tuple(port for port, port_type in interface.items() if not port_type.power)

@@ -12,7 +12,7 @@ import numpy as np
 from ephs.operad import Interface, Path, Quantity
 from ephs.semantics.bundle import Bundle
 from ephs.semantics.checks import STATEMENTS
-from ephs.semantics.derive.forms import stacked
+from ephs.semantics.forms import stacked
 from ephs.semantics.primitives import Irreversible, Primitive, Reversible, Storage
 from ephs.semantics.spaces import manifold
 from ephs.semantics.symbols.algebra import Expr, sp

@@ -11,7 +11,7 @@ import numpy as np
 
 from ephs.operad import Path, Quantity
 from ephs.semantics.bundle import Array
-from ephs.semantics.derive.forms import stacked
+from ephs.semantics.forms import stacked
 from ephs.semantics.primitives import Irreversible, Primitive, Reversible, Storage
 from ephs.semantics.symbols.algebra import Expr, sp
 from ephs.semantics.symbols.calculus import TEMPERATURE, intensive

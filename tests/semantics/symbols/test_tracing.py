@@ -16,7 +16,7 @@ from ephs.mechanics import components
 from ephs.operad import Path
 from ephs.semantics import Reference
 from ephs.semantics.checks import random_point
-from ephs.semantics.derive.forms import storage_form
+from ephs.semantics.forms import storage_form
 from ephs.semantics.spaces import manifold
 from ephs.semantics.symbols.tracing import Untraceable, trace
 from ephs.semantics.symbols.voices import formula_text
