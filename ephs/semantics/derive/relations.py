@@ -330,7 +330,7 @@ def _pointer(atom: Atom, size: int) -> Kind:
     def join(parts: list[Any]) -> Vector | Integers:
         return Vector(parts[0], 0, size) if atom == "reals" else Integers(parts[0], 0, size)
 
-    def split(value: Any) -> tuple[Any, ...] | None:
+    def split(value: Any, _trail: object) -> tuple[Any, ...] | None:
         return (value,) if len(value) == size else None
 
     return Kind(f"an array of {size} numbers", (atom,), split, join)

@@ -138,8 +138,11 @@ class Slopes(Interpreted):
         # on the other side of the cut the angle is that of the turn, whole turns off
         return Slope(start, start + turned, entries)
 
-    def _known(self, truth: Condition) -> bool:
-        raise DeriveError("compared", order="a condition")
+    def _known(self, truth: Condition, what: str) -> bool:
+        raise DeriveError("compared", order=what)
+
+    def _same(self, one: Integer, other: Integer) -> Truth:
+        return self.base.same(one, other)
 
     def _choose(self, truth: Condition, one: Any, other: Any) -> Any:
         raise DeriveError("compared", order="a condition")
