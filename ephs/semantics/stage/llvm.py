@@ -6,7 +6,7 @@ from typing import Any, Final, final
 
 from ephs.semantics.stage.errors import StageError
 
-__all__ = ["Library", "Target", "compile_text", "host", "load"]
+__all__ = ["LEVEL", "Library", "Target", "compile_text", "host", "load", "version"]
 
 LEVEL: Final = 2
 
@@ -51,7 +51,25 @@ def host() -> Target:
     return Target(llvm.get_process_triple(), llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten())
 
 
+@cache
+def version() -> str:
+    """Return the versions of LLVM and of its binding."""
+    from llvmlite import __version__  # pyright: ignore[reportMissingTypeStubs]
+
+    return f"{'.'.join(map(str, _llvm().llvm_version_info))} {__version__}"
+
+
+@cache
+def _foreign() -> None:
+    """Load LLVM's code for machines other than this one."""
+    llvm = _llvm()
+    llvm.initialize_all_targets()
+    llvm.initialize_all_asmprinters()
+
+
 def _machine(target: Target) -> Any:
+    if target != host():
+        _foreign()
     made = _llvm().Target.from_triple(target.triple)
     return made.create_target_machine(
         cpu=target.processor, features=target.features, opt=LEVEL, reloc="pic", codemodel="default"

@@ -13,9 +13,9 @@ from ephs.semantics.stage.emission import IntegerPointer, RealPointer, Symbol, T
 from ephs.semantics.stage.entries import Entry
 from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.kinds import Atom
-from ephs.semantics.stage.llvm import compile_text, load
 from ephs.semantics.stage.machine import Machine
 from ephs.semantics.stage.memory import ArrayIntegers, ArrayReals
+from ephs.semantics.stage.objects import compiled
 from ephs.semantics.stage.plain import PLAIN
 
 __all__ = ["Program"]
@@ -42,6 +42,18 @@ class Program:
         """Return the program as assembly text of LLVM."""
         return _staged(self, members, shared)[0]
 
+    def header(self) -> str:
+        """Return declarations in C of the entry functions in object code.
+
+        Arrays are contiguous, row by row, of ``double`` and ``int64_t``, and must not overlap; their sizes follow them.
+        A table is an array of its integers, one of its numbers, and the count of its rows; `Record` lays out a row.
+        The object code calls no library and keeps no state: calls from several threads are independent.
+        """
+        _, results = _staged(self, 1, ())
+        lines = [f"{_C[results[name]]} {self.name}_{name}({_c(entry)});" for name, entry in self.entries.items()]
+        guard = f"{self.name.upper()}_H"
+        return "\n".join([f"#ifndef {guard}", f"#define {guard}", "#include <stdint.h>", *lines, "#endif", ""])
+
     def compiled(self, members: int = 1, shared: tuple[str, ...] = ()) -> Mapping[str, Call]:
         """Return the entry functions in machine code, by name.
 
@@ -66,6 +78,31 @@ class Program:
         number may be an array of one for each member.
         """
         return MappingProxyType({name: _interpreted(entry, True) for name, entry in self.entries.items()})
+
+
+_C = {"void": "void", "double": "double", "i64": "int64_t"}
+_C_ATOMS: dict[Atom, str] = {
+    "reals": "double *restrict ",
+    "integers": "int64_t *restrict ",
+    "real": "double ",
+    "integer": "int64_t ",
+}
+_SIZES = {
+    ("reals", "integer"): ("", "_size"),
+    ("integers", "integer"): ("", "_size"),
+    ("reals", "integer", "integer"): ("", "_rows", "_columns"),
+    ("integers", "reals", "integer"): ("_integers", "_reals", "_size"),
+}
+"""Endings of the names of an argument's parts, by its atoms."""
+
+
+def _c(entry: Entry) -> str:
+    """Return the parameters of an entry function in C."""
+    out: list[str] = []
+    for name, kind in entry.kinds.items():
+        endings = _SIZES.get(kind.atoms) or ("", *(f"_{k}" for k in range(1, len(kind.atoms))))
+        out += [f"{_C_ATOMS[atom]}{name}{ending}" for atom, ending in zip(kind.atoms, endings, strict=True)]
+    return ", ".join(out) or "void"
 
 
 def _interpreted(entry: Entry, members: bool) -> Callable[..., Any]:
@@ -123,7 +160,7 @@ def _staged(program: Program, members: int, shared: tuple[str, ...]) -> tuple[st
 @cache
 def _compiled(program: Program, members: int, shared: tuple[str, ...]) -> Mapping[str, Call]:
     text, results = _staged(program, members, shared)
-    library = load(compile_text(text))
+    library = compiled(text)
 
     def trail(name: str) -> tuple[int | None, ...]:
         return () if members == 1 or name in shared else (members,)

@@ -1,0 +1,221 @@
+"""Object code: kept whole or not at all, loaded by a second process, the same bits for each kind of processor."""
+
+import ctypes
+import errno
+import os
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from ephs.semantics.stage import Entry, Program, llvm, objects, store, vector
+from ephs.semantics.stage.objects import TARGETS, compiled, emitted
+from ephs.semantics.stage.store import STORE, ObjectCacheWarning
+from tests.semantics.stage.test_elementary import EDGES, PROGRAM, inputs, same
+
+SMALL = Program("small", total=Entry(lambda on, x: x[0] * on.exp(x[1]), x=vector(2)))
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A store of this test's own."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr(STORE, "usable", True)
+    store._prune.cache_clear()
+    return tmp_path / "ephs" / "objects"
+
+
+@pytest.fixture
+def compilations(monkeypatch):
+    """The modules that LLVM compiles."""
+    texts: list[str] = []
+
+    def counted(text, target=None):
+        texts.append(text)
+        return llvm.compile_text(text, target)
+
+    monkeypatch.setattr(objects, "compile_text", counted)
+    return texts
+
+
+def value(library: llvm.Library) -> float:
+    """The result of the small program, called as C calls it."""
+    x = np.array([2.0, 0.0])
+    call = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_void_p, ctypes.c_int64)(library.address("small_total"))
+    return call(x.ctypes.data, 2)
+
+
+def test_a_module_is_compiled_once(folder, compilations):
+    assert [value(compiled(SMALL.text())) for _ in range(3)] == [2.0] * 3
+    assert len(compilations) == 1 and len(list(folder.iterdir())) == 1
+
+
+def test_targets_and_texts_have_names_of_their_own():
+    texts = (SMALL.text(), PROGRAM.text())
+    names = {objects.name_of(text, target) for text in texts for target in (*TARGETS.values(), llvm.host())}
+    assert len(names) == len(texts) * (len(TARGETS) + 1)
+
+
+@given(data=st.data())
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_a_spoilt_file_is_compiled_anew(folder, compilations, data):
+    compiled(SMALL.text())
+    (file,) = folder.iterdir()
+    content = file.read_bytes()
+    spoilt = bytearray(content)
+    if data.draw(st.booleans()):
+        spoilt[data.draw(st.integers(0, len(content) - 1))] ^= data.draw(st.integers(1, 255))
+    else:
+        del spoilt[data.draw(st.integers(0, len(content) - 1)) :]
+    file.write_bytes(spoilt)
+    before = len(compilations)
+    assert value(compiled(SMALL.text())) == 2.0
+    assert len(compilations) == before + 1 and file.read_bytes() == content
+
+
+def full(path, content):
+    """A disk without room."""
+    with open(path, "wb") as file:
+        file.write(content[: len(content) // 2])
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+
+
+def refused(path, *_args, **_keywords):
+    """A folder of others."""
+    raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
+
+
+def sealed(path, *_args, **_keywords):
+    """A disk that can only be read."""
+    raise OSError(errno.EROFS, os.strerror(errno.EROFS), str(path))
+
+
+@pytest.mark.parametrize(
+    ("method", "fault"), [("write_bytes", full), ("write_bytes", refused), ("replace", refused), ("mkdir", sealed)]
+)
+def test_a_disk_that_fails_costs_one_warning(folder, monkeypatch, method, fault):
+    with monkeypatch.context() as broken:
+        broken.setattr(Path, method, fault)
+        with pytest.warns(ObjectCacheWarning, match="XDG_CACHE_HOME") as caught:
+            assert value(compiled(SMALL.text())) == value(compiled(SMALL.text())) == 2.0
+        assert len(caught) == 1
+    assert not folder.exists() or not list(folder.iterdir())
+
+
+def test_a_folder_that_can_only_be_read_serves(folder, compilations, monkeypatch):
+    compiled(SMALL.text())
+    for method in ("write_bytes", "mkdir", "replace"):
+        monkeypatch.setattr(Path, method, sealed)
+    monkeypatch.setattr(os, "utime", sealed)
+    assert value(compiled(SMALL.text())) == 2.0
+    assert len(compilations) == 1
+
+
+def test_without_a_home_nothing_is_kept(monkeypatch):
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    monkeypatch.setattr(Path, "home", lambda: (_ for _ in ()).throw(RuntimeError))
+    monkeypatch.setattr(STORE, "usable", True)
+    with pytest.warns(ObjectCacheWarning, match="no home"):
+        assert value(compiled(SMALL.text())) == 2.0
+
+
+def test_files_that_nobody_uses_are_removed(folder):
+    compiled(SMALL.text())
+    (used,) = folder.iterdir()
+    unused = used.with_name("unused.o")
+    unused.write_bytes(b"")
+    old = time.time() - 2.0 * store.UNUSED  # the age of files; nothing is timed
+    for file in (used, unused):
+        os.utime(file, (old, old))
+    store._prune.cache_clear()
+    compiled(SMALL.text())  # used again
+    compiled(PROGRAM.text())  # a new file is made
+    assert used.exists() and not unused.exists()
+
+
+def test_processes_at_once_leave_one_whole_file(folder):
+    code = (
+        "from tests.semantics.stage.test_objects import SMALL, compiled, value;"
+        "assert value(compiled(SMALL.text())) == 2.0"
+    )
+    environment = os.environ | {"XDG_CACHE_HOME": str(folder.parent.parent)}
+    running = [subprocess.Popen([sys.executable, "-c", code], env=environment) for _ in range(3)]
+    assert [process.wait(timeout=120.0) for process in running] == [0, 0, 0]
+    (file,) = folder.iterdir()
+    assert STORE.read(file.name) is not None
+
+
+def evaluated(library: llvm.Library) -> np.ndarray:
+    """All functions at all inputs, called as C calls them."""
+    x, y = inputs()
+    out = np.zeros(5 * x.size)
+    pair = (ctypes.c_void_p, ctypes.c_int64)
+    call = ctypes.CFUNCTYPE(None, *pair, *pair, *pair)(library.address("elementary_all_of"))
+    call(x.ctypes.data, x.size, y.ctypes.data, y.size, out.ctypes.data, out.size)
+    return out
+
+
+@pytest.mark.skipif(not llvm.host().triple.startswith("x86_64"), reason="object code of x86-64")
+def test_processors_of_two_generations_give_the_same_bits():
+    wide = "+avx2" in llvm.host().features.split(",")
+    names = ["linux-x86-64-v2", *(["linux-x86-64-v3"] if wide else [])]
+    here = evaluated(compiled(PROGRAM.text()))
+    for name in names:
+        assert same(evaluated(llvm.load(emitted(PROGRAM.text(), name))), here), name
+    assert len(EDGES) > 5
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_object_code_is_emitted_for_other_machines(target):
+    code = emitted(SMALL.text(), target)
+    starts = {"linux": b"\x7fELF", "macos": b"\xcf\xfa\xed\xfe", "windows": b"\x64\x86"}
+    assert code.startswith(starts[target.partition("-")[0]])
+    assert code == emitted(SMALL.text(), target)
+
+
+def test_the_header_declares_the_entry_functions():
+    assert "double small_total(double *restrict x, int64_t x_size);" in SMALL.header()
+    assert "void elementary_all_of(double *restrict x, int64_t x_size, " in PROGRAM.header()
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="a compiler of C")
+def test_c_calls_the_object_code(tmp_path):
+    (tmp_path / "small.h").write_text(SMALL.header())
+    (tmp_path / "small.o").write_bytes(llvm.compile_text(SMALL.text()))
+    (tmp_path / "main.c").write_text(
+        '#include "small.h"\nint main(void) { double x[2] = {2.0, 0.0}; return small_total(x, 2) == 2.0 ? 0 : 1; }\n'
+    )
+    subprocess.run(["cc", "-std=c99", "main.c", "small.o", "-o", "main"], cwd=tmp_path, check=True)
+    assert subprocess.run([tmp_path / "main"], check=False).returncode == 0
+
+
+ARM = ("aarch64-linux-gnu-gcc", "qemu-aarch64-static")
+
+
+@pytest.mark.skipif(any(shutil.which(name) is None for name in ARM), reason="a compiler and an emulator of arm64")
+def test_arm_gives_the_same_bits(tmp_path):
+    x, y = inputs()
+    np.concatenate([x, y]).tofile(tmp_path / "in")
+    (tmp_path / "elementary.h").write_text(PROGRAM.header())
+    (tmp_path / "elementary.o").write_bytes(emitted(PROGRAM.text(), "linux-arm64"))
+    n = x.size
+    (tmp_path / "main.c").write_text(f"""
+#include <stdio.h>
+#include "elementary.h"
+static double in[{2 * n}], out[{5 * n}];
+int main(void) {{
+    if (fread(in, 8, {2 * n}, stdin) != {2 * n}) return 1;
+    elementary_all_of(in, {n}, in + {n}, {n}, out, {5 * n});
+    return fwrite(out, 8, {5 * n}, stdout) != {5 * n};
+}}
+""")
+    subprocess.run([ARM[0], "-static", "main.c", "elementary.o", "-o", "main"], cwd=tmp_path, check=True)
+    with (tmp_path / "in").open("rb") as given:
+        found = subprocess.run([ARM[1], tmp_path / "main"], stdin=given, capture_output=True, check=True).stdout
+    assert same(np.frombuffer(found), evaluated(compiled(PROGRAM.text())))
