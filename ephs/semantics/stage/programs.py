@@ -87,7 +87,7 @@ _C_ATOMS: dict[Atom, str] = {
     "real": "double ",
     "integer": "int64_t ",
 }
-_SIZES = {
+_SIZES: dict[tuple[Atom, ...], tuple[str, ...]] = {
     ("reals", "integer"): ("", "_size"),
     ("integers", "integer"): ("", "_size"),
     ("reals", "integer", "integer"): ("", "_rows", "_columns"),
