@@ -17,7 +17,7 @@ STOREYS: tuple[tuple[frozenset[str], ...], ...] = tuple(
         ([".operad"],),
         ([".operad.rewriting"],),
         ([".semantics.stage"],),
-        ([".semantics.spaces"],),
+        ([".semantics.spaces", ".semantics.linear"],),
         ([".semantics.derive"],),
         ([".semantics", ".semantics.library", ".semantics.algebra", ".semantics.relations", ".semantics.symbols"],),
         ([".mechanics.solve"],),

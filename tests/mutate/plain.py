@@ -39,6 +39,15 @@ class Addresses:
         function = self.functions.get(int(address)) or PROTOTYPE(int(address))
         return int(function(*pointers))
 
+    def call_staged(self, address: Any, arguments: tuple[Any, ...]) -> int:
+        """In place of `ephs.semantics.calling.call_staged`: arrays by their place and shape."""
+        parts = [
+            part
+            for value in arguments
+            for part in ([value.ctypes.data, *value.shape] if hasattr(value, "ctypes") else [int(value)])
+        ]
+        return int(ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_int64] * len(parts))(int(address))(*parts))
+
 
 def install() -> None:
     """Make all kernels callable that are loaded from now on. Their arithmetic is IEEE's, without warnings."""
@@ -50,4 +59,5 @@ def install() -> None:
     jit.cfunc_kernel = addresses.cfunc_kernel
     calling: Any = import_module("ephs.semantics.calling")
     calling.call_kernel = addresses.call_kernel
+    calling.call_staged = addresses.call_staged
     np.seterr(all="ignore")

@@ -11,11 +11,11 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.solve.errors import SolveError
-from ephs.mechanics.solve.lu_kernels import factorise
 from ephs.mechanics.solve.model import Model, evaluate_at
 from ephs.mechanics.solve.natural_kernels import STORING, Order
-from ephs.mechanics.solve.sparse import Index, order
+from ephs.mechanics.solve.sparse import Index, lu_addresses, order
 from ephs.semantics.bundle import Array
+from ephs.semantics.linear.sparse import sparse_lu
 from ephs.semantics.spaces.rank import FOLLOWED, IMPLICIT, REGULAR, rank_of
 
 __all__ = ["Analysis", "analyse"]
@@ -89,9 +89,11 @@ def analyse(model: Model, x: Array, z: Array, h: float, before: Index | None = N
         dropped=dropped,
         floor=np.zeros(size),
         tolerance=np.array([DEFECT]),
+        lu=lu_addresses(),
     )
     c, ratio = compiled, np.zeros(size)
     factors, scratch = np.zeros(elimination.fill), np.zeros(size)
+    factorise = sparse_lu().compiled()["factorise"]
     if not factorise(c.place, c.start, c.entry, c.diagonal, data, factors, scratch, c.floor, ratio):
         raise SolveError.undetermined(model, _null_unknown(model, chosen, data))
     compiled = compiled._replace(floor=SHRUNK * ratio)

@@ -268,9 +268,9 @@ def gauss_newton(t, g, p, o, where, x, z, scal, still, unit, inputs, m, s):
                 if t.column[source] < n_rate:
                     entry += h * p.a[i, j] * s.slope[i, source]
                 s.matrix[k] = entry
-            if not factorise(o.place, o.start, o.entry, o.diagonal, s.matrix, s.factors, s.dense, o.floor, s.pivot):
+            if not factorise(o, s.matrix, s.factors, s.dense, s.pivot):
                 return 2, 0, iteration
-        solve(o.rows, o.columns, o.start, o.entry, o.diagonal, s.factors, right, change, s.dense)
+        solve(o, s.factors, right, change, s.dense)
         for i in range(stages):
             for j in range(n):
                 z[i, j] -= change[i * n + j]

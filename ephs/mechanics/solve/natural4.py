@@ -13,13 +13,13 @@ from ephs.mechanics.solve.blame import Blame
 from ephs.mechanics.solve.collocation import moments, values
 from ephs.mechanics.solve.errors import Outcome, SolveError
 from ephs.mechanics.solve.gauss_kernels import Groups, Scheme, Stages, gauss_advance, linearise
-from ephs.mechanics.solve.lu_kernels import factorise
 from ephs.mechanics.solve.model import Model, evaluate_at
 from ephs.mechanics.solve.natural import Chunk, Decided, NaturalState, guessed_efforts, of_status, stored_energies
 from ephs.mechanics.solve.natural_kernels import COMPONENT, DIVERGED, DONE, INCONSISTENT, Memory, Order
 from ephs.mechanics.solve.snapshot import Snapshot, parts
-from ephs.mechanics.solve.sparse import Index, order
+from ephs.mechanics.solve.sparse import Index, lu_addresses, order
 from ephs.semantics.bundle import Array
+from ephs.semantics.linear.sparse import sparse_lu
 from ephs.semantics.primitives import Kernel
 from ephs.semantics.pullback import pulled_ports
 from ephs.semantics.spaces.codes import SE3
@@ -213,11 +213,12 @@ class Natural4:
         place[chosen] = found.place
         made = Order(
             found.rows, found.columns, found.start, found.column, found.diagonal, place, np.tile(dropped, _STAGES),
-            np.zeros(_STAGES * n), np.array([DEFECT]),
+            np.zeros(_STAGES * n), np.array([DEFECT]), lu_addresses(),
         )  # fmt: skip
         self._scratch = s._replace(factors=np.zeros(found.fill))
         ratio = np.zeros(_STAGES * n)
         matrix = np.where(active, data, 0.0)
+        factorise = sparse_lu().compiled()["factorise"]
         if not factorise(
             place, made.start, made.entry, made.diagonal, matrix, self._scratch.factors, s.dense, made.floor, ratio
         ):

@@ -69,6 +69,7 @@ class Order(NamedTuple):
     dropped: Index  # (rows,) 1 where the equation is replaced by "this multiplier is zero"
     floor: Array  # (rows,): the least |pivot|/|largest of its row| that this order accepts
     tolerance: Array  # [0]: the relative residual that dropped equations may keep
+    lu: Index  # addresses of factorise and solve, as `ephs.mechanics.solve.sparse.lu_addresses` gives them
 
 
 class Memory(NamedTuple):
@@ -311,9 +312,9 @@ def newton(t, o, x, z, scal, inputs, m):
         for i in range(o.dropped.shape[0]):
             if o.dropped[i] == 1:
                 m.data[m.data.shape[0] - o.dropped.shape[0] + i] = 1.0
-        if not factorise(o.place, o.start, o.entry, o.diagonal, m.data, m.factors, m.dense, o.floor, m.pivot):
+        if not factorise(o, m.data, m.factors, m.dense, m.pivot):
             return 2, 0, iteration
-        solve(o.rows, o.columns, o.start, o.entry, o.diagonal, m.factors, m.residual, m.step, m.dense)
+        solve(o, m.factors, m.residual, m.step, m.dense)
         for i in range(z.shape[0]):
             z[i] -= m.step[i]
     return 1, 0, 40

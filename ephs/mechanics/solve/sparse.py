@@ -5,13 +5,14 @@ is then known, and each later factorisation only computes numbers in fixed place
 """
 
 from dataclasses import dataclass
+from functools import cache
 from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ephs.mechanics.solve.lu_kernels import fill
 from ephs.semantics.bundle import Array
+from ephs.semantics.linear.sparse import sparse_lu
 
 Index = NDArray[np.int64]
 
@@ -42,6 +43,13 @@ class Elimination:
     def fill(self) -> int:
         """Number of entries of both factors."""
         return int(self.column.size)
+
+
+@cache
+def lu_addresses() -> Index:
+    """Return the addresses of factorise and solve in machine code."""
+    calls = sparse_lu().compiled()
+    return np.array([calls["factorise"].address, calls["solve"].address])
 
 
 def order(n: int, row: Index, column: Index, value: Array) -> Elimination:
@@ -115,9 +123,9 @@ class _Plan:
         """The elimination, None where its factors do not fit into so many entries."""
         n = self.rows.size
         first = np.searchsorted(self.places, np.arange(n + 1) * n).astype(np.int64)
-        start, link, mark = (np.zeros(n + 1, dtype=np.int64) for _ in range(3))
+        start, link, mark = (np.zeros(size, dtype=np.int64) for size in (n + 1, n + 1, n))
         out = np.empty(room, dtype=np.int64)
-        count = fill(first, self.places % n, start, out, link, mark)
+        count = sparse_lu().compiled()["fill"](first, self.places % n, start, out, link, mark)
         if count < 0:
             return None
         flat = out[:count].copy()

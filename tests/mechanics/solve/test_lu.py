@@ -2,11 +2,14 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from ephs.mechanics.solve.lu_kernels import factorise, solve
 from ephs.mechanics.solve.sparse import order
+from ephs.semantics.linear.sparse import sparse_lu
+
+RUNS = {"compiled": sparse_lu().compiled(), "plain": sparse_lu().plain()}
+factorise, solve = RUNS["compiled"]["factorise"], RUNS["compiled"]["solve"]
 
 
 @st.composite
@@ -50,6 +53,43 @@ def test_the_order_serves_other_numbers_in_the_same_places(dense, factor):
     solve(plan.rows, plan.columns, plan.start, plan.column, plan.diagonal, value, right, x, np.zeros(n))
     if good and np.linalg.cond(changed) < 1e6:
         assert np.abs(changed @ x - right).max() <= 1e-7 * (np.abs(changed) @ np.abs(x)).max()
+
+
+@given(matrices(), st.integers(0, 2**32 - 1))
+@settings(max_examples=25)
+def test_floats_and_machine_code_give_the_same_bits(dense, seed):
+    n = dense.shape[0]
+    row, column = np.nonzero(dense)
+    plan = order(n, row, column, dense[row, column])
+    floor = np.random.default_rng(seed).random(n) * 0.3  # some pivots are refused
+    found = []
+    for run in RUNS.values():
+        value, scratch, ratio, x = np.zeros(plan.fill), np.zeros(n), np.zeros(n), np.zeros(n)
+        arrays = (plan.start, plan.column, plan.diagonal)
+        good = run["factorise"](plan.place, *arrays, dense[row, column], value, scratch, floor, ratio)
+        if good:
+            run["solve"](plan.rows, plan.columns, *arrays, value, np.ones(n), x, scratch)
+        found.append((good, value.tobytes(), ratio.tobytes(), x.tobytes()))
+    assert found[0] == found[1]
+
+
+@given(matrices(), st.integers(0, 8))
+@settings(max_examples=25)
+def test_the_pattern_holds_what_elimination_fills(dense, room):
+    n = dense.shape[0]
+    pattern = (dense != 0.0) | np.eye(n, dtype=bool)
+    filled = pattern.copy()
+    for k in range(n):
+        filled[k + 1 :] |= filled[k + 1 :, k, None] & (filled[k] & (np.arange(n) > k))
+    assume(room <= filled.sum())
+    first = np.concatenate([[0], np.cumsum(pattern.sum(axis=1))])
+    for run in RUNS.values():
+        start, out = np.zeros(n + 1, dtype=np.int64), np.zeros(int(filled.sum()) - room, dtype=np.int64)
+        scratch = np.zeros(n + 1, dtype=np.int64), np.zeros(n, dtype=np.int64)
+        count = run["fill"](first, np.nonzero(pattern)[1].copy(), start, out, *scratch)
+        assert count == (-1 if room else filled.sum())
+        if not room:
+            assert np.array_equal(np.repeat(np.arange(n), np.diff(start)) * n + out, np.flatnonzero(filled))
 
 
 def test_a_singular_matrix_is_refused():

@@ -1,0 +1,1 @@
+"""Linear algebra on abstract numbers: factors, solutions, rank."""
