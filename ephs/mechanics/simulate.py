@@ -180,7 +180,9 @@ def simulate(
     setting = Setting(seen, start / unit, control, dict(options or {}))
     watched, told = seen_from(problem, watched, guarded(progress))
     times = None if times is None else times / unit
-    bounds = Bounds.of(control, step, lawful=chosen_method.lawful, undamped=chosen_method.undamped)
+    bounds = Bounds.of(
+        control, step, lawful=chosen_method.lawful, undamped=chosen_method.undamped, order=chosen_method.order
+    )
     with journaled(journal, problem, asked) as written:
         if chosen_method.many is not None and control.step is not None and not watched and end > start:
             solution = integrate(

@@ -15,7 +15,7 @@ from ephs.mechanics.solve.control import Control
 from ephs.mechanics.solve.driven import ComponentMethod
 from ephs.mechanics.solve.findings import Audit, Finding
 from ephs.mechanics.solve.model import Model
-from ephs.mechanics.solve.resolution import step_error, sufficient
+from ephs.mechanics.solve.resolution import Trials
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 
@@ -56,7 +56,10 @@ class Bounds:
     step
         The length of constant steps in s; None where they are chosen.
     undamped
-        What estimates the error of constant steps, of a method that damps nothing at infinity.
+        Makes the natural method that estimates the error of constant steps, of a method that damps nothing at
+        infinity; None of others, which do so by steps of their own.
+    order
+        With which power of the step the method's error falls.
     """
 
     energy: float
@@ -64,6 +67,7 @@ class Bounds:
     ledger: float
     step: float | None = None
     undamped: Callable[[Model], ComponentMethod] | None = None
+    order: int = 1
 
     @classmethod
     def of(
@@ -73,6 +77,7 @@ class Bounds:
         *,
         lawful: bool,
         undamped: Callable[[Model], ComponentMethod] | None = None,
+        order: int = 1,
     ) -> "Bounds":
         """Of a run with these tolerances, and constant steps in s where given.
 
@@ -80,13 +85,13 @@ class Bounds:
         ----------
         lawful
             Whether every step of the method keeps the balance.
-        undamped
+        undamped, order
             See `Bounds`.
         """
         rtol, atol = (max(given.value, *given.special.values(), 0.0) for given in (control.rtol, control.atol))
         chosen = max(MANY_TIMES * (rtol or atol), LEAST)
         error = chosen if step is None else COARSE
-        return cls(LAWFUL if lawful else error, error, chosen, step, undamped)
+        return cls(LAWFUL if lawful else error, error, chosen, step, undamped, order)
 
 
 @final
@@ -101,7 +106,7 @@ class Breach:
     hint: str = ""
 
 
-def _energy(solution: "Solution", _bounds: Bounds) -> Iterator[Breach]:
+def _energy(solution: "Solution", _bounds: Bounds, _trials: Trials | None) -> Iterator[Breach]:
     """The balance of kinetic + potential + heat − work, and of all energies − work."""
     books = solution.ledgers
     worst = _worst(solution.energy_error)
@@ -124,20 +129,20 @@ def _step(values: Array, instant: int) -> float:
     return abs(float(values[instant] - values[instant - 1])) if instant else 0.0
 
 
-def _accuracy(solution: "Solution", bounds: Bounds) -> Iterator[Breach]:
-    """Constant steps of a method that damps nothing at infinity resolve what moves."""
-    if bounds.step is None or bounds.undamped is None:
+def _accuracy(solution: "Solution", bounds: Bounds, trials: Trials | None) -> Iterator[Breach]:
+    """Constant steps resolve what moves."""
+    if bounds.step is None or trials is None:
         return
-    found = step_error(solution, bounds.undamped, bounds.step)
+    found = trials.error(bounds.step, int(solution.stats["steps"]), solution.ledgers.scale)
     if found is not None:
-        hint = ""
+        hint, at = "", trials.times[found.trial]
         if found.size > bounds.accuracy:
-            h = sufficient(solution, bounds.undamped, bounds.step, found.instant, bounds.accuracy)
-            hint = f" of {h:.1g} s, or radau, which damps what is too fast"
-        yield Breach(found.size, 0.0, found.instant, found.path, hint)
+            h = trials.sufficient(found.trial, bounds.step, bounds.accuracy)
+            hint = f" of {h:.1g} s" + (", or radau, which damps what is too fast" if bounds.undamped else "")
+        yield Breach(found.size, 0.0, int(np.argmin(np.abs(solution.t - at))), found.path, hint)
 
 
-def _entropy(solution: "Solution", _bounds: Bounds) -> Iterator[Breach]:
+def _entropy(solution: "Solution", _bounds: Bounds, _trials: Trials | None) -> Iterator[Breach]:
     """No component, and no system without entropy's outer ports, loses entropy in a step."""
     books = solution.ledgers
     least = -float(solution.stats["least_production"])
@@ -154,7 +159,7 @@ def _entropy(solution: "Solution", _bounds: Bounds) -> Iterator[Breach]:
         yield Breach(float(fall[instant]) / scale, rounding, instant)
 
 
-def _constraint(solution: "Solution", _bounds: Bounds) -> Iterator[Breach]:
+def _constraint(solution: "Solution", _bounds: Bounds, _trials: Trials | None) -> Iterator[Breach]:
     """Joints are closed."""
     every = len(solution) // INSTANTS + 1
     for path, residual in solution.motion.gaps(every).items() if solution.motion is not None else ():
@@ -162,7 +167,7 @@ def _constraint(solution: "Solution", _bounds: Bounds) -> Iterator[Breach]:
         yield Breach(float(residual[worst]), 0.0, len(solution) - 1 - worst * every, path)
 
 
-def _ledger(solution: "Solution", bounds: Bounds) -> Iterator[Breach]:
+def _ledger(solution: "Solution", bounds: Bounds, _trials: Trials | None) -> Iterator[Breach]:
     """What the storages hold of an entropy or a volume changes by what was made; work is a sum of power."""
     books = solution.ledgers
     if "work_apart" in solution.stats:
@@ -181,7 +186,7 @@ def _ledger(solution: "Solution", bounds: Bounds) -> Iterator[Breach]:
         yield Breach(abs(float(rest[worst])) / scale, rounding, worst, path)
 
 
-def _input(solution: "Solution", _bounds: Bounds) -> Iterator[Breach]:
+def _input(solution: "Solution", _bounds: Bounds, _trials: Trials | None) -> Iterator[Breach]:
     """Inputs are smooth but for some jumps."""
     found = solution.stats.get("jumps", {}).get("found", ())
     if found:
@@ -234,7 +239,7 @@ class Law:
     holds: str
     scale: str
     limit: str
-    breaches: "Callable[[Solution, Bounds], Iterator[Breach]]"
+    breaches: "Callable[[Solution, Bounds, Trials | None], Iterator[Breach]]"
     allowed: Callable[[Bounds], float]
     advice: tuple[str, str]
 
@@ -250,8 +255,7 @@ LAWS: Mapping[str, Law] = {
         ("take a smaller step, or natural, which keeps the balance", "lower rtol, or take natural, which keeps it"),
     ),
     "accuracy": Law(
-        "constant steps of a method that damps nothing at infinity (natural, natural4, variational) resolve what "
-        "moves: the difference of a step and two of half its length",
+        "constant steps resolve what moves: the difference of a step and two of half its length",
         "what such steps move between storages",
         f"{COARSE:g}",
         _accuracy,
@@ -300,15 +304,18 @@ def _size(breach: Breach) -> float:
     return float(np.nan_to_num(breach.size, nan=np.finfo(float).max))
 
 
-def audit(solution: "Solution", bounds: Bounds) -> Audit:
-    """Hold a solution, whose first instant is the start of its run, against the laws."""
+def audit(solution: "Solution", bounds: Bounds, trials: Trials | None = None) -> Audit:
+    """Hold a solution, whose first instant is the start of its run, against the laws.
+
+    ``trials`` are those of its constant steps.
+    """
     if not len(solution):
         return Audit()
     found: list[Finding] = []
     with np.errstate(all="ignore"):
         for name, law in LAWS.items():
             allowed = law.allowed(bounds)
-            broken = [b for b in law.breaches(solution, bounds) if not b.size <= allowed + b.slack]
+            broken = [b for b in law.breaches(solution, bounds, trials) if not b.size <= allowed + b.slack]
             if broken:
                 worst = max(broken, key=_size)
                 where = str(worst.path) if worst.path is not None else ""

@@ -48,6 +48,11 @@ class Breakpoints:
         self._probe = Probe(asked, t0, until, self.within) if asked else None
 
     @property
+    def times(self) -> tuple[float, ...]:
+        """All that are known, ascending."""
+        return tuple(self._times)
+
+    @property
     def active(self) -> bool:
         """Whether there are any, or may be."""
         return bool(self._times) or self._probe is not None

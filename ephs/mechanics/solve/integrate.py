@@ -21,6 +21,7 @@ from ephs.mechanics.solve.natural_kernels import IRREVERSIBLE
 from ephs.mechanics.solve.problem import Problem, States
 from ephs.mechanics.solve.production import Production
 from ephs.mechanics.solve.record import Record, Recorder, joined
+from ephs.mechanics.solve.resolution import Trials, natural_trials
 from ephs.mechanics.solve.snapshot import Snapshot, like, parts
 from ephs.mechanics.solve.solution import Solution
 from ephs.mechanics.solve.starting import check_start
@@ -187,12 +188,19 @@ def failures_of(run: Run) -> Generator[None, None, None]:
 
 
 def audited(
-    problem: Problem, record: Record, stats: Mapping[str, Any], bounds: Bounds | None, ends: list[Record]
+    problem: Problem,
+    record: Record,
+    stats: Mapping[str, Any],
+    bounds: Bounds | None,
+    ends: list[Record],
+    trials: Callable[[Solution], Trials | None],
 ) -> Solution:
     """Kept part of a run, with the audit from its start to the present time.
 
     Parameters
     ----------
+    trials
+        Makes those of the audit.
     ends
         The first and the last row, kept or not; nothing where there is none.
     """
@@ -202,7 +210,7 @@ def audited(
     first, last = ends
     if not (len(solution) and record.t[0] == first.t[0] and record.t[-1] == last.t[0]):
         whole = solution_of(problem, joined([first, record, last]) or record, stats)
-    solution.stats = {**solution.stats, "audit": audit(whole, bounds).record()}
+    solution.stats = {**solution.stats, "audit": audit(whole, bounds, trials(whole)).record()}
     return solution
 
 
@@ -355,7 +363,16 @@ class _Run:
     def solution(self) -> Solution:
         """The solution so far."""
         recorder = self.recorder
-        return audited(self.problem, recorder.result(), self.stats(), self.bounds, recorder.ends())
+        return audited(
+            self.problem, recorder.result(), self.stats(), self.bounds, recorder.ends(), self._trials
+        )  # fmt: skip
+
+    def _trials(self, solution: Solution) -> Trials | None:
+        bounds = self.bounds
+        if bounds is None or bounds.undamped is None or bounds.step is None:
+            return None
+        jumps = [self.problem.seconds * t for t in self.breakpoints.times]
+        return natural_trials(solution, bounds.undamped, bounds.step, self.stepper, jumps)
 
 
 def coordinates(quantity: Quantity, x: Array) -> Array:

@@ -15,7 +15,8 @@ from ephs.mechanics.solve.integrate import Grid, Progress, audited, failures_of
 from ephs.mechanics.solve.journal import Written
 from ephs.mechanics.solve.problem import Problem, States
 from ephs.mechanics.solve.production import Production
-from ephs.mechanics.solve.record import Record, Rows
+from ephs.mechanics.solve.record import Record, Rows, record_of
+from ephs.mechanics.solve.resolution import Samples, Trials, trials_of
 from ephs.mechanics.solve.snapshot import Snapshot, like, parts
 from ephs.mechanics.solve.solution import Solution
 from ephs.mechanics.solve.stepping import Attempt, Leg, Row, Span, Stepper
@@ -128,6 +129,7 @@ class _Run(Generic[S]):
         self.shortest, self.longest = np.inf, 0.0
         self.pending: list[tuple[float, S, float]] = []
         self.kept = Rows()
+        self.samples: Samples[S] = Samples(wanted=policy is None)
         self.watch: Watch | None = None
         self.leg: Leg[S] | None = None
         self.ended = False
@@ -145,6 +147,7 @@ class _Run(Generic[S]):
         if self.save_at is None or (self.save_at.size and self.save_at[0] == self.t0):
             self.pending.append((self.t0, self.state, 0.0))
             self.saved = 1
+        self.samples.add([(self.t0, self.state, 0.0)])
         self.stepper.prepare(self.state, self.sign * self.h)
         if self.events:
             self.watch = Watch(self.events, self.t0, self._states(row))
@@ -183,6 +186,7 @@ class _Run(Generic[S]):
             finally:
                 fresh, counts = leg.rows(), leg.counts
                 self.pending += fresh
+                self.samples.add(fresh)
                 self.saved += len(fresh)
                 self.t, self.steps, self.rejected, self.h = leg.time, counts.steps, counts.rejected, counts.h
                 self.shortest, self.longest, self.least = counts.shortest, counts.longest, counts.least
@@ -264,6 +268,7 @@ class _Run(Generic[S]):
                 found = after if when == t else self.stepper.inside(attempt, float(when))
                 self.pending.append((float(when), found, attempt.least))
             self.saved = last
+        self.samples.add([(t, after, attempt.least)])
         self.state, self.t, self.cause = after, t, None
         self.steps += 1
         self._look()
@@ -312,20 +317,29 @@ class _Run(Generic[S]):
         self._settle()
         ends = self._ends()
         stats |= {**self.stepper.stats(), **self.remarks}  # what rows tell, too
-        return audited(self.problem, self.kept.whole(self.problem.descriptor), stats, self.bounds, ends)
+        return audited(self.problem, self.kept.whole(self.problem.descriptor), stats, self.bounds, ends, self._trials)
+
+    def _trials(self, solution: Solution) -> Trials | None:
+        step = self.control.step
+        if self.bounds is None or step is None:
+            return None
+        return trials_of(
+            solution, self.bounds.undamped, self.problem, self.stepper, self.bounds.order, self.samples.states,
+            self.sign * step, self.until, self.breakpoints.times,
+        )  # fmt: skip
 
     def _ends(self) -> list[Record]:
         """The first and the last row, kept or not; none of a run that did not start."""
         if self.first is None:
             return []
         rows = ((self.t0, self.first), (self.t, self.stepper.row(self.state)))
-        return [_record([t], [row], [0.0]) for t, row in rows]
+        return [record_of([t], [row], [0.0]) for t, row in rows]
 
     def _settle(self) -> None:
         """Pending part, as it is kept."""
         if self.pending:
             rows = self.stepper.rows([state for _, state, _ in self.pending])
-            self.kept.add(_record([t for t, _, _ in self.pending], rows, [least for _, _, least in self.pending]))
+            self.kept.add(record_of([t for t, _, _ in self.pending], rows, [least for _, _, least in self.pending]))
             self.pending.clear()
 
     def write(self, *, end: bool = False) -> None:
@@ -352,6 +366,7 @@ class _Run(Generic[S]):
             "policy": self.policy.snapshot() if self.policy is not None else None,
             "watch": self.watch.snapshot() if self.watch is not None else None,
             "breakpoints": self.breakpoints.snapshot(),
+            "samples": self.samples.snapshot(),
             "leg": self.leg.snapshot() if self.leg is not None else None,
         }
 
@@ -375,16 +390,7 @@ class _Run(Generic[S]):
         if self.watch is not None:
             self.watch.restore(found["watch"])
         self.pending.clear()
+        self.samples.restore(found["samples"], self.state)
         if self.journal.rows is not None:
             self.kept.add(self.journal.rows, written=True)
         return found["leg"]
-
-
-def _record(times: list[float], rows: list[Row], least: list[float]) -> Record:
-    """Rows at some times, with the least production in the step before each."""
-    return Record(
-        np.array(times),
-        np.array([row.x for row in rows]),
-        np.array([row.energies for row in rows]),
-        np.array([[*row.sums, production] for row, production in zip(rows, least, strict=True)]),
-    )

@@ -8,10 +8,11 @@ import numpy as np
 
 from ephs.mechanics.solve.natural import Chunk
 from ephs.mechanics.solve.snapshot import Snapshot
+from ephs.mechanics.solve.stepping import Row
 from ephs.semantics.bundle import Array
 from ephs.semantics.descriptor import Descriptor
 
-__all__ = ["Inside", "Record", "Recorder", "Rows", "joined"]
+__all__ = ["Inside", "Record", "Recorder", "Rows", "joined", "record_of"]
 
 
 class Inside(Protocol):
@@ -52,6 +53,16 @@ class Record:
     x: Array
     energies: Array
     ledgers: Array
+
+
+def record_of(times: Sequence[float], rows: Sequence[Row], least: Sequence[float]) -> Record:
+    """Rows at some times, with the least production in the step before each."""
+    return Record(
+        np.array(times),
+        np.array([row.x for row in rows]),
+        np.array([row.energies for row in rows]),
+        np.array([[*row.sums, production] for row, production in zip(rows, least, strict=True)]),
+    )
 
 
 def joined(records: Sequence[Record]) -> Record | None:

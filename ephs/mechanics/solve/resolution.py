@@ -1,13 +1,17 @@
-"""Whether constant steps resolve a motion: a step against two of half its length, at some instants of a run.
+"""Whether constant steps resolve a motion: a step against two of half its length, at some times of a run.
 
 Methods of Gauss type and others that damp nothing at infinity keep their balances whatever a step leaves out: a stiff
 brake then stops in a thousand steps instead of one. What shows it is what a step moves from storage to storage. Where
 a step and its halves differ in that by a part d, the error of a method of order p is d / (2ᵖ − 1) of it.
+
+Natural methods try steps from the states of the solution; methods whose steps are taken one by one try their own, from
+states that they were in.
 """
 
-from collections.abc import Callable
+from bisect import bisect_right
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, final
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, final
 
 import numpy as np
 
@@ -15,6 +19,9 @@ from ephs.mechanics.solve.driven import ComponentMethod, advance_driven
 from ephs.mechanics.solve.errors import SolveError
 from ephs.mechanics.solve.model import Model, compile_model
 from ephs.mechanics.solve.problem import Problem
+from ephs.mechanics.solve.record import Record, Rows, record_of
+from ephs.mechanics.solve.snapshot import Snapshot, like, parts
+from ephs.mechanics.solve.stepping import Stepper
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.primitives import Irreversible, Storage
@@ -22,14 +29,15 @@ from ephs.semantics.primitives import Irreversible, Storage
 if TYPE_CHECKING:
     from ephs.mechanics.solve.solution import Solution
 
-__all__ = ["StepError", "step_error", "sufficient"]
+__all__ = ["Samples", "StepError", "Trials", "natural_trials", "trials_of"]
 
-EACH, MOST = 150, 6
-"""One instant is looked at in so many steps, at most so many in all: three steps each."""
+S = TypeVar("S")
+EACH, MOST = 600, 6
+"""One time is looked at in so many steps, at most so many in all: three steps each."""
 STILL = 1e-6
 """Part of the gross energies below which a run of such steps moves nothing."""
 SHORTER = 16
-"""Number of divisions of a step by four in the search for one that resolves the motion."""
+"""How often a step is divided by four to find one that would do."""
 ROUNDED = 1e4 * float(np.finfo(float).eps)
 """Part of the energies that differences of solved steps have lost to rounding."""
 
@@ -43,97 +51,214 @@ class StepError:
     ----------
     size
         Relative to what steps move between storages.
-    instant
-        Index of the instant where it is largest.
+    trial
+        The number of the trial where it is largest.
     path
         The component whose share is largest there.
     """
 
     size: float
-    instant: int
+    trial: int
     path: Path
-
-
-def step_error(solution: "Solution", make: Callable[[Model], ComponentMethod], h: float) -> StepError | None:
-    """The estimated error of constant steps of h s; None where nothing moves, or no instant can be looked at."""
-    problem = solution.problem
-    if problem is None or len(solution) < 2:
-        return None
-    count = int(np.clip(int(solution.stats["steps"]) // EACH, 1, MOST))
-    instants = np.unique(np.linspace(0, len(solution) - 1, count, endpoint=False).astype(int)).tolist()
-    trials = _Trials(problem, make, float(solution.t[0]))
-    found = {i: trials.at(solution, i, h) for i in instants}
-    missed = sum(float(np.sum(trial.missed)) for trial in found.values())
-    moved, stored = (sum(getattr(trial, name) for trial in found.values()) for name in ("moved", "stored"))
-    gross = solution.ledgers.scale * len(instants)
-    if moved * solution.stats["steps"] < STILL * gross or missed < ROUNDED * stored:
-        return None
-    worst = max(instants, key=lambda i: float(np.sum(found[i].missed)))
-    path = problem.descriptor.components[int(np.argmax(found[worst].missed))].path
-    return StepError(missed / moved / (2.0**trials.method.order - 1.0), worst, path)
-
-
-def sufficient(
-    solution: "Solution", make: Callable[[Model], ComponentMethod], h: float, instant: int, allowed: float
-) -> float:
-    """A step in s, some h / 4ᵏ, that would resolve what moves at an instant."""
-    problem = solution.problem
-    assert problem is not None
-    trials = _Trials(problem, make, float(solution.t[0]))
-    for _ in range(SHORTER):
-        h *= 0.25
-        trial = trials.at(solution, instant, h)
-        if float(np.sum(trial.missed)) <= allowed * (2.0**trials.method.order - 1.0) * trial.moved:
-            break
-    return h
 
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class _Trial:
-    """A step and its halves: (components,) by how many J they differ; what they moved, and what is stored, in J."""
+class Trials:
+    """Steps and their halves from some times of a run.
 
-    missed: Array
-    moved: float
-    stored: float
+    Parameters
+    ----------
+    problem
+        Whose components the energies are of.
+    order
+        Of the method.
+    times
+        In s.
+    energies
+        Of the number of a time and a step in s: (components,) energies of the storages, and entropies that the others
+        made, at the start, after the step, and after its halves.
+    """
+
+    problem: Problem
+    order: int
+    times: tuple[float, ...]
+    energies: Callable[[int, float], tuple[Array, Array, Array]]
+
+    def error(self, h: float, steps: int, gross: float) -> StepError | None:
+        """The estimated error of constant steps of h s; None where nothing moves, or nothing can be tried.
+
+        Parameters
+        ----------
+        steps, gross
+            How many there were, and the gross energies of the run in J.
+        """
+        found = [self._trial(k, h) for k in range(len(self.times))]
+        missed, moved = sum(float(trial[0].sum()) for trial in found), sum(trial[1] for trial in found)
+        stored = sum(trial[2] for trial in found)
+        if not found or moved * steps < STILL * gross * len(found) or missed < ROUNDED * stored:
+            return None
+        worst = max(range(len(found)), key=lambda k: float(np.sum(found[k][0])))
+        path = self.problem.descriptor.components[int(np.argmax(found[worst][0]))].path
+        return StepError(missed / moved / (2.0**self.order - 1.0), worst, path)
+
+    def sufficient(self, k: int, h: float, allowed: float) -> float:
+        """A step in s, some h / 4ᵏ, that would resolve what moves at a time."""
+        for _ in range(SHORTER):
+            h *= 0.25
+            missed, moved, _ = self._trial(k, h)
+            if float(np.sum(missed)) <= allowed * (2.0**self.order - 1.0) * moved:
+                break
+        return h
+
+    def _trial(self, k: int, h: float) -> tuple[Array, float, float]:
+        """(components,) by how many J a step and its halves differ; what they moved, and what is stored, in J.
+
+        Nothing of steps that have no solution.
+        """
+        kinds = [slot.primitive for slot in self.problem.descriptor.components]
+        stores = np.array([float(isinstance(kind, Storage)) for kind in kinds])
+        theta = self.problem.reference.temperature
+        joules = stores + np.array([theta * isinstance(kind, Irreversible) for kind in kinds])
+        try:
+            start, coarse, fine = self.energies(k, h)
+        except (SolveError, ArithmeticError, np.linalg.LinAlgError):
+            return np.zeros_like(joules), 0.0, 0.0
+        moved = float(np.sum(np.abs(joules * (fine - start))))
+        return np.abs(joules * (fine - coarse)), moved, float(np.sum(np.abs(stores * start)))
+
+
+def _clear(t: float, h: float, until: float, jumps: Sequence[float]) -> bool:
+    """Whether a step from t ends within the run and meets no jump but at its ends."""
+    first, last = min(t, t + h), max(t, t + h)
+    k = bisect_right(jumps, first)
+    return min(t, until) <= first and last <= max(t, until) and (k == len(jumps) or jumps[k] >= last)
+
+
+def natural_trials(
+    solution: "Solution",
+    make: Callable[[Model], ComponentMethod],
+    h: float,
+    own: ComponentMethod | None = None,
+    jumps: Sequence[float] = (),
+) -> Trials | None:
+    """Steps of h s by a natural method from states of a solution; None where there are none.
+
+    Parameters
+    ----------
+    own
+        The method of the run, which serves where its model is that of the solution; ``make`` makes one else.
+    jumps
+        Times in s that no step goes over.
+    """
+    problem = solution.problem
+    if problem is None or len(solution) < 2:
+        return None
+    t, d = solution.t, problem.descriptor
+    count = int(np.clip(int(solution.stats["steps"]) // EACH, 1, MOST))
+    spread = np.unique(np.linspace(0, len(solution) - 1, count, endpoint=False).astype(int)).tolist()
+    instants = [i for i in spread if _clear(float(t[i]), h, np.inf, jumps)]
+    if own is None or own.model.descriptor is not d:
+        own = make(compile_model(d, problem.reference, problem.inputs(float(t[0]), problem.initial)))
+    method, makers = own, np.array([isinstance(slot.primitive, Irreversible) for slot in d.components])
+
+    def energies(k: int, h: float) -> tuple[Array, Array, Array]:
+        x, when = d.pack(solution.state_at(instants[k])), float(t[instants[k]])
+        coarse, fine = (_after(problem, method, x, when, h, count) for count in (1, 2))
+        return np.where(makers, 0.0, method.energies(x)), coarse, fine
+
+    return Trials(problem, method.order, tuple(float(t[i]) for i in instants), energies)
+
+
+def _after(problem: Problem, method: ComponentMethod, x: Array, t: float, h: float, count: int) -> Array:
+    """(components,) energies, and the entropy made since, after h seconds in so many steps.
+
+    Raises
+    ------
+    SolveError
+        A step has no solution.
+    """
+    state, energies = method.init(x), np.zeros(0)
+    for k in range(count):
+        state, chunk = advance_driven(problem, method, state, t + k * h / count, h / count)
+        if chunk.failure is not None:
+            raise chunk.failure
+        energies = chunk.energies[-1]
+    return energies
 
 
 @final
-class _Trials:
-    """Steps and their halves at instants of a solution, by a method of their own."""
+class Samples(Generic[S]):
+    """Some of the states that a run was in, evenly spread: one in 2ᵏ, at most twice `MOST`; none if not ``wanted``."""
 
-    def __init__(self, problem: Problem, make: Callable[[Model], ComponentMethod], t0: float) -> None:
-        d = problem.descriptor
-        self.problem = problem
-        self.method = make(compile_model(d, problem.reference, problem.inputs(t0, problem.initial)))
-        theta = problem.reference.temperature
-        kinds = [slot.primitive for slot in d.components]
-        self._stores = np.array([float(isinstance(kind, Storage)) for kind in kinds])
-        self._joules = self._stores + np.array([theta * isinstance(kind, Irreversible) for kind in kinds])
+    def __init__(self, *, wanted: bool) -> None:
+        self._wanted = wanted
+        self.states: list[tuple[float, S]] = []
+        self._rows, self._stride = 0, 1
 
-    def at(self, solution: "Solution", instant: int, h: float) -> _Trial:
-        """At one instant; nothing of steps that have no solution."""
-        x, t = self.problem.descriptor.pack(solution.state_at(instant)), float(solution.t[instant])
-        try:
-            coarse, fine = self._after(x, t, h, 1), self._after(x, t, h, 2)
-        except SolveError:
-            return _Trial(np.zeros_like(self._joules), 0.0, 0.0)
-        start = self._stores * self.method.energies(x)
-        moved = float(np.sum(np.abs(self._joules * fine - start)))
-        return _Trial(np.abs(self._joules * (fine - coarse)), moved, float(np.sum(np.abs(start))))
+    def add(self, rows: Iterable[tuple[float, S, float]]) -> None:
+        """Times and states in order, with what a step made at least."""
+        for t, state, _ in rows if self._wanted else ():
+            if not self._rows % self._stride:
+                if len(self.states) == 2 * MOST:
+                    self.states, self._stride = self.states[::2], 2 * self._stride
+                if not self._rows % self._stride:
+                    self.states.append((t, state))
+            self._rows += 1
 
-    def _after(self, x: Array, t: float, h: float, parts: int) -> Array:
-        """(components,) energies, and the entropy made since, after h seconds in so many steps.
+    def snapshot(self) -> Snapshot:
+        """Snapshot for `restore`."""
+        states = [[t, parts(state)] for t, state in self.states]
+        return {"states": states, "counts": [self._rows, self._stride]}
 
-        Raises
-        ------
-        SolveError
-            A step has no solution.
-        """
-        state, energies = self.method.init(x), np.zeros(0)
-        for k in range(parts):
-            state, chunk = advance_driven(self.problem, self.method, state, t + k * h / parts, h / parts)
-            if chunk.failure is not None:
-                raise chunk.failure
-            energies = chunk.energies[-1]
-        return energies
+    def restore(self, snapshot: Snapshot, template: S) -> None:
+        """Go on from a snapshot of states like the template."""
+        self.states = [(t, like(template, found)) for t, found in snapshot["states"]]
+        self._rows, self._stride = snapshot["counts"]
+
+
+def trials_of(
+    solution: "Solution",
+    make: Callable[[Model], ComponentMethod] | None,
+    problem: Problem,
+    stepper: Stepper[Any],
+    order: int,
+    samples: Sequence[tuple[float, Any]],
+    h: float,
+    until: float,
+    jumps: Sequence[float],
+) -> Trials | None:
+    """Constant steps of a method of an order from states that it was in; a natural method's where ``make`` makes one.
+
+    Parameters
+    ----------
+    problem
+        As it is solved; in its unit of time are the samples, the step h, negative backward, ``until`` and the jumps.
+    """
+    seconds, steps = problem.seconds, int(solution.stats["steps"])
+    if make is not None:
+        return natural_trials(solution, make, abs(h) * seconds, jumps=[seconds * t for t in jumps])
+    clear = [(t, state) for t, state in samples if _clear(t, h, until, jumps)]
+    if not clear:
+        return None
+    count = int(np.clip(steps // EACH, 2, MOST))
+    chosen = [clear[i] for i in np.unique(np.linspace(0, len(clear), count, endpoint=False).astype(int))]
+    sign = float(np.sign(h))
+
+    def energies(k: int, h: float) -> tuple[Array, Array, Array]:
+        h = sign * h / seconds
+        start = stepper.anew(chosen[k][1])
+        whole = stepper.step(start, h).end
+        half = stepper.step(stepper.anew(start), 0.5 * h).end
+        rows = stepper.rows([start, whole, stepper.step(half, 0.5 * h).end])
+        return tuple(_shown(problem, record_of([start.t] * 3, rows, [0.0] * 3))[1].energies)
+
+    none = Rows().whole(problem.descriptor)
+    return Trials(_shown(problem, none)[0], order, tuple(t * seconds for t, _ in chosen), energies)
+
+
+def _shown(problem: Problem, record: Record) -> tuple[Problem, Record]:
+    """Problem and rows as a solution shows them."""
+    while problem.shown is not None:
+        problem, record, _ = problem.shown(record, {})
+    return problem, record
