@@ -20,7 +20,7 @@ STOREYS: tuple[tuple[frozenset[str], ...], ...] = tuple(
         ([".semantics.spaces", ".semantics.linear"],),
         ([".semantics.derive"],),
         ([".semantics", ".semantics.library", ".semantics.algebra", ".semantics.relations", ".semantics.symbols"],),
-        ([".mechanics.solve"],),
+        ([".mechanics.solve", ".mechanics.solve.march"],),
         ([".mechanics.scene", ".mechanics.imports"],),
         ([".mechanics", ".mechanics.reduction", ".mechanics.reduced", ".mechanics.engine", ".mechanics.tree"],),
         ([".mechanics.dynamics"], [".mechanics.sweep"]),

@@ -3,7 +3,14 @@
 # numba infers the types of these functions, and exports what it does not list.
 # pyright: basic, reportPrivateImportUsage=false
 
-from ephs.mechanics.reduced.loop_kernels import constraint_rows, correct, reduce_rows, row_biases
+from ephs.mechanics.reduced.loop_kernels import (
+    constraint_rows,
+    correct,
+    multipliers,
+    reduce_rows,
+    row_biases,
+    without_mass,
+)
 from ephs.mechanics.reduced.slope_kernels import frame, frames_of_ends, into, out_of, out_of_edge, relative
 from ephs.mechanics.reduced.sweep_kernels import bracket, forces, inertia_sweep, kinematics
 from ephs.mechanics.reduced.tables import CUT
@@ -37,13 +44,7 @@ def forward_dynamics(t, w, d, q, r, s, drive, wrench, scal, s_rate, made, powers
             d.row[a] = -w.target[a]
         rank = reduce_rows(w, m)
     solve_constrained(w, m, rank, d.rate, d.row, d.row, d.change)
-    for j in range(rank - 1, -1, -1):
-        entry = w.step[j]
-        for b in range(j + 1, rank):
-            entry -= w.triangle[w.chosen[b], w.chosen[j]] * d.multiplier[w.chosen[b]]
-        d.multiplier[w.chosen[j]] = entry / w.triangle[w.chosen[j], w.chosen[j]]
-    for j in range(rank, m):
-        d.multiplier[w.chosen[j]] = 0.0
+    multipliers(w, m, rank, d.multiplier)
     settle(t, w, d, r)
     return 0, 0, m, rank
 
@@ -59,16 +60,7 @@ def _keep_loads(w, d):
 def solve_constrained(w, m, rank, force, row, target, change):
     """force ← M⁻¹(force + Jᵀλ), λ such that J force = −row; target and change are scratch."""
     n = w.mass.shape[0]
-    for i in range(n):
-        entry = force[i]
-        for k in range(i):
-            entry -= w.factor[i, k] * force[k]
-        force[i] = entry / w.factor[i, i]
-    for i in range(n - 1, -1, -1):
-        entry = force[i]
-        for k in range(i + 1, n):
-            entry -= w.factor[k, i] * force[k]
-        force[i] = entry / w.factor[i, i]
+    without_mass(w, force)
     if rank == 0:
         return
     for a in range(m):

@@ -1,7 +1,6 @@
-"""Loops closed in the mass metric: constraint rows, their rank, least corrections, accelerations.
+"""Loops closed in the mass metric: constraint rows, accelerations.
 
-Rows J r = target are turned to A = J L⁻ᵀ with the mass matrix M = L Lᵀ; a row that is a combination of those before it,
-to a tolerance, is left out. So rank is decided in the mass metric, and never on the square of a matrix.
+Rank, least corrections and multipliers are those of `ephs.semantics.linear.rows`, called by address.
 """
 
 # numba infers the types of these functions, and exports what it does not list.
@@ -10,9 +9,9 @@ to a tolerance, is left out. So rank is decided in the mass metric, and never on
 import math
 
 from ephs.mechanics.reduced.sweep_kernels import bracket, carry, forces, inertia_sweep, kinematics, lift, relative_twist
-from ephs.mechanics.reduced.tables import CUT
+from ephs.mechanics.reduced.tables import CORRECT, CUT, MULTIPLIERS, ORTHONORMALISE, SOLVE
+from ephs.semantics.calling import call_staged
 from ephs.semantics.spaces import jit
-from ephs.semantics.spaces.rank import EXPLICIT, REGULAR, ROUNDED
 from ephs.semantics.spaces.se3_kernels import coadjoint_apply, include, pose_compose, pose_inverse, pose_log
 
 kernel = jit.lean_kernel
@@ -99,122 +98,35 @@ def row_biases(t, w):
 
 
 @kernel
-def _remainder(w, m, j):
-    """Largest remainder of the rows from the j-th chosen one on, once those before it are out, relative to the largest
-    row: of the rows as they are, without masses. They are orthonormalised in w.plain."""
-    n, size, largest = w.mass.shape[0], 0.0, 0.0
-    for c in range(m):
-        row, square = w.chosen[c], 0.0
-        for i in range(n):
-            w.plain[row, i] = w.row[row, i]
-            square += w.plain[row, i] * w.plain[row, i]
-        size = max(size, math.sqrt(square))
-        for _ in range(2):
-            for b in range(min(c, j)):
-                base, part = w.chosen[b], 0.0
-                for i in range(n):
-                    part += w.plain[row, i] * w.plain[base, i]
-                for i in range(n):
-                    w.plain[row, i] -= part * w.plain[base, i]
-        square = 0.0
-        for i in range(n):
-            square += w.plain[row, i] * w.plain[row, i]
-        if c < j:
-            for i in range(n):
-                w.plain[row, i] = w.plain[row, i] / math.sqrt(square) if square > 0.0 else 0.0
-        elif w.triangle[row, row] > 0.0:
-            largest = max(largest, math.sqrt(square))
-    return largest / size if size > 0.0 else 0.0
-
-
-@kernel
 def reduce_rows(w, m):
-    """Orthonormalise the rows in the mass metric, largest remainder first; returns the rank.
-
-    A row counts as repeating others where little is left of it both in the mass metric and without masses: in the first
-    alone a constraint between heavy bodies looks small beside one that moves light ones.
-    """
-    n = w.mass.shape[0]
-    for a in range(m):
-        w.chosen[a] = a
-        square = 0.0
-        for i in range(n):  # A = J L⁻ᵀ, row by row
-            entry = w.row[a, i]
-            for k in range(i):
-                entry -= w.factor[i, k] * w.scaled[a, k]
-            w.scaled[a, i] = entry / w.factor[i, i]
-            square += w.scaled[a, i] * w.scaled[a, i]
-        # what cancels to rounding is no equation: the loop cannot open in this direction
-        w.triangle[a, a] = math.sqrt(square) if math.sqrt(square) > ROUNDED * w.size[a] else 0.0
-    largest = 0.0
-    for a in range(m):
-        largest = max(largest, w.triangle[a, a])
-    rank = 0
-    for j in range(m):
-        best, most = -1, 0.0
-        for a in range(j, m):
-            if w.triangle[w.chosen[a], w.chosen[a]] > most:
-                best, most = a, w.triangle[w.chosen[a], w.chosen[a]]
-        if best < 0 or most <= REGULAR * largest or (most <= EXPLICIT * largest and _remainder(w, m, j) <= EXPLICIT):
-            break
-        w.chosen[j], w.chosen[best] = w.chosen[best], w.chosen[j]
-        row = w.chosen[j]
-        size = 0.0
-        for _ in range(2):  # once more against what rounding left
-            for b in range(j):
-                base = w.chosen[b]
-                part = 0.0
-                for i in range(n):
-                    part += w.scaled[row, i] * w.scaled[base, i]
-                w.triangle[row, base] += part
-                for i in range(n):
-                    w.scaled[row, i] -= part * w.scaled[base, i]
-        for i in range(n):
-            size += w.scaled[row, i] * w.scaled[row, i]
-        size = math.sqrt(size)
-        w.triangle[row, row] = size
-        for i in range(n):
-            w.scaled[row, i] /= size
-        for a in range(j + 1, m):
-            other = w.chosen[a]
-            part, square = 0.0, 0.0
-            for i in range(n):
-                part += w.scaled[other, i] * w.scaled[row, i]
-            for i in range(n):
-                w.scaled[other, i] -= part * w.scaled[row, i]
-                square += w.scaled[other, i] * w.scaled[other, i]
-            w.triangle[other, row] = part
-            w.triangle[other, other] = math.sqrt(square)
-        rank += 1
-    return rank
+    """Orthonormalise the rows in the mass metric, largest remainder first; returns the rank."""
+    return call_staged(
+        w.linear[ORTHONORMALISE], (w.row, w.size, w.factor, w.scaled, w.plain, w.triangle, w.chosen, m)
+    )  # fmt: skip
 
 
 @kernel
 def correct(w, rank, target, out):
     """The least change of r in the mass metric with J·change = target on the chosen rows."""
-    n = w.mass.shape[0]
-    for i in range(n):
-        out[i] = 0.0
-    for j in range(rank):
-        row = w.chosen[j]
-        entry = target[row]
-        for b in range(j):
-            entry -= w.triangle[row, w.chosen[b]] * w.step[b]
-        w.step[j] = entry / w.triangle[row, row]
-        for i in range(n):
-            out[i] += w.step[j] * w.scaled[row, i]
-    _back(w, out)
+    call_staged(
+        w.linear[CORRECT],
+        (w.row, w.size, w.factor, w.scaled, w.plain, w.triangle, w.chosen, rank, target, w.step, out),
+    )
 
 
 @kernel
-def _back(w, out):
-    """out ← L⁻ᵀ out."""
-    n = w.mass.shape[0]
-    for i in range(n - 1, -1, -1):
-        entry = out[i]
-        for k in range(i + 1, n):
-            entry -= w.factor[k, i] * out[k]
-        out[i] = entry / w.factor[i, i]
+def multipliers(w, m, rank, out):
+    """The multipliers of the change that `correct` found; zero of rows that repeat others."""
+    call_staged(
+        w.linear[MULTIPLIERS],
+        (w.row, w.size, w.factor, w.scaled, w.plain, w.triangle, w.chosen, m, rank, w.step, out),
+    )
+
+
+@kernel
+def without_mass(w, x):
+    """x ← M⁻¹ x."""
+    call_staged(w.linear[SOLVE], (w.factor, x))
 
 
 @kernel
@@ -228,12 +140,9 @@ def accelerate(t, w, q, r, s, drive, wrench, scal, r_rate, s_rate, made, powers)
     still = inertia_sweep(t, w)
     if still != 0:
         return 20, still - 1
-    for i in range(n):  # M⁻¹ force
-        entry = w.force[i]
-        for k in range(i):
-            entry -= w.factor[i, k] * r_rate[k]
-        r_rate[i] = entry / w.factor[i, i]
-    _back(w, r_rate)
+    for i in range(n):
+        r_rate[i] = w.force[i]
+    without_mass(w, r_rate)
     m = constraint_rows(t, w)
     if m == 0:
         return 0, 0
@@ -246,13 +155,7 @@ def accelerate(t, w, q, r, s, drive, wrench, scal, r_rate, s_rate, made, powers)
     correct(w, rank, w.target, change)
     for i in range(n):
         r_rate[i] += change[i]
-    for j in range(rank - 1, -1, -1):  # the multipliers, for the power of what is prescribed
-        entry = w.step[j]
-        for b in range(j + 1, rank):
-            entry -= w.triangle[w.chosen[b], w.chosen[j]] * w.multiplier[w.chosen[b]]
-        w.multiplier[w.chosen[j]] = entry / w.triangle[w.chosen[j], w.chosen[j]]
-    for j in range(rank, m):
-        w.multiplier[w.chosen[j]] = 0.0
+    multipliers(w, m, rank, w.multiplier)  # for the power of what is prescribed
     a = 0
     for j in range(t.driven.shape[0]):
         if t.driven[j] == 1:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ephs.mechanics.build import component_path
 from ephs.mechanics.reduced.spanning import Edge, joints_of, loop_algebra, spanning_tree, springs_of, twists_of
-from ephs.mechanics.reduced.tables import CUT, SPRING, TREE, Mechanism, Workspace
+from ephs.mechanics.reduced.tables import CUT, SPRING, TREE, Mechanism, Workspace, row_addresses
 from ephs.mechanics.scene.model import GROUND, Scene
 from ephs.mechanics.solve.errors import OptionError
 from ephs.mechanics.solve.model import Model
@@ -82,7 +82,8 @@ class Reduced:
             "small": (512,), "matrix": (6, 6), "scratch": (2048,), "e": (16,), "f": (256,), "c": (16,), "jac": (512,),
         }  # fmt: skip
         arrays = {name: np.zeros(shape) for name, shape in shapes.items()}
-        return Workspace(**arrays, chosen=np.zeros(m, dtype=np.int64))
+        linear = row_addresses() if dense else np.zeros(0, dtype=np.int64)
+        return Workspace(**arrays, chosen=np.zeros(m, dtype=np.int64), linear=linear)
 
 
 def reduce_scene(scene: Scene, problem: Problem, model: Model) -> Reduced:

@@ -7,10 +7,8 @@ u = Ad_{x⁻¹} u_parent + S r; S is constant for joints that are walked from th
 # numba infers the types of these functions, and exports what it does not list.
 # pyright: basic, reportPrivateImportUsage=false
 
-import math
-
-from ephs.mechanics.reduced.tables import SPRING
-from ephs.semantics.calling import call_kernel
+from ephs.mechanics.reduced.tables import CHOLESKY, SPRING
+from ephs.semantics.calling import call_kernel, call_staged
 from ephs.semantics.spaces import jit
 from ephs.semantics.spaces.se3_kernels import (
     adjoint_apply,
@@ -257,7 +255,7 @@ def forces(t, w, q, r, s, drive, wrench, scal, s_rate, made, powers):
 @kernel
 def inertia_sweep(t, w):
     """Mass matrix by composite inertias; loads gathered into the joints' forces; its Cholesky factor."""
-    links, n = t.parent.shape[0], w.mass.shape[0]
+    links = t.parent.shape[0]
     x, product, force, other = w.matrix, w.scratch[0:36].reshape(6, 6), w.small[160:166], w.small[166:172]
     w.mass[:] = 0.0
     for i in range(links):
@@ -299,18 +297,7 @@ def inertia_sweep(t, w):
                     for a in range(6):
                         entry += x[a, k] * product[a, m]
                     w.composite[parent, k, m] += entry
-    for i in range(n):
-        for j in range(i + 1):
-            entry = w.mass[i, j]
-            for k in range(j):
-                entry -= w.factor[i, k] * w.factor[j, k]
-            if i == j:
-                if not entry > 0.0:
-                    return i + 1
-                w.factor[i, i] = math.sqrt(entry)
-            else:
-                w.factor[i, j] = entry / w.factor[j, j]
-    return 0
+    return call_staged(w.linear[CHOLESKY], (w.mass, w.factor))
 
 
 @kernel

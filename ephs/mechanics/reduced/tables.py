@@ -1,14 +1,40 @@
 """The tables of a mechanism, and the scratch memory of one evaluation, as compiled code takes them."""
 
+from functools import cache
 from typing import NamedTuple
+
+import numpy as np
 
 from ephs.mechanics.solve.sparse import Index
 from ephs.semantics.bundle import Array
+from ephs.semantics.linear.rows import row_program
 
-__all__ = ["CUT", "SPRING", "TREE", "Mechanism", "Workspace"]
+__all__ = [
+    "CHOLESKY",
+    "CORRECT",
+    "CUT",
+    "MULTIPLIERS",
+    "ORTHONORMALISE",
+    "SOLVE",
+    "SPRING",
+    "TREE",
+    "Mechanism",
+    "Workspace",
+    "row_addresses",
+]
 
 TREE, CUT, SPRING = 0, 1, 2
 """Kinds of edges."""
+CHOLESKY, SOLVE, ORTHONORMALISE, CORRECT, MULTIPLIERS = range(5)
+"""Functions of `ephs.semantics.linear.rows` by their place among the addresses of a workspace."""
+
+
+@cache
+def row_addresses() -> Index:
+    """Return the addresses of these functions in machine code."""
+    calls = row_program().compiled()
+    names = ("cholesky", "solve", "orthonormalise", "correct", "multipliers")
+    return np.array([calls[name].address for name in names])
 
 
 class Mechanism(NamedTuple):
@@ -70,6 +96,7 @@ class Workspace(NamedTuple):
     step: Array  # (n,)
     temperature: Array  # (entropies,): effort of each
     multiplier: Array  # (m,)
+    linear: Index  # addresses of `row_addresses`
     small: Array  # (512,)
     matrix: Array  # (6, 6)
     scratch: Array  # (2048,)

@@ -1,0 +1,101 @@
+"""A march of a plain right-hand side, run with floats and as machine code; what tests and benchmarks share."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ephs.mechanics.reduced.explicit import tableau
+from ephs.mechanics.solve.control import Proportional
+from ephs.mechanics.solve.march import Control, Ending, Field, Memory, Tableau, march
+from ephs.semantics.stage import Entry, Program, indices, integer, matrix, table, vector
+
+MEMORY = {
+    "q": vector(), "y": vector(), "k": matrix(), "q1": vector(), "y1": vector(), "q2": vector(), "y2": vector(),
+    "k2": matrix(), "last": vector(), "atol": vector(), "rtol": vector(), "allowed": vector(), "fine": vector(),
+    "coarse": vector(), "times": vector(), "rows_t": matrix(), "rows_q": matrix(), "rows_y": matrix(),
+}  # fmt: skip
+TABLEAU = {"a": matrix(), "error": vector(), "coarse_error": vector(), "eighth": indices()}
+
+
+def program(motion):
+    """The program of a motion, made of parameters and the size of y."""
+
+    def run(on, parameters, control, a, error, coarse_error, eighth, q, y, k, q1, y1, q2, y2, k2, last, atol, rtol,
+            allowed, fine, coarse, times, rows_t, rows_q, rows_y, steps):  # fmt: skip
+        memory = Memory(
+            q, y, k, q1, y1, q2, y2, k2, last, atol, rtol, allowed, fine, coarse, times, rows_t, rows_q, rows_y
+        )
+        return march(on, motion(parameters, y.size), Tableau(a, error, coarse_error, eighth), memory, control[0], steps)
+
+    return Program(
+        "march", run=Entry(run, parameters=vector(), control=table(Control), **TABLEAU, **MEMORY, steps=integer())
+    )
+
+
+def field(function):
+    """The program of a right-hand side f(on, y, out, parameters)."""
+    return program(lambda parameters, size: Field(function, parameters, size))
+
+
+@dataclass
+class March:
+    """The march of one run: its arrays, as a driver keeps them."""
+
+    control: object
+    arrays: dict
+    call: object
+
+    @property
+    def c(self):
+        return self.control[0]
+
+    def advance(self, steps):
+        ending = self.call(steps)
+        return Ending(ending) if ending in iter(Ending) else ending
+
+    def snapshot(self):
+        kept = {name: self.arrays[name].copy() for name in ("q", "y", "k")}
+        return kept | {"reals": self.control.reals.array.copy(), "integers": self.control.integers.array.copy()}
+
+    def restore(self, snapshot):
+        for name in ("q", "y", "k"):
+            self.arrays[name][:] = snapshot[name]
+        self.control.reals.array[:], self.control.integers.array[:] = snapshot["reals"], snapshot["integers"]
+        self.c.rows = 0
+
+    def rows(self):
+        count = int(self.c.rows)
+        return self.arrays["rows_t"][:count, 0], self.arrays["rows_y"][:count]
+
+
+def start(call, method, y, until, *, parameters=(0.0,), rtol=1e-9, atol=1e-12, step=1e-3, times=None, rows=4096,
+          limit=0.0, grid=0.0, least_step=0.0, origin=0.0, q=(), increments=0):  # fmt: skip
+    """A march from y over ``until`` seconds, backward where it is negative."""
+    found = tableau(method)
+    scheme, size = found.scheme, len(y)
+    control = Control.table(1)
+    c = control[0]
+    c.end, c.span, c.step, c.origin, c.grid = float(until), abs(float(until)), step, origin, grid
+    c.least_step, c.most_step, c.before, c.limit = least_step, np.inf, 1e-4, limit
+    c.shortest, c.least = np.inf, np.inf
+    c.exponent, c.share, c.damping, c.strict = found.exponent, 0.5, 0.4, Proportional.STRICT
+    c.saved = -1 if times is None else 0
+    stages, elements = (scheme.b.size + 1, size), np.array(q, dtype=float)
+    kept = np.zeros(0) if times is None else np.abs(np.asarray(times, dtype=float))
+    arrays = {
+        "q": elements.copy(), "y": np.array(y, dtype=float), "k": np.zeros(stages), "q1": elements.copy(),
+        "y1": np.zeros(size), "q2": elements.copy(), "y2": np.zeros(size), "k2": np.zeros(stages),
+        "last": np.zeros(size),
+        "atol": np.full(size, atol), "rtol": np.full(size, rtol), "allowed": np.zeros(size), "fine": np.zeros(size),
+        "coarse": np.zeros(size), "times": kept, "rows_t": np.zeros((rows, 2)),
+        "rows_q": np.zeros((rows, elements.size)),
+        "rows_y": np.zeros((rows, size - increments)),
+    }  # fmt: skip
+    tables = (
+        np.vstack([scheme.a, scheme.b]),
+        scheme.error,
+        scheme.coarse.copy(),
+        np.array([scheme.order8], dtype=np.int64),
+    )
+    passed = (np.array(parameters, dtype=float), control, *tables, *arrays.values())
+    return March(control, arrays, lambda steps: call(*passed, steps))

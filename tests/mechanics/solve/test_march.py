@@ -1,0 +1,266 @@
+"""Explicit steps as staged functions: orders, references, control, endings, the same bits by every way to run them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+import ephs
+from benchmarks import families
+from ephs.mechanics.solve.control import Proportional
+from ephs.mechanics.solve.march import Control, Ending, Motion
+from ephs.mechanics.solve.march.control import judge, length
+from ephs.semantics.stage import Entry, Program, Vector, real, table
+from tests.mechanics.solve.marching import field, program, start
+
+
+def kepler(on, y, out, parameters):
+    """A planet about a fixed sun."""
+    square = y[0] * y[0] + y[1] * y[1]
+    cube = square * on.sqrt(square)
+    out[0], out[1], out[2], out[3] = y[2], y[3], -y[0] / cube, -y[1] / cube
+    return 0
+
+
+def van_der_pol(on, y, out, parameters):
+    """ÿ = μ (1 − y²) ẏ − y."""
+    out[0], out[1] = y[1], parameters[0] * (1.0 - y[0] * y[0]) * y[1] - y[0]
+    return 0
+
+
+def decay(on, y, out, parameters):
+    """ẏ = −λ y."""
+    out[0] = -parameters[0] * y[0]
+    return 0
+
+
+def guarded(on, y, out, parameters):
+    """ẏ = 1, refused with status 13 beyond y = parameters[0]."""
+    out[0] = 1.0
+    return on.select(y[0] > parameters[0], 13, 0)
+
+
+@dataclass(frozen=True)
+class Pendulum(Motion):
+    """q̈ = −c sin q with the element q, and y = (v, r, s) with an entropy that nothing changes."""
+
+    parameters: Vector
+
+    increments = freedoms = 1
+    counted = 3
+    closes = False
+
+    def rates(self, on, base, y, q, out):
+        q[0] = base[0] + y[0]
+        out[0], out[1], out[2] = y[1], -self.parameters[0] * on.sin(q[0]), 0.0
+        return 0, 0
+
+    def settle(self, on, base, y, q):
+        q[0] = base[0] + y[0]
+        return 0
+
+    def sizes(self, on, y0, y1, out):
+        for j in (1, 2):
+            out[j] = on.maximum(on.absolute(y0[j]), on.absolute(y1[j]))
+        out[0] = 1.0
+
+    def project(self, on, q, change):
+        raise AssertionError
+
+    def least(self, on, y0, y1):
+        return 0.0
+
+
+def runs(function):
+    return compiled_and_plain(field(function))
+
+
+def compiled_and_plain(made):
+    return {"compiled": made.compiled()["run"], "plain": made.plain()["run"]}
+
+
+KEPLER, VAN_DER_POL, DECAY, GUARDED = (runs(function) for function in (kepler, van_der_pol, decay, guarded))
+PENDULUM = compiled_and_plain(program(lambda parameters, size: Pendulum(parameters)))
+ORBIT = [0.5, 0.0, 0.0, np.sqrt(3.0)]
+"""Eccentricity 1/2, at the perihelion; the period is 2π."""
+METHODS = ("rk54", "rk87")
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_an_orbit_closes(method):
+    run = start(KEPLER["compiled"], method, ORBIT, 2.0 * np.pi, rtol=1e-11, atol=1e-11)
+    assert run.advance(10_000) is Ending.DONE
+    # The share of the tolerance adds up over the run; near the sun errors of place grow along the orbit.
+    assert np.abs(run.arrays["y"] - ORBIT).max() <= 1e3 * 1e-11
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("mu", [0.5, 3.0])
+def test_another_program_finds_the_same_motion(method, mu):
+    instants = np.linspace(0.5, 8.0, 6)
+    run = start(
+        VAN_DER_POL["compiled"], method, [2.0, 0.0], 8.0, parameters=(mu,), rtol=1e-10, atol=1e-10, times=instants
+    )
+    assert run.advance(100_000) is Ending.DONE
+    other = solve_ivp(
+        lambda _, y: [y[1], mu * (1.0 - y[0] ** 2) * y[1] - y[0]], (0.0, 8.0), [2.0, 0.0], method="LSODA",
+        rtol=1e-12, atol=1e-12, t_eval=instants,
+    )  # fmt: skip
+    found, states = run.rows()
+    assert np.array_equal(found, instants)
+    assert np.abs(states - other.y.T).max() <= 1e3 * 1e-10
+
+
+@pytest.mark.parametrize(("method", "order", "steps"), [("rk54", 5, (40, 80)), ("rk87", 8, (10, 20))])
+def test_orders_are_those_of_the_tableaux(method, order, steps):
+    exact = start(KEPLER["compiled"], "rk87", ORBIT, 1.0, grid=1.0 / 160)
+    exact.advance(1000)
+    errors = []
+    for count in steps:
+        run = start(KEPLER["compiled"], method, ORBIT, 1.0, grid=1.0 / count)
+        assert run.advance(1000) is Ending.DONE
+        assert run.c.steps == count
+        errors.append(np.abs(run.arrays["y"] - exact.arrays["y"]).max())
+    assert order - 0.5 <= np.log2(errors[0] / errors[1]) <= order + 1.0
+
+
+def bits(run):
+    return {name: array.tobytes() for name, array in run.arrays.items()} | {
+        "reals": run.control.reals.array.tobytes(),
+        "integers": run.control.integers.array.tobytes(),
+    }
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("options", [{}, {"times": np.linspace(0.3, 2.0, 5)}, {"grid": 0.11}, {"limit": 3.0}])
+def test_floats_and_machine_code_give_the_same_bits(method, options):
+    found = [start(call, method, ORBIT, 2.0, rtol=1e-7, atol=1e-7, **options) for call in KEPLER.values()]
+    assert found[0].advance(60) == found[1].advance(60)
+    assert bits(found[0]) == bits(found[1])
+
+
+@pytest.mark.parametrize("method", METHODS)
+@given(pause=st.integers(1, 30))
+@settings(max_examples=8)
+def test_a_march_that_was_broken_off_and_taken_up_is_the_same(method, pause):
+    options = {"times": np.linspace(0.1, 3.0, 7)}
+    whole = start(KEPLER["compiled"], method, ORBIT, 3.0, **options)
+    first, second = (start(KEPLER["compiled"], method, ORBIT, 3.0, **options) for _ in range(2))
+    assert whole.advance(1000) is Ending.DONE
+    if first.advance(pause) is not Ending.DONE:
+        second.restore(first.snapshot())
+        assert second.advance(1000) is Ending.DONE
+    else:
+        second = first
+    assert second.arrays["y"].tobytes() == whole.arrays["y"].tobytes()
+    assert second.control.reals.array.tobytes() == whole.control.reals.array.tobytes()
+    kept = [run.rows()[1] for run in ((first, second) if second is not first else (first,))]
+    assert np.vstack(kept).tobytes() == whole.rows()[1].tobytes()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_what_is_kept_does_not_change_the_steps(method):
+    one, two = (
+        start(KEPLER["compiled"], method, ORBIT, 3.0, times=times) for times in (None, np.linspace(0.1, 3.0, 9))
+    )
+    assert one.advance(1000) is two.advance(1000) is Ending.DONE
+    assert one.arrays["y"].tobytes() == two.arrays["y"].tobytes()
+    assert len(one.rows()[0]) == one.c.steps == two.c.steps
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_pendulum_takes_the_steps_of_a_mechanism(method):
+    """The same control in another evaluation: a scene's steps differ by the rounding of its sweeps only."""
+    sol = ephs.simulate(families.scene("revolute-chain", 1), 2.0, method=method, rtol=1e-8, atol=1e-8)
+    inertia = families.MASS * families.LENGTH**2 / 4.0 + families.THICK[1]
+    stiffness = families.MASS * 9.81 * 0.5 * families.LENGTH / inertia
+    angle = sol.joint("j0").coordinate[:, 0]
+    first = sol.t[1] - sol.t[0]
+    for call in PENDULUM.values():
+        run = start(
+            call, method, [0.0, 0.0, 0.0], 2.0, parameters=(stiffness,), rtol=1e-8, atol=1e-8, step=first, q=[1.0],
+            increments=1,
+        )  # fmt: skip
+        assert run.advance(10_000) is Ending.DONE
+        assert (run.c.steps, run.c.rejected) == (sol.stats["steps"], sol.stats["rejected"])
+        times, _ = run.rows()
+        # The first steps are so short that their estimates are rounding, as are the digits of steps after them.
+        assert times == pytest.approx(sol.t[1:], rel=1e-4)
+        moved = run.arrays["rows_q"][: len(times), 0] - 1.0
+        assert np.abs(moved - (angle[1:] - angle[0])).max() <= 1e-4 * 2.0 * np.sqrt(stiffness)
+
+
+def test_backward_in_time_leads_back():
+    there = start(KEPLER["compiled"], "rk87", ORBIT, 3.0, rtol=1e-11, atol=1e-11)
+    there.advance(1000)
+    back = start(KEPLER["compiled"], "rk87", there.arrays["y"], -3.0, rtol=1e-11, atol=1e-11, origin=3.0)
+    assert back.advance(1000) is Ending.DONE
+    assert np.abs(back.arrays["y"] - ORBIT).max() <= 1e3 * 1e-11
+
+
+@given(
+    h=st.floats(1e-6, 1.0), error=st.floats(1e-12, 1e4), before=st.floats(1e-4, 1.0), failed=st.booleans(),
+    share=st.sampled_from([0.0, 0.5]), exponent=st.sampled_from([5.0, 8.0]),
+)  # fmt: skip
+def test_steps_are_judged_as_by_the_proportional_control(h, error, before, failed, share, exponent):
+    oracle = Proportional(lambda: exponent, share)
+    oracle.restore({"before": before, "failed": failed})
+    accepted, following = oracle.judge(h, error, 1.0)
+    control = Control.table(1)
+    c = control[0]
+    c.span, c.step, c.exponent, c.share, c.damping, c.strict = 1.0, h, exponent, share, 0.4, Proportional.STRICT
+    c.before, c.failed, c.most_step = before, int(failed), np.inf
+    assert bool(JUDGE["judge"](control, h, error)) == accepted
+    # Powers by exponential and logarithm: each rounds by its argument, which is at most 40, times ε.
+    assert c.step == pytest.approx(following, rel=100.0 * np.finfo(float).eps)
+    assert (c.before, bool(c.failed)) == pytest.approx((oracle.snapshot()["before"], oracle.snapshot()["failed"]))
+
+
+JUDGE = Program(
+    "judging",
+    judge=Entry(
+        lambda on, control, h, error: judge(on, control[0], h, error), control=table(Control), h=real(), error=real()
+    ),
+    length=Entry(lambda on, control, rest: length(on, control[0], rest), control=table(Control), rest=real()),
+).compiled()
+
+
+@pytest.mark.parametrize(
+    ("step", "rest", "taken"), [(1.0, 3.0, 1.0), (1.0, 1.005, 0.5025), (1.0, 1.0 + 1e-8, 1.0 + 1e-8), (1.0, 0.4, 0.4)]
+)
+def test_the_last_steps_are_not_tiny(step, rest, taken):
+    control = Control.table(1)
+    control[0].step = step
+    assert JUDGE["length"](control, rest) == taken
+
+
+def test_a_march_ends_where_it_has_to():
+    slow = start(DECAY["compiled"], "rk54", [1.0], 1.0, parameters=(1.0,), rows=3)
+    assert slow.advance(2) is Ending.PAUSED
+    assert slow.advance(100) is Ending.FULL
+    assert slow.c.rows == 3
+    slow.c.rows = 0  # as a driver that has taken the rows
+    assert slow.advance(1) is Ending.PAUSED
+
+
+def test_stability_that_holds_steps_back_is_told():
+    """rk54 is stable to h·|λ| = 3.3; the hint is of λ itself."""
+    run = start(DECAY["compiled"], "rk54", [1.0], 100.0, parameters=(1e3,), rtol=1e-3, atol=1e-3, limit=2.5)
+    assert run.advance(10_000) is Ending.STIFF
+    assert 2.5 < run.c.stiff < 5.0
+    free = start(DECAY["compiled"], "rk54", [1.0], 1.0, parameters=(1e3,), rtol=1e-3, atol=1e-3)
+    assert free.advance(10_000) is Ending.DONE
+
+
+def test_what_cannot_be_evaluated_makes_steps_shorter_until_they_are_too_short():
+    run = start(GUARDED["compiled"], "rk54", [0.0], 1.0, parameters=(0.25,), least_step=1e-6)
+    assert run.advance(10_000) == Ending.REFUSED + 13
+    assert 0.25 - 1e-5 <= run.arrays["y"][0] <= 0.25
+    at_once = start(GUARDED["compiled"], "rk54", [0.5], 1.0, parameters=(0.25,))
+    assert at_once.advance(1) == Ending.REFUSED + 13
+    on_grid = start(GUARDED["compiled"], "rk54", [0.0], 1.0, parameters=(0.25,), grid=0.1)
+    assert on_grid.advance(100) == Ending.REFUSED + 13
+    assert on_grid.c.steps == 2
