@@ -126,8 +126,7 @@ class Dynamics:
         given = np.asarray(array, dtype=float)
         if given.shape != self.state0.array.shape or not np.isfinite(given).all():
             raise OptionError("array", given.shape, f"{self.state0.array.shape}, finite")
-        q, r, s = self.layout.split(given)
-        return self._state(ReducedState(0.0, q, r, s, self._books()))
+        return self._state(self._counted(*self.layout.split(given)))
 
     def moved(self, state: State, increments: ArrayLike) -> State:
         """The state with the tree's joints at q·exp(v), v (n,) in rad and m; cut joints follow, rates stay."""
@@ -135,9 +134,7 @@ class Dynamics:
         v = np.asarray(increments, dtype=float)
         if v.shape != (self.layout.n,):
             raise OptionError("increments", v.shape, f"({self.layout.n},)")
-        return self._state(
-            ReducedState(0.0, self._equations.fitted(self._equations.moved(q, v), r), r, s, self._books())
-        )
+        return self._state(self._counted(self._equations.fitted(self._equations.moved(q, v), r), r, s))
 
     def closed(self, state: State) -> State:
         """The nearest state in the mass metric whose loops are closed and whose rates are on the constraints.
@@ -345,18 +342,20 @@ class Dynamics:
 
     # ---- inside ------------------------------------------------------------------------------------------------
 
-    def _books(self) -> Array:
-        return np.zeros(2 + len(self._equations.reduced.made))
+    def _counted(self, q: Array, r: Array, s: Array) -> ReducedState:
+        eq = self._equations
+        return ReducedState(0.0, q, r, eq.heats.energies(s), np.zeros(2 + len(eq.reduced.made)))
 
     def _reduced(self, state: State) -> ReducedState:
-        return ReducedState(0.0, *self.layout.split(state.array), self._books())
+        return self._counted(*self.layout.split(state.array))
 
     def _at(self, state: State) -> None:
         self._links.place(*self.layout.split(state.array)[:2])
 
     def _state(self, at: ReducedState) -> State:
+        eq = self._equations
         self._links.place(at.q, at.r)
-        return self.layout.state(at.q, np.concatenate([at.r, self._linear.cut_rates]), at.s)
+        return self.layout.state(at.q, np.concatenate([at.r, self._linear.cut_rates]), eq.heats.entropies(at.heats))
 
     def _of_states(self, states: States) -> State:
         eq = self._equations
@@ -366,7 +365,7 @@ class Dynamics:
         ):  # momenta off the joints, as some methods leave them, count by the nearest in the mass metric
             mass = eq.mass(q, r)
             r = np.asarray(np.linalg.solve(mass, self._links.momenta(states)), dtype=float)
-            return self._state(eq.closed(ReducedState(0.0, q, r, s, self._books())))
+            return self._state(eq.closed(self._counted(q, r, s)))
 
     @contextmanager
     def _pushed(self, forces: Mapping[str, ArrayLike] | None) -> Generator[None, None, None]:

@@ -145,7 +145,8 @@ def memory_of(engine: Engine, entropies: int) -> Memory:
         "dense": (len(engine.basis), tree.GENERAL_SIZE), "force": (n,), "zero": (n,),
         "relative": (len(engine.cut), rows.M_SIZE), "row_value": (m, 4), "entry": (engine.closing.entries,),
         "covector": (slots, 6), "along": (slots, 12), "largest": (max(engine.closing.blocks, 1),),
-        "temperature": (max(entropies, 1),), "small": (512,), "e": (16,), "f": (256,), "c": (16,), "jac": (512,),
+        "temperature": (max(entropies, 1),), "entropy": (entropies,), "small": (512,), "e": (16,), "f": (256,),
+        "c": (16,), "jac": (512,),
         "scratch": (2048,),
     }  # fmt: skip
     return Memory(**{name: np.zeros(shape) for name, shape in shapes.items()})
@@ -279,6 +280,7 @@ def _forces(
         body_frame=np.array([_matrix(inside) for inside in bodies.inside]).reshape(-1, 12),
         node=t.node,
         conduction=t.conduction,
+        sink=t.sink,
         address=t.address,
         dims=t.dims,
         parameters=t.parameters,

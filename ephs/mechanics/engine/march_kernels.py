@@ -9,6 +9,7 @@ The step's length follows `ephs.mechanics.solve.control.Proportional`, the error
 import math
 
 from ephs.mechanics.engine.engine_kernels import DEPENDENT, resolve
+from ephs.mechanics.engine.heat_kernels import count as counted
 from ephs.mechanics.engine.rate_kernels import across, advance, close, derive
 from ephs.semantics.spaces import jit
 
@@ -148,9 +149,10 @@ def judge(control, h, error):
 
 
 @kernel
-def finish(e, m, base, y1, q1, change, moved, drive, loops):
-    """From a step's end to a state: joints' elements in q1, loops closed, rates in y1; a status."""
+def finish(e, m, base, y0, y1, q1, change, moved, drive, scal, loops):
+    """From a step's end to a state: joints' elements in q1, loops closed, rates and what was made in y1; a status."""
     nv, n = drive.shape[0], m.force.shape[0]
+    counted(e.forces, y0[nv + n :], y1[nv + n :], scal, m.temperature)
     advance(e, base, y1, q1)
     if not loops:
         return 0
@@ -241,7 +243,7 @@ def march(e, m, scheme, s, control, times, drive, wrench, scal, steps):
             control[C_STIFF] = stiffness(scheme, s.b, s.k, s.y1, h, n, nv, s.allowed)
             for j in range(n):
                 s.fine[j] = s.y1[nv + j]
-            status = finish(e, m, s.q, s.y1, s.q1, s.change, s.moved, drive, loops)
+            status = finish(e, m, s.q, s.y, s.y1, s.q1, s.change, s.moved, drive, scal, loops)
         if status == DEPENDENT:
             return CAREFUL
         if status == 0:
@@ -287,7 +289,7 @@ def march(e, m, scheme, s, control, times, drive, wrench, scal, steps):
                         e, m, scheme, s.b, s.q, s.y, sign * part, s.k2, s.y2, s.q2, drive, wrench, scal, control
                     )  # fmt: skip
                     if status == 0:
-                        status = finish(e, m, s.q, s.y2, s.q2, s.change, s.moved, drive, loops)
+                        status = finish(e, m, s.q, s.y, s.y2, s.q2, s.change, s.moved, drive, scal, loops)
                     if status != 0:  # the whole step succeeded: take it again, and its part in shorter ones
                         return CAREFUL
                     keep(control, s.rows_t, s.rows_q, s.rows_y, wanted, least, s.q2, s.y2, nv)

@@ -5,6 +5,7 @@
 
 from ephs.mechanics.engine.closing_kernels import nearly_dependent
 from ephs.mechanics.engine.engine_kernels import DEPENDENT, STILL, accelerate, fold, move, resolve
+from ephs.mechanics.engine.heat_kernels import entropies, heat_rates
 from ephs.mechanics.engine.inward_kernels import turned
 from ephs.mechanics.engine.row_kernels import cut_gaps, cut_poses, fit, seen
 from ephs.mechanics.engine.tree_kernels import (
@@ -47,19 +48,23 @@ def advance(e, base, v, q):
 
 @kernel
 def derive(e, m, base, q, y, drive, wrench, scal, out):
-    """ẏ of y = (v, r, s, heat, work, made) at q = base·exp(v), which is left in q; (status, component)."""
+    """ẏ of y = (v, r, heats, heat, work, flows) at q = base·exp(v), which is left in q; (status, component)."""
     nv, n, ns = drive.shape[0], m.force.shape[0], e.forces.node.shape[0]
     at = nv + n + ns
     for j in range(at, out.shape[0]):
         out[j] = 0.0
     advance(e, base, y, q)
     r = y[nv : nv + n]
+    status, component = entropies(e.forces, y[nv + n : at], scal, m.entropy)
+    if status != 0:
+        return status, component
     status, component = accelerate(
-        e, m, q, r, y[nv + n : at], drive, wrench, scal,
+        e, m, q, r, m.entropy, drive, wrench, scal,
         out[nv : nv + n], out[nv + n : at], out[at + 2 :], out[at : at + 2],
     )  # fmt: skip
     if status != 0:
         return status, component
+    heat_rates(e.forces, m.temperature, scal, out[nv + n : at], out[at + 2 :])
     joint_rates(e, m, y, r, out)
     return 0, 0
 

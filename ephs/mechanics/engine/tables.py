@@ -20,6 +20,7 @@ class Forces(NamedTuple):
     body_frame: Array  # (bodies, 12): R and p of the body in its link's frame
     node: Index  # (entropies,): component of the storage, −1: the environment
     conduction: Index  # (conductions, 3): component, entropy, entropy
+    sink: Index  # (frictions, 2): place of what it makes, entropy that takes its heat
     address: Index  # (components,)
     dims: Index  # (components, 4)
     parameters: Array
@@ -57,6 +58,7 @@ class Memory(NamedTuple):
     along: Array  # (slots, 12)
     largest: Array  # (blocks,)
     temperature: Array  # (entropies,)
+    entropy: Array  # (entropies,)
     small: Array  # (512,)
     e: Array
     f: Array

@@ -7,6 +7,7 @@ from typing import final
 import numpy as np
 
 from ephs.mechanics.build import component_path
+from ephs.mechanics.engine.heat_kernels import entropies, heat_rates
 from ephs.mechanics.reduced.given import Given
 from ephs.mechanics.reduced.loop_kernels import accelerate, constraint_rows, correct, loop_gaps, reduce_rows
 from ephs.mechanics.reduced.mechanism import Reduced
@@ -51,6 +52,7 @@ class Dense:
     def __init__(self, reduced: Reduced) -> None:
         self.reduced, self.work = reduced, reduced.workspace(dense=True)
         t = reduced.tables
+        self._entropy = np.zeros(t.node.size)
         self._m, self._rank = int(t.rows.sum() + t.driven.sum()), 0
         self._cut = [i for i in range(len(reduced.edges)) if t.kind[i] == CUT]
 
@@ -86,10 +88,14 @@ class Dense:
         n, nv, ns = self.reduced.freedoms, given.drive.size, len(self.reduced.entropies)
         r, s, at = slice(nv, nv + n), slice(nv + n, nv + n + ns), nv + n + ns
         out[at:] = 0.0
+        status, component = entropies(self.reduced.tables, y[s], scal, self._entropy)
+        if status:
+            return int(status), int(component)
         status, component = accelerate(
-            self.reduced.tables, self.work, q, y[r], y[s], given.drive, given.wrench, scal, out[r], out[s],
+            self.reduced.tables, self.work, q, y[r], self._entropy, given.drive, given.wrench, scal, out[r], out[s],
             out[at + 2 :], out[at : at + 2],
         )  # fmt: skip
+        heat_rates(self.reduced.tables, self.work.temperature, scal, out[s], out[at + 2 :])
         return int(status), int(component)
 
     def closed(self, q: Array, r: Array, motions: Array, moved: Callable[[Array, Array], Array]) -> tuple[Array, Array]:

@@ -13,11 +13,13 @@ import numpy as np
 from ephs.mechanics.build import component_path
 from ephs.mechanics.engine.build import engine_of, memory_of
 from ephs.mechanics.engine.engine_kernels import DEPENDENT, STILL, resolve
+from ephs.mechanics.engine.heat_kernels import count
 from ephs.mechanics.engine.march_kernels import C_COLUMNS, C_COMPONENT, C_EVALUATIONS, attempt
 from ephs.mechanics.engine.rate_kernels import OPEN, across, advance, close, derive, joint_rates
 from ephs.mechanics.engine.tables import Scheme
 from ephs.mechanics.reduced.dense import Dense, unmoved
 from ephs.mechanics.reduced.given import Given
+from ephs.mechanics.reduced.heat import Heats
 from ephs.mechanics.reduced.led import Led
 from ephs.mechanics.reduced.mechanism import reduce_scene
 from ephs.mechanics.reduced.naming import within
@@ -44,10 +46,12 @@ ASIDE = 0.1
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class ReducedState:
-    """Where a mechanism is: joints' elements q, rates r of the tree, entropies s, and what was counted since the start.
+    """Where a mechanism is: joints' elements q, rates r of the tree, heats, and what was counted since the start.
 
     Parameters
     ----------
+    heats
+        Energies in J of what stores entropy, from s = 0; of the environment θ₀ s.
     books
         Heat and work in J, then the entropy that each component made in J/K.
     memory
@@ -57,7 +61,7 @@ class ReducedState:
     t: float
     q: Array
     r: Array
-    s: Array
+    heats: Array
     books: Array
     memory: tuple[Array, ...] = ()
 
@@ -96,6 +100,7 @@ class Equations:
         self.curved = np.array([int(t.r_at[i]) + j for i in groups for j in range(int(t.dim[i]))], dtype=int)
         self.counted = np.r_[np.arange(self.n), self.nv : self.nv + self.n + self.ns]
         number = {slot.path: i for i, slot in enumerate(problem.descriptor.components)}
+        self.heats = Heats(reduced, model.reference.temperature)
         self.led = Led(problem, moved=bool(driven))
         self._makers = np.array([number[path] for path in reduced.made], dtype=int)
         self.scal = model.scal(0.0)
@@ -103,6 +108,7 @@ class Equations:
         self.drive, self.wrench = self.given.drive, self.given.wrench
         self.constant = problem.constant
         self._paper = PaperStates(reduced, problem, self._light)
+        self._last_energies = np.zeros(0), np.zeros(0)
         self.evaluations = 0
         self.gravity = np.array(scene.world.gravity, dtype=float)
         self._driven = np.flatnonzero(t.driven)
@@ -124,7 +130,7 @@ class Equations:
         return out
 
     def rates(self, t: float, base: Array, y: Array) -> Array:
-        """ẏ of y = (v, r, s, books) at q = base·exp(v).
+        """ẏ of y = (v, r, heats, books), of the books heat, work and flows, at q = base·exp(v).
 
         Raises
         ------
@@ -135,8 +141,8 @@ class Equations:
         self.evaluations += 1
         self._factored = False
         if not self.constant:
-            v, r, s, books = np.split(y, [nv, nv + n, nv + n + ns])
-            self.given.place(t, self.states(ReducedState(t, self.advance(base, v), r, s, books)))
+            v, r, heats, books = np.split(y, [nv, nv + n, nv + n + ns])
+            self.given.place(t, self.states(ReducedState(t, self.advance(base, v), r, heats, books)))
         out = np.zeros(self.size)
         status, component = derive(
             self.engine, self.memory, base, self._q, y, self.drive, self.wrench, self.scal, out
@@ -201,7 +207,7 @@ class Equations:
         SolveError
             The loops do not close near by, or the state has left the range of numbers.
         """
-        within(self.reduced, state.q, state.r, state.s)
+        within(self.reduced, state.q, state.r, state.heats)
         if not (self.engine.cut.size or self.prescribed.size):
             return state
         if np.any(state.r[self._driven] != self.prescribed):  # all rates give way, in the mass metric
@@ -214,7 +220,7 @@ class Equations:
         if status != 0:
             return self._closed_carefully(state)
         self._closed_at, self._factored = (q, r), True
-        return ReducedState(state.t, q, r, state.s, state.books)
+        return ReducedState(state.t, q, r, state.heats, state.books)
 
     def separation(self) -> Array:
         """Squared part of each loop constraint off those before it, relative to the largest constraint, (m,).
@@ -230,7 +236,7 @@ class Equations:
         self.careful = True
         q, r = self.dense.closed(state.q, state.r, self.prescribed, self.moved)
         r[self._driven] = self.prescribed
-        return ReducedState(state.t, q, r, state.s, state.books)
+        return ReducedState(state.t, q, r, state.heats, state.books)
 
     # ---- the same over dense matrices --------------------------------------------------------------------------
 
@@ -262,26 +268,33 @@ class Equations:
         """q with the cut joints' elements nearest to where their bodies put them; leaves the dense sweep at q."""
         return self.dense.fitted(q, r)
 
-    def load(self, t: float, q: Array, r: Array, s: Array) -> None:
+    def load(self, t: float, q: Array, r: Array, heats: Array) -> None:
         """Put what drives at a time and state into ``drive`` and ``wrench``."""
         if not self.constant:
             books = np.zeros(2 + len(self.reduced.made))
-            self.given.place(t, self.states(ReducedState(t, q, r, s, books)))
+            self.given.place(t, self.states(ReducedState(t, q, r, heats, books)))
 
     # ---- a step ------------------------------------------------------------------------------------------------
 
     def vector(self, state: ReducedState) -> Array:
         """y at the state: increments zero."""
-        return np.concatenate([np.zeros(self.nv), state.r, state.s, state.books])
+        return np.concatenate([np.zeros(self.nv), state.r, state.heats, state.books])
 
     def state(self, base: ReducedState, y: Array, t: float) -> ReducedState:
-        """The state that the vector y means, counted from ``base``; its loops are as they come."""
+        """The state that the vector y means at the end of a step from ``base``; its loops are as they come."""
         nv, n, ns = self.nv, self.n, self.ns
-        v, r, s, books = np.split(y, [nv, nv + n, nv + n + ns])
-        return ReducedState(t, self.advance(base.q, v), r, s, books)
+        y = self.settled(self.vector(base), y)
+        v, r, heats, books = np.split(y, [nv, nv + n, nv + n + ns])
+        return ReducedState(t, self.advance(base.q, v), r, heats, books)
+
+    def settled(self, y0: Array, y1: Array) -> Array:
+        """The end y1 of a step from y0 with what components made in place of what they passed on."""
+        out, at = np.array(y1), self.nv + self.n
+        count(self.engine.forces, y0[at:], out[at:], self.scal, self.memory.temperature)
+        return out
 
     def allowed(self, rtol: Tolerance, atol: Tolerance) -> tuple[Array, Array]:
-        """rtol and atol of what counts in an error: the tree's increments, its rates, the entropies."""
+        """rtol and atol of what counts in an error: the tree's increments, its rates, the heats."""
         tree = [edge for edge in self.reduced.edges[: self.reduced.links]]
         out: list[Array] = []
         for tolerance in (rtol, atol):
@@ -289,6 +302,8 @@ class Equations:
                 np.full(edge.pair.dim, tolerance.at(*self._named(edge.path, link))) for link, edge in enumerate(tree)
             ]
             entropies = [tolerance.at(path, "entropy") for path in self.reduced.entropies]
+            if tolerance is atol:  # in J, of J/K
+                entropies = [value * self.model.reference.temperature for value in entropies]
             out.append(np.concatenate([*of_joints, *of_joints, np.array(entropies)]))
         return out[0], out[1]
 
@@ -337,8 +352,8 @@ class Equations:
         """Records of many states."""
         if not states:
             return []
-        q, r, s = zip(*((state.q, state.r, state.s) for state in states), strict=True)
-        x = self._paper.rows(np.array(q), np.array(r), np.array(s))
+        q, r, heats = zip(*((state.q, state.r, state.heats) for state in states), strict=True)
+        x = self._paper.rows(np.array(q), np.array(r), self.heats.entropies(np.array(heats)))
         energies = np.zeros((len(states), len(self.problem.descriptor.components)))
         self.refuse(*stored_energies(self.model.tables, self.scal, self._stored, x, energies))
         out: list[Row] = []
@@ -347,6 +362,34 @@ class Equations:
             energy[self._makers] = state.books[2:]
             out.append(Row(point, energy, np.array([heat, work, work, state.books[2:].sum()])))
         return out
+
+    def booked(self, start: ReducedState, end: ReducedState, flows: Array, missed: Array, work: float) -> ReducedState:
+        """The end of a step with what its components passed on and made, see `Heats`.
+
+        Parameters
+        ----------
+        flows, missed
+            (makers,) in J over the step, and by how much their quadrature may be off.
+        work
+            By what drives, in J over the step.
+        """
+        lost = None
+        if self.heats.frictions.size and not self.led.counting:
+            lost = work - float((self._energies(end) - self._energies(start)) @ self.led.mechanical)
+            self._last_energies = end.q, self._energies(end)
+        flows = self.heats.booked(flows, missed, lost)
+        heats, made = self.heats.taken(start.heats, flows)
+        heat = float(flows[self.heats.frictions].sum())
+        return replace(end, heats=heats, books=start.books + np.concatenate([[heat, work], made]))
+
+    def _energies(self, state: ReducedState) -> Array:
+        """(components,) stored energies in J."""
+        if self._last_energies[0] is state.q:
+            return self._last_energies[1]
+        x = self._paper.rows(state.q[None], state.r[None], self.heats.entropies(state.heats)[None])
+        energies = np.zeros((1, len(self.problem.descriptor.components)))
+        self.refuse(*stored_energies(self.model.tables, self.scal, self._stored, x, energies))
+        return energies[0]
 
     def least(self, start: ReducedState, end: ReducedState) -> float:
         """The least entropy that a component made between two states, in J/K."""
@@ -371,7 +414,7 @@ class Equations:
 
     def states(self, state: ReducedState) -> dict[Path, Array]:
         """All states of the scene's system."""
-        return self._paper.at(state.q, state.r, state.s)
+        return self._paper.at(state.q, state.r, self.heats.entropies(state.heats))
 
     def start(self, t: float) -> ReducedState:
         """The state that the problem begins with, its loops closed.
@@ -381,9 +424,10 @@ class Equations:
         SolveError
             The initial states contradict the joints.
         """
-        state = self.closed(ReducedState(t, *self._paper.initial(), np.zeros(2 + len(self.reduced.made))))
+        q, r, s = self._paper.initial()
+        state = self.closed(ReducedState(t, q, r, self.heats.energies(s), np.zeros(2 + len(self.reduced.made))))
         self.led.start(self.row(state).energies)
-        self._paper.check(state.q, state.r, state.s)
+        self._paper.check(state.q, state.r, self.heats.entropies(state.heats))
         if self.careful:
             self._without_repeated(state)
         return state

@@ -254,7 +254,7 @@ class _March:
         rows = int(np.argmin(good)) if not good.all() else good.size
         c[C_ROWS] = rows
         c[C_T] = times[rows - 1, 0] if rows else sound
-        within(eq.reduced, beyond.q, beyond.r, beyond.s)
+        within(eq.reduced, beyond.q, beyond.r, beyond.heats)
         raise SolveError(Outcome.RANGE, "", "heat, work or entropy made")
 
     def _refused(self, status: int) -> None:

@@ -7,6 +7,7 @@ opened by rounding; each move starts IDA anew, at order 1. Needs the package sci
 import os
 from collections.abc import Generator
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any, final
 
 import numpy as np
@@ -47,6 +48,7 @@ class Ida(ReducedMethod):
         self._failure: SolveError | None = None
         self._base: ReducedState | None = None
         self._last: Array | None = None
+        self._y = np.zeros(equations.size)
         self._solver: Any = None
         self.counts = {"restarts": 0}
 
@@ -80,7 +82,10 @@ class Ida(ReducedMethod):
 
     def _attempt(self, state: ReducedState, base: ReducedState, y: Array, t: float) -> Attempt[ReducedState]:
         eq = self.equations
-        free = eq.state(base, y, t)
+        made = slice(eq.size - len(eq.reduced.made), eq.size)
+        passed, self._y = y[made] - self._y[made], y.copy()
+        y[made] = state.books[2:] + passed
+        free = eq.state(replace(state, q=base.q), y, t)
         closed = eq.closed(free)
         moved = float(np.abs(eq.gaps(free.q, free.r)[0]).max(initial=0.0)) if closed is not free else 0.0
         self._last = closed.q
@@ -92,9 +97,10 @@ class Ida(ReducedMethod):
         eq = self.equations
         self._base = state
         self.counts["restarts"] += 1
-        y0 = eq.vector(state)
+        y0 = self._y = eq.vector(state)
         rtol = PART * float(np.min(self.rtol, initial=1.0))
         atol = np.full(y0.size, PART * float(np.min(self.atol, initial=1.0)))
+        atol[eq.nv + eq.n :] *= eq.model.reference.temperature  # J, of J/K
         self._failure = None
 
         def residual(t: float, y: Array, yp: Array, out: Array) -> None:

@@ -1,7 +1,8 @@
 """Radau IIA of order 5 on the reduced form: stiff, adaptive, loops closed after each step.
 
 Hairer and Wanner, *Solving Ordinary Differential Equations II*, IV.8. The stages live in the increments of one step,
-y = (v, r, s), so that the same collocation serves joints on every group; heat and work are its quadratures.
+y = (v, r, heats), so that the same collocation serves joints on every group; work is its quadrature,
+heats follow that and the energies, see `Heats`.
 """
 
 from typing import Any, final
@@ -16,7 +17,7 @@ from ephs.mechanics.reduced.naming import counted
 from ephs.mechanics.solve.control import Control
 from ephs.mechanics.solve.errors import Outcome, SolveError
 from ephs.mechanics.solve.factors import factors
-from ephs.mechanics.solve.radau import COEFFICIENTS, NODES, T_INVERSE, VALUES, T
+from ephs.mechanics.solve.radau import COEFFICIENTS, DEFECT, GAMMA, NODES, T_INVERSE, VALUES, T
 from ephs.mechanics.solve.snapshot import Snapshot
 from ephs.mechanics.solve.stepping import Attempt
 from ephs.semantics.bundle import Array
@@ -64,16 +65,19 @@ class Implicit(ReducedMethod):
             self._known = state.q, eq.rates(state.t, state.q, y0)
         first = self._known[1]
         try:
-            stages, made, fast = self._stages(state, y0, h)
+            stages, passed, fast = self._stages(state, y0, h)
         except SolveError:
             if self.jacobian.fresh(state):
                 raise
             self._renew(state)
-            stages, made, fast = self._stages(state, y0, h)
-        # entropies are quadratures, as what is made: sums of both agree to rounding, not to Newton's last change
-        y1 = y0 + np.concatenate([stages[-1, : eq.nv + eq.n], h * (COEFFICIENTS[-1] @ made)])
+            stages, passed, fast = self._stages(state, y0, h)
+        y1 = y0.copy()
+        y1[: self.jacobian.size] += stages[-1]
         end = eq.state(state, y1, state.t + h)
         closed, error = self._closed(state, end, y0, y1, first, stages, h)
+        missed = h * (GAMMA * first[eq.size - passed.shape[1] :] + DEFECT @ passed)
+        passed = h * (COEFFICIENTS[-1] @ passed)
+        closed = eq.booked(state, closed, passed[2:], missed[2:], float(passed[1]))
         if not fast or self._turned():
             self._renew(closed)
         return Attempt(state, closed, h, error, eq.least(state, closed))
@@ -116,17 +120,19 @@ class Implicit(ReducedMethod):
         return self.atol + self.rtol * self.equations.sizes(y0, y1)
 
     def _stages(self, state: ReducedState, y0: Array, h: float) -> tuple[Array, Array, bool]:
-        """(increments of (v, r, s) at the stages, rates of entropies and books there, Newton was fast)."""
+        """(increments of (v, r, heats) at the stages, rates of the books there, Newton was fast)."""
         eq, size = self.equations, self.jacobian.size
         real, rest = self._solve(state, h)
-        allowed = self._allowed(y0, y0)
         stages, rates = np.zeros((3, size)), np.zeros((3, eq.size))
+        heat = slice(eq.nv + eq.n, size)
+        coldest = eq.heats.coldest(y0[heat])  # an iterate may overshoot, a solution is not below
         worst, before = np.zeros(eq.counted.size), np.inf
         rate = moved = np.inf
         for iteration in range(1, ITERATIONS + 1):
             for i, node in enumerate(NODES):
                 y = y0.copy()
                 y[:size] += stages[i]
+                y[heat] = np.maximum(y[heat], coldest)
                 rates[i] = eq.rates(state.t + node * h, state.q, y)
             self.counts["iterations"] += 1
             defect = T_INVERSE @ (rates[:, :size] - _INVERSE @ stages / h)
@@ -134,22 +140,25 @@ class Implicit(ReducedMethod):
             change = np.real(
                 T @ np.array([lu_solve(real, np.real(defect[0]), check_finite=False), pair, np.conj(pair)])
             )
-            worst = np.max(np.abs(change[:, eq.counted]) / allowed, axis=0, initial=0.0)
+            reached = np.abs(y0)  # what starts from nothing, as heat does, is measured by what it becomes
+            reached[:size] += np.abs(stages + change).max(axis=0)
+            worst = np.max(np.abs(change[:, eq.counted]) / self._allowed(y0, reached), axis=0, initial=0.0)
             moved = float(np.max(worst, initial=0.0))
             if not np.isfinite(moved):
                 break
             stages += change
             if iteration > 1:
                 rate = moved / before
-                if rate >= 1.0 and moved > max(10.0 * self._enough, self._rough):
+                # heats are quadratic in rates: their first change says nothing of convergence
+                if rate >= 1.0 and iteration > 2 and moved > max(10.0 * self._enough, self._rough):
                     break
             if moved <= self._enough or (iteration > 1 and moved * rate <= self._enough * (1.0 - min(rate, 0.9))):
-                return stages, rates[:, eq.nv + eq.n :], iteration <= 2 or rate < FAST
+                return stages, rates[:, eq.nv + eq.n + eq.ns :], iteration <= 2 or rate < FAST
             if iteration > 2 and rate > 0.5 and moved <= self._rough:  # rounding is all that is left
-                return stages, rates[:, eq.nv + eq.n :], False
+                return stages, rates[:, eq.nv + eq.n + eq.ns :], False
             before = moved
         if moved <= self._rough:  # near a change of rank the matrix is no good, and the iteration slow
-            return stages, rates[:, eq.nv + eq.n :], False
+            return stages, rates[:, eq.nv + eq.n + eq.ns :], False
         path, what = counted(eq.reduced, int(np.argmax(np.nan_to_num(worst, nan=np.inf))))
         raise SolveError(Outcome.DIVERGED, path, f"{what} at the stages")
 
@@ -159,6 +168,7 @@ class Implicit(ReducedMethod):
         """The end with its loops closed, and the difference to the embedded method of order 3, filtered by the
         equations as its stiff part must be, relative to what is allowed."""
         eq, size = self.equations, self.jacobian.size
+        heat = slice(eq.nv + eq.n, size)
         real, _ = self._solve(state, h)
         rough = _EMBEDDED @ stages / h
         allowed = self._allowed(y0, y1)
@@ -168,6 +178,7 @@ class Implicit(ReducedMethod):
         if error > 1.0:  # again from where it leads: of stiff parts the first estimate is far too large
             moved = y0.copy()
             moved[:size] += found
+            moved[heat] = np.maximum(moved[heat], eq.heats.coldest(y0[heat]))
             found = lu_solve(real, eq.rates(state.t, state.q, moved)[:size] + rough, check_finite=False)
             closed = eq.closed(end)
             error = float(np.max(np.abs(eq.along(found[eq.counted])) / allowed, initial=0.0))

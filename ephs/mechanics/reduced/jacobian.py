@@ -20,7 +20,7 @@ RELATIVE = 2e-8
 
 @final
 class Jacobian:
-    """∂ẏ/∂y of y = (v, r, s) at v = 0: by tangents; of inputs that are functions, by differences of their values.
+    """∂ẏ/∂y of y = (v, r, heats) at v = 0: by tangents; of inputs that are functions, by differences of their values.
 
     With ``counts`` the matrices are counted there, as ``jacobians``.
     """
@@ -50,15 +50,20 @@ class Jacobian:
             return self._value
         eq, linear = self.equations, self._linear
         n, nv = eq.n, eq.nv
-        eq.load(state.t, state.q, state.r, state.s)
-        linear.forward(state.q, state.r, state.s)
+        s, warmth = eq.heats.entropies(state.heats), eq.heats.temperatures(state.heats)
+        eq.load(state.t, state.q, state.r, state.heats)
+        linear.forward(state.q, state.r, s)
         columns = linear.columns(solve=True, fit=False)
-        if not eq.problem.constant:
-            columns[:n] += self._inputs(state)
         rates = np.concatenate([state.r, linear.cut_rates])
         value = np.zeros((self.size, self.size))
         value[:n, nv : nv + n] = np.eye(n)
         value[n:nv], value[nv : nv + n], value[nv + n :] = columns[n:nv], columns[:n], columns[nv:]
+        heat = slice(nv + n, self.size)  # of entropies so far: ds = dE/θ, and Ė = θ ṡ
+        value[:, heat] /= warmth
+        value[heat] *= warmth[:, None]
+        value[heat, heat] += np.diag(linear.entropy_rates * eq.heats.slopes())
+        if not eq.problem.constant:
+            value[nv : nv + n] += self._inputs(state)
         t = eq.reduced.tables
         for i, edge in enumerate(eq.reduced.edges):
             if t.kind[i] != SPRING and t.code[i] != VECTOR:  # v̇ = dexp⁻¹(v) r turns with v: r + ½ [v, r] + …
@@ -89,12 +94,12 @@ class Jacobian:
         for j in range(self.size):
             moved = y.copy()
             moved[j] += RELATIVE * max(1.0, abs(y[j]))
-            v, r, s = np.split(moved, [eq.nv, eq.nv + eq.n])
-            eq.load(state.t, eq.advance(state.q, v), r, s)
+            v, r, heats = np.split(moved, [eq.nv, eq.nv + eq.n])
+            eq.load(state.t, eq.advance(state.q, v), r, heats)
             by = moved[j] - y[j]
             changes.append(((eq.drive - middle[0]) / by, (eq.wrench - middle[1]) / by))
         eq.drive[:], eq.wrench[:] = middle
-        self._linear.forward(state.q, state.r, state.s)
+        self._linear.forward(state.q, state.r, eq.heats.entropies(state.heats))
         self._linear.columns(solve=True, fit=False)
         for j, (drive, wrench) in enumerate(changes):
             out[:, j] = self._linear.pushed(drive, wrench)

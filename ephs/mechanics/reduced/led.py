@@ -32,12 +32,13 @@ class Led:
         self._from: float | None = None
         self.apart = 0.0, 0.0
         """By how many J work and quadrature differ most, and the time in s."""
-        self._mechanical = np.array(
+        self.mechanical = np.array(
             [
                 float(isinstance(slot.primitive, Storage) and not any(s.quantity.environment for s in slot.reads))
                 for slot in problem.descriptor.components
             ]
         )
+        """(components,) 1 for storages of energy that is not heat."""
 
     @property
     def holds(self) -> bool:
@@ -45,16 +46,21 @@ class Led:
         d = self._problem.descriptor
         return self._moved and not mobility(d, d.pack(self._problem.initial), self._problem.prescribed).mobility
 
+    @property
+    def counting(self) -> bool:
+        """Whether work is what the energies say."""
+        return self._from is not None
+
     def start(self, energies: Array) -> None:
         """Count from here, where no freedom is left; energies (components,) in J."""
-        self._from = float(energies @ self._mechanical) if self.holds else None
+        self._from = float(energies @ self.mechanical) if self.holds else None
 
     def work(self, t: float, energies: Array, books: Array) -> float:
         """The work in J since the start by energies (components,) and the heat, the first of the books; the second, the
         sum of power, where the mechanism is not led."""
         if self._from is None:
             return float(books[1])
-        found = float(energies @ self._mechanical) - self._from + float(books[0])
+        found = float(energies @ self.mechanical) - self._from + float(books[0])
         self.apart = max(self.apart, (abs(found - float(books[1])), t))
         return found
 

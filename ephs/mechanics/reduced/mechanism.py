@@ -222,6 +222,14 @@ def _tables(
         driven=np.array(driven, dtype=np.int64),
         node=np.array([-1 if isinstance(p, Storage) and p.environment else i for i, p in storages], dtype=np.int64),
         conduction=np.array(conduction, dtype=np.int64).reshape(-1, 3),
+        sink=np.array(
+            [
+                [made.index(model.descriptor.components[c].path), taking]
+                for c, taking in zip(friction.tolist(), heat.tolist(), strict=True)
+                if c >= 0
+            ],
+            dtype=np.int64,
+        ).reshape(-1, 2),
         address=t.address,
         dims=t.dims,
         parameters=t.parameters,

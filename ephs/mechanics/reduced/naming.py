@@ -10,32 +10,32 @@ from ephs.semantics.bundle import Array
 __all__ = ["counted", "within"]
 
 
-def within(reduced: Reduced, q: Array, r: Array, s: Array) -> None:
-    """Hold elements, rates and entropies against the range of numbers.
+def within(reduced: Reduced, q: Array, r: Array, heats: Array) -> None:
+    """Hold elements, rates and heats against the range of numbers.
 
     Raises
     ------
     SolveError
         It names what has left it.
     """
-    if all(np.abs(values).max(initial=0.0) < LARGEST for values in (q, r, s)):
+    if all(np.abs(values).max(initial=0.0) < LARGEST for values in (q, r, heats)):
         return
     t = reduced.tables
     for link in range(reduced.links):
         for values, first, size in ((q, t.q_at, t.q_size), (r, t.r_at, t.dim)):
             if not np.abs(values[int(first[link]) : int(first[link] + size[link])]).max(initial=0.0) < LARGEST:
                 raise SolveError(Outcome.RANGE, _path(reduced, link), "")
-    for path, value in zip(reduced.entropies, s, strict=True):
+    for path, value in zip(reduced.entropies, heats, strict=True):
         if not abs(value) < LARGEST:
             raise SolveError(Outcome.RANGE, str(path), "")
     raise SolveError(Outcome.RANGE, "", "")
 
 
 def counted(reduced: Reduced, entry: int) -> tuple[str, str]:
-    """Path and words for an entry of what counts in errors: the tree's increments, its rates, the entropies."""
+    """Path and words for an entry of what counts in errors: the tree's increments, its rates, the heats."""
     n = reduced.freedoms
     if entry >= 2 * n:
-        return str(reduced.entropies[entry - 2 * n]), "its entropy"
+        return str(reduced.entropies[entry - 2 * n]), "its heat"
     link = int(np.flatnonzero(reduced.tables.r_at[: reduced.links] <= entry % n)[-1])
     return _path(reduced, link), "its position" if entry < n else "its rate"
 

@@ -64,6 +64,7 @@ class Mechanism(NamedTuple):
     driven: Index  # (tree freedoms,): 1 where the rate is prescribed
     node: Index  # (entropies,): component of the storage, −1: the environment
     conduction: Index  # (conductions, 3): component, entropy, entropy
+    sink: Index  # (frictions, 2): place of what it makes, entropy that takes its heat
     address: Index  # (components,)
     dims: Index  # (components, 4)
     parameters: Array

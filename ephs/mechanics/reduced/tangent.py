@@ -214,6 +214,11 @@ class Linearised:
         t, w = self.equations.reduced.tables, self.equations.work
         return np.concatenate([np.zeros(0), *(w.rate[i, : t.dim[i]] for i in range(t.kind.size) if t.kind[i] == CUT)])
 
+    @property
+    def entropy_rates(self) -> Array:
+        """(entropies,) ṡ in J/(K s) where `forward` or `inverse` was called last."""
+        return self._s_rate
+
     def targets(self, q: Array, r: Array, s: Array) -> tuple[Array, int]:
         """(m,) what the constraints' rows on the accelerations are to be, −(d rows/dt)·r; and the rows' rank."""
         self.forward(q, r, s)

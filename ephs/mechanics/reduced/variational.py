@@ -77,21 +77,20 @@ class Variational(ReducedMethod):
         except SolveError:
             self._matrix = None
             xi, push, middle = self._solved(state, h, momentum, before, h * state.r)
-        middle_momentum, force, s_rate, made, powers = middle
+        middle_momentum, force, flows, powers = middle
         after = self._turned(xi, middle_momentum + 0.5 * h * self._untwisted(0.5 * xi, force))
         q = eq.moved(state.q, xi)
         mass = eq.mass(q, state.r)
         free = np.asarray(np.linalg.solve(mass, after), dtype=float)
-        s = state.s + h * s_rate
-        books = state.books + h * np.concatenate([powers, made])
-        end = ReducedState(state.t + h, q, free, s, books)
-        closed = eq.closed(end)
+        closed = eq.closed(ReducedState(state.t + h, q, free, state.heats, state.books))
+        work = h * powers[1]
         if self._driven.size:  # the work of what is prescribed: its impulses at both ends of the step
             impulse = mass @ closed.r - after
             rows = eq.rows()
             second = np.linalg.lstsq(rows.T, impulse, rcond=CONSTRAINT)[0][: self._driven.size]
             rates = closed.r[self._driven]
-            books[1] += float((push[: self._driven.size] + second) @ rates)
+            work += float((push[: self._driven.size] + second) @ rates)
+        closed = eq.booked(state, closed, h * flows, np.zeros(flows.size), work)
         self._guess = closed.q, closed.r + (closed.r - state.r) * 0.5
         return Attempt(state, closed, h, 0.0, eq.least(state, closed))
 
@@ -107,7 +106,7 @@ class Variational(ReducedMethod):
 
     def _solved(
         self, state: ReducedState, h: float, momentum: Array, before: Array, xi: Array
-    ) -> tuple[Array, Array, tuple[Array, Array, Array, Array, Array]]:
+    ) -> tuple[Array, Array, tuple[Array, Array, Array, Array]]:
         """ξ, the impulses G⁰ᵀλ, and what the middle of the step gives, to rounding."""
         eq, m, n = self.equations, self._rows, xi.size
         push, last, residual = np.zeros(m), np.inf, np.zeros(n)
@@ -136,32 +135,35 @@ class Variational(ReducedMethod):
         path, what = counted(eq.reduced, n + int(np.argmax(np.nan_to_num(np.abs(residual), nan=np.inf))))
         raise SolveError(Outcome.DIVERGED, path, f"{what} in the middle of the step")
 
-    def _start(self, xi: Array, h: float, middle: tuple[Array, Array, Array, Array, Array]) -> Array:
+    def _start(self, xi: Array, h: float, middle: tuple[Array, Array, Array, Array]) -> Array:
         """The momentum at the step's start that the middle of the step stands for."""
         momentum, force = middle[:2]
         return self._turned(-xi, momentum - 0.5 * h * self._untwisted(-0.5 * xi, force))
 
-    def _middle(self, state: ReducedState, h: float, xi: Array) -> tuple[Array, Array, Array, Array, Array]:
-        """p̄, g, ṡ, what components make, heat and work per second, in the middle of a step."""
+    def _middle(self, state: ReducedState, h: float, xi: Array) -> tuple[Array, Array, Array, Array]:
+        """p̄, g, the flows of heat in W, heat and work per second, in the middle of a step."""
         eq = self.equations
         q, r = eq.moved(state.q, 0.5 * xi), xi / h
         if self._bent:
             q = eq.fitted(q, r)
         momentum, force = np.zeros(eq.n), np.zeros(eq.n)
         s_rate, made, powers = np.zeros(eq.ns), np.zeros(len(eq.reduced.made)), np.zeros(2)
-        s = state.s
+        flows = made
+        heats = state.heats
         for _ in range(2 if eq.ns else 1):  # temperatures in the middle, by two passes
             made[:] = 0.0
-            eq.load(state.t + 0.5 * h, q, r, s)
+            eq.load(state.t + 0.5 * h, q, r, heats)
+            s = eq.heats.entropies(heats)
             eq.refuse(
                 *action_derivatives(
                     eq.reduced.tables, eq.work, q, r, s, eq.drive, eq.wrench, eq.scal, s_rate, made, powers,
                     momentum, force,
                 )
             )  # fmt: skip
-            s = state.s + 0.5 * h * s_rate
+            flows = eq.heats.flows(heats, made)
+            heats = eq.heats.taken(state.heats, 0.5 * h * flows)[0]
         eq.evaluations += 1
-        return momentum, force, s_rate, made, powers
+        return momentum, force, flows, powers
 
     def _gap(self, state: ReducedState, xi: Array, h: float) -> tuple[Array, Array]:
         """Residuals of prescribed joints and loops at the end of the step, and their rows on changes of ξ."""
@@ -177,8 +179,8 @@ class Variational(ReducedMethod):
         eq, n = self.equations, xi.size
         momentum, force = middle[:2]
         q, r = eq.moved(state.q, 0.5 * xi), xi / h
-        eq.load(state.t + 0.5 * h, q, r, state.s)
-        by_momentum, by_force = self._linear.action(eq.fitted(q, r), r, state.s)
+        eq.load(state.t + 0.5 * h, q, r, state.heats)
+        by_momentum, by_force = self._linear.action(eq.fitted(q, r), r, eq.heats.entropies(state.heats))
         along = np.eye(n)
         for code, where in self._groups:
             dexp_left(code, 0.5 * xi[where], along[where, where])

@@ -77,7 +77,7 @@ class ExplicitTangent:
         eq, scheme, c = self.equations, self.method.scheme, self.method.c
         base, count = point.state, scheme.b.size
         numbers = range(len(self.family.parameters))
-        y0 = eq.vector(base)
+        y0, books = eq.vector(base), slice(eq.nv + eq.n + eq.ns, eq.size)
         dy0 = np.hstack([np.zeros_like(point.q), point.y])
         k, dk = np.zeros((count, eq.size)), np.zeros((count, len(numbers), eq.size))
         for i in range(count):
@@ -90,9 +90,20 @@ class ExplicitTangent:
                     j, point.q[j], dy[j], base.q, y, lambda of, q, v, time=time: of.rates(time, q, v)
                 )
         y1, dy1 = y0 + h * (scheme.b @ k), dy0 + h * np.einsum("s,spn->pn", scheme.b, dk)
+        dy1[:, books] = [self._made(base, j, y0, dy0[j], y1, dy1[j]) for j in numbers]
         end = eq.state(base, y1, base.t + h)
         dq = np.array([self._carried(y1[: eq.nv], point.q[j], dy1[j, : eq.nv]) for j in numbers])
         return self._closed(Point(end, dq, dy1[:, eq.nv :]))
+
+    def _made(self, base: ReducedState, number: int, y0: Array, dy0: Array, y1: Array, dy1: Array) -> Array:
+        """The tangent of the books after a step, by those of (v, r, heats, books) before it and of flows in it."""
+        size = y0.size
+
+        def counted(of: Equations, _: Array, both: Array) -> Array:
+            return of.settled(both[size:], both[:size])[of.nv + of.n + of.ns :]
+
+        along, at = np.concatenate([dy1, dy0]), np.concatenate([y1, y0])
+        return self._change(number, np.zeros(self.equations.nv), along, base.q, at, counted)
 
     def _closed(self, point: Point) -> Point:
         """The state with loops closed, and the tangent of that."""
@@ -128,12 +139,13 @@ class ExplicitTangent:
         the parameter's neighbours move the state little enough, else one after the other."""
         eq, parameter = self.equations, self.family.parameters[number]
         rates = slice(eq.nv, eq.nv + eq.n)
+        heats = slice(rates.stop, rates.stop + eq.ns)
         fast = max(1.0, float(np.abs(y[rates]).max(initial=0.0)))
         size = max(
             float(np.abs(dq).max(initial=0.0)),
             float(np.abs(dy[: eq.nv]).max(initial=0.0)),
             float(np.abs(dy[rates]).max(initial=0.0)) / fast,
-            float(np.abs(dy[rates.stop : rates.stop + eq.ns]).max(initial=0.0)),
+            float(np.abs(dy[heats] * eq.heats.slopes() / eq.heats.temperatures(y[heats])).max(initial=0.0)),
         )
 
         def beside(of: Equations, by: float) -> Array:
@@ -163,11 +175,11 @@ class ExplicitTangent:
         return self._others[number, offset]
 
     def _joined(self, of: ReducedState, other: ReducedState) -> Array:
-        """Another state as increments from one: of elements, then of rates, entropies and books as they are."""
+        """Another state as increments from one: of elements, then of rates, heats and books as they are."""
         v = np.zeros(self.equations.nv)
         for freedoms, elements, edge in self._parts:
             v[freedoms] = edge.pair.manifold.increment(of.q[elements], other.q[elements])
-        return np.concatenate([v, other.r, other.s, other.books])
+        return np.concatenate([v, other.r, other.heats, other.books])
 
     def _carried(self, v: Array, dq: Array, dv: Array) -> Array:
         """The tangent of q·exp(v)."""
@@ -193,7 +205,7 @@ class ExplicitTangent:
         states: list[ReducedState] = []
         for point in points:
             state, dy = point.state, offset * point.y[number]
-            r, s, books = np.split(dy, [eq.n, eq.n + eq.ns])
+            r, heats, books = np.split(dy, [eq.n, eq.n + eq.ns])
             q = eq.advance(state.q, offset * point.q[number])
-            states.append(replace(state, q=q, r=state.r + r, s=state.s + s, books=state.books + books))
+            states.append(replace(state, q=q, r=state.r + r, heats=state.heats + heats, books=state.books + books))
         return problem, eq.rows_of(states)

@@ -27,7 +27,7 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.codes import VECTOR
 
-__all__ = ["COEFFICIENTS", "NODES", "T_INVERSE", "VALUES", "Radau", "RadauState", "T"]
+__all__ = ["COEFFICIENTS", "DEFECT", "GAMMA", "NODES", "T_INVERSE", "VALUES", "Radau", "RadauState", "T"]
 
 _S6 = 6.0**0.5
 NODES = np.array([(4.0 - _S6) / 10.0, (4.0 + _S6) / 10.0, 1.0])

@@ -66,7 +66,7 @@ class _Made:
         """All numbers that a run depends on, the start's last."""
         eq = self.equations
         tables = [a for a in self._tables() if a.dtype == np.float64]
-        return [*tables, eq.drive, eq.wrench, eq.scal, self.start.q, self.start.r, self.start.s]
+        return [*tables, eq.drive, eq.wrench, eq.scal, self.start.q, self.start.r, self.start.heats]
 
     def counts(self) -> list[Any]:
         """Structure that all members share."""
@@ -279,7 +279,7 @@ class Ensemble:
             raise Unlike
         _, q, y = leg.kept()
         if first:
-            beginning = np.concatenate([start.r, start.s, start.books])
+            beginning = np.concatenate([start.r, start.heats, start.books])
             q, y = np.concatenate([start.q[None], q]), np.concatenate([beginning[None], y])
         counts = leg.counts
         return [read(q, y) for read in self._reads], counts.steps, counts.rejected
@@ -293,13 +293,13 @@ class Ensemble:
 
     def _fill(self, equations: Equations, image: Array) -> ReducedState:
         """Put an image into the tables; the state that it starts from."""
-        q, r, s = (np.zeros(n) for n in self._sizes[-3:])
-        made = _Made(equations, ReducedState(self._t0, q, r, s, np.zeros(0)))
+        q, r, heats = (np.zeros(n) for n in self._sizes[-3:])
+        made = _Made(equations, ReducedState(self._t0, q, r, heats, np.zeros(0)))
         at = 0
         for array in made.arrays():
             array[...] = image[at : at + array.size].reshape(array.shape)
             at += array.size
-        return ReducedState(self._t0, q, r, s, np.zeros(2 + len(equations.reduced.made)))
+        return ReducedState(self._t0, q, r, heats, np.zeros(2 + len(equations.reduced.made)))
 
     def _stepper(self, equations: Equations) -> Any:
         """The method on these equations, None where it does not take many steps in one call."""

@@ -149,7 +149,7 @@ def test_the_jacobian_of_a_step_is_that_of_its_right_hand_side(drawn):
     scene, model, state, _ = drawn
     equations = Equations(scene, problem_of_scene(scene), 0.0)
     q, r, s = model.layout.split(state.array)
-    here = replace(equations.start(0.0), q=q, r=r, s=s)
+    here = replace(equations.start(0.0), q=q, r=r, heats=equations.heats.energies(s))
     jacobian = Jacobian(equations)
     y, size = equations.vector(here), jacobian.size
 

@@ -53,7 +53,8 @@ def both(eq, state):
         (accelerate_densely, eq.reduced.tables, eq.work),
     ):
         found = [np.zeros(n) for n in (eq.n, eq.ns, len(eq.reduced.made), 2)]
-        status = function(tables, memory, state.q, state.r, state.s, eq.drive, eq.wrench, eq.scal, *found)
+        s = eq.heats.entropies(state.heats)
+        status = function(tables, memory, state.q, state.r, s, eq.drive, eq.wrench, eq.scal, *found)
         assert status[0] == 0
         out.append(found)
     return out

@@ -63,7 +63,18 @@ def test_bodies_are_pulled_together(one, two, tmp_path):
     ):
         rates, heat, made, powers = (np.zeros(n) for n in (eq.n, eq.ns, len(eq.reduced.made), 2))
         status = function(
-            tables, memory, state.q, state.r, state.s, eq.drive, eq.wrench, eq.scal, rates, heat, made, powers
+            tables,
+            memory,
+            state.q,
+            state.r,
+            eq.heats.entropies(state.heats),
+            eq.drive,
+            eq.wrench,
+            eq.scal,
+            rates,
+            heat,
+            made,
+            powers,
         )
         assert status[0] == 0
         # bodies stand as the world's axes do, so that a body's frame is the world's

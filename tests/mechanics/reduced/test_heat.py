@@ -1,0 +1,175 @@
+"""Heat of friction: what a brake takes is what its disc had, and entropies change by what is made, by every method."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+import ephs
+from ephs.mechanics.reduced.heat import Heats
+from examples.failing import scene
+
+RATE, ENERGY = 100.0, 5000.0
+EPS = float(np.finfo(float).eps)
+CONSTANT = {"radau": 0.0, "alpha": 1e-4, "variational": 0.0, "rk54": 0.0, "rk87": 0.0}
+"""Methods that take constant steps, and the part of a stiff brake's heat that they may miss."""
+
+
+def brake(friction, capacity=None, temperature=300.0):
+    """A disc of 1 kg m² on a pin, 100 rad/s: 5000 J."""
+    heat = 'heat = "pad"' if capacity else ""
+    pad = f"[thermal.pad]\ncapacity = {capacity}\ntemperature = {temperature}" if capacity else ""
+    return scene(
+        f"""
+        [bodies.disc]
+        mass = 1.0
+        inertia = [0.5, 0.5, 1.0]
+        angular_velocity = [0.0, 0.0, {RATE}]
+        [joints.pin]
+        type = "revolute"
+        bodies = ["ground", "disc"]
+        at = [0.0, 0.0, 0.0]
+        axis = [0.0, 0.0, 1.0]
+        friction = {friction}
+        {heat}
+        {pad}
+        """,
+        "[world]\ngravity = [0.0, 0.0, 0.0]\n",
+    )
+
+
+def arms(frictions, capacities, conductance, rates):
+    """Two arms in gravity, friction in both pins, each pad warming, heat passing between the pads."""
+    pin, elbow = frictions
+    return scene(
+        f"""
+        [bodies.upper]
+        mass = 1.0
+        inertia = [0.1, 0.1, 0.1]
+        position = [0.5, 0.0, 0.0]
+        velocity = [0.0, {0.5 * rates[0]}, 0.0]
+        angular_velocity = [0.0, 0.0, {rates[0]}]
+        [bodies.lower]
+        mass = 0.7
+        inertia = [0.05, 0.05, 0.05]
+        position = [1.3, 0.0, 0.0]
+        velocity = [0.0, {rates[0] + 0.3 * (rates[0] + rates[1])}, 0.0]
+        angular_velocity = [0.0, 0.0, {rates[0] + rates[1]}]
+        [joints.pin]
+        type = "revolute"
+        bodies = ["ground", "upper"]
+        at = [0.0, 0.0, 0.0]
+        axis = [0.0, 0.0, 1.0]
+        friction = {pin}
+        heat = "one"
+        [joints.elbow]
+        type = "revolute"
+        bodies = ["upper", "lower"]
+        at = [1.0, 0.0, 0.0]
+        axis = [0.0, 0.0, 1.0]
+        friction = {elbow}
+        heat = "two"
+        [thermal.one]
+        capacity = {capacities[0]}
+        temperature = 300.0
+        [thermal.two]
+        capacity = {capacities[1]}
+        temperature = 290.0
+        [conduction.gap]
+        between = ["one", "two"]
+        conductance = {conductance}
+        """,
+        "[world]\ngravity = [0.0, -9.81, 0.0]\n",
+    )
+
+
+def run(model, until, method, step, **more):
+    return ephs.simulate(model, until, method=method, step=step, audit="off", **more)
+
+
+@pytest.mark.parametrize("capacity", [None, 1e-2, 1e-3])
+@pytest.mark.parametrize(("friction", "step"), [(1e6, 0.002), (1e6, 0.5), (100.0, 0.05), (20.0, 0.05), (0.5, 0.05)])
+def test_radau_books_what_the_disc_had_at_any_step(friction, step, capacity):
+    sol = run(brake(friction, capacity), 1.0, "radau", step)
+    books = sol.ledgers
+    assert books.heat[-1] + books.kinetic[-1] == pytest.approx(ENERGY, rel=100 * EPS * math.sqrt(len(sol)))
+    assert sol.audit.passed
+    if capacity:  # in closed form
+        entropy = capacity * math.log1p(books.heat[-1] / (capacity * 300.0))
+        assert books.entropy[-1] - books.entropy[0] == pytest.approx(entropy, rel=1e-12)
+
+
+@pytest.mark.parametrize("capacity", [None, 1e-3])
+@pytest.mark.parametrize(("friction", "step"), [(1e6, 0.002), (100.0, 0.05), (20.0, 0.05)])
+def test_alpha_books_what_the_disc_had(friction, step, capacity):
+    sol = run(brake(friction, capacity), 1.0, "alpha", step)
+    assert sol.ledgers.heat[-1] == pytest.approx(ENERGY, rel=1e-4)
+    assert sol.ledgers.kinetic[-1] < 1e-9
+    assert sol.audit.passed
+
+
+@pytest.mark.parametrize("method", ["radau", "alpha"])
+def test_a_quadrature_alone_does_not(method, monkeypatch):
+    monkeypatch.setattr(Heats, "booked", lambda self, flows, missed, lost: flows)
+    sol = run(brake(1e4), 0.2, method, 0.01)
+    assert abs(sol.ledgers.heat[-1] / ENERGY - 1.0) > 0.5
+    assert not sol.audit.passed
+
+
+def test_vibrations_that_the_method_damps_are_no_heat():
+    model = scene(
+        """
+        [bodies.disc]
+        mass = 1.0
+        inertia = [0.5, 0.5, 1.0]
+        angular_velocity = [0.0, 0.0, 100.0]
+        [joints.pin]
+        type = "revolute"
+        bodies = ["ground", "disc"]
+        at = [0.0, 0.0, 0.0]
+        axis = [0.0, 0.0, 1.0]
+        friction = 1e-6
+        stiffness = 1e6
+        """,
+        "[world]\ngravity = [0.0, 0.0, 0.0]\n",
+    )
+    for method in ("radau", "alpha"):
+        sol = run(model, 0.5, method, 0.01)
+        assert sol.ledgers.heat[-1] < 1e-2 * ENERGY
+        assert [finding.law for finding in sol.audit.findings] == ["energy"]
+
+
+@pytest.mark.parametrize("method", sorted(CONSTANT))
+@settings(max_examples=6)
+@given(
+    st.tuples(st.floats(0.01, 0.3), st.floats(0.01, 0.3)),
+    st.tuples(st.floats(0.5, 50.0), st.floats(0.5, 50.0)),
+    st.floats(0.05, 1.0),
+    st.tuples(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0)),
+)
+@example((0.1, 0.3), (0.05, 0.02), 0.1, (2.0, -3.0))
+def test_entropies_change_by_what_is_made(method, frictions, capacities, conductance, rates):
+    sol = run(arms(frictions, capacities, conductance, rates), 0.3, method, 0.01)
+    books = sol.ledgers
+    change = sum(values - values[0] for values in books.entropies.values())
+    terms = sum(np.abs(values - values[0]) for values in books.entropies.values()) + np.abs(books.made)
+    rounding = 8.0 * EPS * len(sol) * (terms.max() + sum(np.abs(v).max() for v in books.entropies.values()))
+    assert np.abs(change - (books.made - books.made[0])).max() <= rounding
+    assert np.diff(books.heat).min() >= 0.0
+    for made in books.makers.values():
+        assert np.diff(made).min() >= -rounding
+    heats = sum(
+        books.storages[path] - books.storages[path][0] for path in books.entropies if books.exergies[path].any()
+    )
+    assert heats == pytest.approx(books.heat, abs=1e-11 * (1.0 + np.abs(books.heat).max()))
+
+
+@pytest.mark.parametrize(("method", "order", "steps"), [("radau", 5, (8, 16)), ("alpha", 2, (64, 128, 256))])
+def test_the_order_is_kept(method, order, steps):
+    model = arms((0.2, 0.1), (5.0, 2.0), 0.3, (1.0, -2.0))
+    exact = ephs.simulate(model, 0.4, method="rk87", rtol=1e-13, atol=1e-13).ledgers.heat[-1]
+    errors = [abs(run(model, 0.4, method, 0.4 / n).ledgers.heat[-1] - exact) for n in steps]
+    falls = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
+    assert np.all(falls > order - 0.35), (errors, falls)
