@@ -88,7 +88,7 @@ class Symbolic(Interpreted):
         condition = expression(truth)
         if isinstance(one, bool | Condition):
             return _truth(sp.ITE(condition, expression(one), expression(other)))
-        return Expression(sp.Piecewise((expression(one), condition), (expression(other), True)))
+        return Expression(sp.Piecewise((expression(one), condition), (expression(other), True), evaluate=False))
 
     def _both(self, one: Truth, other: Truth) -> Truth:
         return _truth(sp.And(expression(one), expression(other)))

@@ -26,10 +26,10 @@ Place: TypeAlias = tuple["Local", int]
 class Local(Cells[Any]):
     """Cells that exist while staging: each holds a known number, or one of the evaluator's."""
 
-    __slots__ = ("entries", "on", "whole")
+    __slots__ = ("born", "entries", "on", "whole")
 
     def __init__(self, on: "Unrolled", entries: list[Any], whole: bool) -> None:
-        self.on, self.entries, self.whole = on, entries, whole
+        self.on, self.entries, self.whole, self.born = on, entries, whole, on.birth()
 
     def load(self, index: Integer) -> Any:
         """Return the number at an index."""
@@ -56,6 +56,7 @@ class Unrolled(Evaluator):
     def __init__(self, base: Evaluator) -> None:
         self.base = base
         self._journals: list[dict[Place, Any]] = []
+        self._births = 0
 
     def held(self, part: Any) -> Any:
         """Return an array as cells that start with its numbers, or a number as it is."""
@@ -63,6 +64,11 @@ class Unrolled(Evaluator):
             return part
         array = cast("np.ndarray[Any, np.dtype[Any]]", part)
         return Local(self, array.reshape(-1).tolist(), array.dtype == np.int64)
+
+    def birth(self) -> int:
+        """Return how many cells were made before."""
+        self._births += 1
+        return self._births
 
     def written(self, place: Place) -> None:
         """Note the number at a place before it changes, where a branch or a loop must know."""
@@ -131,13 +137,18 @@ class Unrolled(Evaluator):
         self._settle(slots)
 
     def _run(self, body: Callable[[], Any]) -> dict[Place, Any]:
-        """Run a body and return what it changed, with the numbers before."""
+        """Run a body and return what it changed of what was there, with the numbers before."""
+        births = self._births
         self._journals.append({})
         try:
             body()
         finally:
             journal = self._journals.pop()
-        return {place: old for place, old in journal.items() if place[0].entries[place[1]] is not old}
+        return {
+            (cells, index): old
+            for (cells, index), old in journal.items()
+            if cells.born <= births and cells.entries[index] is not old
+        }
 
     def _changed(self, body: Callable[[], Any]) -> set[Place]:
         """Return the places that a body changes in any of its rounds; nothing is emitted."""
