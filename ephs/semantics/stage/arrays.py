@@ -132,9 +132,9 @@ class Arrays(Interpreted):
         return Mask(np.equal(_of(one), _of(other)))
 
     def real(self, integer: Integer) -> Real:
-        return (
-            Batch(integer.values.astype(np.float64)) if isinstance(integer, BatchCount) else float(cast("int", integer))
-        )
+        if isinstance(integer, BatchCount):
+            return Batch(integer.values.astype(np.float64))
+        return np.float64(cast("int", integer))
 
     def integer(self, real: Real) -> Integer:
         values = np.trunc(np.nan_to_num(_of(real), posinf=np.inf, neginf=-np.inf))

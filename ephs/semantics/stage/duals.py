@@ -150,7 +150,7 @@ class Duals(Evaluator):
         return Dual(self.base.scale(x.value, power), tuple(self.base.scale(slope, power) for slope in x.slopes))
 
     def _choose(self, truth: Condition, one: Any, other: Any) -> Any:
-        if not isinstance(one, Dual) and not isinstance(other, Dual):
+        if not isinstance(one, float | Number) and not isinstance(other, float | Number):
             return self.base.select(truth, one, other)
         a, b = self.dual(one), self.dual(other)
         return Dual(self.base.select(truth, a.value, b.value), self.base.select(truth, a.slopes, b.slopes))

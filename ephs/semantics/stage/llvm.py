@@ -39,8 +39,8 @@ def _llvm() -> Any:
     from llvmlite import binding  # pyright: ignore[reportMissingTypeStubs]
 
     llvm: Any = binding
-    llvm.initialize_all_targets()
-    llvm.initialize_all_asmprinters()
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
     return llvm
 
 

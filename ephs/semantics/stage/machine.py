@@ -5,6 +5,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, fields, is_dataclass
 from typing import Any, Final, cast, final
 
+import numpy as np
+
 from ephs.semantics.stage.elementary import COMPOSED
 from ephs.semantics.stage.emission import IntegerPointer, RealPointer, Symbol, TruthSymbol, WholeSymbol, Writer
 from ephs.semantics.stage.errors import StageError
@@ -102,7 +104,7 @@ class Machine(Evaluator):
 
     def _function(self, name: Function, *arguments: Real) -> Real:
         if known(*arguments):
-            return float(elementary(name, *cast("tuple[float, ...]", arguments)))
+            return elementary(name, *cast("tuple[float, ...]", arguments))
         if name in COMPOSED:
             return COMPOSED[name](self, *arguments)
         to, vector = self.to, "" if self.width == 1 else f"v{self.width}"
@@ -113,7 +115,7 @@ class Machine(Evaluator):
 
     def real(self, integer: Integer) -> Real:
         if isinstance(integer, int):
-            return float(integer)
+            return np.float64(integer)
         to = self.to
         operand = to.of_integer(integer, wide=self.width > 1)
         return Symbol(to, to.let(f"sitofp {to.typed('i64')} {operand} to {to.real}"))
@@ -330,7 +332,7 @@ def _flat(to: Writer, value: Any, leaf: Callable[[str, str], None]) -> Any:
             parts = [getattr(value, field.name) for field in fields(value)]
             return (is_dataclass, type(value), *(_flat(to, part, leaf) for part in parts))
         case float():
-            return (float, float(value).hex())
+            return (float, type(value), float(value).hex())
         case _:
             return (None, type(value), value)
 
@@ -351,4 +353,4 @@ def _shaped(to: Writer, form: Any, leaves: Iterator[str]) -> Any:
         return Variable[Any](_shaped(to, rest[0], leaves))
     if kind is Record or kind is is_dataclass:
         return rest[0](*[_shaped(to, part, leaves) for part in rest[1:]])
-    return float.fromhex(rest[0]) if kind is float else rest[1]
+    return rest[0](float.fromhex(rest[1])) if kind is float else rest[1]

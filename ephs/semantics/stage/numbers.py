@@ -7,7 +7,9 @@ sign of a zero.
 """
 
 from abc import ABC, abstractmethod
-from typing import Literal, NoReturn, TypeAlias, Union, final
+from typing import Final, Literal, NoReturn, TypeAlias, Union, final
+
+import numpy as np
 
 from ephs.semantics.stage.errors import StageError
 
@@ -22,6 +24,10 @@ Truth: TypeAlias = Union[bool, "Condition"]
 Operation: TypeAlias = Literal["+", "-", "*", "/"]
 IntegerOperation: TypeAlias = Literal["+", "-", "*", "//", "%"]
 Order: TypeAlias = Literal["<", "<=", ">", ">="]
+
+
+_ZERO: Final = np.float64(0.0)
+"""A zero that follows IEEE where it divides a known number; Python's own raises."""
 
 
 class Condition:
@@ -116,13 +122,13 @@ class Number(_Unknown, ABC):
     @final
     def __mul__(self, other: Real) -> Real:
         if _is(other, 0.0):
-            return 0.0
+            return _ZERO
         return self if _is(other, 1.0) else self._binary("*", self, other)
 
     @final
     def __rmul__(self, other: Real) -> Real:
         if _is(other, 0.0):
-            return 0.0
+            return _ZERO
         return self if _is(other, 1.0) else self._binary("*", other, self)
 
     @final
@@ -131,7 +137,7 @@ class Number(_Unknown, ABC):
 
     @final
     def __rtruediv__(self, other: Real) -> Real:
-        return 0.0 if _is(other, 0.0) else self._binary("/", other, self)
+        return _ZERO if _is(other, 0.0) else self._binary("/", other, self)
 
     @final
     def __neg__(self) -> Real:

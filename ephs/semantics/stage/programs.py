@@ -153,7 +153,8 @@ def _staged(program: Program, members: int, shared: tuple[str, ...]) -> tuple[st
             return _result(on, entry, entry.run(on, made))
 
         texts = [f"{kind} %a{k}" for k, (kind, _, _) in enumerate(parameters)]
-        results[name], _ = on.define(f"{program.name}_{name}", texts, body)
+        with np.errstate(all="ignore"):
+            results[name], _ = on.define(f"{program.name}_{name}", texts, body)
     return on.text, results
 
 

@@ -59,11 +59,12 @@ class Unrolled(Evaluator):
         self._births = 0
 
     def held(self, part: Any) -> Any:
-        """Return an array as cells that start with its numbers, or a number as it is."""
+        """Return an array as cells that start with its numbers, or a number as it is; division by zero follows IEEE."""
         if not isinstance(part, np.ndarray):
             return part
         array = cast("np.ndarray[Any, np.dtype[Any]]", part)
-        return Local(self, array.reshape(-1).tolist(), array.dtype == np.int64)
+        whole = array.dtype == np.int64
+        return Local(self, array.reshape(-1).tolist() if whole else list(array.reshape(-1)), whole)
 
     def birth(self) -> int:
         """Return how many cells were made before."""
@@ -200,7 +201,7 @@ class Unrolled(Evaluator):
     # The rest is the base evaluator's
 
     def _reals(self, size: int) -> RealCells:
-        return cast("RealCells", Local(self, [0.0] * size, False))
+        return cast("RealCells", Local(self, [np.float64()] * size, False))
 
     def _wholes(self, size: int) -> IntegerCells:
         return cast("IntegerCells", Local(self, [0] * size, True))

@@ -13,10 +13,12 @@ from ephs.semantics.stage.intervals import INTERVALS, Interval
 from ephs.semantics.stage.symbolic import SYMBOLIC, Expression, expression, sp
 
 INPUTS, VARIABLES, OUTPUTS = 3, 2, 4
-CONSTANTS = (0.5, -1.0, 1.0, 2.0, 3.25, -0.125, 0.1)
+CONSTANTS = (0.5, -1.0, 1.0, 2.0, 3.25, -0.125, 0.78125)
 """Without zero: what is known to be zero is dropped, which the sign of a zero can tell."""
 UNARY = ("sqrt", "absolute", "floor", "sin", "cos", "exp", "log")
-BINARY = ("atan2", "copysign", "minimum", "maximum")
+BINARY = ("atan2", "copysign", "minimum", "maximum", "/")
+TAME = ("absolute", "floor", "sin", "cos", "minimum", "maximum")
+"""Functions of finite values that do not tell the sign of a zero, for ways in which more is known while staging."""
 
 
 def bodies(functions=(*UNARY, *BINARY), branches=True):
@@ -60,15 +62,15 @@ class Draw:
         ]
         if depth == 0:
             return self.random.choice(leaves)
-        kind = self.random.choice(
-            ["leaf", *"+-*/", "+", "*", "negative", "select", "staged", *self.random.sample(self.functions, 4)]
-        )
+        kinds = ["leaf", *"+-*+*", "negative", "select", "staged", *self.random.sample(self.functions, 4)]
+        kind = self.random.choice(kinds)
         if kind == "leaf":
             return self.random.choice(leaves)
         if kind == "select":
             return kind, self.condition(depth), self.expression(depth - 1), self.expression(depth - 1)
-        count = 1 if kind in UNARY or kind == "negative" else 2
-        return kind, *(self.expression(depth - 1) for _ in range(count))
+        parts = [self.expression(depth - 1) for _ in range(1 if kind in UNARY or kind == "negative" else 2)]
+        # What is made of constants alone may be zero, and what is known to be zero is dropped.
+        return (kind, *parts) if any(part[0] != "c" for part in parts) else parts[0]
 
     def condition(self, depth):
         kind = self.random.choice(["<", "<=", ">", ">=", "both", "either"] if depth > 1 else ["<", ">="])
@@ -81,9 +83,9 @@ def helper(on, a, b):
     return on.select(a < b, a * 2.0 - b, b / (1.0 + a * a))
 
 
-def run(on, body, x, out):
-    """Run a drawn program."""
-    variables = [on.variable(0.5), on.variable(-1.5)]
+def run(on, body, x, out, constant=lambda number: number):
+    """Run a drawn program; `constant` makes its constants numbers of the evaluator's, which are not rounded before."""
+    variables = [on.variable(constant(0.5)), on.variable(constant(-1.5))]
 
     def value(e, i):
         match e:
@@ -92,9 +94,9 @@ def run(on, body, x, out):
             case ("v", k):
                 return variables[k].value
             case ("c", number):
-                return number
+                return constant(number)
             case ("i",):
-                return on.real(i)
+                return constant(on.real(i))
             case ("select", c, a, b):
                 return on.select(truth(c, i), value(a, i), value(b, i))
             case ("staged", a, b):
@@ -106,8 +108,7 @@ def run(on, body, x, out):
             case ("*", a, b):
                 return value(a, i) * value(b, i)
             case ("/", a, b):
-                divisor = value(b, i)
-                return 1.0 if type(divisor) is float and divisor == 0.0 else value(a, i) / divisor
+                return value(a, i) / value(b, i)
             case ("negative", a):
                 return -value(a, i)
             case (name, *arguments):
@@ -200,21 +201,23 @@ def batch(body, x):
     return out[:, 0].copy()
 
 
-EXACT = {"compiled": compiled, "unrolled": unrolled, "tangent": tangent, "dual": dual}
+EXACT = {"compiled": compiled, "tangent": tangent, "dual": dual}
 """Ways to run a program that give the bits of the float run."""
-STRAIGHT = {"members": members, "batch": batch}
-"""The same for programs in which members do not take different branches."""
 
 
 def bounds(body, x):
     """Lower and upper bounds of each output."""
     out = [Interval(0.0, 0.0)] * OUTPUTS
-    run(INTERVALS, body, [Interval(value, value) for value in x], out)
+    run(INTERVALS, body, [Interval(value, value) for value in x], out, lambda c: Interval(c, c))
     return [(n.low, n.high) if isinstance(n, Interval) else (n, n) for n in out]
 
 
 def exact(body, x):
     """Each output as an exact number of SymPy."""
     out = [0.0] * OUTPUTS
-    run(SYMBOLIC, body, [Expression(sp.Rational(*Fraction(value).as_integer_ratio())) for value in x], out)
+
+    def number(value):
+        return Expression(sp.Rational(*Fraction(float(value)).as_integer_ratio()))
+
+    run(SYMBOLIC, body, [number(value) for value in x], out, number)
     return [expression(number) for number in out]
