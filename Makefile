@@ -68,7 +68,8 @@ repeat: $(VENV)/.installed-dev
 # TESTS chooses what the jobs below run: make matrix TESTS=tests/operad ONLY="3.13-newest"
 TESTS ?= tests
 dist: $(VENV)/.installed-release
-	rm -rf dist
+	rm -rf dist ephs/objects
+	$(BIN)/python -m tests.release objects
 	$(BIN)/python -m build --outdir dist
 	$(BIN)/python -m twine check --strict dist/*
 	$(BIN)/python -m tests.release wheel $(TESTS) -n$(CORES)
@@ -100,5 +101,5 @@ docs: $(VENV)/.installed-docs $(MATHJAX)
 	@echo 'The pages: docs/_build/html/index.html'
 
 clean:
-	rm -rf out mutants docs/_build .build .pytest_cache .hypothesis .ruff_cache .coverage dist
+	rm -rf out mutants ephs/objects docs/_build .build .pytest_cache .hypothesis .ruff_cache .coverage dist
 	find ephs tests -name __pycache__ -type d -prune -exec rm -rf {} +

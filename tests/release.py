@@ -1,14 +1,18 @@
-"""What is built, tested as it is installed: ``python -m tests.release wheel|matrix|smoke [what pytest is to run]``.
+"""What is built, tested as it is installed: ``python -m tests.release objects|wheel|matrix|smoke [for pytest]``.
 
+``objects``: object code of the shipped programs, into the tree, from where a build takes it.
 ``wheel``: the wheel and the sdist in dist/; what they hold, and the sdist's tests against the installed wheel.
 ``matrix``: the same tests under each of `VERSIONS` that is found here, oldest and newest dependencies.
 ``smoke``: commands of the wheel under each of these but the running one, with no extras and nothing compiled.
 
-It needs no more than the standard library, ``build`` and ``uv``, and says what it could not find.
+It needs no more than the standard library, ``build`` and ``uv`` (``objects``: the package), and says what it could not
+find.
 """
 
 import argparse
+import csv
 import os
+import shutil
 import subprocess
 import sys
 import tarfile
@@ -34,6 +38,7 @@ DATA = (
     *(f"ephs/show/assets/{file.name}" for file in sorted((ROOT / "ephs/show/assets").iterdir())),
     *(f"ephs/templates/{file.name}" for file in sorted((ROOT / "ephs/templates").iterdir()) if file.is_file()),
 )
+OBJECTS = ROOT / "ephs" / "objects"
 PATIENCE_S = 300.0
 SMOKE = (
     ("--version",),
@@ -91,12 +96,32 @@ def built(folder: Path) -> tuple[Path, Path]:
 
 def faults_of(wheel: Path) -> list[str]:
     """What is missing in a wheel, or has no place there."""
-    names = set(zipfile.ZipFile(wheel).namelist())
+    with zipfile.ZipFile(wheel) as archive:
+        names = set(archive.namelist())
+        listed = {row[0] for name in names if name.endswith("/RECORD") for row in _rows(archive.read(name).decode())}
     sources = {file.relative_to(ROOT).as_posix() for file in (ROOT / "ephs").rglob("*.py")}
-    missing = [f"{name} is missing" for name in sorted({*sources, *DATA} - names)]
+    code = {file.relative_to(ROOT).as_posix() for file in OBJECTS.rglob("*") if file.is_file()}
+    missing = [f"{name} is missing" for name in sorted({*sources, *DATA, *code} - names)]
+    missing += ["object code is missing: run the job objects before the build"] * (not code)
+    missing += [f"{name} is not in RECORD" for name in sorted(names - listed) if not name.endswith("/RECORD")]
     foreign = [f"{n} has no place there" for n in sorted(names) if not n.startswith("ephs/") and ".dist-info/" not in n]
     licensed = any(name.endswith("licenses/LICENSE") for name in names)
     return [*missing, *foreign, *([] if licensed else ["the licence is missing"])]
+
+
+def _rows(text: str) -> list[list[str]]:
+    return list(csv.reader(text.splitlines()))
+
+
+def objects_job() -> int:
+    """The job ``objects``."""
+    from ephs.shipped import write_objects
+
+    shutil.rmtree(OBJECTS, ignore_errors=True)
+    write_objects(OBJECTS)
+    files = [file for file in OBJECTS.rglob("*") if file.is_file()]
+    print(f"ephs/objects: {len(files)} files, {sum(file.stat().st_size for file in files) / 1000:.0f} kB")
+    return 0
 
 
 def tested(python: str, sdist: Path, folder: Path, tests: Sequence[str]) -> int:
@@ -191,13 +216,13 @@ def _smoke(name: str, wheel: Path, folder: Path) -> int:
 def main() -> int:
     """Do the job that is asked for."""
     parser = argparse.ArgumentParser(prog="python -m tests.release", description=__doc__)
-    parser.add_argument("job", choices=("wheel", "matrix", "smoke"))
+    parser.add_argument("job", choices=("objects", "wheel", "matrix", "smoke"))
     parser.add_argument("tests", nargs="*", default=["tests"], help="what pytest is to run")
     parser.add_argument("--only", nargs="+", choices=VERSIONS, default=list(VERSIONS), help="these of the matrix")
     asked, options = parser.parse_known_args()  # what is not known here is pytest's: -n 2
     tests = [*asked.tests, *options]
-    if asked.job == "smoke":
-        return smoke_job()
+    if asked.job in ("objects", "smoke"):
+        return objects_job() if asked.job == "objects" else smoke_job()
     return wheel_job(tests) if asked.job == "wheel" else matrix_job(tests, asked.only)
 
 

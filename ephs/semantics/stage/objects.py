@@ -1,12 +1,13 @@
-"""Object code of modules: from the store or from LLVM, for this machine or for another."""
+"""Object code of modules: from the package, from the store or from LLVM, for this machine or for another."""
 
 import hashlib
 from typing import Final
 
 from ephs.semantics.stage.llvm import LEVEL, Library, Target, compile_text, host, load, version
+from ephs.semantics.stage.shipping import shipped
 from ephs.semantics.stage.store import STORE
 
-__all__ = ["TARGETS", "compiled", "emitted", "name_of"]
+__all__ = ["FITTING", "TARGETS", "compiled", "emitted", "fitting", "name_of"]
 
 TARGETS: Final = {
     "linux-x86-64-v2": Target("x86_64-unknown-linux-gnu", "x86-64-v2", ""),
@@ -16,7 +17,13 @@ TARGETS: Final = {
     "macos-x86-64": Target("x86_64-apple-macosx11.0.0", "x86-64-v2", ""),
     "windows-x86-64": Target("x86_64-pc-windows-msvc", "x86-64-v2", ""),
 }
-"""Machines that object code can be emitted for on any machine. Only the first two are tested."""
+"""Machines that object code can be emitted for on any machine. Only those of `FITTING` are tested."""
+FITTING: Final = {
+    "linux-x86-64-v3": ("x86_64", "avx avx2 bmi bmi2 f16c fma lzcnt movbe"),
+    "linux-x86-64-v2": ("x86_64", "cx16 popcnt sahf sse3 sse4.1 sse4.2 ssse3"),
+    "linux-arm64": ("aarch64", ""),
+}
+"""Targets that come with the package, the better before the worse: architecture, and what a processor must have."""
 
 
 def name_of(text: str, target: Target) -> str:
@@ -26,7 +33,7 @@ def name_of(text: str, target: Target) -> str:
 
 
 def compiled(text: str) -> Library:
-    """Return a module in machine code for this process, compiled if the store does not have it.
+    """Return a module in machine code for this process, compiled if neither package nor store has it.
 
     Parameters
     ----------
@@ -39,12 +46,26 @@ def compiled(text: str) -> Library:
         LLVM does not accept the text.
     """
     target = host()
+    code = shipped(text, fitting(target))
+    if code is not None:
+        return load(code)
     name = name_of(text, target)
     code = STORE.read(name)
     if code is None:
         code = compile_text(text, target)
         STORE.write(name, code)
     return load(code)
+
+
+def fitting(machine: Target) -> list[str]:
+    """Return the targets of `FITTING` whose object code runs on a machine, the best first."""
+    architecture, *system = machine.triple.split("-")
+    features = set(machine.features.split(","))
+    return [
+        name
+        for name, (needed, needs) in FITTING.items()
+        if needed == architecture and "linux" in system and features.issuperset(f"+{one}" for one in needs.split())
+    ]
 
 
 def emitted(text: str, target: str) -> bytes:

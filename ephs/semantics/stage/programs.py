@@ -47,12 +47,12 @@ class Program:
 
         Arrays are contiguous, row by row, of ``double`` and ``int64_t``, and must not overlap; their sizes follow them.
         A table is an array of its integers, one of its numbers, and the count of its rows; `Record` lays out a row.
-        The object code calls no library and keeps no state: calls from several threads are independent.
+        The object code keeps no state, so calls from several threads are independent, and needs no library but C's
+        ``memset``, ``memcpy`` and ``memmove``.
         """
         _, results = _staged(self, 1, ())
         lines = [f"{_C[results[name]]} {self.name}_{name}({_c(entry)});" for name, entry in self.entries.items()]
-        guard = f"{self.name.upper()}_H"
-        return "\n".join([f"#ifndef {guard}", f"#define {guard}", "#include <stdint.h>", *lines, "#endif", ""])
+        return _HEADER.format(guard=f"{self.name.upper()}_H", lines="\n".join(lines))
 
     def compiled(self, members: int = 1, shared: tuple[str, ...] = ()) -> Mapping[str, Call]:
         """Return the entry functions in machine code, by name.
@@ -80,6 +80,21 @@ class Program:
         return MappingProxyType({name: _interpreted(entry, True) for name, entry in self.entries.items()})
 
 
+_HEADER = """\
+#ifndef {guard}
+#define {guard}
+#include <stdint.h>
+#ifdef __cplusplus
+#define restrict __restrict
+extern "C" {{
+#endif
+{lines}
+#ifdef __cplusplus
+}}
+#undef restrict
+#endif
+#endif
+"""
 _C = {"void": "void", "double": "double", "i64": "int64_t"}
 _C_ATOMS: dict[Atom, str] = {
     "reals": "double *restrict ",

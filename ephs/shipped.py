@@ -1,0 +1,32 @@
+"""The programs whose object code comes with the package."""
+
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from typing import Final
+
+from ephs.semantics.stage import Program
+from ephs.semantics.stage.objects import FITTING, emitted
+from ephs.semantics.stage.shipping import ship
+
+__all__ = ["SHIPPED", "programs", "write_objects"]
+
+SHIPPED: Final = ("ephs.semantics.stage.functions:ELEMENTARY", "ephs.semantics.linear.sparse:sparse_lu")
+"""Module and name of each program, or of a function that returns it. To ship a program, list it here."""
+
+
+def programs() -> list[Program]:
+    """Return the programs of `SHIPPED`."""
+    found: list[Program] = []
+    for entry in SHIPPED:
+        module, _, name = entry.partition(":")
+        program: Program | Callable[[], Program] = getattr(import_module(module), name)
+        found.append(program if isinstance(program, Program) else program())
+    return found
+
+
+def write_objects(folder: Path) -> None:
+    """Write the object code of `SHIPPED` for the targets of `FITTING`, with headers and index, into a folder."""
+    made = programs()
+    modules = {one.name: (one.text(), {target: emitted(one.text(), target) for target in FITTING}) for one in made}
+    ship(modules, {one.name: one.header() for one in made}, folder)
