@@ -11,7 +11,11 @@ from ephs.semantics.stage.shipping import ship
 
 __all__ = ["SHIPPED", "programs", "write_objects"]
 
-SHIPPED: Final = ("ephs.semantics.stage.functions:ELEMENTARY", "ephs.semantics.linear.sparse:sparse_lu")
+SHIPPED: Final = (
+    "ephs.semantics.stage.functions:ELEMENTARY",
+    "ephs.semantics.linear.rows:row_program",
+    "ephs.semantics.linear.sparse:sparse_lu",
+)
 """Module and name of each program, or of a function that returns it. To ship a program, list it here."""
 
 

@@ -1,5 +1,6 @@
 """Object code that comes with the package: taken where it is whole and fits, and never where it does not."""
 
+import ast
 import json
 import os
 import struct
@@ -16,7 +17,8 @@ from ephs.semantics.stage import llvm, objects, shipping
 from ephs.semantics.stage.objects import FITTING, TARGETS, compiled, fitting
 from ephs.semantics.stage.shipping import INDEX, ship, shipped
 from ephs.semantics.stage.store import STORE
-from ephs.shipped import programs, write_objects
+from ephs.shipped import SHIPPED, programs, write_objects
+from tests.rooms import SOURCES, module_name
 from tests.semantics.stage.arm import SYMBOLS, sections
 from tests.semantics.stage.test_objects import SMALL, value
 
@@ -35,6 +37,20 @@ def folder(tmp_path_factory):
     made = tmp_path_factory.mktemp("objects")
     write_objects(made)
     return made
+
+
+def unconditional() -> set[str]:
+    """The functions of the package that return one program, whoever asks."""
+    found: set[str] = set()
+    for file in SOURCES:
+        for node in ast.parse(file.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.FunctionDef) and not ast.unparse(node.args) and node.returns is not None:
+                found |= {f"{module_name(file)}:{node.name}"} if ast.unparse(node.returns) == "Program" else set()
+    return found
+
+
+def test_what_all_users_compile_alike_is_shipped():
+    assert unconditional() and unconditional() <= set(SHIPPED)
 
 
 def test_programs_have_names_of_their_own():
