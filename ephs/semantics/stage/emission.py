@@ -23,8 +23,8 @@ from ephs.semantics.stage.numbers import (
 
 __all__ = ["LIMIT", "IntegerPointer", "RealPointer", "Symbol", "TruthSymbol", "WholeSymbol", "Writer"]
 
-LIMIT: Final = 2_000_000
-"""Lines above which a function counts as traced without end."""
+LIMIT: Final = 300_000
+"""Lines above which a function counts as traced without end; LLVM takes a minute for as many."""
 _REAL: Final[dict[Operation, str]] = {"+": "fadd", "-": "fsub", "*": "fmul", "/": "fdiv"}
 _ORDER: Final[dict[Order, str]] = {"<": "lt", "<=": "le", ">": "gt", ">=": "ge"}
 _WHOLE: Final[dict[IntegerOperation, str]] = {"+": "add", "-": "sub", "*": "mul"}

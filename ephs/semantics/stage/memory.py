@@ -143,6 +143,8 @@ class Vector:
     start: Integer
     size: Integer
 
+    __iter__ = None  # Python would ask for entries without end.
+
     def __getitem__(self, index: Integer) -> Real:
         return self.cells.load(self.start + inside(index, self.size, "a vector"))
 
@@ -163,6 +165,8 @@ class Integers:
     cells: IntegerCells
     start: Integer
     size: Integer
+
+    __iter__ = None  # Python would ask for entries without end.
 
     def __getitem__(self, index: Integer) -> Integer:
         return self.cells.load(self.start + inside(index, self.size, "integers"))
@@ -185,6 +189,8 @@ class Matrix:
     start: Integer
     rows: Integer
     columns: Integer
+
+    __iter__ = None  # Python would ask for entries without end.
 
     def _at(self, row: Integer, column: Integer) -> Integer:
         inside(row, self.rows, "the rows of a matrix")

@@ -245,6 +245,8 @@ class Table(Generic[Row]):
     reals: RealCells
     size: Integer
 
+    __iter__ = None  # Python would ask for rows without end.
+
     def __getitem__(self, index: Integer) -> Row:
         inside(index, self.size, f"a table of {self.record.__name__}")
         record = self.record
