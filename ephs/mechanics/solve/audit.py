@@ -315,7 +315,7 @@ def audit(solution: "Solution", bounds: Bounds, trials: Trials | None = None) ->
     with np.errstate(all="ignore"):
         for name, law in LAWS.items():
             allowed = law.allowed(bounds)
-            broken = [b for b in law.breaches(solution, bounds, trials) if not b.size <= allowed + b.slack]
+            broken = [b for b in law.breaches(solution, bounds, trials) if not b.size <= allowed + b.slack < np.inf]
             if broken:
                 worst = max(broken, key=_size)
                 where = str(worst.path) if worst.path is not None else ""

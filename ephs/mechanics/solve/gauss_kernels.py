@@ -20,7 +20,7 @@ the order fall to 2 (Hairer, Lubich and Roche, *Lecture Notes in Mathematics* 14
 from typing import NamedTuple
 
 from ephs.mechanics.solve.lu_kernels import copy, factorise, solve
-from ephs.mechanics.solve.natural_kernels import account, evaluate, measure, tighten
+from ephs.mechanics.solve.natural_kernels import account, evaluate, measure, restrain, tighten
 from ephs.mechanics.solve.sparse import Index
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import jit
@@ -239,7 +239,7 @@ def gauss_newton(t, g, p, o, where, x, z, scal, still, unit, inputs, m, s):
     """Solve one step in place of z, run to stagnation; returns (status, component, iterations)."""
     n, n_rate, stages = t.counts[3], t.counts[0], p.b.shape[0]
     h = scal[0]
-    before, fresh = 1e300, True
+    before, fresh, part = 1e300, True, 1.0
     right, change = s.residual.reshape(stages * n), s.change
     for iteration in range(60):
         status, component = linearise(t, g, p, x, z, scal, still, unit, inputs, m, s, fresh)
@@ -256,7 +256,7 @@ def gauss_newton(t, g, p, o, where, x, z, scal, still, unit, inputs, m, s):
             copy(m.residual, s.residual[i])
         if ratio <= 4e-16 or (ratio < 1e-11 and ratio > 0.7 * before):
             return (3 if defect > o.tolerance[0] else 0), 0, iteration
-        if iteration > 25 and ratio > 0.9 * before:
+        if iteration > 25 and ratio > 0.9 * before and part == 1.0:
             return 1, 0, iteration
         if fresh:
             for k in range(where.shape[0]):
@@ -271,11 +271,14 @@ def gauss_newton(t, g, p, o, where, x, z, scal, still, unit, inputs, m, s):
             if not factorise(o, s.matrix, s.factors, s.dense, s.pivot):
                 return 2, 0, iteration
         solve(o, s.factors, right, change, s.dense)
+        part = 1.0
+        for i in range(stages):
+            part = min(part, restrain(t, z[i], change[i * n : (i + 1) * n]))
         for i in range(stages):
             for j in range(n):
                 z[i, j] -= change[i * n + j]
         # a matrix serves as long as it makes the residual fall fast
-        fresh = iteration == 0 or ratio > 0.1 * before
+        fresh = iteration == 0 or part < 1.0 or ratio > 0.1 * before
         before = ratio
     return 1, 0, 60
 

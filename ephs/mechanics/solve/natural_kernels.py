@@ -291,13 +291,41 @@ def measure(t, z, dropped, m):
 
 
 @kernel
+def restrain(t, z, step):
+    """Shorten a Newton step z − step storage by storage; returns the least part taken of efforts and rates.
+
+    Absolute temperatures fall by half or rise fourfold at most: small heat capacities warm by orders of magnitude in
+    one step of the method, where whole Newton steps would leave what is positive.
+    """
+    least = 1.0
+    for i in range(t.kind.shape[0]):
+        if t.kind[i] != STORING:
+            continue
+        part = 1.0
+        for j in range(t.dims[i, 0]):
+            effort = t.e_index[t.e_at[i] + j]
+            warmth, fall = z[t.counts[0] + effort] + t.intensive[effort], step[t.counts[0] + effort]
+            if t.entropy[effort] == 1.0 and warmth > 0.0:
+                if fall > 0.5 * warmth:
+                    part = min(part, 0.5 * warmth / fall)
+                elif fall < -3.0 * warmth:
+                    part = min(part, -3.0 * warmth / fall)
+        if part < 1.0:
+            least = min(least, part)
+            for j in range(t.dims[i, 0]):
+                step[t.counts[0] + t.e_index[t.e_at[i] + j]] *= part
+                step[t.read_w[t.read_w_at[i] + j]] *= part
+    return least
+
+
+@kernel
 def newton(t, o, x, z, scal, inputs, m):
     """Solve one step in place of z, run to stagnation; returns (status, component, iterations).
 
     A matrix whose pivots have shrunk below the order's floor asks for another order.
     """
-    before = 1e300
-    for iteration in range(40):
+    before, part = 1e300, 1.0
+    for iteration in range(80):
         status, component = evaluate(t, x, z, scal, inputs, m)
         if status != 0:
             return status, component, iteration
@@ -306,7 +334,7 @@ def newton(t, o, x, z, scal, inputs, m):
             return 1, 0, iteration
         if ratio <= 4e-16 or (ratio < 1e-11 and ratio > 0.7 * before):
             return (3 if m.defect[0] > o.tolerance[0] else 0), 0, iteration
-        if iteration > 12 and ratio > 0.9 * before:
+        if iteration > 12 and ratio > 0.9 * before and part == 1.0:
             return 1, 0, iteration
         before = ratio
         for i in range(o.dropped.shape[0]):
@@ -315,9 +343,10 @@ def newton(t, o, x, z, scal, inputs, m):
         if not factorise(o, m.data, m.factors, m.dense, m.pivot):
             return 2, 0, iteration
         solve(o, m.factors, m.residual, m.step, m.dense)
+        part = restrain(t, z, m.step)
         for i in range(z.shape[0]):
             z[i] -= m.step[i]
-    return 1, 0, 40
+    return 1, 0, 80
 
 
 @kernel
@@ -375,8 +404,15 @@ def advance(t, o, x, z, previous, scal, inputs, m, sums, steps, states, energies
             guess[i] = 2.0 * last - previous[i]
             previous[i] = last
             z[i] = guess[i]
+            guess[i] = last - z[i]
+        if restrain(t, previous, guess) < 1.0:
+            copy(previous, z)
         status, component, iterations = newton(t, o, x, z, scal, inputs, m)
         total += iterations
+        if status >= COMPONENT or status == DIVERGED:  # once more from what was last, which cannot be far off
+            copy(previous, z)
+            status, component, iterations = newton(t, o, x, z, scal, inputs, m)
+            total += iterations
         if status != 0:
             for i in range(z.shape[0]):
                 if status == 3:  # rank was decided at the start of the step, and is another on its way

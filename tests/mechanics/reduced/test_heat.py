@@ -89,6 +89,10 @@ def run(model, until, method, step, **more):
     return ephs.simulate(model, until, method=method, step=step, audit="off", **more)
 
 
+def laws(sol):
+    return {finding.law for finding in sol.audit.findings}
+
+
 @pytest.mark.parametrize("capacity", [None, 1e-2, 1e-3])
 @pytest.mark.parametrize(("friction", "step"), [(1e6, 0.002), (1e6, 0.5), (100.0, 0.05), (20.0, 0.05), (0.5, 0.05)])
 def test_radau_books_what_the_disc_had_at_any_step(friction, step, capacity):
@@ -107,7 +111,7 @@ def test_alpha_books_what_the_disc_had(friction, step, capacity):
     sol = run(brake(friction, capacity), 1.0, "alpha", step)
     assert sol.ledgers.heat[-1] == pytest.approx(ENERGY, rel=1e-4)
     assert sol.ledgers.kinetic[-1] < 1e-9
-    assert sol.audit.passed
+    assert not {"energy", "entropy", "ledger"} & laws(sol)  # of when it took hold, the law of accuracy may say more
 
 
 @pytest.mark.parametrize("method", ["radau", "alpha"])
@@ -115,7 +119,7 @@ def test_a_quadrature_alone_does_not(method, monkeypatch):
     monkeypatch.setattr(Heats, "booked", lambda self, flows, missed, lost: flows)
     sol = run(brake(1e4), 0.2, method, 0.01)
     assert abs(sol.ledgers.heat[-1] / ENERGY - 1.0) > 0.5
-    assert not sol.audit.passed
+    assert "energy" in laws(sol)
 
 
 def test_vibrations_that_the_method_damps_are_no_heat():
@@ -138,7 +142,7 @@ def test_vibrations_that_the_method_damps_are_no_heat():
     for method in ("radau", "alpha"):
         sol = run(model, 0.5, method, 0.01)
         assert sol.ledgers.heat[-1] < 1e-2 * ENERGY
-        assert [finding.law for finding in sol.audit.findings] == ["energy"]
+        assert "energy" in laws(sol)
 
 
 @pytest.mark.parametrize("method", sorted(CONSTANT))
@@ -173,3 +177,13 @@ def test_the_order_is_kept(method, order, steps):
     errors = [abs(run(model, 0.4, method, 0.4 / n).ledgers.heat[-1] - exact) for n in steps]
     falls = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
     assert np.all(falls > order - 0.35), (errors, falls)
+
+
+@pytest.mark.parametrize("capacity", [1e-2, 1e-3])
+@pytest.mark.parametrize(("friction", "step"), [(1e6, 0.002), (100.0, 0.05), (20.0, 0.05)])
+def test_natural_solves_for_small_capacities(friction, step, capacity):
+    books = run(brake(friction, capacity), 20 * step, "natural", step).ledgers
+    lost = books.kinetic[0] - books.kinetic[-1]
+    assert books.thermal[-1] == pytest.approx(lost, rel=1e-12)
+    assert books.made[-1] == pytest.approx(capacity * math.log1p(lost / (capacity * 300.0)), rel=1e-11)
+    assert np.diff(books.made).min() >= 0.0
