@@ -10,6 +10,7 @@ from pathlib import Path
 
 from benchmarks import (
     accuracy,
+    audit,
     balance,
     cells,
     ensemble,
@@ -32,6 +33,7 @@ TABLES: dict[str, Callable[[Path | None], str | Report]] = {
     "order": lambda _: order.table(),
     "orders": lambda _: orders.table(),
     "balance": lambda _: balance.table(),
+    "audit": lambda _: audit.report(),
     "size": size.table,
     "cells": cells.table,
     "parts": lambda _: parts.report(),

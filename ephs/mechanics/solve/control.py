@@ -12,12 +12,14 @@ from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.descriptor import Descriptor
 
-__all__ = ["Control", "Policy", "Proportional", "Symmetric", "Tolerance", "told_apart"]
+__all__ = ["Control", "Policy", "Proportional", "Symmetric", "Tolerance", "first_step", "told_apart"]
 
 SHORTEST = 16.0
 """Roundings of the time that a step has at least."""
 NEAREST = 1e6
 """The same of a whole run, whose first steps are a small part of it."""
+FIRST = 1e-4
+"""Part of the time span that the first step takes: too long it is rejected, too short it grows fast."""
 
 
 @final
@@ -138,6 +140,11 @@ class Control:
         if h < max(self.least, SHORTEST * np.spacing(latest)):
             raise cause or SolveError(Outcome.TINY, "", f"{h:.3g} s")
         return h
+
+
+def first_step(control: Control, span: float) -> float:
+    """The length of the first step, in s, of a run over ``span`` seconds."""
+    return control.step or min(max(FIRST * span, control.least), control.most, span)
 
 
 def told_apart(t0: float, until: float, step: float | None) -> None:

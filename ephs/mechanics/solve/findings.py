@@ -10,7 +10,7 @@ from ephs.mechanics.solve.errors import Outcome, SimulationError
 if TYPE_CHECKING:
     from ephs.mechanics.solve.solution import Solution
 
-__all__ = ["POLICIES", "Audit", "AuditError", "AuditWarning", "Finding", "judged"]
+__all__ = ["POLICIES", "Audit", "AuditError", "AuditWarning", "CostWarning", "Finding", "judged"]
 
 POLICIES = ("fail", "warn", "off")
 """What a finding makes of a run: an error, a warning, an entry in the summary."""
@@ -76,6 +76,11 @@ class Audit:
 @final
 class AuditWarning(UserWarning):
     """A run that breaks a law of its audit."""
+
+
+@final
+class CostWarning(UserWarning):
+    """A run whose first steps say that it will be long, and by which methods it would be shorter."""
 
 
 @final

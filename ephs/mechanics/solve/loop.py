@@ -8,9 +8,10 @@ import numpy as np
 
 from ephs.mechanics.solve.audit import Bounds
 from ephs.mechanics.solve.breakpoints import Breakpoints
-from ephs.mechanics.solve.control import Control, Policy
+from ephs.mechanics.solve.control import Control, Policy, first_step
 from ephs.mechanics.solve.errors import OptionError, Outcome, SolveError, solve_error_of
 from ephs.mechanics.solve.events import Crossing, Event, Watch
+from ephs.mechanics.solve.forecast import Forecast
 from ephs.mechanics.solve.integrate import Grid, Progress, audited, failures_of
 from ephs.mechanics.solve.journal import Written
 from ephs.mechanics.solve.problem import Problem, States
@@ -24,7 +25,7 @@ from ephs.mechanics.solve.watching import Balance
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 
-__all__ = ["first_step", "integrate_stepwise"]
+__all__ = ["integrate_stepwise"]
 
 S = TypeVar("S")
 RESPONSE = 0.1
@@ -32,8 +33,6 @@ BURST = 1000
 """Steps in one compiled call at most, for progress and interruption."""
 BLOCK = 1024
 """Rows that wait until they are made what is kept."""
-FIRST = 1e-4
-"""Part of the time span that the first step takes: too long it is rejected, too short it grows fast."""
 FINAL = (Outcome.PYTHON, Outcome.UNSUITED, Outcome.INPUT, Outcome.EVENT, Outcome.INCONSISTENT, Outcome.INTERRUPTED)
 """Failures that a shorter step does not mend."""
 
@@ -88,11 +87,6 @@ def integrate_stepwise(
     return run.solution()
 
 
-def first_step(control: Control, span: float) -> float:
-    """The length of the first step, in s, of a run over ``span`` seconds."""
-    return control.step or min(max(FIRST * span, control.least), control.most, span)
-
-
 class _Run(Generic[S]):
     """One run in progress."""
 
@@ -131,6 +125,7 @@ class _Run(Generic[S]):
         self.kept = Rows()
         self.samples: Samples[S] = Samples(wanted=policy is None)
         self.watch: Watch | None = None
+        self.forecast = Forecast(problem, stepper.name, bounds.order if bounds else 1, until)
         self.leg: Leg[S] | None = None
         self.ended = False
         self.first: Row | None = None
@@ -271,6 +266,8 @@ class _Run(Generic[S]):
         self.samples.add([(t, after, attempt.least)])
         self.state, self.t, self.cause = after, t, None
         self.steps += 1
+        if self.policy is not None:
+            self.forecast.look(self.steps, t, self.stepper.stats)
         self._look()
         return stopped is not None
 
@@ -305,6 +302,7 @@ class _Run(Generic[S]):
             **self.stepper.stats(),
             **self.remarks,
             **self.breakpoints.stats(),
+            **self.forecast.stats(),
             "setup_s": self.setup,
             "integrate_s": time.perf_counter() - self.begin - self.setup,
             "least_production": least,
@@ -366,6 +364,7 @@ class _Run(Generic[S]):
             "policy": self.policy.snapshot() if self.policy is not None else None,
             "watch": self.watch.snapshot() if self.watch is not None else None,
             "breakpoints": self.breakpoints.snapshot(),
+            "forecast": self.forecast.snapshot(),
             "samples": self.samples.snapshot(),
             "leg": self.leg.snapshot() if self.leg is not None else None,
         }
@@ -390,6 +389,7 @@ class _Run(Generic[S]):
         if self.watch is not None:
             self.watch.restore(found["watch"])
         self.pending.clear()
+        self.forecast.restore(found["forecast"])
         self.samples.restore(found["samples"], self.state)
         if self.journal.rows is not None:
             self.kept.add(self.journal.rows, written=True)

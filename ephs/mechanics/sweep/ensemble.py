@@ -26,7 +26,7 @@ from ephs.mechanics.reduced.tables import TREE
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.parameters import varied
 from ephs.mechanics.simulate import control_of, problem_of_scene, times_of
-from ephs.mechanics.solve.loop import first_step
+from ephs.mechanics.solve.control import first_step
 from ephs.mechanics.solve.stepping import Span
 from ephs.mechanics.sweep.axes import Axes
 from ephs.mechanics.sweep.outputs import Output
