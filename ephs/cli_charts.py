@@ -27,6 +27,8 @@ _TEXTS = {
 }
 UNTIL = 1.0
 """Simulated time in s unless something else says it."""
+LIMIT = 1.5
+"""Processor time in s of a run in a chart of stability, unless something else says it."""
 
 charts = App(name="chart", help="Measure and draw speed against accuracy, or where which method fails.")
 Model = TypeVar("Model", bound=Any)  # a Scene or a Family, loaded when they are needed
@@ -89,7 +91,14 @@ def work_precision(
 
 
 @charts.command
-def stability(*families: str, output: Output, until: float = UNTIL, quick: bool = False) -> int:
+def stability(
+    *families: str,
+    output: Output,
+    until: float = UNTIL,
+    quick: bool = False,
+    limit: float = LIMIT,
+    resume: bool = False,
+) -> int:
     """Draw what becomes of every method where scenes get difficult.
 
     Parameters
@@ -102,18 +111,25 @@ def stability(*families: str, output: Output, until: float = UNTIL, quick: bool 
         End of the simulated time of scenes of yours, in seconds.
     quick
         Only the easiest and the most difficult value of each family.
+    limit
+        Processor time of one run, in seconds.
+    resume
+        Go on with the cells that an earlier, interrupted command left in the folder.
     """
     _check_time(until)
     chosen = _named({name: _family(name, until) for name in families or _all()})
     with addressed(str(output), output):
         output.mkdir(parents=True, exist_ok=True)
+        from ephs.show.charts.keeping import Kept
+
+        kept = Kept(output / "stability.jsonl", resume=resume)
     from ephs.show.charts import SILENT, draw_stability, write_cells
     from ephs.show.charts import stability as measured
 
     cells = []
     for name, family in chosen.items():
         with addressed(name, output), _status(family.name) as note:
-            found = measured(family, quick=quick, note=note)
+            found = measured(family, quick=quick, limit=limit, note=note, kept=kept)
             files = draw_stability(found, family, output, f"stability-{family.name}")
             cells += found
         counts = Counter(cell.outcome.value for cell in found)
@@ -121,7 +137,7 @@ def stability(*families: str, output: Output, until: float = UNTIL, quick: bool 
     silent = sum(cell.outcome in SILENT for cell in cells)
     say(f"silent failures, wrong and neither refused nor flagged: {silent} of {len(cells)}")
     with addressed(str(output), output):
-        say("messages and errors:", *map(str, write_cells(cells, output, "stability")))
+        say("messages, errors, counts:", *map(str, write_cells(cells, output, "stability")))
     return 0
 
 

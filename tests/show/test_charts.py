@@ -21,7 +21,7 @@ from ephs.show.charts import (
     work_precision,
 )
 from ephs.show.charts.families import scene_family
-from ephs.show.charts.outcomes import ACCURATE, BOUND, ENERGY, horizon, judge
+from ephs.show.charts.outcomes import BOUND, ENERGY, RIGHT, horizon, judge
 from ephs.show.charts.peers import PEERS, PeerError
 from ephs.show.charts.reference import Motion
 from ephs.show.charts.runs import Ending, Setting, attempt
@@ -37,7 +37,7 @@ def swing(amplitude=1.0, phase=0.0, decay=0.0, drift=0.0):
     x = amplitude * np.exp(-decay * T) * np.cos(T + phase)
     position = np.stack([x, np.zeros_like(x), np.zeros_like(x)], axis=-1)[:, None, :]
     rotation = np.tile(np.eye(3), (len(T), 1, 1, 1))
-    return Motion(T, position, rotation, drift * T / T[-1], 1.0)
+    return Motion(T, position, rotation, drift * T / T[-1], np.zeros((len(T), 2)), 1.0)
 
 
 def spoilt(motion, value):
@@ -49,8 +49,10 @@ def spoilt(motion, value):
 @pytest.mark.parametrize(
     ("found", "outcome"),
     [
-        (swing(), Outcome.ACCURATE),
-        (swing(phase=0.5 * ACCURATE), Outcome.ACCURATE),
+        (swing(), Outcome.RIGHT),
+        (swing(phase=0.5 * RIGHT), Outcome.RIGHT),
+        (replace(swing(), books=np.full((len(T), 2), 0.5 * RIGHT)), Outcome.RIGHT),
+        (replace(swing(), books=np.full((len(T), 2), 2.0 * RIGHT)), Outcome.WRONG_BUT_BOUNDED),
         (swing(phase=1.0), Outcome.WRONG_BUT_BOUNDED),
         (swing(phase=1.0, drift=0.5 * ENERGY), Outcome.WRONG_BUT_BOUNDED),
         (swing(phase=1.0, drift=2.0 * ENERGY), Outcome.ENERGY_DRIFT),
@@ -67,8 +69,8 @@ def test_outcomes_are_told_apart(found, outcome):
 
 
 def test_an_unmoved_body_is_judged_by_its_balance():
-    rest = Motion(T, np.zeros((101, 1, 3)), np.tile(np.eye(3), (101, 1, 1, 1)), np.zeros(101), 0.0)
-    assert judge(rest, rest) == (Outcome.ACCURATE, 0.0)
+    rest = Motion(T, np.zeros((101, 1, 3)), np.tile(np.eye(3), (101, 1, 1, 1)), np.zeros(101), np.zeros((101, 2)), 0.0)
+    assert judge(rest, rest) == (Outcome.RIGHT, 0.0)
     assert judge(replace(rest, turnover=1.0), rest)[0] is Outcome.DIVERGED
 
 
@@ -193,7 +195,7 @@ def test_failures_of_methods_are_cells():
     cells = stability(FAMILIES["half-turn"], ["natural", "rk87"], quick=True)
     assert {cell.value for cell in cells} == {0.5, 1.1}
     natural = {cell.value: cell for cell in cells if cell.method == "natural" and cell.setting.kind == "step"}
-    assert natural[1.1].outcome is not Outcome.ACCURATE
+    assert natural[1.1].outcome is not Outcome.RIGHT
     spun = stability(FAMILIES["spin"], ["natural"], quick=True)
     refused = [cell for cell in spun if cell.outcome is Outcome.REFUSED]
     assert refused
@@ -206,7 +208,7 @@ def test_a_scene_of_ones_own_is_a_family_by_step():
     cells = stability(family, ["rk87"], quick=True)
     steps = [cell for cell in cells if cell.setting.kind == "step"]
     assert [cell.setting.value for cell in steps] == [cell.value for cell in steps] == [0.1 / 1000, 0.1 / 10]
-    assert steps[0].outcome is Outcome.ACCURATE
+    assert steps[0].outcome is Outcome.RIGHT
     assert steps[0].error < steps[1].error
 
 

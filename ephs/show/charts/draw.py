@@ -13,7 +13,7 @@ import numpy as np
 from ephs.mechanics.methods import METHODS
 from ephs.show.charts.families import Family
 from ephs.show.charts.measure import Point
-from ephs.show.charts.outcomes import Outcome
+from ephs.show.charts.outcomes import SILENT, Outcome
 from ephs.show.charts.peers import PEERS
 from ephs.show.charts.runs import Ending, Setting
 from ephs.show.charts.stability import Cell
@@ -25,18 +25,19 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["draw_stability", "draw_work_precision", "write_cells"]
+__all__ = ["counts_table", "draw_stability", "draw_work_precision", "write_cells"]
 
 _COLOURS = (BLUE, SKY, GREEN, ORANGE, RED, PURPLE, BLACK, "#8c6d1f")
 _PEER_COLOURS = ("#6b7280", "#9aa3af", "#4b5563", "#b8bec7")
 _MARKERS = ("o", "s", "D", "^", "v", "P", "X", "h")
 _PEER_MARKERS = ("<", ">", "p", "d")
 _FILLS = {
-    Outcome.ACCURATE: GREEN,
+    Outcome.RIGHT: GREEN,
     Outcome.WRONG_BUT_BOUNDED: "#f0e442",
     Outcome.ENERGY_DRIFT: PURPLE,
     Outcome.DAMPED: SKY,
     Outcome.REFUSED: "#d1d5db",
+    Outcome.SLOW: "#f3f4f6",
     Outcome.DIVERGED: RED,
     Outcome.FLAGGED: ORANGE,
     Outcome.UNKNOWN: "#ffffff",
@@ -46,6 +47,7 @@ _SIGNS = {
     Outcome.ENERGY_DRIFT: "drift",
     Outcome.DAMPED: "damped",
     Outcome.REFUSED: "–",
+    Outcome.SLOW: "slow",
     Outcome.DIVERGED: "diverged",
     Outcome.FLAGGED: "flagged",
     Outcome.UNKNOWN: "?",
@@ -118,7 +120,7 @@ def draw_stability(cells: Sequence[Cell], family: Family, folder: Path, name: st
         for cell in cells:
             x, y = values.index(cell.value), rows.index(_row(cell, family))
             axes.add_patch(Rectangle((x, y), 1, 1, facecolor=_FILLS[cell.outcome], edgecolor="white", linewidth=1.2))
-            dark = cell.outcome in (Outcome.ACCURATE, Outcome.DIVERGED)
+            dark = cell.outcome in (Outcome.RIGHT, Outcome.DIVERGED)
             axes.text(
                 x + 0.5,
                 y + 0.5,
@@ -171,8 +173,28 @@ def _write_data(rows: Sequence[Mapping[str, Any]], folder: Path, name: str) -> l
 
 
 def write_cells(cells: Sequence[Cell], folder: Path, name: str) -> list[Path]:
-    """The data of matrices."""
-    return _write_data([_flat(cell) for cell in cells], folder, name)
+    """The data of matrices, and how many cells of each method had which outcome, as a Markdown table."""
+    table = folder / f"{name}.md"
+    table.write_text(counts_table(cells), encoding="utf-8")
+    return [*_write_data([_flat(cell) for cell in cells], folder, name), table]
+
+
+def counts_table(cells: Sequence[Cell]) -> str:
+    """Cells of each method by outcome, in Markdown; what is silently wrong in one column."""
+    columns = {
+        "right": {Outcome.RIGHT},
+        "refused or failed, with a message": {Outcome.REFUSED},
+        "flagged by the audit": {Outcome.FLAGGED},
+        "silently wrong": SILENT,
+        "took too long": {Outcome.SLOW},
+        "no reference": {Outcome.UNKNOWN},
+    }
+    methods = list(dict.fromkeys(cell.method for cell in cells))
+    rows = [["method", *columns], ["---"] * (1 + len(columns))]
+    for method in [*methods, None]:
+        own = [cell.outcome for cell in cells if method in (None, cell.method) and (method or cell.method in METHODS)]
+        rows.append([method or "all methods", *(str(sum(o in kinds for o in own)) for kinds in columns.values())])
+    return "\n".join(f"| {' | '.join(row)} |" for row in rows) + "\n"
 
 
 def _number(value: Any) -> Any:
@@ -264,9 +286,9 @@ def _row(cell: Cell, family: Family) -> tuple[str, str]:
 def _said(cell: Cell, family: Family) -> str:
     if family.name == "chaos" and np.isfinite(cell.horizon):
         return f"{cell.horizon:.3g} s"
-    if cell.outcome is Outcome.ACCURATE:
+    if cell.outcome is Outcome.RIGHT:
         return "0" if cell.error == 0.0 else f"{cell.error:.0e}".replace("e-0", "e-")
-    return "slow" if cell.message.startswith(Ending.SLOW) else _SIGNS[cell.outcome]
+    return _SIGNS[cell.outcome]
 
 
 def _save(figure: "Figure", folder: Path, name: str) -> list[Path]:

@@ -173,7 +173,7 @@ def _foreign(
             continue
         seconds = float(np.median([each.seconds for each in [*rest, first]]))
         still: Array = np.zeros(1)
-        end = Motion(truth.motion.t[-1:], first.position[None], first.rotation[None], still, 0.0)
+        end = Motion(truth.motion.t[-1:], first.position[None], first.rotation[None], still, np.zeros((1, 2)), 0.0)
         error = float(end.off(_end(truth.motion))[0])
         yield _point(name, setting, error, seconds, first.evaluations, first.steps, truth)
         if first.seconds > limit / 4.0:
@@ -181,7 +181,9 @@ def _foreign(
 
 
 def _end(motion: Motion) -> Motion:
-    return Motion(motion.t[-1:], motion.position[-1:], motion.rotation[-1:], motion.balance[-1:], motion.turnover)
+    last = slice(-1, None)
+    parts = (each[last] for each in (motion.t, motion.position, motion.rotation, motion.balance, motion.books))
+    return Motion(*parts, motion.turnover)
 
 
 def _more(repeats: int, wall: float, limit: float) -> int:

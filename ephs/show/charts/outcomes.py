@@ -5,12 +5,33 @@ from enum import StrEnum
 import numpy as np
 
 from ephs.show.charts.reference import Motion
-from ephs.show.charts.runs import Array
+from ephs.show.charts.runs import Array, Setting
 
-__all__ = ["ACCURATE", "BOUND", "ENERGY", "KEPT", "SILENT", "Outcome", "horizon", "judge"]
+__all__ = [
+    "ACCURATE",
+    "BOUND",
+    "CONDITION",
+    "ENERGY",
+    "KEPT",
+    "RIGHT",
+    "SILENT",
+    "Outcome",
+    "horizon",
+    "judge",
+    "right",
+]
 
 ACCURATE = 1e-2
-"""Largest error of an accurate run, relative to the size of mechanism and motion, or of a rotation matrix's entry."""
+"""Error at which digits of a motion end."""
+RIGHT = 0.1
+"""Largest error of a right run at constant steps, what their audit allows: a part of the size of mechanism and motion,
+an entry of a rotation matrix, a part of the energies turned over."""
+TIMES, AMPLIFIED = 1000.0, 10.0
+"""Largest error of a right run at chosen steps, in tolerances, at most `RIGHT`: this many, or one a step, or so many
+times what a change of the data by the tolerance makes of the motion, whichever is most."""
+CONDITION = 1e3
+"""A motion is judged up to the last time to which it changes by less than this many times a relative change of its
+data: later, digits depend on the rounding of any program."""
 ENERGY = 1e-2
 """Largest defect of the energy balance that is no drift, relative to what was turned over."""
 KEPT = 0.5
@@ -25,21 +46,23 @@ _NO_ENERGY = 1e-9
 class Outcome(StrEnum):
     """Outcome of a run.
 
-    ``ACCURATE``: the error at the end is at most `ACCURATE`.
+    ``RIGHT``: the error where the motion is judged is at most what `right` says.
     ``WRONG_BUT_BOUNDED``: the error is larger, and nothing of what follows shows.
     ``ENERGY_DRIFT``: besides, the energy balance was off by more than `ENERGY`.
     ``DAMPED``: besides, energy was lost that no ledger has, or the extent of the motion is less than `KEPT`.
-    ``REFUSED``: the method stopped and said why, or took too long.
+    ``REFUSED``: the method stopped and said why.
+    ``SLOW``: the chart stopped it, because it took too long.
     ``DIVERGED``: the method said nothing, and the result is not finite, beyond `BOUND`, or its energy beyond `BLOWN`.
-    ``FLAGGED``: the result is not accurate, or not known to be, and the run's audit has a finding.
+    ``FLAGGED``: the result is not right, or not known to be, and the run's audit has a finding.
     ``UNKNOWN``: a result that is finite, with nothing to compare it with.
     """
 
-    ACCURATE = "accurate"
+    RIGHT = "right"
     WRONG_BUT_BOUNDED = "wrong but bounded"
     ENERGY_DRIFT = "energy drift"
     DAMPED = "damped"
     REFUSED = "refused"
+    SLOW = "took too long"
     DIVERGED = "diverged"
     FLAGGED = "flagged"
     UNKNOWN = "not known"
@@ -49,13 +72,23 @@ SILENT = frozenset({Outcome.WRONG_BUT_BOUNDED, Outcome.ENERGY_DRIFT, Outcome.DAM
 """Silent failures: the run succeeded, its audit found nothing, and the result is wrong."""
 
 
-def judge(found: Motion, true: Motion) -> tuple[Outcome, float]:
-    """The outcome of a motion that was computed to the end, and its error there; both motions at the same times."""
-    error = float(found.off(true, true.length)[-1])
+def right(setting: Setting, condition: float, steps: int) -> float:
+    """The largest error of a right run of so many steps at a setting, where the motion has this condition."""
+    if setting.kind == "step":
+        return RIGHT
+    return min(RIGHT, setting.value * max(TIMES, steps, AMPLIFIED * condition))
+
+
+def judge(found: Motion, true: Motion, allowed: float = RIGHT) -> tuple[Outcome, float]:
+    """The outcome of a motion that was computed to the end, and its error there; both motions at the same times.
+
+    The error is that of positions and rotations, or of heat and work, whichever is larger.
+    """
+    error = float(np.maximum(found.off(true, true.length), found.misbooked(true))[-1])
     if _lost(found, true):
         return Outcome.DIVERGED, error
-    if error <= ACCURATE:
-        return Outcome.ACCURATE, error
+    if error <= allowed:
+        return Outcome.RIGHT, error
     drift = found.balance / max(true.turnover, found.turnover, _NO_ENERGY)
     if drift[-1] < -ENERGY:
         return Outcome.DAMPED, error

@@ -2,24 +2,27 @@
 
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, final
 
 import numpy as np
 
 from ephs.mechanics.methods import METHODS
-from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.scene.model import Scene, frozen
+from ephs.mechanics.scene.state import Snapshot
 from ephs.mechanics.solve.solution import Solution
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.show.charts.runs import Array, Ending, Setting, attempt
 from ephs.show.errors import ShowError
 
-__all__ = ["Motion", "Reference", "resting_reference", "shipped_reference", "tight_reference"]
+__all__ = ["Motion", "Reference", "condition", "resting_reference", "shipped_reference", "tight_reference"]
 
 TIGHT = ((1e-13, 1e-12), (1e-12, 1e-11), (1e-10, 1e-9))
 """Tolerance of the reference and of the run that estimates its error, best first."""
 LEAST_ORDER = 5
+CHANGE = 1e-6
+"""Relative change of data by which the condition of a problem is measured."""
 TRUSTED = 1e-4
 """Cross-check of a reference for which no other method is tried."""
 
@@ -37,15 +40,21 @@ class Motion:
         (n, b, 3) of the centres of mass in m, (n, b, 3, 3) body to world.
     balance
         (n,) kinetic + potential + heat − work less the same at the start, in J.
+    books
+        (n, 2) heat and work since the start, in J.
     turnover
         Largest K + |V − V₀| + |heat| + |work|, in J.
+    size
+        The length of the mechanism in m, by which its gaps are measured too.
     """
 
     t: Array
     position: Array
     rotation: Array
     balance: Array
+    books: Array
     turnover: float
+    size: float = 0.0
 
     @staticmethod
     def of(solution: Solution) -> "Motion":
@@ -60,7 +69,9 @@ class Motion:
             np.stack([body.position for body in bodies], axis=1),
             np.stack([body.rotation for body in bodies], axis=1),
             total - total[0],
+            np.column_stack([heat - heat[0], work - work[0]]),
             float(np.max(turnover)),
+            _length(solution.scene),
         )
 
     def off(self, other: "Motion", length: float = 1.0) -> Array:
@@ -68,11 +79,21 @@ class Motion:
         moved = np.abs(self.position - other.position).max(axis=(1, 2)) / length
         return np.maximum(moved, np.abs(self.rotation - other.rotation).max(axis=(1, 2, 3)))
 
+    def misbooked(self, other: "Motion") -> Array:
+        """(n,) largest deviation of heat and work, relative to what the other motion turns over; 0 where that is 0."""
+        off = np.abs(self.books - other.books).max(axis=1)
+        return off / other.turnover if other.turnover > 0.0 else np.zeros_like(off)
+
+    def until(self, count: int) -> "Motion":
+        """Its first instants, so many."""
+        parts = (each[:count] for each in (self.t, self.position, self.rotation, self.balance, self.books))
+        return Motion(*parts, self.turnover, self.size)
+
     @property
     def length(self) -> float:
-        """Largest distance of bodies from their common centre, over all times, in m; 1 where it is zero."""
-        size = float(np.linalg.norm(self.position - self.centre, axis=-1).max())
-        return size if size > 1e-9 else 1.0
+        """Size of mechanism and motion in m: the largest distance of bodies from their common centre, over all times, at
+        least the length of the mechanism; 1 where both are zero."""
+        return max(float(np.linalg.norm(self.position - self.centre, axis=-1).max()), self.size) or 1.0
 
     @property
     def centre(self) -> Array:
@@ -91,11 +112,14 @@ class Reference:
         How far an independent or a looser computation of it was off at the end.
     source
         Where it is from, in words.
+    run
+        The method and the setting of the run that it is, None of others.
     """
 
     motion: Motion
     cross_check: float
     source: str
+    run: tuple[str, Setting] | None = None
 
 
 def tight_reference(scene: Scene, until: float, *, save_at: Array | None = None, limit: float = 60.0) -> Reference:
@@ -127,7 +151,7 @@ def tight_reference(scene: Scene, until: float, *, save_at: Array | None = None,
         motion, check = map(Motion.of, solutions)
         if not (np.isfinite(motion.position).all() and np.isfinite(check.position).all()):
             continue
-        found = Reference(motion, float(motion.off(check)[-1]), f"{method}, {tight}")
+        found = Reference(motion, float(motion.off(check)[-1]), f"{method}, {tight}", (method, tight))
         if found.cross_check <= TRUSTED:
             return found
         best = found if best is None or found.cross_check < best.cross_check else best
@@ -136,13 +160,36 @@ def tight_reference(scene: Scene, until: float, *, save_at: Array | None = None,
     return best
 
 
+def condition(scene: Scene, truth: Reference, limit: float = 60.0) -> Array:
+    """(n,) by how many times a relative change of rates, a mass and gravity changes a motion at its times.
+
+    Ones where that is no run, or its run with other data does not reach the end.
+    """
+    bodies = [
+        (name, replace(body, twist=frozen((1.0 + CHANGE) * np.array(body.twist))))
+        for name, body in scene.bodies.items()
+    ]
+    name, first = bodies[0]
+    heavier = replace(first, mass=(1.0 + CHANGE) * first.mass, inertia=frozen((1.0 + CHANGE) * np.array(first.inertia)))
+    world = replace(scene.world, gravity=frozen((1.0 + CHANGE) * np.array(scene.world.gravity)))
+    changed = replace(scene, bodies={**dict(bodies), name: heavier}, world=world)
+    motion = truth.motion
+    if truth.run is None:
+        return np.ones(len(motion.t))
+    run = attempt(changed, float(motion.t[-1]), *truth.run, limit=limit, save_at=motion.t)
+    if run.solution is None:
+        return np.ones(len(motion.t))
+    return np.maximum.accumulate(Motion.of(run.solution).off(motion, motion.length)) / CHANGE
+
+
 def resting_reference(scene: Scene, save_at: Array) -> Reference:
     """The initial state for ever, for a mechanism that cannot move."""
     n = len(save_at)
     poses = np.array([body.pose for _, body in scene.all_bodies()])
     rotations = np.array([quaternion_to_matrix(pose[:4]) for pose in poses])
     position, rotation = np.tile(poses[:, 4:], (n, 1, 1)), np.tile(rotations, (n, 1, 1, 1))
-    return Reference(Motion(save_at, position, rotation, np.zeros(n), 0.0), 0.0, "it cannot move")
+    motion = Motion(save_at, position, rotation, np.zeros(n), np.zeros((n, 2)), 0.0, _length(scene))
+    return Reference(motion, 0.0, "it cannot move")
 
 
 def shipped_reference(file: Path, scene: Scene, until: float | None = None) -> tuple[Reference, float]:
@@ -171,8 +218,12 @@ def shipped_reference(file: Path, scene: Scene, until: float | None = None) -> t
         if isinstance(error, ShowError):
             raise
         raise ShowError("reference-file", path=str(file), found=f"{type(error).__name__}: {error}") from error
-    motion = Motion(np.array([found]), position, rotation, np.zeros(1), 0.0)
+    motion = Motion(np.array([found]), position, rotation, np.zeros(1), np.zeros((1, 2)), 0.0, _length(scene))
     return Reference(motion, check, how), found
+
+
+def _length(scene: Scene) -> float:
+    return Snapshot.of(scene).scale(scene.world.gravity).length
 
 
 def _candidates(until: float) -> Iterator[tuple[str, Setting, Setting]]:

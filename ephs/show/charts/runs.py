@@ -68,7 +68,8 @@ class _TooLong(Exception):
 
 
 class _Watch:
-    """Stops a run at its time limit, which begins with the first sign of life: kernels are compiled before that."""
+    """Stops a run at its limit of processor time, which other programs do not shorten. It begins with the first sign of
+    life: kernels are compiled before that."""
 
     def __init__(self, limit: float) -> None:
         self.begin, self.limit, self.fired = time.perf_counter(), limit, False
@@ -80,12 +81,12 @@ class _Watch:
         return time.perf_counter() - self.begin
 
     def __call__(self, t: float, until: float, stats: Mapping[str, Any]) -> None:
-        now = time.perf_counter()
+        now = time.process_time()
         if self.alive is None:
             self.alive = now
         elif now - self.alive > self.limit:
             self.fired = True
-            raise _TooLong(f"{Ending.SLOW}: {self.limit:g} s of wall time were over at t = {t:.3g} of {until:g} s")
+            raise _TooLong(f"{Ending.SLOW}: {self.limit:g} s of processor time were over at t = {t:.3g} of {until:g} s")
 
 
 def attempt(
@@ -103,7 +104,7 @@ def attempt(
     Parameters
     ----------
     limit
-        Wall time in s after which the run is stopped.
+        Processor time in s after which the run is stopped.
     save_at
         Times that are kept; the end alone unless given.
     """

@@ -1,27 +1,32 @@
 """Stability: what becomes of every method where scenes get difficult."""
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from typing import final
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 
 from ephs.mechanics.methods import METHODS, Method
 from ephs.mechanics.scene.model import Scene
 from ephs.show.charts.families import Family
-from ephs.show.charts.outcomes import ACCURATE, SILENT, Outcome, horizon, judge
-from ephs.show.charts.reference import Motion, Reference, resting_reference, tight_reference
+from ephs.show.charts.outcomes import CONDITION, SILENT, Outcome, horizon, judge, right
+from ephs.show.charts.reference import Motion, Reference, condition, resting_reference, tight_reference
 from ephs.show.charts.runs import Array, Ending, Run, Setting, attempt
 from ephs.show.charts.specimens import SPECIMENS
 from ephs.show.errors import ShowError
 
-__all__ = ["Cell", "stability"]
+if TYPE_CHECKING:
+    from ephs.show.charts.keeping import Kept
+
+__all__ = ["Cell", "settings_of", "stability"]
 
 INSTANTS = 41
 MOST_STEPS = 100_000
 LIMIT = 1.5
-"""Wall time in s of a cell."""
-TOLERANCES = {False: (1e-3, 1e-6), True: (1e-6,)}
+"""Processor time in s of a cell."""
+DOUBT = 5e-3
+"""Part of the size of mechanism and motion to which a reference must be known."""
+TOLERANCES = {False: (1e-4, 1e-6, 1e-8), True: (1e-6,)}
 """For methods without, and with constant steps too."""
 
 
@@ -37,13 +42,17 @@ class Cell:
     setting
         Step or tolerance.
     error
-        At the end, relative to the size of mechanism and motion; NaN where there is no result.
+        Where the motion is judged, relative to the size of mechanism and motion; NaN where there is no result.
+    estimate
+        Of its error, by the run itself; NaN where it has none.
     horizon
         The last time in s up to which the error was small; NaN where there is no result.
     message
         The error, or the findings of the audit where the result is not accurate.
     reference, cross_check
         What it was compared with, and how well that is known.
+    judged, condition
+        Up to which time in s, and by how many times a relative change of data changes the motion to there.
     """
 
     family: str
@@ -52,11 +61,21 @@ class Cell:
     setting: Setting
     outcome: Outcome
     error: float
+    estimate: float
     horizon: float
     seconds: float
     message: str
     reference: str
     cross_check: float
+    judged: float
+    condition: float
+
+
+def settings_of(family: Family, value: float, method: Method, *, quick: bool = False) -> list[Setting]:
+    """A method's settings for a value: constant steps, the coarse ones first, then tolerances."""
+    steps = family.steps_at(value)[:1] if quick else family.steps_at(value)
+    found = [Setting("step", step) for step in steps] if method.fixed else []
+    return found + [Setting("tolerance", each) for each in (TOLERANCES[method.fixed] if method.adaptive else ())]
 
 
 def stability(
@@ -66,6 +85,7 @@ def stability(
     quick: bool = False,
     limit: float = LIMIT,
     note: Callable[[str], None] | None = None,
+    kept: "Kept | None" = None,
 ) -> list[Cell]:
     """Run every method for scenes over the family's values and its settings.
 
@@ -76,61 +96,94 @@ def stability(
     quick
         Only the easiest and the most difficult value, and the largest step.
     limit
-        Wall time in s of a cell.
+        Processor time in s of a cell.
     note
-        Called with each value's label before it is run.
+        Called with a label before each cell is run.
+    kept
+        Cells that are known, to which new ones are added.
     """
     everything = {**METHODS, **SPECIMENS}
     chosen = [m for m in everything.values() if m.scenes and (methods is None or m.name in methods)]
     values = (family.values[0], family.values[-1]) if quick else family.values
     cells: list[Cell] = []
     for value in values:
-        if note is not None:
-            note(f"{family.name} {family.label(value)}")
-        scene, times = family.make(value), np.linspace(0.0, family.end(value), INSTANTS)
-        truth, why = _truth(family, value, times, limit)
-        steps = family.steps_at(value)[:1] if quick else family.steps_at(value)
+        trial: _Trial | None = None
         for method in chosen:
-            for setting, run in _runs(scene, method, steps, times, limit):
-                found = None if run.solution is None else Motion.of(run.solution)
-                outcome, error, held = _outcome(found, truth)
-                said = run.message or why
-                if outcome in SILENT | {Outcome.UNKNOWN} and run.solution is not None and not run.solution.audit.passed:
-                    outcome, said = Outcome.FLAGGED, str(run.solution.audit)
-                cells.append(
-                    Cell(
-                        family.name,
-                        value,
-                        method.name,
-                        setting,
-                        outcome,
-                        error,
-                        held,
-                        run.wall,
-                        said,
-                        "none" if truth is None else truth.source,
-                        np.nan if truth is None else truth.cross_check,
-                    )
-                )
+            slow: dict[str, Setting] = {}
+            for setting in settings_of(family, value, method, quick=quick):
+                cell = None if kept is None else kept.get(family.name, value, method.name, setting)
+                if cell is None:
+                    if note is not None:
+                        note(f"{family.name} {family.label(value)}: {method.name}, {setting}")
+                    trial = trial or _Trial.of(family, value, limit)
+                    cell = trial.cell(method, setting, limit, slow.get(setting.kind))
+                    if kept is not None:
+                        kept.add(cell)
+                if cell.outcome is Outcome.SLOW:
+                    slow.setdefault(setting.kind, setting)
+                cells.append(cell)
     return cells
 
 
-def _runs(
-    scene: Scene, method: Method, steps: Sequence[float], times: Array, limit: float
-) -> Iterator[tuple[Setting, Run]]:
-    """A method's runs over its settings, coarse ones first; where one took too long, finer ones are not run."""
-    settings = [Setting("step", step) for step in steps] if method.fixed else []
-    if method.adaptive:
-        settings += [Setting("tolerance", each) for each in TOLERANCES[method.fixed]]
-    slow: dict[str, Setting] = {}
-    for setting in settings:
-        if setting.kind in slow:
-            yield setting, Run(None, Ending.SLOW, f"{Ending.SLOW}: already at {slow[setting.kind]}", 0.0)
-            continue
-        run = attempt(scene, float(times[-1]), method, setting, limit=limit, save_at=times, max_steps=MOST_STEPS)
-        if run.ending is Ending.SLOW:
-            slow[setting.kind] = setting
-        yield setting, run
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class _Trial:
+    """A value's scene with the motion that counts as true, as far as it is judged."""
+
+    family: Family
+    value: float
+    scene: Scene
+    times: Array
+    truth: Reference | None
+    condition: float
+    why: str
+
+    @classmethod
+    def of(cls, family: Family, value: float, limit: float) -> "_Trial":
+        """Of a value of a family's parameter."""
+        times = np.linspace(0.0, family.end(value), INSTANTS)
+        truth, why = _truth(family, value, times, limit)
+        if truth is None:
+            return cls(family, value, family.make(value), times, None, np.nan, why)
+        scene = family.make(value) if family.meant is None else family.meant(value)
+        conditions = condition(scene, truth, 4.0 * limit)
+        count = max(2, int(np.sum(conditions <= CONDITION)))
+        truth = replace(truth, motion=truth.motion.until(count))
+        return cls(family, value, family.make(value), times, truth, float(conditions[count - 1]), why)
+
+    def cell(self, method: Method, setting: Setting, limit: float, slow: Setting | None) -> Cell:
+        """One run; where another one took too long, its finer ones are not run."""
+        if slow is None:
+            until = float(self.times[-1])
+            run = attempt(self.scene, until, method, setting, limit=limit, save_at=self.times, max_steps=MOST_STEPS)
+        else:
+            run = Run(None, Ending.SLOW, f"{Ending.SLOW}: already at {slow}", 0.0)
+        found = None if run.solution is None else Motion.of(run.solution)
+        steps = 0 if run.solution is None else int(run.solution.stats["steps"])
+        outcome, error, held = _outcome(found, self.truth, right(setting, self.condition, steps))
+        said, estimate = run.message or self.why, np.nan
+        if run.solution is not None:
+            estimate = run.solution.stats.get("motion_error", {}).get("size", np.nan)
+            if outcome in SILENT | {Outcome.UNKNOWN} and not run.solution.audit.passed:
+                outcome, said = Outcome.FLAGGED, str(run.solution.audit)
+        elif run.ending is Ending.SLOW:
+            outcome = Outcome.SLOW
+        return Cell(
+            self.family.name,
+            self.value,
+            method.name,
+            setting,
+            outcome,
+            error,
+            estimate,
+            held,
+            run.wall,
+            said,
+            "none" if self.truth is None else self.truth.source,
+            np.nan if self.truth is None else self.truth.cross_check,
+            np.nan if self.truth is None else float(self.truth.motion.t[-1]),
+            self.condition,
+        )
 
 
 def _truth(family: Family, value: float, times: Array, limit: float) -> tuple[Reference | None, str]:
@@ -139,7 +192,7 @@ def _truth(family: Family, value: float, times: Array, limit: float) -> tuple[Re
         return resting_reference(scene, times), ""
     try:
         found = tight_reference(scene, float(times[-1]), save_at=times, limit=4.0 * limit)
-        off, most = found.cross_check / found.motion.length, ACCURATE / 2.0
+        off, most = found.cross_check / found.motion.length, DOUBT
         if not off <= most:
             raise ShowError("doubt", path=scene.name, found=f"{off:.1e}", expected=f"{most:.0e}")
     except ShowError as error:
@@ -147,12 +200,13 @@ def _truth(family: Family, value: float, times: Array, limit: float) -> tuple[Re
     return found, ""
 
 
-def _outcome(found: Motion | None, truth: Reference | None) -> tuple[Outcome, float, float]:
+def _outcome(found: Motion | None, truth: Reference | None, allowed: float) -> tuple[Outcome, float, float]:
     """Outcome, error and horizon; without a reference what can be told from the motion alone."""
     if found is None:
         return Outcome.REFUSED, np.nan, np.nan
     if truth is None:
         alone, _ = judge(found, found)
         return (alone if alone is Outcome.DIVERGED else Outcome.UNKNOWN), np.nan, np.nan
-    outcome, error = judge(found, truth.motion)
+    found = found.until(len(truth.motion.t))
+    outcome, error = judge(found, truth.motion, allowed)
     return outcome, error, horizon(found, truth.motion)

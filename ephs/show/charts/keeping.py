@@ -1,0 +1,64 @@
+"""Cells of a chart on disk while it is made: a chart that was stopped goes on where it stood."""
+
+import json
+from collections.abc import Iterator
+from dataclasses import fields
+from pathlib import Path
+from typing import Any, final
+
+import numpy as np
+
+from ephs.show.charts.outcomes import Outcome
+from ephs.show.charts.runs import Setting
+from ephs.show.charts.stability import Cell
+
+__all__ = ["Kept"]
+
+
+@final
+class Kept:
+    """A file with one cell a line, written as soon as it is known.
+
+    Parameters
+    ----------
+    file
+        Where they are.
+    resume
+        Whether cells that are there already count; else the file begins anew.
+    """
+
+    def __init__(self, file: Path, *, resume: bool) -> None:
+        self._file = file
+        self._cells: dict[tuple[str, float, str, Setting], Cell] = {}
+        if resume and file.is_file():
+            for cell in _read(file):
+                self._cells[_key(cell)] = cell
+        else:
+            file.write_text("", encoding="utf-8")
+
+    def get(self, family: str, value: float, method: str, setting: Setting) -> Cell | None:
+        """A cell that is known."""
+        return self._cells.get((family, value, method, setting))
+
+    def add(self, cell: Cell) -> None:
+        """Write a cell down."""
+        self._cells[_key(cell)] = cell
+        row = {field.name: getattr(cell, field.name) for field in fields(cell)}
+        row |= {"setting": [cell.setting.kind, cell.setting.value]}
+        with self._file.open("a", encoding="utf-8") as stream:
+            stream.write(json.dumps(row) + "\n")
+
+
+def _key(cell: Cell) -> tuple[str, float, str, Setting]:
+    return cell.family, cell.value, cell.method, cell.setting
+
+
+def _read(file: Path) -> Iterator[Cell]:
+    """The cells of a file; a line that was cut is none."""
+    for line in file.read_text(encoding="utf-8").splitlines():
+        try:
+            row: dict[str, Any] = json.loads(line)
+        except json.JSONDecodeError:
+            continue
+        row |= {"setting": Setting(*row["setting"]), "outcome": Outcome(row["outcome"])}
+        yield Cell(**{key: np.nan if value is None else value for key, value in row.items()})
