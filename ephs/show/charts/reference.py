@@ -91,8 +91,8 @@ class Motion:
 
     @property
     def length(self) -> float:
-        """Size of mechanism and motion in m: the largest distance of bodies from their common centre, over all times, at
-        least the length of the mechanism; 1 where both are zero."""
+        """Size of mechanism and motion in m: the largest distance of bodies from their common centre, over all times,
+        at least the length of the mechanism; 1 where both are zero."""
         return max(float(np.linalg.norm(self.position - self.centre, axis=-1).max()), self.size) or 1.0
 
     @property
