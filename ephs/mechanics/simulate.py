@@ -18,6 +18,7 @@ from ephs.mechanics.reduction.folded import folded_problem
 from ephs.mechanics.redundancy import explain
 from ephs.mechanics.scene.document import scene_to_text
 from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.scene.state import Snapshot
 from ephs.mechanics.signals import asked_of, jumps_of, numbers_of, signal
 from ephs.mechanics.solve.audit import Bounds
 from ephs.mechanics.solve.breakpoints import Breakpoints
@@ -340,6 +341,7 @@ def problem_of_scene(
         scene=scene,
         document=scene_to_text(scene),
         dependences=lambda: explain(scene),
+        length=Snapshot.of(scene).scale(world.gravity).length,
     )
     if initial:
         _on_joints(problem)

@@ -27,6 +27,9 @@ __all__ = ["LAWS", "Bounds", "audit"]
 LAWFUL, LEAST, COARSE, MANY_TIMES = 1e-10, 1e-9, 1e-2, 100.0
 """Allowed parts of the gross energies: where steps keep the balance; the least and the constant steps' where they do
 not; and how many times rtol where steps are chosen."""
+MOTION = 0.1
+"""Parts of the mechanism's length, or rad, by which constant steps may put bodies wrong at the end, as estimated: the
+estimate adds up errors of steps, which may cancel, so that fewer digits would be guesses."""
 PRODUCTION = 1e-12
 """Part of its scale by which an entropy may fall: what rounding leaves of a difference of flows."""
 CLOSED = 1e-8
@@ -130,10 +133,18 @@ def _step(values: Array, instant: int) -> float:
 
 
 def _accuracy(solution: "Solution", bounds: Bounds, trials: Trials | None) -> Iterator[Breach]:
-    """Constant steps resolve what moves."""
+    """Constant steps put bodies where they belong, and resolve what moves."""
     if bounds.step is None or trials is None:
         return
-    found = trials.error(bounds.step, int(solution.stats["steps"]), solution.ledgers.scale)
+    steps = int(solution.stats["steps"])
+    off = trials.motion(bounds.step, steps)
+    if off is not None:
+        hint = ""
+        if off.size > MOTION:  # of order p + 1 in a step, over as many steps more
+            hint = f" of {0.9 * bounds.step * (MOTION / off.size) ** (1.0 / bounds.order):.2g} s"
+        instant = int(np.argmin(np.abs(solution.t - trials.times[off.trial])))
+        yield Breach(off.size, MOTION - min(MOTION, bounds.accuracy), instant, off.path, hint)
+    found = trials.error(bounds.step, steps, solution.ledgers.scale)
     if found is not None:
         hint, at = "", trials.times[found.trial]
         if found.size > bounds.accuracy:
@@ -255,9 +266,10 @@ LAWS: Mapping[str, Law] = {
         ("take a smaller step, or natural, which keeps the balance", "lower rtol, or take natural, which keeps it"),
     ),
     "accuracy": Law(
-        "constant steps resolve what moves: the difference of a step and two of half its length",
-        "what such steps move between storages",
-        f"{COARSE:g}",
+        "constant steps resolve what moves, and put bodies where they belong: the difference of a step and two of half "
+        "its length, and its sum over the run",
+        "what such steps move between storages; length of the mechanism, 1 rad",
+        f"{COARSE:g}; {MOTION:g} at the end",
         _accuracy,
         lambda bounds: bounds.accuracy,
         ("take a step", "lower rtol"),

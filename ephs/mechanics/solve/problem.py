@@ -165,6 +165,8 @@ class Problem:
         Makes of its states those of the problem that it was made from; None where they are the same.
     seconds
         Its unit of time in s.
+    length
+        Of the mechanism in m, by which errors of positions are measured.
     remarks
         What the statistics of a run say of it: the form of its equations.
     """
@@ -183,6 +185,7 @@ class Problem:
     gaps: Callable[["Solution"], Array] | None = None
     given: Callable[[State], State] | None = None
     seconds: float = 1.0
+    length: float = 1.0
     remarks: Mapping[str, Any] = field(default_factory=lambda: {"form": "paper"})
 
     def inputs(self, t: float, state: State) -> dict[Path, Input]:

@@ -6,11 +6,15 @@ a step and its halves differ in that by a part d, the error of a method of order
 
 Natural methods try steps from the states of the solution; methods whose steps are taken one by one try their own, from
 states that they were in.
+
+What steps err by in the poses of bodies adds up, too: its sum over all steps, as if errors neither grew nor cancelled,
+estimates how far bodies are off at the end.
 """
 
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Generic, TypeVar, final
 
 import numpy as np
@@ -32,8 +36,10 @@ if TYPE_CHECKING:
 __all__ = ["Samples", "StepError", "Trials", "natural_trials", "trials_of"]
 
 S = TypeVar("S")
-EACH, MOST = 600, 6
-"""One time is looked at in so many steps, at most so many in all: three steps each."""
+Tried = tuple[Array, Array]
+"""States and energies."""
+EACH, LEAST, MOST = 600, 4, 6
+"""One time is looked at in so many steps, at least and at most so many in all: three steps each."""
 STILL = 1e-6
 """Part of the gross energies below which a run of such steps moves nothing."""
 SHORTER = 16
@@ -75,15 +81,15 @@ class Trials:
         Of the method.
     times
         In s.
-    energies
-        Of the number of a time and a step in s: (components,) energies of the storages, and entropies that the others
-        made, at the start, after the step, and after its halves.
+    tried
+        Of the number of a time and a step in s, at the start, after the step, and after its halves: (point_size,)
+        states; (components,) energies of the storages, and entropies that the others made.
     """
 
     problem: Problem
     order: int
     times: tuple[float, ...]
-    energies: Callable[[int, float], tuple[Array, Array, Array]]
+    tried: Callable[[int, float], tuple[Tried, Tried, Tried]]
 
     def error(self, h: float, steps: int, gross: float) -> StepError | None:
         """The estimated error of constant steps of h s; None where nothing moves, or nothing can be tried.
@@ -101,6 +107,28 @@ class Trials:
         worst = max(range(len(found)), key=lambda k: float(np.sum(found[k][0])))
         path = self.problem.descriptor.components[int(np.argmax(found[worst][0]))].path
         return StepError(missed / moved / (2.0**self.order - 1.0), worst, path)
+
+    def motion(self, h: float, steps: int) -> StepError | None:
+        """The error of bodies after so many constant steps of h s, in lengths of the mechanism or rad.
+
+        None where there are no bodies, or nothing can be tried.
+        """
+        bodies = [slot for slot in self.problem.descriptor.states if slot.quantity.kind == "pose"]
+        found: list[tuple[float, int, Path]] = []
+        for k in range(len(self.times)) if bodies else ():
+            try:
+                _, coarse, fine = (x for x, _ in self.tried(k, h))
+            except (SolveError, ArithmeticError, np.linalg.LinAlgError):
+                continue
+            off = [_apart(coarse[slot.point], fine[slot.point], self.problem.length) for slot in bodies]
+            worst = int(np.argmax(off))
+            found.append((off[worst], k, bodies[worst].path))
+        if not found:
+            return None
+        times = 2.0**self.order / (2.0**self.order - 1.0)
+        size = times * steps * sum(off for off, _, _ in found) / len(found)
+        _, k, path = max(found, key=lambda each: each[0])
+        return StepError(size, k, path)
 
     def sufficient(self, k: int, h: float, allowed: float) -> float:
         """A step in s, some h / 4ᵏ, that would resolve what moves at a time."""
@@ -121,11 +149,18 @@ class Trials:
         theta = self.problem.reference.temperature
         joules = stores + np.array([theta * isinstance(kind, Irreversible) for kind in kinds])
         try:
-            start, coarse, fine = self.energies(k, h)
+            start, coarse, fine = (energies for _, energies in self.tried(k, h))
         except (SolveError, ArithmeticError, np.linalg.LinAlgError):
             return np.zeros_like(joules), 0.0, 0.0
         moved = float(np.sum(np.abs(joules * (fine - start))))
         return np.abs(joules * (fine - coarse)), moved, float(np.sum(np.abs(stores * start)))
+
+
+def _apart(one: Array, other: Array, length: float) -> float:
+    """Distance of two poses: in parts of a length, or the angle in rad between them."""
+    moved = float(np.linalg.norm(one[4:] - other[4:])) / length
+    chord = min(float(np.linalg.norm(one[:4] - other[:4])), float(np.linalg.norm(one[:4] + other[:4])))
+    return max(moved, 4.0 * float(np.arcsin(min(1.0, 0.5 * chord))))
 
 
 def _clear(t: float, h: float, until: float, jumps: Sequence[float]) -> bool:
@@ -155,23 +190,24 @@ def natural_trials(
     if problem is None or len(solution) < 2:
         return None
     t, d = solution.t, problem.descriptor
-    count = int(np.clip(int(solution.stats["steps"]) // EACH, 1, MOST))
+    count = int(np.clip(int(solution.stats["steps"]) // EACH, LEAST, MOST))
     spread = np.unique(np.linspace(0, len(solution) - 1, count, endpoint=False).astype(int)).tolist()
     instants = [i for i in spread if _clear(float(t[i]), h, np.inf, jumps)]
     if own is None or own.model.descriptor is not d:
         own = make(compile_model(d, problem.reference, problem.inputs(float(t[0]), problem.initial)))
     method, makers = own, np.array([isinstance(slot.primitive, Irreversible) for slot in d.components])
 
-    def energies(k: int, h: float) -> tuple[Array, Array, Array]:
+    @lru_cache(len(instants))
+    def tried(k: int, h: float) -> tuple[Tried, Tried, Tried]:
         x, when = d.pack(solution.state_at(instants[k])), float(t[instants[k]])
         coarse, fine = (_after(problem, method, x, when, h, count) for count in (1, 2))
-        return np.where(makers, 0.0, method.energies(x)), coarse, fine
+        return (x, np.where(makers, 0.0, method.energies(x))), coarse, fine
 
-    return Trials(problem, method.order, tuple(float(t[i]) for i in instants), energies)
+    return Trials(problem, method.order, tuple(float(t[i]) for i in instants), tried)
 
 
-def _after(problem: Problem, method: ComponentMethod, x: Array, t: float, h: float, count: int) -> Array:
-    """(components,) energies, and the entropy made since, after h seconds in so many steps.
+def _after(problem: Problem, method: ComponentMethod, x: Array, t: float, h: float, count: int) -> Tried:
+    """States, (components,) energies, and the entropy made since, after h seconds in so many steps.
 
     Raises
     ------
@@ -184,7 +220,7 @@ def _after(problem: Problem, method: ComponentMethod, x: Array, t: float, h: flo
         if chunk.failure is not None:
             raise chunk.failure
         energies = chunk.energies[-1]
-    return energies
+    return state.x, energies
 
 
 @final
@@ -241,20 +277,23 @@ def trials_of(
     clear = [(t, state) for t, state in samples if _clear(t, h, until, jumps)]
     if not clear:
         return None
-    count = int(np.clip(steps // EACH, 2, MOST))
+    count = int(np.clip(steps // EACH, LEAST, MOST))
     chosen = [clear[i] for i in np.unique(np.linspace(0, len(clear), count, endpoint=False).astype(int))]
     sign = float(np.sign(h))
 
-    def energies(k: int, h: float) -> tuple[Array, Array, Array]:
+    @lru_cache(len(chosen))
+    def tried(k: int, h: float) -> tuple[Tried, Tried, Tried]:
         h = sign * h / seconds
         start = stepper.anew(chosen[k][1])
         whole = stepper.step(start, h).end
         half = stepper.step(stepper.anew(start), 0.5 * h).end
         rows = stepper.rows([start, whole, stepper.step(half, 0.5 * h).end])
-        return tuple(_shown(problem, record_of([start.t] * 3, rows, [0.0] * 3))[1].energies)
+        _, shown = _shown(problem, record_of([start.t] * 3, rows, [0.0] * 3))
+        first, second, third = zip(shown.x, shown.energies, strict=True)
+        return first, second, third
 
     none = Rows().whole(problem.descriptor)
-    return Trials(_shown(problem, none)[0], order, tuple(t * seconds for t, _ in chosen), energies)
+    return Trials(_shown(problem, none)[0], order, tuple(t * seconds for t, _ in chosen), tried)
 
 
 def _shown(problem: Problem, record: Record) -> tuple[Problem, Record]:

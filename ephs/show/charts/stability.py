@@ -43,8 +43,6 @@ class Cell:
         Step or tolerance.
     error
         Where the motion is judged, relative to the size of mechanism and motion; NaN where there is no result.
-    estimate
-        Of its error, by the run itself; NaN where it has none.
     horizon
         The last time in s up to which the error was small; NaN where there is no result.
     message
@@ -61,7 +59,6 @@ class Cell:
     setting: Setting
     outcome: Outcome
     error: float
-    estimate: float
     horizon: float
     seconds: float
     message: str
@@ -161,9 +158,8 @@ class _Trial:
         found = None if run.solution is None else Motion.of(run.solution)
         steps = 0 if run.solution is None else int(run.solution.stats["steps"])
         outcome, error, held = _outcome(found, self.truth, right(setting, self.condition, steps))
-        said, estimate = run.message or self.why, np.nan
+        said = run.message or self.why
         if run.solution is not None:
-            estimate = run.solution.stats.get("motion_error", {}).get("size", np.nan)
             if outcome in SILENT | {Outcome.UNKNOWN} and not run.solution.audit.passed:
                 outcome, said = Outcome.FLAGGED, str(run.solution.audit)
         elif run.ending is Ending.SLOW:
@@ -175,7 +171,6 @@ class _Trial:
             setting,
             outcome,
             error,
-            estimate,
             held,
             run.wall,
             said,
