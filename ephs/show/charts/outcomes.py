@@ -29,7 +29,7 @@ an entry of a rotation matrix, a part of the energies turned over."""
 TIMES, AMPLIFIED = 1000.0, 10.0
 """Largest error of a right run at chosen steps, in tolerances, at most `RIGHT`: this many, or one a step, or so many
 times what a change of the data by the tolerance makes of the motion, whichever is most."""
-CONDITION = 1e3
+CONDITION = 1e2
 """A motion is judged up to the last time to which it changes by less than this many times a relative change of its
 data: later, digits depend on the rounding of any program."""
 ENERGY = 1e-2
