@@ -132,14 +132,14 @@ def test_a_run_beyond_stability_does_not_end_well():
     assert isinstance(error, ephs.SimulationError)
     assert error.outcome is ephs.Outcome.UNLAWFUL
     assert error.partial.t[-1] == 2.0  # the whole solution
-    assert [finding.law for finding in error.findings] == ["energy"]
+    assert [finding.law for finding in error.findings] == ["energy", "accuracy"]
     assert error.findings == error.partial.audit.findings
     assert pickle.loads(pickle.dumps(error.findings)) == error.findings
     assert error.partial.summary()["audit"] == {
         "passed": False,
-        "findings": [error.partial.audit.record()["findings"][0]],
+        "findings": error.partial.audit.record()["findings"],
     }
-    with pytest.warns(ephs.AuditWarning, match="energy: .* is allowed"):
+    with pytest.warns(ephs.AuditWarning, match="is allowed"):
         warned = ephs.simulate(brake(), 2.0, method="rk54", step=0.1, audit="warn")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
