@@ -15,7 +15,7 @@ from functools import cache
 from pathlib import Path
 from typing import Final, final
 
-__all__ = ["STORE", "UNUSED", "ObjectCacheWarning", "Store"]
+__all__ = ["STORE", "UNUSED", "ObjectCacheWarning"]
 
 MARK: Final = hashlib.sha256().digest_size
 UNUSED: Final = 30 * 86400.0
@@ -29,7 +29,7 @@ class ObjectCacheWarning(UserWarning):
 
 @final
 @dataclass(slots=True)
-class Store:
+class _Store:
     """Files of object code in a folder.
 
     Attributes
@@ -86,7 +86,7 @@ class Store:
         )
 
 
-STORE: Final = Store()
+STORE: Final = _Store()
 """The store of this process."""
 
 

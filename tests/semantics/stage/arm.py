@@ -7,13 +7,22 @@ import numpy as np
 from unicorn import UC_ARCH_ARM64, UC_MODE_ARM, Uc
 from unicorn.arm64_const import (
     UC_ARM64_REG_CPACR_EL1,
+    UC_ARM64_REG_D0,
     UC_ARM64_REG_SP,
     UC_ARM64_REG_X0,
     UC_ARM64_REG_X30,
 )
 
-CODE, DATA, STACK, END = 0x10000000, 0x20000000, 0x30000000, 0x40000000
+CODE, DATA, STACK, END = range(0x10000000, 0x14000000, 0x1000000)
+OUTSIDE = END + 16
+"""Where memory begins and what lies there: code, arguments, the stack, where calls end, the library of C."""
 SIZE = 1 << 22
+LIBRARY = {
+    "memset": (0xAA0003E3, 0xB4000082, 0x38001461, 0xD1000442, 0x17FFFFFD, 0xD65F03C0),
+    "memcpy": (0xAA0003E3, 0xB40000A2, 0x38401424, 0x38001464, 0xD1000442, 0x17FFFFFC, 0xD65F03C0),
+}
+"""mov x3, x0; cbz x2, the end; (ldrb w4, [x1], 1;) strb …, [x3], 1; sub x2, x2, 1; b to cbz; ret."""
+PLACES = {name: OUTSIDE + 64 * k for k, name in enumerate(LIBRARY)}
 ALLOCATED, RELOCATIONS, SYMBOLS, EMPTY = 2, 4, 2, 8
 """ELF: the flag of sections in memory; types of sections with relocations, with symbols, and of those of zeros."""
 PAGE, CALLS = 275, (282, 283)
@@ -50,17 +59,19 @@ def sections(code: bytes) -> list[Section]:
     return found
 
 
-def symbols(parts: list[Section]) -> tuple[list[int | None], dict[str, int]]:
-    """Return the addresses of all symbols by number, None where another file has it, and by name."""
+def symbols(parts: list[Section]) -> tuple[list[int | str], dict[str, int]]:
+    """Return the addresses of all symbols by number, its name where another file has it, and by name."""
     (table,) = (part for part in parts if part.kind == SYMBOLS)
     names = parts[table.link].content
-    addresses: list[int | None] = []
+    addresses: list[int | str] = []
     named: dict[str, int] = {}
     for name, _, _, section, value, _ in struct.iter_unpack("<IBBHQQ", table.content):
-        inside = 0 < section < len(parts)
-        addresses.append(parts[section].address + value if inside else None)
-        if inside:
-            named[names[name : names.index(0, name)].decode()] = parts[section].address + value
+        text = names[name : names.index(0, name)].decode()
+        if 0 < section < len(parts):
+            named[text] = parts[section].address + value
+            addresses.append(named[text])
+        else:
+            addresses.append(text)
     return addresses, named
 
 
@@ -80,7 +91,7 @@ class Arm:
     Parameters
     ----------
     code
-        An object file of Linux for arm64, which refers to no other.
+        An object file of Linux for arm64, which refers to nothing but itself and `LIBRARY`.
     """
 
     def __init__(self, code: bytes) -> None:
@@ -90,6 +101,8 @@ class Arm:
         for start in (CODE, DATA, STACK, END):
             self.processor.mem_map(start, SIZE)
         self.processor.reg_write(UC_ARM64_REG_CPACR_EL1, 3 << 20)  # floats
+        for name, words in LIBRARY.items():
+            self.processor.mem_write(PLACES[name], struct.pack(f"<{len(words)}I", *words))
         for part in parts:
             if part.flags & ALLOCATED:
                 self.processor.mem_write(part.address, part.content)
@@ -98,26 +111,46 @@ class Arm:
                 for offset, info, addend in struct.iter_unpack("<QQq", part.content):
                     self._link(parts[part.info].address + offset, info & 0xFFFFFFFF, addresses[info >> 32], addend)
 
-    def _link(self, place: int, kind: int, target: int | None, addend: int) -> None:
-        assert target is not None, "refers to another file"
+    def _link(self, place: int, kind: int, target: int | str, addend: int) -> None:
+        if isinstance(target, str):
+            target = PLACES[target]
         if kind in (PAGE, *CALLS, *OFFSETS):
             (word,) = struct.unpack("<I", self.processor.mem_read(place, 4))
             self.processor.mem_write(place, struct.pack("<I", linked(word, kind, target + addend, place)))
         else:
             assert kind in (260, 261), kind  # tables of frames, which nobody reads here
 
-    def call(self, name: str, *arguments: np.ndarray) -> None:
-        """Call a function with vectors, as C does: each a pointer and a size, at most four; they hold what it wrote."""
-        at = DATA
-        for k, array in enumerate(arguments):
-            self.processor.mem_write(at, array.tobytes())
-            self.processor.reg_write(UC_ARM64_REG_X0 + 2 * k, at)
-            self.processor.reg_write(UC_ARM64_REG_X0 + 2 * k + 1, array.size)
-            at += array.nbytes + -array.nbytes % 16
-        self.processor.reg_write(UC_ARM64_REG_SP, STACK + SIZE)
+    def call(self, name: str, result: str, *arguments: np.ndarray | float | int) -> float | int | None:
+        """Call a function as C does, with arrays (which then hold what it wrote), integers and floats.
+
+        The result is `double`, `i64` or `void`.
+        """
+        at, arrays = DATA, []
+        words: list[int] = []
+        floats: list[int] = []
+        stack: list[int] = []
+        for argument in arguments:
+            if isinstance(argument, float):
+                (bits,) = struct.unpack("<Q", struct.pack("<d", argument))
+                (floats if len(floats) < 8 else stack).append(bits)
+                continue
+            if isinstance(argument, np.ndarray):
+                self.processor.mem_write(at, argument.tobytes())
+                arrays.append((argument, at))
+                word, at = at, at + argument.nbytes + -argument.nbytes % 16
+            else:
+                word = int(argument) & 0xFFFFFFFFFFFFFFFF
+            (words if len(words) < 8 else stack).append(word)
+        for register, bits in (*enumerate(words, UC_ARM64_REG_X0), *enumerate(floats, UC_ARM64_REG_D0)):
+            self.processor.reg_write(register, bits)
+        below = STACK + SIZE - 16 * (len(stack) // 2 + 1)
+        self.processor.mem_write(below, struct.pack(f"<{len(stack)}Q", *stack))
+        self.processor.reg_write(UC_ARM64_REG_SP, below)
         self.processor.reg_write(UC_ARM64_REG_X30, END)
         self.processor.emu_start(self.functions[name], END)
-        at = DATA
-        for array in arguments:
-            array[:] = np.frombuffer(self.processor.mem_read(at, array.nbytes), array.dtype)
-            at += array.nbytes + -array.nbytes % 16
+        for array, place in arrays:
+            array.reshape(-1)[:] = np.frombuffer(self.processor.mem_read(place, array.nbytes), array.dtype)
+        if result == "void":
+            return None
+        found = self.processor.reg_read(UC_ARM64_REG_X0 if result == "i64" else UC_ARM64_REG_D0)
+        return struct.unpack("<q" if result == "i64" else "<d", struct.pack("<Q", found))[0]

@@ -178,7 +178,7 @@ def in_emulator(text: str) -> np.ndarray:
     """All functions at all inputs on arm64."""
     x, y = many()
     out = np.zeros(5 * x.size)
-    Arm(emitted(text, "linux-arm64")).call("elementary_all_of", x, y, out)
+    Arm(emitted(text, "linux-arm64")).call("elementary_all_of", "void", x, x.size, y, y.size, out, out.size)
     return out
 
 

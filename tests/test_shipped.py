@@ -1,0 +1,136 @@
+"""Shipped programs: floats, object code of each level of x86-64, and that of arm64 give the same bits."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ephs.semantics.stage import llvm
+from ephs.semantics.stage.calling import Call
+from ephs.semantics.stage.objects import FITTING, emitted, fitting
+from ephs.semantics.stage.programs import _staged
+from ephs.shipped import programs
+from tests.semantics.linear.test_rows import Solved, problems
+from tests.semantics.stage.arm import Arm
+from tests.semantics.stage.test_elementary import EDGES
+
+PROGRAMS = {program.name: program for program in programs()}
+RUNS = ["compiled", *fitting(llvm.host()), "linux-arm64 in an emulator"]
+
+
+@cache
+def calls(name: str, run: str) -> Mapping[str, Callable[..., Any]]:
+    """The entry functions of a program, by one way to run them."""
+    program, (target, *_) = PROGRAMS[name], run.split()
+    if target not in FITTING:
+        return program.plain() if run == "plain" else program.compiled()
+    _, results = _staged(program, 1, ())
+    code = emitted(program.text(), target)
+    if target == run:
+        library = llvm.load(code)
+        return {
+            key: Call(entry, library, f"{name}_{key}", results[key], lambda _: ())
+            for key, entry in program.entries.items()
+        }
+    arm = Arm(code)
+
+    def call(key: str) -> Callable[..., Any]:
+        entry = program.entries[key]
+        return lambda *arguments: arm.call(f"{name}_{key}", results[key], *entry.split(arguments, lambda _: ()))
+
+    return {key: call(key) for key in program.entries}
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """Entry functions that write down what they return and leave in their arrays."""
+
+    calls: Mapping[str, Callable[..., Any]]
+    heard: list[tuple[str, bytes]]
+
+    def __getitem__(self, key: str) -> Callable[..., Any]:
+        def call(*arguments: Any) -> Any:
+            with np.errstate(all="ignore"):
+                result = self.calls[key](*arguments)
+            arrays = [argument for argument in arguments if isinstance(argument, np.ndarray)]
+            parts = [*([] if result is None else [np.asarray(result)]), *arrays]
+            # Which not-a-number it is, IEEE 754 leaves open.
+            self.heard.append((key, b"".join(np.where(part == part, part, np.nan).tobytes() for part in parts)))
+            return result
+
+        return call
+
+
+def elementary(run: Heard, x: float, y: float) -> None:
+    """Every function at one pair of numbers."""
+    for name in ("sin", "cos", "exp", "log"):
+        run[name](x)
+    run["atan2"](y, x)
+
+
+def constraint_rows(run: Heard, problem: Any) -> None:
+    """Rank, correction and multipliers of drawn rows, and a system with their mass matrix."""
+    row, mass, target, _ = problem
+    Solved(run, row, mass, target)
+    factor, x = np.zeros(mass.shape), np.ones(len(mass))
+    run["cholesky"](mass, factor)
+    run["solve"](factor, x)
+
+
+def sparse(run: Heard, n: int, seed: int, least: float) -> None:
+    """Pattern, factors and solution of a drawn matrix with a full diagonal, whose pivots may fail."""
+    rng = np.random.default_rng(seed)
+    a = np.where(rng.random((n, n)) < 0.4, rng.standard_normal((n, n)), 0.0) + 2.0 * np.eye(n)
+    row, column = np.nonzero(a)
+    first = np.searchsorted(row, np.arange(n + 1)).astype(np.int64)
+    start, out = np.zeros(n + 1, dtype=np.int64), np.zeros(n * n, dtype=np.int64)
+    link, mark = np.zeros(n + 1, dtype=np.int64), np.full(n, -1, dtype=np.int64)
+    count = run["fill"](first, column.astype(np.int64), start, out, link, mark)
+    columns = np.ascontiguousarray(out[:count])
+    rows = np.repeat(np.arange(n), np.diff(start))
+    diagonal = np.flatnonzero(rows == columns).astype(np.int64)
+    find = {(int(r), int(c)): k for k, (r, c) in enumerate(zip(rows, columns, strict=True))}
+    place = np.array([find[int(r), int(c)] for r, c in zip(row, column, strict=True)], dtype=np.int64)
+    value, scratch = np.zeros(count), np.zeros(n)
+    pattern = start, columns, diagonal
+    good = run["factorise"](place, *pattern, a[row, column], value, scratch, np.full(n, least), np.zeros(n))
+    x = np.zeros(n)
+    right = rng.standard_normal(n)
+    run["solve"](np.arange(n), np.arange(n), *pattern, value, right, x, scratch)
+    if good:
+        assert np.allclose(a @ x, right, rtol=0.0, atol=1e-6 * np.linalg.cond(a))
+
+
+NUMBERS = st.one_of(st.floats(-10.0, 10.0), st.sampled_from(EDGES), st.floats())
+USES: dict[str, tuple[Callable[..., None], st.SearchStrategy[Any]]] = {
+    "ephs": (elementary, st.tuples(NUMBERS, NUMBERS)),
+    "constraint_rows": (constraint_rows, st.tuples(problems())),
+    "sparse_lu": (sparse, st.tuples(st.integers(1, 8), st.integers(0, 2**32 - 1), st.sampled_from([0.0, 0.1, 0.9]))),
+}
+"""Of each shipped program, calls of all its entry functions, and what they are drawn from."""
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+@pytest.mark.parametrize("run", RUNS)
+@given(data=st.data())
+@settings(max_examples=20, deadline=None)
+def test_all_ways_to_run_a_program_give_the_same_bits(name, run, data):
+    use, strategy = USES[name]
+    drawn = data.draw(strategy)
+    plain, found = Heard(calls(name, "plain"), []), Heard(calls(name, run), [])
+    use(plain, *drawn)
+    use(found, *drawn)
+    assert plain.heard == found.heard
+    assert {key for key, _ in plain.heard} == set(PROGRAMS[name].entries)
+
+
+def test_another_last_bit_is_noticed():
+    one, other = Heard(calls("ephs", "plain"), []), Heard(calls("ephs", "plain"), [])
+    one["exp"](1.0)
+    other["exp"](1.0 + 2.0**-52)
+    assert one.heard != other.heard
