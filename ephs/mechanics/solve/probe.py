@@ -15,7 +15,7 @@ from ephs.mechanics.solve.snapshot import Snapshot
 
 __all__ = ["WIDTH", "Asked", "Change", "Probe"]
 
-WIDTH = 1.0 / 4000.0
+WIDTH = 1.0 / 2000.0
 """Part of a run between two points at which a function is asked."""
 FIRST, GROWTH = 1.0 / 64.0, 4.0
 """The first points after a jump are nearer: by this part of the width, and each by this factor farther than the last,
@@ -67,28 +67,37 @@ class Change:
 
 @dataclass(slots=True)
 class _Course:
-    """How one function went: its last values, how fast they changed in the last two intervals, the largest so far."""
+    """Course of one function: its last values, their rates of change in the last two intervals, the largest so far."""
 
     asked: Asked
     values: list[float] = field(default_factory=list[float])
-    rates: list[list[float]] = field(default_factory=list[list[float]])
+    last: list[float] = field(default_factory=list[float])
+    before: list[float] = field(default_factory=list[float])
     largest: list[float] = field(default_factory=list[float])
 
     def begin(self, t: float, state: State | None) -> None:
         """Forget what was before t."""
-        self.values, self.rates = self.asked.at(t, state), []
-        self.largest = [max(pair) for pair in zip(map(abs, self.values), self.largest or self.values, strict=True)]
+        self.follow(self.asked.at(t, state))
+        if not self.largest:
+            self.largest = [0.0] * len(self.values)
 
-    def sharp(self, values: Sequence[float], width: float) -> bool:
-        """Whether the change to these values, over a width in s, is one to be looked at."""
-        changes = [abs(b - a) for a, b in zip(self.values, values, strict=True)]
-        self.largest = [max(abs(value), most) for value, most in zip(values, self.largest, strict=True)]
-        found = bool(self.rates) and any(
-            change > SMALL * most and change > SHARP * width * max(rate[j] for rate in self.rates)
-            for j, (change, most) in enumerate(zip(changes, self.largest, strict=True))
-        )
+    def follow(self, values: list[float]) -> None:
+        """Go on from these values as from a start."""
+        self.values, self.last, self.before = values, [], []
+
+    def sharp(self, values: list[float], width: float) -> bool:
+        """Whether the change to these values, over a width in s, is one to be looked at; if not, they are the last."""
+        rates: list[float] = []
+        found = False
+        for j, value in enumerate(values):
+            change = abs(value - self.values[j])
+            if abs(value) > self.largest[j]:
+                self.largest[j] = abs(value)
+            rates.append(change / width)
+            if self.last and change > SMALL * self.largest[j] and rates[j] > SHARP * self.last[j]:
+                found = found or not self.before or rates[j] > SHARP * self.before[j]
         if not found:
-            self.values, self.rates = list(values), [*self.rates[-1:], [change / width for change in changes]]
+            self.values, self.last, self.before = values, rates, self.last
         return found
 
 
@@ -154,7 +163,7 @@ class Probe:
             before, values = course.values, course.asked.at(when, state)
             if course.sharp(values, width):
                 change = self._located(course.asked, before, values, when, h, state)
-                course.values, course.rates = values, []
+                course.follow(values)
                 if change is not None:
                     found.append(change)
         return found
@@ -184,11 +193,11 @@ class Probe:
 
     def snapshot(self) -> Snapshot:
         """Snapshot for `restore`."""
-        courses = [[course.values, course.rates, course.largest] for course in self._courses]
+        courses = [[course.values, course.last, course.before, course.largest] for course in self._courses]
         return {"at": self._at, "spacing": self._spacing, "courses": courses}
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go on from a snapshot."""
         self._at, self._spacing = snapshot["at"], snapshot["spacing"]
-        for course, (values, rates, largest) in zip(self._courses, snapshot["courses"], strict=True):
-            course.values, course.rates, course.largest = list(values), [list(r) for r in rates], list(largest)
+        for course, found in zip(self._courses, snapshot["courses"], strict=True):
+            course.values, course.last, course.before, course.largest = map(list, found)

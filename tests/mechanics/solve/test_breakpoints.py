@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 import ephs
 from ephs.mechanics.methods import METHODS
 from ephs.mechanics.solve import probe
-from ephs.mechanics.solve.breakpoints import MOST_FOUND, Breakpoints
+from ephs.mechanics.solve.breakpoints import Breakpoints
 from ephs.mechanics.solve.probe import WIDTH, Asked
 from examples.failing import scene
 
@@ -177,11 +177,12 @@ def test_jumps_that_are_none_are_one_clear_error(jumps):
         run("rk54", jumps=jumps)
 
 
-def test_noise_is_found_to_be_no_input():
+def test_noise_is_found_to_be_no_input(monkeypatch):
+    for module in ("breakpoints", "audit"):
+        monkeypatch.setattr(f"ephs.mechanics.solve.{module}.MOST_FOUND", 50)
     rng = np.random.default_rng(1)
     with pytest.raises(ephs.AuditError, match=r"input: .* at joints\.rail"):
         run("rk54", function=lambda t: float(rng.standard_normal() ** 9), max_step=0.3, rtol=1e-1, atol=1e9)
-    assert MOST_FOUND == 1000
 
 
 def test_jumps_are_those_of_the_mechanism_in_its_own_units():
