@@ -161,3 +161,31 @@ def test_second_derivatives_are_duals_of_duals():
     assert inner.base is PLAIN
     twice = outer.sin(x * x).slopes[0].slopes[0]
     assert abs(twice - (2 * np.cos(0.09) - 4 * 0.09 * np.sin(0.09))) <= 8 * EPSILON * 3
+
+
+def test_members_have_derivatives_of_their_own():
+    arguments, slopes = drawn(0), [s.reshape(-1) for s in tangent_slopes(np.random.default_rng(0), 1)]
+    x, a, points, gain, _ = arguments
+    shift = np.array([0.0, 0.1, -0.2, 0.5])
+    wide = Point.table(4, members=4)
+    wide.integers.array[:] = 2
+    wide.reals.array[:] = points.reals.array[:, None] + shift
+    values = [x[:, None] + shift, a[:, :, None] + shift, wide, gain + shift, np.zeros((3, 4))]
+    rates = [np.repeat(s[:, None], 4, axis=1) for s in slopes]
+    with pytest.raises(StageError, match=r"on.when depends on a condition"):
+        PROGRAM.compiled(members=4)
+    straight = Program(
+        "straight",
+        product=Entry(lambda on, x, out: out.__setitem__(0, product(on, x[0], x[1])), x=vector(), out=vector()).tangent(
+            "x", "out"
+        ),
+    )
+    found = []
+    for calls in (straight.compiled(members=4), straight.arrays()):
+        y, dy = np.zeros((1, 4)), np.zeros((1, 4))
+        calls["product"]((values[0], rates[0]), (y, dy))
+        found.append((y, dy))
+    for k in range(4):
+        y, dy = np.zeros(1), np.zeros(1)
+        straight.plain()["product"]((values[0][:, k].copy(), slopes[0]), (y, dy))
+        assert all(np.array_equal(one[:, k], y) and np.array_equal(d[:, k], dy) for one, d in found)
