@@ -40,6 +40,29 @@ COMPLEX = {
 """The functions continued to complex numbers: the imaginary part of f(x + ih) is h·f′."""
 
 
+OPERATORS = {
+    "+": lambda a, b: a + b + 1.0,
+    "-": lambda a, b: 2.0 - (a - b),
+    "*": lambda a, b: a * b * 3.0,
+    "/": lambda a, b: 1.0 / (a / b) - a / 2.0,
+    "negative": lambda a: -a,
+}
+
+
+@pytest.mark.parametrize("name", OPERATORS)
+@given(data=st.data())
+def test_every_operator_has_its_derivative(name, data):
+    count = 1 if name == "negative" else 2
+    points = [data.draw(st.integers(1, 400)) / 100 for _ in range(count)]
+    slopes = [data.draw(st.integers(-200, 200)) / 100 for _ in range(count)]
+    number = OPERATORS[name](*(Dual(np.float64(x), (s,)) for x, s in zip(points, slopes, strict=True)))
+    step = 1e-100
+    moved = OPERATORS[name](*(complex(x, step * s) for x, s in zip(points, slopes, strict=True)))
+    terms = sum(abs(s) for s in slopes) * (4 + max(points) / min(points) ** 2)
+    assert abs(number.slopes[0] - moved.imag / step) <= 8 * EPSILON * terms * 3
+    assert abs(number.value - moved.real) <= 8 * EPSILON * (4 + sum(points) * max(points) / min(points))
+
+
 @pytest.mark.parametrize("name", FUNCTIONS)
 @given(data=st.data())
 def test_every_function_has_its_derivative(name, data):
