@@ -132,6 +132,19 @@ BREAKS = {
         "return 0.0",
     ),
     "gluing": Break("ephs/semantics/relations/linear.py", "outer_at[path] + i, -1.0))", "outer_at[path] + i, 1.0))"),
+    "machine code, fused products": Break(
+        "ephs/semantics/stage/emission.py",
+        '"+": "fadd", "-": "fsub", "*": "fmul"',
+        '"+": "fadd contract", "-": "fsub contract", "*": "fmul contract"',
+    ),
+    "object code, not whole": Break(
+        "ephs/semantics/stage/shipping.py",
+        "content is not None and _digest(content) == digest",
+        "content is not None",
+    ),
+    "object code, another processor's": Break(
+        "ephs/semantics/stage/objects.py", 'f"+{one}" for one in needs.split()', 'f"+{one}" for one in ""'
+    ),
 }
 
 
