@@ -1,12 +1,13 @@
 """The primitives of rigid-body mechanics: what the boxes of bodies, joints and springs are filled with.
 
-Each function makes one primitive, in the plain form that is checked and shown, and names its compiled kernel. Fibres
-are left-trivialised; 6-vectors are (angular, linear). Equations of Lohmayer, Capobianco, Leyendecker, sections 4 and 5.
+Each function makes one primitive from the one function that says what it is. Fibres are left-trivialised; 6-vectors are
+(angular, linear). Equations of Lohmayer, Capobianco, Leyendecker, sections 4 and 5.
 """
 
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -15,11 +16,13 @@ from ephs.operad import Directory, Path, PortType, Quantity, quantity
 from ephs.semantics import formulas, structures
 from ephs.semantics.bundle import Array
 from ephs.semantics.checks import STATEMENTS
+from ephs.semantics.derive.linear import Linear
 from ephs.semantics.errors import StructureError
+from ephs.semantics.forms import coupled, stored
 from ephs.semantics.primitives import Formula, Irreversible, Kernel, Point, Reversible, Storage, power_ports
-from ephs.semantics.spaces import SE3, SO3, Pair, codes, manifold
-from ephs.semantics.spaces.rotations import quaternion_to_matrix, rotation_dexp
-from ephs.semantics.verdict import Condition, proved
+from ephs.semantics.spaces import SE3, Pair, codes, manifold
+from ephs.semantics.special import squared_turn
+from ephs.semantics.verdict import proved
 
 __all__ = [
     "frame_change",
@@ -36,9 +39,7 @@ __all__ = [
     "thermal_node",
 ]
 
-KERNELS = "ephs.mechanics.kernels"
 HOLONOMIC = "ephs.mechanics.holonomic_kernels"
-SPRINGS = "ephs.mechanics.spring_kernels"
 POSES = {"SE3": quantity.pose, "SO3xR3": quantity.direct_pose}
 MOMENTA = {"SE3": quantity.body_momentum, "SO3xR3": quantity.direct_momentum}
 
@@ -64,33 +65,19 @@ def kinetic(mass: float, inertia: Array, group: str = "SE3") -> Storage:
 def gravity(weight: Array, group: str = "SE3") -> Storage:
     """Potential ⟨w|r⟩ of a constant force −w on the centre of mass; port q.
 
-    Its discrete gradient (0, (R⁰ V(v_ω))ᵀ w) is exact for r¹ = r⁰ + R⁰ V(v_ω) v_υ.
-
     Parameters
     ----------
     weight
         (3,) −m g in N, in world axes.
     """
     w = np.array(weight, dtype=float)
-    q = Path.of("q")
-    turning = group == "SE3"
-
-    def gradient(x: Point) -> Array:
-        force = quaternion_to_matrix(x[q][:4]).T @ w if turning else w
-        return np.concatenate([np.zeros(3), force])
-
-    def discrete_gradient(x0: Point, v: Array) -> Array:
-        force = rotation_dexp(v[:3]).T @ (quaternion_to_matrix(x0[q][:4]).T @ w) if turning else w
-        return np.concatenate([np.zeros(3), force])
-
-    return Storage(
+    return stored(
         "gravity",
         power_ports(q=POSES[group]),
-        energy=lambda x: float(w @ x[q][4:]),
-        gradient=gradient,
-        discrete_gradient=discrete_gradient,
-        parameters=(("weight", tuple(w.tolist())),),
-        kernel=Kernel(KERNELS, "gravity" if turning else "direct_gravity", tuple(w.tolist())),
+        lambda q, weight: weight @ q[4:],
+        {"weight": w},
+        (("weight", tuple(w.tolist())),),
+        printed=False,
         proof=lambda: proved("a pose is even; E reads the position alone, dE = (0, Rᵀ w)", *STATEMENTS["storage"]),
         trusted=True,
     )
@@ -118,7 +105,7 @@ def no_potential(of: Quantity, port: str) -> Storage:
         energy=lambda _x: 0.0,
         gradient=lambda _x: np.zeros(n),
         discrete_gradient=lambda _x, _v: np.zeros(n),
-        kernel=Kernel(structures.KERNELS, "no_effort"),
+        kernel=Kernel("", "no_effort", (), Linear("no_effort")),
         notation=notation.nothing,
         proof=lambda: proved("E = 0", *STATEMENTS["storage"]),
         trusted=True,
@@ -134,7 +121,6 @@ def pair_spring(of: Pair, stiffness: Array, rest: Array) -> Storage:
         A rotation vector whose stiffness is not isotropic, or whose rest is not zero.
     """
     k, zero = np.array(stiffness, dtype=float), np.array(rest, dtype=float)
-    at = Path.of("q_r")
     if of.code in (codes.SO3, codes.SE3):
         if np.ptp(k[:3]):
             raise StructureError(
@@ -143,32 +129,13 @@ def pair_spring(of: Pair, stiffness: Array, rest: Array) -> Storage:
         if np.any(zero[:3]):
             raise StructureError("parameter", of.name, key="rest", found=zero.tolist(), expected="0 for rotations")
 
-    def energy(x: Point) -> float:
-        off = of.coordinates(x[at]) - zero
-        return 0.5 * float(k @ (off * off))
-
-    turning = 3 if of.code in (codes.SO3, codes.SE3) else 1 if of.code == codes.SE2 else of.dim
-
-    def gradient(x: Point) -> Array:
-        return discrete_gradient(x, np.zeros(of.dim))
-
-    def discrete_gradient(x0: Point, v: Array) -> Array:
-        start, end = x0[at], of.manifold.retract(x0[at], v)
-        mean = 0.5 * (of.coordinates(start) + of.coordinates(end)) - zero
-        pull = k * mean
-        if of.code in (codes.SO3, codes.SE3):
-            pull[:3] = k[0] * _rotation_mean(start[:4], v[:3])
-        pull[turning:] = _mean_turn(of, start, v).T @ pull[turning:]
-        return pull
-
-    return Storage(
+    return stored(
         "pair_spring",
         power_ports(q_r=_relative(of)),
-        energy,
-        gradient,
-        discrete_gradient,
+        lambda q_r: coordinate_energy(of, q_r, k, zero),
+        {},
         (("stiffness", tuple(k.tolist())), ("rest", tuple(zero.tolist()))),
-        kernel=Kernel(SPRINGS, "coordinate_spring", (float(of.code), *k.tolist(), *zero.tolist())),
+        printed=False,
         proof=lambda: proved(
             "poses are even, coordinates are of the rotation itself; d(½ k c²) = k c dc, and d(½ θ²) = θ n",
             *STATEMENTS["storage"],
@@ -177,34 +144,13 @@ def pair_spring(of: Pair, stiffness: Array, rest: Array) -> Storage:
     )
 
 
-def _mean_turn(of: Pair, start: Array, v: Array) -> Array:
-    """The mean over a step of the rotation by which distances are trivialised: displacement = mean · v."""
-    if of.code == codes.SE3:
-        return quaternion_to_matrix(start[:4]) @ rotation_dexp(v[:3])
-    if of.code == codes.SE2:
-        half = 0.5 * float(v[0])
-        c, s, mean = np.cos(start[0] + half), np.sin(start[0] + half), np.sinc(half / np.pi)
-        return mean * np.array([[c, -s], [s, c]])
-    return np.zeros((0, 0))
-
-
-def _rotation_mean(start: Array, v: Array) -> Array:
-    """The discrete gradient of ½ θ² of a rotation: ω at the middle, corrected along v without cancellation."""
-    middle = SO3.retract(start, 0.5 * v)
-    omega = SO3.log(middle)
-    square = float(v @ v)
-    if square == 0.0:
-        return omega
-    change = float(middle[1:] @ v) * 0.25 * np.sinc(0.25 * np.sqrt(square) / np.pi)  # half that of cos(θ/2)
-    ends = [q if q @ middle >= 0.0 else -q for q in (start, SO3.retract(start, v))]  # on the sheet of the middle
-    first, last = (2.0 * np.arctan2(np.linalg.norm(q[1:]), q[0]) for q in ends)
-    if max(first, last) > np.pi:  # past half a turn it is shorter the other way
-        first, last = min(first, 2.0 * np.pi - first), min(last, 2.0 * np.pi - last)
-        rise = last - first
-    else:
-        between = np.sin(0.25 * (first + last))
-        rise = 4.0 * np.arcsin(np.clip(change / between, -1.0, 1.0)) if between > 0.0 else 0.0
-    return omega + (0.5 * (first + last) * rise - float(omega @ v)) / square * v
+def coordinate_energy(of: Pair, q: Any, stiffness: Array, rest: Array) -> Any:
+    """½ k (coordinate − rest)² of an element of a joint's group; of a rotation vector ½ k θ²."""
+    turns = of.code in (codes.SO3, codes.SE3)
+    rotation = 0.5 * stiffness[0] * squared_turn(q[:4]) if turns else 0.0
+    first, numbers = (3, q[4:]) if turns else (0, np.atleast_1d(q))
+    off = numbers - rest[first:]
+    return rotation + 0.5 * sum((k * each * each for k, each in zip(stiffness[first:], off, strict=True)), 0.0)
 
 
 @cache
@@ -216,27 +162,27 @@ def kinematic_coupling(q: Quantity, p: Quantity, q_port: str, p_port: str) -> Re
 @cache
 def lie_poisson(group: str = "SE3") -> Reversible:
     """Gyroscopic forces p.f = −ad*_{p.e} p.x; port p, whose state it reads."""
-    p = Path.of("p")
     space = manifold(POSES[group].space)
+    units = [space.ad(unit) for unit in np.eye(6)]
 
-    def structure(x: Point) -> tuple[Array, Array]:
-        columns = [-space.ad(unit).T @ x[p] for unit in np.eye(6)]
-        return np.array(columns).T, np.zeros((0, 6))
+    def structure(p: Any) -> Any:
+        columns = [[-_product(column, p) for column in unit.T] for unit in units]
+        return np.array(columns).T, None
 
-    name = "lie_poisson" if group == "SE3" else "direct_lie_poisson"
-    kernel = Kernel(KERNELS, name)
-    ports = power_ports(p=MOMENTA[group])
-
-    def proof() -> tuple[Condition, ...]:
-        from ephs.semantics.symbols.proofs import conditions_of
-
-        formula = Formula(lambda **x: structure({p: x["p"]}))
-        return conditions_of(Reversible("lie_poisson", ports, structure, reads=(p,), formula=formula, trusted=True))
-
-    return Reversible(
-        "lie_poisson", ports, structure, reads=(p,), kernel=kernel, notation=notation.lie_poisson, proof=proof,
+    return coupled(
+        "lie_poisson",
+        power_ports(p=MOMENTA[group]),
+        structure,
+        reads=(Path.of("p"),),
+        label="lie_poisson" if group == "SE3" else "direct_lie_poisson",
+        notation=notation.lie_poisson,
         trusted=True,
-    )  # fmt: skip
+    )
+
+
+def _product(row: Array, x: Any) -> Any:
+    """Σ rowᵢ xᵢ over the entries that are not zero."""
+    return sum((float(a) * b for a, b in zip(row, x, strict=True) if a), 0.0)
 
 
 def frame_change(offset: Array, inner: str, outer: str) -> Reversible:
@@ -339,7 +285,6 @@ def joint_friction(
         lambda x, u, theta: np.asarray(resistance(of.coordinates(x[q_r]), u, theta), dtype=float).reshape(
             of.dim, of.dim
         ),
-        reads=(q_r,),
         parameters=(("mu", getattr(mu, "__name__", "function")),),
     )
     return replace(made, notation=notation.friction)

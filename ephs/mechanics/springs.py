@@ -1,23 +1,22 @@
 """Springs and dampers between two points: what their boxes are filled with."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from ephs.mechanics import notation
 from ephs.operad import Directory, Path, PortType, quantity
 from ephs.semantics import structures
-from ephs.semantics.bundle import Array
 from ephs.semantics.checks import STATEMENTS
-from ephs.semantics.errors import StructureError
-from ephs.semantics.primitives import Irreversible, Kernel, Point, Storage, power_ports
-from ephs.semantics.spaces import SE3
-from ephs.semantics.spaces.rotations import quaternion_to_matrix, rotation_dexp
+from ephs.semantics.forms import stored
+from ephs.semantics.primitives import Irreversible, Storage, power_ports
+from ephs.semantics.spaces.rotations import quaternion_to_matrix
+from ephs.semantics.special import choose
 from ephs.semantics.verdict import proved
 
 __all__ = ["point_damper", "point_spring"]
 
-SPRINGS = "ephs.mechanics.spring_kernels"
 RELATIVE = quantity.relative_pose("free")
 
 
@@ -26,42 +25,25 @@ def point_spring(stiffness: float, length: float) -> Storage:
 
     The discrete gradient is that of k/2 (|r| − L)² as a function of |r|², along the chord of r.
     """
-    q_r = Path.of("q_r")
-
-    def energy(x: Point) -> float:
-        return 0.5 * stiffness * (float(np.linalg.norm(x[q_r][4:])) - length) ** 2
-
-    def pull(rotation: Array, mean: Array, lengths: float) -> Array:
-        if length == 0.0:
-            return rotation.T @ (stiffness * mean)
-        if not lengths > 0.0:
-            raise StructureError("parameter", "point_spring", key="distance", found=0.0, expected="> 0")
-        return rotation.T @ (stiffness * (1.0 - 2.0 * length / lengths) * mean)
-
-    def gradient(x: Point) -> Array:
-        r = x[q_r][4:]
-        force = pull(quaternion_to_matrix(x[q_r][:4]), r, 2.0 * float(np.linalg.norm(r)))
-        return np.concatenate([np.zeros(3), force])
-
-    def discrete_gradient(x0: Point, v: Array) -> Array:
-        r0, r1 = x0[q_r][4:], SE3.retract(x0[q_r], v)[4:]
-        rotation = quaternion_to_matrix(x0[q_r][:4]) @ rotation_dexp(v[:3])
-        lengths = float(np.linalg.norm(r0) + np.linalg.norm(r1))
-        return np.concatenate([np.zeros(3), pull(rotation, 0.5 * (r0 + r1), lengths)])
-
-    return Storage(
+    return stored(
         "point_spring",
         power_ports(q_r=RELATIVE),
-        energy,
-        gradient,
-        discrete_gradient,
-        (("stiffness", stiffness), ("length", length)),
-        kernel=Kernel(SPRINGS, "point_spring", (stiffness, length)),
+        distance_energy,
+        {"stiffness": stiffness, "length": length},
+        printed=False,
         proof=lambda: proved(
             "a pose is even; E reads the position alone, dE = (0, Rᵀ k (1 − L/|r|) r)", *STATEMENTS["storage"]
         ),
         trusted=bool(np.isfinite(stiffness) and np.isfinite(length)),
     )
+
+
+def distance_energy(q_r: Any, stiffness: float, length: float) -> Any:
+    """½ k (|r| − L)² of a relative pose; smooth at r = 0 where L = 0."""
+    r = q_r[4:]
+    if length == 0.0:
+        return 0.5 * stiffness * (r @ r)
+    return 0.5 * stiffness * (np.sqrt(r @ r) - length) ** 2
 
 
 def point_damper(damping: float) -> Irreversible:
@@ -76,24 +58,25 @@ def point_damper(damping: float) -> Irreversible:
         "q_r": PortType(RELATIVE, False),
     }
 
-    def resistance(x: Point, _u: Array, _theta: float) -> Array:
-        r = x[q_r][4:]
-        if not r.any():
-            return damping * np.diag([0.0, 0.0, 0.0, 1.0, 1.0, 1.0])
-        axis = quaternion_to_matrix(x[q_r][:4]).T @ (r / np.linalg.norm(r))
-        n = np.concatenate([np.zeros(3), axis])
-        return damping * np.outer(n, n)
-
-    kernel = Kernel(SPRINGS, "point_damper", (damping,))
-    entries, sound = (("damping", damping),), bool(0.0 <= damping < np.inf)
+    sound = bool(0.0 <= damping < np.inf)
     made = structures.dissipation(
         "point_damper",
         Directory(ports),
-        resistance,
-        reads=(q_r,),
-        kernel=kernel,
-        parameters=entries,
+        lambda x, u, _theta: distance_resistance(x[q_r], u, damping),
+        parameters=(("damping", damping),),
         shown=(lambda: structures.dissipation_proof(Directory(ports), None)) if sound else None,
         trusted=sound,
     )
     return replace(made, notation=notation.friction)
+
+
+def distance_resistance(pose: Any, u: Any, damping: float) -> Any:
+    """c n nᵀ (6, 6) of the direction n of a relative pose's position, in turning axes."""
+    r = pose[4:]
+    square = r @ r
+    along = quaternion_to_matrix(pose[:4]).T @ r
+    out = [[0.0] * 6 for _ in range(6)]
+    for i in range(3):
+        for j in range(3):
+            out[3 + i][3 + j] = damping * choose(square, along[i] * along[j] / square, 1.0 if i == j else 0.0)
+    return out

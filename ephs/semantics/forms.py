@@ -1,6 +1,6 @@
 """Elements from plain functions: their tapes, gradients for Python, and relations in machine code."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, final
 
@@ -8,19 +8,28 @@ import numpy as np
 
 from ephs.operad import Interface, Path
 from ephs.operad.charges import ENTROPY, VOLUME
-from ephs.semantics.bundle import Array, Bundle
+from ephs.semantics.bundle import Array, Bundle, Reference
 from ephs.semantics.derive import relations
 from ephs.semantics.derive.recording import Untraceable, record
 from ephs.semantics.derive.relations import Port
-from ephs.semantics.primitives import Domain, Formula, Kernel, Point
+from ephs.semantics.primitives import Domain, Formula, Irreversible, Kernel, Point, Reversible, Storage
 from ephs.semantics.spaces import manifold
 from ephs.semantics.stage.plain import PLAIN
 
-__all__ = ["StorageForm", "irreversible_kernel", "reversible_kernel", "stacked", "storage_form"]
+__all__ = [
+    "StorageForm",
+    "coupled",
+    "dissipated",
+    "irreversible_kernel",
+    "reversible_kernel",
+    "stacked",
+    "storage_form",
+    "stored",
+]
 
 LARGEST = 32
 """How many numbers states and efforts may have together: a relation is written out, every derivative for itself."""
-WITHOUT_SLOPE = ("sign", "sinhc")
+WITHOUT_SLOPE = ("sign", "sinhc", "choose")
 """Functions that jump, or have no rule for their slope between two arguments."""
 Carried = dict[int, tuple[tuple[str, float], ...]]
 
@@ -35,7 +44,111 @@ class StorageForm:
     kernel: Kernel
 
 
-def storage_form(interface: Interface, energy: Callable[..., Any], domain: Domain = ()) -> StorageForm:
+def stored(
+    name: str,
+    interface: Interface,
+    energy: Callable[..., Any],
+    numbers: Mapping[str, Any],
+    parameters: tuple[tuple[str, object], ...] | None = None,
+    printed: bool = True,
+    **said: Any,
+) -> Storage:
+    """Storage of one energy, a function of the ports' states and of the numbers by name.
+
+    Parameters
+    ----------
+    parameters
+        As of a `Storage`; the numbers where None.
+    printed
+        Whether the energy is the formula that is printed and proved.
+    **said
+        As of a `Storage`.
+    """
+
+    def whole(**states: Any) -> Any:
+        return energy(**states, **numbers)
+
+    def value(x: Point) -> float:
+        with np.errstate(all="ignore"):  # what is not a number is found by its value
+            return float(whole(**_named(x)))
+
+    form = storage_form(interface, whole, label=name)
+    kept: dict[str, Any] = {"formula": Formula(energy, tuple(numbers)) if printed else None}
+    return Storage(
+        name,
+        interface,
+        energy=value,
+        gradient=form.gradient,
+        discrete_gradient=form.discrete_gradient,
+        parameters=tuple(numbers.items()) if parameters is None else parameters,
+        kernel=form.kernel,
+        **(kept | said),
+    )
+
+
+def dissipated(
+    name: str,
+    interface: Interface,
+    matrix: Callable[..., Any],
+    numbers: Mapping[str, Any],
+    parameters: tuple[tuple[str, object], ...] | None = None,
+    label: str = "relation",
+    printed: bool = True,
+    **said: Any,
+) -> Irreversible:
+    """Process of one M, a function of energy efforts, states that are read, and the numbers, by name; as `stored`."""
+    bundle = Bundle.of(interface)
+    reads = tuple(port for port, port_type in interface.items() if not port_type.power)
+
+    def whole(**values: Any) -> Any:
+        return matrix(**values, **numbers)
+
+    def evaluate(x: Point, e: Array, reference: Reference) -> Array:
+        given = bundle.split(e + bundle.intensive(reference)) | {port: x[port] for port in reads}
+        with np.errstate(all="ignore"):
+            return np.array(whole(**_named(given)), dtype=float)
+
+    kernel = irreversible_kernel(interface, reads, Formula(whole), label=label)
+    entries = tuple(numbers.items()) if parameters is None else parameters
+    kept: dict[str, Any] = {"formula": Formula(matrix, tuple(numbers)) if printed else None}
+    return Irreversible(name, interface, evaluate, reads, entries, kernel, **(kept | said))
+
+
+def coupled(
+    name: str,
+    interface: Interface,
+    structure: Callable[..., Any],
+    multipliers: int = 0,
+    reads: tuple[Path, ...] = (),
+    label: str = "",
+    **said: Any,
+) -> Reversible:
+    """Reversible exchange of one function of the states that are read, by name: (L, C), either of which may be None.
+
+    Parameters
+    ----------
+    reads
+        Where not the state ports are read.
+    """
+    reads = reads or tuple(port for port, port_type in interface.items() if not port_type.power)
+    n, formula = Bundle.of(interface).size, Formula(structure)
+    both = stacked(formula, n, multipliers)
+
+    def evaluate(x: Point) -> tuple[Array, Array]:
+        found = np.array(both(**_named(x)), dtype=float)
+        return found[:n], found[n:]
+
+    kernel = reversible_kernel(interface, reads, formula, multipliers, label=label or name)
+    return Reversible(name, interface, evaluate, reads, multipliers=multipliers, kernel=kernel, formula=formula, **said)
+
+
+def _named(values: Point) -> dict[str, Any]:
+    return {str(port): np.float64(value[0]) if value.size == 1 else value for port, value in values.items()}
+
+
+def storage_form(
+    interface: Interface, energy: Callable[..., Any], domain: Domain = (), label: str = "storage"
+) -> StorageForm:
     """Record an energy of the states of power ports.
 
     Raises
@@ -66,12 +179,17 @@ def storage_form(interface: Interface, energy: Callable[..., Any], domain: Domai
                 return np.full(bundle.size, np.nan)
 
     return StorageForm(
-        lambda x: discrete(x, np.zeros(bundle.size)), discrete, _kernel("storage", relation, carried, found.parameters)
+        lambda x: discrete(x, np.zeros(bundle.size)), discrete, _kernel(label, relation, carried, found.parameters)
     )
 
 
 def reversible_kernel(
-    interface: Interface, reads: tuple[Path, ...], formula: Formula, multipliers: int, domain: Domain = ()
+    interface: Interface,
+    reads: tuple[Path, ...],
+    formula: Formula,
+    multipliers: int,
+    domain: Domain = (),
+    label: str = "relation",
 ) -> Kernel:
     """Record f = L(x) e + C(x)ᵀ λ, 0 = C(x) e.
 
@@ -84,10 +202,12 @@ def reversible_kernel(
     found = record(stacked(formula, n, multipliers), _arguments(interface, reads))
     _limited(found.tape.inputs + n + multipliers)
     relation = relations.Reversible(found.tape, _ports(interface, reads), _numbers(interface, reads, domain))
-    return _kernel("relation", relation, {}, found.parameters)
+    return _kernel(label, relation, {}, found.parameters)
 
 
-def irreversible_kernel(interface: Interface, reads: tuple[Path, ...], formula: Formula, domain: Domain = ()) -> Kernel:
+def irreversible_kernel(
+    interface: Interface, reads: tuple[Path, ...], formula: Formula, domain: Domain = (), label: str = "relation"
+) -> Kernel:
     """Record f = M(x, eᴱ) e / θ₀.
 
     Raises
@@ -98,14 +218,14 @@ def irreversible_kernel(interface: Interface, reads: tuple[Path, ...], formula: 
     bundle = Bundle.of(interface)
     n = bundle.size
     spans = {str(port): where for port, where, _ in bundle.items()}
-    efforts = {port: 0 if where.stop - where.start == 1 else where.stop - where.start for port, where in spans.items()}
+    efforts = {port: _vector(where.stop - where.start) for port, where in spans.items()}
     states = _arguments(interface, reads)
     found = record(formula.function, {**efforts, **states})
     if found.tape.shape != (n, n):
         raise Untraceable(f"the matrix is {found.tape.shape}, expected {(n, n)}")
     _limited(found.tape.inputs)
     takes = [(True, i) for where in spans.values() for i in range(where.start, where.stop)]
-    takes += [(False, i) for i in range(sum(max(size, 1) for size in states.values()))]
+    takes += [(False, i) for i in range(found.tape.inputs - n)]
     hot = tuple(where.start for _, where, quantity in bundle.items() if quantity.kind == "entropy")
     carried = _carried(bundle)
     mine = [bound for bound in domain if bound[0] not in reads]
@@ -116,7 +236,7 @@ def irreversible_kernel(interface: Interface, reads: tuple[Path, ...], formula: 
         found.tape, tuple(takes), _ports(interface, reads), _reference(bundle), hot, tuple(carried),
         _numbers(interface, reads, domain), bounds,
     )  # fmt: skip
-    return _kernel("relation", relation, carried, found.parameters)
+    return _kernel(label, relation, carried, found.parameters)
 
 
 def stacked(formula: Formula, n: int, multipliers: int) -> Callable[..., Any]:
@@ -143,9 +263,14 @@ def _kernel(name: str, relation: relations.Relation, carried: Carried, parameter
     return Kernel("", name, numbers, relation, potentials=tuple(enumerate(carried.values())))
 
 
-def _arguments(interface: Interface, ports: Sequence[Path]) -> dict[str, int]:
+def _vector(size: int) -> int | None:
+    """A vector of so many numbers, or a number."""
+    return None if size == 1 else size
+
+
+def _arguments(interface: Interface, ports: Sequence[Path]) -> dict[str, int | None]:
     sizes = {str(port): manifold(interface[port].quantity.space).size for port in ports}
-    return {port: 0 if size == 1 else size for port, size in sizes.items()}
+    return {port: _vector(size) for port, size in sizes.items()}
 
 
 def _ports(interface: Interface, ports: Sequence[Path]) -> tuple[Port, ...]:

@@ -18,6 +18,7 @@ from ephs.semantics.spaces import manifold
 from ephs.semantics.verdict import Condition, StructureVerdict, examine
 
 if TYPE_CHECKING:
+    from ephs.semantics.derive.linear import Linear
     from ephs.semantics.derive.relations import Relation
     from ephs.semantics.system import Filling
 
@@ -49,7 +50,7 @@ class Kernel:
     module: str
     name: str
     parameters: tuple[float, ...] = ()
-    relation: "Relation | None" = None
+    relation: "Relation | Linear | None" = None
     inner: "Kernel | None" = None
     potentials: tuple[tuple[int, tuple[tuple[str, float], ...]], ...] = ()
 

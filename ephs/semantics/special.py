@@ -8,7 +8,7 @@ import numpy as np
 
 from ephs.semantics.derive.recording import Recorded
 
-__all__ = ["SHORT", "log_mean", "sinhc"]
+__all__ = ["SHORT", "choose", "log_mean", "sinhc", "squared_turn"]
 
 SHORT = 1e-2
 """Below this a series serves, whose first term left out is below rounding: z⁸/9!."""
@@ -35,3 +35,19 @@ def log_mean(log_a: Any, log_b: Any) -> Any:
     a − b is a non-negative factor times the difference of the logarithms, which is a difference of potentials.
     """
     return np.exp((log_a + log_b) / 2) * sinhc((log_a - log_b) / 2)
+
+
+def choose(number: Any, one: Any, other: Any) -> Any:
+    """One of two values: the first where the number is positive. Both have been evaluated."""
+    if isinstance(number, Recorded):
+        return number.choose(one, other)
+    return one if number > 0.0 else other
+
+
+def squared_turn(q: Any) -> Any:
+    """θ² of a unit quaternion, with the angle 0 ≤ θ ≤ π of its rotation; smooth but at half a turn."""
+    w, x, y, z = q
+    if isinstance(w, Recorded):
+        return w.squared_turn(x, y, z)
+    angle = 2.0 * math.atan2(math.sqrt(x * x + y * y + z * z), abs(w))
+    return angle * angle

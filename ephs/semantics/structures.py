@@ -2,30 +2,20 @@
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from ephs.operad import Interface, Path, quantity
-from ephs.semantics.bundle import Array, Bundle, Reference
+from ephs.semantics.bundle import Array, Bundle
 from ephs.semantics.checks import STATEMENTS
+from ephs.semantics.derive.linear import Linear
+from ephs.semantics.forms import dissipated, stored
 from ephs.semantics.primitives import Formula, Irreversible, Kernel, Point, Proof, Reversible, Storage, power_ports
 from ephs.semantics.spaces import codes, manifold
 from ephs.semantics.verdict import Condition, proved
 
-__all__ = ["KERNELS", "constant_structure", "coupling", "dissipation", "dissipation_proof", "exponential", "quadratic"]
-
-KERNELS = "ephs.semantics.kernels"
-"""The module of the compiled counterparts."""
-
-
-def exp(x: float) -> float:
-    """The exponential, infinite where it overflows: iterates of a solver may go there."""
-    return math.exp(x) if x < 709.0 else math.inf
-
-
-def expm1(x: float) -> float:
-    """exp(x) − 1, infinite where it overflows."""
-    return math.expm1(x) if x < 709.0 else math.inf
+__all__ = ["constant_structure", "coupling", "dissipation", "dissipation_proof", "exponential", "onsager", "quadratic"]
 
 
 def quadratic(
@@ -52,7 +42,7 @@ def quadratic(
         discrete_gradient=lambda x0, v: q @ (vector(x0) + 0.5 * v),
         parameters=parameters,
         # the kernel knows no reference environment
-        kernel=None if Bundle.of(interface).charges else Kernel(KERNELS, "quadratic", tuple(q.ravel())),
+        kernel=None if Bundle.of(interface).charges else Kernel("", "quadratic", tuple(q.ravel()), Linear("quadratic")),
         formula=formula,
         proof=lambda: _quadratic_proof(interface, q),
         trusted=trusted,
@@ -77,33 +67,27 @@ def exponential(
     name: str, c1: float, c2: float, parameters: tuple[tuple[str, object], ...], formula: Formula | None = None
 ) -> Storage:
     """E = c1·(exp(s/c2) − 1): energies count from s = 0, so that small heats are not lost beside a large E."""
-    port = Path.of("s")
     sound = c1 > 0.0 and 0.0 < c2 < math.inf and 0.0 < c1 / c2 < math.inf
 
     def proof() -> tuple[Condition, ...]:
         return proved("an entropy is even, dE = θ = c1/c2 exp(s/c2), c1 > 0 and c2 > 0", *STATEMENTS["storage"])
 
-    def gradient(x: Point) -> Array:
-        return np.array([c1 / c2 * exp(float(x[port][0]) / c2)])
-
-    def discrete_gradient(x0: Point, v: Array) -> Array:
-        rise = float(v[0]) / c2
-        mean = expm1(rise) / rise if rise != 0.0 else 1.0
-        return gradient(x0) * mean
-
-    return Storage(
+    return stored(
         name,
         power_ports(s=quantity.entropy),
-        energy=lambda x: c1 * expm1(float(x[port][0]) / c2),
-        gradient=gradient,
-        discrete_gradient=discrete_gradient,
-        parameters=parameters,
-        kernel=Kernel(KERNELS, "exponential", (c1, c2)),
+        exponential_energy,
+        {"c1": c1, "c2": c2},
+        parameters,
         formula=formula,
         proof=proof if sound else None,
         # a random state of a small capacity is so cold or so hot that differences tell nothing
         trusted=sound,
     )
+
+
+def exponential_energy(s: Any, c1: float, c2: float) -> Any:
+    """E = c1·(exp(s/c2) − 1)."""
+    return c1 * np.expm1(s / c2)
 
 
 def constant_structure(
@@ -125,7 +109,7 @@ def constant_structure(
         structure=lambda _x: (skew, constraint),
         parameters=parameters,
         multipliers=k,
-        kernel=Kernel(KERNELS, "constant_structure", tuple(entry or 0.0 for entry in entries)),  # most share one zero
+        kernel=Kernel("", "constant_structure", tuple(entry or 0.0 for entry in entries), Linear("constant_structure")),
         formula=formula or Formula(lambda: (skew, constraint)),
         trusted=trusted,
     )
@@ -144,8 +128,6 @@ def dissipation(
     interface: Interface,
     resistance: Array | Callable[[Point, Array, float], Array],
     *,
-    reads: tuple[Path, ...] = (),
-    kernel: Kernel | None = None,
     parameters: tuple[tuple[str, object], ...] = (),
     formula: Formula | None = None,
     shown: Proof | None = None,
@@ -164,23 +146,34 @@ def dissipation(
     shown
         Proves the conditions where μ is a function.
     """
-    d = next(iter(interface.values())).quantity.space.dim
+    power, heat, *_ = (str(port) for port in interface)
+    states = [str(port) for port in interface if not interface[port].power]
 
-    def matrix(x: Point, e: Array, reference: Reference) -> Array:
-        u, theta = e[:d], reference.temperature + float(e[d])
-        mu = resistance(x, u, theta) if callable(resistance) else resistance
-        drag = mu @ u
-        out = np.empty((d + 1, d + 1))
-        out[:d, :d] = theta * mu
-        out[:d, d] = out[d, :d] = -drag
-        out[d, d] = float(u @ drag) / theta
-        return out
+    def matrix(**given: Any) -> Any:
+        u, theta = np.atleast_1d(given[power]), given[heat]
+        x = {Path.of(port): np.atleast_1d(given[port]) for port in states}
+        return onsager(resistance(x, u, theta) if callable(resistance) else resistance, u, theta)
 
     proof: Proof | None = shown
     if not callable(resistance):
         mu = np.asarray(resistance, dtype=float)
-        kernel, proof = Kernel(KERNELS, "dissipation", tuple(mu.ravel())), lambda: dissipation_proof(interface, mu)
-    return Irreversible(name, interface, matrix, reads, parameters, kernel, formula, proof=proof, trusted=trusted)
+        proof = lambda: dissipation_proof(interface, mu)  # noqa: E731 - beside the one that is given
+    return dissipated(
+        name, interface, matrix, {}, parameters, "dissipation", formula=formula, proof=proof, trusted=trusted
+    )
+
+
+def onsager(mu: Any, u: Any, theta: Any) -> Any:
+    """M = [[θ μ, −μ u], [−(μ u)ᵀ, ⟨u|μ u⟩/θ]] (d + 1, d + 1), of numbers or what is recorded."""
+    mu = np.asarray(mu)
+    drag = [_product(row, u) for row in mu]
+    rows = [[theta * entry for entry in row] + [-pull] for row, pull in zip(mu, drag, strict=True)]
+    return [*rows, [*(-pull for pull in drag), _product(drag, u) / theta]]
+
+
+def _product(row: Any, u: Any) -> Any:
+    """Σ rowᵢ uᵢ without the entries that are known to vanish."""
+    return sum((a * b for a, b in zip(row, u, strict=True) if not (isinstance(a, float) and a == 0.0)), 0.0)
 
 
 def dissipation_proof(interface: Interface, mu: Array | None) -> tuple[Condition, ...]:

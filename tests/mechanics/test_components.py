@@ -15,7 +15,7 @@ from ephs.operad import quantity as Q
 from ephs.semantics import Reference, Storage, StructureError, library
 from ephs.semantics.behaviour import Natural
 from ephs.semantics.checks import dirac, random_efforts, random_point
-from ephs.semantics.kernel_table import EXTENT, OK, TEMPERATURE, TURN, address_of, prototype
+from ephs.semantics.kernel_table import DOMAIN, OK, TEMPERATURE, TURN, address_of, prototype
 from ephs.semantics.laws import isotropy
 from ephs.semantics.search import search
 from ephs.semantics.spaces import PAIRS, SE3, pair
@@ -320,7 +320,7 @@ def test_a_spring_without_length_has_no_direction():
     draw = Draw(PRIMITIVES["point_spring"], 0, 0.0)
     for value in draw.x.values():
         value[4:] = 0.0
-    assert draw.compiled()[0] == EXTENT
+    assert draw.compiled()[0] == DOMAIN
     with pytest.raises(StructureError, match="distance"):
         draw.plain(draw.z)
 

@@ -12,7 +12,7 @@ from ephs.mechanics.reduction.frames import Joint, anchor, bodies, inertia_at, j
 from ephs.mechanics.reduction.merging import MERGE
 from ephs.mechanics.reduction.rewrite import Draft, Rule, Site, State, StateMap, Strength
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.primitives import Irreversible, Primitive, Reversible, Storage
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rank import CONSTRAINT, rank_of
@@ -47,7 +47,10 @@ def _resists(part: Irreversible) -> bool:
     if kernel is None:
         return True
     inside = kernel.inner or kernel
-    return inside.name != "dissipation" or any(inside.parameters)
+    if inside.name != "dissipation" or part.reads:
+        return True
+    efforts = np.ones(part.bundle.size)
+    return bool(np.any(part.matrix({}, efforts, Reference())[:, :-1]))
 
 
 def _friction(draft: Draft, place: tuple[Path, ...]) -> Site | None:

@@ -20,7 +20,7 @@ from ephs.semantics.primitives import Primitive, Reversible, Storage
 
 __all__ = ["Entry", "entry_of", "laid_out"]
 
-LINEAR = frozenset({("ephs.semantics.kernels", "constant_structure"), ("ephs.semantics.kernels", "quadratic")})
+LINEAR = frozenset({"constant_structure", "quadratic"})
 """Kernels whose Jacobian's entries are their parameters: what vanishes depends on which parameters do."""
 
 
@@ -137,7 +137,7 @@ def _local_pattern(entry: Entry, reference: Reference) -> Array:
     shape = (n, n) if kind == STORING else (n + k, n + k + nv)
     kernel = primitive.kernel
     numbers = kernel.parameters if kernel is not None else ()
-    if kernel is not None and (kernel.module, kernel.name) in LINEAR:
+    if kernel is not None and kernel.name in LINEAR:
         numbers = tuple(number != 0.0 for number in numbers)
     names = None if kernel is None else (kernel.module, kernel.name, kernel.relation)
     key = (names, numbers, read, kind, n, k)

@@ -14,7 +14,17 @@ from typing import Final, final
 from ephs.semantics.stage.evaluator import Evaluator
 from ephs.semantics.stage.numbers import Real
 
-__all__ = ["COMPOSED", "FUNCTIONS", "Rule", "angle_ratio", "polynomial", "root_cosine", "root_sine"]
+__all__ = [
+    "COMPOSED",
+    "FUNCTIONS",
+    "Rule",
+    "angle_ratio",
+    "polynomial",
+    "root_cosine",
+    "root_sine",
+    "squared_turn_slope",
+    "turn",
+]
 
 NEAR: Final = 0.5
 """Up to this size of the argument series serve."""
@@ -190,6 +200,21 @@ FUNCTIONS: Final[Mapping[str, Rule]] = MappingProxyType(
     }
 )
 """Functions with a rule."""
+
+
+TINY: Final = 1e-300
+"""Keeps the derivative of a length finite where it vanishes; beside any other it is nothing."""
+
+
+def turn(on: Evaluator, q: Sequence[Real]) -> Real:
+    """The angle 0 ≤ θ ≤ π of the rotation of a unit quaternion."""
+    w, x, y, z = q
+    return 2.0 * on.atan2(on.sqrt(x * x + y * y + z * z + TINY), on.absolute(w))
+
+
+def squared_turn_slope(on: Evaluator, a: Real, b: Real) -> Real:
+    """(b² − a²)/(cos(b/2) − cos(a/2)) of two angles up to π: −8 (M/sin M)(D/sin D), M = (a + b)/4, D = (b − a)/4."""
+    return -8.0 / (sinc(on, 0.25 * (a + b)) * sinc(on, 0.25 * (b - a)))
 
 
 def tan(on: Evaluator, x: Real) -> Real:

@@ -42,13 +42,13 @@ class Recording:
     parameters: tuple[float, ...]
 
 
-def record(function: Callable[..., Any], arguments: Mapping[str, int]) -> Recording:
+def record(function: Callable[..., Any], arguments: Mapping[str, int | None]) -> Recording:
     """Call a function with recorded values.
 
     Parameters
     ----------
     arguments
-        Name -> 0 for a number, else how many numbers a vector has.
+        Name -> how many numbers a vector has, None for a number.
 
     Raises
     ------
@@ -59,9 +59,9 @@ def record(function: Callable[..., Any], arguments: Mapping[str, int]) -> Record
     given: dict[str, Any] = {}
     count = 0
     for name, size in arguments.items():
-        entries = [_input(recorder, count + i) for i in range(max(size, 1))]
+        entries = [_input(recorder, count + i) for i in range(1 if size is None else size)]
         count += len(entries)
-        given[name] = _array(entries) if size else entries[0]
+        given[name] = entries[0] if size is None else _array(entries)
     try:
         out = np.asarray(_recordable(function)(**given), dtype=object)
     except Untraceable as error:
@@ -193,6 +193,14 @@ class Recorded:
     def arctan2(self, other: Any) -> "Recorded":
         """The angle of a point, as NumPy's function of this name."""
         return self.of("atan2", self.place, _place(other, self.recorder))
+
+    def choose(self, one: Any, other: Any) -> "Recorded":
+        """The first where this is positive, else the other."""
+        return self.of("choose", self.place, _place(one, self.recorder), _place(other, self.recorder))
+
+    def squared_turn(self, x: Any, y: Any, z: Any) -> "Recorded":
+        """The squared angle of the rotation with this quaternion."""
+        return self.of("squared turn", self.place, *(_place(each, self.recorder) for each in (x, y, z)))
 
     def hypot(self, other: Any) -> "Recorded":
         """The length of a vector, as NumPy's function of this name."""

@@ -9,13 +9,13 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, Final, TypeAlias, final
 
+from ephs.semantics.derive.arguments import Arguments, pointer
 from ephs.semantics.derive.charts import moved, over
+from ephs.semantics.derive.linear import Linear
 from ephs.semantics.derive.slopes import Slopes, lifted
 from ephs.semantics.derive.tape import Tape, evaluate
 from ephs.semantics.stage.duals import Dual, Duals
 from ephs.semantics.stage.evaluator import Evaluator
-from ephs.semantics.stage.kinds import Atom, Kind
-from ephs.semantics.stage.memory import Integers, Vector
 from ephs.semantics.stage.numbers import Integer, Real, Truth
 from ephs.semantics.stage.programs import Call, Entry, Program
 
@@ -98,7 +98,7 @@ class Storage:
         found = lifted(evaluate(Slopes(on), self.energy, states, given)[0])
         return [found.slopes.get(i, 0.0) for i in range(first)], found.end, [lifted(each).end for each in states]
 
-    def stage(self, on: Evaluator, a: "Arguments") -> Integer:
+    def stage(self, on: Evaluator, a: Arguments) -> Integer:
         """Write efforts, their derivatives by the step, and the energy."""
         n, _, _, size = self.dimensions
         x, p = [a.x0[i] for i in range(size)], [a.p[i] for i in range(self.numbers)]
@@ -165,7 +165,7 @@ class Reversible:
         """How many parameters there are."""
         return self.structure.parameters
 
-    def stage(self, on: Evaluator, a: "Arguments") -> Integer:
+    def stage(self, on: Evaluator, a: Arguments) -> Integer:
         """Write flows, conditions and their derivatives by efforts, multipliers and increments."""
         n, k, m, _ = self.dimensions
         partials = Duals(on, n + k + m)
@@ -221,7 +221,7 @@ class Irreversible:
         """How many parameters there are."""
         return len(self.potentials) + self.matrix.parameters
 
-    def stage(self, on: Evaluator, a: "Arguments") -> Integer:
+    def stage(self, on: Evaluator, a: Arguments) -> Integer:
         """Write flows and their derivatives by efforts and increments."""
         n, _, m, _ = self.dimensions
         partials = Duals(on, n + m)
@@ -255,7 +255,7 @@ def _along(value: Real, directions: int, direction: int, slope: float = 1.0) -> 
 
 
 def _given(
-    on: Duals, relation: Reversible | Irreversible, a: "Arguments"
+    on: Duals, relation: Reversible | Irreversible, a: Arguments
 ) -> tuple[list[Real], list[Real], list[Real], list[Real]]:
     """Parameters, states at the middle, efforts and multipliers, with directions (e, λ, v)."""
     n, k, m, size = relation.dimensions
@@ -271,7 +271,7 @@ def _given(
     return [on.dual(a.p[i]) for i in range(relation.numbers)], x, e, lam
 
 
-def _written(on: Duals, relation: Relation, a: "Arguments", values: Numbers) -> Truth:
+def _written(on: Duals, relation: Relation, a: Arguments, values: Numbers) -> Truth:
     """Store flows, conditions and their derivatives; whether all values are finite."""
     n, k, m, _ = relation.dimensions
     width = n + k + m
@@ -307,35 +307,6 @@ def _dot(a: Numbers, b: Numbers) -> Real:
     return total
 
 
-@final
-@dataclass(frozen=True, slots=True)
-class Arguments:
-    """The arguments of a relation after the first, which are dimensions that it knows."""
-
-    scal: Vector
-    p: Vector
-    x0: Vector
-    v: Vector
-    e: Vector
-    lam: Vector
-    f: Vector
-    c: Vector
-    jac: Vector
-    work: Vector
-
-
-def _pointer(atom: Atom, size: int) -> Kind:
-    """An argument that is the address of so many numbers."""
-
-    def join(parts: list[Any]) -> Vector | Integers:
-        return Vector(parts[0], 0, size) if atom == "reals" else Integers(parts[0], 0, size)
-
-    def split(value: Any, _trail: object) -> tuple[Any, ...] | None:
-        return (value,) if len(value) == size else None
-
-    return Kind(f"an array of {size} numbers", (atom,), split, join)
-
-
 def sizes(relation: Relation) -> dict[str, int]:
     """How many numbers each argument after the first has."""
     n, k, m, size = relation.dimensions
@@ -353,11 +324,11 @@ def program(relation: Relation) -> Program:
               jac: Any, work: Any) -> Integer:  # fmt: skip
         return relation.stage(on, Arguments(scal, p, x0, v, e, lam, f, c, jac, work))
 
-    kinds = {name: _pointer("reals", size) for name, size in sizes(relation).items()}
-    return Program("element", value=Entry(value, dims=_pointer("integers", 4), **kinds))
+    kinds = {name: pointer("reals", size) for name, size in sizes(relation).items()}
+    return Program("element", value=Entry(value, dims=pointer("integers", 4), **kinds))
 
 
 @cache
-def compiled(relation: Relation) -> Call:
+def compiled(relation: Relation | Linear) -> Call:
     """The relation in machine code; its `address` is good as long as the result lives, which is kept here."""
-    return program(relation).compiled()["value"]
+    return relation.compiled() if isinstance(relation, Linear) else program(relation).compiled()["value"]

@@ -8,12 +8,12 @@ So E = ½ k x² gives k (x⁰ + x¹)/2, E = c exp(s/C) gives c (exp(s¹/C) − e
 gives the sum of both vectors over the sum of both lengths.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, final
 
 from ephs.semantics.derive.errors import DeriveError
-from ephs.semantics.derive.functions import FUNCTIONS, Rule, angle_ratio
+from ephs.semantics.derive.functions import FUNCTIONS, Rule, angle_ratio, squared_turn_slope, turn
 from ephs.semantics.stage.evaluator import Evaluator, Function, Interpreted
 from ephs.semantics.stage.numbers import Condition, Integer, Number, Operation, Order, Real, Truth
 
@@ -137,6 +137,13 @@ class Slopes(Interpreted):
         entries = combined(y.slopes, ratio * x.mean, x.slopes, -(ratio * y.mean))
         # on the other side of the cut the angle is that of the turn, whole turns off
         return Slope(start, start + turned, entries)
+
+    def squared_turn(self, q: Sequence[Slope]) -> Slope:
+        """θ² of a unit quaternion: it changes with the size of the scalar alone."""
+        on, scalar = self.base, self.along(q[0], FUNCTIONS["absolute"])
+        one, other = turn(on, [x.start for x in q]), turn(on, [x.end for x in q])
+        slope = squared_turn_slope(on, one, other)
+        return Slope(one * one, other * other, {i: slope * s for i, s in scalar.slopes.items()})
 
     def _known(self, truth: Condition, what: str) -> bool:
         raise DeriveError("compared", order=what)

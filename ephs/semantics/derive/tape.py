@@ -13,8 +13,8 @@ from typing import Final, TypeVar, final
 
 import numpy as np
 
-from ephs.semantics.derive.functions import COMPOSED, FUNCTIONS
-from ephs.semantics.derive.slopes import Slope, Slopes
+from ephs.semantics.derive.functions import COMPOSED, FUNCTIONS, turn
+from ephs.semantics.derive.slopes import Slope, Slopes, lifted
 from ephs.semantics.stage.evaluator import Evaluator
 from ephs.semantics.stage.numbers import Real
 
@@ -125,6 +125,17 @@ def _sign(on: Evaluator, x: Real) -> Real:
     return on.select(x > 0.0, 1.0, on.select(x < 0.0, -1.0, x))
 
 
+def _choose(on: Evaluator, number: Real, one: Real, other: Real) -> Real:
+    return on.select(number > 0.0, one, other)
+
+
+def _squared_turn(on: Evaluator, *q: Real) -> Real:
+    if isinstance(on, Slopes):
+        return on.squared_turn([lifted(x) for x in q])
+    angle = turn(on, q)
+    return angle * angle
+
+
 def _operations() -> Mapping[str, Callable[..., Real]]:
     one: dict[str, Callable[[Evaluator, Real], Real]] = {"negative": lambda _, a: -a, "sign": _sign}
     one |= {name: _function(name) for name in FUNCTIONS}
@@ -137,7 +148,8 @@ def _operations() -> Mapping[str, Callable[..., Real]]:
         "atan2": lambda on, a, b: on.atan2(a, b),
     }
     power: dict[str, Callable[[Evaluator, Real, float], Real]] = {"power": _power}
-    return MappingProxyType(one | dict(COMPOSED) | two | power)
+    more: dict[str, Callable[..., Real]] = {"choose": _choose, "squared turn": _squared_turn}
+    return MappingProxyType(one | dict(COMPOSED) | two | power | more)
 
 
 OPERATIONS: Final = _operations()

@@ -5,17 +5,17 @@ matrices are the ones that are checked, simulated and shown. Sources: the compon
 conventions; Lohmayer, Capobianco, Leyendecker for ``spring``, ``point_mass``, ``pkc``, ``friction``, ``environment``.
 """
 
-import math
 from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any
 
 import numpy as np
 
-from ephs.operad import Directory, Interface, Path, PortType, Quantity, quantity
+from ephs.operad import Directory, Interface, PortType, Quantity, quantity
 from ephs.semantics import formulas
-from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.checks import STATEMENTS
+from ephs.semantics.derive.linear import Linear
+from ephs.semantics.forms import coupled, dissipated, stored
 from ephs.semantics.library import chemistry as chemistry
 from ephs.semantics.library.chemistry import ideal_mixture, reaction
 from ephs.semantics.library.hydraulics import conduit, inertance, laminar_leak, orifice, pipe_loss, tank
@@ -28,8 +28,8 @@ from ephs.semantics.library.magnetics import (
     saturating_reluctance,
     winding,
 )
-from ephs.semantics.primitives import Formula, Irreversible, Kernel, Point, Reversible, Storage, power_ports
-from ephs.semantics.structures import KERNELS, constant_structure, dissipation, exp, expm1, exponential, quadratic
+from ephs.semantics.primitives import Formula, Irreversible, Kernel, Reversible, Storage, power_ports
+from ephs.semantics.structures import constant_structure, dissipation, exponential, quadratic
 from ephs.semantics.verdict import Condition, proved
 
 __all__ = [
@@ -123,43 +123,12 @@ def thermal_capacity(*, c1: float, c2: float) -> Storage:
 def ideal_gas(*, c1: float, c2: float, v0: float, c: float) -> Storage:
     """Ideal gas; ports s, v: E = c1*(v0/v)**(1/c)*exp(s/c2), θ = ∂E/∂s, π = −∂E/∂v."""
     positive("ideal_gas", c1=c1, c2=c2, v0=v0, c=c)
-    s, v = Path.of("s"), Path.of("v")
-
-    def energy(x: Point) -> float:
-        volume = float(x[v][0])
-        return c1 * exp(float(x[s][0]) / c2) * (v0 / volume) ** (1.0 / c) if volume > 0.0 else math.nan
-
-    def gradient(x: Point) -> Array:
-        e = energy(x)
-        return np.array([e / c2, -e / (c * float(x[v][0]))])
-
-    def discrete_gradient(x0: Point, step: Array) -> Array:
-        """E = a(s) b(v): the difference quotient of one factor times the mean of the other."""
-        volume = float(x0[v][0])
-        heat, growth = float(step[0]) / c2, float(step[1]) / volume
-        if not (volume > 0.0 and growth > -1.0):  # an iterate of a solver may lie where no gas is
-            return np.full(2, math.nan)
-        a = c1 * exp(float(x0[s][0]) / c2)
-        b = (v0 / volume) ** (1.0 / c)
-        rise, fall = expm1(heat), expm1(-math.log1p(growth) / c)
-        by_s = a / c2 * (rise / heat if heat != 0.0 else 1.0)
-        by_v = b / volume * (fall / growth if growth != 0.0 else -1.0 / c)
-        return np.array([by_s * b * (1.0 + 0.5 * fall), by_v * a * (1.0 + 0.5 * rise)])
-
-    parameters = (("c1", c1), ("c2", c2), ("v0", v0), ("c", c))
-    interface = power_ports(s=quantity.entropy, v=quantity.volume)
-    kernel = Kernel(KERNELS, "ideal_gas", (c1, c2, v0, c))
-
-    formula = Formula(formulas.ideal_gas, ("c1", "c2", "v0", "c"), formulas.ideal_gas_slope)
-    return Storage(
+    return stored(
         "ideal_gas",
-        interface,
-        energy,
-        gradient,
-        discrete_gradient,
-        parameters=parameters,
-        kernel=kernel,
-        formula=formula,
+        power_ports(s=quantity.entropy, v=quantity.volume),
+        formulas.ideal_gas,
+        {"c1": c1, "c2": c2, "v0": v0, "c": c},
+        formula=Formula(formulas.ideal_gas, ("c1", "c2", "v0", "c"), formulas.ideal_gas_slope),
         proof=lambda: proved(
             "entropy and volume are even, θ = E/c2 and −π = −E/(c v), E > 0 and c2 > 0", *STATEMENTS["storage"]
         ),
@@ -182,7 +151,7 @@ def environment(**ports: Quantity) -> Storage:
         power_ports(**(ports or {"s": quantity.entropy})),
         energy=lambda x: 0.0,
         environment=True,
-        kernel=Kernel(KERNELS, "no_effort"),
+        kernel=Kernel("", "no_effort", (), Linear("no_effort")),
     )
 
 
@@ -220,7 +189,6 @@ def mkc() -> Reversible:
 
     L = [[0, bs], [-bs, 0]].
     """
-    stator = Path.of("bs")
     interface = Directory(
         {
             "b": PortType(quantity.flux_linkage, True),
@@ -229,19 +197,10 @@ def mkc() -> Reversible:
         }
     )
 
-    def structure(x: Point) -> tuple[Array, Array]:
-        flux = float(x[stator][0])
-        return np.array([[0.0, flux], [-flux, 0.0]]), np.zeros((0, 2))
-
-    formula = Formula(formulas.mkc)
-    kernel = Kernel(KERNELS, "modulated_gyrator")
-
     def proof() -> tuple[Condition, ...]:
         return proved("L = bs [[0, 1], [−1, 0]] with bs odd, both efforts odd", *STATEMENTS["reversible"])
 
-    return Reversible(
-        "mkc", interface, structure, reads=(stator,), kernel=kernel, formula=formula, proof=proof, trusted=True
-    )
+    return coupled("mkc", interface, formulas.mkc, proof=proof, trusted=True)
 
 
 def lever(*, r: float) -> Reversible:
@@ -335,16 +294,8 @@ def heat_transfer(*, h: float) -> Irreversible:
     """
     non_negative("heat_transfer", h=h)
 
-    def matrix(_x: Point, e: Array, reference: Reference) -> Array:
-        first, second = reference.temperature + e
-        return h * np.array([[second / first, -1.0], [-1.0, first / second]])
-
-    ports = power_ports(s1=quantity.entropy, s2=quantity.entropy)
-    formula = Formula(formulas.heat_transfer, ("h",))
-    kernel = Kernel(KERNELS, "heat_transfer", (h,))
-
     def proof() -> tuple[Condition, ...]:
         return proved("M = h/(θ₁θ₂) n nᵀ with n = (θ₂, −θ₁), n·eᴱ = 0", *STATEMENTS["irreversible"])
 
-    parameters = (("h", h),)
-    return Irreversible("heat_transfer", ports, matrix, (), parameters, kernel, formula, proof=proof, trusted=True)
+    ports = power_ports(s1=quantity.entropy, s2=quantity.entropy)
+    return dissipated("heat_transfer", ports, formulas.heat_transfer, {"h": h}, proof=proof, trusted=True)

@@ -18,7 +18,8 @@ import numpy as np
 
 from ephs.operad import Directory, Interface, PortType, Quantity, quantity
 from ephs.semantics.errors import StructureError
-from ephs.semantics.library.made import dissipated, finite, positive, stored
+from ephs.semantics.forms import dissipated, stored
+from ephs.semantics.library.made import finite, positive
 from ephs.semantics.primitives import Irreversible, Storage
 from ephs.semantics.special import log_mean
 
@@ -122,7 +123,7 @@ def ideal_mixture(*, species: Sequence[Species], phase: Phase = "gas") -> Storag
             ground = ground + amount * (one.energy + one.capacity * (base - one.temperature))
         return ground + held * base * np.expm1((s - pure) / held)
 
-    return stored("ideal_mixture", _ports(given, phase, power=True), energy, {}, species=given, phase=phase)
+    return stored("ideal_mixture", _ports(given, phase, power=True), energy, {}, (("species", given), ("phase", phase)))
 
 
 def mixture_entropy(
@@ -201,7 +202,7 @@ def reaction(
 
     interface = _ports(taking, phase, power=False)
     parameters = {"equation": equation, "species": given, "k": k, "activation": activation, "phase": phase}
-    return dissipated("reaction", interface, matrix, {}, **parameters)
+    return dissipated("reaction", interface, matrix, {}, tuple(parameters.items()))
 
 
 def equilibrium_constant(

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from ephs.operad import quantity
-from ephs.semantics.library.made import dissipated, non_negative, positive, stored
+from ephs.semantics.forms import dissipated, stored
+from ephs.semantics.library.made import non_negative, positive
 from ephs.semantics.primitives import Irreversible, Reversible, Storage, power_ports
 from ephs.semantics.structures import constant_structure
 

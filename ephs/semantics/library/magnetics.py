@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from ephs.operad import Quantity, quantity
-from ephs.semantics.library.made import positive, stored
+from ephs.semantics.forms import stored
+from ephs.semantics.library.made import positive
 from ephs.semantics.primitives import Reversible, Storage, power_ports
 from ephs.semantics.structures import constant_structure
 

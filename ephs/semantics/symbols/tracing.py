@@ -61,7 +61,7 @@ def trace(function: Callable[..., Any], arguments: Mapping[str, Any]) -> Trace:
         The function needs numbers, or does not return real ones.
     """
     vectors: dict[str, Sequence[Expr]] = {n: v for n, v in arguments.items() if isinstance(v, (tuple, list))}
-    found = record(function, {name: len(vectors.get(name, ())) for name in arguments})
+    found = record(function, {name: len(vectors[name]) if name in vectors else None for name in arguments})
     inputs = [sp.sympify(x) for name, value in arguments.items() for x in vectors.get(name, (value,))]
     parameters = tuple(sp.Symbol(f"c_{i}", real=True) for i in range(len(found.parameters)))
     try:
@@ -98,6 +98,14 @@ def _power(a: Expr, exponent: float) -> Expr:
     return _bounded(a ** sp.Rational(int(4 * exponent), 4))
 
 
+def _choose(number: Expr, one: Expr, other: Expr) -> Expr:
+    return sp.Piecewise((one, number > 0), (other, True))
+
+
+def _squared_turn(w: Expr, x: Expr, y: Expr, z: Expr) -> Expr:
+    return 4 * sp.atan2(sp.sqrt(x * x + y * y + z * z), sp.Abs(w)) ** 2
+
+
 def _table() -> Mapping[str, Callable[..., Expr]]:
     same = ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh")
     same += ("exp", "log", "sqrt", "sign", "atan2")
@@ -117,7 +125,8 @@ def _table() -> Mapping[str, Callable[..., Expr]]:
         "power": _power,
         "exponential": lambda a, b: a**b,
     }
-    return MappingProxyType(out | one | two)
+    more: dict[str, Callable[..., Expr]] = {"choose": _choose, "squared turn": _squared_turn}
+    return MappingProxyType(out | one | two | more)
 
 
 _TABLE: Final = _table()
