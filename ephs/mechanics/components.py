@@ -85,13 +85,14 @@ def gravity(weight: Array, group: str = "SE3") -> Storage:
 
 def potential(of: Quantity, port: str, energy: Callable[[Array], float], name: str = "potential") -> Storage:
     """Any potential, from a Python function of the coordinates: of a pose the 7-vector, of a joint its coordinates."""
-    at = Path.of(port)
     read = Pair.from_space(of.space).coordinates if of.kind == "relative_pose" else np.array
-    return Storage(
+    return stored(
         name,
         power_ports(**{port: of}),
-        energy=lambda x: float(energy(read(x[at]))),
-        parameters=(("energy", getattr(energy, "__name__", "function")),),
+        lambda **x: energy(read(np.atleast_1d(x[port]))),
+        {},
+        (("energy", getattr(energy, "__name__", "function")),),
+        printed=False,
     )
 
 
@@ -282,9 +283,7 @@ def joint_friction(
     made = structures.dissipation(
         name,
         Directory(ports),
-        lambda x, u, theta: np.asarray(resistance(of.coordinates(x[q_r]), u, theta), dtype=float).reshape(
-            of.dim, of.dim
-        ),
+        lambda x, u, theta: np.asarray(resistance(of.coordinates(x[q_r]), u, theta)).reshape(of.dim, of.dim),
         parameters=(("mu", getattr(mu, "__name__", "function")),),
     )
     return replace(made, notation=notation.friction)

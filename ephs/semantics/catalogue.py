@@ -90,6 +90,9 @@ def _same(one: Any, two: Any, depth: int = 0) -> bool:
         return one.__func__ is two.__func__ and _same(one.__self__, two.__self__, depth + 1)
     if isinstance(one, Formula):
         return one.parameters == two.parameters and _same(one.function, two.function, depth + 1)
+    if isinstance(one, dict):
+        mine, theirs = cast("dict[Any, Any]", one), cast("dict[Any, Any]", two)
+        return list(mine) == list(theirs) and all(_same(mine[key], theirs[key], depth + 1) for key in mine)
     if isinstance(one, np.ndarray):
         return bool(np.array_equal(cast("Any", one), two))
     return bool(one == two)

@@ -12,7 +12,7 @@ from ephs.semantics.bundle import Array, Bundle, Reference
 from ephs.semantics.derive import relations
 from ephs.semantics.derive.recording import Untraceable, record
 from ephs.semantics.derive.relations import Port
-from ephs.semantics.primitives import Domain, Formula, Irreversible, Kernel, Point, Reversible, Storage
+from ephs.semantics.primitives import Domain, Formula, Irreversible, Kernel, Point, Primitive, Reversible, Storage
 from ephs.semantics.spaces import manifold
 from ephs.semantics.stage.plain import PLAIN
 
@@ -21,6 +21,7 @@ __all__ = [
     "coupled",
     "dissipated",
     "irreversible_kernel",
+    "obstacle",
     "reversible_kernel",
     "stacked",
     "storage_form",
@@ -72,16 +73,19 @@ def stored(
         with np.errstate(all="ignore"):  # what is not a number is found by its value
             return float(whole(**_named(x)))
 
-    form = storage_form(interface, whole, label=name)
+    try:
+        form = storage_form(interface, whole, label=name)
+    except Untraceable:  # called back; the library's own are recorded, as tests ask
+        form = None
     kept: dict[str, Any] = {"formula": Formula(energy, tuple(numbers)) if printed else None}
     return Storage(
         name,
         interface,
         energy=value,
-        gradient=form.gradient,
-        discrete_gradient=form.discrete_gradient,
+        gradient=None if form is None else form.gradient,
+        discrete_gradient=None if form is None else form.discrete_gradient,
         parameters=tuple(numbers.items()) if parameters is None else parameters,
-        kernel=form.kernel,
+        kernel=None if form is None else form.kernel,
         **(kept | said),
     )
 
@@ -108,7 +112,10 @@ def dissipated(
         with np.errstate(all="ignore"):
             return np.array(whole(**_named(given)), dtype=float)
 
-    kernel = irreversible_kernel(interface, reads, Formula(whole), label=label)
+    try:
+        kernel = irreversible_kernel(interface, reads, Formula(whole), label=label)
+    except Untraceable:  # called back; the library's own are recorded, as tests ask
+        kernel = None
     entries = tuple(numbers.items()) if parameters is None else parameters
     kept: dict[str, Any] = {"formula": Formula(matrix, tuple(numbers)) if printed else None}
     return Irreversible(name, interface, evaluate, reads, entries, kernel, **(kept | said))
@@ -237,6 +244,22 @@ def irreversible_kernel(
         _numbers(interface, reads, domain), bounds,
     )  # fmt: skip
     return _kernel(label, relation, carried, found.parameters)
+
+
+def obstacle(primitive: Primitive) -> str:
+    """Why a primitive's function cannot be recorded, with the line."""
+    if primitive.formula is None:
+        return "it has no formula"
+    try:
+        if isinstance(primitive, Storage):
+            storage_form(primitive.interface, primitive.formula.function)
+        elif isinstance(primitive, Reversible):
+            reversible_kernel(primitive.interface, primitive.reads, primitive.formula, primitive.multipliers)
+        else:
+            irreversible_kernel(primitive.interface, primitive.reads, primitive.formula)
+    except Untraceable as error:
+        return str(error)
+    return "it was made without"
 
 
 def stacked(formula: Formula, n: int, multipliers: int) -> Callable[..., Any]:

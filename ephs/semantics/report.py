@@ -7,6 +7,7 @@ from typing import NamedTuple, final
 from ephs.operad import Path
 from ephs.semantics.bundle import Reference
 from ephs.semantics.errors import SemanticsError
+from ephs.semantics.forms import obstacle
 from ephs.semantics.laws import SYSTEM_LAWS, Probe, SystemLaw, random_probe
 from ephs.semantics.search import search
 from ephs.semantics.system import System
@@ -67,12 +68,12 @@ def check_system(
 def check_structure(system: System) -> CheckItem:
     """The verdicts on all components; what is not proved is searched once more."""
     count = 0
-    slow: list[Path] = []
+    slow: list[str] = []
     searched: list[Path] = []
     for path, primitive in system.leaves():
         count += 1
         if primitive.kernel is None:
-            slow.append(path)
+            slow.append(f"{path} ({obstacle(primitive)})")
         try:
             search(primitive, PROBES)
             if primitive.verdict != "proved":
@@ -83,7 +84,7 @@ def check_structure(system: System) -> CheckItem:
     if searched:
         detail += f"; searched, and watched in runs: {_listed(searched)}"
     if slow:
-        detail += f"; called back in Python, which is slow: {_listed(slow)}"
+        detail += f"; called back in Python, which is slow: {', '.join(slow)}"
     return CheckItem("structure", True, detail)
 
 

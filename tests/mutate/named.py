@@ -45,12 +45,9 @@ BREAKS = {
         "self.exergy - self.exergy[:1] + self.destroyed",
         "self.exergy - self.exergy[:1] - self.destroyed",
     ),
-    "lp": Break("ephs/mechanics/components.py", "[-space.ad(unit).T @ x[p]", "[space.ad(unit).T @ x[p]"),
-    "lp, compiled": Break(
-        "ephs/mechanics/kernels.py",
-        "flow[3 + i] = u[j] * mean[3 + k] - u[k] * mean[3 + j]",
-        "flow[3 + i] = u[k] * mean[3 + j] - u[j] * mean[3 + k]",
-    ),
+    "lp": Break("ephs/mechanics/components.py", "[[-_product(column, p)", "[[_product(column, p)"),
+    "friction": Break("ephs/semantics/structures.py", "[-pull]", "[pull]"),
+    "chord of a rotation": Break("ephs/semantics/derive/charts.py", "chord = 0.5 *", "chord = 0.25 *"),
     "o1": Break("ephs/mechanics/components.py", "np.hstack([-carried,", "np.hstack([carried,"),
     "o1, not inverted": Break(
         "ephs/mechanics/components.py",
@@ -72,7 +69,6 @@ BREAKS = {
         "out[:d, d] = out[d, :d] = -drag",
         "out[:d, d] = out[d, :d] = drag",
     ),
-    "mf, compiled": Break("ephs/semantics/kernels.py", "flow[d] = -power / theta", "flow[d] = power / theta"),
     "substitution": Break(
         "ephs/operad/substitution.py",
         "        target[path] = kept = box / path\n",

@@ -20,8 +20,6 @@ __all__ = [
     "Rule",
     "angle_ratio",
     "polynomial",
-    "root_cosine",
-    "root_sine",
     "squared_turn_slope",
     "turn",
 ]
@@ -56,7 +54,6 @@ def _even(terms: int, divisor: Callable[[int], float], sign: float) -> tuple[flo
 
 _SINC = _even(9, lambda k: float(math.factorial(2 * k + 1)), -1.0)
 _SINHC = _even(9, lambda k: float(math.factorial(2 * k + 1)), 1.0)
-_COS = _even(9, lambda k: float(math.factorial(2 * k)), -1.0)
 _ATANC = _even(28, lambda k: 2.0 * k + 1.0, -1.0)
 _ATANHC = _even(28, lambda k: 2.0 * k + 1.0, 1.0)
 
@@ -85,19 +82,6 @@ def sinhc(on: Evaluator, x: Real) -> Real:
 def angle_ratio(on: Evaluator, x: Real) -> Real:
     """atan(x)/x."""
     return _joined(on, x, lambda _, x: polynomial(_ATANC, x * x), lambda on, x: on.atan2(x, 1.0) / x, 1.0)
-
-
-def root_sine(on: Evaluator, square: Real) -> Real:
-    """sin(√x)/√x of x ≥ 0, with derivatives at 0, too."""
-    near = square < NEAR
-    root = on.sqrt(on.select(near, 1.0, square))
-    return on.select(near, polynomial(_SINC, square), on.sin(root) / root)
-
-
-def root_cosine(on: Evaluator, square: Real) -> Real:
-    """cos(√x) of x ≥ 0, with derivatives at 0, too."""
-    near = square < NEAR
-    return on.select(near, polynomial(_COS, square), on.cos(on.sqrt(on.select(near, 1.0, square))))
 
 
 def sinh(on: Evaluator, x: Real) -> Real:

@@ -14,6 +14,7 @@ from ephs.semantics.derive.charts import moved, over
 from ephs.semantics.derive.linear import Linear
 from ephs.semantics.derive.slopes import Slopes, lifted
 from ephs.semantics.derive.tape import Tape, evaluate
+from ephs.semantics.spaces.vectors import dot
 from ephs.semantics.stage.duals import Dual, Duals
 from ephs.semantics.stage.evaluator import Evaluator
 from ephs.semantics.stage.numbers import Integer, Real, Truth
@@ -173,9 +174,9 @@ class Reversible:
         rows = evaluate(partials, self.structure, x, p)
         values: list[Real] = []
         for i in range(n):
-            flow = _dot(rows[i * n : i * n + n], e)
-            values.append(flow + _dot([rows[(n + j) * n + i] for j in range(k)], lam))
-        values += [_dot(rows[i * n : i * n + n], e) for i in range(n, n + k)]
+            flow = dot(rows[i * n : i * n + n], e)
+            values.append(flow + dot([rows[(n + j) * n + i] for j in range(k)], lam))
+        values += [dot(rows[i * n : i * n + n], e) for i in range(n, n + k)]
         good = on.both(
             _written(partials, self, a, values), _inside(on, self.domain, [partials.dual(each).value for each in x])
         )
@@ -238,7 +239,7 @@ class Irreversible:
         inputs = [energy[i] if effort else x[i] for effort, i in self.takes]
         rows = evaluate(partials, self.matrix, inputs, p[len(self.potentials) :])
         theta = partials.dual(a.scal[1])
-        values = [_dot(rows[i * n : i * n + n], e) / theta for i in range(n)]
+        values = [dot(rows[i * n : i * n + n], e) / theta for i in range(n)]
         good = on.both(
             _written(partials, self, a, values), _inside(on, self.domain, [partials.dual(each).value for each in x])
         )
@@ -298,13 +299,6 @@ def _inside(on: Evaluator, bounds: Bounds, values: Numbers) -> Truth:
     for i, low, high in bounds:
         good = on.both(good, on.both(values[i] > low, values[i] < high))
     return good
-
-
-def _dot(a: Numbers, b: Numbers) -> Real:
-    total: Real = 0.0
-    for x, y in zip(a, b, strict=True):
-        total = total + x * y
-    return total
 
 
 def sizes(relation: Relation) -> dict[str, int]:

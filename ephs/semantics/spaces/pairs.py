@@ -98,7 +98,7 @@ class Pair:
             case codes.SE3:
                 return np.concatenate((so3.rotation_log(x[:4]), x[4:]))
             case _:
-                return np.array(x, dtype=np.float64)
+                return np.array(x)
 
     def element(self, coordinates: Array) -> Array:
         """The element, shape (size,), with the given joint coordinates.
