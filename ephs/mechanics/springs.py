@@ -71,12 +71,14 @@ def point_damper(damping: float) -> Irreversible:
 
 
 def distance_resistance(pose: Any, u: Any, damping: float) -> Any:
-    """c n nᵀ (6, 6) of the direction n of a relative pose's position, in turning axes."""
+    """c n nᵀ (6, 6) of the direction n of a relative pose's position, in turning axes; of the velocity where r = 0."""
     r = pose[4:]
     square = r @ r
     along = quaternion_to_matrix(pose[:4]).T @ r
+    speed = u[3:] @ u[3:]
     out = [[0.0] * 6 for _ in range(6)]
     for i in range(3):
         for j in range(3):
-            out[3 + i][3 + j] = damping * choose(square, along[i] * along[j] / square, 1.0 if i == j else 0.0)
+            still = choose(speed, u[3 + i] * u[3 + j] / speed, 0.0)
+            out[3 + i][3 + j] = damping * choose(square, along[i] * along[j] / square, still)
     return out
