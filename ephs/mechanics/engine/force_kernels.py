@@ -3,7 +3,7 @@
 # numba infers the types of these functions, and exports what it does not list.
 # pyright: basic, reportPrivateImportUsage=false
 
-from ephs.mechanics.engine.row_kernels import arm, place, place_ground, relative_pose, seen, wrench_on
+from ephs.mechanics.engine.row_kernels import arm, relative_pose, seen, wrench_on
 from ephs.mechanics.reduced.sweep_kernels import component_at
 from ephs.semantics.spaces import jit
 
@@ -11,27 +11,6 @@ kernel = jit.lean_kernel
 
 ON_TREE, ON_CUT, ON_BODIES = range(3)
 """Kinds of edges that carry components."""
-
-
-@kernel
-def _load(planar, work, i, wrench):
-    """Take a wrench on link i, in its frame, out of its load."""
-    if not planar:
-        for k in range(6):
-            work[i, 24 + k] -= wrench[k]
-    else:
-        c, s = work[i, 0], work[i, 1]
-        work[i, 11] -= wrench[2]
-        work[i, 12] -= c * wrench[3] - s * wrench[4]
-        work[i, 13] -= s * wrench[3] + c * wrench[4]
-
-
-@kernel
-def _put(e, m, i, planar, out):
-    if i < 0:
-        place_ground(e.gravity, out)
-    else:
-        place(m.work, i, planar, out)
 
 
 @kernel
@@ -52,22 +31,21 @@ def temperatures(f, m, s, s_rate, scal):
 @kernel
 def act(e, m, q, r, s, drive, wrench, scal, s_rate, made, powers):
     """Forces on joints into m.force, wrenches into the loads, heat and work into powers; (status, component)."""
-    f, planar = e.forces, e.flag[0] == 1
+    f = e.forces
     status, number = temperatures(f, m, s, s_rate, scal)
     if status != 0:
         return status, number
     powers[0] = powers[1] = 0.0
-    one, two, here = m.small[0:24], m.small[24:48], m.small[48:54]
+    here = m.small[48:54]
     for b in range(f.body.shape[0]):
         i = f.body[b]
         if i == -1:
             continue
         wrench_on(f.body_frame[b], 0, wrench[b], 0, 1.0, here)
         if i >= 0:
-            _put(e, m, i, planar, one)
             for k in range(6):
-                powers[1] += here[k] * one[12 + k]
-            _load(planar, m.work, i, here)
+                powers[1] += here[k] * m.place[i, 12 + k]
+                m.wrench[i, k] += here[k]
     rate, pull, wide, x = m.small[54:60], m.small[60:66], m.small[66:72], m.small[72:80]
     arms, first = m.small[80:92], m.small[92:98]
     for i in range(f.edge.shape[0]):
@@ -82,8 +60,7 @@ def act(e, m, q, r, s, drive, wrench, scal, s_rate, made, powers):
                 for k in range(12):
                     arms[k] = m.relative[f.edge[i, 7], 7 + k]
             else:
-                _put(e, m, a, planar, one)
-                _put(e, m, b, planar, two)
+                one, two = m.place[a], m.place[b]  # the ground's is the last one
                 arm(one, two, f.frame[i], 12, arms)
                 relative_pose(f.frame[i], arms, x, m.small[100:110])
                 seen(arms, 0, one, 12, first)
@@ -132,10 +109,12 @@ def act(e, m, q, r, s, drive, wrench, scal, s_rate, made, powers):
                 wide[k] += f.left[i, 6 * j + k] * pull[j]
         if b >= 0:
             wrench_on(f.frame[i], 12, wide, 0, 1.0, first)
-            _load(planar, m.work, b, first)
+            for k in range(6):
+                m.wrench[b, k] += first[k]
         if a >= 0:
             wrench_on(arms, 0, wide, 0, -1.0, first)
-            _load(planar, m.work, a, first)
+            for k in range(6):
+                m.wrench[a, k] += first[k]
     for k in range(f.conduction.shape[0]):
         number, one_end, other = f.conduction[k, 0], f.conduction[k, 1], f.conduction[k, 2]
         m.e[0], m.e[1] = m.temperature[one_end], m.temperature[other]

@@ -11,6 +11,7 @@ import math
 from ephs.mechanics.engine.engine_kernels import DEPENDENT, resolve
 from ephs.mechanics.engine.heat_kernels import count as counted
 from ephs.mechanics.engine.rate_kernels import across, advance, close, derive
+from ephs.mechanics.engine.tables import DIM, R_AT
 from ephs.semantics.spaces import jit
 
 kernel = jit.lean_kernel
@@ -64,7 +65,7 @@ def allowance(e, atol, rtol, y0, y1, nv, out):
     """What an error may be: of the tree's increments, its rates, the entropies, (2 n + ns,)."""
     n = 0
     for i in range(e.link.shape[0]):
-        at, d, most = e.link[i, 3], e.link[i, 5], 0.0
+        at, d, most = e.link[i, R_AT], e.link[i, DIM], 0.0
         n += d
         for j in range(d):
             most = max(most, abs(y0[nv + at + j]), abs(y1[nv + at + j]))

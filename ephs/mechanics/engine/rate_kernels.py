@@ -3,27 +3,20 @@
 # numba infers the types of these functions, and exports what it does not list.
 # pyright: basic, reportPrivateImportUsage=false
 
-from ephs.mechanics.engine.closing_kernels import nearly_dependent
-from ephs.mechanics.engine.engine_kernels import DEPENDENT, STILL, accelerate, fold, move, resolve
-from ephs.mechanics.engine.heat_kernels import entropies, heat_rates
-from ephs.mechanics.engine.inward_kernels import turned
-from ephs.mechanics.engine.row_kernels import cut_gaps, cut_poses, fit, seen
-from ephs.mechanics.engine.tree_kernels import (
-    DENSE,
-    DIM,
-    FORWARD,
-    G_BASIS,
-    G_RATE,
-    KIND,
-    PARENT,
-    Q_AT,
-    R_AT,
-    REVOLUTE,
-    SPHERICAL,
+from ephs.mechanics.engine.engine_kernels import (
+    DEPENDENT,
+    STILL,
+    accelerate,
+    fold,
+    move,
+    nearly_dependent,
+    resolve,
+    spread,
 )
+from ephs.mechanics.engine.heat_kernels import entropies, heat_rates
+from ephs.mechanics.engine.row_kernels import cut_gaps, cut_poses, fit, seen
 from ephs.semantics.spaces import jit
 from ephs.semantics.spaces.codes import VECTOR
-from ephs.semantics.spaces.rank import SPARSE
 from ephs.semantics.spaces.se3_kernels import dexp_left_inv, retract
 
 kernel = jit.lean_kernel
@@ -109,7 +102,7 @@ def close(e, m, q, r, change, moved):
         gap = cut_gaps(e, m, q)
         if fold(e, m, q, m.zero) != 0:
             return STILL, gap
-        if nearly_dependent(e.closing, m.row_value, m.largest, SPARSE):
+        if nearly_dependent(e, m):
             return DEPENDENT, gap
         if gap <= GAP or gap > 0.5 * before:
             break
@@ -149,12 +142,10 @@ def relative_rates(e, m):
 @kernel
 def across(e, m, q, x):
     """Targets that take a change x (n,) of the tree's rates back across the constraints, at the outward sweep's q."""
-    planar = e.flag[0] == 1
-    spread(e, m, q, x, planar)
-    one, two, first, second = m.small[0:6], m.small[6:12], m.small[12:18], m.small[18:24]
+    spread(e, m, q, x)
+    first, second = m.small[12:18], m.small[18:24]
     for i in range(e.cut.shape[0]):
-        _changed(m.work, e.cut[i, 0], planar, one)
-        _changed(m.work, e.cut[i, 1], planar, two)
+        one, two = m.change[e.cut[i, 0]], m.change[e.cut[i, 1]]  # the ground's is the last one
         seen(m.relative[i], 7, one, 0, first)
         seen(e.cut_frame[i], 12, two, 0, second)
         for j in range(e.cut[i, 8]):
@@ -162,62 +153,3 @@ def across(e, m, q, x):
             for k in range(6):
                 total -= e.cut_basis[i, 72 + 6 * j + k] * (second[k] - first[k])
             m.row_value[e.cut[i, 7] + j, 0] = total
-
-
-@kernel
-def _changed(work, i, planar, out):
-    """δu of link i, body-fixed."""
-    for k in range(6):
-        out[k] = 0.0
-    if i < 0:
-        return
-    if planar:
-        c, s, x, y = work[i, 0], work[i, 1], work[i, 26], work[i, 27]
-        out[2], out[3], out[4] = work[i, 25], c * x + s * y, c * y - s * x
-    else:
-        for k in range(6):
-            out[k] = work[i, 72 + k]
-
-
-@kernel
-def spread(e, m, q, x, planar):
-    """The twists that rates x of the joints make, to where links keep their accelerations."""
-    link, work = e.link, m.work
-    for i in range(link.shape[0]):
-        parent, at, d = link[i, PARENT], link[i, R_AT], link[i, DIM]
-        if planar:
-            rate = x[at] * link[i, FORWARD]
-            a0 = a1 = a2 = 0.0
-            if parent >= 0:
-                a0 = work[parent, 25]
-                a1, a2 = work[parent, 26] - a0 * work[i, 5], work[parent, 27] + a0 * work[i, 4]
-            if link[i, KIND] == REVOLUTE:
-                a0 += rate
-            else:
-                a1, a2 = a1 + work[i, 29] * rate, a2 + work[i, 30] * rate
-            work[i, 25], work[i, 26], work[i, 27] = a0, a1, a2
-            continue
-        for k in range(6):
-            work[i, 72 + k] = 0.0
-        if parent >= 0:
-            seen(work[i], 0, work[parent], 72, work[i, 72:78])
-        if link[i, KIND] == REVOLUTE:
-            work[i, 74] += x[at] * link[i, FORWARD]
-        elif link[i, KIND] == SPHERICAL:
-            a, b, c = x[at], x[at + 1], x[at + 2]
-            if link[i, FORWARD] < 0:
-                a, b, c = turned(q, link[i, Q_AT], a, b, c)
-                a, b, c = -a, -b, -c
-            work[i, 72] += a
-            work[i, 73] += b
-            work[i, 74] += c
-        else:
-            g = link[i, DENSE]
-            for j in range(d):
-                rate = x[at + j]
-                if link[i, FORWARD] < 0:
-                    rate = 0.0
-                    for k in range(d):
-                        rate -= m.dense[g, G_RATE + 6 * j + k] * x[at + k]
-                for k in range(6):
-                    work[i, 72 + k] += m.dense[g, G_BASIS + 6 * j + k] * rate

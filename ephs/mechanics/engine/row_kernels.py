@@ -48,52 +48,6 @@ def quaternion(m, at, out):
 
 
 @kernel
-def place(work, i, planar, out):
-    """R and p in the world, twist and acceleration at ṙ = 0 of link i, body-fixed, into out (24,)."""
-    if planar:
-        c, s = work[i, 0], work[i, 1]
-        out[0], out[1], out[2], out[3], out[4], out[5] = c, -s, 0.0, s, c, 0.0
-        out[6], out[7], out[8], out[9], out[10], out[11] = 0.0, 0.0, 1.0, work[i, 2], work[i, 3], work[i, 31]
-        out[12], out[13], out[14], out[17] = 0.0, 0.0, work[i, 6], 0.0
-        x, y = work[i, 7], work[i, 8]
-        out[15], out[16] = c * x + s * y, c * y - s * x
-        # what is left-trivialised differs from the usual acceleration by ω × v
-        x, y = work[i, 9] + work[i, 6] * y, work[i, 10] - work[i, 6] * x
-        out[18], out[19], out[20], out[21], out[22], out[23] = 0.0, 0.0, 0.0, c * x + s * y, c * y - s * x, 0.0
-    else:
-        for k in range(12):
-            out[k] = work[i, 78 + k]
-            out[12 + k] = work[i, 12 + k]
-
-
-@kernel
-def place_ground(gravity, out):
-    """The same of the ground, which gravity accelerates."""
-    for k in range(24):
-        out[k] = 0.0
-    out[0] = out[4] = out[8] = 1.0
-    for k in range(3):
-        out[21 + k] = -gravity[k]
-
-
-@kernel
-def world(link, work):
-    """R and p in the world of all links, on SE(3)."""
-    for i in range(link.shape[0]):
-        p = link[i, 0]
-        if p < 0:
-            for k in range(12):
-                work[i, 78 + k] = work[i, k]
-            continue
-        for k in range(3):
-            a, b, c = work[p, 78 + 3 * k], work[p, 79 + 3 * k], work[p, 80 + 3 * k]
-            work[i, 78 + 3 * k] = a * work[i, 0] + b * work[i, 3] + c * work[i, 6]
-            work[i, 79 + 3 * k] = a * work[i, 1] + b * work[i, 4] + c * work[i, 7]
-            work[i, 80 + 3 * k] = a * work[i, 2] + b * work[i, 5] + c * work[i, 8]
-            work[i, 87 + k] = work[p, 87 + k] + a * work[i, 9] + b * work[i, 10] + c * work[i, 11]
-
-
-@kernel
 def arm(one, two, frame, at, out):
     """R and p of a frame, in frame[at:] relative to link two, in link one; both links as `place` gives them."""
     for j in range(3):  # columns of the frame in the world, then in link one
@@ -150,33 +104,13 @@ def relative_pose(frame, arms, out, small):
 
 
 @kernel
-def add_covector(covector, slot, k, planar, work, i):
-    """Add a covector k (6,) in link i's frame, i < 0 for the ground, to a slot."""
-    if not planar:
-        for j in range(6):
-            covector[slot, j] += k[j]
-    else:
-        c, s = (work[i, 0], work[i, 1]) if i >= 0 else (1.0, 0.0)
-        covector[slot, 0] += k[2]
-        covector[slot, 1] += c * k[3] - s * k[4]
-        covector[slot, 2] += s * k[3] + c * k[4]
-
-
-@kernel
-def cut_rows(cut, frame, basis, end, gravity, work, motion, row_value, covectors, small, planar):
+def cut_rows(cut, frame, basis, end, place, motion, row_value, covectors, small):
     """Rows, targets and relative motions of all cut joints, at the motion that the outward sweep found."""
-    one, two, rest = small[0:24], small[24:48], small[48:54]
+    rest = small[48:54]
     first, second, total, covector = small[54:60], small[60:66], small[66:72], small[72:78]
     for i in range(cut.shape[0]):
         a, b = cut[i, 0], cut[i, 1]
-        if a < 0:
-            place_ground(gravity, one)
-        else:
-            place(work, a, planar, one)
-        if b < 0:
-            place_ground(gravity, two)
-        else:
-            place(work, b, planar, two)
+        one, two = place[a], place[b]  # the ground's is the last one
         relative = motion[i]
         arms = relative[7:19]
         arm(one, two, frame[i], 12, arms)
@@ -203,9 +137,11 @@ def cut_rows(cut, frame, basis, end, gravity, work, motion, row_value, covectors
                 value -= basis[i, at + k] * total[k]
             row_value[row, 0] = value
             wrench_on(frame[i], 12, basis[i], at, 1.0, covector)
-            add_covector(covectors, end[row, 1], covector, planar, work, b)
+            for k in range(6):
+                covectors[end[row, 1], k] += covector[k]
             wrench_on(arms, 0, basis[i], at, -1.0, covector)
-            add_covector(covectors, end[row, 0], covector, planar, work, a)
+            for k in range(6):
+                covectors[end[row, 0], k] += covector[k]
 
 
 @kernel

@@ -6,7 +6,25 @@ from ephs.mechanics.engine.closing import Closing
 from ephs.mechanics.solve.sparse import Index
 from ephs.semantics.bundle import Array
 
-__all__ = ["Engine", "Forces", "Memory", "Scheme", "State"]
+__all__ = [
+    "COLUMNS",
+    "DIM",
+    "DRIVEN",
+    "FORCED",
+    "PARENT",
+    "R_AT",
+    "WIDTH",
+    "Engine",
+    "Forces",
+    "Memory",
+    "Scheme",
+    "State",
+]
+
+PARENT, R_AT, DIM, COLUMNS = range(4)
+"""Columns of links."""
+FORCED, DRIVEN, WIDTH = range(3)
+"""What of a mechanism is said in a number: more than gravity acts, joints are driven, numbers of memory of a link."""
 
 
 class Forces(NamedTuple):
@@ -31,10 +49,11 @@ class Forces(NamedTuple):
 class Engine(NamedTuple):
     """A mechanism. Links are groups of bodies, parents first, in frames at their tree joints."""
 
-    flag: Index  # (4,): on SE(2); anything but gravity acts; joints are driven; poses in the world are needed
-    link: Index  # (links, 10): see `tree_kernels`
-    const: Array  # (links, 22 or 9)
-    basis: Array  # (general joints, 36): columns of B, one after the other
+    flag: Index  # (3,): see above
+    address: Index  # (8,): the staged functions, see `engine_kernels`; 0: not needed
+    link: Index  # (links, 3): see above
+    integers: Index  # (links · width,): records of the sweeps, see `ephs.mechanics.tree.records`
+    reals: Array  # (links · width,)
     gravity: Array  # (3,) in the ground's frame
     chart: Index  # (joints, 7): group code, freedoms, place of q, its size, place in v, place in r, cut joint or −1
     cut: Index  # (cut joints, 9): link of body 1, 2, code, freedoms, place of q, size, place in v, first row, rows
@@ -47,8 +66,10 @@ class Engine(NamedTuple):
 class Memory(NamedTuple):
     """What one evaluation writes."""
 
-    work: Array  # (links, 90 or 31)
-    dense: Array  # (general joints, 234)
+    work: Array  # ((links + 1) · width,): the sweeps' own
+    place: Array  # (links + 1, 24): R and p in the world, twist, bias; the ground's last
+    wrench: Array  # (links, 6): on links, in their frames
+    change: Array  # (links + 1, 6): accelerations beyond the bias; the ground's last
     force: Array  # (n,)
     zero: Array  # (n,): stays zero
     relative: Array  # (cut joints, 25): see `row_kernels`

@@ -15,7 +15,7 @@ from ephs.semantics.spaces.se3 import wrench_outward
 from ephs.semantics.spaces.vectors import add, apply, combine, dot, scale, sub, symmetric
 from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Truth, Vector
 
-__all__ = ["Rows", "carry", "carry_load", "clear", "dependent", "eliminate", "eliminate_load", "multipliers", "push"]
+__all__ = ["Rows", "carry", "carry_load", "dependent", "eliminate", "eliminate_load", "multipliers", "push"]
 
 TARGET, MULTIPLIER, SIZE, PIVOT = range(4)
 """Columns of a row's numbers."""
@@ -86,17 +86,6 @@ class Rows:
             self.row[4 * a + 1],
             lambda x: body(self.flat[head + 3 * x], self.flat[head + (3 * x + 1)], self.flat[head + (3 * x + 2)]),
         )
-
-
-def clear(on: Evaluator, rows: Rows) -> None:
-    """Nothing is coupled yet, no row touches a link."""
-    on.loop(rows.entry.size, lambda k: _put(rows.entry, k))
-    on.loop(rows.covector.size, lambda k: _put(rows.covector, k))
-
-    def small(a: Integer) -> None:
-        rows.value[a, SIZE] = 0.0
-
-    on.loop(rows.value.rows, small)
 
 
 def _put(vector: Vector, k: Integer) -> None:

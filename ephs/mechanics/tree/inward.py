@@ -33,7 +33,7 @@ __all__ = ["inward", "load_inward"]
 def inward(on: Evaluator, tree: Tree, i: Integer, fault: Variable[Integer]) -> None:
     """Eliminate the joint of link i from its articulated inertia, which its parent takes up.
 
-    ``fault`` becomes 1 + i where a freedom of the joint moves no mass.
+    ``fault`` becomes 1 + i where a freedom of the joint moves no mass, unless it tells of another link already.
     """
 
     def one(joint: Joint, link: Link) -> None:
@@ -41,7 +41,7 @@ def inward(on: Evaluator, tree: Tree, i: Integer, fault: Variable[Integer]) -> N
         inertia = _blocks(state)
         if joint.dim and not joint.driven:
             inertia, sound = _eliminated(on, joint, state, inertia)
-            fault.value = on.select(sound, fault.value, i + 1)
+            fault.value = on.select(on.either(sound, fault.value > 0), fault.value, i + 1)
         on.when(link.parent < tree.size, lambda: _take_up(tree.states[link.parent], state, inertia))
 
     tree.visit(on, i, one)

@@ -14,7 +14,7 @@ from typing import Any, Generic, TypeVar, final
 from ephs.semantics.stage import Evaluator, Integer, Real, Record, Truth, Vector
 from ephs.semantics.stage.evaluator import Function
 from ephs.semantics.stage.kinds import Atom, Kind
-from ephs.semantics.stage.memory import IntegerCells, RealCells
+from ephs.semantics.stage.memory import Cells, IntegerCells, RealCells
 from ephs.semantics.stage.numbers import Condition, Count, IntegerOperation, Number, Operation, Order
 
 __all__ = ["NO_INTEGERS", "Compact", "LaidOut", "Layout", "Survey", "layout_of"]
@@ -186,7 +186,6 @@ class _SurveyedReals(RealCells):
     entries: bool
 
     def load(self, index: Integer) -> Real:
-        assert isinstance(index, int) or not self.entries
         return self.on.entries.load(index) if self.entries and isinstance(index, int) else _Trace(0)
 
     def store(self, index: Integer, value: Real) -> None:
@@ -325,6 +324,12 @@ class Survey(Evaluator):
 
     def _wholes(self, size: int) -> IntegerCells:
         return _HeldInteger(self, self._fresh())
+
+    def _constants(self, values: list[Any], whole: bool) -> Cells[Any]:
+        return _SurveyedIntegers() if whole else _SurveyedReals(self, entries=False)
+
+    def _rehearse(self, body: Callable[[], None]) -> None:
+        body()
 
     def _fresh(self) -> int:
         self._variables += 1

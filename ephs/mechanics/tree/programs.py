@@ -1,19 +1,22 @@
 """Looped programs of the sweeps, specialised by what a class of mechanisms has in common."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, Final, final
 
+import numpy as np
+
+from ephs.mechanics.solve.sparse import Index
 from ephs.mechanics.tree import closing
-from ephs.mechanics.tree.accelerations import accelerate_outward, accelerations, no_force
+from ephs.mechanics.tree.accelerations import Force, accelerate_outward, accelerations, no_force
 from ephs.mechanics.tree.closing import Rows
 from ephs.mechanics.tree.inward import inward, load_inward
 from ephs.mechanics.tree.needs import NO_INTEGERS, Compact, LaidOut, Layout, Survey, layout_of
 from ephs.mechanics.tree.outward import outward
 from ephs.mechanics.tree.pack import Class
-from ephs.mechanics.tree.records import Joint, Link, State, States, Tree
+from ephs.mechanics.tree.records import Link, State, States, Tree
 from ephs.mechanics.tree.spreading import driven_power, spread
+from ephs.semantics.spaces.rank import SPARSE
 from ephs.semantics.stage import (
     Entry,
     Evaluator,
@@ -21,17 +24,15 @@ from ephs.semantics.stage import (
     Integers,
     Matrix,
     Program,
-    Real,
     Vector,
     indices,
     integer,
     matrix,
-    real,
     vector,
 )
 from ephs.semantics.stage.memory import IntegerCells, RealCells
 
-__all__ = ["FREE", "GENERAL", "PLACE", "Sweeps", "sweeps"]
+__all__ = ["ENTRIES", "FREE", "GENERAL", "PLACE", "Sweeps", "given_force", "sweeps"]
 
 PLACE: Final = 24
 """Numbers of a link that rows and forces read: R and p in the world, twist, bias."""
@@ -39,6 +40,7 @@ FREE: Final = ("accelerations", "evaluations")
 """Entry functions for trees on which nothing but gravity and forces on the rates act."""
 GENERAL: Final = ("move", "fold", "unfold", "resolve", "spread", "power", "dependent")
 """Entry functions for mechanisms with loops, wrenches on links or prescribed motions."""
+ENTRIES: Final = (*FREE, *GENERAL)
 
 
 @final
@@ -101,8 +103,8 @@ class Sweeps:
         self._class = kind
         self._zeros = (0, 1, 5) if kind.planar else ()
         self._constants = tuple(
-            Layout(dict(known), {k: k for k in range(Link.real_width) if k not in dict(known)})
-            for known in kind.constants
+            Layout(known, {k: k for k in range(Link.real_width) if k not in known})
+            for known in (kind.constants(number) for number in range(len(kind.joints)))
         )
         entries = self._general() if general else self._free()
         self._layout: Layout | None = None
@@ -110,19 +112,34 @@ class Sweeps:
         self.width = self._layout.width
         self.program = Program("sweeps", **entries)
 
+    def tangent(self, directions: int = 1) -> Program:
+        """The program of ``accelerations`` with exact derivatives along directions.
+
+        Memory, q, r, force and rate come with an array of their slopes each; those of quaternions are the quaternions'.
+        """
+        entry = self.program.entries["accelerations"]
+        return Program(
+            "tangents", accelerations=entry.tangent("memory", "q", "r", "force", "rate", directions=directions)
+        )
+
+    def addresses(self) -> Index:
+        """Addresses of the machine code of `ENTRIES`, 0 for those that the program does not have."""
+        calls = self.program.compiled()
+        return np.array([calls[name].address if name in calls else 0 for name in ENTRIES], dtype=np.int64)
+
     def _survey(self, survey: Survey, entries: dict[str, Entry]) -> None:
         self._states: States | None = _Whole(survey.memory())
         for entry in entries.values():
             survey.returned(entry.function(survey, *(survey.argument(kind) for kind in entry.kinds.values())))
         self._states = None
 
-    def _tree(self, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector) -> Tree:
-        known = [gravity[k] if value is None else value for k, value in enumerate(self._class.gravity)]
-        states = self._states
+    def tree(self, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector) -> Tree:
+        """The tree of links that tables describe, with ``width`` numbers of memory for each link and the ground."""
+        states, pull = self._states, [gravity[k] for k in range(3)]
         if states is None:
             assert self._layout is not None
             states = Compact(State, self._layout, memory)
-        return Tree(self._class.joints, size, _Links(self._constants, integers.cells, reals.cells), states, known)
+        return Tree(self._class.joints, size, _Links(self._constants, integers.cells, reals.cells), states, pull)
 
     def _rows(
         self, at: Integers, slot: Integers, row: Integers, flat: Integers, value: Matrix, entry: Vector,
@@ -134,21 +151,18 @@ class Sweeps:
     # ---- trees on which nothing but gravity and forces on the rates act ------------------------------------------
 
     def _free(self) -> dict[str, Entry]:
-        def given(force: Vector) -> Callable[[Integer, Joint, Link], list[Real]]:
-            return lambda i, joint, link: [force[link.r_at + j] for j in range(joint.dim)]
-
         def accelerate(
             on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector, q: Vector,
             r: Vector, force: Vector, rate: Vector,
         ) -> Integer:  # fmt: skip
-            tree = self._tree(size, integers, reals, memory, gravity)
-            return accelerations(on, tree, q, r, rate, given(force))
+            tree = self.tree(size, integers, reals, memory, gravity)
+            return accelerations(on, tree, q, r, rate, given_force(force))
 
         def evaluations(
             on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector, q: Matrix,
             r: Matrix, rates: Matrix, repeats: Integer,
         ) -> None:  # fmt: skip
-            tree = self._tree(size, integers, reals, memory, gravity)
+            tree = self.tree(size, integers, reals, memory, gravity)
 
             def one(k: Integer) -> None:
                 accelerations(on, tree, q.row(k), r.row(k), rates.row(k))
@@ -171,7 +185,7 @@ class Sweeps:
             on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector, q: Vector,
             r: Vector, places: Matrix,
         ) -> None:  # fmt: skip
-            tree = self._tree(size, integers, reals, memory, gravity)
+            tree = self.tree(size, integers, reals, memory, gravity)
             outward(on, tree, q, r)
 
             def show(i: Integer) -> None:
@@ -187,11 +201,8 @@ class Sweeps:
             at: Integers, slot: Integers, row: Integers, flat: Integers, value: Matrix, entry: Vector,
             covector: Matrix, along: Matrix, q: Vector, force: Vector, wrench: Matrix,
         ) -> Integer:  # fmt: skip
-            tree = self._tree(size, integers, reals, memory, gravity)
+            tree = self.tree(size, integers, reals, memory, gravity)
             rows, fault = self._rows(at, slot, row, flat, value, entry, covector, along), on.counter(0)
-
-            def given(i: Integer, joint: Joint, link: Link) -> list[Real]:
-                return [force[link.r_at + j] for j in range(joint.dim)]
 
             def one(i: Integer) -> None:
                 state = tree.states[i]
@@ -199,7 +210,7 @@ class Sweeps:
                 closing.eliminate(on, rows, i, state)
                 closing.eliminate_load(on, rows, i, state)
                 inward(on, tree, i, fault)
-                load_inward(on, tree, q, given, i)
+                load_inward(on, tree, q, given_force(force), i)
                 closing.carry(on, tree, rows, i)
                 closing.carry_load(on, tree, rows, i)
 
@@ -224,7 +235,7 @@ class Sweeps:
             at: Integers, slot: Integers, row: Integers, flat: Integers, value: Matrix, entry: Vector,
             covector: Matrix, along: Matrix, q: Vector, rate: Vector, change: Matrix,
         ) -> None:  # fmt: skip
-            tree = self._tree(size, integers, reals, memory, gravity)
+            tree = self.tree(size, integers, reals, memory, gravity)
             outwards(on, tree, self._rows(at, slot, row, flat, value, entry, covector, along), q, rate, change)
 
         def resolve(
@@ -232,7 +243,7 @@ class Sweeps:
             at: Integers, slot: Integers, row: Integers, flat: Integers, value: Matrix, entry: Vector,
             covector: Matrix, along: Matrix, q: Vector, rate: Vector, change: Matrix,
         ) -> None:  # fmt: skip
-            tree = self._tree(size, integers, reals, memory, gravity)
+            tree = self.tree(size, integers, reals, memory, gravity)
             rows = self._rows(at, slot, row, flat, value, entry, covector, along)
 
             def unloaded(i: Integer) -> None:
@@ -252,25 +263,25 @@ class Sweeps:
             on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector, q: Vector,
             x: Vector, change: Matrix,
         ) -> None:  # fmt: skip
-            tree = self._tree(size, integers, reals, memory, gravity)
+            tree = self.tree(size, integers, reals, memory, gravity)
             spread(on, tree, q, x)
             _show_changes(on, tree, change)
 
         def power(
             on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector,
             at: Integers, slot: Integers, row: Integers, flat: Integers, value: Matrix, entry: Vector,
-            covector: Matrix, along: Matrix, q: Vector, r: Vector, force: Vector,
-        ) -> Real:  # fmt: skip
-            tree = self._tree(size, integers, reals, memory, gravity)
+            covector: Matrix, along: Matrix, q: Vector, r: Vector, force: Vector, out: Vector,
+        ) -> None:  # fmt: skip
+            tree = self.tree(size, integers, reals, memory, gravity)
             rows = self._rows(at, slot, row, flat, value, entry, covector, along)
-            return driven_power(on, tree, rows, q, r, force)
+            out[0] = driven_power(on, tree, rows, q, r, force)
 
         def dependent(
             on: Evaluator, at: Integers, slot: Integers, row: Integers, flat: Integers, value: Matrix, entry: Vector,
-            covector: Matrix, along: Matrix, largest: Vector, limit: Real,
+            covector: Matrix, along: Matrix, largest: Vector,
         ) -> Integer:  # fmt: skip
             rows = self._rows(at, slot, row, flat, value, entry, covector, along)
-            return on.select(closing.dependent(on, rows, largest, limit), 1, 0)
+            return on.select(closing.dependent(on, rows, largest, SPARSE), 1, 0)
 
         return {
             "move": Entry(move, **MECHANISM, q=vector(), r=vector(), places=matrix(PLACE)),
@@ -278,8 +289,8 @@ class Sweeps:
             "unfold": Entry(unfold, **MECHANISM, **ROWS, q=vector(), rate=vector(), change=matrix(6)),
             "resolve": Entry(resolve, **MECHANISM, **ROWS, q=vector(), rate=vector(), change=matrix(6)),
             "spread": Entry(spread_out, **MECHANISM, q=vector(), x=vector(), change=matrix(6)),
-            "power": Entry(power, **MECHANISM, **ROWS, q=vector(), r=vector(), force=vector()),
-            "dependent": Entry(dependent, **ROWS, largest=vector(), limit=real()),
+            "power": Entry(power, **MECHANISM, **ROWS, q=vector(), r=vector(), force=vector(), out=vector()),
+            "dependent": Entry(dependent, **ROWS, largest=vector()),
         }
 
 
@@ -289,6 +300,11 @@ def _show_changes(on: Evaluator, tree: Tree, change: Matrix) -> None:
             change[i, k] = x
 
     on.loop(tree.size, show)
+
+
+def given_force(force: Vector) -> Force:
+    """The forces on the rates that a vector holds."""
+    return lambda i, joint, link: [force[link.r_at + j] for j in range(joint.dim)]
 
 
 @cache

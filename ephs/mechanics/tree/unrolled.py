@@ -3,10 +3,11 @@
 from dataclasses import dataclass, field
 from typing import final
 
-from ephs.mechanics.tree.accelerations import accelerations
+from ephs.mechanics.tree.accelerations import accelerations, no_force
 from ephs.mechanics.tree.needs import NO_INTEGERS
 from ephs.mechanics.tree.pack import Packed
-from ephs.mechanics.tree.records import Joint, Link, State, Tree
+from ephs.mechanics.tree.programs import given_force
+from ephs.mechanics.tree.records import Link, State, Tree
 from ephs.semantics.stage import (
     Entry,
     Evaluator,
@@ -70,18 +71,14 @@ def unrolled(packed: Packed) -> Program:
     accelerations(q, r, force, rate): ṙ into rate under the forces on the rates; 0, or 1 + a link whose joint moves no
     mass. evaluations(q, r, rates, repeats): the same of many states by rows without forces.
     """
-    size = packed.links.size
-    assert isinstance(size, int)
+    size = packed.size
     gravity: list[Real] = [float(x) for x in packed.gravity]
 
     def run(on: Evaluator, q: Vector, r: Vector, force: Vector | None, rate: Vector) -> Integer:
         states = [State(NO_INTEGERS, 0, _Registers(), 0) for _ in range(size + 1)]
         tree = Tree(packed.kind.joints, size, _Links(packed.links), states, gravity)
 
-        def given(i: Integer, joint: Joint, link: Link) -> list[Real]:
-            return [0.0 if force is None else force[link.r_at + j] for j in range(joint.dim)]
-
-        return accelerations(on, tree, q, r, rate, given)
+        return accelerations(on, tree, q, r, rate, no_force if force is None else given_force(force))
 
     def evaluations(on: Evaluator, q: Matrix, r: Matrix, rates: Matrix, repeats: Integer) -> None:
         def one(k: Integer) -> None:

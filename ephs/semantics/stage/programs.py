@@ -2,8 +2,9 @@
 
 from collections.abc import Callable, Mapping
 from functools import cache
+from threading import RLock
 from types import MappingProxyType
-from typing import Any, cast, final
+from typing import Any, Final, cast, final
 
 import numpy as np
 
@@ -19,6 +20,8 @@ from ephs.semantics.stage.objects import compiled
 from ephs.semantics.stage.plain import PLAIN
 
 __all__ = ["Program"]
+
+_COMPILING: Final = RLock()
 
 
 @final
@@ -65,7 +68,8 @@ class Program:
         shared
             Arguments that are the same for all members, without that axis.
         """
-        return _compiled(self, members, shared)
+        with _COMPILING:  # addresses of code that a second thread makes in vain would not last
+            return _compiled(self, members, shared)
 
     def plain(self) -> Mapping[str, Callable[..., Any]]:
         """Return the entry functions run with floats, by name: the same calls, the same results."""

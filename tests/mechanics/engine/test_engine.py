@@ -1,9 +1,5 @@
-"""The compiled engine against the sweeps over dense matrices, against itself without compilation, in growth."""
+"""The compiled engine against the sweeps over dense matrices, and in growth."""
 
-import os
-import pickle
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path as File
 
@@ -14,7 +10,7 @@ from hypothesis import given, settings
 import ephs
 from benchmarks.cases import CASES
 from ephs.mechanics.engine.closing import closing
-from ephs.mechanics.engine.engine_kernels import accelerate, evaluations, resolve
+from ephs.mechanics.engine.engine_kernels import accelerate, resolve
 from ephs.mechanics.engine.rate_kernels import across
 from ephs.mechanics.reduced.equations import Equations
 from ephs.mechanics.reduced.loop_kernels import accelerate as accelerate_densely
@@ -140,41 +136,6 @@ def test_a_ladder_of_loops_has_few_rows_open_at_once(windows):
     assert program.slot.shape[0] <= 7 * program.row.shape[0]
     assert program.flat.size <= 40 * program.row.shape[0]
     assert program.blocks == 1
-
-
-CODE = """
-import pickle, sys
-import numpy as np
-from ephs.mechanics.engine.engine_kernels import evaluations
-with open(sys.argv[1], "rb") as file:
-    for engine, memory, q, r in pickle.load(file):
-        rates = np.zeros_like(r)
-        evaluations(engine, memory, q, r, rates, 1)
-        print(*[float(x).hex() for x in rates[0]])
-"""
-
-
-def test_without_compilation_the_numbers_are_the_same(tmp_path):
-    cases, compiled = [], []
-    for name in ("chain", "spherical-chain-2", "four-bar", "slider-crank", "mbs"):
-        eq = equations(ephs.load(SCENES[name]))
-        state = moved(eq)
-        rates = np.zeros((1, eq.n))
-        cases.append((eq.engine, eq.memory, state.q[None], state.r[None]))
-        evaluations(*cases[-1], rates, 1)
-        compiled.append(rates[0])
-    file = tmp_path / "cases.pickle"
-    file.write_bytes(pickle.dumps(cases))
-    done = subprocess.run(
-        [sys.executable, "-c", CODE, str(file)],
-        capture_output=True, text=True, env=os.environ | {"NUMBA_DISABLE_JIT": "1"},
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    lines = done.stdout.splitlines()
-    assert len(lines) == len(cases)
-    for line, expected in zip(lines, compiled, strict=True):
-        found = [float.fromhex(x) for x in line.split()]
-        assert np.allclose(found, expected, rtol=1e-12, atol=1e-12 * np.abs(expected).max())
 
 
 def test_a_run_that_leaves_the_range_of_numbers_is_not_blamed_on_masses():

@@ -1,6 +1,8 @@
 """One function, run with floats and as machine code: the same bits."""
 
 import re
+from concurrent.futures import ThreadPoolExecutor
+from threading import Barrier
 from typing import Any
 
 import numpy as np
@@ -226,3 +228,20 @@ def test_a_python_condition_on_a_symbol_is_named():
 
     with pytest.raises(StageError, match=r"signed, test_programs.py:\d+: a condition"):
         Program("wrong", signed=Entry(signed, x=real())).compiled()
+
+
+def test_threads_that_compile_a_program_at_once_get_the_same_code():
+    """Else that of all but one would be freed, and its addresses with it."""
+
+    def shifted(on, x, out):
+        out[0] = on.sin(x[0]) + on.exp(x[0])
+
+    program = Program("shifted", shifted=Entry(shifted, x=vector(), out=vector()))
+    together = Barrier(4)
+
+    def compiled(_):
+        together.wait()
+        return program.compiled()["shifted"].address
+
+    with ThreadPoolExecutor(4) as threads:
+        assert len(set(threads.map(compiled, range(4)))) == 1
