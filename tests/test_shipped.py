@@ -106,10 +106,21 @@ def sparse(run: Heard, n: int, seed: int, least: float) -> None:
         assert np.allclose(a @ x, right, rtol=0.0, atol=1e-6 * np.linalg.cond(a))
 
 
+def linear(run: Heard, n: int, k: int, m: int, seed: int) -> None:
+    """The relations of n ports with k conditions and m multipliers, at drawn numbers."""
+    rng = np.random.default_rng(seed)
+    dims, width = np.array([n, k, m, 0]), n + k + m
+    sizes = {"scal": 1, "p": n * (n + k), "x0": n, "v": n, "e": n, "lam": k, "f": n * n, "c": max(k, 1)}
+    sizes |= {"jac": (n + k) * width, "work": 1}
+    for name in PROGRAMS["linear"].entries:
+        run[name](dims, *(rng.standard_normal(size) for size in sizes.values()))
+
+
 NUMBERS = st.one_of(st.floats(-10.0, 10.0), st.sampled_from(EDGES), st.floats())
 USES: dict[str, tuple[Callable[..., None], st.SearchStrategy[Any]]] = {
     "ephs": (elementary, st.tuples(NUMBERS, NUMBERS)),
     "constraint_rows": (constraint_rows, st.tuples(problems())),
+    "linear": (linear, st.tuples(*[st.integers(1, 4), *[st.integers(0, 3)] * 2, st.integers(0, 2**32 - 1)])),
     "sparse_lu": (sparse, st.tuples(st.integers(1, 8), st.integers(0, 2**32 - 1), st.sampled_from([0.0, 0.1, 0.9]))),
 }
 """Of each shipped program, calls of all its entry functions, and what they are drawn from."""

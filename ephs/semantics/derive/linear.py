@@ -14,7 +14,7 @@ from ephs.semantics.stage.memory import Integers, Vector
 from ephs.semantics.stage.numbers import Integer, Real
 from ephs.semantics.stage.programs import Call, Entry, Program
 
-__all__ = ["Linear"]
+__all__ = ["Linear", "linear_program"]
 
 
 def _dot(on: Evaluator, count: Integer, entry: Callable[[Integer], Real]) -> Real:
@@ -105,7 +105,8 @@ FUNCTIONS: Final = (no_effort, quadratic, constant_structure)
 
 
 @cache
-def _program() -> Program:
+def linear_program() -> Program:
+    """Return the program of these relations."""
     names = ("scal", "p", "x0", "v", "e", "lam", "f", "c", "jac", "work")
     kinds: dict[str, Any] = {"dims": pointer("integers", 4)} | {name: pointer("reals", None) for name in names}
     return Program("linear", **{each.__name__: Entry(each, **kinds) for each in FUNCTIONS})
@@ -121,8 +122,8 @@ class Linear:
     @property
     def program(self) -> Program:
         """The program of all of them."""
-        return _program()
+        return linear_program()
 
     def compiled(self) -> Call:
         """The relation in machine code."""
-        return _program().compiled()[self.name]
+        return linear_program().compiled()[self.name]
