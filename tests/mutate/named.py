@@ -46,7 +46,6 @@ BREAKS = {
         "self.exergy - self.exergy[:1] - self.destroyed",
     ),
     "lp": Break("ephs/mechanics/components.py", "[[-_product(column, p)", "[[_product(column, p)"),
-    "friction": Break("ephs/semantics/structures.py", "[-pull]", "[pull]"),
     "chord of a rotation": Break("ephs/semantics/derive/charts.py", "chord = 0.5 *", "chord = 0.25 *"),
     "o1": Break("ephs/mechanics/components.py", "np.hstack([-carried,", "np.hstack([carried,"),
     "o1, not inverted": Break(
@@ -64,11 +63,7 @@ BREAKS = {
         "side[i], mid[i], inner[i] = -0.5 * h * effort[6 + i], 0.5 * h * bi, h * ai",
         "side[i], mid[i], inner[i] = 0.5 * h * effort[6 + i], 0.5 * h * bi, h * ai",
     ),
-    "mf": Break(
-        "ephs/semantics/structures.py",
-        "out[:d, d] = out[d, :d] = -drag",
-        "out[:d, d] = out[d, :d] = drag",
-    ),
+    "mf": Break("ephs/semantics/structures.py", "[-pull]", "[pull]"),
     "substitution": Break(
         "ephs/operad/substitution.py",
         "        target[path] = kept = box / path\n",
