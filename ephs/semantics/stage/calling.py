@@ -72,8 +72,7 @@ class Call:
     def bind(self, *arguments: Any) -> Bound:
         """Check arguments once; what comes back may be called again and again."""
         parts = self.entry.split(arguments, self.trail)
-        apart(self.entry, parts)
-        return Bound(self, tuple(map(_passed, parts)), tuple(parts))
+        return Bound(self, apart(self.entry, parts), tuple(parts))
 
     def __call__(self, *arguments: Any) -> Any:
         return self.bind(*arguments)()
@@ -83,13 +82,21 @@ def _passed(part: Any) -> Any:
     return part.__array_interface__["data"][0] if isinstance(part, np.ndarray) else part
 
 
-def apart(entry: Entry, parts: list[Any]) -> None:
-    """Refuse arrays that share memory: programs are compiled as if none did."""
-    spans = sorted(
-        (_passed(part), _passed(part) + part.nbytes, name)
-        for (name, _), part in zip(entry.atoms, parts, strict=True)
-        if isinstance(part, np.ndarray) and part.size
-    )
+def apart(entry: Entry, parts: list[Any]) -> tuple[Any, ...]:
+    """Return the addresses of arrays, and numbers as they are.
+
+    Raises
+    ------
+    StageError
+        Arrays share memory: programs are compiled as if none did.
+    """
+    passed = tuple(map(_passed, parts))
+    spans: list[tuple[int, int, str]] = []
+    for (name, _), part, start in zip(entry.atoms, parts, passed, strict=True):
+        if isinstance(part, np.ndarray) and (size := part.nbytes):
+            spans.append((start, start + size, name))
+    spans.sort()
     for (_, end, one), (start, _, other) in pairwise(spans):
         if start < end:
             raise StageError("overlap", where=entry.name, argument=one, other=other)
+    return passed

@@ -34,6 +34,8 @@ class Entry:
             name: kind if isinstance(kind, Kind) else REAL if isinstance(kind, RealField) else INTEGER
             for name, kind in kinds.items()
         }
+        self.atoms: list[tuple[str, Atom]] = [(name, atom) for name, kind in self.kinds.items() for atom in kind.atoms]
+        """The atoms of all arguments, each with the name of its argument."""
         names = list(signature(function).parameters)[1:]
         if names != list(kinds):
             raise StageError(
@@ -44,11 +46,6 @@ class Entry:
     def name(self) -> str:
         """The function's name, for errors."""
         return getattr(self.function, "__qualname__", repr(self.function))
-
-    @property
-    def atoms(self) -> list[tuple[str, Atom]]:
-        """The atoms of all arguments, each with the name of its argument."""
-        return [(name, atom) for name, kind in self.kinds.items() for atom in kind.atoms]
 
     def split(self, arguments: tuple[Any, ...], trail: Callable[[str], tuple[int | None, ...]]) -> list[Any]:
         """Return the atoms of arguments, checked; `trail` says what shape follows that of an argument's numbers."""

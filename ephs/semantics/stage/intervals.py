@@ -100,6 +100,10 @@ def _absolute(low: float, high: float) -> Interval:
     return Interval(0.0 if low <= 0.0 <= high else min(abs(low), abs(high)), max(abs(low), abs(high)))
 
 
+def _floor(x: float) -> float:
+    return float(math.floor(x)) if math.isfinite(x) else x
+
+
 def _exp(low: float, high: float) -> Interval:
     values = [math.exp(x) if x < 709.0 else math.inf for x in (low, high)]
     return _clipped(_out((min(values[0], 1.7e308), values[1]), _ULPS), 0.0)
@@ -139,7 +143,7 @@ def _copysign(x: tuple[float, float], sign: tuple[float, float]) -> Interval:
 _ONE: Final[dict[Function, Callable[[float, float], Interval]]] = {
     "sqrt": _sqrt,
     "absolute": _absolute,
-    "floor": lambda low, high: Interval(math.floor(low), math.floor(high)),
+    "floor": lambda low, high: Interval(_floor(low), _floor(high)),
     "sin": lambda low, high: _wave(low, high, math.pi / 2.0),
     "cos": lambda low, high: _wave(low, high, 0.0),
     "exp": _exp,
@@ -189,7 +193,7 @@ class Intervals(Interpreted):
 
     def scale(self, real: Real, power: Integer) -> Real:
         low, high = _of(real)
-        return _out((math.ldexp(low, int(power)), math.ldexp(high, int(power))))
+        return _out((low * 2.0 ** int(power), high * 2.0 ** int(power)))
 
 
 INTERVALS: Final = Intervals()

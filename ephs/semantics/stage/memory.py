@@ -53,7 +53,7 @@ IntegerCells: TypeAlias = Cells[Integer]
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Held(Cells[Value]):
-    """Cells in a Python list."""
+    """Cells in a Python list; floats divide by zero as IEEE says."""
 
     entries: list[Value]
 
@@ -61,7 +61,7 @@ class Held(Cells[Value]):
         return self.entries[index]
 
     def store(self, index: Integer, value: Value) -> None:
-        self.entries[index] = value
+        self.entries[index] = cast("Value", np.float64(value)) if type(value) is float else value
 
 
 @final

@@ -40,7 +40,7 @@ class Local(Cells[Any]):
         if isinstance(index, Count):
             raise StageError("unrolled", what="a place to store at")
         self.on.written((self, index))
-        self.entries[index] = value
+        self.entries[index] = np.float64(value) if type(value) is float else value
 
 
 @final

@@ -139,3 +139,13 @@ def test_a_loop_that_never_ends_is_seen():
 
     with pytest.raises(StageError, match=r"forever.*more than 100000 operations"):
         Program("not", forever=Entry(forever, x=indices()).given(x=np.zeros(1, dtype=np.int64))).text()
+
+
+def test_a_known_zero_divides_as_ieee_says():
+    def inverse(on, x):
+        return 1.0 / on.variable(0.0).value - x
+
+    entry = Entry(inverse, x=real())
+    program = Program("zero", looped=entry, unrolled=entry.given())
+    found = [calls[name](1.0) for calls in (program.plain(), program.compiled()) for name in calls]
+    assert found == [np.inf] * 4
