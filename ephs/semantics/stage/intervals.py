@@ -1,4 +1,7 @@
-"""Evaluation with intervals, rounded outwards: bounds of what a function computes on a box."""
+"""Evaluation with intervals, rounded outwards: bounds of what a function computes on a box.
+
+Where a divisor is zero there is no value to bound.
+"""
 
 import math
 from collections.abc import Callable

@@ -13,7 +13,7 @@ from mpmath import mp, mpf
 from ephs.semantics.stage import PLAIN, Entry, Evaluator, Program, Vector, elementary, vector
 from tests.semantics.stage.coefficients import made
 
-ULPS = {"sin": 0.8, "cos": 0.8, "exp": 0.8, "log": 0.9, "atan2": 1.4}
+ULPS = {"sin": 0.8, "cos": 0.8, "exp": 0.8, "log": 0.9, "atan2": 1.5}
 """Errors that the module promises, in units in the last place."""
 EDGES = (0.0, -0.0, 5e-324, -5e-324, 1.0, -1.0, 2.0**-1022, 1e308, -1e308, math.inf, -math.inf, math.nan)
 HARD = st.integers(1, 2**27).map(lambda n: float(n * mp.pi / 2))
