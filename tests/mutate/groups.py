@@ -151,6 +151,17 @@ GROUPS = {
         ),
         pace=LONG,
     ),
+    "sweeps": Group(
+        (
+            "ephs/mechanics/tree/accelerations.py",
+            "ephs/mechanics/tree/inward.py",
+            "ephs/mechanics/tree/joints.py",
+            "ephs/mechanics/tree/outward.py",
+            "ephs/mechanics/tree/pack.py",
+            "ephs/mechanics/engine/links.py",
+        ),
+        (f"{MECHANICS}/tree",),
+    ),
     "derivatives": Group(
         DERIVATIVES,
         (
