@@ -18,11 +18,11 @@ from ephs.operad import Directory, Interface, Path, PortType, Quantity
 from ephs.semantics import structures
 from ephs.semantics.bundle import Array, Bundle, Reference
 from ephs.semantics.checks import random_point
-from ephs.semantics.domains import Bounds, bounded, domain_of, inside
+from ephs.semantics.domains import Bounds, bounded, domain_of, within_domain
 from ephs.semantics.errors import StructureError
 from ephs.semantics.primitives import Domain, Formula, Irreversible, Kernel, Point, Reversible, Storage
 
-__all__ = ["constraint", "gyrator", "irreversible", "storage", "transformer"]
+__all__ = ["constraint", "gyrator", "irreversible", "reversible", "storage", "transformer"]
 
 Ports = Mapping[str, Quantity]
 Matrix = ArrayLike | Callable[..., ArrayLike]
@@ -76,7 +76,7 @@ def storage(
 
     def value(x: Point) -> float:
         with np.errstate(all="ignore"):  # what is not a number is found by its value
-            return _real(name, _called(name, "the energy", energy, x)) if inside(bounds, x) else math.nan
+            return _real(name, _called(name, "the energy", energy, x)) if within_domain(bounds, x) else math.nan
 
     from ephs.semantics.derive.recording import Untraceable
     from ephs.semantics.forms import storage_form
@@ -122,15 +122,14 @@ def gyrator(ports: Ports, matrix: Matrix, *, domain: Bounds | None = None, name:
     """
     interface = _interface(name, ports)
     n = Bundle.of(interface).size
-    if not callable(matrix):
+    if not callable(matrix) and not domain:
         return structures.constant_structure(name, interface, _matrix(name, matrix, n, n), np.zeros((0, n)))
-    given = matrix
-    read = _reader(name, interface, given)
+    given, read = _reader(name, interface, matrix)
 
     def structure(x: Point) -> tuple[Array, Array]:
         return _matrix(name, read(x), n, n), np.zeros((0, n))
 
-    return _reversible(name, interface, structure, Formula(_both(given, None)), 0, domain)
+    return reversible(name, interface, structure, Formula(_both(given, None)), 0, domain)
 
 
 def transformer(ports: Ports, matrix: Matrix, *, domain: Bounds | None = None, name: str = "transformer") -> Reversible:
@@ -156,11 +155,10 @@ def transformer(ports: Ports, matrix: Matrix, *, domain: Bounds | None = None, n
     def whole(g: Array) -> Array:
         return np.hstack([-g, np.eye(k)])
 
-    if not callable(matrix):
+    if not callable(matrix) and not domain:
         zero = np.zeros((bundle.size, bundle.size))
         return structures.constant_structure(name, interface, zero, whole(_matrix(name, matrix, k, first)))
-    given = matrix
-    read = _reader(name, interface, given)
+    given, read = _reader(name, interface, matrix)
     right = np.eye(k).astype(object)
 
     def beside(**x: Any) -> Any:
@@ -169,7 +167,7 @@ def transformer(ports: Ports, matrix: Matrix, *, domain: Bounds | None = None, n
     def structure(x: Point) -> tuple[Array, Array]:
         return np.zeros((bundle.size, bundle.size)), whole(_matrix(name, read(x), k, first))
 
-    return _reversible(name, interface, structure, Formula(_both(None, beside)), k, domain)
+    return reversible(name, interface, structure, Formula(_both(None, beside)), k, domain)
 
 
 def constraint(
@@ -196,18 +194,17 @@ def constraint(
     interface = _interface(name, ports)
     n = Bundle.of(interface).size
     zero = np.zeros((n, n))
-    if not callable(matrix):
+    if not callable(matrix) and not domain:
         rows: Any = matrix
         k = len(rows) if np.ndim(rows) == 2 else 1
         return structures.constant_structure(name, interface, zero, _matrix(name, np.atleast_2d(rows), k, n))
-    given = matrix
-    read = _reader(name, interface, given)
+    given, read = _reader(name, interface, matrix)
     k = _rows(interface, read) if multipliers is None else multipliers
 
     def structure(x: Point) -> tuple[Array, Array]:
         return zero, _matrix(name, read(x), k, n)
 
-    return _reversible(name, interface, structure, Formula(_both(None, given)), k, domain)
+    return reversible(name, interface, structure, Formula(_both(None, given)), k, domain)
 
 
 def irreversible(
@@ -245,7 +242,7 @@ def irreversible(
         given = {**bundle.split(e + bundle.intensive(reference)), **x}
         return (
             _matrix(name, _called(name, "the matrix", matrix, given), n, n)
-            if inside(bounds, given)
+            if within_domain(bounds, given)
             else np.full((n, n), np.nan)
         )
 
@@ -254,7 +251,7 @@ def irreversible(
     return Irreversible(name, interface, evaluate, _reads(interface), kernel=kernel, formula=formula, domain=bounds)
 
 
-def _reversible(
+def reversible(
     name: str,
     interface: Interface,
     structure: Callable[[Point], tuple[Array, Array]],
@@ -262,8 +259,9 @@ def _reversible(
     multipliers: int,
     domain: Bounds | None,
 ) -> Reversible:
-    """Function of states, as a formula where it can be traced."""
-    bounds, n = domain_of(name, interface, domain), Bundle.of(interface).size
+    """A structure that reads states, compiled where its formula can be traced; those states may have a domain."""
+    bounds = domain_of(name, Interface({port: interface[port] for port in _reads(interface)}), domain)
+    n = Bundle.of(interface).size
     nothing = np.full((n, n), np.nan), np.full((multipliers, n), np.nan)
     return Reversible(
         name,
@@ -341,9 +339,15 @@ def _takes(name: str, key: str, function: object, ports: tuple[Path, ...]) -> No
         raise StructureError("parameter", name, key=key, found=found, expected=expected) from None
 
 
-def _reader(name: str, interface: Interface, matrix: Callable[..., ArrayLike]) -> Callable[[Point], ArrayLike]:
-    _takes(name, "matrix", matrix, _reads(interface))
-    return lambda x: _called(name, "the matrix", matrix, x)
+def _reader(name: str, interface: Interface, matrix: Matrix) -> tuple[Callable[..., Any], Callable[[Point], ArrayLike]]:
+    """The matrix as a function of the states that are read, by name and as a point."""
+
+    def constant(**_: Any) -> Any:
+        return matrix
+
+    given = matrix if callable(matrix) else constant
+    _takes(name, "matrix", given, _reads(interface))
+    return given, lambda x: _called(name, "the matrix", given, x)
 
 
 def _rows(interface: Interface, read: Callable[[Point], ArrayLike]) -> int:

@@ -9,7 +9,7 @@ from ephs.semantics.errors import StructureError
 from ephs.semantics.primitives import Domain, Point
 from ephs.semantics.spaces import codes, manifold
 
-__all__ = ["Bounds", "bounded", "domain_of", "inside"]
+__all__ = ["Bounds", "bounded", "domain_of", "within_domain"]
 
 Bounds = Mapping[str, tuple[float, float]]
 """Port name -> (least, greatest) number."""
@@ -37,11 +37,11 @@ def domain_of(name: str, interface: Interface, domain: Bounds | None) -> Domain:
     return tuple(out)
 
 
-def inside(domain: Domain, values: Mapping[Path, Array]) -> bool:
+def within_domain(domain: Domain, values: Mapping[Path, Array]) -> bool:
     """Whether the values at all ports of the domain lie in it."""
     return all(low < values[port].min() and values[port].max() < high for port, low, high in domain)
 
 
 def bounded(function: Callable[[Point], T], domain: Domain, outside: T) -> Callable[[Point], T]:
     """The function where the states are in the domain, else what is no number."""
-    return lambda x: function(x) if inside(domain, x) else outside
+    return lambda x: function(x) if within_domain(domain, x) else outside

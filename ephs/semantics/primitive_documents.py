@@ -14,10 +14,10 @@ from ephs.semantics import constructors, structures
 from ephs.semantics.bundle import Array, Bundle, Reference
 from ephs.semantics.catalogue import find_part, part_of
 from ephs.semantics.checks import random_efforts, random_point
-from ephs.semantics.domains import Bounds, bounded, domain_of
+from ephs.semantics.domains import Bounds
 from ephs.semantics.errors import SemanticsError, StructureError
 from ephs.semantics.extents import between
-from ephs.semantics.forms import reversible_kernel, stacked
+from ephs.semantics.forms import stacked
 from ephs.semantics.library.chemistry import Species
 from ephs.semantics.primitives import Formula, Irreversible, Point, Primitive, Reversible, Storage
 from ephs.semantics.symbols.algebra import sp
@@ -147,18 +147,9 @@ def _reversible(reader: Reader, where: str, name: str, ports: Interface, found: 
         return upper.reshape(n, n), np.array(lower, dtype=float).reshape(k, n)
 
     def make() -> Primitive:
-        bounds = domain_of(name, ports, domain)
-        if not bounds and all(part is None or part.numbers for part in (skew, constraint)):
+        if not domain and all(part is None or part.numbers for part in (skew, constraint)):
             return structures.constant_structure(name, ports, *structure({}))
-        formula = Formula(Structure(skew, constraint))
-        try:
-            kernel = reversible_kernel(ports, reads, formula, k, bounds)
-        except Untraceable:
-            kernel = None
-        inner = structure
-        if bounds:
-            inner = bounded(structure, bounds, (np.full((n, n), np.nan), np.full((k, n), np.nan)))
-        return Reversible(name, ports, inner, reads=reads, multipliers=k, kernel=kernel, formula=formula, domain=bounds)
+        return constructors.reversible(name, ports, structure, Formula(Structure(skew, constraint)), k, domain)
 
     return make
 

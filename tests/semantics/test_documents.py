@@ -206,6 +206,9 @@ BOUNDED = {
         lambda a: [[0, 1 + a], [-1 - a, 0]],
         domain={"a": (2.0, np.inf)},
     ),
+    "constant": lambda: ephs.transformer(
+        {"a": Q.momentum, "b": Q.momentum, "~x": Q.displacement}, [[2.0]], domain={"x": (1.5, np.inf)}
+    ),
     "irreversible": lambda: ephs.irreversible(
         {"p": Q.momentum, "s": Q.entropy},
         lambda p, s: np.array([[s, -p], [-p, p * p / s]]),
@@ -227,6 +230,16 @@ def test_domains_are_written_and_read_back(make):
     broken = text.replace("null", "1.0") if "null" in text else text.replace(str(found.domain[0][2]), '"x"')
     with pytest.raises((PatternError, SemanticsError), match="domain"):
         System.from_json(broken)
+
+
+@pytest.mark.parametrize("matrix", [[[0.0, 1.0], [-1.0, 0.0]], lambda **_: [[0.0, 1.0], [-1.0, 0.0]]])
+def test_only_states_that_are_read_have_a_domain(matrix):
+    ports = {"q": Q.displacement, "p": Q.momentum, "~a": Q.displacement}
+    with pytest.raises(SemanticsError, match="parameter domain of q is q, expected a"):
+        ephs.gyrator(ports, matrix, domain={"q": (0.0, 1.0)})
+    inner = ephs.gyrator(ports, matrix, domain={"a": (0.0, 1.0)})
+    for a, sound in ((0.5, True), (1.5, False)):
+        assert np.isfinite(inner.structure({Path.of("a"): np.array([a])})[0]).all() == sound
 
 
 def branching(q):

@@ -97,7 +97,7 @@ class Alpha(ReducedMethod):
             self.jacobian.at(state, renew=True)
             return self.step(state, h)
         flows, missed, work = self._passed(state, y0, y1, before, rates, h)
-        closed = eq.booked(state, eq.closed(eq.state(state, y1, state.t + h)), flows, missed, work)
+        closed = eq.booking.step(state, eq.closed(eq.state(state, y1, state.t + h)), flows, missed, work)
         missed = h * h * (self._beta - 1.0 / 6.0) * (mean1 - mean)
         estimate = np.concatenate([missed, np.zeros(n), np.zeros(ns)])
         error = float(np.max(np.abs(eq.along(estimate)) / (self.atol + self.rtol * eq.sizes(y0, y1)), initial=0.0))

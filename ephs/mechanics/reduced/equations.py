@@ -10,21 +10,20 @@ from typing import Any, final
 
 import numpy as np
 
-from ephs.mechanics.build import component_path
 from ephs.mechanics.engine.build import engine_of, memory_of
 from ephs.mechanics.engine.engine_kernels import DEPENDENT, STILL, resolve
 from ephs.mechanics.engine.heat_kernels import count
 from ephs.mechanics.engine.march_kernels import C_COLUMNS, C_COMPONENT, C_EVALUATIONS, attempt
 from ephs.mechanics.engine.rate_kernels import OPEN, across, advance, close, derive, joint_rates
 from ephs.mechanics.engine.tables import Scheme
+from ephs.mechanics.reduced.booking import Booking
 from ephs.mechanics.reduced.dense import Dense, unmoved
 from ephs.mechanics.reduced.given import Given
 from ephs.mechanics.reduced.heat import Heats
 from ephs.mechanics.reduced.led import Led
 from ephs.mechanics.reduced.mechanism import reduce_scene
-from ephs.mechanics.reduced.naming import within
+from ephs.mechanics.reduced.naming import tolerances, within
 from ephs.mechanics.reduced.paper import PaperStates
-from ephs.mechanics.reduced.table_kernels import stored_energies
 from ephs.mechanics.reduced.tables import SPRING, Workspace
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.solve.control import Tolerance
@@ -84,7 +83,6 @@ class Equations:
             problem.descriptor, problem.reference, problem.inputs(t0, problem.initial), matrix=False
         )
         self.reduced = reduced = reduce_scene(scene, problem, model)
-        self._stored = model.memory()
         self._light = reduced.workspace(dense=False)
         self._dense: Dense | None = None
         t = reduced.tables
@@ -108,7 +106,7 @@ class Equations:
         self.drive, self.wrench = self.given.drive, self.given.wrench
         self.constant = problem.constant
         self._paper = PaperStates(reduced, problem, self._light)
-        self._last_energies = np.zeros(0), np.zeros(0)
+        self.booking = Booking(self, self._paper)
         self.evaluations = 0
         self.gravity = np.array(scene.world.gravity, dtype=float)
         self._driven = np.flatnonzero(t.driven)
@@ -295,23 +293,8 @@ class Equations:
 
     def allowed(self, rtol: Tolerance, atol: Tolerance) -> tuple[Array, Array]:
         """rtol and atol of what counts in an error: the tree's increments, its rates, the heats."""
-        tree = [edge for edge in self.reduced.edges[: self.reduced.links]]
-        out: list[Array] = []
-        for tolerance in (rtol, atol):
-            of_joints = [
-                np.full(edge.pair.dim, tolerance.at(*self._named(edge.path, link))) for link, edge in enumerate(tree)
-            ]
-            entropies = [tolerance.at(path, "entropy") for path in self.reduced.entropies]
-            if tolerance is atol:  # in J, of J/K
-                entropies = [value * self.model.reference.temperature for value in entropies]
-            out.append(np.concatenate([*of_joints, *of_joints, np.array(entropies)]))
-        return out[0], out[1]
-
-    def _named(self, path: Path | None, link: int) -> tuple[Path, str]:
-        """Path and kind of the state that a tree joint's element is to a user."""
-        if path is not None:
-            return path / "pe" / "q_r", "relative_pose"
-        return component_path("bodies", str(self.reduced.bodies[link])) / "pe" / "q", "pose"
+        theta = self.model.reference.temperature
+        return tolerances(self.reduced, rtol, 1.0), tolerances(self.reduced, atol, theta)
 
     def sizes(self, y0: Array, y1: Array) -> Array:
         """Reference of a relative tolerance: for increments 1 rad or m, for rates the joint's as a whole."""
@@ -349,47 +332,16 @@ class Equations:
         return self.rows_of([state])[0]
 
     def rows_of(self, states: Sequence[ReducedState]) -> list[Row]:
-        """Records of many states."""
+        """What is kept of many states."""
         if not states:
             return []
-        q, r, heats = zip(*((state.q, state.r, state.heats) for state in states), strict=True)
-        x = self._paper.rows(np.array(q), np.array(r), self.heats.entropies(np.array(heats)))
-        energies = np.zeros((len(states), len(self.problem.descriptor.components)))
-        self.refuse(*stored_energies(self.model.tables, self.scal, self._stored, x, energies))
+        x, energies = self.booking.energies(states)
         out: list[Row] = []
         for state, point, energy in zip(states, x, energies, strict=True):
             heat, work = state.books[0], self.led.work(state.t, energy, state.books)
             energy[self._makers] = state.books[2:]
             out.append(Row(point, energy, np.array([heat, work, work, state.books[2:].sum()])))
         return out
-
-    def booked(self, start: ReducedState, end: ReducedState, flows: Array, missed: Array, work: float) -> ReducedState:
-        """The end of a step with what its components passed on and made, see `Heats`.
-
-        Parameters
-        ----------
-        flows, missed
-            (makers,) in J over the step, and by how much their quadrature may be off.
-        work
-            By what drives, in J over the step.
-        """
-        lost = None
-        if self.heats.frictions.size and not self.led.counting:
-            lost = work - float((self._energies(end) - self._energies(start)) @ self.led.mechanical)
-            self._last_energies = end.q, self._energies(end)
-        flows = self.heats.booked(flows, missed, lost)
-        heats, made = self.heats.taken(start.heats, flows)
-        heat = float(flows[self.heats.frictions].sum())
-        return replace(end, heats=heats, books=start.books + np.concatenate([[heat, work], made]))
-
-    def _energies(self, state: ReducedState) -> Array:
-        """(components,) stored energies in J."""
-        if self._last_energies[0] is state.q:
-            return self._last_energies[1]
-        x = self._paper.rows(state.q[None], state.r[None], self.heats.entropies(state.heats)[None])
-        energies = np.zeros((1, len(self.problem.descriptor.components)))
-        self.refuse(*stored_energies(self.model.tables, self.scal, self._stored, x, energies))
-        return energies[0]
 
     def least(self, start: ReducedState, end: ReducedState) -> float:
         """The least entropy that a component made between two states, in J/K."""

@@ -77,7 +77,7 @@ class Implicit(ReducedMethod):
         closed, error = self._closed(state, end, y0, y1, first, stages, h)
         missed = h * (GAMMA * first[eq.size - passed.shape[1] :] + DEFECT @ passed)
         passed = h * (COEFFICIENTS[-1] @ passed)
-        closed = eq.booked(state, closed, passed[2:], missed[2:], float(passed[1]))
+        closed = eq.booking.step(state, closed, passed[2:], missed[2:], float(passed[1]))
         if not fast or self._turned():
             self._renew(closed)
         return Attempt(state, closed, h, error, eq.least(state, closed))

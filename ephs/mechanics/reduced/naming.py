@@ -4,10 +4,11 @@ import numpy as np
 
 from ephs.mechanics.build import component_path
 from ephs.mechanics.reduced.mechanism import Reduced
+from ephs.mechanics.solve.control import Tolerance
 from ephs.mechanics.solve.errors import LARGEST, Outcome, SolveError
 from ephs.semantics.bundle import Array
 
-__all__ = ["counted", "within"]
+__all__ = ["counted", "tolerances", "within"]
 
 
 def within(reduced: Reduced, q: Array, r: Array, heats: Array) -> None:
@@ -38,6 +39,18 @@ def counted(reduced: Reduced, entry: int) -> tuple[str, str]:
         return str(reduced.entropies[entry - 2 * n]), "its heat"
     link = int(np.flatnonzero(reduced.tables.r_at[: reduced.links] <= entry % n)[-1])
     return _path(reduced, link), "its position" if entry < n else "its rate"
+
+
+def tolerances(reduced: Reduced, tolerance: Tolerance, heat: float) -> Array:
+    """A tolerance of what counts in errors: the tree's increments, its rates, the heats, in ``heat`` J per J/K."""
+    of_joints: list[Array] = []
+    for link, edge in enumerate(reduced.edges[: reduced.links]):
+        path, kind = component_path("bodies", str(reduced.bodies[link])) / "pe" / "q", "pose"
+        if edge.path is not None:
+            path, kind = edge.path / "pe" / "q_r", "relative_pose"
+        of_joints.append(np.full(edge.pair.dim, tolerance.at(path, kind)))
+    heats = [heat * tolerance.at(path, "entropy") for path in reduced.entropies]
+    return np.concatenate([*of_joints, *of_joints, np.array(heats)])
 
 
 def _path(reduced: Reduced, link: int) -> str:

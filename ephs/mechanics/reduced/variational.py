@@ -90,7 +90,7 @@ class Variational(ReducedMethod):
             second = np.linalg.lstsq(rows.T, impulse, rcond=CONSTRAINT)[0][: self._driven.size]
             rates = closed.r[self._driven]
             work += float((push[: self._driven.size] + second) @ rates)
-        closed = eq.booked(state, closed, h * flows, np.zeros(flows.size), work)
+        closed = eq.booking.step(state, closed, h * flows, np.zeros(flows.size), work)
         self._guess = closed.q, closed.r + (closed.r - state.r) * 0.5
         return Attempt(state, closed, h, 0.0, eq.least(state, closed))
 

@@ -20,7 +20,8 @@ the order fall to 2 (Hairer, Lubich and Roche, *Lecture Notes in Mathematics* 14
 from typing import NamedTuple
 
 from ephs.mechanics.solve.lu_kernels import copy, factorise, solve
-from ephs.mechanics.solve.natural_kernels import account, evaluate, measure, restrain, tighten
+from ephs.mechanics.solve.natural_kernels import account, evaluate, measure
+from ephs.mechanics.solve.restraint_kernels import restrain, tighten
 from ephs.mechanics.solve.sparse import Index
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import jit

@@ -6,6 +6,7 @@
 from typing import NamedTuple
 
 from ephs.mechanics.solve.lu_kernels import copy, factorise, solve
+from ephs.mechanics.solve.restraint_kernels import restrain, tighten
 from ephs.mechanics.solve.sparse import Index
 from ephs.semantics.bundle import Array
 from ephs.semantics.calling import call_kernel
@@ -21,7 +22,6 @@ DONE, DIVERGED, PIVOT, INCONSISTENT, COMPONENT = 0, 1, 2, 3, 10
 STORING, REVERSIBLE, IRREVERSIBLE = 0, 1, 2
 SPREAD = 1e-3
 """A block's scale is at least this fraction of the largest of its kind: e = 0 alone has no scale of its own."""
-
 
 TAKES_PART = 1e-3
 """The least coefficient, relative to the largest, with which an effort takes part in a constraint; less is rounding."""
@@ -291,34 +291,6 @@ def measure(t, z, dropped, m):
 
 
 @kernel
-def restrain(t, z, step):
-    """Shorten a Newton step z − step storage by storage; returns the least part taken of efforts and rates.
-
-    Absolute temperatures fall by half or rise fourfold at most: small heat capacities warm by orders of magnitude in
-    one step of the method, where whole Newton steps would leave what is positive.
-    """
-    least = 1.0
-    for i in range(t.kind.shape[0]):
-        if t.kind[i] != STORING:
-            continue
-        part = 1.0
-        for j in range(t.dims[i, 0]):
-            effort = t.e_index[t.e_at[i] + j]
-            warmth, fall = z[t.counts[0] + effort] + t.intensive[effort], step[t.counts[0] + effort]
-            if t.entropy[effort] == 1.0 and warmth > 0.0:
-                if fall > 0.5 * warmth:
-                    part = min(part, 0.5 * warmth / fall)
-                elif fall < -3.0 * warmth:
-                    part = min(part, -3.0 * warmth / fall)
-        if part < 1.0:
-            least = min(least, part)
-            for j in range(t.dims[i, 0]):
-                step[t.counts[0] + t.e_index[t.e_at[i] + j]] *= part
-                step[t.read_w[t.read_w_at[i] + j]] *= part
-    return least
-
-
-@kernel
 def newton(t, o, x, z, scal, inputs, m):
     """Solve one step in place of z, run to stagnation; returns (status, component, iterations).
 
@@ -378,14 +350,6 @@ def account(t, z, scal, inputs, m, sums):
             sums[1] += h * (effort + t.intensive[at + j]) * flow
             sums[2] += h * effort * flow
     return 0.0 if least == 1e300 else least
-
-
-@kernel
-def tighten(q):
-    """Bring a quaternion that is off by rounding back to unit length."""
-    factor = 1.5 - 0.5 * (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
-    for i in range(4):
-        q[i] *= factor
 
 
 @kernel

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 import ephs
 from ephs.mechanics.simulate import problem_of_scene
 from ephs.mechanics.solve.model import compile_model
-from ephs.mechanics.solve.natural_kernels import SPREAD, TAKES_PART, measure, reach, tighten, weigh
+from ephs.mechanics.solve.natural_kernels import SPREAD, TAKES_PART, measure, reach, weigh
+from ephs.mechanics.solve.restraint_kernels import tighten
 
 ROOT = Path(__file__).resolve().parents[3]
 seeds = st.integers(0, 2**32 - 1)
