@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from ephs.semantics.primitives import Irreversible, Point, Primitive, Reversible, Storage
 
 __all__ = [
+    "NEARER",
     "STATEMENTS",
     "check_at",
     "constant",

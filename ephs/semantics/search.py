@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ephs.semantics.bundle import Reference
-from ephs.semantics.checks import check_at
+from ephs.semantics.checks import NEARER, check_at
 from ephs.semantics.errors import StructureError
 from ephs.semantics.trials import REFERENCES, Trial, chosen, coordinates, simpler, smallest, trial_of
 
@@ -26,8 +26,6 @@ DEFINED = 40
 """Trials in which a structure has to have a finite value once."""
 SHRINKS = 2000
 """Trials on the way to the simplest counterexample, at most."""
-SHARES = (1.0, 1e-2, 1e-4, 1e-6, 1e-9, 0.0)
-"""Shares of the distance to the identity, tried where a structure has no finite values farther away."""
 UNDEFINED = ("finite", "undefined")
 """Kinds of failure that say no more than that the structure has no value there."""
 
@@ -77,7 +75,7 @@ def search(primitive: "Primitive", count: int) -> int:
     source = random.Random(20)
     undefined: StructureError | None = None
     defined = 0
-    for share in SHARES:
+    for share in NEARER:
         for number in range(count):
             numbers, reference = chosen(primitive, source.randrange if number else _first)
             found = failure(primitive, trial_of(primitive, numbers, reference).nearer(primitive, share))

@@ -137,12 +137,13 @@ def _accuracy(solution: "Solution", bounds: Bounds, trials: Trials | None) -> It
     if bounds.step is None or trials is None:
         return
     steps = int(solution.stats["steps"])
-    off = trials.motion(bounds.step, steps)
+    own = trials.own or trials
+    off = own.motion(bounds.step, steps)
     if off is not None:
         hint = ""
         if off.size > MOTION:  # of order p + 1 in a step, over as many steps more
             hint = f" of {0.9 * bounds.step * (MOTION / off.size) ** (1.0 / bounds.order):.2g} s"
-        instant = int(np.argmin(np.abs(solution.t - trials.times[off.trial])))
+        instant = int(np.argmin(np.abs(solution.t - own.times[off.trial])))
         yield Breach(off.size, MOTION - min(MOTION, bounds.accuracy), instant, off.path, hint)
     found = trials.error(bounds.step, steps, solution.ledgers.scale)
     if found is not None:

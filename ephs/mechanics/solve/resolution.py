@@ -13,7 +13,7 @@ estimates how far bodies are off at the end.
 
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Generic, TypeVar, final
 
@@ -84,12 +84,15 @@ class Trials:
     tried
         Of the number of a time and a step in s, at the start, after the step, and after its halves: (point_size,)
         states; (components,) energies of the storages, and entropies that the others made.
+    own
+        Those by the method's own steps, where these are by another's.
     """
 
     problem: Problem
     order: int
     times: tuple[float, ...]
     tried: Callable[[int, float], tuple[Tried, Tried, Tried]]
+    own: "Trials | None" = None
 
     def error(self, h: float, steps: int, gross: float) -> StepError | None:
         """The estimated error of constant steps of h s; None where nothing moves, or nothing can be tried.
@@ -272,11 +275,12 @@ def trials_of(
         As it is solved; in its unit of time are the samples, the step h, negative backward, ``until`` and the jumps.
     """
     seconds, steps = problem.seconds, int(solution.stats["steps"])
+    natural = None
     if make is not None:
-        return natural_trials(solution, make, abs(h) * seconds, jumps=[seconds * t for t in jumps])
+        natural = natural_trials(solution, make, abs(h) * seconds, jumps=[seconds * t for t in jumps])
     clear = [(t, state) for t, state in samples if _clear(t, h, until, jumps)]
     if not clear:
-        return None
+        return natural
     count = int(np.clip(steps // EACH, LEAST, MOST))
     chosen = [clear[i] for i in np.unique(np.linspace(0, len(clear), count, endpoint=False).astype(int))]
     sign = float(np.sign(h))
@@ -293,7 +297,8 @@ def trials_of(
         return first, second, third
 
     none = Rows().whole(problem.descriptor)
-    return Trials(_shown(problem, none)[0], order, tuple(t * seconds for t, _ in chosen), tried)
+    own = Trials(_shown(problem, none)[0], order, tuple(t * seconds for t, _ in chosen), tried)
+    return own if natural is None else replace(natural, own=own)
 
 
 def _shown(problem: Problem, record: Record) -> tuple[Problem, Record]:

@@ -15,6 +15,7 @@ from ephs.mechanics.reduced.method import ReducedMethod
 from ephs.mechanics.solve.control import Control
 from ephs.mechanics.solve.errors import OptionError, Outcome, SolveError
 from ephs.mechanics.solve.stepping import Attempt
+from ephs.semantics.spaces.rank import FOLLOWED
 from ephs.show.charts.runs import Array
 
 __all__ = ["SPECIMENS", "TrapezoidalIndex3", "VelocityMidpoint"]
@@ -58,7 +59,7 @@ class _OnLoops(ReducedMethod):
                 return z
             before = size
             columns = [(residual(z + DIFFERENCE * unit) - here) / DIFFERENCE for unit in np.eye(z.size)]
-            z = z - np.linalg.lstsq(np.column_stack(columns), here, rcond=1e-8)[0]
+            z = z - np.linalg.lstsq(np.column_stack(columns), here, rcond=FOLLOWED)[0]
         raise SolveError(Outcome.DIVERGED, "", "")
 
 
