@@ -1,0 +1,109 @@
+"""A staged function beside the same in numba and beside LAPACK: time to compile, time to solve linear equations."""
+
+import time
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from ephs.semantics.linear.dense import lu, lu_solve
+from ephs.semantics.stage import Entry, Evaluator, Integers, Matrix, Program, Truth, Vector, indices, matrix, vector
+
+__all__ = ["table"]
+
+SIZES = (6, 20, 60)
+RUNS, REPEATS = 7, 200
+
+
+def _solved(on: Evaluator, a: Matrix, pivots: Integers, x: Vector) -> Truth:
+    good = lu(on, a, pivots)
+    lu_solve(on, a, pivots, x)
+    return good
+
+
+def _plain(a: Any, pivots: Any, x: Any) -> None:
+    """The same algorithm as numba takes it."""
+    n = len(x)
+    for k in range(n):
+        best = k
+        for i in range(k + 1, n):
+            if abs(a[i, k]) > abs(a[best, k]):
+                best = i
+        pivots[k] = best
+        if best != k:
+            for j in range(n):
+                a[k, j], a[best, j] = a[best, j], a[k, j]
+        inverse = 1.0 / a[k, k]
+        for i in range(k + 1, n):
+            factor = a[i, k] * inverse
+            a[i, k] = factor
+            for j in range(k + 1, n):
+                a[i, j] -= factor * a[k, j]
+    for k in range(n):
+        x[k], x[pivots[k]] = x[pivots[k]], x[k]
+    for i in range(n):
+        for k in range(i):
+            x[i] -= a[i, k] * x[k]
+    for i in range(n - 1, -1, -1):
+        for k in range(i + 1, n):
+            x[i] -= a[i, k] * x[k]
+        x[i] /= a[i, i]
+
+
+def _lapack(a: Any, pivots: Any, x: Any) -> None:
+    lapack: Any = import_module("scipy.linalg.lapack")
+    lapack.dgesv(a, x)
+
+
+def _best(call: Callable[[], object], reset: Callable[[], None]) -> float:
+    best = np.inf
+    for _ in range(RUNS):
+        spent = 0.0
+        for _ in range(REPEATS):
+            reset()
+            begun = time.perf_counter()
+            call()
+            spent += time.perf_counter() - begun
+        best = min(best, spent / REPEATS)
+    return best
+
+
+def _compiled() -> tuple[dict[str, Any], dict[str, float]]:
+    """The three ways to solve, and the processor time to compile each."""
+    numba: Any = import_module("numba")
+
+    numba.njit(lambda x: x + 1.0)(1.0)  # what numba and LLVM do once in a process
+    Program("warm", call=Entry(lambda on, x: on.sqrt(x[0]), x=vector())).compiled()
+    program = Program("solved", call=Entry(_solved, a=matrix(), pivots=indices(), x=vector()))
+    begun = time.process_time()
+    staged = program.compiled()["call"]
+    middle = time.process_time()
+    jitted = numba.njit(error_model="numpy", nogil=True)(_plain)
+    jitted(np.eye(2), np.zeros(2, dtype=np.int64), np.ones(2))
+    spent = {"staged": middle - begun, "numba": time.process_time() - middle, "LAPACK": 0.0}
+    return {"staged": staged, "numba": jitted, "LAPACK": _lapack}, spent
+
+
+def table() -> str:
+    """Dense linear equations factorised and solved: microseconds, calls from Python included."""
+    ways, spent = _compiled()
+    rng = np.random.default_rng(1)
+    lines = [
+        f"| way | compiled in [s] | {' | '.join(f'{n} unknowns [µs]' for n in SIZES)} |",
+        f"| --- | --- |{' --- |' * len(SIZES)}",
+    ]
+    costs: dict[str, list[float]] = {name: [] for name in ways}
+    for n in SIZES:
+        original, right = rng.standard_normal((n, n)), rng.standard_normal(n)
+        a, x, pivots = original.copy(), right.copy(), np.zeros(n, dtype=np.int64)
+
+        def reset(a: Any = a, x: Any = x, original: Any = original, right: Any = right) -> None:
+            a[:], x[:] = original, right
+
+        for name, way in ways.items():
+            call = way.bind(a, pivots, x) if name == "staged" else lambda way=way, a=a, p=pivots, x=x: way(a, p, x)
+            costs[name].append(1e6 * _best(call, reset))
+    for name, found in costs.items():
+        lines.append(f"| {name} | {spent[name]:.2f} | {' | '.join(f'{cost:.2f}' for cost in found)} |")
+    return "\n".join(lines)
