@@ -5,13 +5,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ephs.mechanics.engine import row_kernels as rows
 from ephs.mechanics.engine.closing import closing
 from ephs.mechanics.engine.force_kernels import ON_BODIES, ON_CUT, ON_TREE
 from ephs.mechanics.engine.links import Frames, links_of
 from ephs.mechanics.engine.tables import COLUMNS, DIM, WIDTH, Engine, Forces, Memory
 from ephs.mechanics.reduced.tables import CUT, SPRING, TREE
 from ephs.mechanics.solve.sparse import Index
+from ephs.mechanics.tree.cuts import Cut, Relative
+from ephs.mechanics.tree.loops import kinds_of, loop_addresses
 from ephs.mechanics.tree.programs import PLACE, sweeps
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
@@ -43,6 +44,7 @@ def engine_of(
     found = links_of(reduced)
     bodies, ground = found.bodies, found.ground
     cut, cut_frame, cut_basis, ends = _cut(reduced, bodies, ground, kept)
+    charts = _chart(reduced, cut)
     forces = _forces(reduced, bodies, ground, cut, acted)
     forced = bool(forces.edge.size or forces.conduction.size or np.any(forces.body != -1))
     driven = any(part.joint.driven for part in found.parts)
@@ -56,10 +58,10 @@ def engine_of(
         integers=records.integers,
         reals=records.reals,
         gravity=records.gravity,
-        chart=_chart(reduced, cut),
-        cut=cut[:, :9],
-        cut_frame=cut_frame,
-        cut_basis=cut_basis,
+        loops=loop_addresses(kinds_of([*charts[:, [0, 3, 1]].tolist(), *cut[:, [2, 5, 3]].tolist()])),
+        chart=charts.ravel(),
+        cut=cut[:, :-1].ravel(),
+        cut_numbers=np.hstack([cut_frame, cut_basis]).ravel(),
         closing=closing([part.parent for part in found.parts], ends),
         forces=forces,
     )
@@ -73,7 +75,8 @@ def memory_of(engine: Engine, entropies: int) -> Memory:
     shapes: dict[str, tuple[int, ...]] = {
         "work": ((links + 1) * int(engine.flag[WIDTH]),), "place": (links + 1, PLACE), "wrench": (links, 6),
         "change": (links + 1, 6), "force": (n,), "zero": (n,),
-        "relative": (len(engine.cut), rows.M_SIZE), "row_value": (m, 4), "entry": (engine.closing.entries,),
+        "relative": (engine.cut.size // Cut.integer_width, Relative.real_width), "row_value": (m, 4),
+        "entry": (engine.closing.entries,),
         "covector": (slots, 6), "along": (slots, 12), "largest": (max(engine.closing.blocks, 1),),
         "temperature": (max(entropies, 1),), "entropy": (entropies,), "small": (512,), "e": (16,), "f": (256,),
         "c": (16,), "jac": (512,),
@@ -117,7 +120,7 @@ def _cut(
             one, two, t.code[i], t.dim[i], t.q_at[i], t.q_size[i], t.r_at[i], len(ends), chosen.size, i
         )  # fmt: skip
         ends += [(one, two)] * chosen.size
-    return cut, frames, np.array(numbers).reshape(-1, rows.B_SIZE), ends
+    return cut, frames, np.array(numbers).reshape(-1, 108), ends
 
 
 def _chart(reduced: "Reduced", cut: Index) -> Index:

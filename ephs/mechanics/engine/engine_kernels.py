@@ -4,8 +4,8 @@
 # pyright: basic, reportPrivateImportUsage=false, reportCallIssue=false
 
 from ephs.mechanics.engine.force_kernels import act
-from ephs.mechanics.engine.row_kernels import cut_rows
 from ephs.mechanics.engine.tables import DRIVEN, FORCED, R_AT
+from ephs.mechanics.tree.loops import ROWS
 from ephs.semantics.calling import call_staged
 from ephs.semantics.spaces import jit
 
@@ -27,7 +27,11 @@ def move(e, m, q, r):
         m.covector[:] = 0.0
         for a in range(m.row_value.shape[0]):
             m.row_value[a, 2] = 0.0
-        cut_rows(e.cut, e.cut_frame, e.cut_basis, e.closing.end, m.place, m.relative, m.row_value, m.covector, m.small)
+        end = e.closing.end
+        call_staged(
+            e.loops[ROWS],
+            (e.cut, e.cut_numbers, m.place, m.relative, end.reshape(end.size), m.row_value, m.covector),
+        )
 
 
 @kernel

@@ -3,7 +3,7 @@
 # numba infers the types of these functions, and exports what it does not list.
 # pyright: basic, reportPrivateImportUsage=false
 
-from ephs.mechanics.engine.row_kernels import arm, relative_pose, seen, wrench_on
+from ephs.mechanics.engine.frame_kernels import arm, relative_pose, seen, wrench_on
 from ephs.mechanics.reduced.sweep_kernels import component_at
 from ephs.semantics.spaces import jit
 

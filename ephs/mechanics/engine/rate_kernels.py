@@ -14,10 +14,9 @@ from ephs.mechanics.engine.engine_kernels import (
     spread,
 )
 from ephs.mechanics.engine.heat_kernels import entropies, heat_rates
-from ephs.mechanics.engine.row_kernels import cut_gaps, cut_poses, fit, seen
+from ephs.mechanics.tree.loops import ACROSS, ADVANCE, CHART, FIT, GAPS, MOVE, POSES, RELATIVE_RATES, VELOCITIES
+from ephs.semantics.calling import call_staged
 from ephs.semantics.spaces import jit
-from ephs.semantics.spaces.codes import VECTOR
-from ephs.semantics.spaces.se3_kernels import dexp_left_inv, retract
 
 kernel = jit.lean_kernel
 
@@ -29,14 +28,8 @@ OPEN = 22
 
 @kernel
 def advance(e, base, v, q):
-    """q = base·exp(v), joint by joint."""
-    for i in range(e.chart.shape[0]):
-        code, d, at, size, first = e.chart[i, 0], e.chart[i, 1], e.chart[i, 2], e.chart[i, 3], e.chart[i, 4]
-        if code == VECTOR:
-            for j in range(d):
-                q[at + j] = base[at + j] + v[first + j]
-        else:
-            retract(code, base[at : at + size], v[first : first + d], q[at : at + size])
+    """q = base·exp(v), joint by joint; q is not base."""
+    call_staged(e.loops[ADVANCE], (e.chart, base, v, q))
 
 
 @kernel
@@ -65,27 +58,7 @@ def derive(e, m, base, q, y, drive, wrench, scal, out):
 @kernel
 def joint_rates(e, m, y, r, out):
     """v̇ = dexp⁻¹(v) r of all joints, that of cut ones from the outward sweep, into out."""
-    for i in range(e.chart.shape[0]):
-        code, d, first, where, number = e.chart[i, 0], e.chart[i, 1], e.chart[i, 4], e.chart[i, 5], e.chart[i, 6]
-        for j in range(d):
-            if number < 0:
-                value = r[where + j]
-            else:
-                value = 0.0
-                for k in range(6):
-                    value += e.cut_basis[number, 36 + 6 * j + k] * m.relative[number, 19 + k]
-            if code == VECTOR:
-                out[first + j] = value
-            else:
-                m.small[j] = value
-        if code != VECTOR:
-            turn = m.scratch[0 : d * d].reshape(d, d)
-            dexp_left_inv(code, y[first : first + d], turn)
-            for j in range(d):
-                value = 0.0
-                for k in range(d):
-                    value += turn[j, k] * m.small[k]
-                out[first + j] = value
+    call_staged(e.loops[VELOCITIES], (e.chart, e.cut, e.cut_numbers, m.relative, y, r, out))
 
 
 @kernel
@@ -97,9 +70,9 @@ def close(e, m, q, r, change, moved):
     before = gap = 1e300
     for _ in range(ROUNDS):
         move(e, m, q, r)
-        cut_poses(e, m)
-        fit(e, m, q)
-        gap = cut_gaps(e, m, q)
+        call_staged(e.loops[POSES], (e.cut, e.cut_numbers, m.relative))
+        call_staged(e.loops[FIT], (e.cut, e.cut_numbers, m.relative, q))
+        gap = gaps(e, m, q)
         if fold(e, m, q, m.zero) != 0:
             return STILL, gap
         if nearly_dependent(e, m):
@@ -107,13 +80,13 @@ def close(e, m, q, r, change, moved):
         if gap <= GAP or gap > 0.5 * before:
             break
         before = gap
-        cut_gaps(e, m, q)
+        gaps(e, m, q)
         resolve(e, m, q, change)
         _moved(e, change, moved)
-        advance(e, q, moved, q)
+        call_staged(e.loops[MOVE], (e.chart, moved, q))
     if not gap <= CLOSED:
         return OPEN, gap
-    relative_rates(e, m)
+    call_staged(e.loops[RELATIVE_RATES], (e.cut, e.cut_numbers, m.relative, m.row_value))
     resolve(e, m, q, change)
     for j in range(r.shape[0]):
         r[j] += change[j]
@@ -121,35 +94,24 @@ def close(e, m, q, r, change, moved):
 
 
 @kernel
-def _moved(e, change, moved):
-    """The tree's change as an increment of all joints, cut ones at rest."""
-    for i in range(e.chart.shape[0]):
-        for j in range(e.chart[i, 1]):
-            moved[e.chart[i, 4] + j] = change[e.chart[i, 5] + j] if e.chart[i, 6] < 0 else 0.0
+def gaps(e, m, q):
+    """Targets that close the cut joints in one step of Newton's method; returns how far they are open, in m and rad."""
+    call_staged(e.loops[GAPS], (e.cut, e.cut_numbers, m.relative, q, m.row_value, m.small[0:1]))
+    return m.small[0]
 
 
 @kernel
-def relative_rates(e, m):
-    """Targets that take the cut joints' forbidden velocities away, where the outward sweep has been at r."""
-    for i in range(e.cut.shape[0]):
-        for j in range(e.cut[i, 8]):
-            total = 0.0
-            for k in range(6):
-                total -= e.cut_basis[i, 72 + 6 * j + k] * m.relative[i, 19 + k]
-            m.row_value[e.cut[i, 7] + j, 0] = total
+def _moved(e, change, moved):
+    """The tree's change as an increment of all joints, cut ones at rest."""
+    for i in range(e.chart.shape[0] // CHART):
+        at = CHART * i
+        first, where, cut = e.chart[at + 4], e.chart[at + 5], e.chart[at + 6]
+        for j in range(e.chart[at + 1]):
+            moved[first + j] = change[where + j] if cut < 0 else 0.0
 
 
 @kernel
 def across(e, m, q, x):
     """Targets that take a change x (n,) of the tree's rates back across the constraints, at the outward sweep's q."""
     spread(e, m, q, x)
-    first, second = m.small[12:18], m.small[18:24]
-    for i in range(e.cut.shape[0]):
-        one, two = m.change[e.cut[i, 0]], m.change[e.cut[i, 1]]  # the ground's is the last one
-        seen(m.relative[i], 7, one, 0, first)
-        seen(e.cut_frame[i], 12, two, 0, second)
-        for j in range(e.cut[i, 8]):
-            total = 0.0
-            for k in range(6):
-                total -= e.cut_basis[i, 72 + 6 * j + k] * (second[k] - first[k])
-            m.row_value[e.cut[i, 7] + j, 0] = total
+    call_staged(e.loops[ACROSS], (e.cut, e.cut_numbers, m.relative, m.change, m.row_value))

@@ -55,10 +55,10 @@ class Engine(NamedTuple):
     integers: Index  # (links · width,): records of the sweeps, see `ephs.mechanics.tree.records`
     reals: Array  # (links · width,)
     gravity: Array  # (3,) in the ground's frame
-    chart: Index  # (joints, 7): group code, freedoms, place of q, its size, place in v, place in r, cut joint or −1
-    cut: Index  # (cut joints, 9): link of body 1, 2, code, freedoms, place of q, size, place in v, first row, rows
-    cut_frame: Array  # (cut joints, 24): R and p of both joint frames in their links' frames
-    cut_basis: Array  # (cut joints, 108): B (6, 6) row by row, (BᵀB)⁻¹Bᵀ, covectors of the rows
+    loops: Index  # addresses of `ephs.mechanics.tree.loops`
+    chart: Index  # (joints · width,): records of `ephs.mechanics.tree.cuts.Chart`
+    cut: Index  # (cut joints · width,): records of `ephs.mechanics.tree.cuts.Cut`, their integers
+    cut_numbers: Array  # (cut joints · width,): their numbers
     closing: Closing
     forces: Forces
 
@@ -72,7 +72,7 @@ class Memory(NamedTuple):
     change: Array  # (links + 1, 6): accelerations beyond the bias; the ground's last
     force: Array  # (n,)
     zero: Array  # (n,): stays zero
-    relative: Array  # (cut joints, 25): see `row_kernels`
+    relative: Array  # (cut joints, 25): see `ephs.mechanics.tree.cuts.Relative`
     row_value: Array  # (rows, 4): target, multiplier, size, pivot
     entry: Array  # (entries,): what couples rows
     covector: Array  # (slots, 6)

@@ -362,7 +362,7 @@ class Equations:
     @property
     def unknowns(self) -> int:
         """Places and rates of the tree's freedoms, and a multiplier for each equation of a loop that is kept."""
-        return 2 * self.n + (int(self.engine.cut[:, 8].sum()) if self.engine.cut.size else 0)
+        return 2 * self.n + len(self.engine.closing.end)
 
     def states(self, state: ReducedState) -> dict[Path, Array]:
         """All states of the scene's system."""

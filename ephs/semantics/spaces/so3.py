@@ -4,12 +4,12 @@ Quaternions leave every product with unit length. Functions that take no quatern
 """
 
 from ephs.semantics.spaces.series import alpha, beta, cosine, cot, gamma
-from ephs.semantics.spaces.vectors import Entries, Rows, Vector3, add, cross, dot, hat, plus, scale
+from ephs.semantics.spaces.vectors import Columns, Entries, Rows, Vector3, add, cross, dot, hat, plus, scale
 from ephs.semantics.stage import Evaluator, Real
 
 __all__ = [
     "block", "conjugate", "dexp", "dexp_inv", "difference", "exp", "log", "matrix", "multiply", "normalised",
-    "polynomial", "rotate",
+    "polynomial", "quaternion", "rotate",
 ]  # fmt: skip
 
 
@@ -43,6 +43,25 @@ def matrix(q: Entries) -> Rows:
         [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
         [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
     ]
+
+
+def quaternion(on: Evaluator, m: Columns) -> list[Real]:
+    """The unit quaternion of a rotation matrix, its largest entry positive and found without cancellation."""
+    (a, xy, zx), (yx, b, yz), (xz, zy, c) = m
+    x, y, z = zy - yz, zx - xz, yx - xy
+    xy, yz, zx = xy + yx, yz + zy, zx + xz
+    # Row k is 4 q_k q.
+    lines = [
+        [1.0 + (a + b + c), x, y, z],
+        [x, 1.0 + (a - b - c), xy, zx],
+        [y, xy, 1.0 + (b - a - c), yz],
+        [z, zx, yz, 1.0 + (c - a - b)],
+    ]
+    best, size = lines[0], lines[0][0]
+    for k in range(1, 4):
+        larger = lines[k][k] > size
+        best, size = on.select(larger, lines[k], best), on.select(larger, lines[k][k], size)
+    return scale(0.5 / on.sqrt(size), best)
 
 
 def exp(on: Evaluator, v: Entries) -> list[Real]:

@@ -1,0 +1,200 @@
+"""Cut joints: powers of rows, rates of what is open, accelerations; fitted elements; the same bits by both runs."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ephs.mechanics.tree.cuts import Place
+from ephs.mechanics.tree.loops import kinds_of, loop_program
+from ephs.semantics.spaces import codes, se3, so3
+from ephs.semantics.stage import PLAIN
+
+Z = np.eye(6)[:, 2:3]
+JOINTS = {
+    "weld": (codes.VECTOR, 0, np.zeros((6, 0))),
+    "revolute": (codes.VECTOR, 1, Z),
+    "cylindrical": (codes.VECTOR, 2, np.eye(6)[:, [2, 5]]),
+    "screw": (codes.VECTOR, 1, np.array([[0.0, 0.0, 1.0, 0.0, 0.0, 0.2]]).T),
+    "planar": (codes.SE2, 3, np.eye(6)[:, [2, 3, 4]]),
+    "spherical": (codes.SO3, 4, np.eye(6)[:, :3]),
+}
+KINDS = kinds_of((code, size, basis.shape[1]) for code, size, basis in JOINTS.values())
+RUNS = {"compiled": loop_program(KINDS).compiled(), "plain": loop_program(KINDS).plain()}
+
+
+def frame(rng):
+    """A random frame (R, p)."""
+    pose = np.array(se3.exp(PLAIN, rng.standard_normal(6)), dtype=float)
+    return np.array(so3.matrix(pose[:4]), dtype=float), pose[4:]
+
+
+class Loop:
+    """A cut joint between two moving links, the second of them fitted so that the joint is closed."""
+
+    def __init__(self, name, seed, opened=0.0):
+        code, size, basis = JOINTS[name]
+        rng, dim = np.random.default_rng(seed), basis.shape[1]
+        self.normal = np.linalg.svd(basis.T)[2][dim:] if dim else np.eye(6)
+        self.element = np.array([1.0, 0.0, 0.0, 0.0]) if code == codes.SO3 else rng.uniform(-1.0, 1.0, size)
+        if code == codes.SO3:
+            self.element = np.array(so3.exp(PLAIN, rng.standard_normal(3)), dtype=float)
+        numbers = np.zeros((6, 6)), np.zeros((6, 6)), np.zeros((6, 6))
+        numbers[0][:, :dim] = basis
+        numbers[1][:dim] = np.linalg.pinv(basis) if dim else np.zeros((0, 6))
+        numbers[2][: len(self.normal)] = self.normal
+        self.inner, self.outer = frame(rng), frame(rng)
+        real = np.concatenate([x.ravel() for x in (*self.inner, *self.outer, *numbers)])
+        whole = np.array([0, 1, code, dim, 0, size, 0, 0, len(self.normal)], dtype=np.int64)
+        self.cut, self.numbers = whole, real
+        self.chart = np.array([code, dim, 0, size, 0, 0, 0], dtype=np.int64)
+        near = frame(rng)
+        # far = near · inner · joint · gap · outer⁻¹
+        joint = self.frame_of(code, basis)
+        gap = np.array(se3.exp(PLAIN, opened * rng.standard_normal(6)), dtype=float)
+        far = compose(
+            near, self.inner, joint, (np.array(so3.matrix(gap[:4]), dtype=float), gap[4:]), inverse(self.outer)
+        )
+        self.places = np.zeros((3, Place.real_width))
+        for row, (turn, at) in zip(self.places, (near, far), strict=False):
+            row[:9], row[9:12], row[12:] = turn.ravel(), at, rng.standard_normal(12)
+        self.motions, self.value = np.zeros((1, 25)), np.zeros((len(self.normal), 4))
+        self.covector = np.zeros((2 * len(self.normal), 6))
+        self.end = np.arange(2 * len(self.normal))
+
+    def frame_of(self, code, basis):
+        if code == codes.SO3:
+            return np.array(so3.matrix(self.element), dtype=float), np.zeros(3)
+        if code == codes.SE2:
+            c, s = np.cos(self.element[0]), np.sin(self.element[0])
+            return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]), np.array([*self.element[1:], 0.0])
+        pose = np.array(se3.exp(PLAIN, list(basis @ self.element)), dtype=float)
+        return np.array(so3.matrix(pose[:4]), dtype=float), pose[4:]
+
+    def found(self, run):
+        run["rows"](self.cut, self.numbers, self.places, self.motions, self.end, self.value, self.covector)
+        run["poses"](self.cut, self.numbers, self.motions)
+        return self
+
+    def moved(self, h):
+        """A copy after h seconds at the links' twists, which change by their biases."""
+        other = object.__new__(Loop)
+        other.__dict__ = {key: x.copy() if isinstance(x, np.ndarray) else x for key, x in self.__dict__.items()}
+        other.covector[:] = 0.0
+        for row in other.places[:2]:
+            twist = row[12:18] + 0.5 * h * row[18:24]
+            pose = np.array(se3.exp(PLAIN, list(h * twist)), dtype=float)
+            turn, at = compose(
+                (row[:9].reshape(3, 3), row[9:12]), (np.array(so3.matrix(pose[:4]), dtype=float), pose[4:])
+            )
+            row[:9], row[9:12], row[12:18] = turn.ravel(), at, row[12:18] + h * row[18:24]
+        return other
+
+
+def compose(*frames):
+    turn, at = np.eye(3), np.zeros(3)
+    for other, place in frames:
+        turn, at = turn @ other, at + turn @ place
+    return turn, at
+
+
+def inverse(frame):
+    return frame[0].T, -frame[0].T @ frame[1]
+
+
+drawn = given(name=st.sampled_from(sorted(JOINTS)), seed=st.integers(0, 2**32 - 1))
+some = settings(max_examples=25)
+both = pytest.mark.parametrize("run", RUNS.values(), ids=RUNS)
+STEP = 1e-4
+"""Differences are of order two: their error is STEP² times third derivatives, and rounding over STEP."""
+CLOSE = 1e3 * STEP**2
+
+
+@both
+@drawn
+@some
+def test_rows_make_the_power_of_the_forbidden_twists(run, name, seed):
+    loop = Loop(name, seed).found(run)
+    twist = loop.motions[0, 19:]
+    for a, normal in enumerate(loop.normal):
+        power = loop.covector[2 * a] @ loop.places[0, 12:18] + loop.covector[2 * a + 1] @ loop.places[1, 12:18]
+        assert power == pytest.approx(normal @ twist, abs=1e-13 * np.abs(loop.covector).max() * 10.0)
+
+
+@both
+@drawn
+@some
+def test_what_is_open_changes_by_the_forbidden_twists_and_these_by_the_targets(run, name, seed):
+    loop = Loop(name, seed)
+    worst, gaps, rates = np.zeros(1), [], []
+    for h in (-STEP, STEP):
+        other = loop.moved(h).found(run)
+        run["fit"](other.cut, other.numbers, other.motions, other.element)
+        run["gaps"](other.cut, other.numbers, other.motions, other.element, other.value, worst)
+        gaps.append(-other.value[:, 0])
+        run["relative_rates"](other.cut, other.numbers, other.motions, other.value)
+        rates.append(-other.value[:, 0])
+    here = loop.found(run)
+    size = 1.0 + np.abs(here.places).max() ** 3
+    assert np.abs((rates[1] - rates[0]) / (2.0 * STEP) + here.value[:, 0]).max(initial=0.0) <= CLOSE * size
+    run["relative_rates"](here.cut, here.numbers, here.motions, here.value)
+    # What fits to the bodies is along the joint's own freedoms, of whose groups these rows are the complement.
+    found = (gaps[1] - gaps[0]) / (2.0 * STEP)
+    assert np.abs(found + here.value[:, 0]).max(initial=0.0) <= CLOSE * size
+
+
+@both
+@drawn
+@some
+def test_a_closed_joint_is_fitted_to_its_element(run, name, seed):
+    loop = Loop(name, seed).found(run)
+    wanted, worst = loop.element.copy(), np.zeros(1)
+    loop.element[:] = np.array([1.0, 0.0, 0.0, 0.0]) if JOINTS[name][0] == codes.SO3 else 0.9 * wanted
+    run["fit"](loop.cut, loop.numbers, loop.motions, loop.element)
+    run["gaps"](loop.cut, loop.numbers, loop.motions, loop.element, loop.value, worst)
+    assert worst[0] <= 1e-13
+    sign = np.sign(wanted @ loop.element) if JOINTS[name][0] == codes.SO3 else 1.0
+    assert np.abs(sign * loop.element - wanted).max(initial=0.0) <= 1e-9
+    wide = Loop(name, seed, opened=0.1).found(run)
+    run["gaps"](wide.cut, wide.numbers, wide.motions, wide.element, wide.value, worst)
+    assert worst[0] > 1e-6
+
+
+@both
+@drawn
+@some
+def test_elements_move_as_their_velocities_say(run, name, seed):
+    loop = Loop(name, seed).found(run)
+    dim = JOINTS[name][2].shape[1]
+    v = 0.3 * np.random.default_rng(seed).standard_normal(dim)
+    out, at = np.zeros(dim), np.zeros(loop.element.size)
+    run["velocities"](loop.chart, loop.cut, loop.numbers, loop.motions, v, np.zeros(0), out)
+    run["advance"](loop.chart, loop.element, v, at)
+    # along v + h v̇ the element moves by h r on its right, r = B⁺ u
+    rates = (np.linalg.pinv(JOINTS[name][2]) if dim else np.zeros((0, 6))) @ loop.motions[0, 19:]
+    ends = []
+    for h in (-STEP, STEP):
+        ends.append(np.zeros(at.size))
+        run["advance"](loop.chart, loop.element, v + h * out, ends[-1])
+        direct = at.copy()
+        run["move"](loop.chart, h * rates, direct)
+        ends[-1] -= direct
+    assert np.abs((ends[1] - ends[0]) / (2.0 * STEP)).max(initial=0.0) <= CLOSE * (
+        1.0 + np.abs(rates).max(initial=0.0) ** 3
+    )
+
+
+@drawn
+@some
+def test_floats_and_machine_code_give_the_same_bits(name, seed):
+    found = []
+    for run in RUNS.values():
+        loop, worst = Loop(name, seed, opened=1e-3).found(run), np.zeros(1)
+        run["gaps"](loop.cut, loop.numbers, loop.motions, loop.element, loop.value, worst)
+        run["fit"](loop.cut, loop.numbers, loop.motions, loop.element)
+        change = np.random.default_rng(seed).standard_normal((2, 6))
+        values = loop.value.copy()
+        run["across"](loop.cut, loop.numbers, loop.motions, change, values)
+        parts = (loop.motions, loop.value, loop.covector, loop.element, worst, values)
+        found.append([part.tobytes() for part in parts])
+    assert found[0] == found[1]
