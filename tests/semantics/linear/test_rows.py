@@ -58,6 +58,8 @@ def test_rank_least_corrections_and_multipliers_are_those_of_the_definition(run,
     assert np.abs(found.change - least).max() <= 100.0 * EPS * condition * scale
     assert np.abs(row.T @ found.multiplier - mass @ found.change).max() <= 100.0 * EPS * condition * scale
     assert not found.multiplier[found.chosen[rank:]].any()
+    basis = found.scaled[found.chosen[:rank]]
+    assert np.abs(basis @ basis.T - np.eye(rank)).max(initial=0.0) <= 8.0 * len(mass) * EPS
 
 
 @given(problems(), st.sampled_from([0.0, 1e-13, 1e-9, 1e-5, 1e-3]))
