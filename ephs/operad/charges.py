@@ -1,4 +1,4 @@
-"""What the numbers of a state may be, and what is conserved with them: domains, charges, and those of known kinds."""
+"""Domains and conserved charges of quantities, and those of known kinds."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ ENTROPY, VOLUME = "entropy", "volume"
 @final
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """What scalars of a kind have where they do not say otherwise."""
+    """Defaults of scalars of a kind."""
 
     unit: str = ""
     domain: Domain = WHOLE

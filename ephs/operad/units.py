@@ -34,14 +34,14 @@ _SI: MappingProxyType[str, str] = MappingProxyType(
     }
 )
 _NAMED = ("N", "m/s", "A", "V", "W/K", "K", "Pa", "m³/s")
-"""How flows and efforts are written, where their dimension is one of these."""
+"""Customary units of flows and efforts by their dimension."""
 _TOKEN = re.compile(r"\s*(?:([^\W\d⁰¹²³⁴⁵⁶⁷⁸⁹]+|1)(?:\^?(-?\d+)|([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+))?|([/()·*]))")
 _PLAIN = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 
 
 @cache
 def dimension(unit: str) -> Dimension:
-    """What a unit is made of; nothing where it is empty or 1.
+    """Factors of a unit; none where it is empty or 1.
 
     Examples
     --------

@@ -72,7 +72,7 @@ class Kind:
 
     @property
     def counts(self) -> Index:
-        """How many components, wires, reads, states and junctions there are inside."""
+        """Numbers of components, wires, reads, states and junctions inside."""
         found = (self.primitive, self.wires, self.reads, self.states, self.junctions)
         return np.array([numbers.size for numbers in found], dtype=np.int64)
 
@@ -148,7 +148,7 @@ def repeats(system: System) -> bool:
 
 
 def _count(filling: Filling, known: dict[int, int]) -> int:
-    """How many components there are; each different filling is looked at once."""
+    """Number of components; each different filling is looked at once."""
     found = known.get(id(filling))
     if found is None:
         inner = filling.fillings.values() if isinstance(filling, System) else ()

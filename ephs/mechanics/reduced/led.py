@@ -65,5 +65,5 @@ class Led:
         return found
 
     def stats(self) -> dict[str, Any]:
-        """What the statistics say of a mechanism that is led."""
+        """Statistics of a mechanism that is led."""
         return {} if self._from is None else {"work_apart": self.apart[0], "work_apart_at": self.apart[1]}

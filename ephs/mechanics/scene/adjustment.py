@@ -1,4 +1,4 @@
-"""What adjusting a scene did: which bodies moved, and what that was given could not be kept."""
+"""Record of adjusting a scene: bodies that moved, and given values that could not be kept."""
 
 from dataclasses import dataclass
 from typing import final
@@ -9,7 +9,7 @@ __all__ = ["Adjustment", "Changed", "Displacement"]
 @final
 @dataclass(frozen=True, slots=True)
 class Displacement:
-    """How far the assembly moved a body: m, rad, and the change of its velocity in m/s and rad/s."""
+    """Displacement of a body by the assembly: m, rad, and the change of its velocity in m/s and rad/s."""
 
     body: str
     distance: float
@@ -32,7 +32,7 @@ class Changed:
 @final
 @dataclass(frozen=True, slots=True)
 class Adjustment:
-    """What an adjusting assembly did: the gaps that it found, the bodies that it moved, what it could not keep.
+    """Record of an adjusting assembly: the gaps that it found, the bodies that it moved, values not kept.
 
     ``gap`` is the largest gap of a joint before (m or rad), ``slip`` the largest velocity residual (m/s or
     rad/s).

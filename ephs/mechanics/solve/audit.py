@@ -46,7 +46,7 @@ condition κ of 10."""
 @final
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """What a run may be off by, relative to its scales.
+    """Allowed errors of a run, relative to its scales.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def _energy(solution: "Solution", _bounds: Bounds, _trials: Trials | None) -> It
 
 
 def _rounded(solution: "Solution") -> float:
-    """What rounding leaves of an energy balance, in J."""
+    """Rounding of an energy balance, in J."""
     books = solution.ledgers
     stored = sum(float(np.abs(books.storages[path]).max()) for path, held in books.exergies.items() if held.any())
     return SOLVED * float(solution.stats["steps"] or 1) ** 0.5 * stored
@@ -180,7 +180,7 @@ def _constraint(solution: "Solution", _bounds: Bounds, _trials: Trials | None) -
 
 
 def _ledger(solution: "Solution", bounds: Bounds, _trials: Trials | None) -> Iterator[Breach]:
-    """What the storages hold of an entropy or a volume changes by what was made; work is a sum of power."""
+    """Stored entropies and volumes change by what was made; work is a sum of power."""
     books = solution.ledgers
     if "work_apart" in solution.stats:
         instant = int(np.argmin(np.abs(solution.t - solution.stats["work_apart_at"])))

@@ -1,4 +1,4 @@
-"""What the audit of a run found, and what becomes of a run that does not pass."""
+"""Findings of the audit of a run, and the policies for runs that do not pass."""
 
 import warnings
 from collections.abc import Mapping
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 __all__ = ["POLICIES", "Audit", "AuditError", "AuditWarning", "CostWarning", "Finding", "judged"]
 
 POLICIES = ("fail", "warn", "off")
-"""What a finding makes of a run: an error, a warning, an entry in the summary."""
+"""Policies for findings: an error, a warning, an entry in the summary."""
 
 
 @final
@@ -51,7 +51,7 @@ class Finding:
 @final
 @dataclass(frozen=True, slots=True)
 class Audit:
-    """What the audit of a run found."""
+    """Findings of the audit of a run."""
 
     findings: tuple[Finding, ...] = ()
 

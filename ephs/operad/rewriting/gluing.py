@@ -1,4 +1,4 @@
-"""What a match must be so that a rule can be applied there: a morphism that meets the gluing condition."""
+"""Conditions on a match for a rule to apply there: a morphism that meets the gluing condition."""
 
 from typing import NoReturn
 

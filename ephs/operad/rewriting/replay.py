@@ -18,13 +18,13 @@ from ephs.operad.rewriting.rules import Fragment, Rule
 __all__ = ["replay"]
 
 Item = tuple[str, Any, Any]
-"""What has a state: a junction, an outer state port, a state port of a box."""
+"""Owner of a state: a junction, an outer state port, a state port of a box."""
 
 
 @final
 @dataclass(frozen=True, slots=True)
 class _Facts:
-    """What a pattern says: its boxes, ports, junctions that bear power, and who shares a state with whom."""
+    """Contents of a pattern: its boxes, ports, junctions that bear power, and shared states."""
 
     boxes: frozenset[Path]
     ports: dict[tuple[Path, Path], Path | None]
@@ -104,7 +104,7 @@ def replay(rule: Rule, source: Pattern, target: Pattern, match: Renaming, comatc
 @final
 @dataclass(frozen=True, slots=True)
 class _Own:
-    """What only one side has, by its names in the pattern."""
+    """Elements that only one side has, by their names in the pattern."""
 
     boxes: frozenset[Path]
     ports: frozenset[tuple[Path, Path]]

@@ -138,7 +138,7 @@ class Rule:
 
     @property
     def interface(self) -> Fragment:
-        """What both sides have in common."""
+        """The common part of both sides."""
         left, right = self.left, self.right
         junctions = {path: j for path, j in left.junctions.items() if path in right.junctions}
         ports = right.ports
