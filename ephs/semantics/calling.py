@@ -39,7 +39,7 @@ def call_kernel(
 
 
 @intrinsic
-def call_staged(typingctx: Any, address: Any, arguments: Any) -> Any:
+def _call_staged(typingctx: Any, address: Any, arguments: Any) -> Any:
     """Call the staged function at ``address``; arrays are handed over as their place and their shape. Returns int64.
 
     Nothing checks that arguments fit: addresses come from `ephs.semantics.stage.Program` only.
@@ -61,3 +61,7 @@ def call_staged(typingctx: Any, address: Any, arguments: Any) -> Any:
         return builder.call(builder.inttoptr(args[0], pointer), passed)
 
     return signature, codegen
+
+
+call_staged: Any = _call_staged
+"""The same for type checkers, which do not know that numba gives the first argument."""

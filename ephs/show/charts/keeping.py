@@ -61,4 +61,5 @@ def _read(file: Path) -> Iterator[Cell]:
         except json.JSONDecodeError:
             continue
         row |= {"setting": Setting(*row["setting"]), "outcome": Outcome(row["outcome"])}
-        yield Cell(**{key: np.nan if value is None else value for key, value in row.items()})
+        found: dict[str, Any] = {key: np.nan if value is None else value for key, value in row.items()}
+        yield Cell(**found)

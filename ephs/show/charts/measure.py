@@ -182,8 +182,10 @@ def _foreign(
 
 def _end(motion: Motion) -> Motion:
     last = slice(-1, None)
-    parts = (each[last] for each in (motion.t, motion.position, motion.rotation, motion.balance, motion.books))
-    return Motion(*parts, motion.turnover)
+    t, position, rotation, balance, books = (
+        each[last] for each in (motion.t, motion.position, motion.rotation, motion.balance, motion.books)
+    )
+    return Motion(t, position, rotation, balance, books, motion.turnover, motion.size)
 
 
 def _more(repeats: int, wall: float, limit: float) -> int:

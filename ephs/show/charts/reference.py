@@ -86,8 +86,10 @@ class Motion:
 
     def until(self, count: int) -> "Motion":
         """Its first instants, so many."""
-        parts = (each[:count] for each in (self.t, self.position, self.rotation, self.balance, self.books))
-        return Motion(*parts, self.turnover, self.size)
+        t, position, rotation, balance, books = (
+            each[:count] for each in (self.t, self.position, self.rotation, self.balance, self.books)
+        )
+        return Motion(t, position, rotation, balance, books, self.turnover, self.size)
 
     @property
     def length(self) -> float:

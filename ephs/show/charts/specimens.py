@@ -34,9 +34,10 @@ class _OnLoops(ReducedMethod):
             expected = "a scene of revolute, prismatic, screw and cylindrical joints, none prescribed"
             raise OptionError("method", self.name, expected)
 
-    def forces(self, q: Array, r: Array, s: Array) -> tuple[Array, Array]:
+    def forces(self, q: Array, r: Array, heats: Array) -> tuple[Array, Array]:
         """∂L/∂r and ∂L/∂q with the forces that no potential has."""
         eq = self.equations
+        s = eq.heats.entropies(heats)
         momentum, force = np.zeros(eq.n), np.zeros(eq.n)
         made, powers = np.zeros(len(eq.reduced.made)), np.zeros(2)
         eq.refuse(
@@ -71,15 +72,15 @@ class VelocityMidpoint(_OnLoops):
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
         """One step of h seconds."""
         eq, n = self.equations, self.equations.n
-        before, _ = self.forces(state.q, state.r, state.s)
+        before, _ = self.forces(state.q, state.r, state.heats)
         m = eq.gaps(state.q, state.r)[1].shape[0]
 
         def residual(z: Array) -> Array:
             r = 0.5 * (state.r + z[:n])
             middle = eq.moved(state.q, 0.5 * h * r)
-            _, force = self.forces(middle, r, state.s)
+            _, force = self.forces(middle, r, state.heats)
             rows = eq.gaps(middle, r)[1]
-            after, _ = self.forces(eq.moved(state.q, h * r), z[:n], state.s)
+            after, _ = self.forces(eq.moved(state.q, h * r), z[:n], state.heats)
             return np.concatenate([after - before - h * force - rows.T @ z[n:], rows @ r])
 
         z = self.solved(residual, np.concatenate([state.r, np.zeros(m)]))
@@ -95,13 +96,13 @@ class TrapezoidalIndex3(_OnLoops):
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
         """One step of h seconds."""
         eq, n = self.equations, self.equations.n
-        before, pull = self.forces(state.q, state.r, state.s)
+        before, pull = self.forces(state.q, state.r, state.heats)
         rows = eq.gaps(state.q, state.r)[1]
         known = state.memory[0] if state.memory else np.zeros(rows.shape[0])
 
         def residual(z: Array) -> Array:
             q, r = eq.moved(state.q, z[:n]), 2.0 * z[:n] / h - state.r
-            after, force = self.forces(q, r, state.s)
+            after, force = self.forces(q, r, state.heats)
             gap, there = eq.gaps(q, r)
             balance = after - before - 0.5 * h * (pull + force + rows.T @ known + there.T @ z[n:])
             return np.concatenate([balance, gap])
