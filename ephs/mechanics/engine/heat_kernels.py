@@ -19,10 +19,10 @@ def entropies(f, heats, scal, s):
             s[k] = heats[k] / scal[1]
             continue
         at = f.parameter_at[f.node[k]]
-        share = heats[k] / f.parameters[at]
+        share = heats[k] / f.parameters[at + 1]
         if not share > -1.0:
             return TEMPERATURE, f.node[k]
-        s[k] = f.parameters[at + 1] * math.log1p(share)
+        s[k] = f.parameters[at] * math.log1p(share)
     return 0, 0
 
 
@@ -56,10 +56,10 @@ def count(f, before, after, scal, memory):
             memory[k] = 1.0 / scal[1]
             continue
         p = f.parameter_at[f.node[k]]
-        held = f.parameters[p] + before[k]
+        held = f.parameters[p + 1] + before[k]
         share = (after[k] - before[k]) / held
         ratio = math.log1p(share) / share if abs(share) > 1e-8 else 1.0 - 0.5 * share
-        memory[k] = ratio * f.parameters[p + 1] / held
+        memory[k] = ratio * f.parameters[p] / held
     for i in range(f.sink.shape[0]):
         maker = at + f.sink[i, 0]
         after[maker] = before[maker] + (after[maker] - before[maker]) * memory[f.sink[i, 1]]

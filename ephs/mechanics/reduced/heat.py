@@ -52,7 +52,7 @@ class Heats:
     @property
     def _laws(self) -> tuple[Array, Array]:
         """c1 in J and c2 in J/K of the nodes, as the tables have them at present."""
-        return self._parameters[self._at], self._parameters[self._at + 1]
+        return self._parameters[self._at + 1], self._parameters[self._at]
 
     def temperatures(self, heats: Array) -> Array:
         """(entropies,) in K."""
