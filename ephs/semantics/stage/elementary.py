@@ -14,10 +14,12 @@ from typing import Final
 from ephs.semantics.stage.evaluator import Evaluator, Function, staged
 from ephs.semantics.stage.numbers import Real
 
-__all__ = ["COMPOSED", "LARGEST_ANGLE", "atan2", "cos", "exp", "log", "sin"]
+__all__ = ["COMPOSED", "LARGEST_ANGLE", "WHOLE_TURNS", "atan2", "cos", "exp", "log", "sin"]
 
-LARGEST_ANGLE: Final = 2.0**28
-"""Angles in rad up to which sine and cosine are numbers: beyond, neighbouring floats differ by 6e-8 rad or more."""
+LARGEST_ANGLE: Final = 2.0**26
+"""Angles in rad up to which errors of sine and cosine are relative; beyond they are absolute, below 1e-15."""
+WHOLE_TURNS: Final = 2.0**55
+"""Angles in rad beyond which neighbouring floats differ by more than a turn: these count as whole turns."""
 
 QUARTERS: Final = (
     float.fromhex("0x1.921fb5p+0"),
@@ -108,13 +110,16 @@ def _sum(a: Real, b: Real) -> tuple[Real, Real]:
 
 
 def _reduced(on: Evaluator, x: Real) -> tuple[Real, Real, Real]:
-    """Return x less the nearest multiple n·π/2 in two parts, and n modulo 4; not a number for large angles."""
-    n = on.floor(x * (2.0 / math.pi) + 0.5)
-    rest = (x - n * QUARTERS[0]) - n * QUARTERS[1]
+    """Return x less the nearest multiple n·π/2 in two parts, and n modulo 4; infinities are not numbers."""
+    x = on.select(on.absolute(x) <= WHOLE_TURNS, x, x - x)
+    # A multiple of 2²⁷·π/2 first, none below 2²⁶; its last parts may be as large as 2 and are kept exactly.
+    many = 2.0**27 * on.floor(x * (2.0**-26 / math.pi) + 0.5)
+    near, beside = _sum((x - many * QUARTERS[0]) - many * QUARTERS[1], -(many * QUARTERS[2] + many * QUARTERS[3]))
+    n = on.floor(near * (2.0 / math.pi) + 0.5)
+    rest = (near - n * QUARTERS[0]) - n * QUARTERS[1]
     first, error = _sum(rest, -(n * QUARTERS[2]))
-    second, last = _sum(first, error - n * QUARTERS[3])
-    within = on.absolute(x) <= LARGEST_ANGLE
-    return on.select(within, second, math.nan), last, n - 4.0 * on.floor(n * 0.25)
+    second, last = _sum(first, (error - n * QUARTERS[3]) + beside)
+    return second, last, n - 4.0 * on.floor(n * 0.25)
 
 
 def _sine(x: Real, tail: Real) -> Real:
@@ -132,7 +137,7 @@ def _cosine(x: Real, tail: Real) -> Real:
 
 
 def sin(on: Evaluator, x: Real) -> Real:
-    """Sine, x in rad; not a number beyond `LARGEST_ANGLE`."""
+    """Sine, x in rad; see `LARGEST_ANGLE`."""
     r, tail, n = _reduced(on, x)
     odd = on.either(on.both(n > 0.5, n < 1.5), n > 2.5)
     value = on.select(odd, _cosine(r, tail), _sine(r, tail))
@@ -141,7 +146,7 @@ def sin(on: Evaluator, x: Real) -> Real:
 
 
 def cos(on: Evaluator, x: Real) -> Real:
-    """Cosine, x in rad; not a number beyond `LARGEST_ANGLE`."""
+    """Cosine, x in rad; see `LARGEST_ANGLE`."""
     r, tail, n = _reduced(on, x)
     odd = on.either(on.both(n > 0.5, n < 1.5), n > 2.5)
     value = on.select(odd, _sine(r, tail), _cosine(r, tail))
