@@ -142,7 +142,7 @@ def coupled(
     both = stacked(formula, n, multipliers)
 
     def evaluate(x: Point) -> tuple[Array, Array]:
-        found = np.array(both(**_named(x)), dtype=float)
+        found = np.array(both(**_named({port: x[port] for port in reads})), dtype=float)
         return found[:n], found[n:]
 
     kernel = reversible_kernel(interface, reads, formula, multipliers, label=label or name)

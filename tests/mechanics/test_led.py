@@ -77,6 +77,7 @@ def gained() -> float:
     return RATE**2 * 2.0 * (np.sin(after) ** 2 - np.sin(START) ** 2)
 
 
+@pytest.mark.filterwarnings("ignore::ephs.CostWarning")
 @pytest.mark.parametrize(
     ("method", "rtol"),
     [*((m, r) for m in ("auto", "rk54", "rk87", "radau") for r in (1e-4, 1e-6, 1e-10)), ("alpha", 1e-5)],

@@ -237,12 +237,11 @@ def test_unknown_inputs_are_named():
         ephs.simulate(case.scene(), 1.0, inputs={"joints.pin": 1.0})
 
 
-def test_too_large_a_step_is_refused_by_name():
-    """150 rad/s and 30 ms are more than half a turn."""
+def test_a_step_of_more_than_half_a_turn_does_not_end_well():
+    """150 rad/s and 30 ms: steps are taken in halves, and their error is found."""
     case = next(c for c in CASES if c.name == "heavy-top")
-    with pytest.raises(ephs.SimulationError, match=r"joints\.j0\.hc.*rotation of π.*below π") as caught:
+    with pytest.raises(ephs.AuditError, match="accuracy"):
         ephs.simulate(case.scene(), 1.0, step=0.03)
-    assert caught.value.partial.t[-1] == caught.value.time < 1.0
 
 
 def test_a_motion_that_nothing_determines_is_refused_by_name(tmp_path):
@@ -340,6 +339,10 @@ conductance = 100.0
 """
 
 
+ROUNDING = 8 * np.finfo(float).eps * 100.0 * 0.01
+"""Of the entropy that a conductance of 100 W/K passes on in a step of 0.01 s, in J/K."""
+
+
 def test_what_comes_to_rest_stays_there(tmp_path):
     """Damping makes the square of a rate that is all rounding, conduction the difference of equal temperatures."""
     file = tmp_path / "resting.toml"
@@ -348,4 +351,4 @@ def test_what_comes_to_rest_stays_there(tmp_path):
     warm = [sol.summary()["thermal"][name]["temperature"] for name in "ab"]
     assert warm[0] == pytest.approx(warm[1], rel=1e-12)
     assert np.abs(sol.body("block").position - [0.5, 0.3, 0.2]).max() <= 1e-14
-    assert sol.energy == pytest.approx(sol.energy[0], rel=1e-13) and sol.stats["least_production"] >= 0.0
+    assert sol.energy == pytest.approx(sol.energy[0], rel=1e-13) and sol.stats["least_production"] >= -ROUNDING

@@ -44,8 +44,8 @@ ENTRIES: Final = ("rows", "poses", "fit", "gaps", "relative_rates", "across", "a
 """Entry functions, in the order of `loop_addresses`."""
 ROWS, POSES, FIT, GAPS, RELATIVE_RATES, ACROSS, ADVANCE, MOVE, VELOCITIES = range(len(ENTRIES))
 """Their places."""
-CHART: Final = Chart.integer_width
-"""Integers of a joint's chart."""
+CHART: Final = 7
+"""Integers of a joint's chart, written out since kernels take it."""
 
 
 def kinds_of(joints: Iterable[tuple[int, int, int]]) -> tuple[Kind, ...]:
