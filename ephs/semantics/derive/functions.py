@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final, final
 
+from ephs.semantics.stage.elementary import polynomial
 from ephs.semantics.stage.evaluator import Evaluator
 from ephs.semantics.stage.numbers import Real
 
@@ -19,7 +20,6 @@ __all__ = [
     "FUNCTIONS",
     "Rule",
     "angle_ratio",
-    "polynomial",
     "squared_turn_slope",
     "turn",
 ]
@@ -38,14 +38,6 @@ class Rule:
 
     value: Value
     slope: Callable[[Evaluator, Real, Real], Real]
-
-
-def polynomial(coefficients: Sequence[float], x: Real) -> Real:
-    """Σ cₖ xᵏ, the constant first."""
-    total: Real = coefficients[-1]
-    for coefficient in reversed(coefficients[:-1]):
-        total = total * x + coefficient
-    return total
 
 
 def _even(terms: int, divisor: Callable[[int], float], sign: float) -> tuple[float, ...]:

@@ -8,13 +8,13 @@ machine code, since those of one angle share all their arithmetic. Measured erro
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Final
 
 from ephs.semantics.stage.evaluator import Evaluator, Function, staged
 from ephs.semantics.stage.numbers import Real
 
-__all__ = ["COMPOSED", "LARGEST_ANGLE", "WHOLE_TURNS", "atan2", "cos", "exp", "log", "sin"]
+__all__ = ["COMPOSED", "LARGEST_ANGLE", "WHOLE_TURNS", "atan2", "cos", "exp", "log", "polynomial", "sin"]
 
 LARGEST_ANGLE: Final = 2.0**26
 """Angles in rad up to which errors of sine and cosine are relative; beyond they are absolute, below 1e-15."""
@@ -94,7 +94,7 @@ ARCTANGENT: Final[tuple[float, ...]] = (
 )
 
 
-def _polynomial(coefficients: tuple[float, ...], x: Real) -> Real:
+def polynomial(coefficients: Sequence[float], x: Real) -> Real:
     """Return Σ cₖ xᵏ by Horner's rule."""
     value: Real = coefficients[-1]
     for coefficient in reversed(coefficients[:-1]):
@@ -125,7 +125,7 @@ def _reduced(on: Evaluator, x: Real) -> tuple[Real, Real, Real]:
 def _sine(x: Real, tail: Real) -> Real:
     """Sine of x + tail, |x| ≤ π/4."""
     z = x * x
-    return x + (x * (z * _polynomial(SINE, z)) + tail * (1.0 - 0.5 * z))
+    return x + (x * (z * polynomial(SINE, z)) + tail * (1.0 - 0.5 * z))
 
 
 def _cosine(x: Real, tail: Real) -> Real:
@@ -133,7 +133,7 @@ def _cosine(x: Real, tail: Real) -> Real:
     z = x * x
     half = 0.5 * z
     near = 1.0 - half
-    return near + (((1.0 - near) - half) + (z * (z * _polynomial(COSINE, z)) - x * tail))
+    return near + (((1.0 - near) - half) + (z * (z * polynomial(COSINE, z)) - x * tail))
 
 
 def sin(on: Evaluator, x: Real) -> Real:
@@ -160,7 +160,7 @@ def exp(on: Evaluator, x: Real) -> Real:
     n = on.floor(x * (1.0 / math.log(2.0)) + 0.5)
     high, low = x - n * LN2[0], n * LN2[1]
     r = high - low
-    value = 1.0 + (r + (r * (r * _polynomial(EXPONENTIAL, r)) + ((high - r) - low)))
+    value = 1.0 + (r + (r * (r * polynomial(EXPONENTIAL, r)) + ((high - r) - low)))
     power = on.integer(n)
     half = power // 2
     return on.scale(on.scale(value, half), power - half)
@@ -181,7 +181,7 @@ def log(on: Evaluator, x: Real) -> Real:
     f = m - 1.0
     s = f / (2.0 + f)
     z, half = s * s, 0.5 * f * f
-    series = z * _polynomial(LOGARITHM, z)
+    series = z * polynomial(LOGARITHM, z)
     value = exponent * LN2[0] - ((half - (s * (half + series) + exponent * LN2[1])) - f)
     value = on.select(x < math.inf, value, x)
     return on.select(x > 0.0, value, on.select(x < 0.0, math.nan, x - math.inf))
@@ -208,7 +208,7 @@ def atan2(on: Evaluator, y: Real, x: Real) -> Real:
     rest = on.select(
         equal, ARCTANGENTS[1][1], on.select(one, ARCTANGENTS[1][1], on.select(half, ARCTANGENTS[0][1], 0.0))
     )
-    tail = u * (z * _polynomial(ARCTANGENT, z)) + rest
+    tail = u * (z * polynomial(ARCTANGENT, z)) + rest
     zero = on.negate(high > 0.0)
     base, tail, u = on.select(zero, 0.0, base), on.select(zero, 0.0, tail), on.select(zero, 0.0, u)
     angle, error = _sum(base, u)

@@ -91,7 +91,7 @@ def moved(storage, point, v):
 @given(seed=seeds, length=st.sampled_from([1.0, 1e-3, 1e-7, 1e-12]))
 def test_the_effort_along_the_step_is_the_difference_of_energies(name, seed, length):
     storage, _ = made(name)
-    a, point = arguments(storage.kernel.relation, storage, np.random.default_rng(seed), 0.3 * length)
+    a, point = arguments(storage.kernel.relation, storage, np.random.default_rng(seed), 0.15 * length)
     status, out = run(compiled(storage.kernel.relation), storage.kernel.relation, a)
     before, (_, after) = storage.energy(point), moved(storage, point, a["v"])
     effort = out["e"] + storage.bundle.intensive(ephs.Reference(300.0, 1e-3))
@@ -115,7 +115,7 @@ def test_the_gradient_in_the_middle_misses_the_difference():
 def test_the_ends_of_a_step_may_be_exchanged(name, seed):
     storage, _ = made(name)
     _, point = arguments(storage.kernel.relation, storage, rng := np.random.default_rng(seed), 0.0)
-    v = 0.3 * rng.standard_normal(storage.bundle.size)
+    v = 0.15 * rng.standard_normal(storage.bundle.size)
     there, _ = moved(storage, point, v)
     one, two = storage.discrete_gradient(point, v), storage.discrete_gradient(there, -v)
     assert np.abs(one - two).max() <= 1e4 * EPS * (1.0 + np.abs(one).max())
@@ -158,9 +158,9 @@ def test_floats_and_machine_code_give_the_same_bits(name, seed):
     a, _ = arguments(relation, primitive, np.random.default_rng(seed), 0.3)
     one = run(compiled(relation), relation, a)
     two = run(program(relation).plain()["value"], relation, a)
-    assert one[0] == two[0] == 0
+    assert one[0] == two[0]  # a volume may become negative in such a step
     for argument, values in one[1].items():
-        assert np.array_equal(values, two[1][argument]), argument
+        assert np.array_equal(values, two[1][argument], equal_nan=True), argument
 
 
 @pytest.mark.parametrize("name", ALL)
