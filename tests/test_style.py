@@ -88,25 +88,31 @@ def undocumented(tree: ast.Module) -> list[str]:
     return [getattr(node, "name", "module") for node in (tree, *public) if not ast.get_docstring(node)]
 
 
-@pytest.mark.parametrize("file", SOURCES, ids=named)
-def test_source_keeps_the_rules(file):
-    assert not faults(file.read_text(encoding="utf-8"), may_print=named(file) == "ephs/cli.py")
+def in_files(files, found) -> list[str]:
+    """Return what ``found`` finds in the texts of files, each fault with its file's name."""
+    return [f"{named(file)}: {fault}" for file in files for fault in found(file, file.read_text(encoding="utf-8"))]
 
 
-@pytest.mark.parametrize("file", SOURCES, ids=named)
-def test_one_idea_a_file(file):
-    assert len(file.read_text(encoding="utf-8").splitlines()) <= 400
+def test_sources_keep_the_rules():
+    assert not in_files(SOURCES, lambda file, text: faults(text, may_print=named(file) == "ephs/cli.py"))
 
 
-@pytest.mark.parametrize("file", SOURCES, ids=named)
-def test_public_names_are_documented(file):
-    assert not undocumented(ast.parse(file.read_text(encoding="utf-8")))
+def test_one_idea_a_file():
+    assert not in_files(SOURCES, lambda _, text: [f"{n} lines"] if (n := len(text.splitlines())) > 400 else [])
 
 
-@pytest.mark.parametrize("file", [*SOURCES, *TEXTS], ids=named)
-def test_no_machine_is_named(file):
-    if file.suffix not in {".svg", ".gif", ".png"}:
-        assert not MACHINE.findall(file.read_text(encoding="utf-8"))
+def test_public_names_are_documented():
+    assert not in_files(SOURCES, lambda _, text: undocumented(ast.parse(text)))
+
+
+def test_no_machine_is_named():
+    texts = [file for file in (*SOURCES, *TEXTS) if file.suffix not in {".svg", ".gif", ".png"}]
+    assert not in_files(texts, lambda _, text: MACHINE.findall(text))
+
+
+def test_faults_name_their_file():
+    file = ROOT / "ephs" / "cli.py"
+    assert in_files([file], lambda *_: ["1: print"]) == ["ephs/cli.py: 1: print"]
 
 
 @pytest.mark.parametrize(
