@@ -25,6 +25,7 @@ CLASSES = (
     "ephs.mechanics.motion.JointMotion",
     "ephs.mechanics.sensitivity.Fit",
     "ephs.mechanics.sensitivity.Sensitivity",
+    "ephs.mechanics.views.StateView",
     "ephs.operad.Algebra",
     "ephs.operad.AlgebraMap",
     "ephs.operad.Equation",

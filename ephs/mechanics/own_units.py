@@ -20,7 +20,7 @@ from ephs.mechanics.solve.events import Event
 from ephs.mechanics.solve.instant import Mobility
 from ephs.mechanics.solve.integrate import Progress
 from ephs.mechanics.solve.mobility import mobility
-from ephs.mechanics.solve.problem import Problem, Signal, State, States
+from ephs.mechanics.solve.problem import Problem, Signal, State
 from ephs.mechanics.solve.record import Record
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
@@ -111,14 +111,19 @@ def in_own_units(problem: Problem) -> Problem:
 
 
 def seen_from(problem: Problem, events: tuple[Event, ...], progress: Progress | None) -> tuple[Any, Any]:
-    """Events and progress on times and states of the problem that was given, for the problem in units of its own."""
-    given, seconds = problem.given, problem.seconds
-    if given is None:
-        return events, progress
+    """Events and progress on times of the problem that was given, and on what its users read of its states."""
+    given, seconds, view = problem.given, problem.seconds, problem.view
 
     def seen(event: Event) -> Event:
-        return replace(event, function=lambda t, state: event.function(t * seconds, States(given(state))))
+        function = event.function
 
+        def read(t: float, state: State) -> float:
+            return function(t * seconds, view(state if given is None else given(state)))
+
+        return replace(event, function=read)
+
+    if given is None:
+        return tuple(map(seen, events)), progress
     told = None if progress is None else lambda t, until, stats: progress(t * seconds, until * seconds, stats)
     return tuple(map(seen, events)), told
 

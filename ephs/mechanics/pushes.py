@@ -1,14 +1,14 @@
 """Forces on a scene's joints, bodies and markers, as users give them."""
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Iterator, Mapping
+from typing import Any, final
 
 import numpy as np
 
 from ephs.mechanics.build import component_path
 from ephs.mechanics.scene.model import Marker, Scene
-from ephs.mechanics.signals import signal
-from ephs.mechanics.solve.problem import Signal
+from ephs.mechanics.signals import View, signal
+from ephs.mechanics.solve.problem import Signal, State
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.errors import AssemblyError
@@ -31,8 +31,10 @@ def sum_of(one: Signal, other: Signal) -> Signal:
     return Signal(lambda t, state: one.at(t, state) + other.at(t, state))
 
 
-def scene_signals(scene: Scene, inputs: Mapping[str, Any]) -> tuple[dict[str, Signal], dict[str, Signal]]:
+def scene_signals(scene: Scene, inputs: Mapping[Any, Any], view: View) -> tuple[dict[str, Signal], dict[str, Signal]]:
     """Forces on joints and wrenches on bodies, by name, of what a user gives by joint, body and marker.
+
+    A key may be a tuple of names, whose input gives the numbers of all of them in a row.
 
     Raises
     ------
@@ -42,23 +44,50 @@ def scene_signals(scene: Scene, inputs: Mapping[str, Any]) -> tuple[dict[str, Si
     forces: dict[str, Signal] = {}
     wrenches: dict[str, Signal] = {}
     joints, bodies, markers = dict(scene.all_joints()), dict(scene.all_bodies()), dict(scene.all_markers())
-    for key, value in inputs.items():
+    sizes = {f"joints.{name}": j.dim for name, j in joints.items()} | {f"bodies.{name}": 6 for name in bodies}
+    sizes |= {f"markers.{name}": 3 for name, marker in markers.items() if marker.body in bodies}
+    for key, given in _single(inputs, sizes, view):
         kind, _, name = key.partition(".")
-        if kind == "joints" and name in joints:
-            forces[name] = signal(value, effort=False, name=key, size=joints[name].dim)
-        elif kind == "bodies" and name in bodies:
-            given = signal(value, effort=False, name=key, size=6)
-            wrenches[name] = sum_of(wrenches[name], given) if name in wrenches else given
-        elif kind == "markers" and name in markers and markers[name].body in bodies:
-            given = signal(value, effort=False, name=key, size=3)
-            body, push = markers[name].body, _at_marker(markers[name], given)
-            wrenches[body] = sum_of(wrenches[body], push) if body in wrenches else push
-        else:
-            known = (
-                [f"joints.{n}" for n in joints] + [f"bodies.{n}" for n in bodies] + [f"markers.{n}" for n in markers]
-            )
-            raise AssemblyError("unknown-input", key, expected=", ".join(known))
+        if kind == "joints":
+            forces[name] = sum_of(forces[name], given) if name in forces else given
+            continue
+        if kind == "markers":
+            name, given = markers[name].body, _at_marker(markers[name], given)
+        wrenches[name] = sum_of(wrenches[name], given) if name in wrenches else given
     return forces, wrenches
+
+
+def _single(inputs: Mapping[Any, Any], sizes: Mapping[str, int], view: View) -> Iterator[tuple[str, Signal]]:
+    """The signal of each joint, body or marker, of ``sizes`` numbers by key."""
+    for key, value in inputs.items():
+        keys = key if isinstance(key, tuple) else (key,)
+        for one in keys:
+            if one not in sizes:
+                raise AssemblyError("unknown-input", one, expected=", ".join(sizes))
+        ends = np.cumsum([0, *(sizes[one] for one in keys)])
+        whole = signal(value, effort=False, name=", ".join(keys), size=int(ends[-1]), view=view)
+        if len(keys) == 1:
+            yield keys[0], whole
+            continue
+        shared = whole if whole.constant else Signal(_Latest(whole).at)
+        for one, first, last in zip(keys, ends[:-1], ends[1:], strict=True):
+            yield one, part_of(shared, slice(int(first), int(last)))
+
+
+@final
+class _Latest:
+    """A signal that several ports share: evaluated once for each time and state."""
+
+    def __init__(self, signal: Signal) -> None:
+        self._signal, self._found = signal, np.zeros(0)
+        self._t = float("nan")
+        self._state: State = {}
+
+    def at(self, t: float, state: State) -> Array:
+        if t != self._t or state is not self._state:
+            self._found = self._signal.at(t, state)
+            self._t, self._state = t, state
+        return self._found
 
 
 def _at_marker(marker: Marker, force: Signal) -> Signal:

@@ -8,14 +8,17 @@ import numpy as np
 from ephs.mechanics.solve.errors import OptionError, nearest_of
 from ephs.mechanics.solve.probe import Asked
 from ephs.mechanics.solve.problem import Problem, Signal, State, States
+from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.errors import AssemblyError
 
-__all__ = ["asked_of", "jumps_of", "numbers_of", "signal", "takes_state"]
+View = Callable[[State], Mapping[Path, Array]]
+
+__all__ = ["View", "asked_of", "jumps_of", "numbers_of", "signal", "takes_state"]
 
 
-def signal(value: Any, *, effort: bool, name: str, size: int | None) -> Signal:
-    """A signal from a constant, f(t), or f(t, state), of ``size`` numbers.
+def signal(value: Any, *, effort: bool, name: str, size: int | None, view: View = States) -> Signal:
+    """A signal from a constant, f(t), or f(t, state), of ``size`` numbers; ``view`` makes what f reads of the states.
 
     Raises
     ------
@@ -30,7 +33,7 @@ def signal(value: Any, *, effort: bool, name: str, size: int | None) -> Signal:
         return Signal(found, effort, name, size)
     function: Any = value
     if takes_state(function):
-        return Signal(function, effort, name, size)
+        return Signal(lambda t, state: function(t, view(state)), effort, name, size)
     return Signal(lambda t, _state: function(t), effort, name, size)
 
 
@@ -72,7 +75,7 @@ def asked_of(problem: Problem, inputs: Mapping[str, Any]) -> list[Asked]:
     found: list[Asked] = []
     for name, given in inputs.items():
         values = given.values() if isinstance(given, Mapping) else [given]
-        found += [_asked(problem, name, value) for value in values if callable(value)]
+        found += [_asked(problem, str(name), value) for value in values if callable(value)]
     return found
 
 
@@ -83,7 +86,7 @@ def _asked(problem: Problem, name: str, function: Callable[..., Any]) -> Asked:
 
     def value(t: float, state: State | None) -> Any:
         assert state is not None
-        return function(t * seconds, States(state if given is None else given(state)))
+        return function(t * seconds, problem.view(state if given is None else given(state)))
 
     return Asked(name, value, True)
 

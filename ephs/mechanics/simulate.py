@@ -34,6 +34,7 @@ from ephs.mechanics.solve.record import Record
 from ephs.mechanics.solve.solution import Solution
 from ephs.mechanics.solve.threads import in_one_thread
 from ephs.mechanics.solve.watching import guarded
+from ephs.mechanics.views import Names
 from ephs.operad import Path
 from ephs.semantics import extents
 from ephs.semantics.bundle import Array, Reference
@@ -70,7 +71,7 @@ def simulate(
     max_steps: int | None = None,
     save_at: "ArrayLike | None" = None,
     form: str = "reduced",
-    inputs: Mapping[str, Any] | None = None,
+    inputs: Mapping[Any, Any] | None = None,
     jumps: "ArrayLike | Mapping[str, ArrayLike] | None" = None,
     events: Sequence[Any] | None = None,
     options: Mapping[str, Any] | None = None,
@@ -113,7 +114,9 @@ def simulate(
     inputs
         ``{port: {"effort": f}}`` or ``{"flow": f}`` at outer ports; of a scene also ``{"joints.pin": f}``, a
         generalised force on u_r, ``{"bodies.crank": f}``, a wrench in the body frame, and ``{"markers.tip": f}``, a
-        force in world axes; f a constant, f(t), or f(t, state).
+        force in world axes; f a constant, f(t), or f(t, state). A tuple of such names has all their numbers in a row.
+        The state is read by path, that of a scene by name too: ``state.joints.pin.rate``; see
+        `ephs.mechanics.views.StateView`.
     jumps
         Ascending times in s at which inputs jump, or a mapping from inputs to such times: steps end there, and go on
         from the other side. Functions are searched for others; see `ephs.mechanics.solve.probe`.
@@ -310,10 +313,11 @@ def problem_of_system(
 
 
 def problem_of_scene(
-    scene: Scene, initial: Mapping[str, "ArrayLike"] | None = None, inputs: Mapping[str, Any] | None = None
+    scene: Scene, initial: Mapping[str, "ArrayLike"] | None = None, inputs: Mapping[Any, Any] | None = None
 ) -> Problem:
     """The initial value problem of a scene."""
-    forces, wrenches = scene_signals(scene, inputs or {})
+    view = Names(scene).view
+    forces, wrenches = scene_signals(scene, inputs or {}, view)
     system = scene_system(scene, driven=frozenset(forces), wrenches=frozenset(wrenches))
     state = initial_state(scene)
     if initial:
@@ -342,6 +346,7 @@ def problem_of_scene(
         document=scene_to_text(scene),
         dependences=lambda: explain(scene),
         length=Snapshot.of(scene).scale(world.gravity).length,
+        view=view,
     )
     if initial:
         _on_joints(problem)

@@ -2,8 +2,8 @@
 
 from ephs.mechanics.dynamics.model import Dynamics as Dynamics
 from ephs.mechanics.dynamics.model import dynamics as dynamics
-from ephs.mechanics.dynamics.results import BodyState as BodyState
 from ephs.mechanics.dynamics.results import Constraints as Constraints
 from ephs.mechanics.dynamics.results import Derivatives as Derivatives
 from ephs.mechanics.dynamics.results import Energies as Energies
 from ephs.mechanics.dynamics.state import State as State
+from ephs.mechanics.views import BodyState as BodyState

@@ -5,12 +5,12 @@ from typing import final
 import numpy as np
 
 from ephs.mechanics.build import component_path
-from ephs.mechanics.dynamics.results import BodyState
 from ephs.mechanics.reduced.equations import Equations
 from ephs.mechanics.reduced.sweep_kernels import kinematics
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.solve.errors import OptionError
 from ephs.mechanics.solve.problem import State as States
+from ephs.mechanics.views import BodyState
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import quaternion_to_matrix

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ephs.mechanics.dynamics.links import Links
-from ephs.mechanics.dynamics.results import BodyState, Constraints, Derivatives, Energies
-from ephs.mechanics.dynamics.state import Layout, State
+from ephs.mechanics.dynamics.results import Constraints, Derivatives, Energies
+from ephs.mechanics.dynamics.state import State
 from ephs.mechanics.dynamics.stepping import one_step
 from ephs.mechanics.reduced.equations import Equations, ReducedState
 from ephs.mechanics.reduced.paper import PaperStates
@@ -21,6 +21,7 @@ from ephs.mechanics.simulate import problem_of_scene
 from ephs.mechanics.solve.errors import OptionError, failing_at
 from ephs.mechanics.solve.problem import State as States
 from ephs.mechanics.solve.sparse import Index
+from ephs.mechanics.views import BodyState, Names, StateView
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.primitives import Storage
@@ -67,8 +68,8 @@ class Dynamics:
         self._problem = problem_of_scene(scene)
         self._equations = Equations(scene, self._problem, 0.0, pushed=True)
         self._linear = Linearised(self._equations)
-        self.layout = Layout.of(self._equations.reduced)
-        self._links = Links(scene, self._equations)
+        self.layout = self._equations.layout
+        self._links, self._names = Links(scene, self._equations), Names(scene)
         with failing_at(0.0):
             start = self._equations.start(0.0)
         self.state0 = self._state(start)
@@ -151,6 +152,10 @@ class Dynamics:
         """Body -> where it is and how it moves."""
         self._at(state)
         return self._links.bodies()
+
+    def view(self, state: State) -> StateView:
+        """The state by names, as functions of inputs read it: ``view.joints.pin.rate``."""
+        return self._names.view(self._equations.states(self._reduced(state)))
 
     def states(self, state: State) -> dict[Path, Array]:
         """All states of the scene's system by path, as `simulate` takes them for ``initial``."""
@@ -353,9 +358,10 @@ class Dynamics:
         self._links.place(*self.layout.split(state.array)[:2])
 
     def _state(self, at: ReducedState) -> State:
-        eq = self._equations
-        self._links.place(at.q, at.r)
-        return self.layout.state(at.q, np.concatenate([at.r, self._linear.cut_rates]), eq.heats.entropies(at.heats))
+        if self.layout.total > self.layout.n:
+            self._links.place(at.q, at.r)
+        array = np.concatenate([at.q, at.r, self._equations.heats.entropies(at.heats)])
+        return State(array, self.layout, self._linear.cut_rates)
 
     def _of_states(self, states: States) -> State:
         eq = self._equations

@@ -1,61 +1,11 @@
-"""Results of the dynamics functions: states of bodies, constraints, energies, derivatives."""
+"""Results of the dynamics functions: constraints, energies, derivatives."""
 
 from dataclasses import dataclass
 from typing import final
 
-import numpy as np
-
 from ephs.semantics.bundle import Array
-from ephs.semantics.spaces.rotations import quaternion_to_matrix
 
-__all__ = ["BodyState", "Constraints", "Derivatives", "Energies"]
-
-
-@final
-@dataclass(frozen=True, slots=True, eq=False)
-class BodyState:
-    """Where a body is and how it moves.
-
-    Parameters
-    ----------
-    pose
-        (7,) ``[w, x, y, z, rx, ry, rz]`` of centre of mass and body axes in the world; m.
-    twist
-        (6,) angular and linear velocity in the body's frame; rad/s, m/s.
-    """
-
-    pose: Array
-    twist: Array
-
-    @property
-    def position(self) -> Array:
-        """(3,) of the centre of mass in the world, m."""
-        return self.pose[4:]
-
-    @property
-    def quaternion(self) -> Array:
-        """(4,) body to world, scalar first."""
-        return self.pose[:4]
-
-    @property
-    def rotation(self) -> Array:
-        """(3, 3) body to world."""
-        return quaternion_to_matrix(self.pose[:4])
-
-    @property
-    def velocity(self) -> Array:
-        """(3,) of the centre of mass in the world basis, m/s."""
-        return self.rotation @ self.twist[3:]
-
-    @property
-    def angular_velocity(self) -> Array:
-        """(3,) in the body basis, rad/s."""
-        return self.twist[:3]
-
-    def point(self, at: Array) -> tuple[Array, Array]:
-        """Position and velocity (3,) in the world of a point (3,) in the body's frame."""
-        turn = self.rotation
-        return self.pose[4:] + turn @ at, turn @ (self.twist[3:] + np.cross(self.twist[:3], at))
+__all__ = ["Constraints", "Derivatives", "Energies"]
 
 
 @final

@@ -1,4 +1,4 @@
-"""The state of a mechanism as a value, and where in its vectors each joint stands."""
+"""The state of a mechanism as a value."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -6,17 +6,11 @@ from types import MappingProxyType
 from typing import final
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from ephs.mechanics.reduced.mechanism import Edge, Reduced
-from ephs.mechanics.reduced.tables import SPRING
-from ephs.mechanics.scene.model import frozen
-from ephs.mechanics.solve.errors import OptionError
-from ephs.mechanics.solve.sparse import Index
-from ephs.operad import Path
+from ephs.mechanics.reduced.layout import Layout
 from ephs.semantics.bundle import Array
 
-__all__ = ["Layout", "State"]
+__all__ = ["State"]
 
 
 @final
@@ -29,119 +23,47 @@ class State:
     array
         (size,) the elements of all joints in the order of `Layout.joints` (angles, distances, unit quaternions; of
         cut joints too), the rates of the tree's freedoms, the entropies of `Layout.entropies` in J/K.
-    coordinates
-        Joint -> (d,) its coordinates: rad, m, rotation vectors in the axes of C1.
-    rates
-        Joint -> (d,) its twist u_r in the axes of C2, in rad/s and m/s; of cut joints what the tree's rates make of it.
+    layout
+        Where each joint stands in the array.
+    cut_rates
+        (total − n,) what the tree's rates make of those of cut joints.
     """
 
     array: Array
-    coordinates: Mapping[str, Array]
-    rates: Mapping[str, Array]
+    layout: Layout
+    cut_rates: Array
+
+    def __post_init__(self) -> None:
+        self.array.setflags(write=False)
+        self.cut_rates.setflags(write=False)
+
+    @property
+    def q(self) -> Array:
+        """(elements,) of all joints, those of the tree first; with pins and slides only, its coordinates."""
+        return self.array[: self.layout.elements_end]
+
+    @property
+    def r(self) -> Array:
+        """(n,) rates of the tree's freedoms."""
+        return self.array[self.layout.elements_end : self.layout.elements_end + self.layout.n]
+
+    @property
+    def entropies(self) -> Array:
+        """(entropies,) in J/K."""
+        return self.array[self.layout.elements_end + self.layout.n :]
+
+    @property
+    def coordinates(self) -> Mapping[str, Array]:
+        """Joint -> (d,) its coordinates: rad, m, rotation vectors in the axes of C1."""
+        return MappingProxyType({name: _fixed(x) for name, x in self.layout.coordinates(self.q).items()})
+
+    @property
+    def rates(self) -> Mapping[str, Array]:
+        """Joint -> (d,) its twist u_r in the axes of C2, in rad/s and m/s; of cut joints as the tree makes it."""
+        whole = np.concatenate([self.r, self.cut_rates])
+        return MappingProxyType({name: _fixed(x) for name, x in self.layout.by_joint(whole).items()})
 
 
-@final
-@dataclass(frozen=True, slots=True, eq=False)
-class Layout:
-    """Where each joint stands in the vectors of a mechanism.
-
-    Parameters
-    ----------
-    joints
-        Names of all joints, those of the tree first, in the order of the vectors. A body, or a group of bodies, that
-        no joint holds moves with a free joint of its (first) body's name.
-    freedoms
-        Joint -> (d,) places of its freedoms: in vectors of the tree's n freedoms where below n, and from there on
-        those of cut joints.
-    elements
-        Joint -> places of its element in a state's array.
-    entropies
-        Paths of the entropies.
-    n, total
-        How many freedoms the tree has, and all joints together.
-    """
-
-    joints: tuple[str, ...]
-    freedoms: Mapping[str, Index]
-    elements: Mapping[str, Index]
-    entropies: tuple[Path, ...]
-    n: int
-    total: int
-    edges: Mapping[str, tuple[tuple[int, Edge], ...]]
-
-    @staticmethod
-    def of(reduced: Reduced) -> "Layout":
-        """The layout of a scene in joint coordinates."""
-        t = reduced.tables
-        taken = {edge.name for edge in reduced.edges if edge.name}
-        edges: dict[str, list[tuple[int, Edge]]] = {}
-        for i, edge in enumerate(reduced.edges):
-            if t.kind[i] != SPRING:
-                edges.setdefault(edge.name or _free_name(reduced, i, taken), []).append((i, edge))
-        for parts in edges.values():
-            parts.sort(key=lambda part: part[1].freedoms.start)
-
-        def places(at: Index, size: Index, parts: list[tuple[int, Edge]]) -> Index:
-            return np.concatenate([np.arange(at[i], at[i] + size[i]) for i, _ in parts]).astype(np.int64)
-
-        dims = [int(t.dim[i]) for i in range(len(reduced.edges)) if t.kind[i] != SPRING]
-        return Layout(
-            tuple(edges),
-            MappingProxyType({name: places(t.r_at, t.dim, parts) for name, parts in edges.items()}),
-            MappingProxyType({name: places(t.q_at, t.q_size, parts) for name, parts in edges.items()}),
-            reduced.entropies,
-            reduced.freedoms,
-            sum(dims),
-            MappingProxyType({name: tuple(parts) for name, parts in edges.items()}),
-        )
-
-    def vector(self, what: str, values: Mapping[str, ArrayLike]) -> Array:
-        """(total,) from joint -> (d,), a number where there is one freedom; zero for joints that are not named.
-
-        Raises
-        ------
-        OptionError
-            A joint is not known, or its value has another length or is not finite.
-        """
-        out = np.zeros(self.total)
-        for name, value in values.items():
-            if name not in self.freedoms:
-                raise OptionError(f"{what}[{name!r}]", value, f"a joint: {', '.join(self.joints)}")
-            where = self.freedoms[name]
-            array = np.atleast_1d(np.asarray(value, dtype=float))
-            if array.shape != where.shape or not np.isfinite(array).all():
-                raise OptionError(f"{what}[{name!r}]", value, f"{where.size} finite numbers")
-            out[where] = array
-        return out
-
-    def by_joint(self, values: Array) -> dict[str, Array]:
-        """Joint -> (d,) of a vector (total,), or of one (n,) with zeros for cut joints."""
-        whole = np.concatenate([values, np.zeros(self.total - values.size)])
-        return {name: whole[where] for name, where in self.freedoms.items()}
-
-    def coordinates(self, q: Array) -> dict[str, Array]:
-        """Joint -> (d,) coordinates of the elements at the start of a state's array."""
-        out: dict[str, Array] = {}
-        for name, parts in self.edges.items():
-            sizes = np.cumsum([edge.pair.size for _, edge in parts])[:-1]
-            elements = np.split(q[self.elements[name]], sizes)
-            out[name] = np.concatenate([edge.pair.coordinates(x) for (_, edge), x in zip(parts, elements, strict=True)])
-        return out
-
-    def state(self, q: Array, rates: Array, s: Array) -> State:
-        """A state of elements q, rates (total,) of all joints and entropies s."""
-        return State(
-            frozen(np.concatenate([q, rates[: self.n], s])),
-            MappingProxyType({name: frozen(x) for name, x in self.coordinates(q).items()}),
-            MappingProxyType({name: frozen(x) for name, x in self.by_joint(rates).items()}),
-        )
-
-    def split(self, array: Array) -> tuple[Array, Array, Array]:
-        """(q, r, s) of a state's array."""
-        first = array.size - self.n - len(self.entropies)
-        return array[:first].copy(), array[first : first + self.n].copy(), array[first + self.n :].copy()
-
-
-def _free_name(reduced: Reduced, edge: int, taken: set[str]) -> str:
-    body = str(reduced.bodies[edge])
-    return f"free.{body}" if body in taken else body
+def _fixed(x: Array) -> Array:
+    x.setflags(write=False)
+    return x

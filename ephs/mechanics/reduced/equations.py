@@ -20,10 +20,12 @@ from ephs.mechanics.reduced.booking import Booking
 from ephs.mechanics.reduced.dense import Dense, unmoved
 from ephs.mechanics.reduced.given import Given
 from ephs.mechanics.reduced.heat import Heats
+from ephs.mechanics.reduced.layout import Layout
 from ephs.mechanics.reduced.led import Led
 from ephs.mechanics.reduced.mechanism import reduce_scene
 from ephs.mechanics.reduced.naming import tolerances, within
 from ephs.mechanics.reduced.paper import PaperStates
+from ephs.mechanics.reduced.reading import JointStates
 from ephs.mechanics.reduced.tables import SPRING, Workspace
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.solve.control import Tolerance
@@ -31,7 +33,6 @@ from ephs.mechanics.solve.errors import Outcome, SolveError
 from ephs.mechanics.solve.model import compile_model
 from ephs.mechanics.solve.problem import Problem
 from ephs.mechanics.solve.stepping import Row
-from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.semantics.spaces.rank import SPARSE
@@ -105,7 +106,7 @@ class Equations:
         self.given = Given(scene, problem, reduced, self.nv)
         self.drive, self.wrench = self.given.drive, self.given.wrench
         self.constant = problem.constant
-        self._paper = PaperStates(reduced, problem, self._light)
+        self._paper, self.layout = PaperStates(reduced, problem, self._light), Layout.of(reduced)
         self.booking = Booking(self, self._paper)
         self.evaluations = 0
         self.gravity = np.array(scene.world.gravity, dtype=float)
@@ -364,9 +365,9 @@ class Equations:
         """Places and rates of the tree's freedoms, and a multiplier for each equation of a loop that is kept."""
         return 2 * self.n + len(self.engine.closing.end)
 
-    def states(self, state: ReducedState) -> dict[Path, Array]:
+    def states(self, state: ReducedState) -> JointStates:
         """All states of the scene's system."""
-        return self._paper.at(state.q, state.r, self.heats.entropies(state.heats))
+        return JointStates(self._paper, self.layout, state.q, state.r, self.heats.entropies(state.heats))
 
     def start(self, t: float) -> ReducedState:
         """The state that the problem begins with, its loops closed.

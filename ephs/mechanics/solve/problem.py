@@ -77,7 +77,7 @@ class Signal:
         if not callable(self.value):
             return np.atleast_1d(np.asarray(self.value, dtype=float))
         try:
-            given = self.value(t, States(state))
+            given = self.value(t, state)
             found = np.atleast_1d(np.asarray(given, dtype=float))
         except (SolveError, MemoryError):
             raise
@@ -163,6 +163,8 @@ class Problem:
         Makes of a solution (n,) the largest gap of a joint, m or rad, where no motion does.
     given
         Makes of its states those of the problem that it was made from; None where they are the same.
+    view
+        Makes of states by path what functions of a user read.
     seconds
         Its unit of time in s.
     length
@@ -184,6 +186,7 @@ class Problem:
     shown: "Callable[[Record, Mapping[str, Any]], tuple[Problem, Record, Mapping[str, Any]]] | None" = None
     gaps: Callable[["Solution"], Array] | None = None
     given: Callable[[State], State] | None = None
+    view: Callable[[State], Mapping[Path, Array]] = States
     seconds: float = 1.0
     length: float = 1.0
     remarks: Mapping[str, Any] = field(default_factory=lambda: {"form": "paper"})
