@@ -20,7 +20,18 @@ from ephs.semantics.errors import SemanticsError
 from ephs.semantics.primitives import Kernel, Primitive, Reversible, Storage
 from ephs.semantics.spaces import manifold
 
-__all__ = ["DOMAIN", "EXTENT", "OK", "SIGNATURE", "TEMPERATURE", "TURN", "Callback", "address_of", "prototype"]
+__all__ = [
+    "DOMAIN",
+    "EXTENT",
+    "OK",
+    "RAISED",
+    "SIGNATURE",
+    "TEMPERATURE",
+    "TURN",
+    "Callback",
+    "address_of",
+    "prototype",
+]
 
 OK, TURN, TEMPERATURE, RAISED, EXTENT, DOMAIN = 0, 1, 2, 3, 4, 5
 """What a kernel returns: done; half a turn in a step; θ ≤ 0; a Python function raised; a length or volume ≤ 0; a value

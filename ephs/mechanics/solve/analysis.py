@@ -9,6 +9,7 @@ from itertools import pairwise
 from typing import Any, final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ephs.mechanics.solve.errors import SolveError
 from ephs.mechanics.solve.model import Model, evaluate_at
@@ -18,11 +19,14 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.linear.sparse import sparse_lu
 from ephs.semantics.spaces.rank import FOLLOWED, IMPLICIT, REGULAR, rank_of
 
-__all__ = ["Analysis", "analyse"]
+__all__ = ["Analysis", "analyse", "dependent_rows", "exchanged"]
 
 SHRUNK = 1e-6
 DEFECT = 1e-11
 """Tolerance for a dropped equation, relative to its terms; more asks for another rank decision."""
+
+OTHERWISE = 1e-3
+"""Weight of equations that are not preferred where some are left out: others take part that much more."""
 
 ALIKE = 1e-6
 """Unknowns that null vectors move by the same but for this share are moved alike."""
@@ -101,10 +105,19 @@ def analyse(model: Model, x: Array, z: Array, h: float, before: Index | None = N
     return Analysis(compiled, dropped, redundant, elimination.fill)
 
 
-def dependent_rows(model: Model, values: Array, before: Index | None = None) -> Index:
-    """Marks constraint equations that depend on the others: (rows,) of 0 and 1; ``before``: those marked last time.
+def dependent_rows(
+    model: Model, values: Array, before: Index | None = None, rather: NDArray[np.bool_] | None = None
+) -> Index:
+    """Marks constraint equations that depend on the others: (rows,) of 0 and 1.
 
     Rows that share no effort cannot depend on each other, so that the rank is decided part by part.
+
+    Parameters
+    ----------
+    before
+        (rows,) those marked last time.
+    rather
+        (rows,) those to be marked where there is a choice.
     """
     from scipy import linalg
     from scipy.sparse import block_array, csr_array
@@ -138,8 +151,26 @@ def dependent_rows(model: Model, values: Array, before: Index | None = None) -> 
         if before is not None:
             held = members.size - int(before[rows[members]].sum())
             rank = min(rank, max(held, rank_of(sizes, FOLLOWED)))
-        out[rows[members[pivots[rank:]]]] = 1
+        left = pivots[rank:]
+        if rather is not None and left.size:
+            left = exchanged(triangle, pivots, rank, np.where(rather[rows[members]], 1.0, OTHERWISE))
+        out[rows[members[left]]] = 1
     return out
+
+
+def exchanged(triangle: Array, pivots: Index, rank: int, weights: Array) -> Index:
+    """Rows without which as many independent ones are left: those of the largest weighted part in the dependences.
+
+    The dependences are the null vectors (of the transpose) of a matrix whose rows have this pivoted triangle.
+    """
+    from scipy import linalg
+
+    dependences = np.zeros((pivots.size - rank, pivots.size))
+    dependences[:, pivots[rank:]] = np.eye(pivots.size - rank)
+    if rank:
+        dependences[:, pivots[:rank]] = -linalg.solve_triangular(triangle[:rank, :rank], triangle[:rank, rank:]).T
+    found: Any = linalg.qr(dependences * weights, mode="r", pivoting=True)
+    return found[1][: pivots.size - rank]
 
 
 def _groups(part: Index, count: int) -> list[Index]:

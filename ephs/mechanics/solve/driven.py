@@ -6,7 +6,7 @@ from typing import Protocol
 import numpy as np
 
 from ephs.mechanics.solve.errors import LARGEST, Outcome, SolveError
-from ephs.mechanics.solve.model import Model
+from ephs.mechanics.solve.model import Model, evaluate_at
 from ephs.mechanics.solve.natural import Chunk, NaturalState
 from ephs.mechanics.solve.problem import Problem
 from ephs.mechanics.solve.snapshot import Snapshot
@@ -18,6 +18,7 @@ ROUNDS = 12
 CUTS = 6
 """How often a step without solution is halved."""
 _CURABLE = (Outcome.DIVERGED, Outcome.SINGULAR, Outcome.CONTRADICTION)
+_DOMAINS = (Outcome.TURN, Outcome.TEMPERATURE, Outcome.EXTENT, Outcome.DOMAIN)
 
 
 class ComponentMethod(Protocol):
@@ -79,7 +80,8 @@ def advance_whole(
 ) -> tuple[NaturalState, Chunk]:
     """Up to so many steps of h seconds; one that has no solution is taken in halves, and these so on ``cuts`` times.
 
-    A part keeps every balance and every joint as a whole step does.
+    A part keeps every balance and every joint as a whole step does. A step in which the motion itself leaves the domain
+    of a component, as by half a turn, is not cut; one whose iteration does is.
     """
     chunks: list[Chunk] = []
     while steps:
@@ -87,9 +89,15 @@ def advance_whole(
         chunk = _finite(method.model, chunk)
         chunks.append(chunk)
         steps -= chunk.steps
-        if chunk.failure is None or not cuts or chunk.failure.outcome not in _CURABLE:
+        failure = chunk.failure
+        if failure is None or not cuts or failure.outcome not in (*_CURABLE, *_DOMAINS):
             break
         after, parts = advance_whole(method, state, 0.5 * h, 2, inputs, cuts - 1)
+        if failure.outcome in _DOMAINS:
+            if _leaves(method.model, state.x, after.z if parts.failure is None else state.z, h):
+                break
+            if parts.failure is not None and failure.outcome in (Outcome.TURN, Outcome.DOMAIN):
+                chunks[-1] = replace(chunk, failure=failure.of_iteration())
         if parts.failure is not None:
             break
         ledgers = parts.ledgers[-1:].copy()
@@ -107,6 +115,15 @@ def advance_whole(
         chunks[-1].failure,
         sum(chunk.cut for chunk in chunks),
     )
+
+
+def _leaves(model: Model, x: Array, z: Array, h: float) -> bool:
+    """Whether a step of h seconds from the states x leaves a component's domain by the unknowns z of another step.
+
+    It counts as if it did where z holds no rates yet.
+    """
+    last = z.reshape(-1, model.unknowns)[-1]
+    return not last[: int(model.tables.counts[0])].any() or bool(evaluate_at(model, x, last, h)[0])
 
 
 def _finite(model: Model, chunk: Chunk) -> Chunk:

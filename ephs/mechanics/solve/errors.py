@@ -166,6 +166,10 @@ class SolveError(Exception):
         told = f"{type(cause).__name__}: {cause}" if outcome is Outcome.PYTHON and cause is not None else ""
         return cls(outcome, str(model.path_of(component)), told, cause)
 
+    def of_iteration(self) -> "SolveError":
+        """The same of an iteration that left a domain which the motion does not leave."""
+        return SolveError(Outcome.DIVERGED, self.path, f"its iteration comes to {self.outcome.value}", self.cause)
+
     @classmethod
     def undetermined(cls, model: "Model", unknown: int) -> "SolveError":
         """An unknown without equation."""

@@ -107,7 +107,7 @@ def exponents(code, h, p, w, v, whole, turn, small):
 
 
 @kernel
-def linearise(t, g, p, x, z, scal, still, unit, inputs, m, s, fresh):
+def linearise(t, g, p, dropped, x, z, scal, still, unit, inputs, m, s, fresh):
     """Residuals of the stages with their corrections, and where fresh their matrices; (status, component).
 
     z (stages, unknowns).
@@ -162,7 +162,7 @@ def linearise(t, g, p, x, z, scal, still, unit, inputs, m, s, fresh):
             for j in range(s.data.shape[1]):
                 s.slope[i, j] = 2.0 / unit[0] * (m.data[j] - s.data[i, j])
         _rest(t, h, s.slope[i], s.scale[i])
-    _correct(t, g, p, h, z, s)
+    _correct(t, g, p, dropped, h, z, s)
     return 0, 0
 
 
@@ -182,8 +182,13 @@ def _rest(t, h, slope, scale):
 
 
 @kernel
-def _correct(t, g, p, h, z, s):
-    """Put the one-term corrections into the residuals of the stages."""
+def _correct(t, g, p, dropped, h, z, s):
+    """Put the one-term corrections into the residuals of the stages.
+
+    Stages are off the positions of joints by the order of the quadrature. An equation that follows from the others
+    only where loops are closed (Bricard's linkage) is missed there by as much; over the step it holds, and that is its
+    residual.
+    """
     n_rate, stages = t.counts[0], p.b.shape[0]
     lam_at = n_rate + t.counts[1]
     for c in range(t.kind.shape[0]):
@@ -223,7 +228,7 @@ def _correct(t, g, p, h, z, s):
                 force += p.b[i] * z[i, at + j]
             power += delta * force
             for i in range(stages):
-                s.residual[i, at + j] += delta
+                s.residual[i, at + j] = s.gap[at + j] if dropped[at + j] == 1 else s.residual[i, at + j] + delta
         if square > 1e-280:
             for group in range(k, last):
                 first = n_rate + g.effort[group]
@@ -243,7 +248,7 @@ def gauss_newton(t, g, p, o, where, x, z, scal, still, unit, inputs, m, s):
     before, fresh, part = 1e300, True, 1.0
     right, change = s.residual.reshape(stages * n), s.change
     for iteration in range(60):
-        status, component = linearise(t, g, p, x, z, scal, still, unit, inputs, m, s, fresh)
+        status, component = linearise(t, g, p, o.dropped, x, z, scal, still, unit, inputs, m, s, fresh)
         if status != 0:
             return status, component, iteration
         ratio = defect = 0.0

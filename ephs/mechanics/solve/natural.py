@@ -25,9 +25,19 @@ from ephs.mechanics.solve.natural_kernels import (
 from ephs.mechanics.solve.snapshot import Snapshot, parts
 from ephs.mechanics.solve.sparse import Index
 from ephs.semantics.bundle import Array
+from ephs.semantics.kernel_table import RAISED
 from ephs.semantics.numbering import spans
 
-__all__ = ["Chunk", "Decided", "Natural", "NaturalState", "guessed_efforts", "of_status", "stored_energies"]
+__all__ = [
+    "Chunk",
+    "Decided",
+    "Natural",
+    "NaturalState",
+    "guessed_efforts",
+    "has_choice",
+    "of_status",
+    "stored_energies",
+]
 
 SETTLING = 16
 """Steps after a change of order until the next: the values at the change itself may be exceptional."""
@@ -200,9 +210,9 @@ class Natural:
             if status == DONE:
                 fresh = False
                 self._settle(taken)
-            elif status >= COMPONENT:
+            elif status >= COMPONENT and (fresh or not has_choice(order.dropped, status)):
                 failure = SolveError.of_component(status, model, component)
-            elif fresh and not taken:
+            elif fresh:
                 blame = Blame(model, order.dropped)
                 failure = blame.contradicted(x, z, h) if status == INCONSISTENT else of_status(status)
                 if status == DIVERGED:
@@ -283,6 +293,11 @@ def stored_energies(model: Model, x: Array) -> Array:
     if status:
         raise SolveError.of_component(status, model, component)
     return memory.energy
+
+
+def has_choice(dropped: Index, status: int) -> bool:
+    """Whether leaving out other equations may keep a step within the domain of the component that gave this status."""
+    return bool(dropped.any()) and status != COMPONENT + RAISED
 
 
 def of_status(status: int) -> SolveError:

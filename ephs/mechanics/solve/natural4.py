@@ -7,6 +7,7 @@ composing as it does at order 2. A composition of steps of order 2 would have to
 from typing import final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ephs.mechanics.solve.analysis import DEFECT, SHRUNK, analyse, dependent_rows
 from ephs.mechanics.solve.blame import Blame
@@ -14,7 +15,15 @@ from ephs.mechanics.solve.collocation import moments, values
 from ephs.mechanics.solve.errors import Outcome, SolveError
 from ephs.mechanics.solve.gauss_kernels import Groups, Scheme, Stages, gauss_advance, linearise
 from ephs.mechanics.solve.model import Model, evaluate_at
-from ephs.mechanics.solve.natural import Chunk, Decided, NaturalState, guessed_efforts, of_status, stored_energies
+from ephs.mechanics.solve.natural import (
+    Chunk,
+    Decided,
+    NaturalState,
+    guessed_efforts,
+    has_choice,
+    of_status,
+    stored_energies,
+)
 from ephs.mechanics.solve.natural_kernels import COMPONENT, DIVERGED, DONE, INCONSISTENT, Memory, Order
 from ephs.mechanics.solve.snapshot import Snapshot, parts
 from ephs.mechanics.solve.sparse import Index, lu_addresses, order
@@ -29,6 +38,8 @@ __all__ = ["Natural4"]
 INSTANT = 1e-7
 """The step, in s, over which derivatives by increments are taken at a stage: so short that it is an instant."""
 
+AS_BEFORE, AT_START, WITHIN = 0, 1, 2
+"""Where the order of elimination of a step was decided: for a step before it, at its start, by its unknowns."""
 
 _STAGES = 3
 _NODES = 0.5 * (1.0 + np.polynomial.legendre.leggauss(_STAGES)[0])
@@ -61,6 +72,7 @@ class Natural4:
         t, n = model.tables, model.unknowns
         self._memory: Memory = model.memory()
         self._groups = _groups(model)
+        self._closing = _closing(model, self._groups)
         self._where = _entries(model)
         size, entries, rates = int(model.descriptor.point_size), int(t.row.size), int(t.counts[0])
         k = _STAGES
@@ -75,7 +87,7 @@ class Natural4:
         self._order: Order | None = None
         self._dropped: Index | None = None
         self._decided: Decided | None = None
-        self._inputs = np.zeros(0)
+        self._inputs, self._tried = np.zeros(0), AS_BEFORE
 
     def init(self, x: Array) -> NaturalState:
         """The state of the method at the states x; unknowns are guessed from the efforts there."""
@@ -118,35 +130,35 @@ class Natural4:
         parts = np.array([model.scal(h * weight) for weight in SCHEME.b])
         done = iterations = 0
         failure: SolveError | None = None
-        fresh = self._order is None
+        tried = AT_START if self._order is None else AS_BEFORE
         while failure is None:
             try:
                 if self._order is None:
-                    self._decide(x, z, h, given)
+                    self._decide(x, z, h, given, tried)
             except SolveError as error:
                 failure = error
                 break
             assert self._order is not None
-            o = self._order._replace(floor=np.zeros_like(self._order.floor)) if fresh else self._order
-            wanted = min(steps - done, 1) if fresh else steps - done
+            o = self._order._replace(floor=np.zeros_like(self._order.floor)) if tried else self._order
+            wanted = min(steps - done, 1) if tried else steps - done
             status, component, taken, spent = gauss_advance(
                 t, self._groups, SCHEME, o, self._where, x, z, previous, scal, still, unit, parts, given, AHEAD,
                 self._memory, self._scratch, sums, wanted, rows[done:], energies[done:], ledgers[done:],
             )  # fmt: skip
             done, iterations = done + taken, iterations + spent
             if status == DONE:
-                fresh = False
+                tried = AS_BEFORE
                 if done >= steps:
                     break
-            elif status >= COMPONENT:
+            elif status >= COMPONENT and (tried == WITHIN or not has_choice(o.dropped, status)):
                 failure = SolveError.of_component(status, model, component)
-            elif fresh and not taken:
+            elif tried == WITHIN:
                 blame = Blame(model, o.dropped[: model.unknowns])
                 failure = blame.contradicted(x, z[-1], h) if status == INCONSISTENT else of_status(status)
                 if status == DIVERGED:
                     failure = blame.diverged(self._scratch.residual, self._scratch.scale)
             else:  # another order, at these values
-                self._order, fresh = None, True
+                self._order, tried = None, tried + 1
         after = NaturalState(x, z, previous, sums)
         return after, Chunk(rows[:done], energies[:done], ledgers[:done], int(iterations), failure)
 
@@ -155,6 +167,7 @@ class Natural4:
         return {
             "decided": parts(self._decided) if self._order is not None else None,
             "inputs": self._inputs,
+            "tried": self._tried,
             "dropped": self._dropped,
             "changes": self.changes,
         }
@@ -164,22 +177,34 @@ class Natural4:
         self._order, found = None, snapshot["decided"]
         if found is not None:
             self._dropped = found["before"]
-            self._decide(found["x"], found["z"], found["h"], snapshot["inputs"])
+            self._decide(found["x"], found["z"], found["h"], snapshot["inputs"], snapshot["tried"])
         self._dropped, self.changes = snapshot["dropped"], snapshot["changes"]
 
-    def _decide(self, x: Array, z: Array, h: float, inputs: Array) -> None:
-        """Rank of the constraints, and an order of elimination for all stages, at these values."""
+    def _decide(self, x: Array, z: Array, h: float, inputs: Array, tried: int) -> None:
+        """Rank of the constraints, and an order of elimination for all stages, at these values.
+
+        Where loops are closed, at the start, equations follow from others that do not in a step that is not solved yet;
+        but some follow there only, such as in alignment.
+        """
         model, t, n = self.model, self.model.tables, self.model.unknowns
         self._decided, self._inputs = Decided(x.copy(), z.copy(), float(h), self._dropped), inputs.copy()
+        self._tried = tried
         status, component, memory = evaluate_at(model, x, z[0], h)
         if status:
             raise SolveError.of_component(status, model, component)
-        dropped = self._dropped = dependent_rows(model, memory.data, self._dropped)
+        values = memory.data
+        if tried == AT_START:
+            status, component, memory = evaluate_at(model, x, z[0], 0.0)
+            if status:
+                raise SolveError.of_component(status, model, component)
+            values = np.where(np.isin(t.row, model.constraint_rows), memory.data, values)
+        dropped = self._dropped = dependent_rows(model, values, self._dropped, self._closing)
         s = self._scratch
         status, component = linearise(
             t,
             self._groups,
             SCHEME,
+            dropped,
             x,
             z,
             model.scal(h),
@@ -255,6 +280,15 @@ def _groups(model: Model) -> Groups:
     table = np.array(rows, dtype=np.int64).reshape(-1, 4)
     number, code, effort, dim = (np.ascontiguousarray(column) for column in table.T)
     return Groups(number, code, effort, dim, np.array(metrics).reshape(-1, 6, 6))
+
+
+def _closing(model: Model, groups: Groups) -> NDArray[np.bool_]:
+    """(rows,) the equations of components whose relation holds over a step."""
+    t, out = model.tables, np.zeros(model.unknowns, dtype=np.bool_)
+    for number in np.unique(groups.component):
+        first = int(t.counts[0] + t.counts[1] + t.multiplier_at[number])
+        out[first : first + int(t.dims[number, 1])] = True
+    return out
 
 
 def _ports(kernel: Kernel, size: int) -> list[tuple[int, Array]]:

@@ -85,3 +85,16 @@ def test_a_heavy_link_leaves_the_rank_of_the_loop_alone(method, heavy, tmp_path)
     angle = crank_angle(masses, 0.4)
     exact = 0.5 * np.linalg.norm(POINTS[1]) * np.array([np.cos(angle), np.sin(angle)])
     assert np.abs(sol.body("b0").position[-1, :2] - exact).max() <= 1e-4
+
+
+@pytest.mark.parametrize("heavy", range(3))
+@pytest.mark.parametrize(("method", "allowed"), [("natural", 1e-4), ("natural4", 1e-9)])
+def test_component_by_component_too(method, allowed, heavy, tmp_path):
+    """At constant steps of 0.01 s, to their errors at equal masses; balances to rounding."""
+    masses = np.ones(3)
+    masses[heavy] = 1e10
+    sol = ephs.simulate(four_bar(masses.tolist(), tmp_path), 0.4, method=method, step=0.01)
+    angle = crank_angle(masses, 0.4)
+    exact = 0.5 * np.linalg.norm(POINTS[1]) * np.array([np.cos(angle), np.sin(angle)])
+    assert np.abs(sol.body("b0").position[-1, :2] - exact).max() <= allowed
+    assert sol.energy_error.max() <= 10.0 * np.sqrt(40) * 10.0 * np.finfo(float).eps
