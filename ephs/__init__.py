@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from ephs.mechanics.solve.findings import AuditError as AuditError
     from ephs.mechanics.solve.findings import AuditWarning as AuditWarning
     from ephs.mechanics.solve.findings import CostWarning as CostWarning
+    from ephs.mechanics.solve.sampled import Sampled as Sampled
     from ephs.mechanics.solve.solution import Solution as Solution
     from ephs.mechanics.sweep.sweep import SweepInterrupted as SweepInterrupted
     from ephs.mechanics.sweep.sweep import sweep as sweep
@@ -89,6 +90,7 @@ _HOMES = {
     "ephs.mechanics.sensitivity": ("fit", "sensitivity"),
     "ephs.mechanics.solve.errors": ("Interrupted", "OptionError", "Outcome", "SimulationError"),
     "ephs.mechanics.solve.events": ("Event",),
+    "ephs.mechanics.solve.sampled": ("Sampled",),
     "ephs.mechanics.solve.findings": ("AuditError", "AuditWarning", "CostWarning"),
     "ephs.mechanics.solve.solution": ("Solution",),
     "ephs.mechanics.sweep.sweep": ("SweepInterrupted", "sweep"),

@@ -8,6 +8,7 @@ import numpy as np
 from ephs.mechanics.solve.errors import OptionError, nearest_of
 from ephs.mechanics.solve.probe import Asked
 from ephs.mechanics.solve.problem import Problem, Signal, State, States
+from ephs.mechanics.solve.sampled import Held
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.errors import AssemblyError
@@ -75,7 +76,9 @@ def asked_of(problem: Problem, inputs: Mapping[str, Any]) -> list[Asked]:
     found: list[Asked] = []
     for name, given in inputs.items():
         values = given.values() if isinstance(given, Mapping) else [given]
-        found += [_asked(problem, str(name), value) for value in values if callable(value)]
+        found += [
+            _asked(problem, str(name), value) for value in values if callable(value) and not isinstance(value, Held)
+        ]
     return found
 
 

@@ -31,6 +31,7 @@ from ephs.mechanics.solve.journal import Journal
 from ephs.mechanics.solve.loop import integrate_stepwise
 from ephs.mechanics.solve.problem import Problem, Signal
 from ephs.mechanics.solve.record import Record
+from ephs.mechanics.solve.sampled import Sampling, holding
 from ephs.mechanics.solve.solution import Solution
 from ephs.mechanics.solve.threads import in_one_thread
 from ephs.mechanics.solve.watching import guarded
@@ -114,8 +115,8 @@ def simulate(
     inputs
         ``{port: {"effort": f}}`` or ``{"flow": f}`` at outer ports; of a scene also ``{"joints.pin": f}``, a
         generalised force on u_r, ``{"bodies.crank": f}``, a wrench in the body frame, and ``{"markers.tip": f}``, a
-        force in world axes; f a constant, f(t), or f(t, state). A tuple of such names has all their numbers in a row.
-        The state is read by path, that of a scene by name too: ``state.joints.pin.rate``; see
+        force in world axes; f a constant, f(t), f(t, state), or `ephs.Sampled`. A tuple of such names has the numbers
+        of all in a row. The state is read by path, that of a scene by name too: ``state.joints.pin.rate``; see
         `ephs.mechanics.views.StateView`.
     jumps
         Ascending times in s at which inputs jump, or a mapping from inputs to such times: steps end there, and go on
@@ -146,6 +147,11 @@ def simulate(
         raise OptionError("form", form, f"one of {', '.join(FORMS)}" + nearest_of(form, FORMS))
     if audit not in POLICIES:
         raise OptionError("audit", audit, f"one of {', '.join(POLICIES)}" + nearest_of(audit, POLICIES))
+    start, end = number_of("t0", t0), number_of("until", until)
+    if not (np.isfinite(start) and np.isfinite(end) and end != start):
+        raise OptionError("until", until, f"a finite time other than t0 = {t0!r} s")
+    given = inputs or {}
+    inputs, held = holding(given, start, end)
     if isinstance(model, Scene):
         if reference is not None:
             raise OptionError("reference", reference, "none: a scene's [world] has its own")
@@ -157,9 +163,6 @@ def simulate(
     _fits(form, chosen_method)
     if form == "folded":
         problem = folded_problem(problem)
-    start, end = number_of("t0", t0), number_of("until", until)
-    if not (np.isfinite(start) and np.isfinite(end) and end != start):
-        raise OptionError("until", until, f"a finite time other than t0 = {t0!r} s")
     if end < start:
         _reversible(problem, end)
     control, unit = control_of(problem, rtol, atol, step, min_step, max_step, max_steps), problem.seconds
@@ -171,15 +174,21 @@ def simulate(
         near = nearest_of(unknown[0], chosen_method.options)
         raise OptionError("options", unknown[0], f"options of {chosen_method.name}: {known}{near}")
     times, watched = times_of(save_at, start, end), events_of(events)
-    declared = jumps_of(jumps, inputs or {}, start, end)
+    declared = np.unique(np.concatenate([jumps_of(jumps, inputs, start, end), *(one.times for one in held)]))
     asked = {
         "until": end, "t0": start, "method": chosen_method.name, "form": form, "rtol": rtol, "atol": atol,
         "step": step, "min_step": min_step, "max_step": max_step, "save_at": times,
-        "options": options, "inputs": inputs, "jumps": jumps, "events": [event.name for event in watched],
+        "options": options, "inputs": given, "jumps": jumps, "events": [event.name for event in watched],
     }  # fmt: skip
+    for one in held:
+        if one.sampled.period < control.least * unit:
+            raise OptionError("min_step", min_step, f"at most the period of {one.name}, {one.sampled.period!r} s")
+    breakpoints = Breakpoints(
+        start / unit, end / unit, declared / unit, asked_of(problem, inputs), [Sampling(one, problem) for one in held]
+    )
     with failing_at(start):
+        breakpoints.enter(start / unit, lambda: problem.initial)
         problem.inputs(start / unit, problem.initial)
-    breakpoints = Breakpoints(start / unit, end / unit, declared / unit, asked_of(problem, inputs or {}))
     seen = breakpoints.of(problem)
     setting = Setting(seen, start / unit, control, dict(options or {}))
     watched, told = seen_from(problem, watched, guarded(progress))

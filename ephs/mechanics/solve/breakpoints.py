@@ -13,6 +13,7 @@ import numpy as np
 
 from ephs.mechanics.solve.probe import Asked, Change, Probe
 from ephs.mechanics.solve.problem import Problem, Signal, State
+from ephs.mechanics.solve.sampled import Sampling
 from ephs.mechanics.solve.snapshot import Snapshot
 from ephs.semantics.bundle import Array
 
@@ -36,9 +37,19 @@ class Breakpoints:
         (n,) ascending times.
     asked
         Functions that are searched for jumps.
+    held
+        Sampled inputs, whose times are among those declared.
     """
 
-    def __init__(self, t0: float, until: float, declared: Array | None = None, asked: Sequence[Asked] = ()) -> None:
+    def __init__(
+        self,
+        t0: float,
+        until: float,
+        declared: Array | None = None,
+        asked: Sequence[Asked] = (),
+        held: Sequence[Sampling] = (),
+    ) -> None:
+        self._held = held
         self._until, self._sign, self._at = until, 1.0 if until > t0 else -1.0, t0
         self.near = NEAR * float(np.spacing(max(abs(t0), abs(until))))
         self._times: list[float] = [] if declared is None else declared.tolist()
@@ -109,8 +120,20 @@ class Breakpoints:
         k = bisect_left(self._times, t - self.near) - 1
         return max(self._times[k], self._until) if k >= 0 else self._until
 
-    def enter(self, t: float, *, split: bool = False) -> None:
-        """A step has ended at a jump; ``split``: it is part of a constant one."""
+    def stand(self, t: float) -> None:
+        """Stand at a time, from where all later jumps are ahead."""
+        self._at = t
+
+    def enter(self, t: float, state: Callable[[], State], *, split: bool = False) -> None:
+        """A step has ended at a jump, in a state; ``split``: it is part of a constant one.
+
+        Raises
+        ------
+        SolveError
+            The function of a sampled input has no value there.
+        """
+        for sampling in self._held:
+            sampling.take(t, self.near, state)
         self._at = t
         self._split += split
         if self._probe is not None:
@@ -125,8 +148,9 @@ class Breakpoints:
         """Statistics: the number of declared jumps, the jumps found, the number of divided steps."""
         if not (self._times or self._found):
             return {}
+        sampled = {"samples": {one.held.name: one.held.count for one in self._held}} if self._held else {}
         found = [{"t": change.end, "input": change.name} for change in self._found]
-        return {"jumps": {"declared": len(self._declared), "found": found, "divided_steps": self._split}}
+        return {"jumps": {"declared": len(self._declared), "found": found, "divided_steps": self._split, **sampled}}
 
     def snapshot(self) -> Snapshot:
         """Snapshot for `restore`."""
@@ -135,6 +159,7 @@ class Breakpoints:
             "times": self._times,
             "found": [[change.name, change.start, change.end] for change in self._found],
             "split": self._split,
+            "held": [one.held.snapshot() for one in self._held],
             "probe": self._probe.snapshot() if self._probe is not None else None,
         }
 
@@ -142,5 +167,7 @@ class Breakpoints:
         """Go on from a snapshot."""
         self._at, self._times, self._split = snapshot["at"], list(snapshot["times"]), snapshot["split"]
         self._found = [Change(*change) for change in snapshot["found"]]
+        for one, found in zip(self._held, snapshot["held"], strict=True):
+            one.held.restore(found)
         if self._probe is not None:
             self._probe.restore(snapshot["probe"])

@@ -278,14 +278,17 @@ class _Run:
         grid, first = self.grid, self.done
         while self.done == first:
             at = self.t
-            end = self.breakpoints.end(at, target - at, lambda: States(self.problem.descriptor.unpack(self.state.x)))
+            end = self.breakpoints.end(at, target - at, self._states)
             whole = end - target >= -1e-9 * grid.h  # a jump at the grid's time, to rounding, divides no step
             jump = end != grid.until and end - target <= 1e-9 * grid.h
             regular = abs(target - at - h) <= 1e-9 * grid.h and whole
             self.take(h if regular else min(end, target) - at, 1, end if jump else target)
             if jump:
                 self.state = started(self.stepper, self.state.x, self.state.sums)
-                self.breakpoints.enter(end, split=not whole)
+                self.breakpoints.enter(end, self._states, split=not whole)
+
+    def _states(self) -> States:
+        return States(self.problem.descriptor.unpack(self.state.x))
 
     def take(self, h: float, count: int, end: float | None) -> None:
         """Some steps of one length; ``end`` is their exact end where the grid would round it."""

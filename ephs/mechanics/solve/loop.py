@@ -198,7 +198,7 @@ class _Run(Generic[S]):
                 raise SolveError(Outcome.MANY, "", f"{control.max_steps}")
             if grid:
                 self.h = grid.time(self.steps - self.breakpoints.split + 1) - abs(self.t - self.t0)
-            end = self.breakpoints.end(self.t, self.h, lambda: self._states(self.stepper.row(self.state)))
+            end = self.breakpoints.end(self.t, self.h, self._here)
             rest = abs(end - self.t)
             if grid and rest - self.h <= 1e-9 * grid.h:
                 self.h, whole = rest, rest - self.h >= -1e-9 * grid.h
@@ -229,7 +229,7 @@ class _Run(Generic[S]):
                 return
             if self.t == end != self.until:
                 self.state = self.stepper.anew(self.state)
-                self.breakpoints.enter(end, split=not whole)
+                self.breakpoints.enter(end, self._here, split=not whole)
 
     def _shrink(self, h: float, cause: SolveError | None) -> None:
         self.rejected += 1
@@ -287,6 +287,9 @@ class _Run(Generic[S]):
     def _states(self, row: Row) -> Mapping[Path, Array]:
         return States(self.problem.descriptor.unpack(row.x))
 
+    def _here(self) -> Mapping[Path, Array]:
+        return self._states(self.stepper.row(self.state))
+
     def stats(self) -> dict[str, Any]:
         """Statistics of the run so far."""
         least = float(self.least) if np.isfinite(self.least) else 0.0
@@ -323,7 +326,7 @@ class _Run(Generic[S]):
             return None
         return trials_of(
             solution, self.bounds.undamped, self.problem, self.stepper, self.bounds.order, self.samples.states,
-            self.sign * step, self.until, self.breakpoints.times,
+            self.sign * step, self.until, self.breakpoints,
         )  # fmt: skip
 
     def _ends(self) -> list[Record]:

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar, final
 
 import numpy as np
 
+from ephs.mechanics.solve.breakpoints import Breakpoints
 from ephs.mechanics.solve.driven import ComponentMethod, advance_driven
 from ephs.mechanics.solve.model import Model, compile_model
 from ephs.mechanics.solve.problem import Problem
@@ -264,7 +265,7 @@ def trials_of(
     samples: Sequence[tuple[float, Any]],
     h: float,
     until: float,
-    jumps: Sequence[float],
+    breakpoints: Breakpoints,
 ) -> Trials | None:
     """Constant steps of a method of an order from states that it was in; a natural method's where ``make`` makes one.
 
@@ -273,6 +274,7 @@ def trials_of(
     problem
         As it is solved; in its unit of time are the samples, the step h, negative backward, ``until`` and the jumps.
     """
+    jumps = breakpoints.times
     seconds, steps = problem.seconds, int(solution.stats["steps"])
     natural = None
     if make is not None:
@@ -287,6 +289,7 @@ def trials_of(
     @lru_cache(len(chosen))
     def tried(k: int, h: float) -> tuple[Tried, Tried, Tried]:
         h = sign * h / seconds
+        breakpoints.stand(chosen[k][0])
         start = stepper.anew(chosen[k][1])
         whole = stepper.step(start, h).end
         half = stepper.step(stepper.anew(start), 0.5 * h).end
