@@ -11,11 +11,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar, final
 
-from ephs.semantics.stage import Evaluator, Integer, Real, Record, Truth, Vector
+from ephs.semantics.stage import Evaluator, Integer, Reached, Real, Record, Truth, Vector
+from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.evaluator import Function
 from ephs.semantics.stage.kinds import Atom, Kind
 from ephs.semantics.stage.memory import Cells, IntegerCells, RealCells
 from ephs.semantics.stage.numbers import Condition, Count, IntegerOperation, Number, Operation, Order
+from ephs.semantics.stage.reaching import Part
 
 __all__ = ["NO_INTEGERS", "Compact", "LaidOut", "Layout", "Survey", "layout_of"]
 
@@ -338,6 +340,9 @@ class Survey(Evaluator):
     def hold(self, entry: int, value: object) -> None:
         """Let a function's own numbers follow a value."""
         self.entries.follows[entry] = self.entries.follows.get(entry, 0) | _bits(value) | self.why
+
+    def _reach(self, function: Reached, parts: list[Part]) -> Integer:
+        raise StageError("unreached", what="a survey of memory")
 
     def _call(self, on: Evaluator, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
         return function(on, *arguments)

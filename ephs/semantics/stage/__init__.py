@@ -18,8 +18,11 @@ from ephs.semantics.stage.numbers import Real as Real
 from ephs.semantics.stage.numbers import Truth as Truth
 from ephs.semantics.stage.plain import PLAIN as PLAIN
 from ephs.semantics.stage.programs import Program as Program
+from ephs.semantics.stage.reaching import Reached as Reached
+from ephs.semantics.stage.reaching import Signature as Signature
 from ephs.semantics.stage.records import Record as Record
 from ephs.semantics.stage.records import Table as Table
+from ephs.semantics.stage.records import function as function
 from ephs.semantics.stage.records import integer as integer
 from ephs.semantics.stage.records import integers as integers
 from ephs.semantics.stage.records import real as real

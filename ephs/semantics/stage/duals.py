@@ -8,6 +8,7 @@ from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.evaluator import Evaluator, Function
 from ephs.semantics.stage.memory import Cells, IntegerCells, RealCells
 from ephs.semantics.stage.numbers import Condition, Integer, Number, Operation, Order, Real, Truth
+from ephs.semantics.stage.reaching import Part, Reached
 
 __all__ = ["Dual", "DualCells", "Duals"]
 
@@ -191,6 +192,9 @@ class Duals(Evaluator):
 
     def _rehearse(self, body: Callable[[], None]) -> None:
         self.base._rehearse(body)
+
+    def _reach(self, function: Reached, parts: list[Part]) -> Integer:
+        raise StageError("unreached", what="a derivative")
 
     def _call(self, on: Evaluator, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
         return self.base._call(on, function, arguments)

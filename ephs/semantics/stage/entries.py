@@ -1,14 +1,16 @@
 """Entry functions of programs: a staged function, the kinds of its arguments, and what may be derived from both."""
 
+import inspect
 from collections.abc import Callable, Iterator
 from functools import wraps
-from inspect import Parameter, Signature, signature
+from inspect import Parameter
 from typing import Any, final
 
 from ephs.semantics.stage.duals import Duals
 from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.evaluator import Evaluator
-from ephs.semantics.stage.kinds import INTEGER, REAL, Atom, Kind, described, dual
+from ephs.semantics.stage.kinds import INTEGER, REAL, Kind, described, dual
+from ephs.semantics.stage.reaching import Atom, Signature
 from ephs.semantics.stage.records import IntegerField, RealField
 from ephs.semantics.stage.unrolled import Unrolled
 
@@ -36,7 +38,7 @@ class Entry:
         }
         self.atoms: list[tuple[str, Atom]] = [(name, atom) for name, kind in self.kinds.items() for atom in kind.atoms]
         """The atoms of all arguments, each with the name of its argument."""
-        names = list(signature(function).parameters)[1:]
+        names = list(inspect.signature(function).parameters)[1:]
         if names != list(kinds):
             raise StageError(
                 "parameters", where=self.name, expected=", ".join(names) or "none", found=", ".join(kinds) or "none"
@@ -46,6 +48,10 @@ class Entry:
     def name(self) -> str:
         """The function's name, for errors."""
         return getattr(self.function, "__qualname__", repr(self.function))
+
+    def signature(self, *, returns: bool = True) -> Signature:
+        """Return how this function is called by its address; `returns`: it returns an integer or a condition."""
+        return Signature(tuple(kind.atoms for kind in self.kinds.values()), returns)
 
     def split(self, arguments: tuple[Any, ...], trail: Callable[[str], tuple[int | None, ...]]) -> list[Any]:
         """Return the atoms of arguments, checked; `trail` says what shape follows that of an argument's numbers."""
@@ -132,7 +138,9 @@ class Entry:
 
         names = [name for name in self.kinds if name not in parts]
         run.__qualname__ = self.name
-        run.__signature__ = Signature([Parameter(name, Parameter.POSITIONAL_OR_KEYWORD) for name in ("on", *names)])
+        run.__signature__ = inspect.Signature(
+            [Parameter(name, Parameter.POSITIONAL_OR_KEYWORD) for name in ("on", *names)]
+        )
         return Entry(run, **{name: self.kinds[name] for name in names})
 
     def _known(self, names: tuple[str, ...]) -> None:

@@ -32,6 +32,9 @@ TEXTS: Final = {
     "over as an argument.",
     "entries": "program {where}: found {found}, expected at least one function, each under a Python name.",
     "machine": "{where}: LLVM refuses the program: {found}",
+    "reached": "{where}: a function that is called by its address takes {expected}, found {found}.",
+    "unreached": "{where}: a function is called by its address with {what}; only machine code and the float run can, "
+    "with numbers and with memory of their own.",
     "undecided": "{where}: {what} depends on a condition that has no single answer {found}; write on.select(…).",
 }
 _HERE: Final = str(Path(__file__).parent)

@@ -8,6 +8,7 @@ from typing import Any, Concatenate, Final, Literal, ParamSpec, TypeAlias, TypeV
 from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.memory import Cells, Held, IntegerCells, RealCells, Variable, Vector
 from ephs.semantics.stage.numbers import Condition, Count, Integer, Number, Real, Truth
+from ephs.semantics.stage.reaching import Argument, Part, Reached, called, parts_of
 
 __all__ = ["FUNCTIONS", "Evaluator", "Function", "Interpreted", "known", "staged"]
 
@@ -86,6 +87,10 @@ class Evaluator(ABC):
     @abstractmethod
     def _call(self, on: "Evaluator", function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
         """Call a function decorated by `staged`, with `on` as its evaluator."""
+
+    @abstractmethod
+    def _reach(self, function: Reached, parts: list[Part]) -> Integer:
+        """Call a function by its address with checked arguments."""
 
     @abstractmethod
     def _constants(self, values: list[Any], whole: bool) -> Cells[Any]:
@@ -213,6 +218,17 @@ class Evaluator(ABC):
         """Call a function as one of its own, as the decorator `staged` does."""
         return self._call(self, function, arguments)
 
+    @final
+    def reach(self, function: Reached, *arguments: Argument) -> Integer:
+        """Call a function by its address; its status, 0 where it returns none.
+
+        Raises
+        ------
+        StageError
+            Arguments are not those of the signature, or this evaluation cannot leave the program.
+        """
+        return self._reach(function, parts_of(function, arguments))
+
 
 def staged(
     function: Callable[Concatenate[Evaluator, Parameters], Value],
@@ -280,6 +296,10 @@ class Interpreted(Evaluator):
     @final
     def _call(self, on: Evaluator, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
         return function(on, *arguments)
+
+    @final
+    def _reach(self, function: Reached, parts: list[Part]) -> Integer:
+        return called(function, parts)
 
 
 def known(*numbers: Real) -> bool:

@@ -2,18 +2,17 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Final, Literal, TypeAlias, cast, final
+from typing import Any, Final, TypeAlias, cast, final
 
 import numpy as np
 
 from ephs.semantics.stage.duals import Dual, DualCells
 from ephs.semantics.stage.memory import ArrayIntegers, ArrayReals, Integers, Matrix, RealCells, Vector
+from ephs.semantics.stage.reaching import Atom
 from ephs.semantics.stage.records import Record, Table
 
-__all__ = ["INTEGER", "REAL", "Atom", "Kind", "described", "dual", "indices", "matrix", "table", "vector"]
+__all__ = ["INTEGER", "REAL", "Kind", "described", "dual", "indices", "matrix", "table", "vector"]
 
-Atom: TypeAlias = Literal["reals", "integers", "real", "integer"]
-"""What an argument is made of: an array of floats or of integers, a float, an integer."""
 Shape: TypeAlias = tuple[int | None, ...]
 """A shape, None where any size will do."""
 

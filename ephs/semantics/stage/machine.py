@@ -14,6 +14,7 @@ from ephs.semantics.stage.evaluator import Evaluator, Function, known
 from ephs.semantics.stage.memory import Cells, IntegerCells, RealCells, Variable
 from ephs.semantics.stage.numbers import Condition, Integer, Real, Truth
 from ephs.semantics.stage.plain import elementary
+from ephs.semantics.stage.reaching import Part, Reached
 from ephs.semantics.stage.records import Record
 
 __all__ = ["Machine"]
@@ -290,6 +291,28 @@ class Machine(Evaluator):
         if not emitted.returns.startswith("{"):
             return _shaped(to, emitted.form, iter((value,)))
         return _shaped(to, emitted.form, (to.let(f"extractvalue {emitted.returns} {value}, {k}") for k in range(10**9)))
+
+    def _reach(self, function: Reached, parts: list[Part]) -> Integer:
+        to = self.to
+        if self.width > 1:
+            raise StageError("unreached", what="several members")
+        operands: list[str] = []
+        for atom, value in parts:
+            if atom == "real":
+                operands.append(f"double {to.of_real(value)}")
+            elif atom == "integer":
+                operands.append(f"i64 {to.of_integer(value)}")
+            else:
+                cells, start = value
+                if not isinstance(cells, RealPointer | IntegerPointer):
+                    raise StageError("unreached", what=type(cells).__name__)
+                to.own(cells.writer)
+                operands.append(f"ptr {to.let(f'getelementptr i64, ptr {cells.name}, i64 {to.of_integer(start)}')}")
+        pointer = to.let(f"inttoptr i64 {to.of_integer(function.address)} to ptr")
+        if function.signature.returns:
+            return WholeSymbol(to, to.let(f"call i64 {pointer}({', '.join(operands)})"))
+        to.do(f"call void {pointer}({', '.join(operands)})")
+        return 0
 
     def _emit(self, on: Evaluator, function: Callable[..., Any], form: Any, kinds: list[str]) -> _Emitted:
         name = f"{function.__name__}.{len(self._emitted)}"

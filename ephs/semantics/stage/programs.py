@@ -13,11 +13,11 @@ from ephs.semantics.stage.calling import Call, apart
 from ephs.semantics.stage.emission import IntegerPointer, RealPointer, Symbol, TruthSymbol, WholeSymbol, Writer
 from ephs.semantics.stage.entries import Entry
 from ephs.semantics.stage.errors import StageError
-from ephs.semantics.stage.kinds import Atom
 from ephs.semantics.stage.machine import Machine
 from ephs.semantics.stage.memory import ArrayIntegers, ArrayReals
 from ephs.semantics.stage.objects import compiled
 from ephs.semantics.stage.plain import PLAIN
+from ephs.semantics.stage.reaching import Atom
 
 __all__ = ["Program"]
 

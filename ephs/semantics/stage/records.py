@@ -10,8 +10,10 @@ import numpy as np
 from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.memory import ArrayIntegers, ArrayReals, IntegerCells, RealCells, inside
 from ephs.semantics.stage.numbers import Integer, Real
+from ephs.semantics.stage.reaching import Reached, Signature
 
 __all__ = [
+    "FunctionField",
     "IntegerField",
     "IntegersField",
     "MatrixField",
@@ -19,6 +21,7 @@ __all__ = [
     "Record",
     "Table",
     "VectorField",
+    "function",
     "integer",
     "integers",
     "real",
@@ -94,6 +97,27 @@ class IntegerField(_Field):
 
 
 @final
+class FunctionField(_Field):
+    """A function of a record: its address, an integer, with a signature that is known while staging."""
+
+    __slots__ = ("signature",)
+
+    def __init__(self, signature: Signature) -> None:
+        super().__init__(())
+        self.signature = signature
+
+    @overload
+    def __get__(self, row: None, owner: type) -> Self: ...
+    @overload
+    def __get__(self, row: "Record", owner: type) -> Reached: ...
+    def __get__(self, row: "Record | None", owner: type) -> "Self | Reached":
+        return self if row is None else Reached(self.signature, row.integers.load(row.integer_start + self.offset))
+
+    def __set__(self, row: "Record", value: Integer) -> None:
+        row.integers.store(row.integer_start + self.offset, value)
+
+
+@final
 class IntegersField(_Field):
     """Integers of a record."""
 
@@ -151,6 +175,11 @@ def integer() -> IntegerField:
     return IntegerField(())
 
 
+def function(signature: Signature) -> FunctionField:
+    """Declare a function of a record: set its address, and call what is read by `Evaluator.reach`."""
+    return FunctionField(signature)
+
+
 def integers(size: int) -> IntegersField:
     """Declare integers of a record."""
     return IntegersField((size,))
@@ -185,7 +214,7 @@ class Record:
     def __init_subclass__(cls) -> None:
         cls.integer_width = cls.real_width = 0
         for field in (field for field in vars(cls).values() if isinstance(field, _Field)):
-            if isinstance(field, IntegerField | IntegersField):
+            if isinstance(field, IntegerField | IntegersField | FunctionField):
                 field.offset, cls.integer_width = cls.integer_width, cls.integer_width + prod(field.shape)
             else:
                 field.offset, cls.real_width = cls.real_width, cls.real_width + prod(field.shape)

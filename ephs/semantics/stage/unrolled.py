@@ -14,6 +14,7 @@ from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.evaluator import Evaluator, Function
 from ephs.semantics.stage.memory import Cells, IntegerCells, RealCells
 from ephs.semantics.stage.numbers import Condition, Count, Integer, Real, Truth
+from ephs.semantics.stage.reaching import Part, Reached
 
 __all__ = ["Local", "Unrolled"]
 
@@ -238,3 +239,24 @@ class Unrolled(Evaluator):
 
     def _call(self, on: Evaluator, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
         return function(on, *arguments)
+
+    def _reach(self, function: Reached, parts: list[Part]) -> Integer:
+        """Call with what lives in registers copied to memory, and back."""
+        copies: dict[Local, Cells[Any]] = {}
+        passed: list[Part] = []
+        for atom, value in parts:
+            cells, start = cast("tuple[Any, Integer]", value) if atom in ("reals", "integers") else (value, 0)
+            if not isinstance(cells, Local):
+                passed.append((atom, value))
+                continue
+            if cells not in copies:
+                size = len(cells.entries)
+                copies[cells] = self.base._wholes(size) if cells.whole else self.base._reals(size)
+                for place, entry in enumerate(cells.entries):
+                    copies[cells].store(place, entry)
+            passed.append((atom, (copies[cells], start)))
+        found = self.base._reach(function, passed)
+        for local, cells in copies.items():
+            for place in range(len(local.entries)):
+                local.store(place, cells.load(place))
+        return found
