@@ -1,7 +1,7 @@
-"""Inputs as signals: constants, functions of time, functions of time and state."""
+"""Inputs as signals: constants, functions of time, functions of time and state; times as users give them."""
 
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,9 +13,12 @@ from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.errors import AssemblyError
 
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
 View = Callable[[State], Mapping[Path, Array]]
 
-__all__ = ["View", "asked_of", "jumps_of", "numbers_of", "signal", "takes_state"]
+__all__ = ["View", "asked_of", "jumps_of", "numbers_of", "signal", "takes_state", "times_of"]
 
 
 def signal(value: Any, *, effort: bool, name: str, size: int | None, view: View = States) -> Signal:
@@ -68,6 +71,30 @@ def jumps_of(jumps: Any, names: Iterable[str], t0: float, until: float) -> Array
         raise OptionError("jumps", jumps, "ascending times in s")
     if times.size and not (first <= times[0] and times[-1] <= last):
         raise OptionError("jumps", jumps, f"times in [{first!r}, {last!r}] s")
+    return times
+
+
+def times_of(save_at: "ArrayLike | None", t0: float, until: float) -> Array | None:
+    """The times to keep, None: every step.
+
+    Raises
+    ------
+    OptionError
+        They are not in order, or not within the run.
+    """
+    if save_at is None:
+        return None
+    times = numbers_of(save_at)
+    forward = until > t0
+    if (
+        times is None
+        or times.ndim != 1
+        or not np.all(np.isfinite(times))
+        or np.any(np.diff(times if forward else -times) <= 0.0)
+    ):
+        raise OptionError("save_at", save_at, "ascending times in s" if forward else "descending times in s")
+    if times.size and not (min(t0, until) <= times.min() and times.max() <= max(t0, until)):
+        raise OptionError("save_at", save_at, f"times in [{min(t0, until)!r}, {max(t0, until)!r}] s")
     return times
 
 

@@ -19,7 +19,7 @@ from ephs.mechanics.redundancy import explain
 from ephs.mechanics.scene.document import scene_to_text
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.state import Snapshot
-from ephs.mechanics.signals import asked_of, jumps_of, numbers_of, signal
+from ephs.mechanics.signals import asked_of, jumps_of, signal, times_of
 from ephs.mechanics.solve.audit import Bounds
 from ephs.mechanics.solve.breakpoints import Breakpoints
 from ephs.mechanics.solve.control import Control, Tolerance, told_apart
@@ -38,7 +38,7 @@ from ephs.mechanics.solve.watching import guarded
 from ephs.mechanics.views import Names
 from ephs.operad import Path
 from ephs.semantics import extents
-from ephs.semantics.bundle import Array, Reference
+from ephs.semantics.bundle import Reference
 from ephs.semantics.checks import random_efforts
 from ephs.semantics.errors import AssemblyError
 from ephs.semantics.primitives import Irreversible
@@ -47,7 +47,7 @@ from ephs.semantics.system import System
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-__all__ = ["control_of", "problem_of_scene", "problem_of_system", "simulate", "times_of"]
+__all__ = ["control_of", "problem_of_scene", "problem_of_system", "simulate"]
 
 OPEN = 1e-6
 """m or rad by which given initial states may leave a joint open."""
@@ -383,27 +383,3 @@ def _on_joints(problem: Problem) -> None:
             off = float(np.abs(value - given).max()) / max(1.0, float(np.abs(given).max()))
             if off > OFF:
                 raise AssemblyError("off-joint", path, found=off)
-
-
-def times_of(save_at: "ArrayLike | None", t0: float, until: float) -> Array | None:
-    """The times to keep, None: every step.
-
-    Raises
-    ------
-    OptionError
-        They are not in order, or not within the run.
-    """
-    if save_at is None:
-        return None
-    times = numbers_of(save_at)
-    forward = until > t0
-    if (
-        times is None
-        or times.ndim != 1
-        or not np.all(np.isfinite(times))
-        or np.any(np.diff(times if forward else -times) <= 0.0)
-    ):
-        raise OptionError("save_at", save_at, "ascending times in s" if forward else "descending times in s")
-    if times.size and not (min(t0, until) <= times.min() and times.max() <= max(t0, until)):
-        raise OptionError("save_at", save_at, f"times in [{min(t0, until)!r}, {max(t0, until)!r}] s")
-    return times

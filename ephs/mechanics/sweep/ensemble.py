@@ -25,7 +25,8 @@ from ephs.mechanics.reduced.explicit import Explicit
 from ephs.mechanics.reduced.tables import TREE
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.parameters import varied
-from ephs.mechanics.simulate import control_of, problem_of_scene, times_of
+from ephs.mechanics.signals import times_of
+from ephs.mechanics.simulate import control_of, problem_of_scene
 from ephs.mechanics.solve.control import first_step
 from ephs.mechanics.solve.stepping import Span
 from ephs.mechanics.sweep.axes import Axes

@@ -11,7 +11,7 @@ import numpy as np
 
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.parameters import read
-from ephs.mechanics.simulate import times_of
+from ephs.mechanics.signals import times_of
 from ephs.mechanics.solve.errors import OptionError
 from ephs.mechanics.solve.sparse import Index
 from ephs.mechanics.sweep.axes import Axes
