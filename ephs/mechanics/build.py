@@ -1,6 +1,6 @@
 """Scenes as hierarchical systems.
 
-Boxes are ``bodies.NAME``, ``joints.NAME``, ``springs.NAME``, ``thermal.NAME``, ``conduction.NAME``, ``parts.NAME``,
+Boxes are ``bodies.NAME``, ``joints.NAME``, ``springs.NAME``, ``contacts.NAME``, ``thermal.NAME``, ``conduction.NAME``, ``parts.NAME``,
 ``ground`` and ``environment``; they meet at the junctions ``momenta.BODY`` and ``entropies.NODE``. A driven joint's
 momentum is the outer port ``drives.JOINT``. What a part exposes is joined at ``momenta.PART.BODY`` and so on; a part's
 name is not taken by anything else of its level, so these never clash.
@@ -14,8 +14,11 @@ import numpy as np
 
 from ephs.mechanics import components
 from ephs.mechanics.bodies import rigid_body
+from ephs.mechanics.elements.contact import contact
 from ephs.mechanics.joints import joint, spring_damper, universal_joint
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Body, Joint, Scene, Spring
+from ephs.mechanics.scene.surfaces import Contact, Surface
+from ephs.mechanics.shapes.pairs import Touch, touches
 from ephs.operad import Path, Pattern, Quantity, junction, quantity
 from ephs.semantics import library
 from ephs.semantics.bundle import Array
@@ -25,6 +28,7 @@ from ephs.semantics.system import Filling, System
 
 __all__ = [
     "component_path",
+    "contact_points",
     "drive_ports",
     "initial_state",
     "scene_inputs",
@@ -84,14 +88,18 @@ def initial_state(scene: Scene) -> dict[Path, Array]:
             out[place / "pe" / "q_r"] = value
             if j.heat == ENVIRONMENT:
                 out[place / "env" / "s"] = np.zeros(1)
-    for name, spring in scene.all_springs():
-        at = component_path("springs", name)
-        first, second = (
-            SE3.compose(poses[body], np.concatenate([[1.0, 0.0, 0.0, 0.0], point]))
-            for body, point in ((spring.body1, spring.at1), (spring.body2, spring.at2))
-        )
+    between = [
+        (component_path("springs", name), (s.body1, s.body2), (_point(s.at1), _point(s.at2)), s.heat)
+        for name, s in scene.all_springs()
+    ]
+    for name, c in scene.all_contacts():
+        bodies, touches = contact_points(scene, c)
+        at = component_path("contacts", name)
+        between += [(at / f"point{i}", bodies, (one, two), c.heat) for i, (one, two, _) in enumerate(touches)]
+    for at, bodies, frames, heat in between:
+        first, second = (SE3.compose(poses[body], frame) for body, frame in zip(bodies, frames, strict=True))
         out[at / "pe" / "q_r"] = SE3.normalise(SE3.compose(SE3.inverse(first), second))
-        if spring.heat == ENVIRONMENT:
+        if heat == ENVIRONMENT:
             out[at / "env" / "s"] = np.zeros(1)
     for name, _ in scene.all_thermal():
         out[component_path("thermal", name) / "s"] = np.zeros(1)
@@ -99,6 +107,18 @@ def initial_state(scene: Scene) -> dict[Path, Array]:
         if _needs_environment(part):
             out[prefix / "environment" / "s"] = np.zeros(1)
     return out
+
+
+def _point(at: Array) -> Array:
+    return np.concatenate([[1.0, 0.0, 0.0, 0.0], at])
+
+
+def contact_points(scene: Scene, of: Contact) -> tuple[tuple[str, str], tuple[Touch, ...]]:
+    """Bodies 1 and 2 of a contact, and its gaps with their frames on these."""
+    surfaces: Mapping[str, Surface] = dict(scene.all_surfaces())
+    one, other = (surfaces[name] for name in of.surfaces)
+    points, swapped = touches(one.shape, one.frame, other.shape, other.frame)
+    return ((other.body, one.body) if swapped else (one.body, other.body)), points
 
 
 def scene_inputs(scene: Scene) -> dict[Path, Input]:
@@ -204,6 +224,12 @@ def _level(scene: Scene, demands: _Demands, *, top: bool) -> System:
         if s.heat != ENVIRONMENT:
             ports["s"] = b.entropy(s.heat)
         b.add(Path(["springs", name]), _spring(s), ports)
+    for name, c in scene.contacts.items():
+        ends, points = contact_points(scene, c)
+        ports = {"p1": b.momentum(ends[0]), "p2": b.momentum(ends[1])}
+        if c.heat != ENVIRONMENT:
+            ports["s"] = b.entropy(c.heat)
+        b.add(Path(["contacts", name]), contact(points, c.law, heat=c.heat != ENVIRONMENT), ports)
     for name, node in scene.thermal.items():
         filling = components.thermal_node(node.capacity, node.temperature)
         b.add(Path(["thermal", name]), filling, {"s": b.entropy(name)})
@@ -237,14 +263,22 @@ def _joined(b: _Builder, part: str, port: Path, of: Quantity) -> str:
 def _demands_on_parts(scene: Scene, demands: _Demands) -> _Demands:
     """What the level above and this level's own joints, springs and conductions want of its parts."""
     pairs = [*scene.joints.values(), *scene.springs.values()]
-    bodies = {name for x in pairs for name in (x.body1, x.body2)}
-    nodes = {x.heat for x in pairs} | {name for c in scene.conduction.values() for name in c.between}
+    bodies = {name for x in pairs for name in (x.body1, x.body2)} | _touching(scene)
+    nodes = {x.heat for x in (*pairs, *scene.contacts.values())} | {name for c in scene.conduction.values() for name in c.between}
     return _Demands(demands.bodies | bodies, demands.nodes | nodes, demands.joints)
 
 
 def _uses_ground(scene: Scene) -> bool:
     mine = [*scene.joints.values(), *scene.springs.values()]
+    if GROUND in _touching(scene):
+        return True
     return any(GROUND in (x.body1, x.body2) for x in mine) or any(map(_uses_ground, scene.parts.values()))
+
+
+def _touching(scene: Scene) -> set[str]:
+    """The bodies of this level's own contacts, as seen from it."""
+    surfaces = dict(scene.all_surfaces())
+    return {surfaces[name].body for c in scene.contacts.values() for name in c.surfaces}
 
 
 def _body(body: Body, gravity: Array) -> System:

@@ -18,7 +18,7 @@ from ephs.semantics.system import System
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-__all__ = ["joint", "joint_pattern", "mbs_pattern", "spring_damper", "universal_joint"]
+__all__ = ["between_frames", "joint", "joint_pattern", "mbs_pattern", "spring_damper", "universal_joint"]
 
 Friction = Callable[[Array, Array, float], Array]
 
@@ -147,11 +147,24 @@ def spring_damper(
     stiffness, length, damping
         k in N/m, L in m of ½ k (distance − L)², c in N s/m.
     """
-    free = pair("free")
-    spring = springs.point_spring(stiffness, length)
-    damper = springs.point_damper(damping) if damping else components.joint_friction(free, np.zeros((6, 6)))
+    damper = springs.point_damper(damping) if damping else components.joint_friction(pair("free"), np.zeros((6, 6)))
     frames = [np.concatenate([[1.0, 0.0, 0.0, 0.0], np.asarray(at, dtype=float)]) for at in (at1, at2)]
-    return _joint(free, frames[0], frames[1], spring, damper, heat, False)
+    return between_frames(*frames, springs.point_spring(stiffness, length), damper, heat=heat)
+
+
+def between_frames(
+    frame1: Array, frame2: Array, energy: Storage, loss: Irreversible, *, heat: bool = False
+) -> System:
+    """Energy and loss of the relative pose of two frames: a free joint with this storage and this friction.
+
+    Parameters
+    ----------
+    frame1, frame2
+        (7,) poses in bodies 1 and 2.
+    energy, loss
+        Ports q_r, and p_r, s and perhaps q_r, of the free pair.
+    """
+    return _joint(pair("free"), frame1, frame2, energy, loss, heat, False)
 
 
 def universal_joint(

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from ephs.semantics.primitives import Irreversible, Point, Primitive, Reversible, Storage
 
 __all__ = [
+    "MIRRORED",
     "NEARER",
     "STATEMENTS",
     "check_at",
@@ -48,6 +49,8 @@ STATEMENTS: dict[str, tuple[str, ...]] = {
     ),
 }  # fmt: skip
 """Conditions by the kind of primitive."""
+MIRRORED = STATEMENTS["irreversible"][4]
+"""Condition that is not asked of what is one-sided."""
 
 
 def random_point(
@@ -294,7 +297,7 @@ def _check_irreversible(irreversible: "Irreversible", trial: Trial) -> None:
     mirrored = irreversible.matrix(_reversed(bundle, x), parity * e, reference)
     there = weight[:, None] * (parity[:, None] * mirrored * parity) * weight
     found = float(np.abs(there - even).max(initial=0.0)) if _finite(mirrored) else 0.0
-    if not found <= TOLERANCE * scale:
+    if not irreversible.one_sided and not found <= TOLERANCE * scale:
         raise _fail("parity", irreversible, trial, found)
     for port, opposite in _opposite(bundle, x):
         other = weight[:, None] * irreversible.matrix({**x, port: opposite}, e, reference) * weight

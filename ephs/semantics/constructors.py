@@ -208,7 +208,12 @@ def constraint(
 
 
 def irreversible(
-    ports: Ports, matrix: Callable[..., Any], *, domain: Bounds | None = None, name: str = "irreversible"
+    ports: Ports,
+    matrix: Callable[..., Any],
+    *,
+    domain: Bounds | None = None,
+    one_sided: bool = False,
+    name: str = "irreversible",
 ) -> Irreversible:
     """Irreversible f = M e / θ₀ with M symmetric, non-negative and without effect on energy, M eᴱ = 0.
 
@@ -221,6 +226,8 @@ def irreversible(
         absolute temperature at an entropy port, of −π at a volume port) and of the read states, by port name.
     domain
         Of energy efforts and read states by port name, as of a `storage`.
+    one_sided
+        M depends on the direction of the flow, as of a valve or a diode: it need not be even under time reversal.
 
     Examples
     --------
@@ -248,7 +255,16 @@ def irreversible(
 
     formula = Formula(matrix)
     kernel = _kernel(interface, formula, None, bounds)
-    return Irreversible(name, interface, evaluate, _reads(interface), kernel=kernel, formula=formula, domain=bounds)
+    return Irreversible(
+        name,
+        interface,
+        evaluate,
+        _reads(interface),
+        kernel=kernel,
+        formula=formula,
+        domain=bounds,
+        one_sided=one_sided,
+    )
 
 
 def reversible(

@@ -291,6 +291,9 @@ class Irreversible:
         M (n, n) in the units of θ₀·f/e, from (states of ``reads``, e (n,), reference).
     domain, proof, trusted
         As of a `Storage`; of an irreversible process a domain may bound energy efforts, too.
+    one_sided
+        Whether M depends on the direction of the flow, as of valves, diodes and contacts, which push only: then its
+        parity under time reversal is not asked for.
     """
 
     name: str
@@ -304,6 +307,7 @@ class Irreversible:
     domain: Domain = ()
     proof: Proof | None = field(default=None, compare=False, repr=False)
     trusted: bool = field(default=False, compare=False, repr=False)
+    one_sided: bool = field(default=False, compare=False, repr=False)
     _verdict: StructureVerdict | None = field(default=None, init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:

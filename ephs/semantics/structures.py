@@ -132,6 +132,7 @@ def dissipation(
     formula: Formula | None = None,
     shown: Proof | None = None,
     trusted: bool = False,
+    one_sided: bool = False,
 ) -> Irreversible:
     """Dissipation of a port's power into heat: p.f = μ u, s.f = −⟨u|μ u⟩/θ, with u = p.e and θ = θ₀ + s.e.
 
@@ -145,6 +146,8 @@ def dissipation(
         μ (d, d), symmetric and non-negative; or a function of (states read, u, θ).
     shown
         Proves the conditions where μ is a function.
+    one_sided
+        As of an `Irreversible`.
     """
     power, heat, *_ = (str(port) for port in interface)
     states = [str(port) for port in interface if not interface[port].power]
@@ -158,9 +161,8 @@ def dissipation(
     if not callable(resistance):
         mu = np.asarray(resistance, dtype=float)
         proof = lambda: dissipation_proof(interface, mu)  # noqa: E731 - beside the one that is given
-    return dissipated(
-        name, interface, matrix, {}, parameters, "dissipation", formula=formula, proof=proof, trusted=trusted
-    )
+    said: dict[str, Any] = {"formula": formula, "proof": proof, "trusted": trusted, "one_sided": one_sided}
+    return dissipated(name, interface, matrix, {}, parameters, "dissipation", **said)
 
 
 def onsager(mu: Any, u: Any, theta: Any) -> Any:

@@ -85,12 +85,21 @@ def examine(primitive: "Primitive") -> StructureVerdict:
     """
     from ephs.semantics.search import COUNT, search
 
-    conditions = _proofs(primitive)
+    conditions = _asked(primitive, _proofs(primitive))
     if all(each.proved for each in conditions):
         return StructureVerdict(conditions)
     tried = search(primitive, COUNT)
     how = f"none of {tried} states and efforts contradicts it"
     return StructureVerdict(each if each.proved else Condition(each.statement, False, how) for each in conditions)
+
+
+def _asked(primitive: "Primitive", conditions: tuple[Condition, ...]) -> tuple[Condition, ...]:
+    """The conditions without that on parity where the primitive is one-sided."""
+    from ephs.semantics.checks import MIRRORED
+
+    if primitive.kind != "irreversible" or not primitive.one_sided:
+        return conditions
+    return tuple(each for each in conditions if each.statement != MIRRORED)
 
 
 def _proofs(primitive: "Primitive") -> tuple[Condition, ...]:

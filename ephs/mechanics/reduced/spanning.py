@@ -8,7 +8,7 @@ from typing import final
 import networkx as nx
 import numpy as np
 
-from ephs.mechanics.build import component_path
+from ephs.mechanics.build import component_path, contact_points
 from ephs.mechanics.reduction.subgroup import generated
 from ephs.mechanics.scene.model import IDENTITY_POSE, Scene
 from ephs.operad import Path
@@ -156,13 +156,19 @@ def spanning_tree(joints: list[Edge], masses: list[float]) -> tuple[list[tuple[E
 
 
 def springs_of(scene: Scene, number: Mapping[str, int]) -> list[Edge]:
-    """Springs between points, as edges with all freedoms."""
+    """Springs between points and contacts, as edges with all freedoms."""
     out: list[Edge] = []
     for name, s in scene.all_springs():
         frames = [np.concatenate([[1.0, 0.0, 0.0, 0.0], np.asarray(at, dtype=float)]) for at in (s.at1, s.at2)]
         path, ends = component_path("springs", name), (number[s.body1], number[s.body2])
         one, two = frames
         out.append(Edge(name, path, *ends, one, two, FREE, None, SE3.identity(), slice(0, 6)))
+    for name, c in scene.all_contacts():
+        bodies, points = contact_points(scene, c)
+        ends = number[bodies[0]], number[bodies[1]]
+        for i, (one, two, _) in enumerate(points):
+            path = component_path("contacts", name) / f"point{i}"
+            out.append(Edge(name, path, *ends, one, two, FREE, None, SE3.identity(), slice(0, 6)))
     return out
 
 

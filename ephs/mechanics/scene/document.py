@@ -19,6 +19,8 @@ from ephs.mechanics.scene.model import (
     World,
     frozen,
 )
+from ephs.mechanics.scene.surfaces import Contact, Surface
+from ephs.mechanics.shapes.law import Law
 
 __all__ = ["scene_from_text", "scene_to_text"]
 
@@ -28,6 +30,7 @@ _ARRAYS = {
     Joint: {"frame1", "frame2", "friction", "stiffness", "rest", "drive", "coordinate", "rate", "middle"},
     Spring: {"at1", "at2"},
     Marker: {"at"},
+    Surface: {"frame"},
 }
 _PARTS = {
     "bodies": Body,
@@ -36,6 +39,8 @@ _PARTS = {
     "thermal": ThermalNode,
     "conduction": Conduction,
     "markers": Marker,
+    "surfaces": Surface,
+    "contacts": Contact,
     "parts": Scene,
 }
 
@@ -77,11 +82,16 @@ def _value(cls: Any, data: dict[str, Any]) -> Any:
 def _scene(data: dict[str, Any]) -> Scene:
     given = dict(data)
     for key, cls in _PARTS.items():
-        entries: dict[str, Any] = given.get(key, {})  # files of before there were markers have none
+        entries: dict[str, Any] = given.get(key, {})  # older files lack some
         if cls is Body:
             entries = {name: entry | {"shapes": tuple(entry.get("shapes", ()))} for name, entry in entries.items()}
         if cls is Conduction:
             entries = {name: entry | {"between": tuple(entry["between"])} for name, entry in entries.items()}
+        if cls is Contact:
+            entries = {
+                name: entry | {"surfaces": tuple(entry["surfaces"]), "law": Law(**entry["law"])}
+                for name, entry in entries.items()
+            }
         make = _scene if cls is Scene else lambda entry, cls=cls: _value(cls, entry)
         given[key] = {name: make(entry) for name, entry in entries.items()}
     given["world"] = _value(World, given["world"])

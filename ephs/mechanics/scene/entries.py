@@ -7,7 +7,7 @@ remembered as spoiled, so that the checks after this one can look at the rest of
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Generic, TypeVar, final
+from typing import Any, Generic, TypeVar, final, get_args
 
 from pydantic import ValidationError
 
@@ -17,10 +17,8 @@ from ephs.mechanics.scene.schema import (
     SECTIONS,
     AssemblyEntry,
     Entry,
-    FrameEntry,
-    MotionEntry,
     SceneFile,
-    ShapeEntry,
+    SurfaceShapeEntry,
     WorldEntry,
 )
 
@@ -41,14 +39,8 @@ _NEUTRAL: dict[str, Any] = {
     "conductance": 0.0,
     "use": "?",
     "body": "ground",
-}
-
-_NESTED: dict[str, type[Entry]] = {
-    "shape": ShapeEntry,
-    "shapes": ShapeEntry,
-    "frame1": FrameEntry,
-    "frame2": FrameEntry,
-    "motion": MotionEntry,
+    "shape": SurfaceShapeEntry(),
+    "surfaces": ["?", "?"],
 }
 
 _EXPECTED: dict[str, Callable[[Mapping[str, Any]], tuple[str, str]]] = {
@@ -164,7 +156,7 @@ def _translate(model: type[Entry], key: str, item: Any) -> Fault:
     """One of pydantic's errors in this project's words."""
     code, location, context = item["type"], item["loc"], item.get("ctx", {})
     path = key + "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location)
-    owner = _NESTED.get(str(location[0]), model) if len(location) > 1 else model
+    owner = _nested(model, str(location[0])) if len(location) > 1 else model
     if code == "extra_forbidden":
         return _unknown_key(path, str(location[-1]), list(owner.model_fields))
     if code == "missing":
@@ -182,6 +174,17 @@ def _translate(model: type[Entry], key: str, item: Any) -> Fault:
         text, what = _EXPECTED[code](context)
         return fault(text, path, found, what=what)
     return fault("type", path, found, what=item["msg"])
+
+
+def _nested(model: type[Entry], key: str) -> type[Entry]:
+    """The table that a key of a table holds, itself where there is none."""
+    kinds: list[Any] = [model.model_fields[key].annotation]
+    while kinds:
+        kind = kinds.pop()
+        if isinstance(kind, type) and issubclass(kind, Entry):
+            return kind
+        kinds += get_args(kind)
+    return model
 
 
 def _unknown_key(path: str, key: str, known: list[str]) -> Fault:

@@ -21,6 +21,7 @@ from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Scene, World
 from ephs.mechanics.scene.moving import moved, spring_length
 from ephs.mechanics.scene.state import Asked, adjusted
 from ephs.mechanics.scene.text import file_text
+from ephs.mechanics.scene.touching import Laws, resolve_contacts, resolve_surfaces
 from ephs.operad import Path as Name
 from ephs.operad import PatternError
 from ephs.semantics.spaces.rank import ASSEMBLY
@@ -54,6 +55,7 @@ class _Reading:
     odd: list[Fault] = field(default_factory=list)
     left: list[str] = field(default_factory=list)
     asked: dict[str, Asked] = field(default_factory=dict)
+    laws: dict[str, Laws] = field(default_factory=dict)
 
 
 def load(path: str | PathLike[str], base: str = "fixed", adjust: bool = False, inertia: str | None = None) -> Scene:
@@ -117,6 +119,7 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
     springs = {n: resolve.resolve_spring(n, t, names, faults) for n, t in sections["springs"].items()}
     conduction = resolve.resolve_conduction(document, names, faults)
     markers = resolve.resolve_markers(document, names, faults)
+    surfaces = resolve_surfaces(document, names, faults)
     if faults:
         return None
     drafts = [j for j in joints if j is not None]
@@ -133,7 +136,14 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
         parts,
         str(path),
         markers=markers,
+        surfaces=surfaces,
     )
+    contacts, laws = resolve_contacts(document, scene, r.laws, names, faults)
+    if faults:
+        return None
+    scene = replace(scene, contacts=contacts)
+    r.laws.clear()
+    r.laws[""] = laws
     if r.adjust:
         scene, open_joints = adjusted(scene, r.asked)
     faults += open_joints
@@ -213,12 +223,13 @@ def _parts(
             chain = " → ".join(p.name for p in (*stack[stack.index(file.resolve()) :], file))
             faults.append(fault("cycle", f"{key}.use", shown(entry.use), chain=chain))
             continue
-        below = replace(r, faults=[], odd=[], left=[], asked={})
+        below = replace(r, faults=[], odd=[], left=[], asked={}, laws={})
         part = _read(file, world, stack, below)
         faults += [_seen_from_outside(f, key, entry.use) for f in below.faults]
         r.odd.extend(_seen_from_outside(f, key, entry.use) for f in below.odd)
         r.left.extend(f"{legible(key)}: {line}" for line in below.left)
         r.asked.update({f"{name}.{joint}": asked for joint, asked in below.asked.items()})
+        r.laws[name] = below.laws.get("", {})
         if part is not None:
             found[name] = moved(part, np.array(pose), world)
     return found, set(document.sections["parts"]) - set(found)

@@ -12,11 +12,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ephs.mechanics.scene.adjustment import Adjustment
+from ephs.mechanics.scene.surfaces import Contact, Surface
 
 if TYPE_CHECKING:
     from ephs.semantics import System
 
 T = TypeVar("T")
+J = TypeVar("J", "Joint", "Spring")
 Array = NDArray[np.float64]
 
 GROUND = "ground"
@@ -190,6 +192,8 @@ class Scene:
     source: str | None = None
     adjusted: Adjustment | None = None
     markers: Mapping[str, Marker] = field(default_factory=dict)
+    surfaces: Mapping[str, Surface] = field(default_factory=dict)
+    contacts: Mapping[str, Contact] = field(default_factory=dict)
 
     def system(self) -> "System":
         """The scene as a hierarchical exergetic port-Hamiltonian system."""
@@ -260,20 +264,26 @@ class Scene:
         """Every spring with its dotted name, as `all_joints`."""
         for path, scene in self._scenes():
             for s in scene.springs.values():
-                seen = replace(
-                    s,
-                    name=path + s.name,
-                    body1=_seen(path, s.body1),
-                    body2=_seen(path, s.body2),
-                    heat=_seen(path, s.heat),
-                )
-                yield seen.name, seen
+                yield path + s.name, _joint_seen(path, s)
 
     def all_markers(self) -> Iterator[tuple[str, Marker]]:
         """Every marker with its dotted name."""
         for path, scene in self._scenes():
             for marker in scene.markers.values():
                 yield path + marker.name, replace(marker, name=path + marker.name, body=_seen(path, marker.body))
+
+    def all_surfaces(self) -> Iterator[tuple[str, Surface]]:
+        """Every surface with its dotted name."""
+        for path, scene in self._scenes():
+            for each in scene.surfaces.values():
+                yield path + each.name, replace(each, name=path + each.name, body=_seen(path, each.body))
+
+    def all_contacts(self) -> Iterator[tuple[str, Contact]]:
+        """Every contact with its dotted name; its surfaces and heat sink are dotted too."""
+        for path, scene in self._scenes():
+            for c in scene.contacts.values():
+                pair = path + c.surfaces[0], path + c.surfaces[1]
+                yield path + c.name, replace(c, name=path + c.name, surfaces=pair, heat=_seen(path, c.heat))
 
     def all_thermal(self) -> Iterator[tuple[str, ThermalNode]]:
         """Every thermal node with its dotted name."""
@@ -343,8 +353,8 @@ def free_joint(body: Body) -> Joint:
     )
 
 
-def _joint_seen(path: str, j: Joint) -> Joint:
-    """A joint as seen from outside the part at a path."""
+def _joint_seen(path: str, j: J) -> J:
+    """A joint or spring as seen from outside the part at a path."""
     ends = {key: _seen(path, getattr(j, key)) for key in ("body1", "body2", "heat")}
     return replace(j, name=path + j.name, **ends) if path else j
 

@@ -43,6 +43,7 @@ def moved(scene: Scene, pose: Array, world: World) -> Scene:
         bodies={name: body(b) for name, b in scene.bodies.items()},
         joints={name: joint(j) for name, j in scene.joints.items()},
         springs={name: spring(s) for name, s in scene.springs.items()},
+        surfaces={name: replace(s, frame=frame(s.body, s.frame)) for name, s in scene.surfaces.items()},
         parts={name: moved(part, pose, world) for name, part in scene.parts.items()},
     )
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from ephs.mechanics.scene.geometry import Coupling, coupling_of
 from ephs.mechanics.scene.model import Array, Body, Joint, Scene, Spring, frozen
+from ephs.mechanics.scene.surfaces import Surface
 
 __all__ = ["element_units", "freedom_units", "rescaled"]
 
@@ -13,7 +14,7 @@ __all__ = ["element_units", "freedom_units", "rescaled"]
 def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float = 1.0) -> Scene:
     """The scene with every length multiplied by ``length``, every mass and time likewise; temperatures stay.
 
-    By powers of two nothing is rounded. Shapes, which are for pictures, stay as they are.
+    By powers of two nothing is rounded. Shapes for pictures stay as they are.
     """
     energy = mass * length**2 / time**2
     place = np.array([1.0] * 4 + [length] * 3)
@@ -50,6 +51,10 @@ def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float =
             length=s.length * length, damping=s.damping * mass / time,
         )  # fmt: skip
 
+    def surface(s: Surface) -> Surface:
+        sizes = {kind: size and (np.asarray(size) * length).tolist() for kind, size in s.shape.items()}
+        return replace(s, shape=sizes, frame=frozen(s.frame * place))
+
     world = scene.world
     return replace(
         scene,
@@ -64,6 +69,8 @@ def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float =
             name: replace(c, conductance=c.conductance * energy / time) for name, c in scene.conduction.items()
         },
         markers={name: replace(m, at=frozen(m.at * length)) for name, m in scene.markers.items()},
+        surfaces={name: surface(s) for name, s in scene.surfaces.items()},
+        contacts={name: replace(c, law=c.law.rescaled(length, mass, time)) for name, c in scene.contacts.items()},
         parts={name: rescaled(part, length, mass, time) for name, part in scene.parts.items()},
     )
 

@@ -43,6 +43,7 @@ Quaternion = Annotated[list[Number], Field(min_length=4, max_length=4)]
 Text = Annotated[str, Field(strict=True, min_length=1)]
 Flag = Annotated[bool, Field(strict=True)]
 Pair = Annotated[list[Text], Field(min_length=2, max_length=2)]
+Sizes = Annotated[list[Positive], Field(min_length=2, max_length=2)]
 
 
 def _is_number(value: Any) -> bool:
@@ -207,6 +208,48 @@ class SpringEntry(Entry):
     heat: Text = Field(default="environment", description="where the heat goes: a thermal name")
 
 
+class SurfaceShapeEntry(Entry):
+    """``shape`` of a surface: one of five."""
+
+    sphere: Positive | None = Field(default=None, description="radius, m")
+    capsule: Sizes | None = Field(default=None, description="radius, and length of its axis along z, m")
+    cylinder: Sizes | None = Field(default=None, description="radius and length along z, m")
+    box: Annotated[list[Positive], Field(min_length=3, max_length=3)] | None = Field(
+        default=None, description="edge lengths, m"
+    )
+    plane: dict[str, Number] | None = Field(default=None, description="{}: the plane z = 0, solid below")
+
+
+class ContactLawEntry(Entry):
+    """Keys of a contact's law, on a surface or on a contact."""
+
+    stiffness: Positive | None = Field(default=None, description="k of the elastic force k dⁿ at overlap d, N/mⁿ")
+    exponent: Number | None = Field(default=None, ge=1.0, description="n; 1.5 is Hertz's (default 1)")
+    loss: NonNegative | None = Field(default=None, description="α of Hunt and Crossley, s/m (default 0)")
+    friction: NonNegative | None = Field(default=None, description="coefficient μ (default 0)")
+    slip: Positive | None = Field(
+        default=None, description="slip velocity below which friction is viscous, m/s (default 1e-3)"
+    )
+    rolling: NonNegative | None = Field(default=None, description="arm of the moment against rolling, m (default 0)")
+    spinning: NonNegative | None = Field(default=None, description="arm of that against spinning, m (default 0)")
+    heat: Text | None = Field(default=None, description="where the heat goes: a thermal name")
+
+
+class SurfaceEntry(ContactLawEntry):
+    """``[surfaces.NAME]``"""
+
+    body: Text = Field(description='the body that has it, or "ground"')
+    shape: SurfaceShapeEntry = Field(description="sphere, capsule, cylinder, box or plane")
+    position: Vector | None = Field(default=None, description="in the centre-of-mass frame (ground: world), m")
+    rotation: Quaternion | None = Field(default=None, description="likewise, unit quaternion [w, x, y, z]")
+
+
+class ContactEntry(ContactLawEntry):
+    """``[contacts.NAME]``; without any such table all pairs of surfaces that can meet."""
+
+    surfaces: Pair = Field(description="names of two surfaces; the keys below replace theirs")
+
+
 class ThermalEntry(Entry):
     """``[thermal.NAME]``"""
 
@@ -248,6 +291,8 @@ class SceneFile(Entry):
         default_factory=dict, description="between two bodies, or a body and the ground"
     )
     springs: dict[str, SpringEntry] = Field(default_factory=dict, description="springs and dampers between two points")
+    surfaces: dict[str, SurfaceEntry] = Field(default_factory=dict, description="surfaces of bodies, which touch")
+    contacts: dict[str, ContactEntry] = Field(default_factory=dict, description="pairs of surfaces")
     thermal: dict[str, ThermalEntry] = Field(default_factory=dict, description="what heat warms")
     conduction: dict[str, ConductionEntry] = Field(default_factory=dict, description="how heat passes between them")
     markers: dict[str, MarkerEntry] = Field(default_factory=dict, description="points on bodies")
@@ -258,6 +303,8 @@ SECTIONS: dict[str, type[Entry]] = {
     "bodies": BodyEntry,
     "joints": JointEntry,
     "springs": SpringEntry,
+    "surfaces": SurfaceEntry,
+    "contacts": ContactEntry,
     "thermal": ThermalEntry,
     "conduction": ConductionEntry,
     "markers": MarkerEntry,

@@ -14,6 +14,7 @@ import numpy as np
 from ephs.mechanics.scene.errors import ModelWarning, legible
 from ephs.mechanics.scene.geometry import UNIVERSAL, coupling, joint_types
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Joint, Scene
+from ephs.mechanics.shapes.pairs import SIZES
 from ephs.operad import Path as Name
 
 __all__ = ["check_scene", "meshes_within"]
@@ -37,7 +38,9 @@ def check_scene(scene: Scene) -> None:
     nodes = {ENVIRONMENT, *(name for name, _ in scene.all_thermal())}
     for kind, known, named in (
         ("body", bodies, [end for _, j in (*scene.all_joints(), *scene.all_springs()) for end in (j.body1, j.body2)]),
-        ("body", bodies, [marker.body for _, marker in scene.all_markers()]),
+        ("body", bodies, [each.body for _, each in (*scene.all_markers(), *scene.all_surfaces())]),
+        ("surface", dict(scene.all_surfaces()), [name for _, c in scene.all_contacts() for name in c.surfaces]),
+        ("thermal node", nodes, [contact.heat for _, contact in scene.all_contacts()]),
         ("thermal node", nodes, [each.heat for _, each in (*scene.all_joints(), *scene.all_springs())]),
         ("thermal node", nodes, [end for _, each in scene.all_conduction() for end in each.between]),
     ):
@@ -100,6 +103,13 @@ def _shapes(scene: Scene) -> Iterator[tuple[str, dict[str, tuple[Any, tuple[int,
         yield name, {"conductance": (conduction.conductance, ())}
     for name, marker in scene.all_markers():
         yield name, {"at": (marker.at, (3,))}
+    for name, surface in scene.all_surfaces():
+        ((kind, sizes),) = surface.shape.items()
+        if kind not in SIZES:
+            raise ValueError(f"surface {legible(name)} is a {legible(str(kind))}")
+        yield name, {"frame": (surface.frame, (7,))} | ({kind: (sizes, SIZES[kind])} if kind != "plane" else {})
+    for name, contact in scene.all_contacts():
+        yield name, {key: (number, ()) for key, number in contact.law.numbers}
 
 
 def _joint(j: Joint) -> dict[str, tuple[Any, tuple[int, ...]]]:
@@ -123,7 +133,8 @@ def _joint(j: Joint) -> dict[str, tuple[Any, tuple[int, ...]]]:
 
 
 def _check_names(scene: Scene) -> None:
-    for things in (scene.bodies, scene.joints, scene.springs, scene.thermal, scene.conduction, scene.markers):
+    kinds = ("bodies", "joints", "springs", "thermal", "conduction", "markers", "surfaces", "contacts")
+    for things in (getattr(scene, kind) for kind in kinds):
         for name, thing in things.items():
             if Name([name]) != (thing.name,):
                 raise ValueError(f"{legible(name)} is called {legible(str(thing.name))}")

@@ -1,0 +1,1 @@
+"""Elements: systems and primitives between bodies, one idea a file."""

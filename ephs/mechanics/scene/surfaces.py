@@ -1,0 +1,49 @@
+"""Surfaces of bodies, and contacts between two of them, in a resolved scene."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ephs.mechanics.shapes.law import Law
+
+__all__ = ["Contact", "Surface"]
+
+Array = NDArray[np.float64]
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Surface:
+    """A surface on a body, or on the ground.
+
+    Attributes
+    ----------
+    shape : one of ``{"sphere": r}``, ``{"capsule": [r, length]}``, ``{"cylinder": [r, length]}``, ``{"box": [x, y,
+        z]}``, ``{"plane": {}}``; m, axes along z, a plane solid below z = 0
+    frame : (7,) pose in the body's centre-of-mass frame (ground: world)
+    """
+
+    name: str
+    body: str
+    shape: Mapping[str, Any]
+    frame: Array
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Contact:
+    """A contact between two surfaces.
+
+    Attributes
+    ----------
+    surfaces : names of both
+    heat : where the heat goes, ``"environment"`` or the name of a thermal node
+    """
+
+    name: str
+    surfaces: tuple[str, str]
+    law: Law
+    heat: str

@@ -1,0 +1,141 @@
+"""Surfaces and contacts of a scene file: shapes checked, laws of pairs put together, pairs found where none are named."""
+
+from collections.abc import Iterator, Mapping
+from itertools import combinations, product
+from typing import Any
+
+from ephs.mechanics.scene import values
+from ephs.mechanics.scene.entries import Checked, Document
+from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing
+from ephs.mechanics.scene.model import ENVIRONMENT, Scene, frozen
+from ephs.mechanics.scene.resolve import Names
+from ephs.mechanics.scene.schema import ContactEntry, ContactLawEntry, SurfaceEntry
+from ephs.mechanics.scene.surfaces import Contact, Surface
+from ephs.mechanics.shapes.law import Law
+from ephs.mechanics.shapes.pairs import PAIRS
+
+__all__ = ["resolve_contacts", "resolve_surfaces"]
+
+Laws = Mapping[str, ContactLawEntry]
+
+
+def resolve_surfaces(document: Document, names: Names, faults: list[Fault]) -> dict[str, Surface]:
+    """The surfaces of a file, their bodies and shapes checked."""
+    found: dict[str, Surface] = {}
+    for name, table in document.sections["surfaces"].items():
+        entry, key = table.entry, f"surfaces.{name}"
+        if table.sound("body"):
+            names.check(entry.body, f"{key}.body", "body", faults)
+        if table.sound("heat") and entry.heat is not None:
+            names.check(entry.heat, f"{key}.heat", "thermal", faults)
+        pose = values.pose(entry.position, entry.rotation, key, faults)
+        shape = _shape(table, key, faults)
+        if shape is not None:
+            found[name] = Surface(name, entry.body, shape, frozen(pose))
+    return found
+
+
+def _shape(table: Checked[SurfaceEntry], key: str, faults: list[Fault]) -> Mapping[str, Any] | None:
+    if not table.sound("shape"):
+        return None
+    given = {kind: sizes for kind, sizes in table.entry.shape.model_dump().items() if sizes is not None}
+    if len(given) != 1 or given.get("plane"):
+        faults.append(fault("surface shape", f"{key}.shape", " and ".join(given) or "an empty table"))
+        return None
+    return given
+
+
+def resolve_contacts(
+    document: Document, scene: Scene, below: Mapping[str, Laws], names: Names, faults: list[Fault]
+) -> tuple[dict[str, Contact], Laws]:
+    """The contacts of a file, and the laws of all surfaces by dotted name.
+
+    Parameters
+    ----------
+    scene
+        With its surfaces, joints and parts.
+    below
+        Laws of the surfaces of each part.
+    """
+    laws: dict[str, ContactLawEntry] = {n: t.entry for n, t in document.sections["surfaces"].items()}
+    laws |= {f"{part}.{name}": law for part, inner in below.items() for name, law in inner.items()}
+    surfaces = dict(scene.all_surfaces())
+    found: dict[str, Contact] = {}
+    tables = document.sections["contacts"]
+    for name, table in tables.items():
+        key = f"contacts.{name}"
+        if table.sound("heat") and table.entry.heat is not None:
+            names.check(table.entry.heat, f"{key}.heat", "thermal", faults)
+        if table.sound("surfaces") and _known(table, key, surfaces, faults):
+            one, other = (surfaces[each] for each in table.entry.surfaces)
+            _add(found, name, key, one, other, (table.entry, laws[one.name], laws[other.name]), faults)
+    if not tables:
+        for one, other in _meeting(scene, surfaces):
+            name = f"{one.name}_{other.name}".replace(".", "_")
+            key = f"surfaces.{one.name} and surfaces.{other.name}"
+            _add(found, name, key, one, other, (laws[one.name], laws[other.name]), faults)
+    return found, laws
+
+
+def _known(table: Checked[ContactEntry], key: str, surfaces: Mapping[str, Surface], faults: list[Fault]) -> bool:
+    for i, name in enumerate(table.entry.surfaces):
+        if name not in surfaces:
+            hint = did_you_mean(name, list(surfaces), f"there are: {listing(surfaces)}")
+            faults.append(fault("unknown surface", f"{key}.surfaces[{i}]", f'"{name}"', hint=hint))
+            return False
+    return True
+
+
+def _add(
+    found: dict[str, Contact],
+    name: str,
+    key: str,
+    one: Surface,
+    other: Surface,
+    laws: tuple[ContactLawEntry, ...],
+    faults: list[Fault],
+) -> None:
+    """Add a contact, or the fault of its pair."""
+    kinds = next(iter(one.shape)), next(iter(other.shape))
+    if one.body == other.body:
+        faults.append(fault("same body", key, f'two surfaces of "{one.body}"'))
+    elif kinds not in PAIRS and kinds[::-1] not in PAIRS:
+        pairs = ", ".join(" and ".join(pair) for pair in PAIRS)
+        faults.append(fault("surface pair", key, f"a {kinds[0]} and a {kinds[1]}", pairs=pairs))
+    elif (law := _law(laws, key, faults)) is not None:
+        sinks = [each.heat for each in laws if each.heat is not None]
+        found[name] = Contact(name, (one.name, other.name), law, sinks[0] if sinks else ENVIRONMENT)
+
+
+def _law(laws: tuple[ContactLawEntry, ...], key: str, faults: list[Fault]) -> Law | None:
+    """The law of a pair: what the contact says, else of two elastic surfaces in series, the lesser friction, else the
+    larger number of both."""
+    *own, first, second = laws
+    both = first, second
+
+    def given(name: str) -> list[float]:
+        said = [value for each in own if (value := getattr(each, name)) is not None]
+        return said or [value for each in both if (value := getattr(each, name)) is not None]
+
+    exponents, soft, frictions = set(given("exponent")) or {1.0}, given("stiffness"), given("friction")
+    if len(exponents) > 1:
+        faults.append(fault("two exponents", key, " and ".join(f"{n:g}" for n in sorted(exponents))))
+        return None
+    if not soft:
+        faults.append(fault("no stiffness", key, "two surfaces without stiffness"))
+        return None
+    (n,) = exponents
+    more = {name: max(given(name)) for name in ("loss", "slip", "rolling", "spinning") if given(name)}
+    stiffness = sum(k ** (-1.0 / n) for k in soft) ** -n if len(soft) > 1 else soft[0]
+    return Law(stiffness=float(stiffness), exponent=n, friction=min(frictions, default=0.0), **more)
+
+
+def _meeting(scene: Scene, surfaces: Mapping[str, Surface]) -> Iterator[tuple[Surface, Surface]]:
+    """Pairs of surfaces on bodies that move relative to each other and are not joined, pairs inside of parts left out."""
+    joined = {frozenset((j.body1, j.body2)) for _, j in scene.all_joints()}
+    level = [[each] for name, each in surfaces.items() if "." not in name]
+    level += [[each for name, each in surfaces.items() if name.startswith(f"{part}.")] for part in scene.parts]
+    for some, others in combinations(level, 2):
+        for one, other in product(some, others):
+            if one.body != other.body and frozenset((one.body, other.body)) not in joined:
+                yield one, other

@@ -1,0 +1,1 @@
+"""Shapes of surfaces, and the gaps between pairs of them."""
