@@ -23,7 +23,16 @@ STOREYS: tuple[tuple[frozenset[str], ...], ...] = tuple(
         ([".mechanics.solve", ".mechanics.solve.march"],),
         ([".mechanics.shapes"],),
         ([".mechanics.scene", ".mechanics.imports"],),
-        ([".mechanics", ".mechanics.elements", ".mechanics.reduction", ".mechanics.reduced", ".mechanics.engine", ".mechanics.tree"],),
+        (
+            [
+                ".mechanics",
+                ".mechanics.elements",
+                ".mechanics.reduction",
+                ".mechanics.reduced",
+                ".mechanics.engine",
+                ".mechanics.tree",
+            ],
+        ),
         ([".mechanics.dynamics"], [".mechanics.sweep"]),
         ([".mechanics.linear"], [".mechanics.sensitivity"]),
         ([".show", ".show.charts"], [".testing"]),

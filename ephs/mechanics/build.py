@@ -264,7 +264,9 @@ def _demands_on_parts(scene: Scene, demands: _Demands) -> _Demands:
     """What the level above and this level's own joints, springs and conductions want of its parts."""
     pairs = [*scene.joints.values(), *scene.springs.values()]
     bodies = {name for x in pairs for name in (x.body1, x.body2)} | _touching(scene)
-    nodes = {x.heat for x in (*pairs, *scene.contacts.values())} | {name for c in scene.conduction.values() for name in c.between}
+    nodes = {x.heat for x in (*pairs, *scene.contacts.values())} | {
+        name for c in scene.conduction.values() for name in c.between
+    }
     return _Demands(demands.bodies | bodies, demands.nodes | nodes, demands.joints)
 
 
@@ -289,7 +291,10 @@ def _joint(j: Joint, *, driven: bool) -> System:
     heat = j.heat != ENVIRONMENT
     if j.middle is not None:
         return universal_joint(j.frame1, j.middle, j.frame2, j.friction, j.stiffness, j.rest, heat=heat, driven=driven)
-    return joint(j.kind, j.frame1, j.frame2, j.friction, j.stiffness, j.rest, pitch=j.pitch, heat=heat, driven=driven)
+    return joint(
+        j.kind, j.frame1, j.frame2, j.friction, j.stiffness, j.rest, pitch=j.pitch, heat=heat, driven=driven,
+        limits=j.limits, stop=j.stop,
+    )  # fmt: skip
 
 
 def _spring(s: Spring) -> System:

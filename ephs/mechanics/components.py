@@ -30,12 +30,14 @@ __all__ = [
     "ground",
     "holonomic",
     "joint_friction",
+    "joint_momentum",
     "kinematic_coupling",
     "kinetic",
     "lie_poisson",
     "no_potential",
     "pair_spring",
     "potential",
+    "relative",
     "thermal_node",
 ]
 
@@ -132,7 +134,7 @@ def pair_spring(of: Pair, stiffness: Array, rest: Array) -> Storage:
 
     return stored(
         "pair_spring",
-        power_ports(q_r=_relative(of)),
+        power_ports(q_r=relative(of)),
         lambda q_r: coordinate_energy(of, q_r, k, zero),
         {},
         (("stiffness", tuple(k.tolist())), ("rest", tuple(zero.tolist()))),
@@ -214,8 +216,8 @@ def holonomic(of: Pair) -> Reversible:
         {
             "p_j1": PortType(quantity.body_momentum, True),
             "p_j2": PortType(quantity.body_momentum, True),
-            "p_r": PortType(_joint_momentum(of), True),
-            "q_r": PortType(_relative(of), False),
+            "p_r": PortType(joint_momentum(of), True),
+            "q_r": PortType(relative(of), False),
         }
     )
 
@@ -270,7 +272,7 @@ def joint_friction(
     mu
         (d, d) symmetric and non-negative, or a Python function of (coordinates, u_r, θ), which reads q_r.
     """
-    ports = {"p_r": PortType(_joint_momentum(of), True), "s": PortType(quantity.entropy, True)}
+    ports = {"p_r": PortType(joint_momentum(of), True), "s": PortType(quantity.entropy, True)}
     if not callable(mu):
         matrix = np.array(mu, dtype=float).reshape(of.dim, of.dim)
         entries = (("mu", tuple(matrix.ravel().tolist())),)
@@ -279,7 +281,7 @@ def joint_friction(
         return replace(made, notation=notation.friction)
     q_r = Path.of("q_r")
     resistance = mu
-    ports["q_r"] = PortType(_relative(of), False)
+    ports["q_r"] = PortType(relative(of), False)
     made = structures.dissipation(
         name,
         Directory(ports),
@@ -308,9 +310,11 @@ def thermal_node(capacity: float, temperature: float) -> Storage:
     return structures.exponential("thermal_node", capacity * temperature, capacity, entries, formula)
 
 
-def _relative(of: Pair) -> Quantity:
+def relative(of: Pair) -> Quantity:
+    """The quantity of a joint's q_r."""
     return quantity.relative_pose(of.name, **dict(of.parameters))
 
 
-def _joint_momentum(of: Pair) -> Quantity:
+def joint_momentum(of: Pair) -> Quantity:
+    """The quantity of a joint's p_r."""
     return quantity.joint_momentum(of.name, **dict(of.parameters))

@@ -1,12 +1,14 @@
 """Joints as systems of seven boxes, and what is built of them: springs between points, universal joints."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ephs.mechanics import components, springs
+from ephs.mechanics.elements.limit import limited_friction, limited_spring, stops
+from ephs.mechanics.shapes.law import Law
 from ephs.operad import Pattern, junction, quantity
 from ephs.semantics import library
 from ephs.semantics.bundle import Array
@@ -85,6 +87,8 @@ def joint(
     *,
     heat: bool = False,
     driven: bool = False,
+    limits: "Sequence[float] | None" = None,
+    stop: Law | None = None,
 ) -> System:
     """A joint between two bodies; its ports p1, p2 carry the bodies' momenta.
 
@@ -107,6 +111,8 @@ def joint(
         The friction heat leaves through a port s; else an environment inside takes it.
     driven
         The momentum of u_r is a port p_r: its flow is a generalised force.
+    limits, stop
+        Least and largest coordinate of a joint with one freedom in rad or m, nan for none, and the law of its stops.
 
     Raises
     ------
@@ -120,15 +126,23 @@ def joint(
     spring = components.pair_spring(of, k, zero) if np.any(k) else None
     if potential is not None:
         given, base = potential, spring
-        q_r = spring_port(of)
+        q_r = components.relative(of)
         if base is None:
             spring = components.potential(q_r, "q_r", given)
         else:
             spring = components.potential(q_r, "q_r", lambda x: given(x) + 0.5 * float(k @ (x - zero) ** 2))
     if spring is None:
-        spring = components.no_potential(spring_port(of), "q_r")
+        spring = components.no_potential(components.relative(of), "q_r")
     mu = friction if callable(friction) else _matrix(of, friction)
-    return _joint(of, _frame(frame1), _frame(frame2), spring, components.joint_friction(of, mu), heat, driven)
+    if limits is None:
+        loss = components.joint_friction(of, mu)
+    elif stop is None or potential is not None or callable(mu):
+        found = "limits without the law of their stops" if stop is None else "limits and a function"
+        raise StructureError("parameter", "joint", key="limits", found=found, expected="limits, their law, and numbers")
+    else:
+        held = stops(of, limits)
+        spring, loss = limited_spring(of, k, zero, held, stop), limited_friction(of, mu, held, stop)
+    return _joint(of, _frame(frame1), _frame(frame2), spring, loss, heat, driven)
 
 
 def spring_damper(
@@ -152,9 +166,7 @@ def spring_damper(
     return between_frames(*frames, springs.point_spring(stiffness, length), damper, heat=heat)
 
 
-def between_frames(
-    frame1: Array, frame2: Array, energy: Storage, loss: Irreversible, *, heat: bool = False
-) -> System:
+def between_frames(frame1: Array, frame2: Array, energy: Storage, loss: Irreversible, *, heat: bool = False) -> System:
     """Energy and loss of the relative pose of two frames: a free joint with this storage and this friction.
 
     Parameters
@@ -226,15 +238,10 @@ def universal_joint(
     return System.of(Pattern(junctions=junctions, boxes=boxes), halves)
 
 
-def spring_port(of: Pair) -> Any:
-    """The quantity of q_r."""
-    return quantity.relative_pose(of.name, **dict(of.parameters))
-
-
 def _joint(
     of: Pair, frame1: Array, frame2: Array, energy: Storage, friction: Irreversible, heat: bool, driven: bool
 ) -> System:
-    q_r, p_r = spring_port(of), quantity.joint_momentum(of.name, **dict(of.parameters))
+    q_r, p_r = components.relative(of), components.joint_momentum(of)
     parts: dict[str, Any] = {
         "o1": components.frame_change(frame1, "p_j1", "p1"),
         "o2": components.frame_change(frame2, "p_j2", "p2"),

@@ -7,16 +7,16 @@ allows is lost in the same box, as heat.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, Final, final
 
 import numpy as np
 
 from ephs.mechanics import notation
-from ephs.mechanics.shapes.gap import Gap, ramp
+from ephs.mechanics.joints import between_frames
+from ephs.mechanics.shapes.gap import Gap, Vector, cross, dot, ramp
 from ephs.mechanics.shapes.law import Law
 from ephs.mechanics.shapes.pairs import Touch
-from ephs.mechanics.joints import between_frames
 from ephs.operad import Directory, Path, Pattern, PortType, junction, quantity
 from ephs.semantics import structures
 from ephs.semantics.checks import STATEMENTS
@@ -25,10 +25,11 @@ from ephs.semantics.primitives import Irreversible, Storage, power_ports
 from ephs.semantics.system import System
 from ephs.semantics.verdict import proved
 
-__all__ = ["contact", "contact_energy", "contact_loss", "normal_force"]
+__all__ = ["Touching", "contact", "contact_energy", "contact_loss"]
 
 RELATIVE = quantity.relative_pose("free")
 Q_R = Path.of("q_r")
+UNITS: Final = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 def contact(touches: Sequence[Touch], law: Law, *, heat: bool = False) -> System:
@@ -54,6 +55,44 @@ def contact(touches: Sequence[Touch], law: Law, *, heat: bool = False) -> System
     return System.of(Pattern(junctions=junctions, boxes=dict.fromkeys(points, wires)), points)
 
 
+@final
+@dataclass(frozen=True, slots=True)
+class Touching:
+    """Contact of two surfaces at one pose and twist, or at many.
+
+    Parameters
+    ----------
+    overlap
+        In m, 0 where the surfaces are apart.
+    normal, point
+        As of a `Gap`.
+    opening
+        Rate of the gap, m/s.
+    slip
+        Velocity of the point across the normal, m/s, turned about the normal by a quarter.
+    force, loss
+        Normal force in N, and its part per rate of the gap in N s/m.
+    """
+
+    overlap: Any
+    normal: Vector
+    point: Vector
+    opening: Any
+    slip: Vector
+    force: Any
+    loss: Any
+
+    @staticmethod
+    def of(gap: Gap, law: Law, pose: Any, twist: Any) -> "Touching":
+        """At a relative pose and a twist of C2 relative to C1 in the axes of C2."""
+        normal, point = gap.contact(pose)
+        turned = cross((twist[0], twist[1], twist[2]), point)
+        velocity = twist[3] + turned[0], twist[4] + turned[1], twist[5] + turned[2]
+        overlap, opening = ramp(-gap.distance(pose)), dot(normal, velocity)
+        force, loss = law.normal(overlap, opening)
+        return Touching(overlap, normal, point, opening, cross(normal, velocity), force, loss)
+
+
 def contact_energy(gap: Gap, law: Law) -> Storage:
     """Energy of the overlap of two surfaces; port q_r of the free pair."""
     return stored(
@@ -71,12 +110,6 @@ def contact_energy(gap: Gap, law: Law) -> Storage:
     )
 
 
-def normal_force(law: Law, overlap: Any, opening: Any) -> tuple[Any, Any]:
-    """Normal force N ≥ 0 at an overlap in m and a rate of the gap in m/s, and its part d per rate: N = φ′ − d ġ."""
-    elastic, rate = law.force(overlap), 1.5 * law.loss * opening
-    return elastic * ramp(1.0 - rate), 1.5 * law.loss * elastic / (1.0 + ramp(rate - 1.0))
-
-
 def contact_loss(gap: Gap, law: Law) -> Irreversible:
     """Loss of a contact: μ(q_r, u_r) of Hunt and Crossley's force, slip, rolling and spinning; ports p_r, s, q_r."""
     ports = {
@@ -87,19 +120,16 @@ def contact_loss(gap: Gap, law: Law) -> Irreversible:
     turning = (law.rolling or law.spinning) and gap.radius > 0.0
 
     def resistance(x: Any, u: Any, _theta: Any) -> Any:
-        normal, point = gap.contact(x[Q_R])
-        spin, velocity = u[:3], u[3:] + np.cross(u[:3], point)
-        opening = normal @ velocity
-        force, along = normal_force(law, ramp(-gap.distance(x[Q_R])), opening)
-        slip = np.cross(normal, velocity)
-        across = law.friction * force / np.sqrt(slip @ slip + law.slip**2)
-        sides = np.cross(normal, np.eye(3))  # Σ t tᵀ = 1 − n nᵀ
-        terms = [(along, _lever(normal, point)), *((across, _lever(side, point)) for side in sides)]
+        at = Touching.of(gap, law, x[Q_R], u)
+        across = law.friction * at.force / np.sqrt(dot(at.slip, at.slip) + law.slip**2)
+        sides = [cross(at.normal, unit) for unit in UNITS]  # Σ t tᵀ = 1 − n nᵀ
+        terms = [(at.loss, _lever(at.normal, at.point)), *((across, _lever(side, at.point)) for side in sides)]
         if turning:
-            about, rolling, still = normal @ spin, np.cross(normal, spin), (law.slip / gap.radius) ** 2
-            pivot = law.spinning * force / np.sqrt(about * about + still)
-            roll = law.rolling * force / np.sqrt(rolling @ rolling + still)
-            terms += [(pivot, _moment(normal)), *((roll, _moment(side)) for side in sides)]
+            spin, still = (u[0], u[1], u[2]), (law.slip / gap.radius) ** 2
+            about, rolling = dot(at.normal, spin), cross(at.normal, spin)
+            pivot = law.spinning * at.force / np.sqrt(about * about + still)
+            roll = law.rolling * at.force / np.sqrt(dot(rolling, rolling) + still)
+            terms += [(pivot, (*at.normal, 0.0, 0.0, 0.0)), *((roll, (*side, 0.0, 0.0, 0.0)) for side in sides)]
         return _squares(terms)
 
     made = structures.dissipation(
@@ -114,14 +144,9 @@ def contact_loss(gap: Gap, law: Law) -> Irreversible:
     return replace(made, notation=notation.friction)
 
 
-def _lever(direction: Any, point: Any) -> Any:
-    """(6,) w: ⟨w|u⟩ is the velocity of a point in a direction, for a twist u."""
-    return np.concatenate([np.cross(point, direction), direction])
-
-
-def _moment(direction: Any) -> Any:
-    """(6,) w: ⟨w|u⟩ is the angular velocity about a direction."""
-    return np.concatenate([direction, np.zeros(3)])
+def _lever(direction: Vector, point: Vector) -> tuple[Any, ...]:
+    """w (6,): ⟨w|u⟩ is the velocity of a point in a direction, for a twist u."""
+    return (*cross(point, direction), *direction)
 
 
 def _squares(terms: Any) -> Any:

@@ -27,7 +27,18 @@ __all__ = ["scene_from_text", "scene_to_text"]
 _ARRAYS = {
     World: {"gravity"},
     Body: {"inertia", "pose", "twist"},
-    Joint: {"frame1", "frame2", "friction", "stiffness", "rest", "drive", "coordinate", "rate", "middle"},
+    Joint: {
+        "frame1",
+        "frame2",
+        "friction",
+        "stiffness",
+        "rest",
+        "drive",
+        "coordinate",
+        "rate",
+        "middle",
+        "limits",
+    },  # fmt: skip
     Spring: {"at1", "at2"},
     Marker: {"at"},
     Surface: {"frame"},
@@ -87,6 +98,11 @@ def _scene(data: dict[str, Any]) -> Scene:
             entries = {name: entry | {"shapes": tuple(entry.get("shapes", ()))} for name, entry in entries.items()}
         if cls is Conduction:
             entries = {name: entry | {"between": tuple(entry["between"])} for name, entry in entries.items()}
+        if cls is Joint:
+            entries = {
+                name: entry | ({"stop": Law(**entry["stop"])} if entry.get("stop") else {})
+                for name, entry in entries.items()
+            }
         if cls is Contact:
             entries = {
                 name: entry | {"surfaces": tuple(entry["surfaces"]), "law": Law(**entry["law"])}

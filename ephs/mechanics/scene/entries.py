@@ -51,6 +51,7 @@ _EXPECTED: dict[str, Callable[[Mapping[str, Any]], tuple[str, str]]] = {
     "bool_type": lambda ctx: ("type", "true or false"),
     "list_type": lambda ctx: ("type", "a list"),
     "numbers": lambda ctx: ("type", "a number or a list of numbers"),
+    "limits": lambda ctx: ("range", "[lower, upper], lower < upper, nan for none"),
     "inertia_length": lambda ctx: ("length", "3 or 6 numbers: xx yy zz [xy xz yz]"),
     "too_short": lambda ctx: ("length", f"{ctx['min_length']} entries"),
     "too_long": lambda ctx: ("length", f"{ctx['max_length']} entries"),

@@ -129,6 +129,8 @@ TEXTS: dict[str, tuple[str, str]] = {
     "unknown body": ('"ground" or a body', "{hint}"),
     "unknown thermal": ('"environment" or a [thermal] name', "{hint}"),
     "unknown type": ("one of {known}", "{hint}"),
+    "limited joint": ("a joint with one freedom that is free to move", "take limits out"),
+    "no scale": ("a stiffness, as nothing in the scene moves or falls", "add this key"),
     "unknown surface": ("a surface", "{hint}"),
     "surface shape": ("one of sphere, capsule, cylinder, box, plane = {{}}", "a surface has exactly one shape"),
     "surface pair": ("a pair of shapes that can touch: {pairs}", "list the contacts that are meant, or take others"),

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ephs.mechanics.scene.adjustment import Adjustment
 from ephs.mechanics.scene.surfaces import Contact, Surface
+from ephs.mechanics.shapes.law import Law
 
 if TYPE_CHECKING:
     from ephs.semantics import System
@@ -89,6 +90,8 @@ class Joint:
     coordinate : (size,) initial element of the pair's group; the two angles of a universal joint
     rate : (d,) initial u_r, the twist of C2 relative to C1 in the axes of C2 (the two angle rates of a
         universal joint)
+    limits, stop : (2,) least and largest coordinate of a joint with one freedom, nan for none, and the law of its
+        elastic stops; None both where there are no limits
     middle : (7,) universal only: constant pose from the frame that follows the first revolute (C1 turned by
         angle 1) to the frame before the second, whose z axis is the second axis; None otherwise
     """
@@ -109,6 +112,8 @@ class Joint:
     coordinate: Array
     rate: Array
     middle: Array | None = None
+    limits: Array | None = None
+    stop: Law | None = None
 
     @property
     def dim(self) -> int:

@@ -43,6 +43,8 @@ def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float =
             motion=None if j.motion is None else float(j.motion * unit[0] / time),
             coordinate=frozen(j.coordinate * element_units(j.coordinate.size, unit, length)),
             rate=frozen(j.rate * unit / time),
+            limits=None if j.limits is None else frozen(j.limits * unit[0]),
+            stop=None if j.stop is None else j.stop.rescaled(float(unit[0]), energy * time**2 / unit[0] ** 2, time),
         )
 
     def spring(s: Spring) -> Spring:

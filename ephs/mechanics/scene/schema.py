@@ -57,6 +57,19 @@ def _check_sizes(entries: list[Any]) -> None:
         raise PydanticCustomError("large", "a number of moderate size")
 
 
+_LIST_SCHEMA: dict[str, Any] = {"type": "array", "items": {"type": "number"}}
+
+
+def _limits(value: Any, _handler: Any) -> list[float]:
+    """Two ascending numbers, either of which may be nan."""
+    if not isinstance(value, list) or len(value) != 2 or not all(_is_number(entry) for entry in value):
+        raise PydanticCustomError("limits", "two numbers")
+    lower, upper = map(float, value)
+    if not all(math.isnan(x) or -LARGEST <= x <= LARGEST for x in (lower, upper)) or lower >= upper:
+        raise PydanticCustomError("limits", "two numbers")
+    return [lower, upper]
+
+
 def _numbers(value: Any, handler: Any) -> Any:
     """A number or a list of numbers, with one message instead of one for each alternative."""
     entries = value if isinstance(value, list) else [value]
@@ -84,7 +97,7 @@ def _inertia(value: Any, handler: Any) -> Any:
     return handler(value)
 
 
-_LIST_SCHEMA: dict[str, Any] = {"type": "array", "items": {"type": "number"}}
+Limits = Annotated[list[float], WrapValidator(_limits), WithJsonSchema(_LIST_SCHEMA | {"minItems": 2, "maxItems": 2})]
 _ROWS_SCHEMA: dict[str, Any] = {"type": "array", "items": _LIST_SCHEMA}
 
 Numbers = Annotated[
@@ -194,6 +207,13 @@ class JointEntry(Entry):
     heat: Text = Field(default="environment", description="where the friction heat goes: a thermal name")
     drive: Numbers = Field(default=0.0, description="constant generalised force on u_r; N m, N")
     motion: MotionEntry | None = Field(default=None, description="the freedom's rate is prescribed")
+    limits: Limits | None = Field(
+        default=None, description="least and largest coordinate of a joint with one freedom, nan for none; rad or m"
+    )
+    limit_stiffness: Positive | None = Field(
+        default=None, description="of the elastic stops, N m/rad or N/m; default from the mechanism's scale"
+    )
+    limit_loss: NonNegative = Field(default=0.1, description="α of Hunt and Crossley at the stops, s/rad or s/m")
 
 
 class SpringEntry(Entry):

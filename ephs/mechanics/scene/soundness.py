@@ -129,6 +129,7 @@ def _joint(j: Joint) -> dict[str, tuple[Any, tuple[int, ...]]]:
         "coordinate": (j.coordinate, (of.size,)),
         "motion": (0.0 if j.motion is None else j.motion, ()),
         **({} if j.middle is None else {"middle": (j.middle, (7,))}),
+        **({} if j.stop is None else {f"stop.{key}": (number, ()) for key, number in j.stop.numbers}),
     }
 
 

@@ -1,22 +1,33 @@
-"""Surfaces and contacts of a scene file: shapes checked, laws of pairs put together, pairs found where none are named."""
+"""Surfaces, contacts and limits of joints in a scene file.
+
+Shapes are checked, laws of pairs put together, and pairs found where none are named.
+"""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from itertools import combinations, product
 from typing import Any
+
+import numpy as np
 
 from ephs.mechanics.scene import values
 from ephs.mechanics.scene.entries import Checked, Document
 from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing
-from ephs.mechanics.scene.model import ENVIRONMENT, Scene, frozen
+from ephs.mechanics.scene.geometry import coupling_of
+from ephs.mechanics.scene.model import ENVIRONMENT, Joint, Scene, frozen
 from ephs.mechanics.scene.resolve import Names
 from ephs.mechanics.scene.schema import ContactEntry, ContactLawEntry, SurfaceEntry
+from ephs.mechanics.scene.state import Snapshot
 from ephs.mechanics.scene.surfaces import Contact, Surface
 from ephs.mechanics.shapes.law import Law
 from ephs.mechanics.shapes.pairs import PAIRS
 
-__all__ = ["resolve_contacts", "resolve_surfaces"]
+__all__ = ["Laws", "resolve_contacts", "resolve_surfaces", "with_stops"]
 
 Laws = Mapping[str, ContactLawEntry]
+STIFF = 1e4
+"""Stiffness of stops by default, in M (L ω)² of the scene's mass, length and rate: what falls by its length presses a
+stop by 1/70 rad, or of its length."""
 
 
 def resolve_surfaces(document: Document, names: Names, faults: list[Fault]) -> dict[str, Surface]:
@@ -43,6 +54,35 @@ def _shape(table: Checked[SurfaceEntry], key: str, faults: list[Fault]) -> Mappi
         faults.append(fault("surface shape", f"{key}.shape", " and ".join(given) or "an empty table"))
         return None
     return given
+
+
+def with_stops(document: Document, scene: Scene, faults: list[Fault]) -> Scene:
+    """The scene with the limits of its own joints."""
+    found = dict(scene.joints)
+    for name, table in document.sections["joints"].items():
+        entry, key = table.entry, f"joints.{name}"
+        if entry.limits is None or not table.sound("limits", "limit_stiffness", "limit_loss") or name not in found:
+            continue
+        joint = found[name]
+        if joint.dim != 1 or joint.motion is not None:
+            what = "a joint with a prescribed motion" if joint.motion is not None else f"a {joint.kind} joint"
+            faults.append(fault("limited joint", f"{key}.limits", what))
+            continue
+        stiffness = entry.limit_stiffness or _stiffness(scene, joint)
+        if not stiffness:
+            faults.append(fault("no scale", f"{key}.limit_stiffness", "nothing"))
+            continue
+        law = Law(stiffness=stiffness, loss=entry.limit_loss)
+        found[name] = replace(joint, limits=frozen(entry.limits), stop=law)
+    return replace(scene, joints=found)
+
+
+def _stiffness(scene: Scene, joint: Joint) -> float:
+    """Default stiffness of a joint's stops, N m/rad or N/m; 0 where the scene has no rate of its own."""
+    scale = Snapshot.of(scene).scale(scene.world.gravity)
+    mass = sum(body.mass for _, body in scene.all_bodies())
+    turning = bool(np.any(coupling_of(joint).basis(joint.coordinate)[:3]))
+    return float(STIFF * mass * scale.rate**2 * (scale.length**2 if turning else 1.0))
 
 
 def resolve_contacts(

@@ -1,8 +1,8 @@
 """Gaps between two surfaces: distance, normal and contact point as functions of a relative pose.
 
 A gap is negative where the surfaces overlap. Each function takes the pose (7,) of the second surface's frame C2 in the
-first one's C1; numbers or recorded values. Only sums, products, roots and absolute values occur, so that a gap has exact
-slopes over a step (`ephs.semantics.derive.slopes`).
+first one's C1: numbers, recorded values, or arrays of many instants (7, n). Only sums, products, roots and absolute
+values occur, so that a gap has exact slopes over a step (`ephs.semantics.derive.slopes`).
 """
 
 from collections.abc import Callable
@@ -14,7 +14,10 @@ import numpy as np
 from ephs.semantics.derive.functions import TINY
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 
-__all__ = ["Gap", "plane_rim", "plane_sphere", "ramp", "rounded_box_sphere"]
+__all__ = ["Gap", "Vector", "cross", "dot", "plane_rim", "plane_sphere", "ramp", "rounded_box_sphere"]
+
+Vector = tuple[Any, Any, Any]
+"""Components of a vector."""
 
 
 @final
@@ -29,8 +32,8 @@ class Gap:
     distance
         Relative pose (7,) -> gap in m.
     contact
-        Relative pose (7,) -> unit normal (3,) from the first surface to the second, and the contact point (3,) on the
-        second surface, both in the axes and from the origin of C2, m.
+        Relative pose (7,) -> unit normal from the first surface to the second, and the contact point on the second
+        surface in m, both in the axes and from the origin of C2.
     radius
         Radius of curvature of the second surface at the contact in m; 0 of a corner.
     numbers
@@ -39,7 +42,7 @@ class Gap:
 
     name: str
     distance: Callable[[Any], Any]
-    contact: Callable[[Any], tuple[Any, Any]]
+    contact: Callable[[Any], tuple[Vector, Vector]]
     radius: float
     numbers: tuple[tuple[str, float], ...]
 
@@ -49,12 +52,32 @@ def ramp(x: Any) -> Any:
     return 0.5 * (abs(x) + x)
 
 
+def dot(a: Vector, b: Vector) -> Any:
+    """⟨a|b⟩."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a: Vector, b: Vector) -> Vector:
+    """a × b."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def _times(factor: Any, a: Vector) -> Vector:
+    return factor * a[0], factor * a[1], factor * a[2]
+
+
+def _upwards(pose: Any) -> Vector:
+    """The z axis of C1 in the axes of C2."""
+    x, y, z = quaternion_to_matrix(pose[:4])[2]
+    return x, y, z
+
+
 def plane_sphere(radius: float) -> Gap:
     """Gap between the plane z = 0 of C1, solid below, and a sphere about the origin of C2; radius 0: a point."""
 
-    def contact(pose: Any) -> tuple[Any, Any]:
-        normal = quaternion_to_matrix(pose[:4])[2]
-        return normal, -radius * normal
+    def contact(pose: Any) -> tuple[Vector, Vector]:
+        normal = _upwards(pose)
+        return normal, _times(-radius, normal)
 
     return Gap("plane_sphere", lambda pose: pose[6] - radius, contact, radius, (("radius", radius),))
 
@@ -62,43 +85,40 @@ def plane_sphere(radius: float) -> Gap:
 def plane_rim(radius: float) -> Gap:
     """Gap between the plane z = 0 of C1, solid below, and the circle in the plane z = 0 of C2 about its origin."""
 
-    def lowest(pose: Any) -> tuple[Any, Any, Any]:
-        normal = quaternion_to_matrix(pose[:4])[2]
-        length = np.sqrt(normal[0] * normal[0] + normal[1] * normal[1] + TINY)
-        return normal, length, np.array([-radius * normal[0] / length, -radius * normal[1] / length, 0.0 * length])
+    def inclined(pose: Any) -> tuple[Vector, Any]:
+        normal = _upwards(pose)
+        return normal, np.sqrt(normal[0] * normal[0] + normal[1] * normal[1] + TINY)
 
-    def distance(pose: Any) -> Any:
-        _, length, _ = lowest(pose)
-        return pose[6] - radius * length
+    def contact(pose: Any) -> tuple[Vector, Vector]:
+        normal, length = inclined(pose)
+        out = -radius / length
+        return normal, (out * normal[0], out * normal[1], 0.0)
 
-    def contact(pose: Any) -> tuple[Any, Any]:
-        normal, _, point = lowest(pose)
-        return normal, point
-
-    return Gap("plane_rim", distance, contact, radius, (("radius", radius),))
+    return Gap("plane_rim", lambda pose: pose[6] - radius * inclined(pose)[1], contact, radius, (("radius", radius),))
 
 
-def rounded_box_sphere(half: tuple[float, float, float], rounding: float, radius: float) -> Gap:
+def rounded_box_sphere(half: Vector, rounding: float, radius: float) -> Gap:
     """Gap between a box of half lengths ``half`` about C1, its edges rounded outwards, and a sphere about C2.
 
     With one half length it is a capsule along that axis, with none a sphere of radius ``rounding``. The centre of the
     second sphere has to stay outside of the box itself.
     """
 
-    def beyond(pose: Any) -> tuple[Any, Any]:
-        at = pose[4:]
-        clamped = [0.5 * (abs(x + h) - abs(x - h)) if h else 0.0 for x, h in zip(at, half, strict=True)]
-        away = np.array([x - c for x, c in zip(at, clamped, strict=True)])
-        return away, np.sqrt(away[0] * away[0] + away[1] * away[1] + away[2] * away[2] + TINY)
+    def beyond(pose: Any) -> tuple[Vector, Any]:
+        x, y, z = (at - 0.5 * (abs(at + h) - abs(at - h)) if h else at for at, h in zip(pose[4:], half, strict=True))
+        return (x, y, z), np.sqrt(x * x + y * y + z * z + TINY)
 
-    def distance(pose: Any) -> Any:
-        return beyond(pose)[1] - (rounding + radius)
-
-    def contact(pose: Any) -> tuple[Any, Any]:
+    def contact(pose: Any) -> tuple[Vector, Vector]:
         away, length = beyond(pose)
-        normal = quaternion_to_matrix(pose[:4]).T @ away / length
-        return normal, -radius * normal
+        axes = quaternion_to_matrix(pose[:4])
+        x, y, z = (dot((axes[0][i], axes[1][i], axes[2][i]), away) / length for i in range(3))
+        return (x, y, z), (-radius * x, -radius * y, -radius * z)
 
-    x, y, z = half
-    sizes = (("half_x", x), ("half_y", y), ("half_z", z), ("rounding", rounding), ("radius", radius))
-    return Gap("rounded_box_sphere", distance, contact, radius, sizes)
+    sizes = zip(("half_x", "half_y", "half_z"), half, strict=True)
+    return Gap(
+        "rounded_box_sphere",
+        lambda pose: beyond(pose)[1] - (rounding + radius),
+        contact,
+        radius,
+        (*sizes, ("rounding", rounding), ("radius", radius)),
+    )

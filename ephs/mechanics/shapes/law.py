@@ -6,6 +6,7 @@ from typing import Any, final
 
 import numpy as np
 
+from ephs.mechanics.shapes.gap import ramp
 from ephs.semantics.derive.functions import TINY
 from ephs.semantics.errors import StructureError
 
@@ -56,6 +57,11 @@ class Law:
         """Elastic energy in J of an overlap in m."""
         n = self.exponent
         return self.stiffness / (n + 1.0) * overlap * overlap * (overlap + TINY) ** (n - 1.0)
+
+    def normal(self, overlap: Any, opening: Any) -> tuple[Any, Any]:
+        """Normal force N = φ′ − d ġ ≥ 0 at an overlap in m and a rate ġ of the gap in m/s, and d in N s/m."""
+        elastic, rate = self.force(overlap), 1.5 * self.loss * opening
+        return elastic * ramp(1.0 - rate), 1.5 * self.loss * elastic / (1.0 + ramp(rate - 1.0))
 
     @property
     def numbers(self) -> tuple[tuple[str, float], ...]:
