@@ -1,9 +1,9 @@
 """Scenes as hierarchical systems.
 
-Boxes are ``bodies.NAME``, ``joints.NAME``, ``springs.NAME``, ``contacts.NAME``, ``thermal.NAME``, ``conduction.NAME``, ``parts.NAME``,
-``ground`` and ``environment``; they meet at the junctions ``momenta.BODY`` and ``entropies.NODE``. A driven joint's
-momentum is the outer port ``drives.JOINT``. What a part exposes is joined at ``momenta.PART.BODY`` and so on; a part's
-name is not taken by anything else of its level, so these never clash.
+Boxes are ``bodies.NAME``, ``joints.NAME``, ``springs.NAME``, ``contacts.NAME``, ``thermal.NAME``, ``conduction.NAME``,
+``parts.NAME``, ``ground`` and ``environment``; they meet at the junctions ``momenta.BODY`` and ``entropies.NODE``. A
+driven joint's momentum is the outer port ``drives.JOINT``. What a part exposes is joined at ``momenta.PART.BODY`` and
+so on; a part's name is not taken by anything else of its level, so these never clash.
 """
 
 from collections.abc import Iterable, Mapping

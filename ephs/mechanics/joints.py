@@ -1,6 +1,6 @@
 """Joints as systems of seven boxes, and what is built of them: springs between points, universal joints."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -87,7 +87,7 @@ def joint(
     *,
     heat: bool = False,
     driven: bool = False,
-    limits: "Sequence[float] | None" = None,
+    limits: "ArrayLike | None" = None,
     stop: Law | None = None,
 ) -> System:
     """A joint between two bodies; its ports p1, p2 carry the bodies' momenta.
@@ -162,8 +162,8 @@ def spring_damper(
         k in N/m, L in m of ½ k (distance − L)², c in N s/m.
     """
     damper = springs.point_damper(damping) if damping else components.joint_friction(pair("free"), np.zeros((6, 6)))
-    frames = [np.concatenate([[1.0, 0.0, 0.0, 0.0], np.asarray(at, dtype=float)]) for at in (at1, at2)]
-    return between_frames(*frames, springs.point_spring(stiffness, length), damper, heat=heat)
+    one, two = (np.concatenate([[1.0, 0.0, 0.0, 0.0], np.asarray(at, dtype=float)]) for at in (at1, at2))
+    return between_frames(one, two, springs.point_spring(stiffness, length), damper, heat=heat)
 
 
 def between_frames(frame1: Array, frame2: Array, energy: Storage, loss: Irreversible, *, heat: bool = False) -> System:

@@ -1,8 +1,7 @@
 """Limits of a joint's coordinate: elastic stops with loss, beside the joint's own spring and friction."""
 
-from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,13 +19,16 @@ from ephs.semantics.primitives import Irreversible, Storage, power_ports
 from ephs.semantics.spaces import Pair
 from ephs.semantics.verdict import proved
 
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
 __all__ = ["Stops", "limited_friction", "limited_spring", "stops"]
 
 Stops = tuple[tuple[float, float], ...]
 """(side, bound): +1 at the least coordinate, −1 at the largest; the gap is side·(coordinate − bound)."""
 
 
-def stops(of: Pair, limits: Sequence[float]) -> Stops:
+def stops(of: Pair, limits: "ArrayLike") -> Stops:
     """Stops at [lower, upper] coordinates in rad or m; nan: none on that side.
 
     Raises
@@ -34,7 +36,7 @@ def stops(of: Pair, limits: Sequence[float]) -> Stops:
     StructureError
         The joint has not one freedom, or the limits are not in order.
     """
-    lower, upper = map(float, limits)
+    lower, upper = np.asarray(limits, dtype=float).tolist()
     if of.dim != 1:
         found = f"limits of a joint with {of.dim} freedoms"
         raise StructureError("parameter", of.name, key="limits", found=found, expected="a joint with one freedom")

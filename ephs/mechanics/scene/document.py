@@ -27,18 +27,7 @@ __all__ = ["scene_from_text", "scene_to_text"]
 _ARRAYS = {
     World: {"gravity"},
     Body: {"inertia", "pose", "twist"},
-    Joint: {
-        "frame1",
-        "frame2",
-        "friction",
-        "stiffness",
-        "rest",
-        "drive",
-        "coordinate",
-        "rate",
-        "middle",
-        "limits",
-    },  # fmt: skip
+    Joint: {"frame1", "frame2", "friction", "stiffness", "rest", "drive", "coordinate", "rate", "middle", "limits"},
     Spring: {"at1", "at2"},
     Marker: {"at"},
     Surface: {"frame"},

@@ -171,7 +171,7 @@ def _law(laws: tuple[ContactLawEntry, ...], key: str, faults: list[Fault]) -> La
 
 
 def _meeting(scene: Scene, surfaces: Mapping[str, Surface]) -> Iterator[tuple[Surface, Surface]]:
-    """Pairs of surfaces on bodies that move relative to each other and are not joined, pairs inside of parts left out."""
+    """Pairs of surfaces on different bodies that no joint holds together; of those of one part, none."""
     joined = {frozenset((j.body1, j.body2)) for _, j in scene.all_joints()}
     level = [[each] for name, each in surfaces.items() if "." not in name]
     level += [[each for name, each in surfaces.items() if name.startswith(f"{part}.")] for part in scene.parts]
