@@ -7,6 +7,7 @@ import numpy as np
 
 from ephs.mechanics.batch import rotations, turned
 from ephs.mechanics.build import drive_ports, wrench_port
+from ephs.mechanics.elements.limit import stop_force
 from ephs.mechanics.scene.model import GROUND, Joint, Scene, Spring
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
@@ -66,6 +67,8 @@ def joint_load(joint: Joint, inputs: Inputs, coordinate: Array, rate: Array, rel
     elif joint.kind == "free":
         pull[:, 3:] = _back(relative, pull[:, 3:])
     pull -= rate @ joint.friction
+    if joint.limits is not None and joint.stop is not None:
+        pull += stop_force(joint.limits, joint.stop, coordinate, rate)
     if joint.motion is None:
         for port, where in drive_ports(joint):
             if port in inputs:

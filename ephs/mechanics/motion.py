@@ -12,6 +12,7 @@ import numpy as np
 
 from ephs.mechanics.batch import adjoint_inverse, compose, included, rotations
 from ephs.mechanics.build import component_path
+from ephs.mechanics.contact_motion import ContactMotion, contact_motion
 from ephs.mechanics.gaps import open_by
 from ephs.mechanics.own_motion import OwnMotion, own_motion
 from ephs.mechanics.projection import Held, project, project_dense
@@ -158,6 +159,13 @@ class SceneMotion:
         node = nodes[name]
         s = self._solution[component_path("thermal", name) / "s"]
         return ThermalMotion(node.temperature * np.exp(s / node.capacity), s)
+
+    def contact(self, name: str) -> ContactMotion:
+        """Gap, force, slip and heat of a contact."""
+        contacts = dict(self._scene.all_contacts())
+        if name not in contacts:
+            raise KeyError(f"{name}: no such contact; the contacts are {', '.join(contacts) or 'none'}")
+        return contact_motion(self._scene, contacts[name], self)
 
     def marker(self, name: str) -> MarkerMotion:
         """The motion of a marker."""

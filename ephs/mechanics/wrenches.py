@@ -14,6 +14,7 @@ from typing import Protocol, final
 
 import numpy as np
 
+from ephs.mechanics.contact_motion import contact_wrenches
 from ephs.mechanics.loads import Inputs, Read, body_loads, joint_load
 from ephs.mechanics.scene.model import GROUND, Body, Joint, Scene
 from ephs.mechanics.solve.threads import in_one_thread
@@ -133,6 +134,8 @@ def wrenches(scene: Scene, inputs: Inputs, motion: Moving) -> dict[str, Array]:
     roots = {name: root_of(body) for name, body in scene.all_bodies() if body.mass > 0.0}
     signs = signs_of(scene)
     loads = body_loads(scene, inputs, motion)
+    for name, wrench in contact_wrenches(scene, motion):
+        loads[name] += wrench
     pulls = {
         name: joint_load(j, inputs, motion.coordinates(name), motion.rates[name], motion.inclusion(name))
         for name, j in joints.items()

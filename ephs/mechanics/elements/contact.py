@@ -7,8 +7,8 @@ allows is lost in the same box, as heat.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any, Final, final
+from dataclasses import replace
+from typing import Any, Final
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from ephs.semantics.primitives import Irreversible, Storage, power_ports
 from ephs.semantics.system import System
 from ephs.semantics.verdict import proved
 
-__all__ = ["Touching", "contact", "contact_energy", "contact_loss"]
+__all__ = ["contact", "contact_energy", "contact_loss", "lever", "losses"]
 
 RELATIVE = quantity.relative_pose("free")
 Q_R = Path.of("q_r")
@@ -55,42 +55,33 @@ def contact(touches: Sequence[Touch], law: Law, *, heat: bool = False) -> System
     return System.of(Pattern(junctions=junctions, boxes=dict.fromkeys(points, wires)), points)
 
 
-@final
-@dataclass(frozen=True, slots=True)
-class Touching:
-    """Contact of two surfaces at one pose and twist, or at many.
+def lever(direction: Vector, point: Vector) -> tuple[Any, ...]:
+    """w (6,): ⟨w|u⟩ is the velocity of a point in a direction, for a twist u; a unit force there is the wrench w."""
+    return (*cross(point, direction), *direction)
+
+
+def losses(gap: Gap, law: Law, pose: Any, twist: Any) -> list[tuple[Any, tuple[Any, ...]]]:
+    """Losses (d, w) of a contact at a relative pose and twist: wrenches −d ⟨w|u⟩ w on the second body.
 
     Parameters
     ----------
-    overlap
-        In m, 0 where the surfaces are apart.
-    normal, point
-        As of a `Gap`.
-    opening
-        Rate of the gap, m/s.
-    slip
-        Velocity of the point across the normal, m/s, turned about the normal by a quarter.
-    force, loss
-        Normal force in N, and its part per rate of the gap in N s/m.
+    twist
+        Of C2 relative to C1 in the axes of C2.
     """
-
-    overlap: Any
-    normal: Vector
-    point: Vector
-    opening: Any
-    slip: Vector
-    force: Any
-    loss: Any
-
-    @staticmethod
-    def of(gap: Gap, law: Law, pose: Any, twist: Any) -> "Touching":
-        """At a relative pose and a twist of C2 relative to C1 in the axes of C2."""
-        normal, point = gap.contact(pose)
-        turned = cross((twist[0], twist[1], twist[2]), point)
-        velocity = twist[3] + turned[0], twist[4] + turned[1], twist[5] + turned[2]
-        overlap, opening = ramp(-gap.distance(pose)), dot(normal, velocity)
-        force, loss = law.normal(overlap, opening)
-        return Touching(overlap, normal, point, opening, cross(normal, velocity), force, loss)
+    normal, point = gap.contact(pose)
+    spin = twist[0], twist[1], twist[2]
+    moved = cross(spin, point)
+    velocity = twist[3] + moved[0], twist[4] + moved[1], twist[5] + moved[2]
+    force, along = law.normal(ramp(-gap.distance(pose)), dot(normal, velocity))
+    slip, sides = cross(normal, velocity), [cross(normal, unit) for unit in UNITS]  # Σ t tᵀ = 1 − n nᵀ
+    across = law.friction * force / np.sqrt(dot(slip, slip) + law.slip**2)
+    terms = [(along, lever(normal, point)), *((across, lever(side, point)) for side in sides)]
+    if (law.rolling or law.spinning) and gap.radius > 0.0:
+        about, rolling, still = dot(normal, spin), cross(normal, spin), (law.slip / gap.radius) ** 2
+        pivot = law.spinning * force / np.sqrt(about * about + still)
+        roll = law.rolling * force / np.sqrt(dot(rolling, rolling) + still)
+        terms += [(pivot, (*normal, 0.0, 0.0, 0.0)), *((roll, (*side, 0.0, 0.0, 0.0)) for side in sides)]
+    return terms
 
 
 def contact_energy(gap: Gap, law: Law) -> Storage:
@@ -117,36 +108,16 @@ def contact_loss(gap: Gap, law: Law) -> Irreversible:
         "s": PortType(quantity.entropy, True),
         "q_r": PortType(RELATIVE, False),
     }
-    turning = (law.rolling or law.spinning) and gap.radius > 0.0
-
-    def resistance(x: Any, u: Any, _theta: Any) -> Any:
-        at = Touching.of(gap, law, x[Q_R], u)
-        across = law.friction * at.force / np.sqrt(dot(at.slip, at.slip) + law.slip**2)
-        sides = [cross(at.normal, unit) for unit in UNITS]  # Σ t tᵀ = 1 − n nᵀ
-        terms = [(at.loss, _lever(at.normal, at.point)), *((across, _lever(side, at.point)) for side in sides)]
-        if turning:
-            spin, still = (u[0], u[1], u[2]), (law.slip / gap.radius) ** 2
-            about, rolling = dot(at.normal, spin), cross(at.normal, spin)
-            pivot = law.spinning * at.force / np.sqrt(about * about + still)
-            roll = law.rolling * at.force / np.sqrt(dot(rolling, rolling) + still)
-            terms += [(pivot, (*at.normal, 0.0, 0.0, 0.0)), *((roll, (*side, 0.0, 0.0, 0.0)) for side in sides)]
-        return _squares(terms)
-
     made = structures.dissipation(
         gap.name + "_loss",
         Directory(ports),
-        resistance,
+        lambda x, u, _theta: _squares(losses(gap, law, x[Q_R], u)),
         parameters=(*gap.numbers, *law.numbers),
         shown=lambda: structures.dissipation_proof(Directory(ports), None),
         trusted=True,
         one_sided=True,
     )
     return replace(made, notation=notation.friction)
-
-
-def _lever(direction: Vector, point: Vector) -> tuple[Any, ...]:
-    """w (6,): ⟨w|u⟩ is the velocity of a point in a direction, for a twist u."""
-    return (*cross(point, direction), *direction)
 
 
 def _squares(terms: Any) -> Any:

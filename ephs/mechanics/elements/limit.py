@@ -22,7 +22,7 @@ from ephs.semantics.verdict import proved
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-__all__ = ["Stops", "limited_friction", "limited_spring", "stops"]
+__all__ = ["Stops", "limited_friction", "limited_spring", "stop_force", "stops"]
 
 Stops = tuple[tuple[float, float], ...]
 """(side, bound): +1 at the least coordinate, −1 at the largest; the gap is side·(coordinate − bound)."""
@@ -42,7 +42,21 @@ def stops(of: Pair, limits: "ArrayLike") -> Stops:
         raise StructureError("parameter", of.name, key="limits", found=found, expected="a joint with one freedom")
     if lower >= upper or lower == np.inf or upper == -np.inf:
         raise StructureError("parameter", of.name, key="limits", found=[lower, upper], expected="lower < upper")
+    return sides(limits)
+
+
+def sides(limits: "ArrayLike") -> Stops:
+    """Stops at sound limits."""
+    lower, upper = np.asarray(limits, dtype=float).tolist()
     return tuple((side, bound) for side, bound in ((1.0, lower), (-1.0, upper)) if np.isfinite(bound))
+
+
+def stop_force(limits: "ArrayLike", law: Law, coordinate: Array, rate: Array) -> Array:
+    """Force of the stops at coordinates and rates of any shape, in N m or N."""
+    out = np.zeros_like(coordinate)
+    for side, bound in sides(limits):
+        out += side * law.normal(ramp(side * (bound - coordinate)), side * rate)[0]
+    return out
 
 
 def limited_spring(of: Pair, stiffness: Array, rest: Array, stops: Stops, law: Law) -> Storage:

@@ -230,6 +230,10 @@ class Solution:
         """The motion of a marker: position and velocity in the world."""
         return self._moving("markers").marker(name)
 
+    def contact(self, name: str) -> Any:
+        """The motion of a contact: gap, force, slip and heat."""
+        return self._moving("contacts").contact(name)
+
     def point(self, body: str, xyz: "ArrayLike") -> Array:
         """(n, 3) world position of a point that is given in the body's frame."""
         motion = self.body(body)
