@@ -6,7 +6,6 @@ differ in numbers only. A function that branches on its arguments or turns them 
 then differenced, and called back in Python.
 """
 
-import inspect
 import math
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -20,6 +19,7 @@ from ephs.semantics.bundle import Array, Bundle, Reference
 from ephs.semantics.checks import random_point
 from ephs.semantics.domains import Bounds, bounded, domain_of, within_domain
 from ephs.semantics.errors import StructureError
+from ephs.semantics.given import finite_matrix, flat_vector, real_number, require_arguments, value_of
 from ephs.semantics.primitives import Domain, Formula, Irreversible, Kernel, Point, Reversible, Storage
 
 __all__ = ["constraint", "gyrator", "irreversible", "reversible", "storage", "transformer"]
@@ -67,16 +67,16 @@ def storage(
     n = Bundle.of(interface).size
     for port in _reads(interface):
         raise StructureError("storage-ports", name, found=str(port))
-    _takes(name, "energy", energy, tuple(interface))
+    require_arguments(name, "energy", energy, tuple(interface))
     if gradient is not None:
-        _takes(name, "gradient", gradient, tuple(interface))
+        require_arguments(name, "gradient", gradient, tuple(interface))
     given = gradient
 
     bounds = domain_of(name, interface, domain)
 
     def value(x: Point) -> float:
         with np.errstate(all="ignore"):  # what is not a number is found by its value
-            return _real(name, _called(name, "the energy", energy, x)) if within_domain(bounds, x) else math.nan
+            return real_number(name, value_of(name, "the energy", energy, x)) if within_domain(bounds, x) else math.nan
 
     from ephs.semantics.derive.recording import Untraceable
     from ephs.semantics.forms import storage_form
@@ -87,7 +87,9 @@ def storage(
         form = None
 
     def slope(x: Point) -> Array:
-        return _flat(name, _called(name, "the gradient", given, x), n) if given is not None else np.full(n, np.nan)
+        return (
+            flat_vector(name, value_of(name, "the gradient", given, x), n) if given is not None else np.full(n, np.nan)
+        )
 
     derived = slope if given is not None else None if form is None else form.gradient
     return Storage(
@@ -123,11 +125,11 @@ def gyrator(ports: Ports, matrix: Matrix, *, domain: Bounds | None = None, name:
     interface = _interface(name, ports)
     n = Bundle.of(interface).size
     if not callable(matrix) and not domain:
-        return structures.constant_structure(name, interface, _matrix(name, matrix, n, n), np.zeros((0, n)))
+        return structures.constant_structure(name, interface, finite_matrix(name, matrix, n, n), np.zeros((0, n)))
     given, read = _reader(name, interface, matrix)
 
     def structure(x: Point) -> tuple[Array, Array]:
-        return _matrix(name, read(x), n, n), np.zeros((0, n))
+        return finite_matrix(name, read(x), n, n), np.zeros((0, n))
 
     return reversible(name, interface, structure, Formula(_both(given, None)), 0, domain)
 
@@ -157,7 +159,7 @@ def transformer(ports: Ports, matrix: Matrix, *, domain: Bounds | None = None, n
 
     if not callable(matrix) and not domain:
         zero = np.zeros((bundle.size, bundle.size))
-        return structures.constant_structure(name, interface, zero, whole(_matrix(name, matrix, k, first)))
+        return structures.constant_structure(name, interface, zero, whole(finite_matrix(name, matrix, k, first)))
     given, read = _reader(name, interface, matrix)
     right = np.eye(k).astype(object)
 
@@ -165,7 +167,7 @@ def transformer(ports: Ports, matrix: Matrix, *, domain: Bounds | None = None, n
         return np.hstack([-np.asarray(given(**x), dtype=object).reshape(k, first), right])
 
     def structure(x: Point) -> tuple[Array, Array]:
-        return np.zeros((bundle.size, bundle.size)), whole(_matrix(name, read(x), k, first))
+        return np.zeros((bundle.size, bundle.size)), whole(finite_matrix(name, read(x), k, first))
 
     return reversible(name, interface, structure, Formula(_both(None, beside)), k, domain)
 
@@ -197,12 +199,12 @@ def constraint(
     if not callable(matrix) and not domain:
         rows: Any = matrix
         k = len(rows) if np.ndim(rows) == 2 else 1
-        return structures.constant_structure(name, interface, zero, _matrix(name, np.atleast_2d(rows), k, n))
+        return structures.constant_structure(name, interface, zero, finite_matrix(name, np.atleast_2d(rows), k, n))
     given, read = _reader(name, interface, matrix)
     k = _rows(interface, read) if multipliers is None else multipliers
 
     def structure(x: Point) -> tuple[Array, Array]:
-        return zero, _matrix(name, read(x), k, n)
+        return zero, finite_matrix(name, read(x), k, n)
 
     return reversible(name, interface, structure, Formula(_both(None, given)), k, domain)
 
@@ -242,13 +244,13 @@ def irreversible(
     """
     interface = _interface(name, ports)
     bundle = Bundle.of(interface)
-    _takes(name, "matrix", matrix, tuple(interface))
+    require_arguments(name, "matrix", matrix, tuple(interface))
     bounds, n = domain_of(name, interface, domain), bundle.size
 
     def evaluate(x: Point, e: Array, reference: Reference) -> Array:
         given = {**bundle.split(e + bundle.intensive(reference)), **x}
         return (
-            _matrix(name, _called(name, "the matrix", matrix, given), n, n)
+            finite_matrix(name, value_of(name, "the matrix", matrix, given), n, n)
             if within_domain(bounds, given)
             else np.full((n, n), np.nan)
         )
@@ -314,13 +316,6 @@ def _kernel(interface: Interface, formula: Formula, multipliers: int | None, bou
         return None
 
 
-def _real(name: str, value: Any) -> float:
-    try:
-        return float(value)
-    except (TypeError, ValueError):
-        raise StructureError("parameter", name, key="energy", found=value, expected="a real number") from None
-
-
 def _interface(name: str, ports: Ports) -> Interface:
     found: dict[str, PortType] = {}
     for port, quantity in ports.items():
@@ -339,22 +334,6 @@ def _reads(interface: Interface) -> tuple[Path, ...]:
     return tuple(port for port, port_type in interface.items() if not port_type.power)
 
 
-def _takes(name: str, key: str, function: object, ports: tuple[Path, ...]) -> None:
-    """Refuse what cannot be called with the ports' names."""
-    expected = f"a function of ({', '.join(map(str, ports))})"
-    if not callable(function):
-        raise StructureError("parameter", name, key=key, found=function, expected=expected)
-    try:
-        signature = inspect.signature(function)
-    except ValueError:  # builtin functions have none
-        return
-    try:
-        signature.bind(**{str(port): None for port in ports})
-    except TypeError:
-        found = f"a function of {signature}"
-        raise StructureError("parameter", name, key=key, found=found, expected=expected) from None
-
-
 def _reader(name: str, interface: Interface, matrix: Matrix) -> tuple[Callable[..., Any], Callable[[Point], ArrayLike]]:
     """The matrix as a function of the states that are read, by name and as a point."""
 
@@ -362,53 +341,13 @@ def _reader(name: str, interface: Interface, matrix: Matrix) -> tuple[Callable[.
         return matrix
 
     given = matrix if callable(matrix) else constant
-    _takes(name, "matrix", given, _reads(interface))
-    return given, lambda x: _called(name, "the matrix", given, x)
+    require_arguments(name, "matrix", given, _reads(interface))
+    return given, lambda x: value_of(name, "the matrix", given, x)
 
 
 def _rows(interface: Interface, read: Callable[[Point], ArrayLike]) -> int:
     x = random_point(Bundle.of(interface), _reads(interface), np.random.default_rng(24))
     return len(np.atleast_2d(np.asarray(read(x), dtype=float)))
-
-
-def _called(name: str, what: str, function: Callable[..., Any], values: Mapping[Path, Array]) -> Any:
-    """Value of a user's function; a logarithm of a non-positive state names the state.
-
-    Raises
-    ------
-    StructureError
-        The function has no value there.
-    """
-    given = _named(values)
-    try:
-        return function(**given)
-    except ValueError as error:
-        witness = ", ".join(f"{port}={value}" for port, value in given.items()) or "none is read"
-        raise StructureError("domain", name, what=what, found=error, witness=witness) from error
-
-
-def _named(values: Mapping[Path, Array]) -> dict[str, Any]:
-    return {str(port): float(v[0]) if v.size == 1 else v for port, v in values.items()}
-
-
-def _flat(name: str, value: Any, n: int) -> Array:
-    entries: list[Any] = list(value) if isinstance(value, list | tuple) else [value]  # pyright: ignore[reportUnknownArgumentType]
-    out = np.concatenate([np.atleast_1d(np.asarray(entry, dtype=float)) for entry in entries])
-    if out.shape != (n,):
-        raise StructureError("gradient-shape", name, found=out.shape, expected=(n,))
-    return out
-
-
-def _matrix(name: str, value: ArrayLike, rows: int, columns: int) -> Array:
-    try:
-        out = np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
-        out = np.array(np.nan)
-    if out.shape != (rows, columns) or not np.all(np.isfinite(out)):
-        expected = f"finite numbers of shape ({rows}, {columns})"
-        kind = "parameter" if out.shape != (rows, columns) else "undefined"
-        raise StructureError(kind, name, key="matrix", found=value, expected=expected)
-    return out
 
 
 def _name(function: Callable[..., Any]) -> str:

@@ -73,6 +73,8 @@ def _type(value: Mapping[str, Any], schema: Mapping[str, Any]) -> str:
     match value["type"]:
         case "array":
             return _array(value, schema)
+        case "object" if value.get("maxProperties") == 0:
+            return "an empty table"
         case "object":
             return _type(value["additionalProperties"], schema).replace("table", "tables", 1)
         case "number":

@@ -237,7 +237,9 @@ class SurfaceShapeEntry(Entry):
     box: Annotated[list[Positive], Field(min_length=3, max_length=3)] | None = Field(
         default=None, description="edge lengths, m"
     )
-    plane: dict[str, Number] | None = Field(default=None, description="{}: the plane z = 0, solid below")
+    plane: Annotated[dict[str, Number], Field(max_length=0)] | None = Field(
+        default=None, description="the plane z = 0, solid below"
+    )
 
 
 class ContactLawEntry(Entry):
@@ -265,7 +267,7 @@ class SurfaceEntry(ContactLawEntry):
 
 
 class ContactEntry(ContactLawEntry):
-    """``[contacts.NAME]``; without any such table all pairs of surfaces that can meet."""
+    """``[contacts.NAME]``"""
 
     surfaces: Pair = Field(description="names of two surfaces; the keys below replace theirs")
 

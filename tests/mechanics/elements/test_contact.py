@@ -1,0 +1,244 @@
+"""Contacts and stops against closed forms, by every method."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import ephs
+from ephs.mechanics.elements.contact import contact_energy, contact_loss
+from ephs.mechanics.methods import METHODS
+from ephs.mechanics.scene.document import scene_from_text, scene_to_text
+from ephs.mechanics.shapes.gap import plane_rim, plane_sphere, rounded_box_sphere
+from ephs.mechanics.shapes.law import Law
+from ephs.operad import Path
+from ephs.semantics.spaces import SE3
+from ephs.testing import check_primitive
+
+SCENES = [name for name, method in METHODS.items() if method.scenes]
+GAPS = (
+    plane_sphere(0.3),
+    plane_sphere(0.0),
+    plane_rim(0.2),
+    rounded_box_sphere((0.1, 0.2, 0.3), 0.0, 0.5),
+    rounded_box_sphere((0.0, 0.0, 0.0), 0.3, 0.5),
+)
+HEAD = 'format = 1\nname = "touching"\n[world]\ngravity = [0.0, 0.0, {gravity}]\n'
+BALL = """
+[bodies.ball]
+mass = 2.0
+inertia = [8e-3, 8e-3, 8e-3]
+position = [0.0, 0.0, {height}]
+velocity = [{along}, 0.0, {speed}]
+[surfaces.ball]
+body = "ball"
+shape = {{ sphere = 0.1 }}
+stiffness = {stiffness}
+exponent = {exponent}
+loss = {loss}
+friction = {friction}
+slip = {slip}
+[surfaces.floor]
+body = "ground"
+shape = {{ plane = {{}} }}
+"""
+USUAL = {
+    "gravity": 0.0, "height": 0.15, "along": 0.0, "speed": 0.0, "stiffness": 1e5, "exponent": 1.0, "loss": 0.0,
+    "friction": 0.0, "slip": 1e-3,
+}  # fmt: skip
+
+
+def scene_of(tmp_path, text, **numbers):
+    file = tmp_path / "touching.toml"
+    file.write_text((HEAD + text).format(**(USUAL | numbers)), encoding="utf-8")
+    return ephs.load(file)
+
+
+def run(scene, until, method="rk87", step=None, **options):
+    """A run whose results count, whatever its audit says of constant steps."""
+    if step is None:
+        options = {"rtol": 1e-9, "atol": 1e-11} | options
+    return ephs.simulate(scene, until, method=method, step=step, audit="off", **options)
+
+
+def rebound(speed, loss):
+    """Speed after an impact by Hunt and Crossley: v dv/(1 + cv) = −(k/m) dⁿ dd has one potential on the way back."""
+    c = 1.5 * loss
+
+    def potential(v):
+        return v / c - np.log1p(c * v) / c**2
+
+    return brentq(lambda v: potential(-v) - potential(speed), 0.0, min(speed, (1.0 - 1e-9) / c))
+
+
+@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("exponent", [1.0, 1.5])
+def test_an_impact_loses_what_hunt_and_crossley_say(name, exponent, tmp_path):
+    scene = scene_of(tmp_path, BALL, speed=-1.0, loss=0.4, exponent=exponent)
+    fixed = METHODS[name].fixed
+    sol = run(scene, 0.125, name, step=2.0**-13 if fixed else None)
+    speed = float(sol.body("ball").velocity[-1, 2])
+    error = 2e-3 if fixed else 1e-5
+    assert speed == pytest.approx(rebound(1.0, 0.4), abs=error)
+    assert sol.heat[-1] == pytest.approx(1.0 - speed**2, abs=error)
+
+
+STOPPED = """
+[bodies.slide]
+mass = 2.0
+inertia = [1.0, 1.0, 1.0]
+position = [0.0, 0.0, 0.0]
+[joints.rail]
+type = "prismatic"
+bodies = ["ground", "slide"]
+at = [0.0, 0.0, 0.0]
+axis = [1.0, 0.0, 0.0]
+rate = {rate}
+limits = [{lower}, {upper}]
+limit_stiffness = 1e5
+limit_loss = 0.4
+"""
+
+
+@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize(("rate", "lower", "upper"), [(1.0, "nan", 0.05), (-1.0, -0.05, 0.05)])
+def test_a_stop_is_an_impact(name, rate, lower, upper, tmp_path):
+    scene = scene_of(tmp_path, STOPPED, rate=rate, lower=lower, upper=upper)
+    fixed = METHODS[name].fixed
+    sol = run(scene, 0.0859375, name, step=2.0**-13 if fixed else None)
+    assert sol.joint("rail").rate[-1, 0] == pytest.approx(-rate * rebound(1.0, 0.4), abs=2e-3 if fixed else 1e-5)
+
+
+def test_without_loss_a_ball_comes_back(tmp_path):
+    """An arc of an oscillator between two parabolas, and every joule is there."""
+    m, g, k, fall = 2.0, 9.81, 1e5, 0.05
+    scene = scene_of(tmp_path, BALL, gravity=-g, stiffness=k)
+    down, rate, speed = np.sqrt(2.0 * fall / g), np.sqrt(k / m), np.sqrt(2.0 * g * fall)
+    touching = (np.pi + 2.0 * np.arctan(g / rate / speed)) / rate
+    for name, error in (("rk87", 1e-7), ("radau", 1e-6)):
+        sol = run(scene, 2.0 * down + touching, name)
+        assert sol.body("ball").position[-1, 2] == pytest.approx(0.15, abs=error)
+    sol = run(scene, 0.5, "natural", step=2.0**-9)
+    assert sol.contact("ball_floor").gap.min() < 0.0
+    assert np.abs(sol.energy_error).max() <= 1e-12
+
+
+def test_a_sphere_slides_until_it_rolls(tmp_path):
+    """v = 5/7 v₀ from 2 v₀/(7 μ g) on, and 2/7 of the energy are heat; what slips on is of the size of `slip`."""
+    m, g, mu, v0, k, slip = 2.0, 9.81, 0.3, 1.0, 1e5, 1e-4
+    rest = 0.1 - m * g / k
+    scene = scene_of(tmp_path, BALL, gravity=-g, height=rest, along=v0, stiffness=k, friction=mu, slip=slip)
+    until = 2.0 * v0 / (7.0 * mu * g)
+    sol = run(scene, 1.5 * until, save_at=[0.5 * until, 1.5 * until])
+    assert sol.body("ball").velocity[0, 0] == pytest.approx(v0 - 0.5 * mu * g * until, abs=10.0 * slip)
+    assert sol.body("ball").velocity[-1, 0] == pytest.approx(5.0 / 7.0 * v0, abs=10.0 * slip)
+    assert sol.heat[-1] == pytest.approx(m * v0**2 / 7.0, abs=10.0 * slip)
+
+
+BLOCK = """
+[bodies.block]
+mass = 2.0
+inertia = [0.01, 0.01, 0.01]
+position = [{x}, 0.0, {z}]
+rotation = [{c}, 0.0, {s}, 0.0]
+[surfaces.block]
+body = "block"
+shape = {{ box = [0.4, 0.3, 0.02] }}
+stiffness = 1e5
+loss = 1.0
+friction = {mu}
+slip = 1e-3
+[surfaces.slope]
+body = "ground"
+shape = {{ plane = {{}} }}
+rotation = [{c}, 0.0, {s}, 0.0]
+"""
+
+
+@pytest.mark.parametrize(("mu", "sliding"), [(0.2, True), (0.6, False)])
+def test_a_block_on_a_slope_slides_or_sticks(mu, sliding, tmp_path):
+    m, g, theta = 2.0, 9.81, 0.3
+    sunk = 0.01 - m * g * np.cos(theta) / 4e5  # four corners carry it
+    up = np.array([np.sin(theta), 0.0, np.cos(theta)])
+    x, _, z = sunk * up
+    scene = scene_of(tmp_path, BLOCK, gravity=-g, mu=mu, x=x, z=z, c=np.cos(theta / 2.0), s=np.sin(theta / 2.0))
+    sol = run(scene, 0.4, rtol=1e-7, save_at=[0.2, 0.4])
+    down = np.array([np.cos(theta), 0.0, -np.sin(theta)])
+    speed = sol.body("block").velocity @ down
+    if sliding:
+        assert speed[1] - speed[0] == pytest.approx(0.2 * g * (np.sin(theta) - mu * np.cos(theta)), rel=1e-3)
+    else:
+        steep = np.tan(theta)
+        assert speed[1] == pytest.approx(1e-3 * steep / np.sqrt(mu**2 - steep**2), rel=0.05)
+
+
+@pytest.mark.parametrize("gap", GAPS, ids=lambda gap: f"{gap.name}-{gap.radius:g}")
+def test_the_loss_is_an_onsager_structure(gap):
+    check_primitive(contact_loss(gap, Law(1e3, 1.5, 0.2, 0.5, 0.1, 0.01, 0.02)), max_examples=100)
+
+
+@pytest.mark.parametrize("gap", GAPS, ids=lambda gap: f"{gap.name}-{gap.radius:g}")
+def test_the_energy_has_an_exact_slope(gap):
+    rng, law = np.random.default_rng(5), Law(1e3, 1.5)
+    energy, q_r, touched = contact_energy(gap, law), Path.of("q_r"), 0
+    for _ in range(100):
+        x = 0.3 * rng.normal(size=7)
+        x[:4] /= np.linalg.norm(x[:4])
+        v = 0.5 * rng.normal(size=6)
+        before, after = (energy.energy({q_r: at}) for at in (x, SE3.compose(x, SE3.exp(v))))
+        touched += (before > 0.0) != (after > 0.0)
+        along = energy.discrete_gradient({q_r: x}, v)
+        scale = before + after + np.abs(along) @ np.abs(v) + law.energy(1.0) * np.finfo(float).eps
+        assert abs(after - before - along @ v) <= 1e-13 * scale
+    assert touched >= 5
+
+
+def test_forces_are_those_that_move_the_ball(tmp_path):
+    times = np.linspace(0.09, 0.12, 601)
+    sol = run(scene_of(tmp_path, BALL, gravity=-9.81, loss=0.3), 0.12, save_at=times)
+    contact, pushed = sol.contact("ball_floor"), np.gradient(sol.body("ball").velocity[:, 2], times)
+    assert contact.gap.min() < 0.0 < contact.gap.max()
+    assert contact.force[1:-1, 2] == pytest.approx(2.0 * (pushed + 9.81)[1:-1], abs=0.02 * contact.force.max())
+    heat = np.concatenate([[0.0], np.cumsum(0.5 * (contact.heat[1:] + contact.heat[:-1]) * np.diff(times))])
+    assert heat[-1] == pytest.approx(sol.heat[-1] - sol.heat[0], rel=1e-3)
+
+
+def test_contacts_survive_files(tmp_path):
+    for text, numbers in ((BALL, {"loss": 0.25}), (STOPPED, {"rate": 1.0, "lower": "nan", "upper": 0.5})):
+        scene = scene_of(tmp_path, text, **numbers)
+        again = scene_from_text(scene_to_text(scene))
+        assert scene_to_text(again) == scene_to_text(scene)
+        assert [c.law for _, c in again.all_contacts()] == [c.law for _, c in scene.all_contacts()]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "fault"),
+    [
+        ('body = "ball"', 'body = "bal"', "unknown|bal"),
+        ("sphere = 0.1", "sphere = -0.1", "a number above 0"),
+        ("sphere = 0.1", "sphere = 0.1, box = [1.0, 1.0, 1.0]", "sphere and box"),
+        ("shape = { plane = {} }", "shape = { box = [1.0, 1.0, 1.0] }\n[surfaces.more]\nbody = \"ground\"\n"
+         "shape = { cylinder = [0.1, 0.2] }", "a sphere and a cylinder"),
+        ("stiffness = 100000.0", "stiffness = -1.0", "a number above 0"),
+        ("stiffness = 100000.0", "", "two surfaces without stiffness"),
+        ("exponent = 1.0", "exponent = 0.5", "not below 1"),
+        ("shape = { plane = {} }", "shape = { plane = {} }\nexponent = 1.5", "1 and 1.5"),
+        ("slip = 0.001", "slip = 0.0", "a number above 0"),
+        ("shape = { plane = {} }", "shape = { plane = {} }\n[contacts.one]\nsurfaces = [\"ball\", \"flor\"]", "flor"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_named(old, new, fault, tmp_path):
+    text = (HEAD + BALL).format(**USUAL)
+    assert old in text
+    file = tmp_path / "wrong.toml"
+    file.write_text(text.replace(old, new), encoding="utf-8")
+    with pytest.raises(ephs.SceneError, match=fault):
+        ephs.load(file)
+
+
+@pytest.mark.parametrize("limits", ["[0.5, 0.1]", "[0.1]", '["a", 1.0]', "[inf, 1.0]"])
+def test_limits_ascend(limits, tmp_path):
+    file = tmp_path / "wrong.toml"
+    text = (HEAD + STOPPED).format(**USUAL, rate=1.0, lower=0.0, upper=1.0).replace("[0.0, 1.0]", limits)
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(ephs.SceneError, match="lower < upper"):
+        ephs.load(file)
