@@ -165,7 +165,8 @@ def simulate(
         problem = folded_problem(problem)
     if end < start:
         _reversible(problem, end)
-    control, unit = control_of(problem, rtol, atol, step, min_step, max_step, max_steps), problem.seconds
+    order, unit = chosen_method.order, problem.seconds
+    control = control_of(problem, order, rtol, atol, step, min_step, max_step, max_steps)
     told_apart(start / unit, end / unit, control.step)
     if options is not None and not isinstance(options, Mapping):
         raise OptionError("options", options, "a mapping from names to values")
@@ -235,6 +236,7 @@ def _fits(form: str, method: Method) -> None:
 
 def control_of(
     problem: Problem,
+    order: int,
     rtol: "float | Mapping[str, float]",
     atol: "float | Mapping[str, float]",
     step: float | None,
@@ -242,7 +244,7 @@ def control_of(
     max_step: float | None,
     max_steps: int | None,
 ) -> Control:
-    """Control of the steps of a problem.
+    """Control of the steps of a problem, by a method of an order.
 
     Raises
     ------
@@ -257,7 +259,8 @@ def control_of(
     least = 0.0 if min_step is None else number_of("min_step", min_step) / unit
     most = np.inf if max_step is None else number_of("max_step", max_step) / unit
     if problem.scene is not None and step is None:
-        most = min(most, max(longest_step(problem.scene), least))
+        tightest = min(relative.value, *relative.special.values(), np.inf)
+        most = min(most, max(longest_step(problem.scene, order, tightest), least))
     return Control(
         relative,
         absolute,

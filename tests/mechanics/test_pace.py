@@ -1,12 +1,14 @@
 """Steps that are chosen follow what is prescribed, where no error tells how long they may be."""
 
+import warnings
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import ephs
-from ephs.mechanics.pace import TURN, longest_step
+from benchmarks.hard import CASES
+from ephs.mechanics.pace import TIMES, TURN, longest_step
 from examples.failing import four_bar
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -35,8 +37,19 @@ def test_a_joint_moves_by_a_tenth_of_a_turn_or_of_the_extent_at_most(tmp_path):
     for rate, expected in (("-2.0", TURN * 5.0 / 2.0), ("0.0", np.inf)):
         file = tmp_path / "slide.toml"
         file.write_text(SLIDE.replace("RATE", rate))
-        assert longest_step(ephs.load(file)) == expected
-    assert longest_step(four_bar(2.5)) == TURN
+        assert longest_step(ephs.load(file), 8, 1e-6) == expected
+    assert longest_step(four_bar(2.5), 2, 0.0) == TURN
+    assert longest_step(four_bar(2.5), 2, 1e-6) == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize("rtol", [1e-5, 1e-6])
+def test_steps_of_low_order_follow_the_tolerance_where_nothing_is_free(rtol):
+    """Momenta of natural satisfy constraints to the order of its steps, and there is no position that could show it."""
+    case = CASES["dead centre"]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ephs.CostWarning)
+        sol = ephs.simulate(case.make(), case.until, method="natural", rtol=rtol)
+    assert case.error(sol) <= TIMES * rtol
 
 
 @pytest.mark.parametrize("method", ["rk54", "rk87"])

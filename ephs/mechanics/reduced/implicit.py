@@ -100,7 +100,10 @@ class Implicit(ReducedMethod):
 
     def _turned(self) -> bool:
         """Whether constraints have come nearer to repeating each other, or gone from it, since the matrix was made."""
-        return bool(np.any(np.abs(np.log2(self.equations.separation() / self._separation)) > 1.0))
+        found = self.equations.separation()
+        if found.shape != self._separation.shape:  # another rank
+            return True
+        return bool(np.any(np.abs(np.log2(found / self._separation)) > 1.0))
 
     def _renew(self, state: ReducedState) -> None:
         self.jacobian.at(state, renew=True)

@@ -306,12 +306,14 @@ class Ensemble:
         """The method on these equations, None where it does not take many steps in one call."""
         given = self._options
         method, _ = chosen(given.get("method", "auto"), equations.problem, step=given.get("step"))
-        if method.many is not None or (given.get("step") is None and longest_step(equations.problem.scene) < np.inf):
+        if method.many is not None or (
+            given.get("step") is None and longest_step(equations.problem.scene, 1, 0.0) < np.inf
+        ):
             return None  # each member has its own limit
         if equations.led.holds:  # its work is no sum of rows
             return None
         control = control_of(
-            equations.problem, given.get("rtol", 1e-6), given.get("atol", 1e-9), given.get("step"),
+            equations.problem, method.order, given.get("rtol", 1e-6), given.get("atol", 1e-9), given.get("step"),
             given.get("min_step"), given.get("max_step"), given.get("max_steps"),
         )  # fmt: skip
         stepper, _ = method.make(Setting(equations.problem, self._t0, control, {}, equations))

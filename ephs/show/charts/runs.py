@@ -15,7 +15,9 @@ from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.simulate import simulate
 from ephs.mechanics.solve.errors import Interrupted, SimulationError
 from ephs.mechanics.solve.errors import Outcome as Failure
+from ephs.mechanics.solve.findings import CostWarning
 from ephs.mechanics.solve.solution import Solution
+from ephs.semantics.system import System
 
 __all__ = ["MOST_STEPS", "Array", "Ending", "Run", "Setting", "attempt"]
 
@@ -34,6 +36,7 @@ class Ending(StrEnum):
     REFUSED = "refused"  # at every setting
     FAILED = "failed"  # at this setting
     SLOW = "took too long"
+    LEAKED = "an exception that speaks to no user"
 
 
 @final
@@ -90,7 +93,7 @@ class _Watch:
 
 
 def attempt(
-    scene: Scene,
+    model: Scene | System,
     until: float,
     method: str | Method,
     setting: Setting,
@@ -98,8 +101,9 @@ def attempt(
     limit: float,
     save_at: Array | None = None,
     max_steps: int = MOST_STEPS,
+    options: Mapping[str, Any] | None = None,
 ) -> Run:
-    """Run a scene once; whatever goes wrong comes back as a value.
+    """Run a model once; whatever goes wrong comes back as a value.
 
     Parameters
     ----------
@@ -107,14 +111,17 @@ def attempt(
         Processor time in s after which the run is stopped.
     save_at
         Times that are kept; the end alone unless given.
+    options
+        Further options of `ephs.simulate`.
     """
-    watch = _Watch(limit)
+    watch, told = _Watch(limit), list[warnings.WarningMessage]()
     times = np.array([until]) if save_at is None else save_at
     try:
-        with warnings.catch_warnings(), np.errstate(all="ignore"):
+        with warnings.catch_warnings(record=True) as told, np.errstate(all="ignore"):
             warnings.simplefilter("ignore")  # what overflows on its way to a failure is part of the failure
+            warnings.simplefilter("always", CostWarning)
             solution = simulate(
-                scene,
+                model,
                 until,
                 method=method,
                 save_at=times,
@@ -122,6 +129,7 @@ def attempt(
                 progress=watch,
                 audit="off",  # errors are measured against a reference
                 **setting.options(),
+                **(options or {}),
             )
         return Run(solution, Ending.DONE, "", watch.spent)
     except Interrupted as error:
@@ -135,7 +143,10 @@ def attempt(
             ending, message = (Ending.REFUSED if error.outcome in _REFUSALS else Ending.FAILED), str(error)
     except Exception as error:  # a chart of failures outlives all of them, also those that speak to no user
         spoken = type(error).__module__.startswith("ephs.")
-        ending, message = Ending.REFUSED, str(error) if spoken else f"{type(error).__name__}: {error}"
+        ending = Ending.REFUSED if spoken else Ending.LEAKED
+        message = str(error) if spoken else f"{type(error).__name__}: {error}"
     if watch.fired and ending is not Ending.SLOW:  # a method that made a failure of its own of it
         ending, message = Ending.SLOW, f"{Ending.SLOW}: {message}"
+    if ending is Ending.SLOW:
+        message = "; ".join([message, *(str(each.message) for each in told)])
     return Run(None, ending, message, watch.spent)

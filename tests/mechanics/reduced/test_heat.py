@@ -8,36 +8,13 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import ephs
+from benchmarks.hard.brakes import ENERGY, brake
 from ephs.mechanics.reduced.heat import Heats
 from examples.failing import scene
 
-RATE, ENERGY = 100.0, 5000.0
 EPS = float(np.finfo(float).eps)
 CONSTANT = {"radau": 0.0, "alpha": 1e-4, "variational": 0.0, "rk54": 0.0, "rk87": 0.0}
 """Methods that take constant steps, and the part of a stiff brake's heat that they may miss."""
-
-
-def brake(friction, capacity=None, temperature=300.0):
-    """A disc of 1 kg m² on a pin, 100 rad/s: 5000 J."""
-    heat = 'heat = "pad"' if capacity else ""
-    pad = f"[thermal.pad]\ncapacity = {capacity}\ntemperature = {temperature}" if capacity else ""
-    return scene(
-        f"""
-        [bodies.disc]
-        mass = 1.0
-        inertia = [0.5, 0.5, 1.0]
-        angular_velocity = [0.0, 0.0, {RATE}]
-        [joints.pin]
-        type = "revolute"
-        bodies = ["ground", "disc"]
-        at = [0.0, 0.0, 0.0]
-        axis = [0.0, 0.0, 1.0]
-        friction = {friction}
-        {heat}
-        {pad}
-        """,
-        "[world]\ngravity = [0.0, 0.0, 0.0]\n",
-    )
 
 
 def arms(frictions, capacities, conductance, rates):

@@ -2,25 +2,13 @@
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 import ephs
 from benchmarks.families import scene
+from benchmarks.hard.loops import angles
 
-GRAVITY, SPEED = 9.81, -1.0
 TIMES = np.linspace(0.0, 10.0, 41)
 """Cranks pass through alignment with the ground many times."""
-
-
-def angles(windows: int):
-    """The common angle of the cranks in rad: all bars are alike, couplers only move along circles."""
-    inertia = (windows + 1) / 3.0 + windows
-    torque = GRAVITY * ((windows + 1) / 2.0 + windows)
-    found = solve_ivp(
-        lambda _, y: (y[1], -torque * np.cos(y[0]) / inertia), (0.0, TIMES[-1]), (0.5 * np.pi, SPEED), "DOP853", TIMES,
-        rtol=3e-14, atol=1e-15,
-    )  # fmt: skip
-    return found.y[0]
 
 
 @pytest.mark.parametrize("windows", [1, 2, 3])
@@ -35,7 +23,7 @@ def test_errors_follow_the_tolerance_through_alignment(windows, method, rtol):
     """
     made = scene("four-bar-windows", windows)
     sol = ephs.simulate(made, TIMES[-1], method=method, rtol=rtol, save_at=TIMES, audit="off")
-    angle = angles(windows)
+    angle = angles(windows, tuple(TIMES.tolist()))
     for crank in range(windows + 1):
         exact = np.column_stack([crank + 0.5 * np.cos(angle), 0.5 * np.sin(angle)])
         assert np.abs(sol.body(f"crank{crank}").position[:, :2] - exact).max() <= 100.0 * rtol

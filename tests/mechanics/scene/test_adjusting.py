@@ -8,57 +8,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import ephs
+from benchmarks.hard.four_bars import ADJUSTED
 from ephs.mechanics.check import check_model
 from ephs.mechanics.scene.kinematics import elements, largest_gap, largest_slip
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.state import Snapshot
 from ephs.semantics.spaces.rank import ASSEMBLY
 
-FOUR_BAR = """format = 1
-name = "guessed"
-[assembly]
-adjust = {adjust}
-[world]
-gravity = [0.0, -9.81, 0.0]
-[bodies.crank]
-mass = 1.0
-inertia = [0.1, 0.1, 0.1]
-position = [{x}, 0.4, 0.0]
-[bodies.coupler]
-mass = 1.0
-inertia = [0.1, 0.1, 0.1]
-position = [0.9, 0.95, 0.0]
-[bodies.rocker]
-mass = 1.0
-inertia = [0.1, 0.1, 0.1]
-position = [1.35, 0.55, 0.0]
-[joints.a]
-type = "revolute"
-bodies = ["ground", "crank"]
-frame1 = {{}}
-frame2 = {{ position = [-0.15, -0.4, 0.0] }}
-{crank}
-[joints.b]
-type = "revolute"
-bodies = ["crank", "coupler"]
-frame1 = {{ position = [0.15, 0.4, 0.0] }}
-frame2 = {{ position = [-0.6, -0.15, 0.0] }}
-[joints.c]
-type = "revolute"
-bodies = ["coupler", "rocker"]
-frame1 = {{ position = [0.6, 0.15, 0.0] }}
-frame2 = {{ position = [0.15, 0.55, 0.0] }}
-[joints.d]
-type = "revolute"
-bodies = ["ground", "rocker"]
-frame1 = {{ position = [1.2, 0.0, 0.0] }}
-frame2 = {{ position = [-0.15, -0.55, 0.0] }}
-{rocker}
-"""
-
 
 def text_of(crank="", rocker="", x=0.15, adjust="true"):
-    return FOUR_BAR.format(crank=crank, rocker=rocker, x=x, adjust=adjust)
+    return 'format = 1\nname = "guessed"\n' + ADJUSTED.format(crank=crank, rocker=rocker, x=x, adjust=adjust)
 
 
 def load(tmp_path, **given) -> Scene:

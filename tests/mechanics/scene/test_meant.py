@@ -7,37 +7,21 @@ import numpy as np
 import pytest
 
 import ephs
+from benchmarks.hard.four_bars import PINS, four_bar
+from benchmarks.hard.loops import stretched
 from ephs.mechanics.methods import METHODS
 from ephs.mechanics.own_units import mobility_of
 from ephs.mechanics.scene.load import load
 from ephs.mechanics.scene.meant import as_meant
 from ephs.mechanics.simulate import problem_of_scene
 
-PINS = {"a": (0.0, 0.0), "b": (0.3, 0.8), "c": (1.5, 1.1), "d": (1.2, 0.0)}
-BODIES = {"crank": "ab", "coupler": "bc", "rocker": "cd"}
-JOINTS = {"a": ("ground", "crank"), "b": ("crank", "coupler"), "c": ("coupler", "rocker"), "d": ("ground", "rocker")}
 EACH = pytest.mark.parametrize("name", [name for name, method in METHODS.items() if method.scenes])
-
-
-def tilted(delta, size=1.0, pins=PINS):
-    """A planar four-bar, the axis of one pin tilted."""
-    lines = ["format = 1", 'name = "tilted"', "[world]", "gravity = [0.0, -9.81, 0.0]"]
-    for name, (one, two) in BODIES.items():
-        x, y = 0.5 * size * (np.array(pins[one]) + np.array(pins[two]))
-        inertia = float(0.1 * size**2)
-        lines += [f"[bodies.{name}]", "mass = 1.0", f"inertia = [{inertia!r}, {inertia!r}, {inertia!r}]"]
-        lines += [f"position = [{float(x)!r}, {float(y)!r}, 0.0]"]
-    for name, (one, two) in JOINTS.items():
-        x, y = (size * value for value in pins[name])
-        tilt = delta if name == "b" else 0.0
-        lines += [f"[joints.{name}]", 'type = "revolute"', f'bodies = ["{one}", "{two}"]', f"at = [{x!r}, {y!r}, 0.0]"]
-        lines += [f"axis = [{float(np.sin(tilt))!r}, 0.0, {float(np.cos(tilt))!r}]"]
-    return "\n".join(lines)
 
 
 def read(delta, tmp_path, size=1.0, pins=PINS):
     file = tmp_path / "tilted.toml"
-    file.write_text(tilted(delta, size, pins), encoding="utf-8")
+    text = four_bar(tilt=delta, size=size, pins=pins)
+    file.write_text(f'format = 1\nname = "tilted"\n{text}', encoding="utf-8")
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
         scene = load(file)
@@ -93,38 +77,11 @@ def test_what_is_clearly_locked_is_taken_at_its_word(tmp_path):
     assert mobility_of(problem_of_scene(scene)).mobility == 0
 
 
-STRETCHED = """format = 1
-name = "stretched"
-[bodies.left]
-mass = 1.0
-inertia = [0.1, 0.1, 0.1]
-position = [0.5, {half}, 0.0]
-rotation = {up}
-[bodies.right]
-mass = 1.0
-inertia = [0.1, 0.1, 0.1]
-position = [1.5, {half}, 0.0]
-rotation = {down}
-"""
-
-
 @pytest.mark.parametrize("height", [1e-9, 1e-6])
 def test_a_truss_that_moves_to_first_order_only_is_no_mechanism(height, tmp_path):
     """Two bars, all but in line between two pins of the ground."""
-    half = 0.5 * float(np.arcsin(height))
-    up, down = ([float(np.cos(half)), 0.0, 0.0, sign * float(np.sin(half))] for sign in (1.0, -1.0))
-    text = STRETCHED.format(half=0.5 * height, up=up, down=down)
-    far = 2.0 * float(np.sqrt(1.0 - height**2))
-    pins = {
-        "a": ("ground", "left", 0.0, 0.0),
-        "b": ("left", "right", 0.5 * far, height),
-        "c": ("ground", "right", far, 0.0),
-    }
-    for name, (one, two, x, y) in pins.items():
-        text += f'[joints.{name}]\ntype = "revolute"\nbodies = ["{one}", "{two}"]\nat = [{x!r}, {y!r}, 0.0]\n'
-        text += "axis = [0.0, 0.0, 1.0]\n"
     file = tmp_path / "stretched.toml"
-    file.write_text(text, encoding="utf-8")
+    file.write_text(f'format = 1\nname = "stretched"\n{stretched(height)}', encoding="utf-8")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         load(file)

@@ -6,50 +6,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import ephs
+from benchmarks.hard.case import WEIGHTLESS, read
+from benchmarks.hard.pushes import MASS, OMEGA, SPRING, TIMES, error, motion, push, sprung
 from ephs.mechanics.methods import METHODS
 from ephs.mechanics.solve import probe
 from ephs.mechanics.solve.breakpoints import Breakpoints
 from ephs.mechanics.solve.probe import WIDTH, Asked
-from examples.failing import scene
 
-STILL = "[world]\ngravity = [0.0, 0.0, 0.0]\n"
-SPRING = """
-[bodies.mass]
-mass = 2.0
-inertia = [0.1, 0.1, 0.1]
-[joints.rail]
-type = "prismatic"
-bodies = ["ground", "mass"]
-at = [0.0, 0.0, 0.0]
-axis = [1.0, 0.0, 0.0]
-stiffness = 18.0
-"""
-SCENE = scene(SPRING, STILL)
-MASS, OMEGA = 2.0, 3.0
-TIMES, FORCES = (0.13, 0.31, 0.57, 0.8), (5.0, -3.0, 0.0, 8.0, 2.0)
+SCENE = sprung()
 UNTIL = 1.0
-
-
-def push(t):
-    return FORCES[int(np.searchsorted(TIMES, t, side="right"))]
-
-
-def motion(t, times=TIMES, forces=FORCES):
-    """Place and rate of the mass at a time, from rest: turns about the place that each force holds it at."""
-    x, v, now = 0.0, 0.0, 0.0
-    for after, force in zip([*times, np.inf], forces, strict=True):
-        rest, h = force / MASS / OMEGA**2, min(after, t) - now
-        c, s = np.cos(OMEGA * h), np.sin(OMEGA * h)
-        x, v, now = rest + (x - rest) * c + v / OMEGA * s, v * c - (x - rest) * OMEGA * s, min(after, t)
-        if now == t:
-            break
-    return x, v
-
-
-def error(sol, *course):
-    joint = sol.joint("rail")
-    x, v = np.array([motion(t, *course) for t in sol.t]).T
-    return max(np.abs(joint.coordinate[:, 0] - x).max(), np.abs(joint.rate[:, 0] - v).max() / OMEGA)
 
 
 def run(method, until=UNTIL, function=push, **options):
@@ -187,7 +152,7 @@ def test_noise_is_found_to_be_no_input(monkeypatch):
 
 def test_jumps_are_those_of_the_mechanism_in_its_own_units():
     text = SPRING.replace("mass = 2.0", "mass = 2e-9").replace("0.1, 0.1, 0.1", "1e-22, 1e-22, 1e-22")
-    light = scene(text.replace("18.0", "18.0e-9"), STILL)
+    light = read(text.replace("18.0", "18.0e-9"), WEIGHTLESS)
     for options in ({"jumps": TIMES}, {}):
         sol = ephs.simulate(light, UNTIL, rtol=1e-6, inputs={"joints.rail": lambda t: 1e-9 * push(t)}, **options)
         found = sol.stats["jumps"]
