@@ -156,8 +156,8 @@ CASES = (
     ),
     Case(
         Outcome.TINY, "min_step, where the tolerance asks for less", pendulum,
-        tuple(name for name in CHOOSING if name != "ida"), "", " s$", step=None, within=(0.0, 0.9),
-        options=fixed(min_step=0.1, rtol=1e-10, atol=1e-12),
+        tuple(name for name in CHOOSING if name != "ida"), r"(joints\.pin\.\w+\.\w+)?", r" s\b", step=None,
+        within=(0.0, 0.9), options=fixed(min_step=0.1, rtol=1e-10, atol=1e-12),
     ),
     Case(
         Outcome.TURN, "1000 rad/s in steps of 10 ms", lambda: pendulum(1000.0), ("natural", "natural4"),

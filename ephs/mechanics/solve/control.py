@@ -129,15 +129,15 @@ class Control:
         if self.max_steps is not None and not self.max_steps > 0:
             raise OptionError("max_steps", self.max_steps, "a number > 0")
 
-    def allowed(self, h: float, latest: float, cause: SolveError | None) -> float:
+    def allowed(self, h: float, latest: float, cause: SolveError | None, finest: float = 0.0) -> float:
         """A shorter step h, at times up to ``latest``.
 
         Raises
         ------
         SolveError
-            It is below the least that is allowed, or that rounding leaves: the cause, if there is one.
+            It is below the least that is allowed, ``finest`` or what rounding leaves: the cause, if there is one.
         """
-        if h < max(self.least, SHORTEST * np.spacing(latest)):
+        if h < max(self.least, SHORTEST * np.spacing(latest), finest):
             raise cause or SolveError(Outcome.TINY, "", f"{h:.3g} s")
         return h
 
@@ -166,8 +166,15 @@ def told_apart(t0: float, until: float, step: float | None) -> None:
 class Policy(Protocol):
     """Verdict on a step by its estimated error relative to the tolerance."""
 
+    finest: float
+    """Part of a run below which no step can be."""
+
     def judge(self, h: float, error: float, span: float) -> tuple[bool, float]:
         """(whether it is accepted, the length of the next one or of the next try); span is that of the whole run."""
+        ...
+
+    def wanted(self, h: float, error: float, span: float) -> float:
+        """Length of the step, however short, whose error would be what is aimed at, by the estimate's power."""
         ...
 
     def snapshot(self) -> Snapshot:
@@ -197,6 +204,7 @@ class Proportional:
     """
 
     STRICT = 30.0
+    finest = 0.0
 
     def __init__(self, exponent: Callable[[], float], share: float = 0.0, damping: float = 0.4) -> None:
         self._exponent, self._share, self._damping, self._before = exponent, share, damping, 1e-4
@@ -221,6 +229,11 @@ class Proportional:
         self._failed = False
         return True, h * min(most, max(0.3, factor))
 
+    def wanted(self, h: float, error: float, span: float) -> float:
+        """Length of the step, however short, whose error would be the tolerance."""
+        part = min((span / h) ** self._share, self.STRICT)
+        return h * (error * part) ** (-1.0 / (self._exponent() - self._share))
+
     def snapshot(self) -> Snapshot:
         """Memory of earlier steps."""
         return {"before": float(self._before), "failed": self._failed}
@@ -244,6 +257,8 @@ class Symmetric:
     """
 
     AIM, NEAR, TRIES, GROWTH = 0.5, 1.6, 4, 4.0
+    finest = 1e-11
+    """Such a part of the tolerance is below the rounding of states, and nobody waits for so many steps."""
 
     def __init__(self, exponent: float) -> None:
         self._exponent, self._tries = exponent - 1.0, 0
@@ -256,13 +271,20 @@ class Symmetric:
         error *= span / h
         if not np.isfinite(error):
             return False, 0.25 * h
-        wanted = h * float(np.clip((self.AIM / max(error, 1e-12)) ** (1.0 / self._exponent), 0.1, self.GROWTH))
+        wanted = float(np.clip(self._wanted(h, error), 0.1 * h, self.GROWTH * h))
         near = self.AIM / self.NEAR <= error <= self.AIM * self.NEAR
         self._tries += 1
         if near or (error <= 1.0 and (self._tries >= self.TRIES or wanted >= self.GROWTH * h)):
             self._tries = 0
             return True, wanted
         return False, wanted
+
+    def wanted(self, h: float, error: float, span: float) -> float:
+        """Length of the step, however short, whose error would be what is aimed at."""
+        return self._wanted(h, error * span / h)
+
+    def _wanted(self, h: float, error: float) -> float:
+        return h * (self.AIM / max(error, 1e-12)) ** (1.0 / self._exponent)
 
     def snapshot(self) -> Snapshot:
         """Memory of earlier steps."""

@@ -48,6 +48,9 @@ class Groups(NamedTuple):
     effort: Index  # (groups,): first effort
     dim: Index
     metric: Array  # (groups, 6, 6): in which the component measures it; the identity but where its frame is another
+    node: Index  # (nodes, 3): storages of entropy alone: component, rate, effort among the unknowns
+    slope: Index  # (nodes,): place of ∂θ/∂s in a stage's entries
+    entry: Index  # (nodes, stages, stages): its places in the system of all stages
 
 
 class Stages(NamedTuple):
@@ -60,6 +63,9 @@ class Stages(NamedTuple):
     whole: Array  # (rates,): increment over the step
     mean: Array  # (unknowns,): whole/h and the efforts' exponents/h
     gradient: Array  # (rates,): discrete gradients over the step
+    share: Array  # (nodes, stages): factors of the discrete gradients by the rates at the stages
+    factor: Array  # (nodes,): the factors α
+    end: Array  # (nodes,): temperatures at the end
     gap: Array  # (unknowns,): what the relations over the step miss, in the constraints' rows
     energy: Array  # (components,)
     residual: Array  # (stages, unknowns)
@@ -144,6 +150,9 @@ def linearise(t, g, p, dropped, x, z, scal, still, unit, inputs, m, s, fresh):
             for j in range(t.dims[i, 0]):
                 rate = t.read_w[t.read_w_at[i] + j]
                 s.gradient[rate] = s.mean[n_rate + t.e_index[t.e_at[i] + j]] - m.residual[rate]
+    for k in range(g.node.shape[0]):
+        rate = g.node[k, 1]
+        s.end[k] = s.gradient[rate] - s.whole[rate] / h * m.data[g.slope[k]]
     for j in range(n_rate + n_effort, n):
         s.gap[j] = m.residual[j]
     for i in range(stages):
@@ -162,6 +171,8 @@ def linearise(t, g, p, dropped, x, z, scal, still, unit, inputs, m, s, fresh):
             for j in range(s.data.shape[1]):
                 s.slope[i, j] = 2.0 / unit[0] * (m.data[j] - s.data[i, j])
         _rest(t, h, s.slope[i], s.scale[i])
+    if fresh:
+        _bend(g, p, h, z, s)
     _correct(t, g, p, dropped, h, z, s)
     return 0, 0
 
@@ -179,6 +190,31 @@ def _rest(t, h, slope, scale):
                     place = t.jacobian[j_at + j * n + q]
                     if place >= 0:
                         scale[row] = max(scale[row], abs(h) * abs(slope[place]) * scale[n_rate + t.e_index[e_at + q]])
+
+
+@kernel
+def _bend(g, p, h, z, s):
+    """Derivatives of the factors α of storages of entropy by the rates: their energies bend too much to leave them out.
+
+    A small capacity warms by orders of magnitude in a step; of other storages α is of the quadrature's order.
+    """
+    stages = p.b.shape[0]
+    for k in range(g.node.shape[0]):
+        rate, effort = g.node[k, 1], g.node[k, 2]
+        defect, square = s.gradient[rate] * s.whole[rate] / h, 0.0
+        for i in range(stages):
+            defect -= p.b[i] * (z[i, effort] - s.residual[i, rate]) * z[i, rate]
+            square += p.b[i] * z[i, rate] * z[i, rate]
+        s.factor[k] = 0.0
+        for j in range(stages):
+            s.share[k, j] = 0.0
+        if square > 1e-280:
+            s.factor[k] = defect / square
+            for j in range(stages):
+                by = p.b[j] * (s.end[k] - z[j, effort] + s.residual[j, rate])
+                for i in range(stages):
+                    by += h * p.b[i] * p.a[i, j] * z[i, rate] * s.slope[i, g.slope[k]]
+                s.share[k, j] = (by - 2.0 * s.factor[k] * p.b[j] * z[j, rate]) / square
 
 
 @kernel
@@ -274,12 +310,15 @@ def gauss_newton(t, g, p, o, where, x, z, scal, still, unit, inputs, m, s):
                 if t.column[source] < n_rate:
                     entry += h * p.a[i, j] * s.slope[i, source]
                 s.matrix[k] = entry
+            for k in range(g.node.shape[0]):
+                for i in range(stages):
+                    for j in range(stages):
+                        s.matrix[g.entry[k, i, j]] -= z[i, g.node[k, 1]] * s.share[k, j]
+                    s.matrix[g.entry[k, i, i]] -= s.factor[k]
             if not factorise(o, s.matrix, s.factors, s.dense, s.pivot):
                 return 2, 0, iteration
         solve(o, s.factors, right, change, s.dense)
-        part = 1.0
-        for i in range(stages):
-            part = min(part, restrain(t, z[i], change[i * n : (i + 1) * n]))
+        part = restrain(t, z, change.reshape(stages, n))
         for i in range(stages):
             for j in range(n):
                 z[i, j] -= change[i * n + j]

@@ -20,7 +20,7 @@ from ephs.mechanics.solve.record import Record, Rows, record_of
 from ephs.mechanics.solve.resolution import Samples, Trials, trials_of
 from ephs.mechanics.solve.snapshot import Snapshot, like, parts
 from ephs.mechanics.solve.solution import Solution
-from ephs.mechanics.solve.stepping import Attempt, Leg, Row, Span, Stepper
+from ephs.mechanics.solve.stepping import Attempt, Leg, Row, Span, Stepper, too_fast
 from ephs.mechanics.solve.watching import Balance
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
@@ -219,7 +219,8 @@ class _Run(Generic[S]):
             if self.policy:
                 accepted, wanted = self.policy.judge(h, attempt.error, abs(self.until - self.t0))
                 if not accepted and not (cut and wanted > h):
-                    self._shrink(min(wanted, control.most), self.cause)
+                    asked = self.policy.wanted(h, attempt.error, abs(self.until - self.t0)) * self.problem.seconds
+                    self._shrink(min(wanted, control.most), too_fast(self.stepper.name, attempt.worst, asked))
                     continue
                 # a step that was cut for an end says nothing of longer ones
                 if h == self.h or wanted < (min(self.h, 2.0 * h) if cut else self.h):
@@ -233,7 +234,8 @@ class _Run(Generic[S]):
 
     def _shrink(self, h: float, cause: SolveError | None) -> None:
         self.rejected += 1
-        self.h = self.control.allowed(h, max(abs(self.t), abs(self.until)), cause)
+        finest = self.policy.finest * abs(self.until - self.t0) if self.policy else 0.0
+        self.h = self.control.allowed(h, max(abs(self.t), abs(self.until)), cause, finest)
 
     def _accept(self, attempt: Attempt[S], end: float | None) -> bool:
         """Keep a step; whether an event ends the run with it."""

@@ -24,7 +24,7 @@ from ephs.mechanics.solve.natural import (
     of_status,
     stored_energies,
 )
-from ephs.mechanics.solve.natural_kernels import COMPONENT, DIVERGED, DONE, INCONSISTENT, Memory, Order
+from ephs.mechanics.solve.natural_kernels import COMPONENT, DIVERGED, DONE, INCONSISTENT, STORING, Memory, Order
 from ephs.mechanics.solve.snapshot import Snapshot, parts
 from ephs.mechanics.solve.sparse import Index, lu_addresses, order
 from ephs.semantics.bundle import Array
@@ -71,14 +71,15 @@ class Natural4:
         self.redundant: tuple[str, ...] = ()
         t, n = model.tables, model.unknowns
         self._memory: Memory = model.memory()
-        self._groups = _groups(model)
-        self._closing = _closing(model, self._groups)
         self._where = _entries(model)
+        self._groups = _groups(model, self._where)
+        self._closing = _closing(model, self._groups)
         size, entries, rates = int(model.descriptor.point_size), int(t.row.size), int(t.counts[0])
-        k = _STAGES
+        k, nodes = _STAGES, len(self._groups.node)
         self._scratch = Stages(
             x=np.zeros((k, size)), v=np.zeros((k, rates)), turn=np.zeros((k, 8)), outer=np.zeros((k, 8)),
-            whole=np.zeros(rates), mean=np.zeros(n), gradient=np.zeros(rates), gap=np.zeros(n),
+            whole=np.zeros(rates), mean=np.zeros(n), gradient=np.zeros(rates),
+            share=np.zeros((nodes, k)), factor=np.zeros(nodes), end=np.zeros(nodes), gap=np.zeros(n),
             energy=np.zeros(t.kind.size), residual=np.zeros((k, n)), scale=np.zeros((k, n)),
             data=np.zeros((k, entries)), slope=np.zeros((k, entries)), matrix=np.zeros(len(self._where)),
             change=np.zeros(k * n), dense=np.zeros(k * n), factors=np.zeros(1), pivot=np.zeros(k * n),
@@ -261,8 +262,8 @@ class Natural4:
         return SolveError(Outcome.SINGULAR, "", "")
 
 
-def _groups(model: Model) -> Groups:
-    """The velocities of joints: twists of two frames, and a velocity on the pair's group."""
+def _groups(model: Model, where: Index) -> Groups:
+    """The velocities of joints: twists of two frames, and a velocity on the pair's group; storages of entropy alone."""
     rows: list[tuple[int, int, int, int]] = []
     metrics: list[Array] = []
     for number, slot in enumerate(model.descriptor.components):
@@ -279,7 +280,26 @@ def _groups(model: Model) -> Groups:
                     metrics.append(metric)
     table = np.array(rows, dtype=np.int64).reshape(-1, 4)
     number, code, effort, dim = (np.ascontiguousarray(column) for column in table.T)
-    return Groups(number, code, effort, dim, np.array(metrics).reshape(-1, 6, 6))
+    node, slope = _nodes(model)
+    place = {source: k for k, source in enumerate(slope.tolist())}
+    entry = np.zeros((len(node), _STAGES, _STAGES), dtype=np.int64)
+    for k, (i, j, source) in enumerate(where.tolist()):
+        if source in place:
+            entry[place[source], i, j] = k
+    return Groups(number, code, effort, dim, np.array(metrics).reshape(-1, 6, 6), node, slope, entry)
+
+
+def _nodes(model: Model) -> tuple[Index, Index]:
+    """(nodes, 3) and (nodes,): storages of entropy alone whose temperature depends on it, as `Groups` has them."""
+    t = model.tables
+    found: list[tuple[int, int, int]] = []
+    slopes: list[int] = []
+    for c in np.flatnonzero((t.kind == STORING) & (t.dims[:, 0] == 1)).tolist():
+        effort, slope = int(t.e_index[t.e_at[c]]), int(t.jacobian[t.jacobian_at[c]])
+        if t.entropy[effort] == 1.0 and slope >= 0:
+            found.append((c, int(t.read_w[t.read_w_at[c]]), int(t.counts[0]) + effort))
+            slopes.append(slope)
+    return np.array(found, dtype=np.int64).reshape(-1, 3), np.array(slopes, dtype=np.int64)
 
 
 def _closing(model: Model, groups: Groups) -> NDArray[np.bool_]:

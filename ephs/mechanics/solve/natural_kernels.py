@@ -315,7 +315,7 @@ def newton(t, o, x, z, scal, inputs, m):
         if not factorise(o, m.data, m.factors, m.dense, m.pivot):
             return 2, 0, iteration
         solve(o, m.factors, m.residual, m.step, m.dense)
-        part = restrain(t, z, m.step)
+        part = restrain(t, z.reshape(1, z.shape[0]), m.step.reshape(1, z.shape[0]))
         for i in range(z.shape[0]):
             z[i] -= m.step[i]
     return 1, 0, 80
@@ -369,7 +369,7 @@ def advance(t, o, x, z, previous, scal, inputs, m, sums, steps, states, energies
             previous[i] = last
             z[i] = guess[i]
             guess[i] = last - z[i]
-        if restrain(t, previous, guess) < 1.0:
+        if restrain(t, previous.reshape(1, z.shape[0]), guess.reshape(1, z.shape[0])) < 1.0:
             copy(previous, z)
         status, component, iterations = newton(t, o, x, z, scal, inputs, m)
         total += iterations

@@ -76,7 +76,8 @@ class Paced:
         coarse, _ = self._single(state, h)
         middle, first = self._single(state, 0.5 * h)
         end, second = self._single(middle, 0.5 * h)
-        return Attempt(state, end, h, self._error(state, coarse, end), min(first, second))
+        error, worst = self._error(state, coarse, end)
+        return Attempt(state, end, h, error, min(first, second), worst=worst)
 
     def inside(self, attempt: Attempt[PacedState], t: float) -> PacedState:
         """A shorter step from the same start."""
@@ -125,9 +126,9 @@ class Paced:
         sums = chunk.ledgers[-1]
         return PacedState(state.t + h, inner, Row(chunk.x[-1], chunk.energies[-1], sums[:4])), float(sums[4])
 
-    def _error(self, state: PacedState, coarse: PacedState, fine: PacedState) -> float:
-        """The error of the two half steps, by Richardson, relative to the tolerances."""
-        worst = 0.0
+    def _error(self, state: PacedState, coarse: PacedState, fine: PacedState) -> tuple[float, str]:
+        """The error of the two half steps, by Richardson, relative to the tolerances, and the state where it is."""
+        worst, where = 0.0, ""
         for slot in self.problem.descriptor.states:
             space = manifold(slot.quantity.space)
             if not self._counted[slot.rates].all() or not space.dim:
@@ -137,8 +138,10 @@ class Paced:
             if space.code == VECTOR:
                 size = max(float(np.abs(b).max()), float(np.abs(state.inner.x[slot.point]).max()))
             allowed = self._atol[slot.rates] + self._rtol[slot.rates] * size
-            worst = max(worst, float(np.max(np.abs(space.increment(a, b)) / allowed)))
-        return worst / (2.0**self.method.order - 1.0)
+            error = float(np.max(np.abs(space.increment(a, b)) / allowed))
+            if not error <= worst:
+                worst, where = error, str(slot.path)
+        return worst / (2.0**self.method.order - 1.0), where
 
 
 def _counted(problem: Problem) -> Array:

@@ -13,10 +13,11 @@ STORING = 0
 
 @kernel
 def restrain(t, z, step):
-    """Shorten a Newton step z − step storage by storage; returns the least part taken of efforts and rates.
+    """Shorten a Newton step z − step (stages, unknowns) storage by storage; the least part taken of efforts and rates.
 
     Absolute temperatures fall by half or rise fourfold at most: small heat capacities warm by orders of magnitude in
-    one step of the method, where whole Newton steps would leave what is positive.
+    one step of the method, where whole Newton steps would leave what is positive. All stages take the same part, as the
+    states at each depend on the rates at all.
     """
     least = 1.0
     for i in range(t.kind.shape[0]):
@@ -25,17 +26,20 @@ def restrain(t, z, step):
         part = 1.0
         for j in range(t.dims[i, 0]):
             effort = t.e_index[t.e_at[i] + j]
-            warmth, fall = z[t.counts[0] + effort] + t.intensive[effort], step[t.counts[0] + effort]
-            if t.entropy[effort] == 1.0 and warmth > 0.0:
-                if fall > 0.5 * warmth:
-                    part = min(part, 0.5 * warmth / fall)
-                elif fall < -3.0 * warmth:
-                    part = min(part, -3.0 * warmth / fall)
+            if t.entropy[effort] == 1.0:
+                for k in range(z.shape[0]):
+                    warmth, fall = z[k, t.counts[0] + effort] + t.intensive[effort], step[k, t.counts[0] + effort]
+                    if warmth > 0.0:
+                        if fall > 0.5 * warmth:
+                            part = min(part, 0.5 * warmth / fall)
+                        elif fall < -3.0 * warmth:
+                            part = min(part, -3.0 * warmth / fall)
         if part < 1.0:
             least = min(least, part)
             for j in range(t.dims[i, 0]):
-                step[t.counts[0] + t.e_index[t.e_at[i] + j]] *= part
-                step[t.read_w[t.read_w_at[i] + j]] *= part
+                for k in range(z.shape[0]):
+                    step[k, t.counts[0] + t.e_index[t.e_at[i] + j]] *= part
+                    step[k, t.read_w[t.read_w_at[i] + j]] *= part
     return least
 
 

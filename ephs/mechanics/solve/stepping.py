@@ -4,11 +4,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar, final
 
+import numpy as np
+
 from ephs.mechanics.solve.control import Control, Policy
+from ephs.mechanics.solve.errors import Outcome, SolveError
 from ephs.mechanics.solve.snapshot import Snapshot
 from ephs.semantics.bundle import Array
 
-__all__ = ["Attempt", "Counts", "Leg", "Row", "Span", "Stepper"]
+__all__ = ["Attempt", "Counts", "Leg", "Row", "Span", "Stepper", "too_fast"]
 
 S = TypeVar("S")
 
@@ -50,6 +53,8 @@ class Attempt(Generic[S]):
         The least entropy production of a component in it, in J/K.
     detail
         What dense output needs.
+    worst
+        Path of the state of the largest error, where it is known.
     """
 
     start: S
@@ -58,6 +63,7 @@ class Attempt(Generic[S]):
     error: float
     least: float
     detail: Any = None
+    worst: str = ""
 
 
 @final
@@ -90,6 +96,13 @@ class Counts:
     longest: float
     least: float
     h: float
+
+
+def too_fast(method: str, worst: str, asked: float) -> SolveError:
+    """Refusal of steps that a tolerance asks for at a state, of about so many seconds; it names methods to use."""
+    others = {"natural": "use radau or natural4", "natural4": "use radau"}.get(method, "")
+    told = f"{method} would need steps of about {asked:.1g} s" if np.isfinite(asked) else "its error is not finite"
+    return SolveError(Outcome.TINY, worst, "; ".join(part for part in (told, others) if part))
 
 
 class Leg(Protocol[S]):
