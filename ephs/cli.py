@@ -212,7 +212,7 @@ def convert(
         from ephs.mechanics.imports import convert as convert_model
 
         output.parent.mkdir(parents=True, exist_ok=True)
-        convert_model(model, output, loading.base, loading.adjust, loading.inertia or "warn")
+        convert_model(model, output, loading.base, loading.adjust, loading.inertia or "warn", contact=loading.contact)
     print(output)
     return 0
 

@@ -75,11 +75,14 @@ class Loading:
     inertia
         Whether an inertia that no distribution of mass has is refused, kept, or replaced by the nearest that one has;
         unless given, as the scene file says, and kept for other formats.
+    contact
+        Take limits of joints and contacts from models in other formats.
     """
 
     base: Literal["fixed", "free"] = "fixed"
     adjust: bool = False
     inertia: Literal["strict", "warn", "nearest"] | None = None
+    contact: bool = False
 
 
 AS_GIVEN = Loading()
@@ -153,6 +156,8 @@ def load_model(scene: str, loading: Loading = AS_GIVEN) -> "Scene | System":
     if not Path(scene).is_file():
         raise BadInput(TEXTS["no-file"].format(found=scene) + beside(Path(scene)))
     options: dict[str, Any] = {"base": loading.base, "adjust": loading.adjust}
+    if loading.contact:
+        options["contact"] = True
     if loading.inertia is not None:
         options["inertia"] = loading.inertia
     with addressed(scene), heard():

@@ -21,6 +21,8 @@ def convert(
     base: str = "fixed",
     adjust: bool = False,
     inertia: str = "warn",
+    *,
+    contact: bool = False,
 ) -> None:
     """Write a model as a scene file, which loads to the same scene as the model.
 
@@ -31,7 +33,7 @@ def convert(
     scene
         The scene file to write. Meshes beside or below it stay where they are; others are copied into a folder of
         theirs beside it, since scenes read nothing outside of their own.
-    base, adjust, inertia
+    base, adjust, inertia, contact
         As `ephs.load` takes them; the scene file says them from then on.
 
     Warns
@@ -52,9 +54,9 @@ def convert(
         raise SceneError(str(model), [fault("model suffix", "", f'"{source.suffix}"')])
     if target.suffix != ".toml":
         raise SceneError(str(model), [fault("scene suffix", "scene", f'"{target.name}"')])
-    load(source, base, adjust, inertia)  # faults and warnings are those of loading
+    load(source, base, adjust, inertia, contact=contact)  # faults and warnings are those of loading
     faults: list[Fault] = []
-    tables = read_model(source, base, faults, [])
+    tables = read_model(source, base, faults, [], contact=contact)
     if tables is None:
         raise SceneError(str(model), faults)
     tables["assembly"] = {"adjust": adjust, "inertia": inertia}
@@ -115,7 +117,7 @@ def _value(value: Any) -> str:
         return "[" + ", ".join(map(_value, value)) + "]"
     if isinstance(value, bool):
         return "true" if value else "false"
-    return _text(value) if isinstance(value, str) else repr(value)
+    return _text(value) if isinstance(value, str) else repr(value)  # nan and inf are TOML's
 
 
 def _key(key: str) -> str:

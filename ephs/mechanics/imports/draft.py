@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 LONGEST_NAME = 200
 WORLD = ""
 """Name of the ground in joints: no link has it."""
+UNLIMITED = 1e15
+"""Limits from this size on are none: SDF writes 1e16."""
 _SCHEMES = ("package://", "model://", "file://")
 
 
@@ -29,11 +31,13 @@ class Draft:
     """Collects bodies, joints, faults, and what a model says that a scene does not.
 
     Links are known by their names in the model; their names in the scene are the same, but for dots and blanks.
-    Poses are (7,), of what is given in a link's own frame.
+    Poses are (7,), of what is given in a link's own frame. Limits and surfaces are kept where ``contact`` says so.
     """
 
-    def __init__(self, name: str, folder: Path, faults: list[Fault]) -> None:
-        self.name, self.folder, self.faults = name, folder, faults
+    def __init__(self, name: str, folder: Path, faults: list[Fault], *, contact: bool = False) -> None:
+        self.name, self.folder, self.faults, self.contact = name, folder, faults, contact
+        self._surfaces: dict[str, dict[str, Any]] = {}
+        self._contacts: dict[str, dict[str, Any]] = {}
         self.gravity: list[float] | None = None
         self._bodies: dict[str, dict[str, Any]] = {}
         self._joints: dict[str, dict[str, Any]] = {}
@@ -97,6 +101,26 @@ class Draft:
             **{key: value for key, value in entries.items() if np.any(value)},
         }
 
+    def limit(self, name: str, lower: float, upper: float) -> None:
+        """Put stops to a joint of one freedom, or note that it has limits."""
+        sides = [float(value) if abs(value) < UNLIMITED else np.nan for value in (lower, upper)]
+        if not self.contact or lower >= upper:
+            self.leave("limits of", name)
+        elif not np.all(np.isnan(sides)):
+            self._joints[self._joint_names[name]]["limits"] = sides
+
+    def surface(self, link: str, name: str, kind: str, value: Any, place: Array) -> str:
+        """A surface of a link; returns its name in the scene."""
+        own = self._own(name, self._surfaces)
+        size = {} if kind == "plane" else _plain(value)
+        self._surfaces[own] = {"body": self._names[link], "shape": {kind: size}, **_placed(self._at(link, place))}
+        return own
+
+    def touch(self, surfaces: tuple[str, str], law: Mapping[str, float]) -> None:
+        """A contact of two surfaces."""
+        name = self._own("_".join(surfaces), self._contacts)
+        self._contacts[name] = {"surfaces": list(surfaces), **law}
+
     def hold(self, name: str) -> None:
         """Keep a joint of one freedom where it is."""
         self._joints[self._joint_names[name]]["motion"] = {"rate": 0.0}
@@ -145,6 +169,7 @@ class Draft:
             "assembly": {"inertia": mode},
             "bodies": self._bodies,
             "joints": self._joints,
+            **({"surfaces": self._surfaces, "contacts": self._contacts} if self._contacts else {}),
         }
 
     def _at(self, link: str, place: Array, *, inverse: bool = True) -> Array:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ephs.mechanics.imports.draft import Draft, along, pose, turned_tensor
+from ephs.mechanics.imports.mjcf_contacts import contacts
 from ephs.mechanics.imports.mjcf_links import Thread, loops, screws
 from ephs.mechanics.imports.mjcf_names import Names, noted
 from ephs.mechanics.imports.mjcf_shapes import shapes
@@ -24,7 +25,7 @@ __all__ = ["read_mjcf"]
 Inertias = dict[int, tuple[float, Any]]
 READ = (
     *("body_mass", "body_inertia", "body_pos", "body_quat", "body_ipos", "body_iquat", "qpos0", "qpos_spring"),
-    *("jnt_pos", "jnt_axis", "jnt_stiffness", "dof_damping", "eq_data", "site_pos", "site_quat"),
+    *("jnt_pos", "jnt_axis", "jnt_range", "jnt_stiffness", "dof_damping", "eq_data", "site_pos", "site_quat"),
     *("geom_pos", "geom_quat", "geom_size", "mesh_pos", "mesh_quat", "mesh_scale"),
 )
 
@@ -74,6 +75,7 @@ def read_mjcf(root: Any, draft: Draft) -> None:
         _body(model, b, own, names, draft)
         _joints(model, b, names, threads, draft)
         shapes(model, b, names.bodies[b], source, draft)
+    contacts(model, names, draft)
     loops(model, names, {thread.equality for thread in threads.values()}, draft)
     noted(model, names, draft)
 
@@ -152,7 +154,16 @@ def _joints(model: Any, b: int, names: Names, threads: Mapping[int, Thread], dra
             kind, entries["pitch"] = "screw", thread.pitch
             entries["friction"] += thread.pitch**2 * _passive(model, thread.slide, "prismatic")["friction"]
         draft.joint(names.joints[j], kind, before, after, SE3.compose(at, frame), frame, entries)
+        if kind in ("revolute", "prismatic") and _limited(model, j):
+            draft.limit(names.joints[j], *(model.jnt_range[j] - model.qpos0[int(model.jnt_qposadr[j])]))
+        elif model.jnt_limited[j]:
+            draft.leave("limits of", names.joints[j])
         before, at = after, pose()
+
+
+def _limited(model: Any, j: int) -> bool:
+    mujoco: Any = import_module("mujoco")
+    return bool(model.jnt_limited[j]) and not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_LIMIT
 
 
 def _passive(model: Any, j: int, kind: str) -> dict[str, Any]:

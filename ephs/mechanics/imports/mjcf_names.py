@@ -44,17 +44,12 @@ def noted(model: Any, names: Names, draft: Draft) -> None:
     def bodies(values: Any) -> list[str]:
         return [names.bodies[b] for b in range(1, model.nbody) if np.any(values[b])]
 
-    touching = {
-        int(model.geom_bodyid[g]) for g in range(model.ngeom) if model.geom_contype[g] or model.geom_conaffinity[g]
-    }
     option = model.opt
     parts = {
-        "contacts of": [names.bodies[b] or "the world" for b in sorted(touching)],
         "rotor inertia (armature) of": dofs(model.dof_armature),
         "dry friction of": dofs(model.dof_frictionloss),
         "damping that is not linear of": dofs(model.dof_dampingpoly),
         "stiffness that is not linear of": joints(model.jnt_stiffnesspoly),
-        "limits of": joints(model.jnt_limited),
         "compensation of gravity on": bodies(model.body_gravcomp),
         "motion capture of": bodies(model.body_mocapid >= 0),
         "forces of a medium": [

@@ -14,7 +14,9 @@ __all__ = ["read_model"]
 KINDS = ("robot", "mujoco", "sdf")
 
 
-def read_model(path: Path, base: str, faults: list[Fault], left: list[str]) -> dict[str, Any] | None:
+def read_model(
+    path: Path, base: str, faults: list[Fault], left: list[str], *, contact: bool = False
+) -> dict[str, Any] | None:
     """The tables of a model; None where there were faults.
 
     Parameters
@@ -23,6 +25,8 @@ def read_model(path: Path, base: str, faults: list[Fault], left: list[str]) -> d
         A URDF, an MJCF or an SDF; which of them, its first element says.
     base
         ``"fixed"`` or ``"free"``: how the root of a URDF meets the ground.
+    contact
+        Whether limits of joints and contacts are read.
     left
         Takes a line for each kind of what the tables leave out.
     """
@@ -34,7 +38,7 @@ def read_model(path: Path, base: str, faults: list[Fault], left: list[str]) -> d
         faults.append(fault("root element", "", f"<{root.tag}>", known=known))
         return None
     count = len(faults)
-    draft = Draft(path.stem, path.parent, faults)
+    draft = Draft(path.stem, path.parent, faults, contact=contact)
     match root.tag:
         case "robot":
             read_urdf(root, draft, base)

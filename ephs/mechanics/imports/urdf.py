@@ -159,7 +159,11 @@ def _joint(name: str, joint: Element, parent: str, child: str, draft: Draft) -> 
         for other in set(dynamics.attrib) - {"damping", "friction"}:
             draft.leave("joint dynamics", f"{other} of {name}")
     draft.joint(name, kind, parent, child, SE3.compose(origin, turned), turned, entries)
-    if d and joint.find("limit") is not None:
+    limit = joint.find("limit")
+    if limit is not None and kind in ("revolute", "prismatic") and joint.get("type") != "continuous":
+        lower, upper = (_attribute(limit, side, f"{key}.limit", draft, 0.0) for side in ("lower", "upper"))
+        draft.limit(name, lower, upper)
+    elif d and limit is not None:
         draft.leave("limits of", name)
     mimic = joint.find("mimic")
     if mimic is not None:

@@ -50,6 +50,7 @@ class _Reading:
     adjust: bool
     inertia: str | None
     home: Path
+    contact: bool
     files: Counter[str] = field(default_factory=Counter)
     faults: list[Fault] = field(default_factory=list)
     odd: list[Fault] = field(default_factory=list)
@@ -58,7 +59,14 @@ class _Reading:
     laws: dict[str, Laws] = field(default_factory=dict)
 
 
-def load(path: str | PathLike[str], base: str = "fixed", adjust: bool = False, inertia: str | None = None) -> Scene:
+def load(
+    path: str | PathLike[str],
+    base: str = "fixed",
+    adjust: bool = False,
+    inertia: str | None = None,
+    *,
+    contact: bool = False,
+) -> Scene:
     """Read a scene file, or a model in another format.
 
     Parameters
@@ -70,6 +78,7 @@ def load(path: str | PathLike[str], base: str = "fixed", adjust: bool = False, i
     inertia : ``"strict"``, ``"warn"`` or ``"nearest"``: whether an inertia that no distribution of mass has is
         refused, kept, or replaced by the nearest possible one; unless given, as the scene file says, and ``"warn"``
         for other formats
+    contact : take limits of joints and contacts from models in other formats
 
     Warns
     -----
@@ -83,7 +92,7 @@ def load(path: str | PathLike[str], base: str = "fixed", adjust: bool = False, i
     SceneError
         With every fault that was found.
     """
-    r = _Reading(base, adjust, inertia, Path(path).parent.resolve())
+    r = _Reading(base, adjust, inertia, Path(path).parent.resolve(), contact)
     if base not in ("fixed", "free"):
         r.faults.append(fault("base", "base", shown(base)))
     if inertia not in (None, "strict", "warn", "nearest"):
@@ -163,7 +172,7 @@ def _parse(path: Path, r: _Reading) -> Mapping[str, Any] | None:
     if path.suffix in MODELS:
         from ephs.mechanics.imports import read_model
 
-        return read_model(path, r.base, faults, r.left)
+        return read_model(path, r.base, faults, r.left, contact=r.contact)
     if path.suffix != ".toml":
         faults.append(fault("suffix", "", shown(path.suffix) if path.suffix else "a file without suffix"))
         return None

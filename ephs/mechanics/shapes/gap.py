@@ -7,7 +7,7 @@ values occur, so that a gap has exact slopes over a step (`ephs.semantics.derive
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, final
+from typing import Any, Final, final
 
 import numpy as np
 
@@ -16,6 +16,8 @@ from ephs.semantics.spaces.rotations import quaternion_to_matrix
 
 __all__ = ["Gap", "Vector", "cross", "dot", "plane_rim", "plane_sphere", "ramp", "rounded_box_sphere"]
 
+UPRIGHT: Final = 1e-3
+"""Inclination in rad below which a circle counts as flat: its gap is smaller by this part of the radius at the most."""
 Vector = tuple[Any, Any, Any]
 """Components of a vector."""
 
@@ -83,11 +85,14 @@ def plane_sphere(radius: float) -> Gap:
 
 
 def plane_rim(radius: float) -> Gap:
-    """Gap between the plane z = 0 of C1, solid below, and the circle in the plane z = 0 of C2 about its origin."""
+    """Gap between the plane z = 0 of C1, solid below, and the circle in the plane z = 0 of C2 about its origin.
+
+    Its lowest point goes through the centre where the circle comes to lie flat, within an inclination of `UPRIGHT`.
+    """
 
     def inclined(pose: Any) -> tuple[Vector, Any]:
         normal = _upwards(pose)
-        return normal, np.sqrt(normal[0] * normal[0] + normal[1] * normal[1] + TINY)
+        return normal, np.sqrt(normal[0] * normal[0] + normal[1] * normal[1] + UPRIGHT**2)
 
     def contact(pose: Any) -> tuple[Vector, Vector]:
         normal, length = inclined(pose)
