@@ -16,6 +16,7 @@ VALUES = ("ephs.quantity",)
 CLASSES = (
     "ephs.mechanics.dynamics.Dynamics",
     "ephs.mechanics.dynamics.State",
+    "ephs.mechanics.dynamics.Task",
     "ephs.mechanics.linear.Equilibrium",
     "ephs.mechanics.linear.Mode",
     "ephs.mechanics.linear.PortHamiltonian",

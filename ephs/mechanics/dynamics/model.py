@@ -3,18 +3,20 @@
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import TYPE_CHECKING, final
+from typing import TYPE_CHECKING, final, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ephs.mechanics.dynamics.control import Task, computed_torque, task_of
+from ephs.mechanics.dynamics.differentiating import constraints_of, derivatives_of, forward_slopes
 from ephs.mechanics.dynamics.links import Links
+from ephs.mechanics.dynamics.placing import ByJoint, Placing
 from ephs.mechanics.dynamics.results import Constraints, Derivatives, Energies
 from ephs.mechanics.dynamics.state import State
-from ephs.mechanics.dynamics.stepping import one_step
+from ephs.mechanics.dynamics.stepping import Steps
 from ephs.mechanics.reduced.equations import Equations, ReducedState
 from ephs.mechanics.reduced.paper import PaperStates
-from ephs.mechanics.reduced.tables import CUT
 from ephs.mechanics.reduced.tangent import Linearised
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.simulate import problem_of_scene
@@ -24,7 +26,6 @@ from ephs.mechanics.solve.sparse import Index
 from ephs.mechanics.views import BodyState, Names, StateView
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
-from ephs.semantics.primitives import Storage
 
 if TYPE_CHECKING:
     from ephs.mechanics.methods import Method
@@ -70,6 +71,7 @@ class Dynamics:
         self._linear = Linearised(self._equations)
         self.layout = self._equations.layout
         self._links, self._names = Links(scene, self._equations), Names(scene)
+        self.placing, self._steps = Placing(self._equations), Steps(self._problem, self._equations)
         with failing_at(0.0):
             start = self._equations.start(0.0)
         self.state0 = self._state(start)
@@ -91,6 +93,11 @@ class Dynamics:
         return tuple(edge.name for edge in self._equations.reduced.cut)
 
     @property
+    def free(self) -> bool:
+        """Whether every freedom of the tree moves by itself: there are no loops and no prescribed motions."""
+        return self.placing.free
+
+    @property
     def freedoms(self) -> dict[str, Index]:
         """Joint of the tree -> places of its freedoms in vectors (n,) and matrices."""
         n = self.layout.n
@@ -101,19 +108,25 @@ class Dynamics:
 
     def state(
         self,
-        coordinates: Mapping[str, ArrayLike] | None = None,
-        rates: Mapping[str, ArrayLike] | None = None,
+        coordinates: ByJoint | None = None,
+        rates: ByJoint | None = None,
         *,
         adjust: bool = False,
     ) -> State:
         """The initial state with some joints elsewhere, as `Scene.with_state` has it.
+
+        Of a tree all joints' may be given as arrays (n,).
 
         Raises
         ------
         SceneError
             A name is unknown, a value has the wrong length, or a loop does not close.
         """
-        scene = self.scene.with_state(coordinates, rates, adjust=adjust)
+        made = None if adjust else self.placing.state(self.state0, coordinates, rates)
+        if made is not None:
+            return made
+        by_name = [self.layout.named("state", given) for given in (coordinates, rates)]
+        scene = self.scene.with_state(*by_name, adjust=adjust)
         return self._of_states(problem_of_scene(scene).initial)
 
     def unpack(self, array: ArrayLike) -> State:
@@ -136,6 +149,10 @@ class Dynamics:
         if v.shape != (self.layout.n,):
             raise OptionError("increments", v.shape, f"({self.layout.n},)")
         return self._state(self._counted(self._equations.fitted(self._equations.moved(q, v), r), r, s))
+
+    def difference(self, state: State, wanted: State) -> Array:
+        """(n,) increments of the tree's joints that lead from a state to another: ``moved`` undone; rad, m."""
+        return self.placing.difference(state.q, wanted.q)
 
     def closed(self, state: State) -> State:
         """The nearest state in the mass metric whose loops are closed and whose rates are on the constraints.
@@ -163,13 +180,20 @@ class Dynamics:
 
     # ---- accelerations and forces ------------------------------------------------------------------------------
 
-    def acceleration(self, state: State, forces: Mapping[str, ArrayLike] | None = None) -> dict[str, Array]:
+    @overload
+    def acceleration(self, state: State, forces: Mapping[str, ArrayLike] | None = None) -> dict[str, Array]: ...
+
+    @overload
+    def acceleration(self, state: State, forces: ArrayLike) -> Array: ...
+
+    def acceleration(self, state: State, forces: ByJoint | None = None) -> dict[str, Array] | Array:
         """Joint -> (d,) time derivative of its twist u_r, in rad/s² and m/s²; cut joints included.
 
         Parameters
         ----------
         forces
-            Joint -> (d,) generalised forces on u_r in N m and N, beside the scene's own.
+            Joint -> (d,) generalised forces on u_r in N m and N, beside the scene's own. Of an array (n,) the result
+            is one.
 
         Raises
         ------
@@ -179,12 +203,20 @@ class Dynamics:
         q, r, s = self.layout.split(state.array)
         with self._pushed(forces):
             if self.cut:
-                return self.layout.by_joint(self._linear.forward(q, r, s))
-            eq = self._equations
-            found = eq.rates(0.0, q, eq.vector(self._reduced(state)))
-            return self.layout.by_joint(found[eq.nv : eq.nv + eq.n])
+                found = self._linear.forward(q, r, s)
+            else:
+                eq = self._equations
+                found = eq.rates(0.0, q, eq.vector(self._reduced(state)))[eq.nv : eq.nv + eq.n]
+        by_name = forces is None or isinstance(forces, Mapping)
+        return self.layout.by_joint(found) if by_name else found[: self.layout.n]
 
-    def inverse_dynamics(self, state: State, accelerations: Mapping[str, ArrayLike]) -> dict[str, Array]:
+    @overload
+    def inverse_dynamics(self, state: State, accelerations: Mapping[str, ArrayLike]) -> dict[str, Array]: ...
+
+    @overload
+    def inverse_dynamics(self, state: State, accelerations: ArrayLike) -> Array: ...
+
+    def inverse_dynamics(self, state: State, accelerations: ByJoint) -> dict[str, Array] | Array:
         """Joint -> (d,) the forces, beside the scene's own, that make the tree's accelerations.
 
         With loops they are the generalised forces on the tree's freedoms that do so with nothing from the joints that
@@ -194,7 +226,7 @@ class Dynamics:
         Parameters
         ----------
         accelerations
-            Joint -> (d,) time derivative of u_r; zero where not named.
+            Joint -> (d,) time derivative of u_r; zero where not named. Of an array (n,) the result is one.
 
         Raises
         ------
@@ -204,16 +236,23 @@ class Dynamics:
         q, r, s = self.layout.split(state.array)
         a = self.layout.vector("accelerations", accelerations)[: self.layout.n]
         with failing_at(0.0):
-            return self.layout.by_joint(self._linear.inverse(q, r, s, a))
+            found = self._linear.inverse(q, r, s, a)
+        return self.layout.by_joint(found) if isinstance(accelerations, Mapping) else found
+
+    def computed_torque(
+        self, state: State, wanted: State, accelerations: ArrayLike = 0.0, *, stiffness: ArrayLike, damping: ArrayLike
+    ) -> Array:
+        """(n,) forces that lead to a wanted state; see `ephs.mechanics.dynamics.control.computed_torque`."""
+        return computed_torque(self, state, wanted, accelerations, stiffness, damping)
+
+    def task(
+        self, state: State, body: str, point: ArrayLike | None = None, *, directions: ArrayLike | None = None
+    ) -> Task:
+        """The dynamics of a body or a point of it; see `ephs.mechanics.dynamics.control.task_of`."""
+        return task_of(self, state, body, point, directions)
 
     def mass_matrix(self, state: State) -> Array:
-        """(n, n) M: kinetic energy is ½ rᵀM r.
-
-        Raises
-        ------
-        SimulationError
-            A freedom moves no mass.
-        """
+        """(n, n) M: kinetic energy is ½ rᵀM r. A `SimulationError` where a freedom moves no mass."""
         q, r, _ = self.layout.split(state.array)
         with failing_at(0.0):
             return self._equations.mass(q, r)
@@ -230,9 +269,7 @@ class Dynamics:
 
     def applied(self, state: State) -> Array:
         """(n,) the generalised forces of the scene's drives, springs and friction on the tree's freedoms."""
-        q, r, s = self.layout.split(state.array)
-        with failing_at(0.0):
-            return self.bias(state) - self._linear.inverse(q, r, s, np.zeros(self.layout.n))
+        return self.bias(state) - self.inverse_dynamics(state, np.zeros(self.layout.n))
 
     def jacobian(self, state: State, body: str, point: ArrayLike | None = None) -> Array:
         """Jacobian from the tree's rates to a body's twist.
@@ -263,37 +300,20 @@ class Dynamics:
         SimulationError
             A component cannot be evaluated there.
         """
-        eq, t = self._equations, self._equations.reduced.tables
-        q, r, s = self.layout.split(state.array)
         with failing_at(0.0):
-            target, rank = self._linear.targets(q, r, s)
-            gaps, rows = eq.gaps(q, r)
-        edges = eq.reduced.edges
-        driven = [
-            e.name
-            for i, e in enumerate(edges[: eq.reduced.links])
-            for _ in range(int(t.driven[t.r_at[i] : t.r_at[i] + t.dim[i]].sum()))
-        ]
-        cut = [e.name for i, e in enumerate(edges) if t.kind[i] == CUT for _ in range(int(t.rows[i]))]
-        return Constraints(rows, target, gaps, (*driven, *cut), rank)
+            return constraints_of(self._linear, *self.layout.split(state.array))
 
     def energies(self, state: State) -> Energies:
         """Kinetic, potential and thermal energy."""
-        model, row = self._equations.model, self._equations.row(self._reduced(state))
-        kind = {"ke": 0, "pe": 1}
-        sums = [0.0, 0.0, 0.0]
-        for slot, energy in zip(model.descriptor.components, row.energies, strict=True):
-            if isinstance(slot.primitive, Storage):
-                sums[kind.get(str(slot.path[-1]), 2)] += float(energy)
-        s = self.layout.split(state.array)[2]
-        taken = s[self._equations.reduced.tables.node < 0]  # by the environment, whose energy no component counts
-        return Energies(sums[0], sums[1], sums[2] + model.reference.temperature * float(taken.sum()))
+        eq = self._equations
+        taken = state.entropies[eq.reduced.tables.node < 0]  # by the environment, whose energy no component counts
+        return Energies.of(eq.model, eq.row(self._reduced(state)).energies, float(taken.sum()))
 
     def derivatives(
         self,
         state: State,
-        forces: Mapping[str, ArrayLike] | None = None,
-        accelerations: Mapping[str, ArrayLike] | None = None,
+        forces: ByJoint | None = None,
+        accelerations: ByJoint | None = None,
     ) -> Derivatives:
         """Exact derivatives of accelerations and of inverse dynamics: by tangents, not by differences.
 
@@ -309,30 +329,24 @@ class Dynamics:
         SimulationError
             The motion is not determined there, or a component cannot be evaluated.
         """
-        q, r, s = self.layout.split(state.array)
-        n, nv = self._equations.n, self._equations.nv
+        given = None if accelerations is None else self.layout.vector("accelerations", accelerations)[: self.layout.n]
+        point = self.layout.split(state.array)
         with self._pushed(forces):
-            a = self._linear.forward(q, r, s)[:n]
-            forward = self._linear.columns(solve=True, fit=True)
-            by_force = self._linear.mobility()
-        if accelerations is not None:
-            a = self.layout.vector("accelerations", accelerations)[:n]
+            under = forward_slopes(self._linear, *point)
         with failing_at(0.0):
-            self._linear.inverse(q, r, s, a)
-            inverse = self._linear.columns(solve=False, fit=True)[:n]
-        at_q, at_r, at_s = slice(0, n), slice(nv, nv + n), slice(nv + n, None)
-        return Derivatives(
-            forward[:n, at_q], forward[:n, at_r], by_force, forward[:n, at_s],
-            inverse[:, at_q], inverse[:, at_r], self.mass_matrix(state),
-            forward[nv:, at_q], forward[nv:, at_r], forward[nv:, at_s],
-        )  # fmt: skip
+            return derivatives_of(self._linear, under, *point, given)
 
     # ---- steps -------------------------------------------------------------------------------------------------
 
-    def step(self, state: State, h: float, method: "str | Method" = "natural") -> State:
+    def step(self, state: State, h: float, method: "str | Method" = "rk54", *, forces: ByJoint | None = None) -> State:
         """The state h seconds later, by one step of a method that takes constant steps.
 
         Each step is a start of its own: what a method remembers from step to step (alpha: accelerations) begins anew.
+
+        Parameters
+        ----------
+        forces
+            Joint -> (d,), or (n,), generalised forces on u_r beside the scene's own, constant over the step.
 
         Raises
         ------
@@ -341,8 +355,8 @@ class Dynamics:
         SimulationError
             The step has no solution.
         """
-        with failing_at(0.0):
-            found = one_step(self._problem, self._equations, self._reduced(state), h, method)
+        with self._pushed(forces):
+            found = self._steps.step(self._reduced(state), h, method, forces)
             return self._state(found) if isinstance(found, ReducedState) else self._of_states(found)
 
     # ---- inside ------------------------------------------------------------------------------------------------
@@ -358,27 +372,27 @@ class Dynamics:
         self._links.place(*self.layout.split(state.array)[:2])
 
     def _state(self, at: ReducedState) -> State:
+        cut_rates = np.zeros(0)
         if self.layout.total > self.layout.n:
             self._links.place(at.q, at.r)
+            cut_rates = self._linear.cut_rates
         array = np.concatenate([at.q, at.r, self._equations.heats.entropies(at.heats)])
-        return State(array, self.layout, self._linear.cut_rates)
+        return State(array, self.layout, cut_rates)
 
     def _of_states(self, states: States) -> State:
         eq = self._equations
         q, r, s = PaperStates(eq.reduced, replace(self._problem, initial=states), eq.work).initial()
-        with failing_at(
-            0.0
-        ):  # momenta off the joints, as some methods leave them, count by the nearest in the mass metric
-            mass = eq.mass(q, r)
-            r = np.asarray(np.linalg.solve(mass, self._links.momenta(states)), dtype=float)
+        with failing_at(0.0):  # momenta off the joints, as some methods leave them: the nearest in the mass metric
+            r = np.asarray(np.linalg.solve(eq.mass(q, r), self._links.momenta(states)), dtype=float)
             return self._state(eq.closed(self._counted(q, r, s)))
 
     @contextmanager
-    def _pushed(self, forces: Mapping[str, ArrayLike] | None) -> Generator[None, None, None]:
+    def _pushed(self, forces: ByJoint | None) -> Generator[None, None, None]:
         """Further forces on the joints, for as long as it lasts."""
         drive = self._equations.drive
         before = drive.copy()
-        drive += self.layout.vector("forces", forces or {})
+        if forces is not None:
+            drive += self.layout.vector("forces", forces)
         try:
             with failing_at(0.0):
                 yield

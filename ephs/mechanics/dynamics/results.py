@@ -3,7 +3,9 @@
 from dataclasses import dataclass
 from typing import final
 
+from ephs.mechanics.solve.model import Model
 from ephs.semantics.bundle import Array
+from ephs.semantics.primitives import Storage
 
 __all__ = ["Constraints", "Derivatives", "Energies"]
 
@@ -24,6 +26,15 @@ class Energies:
     kinetic: float
     potential: float
     thermal: float
+
+    @staticmethod
+    def of(model: Model, energies: Array, environment: float) -> "Energies":
+        """Of the components' energies in J, and the entropy that the environment took up in J/K."""
+        kind, sums = {"ke": 0, "pe": 1}, [0.0, 0.0, model.reference.temperature * environment]
+        for slot, energy in zip(model.descriptor.components, energies, strict=True):
+            if isinstance(slot.primitive, Storage):
+                sums[kind.get(str(slot.path[-1]), 2)] += float(energy)
+        return Energies(*sums)
 
     @property
     def total(self) -> float:

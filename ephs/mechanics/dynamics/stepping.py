@@ -2,13 +2,17 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 
+from ephs.mechanics.dynamics.placing import ByJoint
 from ephs.mechanics.methods import Setting, chosen
 from ephs.mechanics.reduced.equations import Equations, ReducedState
+from ephs.mechanics.reduced.explicit import tableau
 from ephs.mechanics.reduced.method import ReducedMethod
+from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.simulate import problem_of_scene
 from ephs.mechanics.solve.control import Control, Tolerance
 from ephs.mechanics.solve.errors import OptionError
 from ephs.mechanics.solve.problem import Problem
@@ -18,29 +22,59 @@ from ephs.semantics.bundle import Array
 if TYPE_CHECKING:
     from ephs.mechanics.methods import Method
 
-__all__ = ["one_step"]
+__all__ = ["Steps"]
+
+EXPLICIT = ("rk54", "rk87")
 
 
-def one_step(
-    problem: Problem, equations: Equations, state: ReducedState, h: float, method: "str | Method"
-) -> ReducedState | Mapping[Path, Array]:
-    """The state of the reduced form, or all states of the system where the method is not of that form.
+@final
+class Steps:
+    """Single steps of one mechanism under what its equations are driven by at present."""
 
-    Raises
-    ------
-    OptionError
-        There is no such method, it takes no constant steps, or h is no length of a step.
-    SolveError
-        The step has no solution.
-    """
-    if not (np.isfinite(h) and h != 0.0):
-        raise OptionError("h", h, "a number of seconds other than 0")
-    of, _ = chosen(method, problem, step=abs(h))
-    tolerance = Tolerance.of("rtol", 1e-10, 1e-10), Tolerance.of("atol", 1e-12, 1e-12)
-    control = Control(*tolerance, abs(h), 0.0, np.inf, None)
-    here = replace(problem, initial={**problem.initial, **equations.states(state)})
-    stepper, _ = of.make(Setting(here, 0.0, control, {}, equations))
-    if isinstance(stepper, ReducedMethod):
-        return stepper.step(state, h).end
-    start = stepper.start(0.0, h)
-    return problem.descriptor.unpack(stepper.row(stepper.step(start, h).end).x)
+    def __init__(self, problem: Problem, equations: Equations) -> None:
+        self._problem, self._equations = problem, equations
+
+    def step(
+        self, state: ReducedState, h: float, method: "str | Method", forces: ByJoint | None
+    ) -> ReducedState | Mapping[Path, Array]:
+        """The state of the reduced form, or all states of the system where the method is not of that form.
+
+        ``forces`` are in what drives the equations already.
+
+        Raises
+        ------
+        OptionError
+            There is no such method, it takes no constant steps, or h is no length of a step.
+        SolveError
+            The step has no solution.
+        """
+        if not (np.isfinite(h) and h != 0.0):
+            raise OptionError("h", h, "a number of seconds other than 0")
+        if method in EXPLICIT:
+            return self._explicit(state, h, str(method))
+        of, _ = chosen(method, self._problem, step=abs(h))
+        tolerance = Tolerance.of("rtol", 1e-10, 1e-10), Tolerance.of("atol", 1e-12, 1e-12)
+        control = Control(*tolerance, abs(h), 0.0, np.inf, None)
+        states = {**self._problem.initial, **self._equations.states(state)}
+        setting = Setting(replace(self._problem, initial=states), 0.0, control, {}, self._equations)
+        stepper, _ = of.make(setting)
+        if isinstance(stepper, ReducedMethod):
+            return stepper.step(state, h).end
+        if forces is not None:
+            by_name = self._equations.layout.named("forces", forces)
+            scene: Scene = self._problem.scene
+            implicit = dict(scene.implicit_joints())
+            inputs = {f"{'bodies' if name in implicit else 'joints'}.{name}": force for name, force in by_name.items()}
+            driven = replace(problem_of_scene(scene, None, inputs), initial=states)
+            stepper, _ = of.make(replace(setting, problem=driven, equations=None))
+        start = stepper.start(0.0, h)
+        return self._problem.descriptor.unpack(stepper.row(stepper.step(start, h).end).x)
+
+    def _explicit(self, state: ReducedState, h: float, method: str) -> ReducedState:
+        """A step without its error."""
+        eq = self._equations
+        of = tableau(method)
+        y0, y1, k = eq.vector(state), np.empty(eq.size), np.zeros((of.scheme.b.size + 1, eq.size))
+        k[0] = eq.rates(state.t, state.q, y0)
+        eq.stages(state, of.scheme, of.c, h, y0, k, y1)
+        return eq.closed(eq.state(state, y1, state.t + h))

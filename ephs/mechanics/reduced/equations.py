@@ -288,6 +288,8 @@ class Equations:
 
     def settled(self, y0: Array, y1: Array) -> Array:
         """The end y1 of a step from y0 with what components made in place of what they passed on."""
+        if not self.ns:
+            return y1
         out, at = np.array(y1), self.nv + self.n
         count(self.engine.forces, y0[at:], out[at:], self.scal, self.memory.temperature)
         return out

@@ -70,6 +70,8 @@ class Heats:
 
     def entropies(self, heats: Array) -> Array:
         """(..., entropies) in J/K, of energies."""
+        if not heats.size:
+            return heats
         out = heats / self._theta
         k, (c1, c2) = self._nodes, self._laws
         out[..., k] = c2 * np.log1p(heats[..., k] / c1)
@@ -77,6 +79,8 @@ class Heats:
 
     def energies(self, s: Array) -> Array:
         """(..., entropies) in J, of entropies."""
+        if not s.size:
+            return s
         out = s * self._theta
         k, (c1, c2) = self._nodes, self._laws
         out[..., k] = c1 * np.expm1(s[..., k] / c2)

@@ -90,8 +90,10 @@ class Layout:
             reduced.coordinates,
         )
 
-    def vector(self, what: str, values: Mapping[str, ArrayLike]) -> Array:
+    def vector(self, what: str, values: "Mapping[str, ArrayLike] | ArrayLike") -> Array:
         """(total,) from joint -> (d,), a number where there is one freedom; zero for joints that are not named.
+
+        Or from an array (n,) of all joints of the tree, or (total,).
 
         Raises
         ------
@@ -99,6 +101,12 @@ class Layout:
             A joint is not known, or its value has another length or is not finite.
         """
         out = np.zeros(self.total)
+        if not isinstance(values, Mapping):
+            given = np.asarray(values, dtype=float)
+            if given.shape not in ((self.n,), (self.total,)) or not np.isfinite(given).all():
+                raise OptionError(what, values, f"{self.n} finite numbers, or such by joint")
+            out[: given.size] = given
+            return out
         for name, value in values.items():
             if name not in self.freedoms:
                 raise OptionError(f"{what}[{name!r}]", value, f"a joint: {', '.join(self.joints)}")
@@ -108,6 +116,19 @@ class Layout:
                 raise OptionError(f"{what}[{name!r}]", value, f"{where.size} finite numbers")
             out[where] = array
         return out
+
+    def named(self, what: str, values: "Mapping[str, ArrayLike] | ArrayLike | None") -> "Mapping[str, ArrayLike]":
+        """Joint -> (d,) of what `vector` takes.
+
+        Raises
+        ------
+        OptionError
+            An array has another length, or is not finite.
+        """
+        if values is None or isinstance(values, Mapping):
+            return values or {}
+        found = self.by_joint(self.vector(what, values))
+        return {name: found[name] for name, where in self.freedoms.items() if where.max(initial=-1) < self.n}
 
     def by_joint(self, values: Array) -> dict[str, Array]:
         """Joint -> (d,) of a vector (total,), or of one (n,) with zeros for cut joints."""
