@@ -6,8 +6,10 @@ import os
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")
 
+import pytest  # noqa: E402
 from hypothesis import Phase, settings  # noqa: E402
 
+from tests.durations import function_of, long_tests  # noqa: E402
 from tests.show.browser import browser  # noqa: E402
 
 # The suite of somebody else's package: test_downstream.py runs it, in a process of its own.
@@ -19,6 +21,14 @@ if browser() is None:
 def pytest_report_header() -> str:
     """Say whether pages are looked at as a browser shows them."""
     return f"browser: {browser() or 'none, so tests/show/test_show_browser.py is left out'}"
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark the tests that are long; `make test` leaves them to `make laws`."""
+    long = long_tests()
+    for item in items:
+        if function_of(item.nodeid) in long:
+            item.add_marker(pytest.mark.long)
 
 
 settings.register_profile("ci", derandomize=True, deadline=None, max_examples=50, print_blob=True)
