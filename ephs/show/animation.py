@@ -16,7 +16,7 @@ from ephs.show.errors import ShowError
 from ephs.show.motion import Array, Film, best_side, between, film, frame_all, point_of
 from ephs.show.overlays import ARROWS, GROUND, Heat, Loads, heat_of, loads_of, tint
 from ephs.show.page import Page
-from ephs.show.solids import Solid, held_at, solid_of
+from ephs.show.solids import Solid, held_at, solids_of
 from ephs.show.symbols import METAL, Colour, add_body, add_joint, add_spring, add_stick, ink
 
 __all__ = ["animate"]
@@ -82,7 +82,7 @@ def animate(
         raise ShowError("viser")
     bodies = dict(sol.scene.all_bodies())
     frames = film(sol, list(bodies), fps, duration)
-    solids = {name: solid_of(body, name) for name, body in bodies.items()}
+    solids = solids_of(sol.scene)
     stage = _Stage(
         dict(sol.scene.all_joints()),
         dict(sol.scene.all_springs()),

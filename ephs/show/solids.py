@@ -15,7 +15,7 @@ from ephs.mechanics.scene.text import MESHES
 from ephs.show.errors import ShowError
 from ephs.show.motion import Array, equivalent_box, rotate
 
-__all__ = ["Solid", "box", "cylinder", "held_at", "solid_of", "sphere"]
+__all__ = ["Solid", "box", "cylinder", "held_at", "solid_of", "solids_of", "sphere"]
 
 MOST_MB = 100
 """Largest mesh that is drawn."""
@@ -110,6 +110,30 @@ def held_at(body: str, joints: Iterable[Any], springs: Iterable[Any]) -> list[Ar
     return out + [
         np.asarray(at, dtype=float) for s in springs for b, at in ((s.body1, s.at1), (s.body2, s.at2)) if b == body
     ]
+
+
+def solids_of(scene: Any) -> dict[str, Solid]:
+    """The solids of a scene's bodies by name; those of their surfaces where bodies have no shapes."""
+    surfaces: dict[str, list[Any]] = {}
+    for _, surface in scene.all_surfaces():
+        surfaces.setdefault(surface.body, []).extend(_shapes_of(surface))
+    found: dict[str, Solid] = {}
+    for name, body in scene.all_bodies():
+        bare = body.shape is None and not body.shapes
+        found[name] = solid_of(replace(body, shapes=tuple(surfaces.get(name, ()))) if bare else body, name)
+    return found
+
+
+def _shapes_of(surface: Any) -> list[dict[str, Any]]:
+    """Shapes that draw a surface; a capsule is a cylinder with two balls, a plane none."""
+    ((kind, sizes),) = surface.shape.items()
+    at: dict[str, Any] = {"rotation": surface.frame[:4], "position": surface.frame[4:]}
+    if kind != "capsule":
+        return [] if kind == "plane" else [{kind: sizes, **at}]
+    radius, length = sizes
+    axis = rotate(np.asarray(surface.frame[:4], dtype=float), np.array([[0.0, 0.0, 0.5 * length]]))[0]
+    balls = [{"sphere": radius, "position": surface.frame[4:] + side * axis} for side in (-1.0, 1.0)]
+    return [{"cylinder": [radius, length], **at}, *balls]
 
 
 def solid_of(body: Any, name: str) -> Solid:

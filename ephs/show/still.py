@@ -7,7 +7,7 @@ import numpy as np
 
 from ephs.show.motion import Array, best_side, point_of, rotate
 from ephs.show.palette import GREY, INK, PAPER
-from ephs.show.solids import Solid, held_at, solid_of
+from ephs.show.solids import Solid, held_at, solids_of
 from ephs.show.symbols import MUTED, ink
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def draw_still(axes: "Axes", scene: Any, poses: dict[str, Array], way: Array | N
     from matplotlib.collections import LineCollection, PolyCollection
 
     joints, springs = dict(scene.all_joints()), dict(scene.all_springs())
-    solids = {name: solid_of(body, name) for name, body in scene.all_bodies()}
+    solids = solids_of(scene)
     ends = {name: _ends(spring, poses) for name, spring in springs.items()}
     places = {name: point_of(poses.get(j.body1, _STILL), np.asarray(j.frame1)[4:]) for name, j in joints.items()}
     corners = {name: poses[name][4:] + rotate(poses[name][:4], solid.vertices) for name, solid in solids.items()}

@@ -129,6 +129,10 @@ TEXTS: dict[str, tuple[str, str]] = {
     "unknown body": ('"ground" or a body', "{hint}"),
     "unknown thermal": ('"environment" or a [thermal] name', "{hint}"),
     "unknown type": ("one of {known}", "{hint}"),
+    "overlap": (
+        "less than {most:.3g} m at the start",
+        "the energy of this overlap is in the balance from the start; move one of the bodies",
+    ),
     "limited joint": ("a joint with one freedom that is free to move", "take limits out"),
     "no scale": ("a stiffness, as nothing in the scene moves or falls", "add this key"),
     "unknown surface": ("a surface", "{hint}"),

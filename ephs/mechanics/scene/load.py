@@ -21,7 +21,7 @@ from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Scene, World
 from ephs.mechanics.scene.moving import moved, spring_length
 from ephs.mechanics.scene.state import Asked, adjusted
 from ephs.mechanics.scene.text import file_text
-from ephs.mechanics.scene.touching import Laws, resolve_contacts, resolve_surfaces, with_stops
+from ephs.mechanics.scene.touching import Laws, overlaps, resolve_contacts, resolve_surfaces, with_stops
 from ephs.operad import Path as Name
 from ephs.operad import PatternError
 from ephs.semantics.spaces.rank import ASSEMBLY
@@ -153,6 +153,7 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
     scene = with_stops(document, replace(scene, contacts=contacts), faults)
     if faults:
         return None
+    r.odd.extend(overlaps(scene))
     r.laws.clear()
     r.laws[""] = laws
     if r.adjust:

@@ -14,20 +14,23 @@ from ephs.mechanics.scene import values
 from ephs.mechanics.scene.entries import Checked, Document
 from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing
 from ephs.mechanics.scene.geometry import coupling_of
-from ephs.mechanics.scene.model import ENVIRONMENT, Joint, Scene, frozen
+from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, IDENTITY_POSE, Joint, Scene, frozen
 from ephs.mechanics.scene.resolve import Names
 from ephs.mechanics.scene.schema import ContactEntry, ContactLawEntry, SurfaceEntry
 from ephs.mechanics.scene.state import Snapshot
 from ephs.mechanics.scene.surfaces import Contact, Surface
 from ephs.mechanics.shapes.law import Law
-from ephs.mechanics.shapes.pairs import PAIRS
+from ephs.mechanics.shapes.pairs import PAIRS, touches
+from ephs.semantics.spaces import SE3
 
-__all__ = ["Laws", "resolve_contacts", "resolve_surfaces", "with_stops"]
+__all__ = ["Laws", "overlaps", "resolve_contacts", "resolve_surfaces", "with_stops"]
 
 Laws = Mapping[str, ContactLawEntry]
 STIFF = 1e4
 """Stiffness of stops by default, in M (L ω)² of the scene's mass, length and rate: what falls by its length presses a
 stop by 1/70 rad, or of its length."""
+DEEP = 1e-3
+"""Part of the mechanism's length from which on an overlap at the start is told."""
 
 
 def resolve_surfaces(document: Document, names: Names, faults: list[Fault]) -> dict[str, Surface]:
@@ -83,6 +86,28 @@ def _stiffness(scene: Scene, joint: Joint) -> float:
     mass = sum(body.mass for _, body in scene.all_bodies())
     turning = bool(np.any(coupling_of(joint).basis(joint.coordinate)[:3]))
     return float(STIFF * mass * scale.rate**2 * (scale.length**2 if turning else 1.0))
+
+
+def overlaps(scene: Scene) -> list[Fault]:
+    """What overlaps at the start by more than a part of the scene's length."""
+    surfaces = dict(scene.all_surfaces())
+    poses = {GROUND: IDENTITY_POSE} | {name: body.pose for name, body in scene.all_bodies()}
+    length = Snapshot.of(scene).scale(scene.world.gravity).length if scene.contacts else 1.0
+    found: list[Fault] = []
+    for name, contact in scene.contacts.items():
+        one, other = (surfaces[each] for each in contact.surfaces)
+        touching, swapped = touches(one.shape, one.frame, other.shape, other.frame)
+        bodies = (other.body, one.body) if swapped else (one.body, other.body)
+        depth = 0.0
+        for frame1, frame2, gap in touching:
+            first, second = SE3.compose(poses[bodies[0]], frame1), SE3.compose(poses[bodies[1]], frame2)
+            depth = max(depth, -float(gap.distance(SE3.compose(SE3.inverse(first), second))))
+        if depth > DEEP * length:
+            pair = " and ".join(contact.surfaces)
+            found.append(
+                fault("overlap", f"contacts.{name}", f"{pair} {depth:.3g} m deep in each other", most=DEEP * length)
+            )
+    return found
 
 
 def resolve_contacts(

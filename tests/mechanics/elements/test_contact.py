@@ -242,3 +242,8 @@ def test_limits_ascend(limits, tmp_path):
     file.write_text(text, encoding="utf-8")
     with pytest.raises(ephs.SceneError, match="lower < upper"):
         ephs.load(file)
+
+
+def test_an_overlap_at_the_start_is_told(tmp_path):
+    with pytest.warns(ephs.SceneWarning, match=r"contacts\.ball_floor: found ball and floor 0\.03 m deep"):
+        scene_of(tmp_path, BALL, height=0.07)
