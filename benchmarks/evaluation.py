@@ -17,7 +17,6 @@ import numpy as np
 
 from benchmarks import families
 from benchmarks.report import Report, table_of
-from ephs.mechanics.engine.engine_kernels import evaluations
 from ephs.mechanics.reduced.equations import Equations
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.simulate import problem_of_scene
@@ -46,11 +45,11 @@ def own(scene: Scene) -> tuple[Block, int]:
     state, rng = equations.start(0.0), np.random.default_rng(0)
     q = np.array([state.q] * STATES)
     r = np.array([state.r + 0.1 * rng.standard_normal(equations.n) for _ in range(STATES)])
-    rates = np.zeros((STATES, equations.n))
+    call = equations.engine.bind("evaluations", q, r, np.zeros(equations.size), np.zeros((STATES, equations.n)), 1)
 
     def block(rounds: int) -> float:
         begin = time.perf_counter()
-        evaluations(equations.engine, equations.memory, q, r, rates, rounds)
+        call(rounds)
         return time.perf_counter() - begin
 
     return block, STATES

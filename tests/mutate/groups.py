@@ -140,7 +140,6 @@ GROUPS = {
             "ephs/mechanics/reduced/loop_kernels.py",
             "ephs/mechanics/reduced/sweep_kernels.py",
             "ephs/mechanics/reduced/table_kernels.py",
-            "ephs/mechanics/engine/march_kernels.py",
         ),
         (
             *RUNS,
@@ -159,8 +158,12 @@ GROUPS = {
             "ephs/mechanics/tree/outward.py",
             "ephs/mechanics/tree/pack.py",
             "ephs/mechanics/engine/links.py",
+            "ephs/mechanics/engine/forces.py",
+            "ephs/mechanics/engine/heats.py",
+            "ephs/mechanics/engine/motion.py",
+            "ephs/mechanics/solve/march/*.py",
         ),
-        (f"{MECHANICS}/tree",),
+        (f"{MECHANICS}/tree", f"{MECHANICS}/engine", f"{MECHANICS}/solve/test_march.py"),
     ),
     "derivatives": Group(
         DERIVATIVES,

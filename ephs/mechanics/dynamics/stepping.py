@@ -74,7 +74,7 @@ class Steps:
         """A step without its error."""
         eq = self._equations
         of = tableau(method)
-        y0, y1, k = eq.vector(state), np.empty(eq.size), np.zeros((of.scheme.b.size + 1, eq.size))
+        y0, y1, k = eq.vector(state), np.empty(eq.size), np.zeros((len(of.arrays["a"]), eq.size))
         k[0] = eq.rates(state.t, state.q, y0)
-        eq.stages(state, of.scheme, of.c, h, y0, k, y1)
+        eq.stages(state, of.arrays, of.c, h, y0, k, y1)
         return eq.closed(eq.state(state, y1, state.t + h))

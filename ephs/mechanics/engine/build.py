@@ -1,32 +1,37 @@
-"""From the tables of a reduced scene to those of the compiled engine: links at their joints, rigid groups merged."""
+"""From the tables of a reduced scene to those of the engine: links at their joints, rigid groups merged."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ephs.mechanics.engine.closing import closing
-from ephs.mechanics.engine.force_kernels import ON_BODIES, ON_CUT, ON_TREE
+from ephs.mechanics.engine.closing import Closing, closing
 from ephs.mechanics.engine.links import Frames, links_of
-from ephs.mechanics.engine.tables import COLUMNS, DIM, WIDTH, Engine, Forces, Memory
+from ephs.mechanics.engine.programs import Engine
+from ephs.mechanics.engine.records import ON_BODIES, ON_CUT, ON_TREE, Component, Own
+from ephs.mechanics.engine.tables import Forces, table_of
 from ephs.mechanics.reduced.tables import CUT, SPRING, TREE
 from ephs.mechanics.solve.sparse import Index
-from ephs.mechanics.tree.cuts import Cut, Relative
-from ephs.mechanics.tree.loops import kinds_of, loop_addresses
-from ephs.mechanics.tree.programs import PLACE, sweeps
+from ephs.mechanics.tree.cuts import Chart, Relative
+from ephs.mechanics.tree.loops import kinds_of, loop_program
+from ephs.mechanics.tree.programs import PLACE, Sweeps, sweeps
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
+from ephs.semantics.stage import Program, Table
 
 if TYPE_CHECKING:
     from ephs.mechanics.reduced.mechanism import Reduced
 
-__all__ = ["engine_of", "memory_of"]
+__all__ = ["engine_of"]
 
 
 def engine_of(
     reduced: "Reduced",
     gravity: Array,
+    drive: Array,
+    wrench: Array,
+    scal: Array,
     acted: tuple[frozenset[int], frozenset[int]] = (frozenset(), frozenset()),
     kept: Sequence[Array] | None = None,
 ) -> Engine:
@@ -36,6 +41,8 @@ def engine_of(
     ----------
     gravity
         (3,) in world axes.
+    drive, wrench, scal
+        Given forces (joints' freedoms,), given wrenches (bodies, 6), and (h, θ₀, π₀), which are read where they are.
     acted
         Edges and bodies on which given forces act.
     kept
@@ -50,39 +57,54 @@ def engine_of(
     driven = any(part.joint.driven for part in found.parts)
     records = found.packed(gravity)
     program = sweeps(records.kind, general=bool(forced or driven or len(cut)))
-    table = np.array([(part.parent, part.r_at, part.joint.dim) for part in found.parts], dtype=np.int64)
-    return Engine(
-        flag=np.array([forced, driven, program.width], dtype=np.int64),
-        address=program.addresses(),
-        link=table.reshape(-1, COLUMNS),
-        integers=records.integers,
-        reals=records.reals,
-        gravity=records.gravity,
-        loops=loop_addresses(kinds_of([*charts[:, [0, 3, 1]].tolist(), *cut[:, [2, 5, 3]].tolist()])),
-        chart=charts.ravel(),
-        cut=cut[:, :-1].ravel(),
-        cut_numbers=np.hstack([cut_frame, cut_basis]).ravel(),
-        closing=closing([part.parent for part in found.parts], ends),
-        forces=forces,
-    )
+    eliminated = closing([part.parent for part in found.parts], ends)
+    joints = kinds_of([*charts[:, [0, 3, 1]].tolist(), *cut[:, [2, 5, 3]].tolist()])
+    tables: dict[str, Any] = {
+        "own": _own(len(found.parts), program, loop_program(joints), forced=forced, driven=driven),
+        "integers": records.integers,
+        "reals": records.reals,
+        "gravity": records.gravity,
+        "chart": table_of(Chart, charts),
+        "cut": cut[:, :-1].ravel(),
+        "cut_numbers": np.hstack([cut_frame, cut_basis]).ravel(),
+        **{name: getattr(eliminated, name).ravel() for name in ("at", "slot", "row", "flat", "end")},
+        **forces.tables(),
+        "drive": drive,
+        "wrench": wrench,
+        "scal": scal,
+    }
+    freedoms, entropies = sum(part.joint.dim for part in found.parts), len(reduced.entropies)
+    sizes = reduced.coordinates, drive.size + freedoms + entropies + 2 + len(reduced.made)
+    work = _work(program, len(found.parts), freedoms, drive.size, len(cut), entropies, eliminated)
+    return Engine(tables, work, eliminated, sizes, looped=len(cut) > 0)
 
 
-def memory_of(engine: Engine, entropies: int) -> Memory:
+def _own(links: int, program: Sweeps, loops: Program, *, forced: bool, driven: bool) -> Table[Own]:
+    made = Own.table(1)
+    own, sweep, loop = made[0], program.program.compiled(), loops.compiled()
+    own.links, own.forced, own.driven, own.falls = links, int(forced), int(driven), int("accelerations" in sweep)
+    for name in ("accelerations", "move", "fold", "unfold", "resolve", "spread", "power", "dependent"):
+        setattr(own, name, sweep[name].address if name in sweep else 0)
+    for name in ("rows", "poses", "fit", "gaps", "relative_rates", "across", "advance", "velocities"):
+        setattr(own, name, loop[name].address)
+    own.displace = loop["move"].address
+    return made
+
+
+def _work(
+    program: Sweeps, links: int, freedoms: int, joints: int, cuts: int, entropies: int, closing: Closing
+) -> dict[str, Any]:
     """Memory for one thread."""
-    links, m = engine.link.shape[0], len(engine.closing.row)
-    n = int(engine.link[:, DIM].sum())
-    slots = len(engine.closing.slot)
+    rows, slots = len(closing.row), len(closing.slot)
     shapes: dict[str, tuple[int, ...]] = {
-        "work": ((links + 1) * int(engine.flag[WIDTH]),), "place": (links + 1, PLACE), "wrench": (links, 6),
-        "change": (links + 1, 6), "force": (n,), "zero": (n,),
-        "relative": (engine.cut.size // Cut.integer_width, Relative.real_width), "row_value": (m, 4),
-        "entry": (engine.closing.entries,),
-        "covector": (slots, 6), "along": (slots, 12), "largest": (max(engine.closing.blocks, 1),),
-        "temperature": (max(entropies, 1),), "entropy": (entropies,), "small": (512,), "e": (16,), "f": (256,),
-        "c": (16,), "jac": (512,),
-        "scratch": (2048,),
+        "work": ((links + 1) * program.width,), "place": (links + 1, PLACE), "change": (links + 1, 6),
+        "pushed": (links, 6), "force": (freedoms,), "zero": (freedoms,), "relative": (cuts, Relative.real_width),
+        "value": (rows, 4), "entry": (closing.entries,), "covector": (slots, 6), "along": (slots, 12),
+        "largest": (max(closing.blocks, 1),), "temperature": (max(entropies, 1),), "entropy": (entropies,),
+        "x": (16,), "v": (64,), "e": (16,), "lam": (64,), "f": (256,), "c": (16,), "jac": (512,), "scratch": (2048,),
+        "alter": (freedoms,), "moved": (joints,), "answer": (1,),
     }  # fmt: skip
-    return Memory(**{name: np.zeros(shape) for name, shape in shapes.items()})
+    return {name: np.zeros(shape) for name, shape in shapes.items()} | {"fault": np.zeros(1, dtype=np.int64)}
 
 
 def _matrix(pose: Array) -> Array:
@@ -163,12 +185,12 @@ def _forces(
         left=np.array(left).reshape(-1, 36),
         body=np.array([bodies.link[b] if b in acted[1] else -1 for b in range(reduced.links)], dtype=np.int64),
         body_frame=np.array([_matrix(inside) for inside in bodies.inside]).reshape(-1, 12),
-        node=t.node,
+        node=reduced.nodes,
         conduction=t.conduction,
         sink=t.sink,
-        address=t.address,
-        dims=t.dims,
+        component=table_of(
+            Component,
+            np.hstack([t.address[:, None], t.dims, t.parameter_at[: len(t.address), None], t.made_at[:, None]]),
+        ),
         parameters=t.parameters,
-        parameter_at=t.parameter_at,
-        made_at=t.made_at,
     )

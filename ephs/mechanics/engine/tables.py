@@ -1,30 +1,16 @@
-"""The tables of a mechanism as the compiled engine takes them, and the memory of one evaluation."""
+"""What acts on a mechanism, as arrays: from the tables of a reduced scene to the records of the engine."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from ephs.mechanics.engine.closing import Closing
+import numpy as np
+
+from ephs.mechanics.engine.records import Acting, Body, Component, Conduction, Node, Sink
 from ephs.mechanics.solve.sparse import Index
 from ephs.semantics.bundle import Array
+from ephs.semantics.stage import Record, Table
+from ephs.semantics.stage.memory import ArrayIntegers, ArrayReals
 
-__all__ = [
-    "COLUMNS",
-    "DIM",
-    "DRIVEN",
-    "FORCED",
-    "PARENT",
-    "R_AT",
-    "WIDTH",
-    "Engine",
-    "Forces",
-    "Memory",
-    "Scheme",
-    "State",
-]
-
-PARENT, R_AT, DIM, COLUMNS = range(4)
-"""Columns of links."""
-FORCED, DRIVEN, WIDTH = range(3)
-"""What of a mechanism is said in a number: more than gravity acts, joints are driven, numbers of memory of a link."""
+__all__ = ["Forces", "table_of"]
 
 
 class Forces(NamedTuple):
@@ -36,87 +22,29 @@ class Forces(NamedTuple):
     left: Array  # (edges, 36): (BᵀB)⁻¹Bᵀ, row by row
     body: Index  # (bodies,): link on which the wrench acts, −1: none does
     body_frame: Array  # (bodies, 12): R and p of the body in its link's frame
-    node: Index  # (entropies,): component of the storage, −1: the environment
+    node: Table[Node]
     conduction: Index  # (conductions, 3): component, entropy, entropy
     sink: Index  # (frictions, 2): place of what it makes, entropy that takes its heat
-    address: Index  # (components,)
-    dims: Index  # (components, 4)
+    component: Table[Component]
     parameters: Array
-    parameter_at: Index
-    made_at: Index  # (components,): place of what it makes, −1
+
+    def tables(self) -> dict[str, Any]:
+        """Return the records of the engine, by name."""
+        return {
+            "acting": table_of(Acting, np.hstack([self.edge, self.part]), np.hstack([self.frame, self.left])),
+            "body": table_of(Body, self.body[:, None], self.body_frame),
+            "node": self.node,
+            "conduction": table_of(Conduction, self.conduction),
+            "sink": table_of(Sink, self.sink),
+            "component": self.component,
+            "parameters": self.parameters,
+        }
 
 
-class Engine(NamedTuple):
-    """A mechanism. Links are groups of bodies, parents first, in frames at their tree joints."""
-
-    flag: Index  # (3,): see above
-    address: Index  # (8,): the staged functions, see `engine_kernels`; 0: not needed
-    link: Index  # (links, 3): see above
-    integers: Index  # (links · width,): records of the sweeps, see `ephs.mechanics.tree.records`
-    reals: Array  # (links · width,)
-    gravity: Array  # (3,) in the ground's frame
-    loops: Index  # addresses of `ephs.mechanics.tree.loops`
-    chart: Index  # (joints · width,): records of `ephs.mechanics.tree.cuts.Chart`
-    cut: Index  # (cut joints · width,): records of `ephs.mechanics.tree.cuts.Cut`, their integers
-    cut_numbers: Array  # (cut joints · width,): their numbers
-    closing: Closing
-    forces: Forces
-
-
-class Memory(NamedTuple):
-    """What one evaluation writes."""
-
-    work: Array  # ((links + 1) · width,): the sweeps' own
-    place: Array  # (links + 1, 24): R and p in the world, twist, bias; the ground's last
-    wrench: Array  # (links, 6): on links, in their frames
-    change: Array  # (links + 1, 6): accelerations beyond the bias; the ground's last
-    force: Array  # (n,)
-    zero: Array  # (n,): stays zero
-    relative: Array  # (cut joints, 25): see `ephs.mechanics.tree.cuts.Relative`
-    row_value: Array  # (rows, 4): target, multiplier, size, pivot
-    entry: Array  # (entries,): what couples rows
-    covector: Array  # (slots, 6)
-    along: Array  # (slots, 12)
-    largest: Array  # (blocks,)
-    temperature: Array  # (entropies,)
-    entropy: Array  # (entropies,)
-    small: Array  # (512,)
-    e: Array
-    f: Array
-    c: Array
-    jac: Array
-    scratch: Array
-
-
-class Scheme(NamedTuple):
-    """An explicit method: stages, weights, estimates of the error."""
-
-    a: Array  # (stages, stages)
-    b: Array  # (stages,)
-    error: Array  # (stages + 1,)
-    coarse: Array  # (stages + 1,): of order 8 only
-    order8: int
-
-
-class State(NamedTuple):
-    """The state of a run of explicit steps, and memory for its next one."""
-
-    q: Array
-    y: Array  # (size,): v = 0, rates, entropies, books
-    k: Array  # (stages + 1, size): rates at the stages
-    y1: Array
-    q1: Array
-    k2: Array
-    y2: Array
-    q2: Array
-    b: Array
-    atol: Array  # (2 n + entropies,)
-    rtol: Array
-    allowed: Array
-    fine: Array
-    coarse: Array
-    change: Array  # (n,)
-    moved: Array  # (size of v,)
-    rows_t: Array  # (rows, 2): time from the start, the step's least production
-    rows_q: Array
-    rows_y: Array
+def table_of(record: type[Record], integers: Index, reals: Array | None = None) -> Table[Any]:
+    """Return a table of records whose fields, in their order, are the columns of arrays."""
+    size, numbers = len(integers), np.zeros(0) if reals is None else np.ascontiguousarray(reals).ravel()
+    whole = np.ascontiguousarray(integers, dtype=np.int64).ravel()
+    assert whole.size == size * record.integer_width
+    assert numbers.size == size * record.real_width
+    return Table(record, ArrayIntegers(whole), ArrayReals(numbers), size)

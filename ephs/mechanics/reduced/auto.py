@@ -6,13 +6,13 @@ mode is, and a step that this holds at the limit of stability again and again se
 
 from typing import TYPE_CHECKING, Any, final
 
-from ephs.mechanics.engine.march_kernels import PATIENCE
 from ephs.mechanics.reduced.equations import Equations, ReducedState
 from ephs.mechanics.reduced.explicit import Explicit, tableau
 from ephs.mechanics.reduced.method import ReducedMethod
 from ephs.mechanics.solve.control import Control
 from ephs.mechanics.solve.errors import SolveError
 from ephs.mechanics.solve.loop import FINAL
+from ephs.mechanics.solve.march.control import PATIENCE
 from ephs.mechanics.solve.snapshot import Snapshot
 from ephs.mechanics.solve.stepping import Attempt, Leg, Span
 

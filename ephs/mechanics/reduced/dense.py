@@ -7,8 +7,8 @@ from typing import final
 import numpy as np
 
 from ephs.mechanics.build import component_path
-from ephs.mechanics.engine.heat_kernels import entropies, heat_rates
 from ephs.mechanics.reduced.given import Given
+from ephs.mechanics.reduced.heat import Heats
 from ephs.mechanics.reduced.loop_kernels import accelerate, constraint_rows, correct, loop_gaps, reduce_rows
 from ephs.mechanics.reduced.mechanism import Reduced
 from ephs.mechanics.reduced.sweep_kernels import inertia_sweep, kinematics
@@ -16,6 +16,7 @@ from ephs.mechanics.reduced.tables import CUT
 from ephs.mechanics.scene.geometry import Coupling
 from ephs.mechanics.solve.errors import Outcome, SolveError
 from ephs.semantics.bundle import Array
+from ephs.semantics.kernel_table import TEMPERATURE
 
 __all__ = ["Dense", "unmoved"]
 
@@ -52,7 +53,6 @@ class Dense:
     def __init__(self, reduced: Reduced) -> None:
         self.reduced, self.work = reduced, reduced.workspace(dense=True)
         t = reduced.tables
-        self._entropy = np.zeros(t.node.size)
         self._m, self._rank = int(t.rows.sum() + t.driven.sum()), 0
         self._cut = [i for i in range(len(reduced.edges)) if t.kind[i] == CUT]
 
@@ -83,19 +83,19 @@ class Dense:
             out[where] = Coupling(self.reduced.edges[i].pair).fit(w.relative[i], out[where])
         return out
 
-    def rates(self, q: Array, y: Array, given: Given, scal: Array, out: Array) -> tuple[int, int]:
-        """Rates of the tree, of the entropies and of the books, as the engine's `derive`; (status, component)."""
+    def rates(self, q: Array, y: Array, given: Given, heats: Heats, scal: Array, out: Array) -> tuple[int, int]:
+        """Rates of the tree, of the entropies and of the books, as the engine's; (status, component)."""
         n, nv, ns = self.reduced.freedoms, given.drive.size, len(self.reduced.entropies)
         r, s, at = slice(nv, nv + n), slice(nv + n, nv + n + ns), nv + n + ns
         out[at:] = 0.0
-        status, component = entropies(self.reduced.tables, y[s], scal, self._entropy)
-        if status:
-            return int(status), int(component)
+        if (frozen := heats.frozen(y[s])) is not None:
+            return TEMPERATURE, frozen
         status, component = accelerate(
-            self.reduced.tables, self.work, q, y[r], self._entropy, given.drive, given.wrench, scal, out[r], out[s],
-            out[at + 2 :], out[at : at + 2],
+            self.reduced.tables, self.work, q, y[r], heats.entropies(y[s]), given.drive, given.wrench, scal,
+            out[r], out[s], out[at + 2 :], out[at : at + 2],
         )  # fmt: skip
-        heat_rates(self.reduced.tables, self.work.temperature, scal, out[s], out[at + 2 :])
+        out[at + 2 :] = heats.flows(y[s], out[at + 2 :])
+        out[s] *= heats.temperatures(y[s])
         return int(status), int(component)
 
     def closed(self, q: Array, r: Array, motions: Array, moved: Callable[[Array, Array], Array]) -> tuple[Array, Array]:

@@ -4,18 +4,13 @@ What every method on the reduced form shares. A step moves q = q⁰·exp(v): the
 spaces, v̇ = dexp⁻¹(v) r.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, final
 
 import numpy as np
 
-from ephs.mechanics.engine.build import engine_of, memory_of
-from ephs.mechanics.engine.engine_kernels import DEPENDENT, STILL, resolve
-from ephs.mechanics.engine.heat_kernels import count
-from ephs.mechanics.engine.march_kernels import C_COLUMNS, C_COMPONENT, C_EVALUATIONS, attempt
-from ephs.mechanics.engine.rate_kernels import OPEN, across, advance, close, derive, joint_rates
-from ephs.mechanics.engine.tables import Scheme
+from ephs.mechanics.engine.build import engine_of
 from ephs.mechanics.reduced.booking import Booking
 from ephs.mechanics.reduced.dense import Dense, unmoved
 from ephs.mechanics.reduced.given import Given
@@ -30,6 +25,7 @@ from ephs.mechanics.reduced.tables import SPRING, Workspace
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.solve.control import Tolerance
 from ephs.mechanics.solve.errors import Outcome, SolveError
+from ephs.mechanics.solve.march import Status
 from ephs.mechanics.solve.model import compile_model
 from ephs.mechanics.solve.problem import Problem
 from ephs.mechanics.solve.stepping import Row
@@ -111,22 +107,20 @@ class Equations:
         self.evaluations = 0
         self.gravity = np.array(scene.world.gravity, dtype=float)
         self._driven = np.flatnonzero(t.driven)
-        self._change, self._moved = np.zeros(self.n), np.zeros(self.nv)
         self._acted = self.given.acted(set(self._moving) if pushed else set())
         self._build(None)
 
     def _build(self, kept: "list[Array] | None") -> None:
-        """The compiled engine, with all rows of the cut joints or those that are kept."""
-        self.engine = engine_of(self.reduced, self.gravity, self._acted, kept)
-        self.memory = memory_of(self.engine, self.ns)
+        """The engine, with all rows of the cut joints or those that are kept."""
+        self.engine = engine_of(
+            self.reduced, self.gravity, self.drive, self.wrench, self.scal, self._acted, kept
+        )  # fmt: skip
 
     # ---- the equations -----------------------------------------------------------------------------------------
 
     def advance(self, q: Array, v: Array) -> Array:
         """q·exp(v), joint by joint."""
-        out = np.array(q)
-        advance(self.engine, q, v, out)
-        return out
+        return self.engine.advance(q, v)
 
     def rates(self, t: float, base: Array, y: Array) -> Array:
         """ẏ of y = (v, r, heats, books), of the books heat, work and flows, at q = base·exp(v).
@@ -142,37 +136,34 @@ class Equations:
         if not self.constant:
             v, r, heats, books = np.split(y, [nv, nv + n, nv + n + ns])
             self.given.place(t, self.states(ReducedState(t, self.advance(base, v), r, heats, books)))
-        out = np.zeros(self.size)
-        status, component = derive(
-            self.engine, self.memory, base, self._q, y, self.drive, self.wrench, self.scal, out
-        )  # fmt: skip
-        if status == DEPENDENT:
-            status, component = self.dense.rates(self._q, y, self.given, self.scal, out)
-            joint_rates(self.engine, self.memory, y, y[self.nv : self.nv + self.n], out)
+        status, q, out = self.engine.rates(base, y)
+        component = self.engine.failed
+        if status == Status.DEPENDENT:
+            status, component = self.dense.rates(q, y, self.given, self.heats, self.scal, out)
+            self.engine.velocities(y, y[self.nv : self.nv + self.n], out)
         self.refuse(status, component)
         return out
 
-    def stages(self, state: ReducedState, scheme: Scheme, c: Array, h: float, y0: Array, k: Array, y1: Array) -> Array:
+    def stages(
+        self, state: ReducedState, tableau: Mapping[str, Array], c: Array, h: float, y0: Array, k: Array, y1: Array
+    ) -> Array:
         """The rates k (stages + 1, size) at an explicit method's stages and end, k[0] known; y at the end into y1.
 
         Returns y at the last stage.
         """
-        count = scheme.b.size
-        before = np.zeros(self.size)
+        a = tableau["a"]
+        count = a.shape[1]
         if self.constant:
-            control = np.zeros(C_COLUMNS)
-            status = attempt(
-                self.engine, self.memory, scheme, before, state.q, y0, h, k, y1, self._q, self.drive, self.wrench,
-                self.scal, control,
-            )  # fmt: skip
-            self.evaluations += int(control[C_EVALUATIONS])
-            if status != DEPENDENT:
-                self.refuse(status, int(control[C_COMPONENT]))
+            status, evaluations, before = self.engine.stages(tableau, state.q, y0, h, k, y1)
+            self.evaluations += evaluations
+            if status != Status.DEPENDENT:
+                self.refuse(status, self.engine.failed)
                 return before
+        before = y0
         for i in range(1, count):
-            before = y0 + h * (scheme.a[i, :i] @ k[:i])
+            before = y0 + h * (a[i, :i] @ k[:i])
             k[i] = self.rates(state.t + c[i] * h, state.q, before)
-        y1[:] = y0 + h * (scheme.b @ k[:count])
+        y1[:] = y0 + h * (a[count] @ k[:count])
         k[-1] = self.rates(state.t + h, state.q, y1)
         return before
 
@@ -183,9 +174,9 @@ class Equations:
 
     def refuse(self, status: int, component: int) -> None:
         """Raise what a compiled function reported, if it did."""
-        if status == STILL and not np.all(np.isfinite(self.memory.work)):
+        if status == Status.STILL and not np.all(np.isfinite(self.engine.array("work"))):
             raise SolveError(Outcome.RANGE, "", "the rates of the joints")
-        if status == STILL:
+        if status == Status.STILL:
             raise unmoved(self.reduced, int(component))
         if status:
             raise SolveError.of_component(int(status), self.model, int(component))
@@ -207,13 +198,13 @@ class Equations:
             The loops do not close near by, or the state has left the range of numbers.
         """
         within(self.reduced, state.q, state.r, state.heats)
-        if not (self.engine.cut.size or self.prescribed.size):
-            return state
         if np.any(state.r[self._driven] != self.prescribed):  # all rates give way, in the mass metric
             return self._closed_carefully(state)
-        q, r = np.array(state.q), np.array(state.r)
-        status, gap = close(self.engine, self.memory, q, r, self._change, self._moved)
-        if status == OPEN:
+        self.careful = False
+        if not self.engine.looped:
+            return state
+        status, gap, q, r = self.engine.close(state.q, state.r)
+        if status == Status.OPEN:
             raise self.dense.opened(self.dense.gaps(q, r)[0], gap)
         self.careful = status != 0
         if status != 0:
@@ -226,7 +217,7 @@ class Equations:
 
         In the mass metric, where loops were closed last; not below what calls for care.
         """
-        rows = self.memory.row_value
+        rows = self.engine.array("value")
         known = self._closed_at[0].size > 0 and not self.careful
         return np.maximum(SPARSE, known * rows[:, 3] / max(rows[:, 2].max(initial=0.0), 1e-300))
 
@@ -288,11 +279,7 @@ class Equations:
 
     def settled(self, y0: Array, y1: Array) -> Array:
         """The end y1 of a step from y0 with what components made in place of what they passed on."""
-        if not self.ns:
-            return y1
-        out, at = np.array(y1), self.nv + self.n
-        count(self.engine.forces, y0[at:], out[at:], self.scal, self.memory.temperature)
-        return out
+        return self.engine.book(y0, y1) if self.ns else y1
 
     def allowed(self, rtol: Tolerance, atol: Tolerance) -> tuple[Array, Array]:
         """rtol and atol of what counts in an error: the tree's increments, its rates, the heats."""
@@ -314,20 +301,16 @@ class Equations:
 
         Closing the loops takes those out; near a singular configuration they are most of the estimate.
         """
-        if not (self.engine.cut.size or self.prescribed.size):
+        if not (self.engine.looped or self.careful):
             return estimate
-        out, change = np.array(estimate), np.zeros(self.n)
-        if not self.careful:
-            q, r = self._closed_at
-            if not self._factored:
-                close(self.engine, self.memory, q, r, self._change, self._moved)
-            for part in (slice(0, self.n), slice(self.n, 2 * self.n)):
-                across(self.engine, self.memory, q, out[part])
-                resolve(self.engine, self.memory, q, change)
-                out[part] += change
-            return out
+        if not (self.careful or self._factored):
+            self.engine.close(*self._closed_at)
+        out = np.array(estimate)
         for part in (slice(0, self.n), slice(self.n, 2 * self.n)):
-            out[part] += self.dense.back(out[part])
+            if self.careful:
+                out[part] += self.dense.back(out[part])
+            else:
+                out[part] = self.engine.along(self._closed_at[0], out[part])
         return out
 
     def row(self, state: ReducedState) -> Row:

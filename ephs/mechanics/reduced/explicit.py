@@ -3,63 +3,22 @@
 Steps of a mechanism on which nothing but given constants acts are taken many in one compiled call.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import final
+from typing import Any, final
 
 import numpy as np
 
-from ephs.mechanics.engine.march_kernels import (
-    C_BEFORE,
-    C_COLUMNS,
-    C_COMPONENT,
-    C_DAMPING,
-    C_END,
-    C_EVALUATIONS,
-    C_EXPONENT,
-    C_FRESH,
-    C_GRID,
-    C_H,
-    C_LEAST,
-    C_LEAST_STEP,
-    C_LIMIT,
-    C_LONGEST,
-    C_MOST,
-    C_ORIGIN,
-    C_REFUSALS,
-    C_REJECTED,
-    C_ROUGH,
-    C_ROWS,
-    C_SAVED,
-    C_SHARE,
-    C_SHORTEST,
-    C_SPAN,
-    C_STEPS,
-    C_STIFF,
-    C_STRICT,
-    C_T,
-    C_TRIED,
-    CAREFUL,
-    DONE,
-    PATIENCE,
-    REFUSED,
-    SHORT,
-    STIFF,
-    drift,
-    judge,
-    march,
-    measure,
-    stiffness,
-)
-from ephs.mechanics.engine.rate_kernels import OPEN
-from ephs.mechanics.engine.tables import Scheme, State
 from ephs.mechanics.reduced import tableaux as t
 from ephs.mechanics.reduced.equations import Equations, ReducedState
 from ephs.mechanics.reduced.method import ReducedMethod
 from ephs.mechanics.reduced.naming import within
 from ephs.mechanics.solve.control import Control, Proportional
 from ephs.mechanics.solve.errors import LARGEST, Outcome, SolveError
+from ephs.mechanics.solve.march import STEPS, Ending, Status
+from ephs.mechanics.solve.march import Control as Steering
+from ephs.mechanics.solve.march.control import PATIENCE
 from ephs.mechanics.solve.snapshot import Snapshot
 from ephs.mechanics.solve.stepping import Attempt, Counts, Leg, Span
 from ephs.semantics.bundle import Array
@@ -73,28 +32,43 @@ ROWS = 1024
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Tableau:
-    """The coefficients of an explicit method; ``exponent``: the power of the step with which its estimate falls."""
+    """The coefficients of an explicit method.
+
+    Attributes
+    ----------
+    arrays
+        By the names of `ephs.mechanics.solve.march.Tableau`.
+    c
+        Its nodes.
+    exponent
+        The power of the step with which its estimate falls.
+    """
 
     name: str
     order: int
-    scheme: Scheme
+    arrays: Mapping[str, Any]
     c: Array
     exponent: float
+
+    @property
+    def estimates(self) -> tuple[Array, ...]:
+        """(stages + 1,) weights of the estimates: of order 8 two."""
+        return tuple(self.arrays[name] for name in ("error", "coarse")[: self.order // 4])
 
 
 @cache
 def tableau(name: str) -> Tableau:
     """The method rk54 or rk87."""
     if name == "rk87":
-        scheme = Scheme(_square(t.A8), np.array(t.B8), np.array(t.E8_5), np.array(t.E8_3), 1)
-        return Tableau(name, 8, scheme, np.array(t.C8), 8.0)
-    scheme = Scheme(_square(t.A5), np.array(t.B5), np.array(t.E5), np.zeros(len(t.B5) + 1), 0)
-    return Tableau(name, 5, scheme, np.array(t.C5), 5.0)
+        arrays = {"a": _steps(t.A8, t.B8), "error": np.array(t.E8_5), "coarse": np.array(t.E8_3)}
+        return Tableau(name, 8, arrays | {"eighth": np.ones(1, dtype=np.int64)}, np.array(t.C8), 8.0)
+    arrays = {"a": _steps(t.A5, t.B5), "error": np.array(t.E5), "coarse": np.zeros(len(t.B5) + 1)}
+    return Tableau(name, 5, arrays | {"eighth": np.zeros(1, dtype=np.int64)}, np.array(t.C5), 5.0)
 
 
-def _square(rows: tuple[tuple[float, ...], ...]) -> Array:
-    out = np.zeros((len(rows) + 1, len(rows) + 1))
-    for i, row in enumerate(rows, 1):
+def _steps(rows: tuple[tuple[float, ...], ...], last: tuple[float, ...]) -> Array:
+    out = np.zeros((len(rows) + 2, len(rows) + 1))
+    for i, row in enumerate((*rows, last), 1):
         out[i, : len(row)] = row
     return out
 
@@ -122,26 +96,24 @@ class Explicit(ReducedMethod):
 
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
         """One step of h seconds."""
-        eq, scheme = self.equations, self.method.scheme
+        eq, scheme = self.equations, self.method.arrays
         if self._known is None or self._known[0] is not state.q:
             self._known = state.q, eq.rates(state.t, state.q, eq.vector(state))
         y0, y1 = eq.vector(state), np.empty(eq.size)
-        k = np.zeros((scheme.b.size + 1, eq.size))
+        k = np.zeros((scheme["a"].shape[0], eq.size))
         k[0] = self._known[1]
         before = eq.stages(state, scheme, self.method.c, h, y0, k, y1)
         end = eq.state(state, y1, state.t + h)
-        allowed = self.atol + self.rtol * eq.sizes(y0, y1)
+        allowed, steps = self.atol + self.rtol * eq.sizes(y0, y1), STEPS.compiled()
         closed = eq.closed(end)
-        estimates = [
-            eq.along(h * (weights @ k)[eq.counted])
-            for weights in ((scheme.error, scheme.coarse) if scheme.order8 else (scheme.error,))
-        ]
-        error = float(measure(estimates[0], estimates[-1], allowed, scheme.order8 == 1))
+        estimates = [eq.along(h * (weights @ k)[eq.counted]) for weights in self.method.estimates]
+        error = float(steps["measure"](estimates[0], np.array(estimates[-1]), allowed, scheme["eighth"]))
         rough = any(q is state.q for q in self.rough)
-        if not (rough or eq.careful):
-            error = max(error, float(drift(end.r, closed.r, allowed)))
+        if eq.engine.looped and not (rough or eq.careful):
+            error = max(error, float(steps["drift"](end.r, closed.r, allowed)))
         self.rough = (*((state.q,) if rough else ()), *((closed.q,) if eq.careful else ()))
-        self.stiffness = float(stiffness(scheme, before, k, y1, h, eq.n, eq.nv, allowed))
+        rise, run = (k[-1] - k[-2])[eq.counted], (y1 - before)[eq.counted]
+        self.stiffness = float(steps["stiffness"](rise, run, allowed, h))
         if closed is end and closed.q is not state.q:  # nothing was projected: the last rates are the next first ones
             first = k[-1].copy()
             first[: eq.nv] = closed.r
@@ -180,31 +152,36 @@ class _March:
         limit: float,
         left: Callable[[float, float, str], None] | None,
     ) -> None:
-        eq, scheme = method.equations, method.method.scheme
+        eq, tableau = method.equations, method.method
         self.method, self.span, self.left, self._leave = method, span, False, left
         self._handed = 0
-        size, q = eq.size, span.state.q
-        rows = ROWS if span.save_at is None else max(span.save_at.size, 1)
-        self.times = np.zeros(0) if span.save_at is None else np.abs(span.save_at - span.t0)
-        stages, counted = (scheme.b.size + 1, size), method.atol.size
-        self.memory = State(
-            q=np.array(q), y=eq.vector(span.state), k=np.zeros(stages), y1=np.zeros(size), q1=np.zeros(q.size),
-            k2=np.zeros(stages), y2=np.zeros(size), q2=np.zeros(q.size), b=np.zeros(size),
-            atol=np.array(method.atol), rtol=np.array(method.rtol), allowed=np.zeros(counted),
-            fine=np.zeros(counted), coarse=np.zeros(counted), change=np.zeros(eq.n),
-            moved=np.zeros(eq.nv), rows_t=np.zeros((rows, 2)), rows_q=np.zeros((rows, q.size)),
-            rows_y=np.zeros((rows, size - eq.nv)),
-        )  # fmt: skip
-        c = self.control = np.zeros(C_COLUMNS)
-        policy = span.policy
-        c[C_END], c[C_SPAN], c[C_ORIGIN], c[C_H] = span.until - span.t0, abs(span.until - span.t0), span.t0, span.h
-        c[C_LEAST_STEP], c[C_MOST] = span.control.least, span.control.most
-        c[C_BEFORE], c[C_SHORTEST], c[C_LEAST] = 1e-4, np.inf, np.inf
-        c[C_EXPONENT], c[C_SHARE], c[C_DAMPING] = method.exponent, method.share, 0.4
-        c[C_STRICT] = Proportional.STRICT
-        c[C_SAVED] = -1.0 if span.save_at is None else float(span.saved)
-        c[C_LIMIT] = limit
-        c[C_GRID] = 0.0 if policy else float(span.control.step or 0.0)
+        size, q, times = eq.size, span.state.q, span.save_at
+        rows = ROWS if times is None else max(times.size, 1)
+        self.times = np.zeros(0) if times is None else np.abs(times - span.t0)
+        stages, counted = tableau.arrays["a"].shape[0], method.atol.size
+        shapes: dict[str, tuple[int, ...]] = {
+            "k": (stages, size), "q1": (q.size,), "y1": (size,), "q2": (q.size,), "y2": (size,), "k2": (stages, size),
+            "last": (size,), "allowed": (counted,), "open": (eq.n,), "fine": (counted,), "coarse": (counted,),
+            "rows_t": (rows, 2), "rows_q": (rows, q.size), "rows_y": (rows, size - eq.nv),
+        }  # fmt: skip
+        self.memory = {name: np.zeros(shape) for name, shape in shapes.items()} | {
+            "q": np.array(q), "y": eq.vector(span.state), "atol": np.array(method.atol), "rtol": np.array(method.rtol),
+            "times": self.times,
+        }  # fmt: skip
+        self._control = Steering.table(1)
+        self._march = eq.engine.bind("march", tableau.arrays, self.memory, self._control, 0)
+        c, policy, control = self.control, span.policy, span.control
+        c.end, c.span, c.origin = span.until - span.t0, abs(span.until - span.t0), span.t0
+        c.step, c.least_step, c.most_step = span.h, control.least, control.most
+        c.before, c.shortest, c.least = 1e-4, np.inf, np.inf
+        c.exponent, c.share, c.damping, c.strict = method.exponent, method.share, 0.4, Proportional.STRICT
+        c.saved = -1 if times is None else span.saved
+        c.limit, c.grid = limit, 0.0 if policy else float(control.step or 0.0)
+
+    @property
+    def control(self) -> Any:
+        """Where the march stands, a record of `Steering`; its numbers are known here."""
+        return self._control[0]
 
     def advance(self, steps: int) -> bool:
         """Up to so many steps; whether the end is reached.
@@ -215,25 +192,23 @@ class _March:
             The steps get too short, or a state cannot be evaluated.
         """
         eq, c = self.method.equations, self.control
-        before = c[C_EVALUATIONS]
-        sound = float(c[C_T])
-        scheme = self.method.method.scheme
-        found = march(eq.engine, eq.memory, scheme, self.memory, c, self.times, eq.drive, eq.wrench, eq.scal, steps)
-        eq.evaluations += int(c[C_EVALUATIONS] - before)
+        before, sound = c.evaluations, float(c.time)
+        found = int(self._march(steps))
+        eq.evaluations += c.evaluations - before
         self._hold(sound)
-        self.method.stiffness = float(c[C_STIFF])
-        if found == CAREFUL:
+        self.method.stiffness = float(c.stiff)
+        if found == Ending.CAREFUL:
             self._step()
-        elif found == STIFF and self._leave is not None:
-            failing = c[C_REFUSALS] > PATIENCE
-            reason = "its steps fail" if failing else f"h·|λ| = {c[C_STIFF]:.1f} holds its steps"
-            self._leave(self.time, float(c[C_H]), reason)
+        elif found == Ending.STIFF and self._leave is not None:
+            failing = c.refusals > PATIENCE
+            reason = "its steps fail" if failing else f"h·|λ| = {c.stiff:.1f} holds its steps"
+            self._leave(self.time, float(c.step), reason)
             self.left = True
-        elif found == SHORT:
-            raise SolveError(Outcome.TINY, "", f"{c[C_H]:.3g} s")
-        elif found >= REFUSED:
-            self._refused(int(found) - REFUSED)
-        return found == DONE
+        elif found == Ending.SHORT:
+            raise SolveError(Outcome.TINY, "", f"{c.step:.3g} s")
+        elif found >= Ending.REFUSED:
+            self._refused(found - Ending.REFUSED)
+        return found == Ending.DONE
 
     def _hold(self, sound: float) -> None:
         """Give up the rows that left the range of numbers; ``sound``: the time before.
@@ -243,77 +218,77 @@ class _March:
         SolveError
             It names the joint.
         """
-        eq, s, c = self.method.equations, self.memory, self.control
-        sizes = (np.abs(s.q), np.abs(s.y[eq.nv : eq.nv + eq.n + eq.ns]))
-        if all(size.max(initial=0.0) < LARGEST for size in sizes) and np.isfinite(s.y[eq.nv :]).all():
+        eq, c, q, y = self.method.equations, self.control, self.memory["q"], self.memory["y"]
+        sizes = (np.abs(q), np.abs(y[eq.nv : eq.nv + eq.n + eq.ns]))
+        if all(size.max(initial=0.0) < LARGEST for size in sizes) and np.isfinite(y[eq.nv :]).all():
             return
-        beyond = self._state(0.0, s.q, s.y[eq.nv :])
+        beyond = self._state(0.0, q, y[eq.nv :])
         times, q, y = self.kept()
         good = np.isfinite(y).all(axis=1)
         good &= np.abs(np.hstack([q, y[:, : eq.n + eq.ns]])).max(axis=1, initial=0.0) < LARGEST
         rows = int(np.argmin(good)) if not good.all() else good.size
-        c[C_ROWS] = rows
-        c[C_T] = times[rows - 1, 0] if rows else sound
+        c.rows, c.time = rows, times[rows - 1, 0] if rows else sound
         within(eq.reduced, beyond.q, beyond.r, beyond.heats)
         raise SolveError(Outcome.RANGE, "", "heat, work or entropy made")
 
     def _refused(self, status: int) -> None:
-        if status == OPEN:
-            eq, (q, rest) = self.method.equations, (self.memory.q, self.memory.y[self.method.equations.nv :])
-            residual = eq.dense.gaps(q, rest[: eq.n])[0]
+        eq = self.method.equations
+        if status == Status.OPEN:
+            residual = eq.dense.gaps(self.memory["q"], self.memory["y"][eq.nv : eq.nv + eq.n])[0]
             raise eq.dense.opened(residual, float(np.abs(residual).max(initial=0.0)))
-        self.method.equations.refuse(status, int(self.control[C_COMPONENT]))
+        eq.refuse(status, eq.engine.failed)
 
     def _step(self) -> None:
         """One step with the careful elimination, where constraints nearly repeat each other."""
-        c, s, h = self.control, self.memory, float(self.control[C_TRIED])
-        sign = 1.0 if c[C_END] >= 0.0 else -1.0
-        state = self.state
-        self.method.rough = (state.q,) if c[C_ROUGH] else ()
+        c, s, h = self.control, self.memory, float(self.control.tried)
+        state, eq, grid = self.state, self.method.equations, float(c.grid)
+        sign, latest = self._sign, max(abs(state.t), abs(self.span.until))
+        self.method.rough = (state.q,) if c.rough else ()
         try:
             attempt = self.method.step(state, sign * h)
         except SolveError as error:
-            if c[C_GRID]:
+            if grid:
                 raise
-            c[C_H], c[C_REJECTED] = 0.25 * h, c[C_REJECTED] + 1.0
-            self.span.control.allowed(float(c[C_H]), max(abs(state.t), abs(self.span.until)), error)
+            c.step, c.rejected = 0.25 * h, c.rejected + 1
+            self.span.control.allowed(float(c.step), latest, error)
             return
-        if not (c[C_GRID] or judge(c, h, attempt.error)):
-            c[C_REJECTED] += 1.0
-            self.span.control.allowed(float(c[C_H]), max(abs(state.t), abs(self.span.until)), None)
+        if not (grid or STEPS.compiled()["judge"](self._control, h, attempt.error)):
+            c.rejected += 1
+            self.span.control.allowed(float(c.step), latest, None)
             return
-        now = float(c[C_T])
-        after = float(abs(c[C_END])) if h >= abs(c[C_END]) - now else now + h
+        now, whole = float(c.time), float(abs(c.end))
+        after = whole if h >= whole - now else now + h
         wanted = [(after, attempt.end)]
-        if c[C_SAVED] >= 0.0:
+        if c.saved >= 0:
             last = int(np.searchsorted(self.times, after, side="right"))
             wanted = [
                 (when, attempt.end if when == after else self.method.inside(attempt, state.t + sign * (when - now)))
-                for when in self.times[int(c[C_SAVED]) : last].tolist()
+                for when in self.times[c.saved : last].tolist()
             ]
-            c[C_SAVED] = last
+            c.saved = last
         for when, found in wanted:
-            row = int(c[C_ROWS])
-            s.rows_t[row] = when, attempt.least
-            s.rows_q[row], s.rows_y[row] = found.q, self.method.equations.vector(found)[self.method.equations.nv :]
-            c[C_ROWS] += 1.0
-        s.q[:], s.y[:] = attempt.end.q, self.method.equations.vector(attempt.end)
-        c[C_T], c[C_STEPS], c[C_FRESH] = after, c[C_STEPS] + 1.0, 0.0
-        c[C_ROUGH] = float(self.method.equations.careful)
-        c[C_SHORTEST], c[C_LONGEST] = min(c[C_SHORTEST], h), max(c[C_LONGEST], h)
-        c[C_LEAST] = min(c[C_LEAST], attempt.least)
+            s["rows_t"][c.rows] = when, attempt.least
+            s["rows_q"][c.rows], s["rows_y"][c.rows] = found.q, eq.vector(found)[eq.nv :]
+            c.rows += 1
+        s["q"][:], s["y"][:] = attempt.end.q, eq.vector(attempt.end)
+        c.time, c.steps, c.fresh, c.rough = after, c.steps + 1, 0, int(eq.careful)
+        c.shortest, c.longest = min(c.shortest, h), max(c.longest, h)
+        c.least = min(c.least, attempt.least)
+
+    @property
+    def _sign(self) -> float:
+        return 1.0 if self.control.end >= 0.0 else -1.0
 
     @property
     def time(self) -> float:
         """The time reached."""
-        sign = 1.0 if self.control[C_END] >= 0.0 else -1.0
-        done = self.control[C_T] >= abs(self.control[C_END])
-        return self.span.until if done else self.span.t0 + sign * float(self.control[C_T])
+        done = self.control.time >= abs(self.control.end)
+        return self.span.until if done else self.span.t0 + self._sign * float(self.control.time)
 
     @property
     def state(self) -> ReducedState:
         """The state reached."""
-        return self._state(self.time, self.memory.q, self.memory.y[self.method.equations.nv :])
+        return self._state(self.time, self.memory["q"], self.memory["y"][self.method.equations.nv :])
 
     def _state(self, t: float, q: Array, rest: Array) -> ReducedState:
         n, ns = self.method.equations.n, self.method.equations.ns
@@ -321,39 +296,40 @@ class _March:
 
     def rows(self) -> list[tuple[float, ReducedState, float]]:
         """Records since the last call: time, state, the step's least production."""
-        sign = 1.0 if self.control[C_END] >= 0.0 else -1.0
+        end = abs(float(self.control.end))
         out: list[tuple[float, ReducedState, float]] = []
         for row, (times, q, y) in enumerate(zip(*self.kept(), strict=True)):
             passed, least = times.tolist()
-            t = self.span.until if passed == abs(self.control[C_END]) else self.span.t0 + sign * passed
+            t = self.span.until if passed == end else self.span.t0 + self._sign * passed
             if self.span.save_at is not None:
                 t = float(self.span.save_at[self.span.saved + self._handed + row])
             out.append((t, self._state(t, q, y), least))
         self._handed += len(out)
-        self.control[C_ROWS] = 0.0
+        self.control.rows = 0
         return out
 
     def kept(self) -> tuple[Array, Array, Array]:
         """The rows that `rows` would hand over: (n, 2) time from the start and least production, (n, ·) elements, and
         (n, ·) rates, entropies and books; views of the memory."""
-        count = int(self.control[C_ROWS])
-        return self.memory.rows_t[:count], self.memory.rows_q[:count], self.memory.rows_y[:count]
+        count, memory = int(self.control.rows), self.memory
+        return memory["rows_t"][:count], memory["rows_q"][:count], memory["rows_y"][:count]
 
     def snapshot(self) -> Snapshot:
         """Where it stands: the state, the rates there, and what chooses the steps."""
-        s = self.memory
-        return {"control": self.control, "q": s.q, "y": s.y, "rates": s.k[0]}
+        return dict(self._taken())
+
+    def _taken(self) -> list[tuple[str, Any]]:
+        (counts, control), s = self._control.arrays, self.memory
+        parts = control, counts, s["q"], s["y"], s["k"][0]
+        return list(zip(("control", "counts", "q", "y", "rates"), parts, strict=True))
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go on from a snapshot."""
-        s = self.memory
-        self.control[:], s.q[:], s.y[:], s.k[0] = (snapshot[key] for key in ("control", "q", "y", "rates"))
+        for name, array in self._taken():
+            array[:] = snapshot[name]
 
     @property
     def counts(self) -> Counts:
         """Statistics so far."""
         c = self.control
-        return Counts(
-            int(c[C_STEPS]), int(c[C_REJECTED]), float(c[C_SHORTEST]), float(c[C_LONGEST]), float(c[C_LEAST]),
-            float(c[C_H]),
-        )  # fmt: skip
+        return Counts(c.steps, c.rejected, float(c.shortest), float(c.longest), float(c.least), float(c.step))

@@ -16,6 +16,7 @@ from typing import final
 
 import numpy as np
 
+from ephs.mechanics.engine.records import Node
 from ephs.mechanics.reduced.mechanism import Reduced
 from ephs.mechanics.solve.errors import Outcome, SolveError
 from ephs.semantics.bundle import Array
@@ -39,8 +40,7 @@ class Heats:
     def __init__(self, reduced: Reduced, theta: float) -> None:
         t = reduced.tables
         self._paths = reduced.entropies
-        self._nodes = t.node >= 0
-        self._parameters, self._at = t.parameters, t.parameter_at[t.node[self._nodes]]
+        self._components, self._nodes, self._law = t.node, t.node >= 0, reduced.nodes
         self._theta = theta
         self.frictions, sinks = t.sink.T
         self._incidence = np.zeros((t.node.size, len(reduced.made)))
@@ -52,7 +52,8 @@ class Heats:
     @property
     def _laws(self) -> tuple[Array, Array]:
         """c1 in J and c2 in J/K of the nodes, as the tables have them at present."""
-        return self._parameters[self._at + 1], self._parameters[self._at]
+        rows = self._law.arrays[1].reshape(-1, Node.real_width)[self._nodes]
+        return rows[:, Node.c1.offset], rows[:, Node.c2.offset]
 
     def temperatures(self, heats: Array) -> Array:
         """(entropies,) in K."""
@@ -60,6 +61,11 @@ class Heats:
         k, (c1, c2) = self._nodes, self._laws
         out[..., k] = (c1 + heats[..., k]) / c2
         return out
+
+    def frozen(self, heats: Array) -> int | None:
+        """Component of a node whose temperature is not above zero; None: there is none."""
+        cold = np.flatnonzero(~(self.temperatures(heats) > 0.0))
+        return int(self._components[cold[0]]) if cold.size else None
 
     def coldest(self, heats: Array) -> Array:
         """(entropies,) energies at a hundredth of the present temperatures, without bound of the environment."""

@@ -7,6 +7,7 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.build import component_path
+from ephs.mechanics.engine.records import Node
 from ephs.mechanics.reduced.spanning import Edge, joints_of, loop_algebra, spanning_tree, springs_of, twists_of
 from ephs.mechanics.reduced.tables import CUT, SPRING, TREE, Mechanism, Workspace, row_addresses
 from ephs.mechanics.scene.model import GROUND, Scene
@@ -17,6 +18,7 @@ from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.primitives import Irreversible, Storage
 from ephs.semantics.spaces import pair
+from ephs.semantics.stage import Table
 
 __all__ = ["Reduced", "reduce_scene"]
 
@@ -38,6 +40,8 @@ class Reduced:
         Paths of the states of entropy, in the order of s.
     made
         Paths of the components that make entropy.
+    nodes
+        What stores entropy, in the order of s.
     unknowns
         How many numbers have to be found.
     twists
@@ -50,6 +54,7 @@ class Reduced:
     links: int
     entropies: tuple[Path, ...]
     made: tuple[Path, ...]
+    nodes: Table[Node]
     unknowns: int
     twists: tuple[Array, ...]
 
@@ -127,7 +132,36 @@ def reduce_scene(scene: Scene, problem: Problem, model: Model) -> Reduced:
     bodies = tuple(names[b] if b < len(names) else None for b in order)
     n = int(mechanism.driven.size)
     rows = int(mechanism.rows.sum())
-    return Reduced(mechanism, tuple(edges), bodies, len(order), tuple(entropies), made, 2 * n + rows, tuple(twists))
+    return Reduced(
+        mechanism,
+        tuple(edges),
+        bodies,
+        len(order),
+        tuple(entropies),
+        made,
+        _nodes(model, entropies),
+        2 * n + rows,
+        tuple(twists),
+    )
+
+
+def _nodes(model: Model, entropies: Mapping[Path, tuple[int, int]]) -> Table[Node]:
+    nodes = Node.table(len(entropies))
+    for k, (path, (number, _)) in enumerate(entropies.items()):
+        primitive, node = model.descriptor.components[number].primitive, nodes[k]
+        if isinstance(primitive, Storage) and primitive.environment:
+            node.component = -1
+            continue
+        node.component = number
+        match dict(primitive.parameters):
+            case {"capacity": float(capacity), "temperature": float(temperature)}:
+                node.c1, node.c2 = capacity * temperature, capacity
+            case {"c1": float(c1), "c2": float(c2)}:
+                node.c1, node.c2 = c1, c2
+            case _:
+                found = f"heat of {path} with the law of {primitive.name}"
+                raise OptionError("method", found, "natural, or capacities whose energies are exponential")
+    return nodes
 
 
 def _entropies(problem: Problem) -> dict[Path, tuple[int, int]]:

@@ -71,17 +71,20 @@ class ReducedMethod(ABC):
         return None
 
     def inside(self, attempt: Attempt[ReducedState], t: float) -> ReducedState:
-        """A shorter step from the same start, or several where that fails: dense output of full order."""
+        """A shorter step from the same start, or several where that fails or errs: dense output of full order."""
         return self._part(attempt.start, t - attempt.start.t, HALVINGS)
 
     def _part(self, state: ReducedState, h: float, halvings: int) -> ReducedState:
+        found = None
         try:
-            return self.step(state, h).end
+            found = self.step(state, h)
         except SolveError:
             if not halvings:
                 raise
-            middle = self._part(state, 0.5 * h, halvings - 1)
-            return self._part(middle, 0.5 * h, halvings - 1)
+        if found is not None and not (halvings and found.error > 1.0 and self.control.step is None):
+            return found.end
+        middle = self._part(state, 0.5 * h, halvings - 1)
+        return self._part(middle, 0.5 * h, halvings - 1)
 
     def at(self, state: ReducedState, t: float) -> ReducedState:
         """The same state at a time that differs by rounding."""

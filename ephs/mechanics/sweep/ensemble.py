@@ -76,7 +76,7 @@ class _Made:
     def _tables(self) -> list[Any]:
         """Those of the engine, and those of the dense sweeps that careful steps take."""
         eq = self.equations
-        every: Iterator[Any] = iter((*eq.engine, *eq.engine.forces, *eq.engine.closing, *eq.reduced.tables))
+        every: Iterator[Any] = iter((*eq.engine.arrays(), *eq.reduced.tables))
         return [a for a in every if isinstance(a, np.ndarray)]
 
     def image(self) -> Array:

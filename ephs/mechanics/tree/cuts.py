@@ -34,8 +34,11 @@ __all__ = [
     "Relative",
     "across",
     "advance",
+    "between",
     "fit",
     "gaps",
+    "motion_of",
+    "place_of",
     "poses",
     "relative_rates",
     "rows",
@@ -124,14 +127,22 @@ class Relative(Record):
     twist = reals(6)
 
 
-def _place(places: Matrix, link: Integer, on: Evaluator) -> Place:
+def place_of(on: Evaluator, places: Matrix, link: Integer) -> Place:
     """Row of a link; the ground's is the last."""
     row = on.select(link < 0, places.rows - 1, link)
     return Place(NO_INTEGERS, 0, places.cells, places.start + row * places.columns)
 
 
-def _relative(motion: Matrix, i: Integer) -> Relative:
+def motion_of(motion: Matrix, i: Integer) -> Relative:
+    """Row of a cut joint."""
     return Relative(NO_INTEGERS, 0, motion.cells, motion.start + i * motion.columns)
+
+
+def between(near: Place, far: Place, turn: list[list[Real]], at: list[Real]) -> tuple[list[list[Real]], list[Real]]:
+    """A frame of the far link, given in it, as the near link has it."""
+    back = transposed(near.turn)
+    there = apply(back, add(sub(far.at, near.at), apply(far.turn, at)))
+    return product(back, product(far.turn, turn)), there
 
 
 def _each_row(on: Evaluator, cut: Cut, body: Callable[[Integer, list[Real]], None]) -> None:
@@ -201,12 +212,10 @@ def rows(
             covector[slot, k] = covector[slot, k] + by[k]
 
     def one(i: Integer) -> None:
-        cut, motion = cuts[i], _relative(motions, i)
-        near, far = _place(places, cut.first, on), _place(places, cut.second, on)
+        cut, motion = cuts[i], motion_of(motions, i)
+        near, far = place_of(on, places, cut.first), place_of(on, places, cut.second)
         outer_turn, outer_at = cut.outer_turn, cut.outer_at
-        back = transposed(near.turn)
-        turn = product(back, product(far.turn, outer_turn))
-        at = apply(back, add(sub(far.at, near.at), apply(far.turn, outer_at)))
+        turn, at = between(near, far, outer_turn, outer_at)
         motion.turn, motion.at = turn, at
         first = se3.twist_inward(turn, at, near.twist)
         twist = sub(se3.twist_inward(outer_turn, outer_at, far.twist), first)
@@ -228,7 +237,7 @@ def poses(on: Evaluator, cuts: Table[Cut], motions: Matrix) -> None:
     """Write poses of second frames in first ones, where `rows` has been."""
 
     def one(i: Integer) -> None:
-        cut, motion = cuts[i], _relative(motions, i)
+        cut, motion = cuts[i], motion_of(motions, i)
         inner = cut.inner_turn
         turn = product(transposed(inner), motion.turn)
         motion.pose = [*so3.quaternion(on, turn), *apply_transposed(inner, sub(motion.at, cut.inner_at))]
@@ -240,7 +249,7 @@ def fit(on: Evaluator, kinds: tuple[Kind, ...], cuts: Table[Cut], motions: Matri
     """Move the cut joints' elements to where their bodies put them."""
 
     def one(i: Integer) -> None:
-        cut, motion = cuts[i], _relative(motions, i)
+        cut, motion = cuts[i], motion_of(motions, i)
 
         def of(kind: Kind) -> None:
             def closer(_: Integer) -> None:
@@ -263,7 +272,7 @@ def gaps(on: Evaluator, kinds: tuple[Kind, ...], cuts: Table[Cut], motions: Matr
     worst = on.variable(0.0)
 
     def one(i: Integer) -> None:
-        cut, motion = cuts[i], _relative(motions, i)
+        cut, motion = cuts[i], motion_of(motions, i)
 
         def of(kind: Kind) -> None:
             log = _gap(on, kind, cut, motion, q)
@@ -291,7 +300,7 @@ def relative_rates(on: Evaluator, cuts: Table[Cut], motions: Matrix, value: Matr
     """Write targets that take the cut joints' forbidden velocities away, where `rows` has been."""
 
     def one(i: Integer) -> None:
-        twist = _relative(motions, i).twist
+        twist = motion_of(motions, i).twist
 
         def row(a: Integer, normal: list[Real]) -> None:
             value[a, 0] = -dot(normal, twist)
@@ -309,7 +318,7 @@ def across(on: Evaluator, cuts: Table[Cut], motions: Matrix, change: Matrix, val
         return [on.select(there, change[row, k], 0.0) for k in range(6)]
 
     def one(i: Integer) -> None:
-        cut, motion = cuts[i], _relative(motions, i)
+        cut, motion = cuts[i], motion_of(motions, i)
         near = se3.twist_inward(motion.turn, motion.at, of(cut.first))
         moved = sub(se3.twist_inward(cut.outer_turn, cut.outer_at, of(cut.second)), near)
 
@@ -355,7 +364,7 @@ def velocities(
                     rate.value = r[chart.r_at + j]
 
             def on_cut() -> None:
-                left, twist = cuts[chart.cut].left, _relative(motions, chart.cut).twist
+                left, twist = cuts[chart.cut].left, motion_of(motions, chart.cut).twist
                 for j, rate in enumerate(rates):
                     rate.value = dot(left[j], twist)
 

@@ -1,11 +1,10 @@
 """The program of cut joints and charts, specialised by the groups that a mechanism has."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from functools import cache
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ephs.mechanics.tree import cuts
 from ephs.mechanics.tree.cuts import Chart, Cut, Kind
@@ -23,29 +22,7 @@ from ephs.semantics.stage import (
 )
 from ephs.semantics.stage.memory import ArrayReals
 
-__all__ = [
-    "ACROSS",
-    "ADVANCE",
-    "CHART",
-    "ENTRIES",
-    "FIT",
-    "GAPS",
-    "MOVE",
-    "POSES",
-    "RELATIVE_RATES",
-    "ROWS",
-    "VELOCITIES",
-    "kinds_of",
-    "loop_addresses",
-    "loop_program",
-]
-
-ENTRIES: Final = ("rows", "poses", "fit", "gaps", "relative_rates", "across", "advance", "move", "velocities")
-"""Entry functions, in the order of `loop_addresses`."""
-ROWS, POSES, FIT, GAPS, RELATIVE_RATES, ACROSS, ADVANCE, MOVE, VELOCITIES = range(len(ENTRIES))
-"""Their places."""
-CHART: Final = 7
-"""Integers of a joint's chart, written out since kernels take it."""
+__all__ = ["ARGUMENTS", "kinds_of", "loop_program"]
 
 
 def kinds_of(joints: Iterable[tuple[int, int, int]]) -> tuple[Kind, ...]:
@@ -54,6 +31,23 @@ def kinds_of(joints: Iterable[tuple[int, int, int]]) -> tuple[Kind, ...]:
 
 
 NO_REALS: Final = ArrayReals(np.zeros(0))
+JOINT: Final[dict[str, Any]] = {"cut": indices(), "numbers": vector(), "motions": matrix(cuts.Relative.real_width)}
+VALUE: Final = matrix(4)
+ARGUMENTS: Final[dict[str, dict[str, Any]]] = {
+    "rows": {
+        "cut": indices(), "numbers": vector(), "places": matrix(cuts.Place.real_width), "motions": JOINT["motions"],
+        "end": indices(), "value": VALUE, "covector": matrix(6),
+    },
+    "poses": JOINT,
+    "fit": {**JOINT, "q": vector()},
+    "gaps": {**JOINT, "q": vector(), "value": VALUE, "worst": vector(1)},
+    "relative_rates": {**JOINT, "value": VALUE},
+    "across": {**JOINT, "change": matrix(6), "value": VALUE},
+    "advance": {"chart": indices(), "base": vector(), "v": vector(), "q": vector()},
+    "move": {"chart": indices(), "v": vector(), "q": vector()},
+    "velocities": {"chart": indices(), **JOINT, "v": vector(), "r": vector(), "out": vector()},
+}  # fmt: skip
+"""What the entry functions take; none returns anything."""
 
 
 @cache
@@ -101,27 +95,8 @@ def loop_program(kinds: tuple[Kind, ...]) -> Program:
     ) -> None:  # fmt: skip
         cuts.velocities(on, kinds, charted(chart), joints(cut, numbers), motions, v, r, out)
 
-    joint = {"cut": indices(), "numbers": vector(), "motions": matrix(cuts.Relative.real_width)}
-    value = matrix(4)
-    return Program(
-        "loops",
-        rows=Entry(
-            rows, cut=indices(), numbers=vector(), places=matrix(cuts.Place.real_width), motions=joint["motions"],
-            end=indices(), value=value, covector=matrix(6),
-        ),
-        poses=Entry(poses, **joint),
-        fit=Entry(fit, **joint, q=vector()),
-        gaps=Entry(gaps, **joint, q=vector(), value=value, worst=vector(1)),
-        relative_rates=Entry(relative_rates, **joint, value=value),
-        across=Entry(across, **joint, change=matrix(6), value=value),
-        advance=Entry(advance, chart=indices(), base=vector(), v=vector(), q=vector()),
-        move=Entry(move, chart=indices(), v=vector(), q=vector()),
-        velocities=Entry(velocities, chart=indices(), **joint, v=vector(), r=vector(), out=vector()),
-    )  # fmt: skip
-
-
-@cache
-def loop_addresses(kinds: tuple[Kind, ...]) -> NDArray[np.int64]:
-    """Return the addresses of the entry functions in machine code."""
-    calls = loop_program(kinds).compiled()
-    return np.array([calls[name].address for name in ENTRIES], dtype=np.int64)
+    functions: dict[str, Callable[..., Any]] = {
+        "rows": rows, "poses": poses, "fit": fit, "gaps": gaps, "relative_rates": relative_rates, "across": across,
+        "advance": advance, "move": move, "velocities": velocities,
+    }  # fmt: skip
+    return Program("loops", **{name: Entry(function, **ARGUMENTS[name]) for name, function in functions.items()})

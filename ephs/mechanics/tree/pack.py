@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from typing import final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ephs.mechanics.tree.records import Joint, Link
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import codes
 from ephs.semantics.stage import Table
-from ephs.semantics.stage.memory import ArrayIntegers, ArrayReals
 
 __all__ = ["SLIDE", "TURN", "Class", "Packed", "Part", "packed"]
 
@@ -91,16 +91,14 @@ class Packed:
         return int(self.integers.size // Link.integer_width)
 
     @property
-    def integers(self) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+    def integers(self) -> NDArray[np.int64]:
         """(links · width,) their integers."""
-        assert isinstance(self.links.integers, ArrayIntegers)
-        return self.links.integers.array
+        return self.links.arrays[0]
 
     @property
     def reals(self) -> Array:
         """(links · width,) their numbers."""
-        assert isinstance(self.links.reals, ArrayReals)
-        return self.links.reals.array
+        return self.links.arrays[1]
 
 
 def packed(parts: Sequence[Part], gravity: Array, *, planar: bool) -> Packed:

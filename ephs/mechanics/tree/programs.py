@@ -1,12 +1,10 @@
 """Looped programs of the sweeps, specialised by what a class of mechanisms has in common."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, Final, final
 
-import numpy as np
-
-from ephs.mechanics.solve.sparse import Index
 from ephs.mechanics.tree import closing
 from ephs.mechanics.tree.accelerations import Force, accelerate_outward, accelerations, no_force
 from ephs.mechanics.tree.closing import Rows
@@ -32,7 +30,7 @@ from ephs.semantics.stage import (
 )
 from ephs.semantics.stage.memory import IntegerCells, RealCells
 
-__all__ = ["ENTRIES", "FREE", "GENERAL", "PLACE", "Sweeps", "given_force", "sweeps"]
+__all__ = ["ARGUMENTS", "ENTRIES", "FREE", "GENERAL", "PLACE", "Sweeps", "given_force", "sweeps"]
 
 PLACE: Final = 24
 """Numbers of a link that rows and forces read: R and p in the world, twist, bias."""
@@ -78,6 +76,17 @@ ROWS: Final[dict[str, Any]] = {
     "covector": matrix(6), "along": matrix(12),
 }  # fmt: skip
 """The rows of its loops: see `ephs.mechanics.tree.closing.Rows`."""
+ARGUMENTS: Final[dict[str, dict[str, Any]]] = {
+    "accelerations": {**MECHANISM, "q": vector(), "r": vector(), "force": vector(), "rate": vector()},
+    "move": {**MECHANISM, "q": vector(), "r": vector(), "places": matrix(PLACE)},
+    "fold": {**MECHANISM, **ROWS, "q": vector(), "force": vector(), "wrench": matrix(6)},
+    "unfold": {**MECHANISM, **ROWS, "q": vector(), "rate": vector(), "change": matrix(6)},
+    "resolve": {**MECHANISM, **ROWS, "q": vector(), "rate": vector(), "change": matrix(6)},
+    "spread": {**MECHANISM, "q": vector(), "x": vector(), "change": matrix(6)},
+    "power": {**MECHANISM, **ROWS, "q": vector(), "r": vector(), "force": vector(), "out": vector()},
+    "dependent": {**ROWS, "largest": vector()},
+}
+"""What the entry functions take; `accelerations`, `fold` and `dependent` return an integer."""
 
 
 @final
@@ -122,11 +131,6 @@ class Sweeps:
             "tangents", accelerations=entry.tangent("memory", "q", "r", "force", "rate", directions=directions)
         )
 
-    def addresses(self) -> Index:
-        """Addresses of the machine code of `ENTRIES`, 0 for those that the program does not have."""
-        calls = self.program.compiled()
-        return np.array([calls[name].address if name in calls else 0 for name in ENTRIES], dtype=np.int64)
-
     def _survey(self, survey: Survey, entries: dict[str, Entry]) -> None:
         self._states: States | None = _Whole(survey.memory())
         for entry in entries.values():
@@ -170,13 +174,9 @@ class Sweeps:
             on.loop(repeats, lambda _: on.loop(q.rows, one))
 
         return {
-            "accelerations": Entry(
-                accelerate, **MECHANISM, q=vector(), r=vector(), force=vector(), rate=vector()
-            ),
-            "evaluations": Entry(
-                evaluations, **MECHANISM, q=matrix(), r=matrix(), rates=matrix(), repeats=integer()
-            ),
-        }  # fmt: skip
+            "accelerations": Entry(accelerate, **ARGUMENTS["accelerations"]),
+            "evaluations": Entry(evaluations, **MECHANISM, q=matrix(), r=matrix(), rates=matrix(), repeats=integer()),
+        }
 
     # ---- mechanisms with loops, wrenches on links, prescribed motions --------------------------------------------
 
@@ -283,15 +283,11 @@ class Sweeps:
             rows = self._rows(at, slot, row, flat, value, entry, covector, along)
             return on.select(closing.dependent(on, rows, largest, SPARSE), 1, 0)
 
-        return {
-            "move": Entry(move, **MECHANISM, q=vector(), r=vector(), places=matrix(PLACE)),
-            "fold": Entry(fold, **MECHANISM, **ROWS, q=vector(), force=vector(), wrench=matrix(6)),
-            "unfold": Entry(unfold, **MECHANISM, **ROWS, q=vector(), rate=vector(), change=matrix(6)),
-            "resolve": Entry(resolve, **MECHANISM, **ROWS, q=vector(), rate=vector(), change=matrix(6)),
-            "spread": Entry(spread_out, **MECHANISM, q=vector(), x=vector(), change=matrix(6)),
-            "power": Entry(power, **MECHANISM, **ROWS, q=vector(), r=vector(), force=vector(), out=vector()),
-            "dependent": Entry(dependent, **ROWS, largest=vector()),
-        }
+        functions: dict[str, Callable[..., Any]] = {
+            "move": move, "fold": fold, "unfold": unfold, "resolve": resolve, "spread": spread_out, "power": power,
+            "dependent": dependent,
+        }  # fmt: skip
+        return {name: Entry(function, **ARGUMENTS[name]) for name, function in functions.items()}
 
 
 def _show_changes(on: Evaluator, tree: Tree, change: Matrix) -> None:

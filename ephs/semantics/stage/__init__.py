@@ -5,8 +5,10 @@ from ephs.semantics.stage.entries import Entry as Entry
 from ephs.semantics.stage.errors import StageError as StageError
 from ephs.semantics.stage.evaluator import Evaluator as Evaluator
 from ephs.semantics.stage.evaluator import staged as staged
+from ephs.semantics.stage.kinds import group as group
 from ephs.semantics.stage.kinds import indices as indices
 from ephs.semantics.stage.kinds import matrix as matrix
+from ephs.semantics.stage.kinds import signature_of as signature_of
 from ephs.semantics.stage.kinds import table as table
 from ephs.semantics.stage.kinds import vector as vector
 from ephs.semantics.stage.memory import Integers as Integers
@@ -18,6 +20,7 @@ from ephs.semantics.stage.numbers import Real as Real
 from ephs.semantics.stage.numbers import Truth as Truth
 from ephs.semantics.stage.plain import PLAIN as PLAIN
 from ephs.semantics.stage.programs import Program as Program
+from ephs.semantics.stage.reaching import Argument as Argument
 from ephs.semantics.stage.reaching import Reached as Reached
 from ephs.semantics.stage.reaching import Signature as Signature
 from ephs.semantics.stage.records import Record as Record

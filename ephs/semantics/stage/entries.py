@@ -9,7 +9,7 @@ from typing import Any, final
 from ephs.semantics.stage.duals import Duals
 from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.evaluator import Evaluator
-from ephs.semantics.stage.kinds import INTEGER, REAL, Kind, described, dual
+from ephs.semantics.stage.kinds import Kind, described, dual, of_field, signature_of
 from ephs.semantics.stage.reaching import Atom, Signature
 from ephs.semantics.stage.records import IntegerField, RealField
 from ephs.semantics.stage.unrolled import Unrolled
@@ -32,10 +32,7 @@ class Entry:
 
     def __init__(self, function: Callable[..., Any], **kinds: Kind | RealField | IntegerField) -> None:
         self.function = function
-        self.kinds = {
-            name: kind if isinstance(kind, Kind) else REAL if isinstance(kind, RealField) else INTEGER
-            for name, kind in kinds.items()
-        }
+        self.kinds = {name: of_field(kind) for name, kind in kinds.items()}
         self.atoms: list[tuple[str, Atom]] = [(name, atom) for name, kind in self.kinds.items() for atom in kind.atoms]
         """The atoms of all arguments, each with the name of its argument."""
         names = list(inspect.signature(function).parameters)[1:]
@@ -51,7 +48,7 @@ class Entry:
 
     def signature(self, *, returns: bool = True) -> Signature:
         """Return how this function is called by its address; `returns`: it returns an integer or a condition."""
-        return Signature(tuple(kind.atoms for kind in self.kinds.values()), returns)
+        return signature_of(returns=returns, **self.kinds)
 
     def split(self, arguments: tuple[Any, ...], trail: Callable[[str], tuple[int | None, ...]]) -> list[Any]:
         """Return the atoms of arguments, checked; `trail` says what shape follows that of an argument's numbers."""

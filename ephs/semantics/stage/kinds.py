@@ -1,17 +1,31 @@
 """Kinds of arguments: the arrays and numbers that a program is handed for each, and what they make inside."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, TypeAlias, cast, final
 
 import numpy as np
 
 from ephs.semantics.stage.duals import Dual, DualCells
+from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.memory import ArrayIntegers, ArrayReals, Integers, Matrix, RealCells, Vector
-from ephs.semantics.stage.reaching import Atom
-from ephs.semantics.stage.records import Record, Table
+from ephs.semantics.stage.reaching import Atom, Signature
+from ephs.semantics.stage.records import IntegerField, RealField, Record, Table
 
-__all__ = ["INTEGER", "REAL", "Kind", "described", "dual", "indices", "matrix", "table", "vector"]
+__all__ = [
+    "INTEGER",
+    "REAL",
+    "Kind",
+    "described",
+    "dual",
+    "group",
+    "indices",
+    "matrix",
+    "of_field",
+    "signature_of",
+    "table",
+    "vector",
+]
 
 Shape: TypeAlias = tuple[int | None, ...]
 """A shape, None where any size will do."""
@@ -121,6 +135,43 @@ def table(record: type[Record]) -> Kind:
     )
 
 
+def group(cls: Callable[..., Any], **kinds: "Kind | Any") -> Kind:
+    """Describe an argument of several parts, given as a mapping of their names.
+
+    Parameters
+    ----------
+    cls
+        What is made of the parts inside: called with them by name.
+    **kinds
+        The parts, as the arguments of an entry function.
+    """
+    parts = {name: of_field(kind) for name, kind in kinds.items()}
+
+    def split(value: Any, trail: Shape) -> tuple[Any, ...] | None:
+        if not isinstance(value, Mapping) or not parts.keys() <= cast("Mapping[str, Any]", value).keys():
+            return None
+        out: list[Any] = []
+        for name, kind in parts.items():
+            found = kind.split(value[name], trail)
+            if found is None:
+                described_part = described(cast("object", value[name]))
+                raise StageError("argument", where=name, argument=name, found=described_part, expected=kind.expected)
+            out += found
+        return tuple(out)
+
+    def join(found: list[Any]) -> Any:
+        rest = iter(found)
+        return cls(**{name: kind.join([next(rest) for _ in kind.atoms]) for name, kind in parts.items()})
+
+    atoms: tuple[Atom, ...] = tuple(atom for kind in parts.values() for atom in kind.atoms)
+    return Kind(f"a mapping with the names {', '.join(parts)}", atoms, split, join)
+
+
+def of_field(kind: "Kind | RealField | IntegerField") -> Kind:
+    """Return the kind of an argument that is declared as such, or as `real()` or `integer()`."""
+    return kind if isinstance(kind, Kind) else REAL if isinstance(kind, RealField) else INTEGER
+
+
 def dual(kind: Kind, directions: int, active: bool) -> Kind:
     """Return the kind of an argument of dual numbers: a value and its slopes, or, not active, a constant."""
 
@@ -153,6 +204,17 @@ def dual(kind: Kind, directions: int, active: bool) -> Kind:
         return Kind(kind.expected, kind.atoms, kind.split, join)
     shape = "of its shape" if directions == 1 else f"of its shape and {directions} directions after it"
     return Kind(f"a pair: {kind.expected}, and its slopes, float64 {shape}", (*kind.atoms, "reals"), split, join)
+
+
+def signature_of(*, returns: bool = True, **kinds: "Kind | RealField | IntegerField") -> Signature:
+    """Return how an entry function with arguments of these kinds is called by its address.
+
+    Parameters
+    ----------
+    returns
+        Whether it returns an integer or a condition; else nothing.
+    """
+    return Signature(tuple(of_field(kind).atoms for kind in kinds.values()), returns)
 
 
 def described(value: Any) -> str:

@@ -6,6 +6,7 @@ from math import prod
 from typing import Any, ClassVar, Generic, Self, TypeVar, cast, final, overload
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.memory import ArrayIntegers, ArrayReals, IntegerCells, RealCells, inside
@@ -280,3 +281,10 @@ class Table(Generic[Row]):
         inside(index, self.size, f"a table of {self.record.__name__}")
         record = self.record
         return record(self.integers, index * record.integer_width, self.reals, index * record.real_width)
+
+    @property
+    def arrays(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """The integers and the real numbers of a table of NumPy arrays, as `Record.table` makes it."""
+        assert isinstance(self.integers, ArrayIntegers)
+        assert isinstance(self.reals, ArrayReals)
+        return self.integers.array, self.reals.array

@@ -10,10 +10,7 @@ from hypothesis import given, settings
 import ephs
 from benchmarks.cases import CASES
 from ephs.mechanics.engine.closing import closing
-from ephs.mechanics.engine.engine_kernels import accelerate, resolve
-from ephs.mechanics.engine.rate_kernels import across
 from ephs.mechanics.reduced.equations import Equations
-from ephs.mechanics.reduced.loop_kernels import accelerate as accelerate_densely
 from ephs.mechanics.simulate import problem_of_scene
 from ephs.mechanics.solve.errors import SolveError
 from ephs.testing import mechanisms
@@ -42,18 +39,13 @@ def moved(eq, seed=0, far=0.3):
 
 
 def both(eq, state):
-    """(ṙ, ṡ, made, powers) of the engine and of the dense sweeps."""
-    out = []
-    for function, tables, memory in (
-        (accelerate, eq.engine, eq.memory),
-        (accelerate_densely, eq.reduced.tables, eq.work),
-    ):
-        found = [np.zeros(n) for n in (eq.n, eq.ns, len(eq.reduced.made), 2)]
-        s = eq.heats.entropies(state.heats)
-        status = function(tables, memory, state.q, state.r, s, eq.drive, eq.wrench, eq.scal, *found)
-        assert status[0] == 0
-        out.append(found)
-    return out
+    """(ṙ, rates of heats, flows, powers) of the engine and of the dense sweeps."""
+    y, dense = eq.vector(state), np.zeros(eq.size)
+    status, q, found = eq.engine.rates(state.q, y)
+    assert status == 0
+    assert eq.dense.rates(q, y, eq.given, eq.heats, eq.scal, dense)[0] == 0
+    at = np.cumsum([eq.nv, eq.n, eq.ns, 2])
+    return [[part[k] for k in (1, 2, 4, 3)] for part in (np.split(found, at), np.split(dense, at))]
 
 
 def agree(eq, state):
@@ -91,9 +83,8 @@ def test_least_corrections_take_rates_onto_the_constraints(scene):
     if not eq.engine.closing.row.size:
         return
     eq.closed(state)
-    x, change = np.random.default_rng(1).standard_normal(eq.n), np.zeros(eq.n)
-    across(eq.engine, eq.memory, state.q, x)
-    resolve(eq.engine, eq.memory, state.q, change)
+    x = np.random.default_rng(1).standard_normal(eq.n)
+    change = eq.engine.along(state.q, x) - x
     mass = eq.mass(state.q, state.r)
     rows = eq.rows()
     assert np.abs(rows @ (x + change)).max() <= 1e-10

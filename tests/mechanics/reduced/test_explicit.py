@@ -230,9 +230,10 @@ def test_coefficients_are_those_of_scipy(name, scipys):
 
     method, own = getattr(scipy.integrate, scipys), tableau(name)
     n = method.n_stages
-    assert np.array_equal(own.scheme.a[:, : method.A.shape[1]], method.A[:n, :n]) and np.array_equal(
-        own.scheme.b, method.B
-    )
+    a = own.arrays["a"]
+    assert np.array_equal(a[:n, : method.A.shape[1]], method.A[:n, :n])
+    assert np.array_equal(a[n], method.B)
     assert np.array_equal(own.c, method.C[:n])
     estimates = (method.E5, method.E3) if name == "rk87" else (method.E, np.zeros(n + 1))
-    assert np.array_equal(own.scheme.error, estimates[0]) and np.array_equal(own.scheme.coarse, estimates[1])
+    assert np.array_equal(own.arrays["error"], estimates[0])
+    assert np.array_equal(own.arrays["coarse"], estimates[1])

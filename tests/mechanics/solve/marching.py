@@ -6,30 +6,18 @@ import numpy as np
 
 from ephs.mechanics.reduced.explicit import tableau
 from ephs.mechanics.solve.control import Proportional
-from ephs.mechanics.solve.march import Control, Ending, Field, Memory, Tableau, march
-from ephs.semantics.stage import Entry, Program, indices, integer, matrix, table, vector
-
-MEMORY = {
-    "q": vector(), "y": vector(), "k": matrix(), "q1": vector(), "y1": vector(), "q2": vector(), "y2": vector(),
-    "k2": matrix(), "last": vector(), "atol": vector(), "rtol": vector(), "allowed": vector(), "fine": vector(),
-    "coarse": vector(), "times": vector(), "rows_t": matrix(), "rows_q": matrix(), "rows_y": matrix(),
-}  # fmt: skip
-TABLEAU = {"a": matrix(), "error": vector(), "coarse_error": vector(), "eighth": indices()}
+from ephs.mechanics.solve.march import MEMORY, TABLEAU, Control, Ending, Field, Memory, Tableau, march
+from ephs.semantics.stage import Entry, Program, group, integer, table, vector
 
 
 def program(motion):
     """The program of a motion, made of parameters and the size of y."""
 
-    def run(on, parameters, control, a, error, coarse_error, eighth, q, y, k, q1, y1, q2, y2, k2, last, atol, rtol,
-            allowed, fine, coarse, times, rows_t, rows_q, rows_y, steps):  # fmt: skip
-        memory = Memory(
-            q, y, k, q1, y1, q2, y2, k2, last, atol, rtol, allowed, fine, coarse, times, rows_t, rows_q, rows_y
-        )
-        return march(on, motion(parameters, y.size), Tableau(a, error, coarse_error, eighth), memory, control[0], steps)
+    def run(on, parameters, control, tableau, memory, steps):
+        return march(on, motion(parameters, memory.y.size), tableau, memory, control[0], steps)
 
-    return Program(
-        "march", run=Entry(run, parameters=vector(), control=table(Control), **TABLEAU, **MEMORY, steps=integer())
-    )
+    kinds = {"tableau": group(Tableau, **TABLEAU), "memory": group(Memory, **MEMORY)}
+    return Program("march", run=Entry(run, parameters=vector(), control=table(Control), **kinds, steps=integer()))
 
 
 def field(function):
@@ -72,7 +60,7 @@ def start(call, method, y, until, *, parameters=(0.0,), rtol=1e-9, atol=1e-12, s
           limit=0.0, grid=0.0, least_step=0.0, origin=0.0, q=(), increments=0):  # fmt: skip
     """A march from y over ``until`` seconds, backward where it is negative."""
     found = tableau(method)
-    scheme, size = found.scheme, len(y)
+    size = len(y)
     control = Control.table(1)
     c = control[0]
     c.end, c.span, c.step, c.origin, c.grid = float(until), abs(float(until)), step, origin, grid
@@ -80,22 +68,17 @@ def start(call, method, y, until, *, parameters=(0.0,), rtol=1e-9, atol=1e-12, s
     c.shortest, c.least = np.inf, np.inf
     c.exponent, c.share, c.damping, c.strict = found.exponent, 0.5, 0.4, Proportional.STRICT
     c.saved = -1 if times is None else 0
-    stages, elements = (scheme.b.size + 1, size), np.array(q, dtype=float)
+    stages, elements = (len(found.arrays["a"]), size), np.array(q, dtype=float)
     kept = np.zeros(0) if times is None else np.abs(np.asarray(times, dtype=float))
     arrays = {
         "q": elements.copy(), "y": np.array(y, dtype=float), "k": np.zeros(stages), "q1": elements.copy(),
         "y1": np.zeros(size), "q2": elements.copy(), "y2": np.zeros(size), "k2": np.zeros(stages),
         "last": np.zeros(size),
-        "atol": np.full(size, atol), "rtol": np.full(size, rtol), "allowed": np.zeros(size), "fine": np.zeros(size),
+        "atol": np.full(size, atol), "rtol": np.full(size, rtol), "allowed": np.zeros(size), "open": np.zeros(0),
+        "fine": np.zeros(size),
         "coarse": np.zeros(size), "times": kept, "rows_t": np.zeros((rows, 2)),
         "rows_q": np.zeros((rows, elements.size)),
         "rows_y": np.zeros((rows, size - increments)),
     }  # fmt: skip
-    tables = (
-        np.vstack([scheme.a, scheme.b]),
-        scheme.error,
-        scheme.coarse.copy(),
-        np.array([scheme.order8], dtype=np.int64),
-    )
-    passed = (np.array(parameters, dtype=float), control, *tables, *arrays.values())
+    passed = np.array(parameters, dtype=float), control, found.arrays, arrays
     return March(control, arrays, lambda steps: call(*passed, steps))

@@ -11,8 +11,8 @@ from scipy.integrate import solve_ivp
 import ephs
 from benchmarks import families
 from ephs.mechanics.solve.control import Proportional
-from ephs.mechanics.solve.march import Control, Ending, Motion
-from ephs.mechanics.solve.march.control import judge, length
+from ephs.mechanics.solve.march import STEPS, Control, Ending, Motion
+from ephs.mechanics.solve.march.control import PATIENCE, held_back, length
 from ephs.semantics.stage import Entry, Program, Vector, real, table
 from tests.mechanics.solve.marching import field, program, start
 
@@ -58,7 +58,7 @@ class Pendulum(Motion):
         out[0], out[1], out[2] = y[1], -self.parameters[0] * on.sin(q[0]), 0.0
         return 0, 0
 
-    def settle(self, on, base, y, q):
+    def settle(self, on, base, start, y, q):
         q[0] = base[0] + y[0]
         return 0
 
@@ -213,19 +213,69 @@ def test_steps_are_judged_as_by_the_proportional_control(h, error, before, faile
     c = control[0]
     c.span, c.step, c.exponent, c.share, c.damping, c.strict = 1.0, h, exponent, share, 0.4, Proportional.STRICT
     c.before, c.failed, c.most_step = before, int(failed), np.inf
-    assert bool(JUDGE["judge"](control, h, error)) == accepted
+    assert bool(JUDGE(control, h, error)) == accepted
     # Powers by exponential and logarithm: each rounds by its argument, which is at most 40, times ε.
     assert c.step == pytest.approx(following, rel=100.0 * np.finfo(float).eps)
     assert (c.before, bool(c.failed)) == pytest.approx((oracle.snapshot()["before"], oracle.snapshot()["failed"]))
 
 
-JUDGE = Program(
-    "judging",
-    judge=Entry(
-        lambda on, control, h, error: judge(on, control[0], h, error), control=table(Control), h=real(), error=real()
-    ),
+JUDGE = STEPS.compiled()["judge"]
+CONTROL = Program(
+    "control",
     length=Entry(lambda on, control, rest: length(on, control[0], rest), control=table(Control), rest=real()),
+    held=Entry(lambda on, control: held_back(on, control[0]), control=table(Control)),
 ).compiled()
+
+
+def test_a_step_is_not_wanted_longer_than_is_allowed_nor_shorter_than_the_least():
+    for bounds, h, error, wanted in (
+        ({"most_step": 0.15}, 0.1, 1e-9, 0.15),
+        ({"least_step": 0.09}, 0.1, 1.0, 0.09),
+        ({"least_step": 0.5}, 0.1, 1.0, 0.1),  # what is accepted was long enough
+        ({}, 0.05, 1e-6, 0.1),  # a step that was cut short does not lengthen the next ones
+    ):
+        control = Control.table(1)
+        settings = {"span": 1.0, "strict": Proportional.STRICT, "before": 1e-4, "exponent": 5.0, "most_step": np.inf}
+        for name, value in (settings | {"step": 0.1} | bounds).items():
+            setattr(control[0], name, value)
+        assert JUDGE(control, h, error)
+        assert control[0].step == pytest.approx(wanted)
+
+
+def test_the_size_of_an_estimate_is_a_root_mean_square_and_that_of_two_their_blend():
+    rng, measure = np.random.default_rng(3), STEPS.compiled()["measure"]
+    fine, coarse, allowed = rng.standard_normal(5), rng.standard_normal(5), rng.uniform(0.5, 2.0, 5)
+    one, two = np.mean((fine / allowed) ** 2), np.mean((coarse / allowed) ** 2)
+    order5, order8 = np.zeros(1, dtype=np.int64), np.ones(1, dtype=np.int64)
+    assert measure(fine, coarse, allowed, order5) == pytest.approx(np.sqrt(one), rel=1e-14)
+    # Hairer, Nørsett and Wanner, II.10: the estimate of order 5 times its share of both
+    expected = np.sqrt(one) * np.sqrt(one / (one + 0.01 * two))
+    assert measure(fine, coarse, allowed, order8) == pytest.approx(expected, rel=1e-14)
+    assert measure(0.0 * fine, coarse, allowed, order8) == 0.0
+    assert measure(np.zeros(0), np.zeros(0), np.zeros(0), order8) == 0.0
+
+
+@pytest.mark.parametrize("h", [0.1, -0.1])
+def test_stiffness_of_a_linear_equation_is_its_eigenvalue(h):
+    rng, stiffness = np.random.default_rng(1), STEPS.compiled()["stiffness"]
+    run, allowed = rng.standard_normal(5), rng.uniform(0.5, 2.0, 5)
+    assert stiffness(-7.0 * run, run, allowed, h) == pytest.approx(0.7, rel=1e-13)
+    assert stiffness(run, np.zeros(5), allowed, h) == 0.0
+
+
+def test_stability_has_to_hold_steps_back_many_times_and_is_forgiven_after_six():
+    control = Control.table(1)
+    c = control[0]
+    c.limit, c.stiff = 3.0, 3.5
+    assert [bool(CONTROL["held"](control)) for _ in range(PATIENCE)] == [False] * (PATIENCE - 1) + [True]
+    c.stiff = 3.0
+    for _ in range(6):
+        assert c.held == PATIENCE
+        assert not CONTROL["held"](control)
+    assert c.held == 0
+    c.stiff = 3.5
+    assert not CONTROL["held"](control)
+    assert c.held == 1
 
 
 @pytest.mark.parametrize(
@@ -234,7 +284,7 @@ JUDGE = Program(
 def test_the_last_steps_are_not_tiny(step, rest, taken):
     control = Control.table(1)
     control[0].step = step
-    assert JUDGE["length"](control, rest) == taken
+    assert CONTROL["length"](control, rest) == taken
 
 
 def test_a_march_ends_where_it_has_to():

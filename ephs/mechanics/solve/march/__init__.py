@@ -1,6 +1,8 @@
 """Explicit Runge-Kutta steps as staged functions, many in one call."""
 
 from ephs.mechanics.solve.march.march import march as march
+from ephs.mechanics.solve.march.records import MEMORY as MEMORY
+from ephs.mechanics.solve.march.records import TABLEAU as TABLEAU
 from ephs.mechanics.solve.march.records import Control as Control
 from ephs.mechanics.solve.march.records import Ending as Ending
 from ephs.mechanics.solve.march.records import Field as Field
@@ -8,3 +10,4 @@ from ephs.mechanics.solve.march.records import Memory as Memory
 from ephs.mechanics.solve.march.records import Motion as Motion
 from ephs.mechanics.solve.march.records import Status as Status
 from ephs.mechanics.solve.march.records import Tableau as Tableau
+from ephs.mechanics.solve.march.steps import STEPS as STEPS

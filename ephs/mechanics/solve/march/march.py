@@ -6,9 +6,9 @@ from typing import final
 
 from ephs.mechanics.solve.march.control import PATIENCE, held_back, judge, length
 from ephs.mechanics.solve.march.records import Control, Ending, Memory, Motion, Status, Tableau
-from ephs.mechanics.solve.march.steps import allow, attempt, drift, error_of, first, stiffness
+from ephs.mechanics.solve.march.steps import allow, attempt, drift, error_of, first, stiffness_of
 from ephs.semantics.linear.dense import copy
-from ephs.semantics.stage import Evaluator, Integer, Real, Truth, Variable, Vector
+from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Truth, Variable, Vector
 
 __all__ = ["march"]
 
@@ -106,29 +106,17 @@ class _Run:
     def _try(self, h: Real, rest: Real) -> None:
         """Take a step of length h, measure its error, and accept it or not."""
         on, motion, m, c = self.on, self.motion, self.memory, self.control
-        n, nv = motion.freedoms, motion.increments
         self.accepted.value = 0
         self.status.value = attempt(on, motion, self.tableau, c, m.q, m.y, self.sign * h, m.k, m.last, m.y1, m.q1)
 
-        def settle() -> None:
-            allow(on, motion, m)
-            c.stiff = stiffness(on, motion, self.tableau, m, h)
-            if motion.closes:
-                copy(on, m.y1.part(nv, n), m.fine.part(0, n))
-            self.status.value = motion.settle(on, m.q, m.y1, m.q1)
+        def look() -> None:
+            allow(on, motion, m, m.y1)
+            c.stiff = stiffness_of(on, motion, self.tableau, m, h)
 
-        on.when(self.sound, settle)
+        on.when(self.sound, look)
+        error = self._finish(m.k, self.sign * h, m.y1, m.q1)
 
         def weigh() -> None:
-            drifted = on.variable(0.0)
-
-            def measure() -> None:
-                drifted.value = drift(on, m.fine.part(0, n), m.y1.part(nv, n), m.allowed)
-
-            if motion.closes:
-                on.when(on.same(c.rough, 0), measure)
-            error = on.maximum(error_of(on, motion, self.tableau, m, self.sign * h), drifted.value)
-
             def always() -> None:
                 self.accepted.value = 1
 
@@ -150,6 +138,29 @@ class _Run:
         on.when(self.sound, weigh, refused)
         taken = on.same(self.accepted.value, 1)
         self.unless_ended(lambda: on.when(taken, lambda: self._take(h, rest), self._reject))
+
+    def _finish(self, k: Matrix, h: Real, y: Vector, q: Vector) -> Real:
+        """Take the end of a step to a state, and return its error."""
+        on, motion, m, c = self.on, self.motion, self.memory, self.control
+        n, nv, error = motion.freedoms, motion.increments, on.variable(0.0)
+
+        def settle() -> None:
+            if motion.closes:
+                copy(on, y.part(nv, n), m.open)
+            self.status.value = motion.settle(on, m.q, m.y, y, q)
+
+        def measure() -> None:
+            error.value = error_of(on, motion, self.tableau, m, k, h, q)
+
+            def reveal() -> None:
+                error.value = on.maximum(error.value, drift(on, m.open, y.part(nv, n), m.allowed))
+
+            if motion.closes:
+                on.when(on.same(c.rough, 0), reveal)
+
+        on.when(self.sound, settle)
+        on.when(self.sound, measure)
+        return error.value
 
     def _reject(self) -> None:
         """Count a step that is tried again; end where it gets too short or keeps failing."""
@@ -193,12 +204,13 @@ class _Run:
             part = self.sign * (wanted - c.time)
             self.status.value = attempt(on, motion, self.tableau, c, m.q, m.y, part, m.k2, m.last, m.y2, m.q2)
 
-            def settle() -> None:
-                self.status.value = motion.settle(on, m.q, m.y2, m.q2)
-
-            on.when(self.sound, settle)
-            # The whole step succeeded: it is taken again, and its part in shorter ones.
-            on.when(self.sound, lambda: self._keep(wanted, least, m.q2, m.y2), lambda: self.end(Ending.CAREFUL))
+            # Near a change of rank a part may be wrong though the whole is right: closing takes out what is across.
+            on.when(self.sound, lambda: allow(on, motion, m, m.y2))
+            error = self._finish(m.k2, part, m.y2, m.q2)
+            right = on.either(c.grid > 0.0, on.negate(error > 1.0)) if motion.closes else True
+            # Where it is not, the step is taken again carefully, and its part in shorter ones.
+            kept = on.both(self.sound, right)
+            on.when(kept, lambda: self._keep(wanted, least, m.q2, m.y2), lambda: self.end(Ending.CAREFUL))
 
         def one() -> Truth:
             wanted = m.times[c.saved]

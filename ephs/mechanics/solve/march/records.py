@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any, final
+from typing import Any, Final, final
 
 from ephs.semantics.stage import (
     Evaluator,
@@ -14,11 +14,14 @@ from ephs.semantics.stage import (
     Real,
     Record,
     Vector,
+    indices,
     integer,
+    matrix,
     real,
+    vector,
 )
 
-__all__ = ["Control", "Ending", "Field", "Memory", "Motion", "Status", "Tableau"]
+__all__ = ["MEMORY", "TABLEAU", "Control", "Ending", "Field", "Memory", "Motion", "Status", "Tableau"]
 
 
 class Ending(IntEnum):
@@ -88,8 +91,8 @@ class Motion(ABC):
         """Write ẏ at q = base·exp(v) into ``out``, and leave q; return a status and the component that it is of."""
 
     @abstractmethod
-    def settle(self, on: Evaluator, base: Vector, y: Vector, q: Vector) -> Integer:
-        """Take a step's end to a state: elements base·exp(v) to q, closed, rates in y; return a status."""
+    def settle(self, on: Evaluator, base: Vector, start: Vector, y: Vector, q: Vector) -> Integer:
+        """Take the end y of a step from ``start`` to a state: base·exp(v) to q, closed, rates in y; return a status."""
 
     @abstractmethod
     def sizes(self, on: Evaluator, y0: Vector, y1: Vector, out: Vector) -> None:
@@ -142,7 +145,7 @@ class Field(Motion):
     def rates(self, on: Evaluator, base: Vector, y: Vector, q: Vector, out: Vector) -> tuple[Integer, Integer]:
         return self.function(on, y, out, self.parameters), 0
 
-    def settle(self, on: Evaluator, base: Vector, y: Vector, q: Vector) -> Integer:
+    def settle(self, on: Evaluator, base: Vector, start: Vector, y: Vector, q: Vector) -> Integer:
         return 0
 
     def sizes(self, on: Evaluator, y0: Vector, y1: Vector, out: Vector) -> None:
@@ -177,6 +180,9 @@ class Tableau:
     error: Vector
     coarse: Vector
     eighth: Integers
+
+
+TABLEAU: Final[dict[str, Any]] = {"a": matrix(), "error": vector(), "coarse": vector(), "eighth": indices(1)}
 
 
 class Control(Record):
@@ -266,6 +272,8 @@ class Memory:
         The same at a step's end, and of a part of a step.
     last
         y at the last stage.
+    open
+        (freedoms,): rates before they are put on the constraints.
     atol, rtol, allowed, fine, coarse
         (counted,): tolerances, what they allow, estimates.
     times
@@ -286,9 +294,18 @@ class Memory:
     atol: Vector
     rtol: Vector
     allowed: Vector
+    open: Vector
     fine: Vector
     coarse: Vector
     times: Vector
     rows_t: Matrix
     rows_q: Matrix
     rows_y: Matrix
+
+
+MEMORY: Final[dict[str, Any]] = {
+    "q": vector(), "y": vector(), "k": matrix(), "q1": vector(), "y1": vector(), "q2": vector(), "y2": vector(),
+    "k2": matrix(), "last": vector(), "atol": vector(), "rtol": vector(), "allowed": vector(), "open": vector(),
+    "fine": vector(), "coarse": vector(), "times": vector(), "rows_t": matrix(2), "rows_q": matrix(),
+    "rows_y": matrix(),
+}  # fmt: skip

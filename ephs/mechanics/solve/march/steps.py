@@ -1,10 +1,29 @@
 """One step: its stages, the estimates of its error, the fastest mode that it shows."""
 
+from typing import Final
+
+from ephs.mechanics.solve.march.control import judge
 from ephs.mechanics.solve.march.records import Control, Memory, Motion, Status, Tableau
 from ephs.semantics.linear.dense import copy
-from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Truth, Vector, staged
+from ephs.semantics.stage import (
+    Entry,
+    Evaluator,
+    Integer,
+    Integers,
+    Matrix,
+    Program,
+    Real,
+    Table,
+    Truth,
+    Vector,
+    indices,
+    real,
+    staged,
+    table,
+    vector,
+)
 
-__all__ = ["DRIFT", "allow", "attempt", "drift", "error_of", "first", "stiffness"]
+__all__ = ["DRIFT", "STEPS", "allow", "attempt", "drift", "error_of", "first", "measure", "stiffness_of"]
 
 DRIFT = 1e-2
 """Share of a step's drift off the constraints that counts as its error.
@@ -74,9 +93,9 @@ def attempt(
     return status.value
 
 
-def allow(on: Evaluator, motion: Motion, memory: Memory) -> None:
-    """Write what errors may be, atol + rtol · size, to ``allowed``."""
-    motion.sizes(on, memory.y, memory.y1, memory.allowed)
+def allow(on: Evaluator, motion: Motion, memory: Memory, end: Vector) -> None:
+    """Write what errors of a step to ``end`` may be, atol + rtol · size, to ``allowed``."""
+    motion.sizes(on, memory.y, end, memory.allowed)
 
     def one(j: Integer) -> None:
         memory.allowed[j] = memory.atol[j] + memory.rtol[j] * memory.allowed[j]
@@ -110,28 +129,34 @@ def _estimate(on: Evaluator, motion: Motion, weights: Vector, k: Matrix, h: Real
         on.loop(2, lambda part: motion.project(on, q, out.part(part * n, n)))
 
 
-def error_of(on: Evaluator, motion: Motion, tableau: Tableau, memory: Memory, h: Real) -> Real:
-    """Return the size of the estimates relative to what is allowed: of order 5, or of order 8 from two of them.
+@staged
+def error_of(on: Evaluator, motion: Motion, tableau: Tableau, memory: Memory, k: Matrix, h: Real, q: Vector) -> Real:
+    """Return the size of the estimates of a step with rates k that ends at q, relative to what is allowed."""
+    m, eighth = memory, on.same(tableau.eighth[0], 1)
+    _estimate(on, motion, tableau.error, k, h, q, m.fine)
+    on.when(eighth, lambda: _estimate(on, motion, tableau.coarse, k, h, q, m.coarse))
+    return measure(on, m.fine, m.coarse, m.allowed, tableau.eighth)
+
+
+def measure(on: Evaluator, fine: Vector, coarse: Vector, allowed: Vector, eighth: Integers) -> Real:
+    """Return the size of estimates relative to what is allowed: of order 5, or of order 8 from two of them.
 
     Hairer, Nørsett and Wanner, *Solving Ordinary Differential Equations I*, II.4 and II.10.
     """
-    m, eighth = memory, on.same(tableau.eighth[0], 1)
-
-    _estimate(on, motion, tableau.error, m.k, h, m.q1, m.fine)
-    on.when(eighth, lambda: _estimate(on, motion, tableau.coarse, m.k, h, m.q1, m.coarse))
-    fine, coarse = on.variable(0.0), on.variable(0.0)
+    two, size = on.same(eighth[0], 1), allowed.size
+    first, second = on.variable(0.0), on.variable(0.0)
 
     def one(j: Integer) -> None:
-        x = m.fine[j] / m.allowed[j]
-        fine.value = fine.value + x * x
-        y = m.coarse[j] / m.allowed[j]
-        coarse.value = on.select(eighth, coarse.value + y * y, 0.0)
+        x = fine[j] / allowed[j]
+        first.value = first.value + x * x
+        y = coarse[j] / allowed[j]
+        second.value = on.select(two, second.value + y * y, 0.0)
 
-    on.loop(motion.counted, one)
-    size = on.real(on.select(motion.counted > 1, motion.counted, 1))
-    plain = on.sqrt(fine.value / size)
-    both = fine.value / on.sqrt((fine.value + 0.01 * coarse.value) * size)
-    return on.select(on.both(eighth, on.negate(fine.value <= 0.0)), both, plain)
+    on.loop(size, one)
+    count = on.real(on.select(size > 1, size, 1))
+    plain = on.sqrt(first.value / count)
+    both = first.value / on.sqrt((first.value + 0.01 * second.value) * count)
+    return on.select(on.both(two, on.negate(first.value <= 0.0)), both, plain)
 
 
 def drift(on: Evaluator, before: Vector, after: Vector, allowed: Vector) -> Real:
@@ -146,18 +171,42 @@ def drift(on: Evaluator, before: Vector, after: Vector, allowed: Vector) -> Real
     return DRIFT * on.sqrt(total.value / on.real(on.select(n > 1, n, 1)))
 
 
-def stiffness(on: Evaluator, motion: Motion, tableau: Tableau, memory: Memory, h: Real) -> Real:
-    """Return h·|λ| of the mode in which the last two stages differ.
+def stiffness(on: Evaluator, rise: Vector, run: Vector, allowed: Vector, h: Real) -> Real:
+    """Return h·|λ| of the mode in which two stages differ: by ``rise`` in their rates, by ``run`` in themselves.
 
     Hairer and Wanner, *Solving Ordinary Differential Equations II*, IV.2.
     """
+    above, along = on.variable(0.0), on.variable(0.0)
+
+    def one(j: Integer) -> None:
+        x, y = rise[j] / allowed[j], run[j] / allowed[j]
+        above.value, along.value = above.value + x * x, along.value + y * y
+
+    on.loop(allowed.size, one)
+    return on.select(along.value > 0.0, on.absolute(h) * on.sqrt(above.value / along.value), 0.0)
+
+
+def stiffness_of(on: Evaluator, motion: Motion, tableau: Tableau, memory: Memory, h: Real) -> Real:
+    """Return the stiffness that the last two stages show; the memory of estimates takes their differences."""
     count, m = tableau.a.columns, memory
-    rise, run = on.variable(0.0), on.variable(0.0)
 
     def one(j: Integer) -> None:
         at = _place(on, motion, j)
-        x, y = (m.k[count, at] - m.k[count - 1, at]) / m.allowed[j], (m.y1[at] - m.last[at]) / m.allowed[j]
-        rise.value, run.value = rise.value + x * x, run.value + y * y
+        m.fine[j], m.coarse[j] = m.k[count, at] - m.k[count - 1, at], m.y1[at] - m.last[at]
 
     on.loop(motion.counted, one)
-    return on.select(run.value > 0.0, on.absolute(h) * on.sqrt(rise.value / run.value), 0.0)
+    return stiffness(on, m.fine, m.coarse, m.allowed, h)
+
+
+def _judge(on: Evaluator, control: Table[Control], h: Real, error: Real) -> Integer:
+    return judge(on, control[0], h, error)
+
+
+STEPS: Final = Program(
+    "steps",
+    measure=Entry(measure, fine=vector(), coarse=vector(), allowed=vector(), eighth=indices(1)),
+    drift=Entry(drift, before=vector(), after=vector(), allowed=vector()),
+    stiffness=Entry(stiffness, rise=vector(), run=vector(), allowed=vector(), h=real()),
+    judge=Entry(_judge, control=table(Control), h=real(), error=real()),
+)
+"""What drivers that take one step a call share with the march."""
