@@ -74,22 +74,22 @@ class ExplicitTangent:
 
     def step(self, point: Point, h: float) -> Point:
         """One step of h seconds."""
-        eq, scheme, c = self.equations, self.method.scheme, self.method.c
-        base, count = point.state, scheme.b.size
+        eq, a, c = self.equations, self.method.arrays["a"], self.method.c
+        base, count = point.state, a.shape[1]
         numbers = range(len(self.family.parameters))
         y0, books = eq.vector(base), slice(eq.nv + eq.n + eq.ns, eq.size)
         dy0 = np.hstack([np.zeros_like(point.q), point.y])
         k, dk = np.zeros((count, eq.size)), np.zeros((count, len(numbers), eq.size))
         for i in range(count):
-            y = y0 + h * (scheme.a[i, :i] @ k[:i])
-            dy = dy0 + h * np.einsum("s,spn->pn", scheme.a[i, :i], dk[:i])
+            y = y0 + h * (a[i, :i] @ k[:i])
+            dy = dy0 + h * np.einsum("s,spn->pn", a[i, :i], dk[:i])
             time = base.t + c[i] * h
             k[i] = eq.rates(time, base.q, y)
             for j in numbers:
                 dk[i, j] = self._change(
                     j, point.q[j], dy[j], base.q, y, lambda of, q, v, time=time: of.rates(time, q, v)
                 )
-        y1, dy1 = y0 + h * (scheme.b @ k), dy0 + h * np.einsum("s,spn->pn", scheme.b, dk)
+        y1, dy1 = y0 + h * (a[count] @ k), dy0 + h * np.einsum("s,spn->pn", a[count], dk)
         dy1[:, books] = [self._made(base, j, y0, dy0[j], y1, dy1[j]) for j in numbers]
         end = eq.state(base, y1, base.t + h)
         dq = np.array([self._carried(y1[: eq.nv], point.q[j], dy1[j, : eq.nv]) for j in numbers])
