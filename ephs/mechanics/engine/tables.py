@@ -45,6 +45,4 @@ def table_of(record: type[Record], integers: Index, reals: Array | None = None) 
     """Return a table of records whose fields, in their order, are the columns of arrays."""
     size, numbers = len(integers), np.zeros(0) if reals is None else np.ascontiguousarray(reals).ravel()
     whole = np.ascontiguousarray(integers, dtype=np.int64).ravel()
-    assert whole.size == size * record.integer_width
-    assert numbers.size == size * record.real_width
     return Table(record, ArrayIntegers(whole), ArrayReals(numbers), size)
