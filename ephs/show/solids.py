@@ -120,7 +120,7 @@ def solids_of(scene: Any) -> dict[str, Solid]:
     found: dict[str, Solid] = {}
     for name, body in scene.all_bodies():
         bare = body.shape is None and not body.shapes
-        found[name] = solid_of(replace(body, shapes=tuple(surfaces.get(name, ()))) if bare else body, name)
+        found[name] = solid_of(replace(body, shapes=tuple(surfaces[name])) if bare and name in surfaces else body, name)
     return found
 
 

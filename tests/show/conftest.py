@@ -39,6 +39,9 @@ class FakeScene:
     def all_springs(self) -> list[tuple[str, Any]]:
         return list(self.springs.items())
 
+    def all_surfaces(self) -> list[tuple[str, Any]]:
+        return []
+
     def all_thermal(self) -> list[tuple[str, Any]]:
         return [("housing", None)]
 
