@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from ephs.mechanics import components, springs
+from ephs.mechanics.elements import beam
 from ephs.operad import Interface, Path, Quantity
 from ephs.semantics.catalogue import Part
 from ephs.semantics.primitives import Primitive
@@ -60,6 +61,8 @@ def _pair_spring(ports: Interface, numbers: Numbers) -> Primitive:
 
 
 PARTS: tuple[Part, ...] = (
+    Part("beam_damper", "beam_damper", lambda _, n: beam.beam_damper(n["length"], n["stiffness"], n["damping"])),
+    Part("beam_spring", "beam_spring", lambda _, n: beam.beam_spring(n["length"], n["stiffness"], n["rest"])),
     Part("frame_change", "frame_change", _frame_change),
     Part("gravity", "gravity", lambda ports, numbers: components.gravity(numbers["weight"], _group(ports))),
     Part("ground", "ground", lambda ports, _: components.ground(next(iter(ports.values())).quantity)),

@@ -6,6 +6,7 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.build import component_path
+from ephs.mechanics.scene.flexible import Load
 from ephs.mechanics.scene.model import Marker, Scene
 from ephs.mechanics.signals import View, signal
 from ephs.mechanics.solve.problem import Signal, State
@@ -32,7 +33,7 @@ def sum_of(one: Signal, other: Signal) -> Signal:
 
 
 def scene_signals(scene: Scene, inputs: Mapping[Any, Any], view: View) -> tuple[dict[str, Signal], dict[str, Signal]]:
-    """Forces on joints and wrenches on bodies, by name, of what a user gives by joint, body and marker.
+    """Forces on joints and wrenches on bodies, by name: the loads, and what a user gives by joint, body and marker.
 
     A key may be a tuple of names, whose input gives the numbers of all of them in a row.
 
@@ -46,6 +47,9 @@ def scene_signals(scene: Scene, inputs: Mapping[Any, Any], view: View) -> tuple[
     joints, bodies, markers = dict(scene.all_joints()), dict(scene.all_bodies()), dict(scene.all_markers())
     sizes = {f"joints.{name}": j.dim for name, j in joints.items()} | {f"bodies.{name}": 6 for name in bodies}
     sizes |= {f"markers.{name}": 3 for name, marker in markers.items() if marker.body in bodies}
+    for _, load in scene.all_loads():
+        push = _of_load(load)
+        wrenches[load.body] = sum_of(wrenches[load.body], push) if load.body in wrenches else push
     for key, given in _single(inputs, sizes, view):
         kind, _, name = key.partition(".")
         if kind == "joints":
@@ -99,3 +103,17 @@ def _at_marker(marker: Marker, force: Signal) -> Signal:
         return np.concatenate([np.cross(marker.at, own), own])
 
     return Signal(wrench)
+
+
+def _of_load(load: Load) -> Signal:
+    """A load as a wrench in the body's frame."""
+    full, pose = np.concatenate([load.moment, load.force]), component_path("bodies", load.body) / "pe" / "q"
+
+    def wrench(t: float, state: Mapping[Path, Array]) -> Array:
+        share = 1.0 if t >= load.ramp else max(t, 0.0) / load.ramp
+        if load.follower:
+            return share * full
+        turn = quaternion_to_matrix(state[pose][:4]).T
+        return share * np.concatenate([turn @ load.moment, turn @ load.force])
+
+    return Signal(full) if load.follower and not load.ramp else Signal(wrench)

@@ -6,9 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from ephs.semantics.derive.functions import FUNCTIONS
 from ephs.semantics.derive.recording import Recorded
+from ephs.semantics.stage.plain import PLAIN
 
-__all__ = ["SHORT", "choose", "log_mean", "sinhc", "squared_turn"]
+__all__ = ["SHORT", "choose", "log_mean", "sinhc", "squared_turn", "turn_curve", "turn_curve_slope", "turn_ratio"]
 
 SHORT = 1e-2
 """Below this a series serves, whose first term left out is below rounding: z⁸/9!."""
@@ -51,3 +53,20 @@ def squared_turn(q: Any) -> Any:
         return w.squared_turn(x, y, z)
     angle = 2.0 * math.atan2(math.sqrt(x * x + y * y + z * z), abs(w))
     return angle * angle
+
+
+def turn_ratio(square: Any) -> Any:
+    """(θ/2)/sin(θ/2) of θ² ≤ π²: a rotation vector is 2 (θ/2)/sin(θ/2) times the vector of its quaternion."""
+    return square.turn_ratio() if isinstance(square, Recorded) else FUNCTIONS["turn_ratio"].value(PLAIN, square)
+
+
+def turn_curve(square: Any) -> Any:
+    """c = (1 − (θ/2) cot(θ/2))/θ² of θ² ≤ π²: what the inverse derivatives of exponentials are made of."""
+    return square.turn_curve() if isinstance(square, Recorded) else FUNCTIONS["turn_curve"].value(PLAIN, square)
+
+
+def turn_curve_slope(square: Any) -> Any:
+    """Derivative of `turn_curve` by θ²."""
+    if isinstance(square, Recorded):
+        return square.turn_curve_slope()
+    return FUNCTIONS["turn_curve_slope"].value(PLAIN, square)

@@ -17,7 +17,7 @@ from ephs.mechanics.imports.mjcf_names import Names, noted
 from ephs.mechanics.imports.mjcf_shapes import shapes
 from ephs.mechanics.imports.mjcf_source import Source
 from ephs.mechanics.scene.errors import fault
-from ephs.mechanics.scene.schema import LARGEST
+from ephs.mechanics.scene.schema_numbers import LARGEST
 from ephs.semantics.spaces import SE3
 
 __all__ = ["read_mjcf"]

@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from ephs.mechanics.scene.errors import Fault, fault
-from ephs.mechanics.scene.schema import LARGEST
+from ephs.mechanics.scene.schema_numbers import LARGEST
 from ephs.mechanics.scene.text import file_text
 
 __all__ = ["numbers", "read_tree", "vector"]

@@ -8,17 +8,8 @@ from typing import Any
 import numpy as np
 
 from ephs.mechanics.scene.adjustment import Adjustment, Changed, Displacement
-from ephs.mechanics.scene.model import (
-    Body,
-    Conduction,
-    Joint,
-    Marker,
-    Scene,
-    Spring,
-    ThermalNode,
-    World,
-    frozen,
-)
+from ephs.mechanics.scene.flexible import Beam, Load, Strain
+from ephs.mechanics.scene.model import Body, Conduction, Joint, Marker, Scene, Spring, ThermalNode, World, frozen
 from ephs.mechanics.scene.surfaces import Contact, Surface
 from ephs.mechanics.shapes.law import Law
 
@@ -31,6 +22,8 @@ _ARRAYS = {
     Spring: {"at1", "at2"},
     Marker: {"at"},
     Surface: {"frame"},
+    Strain: {"stiffness", "rest"},
+    Load: {"force", "moment"},
 }
 _PARTS = {
     "bodies": Body,
@@ -41,6 +34,8 @@ _PARTS = {
     "markers": Marker,
     "surfaces": Surface,
     "contacts": Contact,
+    "beams": Beam,
+    "loads": Load,
     "parts": Scene,
 }
 
@@ -89,7 +84,9 @@ def _scene(data: dict[str, Any]) -> Scene:
             entries = {name: entry | {"between": tuple(entry["between"])} for name, entry in entries.items()}
         if cls is Joint:
             entries = {
-                name: entry | ({"stop": Law(**entry["stop"])} if entry.get("stop") else {})
+                name: entry
+                | ({"stop": Law(**entry["stop"])} if entry.get("stop") else {})
+                | ({"strain": _value(Strain, entry["strain"])} if entry.get("strain") else {})
                 for name, entry in entries.items()
             }
         if cls is Contact:
@@ -97,6 +94,9 @@ def _scene(data: dict[str, Any]) -> Scene:
                 name: entry | {"surfaces": tuple(entry["surfaces"]), "law": Law(**entry["law"])}
                 for name, entry in entries.items()
             }
+        if cls is Beam:
+            pairs = ("ends", "outline")
+            entries = {name: entry | {key: tuple(entry[key]) for key in pairs} for name, entry in entries.items()}
         make = _scene if cls is Scene else lambda entry, cls=cls: _value(cls, entry)
         given[key] = {name: make(entry) for name, entry in entries.items()}
     given["world"] = _value(World, given["world"])

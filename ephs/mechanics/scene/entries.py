@@ -12,15 +12,9 @@ from typing import Any, Generic, TypeVar, final, get_args
 from pydantic import ValidationError
 
 from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing
-from ephs.mechanics.scene.schema import (
-    LARGEST,
-    SECTIONS,
-    AssemblyEntry,
-    Entry,
-    SceneFile,
-    SurfaceShapeEntry,
-    WorldEntry,
-)
+from ephs.mechanics.scene.schema import SECTIONS, AssemblyEntry, SceneFile, SurfaceShapeEntry, WorldEntry
+from ephs.mechanics.scene.schema_flexible import SectionEntry
+from ephs.mechanics.scene.schema_numbers import LARGEST, Entry
 
 LONGEST_NAME = 200
 E = TypeVar("E", bound=Entry)
@@ -41,6 +35,7 @@ _NEUTRAL: dict[str, Any] = {
     "body": "ground",
     "shape": SurfaceShapeEntry(),
     "surfaces": ["?", "?"],
+    "section": SectionEntry(),
 }
 
 _EXPECTED: dict[str, Callable[[Mapping[str, Any]], tuple[str, str]]] = {

@@ -192,6 +192,17 @@ TEXTS: dict[str, tuple[str, str]] = {
         "0 where at and axis are given",
         "give frame1 and frame2 to start at another coordinate",
     ),
+    # beams and loads
+    "section": (
+        "either EA, GA, GJ, EI, rhoA, rhoI, or one of circle, tube, rectangle with E, nu, rho",
+        "give the one or the other, complete",
+    ),
+    "tube": ("an inner radius below the outer one", "give the outer radius first"),
+    "beam place": ("either from and to, or points", "say where the beam is in one of the two ways"),
+    "beam points": ("a point away from the one before", "take it out, or move it"),
+    "beam elements": ("a multiple of the {segments} segments, at most {most}", "there is a node at every point"),
+    "up": ("a direction along no tangent of the beam", "give another up"),
+    "load ground": ("a body", "loads on the ground do nothing"),
     "same ends": ("two different points or nodes", "mend one of the two"),
     # assembly
     "gap": ("gaps below {limit}", "mend {who}, or set assembly.adjust = true"),

@@ -14,6 +14,7 @@ import numpy as np
 
 from ephs.mechanics.scene import resolve, values
 from ephs.mechanics.scene.assembly import assemble
+from ephs.mechanics.scene.beams import BeamDraft, resolve_beam
 from ephs.mechanics.scene.entries import Document, read_document, shown
 from ephs.mechanics.scene.errors import Fault, ModelWarning, SceneError, SceneWarning, fault, legible
 from ephs.mechanics.scene.meant import as_meant
@@ -122,6 +123,9 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
     _check_names(document, faults)
     names = _names(document, parts, lost)
     sections = document.sections
+    rods = _beams(document, world, names, faults)
+    parts |= {name: rod.nodes for name, rod in rods.items()}
+    names = _names(document, parts, lost | (set(sections["beams"]) - set(rods)))
     mode = r.inertia or document.assembly.inertia
     bodies = [resolve.resolve_body(n, t, mode, path.parent, faults, r.odd) for n, t in sections["bodies"].items()]
     joints = [resolve.resolve_joint(n, t, names, faults) for n, t in sections["joints"].items()]
@@ -129,9 +133,10 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
     conduction = resolve.resolve_conduction(document, names, faults)
     markers = resolve.resolve_markers(document, names, faults)
     surfaces = resolve_surfaces(document, names, faults)
+    loads = resolve.resolve_loads(document, names, faults)
     if faults:
         return None
-    drafts = [j for j in joints if j is not None]
+    drafts = [*(j for j in joints if j is not None), *(j for rod in rods.values() for j in rod.joints)]
     placed, coupled, open_joints = assemble(bodies, drafts, parts, world.gravity)
     r.asked.update({j.name: Asked(j.coordinates if j.place.in_bodies else None, j.rate) for j in drafts})
     scene = Scene(
@@ -146,6 +151,8 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
         str(path),
         markers=markers,
         surfaces=surfaces,
+        beams={name: rod.beam for name, rod in rods.items()},
+        loads=loads,
     )
     contacts, laws = resolve_contacts(document, scene, r.laws, names, faults)
     if faults:
@@ -247,6 +254,17 @@ def _parts(
     return found, set(document.sections["parts"]) - set(found)
 
 
+def _beams(document: Document, world: World, names: resolve.Names, faults: list[Fault]) -> dict[str, BeamDraft]:
+    """The beams whose place and section can be told."""
+    drafts = {n: resolve_beam(n, t, world, names, faults) for n, t in document.sections["beams"].items()}
+    found = {name: draft for name, draft in drafts.items() if draft is not None}
+    for name, draft in found.items():
+        for joint in draft.joints:
+            if joint.name in document.sections["joints"]:
+                faults.append(fault("collision", f"joints.{joint.name}", shown(joint.name), other=f"the beam {name}"))
+    return found
+
+
 def _file_inside(file: Path, home: Path) -> Path | None:
     """The file, if it lies in a folder or below once links are followed."""
     try:
@@ -285,7 +303,9 @@ def _check_names(document: Document, faults: list[Fault]) -> None:
                 faults.append(fault("name", f'{section}."{name}"', shown(name)))
             elif name in (GROUND, ENVIRONMENT):
                 faults.append(fault("reserved", key, shown(name), reserved=f'"{GROUND}" and "{ENVIRONMENT}"'))
-            elif section != "parts" and name in document.sections["parts"]:
+            elif section not in ("parts", "loads") and name in document.sections["parts"]:
                 faults.append(fault("collision", key, shown(name), other="a part"))
+            elif section not in ("beams", "loads") and name in document.sections["beams"]:
+                faults.append(fault("collision", key, shown(name), other="a beam"))
             elif section == "joints" and name in document.sections["bodies"] and name not in held:
                 faults.append(fault("collision", key, shown(name), other="the free joint of the body of this name"))

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ephs.mechanics.scene.adjustment import Adjustment
+from ephs.mechanics.scene.flexible import FREE_END, Beam, Load, Strain
 from ephs.mechanics.scene.surfaces import Contact, Surface
 from ephs.mechanics.shapes.law import Law
 
@@ -94,6 +95,7 @@ class Joint:
         elastic stops; None both where there are no limits
     middle : (7,) universal only: constant pose from the frame that follows the first revolute (C1 turned by
         angle 1) to the frame before the second, whose z axis is the second axis; None otherwise
+    strain : of a beam element, which is a free joint; then friction and stiffness are 0
     """
 
     name: str
@@ -114,6 +116,7 @@ class Joint:
     middle: Array | None = None
     limits: Array | None = None
     stop: Law | None = None
+    strain: Strain | None = None
 
     @property
     def dim(self) -> int:
@@ -199,6 +202,8 @@ class Scene:
     markers: Mapping[str, Marker] = field(default_factory=dict)
     surfaces: Mapping[str, Surface] = field(default_factory=dict)
     contacts: Mapping[str, Contact] = field(default_factory=dict)
+    beams: Mapping[str, Beam] = field(default_factory=dict)
+    loads: Mapping[str, Load] = field(default_factory=dict)
 
     def system(self) -> "System":
         """The scene as a hierarchical exergetic port-Hamiltonian system."""
@@ -289,6 +294,19 @@ class Scene:
             for c in scene.contacts.values():
                 pair = path + c.surfaces[0], path + c.surfaces[1]
                 yield path + c.name, replace(c, name=path + c.name, surfaces=pair, heat=_seen(path, c.heat))
+
+    def all_beams(self) -> Iterator[tuple[str, Beam]]:
+        """Every beam with its dotted name."""
+        for path, scene in self._scenes():
+            for beam in scene.beams.values():
+                one, two = (end if end == FREE_END else _seen(path, end) for end in beam.ends)
+                yield path + beam.name, replace(beam, name=path + beam.name, ends=(one, two))
+
+    def all_loads(self) -> Iterator[tuple[str, Load]]:
+        """Every load with its dotted name."""
+        for path, scene in self._scenes():
+            for load in scene.loads.values():
+                yield path + load.name, replace(load, name=path + load.name, body=_seen(path, load.body))
 
     def all_thermal(self) -> Iterator[tuple[str, ThermalNode]]:
         """Every thermal node with its dotted name."""

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ephs.mechanics.scene.flexible import Load
 from ephs.mechanics.scene.model import GROUND, Body, Joint, Marker, Scene, Spring, World, frozen
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces import rotations as so3
@@ -33,12 +34,17 @@ def moved(scene: Scene, pose: Array, world: World) -> Scene:
     def spring(s: Spring) -> Spring:
         return replace(s, at1=point(s.body1, s.at1), at2=point(s.body2, s.at2))
 
+    def load(x: Load) -> Load:
+        turn = np.eye(3) if x.follower else so3.quaternion_to_matrix(pose[:4])
+        return replace(x, force=frozen(turn @ x.force), moment=frozen(turn @ x.moment))
+
     def marker(m: Marker) -> Marker:
         return replace(m, at=point(m.body, m.at))
 
     return replace(
         scene,
         world=world,
+        loads={name: load(x) for name, x in scene.loads.items()},
         markers={name: marker(m) for name, m in scene.markers.items()},
         bodies={name: body(b) for name, b in scene.bodies.items()},
         joints={name: joint(j) for name, j in scene.joints.items()},

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ephs.mechanics.scene.flexible import Load, Strain
 from ephs.mechanics.scene.geometry import Coupling, coupling_of
 from ephs.mechanics.scene.model import Array, Body, Joint, Scene, Spring, frozen
 from ephs.mechanics.scene.surfaces import Surface
@@ -45,7 +46,21 @@ def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float =
             rate=frozen(j.rate * unit / time),
             limits=None if j.limits is None else frozen(j.limits * unit[0]),
             stop=None if j.stop is None else j.stop.rescaled(float(unit[0]), energy * time**2 / unit[0] ** 2, time),
+            strain=None if j.strain is None else strain(j.strain),
         )
+
+    def strain(s: Strain) -> Strain:
+        turning = np.array([1.0] * 3 + [1.0 / length] * 3)
+        return Strain(
+            s.length * length,
+            frozen(s.stiffness * energy * length * turning**2),
+            frozen(s.rest / length / turning),
+            s.damping * time,
+        )
+
+    def load(x: Load) -> Load:
+        force = energy / length
+        return replace(x, force=frozen(x.force * force), moment=frozen(x.moment * energy), ramp=x.ramp * time)
 
     def spring(s: Spring) -> Spring:
         return replace(
@@ -70,6 +85,7 @@ def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float =
         conduction={
             name: replace(c, conductance=c.conductance * energy / time) for name, c in scene.conduction.items()
         },
+        loads={name: load(x) for name, x in scene.loads.items()},
         markers={name: replace(m, at=frozen(m.at * length)) for name, m in scene.markers.items()},
         surfaces={name: surface(s) for name, s in scene.surfaces.items()},
         contacts={name: replace(c, law=c.law.rescaled(length, mass, time)) for name, c in scene.contacts.items()},

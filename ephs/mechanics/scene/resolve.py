@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ephs.mechanics.scene import values
 from ephs.mechanics.scene.entries import Checked, Document, shown
 from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing
+from ephs.mechanics.scene.flexible import Load, Strain
 from ephs.mechanics.scene.geometry import Coupling, coupling, joint_types
 from ephs.mechanics.scene.inertia import mass_and_inertia
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Conduction, Marker, Spring, ThermalNode, World, frozen
@@ -62,6 +63,7 @@ class JointDraft:
     motion: float | None
     coordinates: Array | None
     rate: Array | None
+    strain: Strain | None = None
 
     def coupling(self) -> Coupling:
         """Motions that the joint allows."""
@@ -207,6 +209,19 @@ def resolve_markers(document: Document, names: Names, faults: list[Fault]) -> di
         if table.sound("body"):
             names.check(table.entry.body, f"markers.{name}.body", "body", faults)
         found[name] = Marker(name, table.entry.body, frozen(table.entry.at))
+    return found
+
+
+def resolve_loads(document: Document, names: Names, faults: list[Fault]) -> dict[str, Load]:
+    """The loads, their bodies checked."""
+    found: dict[str, Load] = {}
+    for name, table in document.sections["loads"].items():
+        entry, key = table.entry, f"loads.{name}.body"
+        if table.sound("body"):
+            names.check(entry.body, key, "body", faults)
+            if entry.body == GROUND:
+                faults.append(fault("load ground", key, shown(entry.body)))
+        found[name] = Load(name, entry.body, frozen(entry.force), frozen(entry.moment), entry.follower, entry.ramp)
     return found
 
 

@@ -41,6 +41,9 @@ def check_scene(scene: Scene) -> None:
         ("body", bodies, [each.body for _, each in (*scene.all_markers(), *scene.all_surfaces())]),
         ("surface", dict(scene.all_surfaces()), [name for _, c in scene.all_contacts() for name in c.surfaces]),
         ("thermal node", nodes, [contact.heat for _, contact in scene.all_contacts()]),
+        ("body", bodies, [load.body for _, load in scene.all_loads()]),
+        ("body", bodies, [node for _, beam in scene.all_beams() for node in beam.nodes]),
+        ("joint", dict(scene.all_joints()), [name for _, beam in scene.all_beams() for name in beam.joints]),
         ("thermal node", nodes, [each.heat for _, each in (*scene.all_joints(), *scene.all_springs())]),
         ("thermal node", nodes, [end for _, each in scene.all_conduction() for end in each.between]),
     ):
@@ -110,6 +113,8 @@ def _shapes(scene: Scene) -> Iterator[tuple[str, dict[str, tuple[Any, tuple[int,
         yield name, {"frame": (surface.frame, (7,))} | ({kind: (sizes, SIZES[kind])} if kind != "plane" else {})
     for name, contact in scene.all_contacts():
         yield name, {key: (number, ()) for key, number in contact.law.numbers}
+    for name, load in scene.all_loads():
+        yield name, {"force": (load.force, (3,)), "moment": (load.moment, (3,)), "ramp": (load.ramp, ())}
 
 
 def _joint(j: Joint) -> dict[str, tuple[Any, tuple[int, ...]]]:
@@ -130,12 +135,25 @@ def _joint(j: Joint) -> dict[str, tuple[Any, tuple[int, ...]]]:
         "motion": (0.0 if j.motion is None else j.motion, ()),
         **({} if j.middle is None else {"middle": (j.middle, (7,))}),
         **({} if j.stop is None else {f"stop.{key}": (number, ()) for key, number in j.stop.numbers}),
+        **({} if j.strain is None else _strain(j)),
+    }
+
+
+def _strain(j: Joint) -> dict[str, tuple[Any, tuple[int, ...]]]:
+    s = j.strain
+    if s is None or j.kind != "free":
+        raise ValueError(f"joint {legible(j.name)} has a strain, which free joints have only")
+    return {
+        "strain.length": (s.length, ()),
+        "strain.stiffness": (s.stiffness, (6,)),
+        "strain.rest": (s.rest, (6,)),
+        "strain.damping": (s.damping, ()),
     }
 
 
 def _check_names(scene: Scene) -> None:
     kinds = ("bodies", "joints", "springs", "thermal", "conduction", "markers", "surfaces", "contacts")
-    for things in (getattr(scene, kind) for kind in kinds):
+    for things in (getattr(scene, kind) for kind in (*kinds, "beams", "loads")):
         for name, thing in things.items():
             if Name([name]) != (thing.name,):
                 raise ValueError(f"{legible(name)} is called {legible(str(thing.name))}")

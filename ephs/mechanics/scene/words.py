@@ -42,6 +42,8 @@ def _things(scene: "Scene") -> list[tuple[str, str, str]]:
         *(("joint", name, f"{j.kind}, {j.body1} – {j.body2}") for name, j in scene.all_joints()),
         *(("spring", name, f"{s.body1} – {s.body2}, {s.stiffness:g} N/m") for name, s in scene.all_springs()),
         *(("contact", name, " – ".join(c.surfaces)) for name, c in scene.all_contacts()),
+        *(("beam", name, f"{beam.elements} elements, {' – '.join(beam.ends)}") for name, beam in scene.all_beams()),
+        *(("load", name, f"on {load.body}") for name, load in scene.all_loads()),
         *(("thermal", name, f"{n.capacity:g} J/K at {n.temperature:g} K") for name, n in scene.all_thermal()),
         *(("conduction", n, f"{' – '.join(c.between)}, {c.conductance:g} W/K") for n, c in scene.all_conduction()),
     ]

@@ -158,6 +158,36 @@ def _of_absolute(on: Evaluator, a: Real, b: Real) -> Real:
     return on.select(kink, 0.0, (a + b) / on.select(kink, 1.0, below))
 
 
+def _half_turn_series() -> tuple[float, ...]:
+    """Coefficients z₁, z₂, … of 1 − φ cot φ = Σ z_k φ²ᵏ, by its differential equation φ w′ = w² − w + φ²."""
+    found = [1.0 / 3.0]
+    for k in range(2, TURN_TERMS + 2):
+        found.append(sum(found[i] * found[k - 2 - i] for i in range(k - 1)) / (2.0 * k + 1.0))
+    return tuple(found)
+
+
+TURN_TERMS: Final = 28
+"""Terms of series in θ² that serve up to half a turn, where each is a quarter of the one before."""
+_COTANGENT = _half_turn_series()
+_TURN_RATIO = (1.0, *((1.0 - 0.5 ** (2 * k + 1)) * z / 4.0 ** (k + 1) for k, z in enumerate(_COTANGENT[:TURN_TERMS])))
+_TURN_CURVE = tuple(z / 4.0 ** (k + 1) for k, z in enumerate(_COTANGENT))
+_TURN_CURVE_SLOPE = tuple(k * c for k, c in enumerate(_TURN_CURVE) if k)
+
+
+def series(coefficients: Sequence[float]) -> Rule:
+    """Polynomial c₀ + c₁ x + …, and its slope Σ c_k (b^k − a^k)/(b − a) by the same scheme."""
+
+    def slope(_: Evaluator, a: Real, b: Real) -> Real:
+        value: Real = coefficients[-1]
+        found: Real = 0.0
+        for coefficient in coefficients[-2::-1]:
+            found = found * b + value
+            value = value * a + coefficient
+        return found
+
+    return Rule(lambda _, x: polynomial(coefficients, x), slope)
+
+
 FUNCTIONS: Final[Mapping[str, Rule]] = MappingProxyType(
     {
         "sqrt": Rule(lambda on, x: on.sqrt(x), lambda on, a, b: 1.0 / (on.sqrt(a) + on.sqrt(b))),
@@ -173,9 +203,13 @@ FUNCTIONS: Final[Mapping[str, Rule]] = MappingProxyType(
         "log1p": Rule(log1p, lambda on, a, b: _of_logarithm(on, 1.0 + a, 1.0 + b)),
         "atan": Rule(atan, _of_angle),
         "asinh": Rule(asinh, _of_asinh),
+        "turn_ratio": series(_TURN_RATIO),
+        "turn_curve": series(_TURN_CURVE),
+        "turn_curve_slope": series(_TURN_CURVE_SLOPE),
     }
 )
-"""Functions with a rule."""
+"""Functions with a rule. Those named after turns are of θ², θ the angle of a rotation up to half a turn:
+(θ/2)/sin(θ/2), c = (1 − (θ/2) cot(θ/2))/θ², and the derivative of c by θ²: what logarithms of poses are made of."""
 
 
 TINY: Final = 1e-300

@@ -181,6 +181,8 @@ class Recorded:
     arcsinh, arccosh, arctanh = (_function(name) for name in ("asinh", "acosh", "atanh"))
     sqrt, exp, log, expm1, log1p = (_function(name) for name in ("sqrt", "exp", "log", "expm1", "log1p"))
     sign, sinhc = (_function(name) for name in ("sign", "sinhc"))
+    turn_ratio, turn_curve = (_function(name) for name in ("turn_ratio", "turn_curve"))
+    turn_curve_slope = _function("turn_curve_slope")
 
     def square(self) -> "Recorded":
         """The square, as NumPy's function of this name."""

@@ -106,6 +106,13 @@ def _squared_turn(w: Expr, x: Expr, y: Expr, z: Expr) -> Expr:
     return 4 * sp.atan2(sp.sqrt(x * x + y * y + z * z), sp.Abs(w)) ** 2
 
 
+_TURN: Final = sp.Symbol("turn", positive=True)
+
+
+def _turn_curve(a: Expr) -> Expr:
+    return (1 - sp.sqrt(a) / 2 * sp.cot(sp.sqrt(a) / 2)) / a
+
+
 def _table() -> Mapping[str, Callable[..., Expr]]:
     same = ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh")
     same += ("exp", "log", "sqrt", "sign", "atan2")
@@ -116,6 +123,9 @@ def _table() -> Mapping[str, Callable[..., Expr]]:
         "expm1": lambda a: sp.exp(a) - 1,
         "log1p": lambda a: sp.log(1 + a),
         "sinhc": Sinhc,
+        "turn_ratio": lambda a: sp.sqrt(a) / 2 / sp.sin(sp.sqrt(a) / 2),
+        "turn_curve": _turn_curve,
+        "turn_curve_slope": lambda a: sp.diff(_turn_curve(_TURN), _TURN).subs(_TURN, a),
     }
     two: dict[str, Callable[[Expr, Expr], Expr]] = {
         "+": lambda a, b: _bounded(a + b),

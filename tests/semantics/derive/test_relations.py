@@ -122,14 +122,29 @@ def test_the_ends_of_a_step_may_be_exchanged(name, seed):
 
 
 SINGLE = [*FUNCTIONS, "tan", "asin", "acos", "atanh"]
-EXACT = {"absolute": abs, "asin": mpmath.asin, "acos": mpmath.acos, "atan": mpmath.atan}
+EXACT = {
+    "absolute": abs,
+    "asin": mpmath.asin,
+    "acos": mpmath.acos,
+    "atan": mpmath.atan,
+    "turn_ratio": lambda x: mpmath.sqrt(x) / 2 / mpmath.sin(mpmath.sqrt(x) / 2),
+    "turn_curve": lambda x: curve(x),
+    "turn_curve_slope": lambda x: mpmath.diff(curve, x),
+}
+POSITIVE = ("sqrt", "log", "turn_ratio", "turn_curve", "turn_curve_slope")
+
+
+def curve(x):
+    """c of θ², as in the logarithm of a pose."""
+    return (1 - mpmath.sqrt(x) / 2 * mpmath.cot(mpmath.sqrt(x) / 2)) / x
+
 
 
 @pytest.mark.parametrize("name", SINGLE)
 @given(a=st.floats(0.05, 0.9), share=st.floats(1e-12, 0.05), sign=st.sampled_from([-1.0, 1.0]))
 def test_slopes_of_functions_are_difference_quotients_without_cancellation(name, a, share, sign):
     """Against 60 digits: a difference quotient in floats would be off by ε/share."""
-    if name in ("sqrt", "log"):
+    if name in POSITIVE:
         sign = 1.0
     start, end = np.float64(sign * a), np.float64(sign * (a + share))
     with np.errstate(all="ignore"):

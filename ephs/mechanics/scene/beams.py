@@ -1,0 +1,194 @@
+"""Beams of a scene file as bodies and joints: lumped nodes, and between them six-freedom joints with strain energy.
+
+The nodes of the beam ``rod`` are the bodies ``rod.0`` … ``rod.n`` of a part; its elements are the joints ``rod-1`` …
+``rod-n``, its welds ``rod-start`` and ``rod-end``. The reference curve is a helix on each segment between two points,
+so a beam through points of a circle is that circle, whatever the number of its elements.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ephs.mechanics.scene.entries import Checked, shown
+from ephs.mechanics.scene.errors import Fault, fault
+from ephs.mechanics.scene.flexible import FREE_END, Beam, Strain
+from ephs.mechanics.scene.geometry import body_twist
+from ephs.mechanics.scene.model import ENVIRONMENT, IDENTITY_POSE, Body, Scene, World, frozen
+from ephs.mechanics.scene.placing import Place
+from ephs.mechanics.scene.resolve import JointDraft, Names
+from ephs.mechanics.scene.schema_flexible import BeamEntry
+from ephs.mechanics.scene.sections import Section, resolve_section
+from ephs.semantics.spaces import SE3
+from ephs.semantics.spaces import rotations as so3
+
+__all__ = ["BeamDraft", "curve_frames", "resolve_beam"]
+
+Array = NDArray[np.float64]
+PARALLEL = 0.9
+"""Cosine above which a world axis counts as along a tangent, and the next one is taken for ``up``."""
+NOISE = 1e-12
+"""Strains of a reference curve below this part of the largest are rounding."""
+MOST_ELEMENTS = 100_000
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class BeamDraft:
+    """A beam with its nodes as a scene of bodies, and its elements and welds as joints yet to be measured."""
+
+    beam: Beam
+    nodes: Scene
+    joints: tuple[JointDraft, ...]
+
+
+def resolve_beam(
+    name: str, table: Checked[BeamEntry], world: World, names: Names, faults: list[Fault]
+) -> BeamDraft | None:
+    """A beam's bodies and joints; None where its place or section cannot be told."""
+    entry, key = table.entry, f"beams.{name}"
+    if table.sound("heat"):
+        names.check(entry.heat, f"{key}.heat", "thermal", faults)
+    ends = [*entry.ends, *[FREE_END] * (2 - len(entry.ends))]
+    for i, end in enumerate(entry.ends if table.sound("ends") else ()):
+        if end != FREE_END:
+            names.check(end, f"{key}.ends[{i}]", "body", faults)
+    section = resolve_section(entry.section, f"{key}.section", faults) if table.sound("section") else None
+    frames = _frames(table, key, faults)
+    if section is None or frames is None:
+        return None
+    n = len(frames) - 1
+    between = [SE3.compose(SE3.inverse(one), two) for one, two in pairwise(frames)]
+    shapes = [SE3.log(pose) for pose in between]
+    lengths = np.array([np.linalg.norm(shape[3:]) for shape in shapes])
+    initial = np.array(entry.strain or np.zeros(6))
+    joints = [
+        _joint(
+            f"{name}-{i + 1}", "free", (f"{name}.{i}", f"{name}.{i + 1}"), Place(IDENTITY_POSE, IDENTITY_POSE, True),
+            entry.heat, Strain(float(lengths[i]), frozen(section.stiffness),
+                               frozen(_settled(shapes[i] / lengths[i]) - initial), entry.damping),
+        )
+        for i in range(n)
+    ]  # fmt: skip
+    for end, node, side in ((ends[0], 0, "start"), (ends[1], n, "end")):
+        if end != FREE_END:
+            at = frames[node]
+            joints.append(_joint(f"{name}-{side}", "fixed", (end, f"{name}.{node}"), Place(at, at, False)))
+    beam = Beam(name, n, (ends[0], ends[1]), section.outline)
+    return BeamDraft(beam, _nodes(name, entry, section, frames, lengths, world), tuple(joints))
+
+
+def _nodes(name: str, entry: BeamEntry, section: Section, frames: list[Array], lengths: Array, world: World) -> Scene:
+    """The part with the nodes: each has the mass of half an element on either side."""
+    share = 0.5 * (np.append(lengths, 0.0) + np.insert(lengths, 0, 0.0))
+    speed, spin = np.array(entry.velocity or np.zeros(3)), np.array(entry.angular_velocity or np.zeros(3))
+    bodies: dict[str, Body] = {}
+    for i, (pose, length) in enumerate(zip(frames, share, strict=True)):
+        velocity = speed + np.cross(spin, pose[4:] - frames[0][4:])
+        twist = body_twist(pose, velocity, so3.quaternion_to_matrix(pose[:4]).T @ spin)
+        back = 0.5 * lengths[i - 1] if i else 0.0
+        bodies[str(i)] = Body(
+            str(i), section.mass * length, frozen(np.diag(section.inertia * length)), frozen(pose), frozen(twist),
+            _shape(section.outline, float(length), float(0.5 * length - back)),
+        )  # fmt: skip
+    return Scene(name, world, bodies)
+
+
+def _shape(outline: tuple[float, ...], length: float, shift: float) -> dict[str, Any]:
+    """A piece of the beam about its node, for pictures."""
+    place = {"position": [shift, 0.0, 0.0]}
+    if len(outline) == 2:
+        return {"box": [length, *outline], **place}
+    turned = [float(np.sqrt(0.5)), 0.0, float(np.sqrt(0.5)), 0.0]  # the axis z of a cylinder along the tangent
+    return {"cylinder": [outline[0], length], **place, "rotation": turned}
+
+
+def _joint(
+    name: str, kind: str, bodies: tuple[str, str], place: Place, heat: str = ENVIRONMENT, strain: Strain | None = None
+) -> JointDraft:
+    d = 6 if kind == "free" else 0
+    none = np.zeros(d)
+    return JointDraft(
+        name, kind, *bodies, place, 0.0, np.zeros((d, d)), none, none, heat, none, None, None, None, strain
+    )
+
+
+def _settled(strain: Array) -> Array:
+    """The strain without what rounding left of zeros."""
+    return np.where(np.abs(strain) <= NOISE * np.abs(strain).max(), 0.0, strain)
+
+
+def _frames(table: Checked[BeamEntry], key: str, faults: list[Fault]) -> list[Array] | None:
+    """The poses of the nodes, axis 1 along the tangent; None, with a fault, where they cannot be told."""
+    entry = table.entry
+    if not table.sound("from", "to", "points", "up", "elements"):
+        return None
+    ends = getattr(entry, "from"), entry.to
+    if (entry.points is None) == (ends == (None, None)) or (ends != (None, None) and None in ends):
+        given = [word for word in ("from", "to", "points") if getattr(entry, word) is not None]
+        faults.append(fault("beam place", key, " and ".join(given) or "nothing that says where the beam is"))
+        return None
+    points = np.array(entry.points if entry.points is not None else ends, dtype=float)
+    gaps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    short = np.flatnonzero(gaps <= NOISE * max(float(np.abs(points).max()), 1e-300))
+    if short.size:
+        where = f"{key}.points[{short[0] + 1}]" if entry.points is not None else f"{key}.to"
+        faults.append(fault("beam points", where, shown(points[short[0] + 1].tolist())))
+        return None
+    segments = len(points) - 1
+    elements = entry.elements or segments
+    if elements % segments or elements > MOST_ELEMENTS:
+        faults.append(fault("beam elements", f"{key}.elements", elements, segments=segments, most=MOST_ELEMENTS))
+        return None
+    frames = curve_frames(points, None if entry.up is None else np.array(entry.up), elements)
+    if frames is None:
+        faults.append(fault("up", f"{key}.up", "nothing" if entry.up is None else shown(entry.up)))
+    return frames
+
+
+def curve_frames(points: Array, up: Array | None, elements: int) -> list[Array] | None:
+    """Poses (7,) of the nodes on a curve through points (k, 3): axis 1 along it, axis 2 as near ``up`` as can be.
+
+    Between two points the curve is a helix, cut into equal elements. Where ``up`` is None it is the first of the
+    world's axes z, y, x that is along no tangent; None where ``up`` is along one.
+    """
+    tangents = _tangents(points)
+    ways = [up] if up is not None else [np.eye(3)[i] for i in (2, 1, 0)]
+    most = 1.0 - 1e-9 if up is not None else PARALLEL
+    fits = [u / np.linalg.norm(u) for u in ways if np.linalg.norm(u) > 0.0]
+    chosen = next((u for u in fits if np.abs(tangents @ u).max() <= most), None)
+    if chosen is None:
+        return None
+    corners = [_frame(point, tangent, chosen) for point, tangent in zip(points, tangents, strict=True)]
+    cut = elements // (len(points) - 1)
+    frames = [corners[0]]
+    for one, two in pairwise(corners):
+        along = SE3.log(SE3.compose(SE3.inverse(one), two))
+        frames += [SE3.normalise(SE3.compose(one, SE3.exp(along * (i / cut)))) for i in range(1, cut)]
+        frames.append(two)
+    return frames
+
+
+def _tangents(points: Array) -> Array:
+    """Unit tangents at points: of the circle through three neighbours, so that circles are met exactly."""
+    sides = np.diff(points, axis=0)
+    if len(points) == 2:
+        return np.repeat(sides / np.linalg.norm(sides), 2, axis=0)
+    found = np.zeros_like(points)
+    squares = np.sum(sides * sides, axis=1)
+    for i in range(1, len(points) - 1):
+        found[i] = sides[i - 1] / squares[i - 1] + sides[i] / squares[i]
+    found[1:-1] /= np.linalg.norm(found[1:-1], axis=1)[:, None]
+    for end, near, side in ((0, 1, sides[0]), (-1, -2, sides[-1])):  # the chord halves the turn between its tangents
+        way = side / np.linalg.norm(side)
+        found[end] = 2.0 * (way @ found[near]) * way - found[near]
+    return found
+
+
+def _frame(point: Array, tangent: Array, up: Array) -> Array:
+    second = up - (up @ tangent) * tangent
+    second /= np.linalg.norm(second)
+    rotation = np.column_stack([tangent, second, np.cross(tangent, second)])
+    return np.concatenate([so3.matrix_to_quaternion(rotation), point])

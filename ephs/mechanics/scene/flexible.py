@@ -1,0 +1,75 @@
+"""Resolved beams and loads: elasticity of an element, nodes and elements of a rod, forces on bodies."""
+
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["FREE_END", "Beam", "Load", "Strain"]
+
+Array = NDArray[np.float64]
+FREE_END = "free"
+"""An end of a beam that is welded to nothing."""
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Strain:
+    """Elasticity of a beam element: the energy L/2 (ξ − ξ₀)ᵀ K (ξ − ξ₀) of the strain ξ = log(q_r)/L.
+
+    Attributes
+    ----------
+    length : L in m
+    stiffness : (6,) diagonal of K: GJ, EI2, EI3 in N m², EA, GA2, GA3 in N
+    rest : (6,) ξ₀: torsion and curvatures in 1/m, stretch (1: none) and shears
+    damping : Kelvin–Voigt time in s: τ K resists the rate of ξ
+    """
+
+    length: float
+    stiffness: Array
+    rest: Array
+    damping: float = 0.0
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Beam:
+    """A rod: its nodes are the bodies ``NAME.0`` … ``NAME.n``, its elements the joints ``NAME-1`` … ``NAME-n``.
+
+    Attributes
+    ----------
+    ends : what the first and the last node are welded to, ``"free"`` where to nothing
+    outline : radius of a round section, or extents along axes 2 and 3 in m; for pictures
+    """
+
+    name: str
+    elements: int
+    ends: tuple[str, str]
+    outline: tuple[float, ...]
+
+    @property
+    def nodes(self) -> list[str]:
+        """The bodies."""
+        return [f"{self.name}.{i}" for i in range(self.elements + 1)]
+
+    @property
+    def joints(self) -> list[str]:
+        """The joints that are its elements."""
+        return [f"{self.name}-{i}" for i in range(1, self.elements + 1)]
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Load:
+    """A force (3,) in N and a moment (3,) in N m on a body's centre of mass, which grow over ``ramp`` seconds.
+
+    In world axes; those of a follower are in the axes of the body.
+    """
+
+    name: str
+    body: str
+    force: Array
+    moment: Array
+    follower: bool = False
+    ramp: float = 0.0

@@ -1,0 +1,77 @@
+"""Tables of beams and loads in scene files."""
+
+from typing import Annotated, Any
+
+from pydantic import Field, create_model
+
+from ephs.mechanics.scene.schema_numbers import Entry, Flag, NonNegative, Number, Positive, Text, Vector
+
+
+class SectionEntry(Entry):
+    """``section``: numbers, or a shape with E, nu and rho."""
+
+    EA: Positive | None = Field(default=None, description="stiffness against stretch, N")
+    GA: Annotated[list[Positive], Field(min_length=2, max_length=2)] | None = Field(
+        default=None, description="against shear along axes 2 and 3, N"
+    )
+    GJ: Positive | None = Field(default=None, description="against torsion, N m²")
+    EI: Annotated[list[Positive], Field(min_length=2, max_length=2)] | None = Field(
+        default=None, description="against bending about axes 2 and 3, N m²"
+    )
+    rhoA: Positive | None = Field(default=None, description="mass per length, kg/m")
+    rhoI: Annotated[list[Positive], Field(min_length=3, max_length=3)] | None = Field(
+        default=None, description="inertia per length about axes 1, 2, 3, kg m"
+    )
+    circle: Positive | None = Field(default=None, description="radius, m")
+    tube: Annotated[list[Positive], Field(min_length=2, max_length=2)] | None = Field(
+        default=None, description="outer and inner radius, m"
+    )
+    rectangle: Annotated[list[Positive], Field(min_length=2, max_length=2)] | None = Field(
+        default=None, description="width along axis 3 and height along axis 2, m"
+    )
+    E: Positive | None = Field(default=None, description="Young's modulus, N/m²")
+    nu: Annotated[Number, Field(gt=-1.0, le=0.5)] | None = Field(default=None, description="Poisson's ratio")
+    rho: Positive | None = Field(default=None, description="density, kg/m³")
+
+
+class _BeamEntry(Entry):
+    to: Vector | None = Field(default=None, description="where it ends, world coordinates, m")
+    points: Annotated[list[Vector], Field(min_length=2)] | None = Field(
+        default=None, description="instead of from and to: points on a curve, where there are nodes"
+    )
+    up: Vector | None = Field(
+        default=None, description="world direction of axis 2 of the section, made normal to the tangent"
+    )
+    elements: Annotated[int, Field(strict=True, ge=1)] | None = Field(
+        default=None, description="how many; with points the same number between any two of them, 1 unless given"
+    )
+    section: SectionEntry = Field(description="stiffness and inertia per length")
+    strain: Annotated[list[Number], Field(min_length=6, max_length=6)] | None = Field(
+        default=None, description="of the initial shape: torsion, bending 2, 3 in 1/m, stretch, shear 2, 3"
+    )
+    damping: NonNegative = Field(default=0.0, description="Kelvin–Voigt time, s")
+    heat: Text = Field(default="environment", description="where the heat of damping goes: a thermal name")
+    ends: Annotated[list[Text], Field(max_length=2)] = Field(
+        default=[], description='what the first and the last node are welded to: a body, "ground" or "free"'
+    )
+    velocity: Vector | None = Field(default=None, description="of the first node, world basis, m/s")
+    angular_velocity: Vector | None = Field(default=None, description="of the whole, world basis, rad/s")
+
+
+# `from` is a word of Python, and can only be a name where it is a text
+BeamEntry: Any = create_model(
+    "BeamEntry",
+    __base__=_BeamEntry,
+    __doc__="``[beams.NAME]``",
+    **{"from": (Vector | None, Field(default=None, description="where it starts, world coordinates, m"))},  # pyright: ignore[reportArgumentType, reportCallIssue]
+)
+
+
+class LoadEntry(Entry):
+    """``[loads.NAME]``"""
+
+    body: Text = Field(description="the body on whose centre of mass it acts")
+    force: Vector = Field(default=[0.0, 0.0, 0.0], description="world axes, N")
+    moment: Vector = Field(default=[0.0, 0.0, 0.0], description="world axes, N m")
+    follower: Flag = Field(default=False, description="force and moment are in body axes, and turn with the body")
+    ramp: NonNegative = Field(default=0.0, description="time over which it grows in proportion from 0, s")

@@ -1,0 +1,109 @@
+"""Cross-sections of beams: stiffness and inertia per length, from numbers or from a shape and a material.
+
+Axis 1 is the tangent of the beam, axis 2 its ``up``. Shear factors: Cowper's for circles and tubes, 5/6 for rectangles.
+Torsion of rectangles by Saint-Venant's series.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ephs.mechanics.scene.entries import shown
+from ephs.mechanics.scene.errors import Fault, fault
+from ephs.mechanics.scene.schema_flexible import SectionEntry
+
+__all__ = ["Section", "circle", "rectangle", "resolve_section", "tube"]
+
+Array = NDArray[np.float64]
+NUMBERS = ("EA", "GA", "GJ", "EI", "rhoA", "rhoI")
+SHAPES = ("circle", "tube", "rectangle")
+MATERIAL = ("E", "nu", "rho")
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Section:
+    """Stiffness and inertia of a beam per length.
+
+    Attributes
+    ----------
+    stiffness : (6,) GJ, EI2, EI3 in N m², EA, GA2, GA3 in N
+    mass : ρA in kg/m
+    inertia : (3,) ρI about axes 1, 2, 3, in kg m
+    outline : radius of a round section, or extents along axes 2 and 3, m; for pictures
+    """
+
+    stiffness: Array
+    mass: float
+    inertia: Array
+    outline: tuple[float, ...]
+
+
+def circle(radius: float, E: float, nu: float, rho: float) -> Section:
+    """Full circle; lengths in m, E in N/m², ρ in kg/m³."""
+    return tube(radius, 0.0, E, nu, rho)
+
+
+def tube(outer: float, inner: float, E: float, nu: float, rho: float) -> Section:
+    """Ring of two radii; units as of `circle`."""
+    area, second, m = np.pi * (outer**2 - inner**2), np.pi / 4.0 * (outer**4 - inner**4), inner / outer
+    round_ = (1.0 + m * m) ** 2
+    shear = 6.0 * (1.0 + nu) * round_ / ((7.0 + 6.0 * nu) * round_ + (20.0 + 12.0 * nu) * m * m)
+    return _of(area, second, second, 2.0 * second, shear, E, nu, rho, (float(outer),))
+
+
+def rectangle(b: float, h: float, E: float, nu: float, rho: float) -> Section:
+    """Width b along axis 3 and height h along axis 2 (``up``); units as of `circle`."""
+    long, short = max(b, h), min(b, h)
+    odd = np.arange(1.0, 40.0, 2.0)
+    series = float(np.sum(np.tanh(0.5 * np.pi * odd * long / short) / odd**5))
+    torsion = long * short**3 / 3.0 * (1.0 - 192.0 / np.pi**5 * short / long * series)
+    return _of(b * h, h * b**3 / 12.0, b * h**3 / 12.0, torsion, 5.0 / 6.0, E, nu, rho, (float(h), float(b)))
+
+
+def _of(
+    area: float, about2: float, about3: float, torsion: float, shear: float,
+    young: float, nu: float, rho: float, outline: tuple[float, ...],
+) -> Section:  # fmt: skip
+    rigidity = young / (2.0 * (1.0 + nu))
+    bending = [rigidity * torsion, young * about2, young * about3]
+    axial = [young * area, shear * rigidity * area, shear * rigidity * area]
+    inertia = rho * np.array([about2 + about3, about2, about3])
+    return Section(np.array(bending + axial), float(rho * area), inertia, outline)
+
+
+def resolve_section(entry: SectionEntry, key: str, faults: list[Fault]) -> Section | None:
+    """The section of a table; None, with a fault, where it says too little or too much."""
+    given: Mapping[str, Any] = {name: value for name, value in entry.model_dump().items() if value is not None}
+    shapes = [name for name in given if name in SHAPES]
+    if len(shapes) > 1 or (shapes and any(name in NUMBERS for name in given)):
+        names = [name for name in given if name in (*SHAPES, *NUMBERS)]
+        faults.append(fault("section", key, f"{', '.join(names[:-1])} and {names[-1]}"))
+        return None
+    needed = MATERIAL if shapes else NUMBERS
+    missing = [name for name in needed if name not in given]
+    if missing:
+        found = "an empty table" if not given else f"a table without {', '.join(missing)}"
+        faults.append(fault("section", key, found))
+        return None
+    spare = [name for name in given if name not in (*needed, *shapes)]
+    if spare:
+        faults.append(fault("section", f"{key}.{spare[0]}", shown(given[spare[0]])))
+        return None
+    if not shapes:
+        stiffness = np.array([given["GJ"], *given["EI"], given["EA"], *given["GA"]])
+        radius = 2.0 * float(np.sqrt(max(given["EI"]) / given["EA"]))
+        return Section(stiffness, given["rhoA"], np.array(given["rhoI"]), (radius,))
+    material = {name: given[name] for name in MATERIAL}
+    if shapes == ["circle"]:
+        return circle(given["circle"], **material)
+    sizes = given[shapes[0]]
+    if shapes == ["tube"]:
+        if not sizes[1] < sizes[0]:
+            faults.append(fault("tube", f"{key}.tube", shown(sizes)))
+            return None
+        return tube(*sizes, **material)
+    return rectangle(*sizes, **material)
