@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from ephs.mechanics.bodies import body_pattern as body_pattern
     from ephs.mechanics.bodies import rigid_body as rigid_body
+    from ephs.mechanics.elements.beam import beam_element as beam_element
     from ephs.mechanics.inside import Inside as Inside
     from ephs.mechanics.joints import joint as joint
     from ephs.mechanics.joints import joint_pattern as joint_pattern
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from ephs.mechanics.joints import universal_joint as universal_joint
 
 _HOME = {
+    "beam_element": "ephs.mechanics.elements.beam",
     "Inside": "ephs.mechanics.inside",
     "joint": "ephs.mechanics.joints",
     "body_pattern": "ephs.mechanics.bodies",

@@ -14,9 +14,9 @@ import numpy as np
 
 from ephs.mechanics import components
 from ephs.mechanics.bodies import rigid_body
-from ephs.mechanics.elements.beam import beam_element
+from ephs.mechanics.elements.beam import elastic
 from ephs.mechanics.elements.contact import contact
-from ephs.mechanics.joints import joint, spring_damper, universal_joint
+from ephs.mechanics.joints import between_frames, joint, spring_damper, universal_joint
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Body, Joint, Scene, Spring
 from ephs.mechanics.scene.surfaces import Contact, Surface
 from ephs.mechanics.shapes.pairs import Touch, touches
@@ -294,9 +294,8 @@ def _joint(j: Joint, *, driven: bool) -> System:
         return universal_joint(j.frame1, j.middle, j.frame2, j.friction, j.stiffness, j.rest, heat=heat, driven=driven)
     if j.strain is not None:
         of = j.strain
-        return beam_element(
-            j.frame1, j.frame2, length=of.length, stiffness=of.stiffness, rest=of.rest, damping=of.damping, heat=heat
-        )
+        parts = elastic(of.length, of.stiffness, of.rest, of.damping)
+        return between_frames(j.frame1, j.frame2, *parts, heat=heat)
     return joint(
         j.kind, j.frame1, j.frame2, j.friction, j.stiffness, j.rest, pitch=j.pitch, heat=heat, driven=driven,
         limits=j.limits, stop=j.stop,

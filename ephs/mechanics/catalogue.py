@@ -60,8 +60,12 @@ def _pair_spring(ports: Interface, numbers: Numbers) -> Primitive:
     return components.pair_spring(_pair(ports, "q_r"), numbers["stiffness"], numbers["rest"])
 
 
+def _beam_damper(_ports: Interface, n: Numbers) -> Primitive:
+    return beam.beam_damper(n["length"], n["stiffness"], n["rest"], n["damping"])
+
+
 PARTS: tuple[Part, ...] = (
-    Part("beam_damper", "beam_damper", lambda _, n: beam.beam_damper(n["length"], n["stiffness"], n["damping"])),
+    Part("beam_damper", "beam_damper", _beam_damper),
     Part("beam_spring", "beam_spring", lambda _, n: beam.beam_spring(n["length"], n["stiffness"], n["rest"])),
     Part("frame_change", "frame_change", _frame_change),
     Part("gravity", "gravity", lambda ports, numbers: components.gravity(numbers["weight"], _group(ports))),

@@ -22,6 +22,7 @@ from ephs.semantics.errors import StructureError
 from ephs.semantics.forms import stored
 from ephs.semantics.primitives import Irreversible, Storage, power_ports
 from ephs.semantics.spaces import SE3, pair
+from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.semantics.special import squared_turn, turn_curve, turn_curve_slope, turn_ratio
 from ephs.semantics.system import System
 from ephs.semantics.verdict import proved
@@ -29,7 +30,16 @@ from ephs.semantics.verdict import proved
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-__all__ = ["beam_damper", "beam_element", "beam_spring", "logarithm", "strain_energy", "strain_resistance"]
+__all__ = [
+    "beam_damper",
+    "beam_element",
+    "beam_spring",
+    "displacement",
+    "elastic",
+    "logarithm",
+    "strain_energy",
+    "strain_resistance",
+]
 
 RELATIVE = quantity.relative_pose("free")
 
@@ -66,15 +76,21 @@ def beam_element(
     StructureError
         A parameter of a wrong shape or value.
     """
-    k = np.asarray(stiffness, dtype=float)
-    spring = beam_spring(length, k, np.asarray(rest, dtype=float))
-    damper = beam_damper(length, k, damping) if damping else components.joint_friction(pair("free"), np.zeros((6, 6)))
+    k, zero = np.asarray(stiffness, dtype=float), np.asarray(rest, dtype=float)
     one, two = (SE3.identity() if frame is None else np.asarray(frame, dtype=float) for frame in (frame1, frame2))
-    return between_frames(one, two, spring, damper, heat=heat)
+    parts = elastic(length, k, zero, damping)
+    return between_frames(SE3.compose(one, SE3.exp(length * zero)), two, *parts, heat=heat)
+
+
+def elastic(length: float, stiffness: Array, rest: Array, damping: float) -> tuple[Storage, Irreversible]:
+    """Energy and loss of an element."""
+    if damping:
+        return beam_spring(length, stiffness, rest), beam_damper(length, stiffness, rest, damping)
+    return beam_spring(length, stiffness, rest), components.joint_friction(pair("free"), np.zeros((6, 6)))
 
 
 def beam_spring(length: float, stiffness: Array, rest: Array) -> Storage:
-    """L/2 (ξ − ξ₀)ᵀ K (ξ − ξ₀) of the strain of a relative pose; port q_r of the free pair.
+    """L/2 (ξ − ξ₀)ᵀ K (ξ − ξ₀); port q_r of the free pair, the pose relative to exp(L ξ₀): 1 where there is no force.
 
     Parameters
     ----------
@@ -105,15 +121,15 @@ def beam_spring(length: float, stiffness: Array, rest: Array) -> Storage:
     )
 
 
-def beam_damper(length: float, stiffness: Array, damping: float) -> Irreversible:
-    """Kelvin–Voigt damping μ(q_r) = T⁻ᵀ τ K T⁻¹ / L of a relative pose; ports p_r, s, reads q_r; τ in s.
+def beam_damper(length: float, stiffness: Array, rest: Array, damping: float) -> Irreversible:
+    """Kelvin–Voigt damping μ(q_r) = T⁻ᵀ τ K T⁻¹ / L; ports p_r, s, reads q_r as `beam_spring` does; τ in s.
 
     Raises
     ------
     StructureError
         As `beam_spring`, or the damping is negative.
     """
-    k, _ = _checked(length, stiffness, np.zeros(6))
+    k, zero = _checked(length, stiffness, rest)
     if not 0.0 <= damping < np.inf:
         raise StructureError("parameter", "beam", key="damping", found=damping, expected="a number ≥ 0")
     q_r = Path.of("q_r")
@@ -127,8 +143,13 @@ def beam_damper(length: float, stiffness: Array, damping: float) -> Irreversible
     made = structures.dissipation(
         "beam_damper",
         ports,
-        lambda x, _u, _theta: strain_resistance(x[q_r], length, k, damping),
-        parameters=(("length", float(length)), ("stiffness", tuple(k.tolist())), ("damping", float(damping))),
+        lambda x, _u, _theta: strain_resistance(x[q_r], length, k, zero, damping),
+        parameters=(
+            ("length", float(length)),
+            ("stiffness", tuple(k.tolist())),
+            ("rest", tuple(zero.tolist())),
+            ("damping", float(damping)),
+        ),
         shown=lambda: structures.dissipation_proof(ports, None),
         trusted=True,
     )
@@ -136,17 +157,43 @@ def beam_damper(length: float, stiffness: Array, damping: float) -> Irreversible
 
 
 def strain_energy(pose: Any, length: float, stiffness: Array, rest: Array) -> Any:
-    """L/2 (ξ − ξ₀)ᵀ K (ξ − ξ₀) of a relative pose (7,), of numbers or what is recorded."""
-    terms = zip(logarithm(pose), rest, stiffness, strict=True)
-    return sum((0.5 * k / length * (d - length * zero) ** 2 for d, zero, k in terms if k), 0.0)
+    """L/2 (ξ − ξ₀)ᵀ K (ξ − ξ₀) of a pose relative to the one without force, of numbers or what is recorded."""
+    terms = zip(displacement(pose, length, rest), stiffness, strict=True)
+    return sum((0.5 * k / length * d * d for d, k in terms if k), 0.0)
 
 
-def strain_resistance(pose: Any, length: float, stiffness: Array, damping: float) -> Any:
+def strain_resistance(pose: Any, length: float, stiffness: Array, rest: Array, damping: float) -> Any:
     """(6, 6) resistance of a relative pose to its own twist, of numbers or what is recorded."""
-    rate = _logarithm_rate(pose)
+    rate = _logarithm_rate(_whole(pose, length * rest))
     weights = np.sqrt(stiffness * damping / length)
     rows = [[w * entry for entry in row] for w, row in zip(weights, rate, strict=True) if w]
     return [[_sum(row[i] * row[j] for row in rows) for j in range(6)] for i in range(6)]
+
+
+def displacement(pose: Any, length: float, rest: Array) -> list[Any]:
+    """(6,) L (ξ − ξ₀) = log(d₀ q) − log d₀, d₀ = exp(L ξ₀), of a pose q, without a difference of large numbers.
+
+    With log d = (ω, r − ½ ω × r + c ω × (ω × r)), r = r₀ + R₀ x, every term below is small where q is near 1. Stiff
+    rods need that: what rounding leaves of a strain counts with EA.
+    """
+    base = length * np.asarray(rest, dtype=float)
+    turn, start = base[:3], SE3.exp(base)
+    whole = _whole(pose, base)
+    square = squared_turn(whole[:4])
+    w, c = _rotation_vector(whole, square), turn_curve(square)
+    x = _turned(start, pose[4:])
+    r = start[4:]
+    side = _cross(w, x)
+    far = _cross(w, side)
+    change = [w[i] - turn[i] for i in range(3)] if turn.any() else w
+    more = _cross(change, r)
+    further = _cross(change, _cross(w, r))
+    out = [x[i] - 0.5 * (side[i] + more[i]) + c * (far[i] + further[i]) for i in range(3)]
+    if turn.any():
+        across, old = _cross(turn, more), np.cross(turn, np.cross(turn, r))
+        bent = c - turn_curve(float(turn @ turn))
+        out = [out[i] + c * across[i] + bent * old[i] for i in range(3)]
+    return [*change, *out]
 
 
 def logarithm(pose: Any) -> list[Any]:
@@ -158,6 +205,25 @@ def logarithm(pose: Any) -> list[Any]:
     far = _cross(w, side)
     c = turn_curve(square)
     return [*w, *(r[i] - 0.5 * side[i] + c * far[i] for i in range(3))]
+
+
+def _whole(pose: Any, base: Array) -> list[Any]:
+    """d₀ q with d₀ = exp(base), of a recorded pose too."""
+    start = SE3.exp(base)
+    moved = [start[4 + i] + x for i, x in enumerate(_turned(start, pose[4:]))]
+    if not base[:3].any():
+        return [*pose[:4], *moved]
+    a, u = start[0], start[1:4]
+    b, v = pose[0], list(pose[1:4])
+    side = _cross(u, v)
+    return [a * b - _sum(u[i] * v[i] for i in range(3)), *(a * v[i] + u[i] * b + side[i] for i in range(3)), *moved]
+
+
+def _turned(start: Array, x: Any) -> list[Any]:
+    if not start[1:4].any():
+        return list(x)
+    rotation = quaternion_to_matrix(start[:4])
+    return [_sum(rotation[i, j] * x[j] for j in range(3)) for i in range(3)]
 
 
 def _rotation_vector(pose: Any, square: Any) -> list[Any]:

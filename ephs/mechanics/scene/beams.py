@@ -19,7 +19,6 @@ from ephs.mechanics.scene.geometry import body_twist
 from ephs.mechanics.scene.model import ENVIRONMENT, IDENTITY_POSE, Body, Scene, World, frozen
 from ephs.mechanics.scene.placing import Place
 from ephs.mechanics.scene.resolve import JointDraft, Names
-from ephs.mechanics.scene.schema_flexible import BeamEntry
 from ephs.mechanics.scene.sections import Section, resolve_section
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces import rotations as so3
@@ -44,9 +43,7 @@ class BeamDraft:
     joints: tuple[JointDraft, ...]
 
 
-def resolve_beam(
-    name: str, table: Checked[BeamEntry], world: World, names: Names, faults: list[Fault]
-) -> BeamDraft | None:
+def resolve_beam(name: str, table: Checked[Any], world: World, names: Names, faults: list[Fault]) -> BeamDraft | None:
     """A beam's bodies and joints; None where its place or section cannot be told."""
     entry, key = table.entry, f"beams.{name}"
     if table.sound("heat"):
@@ -62,16 +59,14 @@ def resolve_beam(
     n = len(frames) - 1
     between = [SE3.compose(SE3.inverse(one), two) for one, two in pairwise(frames)]
     shapes = [SE3.log(pose) for pose in between]
-    lengths = np.array([np.linalg.norm(shape[3:]) for shape in shapes])
+    lengths = np.array([float(np.linalg.norm(shape[3:])) for shape in shapes])
     initial = np.array(entry.strain or np.zeros(6))
-    joints = [
-        _joint(
-            f"{name}-{i + 1}", "free", (f"{name}.{i}", f"{name}.{i + 1}"), Place(IDENTITY_POSE, IDENTITY_POSE, True),
-            entry.heat, Strain(float(lengths[i]), frozen(section.stiffness),
-                               frozen(_settled(shapes[i] / lengths[i]) - initial), entry.damping),
-        )
-        for i in range(n)
-    ]  # fmt: skip
+    joints: list[JointDraft] = []
+    for i, (shape, length) in enumerate(zip(shapes, lengths.tolist(), strict=True)):
+        rest = _settled(shape / length) - initial
+        start = Place(SE3.exp(length * rest), IDENTITY_POSE, in_bodies=True)
+        strain = Strain(length, frozen(section.stiffness), frozen(rest), entry.damping)
+        joints.append(_joint(f"{name}-{i + 1}", "free", (f"{name}.{i}", f"{name}.{i + 1}"), start, entry.heat, strain))
     for end, node, side in ((ends[0], 0, "start"), (ends[1], n, "end")):
         if end != FREE_END:
             at = frames[node]
@@ -80,7 +75,7 @@ def resolve_beam(
     return BeamDraft(beam, _nodes(name, entry, section, frames, lengths, world), tuple(joints))
 
 
-def _nodes(name: str, entry: BeamEntry, section: Section, frames: list[Array], lengths: Array, world: World) -> Scene:
+def _nodes(name: str, entry: Any, section: Section, frames: list[Array], lengths: Array, world: World) -> Scene:
     """The part with the nodes: each has the mass of half an element on either side."""
     share = 0.5 * (np.append(lengths, 0.0) + np.insert(lengths, 0, 0.0))
     speed, spin = np.array(entry.velocity or np.zeros(3)), np.array(entry.angular_velocity or np.zeros(3))
@@ -120,7 +115,7 @@ def _settled(strain: Array) -> Array:
     return np.where(np.abs(strain) <= NOISE * np.abs(strain).max(), 0.0, strain)
 
 
-def _frames(table: Checked[BeamEntry], key: str, faults: list[Fault]) -> list[Array] | None:
+def _frames(table: Checked[Any], key: str, faults: list[Fault]) -> list[Array] | None:
     """The poses of the nodes, axis 1 along the tangent; None, with a fault, where they cannot be told."""
     entry = table.entry
     if not table.sound("from", "to", "points", "up", "elements"):

@@ -16,7 +16,9 @@ FREE_END = "free"
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Strain:
-    """Elasticity of a beam element: the energy L/2 (ξ − ξ₀)ᵀ K (ξ − ξ₀) of the strain ξ = log(q_r)/L.
+    """Elasticity of a beam element: the energy L/2 (ξ − ξ₀)ᵀ K (ξ − ξ₀) of the strain ξ = log(exp(L ξ₀) q_r)/L.
+
+    Its joint's frame C1 is where C2 would be without force, so that q_r is 1 there.
 
     Attributes
     ----------

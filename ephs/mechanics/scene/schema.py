@@ -223,7 +223,9 @@ class SceneFile(Entry):
     springs: dict[str, SpringEntry] = Field(default_factory=dict, description="springs and dampers between two points")
     surfaces: dict[str, SurfaceEntry] = Field(default_factory=dict, description="surfaces of bodies, which touch")
     contacts: dict[str, ContactEntry] = Field(default_factory=dict, description="pairs of surfaces")
-    beams: dict[str, BeamEntry] = Field(default_factory=dict, description="rods that bend, twist and stretch")
+    beams: dict[str, BeamEntry] = Field(  # pyright: ignore[reportInvalidTypeForm] - a class made at run time
+        default_factory=dict, description="rods that bend, twist and stretch"
+    )
     loads: dict[str, LoadEntry] = Field(default_factory=dict, description="forces and moments on bodies")
     thermal: dict[str, ThermalEntry] = Field(default_factory=dict, description="what heat warms")
     conduction: dict[str, ConductionEntry] = Field(default_factory=dict, description="how heat passes between them")

@@ -1,6 +1,6 @@
 """Tables of beams and loads in scene files."""
 
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeAlias
 
 from pydantic import Field, create_model
 
@@ -34,37 +34,41 @@ class SectionEntry(Entry):
     rho: Positive | None = Field(default=None, description="density, kg/m³")
 
 
-class _BeamEntry(Entry):
-    to: Vector | None = Field(default=None, description="where it ends, world coordinates, m")
-    points: Annotated[list[Vector], Field(min_length=2)] | None = Field(
-        default=None, description="instead of from and to: points on a curve, where there are nodes"
-    )
-    up: Vector | None = Field(
-        default=None, description="world direction of axis 2 of the section, made normal to the tangent"
-    )
-    elements: Annotated[int, Field(strict=True, ge=1)] | None = Field(
-        default=None, description="how many; with points the same number between any two of them, 1 unless given"
-    )
-    section: SectionEntry = Field(description="stiffness and inertia per length")
-    strain: Annotated[list[Number], Field(min_length=6, max_length=6)] | None = Field(
-        default=None, description="of the initial shape: torsion, bending 2, 3 in 1/m, stretch, shear 2, 3"
-    )
-    damping: NonNegative = Field(default=0.0, description="Kelvin–Voigt time, s")
-    heat: Text = Field(default="environment", description="where the heat of damping goes: a thermal name")
-    ends: Annotated[list[Text], Field(max_length=2)] = Field(
-        default=[], description='what the first and the last node are welded to: a body, "ground" or "free"'
-    )
-    velocity: Vector | None = Field(default=None, description="of the first node, world basis, m/s")
-    angular_velocity: Vector | None = Field(default=None, description="of the whole, world basis, rad/s")
-
-
-# `from` is a word of Python, and can only be a name where it is a text
-BeamEntry: Any = create_model(
-    "BeamEntry",
-    __base__=_BeamEntry,
-    __doc__="``[beams.NAME]``",
-    **{"from": (Vector | None, Field(default=None, description="where it starts, world coordinates, m"))},  # pyright: ignore[reportArgumentType, reportCallIssue]
-)
+_Vector: TypeAlias = Vector | None
+_Points: TypeAlias = Annotated[list[Vector], Field(min_length=2)] | None
+_Count: TypeAlias = Annotated[int, Field(strict=True, ge=1)] | None
+_Strain: TypeAlias = Annotated[list[Number], Field(min_length=6, max_length=6)] | None
+_BEAM: dict[str, Any] = {
+    "from": (_Vector, Field(default=None, description="where it starts, world coordinates, m")),
+    "to": (_Vector, Field(default=None, description="where it ends, likewise")),
+    "points": (
+        _Points,
+        Field(default=None, description="instead of from and to: points on a curve, with a node at each, m"),
+    ),
+    "up": (
+        _Vector,
+        Field(default=None, description="world direction of axis 2 of the section, made normal to the tangent"),
+    ),
+    "elements": (
+        _Count,
+        Field(default=None, description="how many, the same number between any two points; 1 there unless given"),
+    ),
+    "section": (SectionEntry, Field(description="stiffness and inertia per length")),
+    "strain": (
+        _Strain,
+        Field(default=None, description="at t = 0: torsion, bending about 2, 3 in 1/m, stretch, shear along 2, 3"),
+    ),
+    "damping": (NonNegative, Field(default=0.0, description="Kelvin–Voigt time, s")),
+    "heat": (Text, Field(default="environment", description="where the heat of damping goes: a thermal name")),
+    "ends": (
+        Annotated[list[Text], Field(max_length=2)],
+        Field(default=[], description='what the first and the last node are welded to: a body, "ground" or "free"'),
+    ),
+    "velocity": (_Vector, Field(default=None, description="of the first node, world basis, m/s")),
+    "angular_velocity": (_Vector, Field(default=None, description="of the whole, world basis, rad/s")),
+}
+# a class cannot have `from` for a name
+BeamEntry: Any = create_model("BeamEntry", __base__=Entry, __doc__="``[beams.NAME]``", **_BEAM)
 
 
 class LoadEntry(Entry):

@@ -139,7 +139,6 @@ def curve(x):
     return (1 - mpmath.sqrt(x) / 2 * mpmath.cot(mpmath.sqrt(x) / 2)) / x
 
 
-
 @pytest.mark.parametrize("name", SINGLE)
 @given(a=st.floats(0.05, 0.9), share=st.floats(1e-12, 0.05), sign=st.sampled_from([-1.0, 1.0]))
 def test_slopes_of_functions_are_difference_quotients_without_cancellation(name, a, share, sign):

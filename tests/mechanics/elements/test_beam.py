@@ -1,0 +1,260 @@
+"""Beams: the laws of the element, and rods by every method against closed forms."""
+
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import ephs
+from ephs.mechanics.elements.beam import beam_damper, beam_element, beam_spring, displacement, logarithm
+from ephs.mechanics.methods import METHODS
+from ephs.mechanics.scene.document import scene_from_text, scene_to_text
+from ephs.operad import Path
+from ephs.semantics.errors import StructureError
+from ephs.semantics.spaces import SE3
+from ephs.testing import check_primitive
+
+EPS = float(np.finfo(float).eps)
+STIFFNESS = np.array([500.0, 400.0, 600.0, 1e4, 8e3, 9e3])
+REST = np.array([0.1, 0.0, 0.2, 1.0, 0.0, 0.1])
+Q_R = Path.of("q_r")
+seeds = st.integers(0, 2**32 - 1)
+# what is sent: the flying rod of Simo and Vu-Quoc in three dimensions
+SECTION = "{ EA = 1e4, GA = [1e4, 1e4], GJ = 500.0, EI = [500.0, 500.0], rhoA = 1.0, rhoI = [20.0, 10.0, 10.0] }"
+ROD = """format = 1
+name = "rod"
+[world]
+gravity = [0.0, 0.0, 0.0]
+[beams.rod]
+from = [0.0, 0.0, 0.0]
+to = [6.0, 8.0, 0.0]
+elements = 4
+section = {section}
+{more}
+"""
+
+
+def scene_of(text, tmp_path):
+    file = tmp_path / "rod.toml"
+    file.write_text(text, encoding="utf-8")
+    return ephs.load(file)
+
+
+def rod(tmp_path, more=""):
+    return scene_of(ROD.format(section=SECTION, more=more), tmp_path)
+
+
+def pose(rng, size):
+    return SE3.exp(size * rng.standard_normal(6))
+
+
+# ---- the element ----------------------------------------------------------------------------------------------------
+
+
+@given(seeds, st.floats(1e-9, 1.2))
+def test_the_recorded_logarithm_is_that_of_the_group(seed, size):
+    q = pose(np.random.default_rng(seed), size)
+    found = np.array(logarithm(q))
+    assert np.abs(found - SE3.log(q)).max() <= 64 * EPS * max(1.0, np.abs(found).max())
+    other = np.concatenate([-q[:4], q[4:]])
+    assert np.array_equal(np.array(logarithm(other)), found)
+
+
+@pytest.mark.parametrize("rest", [REST, np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0])])
+@settings(max_examples=12)
+@given(seeds, st.floats(1e-12, 1.0))
+def test_the_strain_is_a_difference_of_logarithms_without_their_rounding(rest, seed, size):
+    """Against 40 digits: near rest it is right relative to itself where the reference curve is straight."""
+    q, length = pose(np.random.default_rng(seed), size), 1.3
+    found = np.array(displacement(q, length, rest))
+    with mpmath.workdps(40):
+        expected = np.array([float(x) for x in exact_displacement(q, length * rest)])
+    size = np.abs(found).max() if not rest[:3].any() else 1.0
+    assert np.abs(found - expected).max() <= 256 * EPS * size
+
+
+def exact_displacement(q, base):
+    """log(exp(a) q) − a by power series of 4 × 4 matrices."""
+
+    def screw(a):
+        w, v = a[:3], a[3:]
+        rows = [[0, -w[2], w[1], v[0]], [w[2], 0, -w[0], v[1]], [-w[1], w[0], 0, v[2]], [0, 0, 0, 0]]
+        return mpmath.matrix(rows)
+
+    w, x, y, z = (mpmath.mpf(float(entry)) for entry in q[:4])
+    norm = mpmath.sqrt(w * w + x * x + y * y + z * z)
+    w, x, y, z = w / norm, x / norm, y / norm, z / norm
+    turn = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    place = mpmath.matrix([[*turn[i], mpmath.mpf(float(q[4 + i]))] for i in range(3)] + [[0, 0, 0, 1]])
+    given_ = [mpmath.mpf(float(entry)) for entry in base]
+    found = mpmath.logm(mpmath.expm(screw(given_)) * place)
+    out = [found[2, 1], found[0, 2], found[1, 0], found[0, 3], found[1, 3], found[2, 3]]
+    return [mpmath.re(a) - b for a, b in zip(out, given_, strict=True)]
+
+
+@given(seeds, st.floats(1e-6, 0.5))
+def test_a_step_changes_the_energy_by_what_its_effort_does(seed, size):
+    rng = np.random.default_rng(seed)
+    spring, q, v = beam_spring(1.3, STIFFNESS, REST), pose(rng, 0.4), size * rng.standard_normal(6) / 3.0
+    before, after = (spring.energy({Q_R: x}) for x in (q, SE3.retract(q, v)))
+    work = spring.discrete_gradient({Q_R: q}, v) @ v
+    assert abs(work - (after - before)) <= 256 * EPS * (before + after + STIFFNESS.max())
+
+
+def test_energy_and_damping_are_what_their_ports_ask_for():
+    check_primitive(beam_spring(1.3, STIFFNESS, REST), max_examples=20)
+    check_primitive(beam_damper(1.3, STIFFNESS, REST, 0.02), max_examples=20)
+
+
+@given(seeds)
+def test_damping_resists_the_rate_of_the_strain(seed):
+    """⟨u|μ u⟩ = L ξ̇ᵀ τ K ξ̇, the rate of the strain by differences of a logarithm of another code."""
+    rng, tau, length, h = np.random.default_rng(seed), 0.02, 1.3, 1e-5
+    damper, q, u = beam_damper(length, STIFFNESS, REST, tau), pose(rng, 0.4), rng.standard_normal(6)
+    d = SE3.compose(SE3.exp(length * REST), q)
+    rate = (SE3.log(SE3.retract(d, h * u)) - SE3.log(SE3.retract(d, -h * u))) / (2.0 * h * length)
+    reference = ephs.Reference()
+    flow = damper.flow({Q_R: q}, np.append(u, 0.0), reference)
+    expected = length * tau * float(rate @ (STIFFNESS * rate))
+    assert u @ flow[:6] == pytest.approx(expected, rel=1e-8)
+    assert -flow[6] * reference.temperature == pytest.approx(expected, rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("changed", "key"),
+    [({"length": 0.0}, "length"), ({"stiffness": -STIFFNESS}, "stiffness"), ({"damping": -1.0}, "damping")],
+)
+def test_elements_of_impossible_numbers_are_refused(changed, key):
+    with pytest.raises(StructureError, match=key):
+        beam_element(**({"length": 1.0, "stiffness": STIFFNESS, "damping": 0.1} | changed))
+
+
+def test_an_element_joins_two_bodies_by_hand():
+    """Two equal bodies oscillate along the element with ω² = 2 EA/(L m)."""
+    from ephs import Pattern, junction
+    from ephs import quantity as of
+    from ephs.mechanics import rigid_body
+
+    pattern = Pattern(
+        junctions={"p1": junction(of.body_momentum), "p2": junction(of.body_momentum)},
+        boxes={"one": {"p": "p1"}, "two": {"p": "p2"}, "rod": {"p1": "p1", "p2": "p2"}},
+    )
+    body = rigid_body(2.0, [0.1, 0.1, 0.1], (0.0, 0.0, 0.0))
+    system = pattern(one=body, two=body, rod=beam_element(length=0.5, stiffness=STIFFNESS))
+    turn, stretch = np.sqrt(2.0 * STIFFNESS[3] / (0.5 * 2.0)), 1e-3
+    start = {"two.pe.q": [1.0, 0.0, 0.0, 0.0, 0.5 + stretch, 0.0, 0.0]}
+    sol = ephs.simulate(system, np.pi / turn, initial=start, method="natural", step=np.pi / turn / 64)
+    assert sol["two.pe.q"][-1, 4] - sol["one.pe.q"][-1, 4] == pytest.approx(0.5 - stretch, abs=stretch * 2e-3)
+    assert sol.summary()["max_energy_error"] <= 1e-11
+
+
+# ---- scenes ----------------------------------------------------------------------------------------------------------
+
+
+def test_a_beam_through_points_of_a_circle_is_the_circle(tmp_path):
+    radius, at = 3.0, np.linspace(0.0, 0.5 * np.pi, 3)
+    points = [[radius * float(np.sin(a)), radius * float(1.0 - np.cos(a)), 0.0] for a in at]
+    text = ROD.format(section=SECTION, more="").replace("from = [0.0, 0.0, 0.0]\nto = [6.0, 8.0, 0.0]", f"{points = }")
+    scene = scene_of(text, tmp_path)
+    for i, angle in enumerate(np.linspace(0.0, 0.5 * np.pi, 5)):
+        expected = [radius * np.sin(angle), radius * (1.0 - np.cos(angle)), 0.0]
+        assert np.abs(scene.body(f"rod.{i}").pose[4:] - expected).max() <= 64 * EPS * radius
+    for i in range(1, 5):
+        strain = scene.joint(f"rod-{i}").strain
+        assert strain.length == pytest.approx(0.125 * np.pi * radius, rel=64 * EPS)
+        assert np.abs(np.abs(strain.rest) - [0.0, 1.0 / radius, 0.0, 1.0, 0.0, 0.0]).max() <= 64 * EPS
+    assert sum(body.mass for _, body in scene.all_bodies()) == pytest.approx(0.5 * np.pi * radius, rel=64 * EPS)
+
+
+def test_scenes_with_beams_come_back_from_text(tmp_path):
+    more = 'ends = ["ground"]\ndamping = 0.1\nstrain = [0.0, 0.1, 0.0, 0.01, 0.0, 0.0]\n'
+    scene = rod(tmp_path, more + '[loads.tip]\nbody = "rod.4"\nforce = [0.0, 0.0, 6.0]\nramp = 2.0\n')
+    text = scene_to_text(scene)
+    again = scene_from_text(text)
+    assert scene_to_text(again) == text
+    assert again.beams["rod"] == scene.beams["rod"] and again.joint("rod-2").strain.damping == 0.1
+    assert again.loads["tip"].ramp == 2.0 and "beam rod: 4 elements" in str(again)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key"),
+    [
+        ("elements = 4", "elements = 0", "beams.rod.elements"),
+        ("EA = 1e4, ", "", "beams.rod.section"),
+        ("EA = 1e4, ", "EA = 1e4, circle = 0.1, ", "beams.rod.section"),
+        ("EA = 1e4", "EA = -1.0", "beams.rod.section.EA"),
+        ("to = [6.0, 8.0, 0.0]", "", "beams.rod"),
+        ("to = [6.0, 8.0, 0.0]", "to = [0.0, 0.0, 0.0]", "beams.rod.to"),
+        ("elements = 4", "up = [3.0, 4.0, 0.0]", "beams.rod.up"),
+        ("elements = 4", 'ends = ["grond"]', "beams.rod.ends[0]"),
+        ("elements = 4", 'heat = "nowhere"', "beams.rod.heat"),
+        ("10.0] }", '10.0] }\n[loads.tip]\nbody = "rod.5"', "loads.tip.body"),
+        ("10.0] }", '10.0] }\n[loads.tip]\nbody = "ground"', "loads.tip.body"),
+        ("10.0] }", "10.0] }\n[bodies.rod]\nmass = 1.0\ninertia = [1.0, 1.0, 1.0]", "bodies.rod"),
+    ],
+)
+def test_faults_name_the_key(old, new, key, tmp_path):
+    with pytest.raises(ephs.SceneError) as caught:
+        scene_of(ROD.format(section=SECTION, more="").replace(old, new, 1), tmp_path)
+    assert [fault.key for fault in caught.value.faults] == [key]
+
+
+@pytest.mark.parametrize(
+    ("shape", "expected"),
+    [
+        # of Timoshenko and Goodier's table: J = 0.1406 a⁴ of a square, 0.229 a b³ where a = 2 b
+        ("rectangle = [2.0, 2.0]", [0.1406 * 16.0, 16.0 / 12.0, 16.0 / 12.0, 4.0]),
+        ("rectangle = [1.0, 2.0]", [0.229 * 2.0, 2.0 / 12.0, 8.0 / 12.0, 2.0]),
+        ("circle = 2.0", [8.0 * np.pi, 4.0 * np.pi, 4.0 * np.pi, 4.0 * np.pi]),
+        ("tube = [2.0, 1.0]", [7.5 * np.pi, 3.75 * np.pi, 3.75 * np.pi, 3.0 * np.pi]),
+    ],
+)
+def test_sections_of_shapes_have_their_moments(shape, expected, tmp_path):
+    section = f"{{ {shape}, E = 1.0, nu = 0.0, rho = 1.0 }}"
+    found = scene_of(ROD.format(section=section, more=""), tmp_path).joint("rod-1").strain.stiffness
+    assert found[:4] * [2.0, 1.0, 1.0, 1.0] == pytest.approx(expected, rel=2e-3)
+
+
+# ---- motion ----------------------------------------------------------------------------------------------------------
+
+
+def momenta(sol):
+    """Linear and angular momentum about the origin (n, 6)."""
+    out = np.zeros((len(sol.t), 6))
+    for name, body in sol.scene.all_bodies():
+        seen = sol.body(name)
+        linear = body.mass * seen.velocity
+        spin = np.einsum("tij,tj->ti", seen.rotation, seen.angular_velocity @ body.inertia)
+        out += np.hstack([linear, np.cross(seen.position, linear) + spin])
+    return out
+
+
+STRUCK = "angular_velocity = [0.0, 2.0, 3.0]\nstrain = [0.1, 0.05, 0.0, 0.02, 0.0, 0.01]\nvelocity = [1.0, 2.0, 3.0]\n"
+
+
+CONSTANT = ("natural", "natural4", "variational", "alpha")
+
+
+@pytest.mark.parametrize("name", [name for name, method in METHODS.items() if method.scenes])
+def test_a_flying_rod_keeps_what_its_method_keeps(name, tmp_path):
+    steps = {"step": 2.0**-6} if name in CONSTANT else {"rtol": 1e-7, "atol": 1e-9}
+    sol = ephs.simulate(rod(tmp_path, STRUCK), 0.5, method=name, audit="off", **steps)
+    energy, kept = sol.energy, momenta(sol)
+    drift = np.abs(kept - kept[0]).max() / np.abs(kept).max()
+    lost = float(np.ptp(energy) / np.abs(energy).max())
+    assert drift <= (1e-12 if name == "variational" else 1e-2 if name in CONSTANT else 1e-5)
+    assert lost <= (1e-11 if name.startswith("natural") else 1e-2 if name in CONSTANT else 1e-5)
+
+
+def test_damping_turns_into_heat_what_the_motion_loses(tmp_path):
+    heat = 'damping = 0.02\nheat = "core"\n[thermal.core]\ncapacity = 10.0\ntemperature = 300.0\n'
+    sol = ephs.simulate(rod(tmp_path, STRUCK + heat), 0.5, method="natural", step=2.0**-6)
+    summary = sol.summary()
+    assert summary["heat"] > 1.0
+    assert summary["max_energy_error"] <= 1e-12 and summary["min_entropy_production"] >= 0.0
+    assert summary["thermal"]["core"]["temperature"] == pytest.approx(300.0 + summary["heat"] / 10.0, rel=1e-12)
