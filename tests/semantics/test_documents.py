@@ -13,7 +13,7 @@ from referencing import Registry, Resource
 import ephs
 from ephs import Pattern, PatternError, SemanticsError, System, junction, library
 from ephs import quantity as Q
-from ephs.mechanics import joint, rigid_body, spring_damper
+from ephs.mechanics import beam_element, joint, rigid_body, spring_damper
 from ephs.mechanics.catalogue import PARTS
 from ephs.operad import Path
 from ephs.operad.documents import SCHEMA_FILE as PATTERN_SCHEMA
@@ -165,6 +165,9 @@ MECHANICS = [
     rigid_body(2.0, [0.1, 0.2, 0.25]),
     rigid_body(2.0, [0.1, 0.2, 0.25], gravity=[0, 0, 0], group="SO3xR3"),
     spring_damper([0, 0, 0], [0, 0, 1.0], 3.0, 1.0, 0.2),
+    beam_element(
+        length=2.0, stiffness=[5.0, 4.0, 6.0, 1e2, 8e1, 9e1], rest=[0.1, 0.0, 0.2, 1.0, 0.0, 0.1], damping=0.1
+    ),
     alone(ephs.mechanics.components.ground()),
     alone(ephs.mechanics.components.thermal_node(3.0, 300.0)),
 ]
