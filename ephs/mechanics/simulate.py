@@ -9,13 +9,14 @@ import numpy as np
 from ephs.mechanics.assembling import assembled, flat_joints
 from ephs.mechanics.build import drive_ports, initial_state, scene_inputs, scene_system, wrench_port
 from ephs.mechanics.journaling import journaled
-from ephs.mechanics.methods import METHODS, Method, Setting, chosen
+from ephs.mechanics.methods import METHODS, Method, chosen
 from ephs.mechanics.motion import SceneMotion
 from ephs.mechanics.own_units import in_own_units, seen_from
 from ephs.mechanics.pace import longest_step
 from ephs.mechanics.pushes import part_of, scene_signals, sum_of
 from ephs.mechanics.reduction.folded import folded_problem
 from ephs.mechanics.redundancy import explain
+from ephs.mechanics.running import Course
 from ephs.mechanics.scene.document import scene_to_text
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.state import Snapshot
@@ -26,9 +27,8 @@ from ephs.mechanics.solve.control import Control, Tolerance, told_apart
 from ephs.mechanics.solve.errors import OptionError, failing_at, nearest_of, number_of
 from ephs.mechanics.solve.events import events_of
 from ephs.mechanics.solve.findings import POLICIES, judged
-from ephs.mechanics.solve.integrate import Grid, integrate, solution_of
+from ephs.mechanics.solve.integrate import solution_of
 from ephs.mechanics.solve.journal import Journal
-from ephs.mechanics.solve.loop import integrate_stepwise
 from ephs.mechanics.solve.problem import Problem, Signal
 from ephs.mechanics.solve.record import Record
 from ephs.mechanics.solve.sampled import Sampling, holding
@@ -184,47 +184,34 @@ def simulate(
     for one in held:
         if one.sampled.period < control.least * unit:
             raise OptionError("min_step", min_step, f"at most the period of {one.name}, {one.sampled.period!r} s")
+    functions = asked_of(problem, inputs)
     breakpoints = Breakpoints(
-        start / unit, end / unit, declared / unit, asked_of(problem, inputs), [Sampling(one, problem) for one in held]
+        start / unit, end / unit, declared / unit, functions, [Sampling(one, problem) for one in held]
     )
     with failing_at(start):
         breakpoints.enter(start / unit, lambda: problem.initial)
         problem.inputs(start / unit, problem.initial)
-    seen = breakpoints.of(problem)
-    setting = Setting(seen, start / unit, control, dict(options or {}))
     watched, told = seen_from(problem, watched, guarded(progress))
-    times = None if times is None else times / unit
+    course = Course(problem, chosen_method, start / unit, end / unit, control, dict(options or {}))
+    again = None if held or any(each.stateful for each in functions) else course.again(breakpoints)
     bounds = Bounds.of(
-        control, step, lawful=chosen_method.lawful, undamped=chosen_method.undamped, order=chosen_method.order
+        control,
+        step,
+        lawful=chosen_method.lawful,
+        undamped=chosen_method.undamped,
+        order=order,
+        again=again,
     )
     with journaled(journal, problem, asked) as written:
-        if chosen_method.many is not None and control.step is not None and not watched and end > start:
-            solution = integrate(
-                seen,
-                Grid(start / unit, end / unit, control.step),
-                make=chosen_method.many,
-                save_at=times,
-                max_steps=max_steps,
-                progress=told,
-                journal=written,
-                bounds=bounds,
-                breakpoints=breakpoints,
-            )
-        else:
-            solution = integrate_stepwise(
-                seen,
-                start / unit,
-                end / unit,
-                make=lambda: chosen_method.make(setting),
-                control=control,
-                events=watched,
-                save_at=times,
-                progress=told,
-                remarks={"auto": reason} if method == "auto" else {},
-                journal=written,
-                bounds=bounds,
-                breakpoints=breakpoints,
-            )
+        solution = course.run(
+            breakpoints,
+            events=watched,
+            save_at=None if times is None else times / unit,
+            progress=told,
+            remarks={"auto": reason} if method == "auto" else {},
+            journal=written,
+            bounds=bounds,
+        )
     return judged(solution, audit)
 
 

@@ -14,6 +14,7 @@ from ephs.mechanics.solve.breakpoints import MOST_FOUND
 from ephs.mechanics.solve.control import Control
 from ephs.mechanics.solve.driven import ComponentMethod
 from ephs.mechanics.solve.findings import Audit, Finding
+from ephs.mechanics.solve.growth import Again, GlobalError, global_error
 from ephs.mechanics.solve.model import Model
 from ephs.mechanics.solve.resolution import Trials
 from ephs.operad import Path
@@ -63,6 +64,8 @@ class Bounds:
         infinity; None of others, which do so by steps of their own.
     order
         With which power of the step the method's error falls.
+    again
+        Further runs of the same problem; None where its inputs cannot be given again.
     """
 
     energy: float
@@ -71,6 +74,7 @@ class Bounds:
     step: float | None = None
     undamped: Callable[[Model], ComponentMethod] | None = None
     order: int = 1
+    again: Again | None = None
 
     @classmethod
     def of(
@@ -81,6 +85,7 @@ class Bounds:
         lawful: bool,
         undamped: Callable[[Model], ComponentMethod] | None = None,
         order: int = 1,
+        again: Again | None = None,
     ) -> "Bounds":
         """Of a run with these tolerances, and constant steps in s where given.
 
@@ -88,13 +93,13 @@ class Bounds:
         ----------
         lawful
             Whether every step of the method keeps the balance.
-        undamped, order
+        undamped, order, again
             See `Bounds`.
         """
         rtol, atol = (max(given.value, *given.special.values(), 0.0) for given in (control.rtol, control.atol))
         chosen = max(MANY_TIMES * (rtol or atol), LEAST)
         error = chosen if step is None else COARSE
-        return cls(LAWFUL if lawful else error, error, chosen, step, undamped, order)
+        return cls(LAWFUL if lawful else error, error, chosen, step, undamped, order, again)
 
 
 @final
@@ -138,13 +143,19 @@ def _accuracy(solution: "Solution", bounds: Bounds, trials: Trials | None) -> It
         return
     steps = int(solution.stats["steps"])
     own = trials.own or trials
+    slack = MOTION - min(MOTION, bounds.accuracy)
     off = own.motion(bounds.step, steps)
     if off is not None:
         hint = ""
         if off.size > MOTION:  # of order p + 1 in a step, over as many steps more
             hint = f" of {0.9 * bounds.step * (MOTION / off.size) ** (1.0 / bounds.order):.2g} s"
         instant = int(np.argmin(np.abs(solution.t - own.times[off.trial])))
-        yield Breach(off.size, MOTION - min(MOTION, bounds.accuracy), instant, off.path, hint)
+        yield Breach(off.size, slack, instant, off.path, hint)
+    if trials.again is not None:
+        summed = 0.0 if off is None else off.size
+        grown = global_error(solution, bounds.order, bounds.step, summed, MOTION, trials.again)
+        if grown is not None:
+            yield Breach(grown.size, slack, grown.instant, grown.path, _shorter(bounds, grown))
     found = trials.error(bounds.step, steps, solution.ledgers.scale)
     if found is not None:
         hint, at = "", trials.times[found.trial]
@@ -152,6 +163,15 @@ def _accuracy(solution: "Solution", bounds: Bounds, trials: Trials | None) -> It
             h = trials.sufficient(found.trial, bounds.step, bounds.accuracy)
             hint = f" of {h:.1g} s" + (", or radau, which damps what is too fast" if bounds.undamped else "")
         yield Breach(found.size, 0.0, int(np.argmin(np.abs(solution.t - at))), found.path, hint)
+
+
+def _shorter(bounds: Bounds, found: GlobalError) -> str:
+    """End of the advice to take shorter steps."""
+    if found.size <= MOTION or bounds.step is None:
+        return ""
+    if not found.resolved:
+        return f" of {0.25 * bounds.step:.2g} s or less: one of twice its length leads elsewhere"
+    return f" of {0.9 * bounds.step * (MOTION / found.size) ** (1.0 / bounds.order):.2g} s"
 
 
 def _entropy(solution: "Solution", _bounds: Bounds, _trials: Trials | None) -> Iterator[Breach]:
@@ -268,7 +288,7 @@ LAWS: Mapping[str, Law] = {
     ),
     "accuracy": Law(
         "constant steps resolve what moves, and put bodies where they belong: the difference of a step and two of half "
-        "its length, and its sum over the run",
+        "its length, its sum over the run, and the difference from a run with longer steps",
         "what such steps move between storages; length of the mechanism, 1 rad",
         f"{COARSE:g}; {MOTION:g} at the end",
         _accuracy,
@@ -330,7 +350,7 @@ def audit(solution: "Solution", bounds: Bounds, trials: Trials | None = None) ->
             allowed = law.allowed(bounds)
             broken = [b for b in law.breaches(solution, bounds, trials) if not b.size <= allowed + b.slack < np.inf]
             if broken:
-                worst = max(broken, key=_size)
+                worst = max(broken, key=lambda breach: _size(breach) / (allowed + breach.slack))
                 where = str(worst.path) if worst.path is not None else ""
                 at, advice = float(solution.t[worst.instant]), law.advice[int(bounds.step is None)] + worst.hint
                 found.append(Finding(name, _size(worst), allowed + worst.slack, at, where, advice))

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol, final
 
 import numpy as np
@@ -31,7 +31,7 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import Pair
 from ephs.semantics.spaces.codes import VECTOR
 
-__all__ = ["Grid", "Progress", "audited", "failures_of", "integrate", "solution_of"]
+__all__ = ["Grid", "Progress", "audited", "failures_of", "integrate", "repeatable", "solution_of"]
 
 RESPONSE = 0.1
 """Wanted seconds between two looks at progress and Ctrl-C."""
@@ -214,6 +214,11 @@ def audited(
     return solution
 
 
+def repeatable(trials: Trials | None, bounds: Bounds, *, ended: bool) -> Trials | None:
+    """Trials with further runs of the problem, where its run has ended."""
+    return replace(trials, again=bounds.again) if trials is not None and ended else trials
+
+
 def solution_of(problem: Problem, record: Record, stats: Mapping[str, Any]) -> Solution:
     """Kept part of a run, as a solution."""
     while problem.shown is not None:
@@ -375,7 +380,8 @@ class _Run:
         if bounds is None or bounds.undamped is None or bounds.step is None:
             return None
         jumps = [self.problem.seconds * t for t in self.breakpoints.times]
-        return natural_trials(solution, bounds.undamped, bounds.step, self.stepper, jumps)
+        trials = natural_trials(solution, bounds.undamped, bounds.step, self.stepper, jumps)
+        return repeatable(trials, bounds, ended=self.t == self.grid.until)
 
 
 def coordinates(quantity: Quantity, x: Array) -> Array:

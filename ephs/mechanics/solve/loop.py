@@ -12,7 +12,7 @@ from ephs.mechanics.solve.control import Control, Policy, first_step
 from ephs.mechanics.solve.errors import OptionError, Outcome, SolveError, solve_error_of
 from ephs.mechanics.solve.events import Crossing, Event, Watch
 from ephs.mechanics.solve.forecast import Forecast
-from ephs.mechanics.solve.integrate import Grid, Progress, audited, failures_of
+from ephs.mechanics.solve.integrate import Grid, Progress, audited, failures_of, repeatable
 from ephs.mechanics.solve.journal import Written
 from ephs.mechanics.solve.problem import Problem, States
 from ephs.mechanics.solve.production import Production
@@ -326,10 +326,11 @@ class _Run(Generic[S]):
         step = self.control.step
         if self.bounds is None or step is None:
             return None
-        return trials_of(
+        trials = trials_of(
             solution, self.bounds.undamped, self.problem, self.stepper, self.bounds.order, self.samples.states,
             self.sign * step, self.until, self.breakpoints,
         )  # fmt: skip
+        return repeatable(trials, self.bounds, ended=self.ended or self.t == self.until)
 
     def _ends(self) -> list[Record]:
         """The first and the last row, kept or not; none of a run that did not start."""

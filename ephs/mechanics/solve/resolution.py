@@ -8,7 +8,8 @@ Natural methods try steps from the states of the solution; methods whose steps a
 states that they were in.
 
 What steps err by in the poses of bodies adds up, too: its sum over all steps, as if errors neither grew nor cancelled,
-estimates how far bodies are off at the end.
+estimates how far bodies are off at the end, and how much coarser a second run may be that says how they grew
+(`growth`).
 """
 
 from bisect import bisect_right
@@ -21,6 +22,7 @@ import numpy as np
 
 from ephs.mechanics.solve.breakpoints import Breakpoints
 from ephs.mechanics.solve.driven import ComponentMethod, advance_driven
+from ephs.mechanics.solve.growth import Again, apart
 from ephs.mechanics.solve.model import Model, compile_model
 from ephs.mechanics.solve.problem import Problem
 from ephs.mechanics.solve.record import Record, Rows, record_of
@@ -86,6 +88,8 @@ class Trials:
         states; (components,) energies of the storages, and entropies that the others made.
     own
         Those by the method's own steps, where these are by another's.
+    again
+        Further runs of the problem, where this one reached its end.
     """
 
     problem: Problem
@@ -93,6 +97,7 @@ class Trials:
     times: tuple[float, ...]
     tried: Callable[[int, float], tuple[Tried, Tried, Tried]]
     own: "Trials | None" = None
+    again: Again | None = None
 
     def error(self, h: float, steps: int, gross: float) -> StepError | None:
         """The estimated error of constant steps of h s; None where nothing moves, or nothing can be tried.
@@ -123,7 +128,7 @@ class Trials:
                 _, coarse, fine = (x for x, _ in self.tried(k, h))
             except Exception:  # no solution, or an input that fails beyond the end of the run
                 continue
-            off = [_apart(coarse[slot.point], fine[slot.point], self.problem.length) for slot in bodies]
+            off = [float(apart(coarse[slot.point], fine[slot.point], self.problem.length)) for slot in bodies]
             worst = int(np.argmax(off))
             found.append((off[worst], k, bodies[worst].path))
         if not found:
@@ -157,13 +162,6 @@ class Trials:
             return np.zeros_like(joules), 0.0, 0.0
         moved = float(np.sum(np.abs(joules * (fine - start))))
         return np.abs(joules * (fine - coarse)), moved, float(np.sum(np.abs(stores * start)))
-
-
-def _apart(one: Array, other: Array, length: float) -> float:
-    """Distance of two poses: in parts of a length, or the angle in rad between them."""
-    moved = float(np.linalg.norm(one[4:] - other[4:])) / length
-    chord = min(float(np.linalg.norm(one[:4] - other[:4])), float(np.linalg.norm(one[:4] + other[:4])))
-    return max(moved, 4.0 * float(np.arcsin(min(1.0, 0.5 * chord))))
 
 
 def _clear(t: float, h: float, until: float, jumps: Sequence[float]) -> bool:
