@@ -155,11 +155,8 @@ class _Run(Generic[S]):
         # nothing has to be looked at in each step
         alone = self.watch is None and not self.production.active and not self.breakpoints.active
         if alone and (self.journal is None or self.journal.snapshot is None or stood is not None):
-            self.leg = self.stepper.many(
-                Span(
-                    self.state, self.t0, self.until, self.h, self.control, self.policy, self.save_at, self.saved
-                )
-            )  # fmt: skip
+            span = Span(self.state, self.t0, self.until, self.h, self.control, self.policy, self.save_at, self.saved)
+            self.leg = self.stepper.many(span)
             if self.leg is not None:
                 if stood is not None:
                     self.leg.restore(stood)
