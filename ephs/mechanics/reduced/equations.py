@@ -14,7 +14,7 @@ from ephs.mechanics.engine.build import engine_of
 from ephs.mechanics.reduced.booking import Booking
 from ephs.mechanics.reduced.dense import Dense, unmoved
 from ephs.mechanics.reduced.given import Given
-from ephs.mechanics.reduced.heat import Heats
+from ephs.mechanics.reduced.heat import heats_of
 from ephs.mechanics.reduced.layout import Layout
 from ephs.mechanics.reduced.led import Led
 from ephs.mechanics.reduced.mechanism import reduce_scene
@@ -95,7 +95,7 @@ class Equations:
         self.curved = np.array([int(t.r_at[i]) + j for i in groups for j in range(int(t.dim[i]))], dtype=int)
         self.counted = np.r_[np.arange(self.n), self.nv : self.nv + self.n + self.ns]
         number = {slot.path: i for i, slot in enumerate(problem.descriptor.components)}
-        self.heats = Heats(reduced, model.reference.temperature)
+        self.heats = heats_of(reduced, model.reference.temperature)
         self.led = Led(problem, moved=bool(driven))
         self._makers = np.array([number[path] for path in reduced.made], dtype=int)
         self.scal = model.scal(0.0)

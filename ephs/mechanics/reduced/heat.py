@@ -1,149 +1,32 @@
-"""Heat on the reduced form: storages advanced by energy, and friction's heat by the energy that the motion lost.
-
-**Energies.** A storage of heat is advanced by the energy that it takes up, E = c1 (exp(s/c2) − 1); its entropy
-follows, with it the mean temperature θ̄ = ΔE/Δs of the step. A component makes flow · (1/θ̄ at its sink − 1/θ̄ at its
-source), so entropies change by what is made, to rounding, and friction never makes less than nothing.
-
-**Friction.** The heat H of a step is a quadrature of powers, which says nothing of a motion that decays in the step.
-There D = E⁰ + W − E¹ of all that is not heat is right, where Radau IIA finds a hundredth of it at hλ = 2000 and the
-trapezoidal rule thousands of times as much. So the heat Q of each friction goes from H towards D: no further than the
-estimated error of its quadrature, which is its difference to an embedded one, and not below zero. As |Q − H| ≤ |D − H|
-and D − H is of the order of the method's error, the order stays. What remains of D − H is an error of the motion, such
-as vibrations that the method damped: it stays in the balance, and the audit sees it.
-"""
-
-from typing import final
+"""Storages of heat of a mechanism in joint coordinates, and what its components pass on to them."""
 
 import numpy as np
 
 from ephs.mechanics.engine.records import Node
 from ephs.mechanics.reduced.mechanism import Reduced
-from ephs.mechanics.solve.errors import Outcome, SolveError
+from ephs.mechanics.solve.heats import Heats
 from ephs.semantics.bundle import Array
 
-__all__ = ["Heats"]
+__all__ = ["heats_of"]
 
 
-@final
-class Heats:
-    """What stores heat in one mechanism, and what its components pass on to it.
-
-    Energies are in J and count from s = 0. Flows, in W or J, are of the components that make entropy: the heat of
-    friction; of conduction what goes from its first to its second end.
+def heats_of(reduced: Reduced, theta: float) -> Heats:
+    """The storages of heat of a mechanism; flows are by its components that make entropy.
 
     Parameters
     ----------
     theta
         Temperature of the environment in K.
     """
+    t, table = reduced.tables, reduced.nodes
 
-    def __init__(self, reduced: Reduced, theta: float) -> None:
-        t = reduced.tables
-        self._paths = reduced.entropies
-        self._components, self._nodes, self._law = t.node, t.node >= 0, reduced.nodes
-        self._theta = theta
-        self.frictions, sinks = t.sink.T
-        self._incidence = np.zeros((t.node.size, len(reduced.made)))
-        self._incidence[sinks, self.frictions] = 1.0
-        for component, one, two in t.conduction.tolist():
-            self._incidence[one, t.made_at[component]], self._incidence[two, t.made_at[component]] = -1.0, 1.0
-        self._sources, self._sinks = np.maximum(-self._incidence, 0.0).T, np.maximum(self._incidence, 0.0).T
-
-    @property
-    def _laws(self) -> tuple[Array, Array]:
-        """c1 in J and c2 in J/K of the nodes, as the tables have them at present."""
-        rows = self._law.arrays[1].reshape(-1, Node.real_width)[self._nodes]
+    def laws() -> tuple[Array, Array]:
+        rows = table.arrays[1].reshape(-1, Node.real_width)[t.node >= 0]
         return rows[:, Node.c1.offset], rows[:, Node.c2.offset]
 
-    def temperatures(self, heats: Array) -> Array:
-        """(entropies,) in K."""
-        out = np.full(heats.shape, self._theta)
-        k, (c1, c2) = self._nodes, self._laws
-        out[..., k] = (c1 + heats[..., k]) / c2
-        return out
-
-    def frozen(self, heats: Array) -> int | None:
-        """Component of a node whose temperature is not above zero; None: there is none."""
-        cold = np.flatnonzero(~(self.temperatures(heats) > 0.0))
-        return int(self._components[cold[0]]) if cold.size else None
-
-    def coldest(self, heats: Array) -> Array:
-        """(entropies,) energies at a hundredth of the present temperatures, without bound of the environment."""
-        out = np.full(heats.shape, -np.inf)
-        k, (c1, _) = self._nodes, self._laws
-        out[k] = 0.01 * (c1 + heats[k]) - c1
-        return out
-
-    def entropies(self, heats: Array) -> Array:
-        """(..., entropies) in J/K, of energies."""
-        if not heats.size:
-            return heats
-        out = heats / self._theta
-        k, (c1, c2) = self._nodes, self._laws
-        out[..., k] = c2 * np.log1p(heats[..., k] / c1)
-        return out
-
-    def energies(self, s: Array) -> Array:
-        """(..., entropies) in J, of entropies."""
-        if not s.size:
-            return s
-        out = s * self._theta
-        k, (c1, c2) = self._nodes, self._laws
-        out[..., k] = c1 * np.expm1(s[..., k] / c2)
-        return out
-
-    def slopes(self) -> Array:
-        """(entropies,) dθ/dE in K/J, zero of the environment."""
-        out = np.zeros(self._nodes.size)
-        out[self._nodes] = 1.0 / self._laws[1]
-        return out
-
-    def flows(self, heats: Array, made: Array) -> Array:
-        """(makers,) flows where components make so much entropy."""
-        theta = self.temperatures(heats)
-        one, two = self._sources @ theta, self._sinks @ theta
-        drop = np.where(self._sources.any(axis=1), one - two, 1.0)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            carried = made * one * two / drop
-        carried[drop == 0.0] = 0.0
-        carried[self.frictions] = made[self.frictions] * two[self.frictions]
-        return carried
-
-    def booked(self, flows: Array, missed: Array, lost: float | None) -> Array:
-        """Flows of a step with friction's heat moved towards the energy that the motion lost.
-
-        Parameters
-        ----------
-        flows, missed
-            (makers,) in J by a quadrature, and its differences to an embedded one.
-        lost
-            E⁰ + W − E¹ in J; None where the work is what the energies say.
-        """
-        if lost is None or not self.frictions.size:
-            return flows
-        out, k = flows.copy(), self.frictions
-        short = lost - float(flows[k].sum())
-        room = np.abs(missed[k]) if short > 0.0 else np.minimum(np.abs(missed[k]), flows[k])
-        whole = float(room.sum())
-        if whole > 0.0:
-            out[k] = np.maximum(0.0, flows[k] + room * (np.sign(short) * min(1.0, abs(short) / whole)))
-        return out
-
-    def taken(self, heats: Array, flows: Array) -> tuple[Array, Array]:
-        """Energies after the flows of a step in J, and the entropy that each component made in J/K.
-
-        Raises
-        ------
-        SolveError
-            More heat was carried away than there is.
-        """
-        change = self._incidence @ flows
-        k, theta = self._nodes, self.temperatures(heats)
-        share = np.zeros(heats.size)
-        share[k] = change[k] / (self._laws[1] * theta[k])
-        if not np.all(share > -1.0):
-            raise SolveError(Outcome.TEMPERATURE, str(self._paths[int(np.argmin(share > -1.0))]), "")
-        small = np.abs(share) < 1e-8  # θ̄/θ = x / log(1 + x)
-        ratio = np.where(small, 1.0 + 0.5 * share, share / np.log1p(np.where(small, 1.0, share)))
-        cold = 1.0 / (theta * ratio)
-        return heats + change, flows * (self._sinks @ cold - self._sources @ cold)
+    frictions, sinks = t.sink.T
+    incidence = np.zeros((t.node.size, len(reduced.made)))
+    incidence[sinks, frictions] = 1.0
+    for component, one, two in t.conduction.tolist():
+        incidence[one, t.made_at[component]], incidence[two, t.made_at[component]] = -1.0, 1.0
+    return Heats(reduced.entropies, t.node, laws, incidence, frictions, theta)

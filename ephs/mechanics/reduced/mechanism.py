@@ -12,6 +12,7 @@ from ephs.mechanics.reduced.spanning import Edge, joints_of, loop_algebra, spann
 from ephs.mechanics.reduced.tables import CUT, SPRING, TREE, Mechanism, Workspace, row_addresses
 from ephs.mechanics.scene.model import GROUND, Scene
 from ephs.mechanics.solve.errors import OptionError
+from ephs.mechanics.solve.heats import exponential_law
 from ephs.mechanics.solve.model import Model
 from ephs.mechanics.solve.problem import Problem
 from ephs.operad import Path
@@ -153,14 +154,11 @@ def _nodes(model: Model, entropies: Mapping[Path, tuple[int, int]]) -> Table[Nod
             node.component = -1
             continue
         node.component = number
-        match dict(primitive.parameters):
-            case {"capacity": float(capacity), "temperature": float(temperature)}:
-                node.c1, node.c2 = capacity * temperature, capacity
-            case {"c1": float(c1), "c2": float(c2)}:
-                node.c1, node.c2 = c1, c2
-            case _:
-                found = f"heat of {path} with the law of {primitive.name}"
-                raise OptionError("method", found, "natural, or capacities whose energies are exponential")
+        law = exponential_law(primitive)
+        if law is None:
+            found = f"heat of {path} with the law of {primitive.name}"
+            raise OptionError("method", found, "natural, or capacities whose energies are exponential")
+        node.c1, node.c2 = law
     return nodes
 
 

@@ -72,13 +72,13 @@ class Continuous:
         states = 2.0 * (self._memory.data - unknowns)
         return Matrices(whole(unknowns), whole(states))
 
-    def powers(self, x: Array, z: Array, inputs: Array) -> tuple[Array, float]:
+    def powers(self, x: Array, z: Array, inputs: Array) -> tuple[Array, Array]:
         """Rates of the ledgers, per second, (4 + components,): heat, energy, exergy supplied, entropy made, and
-        the entropy made by each component; and the least entropy production of a component in W/K."""
+        the entropy made by each component; and the flows into the ports of all components but storages."""
         self._evaluate(x, z, self._still, inputs)
         sums = np.zeros(4 + self.model.tables.kind.size)
-        least = account(self.model.tables, z, self._unit, inputs, self._memory, sums)
-        return sums, float(least)
+        account(self.model.tables, z, self._unit, inputs, self._memory, sums)
+        return sums, self._memory.flows.copy()
 
     def energies(self, x: Array, z: Array, inputs: Array) -> Array:
         """(components,): energy of each storage at the states x, zero elsewhere."""

@@ -190,7 +190,7 @@ class _Run(Generic[S]):
     def _advance_stepwise(self) -> None:
         control = self.control
         grid = None if self.policy else Grid(0.0, abs(self.until - self.t0), float(control.step or 0.0))
-        while self.t != self.until:
+        while self.t != self.until and not self.ended:
             if control.max_steps is not None and self.steps >= control.max_steps:
                 raise SolveError(Outcome.MANY, "", f"{control.max_steps}")
             if grid:
@@ -207,32 +207,31 @@ class _Run(Generic[S]):
             try:
                 attempt = self.stepper.step(self.state, self.sign * h)
             except (SolveError, ArithmeticError, np.linalg.LinAlgError) as error:
-                failure = solve_error_of(error)
+                failure = self.cause = solve_error_of(error)
                 if grid or failure.outcome in FINAL:
                     raise failure from error
-                self.cause = failure
                 self._shrink(0.25 * h, failure)
                 continue
             if self.policy:
                 accepted, wanted = self.policy.judge(h, attempt.error, abs(self.until - self.t0))
                 if not accepted and not (cut and wanted > h):
-                    asked = self.policy.wanted(h, attempt.error, abs(self.until - self.t0)) * self.problem.seconds
-                    self._shrink(min(wanted, control.most), too_fast(self.stepper.name, attempt.worst, asked))
+                    asked = self.policy.wanted(h, attempt.error, abs(self.until - self.t0))
+                    cause = too_fast(self.stepper.name, attempt.worst, asked * self.problem.seconds)
+                    self._shrink(min(wanted, control.most), cause)
                     continue
                 # a step that was cut for an end says nothing of longer ones
                 if h == self.h or wanted < (min(self.h, 2.0 * h) if cut else self.h):
                     self.h = max(min(wanted, control.most), min(control.least, h))
-            if self._accept(attempt, end if h == rest and abs(abs(attempt.h) - h) <= self.breakpoints.near else None):
-                self.ended = True
-                return
-            if self.t == end != self.until:
+            there = h == rest and abs(abs(attempt.h) - h) <= self.breakpoints.near
+            self.ended = self._accept(attempt, end if there else None)
+            if self.t == end != self.until and not self.ended:
                 self.state = self.stepper.anew(self.state)
                 self.breakpoints.enter(end, self._here, split=not whole)
 
     def _shrink(self, h: float, cause: SolveError | None) -> None:
         self.rejected += 1
-        finest = self.policy.finest * abs(self.until - self.t0) if self.policy else 0.0
-        self.h = self.control.allowed(h, max(abs(self.t), abs(self.until)), cause, finest)
+        finest = self.policy.finest if self.policy else 0.0
+        self.h = self.control.allowed(h, max(abs(self.t), abs(self.until)), cause, finest * abs(self.until - self.t0))
 
     def _accept(self, attempt: Attempt[S], end: float | None) -> bool:
         """Keep a step; whether an event ends the run with it."""

@@ -20,6 +20,7 @@ from ephs.mechanics.solve.errors import LARGEST, Outcome, SolveError
 from ephs.mechanics.solve.model import compile_model
 from ephs.mechanics.solve.natural import guessed_efforts
 from ephs.mechanics.solve.natural_kernels import IRREVERSIBLE
+from ephs.mechanics.solve.passages import Passages
 from ephs.mechanics.solve.problem import Problem
 from ephs.mechanics.solve.snapshot import Snapshot, like, parts
 from ephs.mechanics.solve.stepping import Attempt, Row, Span
@@ -73,6 +74,23 @@ class RadauState:
 
 
 @final
+@dataclass(frozen=True, slots=True, eq=False)
+class Books:
+    """Powers of a step.
+
+    Parameters
+    ----------
+    powers
+        (stages, 4 + components) rates of the ledgers at the stages.
+    passed
+        (1 + stages, 2, passages) heat in W and entropy in W/K that is passed at the start and the stages.
+    """
+
+    powers: Array
+    passed: Array
+
+
+@final
 class Radau:
     """The method for one problem whose states are on vector spaces."""
 
@@ -84,6 +102,7 @@ class Radau:
         self.problem = problem
         self.model = compile_model(problem.descriptor, problem.reference, problem.inputs(t0, problem.initial))
         self.equations = Continuous(self.model)
+        self._passages = Passages(self.model)
         self.rtol, self.atol = control.rtol.rates(problem.descriptor), control.atol.rates(problem.descriptor)
         self.evaluations = self.factorisations = self.iterations = 0
         self._rates = int(self.model.tables.counts[0])
@@ -91,6 +110,7 @@ class Radau:
         self._matrices: Matrices | None = None
         self._solvers: tuple[float, Any, Any] | None = None
         self._current: RadauState | None = None
+        self._last: tuple[RadauState, Array, Array] | None = None
 
     def inputs(self, t: float, x: Array) -> Array:
         """Values at the outer ports, one after the other."""
@@ -139,27 +159,22 @@ class Radau:
         stages, x, iterations = self._solved(state, h)
         if not np.abs(x).max(initial=0.0) < LARGEST:
             raise SolveError(Outcome.RANGE, self._path(int(np.argmin(np.abs(x) < LARGEST))), "")
-        powers, least = self._powers(state, h, stages)
-        sums = state.sums + h * COEFFICIENTS[-1] @ powers
-        end = RadauState(state.t + h, x, stages[-1].copy(), sums)
+        books = self._books(state, h, stages)
         error = self._error(state, h, stages, x)
+        end = self._end(state, h, 1.0, x, stages[-1].copy(), books)
+        made = (end.sums - state.sums)[4:][self._makers]
         self.iterations += iterations
         if iterations > 4:
             self._matrices = None
-        return Attempt(state, end, h, error, least, (stages, powers))
+        return Attempt(state, end, h, error, float(made.min(initial=np.inf)) if made.size else 0.0, (stages, books))
 
     def inside(self, attempt: Attempt[RadauState], t: float) -> RadauState:
         """The state at a time within the step, by its collocation polynomial."""
-        stages, powers = attempt.detail
+        stages, books = attempt.detail
         start, h = attempt.start, attempt.h
         theta = (t - start.t) / h
-        weights = h * moments(NODES, theta)
-        return RadauState(
-            t,
-            start.x + weights @ stages[:, : self._rates],
-            values(NODES, theta) @ stages,
-            start.sums + weights @ powers,
-        )
+        x = start.x + h * moments(NODES, theta) @ stages[:, : self._rates]
+        return self._end(start, h, theta, x, values(NODES, theta) @ stages, books)
 
     def at(self, state: RadauState, t: float) -> RadauState:
         """The same state at a time that differs by rounding."""
@@ -220,15 +235,41 @@ class Radau:
             stages, iterations = self._stages(state, h)
         return stages, state.x + h * COEFFICIENTS[-1] @ stages[:, : self._rates], iterations
 
-    def _powers(self, state: RadauState, h: float, stages: Array) -> tuple[Array, float]:
-        """Rates of the ledgers at the stages, per second, (3, 4 + components); and the least entropy production
-        of a component at a stage, times the step."""
+    def _books(self, state: RadauState, h: float, stages: Array) -> Books:
+        """What the ledgers get at the stages, and the heat that is passed there and at the start."""
         xs = state.x + h * COEFFICIENTS @ stages[:, : self._rates]
-        found = [
-            self.equations.powers(x, z, self.inputs(state.t + c * h, x))
-            for x, z, c in zip(xs, stages, NODES, strict=True)
-        ]
-        return np.array([sums for sums, _ in found]), h * min(least for _, least in found)
+        powers, passed = list[Array](), list[Array]()
+        for x, z, c in zip(xs, stages, NODES, strict=True):
+            sums, flows = self.equations.powers(x, z, self.inputs(state.t + c * h, x))
+            powers.append(sums)
+            passed.append(self._passages.powers(flows, z))
+        first = self._passages.powers(self._known(state)[1], state.z)
+        return Books(np.array(powers), np.array([first, *passed]))
+
+    def _known(self, state: RadauState) -> tuple[Array, Array]:
+        """(components,) stored energies, and the flows into all components."""
+        if self._last is None or self._last[0] is not state:
+            given = self.model.input_values()  # neither depends on them
+            energies = self.equations.energies(state.x, state.z, given)
+            self._last = state, energies, self.equations.powers(state.x, state.z, given)[1]
+        return self._last[1:]
+
+    def _end(self, state: RadauState, h: float, theta: float, x: Array, z: Array, books: Books) -> RadauState:
+        """The state at a part of a step of h seconds: its heat is booked by energy, see `Heats`."""
+        t, weights, passages = state.t + theta * h, h * moments(NODES, theta), self._passages
+        sums = state.sums + weights @ books.powers
+        if passages.states.size:
+            x[passages.states] = state.x[passages.states]
+            energies = [self._known(state)[0], self.equations.energies(x, z, self.model.input_values())]
+            missed = theta * h * (GAMMA * books.passed[0, 0] + DEFECT @ books.passed[1:, 0])
+            booked = passages.booked(
+                state.x, np.tensordot(weights, books.passed[1:], 1), missed, np.array(energies), sums[1] - state.sums[1]
+            )
+            x[passages.states] = booked.entropies
+            sums[0] += booked.heat
+            sums[3] += booked.made.sum()
+            sums[4:] += booked.made
+        return RadauState(t, x, z, sums)
 
     def _refresh(self, state: RadauState) -> None:
         self._matrices = self.equations.matrices(state.x, state.z, self.inputs(state.t, state.x))

@@ -7,6 +7,7 @@ from scipy.integrate import solve_ivp
 import ephs
 from ephs import Pattern, library
 from ephs.mechanics.solve.errors import Outcome
+from ephs.mechanics.solve.heats import Heats
 from ephs.mechanics.solve.radau import COEFFICIENTS, NODES
 from examples import oscillator, physics
 
@@ -233,3 +234,40 @@ def test_an_explosion_ends_where_it_happens():
     with pytest.raises(ephs.SimulationError) as caught:
         ephs.simulate(system, 10.0, initial={"pe.q": 1.0, "ke.p": 1.0}, method="radau", rtol=1e-6, atol=1e-6)
     assert 1.0 < caught.value.time < 2.0 and caught.value.partial["pe.q"][-1] > 100.0
+
+
+BRAKE = Pattern.from_text("p: momentum; s: entropy; ke(p); mf(p, s); env(s)")
+
+
+def stopped(friction, *, store=None, **options):
+    """A mass of 1 kg at 100 m/s, 5000 J, whose friction warms the environment or a capacity."""
+    parts = {"ke": library.point_mass(m=1.0), "mf": library.friction(d=friction)}
+    system = BRAKE(**parts, env=store or library.environment())
+    return ephs.simulate(system, 1.0, initial={"ke.p": 100.0}, method="radau", audit="off", **options)
+
+
+@pytest.mark.parametrize("step", [0.002, 0.05, None])
+@pytest.mark.parametrize("friction", [20.0, 1e4, 1e6])
+def test_a_brake_put_together_by_hand_makes_heat_of_all_that_it_takes(friction, step):
+    """Its heat is ½ (p⁰² − p¹²)/m to rounding of N steps, also within steps."""
+    times = np.linspace(0.0, 1.0, 8)
+    sol = stopped(friction, save_at=times, **({"step": step} if step else {"rtol": 1e-6}))
+    lost = 5000.0 - 0.5 * np.ravel(sol["ke.p"]) ** 2
+    allowed = 10.0 * np.sqrt(sol.stats["steps"]) * 10.0 * np.finfo(float).eps * 5000.0
+    assert np.abs(np.ravel(sol["env.s"]) * 293.15 - lost).max() <= allowed
+    assert sol.energy_error.max() * 5000.0 <= allowed and abs(sol.summary()["heat"] - lost[-1]) <= allowed
+    assert np.all(np.diff(np.ravel(sol["env.s"])) >= -8.0 * np.finfo(float).eps * 20.0)
+
+
+def test_without_the_energy_the_quadrature_misses_it(monkeypatch):
+    """The control."""
+    monkeypatch.setattr(Heats, "booked", lambda self, flows, missed, lost: flows)
+    assert stopped(1e6, step=0.002).summary()["heat"] < 100.0
+
+
+def test_a_capacity_takes_the_energy_that_the_mass_lost():
+    """E = c1 (exp(s/c2) − 1), at chosen steps."""
+    sol = stopped(20.0, store=library.thermal_capacity(c1=300.0, c2=1.0), rtol=1e-6)
+    held = 300.0 * np.expm1(np.ravel(sol["env.s"])[-1])
+    assert abs(held - 5000.0 + 0.5 * np.ravel(sol["ke.p"])[-1] ** 2) <= 1e-9
+    assert sol.entropy_production.sum() == pytest.approx(np.ravel(sol["env.s"])[-1], rel=1e-12)
