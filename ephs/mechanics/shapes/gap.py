@@ -40,6 +40,8 @@ class Gap:
         Radius of curvature of the second surface at the contact in m; 0 of a corner.
     numbers
         Sizes of both surfaces by name, m.
+    thickness
+        Least length of a straight way of C2 through the overlap, from side to side, in m; infinite behind a plane.
     """
 
     name: str
@@ -47,6 +49,7 @@ class Gap:
     contact: Callable[[Any], tuple[Vector, Vector]]
     radius: float
     numbers: tuple[tuple[str, float], ...]
+    thickness: float = np.inf
 
 
 def ramp(x: Any) -> Any:
@@ -126,4 +129,5 @@ def rounded_box_sphere(half: Vector, rounding: float, radius: float) -> Gap:
         contact,
         radius,
         (*sizes, ("rounding", rounding), ("radius", radius)),
+        2.0 * (min(half) + rounding + radius),
     )

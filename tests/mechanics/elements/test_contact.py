@@ -7,6 +7,7 @@ from scipy.optimize import brentq
 import ephs
 from ephs.mechanics.elements.contact import contact_energy, contact_loss
 from ephs.mechanics.methods import METHODS
+from ephs.mechanics.pace import longest_step
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.mechanics.shapes.gap import plane_rim, plane_sphere, rounded_box_sphere
 from ephs.mechanics.shapes.law import Law
@@ -247,3 +248,30 @@ def test_limits_ascend(limits, tmp_path):
 def test_an_overlap_at_the_start_is_told(tmp_path):
     with pytest.warns(ephs.SceneWarning, match=r"contacts\.ball_floor: found ball and floor 0\.03 m deep"):
         scene_of(tmp_path, BALL, height=0.07)
+
+
+PLATE = """
+[bodies.bullet]
+mass = 0.1
+inertia = [1e-5, 1e-5, 1e-5]
+position = [0.013, 0.0, 5.0]
+velocity = [0.0, 0.0, -40.0]
+[surfaces.bullet]
+body = "bullet"
+shape = { sphere = 0.01 }
+stiffness = 1e7
+[surfaces.plate]
+body = "ground"
+shape = { box = [2.0, 2.0, 0.001] }
+"""
+
+
+@pytest.mark.parametrize("name", [name for name in SCENES if METHODS[name].adaptive])
+@pytest.mark.filterwarnings("ignore::ephs.CostWarning")
+def test_no_step_leaps_over_a_thin_plate(name, tmp_path):
+    file = tmp_path / "plate.toml"
+    file.write_text(HEAD.format(gravity=0.0) + PLATE, encoding="utf-8")
+    scene = ephs.load(file)
+    assert ephs.simulate(scene, 0.2, method=name, rtol=1e-3, audit="off").body("bullet").velocity[-1, 2] > 30.0
+    longest = longest_step(scene, 5, 1e-3)
+    assert longest == pytest.approx(0.5 * 0.021 / 40.0, rel=0.1)
