@@ -41,7 +41,7 @@ STATES = 16
 
 def own(scene: Scene) -> tuple[Block, int]:
     """Our accelerations: a block of rounds, and how many evaluations a round has."""
-    equations = Equations(scene, problem_of_scene(scene), 0.0)
+    equations = Equations(problem_of_scene(scene), 0.0)
     state, rng = equations.start(0.0), np.random.default_rng(0)
     q = np.array([state.q] * STATES)
     r = np.array([state.r + 0.1 * rng.standard_normal(equations.n) for _ in range(STATES)])

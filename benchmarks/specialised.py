@@ -39,7 +39,7 @@ def _compiling(program: Program) -> float:
 def measure(family: str, size: int) -> dict[str, Any]:
     """Seconds of an evaluation, and to compile, of both programs."""
     scene = families.scene(family, size)
-    equations = Equations(scene, problem_of_scene(scene), 0.0)
+    equations = Equations(problem_of_scene(scene), 0.0)
     found = links_of(equations.reduced).packed(equations.gravity)
     looped, written = sweeps(found.kind), unrolled(found)
     state, rng = equations.start(0.0), np.random.default_rng(0)

@@ -33,6 +33,7 @@ __all__ = [
     "drive_ports",
     "initial_state",
     "scene_inputs",
+    "scene_names",
     "scene_system",
     "wrench_port",
 ]
@@ -130,6 +131,19 @@ def scene_inputs(scene: Scene) -> dict[Path, Input]:
             for port, where in drive_ports(j):
                 value = j.drive[where] if j.motion is None else np.array([j.motion])
                 out[port] = Input(np.array(value), j.motion is not None)
+    return out
+
+
+def scene_names(scene: Scene) -> dict[Path, str]:
+    """Box in the scene's system -> the name of what it stands for: of bodies, joints, springs, contacts."""
+    out: dict[Path, str] = {component_path("bodies", name): name for name, _ in scene.all_bodies()}
+    out |= {component_path("springs", name): name for name, _ in scene.all_springs()}
+    for name, c in scene.all_contacts():
+        points = range(len(contact_points(scene, c)[1]))
+        out |= {component_path("contacts", name) / f"point{i}": name for i in points}
+    for name, j in scene.all_joints():
+        at = component_path("joints", name)
+        out |= {part: name for part in ([at] if j.middle is None else [at / "first", at / "second"])}
     return out
 
 

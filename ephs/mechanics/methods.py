@@ -11,6 +11,7 @@ from ephs.mechanics.solve.model import Model, compile_model
 from ephs.mechanics.solve.natural import Natural
 from ephs.mechanics.solve.problem import Problem
 from ephs.mechanics.solve.stepping import Stepper
+from ephs.mechanics.tree.frames import Unplaced
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.codes import VECTOR
 
@@ -31,7 +32,9 @@ class Setting:
     options
         The method's own, by name.
     equations
-        The reduced form of the problem's scene, where it is there already.
+        The reduced form of the problem, where it is there already.
+    method
+        Name of the method, for messages.
     """
 
     problem: Problem
@@ -39,6 +42,7 @@ class Setting:
     control: Control
     options: Mapping[str, Any]
     equations: Any = None
+    method: str = ""
 
 
 @final
@@ -53,7 +57,7 @@ class Method:
     adaptive, fixed
         Whether it runs by rtol and atol, and with a constant step.
     systems, scenes
-        Whether it solves a System, and a Scene.
+        Whether it solves any System; and mechanisms: scenes, and systems that have joint coordinates.
     summary
         In words.
     make
@@ -87,7 +91,7 @@ class Method:
 
 
 def on_joints(make: Callable[..., Any]) -> Callable[[Setting], tuple[Stepper[Any], Policy | None]]:
-    """Constructor of a method on the reduced form of a scene, from ``make(equations, control, **options)``.
+    """Constructor of a method on the reduced form of a problem, from ``make(equations, control, **options)``.
 
     Its steps follow proportional-integral control by its ``exponent`` and its ``share``.
     """
@@ -95,7 +99,11 @@ def on_joints(make: Callable[..., Any]) -> Callable[[Setting], tuple[Stepper[Any
     def made(setting: Setting) -> tuple[Stepper[Any], Policy | None]:
         from ephs.mechanics.reduced.equations import Equations  # its kernels take a quarter of a second to load
 
-        equations = setting.equations or Equations(setting.problem.scene, setting.problem, setting.t0)
+        try:
+            equations = setting.equations or Equations(setting.problem, setting.t0)
+        except Unplaced as error:
+            serving = ", ".join(m.name for m in METHODS.values() if m.systems and m.name != setting.method)
+            raise OptionError("method", setting.method, f"{serving}: {error}") from None
         stepper = make(equations, setting.control, **setting.options)
         return stepper, None if setting.control.step is not None else Proportional(
             lambda: stepper.exponent, stepper.share
@@ -164,7 +172,7 @@ def _of_order_4(model: Model) -> ComponentMethod:
 
 
 def _radau(setting: Setting) -> tuple[Stepper[Any], Policy | None]:
-    if setting.problem.scene is not None:
+    if setting.problem.scene is not None or not _flat(setting.problem):
         return on_joints(_implicit)(setting)
     from ephs.mechanics.solve.radau import Radau
 
@@ -250,7 +258,7 @@ def _for_scenes(setting: Setting) -> tuple[Stepper[Any], Policy | None]:
 
 
 AUTO = Method("auto", 8, True, False, False, True, "rk54 or rk87, radau where stiff", _for_scenes)
-"""Method behind `auto` for scenes in joint coordinates."""
+"""Method behind `auto` for mechanisms in joint coordinates."""
 
 
 def chosen(name: str | Method, problem: Problem, *, step: float | None) -> tuple[Method, str]:
@@ -268,9 +276,6 @@ def chosen(name: str | Method, problem: Problem, *, step: float | None) -> tuple
         raise OptionError("method", name, f"one of {', '.join(known)}" + nearest_of(name, known))
     method = name if isinstance(name, Method) else METHODS[name]
     name = method.name
-    if problem.scene is None and not method.systems:
-        serving = ", ".join(m.name for m in METHODS.values() if m.systems)
-        raise OptionError("method", name, f"{serving}: {name} is for scenes")
     if problem.scene is not None and not method.scenes:
         raise OptionError("method", name, f"{', '.join(m.name for m in METHODS.values() if m.scenes)} for a scene")
     if step is not None and not method.fixed:
@@ -285,7 +290,17 @@ def _for_all(problem: Problem, step: float | None) -> tuple[Method, str]:
         return METHODS["natural"], "a constant step is given"
     if problem.scene is not None:
         return AUTO, "a scene without a constant step"
-    flat = all(manifold(slot.quantity.space).code == VECTOR for slot in problem.descriptor.states)
-    if flat:
+    if _flat(problem):
         return METHODS["radau"], "a system on vector spaces without a constant step"
-    return METHODS["natural4"], "a system on Lie groups without a constant step"
+    from ephs.mechanics.reduced.parts import parts_of
+
+    try:
+        parts_of(problem)
+    except Unplaced as error:
+        return METHODS["natural4"], f"a system on Lie groups without a constant step, where {error}"
+    return AUTO, "a mechanism without a constant step"
+
+
+def _flat(problem: Problem) -> bool:
+    """Whether all states lie in vector spaces."""
+    return all(manifold(slot.quantity.space).code == VECTOR for slot in problem.descriptor.states)

@@ -75,7 +75,7 @@ class Course:
                 bounds=bounds,
                 breakpoints=breakpoints,
             )
-        setting = Setting(seen, self.start, control, self.options)
+        setting = Setting(seen, self.start, control, self.options, method=self.method.name)
         return integrate_stepwise(
             seen,
             self.start,

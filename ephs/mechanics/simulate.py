@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ephs.mechanics.assembling import assembled, flat_joints
-from ephs.mechanics.build import drive_ports, initial_state, scene_inputs, scene_system, wrench_port
+from ephs.mechanics.build import drive_ports, initial_state, scene_inputs, scene_names, scene_system, wrench_port
 from ephs.mechanics.journaling import journaled
 from ephs.mechanics.methods import METHODS, Method, chosen
 from ephs.mechanics.motion import SceneMotion
@@ -346,6 +346,7 @@ def problem_of_scene(
         dependences=lambda: explain(scene),
         length=Snapshot.of(scene).scale(world.gravity).length,
         view=view,
+        names=scene_names(scene),
     )
     if initial:
         _on_joints(problem)

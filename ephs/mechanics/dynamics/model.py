@@ -67,7 +67,7 @@ class Dynamics:
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         self._problem = problem_of_scene(scene)
-        self._equations = Equations(scene, self._problem, 0.0, pushed=True)
+        self._equations = Equations(self._problem, 0.0, pushed=True)
         self._linear = Linearised(self._equations)
         self.layout = self._equations.layout
         self._links, self._names = Links(scene, self._equations), Names(scene)

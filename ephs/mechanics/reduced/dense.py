@@ -6,14 +6,12 @@ from typing import final
 
 import numpy as np
 
-from ephs.mechanics.build import component_path
 from ephs.mechanics.reduced.given import Given
 from ephs.mechanics.reduced.heat import Heats
 from ephs.mechanics.reduced.loop_kernels import accelerate, constraint_rows, correct, loop_gaps, reduce_rows
 from ephs.mechanics.reduced.mechanism import Reduced
 from ephs.mechanics.reduced.sweep_kernels import inertia_sweep, kinematics
 from ephs.mechanics.reduced.tables import CUT
-from ephs.mechanics.scene.geometry import Coupling
 from ephs.mechanics.solve.errors import Outcome, SolveError
 from ephs.semantics.bundle import Array
 from ephs.semantics.kernel_table import TEMPERATURE
@@ -36,8 +34,7 @@ def unmoved(reduced: Reduced, freedom: int) -> SolveError:
     link = int(np.flatnonzero(at <= freedom)[-1])
     edge, body = reduced.edges[link], reduced.bodies[link]
     name = f"joint {edge.name}" if edge.name else f"body {body}"
-    path = edge.path if edge.path is not None else component_path("bodies", str(body))
-    return SolveError(Outcome.UNDETERMINED, str(path), f"the rate of {name}, which moves no mass")
+    return SolveError(Outcome.UNDETERMINED, str(reduced.path(link)), f"the rate of {name}, which moves no mass")
 
 
 @final
@@ -80,7 +77,7 @@ class Dense:
         kinematics(tables, w, out, r)
         for i in self._cut:
             where = slice(int(tables.q_at[i]), int(tables.q_at[i] + tables.q_size[i]))
-            out[where] = Coupling(self.reduced.edges[i].pair).fit(w.relative[i], out[where])
+            out[where] = self.reduced.edges[i].pair.fit(w.relative[i], out[where])
         return out
 
     def rates(self, q: Array, y: Array, given: Given, heats: Heats, scal: Array, out: Array) -> tuple[int, int]:

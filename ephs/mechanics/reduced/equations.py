@@ -17,12 +17,11 @@ from ephs.mechanics.reduced.given import Given
 from ephs.mechanics.reduced.heat import heats_of
 from ephs.mechanics.reduced.layout import Layout
 from ephs.mechanics.reduced.led import Led
-from ephs.mechanics.reduced.mechanism import reduce_scene
+from ephs.mechanics.reduced.mechanism import reduce_system
 from ephs.mechanics.reduced.naming import tolerances, within
 from ephs.mechanics.reduced.paper import PaperStates
 from ephs.mechanics.reduced.reading import JointStates
 from ephs.mechanics.reduced.tables import SPRING, Workspace
-from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.solve.control import Tolerance
 from ephs.mechanics.solve.errors import Outcome, SolveError
 from ephs.mechanics.solve.march import Status
@@ -74,12 +73,12 @@ class Equations:
         Whether the loops were closed last at constraints that nearly repeat each other.
     """
 
-    def __init__(self, scene: Scene, problem: Problem, t0: float, *, pushed: bool = False) -> None:
+    def __init__(self, problem: Problem, t0: float, *, pushed: bool = False) -> None:
         self.problem = problem
         self.model = model = compile_model(
             problem.descriptor, problem.reference, problem.inputs(t0, problem.initial), matrix=False
         )
-        self.reduced = reduced = reduce_scene(scene, problem, model)
+        self.reduced = reduced = reduce_system(problem, model)
         self._light = reduced.workspace(dense=False)
         self._dense: Dense | None = None
         t = reduced.tables
@@ -99,13 +98,13 @@ class Equations:
         self.led = Led(problem, moved=bool(driven))
         self._makers = np.array([number[path] for path in reduced.made], dtype=int)
         self.scal = model.scal(0.0)
-        self.given = Given(scene, problem, reduced, self.nv)
+        self.given = Given(problem, reduced, self.nv)
         self.drive, self.wrench = self.given.drive, self.given.wrench
         self.constant = problem.constant
         self._paper, self.layout = PaperStates(reduced, problem, self._light), Layout.of(reduced)
         self.booking = Booking(self, self._paper)
         self.evaluations = 0
-        self.gravity = np.array(scene.world.gravity, dtype=float)
+        self.gravity = reduced.gravity
         self._driven = np.flatnonzero(t.driven)
         self._acted = self.given.acted(set(self._moving) if pushed else set())
         self._build(None)
@@ -351,7 +350,7 @@ class Equations:
         return 2 * self.n + len(self.engine.closing.end)
 
     def states(self, state: ReducedState) -> JointStates:
-        """All states of the scene's system."""
+        """All states of the system."""
         return JointStates(self._paper, self.layout, state.q, state.r, self.heats.entropies(state.heats))
 
     def start(self, t: float) -> ReducedState:

@@ -57,7 +57,7 @@ class Layout:
 
     @staticmethod
     def of(reduced: Reduced) -> "Layout":
-        """The layout of a scene in joint coordinates."""
+        """The layout of a system in joint coordinates."""
         t = reduced.tables
         taken = {edge.name for edge in reduced.edges if edge.name}
         edges: dict[str, list[tuple[int, Edge]]] = {}
@@ -81,10 +81,10 @@ class Layout:
             MappingProxyType({name: tuple(parts) for name, parts in edges.items()}),
             MappingProxyType(
                 {
-                    edge.path / "pe" / "q_r": slice(int(t.q_at[i]), int(t.q_at[i] + t.q_size[i]))
+                    edge.state: slice(int(t.q_at[i]), int(t.q_at[i] + t.q_size[i]))
                     for parts in edges.values()
                     for i, edge in parts
-                    if edge.path is not None
+                    if edge.path is not None and edge.state is not None
                 }
             ),
             reduced.coordinates,

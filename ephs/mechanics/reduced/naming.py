@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from ephs.mechanics.build import component_path
 from ephs.mechanics.reduced.mechanism import Reduced
 from ephs.mechanics.solve.control import Tolerance
 from ephs.mechanics.solve.errors import LARGEST, Outcome, SolveError
+from ephs.operad import Path
 from ephs.semantics.bundle import Array
 
 __all__ = ["counted", "tolerances", "within"]
@@ -25,7 +25,7 @@ def within(reduced: Reduced, q: Array, r: Array, heats: Array) -> None:
     for link in range(reduced.links):
         for values, first, size in ((q, t.q_at, t.q_size), (r, t.r_at, t.dim)):
             if not np.abs(values[int(first[link]) : int(first[link] + size[link])]).max(initial=0.0) < LARGEST:
-                raise SolveError(Outcome.RANGE, _path(reduced, link), "")
+                raise SolveError(Outcome.RANGE, str(reduced.path(link)), "")
     for path, value in zip(reduced.entropies, heats, strict=True):
         if not abs(value) < LARGEST:
             raise SolveError(Outcome.RANGE, str(path), "")
@@ -38,21 +38,14 @@ def counted(reduced: Reduced, entry: int) -> tuple[str, str]:
     if entry >= 2 * n:
         return str(reduced.entropies[entry - 2 * n]), "its heat"
     link = int(np.flatnonzero(reduced.tables.r_at[: reduced.links] <= entry % n)[-1])
-    return _path(reduced, link), "its position" if entry < n else "its rate"
+    return str(reduced.path(link)), "its position" if entry < n else "its rate"
 
 
 def tolerances(reduced: Reduced, tolerance: Tolerance, heat: float) -> Array:
     """A tolerance of what counts in errors: the tree's increments, its rates, the heats, in ``heat`` J per J/K."""
     of_joints: list[Array] = []
-    for link, edge in enumerate(reduced.edges[: reduced.links]):
-        path, kind = component_path("bodies", str(reduced.bodies[link])) / "pe" / "q", "pose"
-        if edge.path is not None:
-            path, kind = edge.path / "pe" / "q_r", "relative_pose"
+    for edge in reduced.edges[: reduced.links]:
+        path, kind = edge.state or Path(), "pose" if edge.path is None else "relative_pose"
         of_joints.append(np.full(edge.pair.dim, tolerance.at(path, kind)))
     heats = [heat * tolerance.at(path, "entropy") for path in reduced.entropies]
     return np.concatenate([*of_joints, *of_joints, np.array(heats)])
-
-
-def _path(reduced: Reduced, link: int) -> str:
-    edge = reduced.edges[link]
-    return str(edge.path if edge.path is not None else component_path("bodies", str(reduced.bodies[link])))

@@ -5,7 +5,6 @@ from typing import final
 
 import numpy as np
 
-from ephs.mechanics.build import component_path
 from ephs.mechanics.reduced.mechanism import Reduced
 from ephs.mechanics.reduced.sweep_kernels import kinematics
 from ephs.mechanics.reduced.table_kernels import ELEMENT, ENTROPY, MOMENTUM, POSE, RELATIVE, paper_rows
@@ -44,15 +43,15 @@ class PaperStates:
         """(path, where it comes from, number of the link, edge or entropy) of the states."""
         for number, path in enumerate(self.reduced.entropies):
             yield path, ENTROPY, number
-        for link, name in enumerate(self.reduced.bodies):
-            if name is not None:
-                at = component_path("bodies", name)
-                yield at / "pe" / "q", POSE, link
-                yield at / "ke" / "p", MOMENTUM, link
+        for number, link in enumerate(self.reduced.places):
+            if link.pose is not None:
+                yield link.pose.path, POSE, number
+            if link.momentum is not None:
+                yield link.momentum.path, MOMENTUM, number
         for number, edge in enumerate(self.reduced.edges):
-            if edge.path is not None:
+            if edge.path is not None and edge.state is not None:
                 spring = self.reduced.tables.kind[number] == SPRING
-                yield edge.path / "pe" / "q_r", RELATIVE if spring else ELEMENT, number
+                yield edge.state, RELATIVE if spring else ELEMENT, number
 
     def rows(self, q: Array, r: Array, s: Array) -> Array:
         """(rows, point_size) all states, of rows of joints' elements, rates and entropies."""
@@ -69,7 +68,7 @@ class PaperStates:
         return out
 
     def at(self, q: Array, r: Array, s: Array) -> dict[Path, Array]:
-        """All states of the scene's system."""
+        """All states of the system."""
         x = self.rows(q[None], r[None], s[None])[0]
         return {path: x[at : at + size] for path, (*_, at, size) in zip(self._paths, self._plan.tolist(), strict=True)}
 
@@ -79,9 +78,7 @@ class PaperStates:
         q = np.zeros(reduced.coordinates)
         for i, edge in enumerate(reduced.edges):
             if tables.kind[i] != SPRING:
-                body = component_path("bodies", str(reduced.bodies[i])) if i < reduced.links else Path()
-                # of a body that no joint holds, the element is its pose
-                given = initial[body / "pe" / "q" if edge.path is None else edge.path / "pe" / "q_r"]
+                given = edge.pair.manifold.identity() if edge.state is None else initial[edge.state]
                 q[int(tables.q_at[i]) : int(tables.q_at[i] + tables.q_size[i])] = given
         s = np.array([float(initial[path][0]) for path in reduced.entropies])
         return q, self._rates_of(q), s
@@ -110,11 +107,10 @@ class PaperStates:
         rates = np.zeros(reduced.freedoms)
         kinematics(tables, w, q, rates)
         twists: dict[int, Array] = {-1: np.zeros(6)}
-        for i, name in enumerate(reduced.bodies):
-            if name is None or not np.any(tables.inertia[i]):
+        for i, link in enumerate(reduced.places):
+            if link.momentum is None:
                 continue
-            momentum = initial[component_path("bodies", name) / "ke" / "p"]
-            twists[i] = np.linalg.solve(tables.inertia[i], momentum)
+            twists[i] = np.linalg.solve(tables.inertia[i], initial[link.momentum.path])
             columns: list[Array] = []
             freedoms: list[int] = []
             carried, here = np.eye(6), i

@@ -112,7 +112,7 @@ class Linearised:
     def __init__(self, equations: Equations) -> None:
         self.equations = equations
         self.memory = Tangents.of(equations.reduced.tables)
-        self._unread = unread(equations.problem.scene, equations.reduced)
+        self._unread = unread(equations.reduced)
         self._s_rate = np.zeros(equations.ns)
         self._made, self._powers = np.zeros(len(equations.reduced.made)), np.zeros(2)
         self._rows = self._rank = 0

@@ -9,7 +9,7 @@ from typing import final
 
 import numpy as np
 
-from ephs.mechanics.reduced.mechanism import Reduced, reduce_scene
+from ephs.mechanics.reduced.mechanism import Reduced, reduce_system
 from ephs.mechanics.reduced.tables import CUT, SPRING, TREE
 from ephs.mechanics.reduction.rewrite import Strength
 from ephs.mechanics.reduction.steps import Step, listed
@@ -81,7 +81,7 @@ def coordinate_steps(scene: Scene, problem: Problem, before: int) -> Iterator[St
     """The steps from a scene's system to its form in joint coordinates, as far as there is one."""
     model = compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial), matrix=False)
     try:
-        reduced = reduce_scene(scene, problem, model)
+        reduced = reduce_system(problem, model)
     except OptionError:
         return
     for step in (_tree, _groups, _loops, _redundant, _separate, _cyclic, _forces):
@@ -137,7 +137,7 @@ def loops(reduced: Reduced) -> tuple[Loop, ...]:
     return tuple(out)
 
 
-def cyclic(scene: Scene, reduced: Reduced, part: Part) -> Subgroup:
+def cyclic(reduced: Reduced, part: Part) -> Subgroup:
     """The motions of a whole mechanism that nothing reads: the algebra, in world axes, of its cyclic coordinates.
 
     They are motions of its only joint with the ground that leave gravity's potential as it is, where that joint has no
@@ -148,24 +148,24 @@ def cyclic(scene: Scene, reduced: Reduced, part: Part) -> Subgroup:
     held = [i for i in part.edges if t.first[i] < 0 or t.second[i] < 0]
     if len(held) != 1 or t.kind[held[0]] != TREE:
         return none
-    edge, free = reduced.edges[held[0]], reduced.twists[held[0]]
-    if edge.path is not None and np.any(scene.joint(edge.name).stiffness[edge.freedoms]):
+    free = reduced.twists[held[0]]
+    if t.spring[held[0]] >= 0:
         return none
-    kept = _invariance(scene.world.gravity)
+    kept = _invariance(reduced.gravity)
     if not free.shape[1] or not kept.shape[1]:
         return none
     left, sizes, _ = np.linalg.svd(np.linalg.qr(free)[0].T @ kept)
     return Subgroup(np.linalg.qr(free)[0] @ left[:, : int(np.sum(sizes > 1.0 - ASSEMBLY))])
 
 
-def unread(scene: Scene, reduced: Reduced) -> Index:
+def unread(reduced: Reduced) -> Index:
     """(n,) 1 for the tree's freedoms whose columns of a Jacobian by coordinates are zero wherever the mechanism is.
 
     Those of joints all of whose motions are cyclic: the others' cyclic motions are no columns, but their combinations.
     """
     out, t = np.zeros(reduced.freedoms, dtype=np.int64), reduced.tables
     for part in mechanisms(reduced):
-        group = cyclic(scene, reduced, part)
+        group = cyclic(reduced, part)
         (held,) = [i for i in part.edges if t.first[i] < 0 or t.second[i] < 0] if group.dim else [-1]
         if group.dim and group.dim == int(t.dim[held]):
             out[int(t.r_at[held]) : int(t.r_at[held]) + group.dim] = 1
@@ -282,12 +282,12 @@ def _separate(_scene: Scene, reduced: Reduced, before: int) -> Step | None:
 
 
 def _cyclic(scene: Scene, reduced: Reduced, before: int) -> Step | None:
-    found = [(part, cyclic(scene, reduced, part)) for part in mechanisms(reduced)]
+    found = [(part, cyclic(reduced, part)) for part in mechanisms(reduced)]
     found = [(part, group) for part, group in found if group.dim]
     if not found:
         return None
     pull = "nothing reads where a mechanism is as a whole"
-    if np.any(scene.world.gravity):
+    if np.any(reduced.gravity):
         pull += " but gravity, which sees neither turns about its direction nor shifts across it"
     said = [f"of {_called(part)}, {_motions(group)}" for part, group in found[:4]]
     said += [f"and of {len(found) - 4} more mechanisms"] if len(found) > 4 else []

@@ -5,17 +5,17 @@ Poses are 7-vectors ``[w, x, y, z, rx, ry, rz]``; every twist is left-trivialise
 """
 
 from dataclasses import dataclass
-from functools import cache
 from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ephs.mechanics.scene.model import IDENTITY_POSE, Joint, frozen
+from ephs.mechanics.scene.model import IDENTITY_POSE, Joint
 from ephs.semantics.spaces import PAIRS, SE3, Pair, pair
 from ephs.semantics.spaces import rotations as so3
 from ephs.semantics.spaces.codes import SE3 as SE3_CODE
 from ephs.semantics.spaces.codes import SO3 as SO3_CODE
+from ephs.semantics.spaces.pairs import left_inverse
 
 Array = NDArray[np.float64]
 
@@ -70,7 +70,7 @@ class Coupling:
 
     def left_inverse(self, basis: Array) -> Array:
         """(d, 6) of least norm with B⁺ B = 1, of a basis (6, d) that `basis` gave."""
-        return _left_inverse(self.pair) if self.middle is None else np.asarray(np.linalg.pinv(basis), dtype=float)
+        return left_inverse(self.pair) if self.middle is None else np.asarray(np.linalg.pinv(basis), dtype=float)
 
     def coordinates(self, x: Array) -> Array:
         """The coordinates (d,) of an element."""
@@ -84,18 +84,7 @@ class Coupling:
         """The element whose inclusion comes nearest to a pose; of several, one close to ``near``."""
         if self.middle is not None:
             return self._fit_universal(relative, near)
-        x = self._start(relative) if near is None else np.array(near)
-        for _ in range(30):
-            step = _left_inverse(self.pair) @ SE3.log(SE3.compose(SE3.inverse(self.pair.include(x)), relative))
-            x = self.pair.manifold.retract(x, step)
-            if np.linalg.norm(step) < 1e-13:
-                break
-        return x
-
-    def _start(self, relative: Array) -> Array:
-        pitch = dict(self.pair.parameters).get("pitch", 0.0)
-        # A screw's translation tells how often it was turned.
-        return np.array([relative[6] / pitch]) if pitch else self.identity()
+        return self.pair.fit(relative, near)
 
     def _fit_universal(self, relative: Array, near: Array | None) -> Array:
         middle = so3.quaternion_to_matrix(np.asarray(self.middle)[:4])
@@ -106,11 +95,6 @@ class Coupling:
         found = np.array([first, np.arctan2(rest[1, 0] - rest[0, 1], rest[0, 0] + rest[1, 1])])
         about = np.zeros(2) if near is None else near
         return found - 2.0 * np.pi * np.round((found - about) / (2.0 * np.pi))
-
-
-@cache
-def _left_inverse(of: Pair) -> Array:
-    return frozen(np.linalg.pinv(of.basis))
 
 
 def coupling(kind: str, pitch: float = 0.0, middle: Array | None = None) -> Coupling:

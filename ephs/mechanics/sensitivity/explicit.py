@@ -46,7 +46,7 @@ class ExplicitTangent:
 
     def __init__(self, family: Family, t0: float, method: str) -> None:
         self.family, self.t0, self.method = family, t0, tableau(method)
-        self.equations = Equations(family.problem.scene, family.problem, t0)
+        self.equations = Equations(family.problem, t0)
         self._others: dict[tuple[int, float], tuple[Problem, Equations]] = {}
         eq = self.equations
         t = eq.reduced.tables
@@ -168,7 +168,7 @@ class ExplicitTangent:
             return self.family.problem, self.equations
         if (number, offset) not in self._others:
             problem = self.family.at(number, offset)
-            found = Equations(problem.scene, problem, self.t0)
+            found = Equations(problem, self.t0)
             same_shape(self.equations._q, found._q, self.family.parameters[number].path)
             found.start(self.t0)
             self._others[number, offset] = problem, found

@@ -32,11 +32,14 @@ def exponential_law(primitive: Primitive) -> tuple[float, float] | None:
         return None
     match dict(primitive.parameters):
         case {"capacity": float(capacity), "temperature": float(temperature)}:
-            return capacity * temperature, capacity
+            c1, c2 = capacity * temperature, capacity
         case {"c1": float(c1), "c2": float(c2)}:
-            return c1, c2
+            pass
         case _:
             return None
+    points = c2 * np.array([-0.7, 1.1])  # others may call their numbers so
+    found = [float(primitive.energy({port: np.array([s])})) for port in primitive.bundle.ports for s in points]
+    return (c1, c2) if np.allclose(found, c1 * np.expm1(points / c2), rtol=1e-12, atol=0.0) else None
 
 
 @final

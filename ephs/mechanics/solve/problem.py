@@ -169,6 +169,8 @@ class Problem:
         Its unit of time in s.
     length
         Of the mechanism in m, by which errors of positions are measured.
+    names
+        Box of a body, joint or spring -> its name, where that is not the path itself.
     remarks
         What the statistics of a run say of it: the form of its equations.
     """
@@ -189,6 +191,7 @@ class Problem:
     view: Callable[[State], Mapping[Path, Array]] = States
     seconds: float = 1.0
     length: float = 1.0
+    names: Mapping[Path, str] = field(default_factory=dict)
     remarks: Mapping[str, Any] = field(default_factory=lambda: {"form": "paper"})
 
     def inputs(self, t: float, state: State) -> dict[Path, Input]:

@@ -60,7 +60,7 @@ class _Made:
     def of(scene: Scene, t0: float) -> "_Made":
         if Units.of(scene) != SI:
             raise Unlike(f"{scene.name} is solved in units of its own")
-        equations = Equations(scene, problem_of_scene(scene), t0)
+        equations = Equations(problem_of_scene(scene), t0)
         return _Made(equations, equations.start(t0))
 
     def arrays(self) -> list[Array]:

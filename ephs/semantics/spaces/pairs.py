@@ -11,6 +11,7 @@ Source: Lohmayer, Capobianco, Leyendecker, "Exergetic Port-Hamiltonian Systems f
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from types import MappingProxyType
 from typing import TYPE_CHECKING, TypeAlias, final
 
@@ -118,6 +119,30 @@ class Pair:
                 return np.concatenate((groups.SO3.exp(given[:3]), given[3:]))
             case _:
                 return given
+
+    def fit(self, relative: Array, near: Array | None = None) -> Array:
+        """The element whose inclusion comes nearest to a pose (7,); of several, one close to ``near``."""
+        pitch = dict(self.parameters).get("pitch", 0.0)
+        if near is not None:
+            x = np.array(near)
+        else:  # a screw's translation tells how often it was turned
+            x = np.array([relative[6] / pitch]) if pitch else self.manifold.identity()
+        for _ in range(30):
+            step = left_inverse(self) @ groups.SE3.log(
+                groups.SE3.compose(groups.SE3.inverse(self.include(x)), relative)
+            )
+            x = self.manifold.retract(x, step)
+            if np.linalg.norm(step) < 1e-13:
+                break
+        return x
+
+
+@cache
+def left_inverse(of: Pair) -> Array:
+    """(d, 6), read-only: the least matrix B⁺ with B⁺ B = 1."""
+    out = np.asarray(np.linalg.pinv(of.basis), dtype=float)
+    out.setflags(write=False)
+    return out
 
 
 @final

@@ -147,7 +147,7 @@ def test_a_pendulum_on_a_spring_has_the_derivatives_of_its_formula(tmp_path):
 @given(drawn=moving())
 def test_the_jacobian_of_a_step_is_that_of_its_right_hand_side(drawn):
     scene, model, state, _ = drawn
-    equations = Equations(scene, problem_of_scene(scene), 0.0)
+    equations = Equations(problem_of_scene(scene), 0.0)
     q, r, s = model.layout.split(state.array)
     here = replace(equations.start(0.0), q=q, r=r, heats=equations.heats.energies(s))
     jacobian = Jacobian(equations)
@@ -170,7 +170,7 @@ def test_inputs_that_read_the_state_are_in_the_jacobian(scene):
     if joint is not None:
         dim = scene.joint(joint).dim
         inputs[f"joints.{joint}"] = lambda t, state: -0.7 * np.sin(t + np.arange(dim))
-    equations = Equations(scene, problem_of_scene(scene, None, inputs), 0.0)
+    equations = Equations(problem_of_scene(scene, None, inputs), 0.0)
     start = equations.start(0.0)
     jacobian = Jacobian(equations)
     y, size = equations.vector(start), jacobian.size
@@ -187,7 +187,7 @@ def test_inputs_that_read_the_state_are_in_the_jacobian(scene):
 @given(drawn=moving())
 def test_momenta_and_their_forces_differentiate_as_differences_say(drawn):
     scene, model, state, _ = drawn
-    equations = Equations(scene, problem_of_scene(scene), 0.0)
+    equations = Equations(problem_of_scene(scene), 0.0)
     q, r, s = model.layout.split(state.array)
     n = equations.n
     linear = Linearised(equations)
@@ -211,7 +211,7 @@ def test_momenta_and_their_forces_differentiate_as_differences_say(drawn):
 def test_columns_by_all_joints_are_what_single_directions_say(drawn, fit):
     """Two ways to one Jacobian, both exact: to rounding."""
     scene, model, state, _ = drawn
-    equations = Equations(scene, problem_of_scene(scene), 0.0)
+    equations = Equations(problem_of_scene(scene), 0.0)
     linear, (q, r, s) = Linearised(equations), model.layout.split(state.array)
     linear.forward(q, r, s)
     found = linear.columns(solve=False, fit=fit)

@@ -22,7 +22,7 @@ SCENES = {file.stem: file for file in sorted((ROOT / "scenes").glob("*.toml"))} 
 
 
 def equations(scene):
-    return Equations(scene, problem_of_scene(scene), 0.0)
+    return Equations(problem_of_scene(scene), 0.0)
 
 
 def moved(eq, seed=0, far=0.3):

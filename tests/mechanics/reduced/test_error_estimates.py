@@ -25,7 +25,7 @@ def equations(tmp_path_factory):
     file = tmp_path_factory.mktemp("torsion") / "torsion.toml"
     file.write_text(SCENE, encoding="utf-8")
     scene = ephs.load(file)
-    return Equations(scene, problem_of_scene(scene), 0.0)
+    return Equations(problem_of_scene(scene), 0.0)
 
 
 def stepper(equations, method, **options):

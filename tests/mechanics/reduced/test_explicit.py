@@ -9,7 +9,7 @@ from hypothesis import given, settings
 import ephs
 from benchmarks.cases import CASES
 from ephs.mechanics.reduced.explicit import tableau
-from ephs.mechanics.reduced.mechanism import reduce_scene
+from ephs.mechanics.reduced.mechanism import reduce_system
 from ephs.mechanics.simulate import problem_of_scene
 from ephs.mechanics.solve.model import compile_model
 from ephs.testing import mechanisms
@@ -159,7 +159,7 @@ def test_few_unknowns_are_left():
     scene = ephs.load(SCENES[0].parent / "four-bar.toml")
     problem = problem_of_scene(scene)
     model = compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
-    reduced = reduce_scene(scene, problem, model)
+    reduced = reduce_system(problem, model)
     assert reduced.freedoms == 3
     assert len(reduced.cut) == 1
     assert reduced.unknowns < 0.1 * model.unknowns
@@ -210,10 +210,10 @@ def test_bad_options_are_named(options, message):
         ephs.simulate(BY_NAME["tumbling-body"].scene(), 0.1, **options)
 
 
-def test_explicit_methods_are_for_scenes():
+def test_explicit_methods_are_for_mechanisms():
     from examples import oscillator
 
-    with pytest.raises(ephs.OptionError, match="expected natural, natural4, radau: rk87 is for scenes"):
+    with pytest.raises(ephs.OptionError, match="expected natural, natural4, radau: the system has no body"):
         ephs.simulate(oscillator.free_oscillator, 1.0, method="rk87")
 
 

@@ -49,7 +49,7 @@ def five_bar(folder, mass=1.0):
 
 
 def equations(scene):
-    return Equations(scene, problem_of_scene(scene), 0.0)
+    return Equations(problem_of_scene(scene), 0.0)
 
 
 @pytest.fixture(scope="module")

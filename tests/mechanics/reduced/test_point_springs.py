@@ -45,7 +45,7 @@ def scene_of(one, two, folder):
 )
 def test_bodies_are_pulled_together(one, two, tmp_path):
     scene = scene_of(one, two, tmp_path)
-    eq = Equations(scene, problem_of_scene(scene), 0.0)
+    eq = Equations(problem_of_scene(scene), 0.0)
     state = eq.start(0.0)
     along = PLACES[two] - PLACES[one]
     distance = np.linalg.norm(along)

@@ -47,7 +47,7 @@ def equations(folder, gravity, stiffness):
     file = folder / "pair.toml"
     file.write_text(SCENE.format(gravity=gravity, stiffness=stiffness), encoding="utf-8")
     scene = ephs.load(file)
-    return Equations(scene, problem_of_scene(scene), 0.0)
+    return Equations(problem_of_scene(scene), 0.0)
 
 
 def stepper(eq, name):

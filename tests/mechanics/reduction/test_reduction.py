@@ -12,7 +12,7 @@ from benchmarks.cases import CASES
 from ephs import library
 from ephs.cli import main
 from ephs.mechanics.build import component_path, initial_state
-from ephs.mechanics.reduced.mechanism import reduce_scene
+from ephs.mechanics.reduced.mechanism import reduce_system
 from ephs.mechanics.reduction import coordinates
 from ephs.mechanics.reduction.rewrite import Strength
 from ephs.mechanics.scene.geometry import coupling_of
@@ -28,8 +28,8 @@ BY_NAME = {case.name: case for case in CASES}
 
 def reduced_of(scene):
     problem = problem_of_scene(scene)
-    return reduce_scene(
-        scene, problem, compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
+    return reduce_system(
+        problem, compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
     )
 
 
@@ -152,7 +152,7 @@ def test_what_no_group_explains_is_found_by_rank():
 
 def count(scene):
     reduced = reduced_of(scene)
-    return sum(coordinates.cyclic(scene, reduced, part).dim for part in coordinates.mechanisms(reduced))
+    return sum(coordinates.cyclic(reduced, part).dim for part in coordinates.mechanisms(reduced))
 
 
 TOP = """
@@ -216,7 +216,7 @@ def test_cyclic_coordinates_of_one_joint(tmp_path, gravity, kind, axis, more, ex
 def test_jacobians_leave_out_joints_that_only_move_what_nothing_reads(tmp_path, gravity, kind, axis, more, expected):
     joint = "" if kind is None else PIVOT.format(kind=kind, axis=axis, more=more)
     scene = scene_of(tmp_path, TOP.format(gravity=gravity, joint=joint))
-    assert coordinates.unread(scene, reduced_of(scene)).tolist() == expected
+    assert coordinates.unread(reduced_of(scene)).tolist() == expected
 
 
 def test_a_spring_to_the_ground_and_a_loop_read_where_a_mechanism_is(tmp_path):
@@ -235,7 +235,7 @@ def test_moving_along_cyclic_coordinates_changes_nothing_else(scene, seed):
     changed = {str(path): value for path, value in initial_state(scene).items()}
     shifted = set()
     for part in coordinates.mechanisms(reduced):
-        group = coordinates.cyclic(scene, reduced, part)
+        group = coordinates.cyclic(reduced, part)
         if not group.dim:
             continue
         move = SE3.exp(group.basis @ (0.5 * rng.standard_normal(group.dim)))

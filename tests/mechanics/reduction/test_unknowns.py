@@ -42,6 +42,6 @@ def test_the_first_step_begins_with_all_unknowns(motion, tmp_path):
 )
 def test_the_last_step_ends_with_the_unknowns_of_a_run(file):
     scene = ephs.load(file)
-    equations = Equations(scene, problem_of_scene(scene), 0.0)
+    equations = Equations(problem_of_scene(scene), 0.0)
     equations.start(0.0)
     assert ephs.reduce(scene).steps[-1].after == equations.stats()["unknowns"]

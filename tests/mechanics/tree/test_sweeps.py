@@ -27,7 +27,7 @@ class Tree:
     """A scene's tree: its equations, its records and a state aside of the initial one."""
 
     def __init__(self, scene, seed=0):
-        self.equations = eq = Equations(scene, problem_of_scene(scene), 0.0)
+        self.equations = eq = Equations(problem_of_scene(scene), 0.0)
         self.packed = links_of(eq.reduced).packed(eq.gravity)
         self.sweeps = sweeps(self.packed.kind)
         rng = np.random.default_rng(seed)

@@ -1,0 +1,145 @@
+"""What joint coordinates are made of: read from the structure of a flat system, whatever its names and its nesting."""
+
+import ast
+from dataclasses import replace
+from pathlib import Path as File
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import ephs
+from ephs import Pattern, junction, quantity
+from ephs.mechanics import components, joint, rigid_body
+from ephs.mechanics.build import initial_state, scene_inputs, scene_system
+from ephs.mechanics.reduced.mechanism import reduce_system
+from ephs.mechanics.simulate import problem_of_scene
+from ephs.mechanics.solve.model import compile_model
+from ephs.mechanics.solve.problem import Problem, Signal
+from ephs.mechanics.tree.frames import Unplaced, inertia_of
+from ephs.operad import Path
+from ephs.semantics import library, structures
+from ephs.semantics.bundle import Reference
+from ephs.semantics.primitives import power_ports
+from ephs.semantics.system import System
+from ephs.testing import mechanisms
+
+REDUCED = File(ephs.__file__).parent / "mechanics" / "reduced"
+FROM_MODEL = ("address", "dims", "parameters", "parameter_at")
+
+
+def reduced_of(problem):
+    model = compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial), matrix=False)
+    return reduce_system(problem, model)
+
+
+def problem_of(system, initial=None, signals=None):
+    return Problem("system", system, system.descriptor(), initial or system.state(), signals or {}, Reference())
+
+
+def renamed(scene, word):
+    """The system of a scene in one level, with names that say nothing, as a problem."""
+    flat = scene_system(scene).flatten()
+    boxes = {box: Path([word, f"b{i}"]) for i, box in enumerate(flat.pattern.boxes)}
+    outer = {j for j, of in flat.pattern.junctions.items() if of.exposed}
+    names = {j: j if j in outer else Path([f"{word}-j", f"j{i}"]) for i, j in enumerate(flat.pattern.junctions)}
+    pattern = Pattern(
+        junctions={names[j]: of for j, of in flat.pattern.junctions.items()},
+        boxes={
+            boxes[box]: {port: replace(at, junction=names[at.junction]) for port, at in of.ports.items()}
+            for box, of in flat.pattern.boxes.items()
+        },
+    )
+    system = System.of(pattern, {boxes[box]: filling for box, filling in flat.fillings.items()})
+    initial = {boxes[Path(tuple(path)[:-1])] / path[-1]: value for path, value in initial_state(scene).items()}
+    signals = {path: Signal(one.value, one.effort) for path, one in scene_inputs(scene).items()}
+    return problem_of(system, initial, signals)
+
+
+@given(mechanisms(max_bodies=3), st.sampled_from(["x", "pe", "a-b"]))
+def test_names_and_nesting_do_not_matter(scene, word):
+    one, other = reduced_of(problem_of_scene(scene)), reduced_of(renamed(scene, word))
+    for name, first, second in zip(one.tables._fields, one.tables, other.tables, strict=True):
+        if name not in FROM_MODEL:
+            assert np.array_equal(first, second), name
+    assert np.array_equal(one.gravity, other.gravity)
+    assert all(np.array_equal(a, b) for a, b in zip(one.twists, other.twists, strict=True))
+    heavier = {name: replace(b, mass=2.0 * b.mass) for name, b in scene.bodies.items()}
+    control = reduced_of(problem_of_scene(replace(scene, bodies=heavier)))
+    assert not np.array_equal(one.tables.inertia, control.tables.inertia)
+
+
+def test_no_module_of_joint_coordinates_knows_scenes():
+    found = {
+        (file.name, name)
+        for file in REDUCED.glob("*.py")
+        for node in ast.walk(ast.parse(file.read_text()))
+        if isinstance(node, ast.ImportFrom | ast.Import)
+        for name in [getattr(node, "module", None) or "", *(alias.name for alias in node.names)]
+        if name.startswith("ephs.mechanics.scene") or name == "ephs.mechanics.build"
+    }
+    assert not found
+
+
+# ---- by hand ---------------------------------------------------------------------------------------------------
+
+MOMENTUM = quantity.body_momentum
+
+
+def hung(of, **more):
+    """A body on the ground by a joint; ``more`` are further boxes: their filling, and their ports' junctions."""
+    junctions = {"g": junction(MOMENTUM), "p": junction(MOMENTUM)}
+    boxes = {"ground": {"p": "g"}, "body": {"p": "p"}, "hinge": {"p1": "g", "p2": "p"}}
+    parts = {"ground": components.ground(), "body": of, "hinge": joint("revolute", friction=0.1)}
+    for name, (filling, ports) in more.items():
+        boxes[name], parts[name] = ports, filling
+        for port, at in ports.items():
+            junctions.setdefault(at, junction(filling.interface[Path.of(port)].quantity))
+    return Pattern(junctions=junctions, boxes=boxes)(**parts)
+
+
+def test_bodies_and_joints_of_a_system_have_the_names_of_their_boxes():
+    found = reduced_of(problem_of(hung(rigid_body(1.0, [0.3, 0.4, 0.5]))))
+    assert found.bodies == ("body",)
+    assert [(edge.name, str(edge.path)) for edge in found.edges] == [("hinge", "hinge")]
+    assert found.gravity.tolist() == [0.0, 0.0, -9.81]
+
+
+def test_weights_that_differ_are_forces_of_their_own():
+    junctions = {"p": junction(MOMENTUM), "other": junction(MOMENTUM)}
+    pattern = Pattern(junctions=junctions, boxes={"a": {"p": "p"}, "b": {"p": "other"}})
+    system = pattern(a=rigid_body(1.0, [1, 1, 1]), b=rigid_body(2.0, [1, 1, 1], gravity=(0, 0, 0)))
+    found = reduced_of(problem_of(system))
+    assert not found.gravity.any()
+    assert found.tables.weight.tolist() == [-1, -1]
+    assert [str(edge.path) for edge in found.edges[2:]] == ["a.pe"]
+
+
+@pytest.mark.parametrize(
+    ("name", "filling", "ports", "words"),
+    [
+        ("spin", library.point_mass(m=1.0), {"p": "x"}, "stores momentum"),
+        ("spring", library.spring(k=1.0), {"q": "x"}, "stores displacement"),
+        ("weld", components.frame_change([1, 0, 0, 0, 1, 0, 0], "p_j", "p"), {"p": "p", "p_j": "g"}, "without a joint"),
+    ],
+)
+def test_what_has_no_place_is_refused_by_path(name, filling, ports, words):
+    system = hung(rigid_body(1.0, [0.3, 0.4, 0.5]), **{name: (filling, ports)})
+    with pytest.raises(Unplaced, match=words) as refused:
+        reduced_of(problem_of(system))
+    assert str(refused.value.path).startswith(name)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_an_inertia_is_read_from_the_energy_itself(seed):
+    rng = np.random.default_rng(seed)
+    root, mass = rng.standard_normal((3, 3)), rng.uniform(0.1, 9.0)
+    inertia = root @ root.T + 0.1 * np.eye(3)
+    inverse = np.linalg.inv(np.block([[inertia, np.zeros((3, 3))], [np.zeros((3, 3)), mass * np.eye(3)]]))
+    plain = structures.quadratic("store", power_ports(p=MOMENTUM), inverse, (), trusted=True)
+    found, exact = inertia_of(plain), inertia_of(components.kinetic(mass, inertia))
+    assert np.allclose(found, exact, rtol=0.0, atol=4e-15 * np.linalg.cond(inverse) * np.abs(exact).max())
+    turned = np.array(inverse)
+    turned[0, 3] = turned[3, 0] = 0.3 * np.sqrt(inverse[0, 0] * inverse[3, 3])
+    assert inertia_of(structures.quadratic("store", power_ports(p=MOMENTUM), turned, (), trusted=True)) is None
