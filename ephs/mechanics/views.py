@@ -148,7 +148,9 @@ class Names:
 
     def __init__(self, scene: Scene) -> None:
         now = Snapshot.of(scene)
-        self.links: dict[str, Link] = {link.name: link for link in reversed(now.links)}
+        self.links: dict[str, Link] = {}
+        for link in now.links:  # a joint comes before an implicit one of its name
+            self.links.setdefault(link.name, link)
         self.number = {name: i for i, name in enumerate(now.names)}
         self.implicit = {name for name, _ in scene.implicit_joints()} - {name for name, _ in scene.all_joints()}
         self.split = {name for name, j in scene.all_joints() if j.middle is not None}

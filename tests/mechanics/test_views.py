@@ -137,6 +137,8 @@ def test_names_read_what_solutions_say(followers):
 
 def test_what_is_not_there_is_named_with_what_is_near(followers):
     view = Names(followers).view({})
+    assert list(view.joints) == ["pin", "elbow", "wrist", "comet"]
+    assert list(view.bodies) == list(followers.bodies)
     with pytest.raises(AttributeError, match=r"no joints\.writs; there are: .*; did you mean 'wrist'"):
         view.joints.writs  # noqa: B018
     with pytest.raises(KeyError, match=r"no bodies\.arm"):

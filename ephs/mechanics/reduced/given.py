@@ -55,7 +55,7 @@ class Given:
 
     def _value(self, port: Path, t: float, state: Mapping[Path, Array] | None) -> Array | float:
         signal = self._signals[port]
-        return signal.at(t, state or {}) if state is not None or signal.constant else 0.0
+        return signal.at(t, {} if state is None else state) if state is not None or signal.constant else 0.0
 
     def acted(self, edges: set[int]) -> tuple[frozenset[int], frozenset[int]]:
         """Edges, beside those given, and links on which they act."""

@@ -51,7 +51,7 @@ class Signal:
     effort
         True where the effort is prescribed.
     name
-        What the user calls it.
+        What the user calls it; empty where it is made of other signals.
     size
         How many numbers a function has to give; not checked where None.
     """
@@ -76,6 +76,8 @@ class Signal:
         """
         if not callable(self.value):
             return np.atleast_1d(np.asarray(self.value, dtype=float))
+        if not self.name:  # made of signals that are checked
+            return self.value(t, state)
         try:
             given = self.value(t, state)
             found = np.atleast_1d(np.asarray(given, dtype=float))
