@@ -223,3 +223,29 @@ def off(q: float) -> float:
     if q > 10.0:
         raise ZeroDivisionError("off the table")
     return 0.0
+
+
+def truss() -> ephs.Scene:
+    """Two bars in line between two fixed pins, in gravity across them."""
+    bars = [
+        f"""
+        [bodies.{name}]
+        mass = 1.0
+        inertia = [0.001, 0.08, 0.08]
+        position = [{x}, 0.0, 0.0]
+        """
+        for name, x in (("left", 0.5), ("right", 1.5))
+    ]
+    pins = [
+        f"""
+        [joints.{name}]
+        type = "revolute"
+        bodies = [{first!r}, {second!r}]
+        at = [{x}, 0.0, 0.0]
+        axis = [0.0, 0.0, 1.0]
+        """
+        for name, first, second, x in (
+            ("start", "ground", "left", 0.0), ("middle", "left", "right", 1.0), ("end", "right", "ground", 2.0),
+        )
+    ]  # fmt: skip
+    return scene("".join([*bars, *pins]), "[world]\ngravity = [0.0, -9.81, 0.0]\n")

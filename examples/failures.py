@@ -29,6 +29,7 @@ from examples.failing import (
     oscillator,
     pendulum,
     slide,
+    truss,
     tumbling,
 )
 
@@ -229,6 +230,11 @@ CASES = (
     Case(
         Outcome.OPEN, "a crank turned farther than its linkage goes", lambda: four_bar(1.2), ("rk54", "rk87"),
         r"joints\.hip", "hip", 6.0, 0.02, (4.0, 4.1),
+    ),
+    Case(
+        Outcome.SHAKY, "two bars in line that carry a weight", truss,
+        ("natural", "rk54", "rk87", "radau", "variational", "alpha", "ida"), r"ground|joints\.\w+", ".", step=0.01,
+        within=(0.0, 0.01),
     ),
     Case(Outcome.UNSUITED, "a body's pose, for radau without a scene", tumbling, ("radau",), r"body\.pe\.q", "vector"),
     Case(

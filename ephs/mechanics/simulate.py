@@ -18,6 +18,7 @@ from ephs.mechanics.reduction.folded import folded_problem
 from ephs.mechanics.redundancy import explain
 from ephs.mechanics.running import Course
 from ephs.mechanics.scene.document import scene_to_text
+from ephs.mechanics.scene.meant import is_shaky
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.state import Snapshot
 from ephs.mechanics.signals import asked_of, jumps_of, signal, times_of
@@ -344,6 +345,7 @@ def problem_of_scene(
         scene=scene,
         document=scene_to_text(scene),
         dependences=lambda: explain(scene),
+        shaky=lambda: is_shaky(scene),
         length=Snapshot.of(scene).scale(world.gravity).length,
         view=view,
         names=scene_names(scene),

@@ -10,6 +10,7 @@ It is refused. Where they open with the motion, it is a mechanism near a singula
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,8 @@ STRIDE, STRIDES = 0.2, 5
 LARGEST = 60
 """Bodies beyond which a scene is taken at its word: the decision costs the third power of their number."""
 ROUNDS = 4
+SHAKEN, LEFT = 40, 0.05
+"""Iterations that close joints after a step, and the part of it that is left where it was along a finite motion."""
 ROUNDING = 10.0 * REGULAR
 """Singular values of a mechanism that moves exactly, beside the largest: of some tens of rows, 8 n ε."""
 
@@ -63,6 +66,37 @@ def as_meant(scene: Scene) -> tuple[Scene, str, list[Fault]]:
     frames = {link.name: link.frame2 for link in exact}
     out = rebuilt(_framed(scene, "", frames), now, poses, now.twists if twists is None else twists, xs)
     return out, f"joint frames are moved by up to {by:.1g} m or rad, so that the mechanism moves as it is meant to", []
+
+
+@in_one_thread
+def is_shaky(scene: Scene) -> bool:
+    """Whether a mechanism's velocities are of first order only: along none of them it comes to another configuration.
+
+    So it is of two bars in line between two fixed pins: its middle has a velocity, and no place to go.
+    """
+    now = Snapshot.of(scene)
+    if len(now.bodies) > LARGEST or len(now.links) <= len(now.bodies):  # no loop
+        return False
+    scale, links = now.scale(scene.world.gravity), now.links
+    _, sigma, vt = np.linalg.svd(_matrix(links, now.poses, scale), full_matrices=True)
+    free = vt[rank_of(sigma, EXPLICIT) :]
+    sums = [one + two for one, two in combinations(free, 2)]
+    return len(free) > 0 and not any(
+        _comes_away(links, now.poses, sign * way, scale) for way in (*free, *sums) for sign in (1.0, -1.0)
+    )
+
+
+def _comes_away(links: Sequence[Link], poses: Array, way: Array, scale: Scale) -> bool:
+    """Whether joints close again near by, after a step along a velocity, elsewhere than before it.
+
+    Back to where bars were in line the gap falls by a half from one iteration to the next.
+    """
+    unit = np.array([1.0] * 3 + [scale.length] * 3)
+    there = _stepped(poses, STRIDE / np.abs(way).max() * way, scale)
+    for _ in range(SHAKEN):
+        there = _stepped(there, -_solved(links, there, scale), scale)
+    moves = [SE3.log(SE3.compose(SE3.inverse(a), b)) / unit for a, b in zip(poses, there, strict=True)]
+    return bool(np.abs(moves).max() > LEFT * STRIDE)
 
 
 def _matrix(links: Sequence[Link], poses: Array, scale: Scale) -> Array:

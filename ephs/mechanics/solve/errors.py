@@ -30,6 +30,7 @@ class Outcome(StrEnum):
     SINGULAR = "the step's equations stay singular"
     CONTRADICTION = "a constraint contradicts the others"
     OPEN = "a loop that does not close near by"
+    SHAKY = "a mechanism that moves to first order only"
     TURN = "a rotation of π or more in one step"
     TEMPERATURE = "an absolute temperature that is not positive"
     ENTROPY = "a component that destroys entropy"
@@ -62,6 +63,7 @@ _ADVICE = {
     Outcome.SINGULAR: "take a smaller step, start elsewhere, or use natural, which leaves out what repeats",
     Outcome.CONTRADICTION: "check prescribed motions and initial values, or take a smaller step",
     Outcome.OPEN: "take a smaller step, or check what is prescribed: the mechanism may be at the end of its travel",
+    Outcome.SHAKY: "change its geometry or hold it by springs: rigid joints carry nothing across their line",
     Outcome.TURN: "take a smaller step: h·|ω| must stay below π",
     Outcome.TEMPERATURE: "check initial temperatures and heat capacities, or take a smaller step",
     Outcome.ENTROPY: "mend the component's function there; if it is right, take a smaller step",

@@ -167,6 +167,9 @@ class Run(Protocol):
         ...
 
 
+_AT_LOOPS = (Outcome.OPEN, Outcome.CONTRADICTION, Outcome.DIVERGED, Outcome.SINGULAR, Outcome.TINY)
+
+
 @contextmanager
 def failures_of(run: Run) -> Generator[None, None, None]:
     """Failures and interruptions inside become those of the run, with its time and partial solution."""
@@ -175,12 +178,15 @@ def failures_of(run: Run) -> Generator[None, None, None]:
             yield
     except (SolveError, ArithmeticError, np.linalg.LinAlgError) as raised:
         error = solve_error_of(raised)
+        outcome = error.outcome
+        if outcome in _AT_LOOPS and run.problem.shaky is not None and run.problem.shaky():
+            outcome = Outcome.SHAKY
         failed = Interrupted if isinstance(error.cause, KeyboardInterrupt) else SimulationError
         told = [error.equation]
         if error.outcome in (Outcome.SINGULAR, Outcome.CONTRADICTION, Outcome.DIVERGED) and run.problem.dependences:
             told.append(run.problem.dependences())
         equation = "; ".join(filter(None, told))
-        raise failed(error.outcome, run.t * run.problem.seconds, error.path, equation, run.solution()) from error.cause
+        raise failed(outcome, run.t * run.problem.seconds, error.path, equation, run.solution()) from error.cause
     except KeyboardInterrupt as error:
         raise Interrupted(Outcome.INTERRUPTED, run.t * run.problem.seconds, "", "", run.solution()) from error
     except MemoryError as error:

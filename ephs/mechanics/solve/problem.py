@@ -156,6 +156,8 @@ class Problem:
         The scene that the system was built from, or None.
     dependences
         Says in words which constraints depend on which: what a run that fails at them tells its user.
+    shaky
+        Whether the mechanism has velocities, but no finite motion that belongs to them.
     document
         The scene as text, for solution files.
     shown
@@ -187,6 +189,7 @@ class Problem:
     scene: Any = None
     document: str = ""
     dependences: Callable[[], str] | None = None
+    shaky: Callable[[], bool] | None = None
     shown: "Callable[[Record, Mapping[str, Any]], tuple[Problem, Record, Mapping[str, Any]]] | None" = None
     gaps: Callable[["Solution"], Array] | None = None
     given: Callable[[State], State] | None = None
