@@ -139,7 +139,6 @@ GROUPS = {
             "ephs/mechanics/solve/gauss_kernels.py",
             "ephs/mechanics/reduced/loop_kernels.py",
             "ephs/mechanics/reduced/sweep_kernels.py",
-            "ephs/mechanics/reduced/table_kernels.py",
         ),
         (
             *RUNS,

@@ -381,7 +381,7 @@ class Dynamics:
 
     def _of_states(self, states: States) -> State:
         eq = self._equations
-        q, r, s = PaperStates(eq.reduced, replace(self._problem, initial=states), eq.work).initial()
+        q, r, s = PaperStates(eq.reduced, replace(self._problem, initial=states)).initial()
         with failing_at(0.0):  # momenta off the joints, as some methods leave them: the nearest in the mass metric
             r = np.asarray(np.linalg.solve(eq.mass(q, r), self._links.momenta(states)), dtype=float)
             return self._state(eq.closed(self._counted(q, r, s)))

@@ -28,6 +28,7 @@ from ephs.semantics.stage import (
 from ephs.semantics.stage.reaching import Atom
 
 __all__ = [
+    "KERNEL",
     "ON_BODIES",
     "ON_CUT",
     "ON_TREE",

@@ -6,8 +6,10 @@ from typing import TYPE_CHECKING, final
 
 import numpy as np
 
+from ephs.mechanics.engine.states import STATES, Stored
+from ephs.mechanics.engine.tables import table_of
 from ephs.mechanics.reduced.paper import PaperStates
-from ephs.mechanics.reduced.table_kernels import stored_energies
+from ephs.mechanics.solve.model import STORING
 from ephs.semantics.bundle import Array
 
 if TYPE_CHECKING:
@@ -21,7 +23,12 @@ class Booking:
     """The books of one mechanism's steps."""
 
     def __init__(self, equations: "Equations", paper: PaperStates) -> None:
-        self._equations, self._paper, self._memory = equations, paper, equations.model.memory()
+        self._equations, self._paper = equations, paper
+        t, m = equations.model.tables, equations.model.memory()
+        kept = np.flatnonzero(t.kind == STORING)
+        places = np.stack([kept, t.parameter_at[kept], t.read_x_at[kept]], axis=1)
+        self._storages = table_of(Stored, np.hstack([t.address[kept, None], t.dims[kept], places]))
+        self._memory = m.x, m.v, m.e, m.lam, m.f, m.c, m.jac, m.work
         self._last = np.zeros(0), np.zeros(0)
 
     def step(
@@ -53,7 +60,11 @@ class Booking:
         q, r, heats = zip(*((state.q, state.r, state.heats) for state in states), strict=True)
         x = self._paper.rows(np.array(q), np.array(r), eq.heats.entropies(np.array(heats)))
         energies = np.zeros((len(states), len(eq.problem.descriptor.components)))
-        eq.refuse(*stored_energies(eq.model.tables, eq.scal, self._memory, x, energies))
+        t, fault = eq.model.tables, np.zeros(1, dtype=np.int64)
+        status = STATES.compiled()["energies"](
+            self._storages, t.read_x, t.parameters, eq.scal, x, *self._memory, energies, fault
+        )
+        eq.refuse(status, int(fault[0]))
         return x, energies
 
     def _energies(self, state: "ReducedState") -> Array:

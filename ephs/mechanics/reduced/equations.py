@@ -79,7 +79,6 @@ class Equations:
             problem.descriptor, problem.reference, problem.inputs(t0, problem.initial), matrix=False
         )
         self.reduced = reduced = reduce_system(problem, model)
-        self._light = reduced.workspace(dense=False)
         self._dense: Dense | None = None
         t = reduced.tables
         self._moving = [i for i in range(len(reduced.edges)) if t.kind[i] != SPRING]
@@ -101,7 +100,7 @@ class Equations:
         self.given = Given(problem, reduced, self.nv)
         self.drive, self.wrench = self.given.drive, self.given.wrench
         self.constant = problem.constant
-        self._paper, self.layout = PaperStates(reduced, problem, self._light), Layout.of(reduced)
+        self._paper, self.layout = PaperStates(reduced, problem), Layout.of(reduced)
         self.booking = Booking(self, self._paper)
         self.evaluations = 0
         self.gravity = reduced.gravity

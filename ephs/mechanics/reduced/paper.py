@@ -5,10 +5,10 @@ from typing import final
 
 import numpy as np
 
+from ephs.mechanics.engine.states import ELEMENT, ENTROPY, MOMENTUM, POSE, RELATIVE, STATES, Ends, Source, Walked
+from ephs.mechanics.engine.tables import table_of
 from ephs.mechanics.reduced.mechanism import Reduced
-from ephs.mechanics.reduced.sweep_kernels import kinematics
-from ephs.mechanics.reduced.table_kernels import ELEMENT, ENTROPY, MOMENTUM, POSE, RELATIVE, paper_rows
-from ephs.mechanics.reduced.tables import SPRING, Workspace
+from ephs.mechanics.reduced.tables import SPRING
 from ephs.mechanics.solve.errors import Outcome, SolveError
 from ephs.mechanics.solve.problem import Problem
 from ephs.operad import Path
@@ -24,19 +24,30 @@ is above 1: nodal momenta of some methods do differ, to their order."""
 
 @final
 class PaperStates:
-    """The map of states for one problem; it shares the scratch memory of its equations."""
+    """The map of states for one problem."""
 
-    def __init__(self, reduced: Reduced, problem: Problem, work: Workspace) -> None:
-        self.reduced, self.problem, self.work = reduced, problem, work
+    def __init__(self, reduced: Reduced, problem: Problem) -> None:
+        self.reduced, self.problem = reduced, problem
         slots = {slot.path: slot for slot in problem.descriptor.states}
         self._paths: list[Path] = []
-        plan: list[tuple[int, int, int, int]] = []
+        t, plan = reduced.tables, []
         for path, source, number in self._sources():
             if path in slots:
                 self._paths.append(path)
-                plan.append((source, number, slots[path].at, slots[path].quantity.space.size))
-        self._plan = np.array(plan, dtype=np.int64).reshape(-1, 4)
-        self._sign: Array | None = None
+                start = int(t.q_at[number]) if source == ELEMENT else number
+                plan.append([source, start, slots[path].at, slots[path].quantity.space.size, 0])
+        self._plan = np.array(plan, dtype=np.int64).reshape(-1, Source.integer_width)
+        walked, springs = slice(0, reduced.links), np.flatnonzero(t.kind == SPRING)
+        joints = np.stack(
+            [t.parent, *(column[walked] for column in (t.forward, t.code, t.dim, t.q_at, t.r_at))], axis=1
+        )
+        frames = [t.offset1, t.offset2, t.basis.reshape(-1, 36)]
+        bodies = np.hstack([*(column[walked] for column in frames), t.inertia.reshape(-1, 36)])
+        ends = np.stack([t.first[springs], t.second[springs]], axis=1)
+        offsets = np.hstack([t.offset1[springs], t.offset2[springs]])
+        self._tables = table_of(Walked, joints, bodies), table_of(Ends, ends, offsets)
+        self._memory = np.zeros((reduced.links + 1, 7)), np.zeros((reduced.links + 1, 6))
+        self._known = False
         self._rest = problem.descriptor.pack(problem.initial)
 
     def _sources(self) -> Iterator[tuple[Path, int, int]]:
@@ -51,26 +62,29 @@ class PaperStates:
         for number, edge in enumerate(self.reduced.edges):
             if edge.path is not None and edge.state is not None:
                 spring = self.reduced.tables.kind[number] == SPRING
-                yield edge.state, RELATIVE if spring else ELEMENT, number
+                first = number - int(np.count_nonzero(self.reduced.tables.kind[:number] != SPRING))
+                yield edge.state, RELATIVE if spring else ELEMENT, first if spring else number
 
     def rows(self, q: Array, r: Array, s: Array) -> Array:
         """(rows, point_size) all states, of rows of joints' elements, rates and entropies."""
         out = np.tile(self._rest, (q.shape[0], 1))
-        if self._sign is None and q.shape[0]:
-            self._sign = np.ones(len(self._paths))
+        if not self._known and q.shape[0]:
+            self._known = True
             first = self.rows(q[:1], r[:1], s[:1])[0]
-            for k, (source, _, at, _) in enumerate(self._plan.tolist()):
+            for row in self._plan:
+                source, _, at, *_ = row.tolist()
                 # a pose has two quaternions: that one which is continuous with the initial one
-                if source in (POSE, RELATIVE) and float(first[at : at + 4] @ self._rest[at : at + 4]) < 0.0:
-                    self._sign[k] = -1.0
-        if self._sign is not None:
-            paper_rows(self.reduced.tables, self.work, self._plan, self._sign, q, r, s, out)
+                row[-1] = source in (POSE, RELATIVE) and float(first[at : at + 4] @ self._rest[at : at + 4]) < 0.0
+        plan = table_of(Source, self._plan)
+        STATES.compiled()["rows"](*self._tables, plan, q, r, s, *self._memory, out)
         return out
 
     def at(self, q: Array, r: Array, s: Array) -> dict[Path, Array]:
         """All states of the system."""
         x = self.rows(q[None], r[None], s[None])[0]
-        return {path: x[at : at + size] for path, (*_, at, size) in zip(self._paths, self._plan.tolist(), strict=True)}
+        return {
+            path: x[at : at + size] for path, (_, _, at, size, _) in zip(self._paths, self._plan.tolist(), strict=True)
+        }
 
     def initial(self) -> tuple[Array, Array, Array]:
         """(q, r, s) of the problem's initial states."""
@@ -103,9 +117,8 @@ class PaperStates:
 
     def _rates_of(self, q: Array) -> Array:
         """The tree's rates from the bodies' momenta: from each body to the nearest one with inertia before it."""
-        tables, reduced, initial, w = self.reduced.tables, self.reduced, self.problem.initial, self.work
+        tables, reduced, initial = self.reduced.tables, self.reduced, self.problem.initial
         rates = np.zeros(reduced.freedoms)
-        kinematics(tables, w, q, rates)
         twists: dict[int, Array] = {-1: np.zeros(6)}
         for i, link in enumerate(reduced.places):
             if link.momentum is None:
@@ -116,14 +129,25 @@ class PaperStates:
             carried, here = np.eye(6), i
             while here == i or here not in twists:
                 d, at = int(tables.dim[here]), int(tables.r_at[here])
-                columns.append(carried @ w.motion[here, :d].T)
+                inner, motion = self._joint(q, here)
+                columns.append(carried @ motion)
                 freedoms += range(at, at + d)
-                carried = carried @ SE3.adjoint(SE3.inverse(w.inner[here]))
+                carried = carried @ SE3.adjoint(SE3.inverse(inner))
                 here = int(tables.parent[here])
             own = twists[i] - carried @ twists[here]
             root = _root(tables.inertia[i])  # what hardly has inertia knows little of its twist
             rates[freedoms] = np.linalg.lstsq(root @ np.column_stack(columns), root @ own, rcond=None)[0]
         return rates
+
+    def _joint(self, q: Array, i: int) -> tuple[Array, Array]:
+        """Pose of a body in the one before it, and (6, d) the twists that its joint's rates make."""
+        t, pair = self.reduced.tables, self.reduced.edges[i].pair
+        near, far = t.offset1[i], t.offset2[i]
+        there = SE3.compose(near, pair.include(q[int(t.q_at[i]) : int(t.q_at[i] + t.q_size[i])]))
+        ahead = SE3.compose(there, SE3.inverse(far))
+        if t.forward[i]:
+            return ahead, SE3.adjoint(far) @ pair.basis
+        return SE3.inverse(ahead), -SE3.adjoint(there) @ pair.basis
 
 
 def _root(inertia: Array) -> Array:

@@ -42,9 +42,12 @@ class Entry:
     counts: tuple[int, int, int, int, int]
 
 
-def entry_of(primitive: Primitive, reference: Reference) -> Entry:
-    """The entry of a primitive; its kernel is compiled if need be."""
-    address, numbers, callback = address_of(primitive, reference)
+def entry_of(primitive: Primitive, reference: Reference, *, reversible: bool = True) -> Entry:
+    """The entry of a primitive; its kernel is compiled if need be, of reversible ones where they are asked for."""
+    if reversible or not isinstance(primitive, Reversible):
+        address, numbers, callback = address_of(primitive, reference)
+    else:
+        address, numbers, callback = 0, (), None
     kind = REVERSIBLE if isinstance(primitive, Reversible) else IRREVERSIBLE
     multipliers = primitive.multipliers if isinstance(primitive, Reversible) else 0
     bundle = primitive.bundle

@@ -147,8 +147,8 @@ def compile_model(
     Parameters
     ----------
     matrix
-        Whether to lay out the Jacobian, which most of the tables is; without it the components are there, and the whole
-        cannot be evaluated.
+        Whether to lay out the Jacobian, which most of the tables is; without it storages and irreversible components
+        are there, and the whole cannot be evaluated.
 
     Raises
     ------
@@ -159,7 +159,7 @@ def compile_model(
     given = d.complete_inputs(inputs)
     n_rate, n_effort, n_lam = d.rate_size, d.effort_size, d.multiplier_size
     size = d.unknowns(given)
-    each = [entry_of(primitive, reference) for primitive in n.primitives]
+    each = [entry_of(primitive, reference, reversible=matrix) for primitive in n.primitives]
     counts = np.array([entry.counts for entry in each], dtype=np.int64).reshape(-1, 5)[n.primitive]
     kinds, numbers, reads = counts[:, 0], counts[:, 1], counts[:, 4]
     junction_dims, state_dims, state_sizes = n.dims(n.junctions), n.dims(n.states), n.sizes(n.states)

@@ -93,7 +93,7 @@ def test_power_of_what_is_prescribed_is_the_change_of_energy(closed):
     engine = eq.rates(0.0, state.q, y)
     dense = np.zeros(eq.size)
     dense[:nv] = engine[:nv]
-    assert eq.dense.rates(np.array(state.q), y, eq.given, eq.scal, dense)[0] == 0
+    assert eq.dense.rates(np.array(state.q), y, eq.given, eq.heats, eq.scal, dense)[0] == 0
     assert np.abs(dense - engine).max() <= 1e-9 * np.abs(engine).max()
     h = 1e-4
     energies = []
