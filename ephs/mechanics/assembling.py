@@ -17,12 +17,12 @@ from ephs.mechanics.scene.geometry import Coupling
 from ephs.mechanics.scene.kinematics import Link, extent
 from ephs.mechanics.scene.tree import spanning_hops
 from ephs.mechanics.solve.solution import Solution
-from ephs.operad import Path, quantity
+from ephs.mechanics.tree.frames import GROUND, frames_of
+from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.descriptor import Descriptor
 from ephs.semantics.errors import AssemblyError
-from ephs.semantics.primitives import Storage
-from ephs.semantics.spaces import SE3, Pair
+from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rank import ASSEMBLY
 
 __all__ = ["FlatJoints", "assembled", "flat_joints"]
@@ -72,49 +72,20 @@ def _ends(link: Link) -> tuple[tuple[int, Array], tuple[int, Array]]:
 
 def flat_joints(d: Descriptor) -> FlatJoints:
     """The joints of a flat system between bodies with poses, and the ground."""
-    places = {slot.efforts[0]: slot.reads[0].path for slot in d.components if _stores_a_pose(slot.primitive)}
-    body: dict[int, int] = {}  # effort where a momentum begins -> body
-    frames: dict[int, tuple[int, Array]] = {}  # that of a joint frame -> momentum it is carried from, offset
-    poses: list[Path] = []
-    for slot in d.components:
-        name, of = slot.primitive.name, slot.primitive.bundle
-        first = {port: slot.efforts[where.start] for port, where, _ in of.items() if where.stop > where.start}
-        kinds = {port: quantity for port, _, quantity in of.items()}
-        if name == "pkc":
-            pose = next((e for port, e in first.items() if kinds[port].kind == "pose"), None)
-            carried = next((e for port, e in first.items() if kinds[port] == quantity.body_momentum), None)
-            if pose in places and carried is not None:
-                body[carried] = len(poses)
-                poses.append(places[pose])
-        elif name == "ground":
-            body.update(dict.fromkeys(first.values(), -1))
-        elif name == "frame_change":
-            offset = np.array(dict(slot.primitive.parameters)["offset"], dtype=float)
-            inner = next(port for port in first if str(port).startswith("p_j"))
-            outer = next(port for port in first if port != inner)
-            frames[first[inner]] = first[outer], offset
-    links: list[Link] = []
-    relative: list[Path] = []
-    for slot in d.components:
-        kernel = slot.primitive.kernel
-        if kernel is None or kernel.name != "holonomic":  # others have offsets folded in by a reduction
-            continue
-        first = {str(port): slot.efforts[w.start] for port, w, _ in slot.primitive.bundle.items() if w.stop > w.start}
-        if not {"p_j1", "p_j2"} <= first.keys():  # a reduction dropped the end that rests
-            continue
-        ends = [frames.get(first[port], (first[port], SE3.identity())) for port in ("p_j1", "p_j2")]
-        if any(momentum not in body for momentum, _ in ends):
-            continue
-        (one, frame1), (two, frame2) = ends
-        state = slot.reads[0]
-        coupling = Coupling(Pair.from_space(state.quantity.space))
-        links.append(Link(str(Path(tuple(slot.path)[:-1])), body[one], body[two], frame1, frame2, coupling))
-        relative.append(state.path)
-    return FlatJoints(tuple(links), tuple(relative), tuple(poses))
-
-
-def _stores_a_pose(primitive: object) -> bool:
-    return isinstance(primitive, Storage) and [q.kind for _, _, q in primitive.bundle.items()] == ["pose"]
+    found = frames_of(d)
+    posed = [i for i, link in enumerate(found.links) if link.pose is not None]
+    body = {i: number for number, i in enumerate(posed)} | {GROUND: GROUND}
+    joints = [j for j in found.joints if {j.first.link, j.second.link} <= body.keys()]
+    return FlatJoints(
+        tuple(
+            Link(
+                str(j.path), body[j.first.link], body[j.second.link], j.first.offset, j.second.offset, Coupling(j.pair)
+            )
+            for j in joints
+        ),
+        tuple(j.state.path for j in joints),
+        tuple(pose.path for i in posed if (pose := found.links[i].pose) is not None),
+    )
 
 
 def assembled(joints: FlatJoints, state: Mapping[Path, Array], given: Collection[Path]) -> dict[Path, Array]:

@@ -95,6 +95,8 @@ class _Reader:
 
     def parts(self) -> Parts:
         links = self.found.links
+        if self.found.faults:
+            raise self.found.faults[0]
         if not links:
             raise Unplaced(Path(), "has no body")
         names = tuple(None if link.path is None else self._name(link.path) for link in links)

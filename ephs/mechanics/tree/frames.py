@@ -118,6 +118,8 @@ class Frames:
         Components that links and joints are made of.
     roles
         (components,) role of each.
+    faults
+        Bodies and joints that are not whole, and bodies that are joined without a joint.
     """
 
     wiring: Wiring
@@ -126,16 +128,11 @@ class Frames:
     frames: dict[int, Frame]
     placed: frozenset[int]
     roles: tuple[Role, ...]
+    faults: tuple[Unplaced, ...]
 
 
 def frames_of(descriptor: Descriptor) -> Frames:
-    """The links and joints of a flat system.
-
-    Raises
-    ------
-    Unplaced
-        A body or a joint is not whole, or two bodies are joined without a joint.
-    """
+    """The links and joints of a flat system."""
     return _Finder(Wiring.of(descriptor)).found()
 
 
@@ -146,6 +143,7 @@ class _Finder:
         self.wiring = wiring
         self.roles = tuple(roles.of(slot.primitive) for slot in wiring.components)
         self.placed: set[int] = set()
+        self.faults: list[Unplaced] = []
         self.frames: dict[int, Frame] = {}
         self.links: list[Link] = []
         self._through: dict[int, int] = {}  # junction -> the offset by which it was reached
@@ -172,9 +170,11 @@ class _Finder:
         for number in relations:
             for port in ("p_j1", "p_j2"):
                 self._bare(self.wiring.ports[number][port], number)
-        joints = tuple(self._joint(number) for number in relations)
+        joints = tuple(joint for number in relations if (joint := self._joint(number)) is not None)
         self.placed |= set(self._with(Role.GROUND)) | set(self._with(Role.OFFSET))
-        return Frames(self.wiring, tuple(self.links), joints, self.frames, frozenset(self.placed), self.roles)
+        return Frames(
+            self.wiring, tuple(self.links), joints, self.frames, frozenset(self.placed), self.roles, tuple(self.faults)
+        )
 
     def _with(self, role: Role) -> list[int]:
         return [number for number, found in enumerate(self.roles) if found is role]
@@ -188,21 +188,14 @@ class _Finder:
         return None
 
     def _carry(self, junction: int, link: int, number: int) -> None:
-        """Give the frames at constant offsets from a junction to a link.
-
-        Raises
-        ------
-        Unplaced
-            One of them belongs to another link.
-        """
+        """Give the frames at constant offsets from a junction to a link, but for those that belong to another."""
         queue = deque([(junction, SE3.identity(), number)])
         passed: set[int] = set()
         while queue:
             here, offset, by = queue.popleft()
             if here in self.frames:
-                raise self._unplaced(
-                    self._through.get(here, by), "joins two bodies, or a body and the ground, without a joint"
-                )
+                self._fault(self._through.get(here, by), "joins two bodies, or a body and the ground, without a joint")
+                continue
             self.frames[here] = Frame(link, offset)
             if here != junction:
                 self._through[here] = by
@@ -223,7 +216,8 @@ class _Finder:
             if role is Role.KINETIC:
                 found = inertia_of(slot.primitive)
                 if found is None:
-                    raise self._unplaced(number, "is no kinetic energy about a centre of mass")
+                    self._fault(number, "is no kinetic energy about a centre of mass")
+                    continue
                 inertia, momentum = found, slot.reads[0]
             elif role is Role.GYROSCOPIC:
                 turning = number
@@ -231,16 +225,17 @@ class _Finder:
                 (at,) = (j for p, j in self.wiring.ports[number].items() if p != port)
                 stored = self.wiring.stored(at)
                 if pose is not None or stored is None or self.roles[stored[0]] is not Role.POSE:
-                    raise self._unplaced(number, "couples a body to no pose, or to a second one")
+                    self._fault(number, "couples a body to no pose, or to a second one")
+                    continue
                 potential, pose = stored
                 mine.append(potential)
             else:
                 continue
             mine.append(number)
         if (turning is None) != (momentum is None):
-            raise self._unplaced(mine[0], "belongs to a body without kinetic energy, or without gyroscopic forces")
+            self._fault(mine[0], "belongs to a body without kinetic energy, or without gyroscopic forces")
         self.placed |= set(mine)
-        box = self._box(potential if potential >= 0 else mine[0], self._shared, 2)
+        box = self._box(potential if potential >= 0 else mine[0], self._shared, 2) if mine else None
         return Link(box, inertia, potential, pose, momentum)
 
     def _bare(self, junction: int, number: int) -> None:
@@ -255,8 +250,8 @@ class _Finder:
         self._carry(above, len(self.links), number)
         self.links.append(Link(None, np.zeros((6, 6)), -1, None, None))
 
-    def _joint(self, number: int) -> LinkJoint:
-        """The joint of a relation."""
+    def _joint(self, number: int) -> LinkJoint | None:
+        """The joint of a relation; None where it is not whole."""
         wiring, ports = self.wiring, self.wiring.ports[number]
         state, rate = wiring.components[number].reads[0], ports["p_r"]
         for other, port in wiring.neighbours(rate, number):
@@ -269,7 +264,8 @@ class _Finder:
                     pair = Pair.from_space(state.quantity.space)
                     box = self._box(number, self._of_joints, 1)
                     return LinkJoint(box, number, first, second, pair, stored[0], state, rate)
-        raise self._unplaced(number, "is a joint whose relative pose does not follow from its rate")
+        self._fault(number, "is a joint whose relative pose does not follow from its rate")
+        return None
 
     def _around(self, number: int) -> Path:
         return Path(tuple(self.wiring.components[number].path)[:-1])
@@ -279,8 +275,8 @@ class _Finder:
         around = self._around(number)
         return around if tuple(around) and sharing[around] <= most else self.wiring.components[number].path
 
-    def _unplaced(self, number: int, reason: str) -> Unplaced:
-        return Unplaced(self.wiring.components[number].path, reason)
+    def _fault(self, number: int, reason: str) -> None:
+        self.faults.append(Unplaced(self.wiring.components[number].path, reason))
 
 
 def inertia_of(primitive: Primitive) -> Array | None:

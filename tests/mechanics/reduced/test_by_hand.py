@@ -1,0 +1,125 @@
+"""Mechanisms made by hand: the same motion as from a file, and the rates of the general form."""
+
+from pathlib import Path as File
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import ephs
+from ephs import Pattern, junction, library, quantity
+from ephs.mechanics import components, joint, rigid_body
+from ephs.mechanics.methods import METHODS
+from ephs.mechanics.reduced.equations import Equations
+from ephs.mechanics.solve.instant import instant
+from ephs.semantics.spaces import SE3
+from ephs.testing import mechanisms
+from tests.mechanics.reduced.systems import renamed
+
+FOUR_BAR = File(ephs.__file__).parents[1] / "scenes" / "four-bar.toml"
+
+
+def four_bar():
+    """The linkage of the scene: its system, initial state, and the moment that drives it."""
+    scene = ephs.load(FOUR_BAR)
+    pins = {"main": ("ground", "crank"), "pin": ("crank", "coupler"), "knee": ("coupler", "rocker")}
+    pins["pivot"] = ("ground", "rocker")
+    friction, drive, momentum = {"main": 0.05, "pivot": 0.2}, {"main": {"p_r": "motor"}}, quantity.body_momentum
+    motor = junction(quantity.joint_momentum("revolute"), exposed=True)
+    pattern = Pattern(
+        junctions={name: junction(momentum) for name in ("ground", *scene.bodies)} | {"motor": motor},
+        boxes={f"bars.{name}": {"p": name} for name in scene.bodies}
+        | {pin: {"p1": one, "p2": two} | drive.get(pin, {}) for pin, (one, two) in pins.items()}
+        | {"base": {"p": "ground"}},
+    )
+    parts = {f"bars.{name}": rigid_body(b.mass, b.inertia, (0, -9.81, 0)) for name, b in scene.bodies.items()}
+    for pin in pins:
+        frames = scene.joint(pin).frame1, scene.joint(pin).frame2
+        parts[pin] = joint("revolute", *frames, friction.get(pin, 0.0), driven=pin in drive)
+    poses = {f"bars.{name}.pe.q": b.pose for name, b in scene.bodies.items()}
+    poses |= {f"{pin}.pe.q_r": 0.0 for pin in pins}
+    return scene, pattern(**parts, base=components.ground()), poses, {"motor": {"flow": 4.0}}
+
+
+@pytest.mark.parametrize("method", ["rk87", "rk54", "radau", "alpha", "variational", "auto"])
+def test_a_four_bar_made_by_hand_moves_as_that_of_a_file(method):
+    scene, system, poses, inputs = four_bar()
+    how = {"step": 5e-3} if not METHODS.get(method, METHODS["rk87"]).adaptive else {"rtol": 1e-8, "atol": 1e-9}
+    how = {"step": 5e-3} if method == "alpha" else how
+    one = ephs.simulate(scene, 0.1, method=method, **how)
+    other = ephs.simulate(system, 0.1, method=method, initial=poses, inputs=inputs, **how)
+    assert one.stats["steps"] == other.stats["steps"]
+    assert np.array_equal(one.t, other.t)
+    for name in scene.bodies:
+        for state in ("pe.q", "ke.p"):
+            assert np.array_equal(one[f"bodies.{name}.{state}"], other[f"bars.{name}.{state}"])
+    assert np.array_equal(one.heat, other.heat)
+    control = ephs.simulate(system, 0.1, method=method, initial=poses, inputs={"motor": {"flow": 4.1}}, **how)
+    assert not np.array_equal(control["bars.crank.pe.q"][-1], other["bars.crank.pe.q"][-1])
+
+
+def test_what_joint_coordinates_have_no_place_for_is_refused_by_name():
+    momentum = quantity.body_momentum
+    pattern = Pattern(
+        junctions={"p": junction(momentum), "q": junction(quantity.displacement), "x": junction(quantity.momentum)},
+        boxes={"body": {"p": "p"}, "mass": {"p": "x"}, "spring": {"q": "q"}, "pkc": {"q": "q", "p": "x"}},
+    )
+    parts = {"mass": library.point_mass(m=1.0), "spring": library.spring(k=1.0), "pkc": library.pkc()}
+    system = pattern(body=rigid_body(1.0, [1, 1, 1]), **parts)
+    with pytest.raises(ephs.OptionError, match="'rk87', expected natural, natural4, radau: mass stores momentum in"):
+        ephs.simulate(system, 0.1, method="rk87")
+    assert "mass stores momentum" in ephs.simulate(system, 1e-3).stats["auto"]
+
+
+# ---- the general form ------------------------------------------------------------------------------------------
+
+KINDS = ("revolute", "prismatic", "screw", "cylindrical", "spherical", "planar", "fixed", "free")
+
+
+def accelerations(equations, twist_of):
+    """ṙ of the tree's joints from twists and their rates: the derivative of B r = Ad u₂ − Ad I⁻¹ Ad u₁, by hand."""
+    out = []
+    for edge in equations.reduced.edges[: equations.reduced.links]:
+        ends = [twist_of(body) for body in (edge.body1, edge.body2)]
+        carried = [SE3.adjoint(SE3.inverse(offset)) for offset in (edge.offset1, edge.offset2)]
+        back = SE3.adjoint(SE3.inverse(edge.pair.include(edge.coordinate)))
+        first = [back @ carried[0] @ x for x in ends[0]]
+        second = [carried[1] @ x for x in ends[1]]
+        r = np.linalg.pinv(edge.pair.basis) @ (second[0] - first[0])
+        turned = SE3.ad(edge.pair.basis @ r) @ first[0]
+        out.append(np.linalg.pinv(edge.pair.basis) @ (second[1] - first[1] + turned))
+    return np.concatenate(out)
+
+
+@settings(max_examples=30)
+@given(mechanisms(max_bodies=3, kinds=KINDS), st.sampled_from(["x", "pe"]), st.integers(0, 2**32 - 1))
+def test_rates_in_joint_coordinates_are_those_of_the_general_form(scene, word, seed):
+    problem, _ = renamed(scene, word, seed)
+    equations = Equations(problem, 0.0)
+    state = equations.start(0.0)
+    found = equations.rates(0.0, state.q, equations.vector(state))
+    d, whole = problem.descriptor, dict(problem.initial) | dict(equations.states(state))
+    general = instant(d, problem.reference, d.pack(whole), problem.inputs(0.0, whole)).rates
+    reduced = equations.reduced
+    inverse = [np.linalg.inv(inertia) for inertia in reduced.tables.inertia]
+    links = {id(link): i for i, link in enumerate(reduced.places)}
+    order = [links[id(link)] for link in sorted(reduced.places, key=lambda link: link.momentum.at)]
+
+    def twist_of(body):
+        if body < 0:
+            return np.zeros(6), np.zeros(6)
+        number = order[body]
+        path = reduced.places[number].momentum.path
+        return inverse[number] @ whole[path], inverse[number] @ general[path]
+
+    expected = accelerations(equations, twist_of)
+    mass = equations.mass(state.q, state.r)
+    size = (np.linalg.cond(mass) if mass.size else 1.0) * (1.0 + np.abs(expected).max(initial=0.0))
+    at = slice(equations.nv, equations.nv + equations.n)
+    assert np.abs(found[at] - expected).max(initial=0.0) <= 1e-10 * size
+    heats = found[at.stop : at.stop + equations.ns]
+    warmth = equations.heats.temperatures(state.heats)
+    entropies = np.array([general[path][0] for path in reduced.entropies])
+    made = 1.0 + np.abs(entropies).max(initial=0.0)
+    assert np.abs(heats / warmth - entropies).max(initial=0.0) <= 1e-10 * made
