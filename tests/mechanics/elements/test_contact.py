@@ -5,9 +5,9 @@ import pytest
 from scipy.optimize import brentq
 
 import ephs
+from ephs.mechanics import pace
 from ephs.mechanics.elements.contact import contact_energy, contact_loss
 from ephs.mechanics.methods import METHODS
-from ephs.mechanics.pace import longest_step
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.mechanics.shapes.gap import plane_rim, plane_sphere, rounded_box_sphere
 from ephs.mechanics.shapes.law import Law
@@ -268,10 +268,17 @@ shape = { box = [2.0, 2.0, 0.001] }
 
 @pytest.mark.parametrize("name", [name for name in SCENES if METHODS[name].adaptive])
 @pytest.mark.filterwarnings("ignore::ephs.CostWarning")
-def test_no_step_leaps_over_a_thin_plate(name, tmp_path):
+def test_no_step_leaps_over_a_thin_plate(name, tmp_path, monkeypatch):
     file = tmp_path / "plate.toml"
     file.write_text(HEAD.format(gravity=0.0) + PLATE, encoding="utf-8")
     scene = ephs.load(file)
     assert ephs.simulate(scene, 0.2, method=name, rtol=1e-3, audit="off").body("bullet").velocity[-1, 2] > 30.0
-    longest = longest_step(scene, 5, 1e-3)
+    monkeypatch.setattr(pace, "_contact_step", lambda _: np.inf)
+    assert ephs.simulate(scene, 0.2, method=name, rtol=1e-3, audit="off").body("bullet").velocity[-1, 2] == -40.0
+
+
+def test_the_limit_is_half_the_way_through(tmp_path):
+    file = tmp_path / "plate.toml"
+    file.write_text(HEAD.format(gravity=0.0) + PLATE, encoding="utf-8")
+    longest = pace.longest_step(ephs.load(file), 5, 1e-3)
     assert longest == pytest.approx(0.5 * 0.021 / 40.0, rel=0.1)
