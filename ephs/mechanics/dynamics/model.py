@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from ephs.mechanics.dynamics.control import Task, computed_torque, task_of
 from ephs.mechanics.dynamics.differentiating import constraints_of, derivatives_of, forward_slopes
 from ephs.mechanics.dynamics.links import Links
+from ephs.mechanics.dynamics.loading import Loading
 from ephs.mechanics.dynamics.placing import ByJoint, Placing
 from ephs.mechanics.dynamics.results import Constraints, Derivatives, Energies
 from ephs.mechanics.dynamics.state import State
@@ -62,6 +63,8 @@ class Dynamics:
     ----------
     state0
         The scene's initial state, its loops closed.
+    loading
+        Its loads, which act in full unless ``loading.share`` is less.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -71,6 +74,7 @@ class Dynamics:
         self._linear = Linearised(self._equations)
         self.layout = self._equations.layout
         self._links, self._names = Links(scene, self._equations), Names(scene)
+        self.loading = Loading(scene, self._equations, self._links)
         self.placing, self._steps = Placing(self._equations), Steps(self._problem, self._equations)
         with failing_at(0.0):
             start = self._equations.start(0.0)
@@ -106,13 +110,7 @@ class Dynamics:
 
     # ---- states ------------------------------------------------------------------------------------------------
 
-    def state(
-        self,
-        coordinates: ByJoint | None = None,
-        rates: ByJoint | None = None,
-        *,
-        adjust: bool = False,
-    ) -> State:
+    def state(self, coordinates: ByJoint | None = None, rates: ByJoint | None = None, *, adjust: bool = False) -> State:
         """The initial state with some joints elsewhere, as `Scene.with_state` has it.
 
         Of a tree all joints' may be given as arrays (n,).
@@ -201,8 +199,9 @@ class Dynamics:
             The motion is not determined there, or a component cannot be evaluated.
         """
         q, r, s = self.layout.split(state.array)
+        self.loading.place(q, r)
         with self._pushed(forces):
-            if self.cut:
+            if self.cut or self.loading:
                 found = self._linear.forward(q, r, s)
             else:
                 eq = self._equations
@@ -235,6 +234,7 @@ class Dynamics:
         """
         q, r, s = self.layout.split(state.array)
         a = self.layout.vector("accelerations", accelerations)[: self.layout.n]
+        self.loading.place(q, r)
         with failing_at(0.0):
             found = self._linear.inverse(q, r, s, a)
         return self.layout.by_joint(found) if isinstance(accelerations, Mapping) else found
@@ -268,7 +268,7 @@ class Dynamics:
         return self._links.gravity()
 
     def applied(self, state: State) -> Array:
-        """(n,) the generalised forces of the scene's drives, springs and friction on the tree's freedoms."""
+        """(n,) the generalised forces of the scene's drives, loads, springs and friction on the tree's freedoms."""
         return self.bias(state) - self.inverse_dynamics(state, np.zeros(self.layout.n))
 
     def jacobian(self, state: State, body: str, point: ArrayLike | None = None) -> Array:
@@ -310,10 +310,7 @@ class Dynamics:
         return Energies.of(eq.model, eq.row(self._reduced(state)).energies, float(taken.sum()))
 
     def derivatives(
-        self,
-        state: State,
-        forces: ByJoint | None = None,
-        accelerations: ByJoint | None = None,
+        self, state: State, forces: ByJoint | None = None, accelerations: ByJoint | None = None
     ) -> Derivatives:
         """Exact derivatives of accelerations and of inverse dynamics: by tangents, not by differences.
 
@@ -330,11 +327,12 @@ class Dynamics:
             The motion is not determined there, or a component cannot be evaluated.
         """
         given = None if accelerations is None else self.layout.vector("accelerations", accelerations)[: self.layout.n]
-        point = self.layout.split(state.array)
+        q, r, s = self.layout.split(state.array)
+        self.loading.place(q, r)
         with self._pushed(forces):
-            under = forward_slopes(self._linear, *point)
+            under = forward_slopes(self._linear, q, r, s)
         with failing_at(0.0):
-            return derivatives_of(self._linear, under, *point, given)
+            return self.loading.stiffened(derivatives_of(self._linear, under, q, r, s, given), q, r)
 
     # ---- steps -------------------------------------------------------------------------------------------------
 
@@ -369,7 +367,7 @@ class Dynamics:
         return self._counted(*self.layout.split(state.array))
 
     def _at(self, state: State) -> None:
-        self._links.place(*self.layout.split(state.array)[:2])
+        self._links.place(state.q, state.r)
 
     def _state(self, at: ReducedState) -> State:
         cut_rates = np.zeros(0)

@@ -1,7 +1,7 @@
 """States in which nothing moves: of a scene by its forces, of a system by letting it settle."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
@@ -43,12 +43,18 @@ class Equilibrium:
         to the state.
     steps
         How many steps led there.
+    shares
+        (n,) of a scene with loads: the parts of them at the equilibria on the way, which fall beyond limit points.
+    critical
+        Parts of the loads on the way at which it becomes unstable, or stable again: limit points and bifurcations.
     """
 
     model: Scene | System
     states: Mapping[Path, Array]
     residual: float
     steps: int
+    shares: Array = field(default_factory=lambda: np.ones(1))
+    critical: tuple[float, ...] = ()
 
 
 @in_one_thread
@@ -98,9 +104,30 @@ def _of_scene(scene: Scene) -> Equilibrium:
     if moving:
         raise _none(f"joints.{moving[0]}", "its motion is prescribed")
     model = Dynamics(_resting(scene))
+    if model.loading:
+        return _loaded(model)
     state, left, steps = _settled(model)
     found = _at(model, state)
     return Equilibrium(found, model.states(state), left, steps)
+
+
+def _loaded(model: "Dynamics") -> Equilibrium:
+    """Under loads: first without them, then along the path on which they grow."""
+    from ephs.mechanics.linear.continuation import follow
+    from ephs.mechanics.linear.scene import freedoms_of, unbalanced
+    from ephs.mechanics.scene.state import Snapshot
+
+    model.loading.share = 0.0
+    try:
+        start, _, _ = _settled(model)
+    finally:
+        model.loading.share = 1.0
+    path = follow(model, start, Snapshot.of(model.scene).scale(model.scene.world.gravity).length)
+    if path is None:
+        raise _none(*_culprit(model, start))
+    state = path.states[-1]
+    left = unbalanced(model, state, freedoms_of(model, state), model.derivatives(state).force_q)
+    return Equilibrium(_at(model, state), model.states(state), left, len(path.shares) - 1, path.shares, path.critical)
 
 
 def _resting(scene: Scene) -> Scene:

@@ -23,7 +23,7 @@ from ephs.mechanics.scene.sections import Section, resolve_section
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces import rotations as so3
 
-__all__ = ["BeamDraft", "curve_frames", "resolve_beam"]
+__all__ = ["BeamDraft", "check_beam", "curve_frames", "resolve_beam"]
 
 Array = NDArray[np.float64]
 PARALLEL = 0.9
@@ -43,15 +43,20 @@ class BeamDraft:
     joints: tuple[JointDraft, ...]
 
 
-def resolve_beam(name: str, table: Checked[Any], world: World, names: Names, faults: list[Fault]) -> BeamDraft | None:
-    """A beam's bodies and joints; None where its place or section cannot be told."""
+def check_beam(name: str, table: Checked[Any], names: Names, faults: list[Fault]) -> None:
+    """Append a fault where a beam's end or heat leads nowhere; ``names`` have the nodes of all beams."""
     entry, key = table.entry, f"beams.{name}"
     if table.sound("heat"):
         names.check(entry.heat, f"{key}.heat", "thermal", faults)
-    ends = [*entry.ends, *[FREE_END] * (2 - len(entry.ends))]
     for i, end in enumerate(entry.ends if table.sound("ends") else ()):
         if end != FREE_END:
             names.check(end, f"{key}.ends[{i}]", "body", faults)
+
+
+def resolve_beam(name: str, table: Checked[Any], world: World, faults: list[Fault]) -> BeamDraft | None:
+    """A beam's bodies and joints; None where its place or section cannot be told."""
+    entry, key = table.entry, f"beams.{name}"
+    ends = [*entry.ends, *[FREE_END] * (2 - len(entry.ends))]
     section = resolve_section(entry.section, f"{key}.section", faults) if table.sound("section") else None
     frames = _frames(table, key, faults)
     if section is None or frames is None:

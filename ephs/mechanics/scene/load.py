@@ -14,7 +14,7 @@ import numpy as np
 
 from ephs.mechanics.scene import resolve, values
 from ephs.mechanics.scene.assembly import assemble
-from ephs.mechanics.scene.beams import BeamDraft, resolve_beam
+from ephs.mechanics.scene.beams import BeamDraft, check_beam, resolve_beam
 from ephs.mechanics.scene.entries import Document, read_document, shown
 from ephs.mechanics.scene.errors import Fault, ModelWarning, SceneError, SceneWarning, fault, legible
 from ephs.mechanics.scene.meant import as_meant
@@ -121,11 +121,12 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
     world = _world(document, world, faults)
     parts, lost = _parts(document, path, world, stack, r)
     _check_names(document, faults)
-    names = _names(document, parts, lost)
     sections = document.sections
-    rods = _beams(document, world, names, faults)
+    rods = _beams(document, world, faults)
     parts |= {name: rod.nodes for name, rod in rods.items()}
     names = _names(document, parts, lost | (set(sections["beams"]) - set(rods)))
+    for name, table in sections["beams"].items():
+        check_beam(name, table, names, faults)
     mode = r.inertia or document.assembly.inertia
     bodies = [resolve.resolve_body(n, t, mode, path.parent, faults, r.odd) for n, t in sections["bodies"].items()]
     joints = [resolve.resolve_joint(n, t, names, faults) for n, t in sections["joints"].items()]
@@ -254,9 +255,9 @@ def _parts(
     return found, set(document.sections["parts"]) - set(found)
 
 
-def _beams(document: Document, world: World, names: resolve.Names, faults: list[Fault]) -> dict[str, BeamDraft]:
+def _beams(document: Document, world: World, faults: list[Fault]) -> dict[str, BeamDraft]:
     """The beams whose place and section can be told."""
-    drafts = {n: resolve_beam(n, t, world, names, faults) for n, t in document.sections["beams"].items()}
+    drafts = {n: resolve_beam(n, t, world, faults) for n, t in document.sections["beams"].items()}
     found = {name: draft for name, draft in drafts.items() if draft is not None}
     for name, draft in found.items():
         for joint in draft.joints:

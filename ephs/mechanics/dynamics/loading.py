@@ -1,0 +1,60 @@
+"""Loads of a scene on its links: wrenches where the links are, and how they turn with them."""
+
+from dataclasses import replace
+from typing import final
+
+import numpy as np
+
+from ephs.mechanics.dynamics.links import Links
+from ephs.mechanics.dynamics.results import Derivatives
+from ephs.mechanics.reduced.equations import Equations
+from ephs.mechanics.scene.model import Scene
+from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.rotations import hat, quaternion_to_matrix
+
+__all__ = ["Loading"]
+
+
+@final
+class Loading:
+    """The loads of a scene.
+
+    Attributes
+    ----------
+    share
+        Part of the loads that acts: 1 after their ramps.
+    """
+
+    def __init__(self, scene: Scene, equations: Equations, links: Links) -> None:
+        self.share = 1.0
+        self._equations, self._links = equations, links
+        numbers = {name: i for i, name in enumerate(equations.reduced.bodies) if name is not None}
+        self._loads = [(numbers[load.body], load) for _, load in scene.all_loads()]
+
+    def __bool__(self) -> bool:
+        return bool(self._loads)
+
+    def place(self, q: Array, r: Array) -> None:
+        """Put the wrenches at a configuration into those of the equations."""
+        if not self._loads:
+            return
+        self._links.place(q, r)
+        self._equations.wrench[:] = 0.0
+        for link, load in self._loads:
+            turn = np.eye(3) if load.follower else quaternion_to_matrix(self._equations.work.pose[link, :4]).T
+            self._equations.wrench[link] += self.share * np.concatenate([turn @ load.moment, turn @ load.force])
+
+    def stiffened(self, found: Derivatives, q: Array, r: Array) -> Derivatives:
+        """Derivatives with those of the loads' directions, which keep to the world while their bodies turn."""
+        if not self._loads:
+            return found
+        self.place(q, r)
+        change = np.zeros_like(found.force_q)
+        for link, load in self._loads:
+            if not load.follower:
+                jacobian = self._links.jacobian(load.body, None)
+                turn = quaternion_to_matrix(self._equations.work.pose[link, :4]).T
+                turning = np.vstack([hat(turn @ load.moment), hat(turn @ load.force)])
+                change += self.share * jacobian.T @ turning @ jacobian[:3]
+        by_place = found.acceleration_q + found.acceleration_force @ change
+        return replace(found, acceleration_q=by_place, force_q=found.force_q - change)

@@ -1,0 +1,188 @@
+"""Beams at rest: large bending, follower loads, buckling, modes of stressed states, against closed forms and tables."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
+
+import ephs
+
+HEAD = 'format = 1\nname = "rods"\n[world]\ngravity = [0.0, 0.0, 0.0]\n'
+ROD = """[beams.{name}]
+points = {points}
+elements = {elements}
+up = {up}
+section = {{ EA = {EA!r}, GA = [{GA!r}, {GA!r}], GJ = {GJ!r}, EI = [{EI2!r}, {EI3!r}], {inertia} }}
+ends = [{ends}]
+"""
+INERTIA = "rhoA = 1.0, rhoI = [2e-3, 1e-3, 1e-3]"
+SOFT = {"EA": 1e4, "GA": 1e4, "GJ": 500.0, "EI2": 500.0, "EI3": 500.0}
+
+
+def rod(points, elements, section, name="rod", up=(0.0, 0.0, 1.0), ends='"ground"'):
+    points = [[float(x) for x in point] for point in points]
+    return ROD.format(
+        name=name, points=points, inertia=INERTIA, elements=elements, up=[float(x) for x in up], ends=ends, **section
+    )
+
+
+def load(body, **given):
+    return f'[loads.{body.replace(".", "_")}]\nbody = "{body}"\n' + "".join(f"{k} = {v}\n" for k, v in given.items())
+
+
+def scene_of(text, tmp_path):
+    file = tmp_path / "rods.toml"
+    file.write_text(HEAD + text, encoding="utf-8")
+    return ephs.load(file)
+
+
+def displaced(scene, body):
+    """How far a body goes to its equilibrium."""
+    return ephs.equilibrium(scene).model.body(body).pose[4:] - scene.body(body).pose[4:]
+
+
+def along(length):
+    return [(0.0, 0.0, 0.0), (length, 0.0, 0.0)]
+
+
+@pytest.mark.parametrize("elements", [3, 4, 8])
+@pytest.mark.parametrize("follower", ["true", "false"])
+def test_an_end_moment_rolls_a_rod_up_to_a_circle(elements, follower, tmp_path):
+    moment = load(f"rod.{elements}", moment=[0.0, 2.0 * np.pi * 500.0, 0.0], follower=follower)
+    scene = scene_of(rod(along(1.0), elements, SOFT) + moment, tmp_path)
+    assert np.abs(ephs.equilibrium(scene).model.body(f"rod.{elements}").pose[4:]).max() <= 1e-12
+
+
+def test_a_bend_of_45_degrees_goes_to_its_limit_by_order_2(tmp_path):
+    """Bathe and Bolourchi's cantilever: E = 1e7, section 1 × 1 with J = 1/6 and κ = 5/6, radius 100, 600 across."""
+    young = 1e7
+    section = {"EA": young, "GA": young / 2.4, "GJ": young / 12.0, "EI2": young / 12.0, "EI3": young / 12.0}
+    found = []
+    for elements in (4, 8, 16):
+        angles = np.linspace(0.0, np.pi / 4.0, 5)
+        points = [(100.0 * np.sin(a), 100.0 * (1.0 - np.cos(a)), 0.0) for a in angles]
+        text = rod(points, elements, section) + load(f"rod.{elements}", force=[0.0, 0.0, 600.0])
+        found.append(displaced(scene_of(text, tmp_path), f"rod.{elements}"))
+    one, two = found[1] - found[0], found[2] - found[1]
+    assert np.linalg.norm(one) / np.linalg.norm(two) == pytest.approx(4.0, abs=0.1)
+    assert np.abs(found[2] + two / 3.0 - [-23.5607, -13.6047, 53.4755]).max() <= 5e-4
+
+
+TABLE = [
+    (8.896, 30, 10.112, 79.39), (8.896, 60, 6.605, 129.89), (8.896, 90, 0.0, 146.25),
+    (13.345, 15, 16.458, 64.36), (13.345, 45, 15.186, 156.47), (13.345, 75, 6.249, 196.10),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("force", "degrees", "y", "z"), TABLE)
+def test_the_princeton_beam_goes_where_its_table_says(force, degrees, y, z, tmp_path):
+    length, h, w, young, nu = 0.508, 12.3777e-3, 3.2024e-3, 71.7e9, 0.31
+    area, strong, weak = h * w, w * h**3 / 12.0, h * w**3 / 12.0
+    shear = young / (2.0 * (1.0 + nu))
+    section = {
+        "EA": young * area, "GA": shear * area * 5.0 / 6.0, "GJ": 0.198 * shear * (strong + weak),
+        "EI2": young * weak, "EI3": young * strong,
+    }  # fmt: skip
+    beta = np.radians(degrees)
+    push = load("rod.12", force=[0.0, float(force * np.cos(beta)), float(force * np.sin(beta))])
+    scene = scene_of(rod(along(length), 12, section, up=(0.0, 1.0, 0.0)) + push, tmp_path)
+    found = 1e3 * displaced(scene, "rod.12")[1:]
+    assert np.abs(found - [y, z]).max() <= 0.01 * max(y, z)
+
+
+def elastica(load_number):
+    """Tip (x, y)/L of a cantilever under a dead load across its end, with P L²/EI given, by elliptic integrals."""
+
+    def start(k):
+        return np.arcsin(1.0 / (k * np.sqrt(2.0)))
+
+    def excess(k):
+        return ellipk(k * k) - ellipkinc(start(k), k * k) - np.sqrt(load_number)
+
+    k = brentq(excess, np.sqrt(0.5) + 1e-12, 1.0 - 1e-9)
+    root = np.sqrt(load_number)
+    x = np.sqrt(2.0) * np.sqrt(2.0 * k * k - 1.0) / root
+    y = 1.0 - 2.0 * (ellipe(k * k) - ellipeinc(start(k), k * k)) / root
+    return np.array([x, y])
+
+
+@pytest.mark.parametrize("number", [1.0, 5.0, 10.0])
+def test_a_thin_rod_is_the_elastica(number, tmp_path):
+    section = {"EA": 1e8, "GA": 1e8, "GJ": 1.0, "EI2": 1.0, "EI3": 1.0}
+    tips = []
+    for elements in (8, 16):
+        text = rod(along(1.0), elements, section) + load(f"rod.{elements}", force=[0.0, 0.0, number])
+        tips.append(ephs.equilibrium(scene_of(text, tmp_path)).model.body(f"rod.{elements}").pose[[4, 6]])
+    limit = tips[1] + (tips[1] - tips[0]) / 3.0
+    assert np.abs(limit - elastica(number)).max() <= np.abs(tips[1] - tips[0]).max() / 128.0
+    assert np.abs(tips[0] - elastica(number)).max() > 1e-4  # eight elements alone are not that near
+
+
+def frame(elements, force):
+    young, nu, t, h, length = 7.124e10, 0.31, 0.6e-3, 30e-3, 0.24
+    shear = young / (2.0 * (1.0 + nu))
+    section = {
+        "EA": young * t * h, "GA": shear * t * h * 5.0 / 6.0, "GJ": shear * h * t**3 / 3.0 * (1.0 - 0.63 * t / h),
+        "EI2": young * h**3 * t / 12.0, "EI3": young * t**3 * h / 12.0,
+    }  # fmt: skip
+    corner, end = (length, 0.0, 0.0), (length, -length, 0.0)
+    legs = rod([(0.0, 0.0, 0.0), corner], elements, section)
+    legs += rod([corner, end], elements, section, "arm", ends=f'"rod.{elements}"')
+    return legs + load(f"arm.{elements}", force=[force, 0.0, 0.0])
+
+
+def test_a_right_angle_frame_buckles_out_of_its_plane(tmp_path):
+    found = ephs.equilibrium(scene_of(frame(8, 1.5), tmp_path))
+    assert 1.5 * min(found.critical) == pytest.approx(1.088, rel=5e-3)
+
+
+def test_a_path_goes_through_limit_points(tmp_path):
+    """A shallow arch with clamped feet snaps: the load falls, and rises again on the other side."""
+    angles = np.linspace(-0.25, 0.25, 9)
+    points = [(4.0 * np.sin(a), 0.0, 4.0 * np.cos(a)) for a in angles]
+    section = {"EA": 1e4, "GA": 1e4, "GJ": 1.0, "EI2": 1.0, "EI3": 1.0}
+    text = rod(points, 8, section, up=(0.0, 1.0, 0.0), ends='"ground", "ground"')
+    found = ephs.equilibrium(scene_of(text + load("rod.4", force=[0.0, 0.0, -600.0]), tmp_path))
+    assert np.any(np.diff(found.shares) < 0.0) and found.shares[-1] == 1.0
+    assert len(found.critical) >= 2 and found.model.body("rod.4").pose[6] < points[0][2]
+
+
+@pytest.mark.parametrize(
+    ("ends", "first"), [('"ground"', 1.8751040687), ("", 4.7300407449)], ids=["cantilever", "free-free"]
+)
+def test_rods_swing_at_the_frequencies_of_thin_beams(ends, first, tmp_path):
+    section = {"EA": 1e6, "GA": 1e6, "GJ": 1.0, "EI2": 1.0, "EI3": 1.0}
+    found = []
+    for elements in (8, 16):
+        text = rod(along(1.0), elements, section, ends=ends).replace("[2e-3, 1e-3, 1e-3]", "[2e-6, 1e-6, 1e-6]")
+        linear = ephs.linearize(scene_of(text, tmp_path))
+        found.append(min(mode.frequency for mode in linear.modes if mode.frequency > 1e-3))
+    exact = first**2 / (2.0 * np.pi)
+    assert abs(found[0] / exact - 1.0) > 3.0 * abs(found[1] / exact - 1.0)
+    assert found[1] + (found[1] - found[0]) / 3.0 == pytest.approx(exact, rel=1e-3)
+
+
+def test_tension_stiffens_and_modes_of_the_stressed_state_show_it(tmp_path):
+    """A clamped rod under tension swings faster; under compression near Euler's load hardly at all."""
+    section = {"EA": 1e6, "GA": 1e6, "GJ": 1.0, "EI2": 1.0, "EI3": 1.0}
+    euler, slow = np.pi**2 / 4.0, []
+    for force in (-0.97 * euler, 0.0, euler):
+        text = rod(along(1.0), 8, section) + load("rod.8", force=[float(force), 0.0, 0.0])
+        scene = scene_of(text, tmp_path)
+        rest = ephs.equilibrium(scene).model
+        slow.append(min(mode.frequency for mode in ephs.linearize(rest).modes if mode.frequency > 1e-6))
+    assert slow[0] < 0.3 * slow[1] < 0.3 * slow[2]
+
+
+def test_loads_count_in_the_derivatives_of_the_dynamics(tmp_path):
+    loads = load("rod.2", force=[1.0, 2.0, 30.0], moment=[4.0, 50.0, 6.0])
+    loads += load("rod.1", force=[1.0, 20.0, 3.0], moment=[4.0, 5.0, 6.0], follower="true")
+    model = ephs.dynamics(scene_of(rod(along(1.0), 2, SOFT) + loads, tmp_path))
+    n, h = model.layout.n, 1e-6
+    at, zero = model.moved(model.state0, 0.1 * np.random.default_rng(3).standard_normal(n)), np.zeros(n)
+    by = model.derivatives(at, accelerations={})
+    forward = model.derivatives(at).acceleration_q
+    for exact, function in ((by.force_q, model.inverse_dynamics), (forward, model.acceleration)):
+        ends = [[function(model.moved(at, sign * h * unit), zero) for sign in (1.0, -1.0)] for unit in np.eye(n)]
+        differenced = np.array([(one - two) / (2.0 * h) for one, two in ends]).T
+        assert np.abs(exact - differenced).max() <= 1e-8 * np.abs(exact).max()
