@@ -72,8 +72,8 @@ class _Balance:
         return float(values.real[np.abs(values).argmin()] / np.abs(values).max())
 
     @property
-    def _values(self) -> NDArray[np.complexfloating]:
-        return np.linalg.eigvals(self.stiffness)
+    def _values(self) -> NDArray[np.complex128]:
+        return np.linalg.eigvals(self.stiffness).astype(complex)
 
 
 def follow(model: Dynamics, start: State, length: float, until: float = 1.0) -> StaticPath | None:
@@ -181,16 +181,13 @@ def _along(
         made[:] += np.append(at.Z @ change[:-1], change[-1])
 
     start = _moved(model, here.state, made[:-1])
-    found = _solved(model, start, share + made[-1], metric, bordered, moved)
-    return None if found is None else found
+    return _solved(model, start, share + float(made[-1]), metric, bordered, moved)
 
 
 def _held(model: Dynamics, state: State, share: float) -> _Balance | None:
     """The equilibrium near by at a part of the loads."""
     metric = np.ones(model.layout.n + 1)
-    found = _solved(
-        model, state, share, metric, lambda at: (at.stiffness, at.force), lambda change, at: None
-    )  # fmt: skip
+    found = _solved(model, state, share, metric, lambda at: (at.stiffness, at.force), lambda _change, _at: None)
     return None if found is None else found[0]
 
 
@@ -203,12 +200,11 @@ def _solved(
     moved: Callable[[Array, _Balance], None],
 ) -> tuple[_Balance, float, int] | None:
     """Newton's iteration to rounding; None where it does not converge."""
-    last = np.inf
+    last, at = np.inf, _balance(model, state, share)
     for count in range(1, ITERATIONS + 1):
-        at = _balance(model, state, share)
         matrix, residual = system(at)
         try:
-            change = np.linalg.solve(matrix, residual)
+            change = np.asarray(np.linalg.solve(matrix, residual), dtype=float)
         except np.linalg.LinAlgError:
             return None
         if not np.isfinite(change).all():
@@ -221,9 +217,7 @@ def _solved(
         last = size
         moved(change, at)
         share += float(change[k]) if change.size > k else 0.0
-        state = _moved(model, state, step)
-        if size <= 1e-15:
-            return _balance(model, state, share), share, count
+        at = _balance(model, _moved(model, at.state, step), share)
     return (at, share, ITERATIONS) if last <= ROUNDED else None
 
 

@@ -20,10 +20,8 @@ SOFT = {"EA": 1e4, "GA": 1e4, "GJ": 500.0, "EI2": 500.0, "EI3": 500.0}
 
 
 def rod(points, elements, section, name="rod", up=(0.0, 0.0, 1.0), ends='"ground"'):
-    points = [[float(x) for x in point] for point in points]
-    return ROD.format(
-        name=name, points=points, inertia=INERTIA, elements=elements, up=[float(x) for x in up], ends=ends, **section
-    )
+    points, up = [[float(x) for x in point] for point in points], [float(x) for x in up]
+    return ROD.format(name=name, points=points, inertia=INERTIA, elements=elements, up=up, ends=ends, **section)
 
 
 def load(body, **given):
