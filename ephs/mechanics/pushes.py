@@ -22,14 +22,15 @@ def part_of(whole: Signal, where: slice) -> Signal:
     """Some of a signal's numbers."""
     if whole.constant:
         return Signal(whole.at(0.0, {})[where])
-    return Signal(lambda t, state: whole.at(t, state)[where])
+    return Signal(lambda t, state: whole.at(t, state)[where], held=whole.held)
 
 
 def sum_of(one: Signal, other: Signal) -> Signal:
     """The sum of two signals."""
     if one.constant and other.constant:
         return Signal(one.at(0.0, {}) + other.at(0.0, {}))
-    return Signal(lambda t, state: one.at(t, state) + other.at(t, state))
+    held = all(signal.constant or signal.held for signal in (one, other))
+    return Signal(lambda t, state: one.at(t, state) + other.at(t, state), held=held)
 
 
 def scene_signals(scene: Scene, inputs: Mapping[Any, Any], view: View) -> tuple[dict[str, Signal], dict[str, Signal]]:
@@ -73,7 +74,7 @@ def _single(inputs: Mapping[Any, Any], sizes: Mapping[str, int], view: View) -> 
         if len(keys) == 1:
             yield keys[0], whole
             continue
-        shared = whole if whole.constant else Signal(_Latest(whole).at)
+        shared = whole if whole.constant else Signal(_Latest(whole).at, held=whole.held)
         for one, first, last in zip(keys, ends[:-1], ends[1:], strict=True):
             yield one, part_of(shared, slice(int(first), int(last)))
 

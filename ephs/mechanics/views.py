@@ -20,11 +20,14 @@ from ephs.mechanics.solve.errors import nearest_of
 from ephs.mechanics.solve.problem import State
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 
 __all__ = ["BodyState", "JointState", "MarkerState", "Names", "StateView", "ThermalState"]
 
 Item = TypeVar("Item")
+AXIAL = frozenset({"revolute", "prismatic", "cylindrical", "screw"})
+"""Pairs about one axis: components of twists along it are the same in all frames that they move to."""
 
 
 @final
@@ -151,6 +154,7 @@ class Names:
         self.links: dict[str, Link] = {}
         for link in now.links:  # a joint comes before an implicit one of its name
             self.links.setdefault(link.name, link)
+        self.axial = {name: _axial_rows(link) for name, link in self.links.items() if _axial(link)}
         self.number = {name: i for i, name in enumerate(now.names)}
         self.implicit = {name for name, _ in scene.implicit_joints()} - {name for name, _ in scene.all_joints()}
         self.split = {name for name, j in scene.all_joints() if j.middle is not None}
@@ -230,7 +234,11 @@ class StateView(Mapping[Path, Array]):
         names = self._names
         if joint in names.implicit:
             return self._twists[names.number[joint]]
-        return names.links[joint].slip(self._twists, self._element(joint))[0]
+        link = names.links[joint]
+        if joint in names.axial:
+            first, second = names.axial[joint]
+            return second @ twist(self._twists, link.body2) - first @ twist(self._twists, link.body1)
+        return link.slip(self._twists, self._element(joint))[0]
 
     def _element(self, joint: str) -> Array:
         """(size,) the joint's element as it is stored."""
@@ -287,6 +295,17 @@ class StateView(Mapping[Path, Array]):
             column += link.coupling.dim
         found = np.linalg.lstsq(rows, right, rcond=None)[0]
         return np.asarray(found[:first], dtype=float).reshape(-1, 6)
+
+
+def _axial(link: Link) -> bool:
+    return link.coupling.middle is None and link.coupling.pair.name in AXIAL
+
+
+def _axial_rows(link: Link) -> tuple[Array, Array]:
+    """(d, 6) each: the rate of a joint about one axis from the twists of its bodies."""
+    left = link.coupling.left_inverse(link.coupling.basis(link.coupling.identity()))
+    first, second = (left @ SE3.adjoint(SE3.inverse(frame)) for frame in (link.frame1, link.frame2))
+    return first, second
 
 
 def _inverse_inertia(mass: float, inertia: Iterable[object]) -> Array:

@@ -99,7 +99,7 @@ class Equations:
         self.scal = model.scal(0.0)
         self.given = Given(problem, reduced, self.nv)
         self.drive, self.wrench = self.given.drive, self.given.wrench
-        self.constant = problem.constant
+        self.constant, self.held = problem.constant, problem.held and not problem.constant
         self._paper, self.layout = PaperStates(reduced, problem), Layout.of(reduced)
         self.booking = Booking(self, self._paper)
         self.evaluations = 0
@@ -131,7 +131,9 @@ class Equations:
         nv, n, ns = self.nv, self.n, self.ns
         self.evaluations += 1
         self._factored = False
-        if not self.constant:
+        if self.held:
+            self.given.place(t, {})
+        elif not self.constant:
             v, r, heats, books = np.split(y, [nv, nv + n, nv + n + ns])
             self.given.place(t, self.states(ReducedState(t, self.advance(base, v), r, heats, books)))
         status, q, out = self.engine.rates(base, y)
@@ -151,7 +153,9 @@ class Equations:
         """
         a = tableau["a"]
         count = a.shape[1]
-        if self.constant:
+        if self.held:
+            self.given.place(state.t, {})
+        if self.constant or self.held:
             status, evaluations, before = self.engine.stages(tableau, state.q, y0, h, k, y1)
             self.evaluations += evaluations
             if status != Status.DEPENDENT:

@@ -54,12 +54,15 @@ class Signal:
         What the user calls it; empty where it is made of other signals.
     size
         How many numbers a function has to give; not checked where None.
+    held
+        Whether the value changes where steps end, and nowhere else: of a sampled input.
     """
 
     value: Array | Callable[[float, State], Array]
     effort: bool = False
     name: str = ""
     size: int | None = None
+    held: bool = False
 
     @property
     def constant(self) -> bool:
@@ -212,3 +215,8 @@ class Problem:
     def constant(self) -> bool:
         """Whether no input depends on time or state."""
         return all(signal.constant for signal in self.signals.values())
+
+    @property
+    def held(self) -> bool:
+        """Whether no input changes within a step."""
+        return all(signal.constant or signal.held for signal in self.signals.values())

@@ -1,5 +1,7 @@
 """Sampled inputs: discrete controllers by every method, against the exact sampled plant."""
 
+from bisect import bisect_right
+
 import numpy as np
 import pytest
 from scipy.linalg import expm
@@ -88,6 +90,29 @@ def test_the_same_function_at_every_moment_is_another_controller(cart):
     expected, _ = exact(round(UNTIL / PERIOD))
     free = ephs.simulate(cart, UNTIL, method="rk87", save_at=PERIOD * np.arange(21), inputs={"joints.rail": control})
     assert apart(free, expected) > 10.0 * SECOND
+
+
+@pytest.mark.parametrize("method", ["rk54", "rk87", "radau"])
+def test_a_sampled_input_is_a_function_of_time_with_declared_jumps(cart, method):
+    """To rounding: held values need no evaluation of the function, and no states."""
+    times, values = [], []
+
+    def noted(t, state):
+        times.append(t)
+        values.append(control(t, state))
+        return values[-1]
+
+    steps = {"method": method, "step": 0.005}
+    held = ephs.simulate(cart, UNTIL, inputs={"joints.rail": ephs.Sampled(PERIOD, noted)}, **steps)
+    known = {"joints.rail": lambda t: values[bisect_right(times, t) - 1]}
+    free = ephs.simulate(cart, UNTIL, inputs=known, jumps=times[1:], **steps)
+    assert np.array_equal(held.t, free.t)
+    for path, values_there in held.states.items():
+        assert np.abs(values_there - free.states[path]).max() <= 1e-13
+    late = ephs.simulate(
+        cart, UNTIL, inputs={"joints.rail": lambda t: values[bisect_right(times, t - 0.01) - 1]}, **steps
+    )
+    assert apart(late, at_samples(held)) > SECOND
 
 
 def test_delay_limits_and_the_first_value_are_those_of_the_exact_plant(cart):
