@@ -16,8 +16,10 @@ SHIPPED: Final = (
     "ephs.semantics.derive.linear:linear_program",
     "ephs.semantics.linear.rows:row_program",
     "ephs.semantics.linear.sparse:sparse_lu",
+    "ephs.mechanics.tree.programs:common_sweeps",
+    "ephs.mechanics.tree.loops:common_loops",
 )
-"""Module and name of each program, or of a function that returns it. To ship a program, list it here."""
+"""Module and name of each program, or of a function that returns one or several. To ship a program, list it here."""
 
 
 def programs() -> list[Program]:
@@ -25,8 +27,9 @@ def programs() -> list[Program]:
     found: list[Program] = []
     for entry in SHIPPED:
         module, _, name = entry.partition(":")
-        program: Program | Callable[[], Program] = getattr(import_module(module), name)
-        found.append(program if isinstance(program, Program) else program())
+        given: Program | Callable[[], Program | tuple[Program, ...]] = getattr(import_module(module), name)
+        made = given if isinstance(given, Program) else given()
+        found += [made] if isinstance(made, Program) else made
     return found
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from ephs.mechanics.tree import cuts
 from ephs.mechanics.tree.cuts import Chart, Cut, Kind
+from ephs.semantics.spaces import codes
 from ephs.semantics.stage import (
     Entry,
     Evaluator,
@@ -22,7 +23,7 @@ from ephs.semantics.stage import (
 )
 from ephs.semantics.stage.memory import ArrayReals
 
-__all__ = ["ARGUMENTS", "kinds_of", "loop_program"]
+__all__ = ["ARGUMENTS", "common_loops", "kinds_of", "loop_program"]
 
 
 def kinds_of(joints: Iterable[tuple[int, int, int]]) -> tuple[Kind, ...]:
@@ -99,4 +100,10 @@ def loop_program(kinds: tuple[Kind, ...]) -> Program:
         "rows": rows, "poses": poses, "fit": fit, "gaps": gaps, "relative_rates": relative_rates, "across": across,
         "advance": advance, "move": move, "velocities": velocities,
     }  # fmt: skip
-    return Program("loops", **{name: Entry(function, **ARGUMENTS[name]) for name, function in functions.items()})
+    name = "_".join(["loops", *(f"{kind.code}_{kind.dim}" for kind in kinds)])
+    return Program(name, **{name: Entry(function, **ARGUMENTS[name]) for name, function in functions.items()})
+
+
+def common_loops() -> Program:
+    """Return the program of the most common loops: of joints that turn about an axis or slide along one."""
+    return loop_program(kinds_of([(codes.VECTOR, 1, 1)]))

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from hashlib import sha256
 from typing import Any, Final, final
 
 from ephs.mechanics.tree import closing
@@ -11,7 +12,7 @@ from ephs.mechanics.tree.closing import Rows
 from ephs.mechanics.tree.inward import inward, load_inward
 from ephs.mechanics.tree.needs import NO_INTEGERS, Compact, LaidOut, Layout, Survey, layout_of
 from ephs.mechanics.tree.outward import outward
-from ephs.mechanics.tree.pack import Class
+from ephs.mechanics.tree.pack import SLIDE, TURN, Class
 from ephs.mechanics.tree.records import Link, State, States, Tree
 from ephs.mechanics.tree.spreading import driven_power, spread
 from ephs.semantics.spaces.rank import SPARSE
@@ -30,7 +31,7 @@ from ephs.semantics.stage import (
 )
 from ephs.semantics.stage.memory import IntegerCells, RealCells
 
-__all__ = ["ARGUMENTS", "ENTRIES", "FREE", "GENERAL", "PLACE", "Sweeps", "given_force", "sweeps"]
+__all__ = ["ARGUMENTS", "ENTRIES", "FREE", "GENERAL", "PLACE", "Sweeps", "common_sweeps", "given_force", "sweeps"]
 
 PLACE: Final = 24
 """Numbers of a link that rows and forces read: R and p in the world, twist, bias."""
@@ -119,7 +120,7 @@ class Sweeps:
         self._layout: Layout | None = None
         self._layout = layout_of(State.real_width, lambda survey: self._survey(survey, entries))
         self.width = self._layout.width
-        self.program = Program("sweeps", **entries)
+        self.program = Program(_name(kind, general=general), **entries)
 
     def tangent(self, directions: int = 1) -> Program:
         """The program of ``accelerations`` with exact derivatives along directions.
@@ -307,3 +308,17 @@ def given_force(force: Vector) -> Force:
 def sweeps(kind: Class, *, general: bool = False) -> Sweeps:
     """The program of a class, made once; it lives as long as the process, since tables keep its addresses."""
     return Sweeps(kind, general=general)
+
+
+def _name(kind: Class, *, general: bool) -> str:
+    """Name of a class: object code of several may be linked together."""
+    known = {TURN: "turn", SLIDE: "slide"}
+    joints = [known.get(joint) or sha256(repr(joint).encode()).hexdigest()[:8] for joint in kind.joints]
+    return "_".join(["sweeps", "planar" if kind.planar else "spatial", *joints, "loops" if general else "trees"])
+
+
+def common_sweeps() -> tuple[Program, ...]:
+    """Return the programs of the most common classes: mechanisms in a plane, whose joints turn or slide."""
+    turning, sliding = Class((TURN,), True), Class((SLIDE, TURN), True)
+    wanted = [(turning, False), (turning, True), (sliding, True)]
+    return tuple(sweeps(kind, general=general).program for kind, general in wanted)
