@@ -7,6 +7,7 @@ import numpy as np
 
 from ephs.mechanics.batch import rotations, turned
 from ephs.mechanics.build import drive_ports, wrench_port
+from ephs.mechanics.elements.beam import element_force
 from ephs.mechanics.elements.limit import stop_force
 from ephs.mechanics.scene.model import GROUND, Joint, Scene, Spring
 from ephs.operad import Path
@@ -60,6 +61,8 @@ def joint_load(joint: Joint, inputs: Inputs, coordinate: Array, rate: Array, rel
     relative
         (n, 7) the pose of C2 in C1.
     """
+    if (s := joint.strain) is not None:
+        return element_force(s.length, s.stiffness, s.rest, s.damping, relative, rate)
     pull = -joint.stiffness * (coordinate - joint.rest)
     # coordinates are in the axes of C1, rates in those of C2
     if joint.kind == "planar":

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 
 from ephs.mechanics.batch import adjoint_inverse, compose, included, rotations
+from ephs.mechanics.beam_motion import BeamMotion, beam_motion
 from ephs.mechanics.build import component_path
 from ephs.mechanics.contact_motion import ContactMotion, contact_motion
 from ephs.mechanics.gaps import open_by
@@ -166,6 +167,13 @@ class SceneMotion:
         if name not in contacts:
             raise KeyError(f"{name}: no such contact; the contacts are {', '.join(contacts) or 'none'}")
         return contact_motion(self._scene, contacts[name], self)
+
+    def beam(self, name: str) -> BeamMotion:
+        """Nodes, strains, forces and moments of a beam."""
+        beams = dict(self._scene.all_beams())
+        if name not in beams:
+            raise KeyError(f"{name}: no such beam; the beams are {', '.join(beams) or 'none'}")
+        return beam_motion(self._scene, beams[name], self.poses, self.inclusion)
 
     def marker(self, name: str) -> MarkerMotion:
         """The motion of a marker."""

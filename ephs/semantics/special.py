@@ -47,10 +47,12 @@ def choose(number: Any, one: Any, other: Any) -> Any:
 
 
 def squared_turn(q: Any) -> Any:
-    """θ² of a unit quaternion, with the angle 0 ≤ θ ≤ π of its rotation; smooth but at half a turn."""
+    """θ² of a unit quaternion, or of four arrays, with the angle 0 ≤ θ ≤ π of rotation; smooth but at half a turn."""
     w, x, y, z = q
     if isinstance(w, Recorded):
         return w.squared_turn(x, y, z)
+    if np.ndim(w):
+        return (2.0 * np.arctan2(np.sqrt(x * x + y * y + z * z), np.abs(w))) ** 2
     angle = 2.0 * math.atan2(math.sqrt(x * x + y * y + z * z), abs(w))
     return angle * angle
 

@@ -36,6 +36,7 @@ __all__ = [
     "beam_spring",
     "displacement",
     "elastic",
+    "element_force",
     "logarithm",
     "strain_energy",
     "strain_resistance",
@@ -196,6 +197,19 @@ def displacement(pose: Any, length: float, rest: Array) -> list[Any]:
     return [*change, *out]
 
 
+def element_force(length: float, stiffness: Array, rest: Array, damping: float, poses: Array, rates: Array) -> Array:
+    """(n, 6) what an element does on u_r, at relative poses (n, 7) and rates (n, 6): −dE − μ u_r."""
+    rows = np.asarray(poses, dtype=float).T
+    rate = _logarithm_rate(_whole(rows, length * rest))
+    speed = [_sum(row[j] * u for j, u in enumerate(rates.T)) for row in rate]
+    stress = [
+        k / length * (d + damping * v)
+        for k, d, v in zip(stiffness, displacement(rows, length, rest), speed, strict=True)
+    ]
+    out = [-_sum(rate[i][j] * stress[i] for i in range(6)) for j in range(6)]
+    return np.column_stack([np.broadcast_to(x, len(poses)) for x in out])
+
+
 def logarithm(pose: Any) -> list[Any]:
     """(6,) log of a pose (7,), angular part first, up to half a turn; of numbers or what is recorded."""
     square = squared_turn(pose[:4])
@@ -237,19 +251,28 @@ def _logarithm_rate(pose: Any) -> list[list[Any]]:
 
     Its blocks are [[A, 0], [A′, A]] with A = 1 + ½ω̃ + c ω̃² and A′ the derivative of A along υ.
     """
-    square = squared_turn(pose[:4])
-    w, v = np.array(logarithm(pose), dtype=object).reshape(2, 3)
+    square, whole = squared_turn(pose[:4]), logarithm(pose)
+    w, v = whole[:3], whole[3:]
     c, slope = turn_curve(square), turn_curve_slope(square)
     turning, moving = _skew(w), _skew(v)
-    twice = turning @ turning
-    block = np.eye(3) + 0.5 * turning + c * twice
-    change = 0.5 * moving + c * (turning @ moving + moving @ turning) + 2.0 * slope * _sum(w * v) * twice
-    return [[*block[i], 0.0, 0.0, 0.0] for i in range(3)] + [[*change[i], *block[i]] for i in range(3)]
+    twice, there, back = _product(turning, turning), _product(turning, moving), _product(moving, turning)
+    twist = 2.0 * slope * _sum(w[i] * v[i] for i in range(3))
+    at = [(i, j) for i in range(3) for j in range(3)]
+    block = {(i, j): float(i == j) + 0.5 * turning[i][j] + c * twice[i][j] for i, j in at}
+    change = {
+        (i, j): 0.5 * moving[i][j] + c * (there[i][j] + back[i][j]) + twist * twice[i][j] for i, j in at
+    }  # fmt: skip
+    upper = [[*(block[i, j] for j in range(3)), 0.0, 0.0, 0.0] for i in range(3)]
+    return upper + [[*(change[i, j] for j in range(3)), *(block[i, j] for j in range(3))] for i in range(3)]
 
 
-def _skew(w: Any) -> Any:
+def _skew(w: Any) -> list[list[Any]]:
     x, y, z = w
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]], dtype=object)
+    return [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]
+
+
+def _product(a: list[list[Any]], b: list[list[Any]]) -> list[list[Any]]:
+    return [[_sum(a[i][k] * b[k][j] for k in range(3)) for j in range(3)] for i in range(3)]
 
 
 def _cross(a: Any, b: Any) -> list[Any]:

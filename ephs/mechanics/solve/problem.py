@@ -114,6 +114,14 @@ class Motion(Protocol):
         """The motion of a marker."""
         ...
 
+    def contact(self, name: str) -> Any:
+        """Motion of a contact."""
+        ...
+
+    def beam(self, name: str) -> Any:
+        """Motion of a beam."""
+        ...
+
     def state(self, i: int) -> dict[Path, Array]:
         """The states at the i-th instant, as the continuous relations want them."""
         ...

@@ -234,6 +234,10 @@ class Solution:
         """The motion of a contact: gap, force, slip and heat."""
         return self._moving("contacts").contact(name)
 
+    def beam(self, name: str) -> Any:
+        """The motion of a beam: nodes, strains, forces, moments and energy."""
+        return self._moving("beams").beam(name)
+
     def point(self, body: str, xyz: "ArrayLike") -> Array:
         """(n, 3) world position of a point that is given in the body's frame."""
         motion = self.body(body)

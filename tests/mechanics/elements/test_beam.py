@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import ephs
-from ephs.mechanics.elements.beam import beam_damper, beam_element, beam_spring, displacement, logarithm
+from ephs.mechanics.elements.beam import beam_damper, beam_element, beam_spring, displacement, element_force, logarithm
 from ephs.mechanics.methods import METHODS
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.operad import Path
@@ -258,3 +258,33 @@ def test_damping_turns_into_heat_what_the_motion_loses(tmp_path):
     assert summary["heat"] > 1.0
     assert summary["max_energy_error"] <= 1e-12 and summary["min_entropy_production"] >= 0.0
     assert summary["thermal"]["core"]["temperature"] == pytest.approx(300.0 + summary["heat"] / 10.0, rel=1e-12)
+
+
+def test_a_beam_tells_its_strain_and_its_support_what_it_holds(tmp_path):
+    """A cantilever at rest under a load on its end: in every section the load, and its moment about it."""
+    load = 'ends = ["ground"]\n[loads.tip]\nbody = "rod.4"\nforce = [0.0, 0.0, 2.0]\n'
+    text = ROD.format(section=SECTION, more=load).replace("[6.0, 8.0, 0.0]", "[10.0, 0.0, 0.0]")
+    rest = ephs.equilibrium(scene_of(text, tmp_path)).model
+    sol = ephs.simulate(rest, 2.0**-6, method="natural", step=2.0**-7)
+    rod, wrench = sol.beam("rod"), sol.joint("rod-start").wrench[-1]
+    tip = rod.position[-1, -1]
+    assert rod.position.shape == (3, 5, 3) and rod.strain.shape == (3, 4, 6)
+    assert np.linalg.norm(rod.force[-1], axis=1) == pytest.approx(2.0, rel=0.02)
+    # axes of the root: x, z, −y; the middle of an element holds the mean of its ends' moments
+    assert np.abs(wrench - [0.0, 0.0, -2.0 * tip[0], 0.0, -2.0, 0.0]).max() <= 1e-6
+    middle = 2.0 * (tip[0] - 0.5 * (rod.position[-1, 1:, 0] + rod.position[-1, :-1, 0]))
+    assert np.abs(rod.moment[-1][:, 2]) == pytest.approx(middle, rel=1e-3)
+    with pytest.raises(KeyError, match="the beams are rod"):
+        sol.beam("rode")
+
+
+@given(seeds)
+def test_forces_of_a_motion_are_those_of_the_element(seed):
+    """What reads solutions, in arrays, beside the relations of the components."""
+    rng, length, tau = np.random.default_rng(seed), 1.3, 0.02
+    q, u = pose(rng, 0.4), rng.standard_normal(6)
+    found = element_force(length, STIFFNESS, REST, tau, np.stack([q, q]), np.stack([u, 0.0 * u]))
+    pull = beam_spring(length, STIFFNESS, REST).gradient({Q_R: q})
+    loss = beam_damper(length, STIFFNESS, REST, tau).flow({Q_R: q}, np.append(u, 0.0), ephs.Reference())[:6]
+    scale = np.abs(pull).max() + np.abs(loss).max()
+    assert np.abs(found - [-pull - loss, -pull]).max() <= 64 * EPS * scale
