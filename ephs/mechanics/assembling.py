@@ -17,7 +17,7 @@ from ephs.mechanics.scene.geometry import Coupling
 from ephs.mechanics.scene.kinematics import Link, extent
 from ephs.mechanics.scene.tree import spanning_hops
 from ephs.mechanics.solve.solution import Solution
-from ephs.mechanics.tree.frames import GROUND, frames_of
+from ephs.mechanics.tree.frames import GROUND, Frames, frames_of
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.descriptor import Descriptor
@@ -41,11 +41,14 @@ class FlatJoints:
         Paths of their relative poses.
     poses
         Paths of the bodies' poses, by number.
+    frames
+        Links and joints as they are found in the system.
     """
 
     links: tuple[Link, ...]
     relative: tuple[Path, ...]
     poses: tuple[Path, ...]
+    frames: Frames
 
     def gaps(self, solution: Solution) -> Array:
         """(n,) largest distance in m or angle in rad between where a joint and its bodies put the frame C2."""
@@ -85,6 +88,7 @@ def flat_joints(d: Descriptor) -> FlatJoints:
         ),
         tuple(j.state.path for j in joints),
         tuple(pose.path for i in posed if (pose := found.links[i].pose) is not None),
+        found,
     )
 
 

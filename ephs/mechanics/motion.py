@@ -15,6 +15,7 @@ from ephs.mechanics.beam_motion import BeamMotion, beam_motion
 from ephs.mechanics.build import component_path
 from ephs.mechanics.contact_motion import ContactMotion, contact_motion
 from ephs.mechanics.gaps import open_by
+from ephs.mechanics.moving import Moving
 from ephs.mechanics.own_motion import OwnMotion, own_motion
 from ephs.mechanics.projection import Held, project, project_dense
 from ephs.mechanics.readout import summary, variables
@@ -64,7 +65,7 @@ class BodyMotion:
         (n, 3) in the body basis, in rad/s.
     """
 
-    def __init__(self, motion: "SceneMotion", name: str) -> None:
+    def __init__(self, motion: Moving, name: str) -> None:
         self._motion, self._name = motion, name
         pose = motion.poses(name)
         self.quaternion, self.position = pose[:, :4], pose[:, 4:]
@@ -102,7 +103,7 @@ class JointMotion:
         (n, 6) λ on body 2 in the joint frame C2 (moment, force), NaN where statically indeterminate.
     """
 
-    def __init__(self, motion: "SceneMotion", name: str, coordinate: Array) -> None:
+    def __init__(self, motion: Moving, name: str, coordinate: Array) -> None:
         self._motion, self._name, self.coordinate = motion, name, coordinate
 
     @property

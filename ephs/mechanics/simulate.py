@@ -9,6 +9,7 @@ import numpy as np
 from ephs.mechanics.assembling import assembled, flat_joints
 from ephs.mechanics.build import drive_ports, initial_state, scene_inputs, scene_names, scene_system, wrench_port
 from ephs.mechanics.journaling import journaled
+from ephs.mechanics.link_motion import LinkMotion
 from ephs.mechanics.methods import METHODS, Method, chosen
 from ephs.mechanics.motion import SceneMotion
 from ephs.mechanics.own_units import in_own_units, seen_from
@@ -309,7 +310,9 @@ def problem_of_system(
     if assemble and joints.links:
         state = assembled(joints, state, {Path.of(path) for path in initial or {}})
     gaps = joints.gaps if joints.links else None
-    return Problem(name, system, descriptor, state, signals, reference or Reference(), gaps=gaps)
+    linked = (lambda solution: LinkMotion(joints.frames, solution)) if joints.frames.links else None
+    given = reference or Reference()
+    return Problem(name, system, descriptor, state, signals, given, gaps=gaps, linked=linked)
 
 
 def problem_of_scene(

@@ -95,6 +95,18 @@ class Signal:
         return found
 
 
+class Linked(Protocol):
+    """Motion of bodies and joints by name."""
+
+    def body(self, name: str) -> Any:
+        """The motion of a body."""
+        ...
+
+    def joint(self, name: str) -> Any:
+        """The motion of a joint."""
+        ...
+
+
 class Motion(Protocol):
     """A motion in the terms of its field: the solver itself knows states, efforts and flows only."""
 
@@ -176,6 +188,8 @@ class Problem:
         solutions are of; None where none was.
     gaps
         Makes of a solution (n,) the largest gap of a joint, m or rad, where no motion does.
+    linked
+        Makes of a solution the motion of its bodies and joints by the paths of their boxes, where no motion does.
     given
         Makes of its states those of the problem that it was made from; None where they are the same.
     view
@@ -203,6 +217,7 @@ class Problem:
     shaky: Callable[[], bool] | None = None
     shown: "Callable[[Record, Mapping[str, Any]], tuple[Problem, Record, Mapping[str, Any]]] | None" = None
     gaps: Callable[["Solution"], Array] | None = None
+    linked: Callable[["Solution"], "Linked"] | None = None
     given: Callable[[State], State] | None = None
     view: Callable[[State], Mapping[Path, Array]] = States
     seconds: float = 1.0

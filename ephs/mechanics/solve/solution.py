@@ -15,7 +15,7 @@ from ephs.mechanics.solve.events import Crossing
 from ephs.mechanics.solve.findings import Audit
 from ephs.mechanics.solve.labels import Labels
 from ephs.mechanics.solve.ledger import Ledgers
-from ephs.mechanics.solve.problem import Motion, Problem
+from ephs.mechanics.solve.problem import Linked, Motion, Problem
 from ephs.operad import ROOT, Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import Pair
@@ -211,16 +211,24 @@ class Solution:
     def body(self, name: str) -> Any:
         """The motion of a body: position, quaternion, rotation, velocity, angular_velocity.
 
+        Bodies and joints of a system that is not a scene are known by the paths of their boxes.
+
         Raises
         ------
         TypeError
-            The solution is not of a scene.
+            There are no bodies.
         """
-        return self._moving("bodies").body(name)
+        return (self._linked or self._moving("bodies")).body(name)
 
     def joint(self, name: str) -> Any:
         """The motion of a joint: coordinate, rate, wrench."""
-        return self._moving("joints").joint(name)
+        return (self._linked or self._moving("joints")).joint(name)
+
+    @cached_property
+    def _linked(self) -> Linked | None:
+        if self.motion is not None:
+            return self.motion
+        return None if self.problem is None or self.problem.linked is None else self.problem.linked(self)
 
     def thermal(self, name: str) -> Any:
         """The temperature of a thermal node."""
