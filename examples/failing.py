@@ -225,7 +225,7 @@ def off(q: float) -> float:
     return 0.0
 
 
-def truss() -> ephs.Scene:
+def truss(gravity: float = 9.81) -> ephs.Scene:
     """Two bars in line between two fixed pins, in gravity across them."""
     bars = [
         f"""
@@ -248,4 +248,4 @@ def truss() -> ephs.Scene:
             ("start", "ground", "left", 0.0), ("middle", "left", "right", 1.0), ("end", "right", "ground", 2.0),
         )
     ]  # fmt: skip
-    return scene("".join([*bars, *pins]), "[world]\ngravity = [0.0, -9.81, 0.0]\n")
+    return scene("".join([*bars, *pins]), f"[world]\ngravity = [0.0, {-gravity}, 0.0]\n")
