@@ -9,12 +9,13 @@ from ephs.mechanics.engine.records import Tables, Work
 from ephs.mechanics.solve.march.records import Motion, Status
 from ephs.mechanics.tree.closing import SIZE
 from ephs.mechanics.tree.records import Link
+from ephs.semantics.spaces.rank import CLOSED, GAP
 from ephs.semantics.stage import Argument, Evaluator, Integer, Matrix, Real, Truth, Vector, staged
 
-__all__ = ["CLOSED", "Mechanism", "close"]
+__all__ = ["Mechanism", "close"]
 
-GAP, CLOSED, ROUNDS = 1e-15, 1e-8, 20
-"""Loops are closed to GAP where rounding lets them, and a state is refused where they stay open by CLOSED."""
+ROUNDS = 20
+"""Iterations that close loops."""
 
 
 def _clear(on: Evaluator, x: Vector) -> None:

@@ -7,21 +7,18 @@ from typing import final
 import numpy as np
 
 from ephs.mechanics.reduced.given import Given
-from ephs.mechanics.reduced.heat import Heats
 from ephs.mechanics.reduced.loop_kernels import accelerate, constraint_rows, correct, loop_gaps, reduce_rows
 from ephs.mechanics.reduced.mechanism import Reduced
 from ephs.mechanics.reduced.sweep_kernels import inertia_sweep, kinematics
 from ephs.mechanics.reduced.tables import CUT
 from ephs.mechanics.solve.errors import Outcome, SolveError
+from ephs.mechanics.solve.heats import Heats
 from ephs.semantics.bundle import Array
 from ephs.semantics.kernel_table import TEMPERATURE
+from ephs.semantics.spaces.rank import CLOSED_SINGULAR, GAP
 
 __all__ = ["Dense", "unmoved"]
 
-GAP = 1e-15
-"""Position residuals to which loops are closed, in m and rad."""
-CLOSED = 1e-10
-"""Residuals above this cannot be accepted."""
 ROUNDS = 12
 SLIP = 1e-2
 """Part of the rates by which constraints may be missed that are left out as repeating others: where they only nearly
@@ -115,7 +112,7 @@ class Dense:
             self._reduce()
             correct(w, self._rank, -residual, change)
             q = moved(q, change)
-        if not gap <= CLOSED:
+        if not gap <= CLOSED_SINGULAR:
             raise self.opened(residual, gap)
         self._reduce()
         target = -w.row[: self._m] @ r

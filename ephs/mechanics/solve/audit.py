@@ -19,6 +19,7 @@ from ephs.mechanics.solve.model import Model
 from ephs.mechanics.solve.resolution import Trials
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.rank import CLOSED
 
 if TYPE_CHECKING:
     from ephs.mechanics.solve.solution import Solution
@@ -33,8 +34,6 @@ MOTION = 0.1
 estimate adds up errors of steps, which may cancel, so that fewer digits would be guesses."""
 PRODUCTION = 1e-12
 """Part of its scale by which an entropy may fall: what rounding leaves of a difference of flows."""
-CLOSED = 1e-8
-"""Part of the mechanism's length, or rad, by which joints may be open."""
 INSTANTS = 500
 """Instants, evenly spread, at which the positions of joints are looked at."""
 ROUNDING = 8.0 * float(np.finfo(float).eps)

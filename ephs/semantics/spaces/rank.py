@@ -12,10 +12,13 @@ from numpy.typing import NDArray
 
 __all__ = [
     "ASSEMBLY",
+    "CLOSED",
+    "CLOSED_SINGULAR",
     "CONSTRAINT",
     "ELIMINATION",
     "EXPLICIT",
     "FOLLOWED",
+    "GAP",
     "IMPLICIT",
     "LIGHT",
     "NEIGHBOUR",
@@ -29,6 +32,14 @@ __all__ = [
 ASSEMBLY = 1e-8
 """Tolerance of assembly, as a part of the mechanism's length: files written with nine digits round by less, and no
 mechanism is made more exactly. Angles in rad and twists of size one are held to it, too."""
+GAP = 1e-15
+"""Gap to which loops are closed where rounding lets them, in m and rad: that of positions of size one."""
+CLOSED = ASSEMBLY
+"""Gap above which a state of a loop of full rank is refused: what may be assembled so may move so. The audit holds runs
+to the same."""
+CLOSED_SINGULAR = 1e-10
+"""The same where rank is nearly lost. There joints open with the square of a motion, so that 1e-8 would let two bars in
+line between fixed pins fall by 1e-4 of their length, and more with every step."""
 ELIMINATION = 1e-10
 """Rank of relations and of linear equations between states: after a few orthogonal eliminations of condition up to 1e5
 rounding is 10 κ ε, a tenth of this at most."""
