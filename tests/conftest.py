@@ -7,7 +7,7 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")
 
 import pytest  # noqa: E402
-from hypothesis import Phase, settings  # noqa: E402
+from hypothesis import HealthCheck, Phase, settings  # noqa: E402
 
 from tests.durations import function_of, long_tests  # noqa: E402
 from tests.show.browser import browser  # noqa: E402
@@ -31,8 +31,11 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.long)
 
 
-settings.register_profile("ci", derandomize=True, deadline=None, max_examples=50, print_blob=True)
-settings.register_profile("dev", deadline=None, max_examples=50)
+COMPILING = [HealthCheck.too_slow]  # programs are compiled while mechanisms of a new class are drawn
+settings.register_profile(
+    "ci", derandomize=True, deadline=None, max_examples=50, print_blob=True, suppress_health_check=COMPILING
+)
+settings.register_profile("dev", deadline=None, max_examples=50, suppress_health_check=COMPILING)
 # A broken law is enough; which of its counterexamples is smallest does not matter.
 settings.register_profile(
     "mutate", derandomize=True, deadline=None, max_examples=20, database=None, phases=[Phase.explicit, Phase.generate]

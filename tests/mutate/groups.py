@@ -50,9 +50,12 @@ RUNS = (
 
 LONG = Pace(each=10.0, file=90.0, budget=40.0)
 """For what shows itself over many steps."""
-DERIVATIVES = tuple(
-    f"ephs/mechanics/reduced/{name}_kernels.py"
-    for name in ("action", "action_tangent", "column", "dynamics", "jacobian", "slope", "tangent")
+DERIVATIVES = (
+    "ephs/mechanics/tree/closures.py",
+    "ephs/mechanics/tree/edges.py",
+    "ephs/mechanics/tree/inverse.py",
+    "ephs/mechanics/engine/laws.py",
+    "ephs/mechanics/reduced/slopes.py",
 )
 
 GROUPS = {
@@ -137,8 +140,6 @@ GROUPS = {
         (
             "ephs/mechanics/solve/natural_kernels.py",
             "ephs/mechanics/solve/gauss_kernels.py",
-            "ephs/mechanics/reduced/loop_kernels.py",
-            "ephs/mechanics/reduced/sweep_kernels.py",
         ),
         (
             *RUNS,

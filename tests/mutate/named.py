@@ -29,17 +29,11 @@ BREAKS = {
         "parts.balances[writer.junction(path, port)] += expression",
         "parts.balances[writer.junction(path, port)] -= expression",
     ),
-    "reduced, turning frames": Break(
-        "ephs/mechanics/reduced/sweep_kernels.py",
-        "w.bias[i, k] = carried[k] + column[k]",
-        "w.bias[i, k] = carried[k] - column[k]",
+    "dense, axes that turn": Break(
+        "ephs/mechanics/tree/inverse.py", "+ dot(load, bracket(twist, axis))", "- dot(load, bracket(twist, axis))"
     ),
-    "reduced, cut joints": Break(
-        "ephs/mechanics/reduced/loop_kernels.py", "total[k] += turned[k]", "total[k] -= turned[k]"
-    ),
-    "reduced, heat": Break(
-        "ephs/mechanics/reduced/sweep_kernels.py", "s_rate[t.heat[i]] -= w.f[d]", "s_rate[t.heat[i]] += w.f[d]"
-    ),
+    "dense, multipliers": Break("ephs/mechanics/tree/closures.py", "scale(-multiplier[row]", "scale(multiplier[row]"),
+    "dense, heat": Break("ephs/mechanics/tree/edges.py", "+ (law.made + (", "- (law.made + ("),
     "books": Break(
         "ephs/mechanics/solve/books.py",
         "self.exergy - self.exergy[:1] + self.destroyed",

@@ -41,7 +41,7 @@ class Loading:
         self._links.place(q, r)
         self._equations.wrench[:] = 0.0
         for link, load in self._loads:
-            turn = np.eye(3) if load.follower else quaternion_to_matrix(self._equations.work.pose[link, :4]).T
+            turn = np.eye(3) if load.follower else quaternion_to_matrix(self._equations.dense.residual.pose(link)[:4]).T
             self._equations.wrench[link] += self.share * np.concatenate([turn @ load.moment, turn @ load.force])
 
     def stiffened(self, found: Derivatives, q: Array, r: Array) -> Derivatives:
@@ -53,7 +53,7 @@ class Loading:
         for link, load in self._loads:
             if not load.follower:
                 jacobian = self._links.jacobian(load.body, None)
-                turn = quaternion_to_matrix(self._equations.work.pose[link, :4]).T
+                turn = quaternion_to_matrix(self._equations.dense.residual.pose(link)[:4]).T
                 turning = np.vstack([hat(turn @ load.moment), hat(turn @ load.force)])
                 change += self.share * jacobian.T @ turning @ jacobian[:3]
         by_place = found.acceleration_q + found.acceleration_force @ change

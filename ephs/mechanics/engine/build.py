@@ -23,7 +23,7 @@ from ephs.semantics.stage import Program, Table
 if TYPE_CHECKING:
     from ephs.mechanics.reduced.mechanism import Reduced
 
-__all__ = ["engine_of"]
+__all__ = ["engine_of", "whole_tables"]
 
 
 def engine_of(
@@ -105,6 +105,14 @@ def _work(
         "alter": (freedoms,), "moved": (joints,), "answer": (1,),
     }  # fmt: skip
     return {name: np.zeros(shape) for name, shape in shapes.items()} | {"fault": np.zeros(1, dtype=np.int64)}
+
+
+def whole_tables(reduced: "Reduced", bodies: Frames, ground: Array) -> tuple[Index, Index, Array, Forces]:
+    """Charts, cut joints with all their rows, and the tables of forces where anything may act."""
+    cut, frames, basis, _ = _cut(reduced, bodies, ground, None)
+    every = frozenset(range(len(reduced.edges))), frozenset(range(reduced.links))
+    forces = _forces(reduced, bodies, ground, cut, every)
+    return _chart(reduced, cut), cut[:, :-1], np.hstack([frames, basis]), forces
 
 
 def _matrix(pose: Array) -> Array:

@@ -21,7 +21,7 @@ from ephs.mechanics.reduced.mechanism import reduce_system
 from ephs.mechanics.reduced.naming import tolerances, within
 from ephs.mechanics.reduced.paper import PaperStates
 from ephs.mechanics.reduced.reading import JointStates
-from ephs.mechanics.reduced.tables import SPRING, Workspace
+from ephs.mechanics.reduced.tables import SPRING
 from ephs.mechanics.solve.control import Tolerance
 from ephs.mechanics.solve.errors import Outcome, SolveError
 from ephs.mechanics.solve.march import Status
@@ -139,7 +139,7 @@ class Equations:
         status, q, out = self.engine.rates(base, y)
         component = self.engine.failed
         if status == Status.DEPENDENT:
-            status, component = self.dense.rates(q, y, self.given, self.heats, self.scal, out)
+            status, component = self.dense.rates(q, y, self.given, self.heats, out)
             self.engine.velocities(y, y[self.nv : self.nv + self.n], out)
         self.refuse(status, component)
         return out
@@ -236,13 +236,8 @@ class Equations:
     def dense(self) -> Dense:
         """Sweeps over dense matrices, made when they are first asked for."""
         if self._dense is None:
-            self._dense = Dense(self.reduced)
+            self._dense = Dense(self.reduced, self.gravity, self.scal)
         return self._dense
-
-    @property
-    def work(self) -> Workspace:
-        """Their memory."""
-        return self.dense.work
 
     def mass(self, q: Array, r: Array) -> Array:
         """(n, n) the mass matrix at q."""
@@ -257,7 +252,7 @@ class Equations:
         return self.dense.gaps(q, r)
 
     def fitted(self, q: Array, r: Array) -> Array:
-        """q with the cut joints' elements nearest to where their bodies put them; leaves the dense sweep at q."""
+        """q with the cut joints' elements nearest to where their bodies put them."""
         return self.dense.fitted(q, r)
 
     def load(self, t: float, q: Array, r: Array, heats: Array) -> None:

@@ -89,7 +89,6 @@ class Jacobian:
         eq = self.equations
         y = eq.vector(state)[: self.size]
         middle = eq.drive.copy(), eq.wrench.copy()
-        out = np.empty((eq.n, self.size))
         changes: list[tuple[Array, Array]] = []
         for j in range(self.size):
             moved = y.copy()
@@ -100,7 +99,5 @@ class Jacobian:
             changes.append(((eq.drive - middle[0]) / by, (eq.wrench - middle[1]) / by))
         eq.drive[:], eq.wrench[:] = middle
         self._linear.forward(state.q, state.r, eq.heats.entropies(state.heats))
-        self._linear.columns(solve=True, fit=False)
-        for j, (drive, wrench) in enumerate(changes):
-            out[:, j] = self._linear.pushed(drive, wrench)
-        return out
+        drive, wrench = (np.moveaxis(np.array(parts), 0, -1) for parts in zip(*changes, strict=True))
+        return self._linear.pushed(drive, wrench)

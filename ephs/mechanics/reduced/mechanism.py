@@ -8,7 +8,7 @@ import numpy as np
 from ephs.mechanics.engine.records import Node
 from ephs.mechanics.reduced.parts import Acting, Parts, parts_of
 from ephs.mechanics.reduced.spanning import Edge, frames_of_joints, loop_algebra, spanning_tree, twists_of
-from ephs.mechanics.reduced.tables import CUT, SPRING, TREE, Mechanism, Workspace, row_addresses
+from ephs.mechanics.reduced.tables import CUT, SPRING, TREE, Mechanism
 from ephs.mechanics.solve.errors import OptionError
 from ephs.mechanics.solve.heats import exponential_law
 from ephs.mechanics.solve.model import Model
@@ -88,23 +88,6 @@ class Reduced:
     def freedoms(self) -> int:
         """The number of the tree's freedoms."""
         return int(self.tables.driven.size)
-
-    def workspace(self, *, dense: bool) -> Workspace:
-        """Scratch memory for one thread; dense: with the matrices of all freedoms and constraints."""
-        t = self.tables
-        links, edges, n, m = self.links, len(self.edges), self.freedoms, int(t.rows.sum()) + int(t.driven.sum())
-        n, m = (n, m) if dense else (0, 0)
-        shapes: dict[str, tuple[int, ...]] = {
-            "pose": (links, 7), "inner": (links, 7), "twist": (links, 6), "bias": (links, 6), "load": (links, 6),
-            "composite": (links, 6, 6), "motion": (edges, 6, 6), "relative": (edges, 7), "rate": (edges, 6),
-            "mass": (n, n), "factor": (n, n), "force": (n,), "row": (m, n), "size": (m,), "target": (m,),
-            "scaled": (m, n), "plain": (m, n),
-            "triangle": (m, m), "step": (max(n, m),), "temperature": (max(t.node.size, 1),), "multiplier": (m,),
-            "small": (512,), "matrix": (6, 6), "scratch": (2048,), "e": (16,), "f": (256,), "c": (16,), "jac": (512,),
-        }  # fmt: skip
-        arrays = {name: np.zeros(shape) for name, shape in shapes.items()}
-        linear = row_addresses() if dense else np.zeros(0, dtype=np.int64)
-        return Workspace(**arrays, chosen=np.zeros(m, dtype=np.int64), linear=linear)
 
 
 def reduce_system(problem: Problem, model: Model) -> Reduced:

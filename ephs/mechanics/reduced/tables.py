@@ -1,40 +1,14 @@
-"""The tables of a mechanism, and the scratch memory of one evaluation, as compiled code takes them."""
+"""The tables of a mechanism in joint coordinates."""
 
-from functools import cache
 from typing import NamedTuple
-
-import numpy as np
 
 from ephs.mechanics.solve.sparse import Index
 from ephs.semantics.bundle import Array
-from ephs.semantics.linear.rows import row_program
 
-__all__ = [
-    "CHOLESKY",
-    "CORRECT",
-    "CUT",
-    "MULTIPLIERS",
-    "ORTHONORMALISE",
-    "SOLVE",
-    "SPRING",
-    "TREE",
-    "Mechanism",
-    "Workspace",
-    "row_addresses",
-]
+__all__ = ["CUT", "SPRING", "TREE", "Mechanism"]
 
 TREE, CUT, SPRING = 0, 1, 2
 """Kinds of edges."""
-CHOLESKY, SOLVE, ORTHONORMALISE, CORRECT, MULTIPLIERS = range(5)
-"""Functions of `ephs.semantics.linear.rows` by their place among the addresses of a workspace."""
-
-
-@cache
-def row_addresses() -> Index:
-    """Return the addresses of these functions in machine code."""
-    calls = row_program().compiled()
-    names = ("cholesky", "solve", "orthonormalise", "correct", "multipliers")
-    return np.array([calls[name].address for name in names])
 
 
 class Mechanism(NamedTuple):
@@ -70,38 +44,3 @@ class Mechanism(NamedTuple):
     parameters: Array
     parameter_at: Index
     made_at: Index  # (components,): place of what it makes, −1
-
-
-class Workspace(NamedTuple):
-    """Scratch memory for one evaluation."""
-
-    pose: Array  # (links, 7) in the world
-    inner: Array  # (links, 7) in the parent
-    twist: Array  # (links, 6)
-    bias: Array  # (links, 6)
-    load: Array  # (links, 6)
-    composite: Array  # (links, 6, 6)
-    motion: Array  # (edges, 6, 6): S, columns
-    relative: Array  # (edges, 7) pose of C2 in C1, of cut edges and springs
-    rate: Array  # (edges, 6): r of cut edges and springs
-    mass: Array  # (n, n)
-    factor: Array  # (n, n)
-    force: Array  # (n,)
-    row: Array  # (m, n): constraints
-    size: Array  # (m,): what the rows could be if nothing cancelled, in the mass metric
-    target: Array  # (m,)
-    scaled: Array  # (m, n): rows in the mass metric, orthonormalised
-    plain: Array  # (m, n): rows without masses, orthonormalised
-    triangle: Array  # (m, m)
-    chosen: Index  # (m,)
-    step: Array  # (n,)
-    temperature: Array  # (entropies,): effort of each
-    multiplier: Array  # (m,)
-    linear: Index  # addresses of `row_addresses`
-    small: Array  # (512,)
-    matrix: Array  # (6, 6)
-    scratch: Array  # (2048,)
-    e: Array
-    f: Array
-    c: Array
-    jac: Array

@@ -13,7 +13,6 @@ from typing import Any, final
 
 import numpy as np
 
-from ephs.mechanics.reduced.action_kernels import action_derivatives
 from ephs.mechanics.reduced.equations import Equations, ReducedState
 from ephs.mechanics.reduced.method import ReducedMethod
 from ephs.mechanics.reduced.naming import counted
@@ -146,24 +145,15 @@ class Variational(ReducedMethod):
         q, r = eq.moved(state.q, 0.5 * xi), xi / h
         if self._bent:
             q = eq.fitted(q, r)
-        momentum, force = np.zeros(eq.n), np.zeros(eq.n)
-        s_rate, made, powers = np.zeros(eq.ns), np.zeros(len(eq.reduced.made)), np.zeros(2)
-        flows = made
-        heats = state.heats
+        heats, found = state.heats, eq.dense.residual
+        flows = np.zeros(len(eq.reduced.made))
         for _ in range(2 if eq.ns else 1):  # temperatures in the middle, by two passes
-            made[:] = 0.0
             eq.load(state.t + 0.5 * h, q, r, heats)
-            s = eq.heats.entropies(heats)
-            eq.refuse(
-                *action_derivatives(
-                    eq.reduced.tables, eq.work, q, r, s, eq.drive, eq.wrench, eq.scal, s_rate, made, powers,
-                    momentum, force,
-                )
-            )  # fmt: skip
-            flows = eq.heats.flows(heats, made)
+            eq.refuse(*found.about(q, r, eq.heats.entropies(heats), eq.drive, eq.wrench))
+            flows = eq.heats.flows(heats, found.laws.made)
             heats = eq.heats.taken(state.heats, 0.5 * h * flows)[0]
         eq.evaluations += 1
-        return momentum, force, flows, powers
+        return *found.momenta(), flows, np.array([found.laws.heat, found.power()])
 
     def _gap(self, state: ReducedState, xi: Array, h: float) -> tuple[Array, Array]:
         """Residuals of prescribed joints and loops at the end of the step, and their rows on changes of ξ."""

@@ -43,6 +43,7 @@ __all__ = [
     "relative_rates",
     "rows",
     "velocities",
+    "visit_kind",
 ]
 
 
@@ -119,12 +120,16 @@ class Place(Record):
 
 
 class Relative(Record):
-    """Motion of a cut joint's second frame: pose in its first frame, frame in the first link, relative twist."""
+    """Motion of a cut joint's second frame: pose in its first frame, frame in the first link, relative twist.
+
+    ``change`` is the twist's derivative at the accelerations that the links' places have.
+    """
 
     pose = reals(7)
     turn = reals(3, 3)
     at = reals(3)
     twist = reals(6)
+    change = reals(6)
 
 
 def place_of(on: Evaluator, places: Matrix, link: Integer) -> Place:
@@ -155,9 +160,10 @@ def _each_row(on: Evaluator, cut: Cut, body: Callable[[Integer, list[Real]], Non
     on.loop(cut.rows, one)
 
 
-def _visit(on: Evaluator, kinds: tuple[Kind, ...], joint: Chart | Cut, body: Callable[[Kind], None]) -> None:
+def visit_kind(
+    on: Evaluator, kinds: tuple[Kind, ...], code: Integer, dim: Integer, body: Callable[[Kind], None]
+) -> None:
     """Call body(kind) with the kind of a joint, which is then known."""
-    code, dim = joint.code, joint.dim
 
     def among(first: int) -> None:
         kind = kinds[first]
@@ -200,7 +206,7 @@ def rows(
     places
         (links + 1, 24): `Place` of each link and the ground.
     motions
-        (cuts, 25): receives `Relative`, but for poses.
+        (cuts, 31): receives `Relative`, but for poses.
     end
         (2 rows,): the slots of a row on its first and on its second link.
     value, covector
@@ -222,6 +228,7 @@ def rows(
         motion.twist = twist
         bias = sub(se3.twist_inward(outer_turn, outer_at, far.bias), se3.twist_inward(turn, at, near.bias))
         total = add(se3.bracket(twist, first), bias)
+        motion.change = total
 
         def row(a: Integer, normal: list[Real]) -> None:
             value[a, 0] = -dot(normal, total)
@@ -262,7 +269,7 @@ def fit(on: Evaluator, kinds: tuple[Kind, ...], cuts: Table[Cut], motions: Matri
             if kind.dim:
                 on.loop(3 if kind.dim > 1 or kind.code != codes.VECTOR else 2, closer)
 
-        _visit(on, kinds, cut, of)
+        visit_kind(on, kinds, cut.code, cut.dim, of)
 
     on.loop(cuts.size, one)
 
@@ -284,7 +291,7 @@ def gaps(on: Evaluator, kinds: tuple[Kind, ...], cuts: Table[Cut], motions: Matr
 
             _each_row(on, cut, row)
 
-        _visit(on, kinds, cut, of)
+        visit_kind(on, kinds, cut.code, cut.dim, of)
 
     on.loop(cuts.size, one)
     return worst.value
@@ -342,7 +349,7 @@ def advance(on: Evaluator, kinds: tuple[Kind, ...], charts: Table[Chart], base: 
             for k, x in enumerate(STAGED[kind.code].retract(on, element, change)):
                 q[chart.q_at + k] = x
 
-        _visit(on, kinds, chart, of)
+        visit_kind(on, kinds, chart.code, chart.dim, of)
 
     on.loop(charts.size, one)
 
@@ -376,6 +383,6 @@ def velocities(
             for j, x in enumerate(found):
                 out[chart.v_at + j] = x
 
-        _visit(on, kinds, chart, of)
+        visit_kind(on, kinds, chart.code, chart.dim, of)
 
     on.loop(charts.size, one)

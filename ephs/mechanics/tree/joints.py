@@ -12,7 +12,7 @@ from ephs.semantics.spaces.staged_groups import about_z, included
 from ephs.semantics.spaces.vectors import Rows, add, apply, apply_transposed, dot, product, scale, transposed
 from ephs.semantics.stage import Evaluator, Real, Vector
 
-__all__ = ["force_inside", "frame", "rate_inside", "rate_outside"]
+__all__ = ["force_inside", "force_outside", "frame", "rate_inside", "rate_outside"]
 
 
 def _element(on: Evaluator, joint: Joint, link: Link, q: Vector) -> tuple[Rows, list[Real]]:
@@ -59,3 +59,10 @@ def force_inside(on: Evaluator, joint: Joint, link: Link, q: Vector, force: list
     if not joint.backward:
         return scale(link.sense, force)
     return scale(-1.0, apply_transposed(_carried(on, joint, link, q, back=True), force))
+
+
+def force_outside(on: Evaluator, joint: Joint, link: Link, q: Vector, force: list[Real]) -> list[Real]:
+    """The force on r of a force on ρ: `force_inside` undone."""
+    if not joint.backward:
+        return scale(link.sense, force)
+    return scale(-1.0, apply_transposed(_carried(on, joint, link, q, back=False), force))

@@ -10,15 +10,29 @@ from numpy.typing import NDArray
 
 from ephs.mechanics.tree.records import Joint, Link
 from ephs.semantics.bundle import Array
-from ephs.semantics.spaces import codes
+from ephs.semantics.spaces import codes, pair
 from ephs.semantics.stage import Table
 
-__all__ = ["SLIDE", "TURN", "Class", "Packed", "Part", "packed"]
+__all__ = ["SLIDE", "STANDARD", "TURN", "Class", "Packed", "Part", "packed"]
 
 TURN = Joint(codes.VECTOR, 1, ((0.0, 0.0, 1.0, 0.0, 0.0, 0.0),))
 """A joint that turns about z."""
 SLIDE = Joint(codes.VECTOR, 1, ((0.0, 0.0, 0.0, 1.0, 0.0, 0.0),))
 """A joint that slides along x, as planar mechanisms have it."""
+
+
+def _of(name: str, *, backward: bool) -> Joint:
+    found = pair(name)
+    return Joint(found.code, found.size, tuple(tuple(column) for column in found.basis.T.tolist()), backward)
+
+
+STANDARD: tuple[Joint, ...] = (
+    TURN,
+    SLIDE,
+    *(_of(name, backward=False) for name in ("prismatic", "cylindrical", "planar", "spherical", "free")),
+    *(_of(name, backward=True) for name in ("planar", "spherical", "free")),
+)
+"""Joints without parameters: one looped program serves all mechanisms of these."""
 
 
 @final
@@ -101,7 +115,7 @@ class Packed:
         return self.links.arrays[1]
 
 
-def packed(parts: Sequence[Part], gravity: Array, *, planar: bool) -> Packed:
+def packed(parts: Sequence[Part], gravity: Array, *, planar: bool, among: Sequence[Joint] = ()) -> Packed:
     """The records of a mechanism's tree, whose parts stand after their parents.
 
     Parameters
@@ -110,8 +124,10 @@ def packed(parts: Sequence[Part], gravity: Array, *, planar: bool) -> Packed:
         (3,) in the ground's frame.
     planar
         All joints turn about z or slide along x, and all z axes are parallel.
+    among
+        Further kinds of joints that the class has.
     """
-    count, joints = len(parts), tuple(sorted({part.joint for part in parts}, key=repr))
+    count, joints = len(parts), tuple(sorted({part.joint for part in parts} | set(among), key=repr))
     links = Link.table(count)
     for i, part in enumerate(parts):
         link, c = links[i], [float(x) for x in part.numbers]

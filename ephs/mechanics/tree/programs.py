@@ -31,7 +31,9 @@ from ephs.semantics.stage import (
 )
 from ephs.semantics.stage.memory import IntegerCells, RealCells
 
-__all__ = ["ARGUMENTS", "ENTRIES", "FREE", "GENERAL", "PLACE", "Sweeps", "common_sweeps", "given_force", "sweeps"]
+__all__ = [
+    "ARGUMENTS", "ENTRIES", "FREE", "GENERAL", "MECHANISM", "PLACE", "Sweeps", "common_sweeps", "given_force", "sweeps",
+]  # fmt: skip
 
 PLACE: Final = 24
 """Numbers of a link that rows and forces read: R and p in the world, twist, bias."""
@@ -100,6 +102,8 @@ class Sweeps:
         The class.
     general
         Loops, wrenches on links and prescribed motions are there; else a tree under forces on its rates.
+    others
+        Entry functions in place of those, made with these sweeps' `tree`.
 
     Attributes
     ----------
@@ -109,14 +113,16 @@ class Sweeps:
         The entry functions of `FREE` or `GENERAL`.
     """
 
-    def __init__(self, kind: Class, *, general: bool) -> None:
+    def __init__(
+        self, kind: Class, *, general: bool = True, others: "Callable[[Sweeps], dict[str, Entry]] | None" = None
+    ) -> None:
         self._class = kind
         self._zeros = (0, 1, 5) if kind.planar else ()
         self._constants = tuple(
             Layout(known, {k: k for k in range(Link.real_width) if k not in known})
             for known in (kind.constants(number) for number in range(len(kind.joints)))
         )
-        entries = self._general() if general else self._free()
+        entries = others(self) if others is not None else self._general() if general else self._free()
         self._layout: Layout | None = None
         self._layout = layout_of(State.real_width, lambda survey: self._survey(survey, entries))
         self.width = self._layout.width

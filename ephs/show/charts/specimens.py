@@ -9,7 +9,6 @@ from collections.abc import Callable
 import numpy as np
 
 from ephs.mechanics.methods import Method, on_joints
-from ephs.mechanics.reduced.action_kernels import action_derivatives
 from ephs.mechanics.reduced.equations import Equations, ReducedState
 from ephs.mechanics.reduced.method import ReducedMethod
 from ephs.mechanics.solve.control import Control
@@ -37,16 +36,9 @@ class _OnLoops(ReducedMethod):
     def forces(self, q: Array, r: Array, heats: Array) -> tuple[Array, Array]:
         """∂L/∂r and ∂L/∂q with the forces that no potential has."""
         eq = self.equations
-        s = eq.heats.entropies(heats)
-        momentum, force = np.zeros(eq.n), np.zeros(eq.n)
-        made, powers = np.zeros(len(eq.reduced.made)), np.zeros(2)
-        eq.refuse(
-            *action_derivatives(
-                eq.reduced.tables, eq.work, q, r, s, eq.drive, eq.wrench, eq.scal, np.zeros(eq.ns), made, powers,
-                momentum, force,
-            )
-        )  # fmt: skip
-        return momentum, force
+        found = eq.dense.residual
+        eq.refuse(*found.about(q, r, eq.heats.entropies(heats), eq.drive, eq.wrench))
+        return found.momenta()
 
     def solved(self, residual: Callable[[Array], Array], guess: Array) -> Array:
         """A root by Newton's method, of least change where equations depend on one another."""

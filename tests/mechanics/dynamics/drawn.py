@@ -7,9 +7,14 @@ from hypothesis import assume
 from hypothesis import strategies as st
 
 import ephs
+from benchmarks import families
 from ephs.mechanics.scene.geometry import coupling_of
 from ephs.mechanics.scene.model import frozen
 from ephs.testing import mechanisms
+
+SHARED = ephs.dynamics(families.scene("planar-chain", 1))
+"""Compiles what all mechanisms share, before draws are timed."""
+SHARED.derivatives(SHARED.state0)
 
 
 def turned(joint):

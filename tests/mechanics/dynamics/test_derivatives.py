@@ -4,15 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import assume, given, settings
 
 import ephs
-from ephs.mechanics.reduced.action_kernels import action_derivatives
 from ephs.mechanics.reduced.equations import Equations
 from ephs.mechanics.reduced.jacobian import Jacobian
 from ephs.mechanics.reduced.tangent import Linearised
-from ephs.mechanics.reduced.tangent_kernels import still, tangent
 from ephs.mechanics.simulate import problem_of_scene
 from ephs.testing import mechanisms
 from tests.mechanics.dynamics.drawn import moving
@@ -194,33 +191,43 @@ def test_momenta_and_their_forces_differentiate_as_differences_say(drawn):
 
     def action(change):
         moved, rates = equations.fitted(equations.moved(q, change[:n]), r + change[n:]), r + change[n:]
-        s_rate, made, powers = np.zeros(equations.ns), np.zeros(len(equations.reduced.made)), np.zeros(2)
-        momentum, force = np.zeros(n), np.zeros(n)
-        status = action_derivatives(
-            equations.reduced.tables, equations.work, moved, rates, s, equations.drive, equations.wrench,
-            equations.scal, s_rate, made, powers, momentum, force,
-        )  # fmt: skip
-        equations.refuse(*status)
-        return np.concatenate([momentum, force])
+        found = equations.dense.residual
+        equations.refuse(*found.about(moved, rates, s, equations.drive, equations.wrench))
+        return np.concatenate(found.momenta())
 
     close(np.vstack(linear.action(q, r, s)), difference(action, 2 * n))
 
 
-@settings(max_examples=30)
-@given(drawn=moving(), fit=st.booleans())
-def test_columns_by_all_joints_are_what_single_directions_say(drawn, fit):
-    """Two ways to one Jacobian, both exact: to rounding."""
+@settings(max_examples=20)
+@given(drawn=moving())
+def test_forward_columns_are_inverse_columns_solved(drawn):
+    """Two ways to one Jacobian, both exact: to rounding times the condition of the mass matrix."""
     scene, model, state, _ = drawn
     equations = Equations(problem_of_scene(scene), 0.0)
     linear, (q, r, s) = Linearised(equations), model.layout.split(state.array)
+    n = equations.n
+    assume(n and not model.cut and not equations.prescribed.size)
+    a = linear.forward(q, r, s)
+    forward = linear.columns(solve=True, fit=True)
+    linear.inverse(q, r, s, a)
+    inverse, mass = linear.columns(solve=False, fit=True), equations.mass(q, r)
+    assert np.array_equal(forward[n:], inverse[n:])
+    size = max(1.0, np.abs(inverse).max(), np.abs(mass).max() * np.abs(forward[:n]).max())
+    assert np.abs(mass @ forward[:n] + inverse[:n]).max() <= 10 * np.finfo(float).eps * np.linalg.cond(mass) * size
+
+
+@settings(max_examples=10)
+@given(drawn=moving())
+def test_columns_add_up_along_any_direction(drawn):
+    """Several directions at a time, and single ones."""
+    scene, model, state, rng = drawn
+    equations = Equations(scene, problem_of_scene(scene), 0.0)
+    linear, (q, r, s) = Linearised(equations), model.layout.split(state.array)
     linear.forward(q, r, s)
-    found = linear.columns(solve=False, fit=fit)
-    d, n, nv = linear.memory, equations.n, equations.nv
-    still(d)
-    for column, (values, at) in enumerate([*((d.dq, j) for j in range(n)), *((d.dr, j) for j in range(n))]):
-        values[at] = 1.0
-        tangent(equations.reduced.tables, equations.work, d, int(fit), 1)
-        values[at] = 0.0
-        expected = np.concatenate([d.force, d.cut, d.heat])
-        size = max(1.0, np.abs(d.total).max(initial=0.0), np.abs(expected).max(initial=0.0))
-        assert np.abs(found[:, column if column < n else nv + column - n] - expected).max() <= 1e-12 * size
+    slopes = equations.dense.residual.slopes()
+    sizes = {"v": equations.nv, "r": equations.n, "s": equations.ns, "a": equations.n}
+    seeds = {name: rng.standard_normal((size, 3)) for name, size in sizes.items()}
+    along = slopes.of("residual", seeds, 3)
+    columns, whole = slopes.along("residual", tuple(sizes)), np.concatenate(list(seeds.values()))
+    size = 1.0 + np.abs(columns) @ np.abs(whole)
+    assert np.all(np.abs(columns @ whole - along) <= 1e-13 * whole.shape[0] * size)

@@ -43,7 +43,7 @@ def both(eq, state):
     y, dense = eq.vector(state), np.zeros(eq.size)
     status, q, found = eq.engine.rates(state.q, y)
     assert status == 0
-    assert eq.dense.rates(q, y, eq.given, eq.heats, eq.scal, dense)[0] == 0
+    assert eq.dense.rates(q, y, eq.given, eq.heats, dense)[0] == 0
     at = np.cumsum([eq.nv, eq.n, eq.ns, 2])
     return [[part[k] for k in (1, 2, 4, 3)] for part in (np.split(found, at), np.split(dense, at))]
 

@@ -6,7 +6,6 @@ import pytest
 import ephs
 from ephs.mechanics.methods import METHODS
 from ephs.mechanics.reduced.equations import Equations
-from ephs.mechanics.reduced.loop_kernels import constraint_rows, loop_gaps, reduce_rows
 from ephs.mechanics.simulate import problem_of_scene
 
 BODY = """
@@ -77,12 +76,12 @@ def test_sizes_of_rows_are_measured_by_inertia(closed, tmp_path):
     for eq in (closed[0], equations(five_bar(tmp_path, 4.0))):
         state = eq.start(0.0)
         eq.gaps(state.q, state.r)
-        t, w = eq.reduced.tables, eq.work
-        m = constraint_rows(t, w)
-        for i, j in enumerate(np.flatnonzero(t.driven)):
-            assert w.size[i] == pytest.approx(1.0 / w.factor[j, j], rel=1e-14)
-        found.append(np.array(w.size[:m]))
-        assert reduce_rows(w, m) == 4  # two prescribed, two of the loop in its plane
+        arrays = eq.dense.residual.arrays
+        for i, j in enumerate(np.flatnonzero(eq.reduced.tables.driven)):
+            assert arrays["terms"][i] == pytest.approx(1.0 / arrays["factor"][j, j], rel=1e-14)
+        found.append(arrays["terms"].copy())
+        kept = eq.dense.independent(state.q, state.r)
+        assert 2 + sum(rows.size for rows in kept) == 4  # two prescribed, two of the loop in its plane
     assert np.abs(found[0] - 2.0 * found[1]).max() <= 1e-12 * found[0].max()
 
 
@@ -93,7 +92,7 @@ def test_power_of_what_is_prescribed_is_the_change_of_energy(closed):
     engine = eq.rates(0.0, state.q, y)
     dense = np.zeros(eq.size)
     dense[:nv] = engine[:nv]
-    assert eq.dense.rates(np.array(state.q), y, eq.given, eq.heats, eq.scal, dense)[0] == 0
+    assert eq.dense.rates(np.array(state.q), y, eq.given, eq.heats, dense)[0] == 0
     assert np.abs(dense - engine).max() <= 1e-9 * np.abs(engine).max()
     h = 1e-4
     energies = []
@@ -108,10 +107,11 @@ def test_power_of_what_is_prescribed_is_the_change_of_energy(closed):
 
 def test_gaps_are_counted_from_the_last_prescribed_joint_on(closed):
     eq, state = closed
-    out = np.full(2 + int(eq.reduced.tables.rows.sum()), 9.0)
     open_q = eq.moved(state.q, np.array([0.0, 0.0, 1e-3, 0.0]))
-    worst = loop_gaps(eq.reduced.tables, eq.work, eq.fitted(open_q, state.r), out)
-    assert np.array_equal(out[:2], [0.0, 0.0]) and worst == np.abs(out).max() > 1e-5
+    out, _ = eq.gaps(open_q, state.r)
+    eq.fitted(open_q, state.r)
+    own, worst = eq.dense.residual.gaps()
+    assert np.array_equal(out, [0.0, 0.0, *own]) and worst == np.abs(own).max() > 1e-5
 
 
 @pytest.mark.parametrize("method", [name for name, m in METHODS.items() if m.scenes and m.fixed])

@@ -56,7 +56,7 @@ def test_bodies_are_pulled_together(one, two, tmp_path):
         if name in MASSES:
             expected[name] = sign * pull * along / MASSES[name]
     y, dense, nv = eq.vector(state), np.zeros(eq.size), eq.nv
-    assert eq.dense.rates(state.q, y, eq.given, eq.heats, eq.scal, dense)[0] == 0
+    assert eq.dense.rates(state.q, y, eq.given, eq.heats, dense)[0] == 0
     for found_rates in (eq.rates(0.0, state.q, y), dense):
         rates, flows = found_rates[nv : nv + eq.n], found_rates[nv + eq.n + eq.ns + 2 :]
         # bodies stand as the world's axes do, so that a body's frame is the world's

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ephs.mechanics.tree.cuts import Place
+from ephs.mechanics.tree.cuts import Place, Relative
 from ephs.mechanics.tree.loops import kinds_of, loop_program
 from ephs.semantics.spaces import codes, se3, so3
 from ephs.semantics.stage import PLAIN
@@ -58,7 +58,7 @@ class Loop:
         self.places = np.zeros((3, Place.real_width))
         for row, (turn, at) in zip(self.places, (near, far), strict=False):
             row[:9], row[9:12], row[12:] = turn.ravel(), at, rng.standard_normal(12)
-        self.motions, self.value = np.zeros((1, 25)), np.zeros((len(self.normal), 4))
+        self.motions, self.value = np.zeros((1, Relative.real_width)), np.zeros((len(self.normal), 4))
         self.covector = np.zeros((2 * len(self.normal), 6))
         self.end = np.arange(2 * len(self.normal))
 
@@ -115,7 +115,7 @@ CLOSE = 1e3 * STEP**2
 @some
 def test_rows_make_the_power_of_the_forbidden_twists(run, name, seed):
     loop = Loop(name, seed).found(run)
-    twist = loop.motions[0, 19:]
+    twist = loop.motions[0, 19:25]
     for a, normal in enumerate(loop.normal):
         power = loop.covector[2 * a] @ loop.places[0, 12:18] + loop.covector[2 * a + 1] @ loop.places[1, 12:18]
         assert power == pytest.approx(normal @ twist, abs=1e-13 * np.abs(loop.covector).max() * 10.0)
@@ -171,7 +171,7 @@ def test_elements_move_as_their_velocities_say(run, name, seed):
     run["velocities"](loop.chart, loop.cut, loop.numbers, loop.motions, v, np.zeros(0), out)
     run["advance"](loop.chart, loop.element, v, at)
     # along v + h v̇ the element moves by h r on its right, r = B⁺ u
-    rates = (np.linalg.pinv(JOINTS[name][2]) if dim else np.zeros((0, 6))) @ loop.motions[0, 19:]
+    rates = (np.linalg.pinv(JOINTS[name][2]) if dim else np.zeros((0, 6))) @ loop.motions[0, 19:25]
     ends = []
     for h in (-STEP, STEP):
         ends.append(np.zeros(at.size))
