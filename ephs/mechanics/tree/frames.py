@@ -291,5 +291,6 @@ def inertia_of(primitive: Primitive) -> Array | None:
         out = np.linalg.inv(inverse)
         out[3:, 3:] = np.mean(np.diag(out)[3:]) * np.eye(3)
         out[3:, :3] = out[:3, 3:] = 0.0
-    near = np.abs(out @ inverse - np.eye(6)).max() <= KINETIC * np.linalg.cond(out)
+    size = 6.0 * float(np.abs(out).max() * np.abs(inverse).max())  # not below the condition number over 6
+    near = np.abs(out @ inverse - np.eye(6)).max() <= KINETIC * size
     return out if near else None
