@@ -140,3 +140,31 @@ def test_rules_leave_good_source_alone():
     assert not faults(source)
     assert faults("print(1)", may_print=True) == []
     assert undocumented(ast.parse(source)) == ["module", "A"]
+
+
+SMALL, BARE = 1e-5, 184
+"""Numbers up to the first are thresholds, with a name and a reason; so many have none yet, and no more may come."""
+
+
+def bare_thresholds(tree: ast.AST) -> list[int]:
+    """Lines of small numbers that no constant in capitals names."""
+    named_ones: set[int] = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Assign | ast.AnnAssign):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            names = [name.id for target in targets for name in ast.walk(target) if isinstance(name, ast.Name)]
+            if names and all(name.isupper() for name in names):
+                named_ones |= {id(inner) for inner in ast.walk(node)}
+    return [
+        node.lineno
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Constant) and isinstance(node.value, float) and 0.0 < node.value <= SMALL
+        and id(node) not in named_ones
+    ]  # fmt: skip
+
+
+def test_no_more_thresholds_without_a_name_come():
+    assert bare_thresholds(ast.parse("TIGHT = 1e-9\n")) == []
+    assert bare_thresholds(ast.parse("if x < 1e-9:\n    y = 1e-7\n")) == [1, 2], "the control"
+    found = {named(file): bare_thresholds(ast.parse(file.read_text(encoding="utf-8"))) for file in SOURCES}
+    assert sum(len(lines) for lines in found.values()) <= BARE, {name: lines for name, lines in found.items() if lines}
