@@ -13,6 +13,7 @@ from cyclopts import App, CycloptsError, Parameter
 
 from ephs.cli_animate import animate
 from ephs.cli_charts import charts
+from ephs.cli_equilibrium import resting
 from ephs.cli_input import (
     AS_GIVEN,
     TEXTS,
@@ -62,6 +63,7 @@ app.command(animate)
 app.command(charts)
 app.command(sweeps)
 app.command(linearizing)
+app.command(resting)
 app.command(news)
 app.register_install_completion_command(help="Teach your shell the names of commands and options.")
 

@@ -26,6 +26,7 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
     "reduce": ("ephs reduce scenes/four-bar.toml",),
     "animate": ("ephs animate out/slider-crank -o slider-crank.html",),
     "sweep": ("ephs sweep scenes/heavy-top.toml --vary bodies.top.mass=5:25:9 --until 1 -o out/sweep",),
+    "equilibrium": ("ephs equilibrium scenes/four-bar.toml --out out/rest",),
     "linearize": ("ephs linearize scenes/four-bar.toml --at equilibrium",),
     "convert": ("ephs convert examples/arm.urdf -o arm.toml",),
     "chart": (
