@@ -8,6 +8,7 @@ by rigid motions, free of locking in pure bending; with lumped nodes of order 2 
 """
 
 from dataclasses import replace
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -84,10 +85,18 @@ def beam_element(
 
 
 def elastic(length: float, stiffness: Array, rest: Array, damping: float) -> tuple[Storage, Irreversible]:
-    """Energy and loss of an element."""
+    """Energy and loss of an element; equal elements share them."""
+    return _elastic(float(length), tuple(stiffness.tolist()), tuple(rest.tolist()), float(damping))
+
+
+@lru_cache(maxsize=1024)
+def _elastic(
+    length: float, stiffness: tuple[float, ...], rest: tuple[float, ...], damping: float
+) -> tuple[Storage, Irreversible]:
+    k, zero = np.array(stiffness), np.array(rest)
     if damping:
-        return beam_spring(length, stiffness, rest), beam_damper(length, stiffness, rest, damping)
-    return beam_spring(length, stiffness, rest), components.joint_friction(pair("free"), np.zeros((6, 6)))
+        return beam_spring(length, k, zero), beam_damper(length, k, zero, damping)
+    return beam_spring(length, k, zero), components.joint_friction(pair("free"), np.zeros((6, 6)))
 
 
 def beam_spring(length: float, stiffness: Array, rest: Array) -> Storage:
