@@ -4,8 +4,8 @@ A method of order p errs at a time t by C(t) hᵖ, where C holds how errors of s
 So runs with steps h and k h are (kᵖ − 1) C hᵖ apart. What they are apart bounds the error of the shorter steps, so a
 few long steps are enough where these are good: the first k is the largest for which they should be, by the errors of
 single steps. Where runs are far apart C hᵖ is not all of the error, and k is made smaller; where they are at k = 2, a
-run with h / 2 decides for methods of high order, and otherwise the run counts as not resolved. Long runs are held
-against one by an explicit method of high order first, which takes few steps: if it agrees, nothing more is run.
+run with h / 2 decides if the run could be right by its order, and otherwise it counts as not resolved. Long runs are
+held against one by an explicit method of high order first, which takes few steps: if it agrees, nothing more is run.
 """
 
 from collections.abc import Callable
@@ -35,8 +35,6 @@ INSTANTS = 16
 """Times at which a run by another method is compared."""
 SHARE = 4
 """Steps of the run for one of the other method at most."""
-FAR = 3.0
-"""Distance, in allowed errors, from which on an error is not of order p."""
 
 
 @final
@@ -103,14 +101,14 @@ def global_error(
     while True:
         found = _distance(solution, lambda h=k * h: again.coarser(h, end))
         size, instant, path = found or (np.inf, 0, None)
-        if size <= FAR * allowed:
+        if size <= allowed:
             return GlobalError(size / (float(k) ** order - 1.0), instant, path, resolved=True)
         if k == 2:
             break
         k = max(2, k // SHORTER)
     if found is None:
         return None
-    if size <= FAR * allowed * (times - 1.0):  # that of the shorter steps could still be right
+    if size <= allowed * (times - 1.0):  # the run could still be right, by its order
         finer = _distance(solution, lambda: again.coarser(0.5 * h, end))
         if finer is not None and finer[0] <= allowed:
             return GlobalError(finer[0] * times / (times - 1.0), *finer[1:], resolved=True)

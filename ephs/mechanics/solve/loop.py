@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -329,11 +330,11 @@ class _Run(Generic[S]):
         return repeatable(trials, self.bounds, ended=self.ended or self.t == self.until)
 
     def _ends(self) -> list[Record]:
-        """The first and the last row, kept or not; none of a run that did not start."""
-        if self.first is None:
-            return []
-        rows = ((self.t0, self.first), (self.t, self.stepper.row(self.state)))
-        return [record_of([t], [row], [0.0]) for t, row in rows]
+        """The first and the last row, kept or not; none of a run that did not start, or stands outside all numbers."""
+        with suppress(SolveError):  # a failed run can stand where nothing can be evaluated
+            rows = [(self.t, self.stepper.row(self.state))] if self.first else []
+            return [record_of([t], [row], [0.0]) for t, row in ((self.t0, self.first), *rows) if row]
+        return []
 
     def _settle(self) -> None:
         """Pending part, as it is kept."""

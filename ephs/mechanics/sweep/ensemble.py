@@ -10,6 +10,7 @@ import threading
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations
 from typing import Any, final
 
@@ -27,10 +28,12 @@ from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.parameters import varied
 from ephs.mechanics.signals import times_of
 from ephs.mechanics.simulate import control_of, problem_of_scene
-from ephs.mechanics.solve.control import first_step
+from ephs.mechanics.solve.audit import Bounds
+from ephs.mechanics.solve.control import Control, first_step
 from ephs.mechanics.solve.stepping import Span
 from ephs.mechanics.sweep.axes import Axes
 from ephs.mechanics.sweep.outputs import Output
+from ephs.mechanics.sweep.suspicion import LONGER, Suspicion
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import Pair
 
@@ -67,7 +70,16 @@ class _Made:
         """All numbers that a run depends on, the start's last."""
         eq = self.equations
         tables = [a for a in self._tables() if a.dtype == np.float64]
-        return [*tables, eq.drive, eq.wrench, eq.scal, self.start.q, self.start.r, self.start.heats]
+        return [
+            *tables,
+            eq.model.tables.parameters,
+            eq.drive,
+            eq.wrench,
+            eq.scal,
+            self.start.q,
+            self.start.r,
+            self.start.heats,
+        ]
 
     def counts(self) -> list[Any]:
         """Structure that all members share."""
@@ -259,7 +271,7 @@ class Ensemble:
         Raises
         ------
         Unlike
-            It has to be run on its own.
+            It has to be run on its own: it is not like the others, or may break a law of its audit.
         SceneError, SolveError
             There is no such member, or a step has no solution.
         """
@@ -270,20 +282,32 @@ class Ensemble:
         assert times is not None  # a sweep says what it keeps
         first = int(times.size > 0 and times[0] == self._t0)
         control = stepper.control
-        leg: Any = stepper.many(
-            Span(
-                start, self._t0, self._until, first_step(control, abs(self._until - self._t0)), control,
-                None if control.step is not None else _CHOSEN, times, first,
-            )
-        )  # fmt: skip
-        if not leg.advance(BURST) or leg.left:
-            raise Unlike
+        leg = self._leg(stepper, start, control, times, first)
         _, q, y = leg.kept()
+        end, longer = leg.state, partial(self._longer, stepper, start)
+        if Suspicion(equations, self._bounds(control)).of(start, q, y, end, leg.counts.least, longer):
+            raise Unlike
         if first:
             beginning = np.concatenate([start.r, start.heats, start.books])
             q, y = np.concatenate([start.q[None], q]), np.concatenate([beginning[None], y])
         counts = leg.counts
         return [read(q, y) for read in self._reads], counts.steps, counts.rejected
+
+    def _leg(self, stepper: Any, start: ReducedState, control: Control, times: Array, first: int) -> Any:
+        """Compiled steps to the end."""
+        policy = None if control.step is not None else _CHOSEN
+        h = first_step(control, abs(self._until - self._t0))
+        leg = stepper.many(Span(start, self._t0, self._until, h, control, policy, times, first))
+        if not leg.advance(BURST) or leg.left:
+            raise Unlike
+        return leg
+
+    def _longer(self, stepper: Any, start: ReducedState) -> ReducedState:
+        control = replace(stepper.control, step=LONGER * stepper.control.step)
+        return self._leg(stepper, start, control, np.zeros(0), 0).state
+
+    def _bounds(self, control: Control) -> Bounds:
+        return Bounds.of(control, control.step, lawful=False)
 
     def _threads_own(self) -> tuple[Equations, Any]:
         if not getattr(self._own, "ready", None):

@@ -1,0 +1,83 @@
+"""Members of an ensemble that may break a law of their audit: they are run again on their own, with the whole audit.
+
+What is looked at is cheap beside a member's run, and stricter than the audit: the balance of energy at a few of its
+instants, the entropy made in its steps, and at constant steps the distance from a run with longer ones.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from ephs.mechanics.reduced.equations import Equations, ReducedState
+from ephs.mechanics.solve.audit import MOTION, Bounds
+from ephs.mechanics.solve.growth import apart
+from ephs.semantics.bundle import Array
+
+__all__ = ["LONGER", "Suspicion"]
+
+LONGER = 4
+"""Constant steps are held against some that are so many times as long."""
+INSTANTS = 5
+"""Instants of a member whose energies are looked at, with the first and the last."""
+ROUNDING = 1e-12
+"""Part of the energies that rounding may leave of a balance: what is within it is right."""
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Suspicion:
+    """What members of an ensemble are held against.
+
+    Parameters
+    ----------
+    equations
+        Filled with the numbers of the member that is looked at.
+    bounds
+        What its audit allows.
+    """
+
+    equations: Equations
+    bounds: Bounds
+
+    def of(
+        self,
+        start: ReducedState,
+        q: Array,
+        y: Array,
+        end: ReducedState,
+        least: float,
+        longer: Callable[[], ReducedState],
+    ) -> bool:
+        """Whether a member has to be run on its own.
+
+        Parameters
+        ----------
+        q, y
+            (n, …) joints' elements and rates, entropies and ledgers that were kept.
+        least
+            The least entropy in J/K that a component made in a step.
+        longer
+            The end of a run with constant steps that are `LONGER` times as long.
+        """
+        n, ns = self.equations.n, self.equations.ns
+        chosen = np.unique(np.linspace(0, len(q) - 1, INSTANTS).astype(int)).tolist() if len(q) else []
+        kept = [ReducedState(start.t, q[i], y[i, :n], y[i, n : n + ns], y[i, n + ns :]) for i in chosen]
+        x, energies = self.equations.booking.energies([start, *kept, end])
+        books = np.array([state.books for state in (start, *kept, end)])
+        held = energies * self.equations.led.mechanical
+        changes = held - held[0]
+        heat, work = books[:, 0], books[:, 1]
+        gross = float(np.max(np.abs(changes).sum(axis=1) + np.abs(heat) + np.abs(work)))
+        defect = float(np.max(np.abs(changes.sum(axis=1) + heat - work)))
+        if not defect <= self.bounds.energy * gross + ROUNDING * float(np.abs(held).sum(axis=1).max()):
+            return True
+        if least < 0.0:
+            return True
+        if self.bounds.step is None:
+            return False
+        other, _ = self.equations.booking.energies([longer()])
+        descriptor, length = self.equations.problem.descriptor, self.equations.problem.length
+        poses = [slot.point for slot in descriptor.states if slot.quantity.kind == "pose"]
+        return not all(float(apart(x[-1, at], other[0, at], length)) <= MOTION for at in poses)
