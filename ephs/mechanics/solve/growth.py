@@ -4,8 +4,9 @@ A method of order p errs at a time t by C(t) hᵖ, where C holds how errors of s
 So runs with steps h and k h are (kᵖ − 1) C hᵖ apart. What they are apart bounds the error of the shorter steps, so a
 few long steps are enough where these are good: the first k is the largest for which they should be, by the errors of
 single steps. Where runs are far apart C hᵖ is not all of the error, and k is made smaller; where they are at k = 2, a
-run with h / 2 decides if the run could be right by its order, and otherwise it counts as not resolved. Long runs are
-held against one by an explicit method of high order first, which takes few steps: if it agrees, nothing more is run.
+run with h / 2 decides if the run could be right by its order, or longer steps fail; otherwise it counts as not
+resolved. Long runs are held against one by an explicit method of high order first, which takes few steps: if it agrees,
+nothing more is run.
 """
 
 from collections.abc import Callable
@@ -106,13 +107,13 @@ def global_error(
         if k == 2:
             break
         k = max(2, k // SHORTER)
-    if found is None:
-        return None
-    if size <= allowed * (times - 1.0):  # the run could still be right, by its order
+    finer = None
+    if found is None or size <= allowed * (times - 1.0):  # the run could still be right, by its order
         finer = _distance(solution, lambda: again.coarser(0.5 * h, end))
-        if finer is not None and finer[0] <= allowed:
-            return GlobalError(finer[0] * times / (times - 1.0), *finer[1:], resolved=True)
-    return GlobalError(size, instant, path, resolved=False)
+    if finer is not None and finer[0] <= allowed:
+        return GlobalError(finer[0] * times / (times - 1.0), *finer[1:], resolved=True)
+    found = found or finer
+    return GlobalError(*found, resolved=False) if found is not None else None
 
 
 def _distance(one: "Solution", run: Callable[[], "Solution"]) -> tuple[float, int, Path | None] | None:
