@@ -39,6 +39,7 @@ __all__ = [
 
 TEXTS = {
     "initial": "--initial {found}: expected PATH=NUMBER or PATH=NUMBER,NUMBER,..., as in osc.pe.q=1.0",
+    "jumps": "--jumps {found}: expected TIME,TIME,... in seconds, as in 0.1,0.25",
     "suffix": "{found}: expected one of {expected}; choose the file name's ending accordingly",
     "no-file": "{found}: no such file; expected a scene file (.toml), a model (.urdf, .xml, .sdf) or FILE.py:NAME",
     "no-result": "{found}: no solution.nc in it; expected a result folder, as ephs run writes it",
@@ -121,6 +122,8 @@ class Stepping:
         Constant step size, in seconds.
     form
         Which form of the equations is integrated.
+    jumps
+        Times in seconds at which steps end and start anew, TIME,TIME,...: jumps of what the model is given.
     """
 
     method: str | None = None
@@ -128,11 +131,24 @@ class Stepping:
     atol: Positive = None
     step: Positive = None
     form: Literal["paper", "folded", "reduced"] | None = None
+    jumps: str | None = None
 
     def options(self) -> dict[str, Any]:
-        """Options that were given, as keywords of ``simulate``."""
+        """Options that were given, as keywords of ``simulate``.
+
+        Raises
+        ------
+        BadInput
+            A time is no number.
+        """
         values = ((field.name, getattr(self, field.name)) for field in fields(self))
-        return {name: value for name, value in values if value is not None}
+        found = {name: value for name, value in values if value is not None}
+        if self.jumps is not None:
+            try:
+                found["jumps"] = [float(time) for time in self.jumps.split(",")]
+            except ValueError as error:
+                raise BadInput(TEXTS["jumps"].format(found=self.jumps)) from error
+        return found
 
 
 AS_CHOSEN = Stepping()

@@ -237,6 +237,13 @@ def test_an_interrupt_while_loading_exits_with_130(house, monkeypatch):
     assert cli.main(["run", "crank.toml", "--until", "1"]) == 130
 
 
+def test_jumps_are_times(house, capsys):
+    assert cli.main(["run", "crank.toml", "--until", "1", "--jumps", "0.1,0.25"]) == 0
+    assert house.simulate[2]["jumps"] == [0.1, 0.25]
+    assert cli.main(["run", "crank.toml", "--until", "1", "--jumps", "0.1,soon"]) == 2
+    assert "--jumps 0.1,soon: expected TIME,TIME,... in seconds" in capsys.readouterr().err
+
+
 def test_an_unusable_result_folder_is_told_before_the_run(house, capsys):
     Path("taken").write_text("a file")
     assert cli.main(["run", "crank.toml", "--until", "1", "--out", "taken"]) == 2
