@@ -22,7 +22,7 @@ from ephs.semantics.bundle import Array
 
 __all__ = ["Course"]
 
-CLOSE = 1e-7
+CLOSE = 1e-6
 """Tolerance of the steps of an independent run."""
 
 

@@ -34,7 +34,7 @@ MOTION = 0.1
 estimate adds up errors of steps, which may cancel, so that fewer digits would be guesses."""
 PRODUCTION = 1e-12
 """Part of its scale by which an entropy may fall: what rounding leaves of a difference of flows."""
-INSTANTS = 500
+INSTANTS = 125
 """Instants, evenly spread, at which the positions of joints are looked at."""
 ROUNDING = 8.0 * float(np.finfo(float).eps)
 """Part of what is stored that rounding leaves of a difference."""

@@ -34,7 +34,7 @@ FEW = 300
 """Steps of a run for which one by another method is not worth its setting up."""
 INSTANTS = 16
 """Times at which a run by another method is compared."""
-SHARE = 4
+SHARE = 2
 """Steps of the run for one of the other method at most."""
 
 
