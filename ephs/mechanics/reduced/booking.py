@@ -54,6 +54,10 @@ class Booking:
         heat = float(flows[heats.frictions].sum())
         return replace(end, heats=taken, books=start.books + np.concatenate([[heat, work], made]))
 
+    def arrays(self) -> list[Array]:
+        """All arrays of the tables that states are made from."""
+        return self._paper.arrays()
+
     def energies(self, states: Sequence["ReducedState"]) -> tuple[Array, Array]:
         """(rows, point_size) all states of the scene's system, and (rows, components) the energies that they hold."""
         eq = self._equations

@@ -65,6 +65,10 @@ class PaperStates:
                 first = number - int(np.count_nonzero(self.reduced.tables.kind[:number] != SPRING))
                 yield edge.state, RELATIVE if spring else ELEMENT, first if spring else number
 
+    def arrays(self) -> list[Array]:
+        """All arrays of the tables."""
+        return [array for table in self._tables for array in table.arrays]
+
     def rows(self, q: Array, r: Array, s: Array) -> Array:
         """(rows, point_size) all states, of rows of joints' elements, rates and entropies."""
         out = np.tile(self._rest, (q.shape[0], 1))

@@ -86,9 +86,9 @@ class _Made:
         return [a for a in self._tables() if a.dtype != np.float64]
 
     def _tables(self) -> list[Any]:
-        """Those of the engine, and those of the dense sweeps that careful steps take."""
+        """Those of the engine, of the dense sweeps that careful steps take, and of states and their energies."""
         eq = self.equations
-        every: Iterator[Any] = iter((*eq.engine.arrays(), *eq.reduced.tables))
+        every: Iterator[Any] = iter((*eq.engine.arrays(), *eq.reduced.tables, *eq.booking.arrays()))
         return [a for a in every if isinstance(a, np.ndarray)]
 
     def image(self) -> Array:
