@@ -16,6 +16,7 @@ import numpy as np
 
 import ephs
 from benchmarks.report import Report, table_of
+from ephs.show.charts.peer_mujoco import silent
 
 MODELS = ("hopper", "half_cheetah", "ant", "walker2d")
 UNTIL = 1.0
@@ -68,6 +69,7 @@ def _ours(folder: Path, name: str) -> list[dict[str, Any]]:
 
 def _mujoco(file: Path) -> dict[str, Any]:
     mujoco: Any = import_module("mujoco")
+    mujoco.set_mju_user_warning(silent)  # else it writes a log file into the working folder
     model = mujoco.MjModel.from_xml_path(str(file))
     model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
     data = mujoco.MjData(model)

@@ -29,7 +29,7 @@ Laws = Mapping[str, ContactLawEntry]
 STIFF = 1e4
 """Stiffness of stops by default, in M (L ω)² of the scene's mass, length and rate: what falls by its length presses a
 stop by 1/70 rad, or of its length."""
-DEEP = 1e-3
+DEEP = 1e-2
 """Part of the mechanism's length from which on an overlap at the start is told."""
 
 

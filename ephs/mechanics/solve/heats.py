@@ -148,10 +148,11 @@ class Heats:
             return flows
         out, k = flows.copy(), self.frictions
         short = lost - float(flows[k].sum())
-        room = np.abs(missed[k]) if short > 0.0 else np.minimum(np.abs(missed[k]), flows[k])
+        made = np.maximum(0.0, flows[k])  # a component that destroys entropy is not covered up
+        room = np.abs(missed[k]) if short > 0.0 else np.minimum(np.abs(missed[k]), made)
         whole = float(room.sum())
         if whole > 0.0:
-            out[k] = np.maximum(0.0, flows[k] + room * (np.sign(short) * min(1.0, abs(short) / whole)))
+            out[k] = np.maximum(flows[k] - made, flows[k] + room * (np.sign(short) * min(1.0, abs(short) / whole)))
         return out
 
     def taken(self, heats: Array, flows: Array) -> tuple[Array, Array]:

@@ -132,7 +132,7 @@ def test_a_run_beyond_stability_does_not_end_well():
     assert isinstance(error, ephs.SimulationError)
     assert error.outcome is ephs.Outcome.UNLAWFUL
     assert error.partial.t[-1] == 2.0  # the whole solution
-    assert [finding.law for finding in error.findings] == ["energy", "accuracy"]
+    assert {finding.law for finding in error.findings} >= {"energy", "accuracy"}
     assert error.findings == error.partial.audit.findings
     assert pickle.loads(pickle.dumps(error.findings)) == error.findings
     assert error.partial.summary()["audit"] == {

@@ -189,13 +189,6 @@ def test_initial_values_against_the_constraints_are_refused():
     assert caught.value.outcome == Outcome.INCONSISTENT and caught.value.path in ("ke.p", "other.p")
 
 
-def test_states_on_groups_are_refused_by_name():
-    body = ephs.mechanics.rigid_body(mass=1.0, inertia=[0.1, 0.2, 0.3])
-    free_body = Pattern.from_text("p: body_momentum; body(p)")(body=body)
-    with pytest.raises(ephs.SimulationError, match=r"body\.pe\.q.*vector spaces.*natural"):
-        ephs.simulate(free_body, 1.0, method="radau")
-
-
 @pytest.mark.parametrize(
     ("options", "words"),
     [
