@@ -208,9 +208,9 @@ def loose() -> ephs.System:
 
 def tumbling() -> ephs.System:
     """A rigid body, whose pose is on a group, beside a capacitor, which has no place in joint coordinates."""
-    return Pattern({"p": junction(Q.body_momentum), "q": junction(Q.charge)}, {"body": {"p": "p"}, "store": {"q": "q"}})(
-        body=ephs.mechanics.rigid_body(mass=1.0, inertia=[0.1, 0.2, 0.3]), store=lib.capacitor(c=1.0)
-    )
+    return Pattern(
+        {"p": junction(Q.body_momentum), "q": junction(Q.charge)}, {"body": {"p": "p"}, "store": {"q": "q"}}
+    )(body=ephs.mechanics.rigid_body(mass=1.0, inertia=[0.1, 0.2, 0.3]), store=lib.capacitor(c=1.0))
 
 
 def beyond(q: Any) -> Any:
