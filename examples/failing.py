@@ -206,13 +206,6 @@ def loose() -> ephs.System:
     return pattern(ke=lib.point_mass(m=1.0), link=lib.rigid_link())
 
 
-def tumbling() -> ephs.System:
-    """A rigid body, whose pose is on a group, beside a capacitor, which has no place in joint coordinates."""
-    return Pattern(
-        {"p": junction(Q.body_momentum), "q": junction(Q.charge)}, {"body": {"p": "p"}, "store": {"q": "q"}}
-    )(body=ephs.mechanics.rigid_body(mass=1.0, inertia=[0.1, 0.2, 0.3]), store=lib.capacitor(c=1.0))
-
-
 def beyond(q: Any) -> Any:
     """An energy that has no value beyond q = 1."""
     return -np.sqrt(1.0 - q)

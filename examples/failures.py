@@ -30,7 +30,6 @@ from examples.failing import (
     pendulum,
     slide,
     truss,
-    tumbling,
 )
 
 ALL = tuple(METHODS)
@@ -236,7 +235,6 @@ CASES = (
         ("natural", "rk54", "rk87", "radau", "variational", "alpha", "ida"), r"ground|joints\.\w+", ".", step=0.01,
         within=(0.0, 0.01),
     ),
-    Case(Outcome.UNSUITED, "a body's pose beside a circuit, for radau", tumbling, ("radau",), r"body\.pe\.q", "vector"),
     Case(
         Outcome.INCONSISTENT, "velocities that a rigid link does not allow", linked, SYSTEMS, r"(ke|other)\.p",
         "constraints", options=fixed(initial={"ke.p": 1.0}),

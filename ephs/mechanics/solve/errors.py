@@ -38,7 +38,6 @@ class Outcome(StrEnum):
     DOMAIN = "an energy or a flow that is not a finite number"
     RANGE = "a state beyond the range of numbers"
     PYTHON = "a Python function of the model raised an exception"
-    UNSUITED = "a state that the method cannot carry"
     INCONSISTENT = "an initial state that contradicts the constraints"
     TINY = "a step below the least that is allowed"
     MANY = "more steps than are allowed"
@@ -71,7 +70,6 @@ _ADVICE = {
     Outcome.DOMAIN: "check initial values and the component's function there, or take a smaller step",
     Outcome.RANGE: "check initial values and inputs, or take a smaller step",
     Outcome.PYTHON: "see the exception above this one",
-    Outcome.UNSUITED: "use the method natural",
     Outcome.INCONSISTENT: "give initial values that satisfy the constraints",
     Outcome.TINY: "loosen rtol and atol, lower min_step, or look for a singularity at this time",
     Outcome.MANY: "raise max_steps, or loosen rtol and atol",

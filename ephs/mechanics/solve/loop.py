@@ -34,7 +34,7 @@ BURST = 1000
 """Steps in one compiled call at most, for progress and interruption."""
 BLOCK = 1024
 """Rows that wait until they are made what is kept."""
-FINAL = (Outcome.PYTHON, Outcome.UNSUITED, Outcome.INPUT, Outcome.EVENT, Outcome.INCONSISTENT, Outcome.INTERRUPTED)
+FINAL = (Outcome.PYTHON, Outcome.INPUT, Outcome.EVENT, Outcome.INCONSISTENT, Outcome.INTERRUPTED)
 """Failures that a shorter step does not mend."""
 
 

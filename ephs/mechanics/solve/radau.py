@@ -25,8 +25,6 @@ from ephs.mechanics.solve.problem import Problem
 from ephs.mechanics.solve.snapshot import Snapshot, like, parts
 from ephs.mechanics.solve.stepping import Attempt, Row, Span
 from ephs.semantics.bundle import Array
-from ephs.semantics.spaces import manifold
-from ephs.semantics.spaces.codes import VECTOR
 
 __all__ = ["COEFFICIENTS", "DEFECT", "GAMMA", "NODES", "T_INVERSE", "VALUES", "Radau", "RadauState", "T"]
 
@@ -123,14 +121,10 @@ class Radau:
         Raises
         ------
         SolveError
-            The states contradict the constraints: however short the step, they jump. Or a state is on a Lie group.
+            The states contradict the constraints: however short the step, they jump.
         """
         d = self.model.descriptor
         x = d.pack(self.problem.initial)
-        for slot in d.states:
-            if manifold(slot.quantity.space).code != VECTOR:
-                found = f"it is on {slot.quantity.space}, radau wants vector spaces where there is no scene"
-                raise SolveError(Outcome.UNSUITED, str(slot.path), found)
         z = guessed_efforts(self.model, x)
         start = RadauState(t, x.copy(), z, np.zeros(4 + len(d.components)))
         first, second = (self._solved(start, 1e-7 * h * part)[1] for part in (1.0, 0.5))

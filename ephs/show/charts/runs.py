@@ -26,7 +26,7 @@ MOST_STEPS = 500_000
 """Of one run, where nothing smaller is asked for."""
 
 
-_REFUSALS = (Failure.UNSUITED, Failure.INCONSISTENT, Failure.UNDETERMINED, Failure.PYTHON)
+_REFUSALS = (Failure.INCONSISTENT, Failure.UNDETERMINED, Failure.PYTHON)
 
 
 class Ending(StrEnum):
