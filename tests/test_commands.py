@@ -237,7 +237,7 @@ def test_resuming_what_is_not_there_is_bad_input(tmp_path, capsys):
     assert main(["run", str(ROOT / "scenes/heavy-top.toml"), "--until", "1", "--keep", "0"]) == 2
 
 
-@pytest.mark.parametrize("command", ["run --until 1", "check", "reduce"])
+@pytest.mark.parametrize("command", ["run --until 1 --method natural --step 0.01", "check"])
 def test_kernels_that_are_not_compiled_are_told(tmp_path, command):
     words = [*command.split()[:1], str(ROOT / "scenes/heavy-top.toml"), *command.split()[1:]]
     environment = os.environ | {"NUMBA_DISABLE_JIT": "1"}

@@ -151,7 +151,7 @@ def test_a_four_bar_passes_its_singular_configuration():
 
 @pytest.mark.parametrize("file", SCENES, ids=lambda file: file.stem)
 def test_the_shipped_scenes_move(file):
-    sol = ephs.simulate(ephs.load(file), 0.5, step=1e-3)
+    sol = ephs.simulate(ephs.load(file), 0.5, step=1e-3, audit="off")  # too long for digits of the top
     assert sol.energy_error.max() <= 1e-12
     assert sol.constraint_error.max() <= 1e-12
     assert sol.stats["least_production"] >= 0.0

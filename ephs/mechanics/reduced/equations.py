@@ -239,6 +239,10 @@ class Equations:
             self._dense = Dense(self.reduced, self.gravity, self.scal)
         return self._dense
 
+    def refilled(self) -> None:
+        """Forget what was made of the tables, after other numbers were put into them."""
+        self._dense, self._closed_at = None, (np.zeros(0), np.zeros(0))
+
     def mass(self, q: Array, r: Array) -> Array:
         """(n, n) the mass matrix at q."""
         return self.dense.mass(q, r)

@@ -76,6 +76,7 @@ class _Made:
             eq.drive,
             eq.wrench,
             eq.scal,
+            eq.gravity,
             self.start.q,
             self.start.r,
             self.start.heats,
@@ -324,6 +325,7 @@ class Ensemble:
         for array in made.arrays():
             array[...] = image[at : at + array.size].reshape(array.shape)
             at += array.size
+        equations.refilled()
         return ReducedState(self._t0, q, r, heats, np.zeros(2 + len(equations.reduced.made)))
 
     def _stepper(self, equations: Equations) -> Any:

@@ -221,7 +221,7 @@ def test_forward_columns_are_inverse_columns_solved(drawn):
 def test_columns_add_up_along_any_direction(drawn):
     """Several directions at a time, and single ones."""
     scene, model, state, rng = drawn
-    equations = Equations(scene, problem_of_scene(scene), 0.0)
+    equations = Equations(problem_of_scene(scene), 0.0)
     linear, (q, r, s) = Linearised(equations), model.layout.split(state.array)
     linear.forward(q, r, s)
     slopes = equations.dense.residual.slopes()
