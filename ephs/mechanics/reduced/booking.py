@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
@@ -54,7 +54,7 @@ class Booking:
         heat = float(flows[heats.frictions].sum())
         return replace(end, heats=taken, books=start.books + np.concatenate([[heat, work], made]))
 
-    def arrays(self) -> list[Array]:
+    def arrays(self) -> list[Any]:
         """All arrays of the tables that states are made from."""
         return self._paper.arrays()
 

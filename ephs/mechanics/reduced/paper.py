@@ -1,7 +1,7 @@
 """Between the reduced form and the paper's states: every state of the system from joints' elements, and back."""
 
 from collections.abc import Iterator
-from typing import final
+from typing import Any, final
 
 import numpy as np
 
@@ -65,8 +65,8 @@ class PaperStates:
                 first = number - int(np.count_nonzero(self.reduced.tables.kind[:number] != SPRING))
                 yield edge.state, RELATIVE if spring else ELEMENT, first if spring else number
 
-    def arrays(self) -> list[Array]:
-        """All arrays of the tables."""
+    def arrays(self) -> list[Any]:
+        """All arrays of the tables, of whole and of real numbers."""
         return [array for table in self._tables for array in table.arrays]
 
     def rows(self, q: Array, r: Array, s: Array) -> Array:

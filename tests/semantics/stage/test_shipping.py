@@ -50,8 +50,12 @@ def unconditional() -> set[str]:
     return found
 
 
+REACHING = {f"ephs.mechanics.engine.programs:{name}" for name in ("motion_of_trees", "motion_of_loops")}
+"""Programs that call others by address: the emulator of arm64 has no others, so their bits there are not known."""
+
+
 def test_what_all_users_compile_alike_is_shipped():
-    assert unconditional() and unconditional() <= set(SHIPPED)
+    assert REACHING < unconditional() <= REACHING | set(SHIPPED)
 
 
 def test_programs_have_names_of_their_own():
