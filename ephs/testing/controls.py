@@ -138,7 +138,7 @@ class LawCell:
 def law_cell(law: Law, algebra: Algebra[Any], elements: Elements, *, max_examples: int = 50) -> LawCell:
     """Try a law on an algebra, and on its spoiled copy until it fails."""
     holds = not refuted(law, algebra, elements, max_examples=max_examples)
-    return LawCell(holds, refuted(law, spoiled(algebra, law), elements, max_examples=40 * max_examples))
+    return LawCell(holds, refuted(law, spoiled(algebra, law), elements, max_examples=400 * max_examples))
 
 
 def refuted(

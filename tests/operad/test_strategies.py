@@ -17,7 +17,7 @@ from ephs.semantics import System
 from ephs.testing import interfaces, law_inputs, nestings, paths, patterns, quantities
 
 # To reach something is enough, it need not be small.
-SEARCH = settings(max_examples=2000, database=None, deadline=None, phases=[Phase.generate])
+SEARCH = settings(max_examples=20000, database=None, deadline=None, phases=[Phase.generate])
 
 
 def ports_of(f):
