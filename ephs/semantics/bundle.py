@@ -89,8 +89,9 @@ class Bundle:
 
     def items(self) -> Iterator[tuple[Path, Span, Quantity]]:
         """Iterate over power ports with their slices and quantities."""
-        for port in self.ports:
-            yield port, self.slice(port), self.quantity(port)
+        for port, start in zip(self.ports, self.offsets, strict=True):
+            quantity = self.quantity(port)
+            yield port, Span(start, start + quantity.space.dim), quantity
 
     def split(self, vector: Array) -> dict[Path, Array]:
         """Cut a fibre vector into the ports' parts."""

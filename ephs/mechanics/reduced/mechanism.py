@@ -171,6 +171,7 @@ def _tables(
         spring[i] = -1 if edge.spring < 0 or _stores_nothing(model, edge.spring) else edge.spring
         friction[i] = -1 if edge.friction < 0 or _idle(model, edge.friction) else edge.friction
     t, components = model.tables, model.descriptor.components
+    making = {path: i for i, path in enumerate(made)}
     storages = [(number, components[number].primitive) for number in parts.entropies.values()]
     return Mechanism(
         parent=np.array(parents, dtype=np.int64),
@@ -199,7 +200,7 @@ def _tables(
         conduction=np.array(parts.conduction, dtype=np.int64).reshape(-1, 3),
         sink=np.array(
             [
-                [made.index(components[c].path), taking]
+                [making[components[c].path], taking]
                 for c, taking in zip(friction.tolist(), heat.tolist(), strict=True)
                 if c >= 0
             ],
@@ -209,7 +210,7 @@ def _tables(
         dims=t.dims,
         parameters=t.parameters,
         parameter_at=t.parameter_at,
-        made_at=np.array([made.index(s.path) if s.path in made else -1 for s in components], dtype=np.int64),
+        made_at=np.array([making.get(s.path, -1) for s in components], dtype=np.int64),
     )
 
 

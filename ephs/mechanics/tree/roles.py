@@ -68,8 +68,8 @@ def offset_of(primitive: Primitive) -> np.ndarray | None:
 
 
 def _role(primitive: Primitive) -> Role:
-    kinds = [q.kind for _, _, q in primitive.bundle.items()]
-    on_bodies = [q == quantity.body_momentum for _, _, q in primitive.bundle.items()]
+    quantities = [q for _, _, q in primitive.bundle.items()]
+    kinds, on_bodies = [q.kind for q in quantities], [q == quantity.body_momentum for q in quantities]
     if isinstance(primitive, Storage):
         return _of_storage(primitive, kinds, on_bodies)
     if isinstance(primitive, Irreversible):

@@ -37,8 +37,12 @@ class Wiring:
         components, wires = descriptor.components, iter(descriptor.numbering.wires.tolist())
         ports: list[dict[str, int]] = []
         on: dict[int, list[tuple[int, str]]] = {}
+        known: dict[int, tuple[str, ...]] = {}
         for number, slot in enumerate(components):
-            mine = {str(port): next(wires) for port in slot.primitive.bundle.ports}
+            names = known.get(id(slot.primitive))
+            if names is None:
+                names = known[id(slot.primitive)] = tuple(map(str, slot.primitive.bundle.ports))
+            mine = {port: next(wires) for port in names}
             ports.append(mine)
             for port, junction in mine.items():
                 on.setdefault(junction, []).append((number, port))
