@@ -8,8 +8,8 @@ from typing import Any
 
 import ephs
 from benchmarks.report import Report, table_of
-from ephs.mechanics.solve import integrate
-from ephs.mechanics.solve.probe import Probe
+from ephs.solve import integrate
+from ephs.solve.probe import Probe
 
 SCENES = Path(__file__).parents[1] / "scenes"
 RUNS: dict[str, dict[str, Any]] = {

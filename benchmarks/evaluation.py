@@ -17,9 +17,9 @@ import numpy as np
 
 from benchmarks import families
 from benchmarks.report import Report, table_of
-from ephs.mechanics.reduced.equations import Equations
+from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.scene.model import Scene
-from ephs.mechanics.simulate import problem_of_scene
+from ephs.mechanics.tree.equations.equations import Equations
 from ephs.show.charts.peer_mujoco import mujoco_model, silent
 from ephs.show.charts.peer_pin import PinModel
 from ephs.show.charts.peer_scene import PeerError, peer_scene

@@ -13,7 +13,7 @@ import numpy as np
 import ephs
 from benchmarks.hard import CASES, Case
 from benchmarks.report import Report
-from ephs.mechanics.methods import AUTO, METHODS, Method
+from ephs.mechanics.methods.registry import AUTO, METHODS, Method
 from ephs.mechanics.scene.errors import SceneWarning
 from ephs.show.charts.outcomes import right
 from ephs.show.charts.runs import Ending, Run, Setting, attempt

@@ -6,7 +6,7 @@ import numpy as np
 
 import ephs
 from benchmarks.cases import CASES, Case
-from ephs.mechanics.methods import METHODS
+from ephs.mechanics.methods.registry import METHODS
 
 __all__ = ["fitted", "table"]
 

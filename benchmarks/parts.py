@@ -16,12 +16,12 @@ from benchmarks.report import Report, table_of
 from ephs import Pattern, Reference, System, junction
 from ephs import library as lib
 from ephs.mechanics import joint, rigid_body
-from ephs.mechanics.solve.condensed import solved_by_parts
-from ephs.mechanics.solve.model import Model, compile_model
-from ephs.mechanics.solve.natural import Natural
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.descriptor import Input, assemble
+from ephs.solve.methods.condensed import solved_by_parts
+from ephs.solve.methods.natural import Natural
+from ephs.solve.model import Model, compile_model
 
 __all__ = ["measure", "report"]
 

@@ -16,7 +16,7 @@ import numpy as np
 import ephs
 from benchmarks import cells, families, size
 from benchmarks.evaluation import ENGINES
-from ephs.mechanics.methods import METHODS
+from ephs.mechanics.methods.registry import METHODS
 
 __all__ = ["CASES", "OTHERS", "Work"]
 

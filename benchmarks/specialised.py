@@ -14,11 +14,11 @@ import numpy as np
 
 from benchmarks import families
 from benchmarks.report import Report, table_of
-from ephs.mechanics.engine.links import links_of
-from ephs.mechanics.reduced.equations import Equations
-from ephs.mechanics.simulate import problem_of_scene
-from ephs.mechanics.tree.programs import sweeps
-from ephs.mechanics.tree.unrolled import unrolled
+from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.tree.engine.links import links_of
+from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.sweeps.programs import sweeps
+from ephs.mechanics.tree.sweeps.unrolled import unrolled
 from ephs.semantics.stage import Program
 from ephs.semantics.stage.llvm import compile_text
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from gallery_pictures import View, moving_scene, sliding
 
-from ephs.mechanics.inside import Inside
+from ephs.mechanics.motion.inside import Inside
 from examples.gallery import UNTIL, entries
 
 ENTRIES = entries()

@@ -8,14 +8,15 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ephs.mechanics.check import check_model as check_model
-    from ephs.mechanics.citing import cite as cite
     from ephs.mechanics.dynamics import dynamics as dynamics
     from ephs.mechanics.linear import equilibrium as equilibrium
     from ephs.mechanics.linear import linearize as linearize
-    from ephs.mechanics.methods import register_method as register_method
-    from ephs.mechanics.reading import load_solution as load_solution
-    from ephs.mechanics.reduction.report import reduce as reduce
+    from ephs.mechanics.methods.registry import register_method as register_method
+    from ephs.mechanics.runs.check import check_model as check_model
+    from ephs.mechanics.runs.citing import cite as cite
+    from ephs.mechanics.runs.reading import load_solution as load_solution
+    from ephs.mechanics.runs.reduce import reduce as reduce
+    from ephs.mechanics.runs.simulate import simulate as simulate
     from ephs.mechanics.scene import ModelWarning as ModelWarning
     from ephs.mechanics.scene import Scene as Scene
     from ephs.mechanics.scene import SceneError as SceneError
@@ -23,16 +24,6 @@ if TYPE_CHECKING:
     from ephs.mechanics.scene.load import load as load
     from ephs.mechanics.sensitivity import fit as fit
     from ephs.mechanics.sensitivity import sensitivity as sensitivity
-    from ephs.mechanics.simulate import simulate as simulate
-    from ephs.mechanics.solve.errors import Interrupted as Interrupted
-    from ephs.mechanics.solve.errors import OptionError as OptionError
-    from ephs.mechanics.solve.errors import SimulationError as SimulationError
-    from ephs.mechanics.solve.events import Event as Event
-    from ephs.mechanics.solve.findings import AuditError as AuditError
-    from ephs.mechanics.solve.findings import AuditWarning as AuditWarning
-    from ephs.mechanics.solve.findings import CostWarning as CostWarning
-    from ephs.mechanics.solve.sampled import Sampled as Sampled
-    from ephs.mechanics.solve.solution import Solution as Solution
     from ephs.mechanics.sweep.sweep import SweepInterrupted as SweepInterrupted
     from ephs.mechanics.sweep.sweep import sweep as sweep
     from ephs.operad import Directory as Directory
@@ -55,6 +46,15 @@ if TYPE_CHECKING:
     from ephs.semantics.constructors import irreversible as irreversible
     from ephs.semantics.constructors import storage as storage
     from ephs.semantics.constructors import transformer as transformer
+    from ephs.solve.auditing.findings import AuditError as AuditError
+    from ephs.solve.auditing.findings import AuditWarning as AuditWarning
+    from ephs.solve.auditing.findings import CostWarning as CostWarning
+    from ephs.solve.errors import Interrupted as Interrupted
+    from ephs.solve.errors import OptionError as OptionError
+    from ephs.solve.errors import SimulationError as SimulationError
+    from ephs.solve.events import Event as Event
+    from ephs.solve.result.solution import Solution as Solution
+    from ephs.solve.sampled import Sampled as Sampled
 
 _HOMES = {
     "ephs.operad": (
@@ -79,20 +79,20 @@ _HOMES = {
     "ephs.semantics.constructors": ("constraint", "gyrator", "irreversible", "storage", "transformer"),
     "ephs.mechanics.scene": ("ModelWarning", "Scene", "SceneError", "SceneWarning"),
     "ephs.mechanics.scene.load": ("load",),
-    "ephs.mechanics.check": ("check_model",),
-    "ephs.mechanics.citing": ("cite",),
+    "ephs.mechanics.runs.check": ("check_model",),
+    "ephs.mechanics.runs.citing": ("cite",),
     "ephs.mechanics.dynamics": ("dynamics",),
     "ephs.mechanics.linear": ("equilibrium", "linearize"),
-    "ephs.mechanics.methods": ("register_method",),
-    "ephs.mechanics.reduction.report": ("reduce",),
-    "ephs.mechanics.reading": ("load_solution",),
-    "ephs.mechanics.simulate": ("simulate",),
+    "ephs.mechanics.methods.registry": ("register_method",),
+    "ephs.mechanics.runs.reduce": ("reduce",),
+    "ephs.mechanics.runs.reading": ("load_solution",),
+    "ephs.mechanics.runs.simulate": ("simulate",),
     "ephs.mechanics.sensitivity": ("fit", "sensitivity"),
-    "ephs.mechanics.solve.errors": ("Interrupted", "OptionError", "Outcome", "SimulationError"),
-    "ephs.mechanics.solve.events": ("Event",),
-    "ephs.mechanics.solve.sampled": ("Sampled",),
-    "ephs.mechanics.solve.findings": ("AuditError", "AuditWarning", "CostWarning"),
-    "ephs.mechanics.solve.solution": ("Solution",),
+    "ephs.solve.errors": ("Interrupted", "OptionError", "Outcome", "SimulationError"),
+    "ephs.solve.events": ("Event",),
+    "ephs.solve.sampled": ("Sampled",),
+    "ephs.solve.auditing.findings": ("AuditError", "AuditWarning", "CostWarning"),
+    "ephs.solve.result.solution": ("Solution",),
     "ephs.mechanics.sweep.sweep": ("SweepInterrupted", "sweep"),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}

@@ -16,8 +16,8 @@ SHIPPED: Final = (
     "ephs.semantics.derive.linear:linear_program",
     "ephs.semantics.linear.rows:row_program",
     "ephs.semantics.linear.sparse:sparse_lu",
-    "ephs.mechanics.tree.programs:common_sweeps",
-    "ephs.mechanics.tree.loops:common_loops",
+    "ephs.mechanics.tree.sweeps.programs:common_sweeps",
+    "ephs.mechanics.tree.sweeps.loops:common_loops",
 )
 """Module and name of each program, or of a function that returns one or several. To ship a program, list it here."""
 

@@ -11,7 +11,7 @@ import numpy as np
 
 import ephs
 from ephs import Outcome
-from ephs.mechanics.methods import METHODS
+from ephs.mechanics.methods.registry import METHODS
 from examples.failing import (
     CORD,
     beyond,

@@ -14,7 +14,7 @@ import ephs
 from ephs import Pattern, Reference, junction
 from ephs import library as lib
 from ephs import quantity as Q
-from ephs.mechanics.build import initial_state, scene_system
+from ephs.mechanics.scene.build import initial_state, scene_system
 
 AREA = 2.0e-3  # m², of the piston
 HOT = 700.0  # K, of the gas above the piston

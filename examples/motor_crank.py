@@ -12,7 +12,7 @@ import ephs
 from ephs import Pattern, junction
 from ephs import library as lib
 from ephs import quantity as Q
-from ephs.mechanics.build import initial_state, scene_system
+from ephs.mechanics.scene.build import initial_state, scene_system
 
 VOLTAGE, RESISTANCE, FLUX, GEAR, ROTOR = 12.0, 0.8, 0.08, 0.5, 2.0e-4  # V, Ω, Wb, crank per rotor, kg m²
 

@@ -19,7 +19,7 @@ import ephs
 from ephs import Pattern, junction
 from ephs import library as lib
 from ephs import quantity as Q
-from ephs.mechanics.methods import METHODS
+from ephs.mechanics.methods.registry import METHODS
 
 ROOT = Path(__file__).resolve().parents[1]
 

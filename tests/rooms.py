@@ -20,34 +20,31 @@ STOREYS: tuple[tuple[frozenset[str], ...], ...] = tuple(
         ([".semantics.spaces", ".semantics.linear"],),
         ([".semantics.derive"],),
         ([".semantics", ".semantics.library", ".semantics.algebra", ".semantics.relations", ".semantics.symbols"],),
-        ([".mechanics.solve", ".mechanics.solve.march"],),
+        ([".solve", ".solve.march", ".solve.methods", ".solve.result", ".solve.auditing"],),
         ([".mechanics.shapes"],),
-        ([".mechanics.scene", ".mechanics.imports"],),
-        (
-            [
-                ".mechanics",
-                ".mechanics.elements",
-                ".mechanics.reduction",
-                ".mechanics.reduced",
-                ".mechanics.engine",
-                ".mechanics.tree",
-            ],
-        ),
+        ([".mechanics.elements"],),
+        ([".mechanics.scene", ".mechanics.imports"], [".mechanics.tree", ".mechanics.tree.sweeps"]),
+        ([".mechanics.constraints"],),
+        ([".mechanics.tree.finding"],),
+        ([".mechanics.tree.engine"], [".mechanics.rewrite"]),
+        ([".mechanics.tree.equations"],),
+        ([".mechanics.methods"],),
+        ([".mechanics.motion"],),
+        ([".mechanics", ".mechanics.runs"],),
         ([".mechanics.dynamics"], [".mechanics.sweep"]),
         ([".mechanics.linear"], [".mechanics.sensitivity"]),
         ([".show", ".show.charts"], [".testing"]),
-        ([""],),
+        (["", ".cli"],),
     )
 )
 """From the ground up. Rooms that stand together know each other and all storeys below; no others."""
 DOORS = {
     ("ephs.operad.pattern", "ephs.show"): "a pattern shows itself in notebooks",
     ("ephs.operad.algebra", "ephs.semantics.algebra"): "the empty pattern that is called makes the empty system",
-    ("ephs.semantics.catalogue", "ephs.mechanics"): "documents of systems name parts of mechanics",
+    ("ephs.semantics.catalogue", "ephs.mechanics.elements"): "documents of systems name parts of mechanics",
     ("ephs.semantics.system", "ephs.show"): "so does a system",
     ("ephs.mechanics.scene.words", "ephs.show"): "so does a scene",
-    ("ephs.mechanics.solve.solution", "ephs.show"): "a solution plots and moves itself",
-    ("ephs.mechanics.scene.model", "ephs.mechanics"): "a scene makes its system",
+    ("ephs.solve.result.solution", "ephs.show"): "a solution plots and moves itself",
 }
 """Module, room above it: why it may know that. What is above is loaded when it is asked for."""
 PLACE = {room: (level, flat) for level, storey in enumerate(STOREYS) for flat in storey for room in flat}

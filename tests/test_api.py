@@ -6,7 +6,7 @@ import pytest
 
 import ephs
 from ephs.cli import app
-from ephs.mechanics.methods import METHODS
+from ephs.mechanics.methods.registry import METHODS
 from tests.public import FILE, lines, named, options
 
 REQUIRED = inspect.Parameter.empty
@@ -118,8 +118,8 @@ ATTRIBUTES = {
     "ephs.semantics.subspace.Subspace": "projector",
     "ephs.mechanics.dynamics.Dynamics": "state0",
     "ephs.mechanics.dynamics.State": "array",
-    "ephs.mechanics.motion.BodyMotion": "position quaternion rotation velocity angular_velocity",
-    "ephs.mechanics.motion.JointMotion": "coordinate rate wrench",
+    "ephs.mechanics.motion.motion.BodyMotion": "position quaternion rotation velocity angular_velocity",
+    "ephs.mechanics.motion.motion.JointMotion": "coordinate rate wrench",
 }
 QUANTITIES = (
     "displacement momentum angle angular_momentum charge flux_linkage entropy volume pose body_momentum relative_pose "

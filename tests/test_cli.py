@@ -13,12 +13,13 @@ import numpy as np
 import pytest
 
 import ephs
-from ephs import Outcome, cli
-from ephs.cli_input import Loading, Stepping
-from ephs.cli_linear import linearize
-from ephs.cli_run import run
-from ephs.cli_sweep import sweep
-from ephs.mechanics.solve.findings import Audit, Finding
+from ephs import Outcome
+from ephs.cli import main as cli
+from ephs.cli.input import Loading, Stepping
+from ephs.cli.linear import linearize
+from ephs.cli.run import run
+from ephs.cli.sweep import sweep
+from ephs.solve.auditing.findings import Audit, Finding
 from examples.failures import CASES, Case
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -264,7 +265,7 @@ def test_a_missing_extra_keeps_the_data(house, capsys, monkeypatch):
 def test_check_prints_each_law_and_exits_by_the_verdict(house, capsys, monkeypatch, ok, code):
     items = [("power balance", True, "defect 1e-16"), ("energy [mf]", ok, "found 0.1")]
     module = SimpleNamespace(check_model=lambda model, initial: SimpleNamespace(items=items, ok=ok))
-    monkeypatch.setitem(sys.modules, "ephs.mechanics.check", module)
+    monkeypatch.setitem(sys.modules, "ephs.mechanics.runs.check", module)
     assert cli.main(["check", "crank.toml"]) == code
     said = capsys.readouterr().out
     assert all(name in said and detail in said for name, _, detail in items)

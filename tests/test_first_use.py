@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 import ephs
-from ephs import cli
-from ephs.cli_new import TEMPLATES
-from ephs.cli_next import EXAMPLES, commands
-from ephs.cli_progress import said_of
+from ephs.cli import main as cli
+from ephs.cli.new import TEMPLATES
+from ephs.cli.next import EXAMPLES, commands
+from ephs.cli.progress import said_of
 
 ROOT = Path(__file__).resolve().parents[1]
 

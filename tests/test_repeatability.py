@@ -11,8 +11,8 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import ephs
-from ephs.mechanics.solve import integrate, loop
-from ephs.mechanics.solve.threads import in_one_thread
+from ephs.solve import integrate, loop
+from ephs.solve.threads import in_one_thread
 from tests.repeat import contents, digest
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -368,8 +368,8 @@ def test_messages_steer_no_terminal(tmp_path):
 
 
 def test_progress_obeys_no_name(monkeypatch):
-    from ephs.cli_charts import _status
-    from ephs.cli_progress import progress_bar
+    from ephs.cli.charts import _status
+    from ephs.cli.progress import progress_bar
 
     monkeypatch.setenv("FORCE_COLOR", "1")  # as on a terminal
     with _status("[/b][link=x]") as note:

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 import ephs
 from benchmarks import families
-from ephs.mechanics.reduced.equations import Equations
-from ephs.mechanics.simulate import problem_of_scene
-from ephs.mechanics.tree.loops import ARGUMENTS as LOOPS
-from ephs.mechanics.tree.programs import ARGUMENTS as SWEEPS
+from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.sweeps.loops import ARGUMENTS as LOOPS
+from ephs.mechanics.tree.sweeps.programs import ARGUMENTS as SWEEPS
 from ephs.semantics.stage import llvm
 from ephs.semantics.stage.calling import Call
 from ephs.semantics.stage.objects import FITTING, emitted, fitting

@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 import ephs
 from benchmarks.hard.case import Case, read
 from ephs.mechanics import joint, rigid_body
-from ephs.mechanics.components import ground
+from ephs.mechanics.elements.components import ground
 from ephs.operad import Pattern, junction, quantity
 
 __all__ = ["ADJUSTED", "CASES", "PINS", "crank_angle", "four_bar", "wired", "wired_poses"]

@@ -57,7 +57,7 @@ def _from_parameters(make: Callable[..., Primitive]) -> Callable[[Interface, Map
 
 @cache
 def _mechanical() -> Mapping[str, Part]:
-    parts: tuple[Part, ...] = import_module("ephs.mechanics.catalogue").PARTS
+    parts: tuple[Part, ...] = import_module("ephs.mechanics.elements.catalogue").PARTS
     return {part.word: part for part in parts}
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ephs.mechanics.readout import freedoms_of
+from ephs.mechanics.motion.readout import freedoms_of
 
 Array = NDArray[np.float64]
 

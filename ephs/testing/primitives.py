@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from hypothesis import strategies as st
 
-from ephs.mechanics import components
+from ephs.mechanics.elements import components
 from ephs.operad import Interface, Path
 from ephs.operad import quantity as quantities
 from ephs.operad.charges import ENTROPY

@@ -4,8 +4,8 @@ import pytest
 
 from benchmarks.hard import CASES
 from benchmarks.honesty import Kind, cells, known, methods, settings
-from ephs.mechanics.solve import integrate
-from ephs.mechanics.solve.findings import Audit
+from ephs.solve import integrate
+from ephs.solve.auditing.findings import Audit
 
 HERE = {
     "brake 100": ("natural", "natural4", "radau", "alpha", "rk54", "ida"),

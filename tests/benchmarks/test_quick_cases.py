@@ -3,7 +3,7 @@
 import pytest
 
 from benchmarks.quick_cases import CASES, OTHERS, RUNS
-from ephs.mechanics.methods import METHODS
+from ephs.mechanics.methods.registry import METHODS
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import ephs
-from ephs.mechanics.check import check_model
+from ephs.mechanics.runs.check import check_model
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))

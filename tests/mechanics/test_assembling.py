@@ -7,12 +7,12 @@ import pytest
 
 import ephs
 from benchmarks.hard.four_bars import wired, wired_poses
-from ephs.mechanics.build import initial_state
-from ephs.mechanics.check import check_model
-from ephs.mechanics.simulate import problem_of_system
-from ephs.mechanics.solve.mobility import mobility
+from ephs.mechanics.runs.check import check_model
+from ephs.mechanics.runs.simulate import problem_of_system
+from ephs.mechanics.scene.build import initial_state
 from ephs.semantics import AssemblyError
 from ephs.semantics.spaces import SE3
+from ephs.solve.mobility import mobility
 
 METHODS = ("natural", "natural4")
 

@@ -9,13 +9,20 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 
 import ephs
-from ephs.mechanics.build import component_path, drive_ports, initial_state, scene_inputs, scene_system, wrench_port
-from ephs.mechanics.check import check_model
+from ephs.mechanics.runs.check import check_model
+from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.scene.build import (
+    component_path,
+    drive_ports,
+    initial_state,
+    scene_inputs,
+    scene_system,
+    wrench_port,
+)
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
-from ephs.mechanics.simulate import problem_of_scene
-from ephs.mechanics.solve.instant import instant, mobility
 from ephs.operad import Path
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
+from ephs.solve.instant import instant, mobility
 from ephs.testing import mechanisms
 
 ROOT = File(__file__).parents[2]

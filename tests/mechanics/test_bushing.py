@@ -6,7 +6,7 @@ import pytest
 import ephs
 from benchmarks.hard.case import read
 from benchmarks.hard.loops import BLOCK, BUSHING, GRAVITY, STIFFNESS, fall
-from ephs.mechanics.methods import METHODS
+from ephs.mechanics.methods.registry import METHODS
 
 
 def scene_of(length):

@@ -8,8 +8,8 @@ from types import SimpleNamespace
 import pytest
 
 import ephs
-from ephs.mechanics.citing import ALWAYS, FORM_SOURCES, METHOD_SOURCES, bibliography
-from ephs.mechanics.methods import METHODS
+from ephs.mechanics.methods.registry import METHODS
+from ephs.mechanics.runs.citing import ALWAYS, FORM_SOURCES, METHOD_SOURCES, bibliography
 
 ROOT = Path(__file__).resolve().parents[2]
 SHIPPED = tuple(METHODS)  # before any test registers its own

@@ -2,7 +2,7 @@
 
 import numba
 
-from ephs.mechanics.compiling import compiling
+from ephs.mechanics.runs.compiling import compiling
 
 
 def test_compilations_are_named_and_their_end_is_told():

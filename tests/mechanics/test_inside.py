@@ -7,8 +7,8 @@ import pytest
 
 import ephs
 from ephs import Pattern
-from ephs.mechanics.build import initial_state
-from ephs.mechanics.inside import Inside
+from ephs.mechanics.motion.inside import Inside
+from ephs.mechanics.scene.build import initial_state
 from ephs.show import animate
 
 ROOT = Path(__file__).resolve().parents[2]

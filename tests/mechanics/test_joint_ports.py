@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ephs.mechanics import holonomic_kernels, joints
+from ephs.mechanics.elements import holonomic_kernels, joints
 
 BOTH = {"p1", "p2"}
 WITH = {(False, False): set(), (True, False): {"s"}, (False, True): {"p_r"}, (True, True): {"s", "p_r"}}

@@ -12,10 +12,10 @@ from benchmarks.cases import CASES
 from ephs import Pattern, junction
 from ephs import library as lib
 from ephs import quantity as Q
-from ephs.mechanics import methods as registry
-from ephs.mechanics.methods import METHODS, Method, on_joints, register_method
-from ephs.mechanics.reduced.method import ReducedMethod
-from ephs.mechanics.solve.stepping import Attempt
+from ephs.mechanics.methods import registry
+from ephs.mechanics.methods.method import ReducedMethod
+from ephs.mechanics.methods.registry import METHODS, Method, on_joints, register_method
+from ephs.solve.stepping import Attempt
 
 ROOT = Path(__file__).parents[2]
 BY_NAME = {case.name: case for case in CASES}

@@ -9,9 +9,10 @@ from hypothesis import HealthCheck, find, given, settings
 
 import ephs
 from benchmarks.cases import CASES
-from ephs.mechanics import components, joint, rigid_body
-from ephs.mechanics.build import initial_state, scene_system
-from ephs.mechanics.methods import METHODS
+from ephs.mechanics import joint, rigid_body
+from ephs.mechanics.elements import components
+from ephs.mechanics.methods.registry import METHODS
+from ephs.mechanics.scene.build import initial_state, scene_system
 from ephs.mechanics.scene.model import frozen
 from ephs.operad import quantity as Q
 from ephs.semantics import Reference

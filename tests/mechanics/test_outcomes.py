@@ -8,11 +8,12 @@ import pytest
 
 import ephs
 from ephs import Outcome
-from ephs.mechanics.methods import METHODS, Method, on_joints
-from ephs.mechanics.reduced.explicit import Explicit, tableau
-from ephs.mechanics.reduced.method import ReducedMethod
-from ephs.mechanics.solve import factors, integrate, loop
-from ephs.mechanics.solve.errors import SolveError
+from ephs.mechanics.methods.explicit import Explicit, tableau
+from ephs.mechanics.methods.method import ReducedMethod
+from ephs.mechanics.methods.registry import METHODS, Method, on_joints
+from ephs.solve import integrate, loop
+from ephs.solve.errors import SolveError
+from ephs.solve.methods import factors
 from examples.failing import oscillator, pendulum, scene
 from examples.failures import ALL, CASES, ELSEWHERE, Case, pushed, runs
 

@@ -8,10 +8,10 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import ephs
-from ephs.mechanics.methods import METHODS
-from ephs.mechanics.own_units import NEAR, SI, Units, mobility_of
+from ephs.mechanics.methods.registry import METHODS
+from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.scene.own_units import NEAR, SI, Units, mobility_of
 from ephs.mechanics.scene.rescaled import rescaled
-from ephs.mechanics.simulate import problem_of_scene
 
 FOUR_BAR = ephs.load(Path(__file__).parents[2] / "scenes" / "four-bar.toml")
 SPAN, STEP = 0.125, 2.0**-6

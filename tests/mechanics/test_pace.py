@@ -8,7 +8,7 @@ import pytest
 
 import ephs
 from benchmarks.hard import CASES
-from ephs.mechanics.pace import TIMES, TURN, longest_step
+from ephs.mechanics.runs.pace import TIMES, TURN, longest_step
 from examples.failing import four_bar
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -8,14 +8,14 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 
 import ephs
-from ephs.mechanics.build import component_path
-from ephs.mechanics.check import check_model
-from ephs.mechanics.redundancy import dependences, explain, indeterminate, wrenches_in_words
+from ephs.mechanics.constraints.redundancy import dependences, explain, indeterminate, wrenches_in_words
+from ephs.mechanics.runs.check import check_model
+from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.scene.build import component_path
 from ephs.mechanics.scene.geometry import coupling_of
 from ephs.mechanics.scene.model import GROUND
-from ephs.mechanics.simulate import problem_of_scene
-from ephs.mechanics.solve.instant import instant, mobility
 from ephs.semantics.spaces import SE3
+from ephs.solve.instant import instant, mobility
 from ephs.testing import mechanisms
 
 ROOT = Path(__file__).resolve().parents[2]

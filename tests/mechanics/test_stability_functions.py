@@ -12,13 +12,12 @@ import pytest
 import ephs
 from ephs import Pattern, junction, library
 from ephs import quantity as Q
-from ephs.mechanics.methods import METHODS, Setting
-from ephs.mechanics.reduced import tableaux
-from ephs.mechanics.reduced.explicit import tableau
-from ephs.mechanics.simulate import problem_of_system
-from ephs.mechanics.solve.control import Control, Tolerance
-from ephs.mechanics.solve.model import compile_model
-from ephs.mechanics.solve.radau import COEFFICIENTS, NODES
+from ephs.mechanics.methods.explicit import tableau
+from ephs.mechanics.methods.registry import METHODS, Setting, tableaux
+from ephs.mechanics.runs.simulate import problem_of_system
+from ephs.solve.control import Control, Tolerance
+from ephs.solve.methods.radau import COEFFICIENTS, NODES
+from ephs.solve.model import compile_model
 from tests.mechanics.torsion import torsion
 
 J, K, D = 0.5, 3.0, 0.4

@@ -6,12 +6,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ephs.mechanics import rigid_body
-from ephs.mechanics.solve.instant import instant
 from ephs.operad import Path
 from ephs.semantics import Reference
 from ephs.semantics.descriptor import Input
 from ephs.semantics.spaces import SE3, SO3xR3
 from ephs.semantics.spaces.rotations import rotation_log
+from ephs.solve.instant import instant
 from tests.mechanics.mechanisms import GRAVITY, TwoBodies, kinds
 
 seeds = st.integers(0, 2**20)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 
 import ephs
-from ephs.mechanics.views import Names
+from ephs.mechanics.motion.views import Names
 from ephs.semantics.errors import AssemblyError
 from tests.mechanics.dynamics.drawn import moving
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import ephs
-from ephs.mechanics.methods import METHODS
+from ephs.mechanics.methods.registry import METHODS
 from examples.failing import oscillator
 
 ROOT = Path(__file__).resolve().parents[2]

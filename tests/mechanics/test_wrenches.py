@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import ephs
-from ephs.mechanics.build import component_path
+from ephs.mechanics.scene.build import component_path
 from ephs.mechanics.scene.model import Scene
-from ephs.mechanics.solve.instant import instant
+from ephs.solve.instant import instant
 from ephs.testing import mechanisms
 
 

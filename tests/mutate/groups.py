@@ -51,11 +51,11 @@ RUNS = (
 LONG = Pace(each=10.0, file=90.0, budget=40.0)
 """For what shows itself over many steps."""
 DERIVATIVES = (
-    "ephs/mechanics/tree/closures.py",
-    "ephs/mechanics/tree/edges.py",
-    "ephs/mechanics/tree/inverse.py",
-    "ephs/mechanics/engine/laws.py",
-    "ephs/mechanics/reduced/slopes.py",
+    "ephs/mechanics/tree/sweeps/closures.py",
+    "ephs/mechanics/tree/sweeps/edges.py",
+    "ephs/mechanics/tree/sweeps/inverse.py",
+    "ephs/mechanics/tree/engine/laws.py",
+    "ephs/mechanics/tree/equations/slopes.py",
 )
 
 GROUPS = {
@@ -67,11 +67,11 @@ GROUPS = {
     ),
     "pairs": Group(
         (
-            "ephs/mechanics/joints.py",
-            "ephs/mechanics/components.py",
-            "ephs/mechanics/directions.py",
-            "ephs/mechanics/holonomic_kernels.py",
-            "ephs/mechanics/springs.py",
+            "ephs/mechanics/elements/joints.py",
+            "ephs/mechanics/elements/components.py",
+            "ephs/mechanics/constraints/directions.py",
+            "ephs/mechanics/elements/holonomic_kernels.py",
+            "ephs/mechanics/elements/springs.py",
         ),
         (
             *PARTS,
@@ -112,15 +112,15 @@ GROUPS = {
     ),
     "integrators": Group(
         (
-            "ephs/mechanics/solve/natural.py",
-            "ephs/mechanics/solve/natural4.py",
-            "ephs/mechanics/solve/radau.py",
-            "ephs/mechanics/solve/collocation.py",
-            "ephs/mechanics/reduced/explicit.py",
-            "ephs/mechanics/reduced/tableaux.py",
-            "ephs/mechanics/reduced/alpha.py",
-            "ephs/mechanics/reduced/implicit.py",
-            "ephs/mechanics/reduced/variational.py",
+            "ephs/solve/methods/natural.py",
+            "ephs/solve/methods/natural4.py",
+            "ephs/solve/methods/radau.py",
+            "ephs/solve/methods/collocation.py",
+            "ephs/mechanics/methods/explicit.py",
+            "ephs/mechanics/methods/tableaux.py",
+            "ephs/mechanics/methods/alpha.py",
+            "ephs/mechanics/methods/radau.py",
+            "ephs/mechanics/methods/variational.py",
         ),
         (
             *RUNS,
@@ -138,8 +138,8 @@ GROUPS = {
     ),
     "kernels": Group(
         (
-            "ephs/mechanics/solve/natural_kernels.py",
-            "ephs/mechanics/solve/gauss_kernels.py",
+            "ephs/solve/methods/natural_kernels.py",
+            "ephs/solve/methods/gauss_kernels.py",
         ),
         (
             *RUNS,
@@ -152,16 +152,16 @@ GROUPS = {
     ),
     "sweeps": Group(
         (
-            "ephs/mechanics/tree/accelerations.py",
-            "ephs/mechanics/tree/inward.py",
-            "ephs/mechanics/tree/joints.py",
-            "ephs/mechanics/tree/outward.py",
-            "ephs/mechanics/tree/pack.py",
-            "ephs/mechanics/engine/links.py",
-            "ephs/mechanics/engine/forces.py",
-            "ephs/mechanics/engine/heats.py",
-            "ephs/mechanics/engine/motion.py",
-            "ephs/mechanics/solve/march/*.py",
+            "ephs/mechanics/tree/sweeps/accelerations.py",
+            "ephs/mechanics/tree/sweeps/inward.py",
+            "ephs/mechanics/tree/sweeps/joints.py",
+            "ephs/mechanics/tree/sweeps/outward.py",
+            "ephs/mechanics/tree/sweeps/pack.py",
+            "ephs/mechanics/tree/engine/links.py",
+            "ephs/mechanics/tree/engine/forces.py",
+            "ephs/mechanics/tree/engine/heats.py",
+            "ephs/mechanics/tree/engine/motion.py",
+            "ephs/solve/march/*.py",
         ),
         (f"{MECHANICS}/tree", f"{MECHANICS}/engine", f"{MECHANICS}/solve/test_march.py"),
     ),
@@ -176,12 +176,12 @@ GROUPS = {
     ),
     "reductions": Group(
         (
-            "ephs/mechanics/reduction/*.py",
-            "ephs/mechanics/engine/build.py",
-            "ephs/mechanics/engine/closing.py",
-            "ephs/mechanics/engine/tables.py",
-            "ephs/mechanics/reduced/mechanism.py",
-            "ephs/mechanics/reduced/spanning.py",
+            "ephs/mechanics/rewrite/*.py",
+            "ephs/mechanics/tree/engine/build.py",
+            "ephs/mechanics/tree/engine/closing.py",
+            "ephs/mechanics/tree/engine/tables.py",
+            "ephs/mechanics/tree/finding/mechanism.py",
+            "ephs/mechanics/tree/finding/spanning.py",
         ),
         (f"{MECHANICS}/reduction", f"{MECHANICS}/engine", f"{MECHANICS}/test_stability_functions.py"),
     ),

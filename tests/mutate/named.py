@@ -30,30 +30,34 @@ BREAKS = {
         "parts.balances[writer.junction(path, port)] -= expression",
     ),
     "dense, axes that turn": Break(
-        "ephs/mechanics/tree/inverse.py", "+ dot(load, bracket(twist, axis))", "- dot(load, bracket(twist, axis))"
+        "ephs/mechanics/tree/sweeps/inverse.py",
+        "+ dot(load, bracket(twist, axis))",
+        "- dot(load, bracket(twist, axis))",
     ),
-    "dense, multipliers": Break("ephs/mechanics/tree/closures.py", "scale(-multiplier[row]", "scale(multiplier[row]"),
-    "dense, heat": Break("ephs/mechanics/tree/edges.py", "+ (law.made + (", "- (law.made + ("),
+    "dense, multipliers": Break(
+        "ephs/mechanics/tree/sweeps/closures.py", "scale(-multiplier[row]", "scale(multiplier[row]"
+    ),
+    "dense, heat": Break("ephs/mechanics/tree/sweeps/edges.py", "+ (law.made + (", "- (law.made + ("),
     "books": Break(
-        "ephs/mechanics/solve/books.py",
+        "ephs/solve/result/books.py",
         "self.exergy - self.exergy[:1] + self.destroyed",
         "self.exergy - self.exergy[:1] - self.destroyed",
     ),
-    "lp": Break("ephs/mechanics/components.py", "[[-_product(column, p)", "[[_product(column, p)"),
+    "lp": Break("ephs/mechanics/elements/components.py", "[[-_product(column, p)", "[[_product(column, p)"),
     "chord of a rotation": Break("ephs/semantics/derive/charts.py", "chord = 0.5 *", "chord = 0.25 *"),
-    "o1": Break("ephs/mechanics/components.py", "np.hstack([-carried,", "np.hstack([carried,"),
+    "o1": Break("ephs/mechanics/elements/components.py", "np.hstack([-carried,", "np.hstack([carried,"),
     "o1, not inverted": Break(
-        "ephs/mechanics/components.py",
+        "ephs/mechanics/elements/components.py",
         "carried = SE3.adjoint(SE3.inverse(np.asarray(offset, dtype=float)))",
         "carried = SE3.adjoint(np.asarray(offset, dtype=float))",
     ),
     "hc": Break(
-        "ephs/mechanics/components.py",
+        "ephs/mechanics/elements/components.py",
         "np.hstack([SE3.adjoint(SE3.inverse(pose)), -np.eye(6), of.basis])",
         "np.hstack([SE3.adjoint(SE3.inverse(pose)), np.eye(6), of.basis])",
     ),
     "hc, compiled": Break(
-        "ephs/mechanics/holonomic_kernels.py",
+        "ephs/mechanics/elements/holonomic_kernels.py",
         "side[i], mid[i], inner[i] = -0.5 * h * effort[6 + i], 0.5 * h * bi, h * ai",
         "side[i], mid[i], inner[i] = 0.5 * h * effort[6 + i], 0.5 * h * bi, h * ai",
     ),

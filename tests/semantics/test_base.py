@@ -7,7 +7,7 @@ import ephs
 from ephs import Pattern
 from ephs import library as lib
 from ephs import quantity as Q
-from ephs.mechanics.components import gravity
+from ephs.mechanics.elements.components import gravity
 from ephs.operad import ROOT, Path, PatternError
 from ephs.semantics import AssemblyError, Reference, Relation, SemanticsError, System
 from ephs.semantics.behaviour import Natural

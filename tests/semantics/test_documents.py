@@ -14,7 +14,7 @@ import ephs
 from ephs import Pattern, PatternError, SemanticsError, System, junction, library
 from ephs import quantity as Q
 from ephs.mechanics import beam_element, joint, rigid_body, spring_damper
-from ephs.mechanics.catalogue import PARTS
+from ephs.mechanics.elements.catalogue import PARTS
 from ephs.operad import Path
 from ephs.operad.documents import SCHEMA_FILE as PATTERN_SCHEMA
 from ephs.operad.reading import Reader
@@ -168,8 +168,8 @@ MECHANICS = [
     beam_element(
         length=2.0, stiffness=[5.0, 4.0, 6.0, 1e2, 8e1, 9e1], rest=[0.1, 0.0, 0.2, 1.0, 0.0, 0.1], damping=0.1
     ),
-    alone(ephs.mechanics.components.ground()),
-    alone(ephs.mechanics.components.thermal_node(3.0, 300.0)),
+    alone(ephs.mechanics.elements.components.ground()),
+    alone(ephs.mechanics.elements.components.thermal_node(3.0, 300.0)),
 ]
 
 

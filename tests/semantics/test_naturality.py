@@ -13,8 +13,8 @@ import ephs
 from ephs import Pattern, junction
 from ephs import library as lib
 from ephs import quantity as Q
+from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.scene.geometry import coupling_of
-from ephs.mechanics.simulate import problem_of_scene
 from ephs.operad import Directory, Path
 from ephs.semantics import Reference, System
 from ephs.semantics.behaviour import GRADIENTS, Natural

@@ -7,9 +7,9 @@ from typing import Any, final
 import numpy as np
 import pytest
 
-from ephs.mechanics.solve.books import Entry
-from ephs.mechanics.solve.labels import labels_of
 from ephs.operad import Path, Pattern, junction, quantity
+from ephs.solve.result.books import Entry
+from ephs.solve.result.labels import labels_of
 
 
 @final

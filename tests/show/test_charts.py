@@ -10,7 +10,7 @@ import pytest
 
 import ephs
 from ephs.cli import main
-from ephs.mechanics.methods import METHODS
+from ephs.mechanics.methods.registry import METHODS
 from ephs.show.charts import (
     FAMILIES,
     Outcome,

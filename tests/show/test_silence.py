@@ -2,10 +2,10 @@
 
 import pytest
 
-from ephs.mechanics.methods import METHODS
-from ephs.mechanics.solve import integrate
-from ephs.mechanics.solve.findings import Audit
+from ephs.mechanics.methods.registry import METHODS
 from ephs.show.charts import FAMILIES, SILENT, Outcome, stability
+from ephs.solve import integrate
+from ephs.solve.auditing.findings import Audit
 
 LIMIT = 0.5
 """Processor time in s of a run."""

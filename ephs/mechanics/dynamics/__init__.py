@@ -7,4 +7,4 @@ from ephs.mechanics.dynamics.results import Constraints as Constraints
 from ephs.mechanics.dynamics.results import Derivatives as Derivatives
 from ephs.mechanics.dynamics.results import Energies as Energies
 from ephs.mechanics.dynamics.state import State as State
-from ephs.mechanics.views import BodyState as BodyState
+from ephs.mechanics.motion.views import BodyState as BodyState

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ephs.mechanics.solve.errors import OptionError
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rank import ELIMINATION, rank_of
+from ephs.solve.errors import OptionError
 
 if TYPE_CHECKING:
     from ephs.mechanics.dynamics.model import Dynamics

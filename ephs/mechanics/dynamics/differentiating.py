@@ -1,8 +1,8 @@
 """Exact derivatives of a mechanism's dynamics, and its constraints, from the linearised equations."""
 
 from ephs.mechanics.dynamics.results import Constraints, Derivatives
-from ephs.mechanics.reduced.tables import CUT
-from ephs.mechanics.reduced.tangent import Linearised
+from ephs.mechanics.tree.equations.tangent import Linearised
+from ephs.mechanics.tree.finding.tables import CUT
 from ephs.semantics.bundle import Array
 
 __all__ = ["constraints_of", "derivatives_of", "forward_slopes"]

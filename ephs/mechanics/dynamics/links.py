@@ -4,14 +4,14 @@ from typing import final
 
 import numpy as np
 
-from ephs.mechanics.build import component_path
-from ephs.mechanics.reduced.equations import Equations
+from ephs.mechanics.motion.views import BodyState
+from ephs.mechanics.scene.build import component_path
 from ephs.mechanics.scene.model import Scene
-from ephs.mechanics.solve.errors import OptionError
-from ephs.mechanics.solve.problem import State as States
-from ephs.mechanics.views import BodyState
+from ephs.mechanics.tree.equations.equations import Equations
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
+from ephs.solve.errors import OptionError
+from ephs.solve.problem import State as States
 
 __all__ = ["Links"]
 

@@ -7,8 +7,8 @@ import numpy as np
 
 from ephs.mechanics.dynamics.links import Links
 from ephs.mechanics.dynamics.results import Derivatives
-from ephs.mechanics.reduced.equations import Equations
 from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.tree.equations.equations import Equations
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.rotations import hat, quaternion_to_matrix
 

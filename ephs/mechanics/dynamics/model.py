@@ -16,20 +16,20 @@ from ephs.mechanics.dynamics.placing import ByJoint, Placing
 from ephs.mechanics.dynamics.results import Constraints, Derivatives, Energies
 from ephs.mechanics.dynamics.state import State
 from ephs.mechanics.dynamics.stepping import Steps
-from ephs.mechanics.reduced.equations import Equations, ReducedState
-from ephs.mechanics.reduced.paper import PaperStates
-from ephs.mechanics.reduced.tangent import Linearised
+from ephs.mechanics.motion.views import BodyState, Names, StateView
+from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.scene.model import Scene
-from ephs.mechanics.simulate import problem_of_scene
-from ephs.mechanics.solve.errors import OptionError, failing_at
-from ephs.mechanics.solve.problem import State as States
-from ephs.mechanics.solve.sparse import Index
-from ephs.mechanics.views import BodyState, Names, StateView
+from ephs.mechanics.tree.equations.equations import Equations, ReducedState
+from ephs.mechanics.tree.equations.paper import PaperStates
+from ephs.mechanics.tree.equations.tangent import Linearised
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
+from ephs.solve.errors import OptionError, failing_at
+from ephs.solve.problem import State as States
+from ephs.solve.sparse import Index
 
 if TYPE_CHECKING:
-    from ephs.mechanics.methods import Method
+    from ephs.mechanics.methods.registry import Method
 
 __all__ = ["Dynamics", "dynamics"]
 

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ephs.mechanics.dynamics.state import State
-from ephs.mechanics.reduced.equations import Equations
-from ephs.mechanics.reduced.layout import Layout
+from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.finding.layout import Layout
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.codes import VECTOR
 

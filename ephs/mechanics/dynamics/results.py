@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from typing import final
 
-from ephs.mechanics.solve.model import Model
 from ephs.semantics.bundle import Array
 from ephs.semantics.primitives import Storage
+from ephs.solve.model import Model
 
 __all__ = ["Constraints", "Derivatives", "Energies"]
 

@@ -7,7 +7,7 @@ from typing import final
 
 import numpy as np
 
-from ephs.mechanics.reduced.layout import Layout
+from ephs.mechanics.tree.finding.layout import Layout
 from ephs.semantics.bundle import Array
 
 __all__ = ["State"]

@@ -7,20 +7,20 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 
 from ephs.mechanics.dynamics.placing import ByJoint
-from ephs.mechanics.methods import Setting, chosen
-from ephs.mechanics.reduced.equations import Equations, ReducedState
-from ephs.mechanics.reduced.explicit import tableau
-from ephs.mechanics.reduced.method import ReducedMethod
+from ephs.mechanics.methods.explicit import tableau
+from ephs.mechanics.methods.method import ReducedMethod
+from ephs.mechanics.methods.registry import Setting, chosen
+from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.scene.model import Scene
-from ephs.mechanics.simulate import problem_of_scene
-from ephs.mechanics.solve.control import Control, Tolerance
-from ephs.mechanics.solve.errors import OptionError
-from ephs.mechanics.solve.problem import Problem
+from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
+from ephs.solve.control import Control, Tolerance
+from ephs.solve.errors import OptionError
+from ephs.solve.problem import Problem
 
 if TYPE_CHECKING:
-    from ephs.mechanics.methods import Method
+    from ephs.mechanics.methods.registry import Method
 
 __all__ = ["Steps"]
 

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ephs.mechanics import components, notation
-from ephs.mechanics.joints import between_frames
+from ephs.mechanics.elements import components, notation
+from ephs.mechanics.elements.joints import between_frames
 from ephs.operad import Directory, Path, PortType, quantity
 from ephs.semantics import structures
 from ephs.semantics.bundle import Array

@@ -12,8 +12,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from ephs.mechanics import notation
-from ephs.mechanics.joints import between_frames
+from ephs.mechanics.elements import notation
+from ephs.mechanics.elements.joints import between_frames
 from ephs.mechanics.shapes.gap import Gap, Vector, cross, dot, ramp
 from ephs.mechanics.shapes.law import Law
 from ephs.mechanics.shapes.pairs import Touch

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ephs.mechanics import notation
-from ephs.mechanics.components import coordinate_energy, joint_momentum, relative
+from ephs.mechanics.elements import notation
+from ephs.mechanics.elements.components import coordinate_energy, joint_momentum, relative
 from ephs.mechanics.shapes.gap import ramp
 from ephs.mechanics.shapes.law import Law
 from ephs.operad import Directory, PortType, quantity

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 
 from ephs.mechanics.scene.model import Scene
-from ephs.mechanics.solve.errors import OptionError, Outcome, SimulationError, SolveError
-from ephs.mechanics.solve.threads import in_one_thread
 from ephs.operad import Path
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.system import System
+from ephs.solve.errors import OptionError, Outcome, SimulationError, SolveError
+from ephs.solve.threads import in_one_thread
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

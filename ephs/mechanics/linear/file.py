@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ephs.mechanics.solve.errors import OptionError
 from ephs.semantics.bundle import Array
+from ephs.solve.errors import OptionError
 
 if TYPE_CHECKING:
     from ephs.mechanics.linear.statespace import StateSpace

@@ -5,11 +5,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ephs.mechanics.linear.modes import Mode
-from ephs.mechanics.solve.errors import OptionError
+from ephs.solve.errors import OptionError
 
 if TYPE_CHECKING:
     from ephs.mechanics.linear.statespace import StateSpace
-    from ephs.mechanics.solve.solution import Solution
+    from ephs.solve.result.solution import Solution
 
 __all__ = ["film"]
 

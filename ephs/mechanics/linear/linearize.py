@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING, Any
 
 from ephs.mechanics.linear.statespace import StateSpace
 from ephs.mechanics.scene.model import Scene
-from ephs.mechanics.solve.errors import OptionError
-from ephs.mechanics.solve.threads import in_one_thread
 from ephs.semantics.bundle import Reference
 from ephs.semantics.system import System
+from ephs.solve.errors import OptionError
+from ephs.solve.threads import in_one_thread
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -88,7 +88,7 @@ def linearize(
     dynamics = Dynamics(model)
     at = dynamics.state0 if state is None else state
     assert isinstance(at, State)
-    from ephs.mechanics.simulate import problem_of_scene
+    from ephs.mechanics.runs.simulate import problem_of_scene
 
     return linear_system(
         problem_of_scene(model).system, dynamics.states(at), _driven(model), outputs, _reference(model), model.name
@@ -97,7 +97,7 @@ def linearize(
 
 def _driven(scene: Scene) -> dict[str, Any]:
     """What a scene prescribes at the outer ports of its system."""
-    from ephs.mechanics.build import scene_inputs
+    from ephs.mechanics.scene.build import scene_inputs
 
     return {
         str(path): {"effort" if given.effort else "flow": given.value} for path, given in scene_inputs(scene).items()

@@ -10,17 +10,17 @@ from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
-from ephs.mechanics.simulate import problem_of_system
-from ephs.mechanics.solve.continuous import Continuous
-from ephs.mechanics.solve.errors import OptionError, Outcome, SolveError
-from ephs.mechanics.solve.model import Model, compile_model
-from ephs.mechanics.solve.natural import guessed_efforts
-from ephs.mechanics.solve.problem import Problem
-from ephs.mechanics.solve.sparse import Index
+from ephs.mechanics.runs.simulate import problem_of_system
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.primitives import Storage
 from ephs.semantics.spaces.rank import CONSTRAINT, ELIMINATION, REGULAR, rank_of
 from ephs.semantics.system import System
+from ephs.solve.errors import OptionError, Outcome, SolveError
+from ephs.solve.methods.continuous import Continuous
+from ephs.solve.methods.natural import guessed_efforts
+from ephs.solve.model import Model, compile_model
+from ephs.solve.problem import Problem
+from ephs.solve.sparse import Index
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

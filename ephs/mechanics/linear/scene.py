@@ -18,18 +18,18 @@ import numpy as np
 from ephs.mechanics.dynamics import Derivatives, Dynamics, State
 from ephs.mechanics.linear.statespace import StateSpace
 from ephs.mechanics.linear.structure import PortHamiltonian
+from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.scene.errors import did_you_mean, listing
 from ephs.mechanics.scene.model import GROUND, Scene
-from ephs.mechanics.simulate import problem_of_scene
-from ephs.mechanics.solve.errors import OptionError
-from ephs.mechanics.solve.model import compile_model
-from ephs.mechanics.solve.natural import stored_energies
-from ephs.mechanics.solve.replay import replay
-from ephs.mechanics.solve.solution import Solution
-from ephs.mechanics.solve.sparse import Index
-from ephs.mechanics.solve.stepping import Row
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.rank import ELIMINATION
+from ephs.solve.errors import OptionError
+from ephs.solve.methods.natural import stored_energies
+from ephs.solve.model import compile_model
+from ephs.solve.result.replay import replay
+from ephs.solve.result.solution import Solution
+from ephs.solve.sparse import Index
+from ephs.solve.stepping import Row
 
 __all__ = ["Freedoms", "freedoms_of", "linear_scene", "unbalanced"]
 

@@ -12,7 +12,7 @@ from ephs.mechanics.linear.structure import Law, PortHamiltonian, laws_of
 from ephs.semantics.bundle import Array
 
 if TYPE_CHECKING:
-    from ephs.mechanics.solve.solution import Solution
+    from ephs.solve.result.solution import Solution
 
 __all__ = ["StateSpace"]
 

@@ -15,19 +15,19 @@ from ephs.mechanics.linear.pencil import Parts, Pencil, system_problem
 from ephs.mechanics.linear.statespace import StateSpace
 from ephs.mechanics.linear.structure import PortHamiltonian
 from ephs.mechanics.scene.errors import did_you_mean, listing
-from ephs.mechanics.solve.errors import OptionError, failing_at
-from ephs.mechanics.solve.model import Model
-from ephs.mechanics.solve.natural import stored_energies
-from ephs.mechanics.solve.problem import Problem
-from ephs.mechanics.solve.replay import replay
-from ephs.mechanics.solve.solution import Solution
-from ephs.mechanics.solve.sparse import Index
-from ephs.mechanics.solve.stepping import Row
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.primitives import Storage
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.rank import ELIMINATION, IMPLICIT, rank_of
 from ephs.semantics.system import System
+from ephs.solve.errors import OptionError, failing_at
+from ephs.solve.methods.natural import stored_energies
+from ephs.solve.model import Model
+from ephs.solve.problem import Problem
+from ephs.solve.result.replay import replay
+from ephs.solve.result.solution import Solution
+from ephs.solve.sparse import Index
+from ephs.solve.stepping import Row
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

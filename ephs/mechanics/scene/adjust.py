@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ephs.mechanics.scene.kinematics import Link, Scale, elements, largest_gap, largest_slip
-from ephs.mechanics.solve.threads import in_one_thread
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rank import ASSEMBLY, CONSTRAINT, LIGHT
+from ephs.solve.threads import in_one_thread
 
 Array = NDArray[np.float64]
 

@@ -20,9 +20,9 @@ from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.kinematics import Link, Scale, elements, largest_gap
 from ephs.mechanics.scene.model import Joint, Scene, frozen
 from ephs.mechanics.scene.state import Snapshot, rebuilt
-from ephs.mechanics.solve.threads import in_one_thread
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rank import ASSEMBLY, EXPLICIT, REGULAR, rank_of
+from ephs.solve.threads import in_one_thread
 
 Array = NDArray[np.float64]
 

@@ -207,7 +207,7 @@ class Scene:
 
     def system(self) -> "System":
         """The scene as a hierarchical exergetic port-Hamiltonian system."""
-        from ephs.mechanics.build import scene_system
+        from ephs.mechanics.scene.build import scene_system
 
         return scene_system(self)
 

@@ -11,13 +11,13 @@ from typing import final
 
 import numpy as np
 
-from ephs.mechanics.reduced.equations import Equations, ReducedState
-from ephs.mechanics.reduced.explicit import tableau
-from ephs.mechanics.reduced.tables import SPRING
+from ephs.mechanics.methods.explicit import tableau
 from ephs.mechanics.sensitivity.family import CENTRAL, Family, difference, same_shape
-from ephs.mechanics.solve.problem import Problem
-from ephs.mechanics.solve.stepping import Row
+from ephs.mechanics.tree.equations.equations import Equations, ReducedState
+from ephs.mechanics.tree.finding.tables import SPRING
 from ephs.semantics.bundle import Array
+from ephs.solve.problem import Problem
+from ephs.solve.stepping import Row
 
 __all__ = ["ExplicitTangent"]
 

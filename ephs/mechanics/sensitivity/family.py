@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
+from ephs.mechanics.runs.simulate import problem_of_scene, problem_of_system
 from ephs.mechanics.scene.errors import SceneError
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.parameters import read, varied
-from ephs.mechanics.simulate import problem_of_scene, problem_of_system
-from ephs.mechanics.solve.errors import OptionError
-from ephs.mechanics.solve.problem import Problem
 from ephs.operad import Path
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.errors import StructureError
 from ephs.semantics.system import System
+from ephs.solve.errors import OptionError
+from ephs.solve.problem import Problem
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

@@ -10,12 +10,12 @@ from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.parameters import read, varied
 from ephs.mechanics.sensitivity.readings import reading_of
 from ephs.mechanics.sensitivity.sensitivity import Sensitivity, sensitivity
-from ephs.mechanics.solve.errors import OptionError
-from ephs.mechanics.solve.solution import Solution
-from ephs.mechanics.solve.threads import in_one_thread
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.rank import ELIMINATION
 from ephs.semantics.system import System
+from ephs.solve.errors import OptionError
+from ephs.solve.result.solution import Solution
+from ephs.solve.threads import in_one_thread
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

@@ -12,16 +12,16 @@ from typing import final
 import numpy as np
 
 from ephs.mechanics.sensitivity.family import CENTRAL, Family, difference, same_shape
-from ephs.mechanics.solve.errors import OptionError, SolveError
-from ephs.mechanics.solve.model import Model, compile_model
-from ephs.mechanics.solve.natural import Natural, NaturalState, stored_energies
-from ephs.mechanics.solve.natural_kernels import Memory, account, evaluate
-from ephs.mechanics.solve.problem import Problem
-from ephs.mechanics.solve.stepping import Row
 from ephs.semantics.bundle import Array
 from ephs.semantics.primitives import Irreversible
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.rank import IMPLICIT
+from ephs.solve.errors import OptionError, SolveError
+from ephs.solve.methods.natural import Natural, NaturalState, stored_energies
+from ephs.solve.methods.natural_kernels import Memory, account, evaluate
+from ephs.solve.model import Model, compile_model
+from ephs.solve.problem import Problem
+from ephs.solve.stepping import Row
 
 __all__ = ["NaturalTangent"]
 

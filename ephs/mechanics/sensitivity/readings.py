@@ -3,11 +3,11 @@
 from collections.abc import Callable
 
 from ephs.mechanics.scene.model import Scene
-from ephs.mechanics.solve.errors import OptionError
-from ephs.mechanics.solve.solution import Solution
 from ephs.mechanics.sweep.outputs import outputs_of
 from ephs.semantics.bundle import Array
 from ephs.semantics.system import System
+from ephs.solve.errors import OptionError
+from ephs.solve.result.solution import Solution
 
 __all__ = ["Reading", "reading_of"]
 

@@ -6,17 +6,17 @@ from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
+from ephs.mechanics.runs.signals import numbers_of
+from ephs.mechanics.runs.simulate import simulate
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.sensitivity.family import Family, Parameter, difference
 from ephs.mechanics.sensitivity.readings import reading_of
-from ephs.mechanics.signals import numbers_of
-from ephs.mechanics.simulate import simulate
-from ephs.mechanics.solve.errors import OptionError, failing_at
-from ephs.mechanics.solve.replay import replay
-from ephs.mechanics.solve.solution import Solution
-from ephs.mechanics.solve.threads import in_one_thread
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.system import System
+from ephs.solve.errors import OptionError, failing_at
+from ephs.solve.result.replay import replay
+from ephs.solve.result.solution import Solution
+from ephs.solve.threads import in_one_thread
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

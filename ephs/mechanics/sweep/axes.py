@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, final
 
 import numpy as np
 
-from ephs.mechanics.solve.errors import OptionError
 from ephs.semantics.bundle import Array
+from ephs.solve.errors import OptionError
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

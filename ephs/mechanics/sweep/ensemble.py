@@ -16,26 +16,26 @@ from typing import Any, final
 
 import numpy as np
 
-from ephs.mechanics.build import component_path
-from ephs.mechanics.methods import Setting, chosen
-from ephs.mechanics.own_units import SI, Units
-from ephs.mechanics.pace import longest_step
-from ephs.mechanics.reduced.auto import Auto
-from ephs.mechanics.reduced.equations import Equations, ReducedState
-from ephs.mechanics.reduced.explicit import Explicit
-from ephs.mechanics.reduced.tables import TREE
+from ephs.mechanics.methods.auto import Auto
+from ephs.mechanics.methods.explicit import Explicit
+from ephs.mechanics.methods.registry import Setting, chosen
+from ephs.mechanics.runs.pace import longest_step
+from ephs.mechanics.runs.signals import times_of
+from ephs.mechanics.runs.simulate import control_of, problem_of_scene
+from ephs.mechanics.scene.build import component_path
 from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.scene.own_units import SI, Units
 from ephs.mechanics.scene.parameters import varied
-from ephs.mechanics.signals import times_of
-from ephs.mechanics.simulate import control_of, problem_of_scene
-from ephs.mechanics.solve.audit import Bounds
-from ephs.mechanics.solve.control import Control, first_step
-from ephs.mechanics.solve.stepping import Span
 from ephs.mechanics.sweep.axes import Axes
 from ephs.mechanics.sweep.outputs import Output
 from ephs.mechanics.sweep.suspicion import LONGER, Suspicion
+from ephs.mechanics.tree.equations.equations import Equations, ReducedState
+from ephs.mechanics.tree.finding.tables import TREE
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import Pair
+from ephs.solve.auditing.audit import Bounds
+from ephs.solve.control import Control, first_step
+from ephs.solve.stepping import Span
 
 __all__ = ["Ensemble", "Unlike"]
 

@@ -7,18 +7,18 @@ from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
+from ephs.mechanics.runs.simulate import simulate
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.mechanics.scene.errors import SceneError
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.parameters import varied
-from ephs.mechanics.simulate import simulate
-from ephs.mechanics.solve.errors import Interrupted, SimulationError, SolveError
-from ephs.mechanics.solve.sparse import Index
 from ephs.mechanics.sweep.axes import Axes
 from ephs.mechanics.sweep.ensemble import Ensemble, Unlike
 from ephs.mechanics.sweep.outputs import Output
 from ephs.semantics.bundle import Array
 from ephs.semantics.errors import AssemblyError, SemanticsError
+from ephs.solve.errors import Interrupted, SimulationError, SolveError
+from ephs.solve.sparse import Index
 
 if TYPE_CHECKING:
     from ephs.semantics.system import System

@@ -6,16 +6,16 @@ from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
-from ephs.mechanics.readout import freedoms_of
+from ephs.mechanics.motion.readout import freedoms_of
 from ephs.mechanics.scene.errors import did_you_mean, listing
 from ephs.mechanics.scene.model import Scene
-from ephs.mechanics.solve.errors import OptionError
-from ephs.mechanics.solve.labels import POSE, WRENCH, Labels, labels_of
 from ephs.semantics.bundle import Array
+from ephs.solve.errors import OptionError
+from ephs.solve.result.labels import POSE, WRENCH, Labels, labels_of
 
 if TYPE_CHECKING:
-    from ephs.mechanics.solve.solution import Solution
     from ephs.semantics.system import System
+    from ephs.solve.result.solution import Solution
 
 __all__ = ["BOOKS", "JOINT", "Output", "outputs_of"]
 
@@ -98,7 +98,7 @@ def outputs_of(model: "Scene | System", names: Sequence[str] | None) -> tuple[Ou
 def _known(model: "Scene | System") -> "Iterator[tuple[str, Labels]]":
     system: Any = model
     if isinstance(model, Scene):
-        from ephs.mechanics.build import scene_system
+        from ephs.mechanics.scene.build import scene_system
 
         system = scene_system(model)
         joints = [(name, joint) for name, joint in model.all_joints() if joint.dim]

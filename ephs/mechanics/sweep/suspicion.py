@@ -10,10 +10,10 @@ from typing import final
 
 import numpy as np
 
-from ephs.mechanics.reduced.equations import Equations, ReducedState
-from ephs.mechanics.solve.audit import MOTION, Bounds
-from ephs.mechanics.solve.growth import apart
+from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.semantics.bundle import Array
+from ephs.solve.auditing.audit import MOTION, Bounds
+from ephs.solve.auditing.growth import apart
 
 __all__ = ["LONGER", "Suspicion"]
 

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ephs.mechanics.runs.signals import times_of
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.parameters import read
-from ephs.mechanics.signals import times_of
-from ephs.mechanics.solve.errors import OptionError
-from ephs.mechanics.solve.sparse import Index
 from ephs.mechanics.sweep.axes import Axes
 from ephs.mechanics.sweep.job import DONE, Batch, Job
 from ephs.mechanics.sweep.outputs import outputs_of
+from ephs.solve.errors import OptionError
+from ephs.solve.sparse import Index
 
 if TYPE_CHECKING:
     import xarray as xr

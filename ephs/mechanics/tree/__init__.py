@@ -1,1 +1,1 @@
-"""Mechanisms in joint coordinates: the sweeps over a tree of links, each stated once as a staged function."""
+"""Mechanisms in joint coordinates: found in the flat system, stated once as staged sweeps, evaluated."""

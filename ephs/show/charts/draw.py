@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ephs.mechanics.methods import METHODS
+from ephs.mechanics.methods.registry import METHODS
 from ephs.show.charts.families import Family
 from ephs.show.charts.measure import Point
 from ephs.show.charts.outcomes import SILENT, Outcome

@@ -6,7 +6,7 @@ from typing import final
 
 import numpy as np
 
-from ephs.mechanics.methods import AUTO, METHODS
+from ephs.mechanics.methods.registry import AUTO, METHODS
 from ephs.mechanics.scene.model import Scene
 from ephs.show.charts.peers import PEERS, PeerError, PeerRun
 from ephs.show.charts.reference import Motion, Reference, tight_reference

@@ -8,13 +8,13 @@ from typing import Any, final
 
 import numpy as np
 
-from ephs.mechanics.methods import METHODS
+from ephs.mechanics.methods.registry import METHODS
 from ephs.mechanics.scene.model import Scene, frozen
 from ephs.mechanics.scene.state import Snapshot
-from ephs.mechanics.solve.solution import Solution
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.show.charts.runs import Array, Ending, Setting, attempt
 from ephs.show.errors import ShowError
+from ephs.solve.result.solution import Solution
 
 __all__ = ["Motion", "Reference", "condition", "resting_reference", "shipped_reference", "tight_reference"]
 

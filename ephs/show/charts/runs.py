@@ -10,14 +10,14 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-from ephs.mechanics.methods import Method
+from ephs.mechanics.methods.registry import Method
+from ephs.mechanics.runs.simulate import simulate
 from ephs.mechanics.scene.model import Scene
-from ephs.mechanics.simulate import simulate
-from ephs.mechanics.solve.errors import Interrupted, SimulationError
-from ephs.mechanics.solve.errors import Outcome as Failure
-from ephs.mechanics.solve.findings import CostWarning
-from ephs.mechanics.solve.solution import Solution
 from ephs.semantics.system import System
+from ephs.solve.auditing.findings import CostWarning
+from ephs.solve.errors import Interrupted, SimulationError
+from ephs.solve.errors import Outcome as Failure
+from ephs.solve.result.solution import Solution
 
 __all__ = ["MOST_STEPS", "Array", "Ending", "Run", "Setting", "attempt"]
 

@@ -8,14 +8,14 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ephs.mechanics.methods import Method, on_joints
-from ephs.mechanics.reduced.equations import Equations, ReducedState
-from ephs.mechanics.reduced.method import ReducedMethod
-from ephs.mechanics.solve.control import Control
-from ephs.mechanics.solve.errors import OptionError, Outcome, SolveError
-from ephs.mechanics.solve.stepping import Attempt
+from ephs.mechanics.methods.method import ReducedMethod
+from ephs.mechanics.methods.registry import Method, on_joints
+from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.semantics.spaces.rank import FOLLOWED
 from ephs.show.charts.runs import Array
+from ephs.solve.control import Control
+from ephs.solve.errors import OptionError, Outcome, SolveError
+from ephs.solve.stepping import Attempt
 
 __all__ = ["SPECIMENS", "TrapezoidalIndex3", "VelocityMidpoint"]
 

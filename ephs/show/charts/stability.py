@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, final
 
 import numpy as np
 
-from ephs.mechanics.methods import METHODS, Method
+from ephs.mechanics.methods.registry import METHODS, Method
 from ephs.mechanics.scene.model import Scene
 from ephs.show.charts.families import Family
 from ephs.show.charts.outcomes import CONDITION, SILENT, Outcome, horizon, judge, right

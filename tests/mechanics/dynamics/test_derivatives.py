@@ -7,10 +7,10 @@ import pytest
 from hypothesis import assume, given, settings
 
 import ephs
-from ephs.mechanics.reduced.equations import Equations
-from ephs.mechanics.reduced.jacobian import Jacobian
-from ephs.mechanics.reduced.tangent import Linearised
-from ephs.mechanics.simulate import problem_of_scene
+from ephs.mechanics.methods.jacobian import Jacobian
+from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.equations.tangent import Linearised
 from ephs.testing import mechanisms
 from tests.mechanics.dynamics.drawn import moving
 

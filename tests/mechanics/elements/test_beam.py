@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 import ephs
 from ephs.mechanics.elements.beam import beam_damper, beam_element, beam_spring, displacement, element_force, logarithm
-from ephs.mechanics.methods import METHODS
+from ephs.mechanics.methods.registry import METHODS
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.operad import Path
 from ephs.semantics.errors import StructureError

@@ -5,9 +5,9 @@ import pytest
 from scipy.optimize import brentq
 
 import ephs
-from ephs.mechanics import pace
 from ephs.mechanics.elements.contact import contact_energy, contact_loss
-from ephs.mechanics.methods import METHODS
+from ephs.mechanics.methods.registry import METHODS
+from ephs.mechanics.runs import pace
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.mechanics.shapes.gap import plane_rim, plane_sphere, rounded_box_sphere
 from ephs.mechanics.shapes.law import Law

@@ -9,10 +9,10 @@ from hypothesis import given, settings
 
 import ephs
 from benchmarks.cases import CASES
-from ephs.mechanics.engine.closing import closing
-from ephs.mechanics.reduced.equations import Equations
-from ephs.mechanics.simulate import problem_of_scene
-from ephs.mechanics.solve.errors import SolveError
+from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.tree.engine.closing import closing
+from ephs.mechanics.tree.equations.equations import Equations
+from ephs.solve.errors import SolveError
 from ephs.testing import mechanisms
 
 ROOT = File(__file__).parents[3]

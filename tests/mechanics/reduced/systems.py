@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 
 from ephs import Pattern
-from ephs.mechanics.build import initial_state, scene_inputs, scene_system
-from ephs.mechanics.solve.problem import Problem, Signal
+from ephs.mechanics.scene.build import initial_state, scene_inputs, scene_system
 from ephs.operad import Path, junction
 from ephs.semantics.bundle import Reference
 from ephs.semantics.system import System
+from ephs.solve.problem import Problem, Signal
 
 
 def problem_of(system, initial=None, signals=None, reference=None):

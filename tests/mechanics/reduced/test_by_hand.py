@@ -9,11 +9,12 @@ from hypothesis import strategies as st
 
 import ephs
 from ephs import Pattern, junction, library, quantity
-from ephs.mechanics import components, joint, rigid_body
-from ephs.mechanics.methods import METHODS
-from ephs.mechanics.reduced.equations import Equations
-from ephs.mechanics.solve.instant import instant
+from ephs.mechanics import joint, rigid_body
+from ephs.mechanics.elements import components
+from ephs.mechanics.methods.registry import METHODS
+from ephs.mechanics.tree.equations.equations import Equations
 from ephs.semantics.spaces import SE3
+from ephs.solve.instant import instant
 from ephs.testing import mechanisms
 from tests.mechanics.reduced.systems import renamed
 

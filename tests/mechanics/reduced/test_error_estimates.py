@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import ephs
-from ephs.mechanics.methods import METHODS, Setting
-from ephs.mechanics.reduced import tableaux
-from ephs.mechanics.reduced.equations import Equations
-from ephs.mechanics.simulate import problem_of_scene
-from ephs.mechanics.solve.control import Control, Tolerance
+from ephs.mechanics.methods import tableaux
+from ephs.mechanics.methods.registry import METHODS, Setting
+from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.tree.equations.equations import Equations
+from ephs.solve.control import Control, Tolerance
 from tests.mechanics.torsion import torsion
 
 J, K, RATE = 0.5, 3.0, -1.1

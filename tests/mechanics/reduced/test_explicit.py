@@ -8,10 +8,10 @@ from hypothesis import given, settings
 
 import ephs
 from benchmarks.cases import CASES
-from ephs.mechanics.reduced.explicit import tableau
-from ephs.mechanics.reduced.mechanism import reduce_system
-from ephs.mechanics.simulate import problem_of_scene
-from ephs.mechanics.solve.model import compile_model
+from ephs.mechanics.methods.explicit import tableau
+from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.tree.finding.mechanism import reduce_system
+from ephs.solve.model import compile_model
 from ephs.testing import mechanisms
 
 SCENES = sorted((File(__file__).parents[3] / "scenes").glob("*.toml"))

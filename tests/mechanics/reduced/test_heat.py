@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import ephs
 from benchmarks.hard.brakes import ENERGY, brake
-from ephs.mechanics.solve.heats import Heats
+from ephs.solve.heats import Heats
 from examples.failing import scene
 
 EPS = float(np.finfo(float).eps)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import ephs
-from ephs.mechanics.methods import METHODS
-from ephs.mechanics.reduced.equations import Equations
-from ephs.mechanics.simulate import problem_of_scene
+from ephs.mechanics.methods.registry import METHODS
+from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.tree.equations.equations import Equations
 
 BODY = """
 [bodies.{name}]

@@ -11,14 +11,15 @@ from hypothesis import strategies as st
 
 import ephs
 from ephs import Pattern, junction, quantity
-from ephs.mechanics import components, joint, rigid_body
-from ephs.mechanics.reduced.mechanism import reduce_system
-from ephs.mechanics.simulate import problem_of_scene
-from ephs.mechanics.solve.model import compile_model
-from ephs.mechanics.tree.frames import Unplaced, inertia_of
+from ephs.mechanics import joint, rigid_body
+from ephs.mechanics.elements import components
+from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.tree.finding.frames import Unplaced, inertia_of
+from ephs.mechanics.tree.finding.mechanism import reduce_system
 from ephs.operad import Path
 from ephs.semantics import library, structures
 from ephs.semantics.primitives import power_ports
+from ephs.solve.model import compile_model
 from ephs.testing import mechanisms
 from tests.mechanics.reduced.systems import problem_of, renamed
 
@@ -52,7 +53,7 @@ def test_no_module_of_joint_coordinates_knows_scenes():
         for node in ast.walk(ast.parse(file.read_text()))
         if isinstance(node, ast.ImportFrom | ast.Import)
         for name in [getattr(node, "module", None) or "", *(alias.name for alias in node.names)]
-        if name.startswith("ephs.mechanics.scene") or name == "ephs.mechanics.build"
+        if name.startswith("ephs.mechanics.scene") or name == "ephs.mechanics.scene.build"
     }
     assert not found
 

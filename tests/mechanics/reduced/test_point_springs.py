@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import ephs
-from ephs.mechanics.reduced.equations import Equations
-from ephs.mechanics.simulate import problem_of_scene
+from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.tree.equations.equations import Equations
 
 K, LENGTH, D = 50.0, 0.4, 3.0
 MASSES = {"a": 2.0, "b": 3.0}

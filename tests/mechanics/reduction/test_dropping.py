@@ -10,17 +10,17 @@ from hypothesis import strategies as st
 import ephs
 from ephs import Path, Pattern, System, junction, quantity
 from ephs.mechanics import joint, mbs_pattern, rigid_body
-from ephs.mechanics.build import initial_state
-from ephs.mechanics.components import ground
-from ephs.mechanics.reduction.dropping import DROP_FRICTION, DROP_GYROSCOPIC, DROP_JOINT, DROP_POSE
-from ephs.mechanics.reduction.folding import FOLD
-from ephs.mechanics.reduction.rewrite import Strength, rewrite, sites_of
-from ephs.mechanics.reduction.rules import RULES
+from ephs.mechanics.elements.components import ground
+from ephs.mechanics.rewrite.dropping import DROP_FRICTION, DROP_GYROSCOPIC, DROP_JOINT, DROP_POSE
+from ephs.mechanics.rewrite.folding import FOLD
+from ephs.mechanics.rewrite.rewrite import Strength, rewrite, sites_of
+from ephs.mechanics.rewrite.rules import RULES
+from ephs.mechanics.runs.simulate import problem_of_system
+from ephs.mechanics.scene.build import initial_state
 from ephs.mechanics.scene.model import frozen
-from ephs.mechanics.simulate import problem_of_system
-from ephs.mechanics.solve.integrate import Grid, integrate
 from ephs.semantics import Reference
 from ephs.semantics.spaces import SE3
+from ephs.solve.integrate import Grid, integrate
 from ephs.testing import mechanisms
 
 seeds = st.integers(0, 2**20)
@@ -179,7 +179,7 @@ def test_friction_that_heats_nothing_leaves_the_node():
         },
         boxes={"ground": {"p": "g"}, "body": {"p": "p"}, "joint": {"p1": "g", "p2": "p", "s": "s"}, "node": {"s": "s"}},
     )
-    node = ephs.mechanics.components.thermal_node(10.0, 300.0)
+    node = ephs.mechanics.elements.components.thermal_node(10.0, 300.0)
     system = pattern(ground=ground(), body=rigid_body(1.0, BRICK), joint=joint("revolute", heat=True), node=node)
     done = rewrite(system, [DROP_FRICTION])
     assert paths(system) - paths(done.system) == {"joint.mf"}

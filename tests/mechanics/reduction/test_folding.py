@@ -11,10 +11,11 @@ from hypothesis import strategies as st
 import ephs
 from benchmarks.cases import CASES
 from ephs import Path, Pattern, System, junction, library, quantity
-from ephs.mechanics import components, joint
-from ephs.mechanics.build import scene_system
-from ephs.mechanics.reduction.folding import FOLD
-from ephs.mechanics.reduction.rewrite import rewrite, sites_of
+from ephs.mechanics import joint
+from ephs.mechanics.elements import components
+from ephs.mechanics.rewrite.folding import FOLD
+from ephs.mechanics.rewrite.rewrite import rewrite, sites_of
+from ephs.mechanics.scene.build import scene_system
 from ephs.operad import PortType
 from ephs.semantics import StructureError
 from ephs.semantics.behaviour import Natural

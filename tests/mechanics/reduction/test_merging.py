@@ -10,15 +10,15 @@ from hypothesis import strategies as st
 import ephs
 from ephs import Path
 from ephs.mechanics import joint, mbs_pattern, rigid_body
-from ephs.mechanics.build import initial_state
-from ephs.mechanics.reduction.dropping import DROP_FRICTION
-from ephs.mechanics.reduction.folding import FOLD
-from ephs.mechanics.reduction.merging import MERGE
-from ephs.mechanics.reduction.rewrite import rewrite, sites_of
+from ephs.mechanics.rewrite.dropping import DROP_FRICTION
+from ephs.mechanics.rewrite.folding import FOLD
+from ephs.mechanics.rewrite.merging import MERGE
+from ephs.mechanics.rewrite.rewrite import rewrite, sites_of
+from ephs.mechanics.scene.build import initial_state
 from ephs.mechanics.scene.model import frozen
-from ephs.mechanics.solve.instant import instant
 from ephs.semantics import Reference
 from ephs.semantics.spaces import SE3
+from ephs.solve.instant import instant
 from ephs.testing import mechanisms
 
 KINDS = (*4 * ("fixed",), "revolute", "spherical", "free")

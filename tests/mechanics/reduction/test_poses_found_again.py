@@ -5,9 +5,9 @@ import pytest
 
 from ephs import Path
 from ephs.mechanics import joint, mbs_pattern, rigid_body
-from ephs.mechanics.reduction.dropping import DROP_FRICTION, DROP_POSE
-from ephs.mechanics.reduction.folding import FOLD
-from ephs.mechanics.reduction.rewrite import rewrite
+from ephs.mechanics.rewrite.dropping import DROP_FRICTION, DROP_POSE
+from ephs.mechanics.rewrite.folding import FOLD
+from ephs.mechanics.rewrite.rewrite import rewrite
 from ephs.semantics.spaces import SE3
 
 

@@ -11,15 +11,15 @@ import ephs
 from benchmarks.cases import CASES
 from ephs import library
 from ephs.cli import main
-from ephs.mechanics.build import component_path, initial_state
-from ephs.mechanics.reduced.mechanism import reduce_system
-from ephs.mechanics.reduction import coordinates
-from ephs.mechanics.reduction.rewrite import Strength
+from ephs.mechanics.rewrite import coordinates
+from ephs.mechanics.rewrite.rewrite import Strength
+from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.scene.build import component_path, initial_state
 from ephs.mechanics.scene.geometry import coupling_of
-from ephs.mechanics.simulate import problem_of_scene
-from ephs.mechanics.solve.instant import mobility
-from ephs.mechanics.solve.model import compile_model
+from ephs.mechanics.tree.finding.mechanism import reduce_system
 from ephs.semantics.spaces import SE3
+from ephs.solve.instant import mobility
+from ephs.solve.model import compile_model
 from ephs.testing import mechanisms
 
 SCENES = sorted((File(__file__).parents[3] / "scenes").glob("*.toml"))

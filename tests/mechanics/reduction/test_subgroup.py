@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ephs.mechanics.reduction.subgroup import generated
+from ephs.mechanics.constraints.subgroup import generated
 from ephs.semantics.spaces import SE3
 
 X, Y, Z = np.eye(3)

@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 import ephs
-from ephs.mechanics.reduced.equations import Equations
-from ephs.mechanics.simulate import problem_of_scene
-from ephs.mechanics.solve.model import compile_model
+from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.tree.equations.equations import Equations
+from ephs.solve.model import compile_model
 
 SCENE = """format = 1
 name = "driven"

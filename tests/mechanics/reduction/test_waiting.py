@@ -4,9 +4,9 @@ import numpy as np
 
 from ephs import Pattern, junction, quantity
 from ephs.mechanics import joint, rigid_body
-from ephs.mechanics.reduction.dropping import DROP_FRICTION, DROP_GYROSCOPIC, DROP_POSE
-from ephs.mechanics.reduction.folding import FOLD
-from ephs.mechanics.reduction.rewrite import rewrite, sites_of
+from ephs.mechanics.rewrite.dropping import DROP_FRICTION, DROP_GYROSCOPIC, DROP_POSE
+from ephs.mechanics.rewrite.folding import FOLD
+from ephs.mechanics.rewrite.rewrite import rewrite, sites_of
 
 NAMES = ("left", "right", "alone", "other")
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import ephs
 from benchmarks.hard.four_bars import ADJUSTED
-from ephs.mechanics.check import check_model
+from ephs.mechanics.runs.check import check_model
 from ephs.mechanics.scene.kinematics import elements, largest_gap, largest_slip
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.state import Snapshot

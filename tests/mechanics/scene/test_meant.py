@@ -9,11 +9,11 @@ import pytest
 import ephs
 from benchmarks.hard.four_bars import PINS, four_bar
 from benchmarks.hard.loops import stretched
-from ephs.mechanics.methods import METHODS
-from ephs.mechanics.own_units import mobility_of
+from ephs.mechanics.methods.registry import METHODS
+from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.scene.load import load
 from ephs.mechanics.scene.meant import as_meant
-from ephs.mechanics.simulate import problem_of_scene
+from ephs.mechanics.scene.own_units import mobility_of
 
 EACH = pytest.mark.parametrize("name", [name for name, method in METHODS.items() if method.scenes])
 

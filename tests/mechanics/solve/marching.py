@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ephs.mechanics.reduced.explicit import tableau
-from ephs.mechanics.solve.control import Proportional
-from ephs.mechanics.solve.march import MEMORY, TABLEAU, Control, Ending, Field, Memory, Tableau, march
+from ephs.mechanics.methods.explicit import tableau
 from ephs.semantics.stage import Entry, Program, group, integer, table, vector
+from ephs.solve.control import Proportional
+from ephs.solve.march import MEMORY, TABLEAU, Control, Ending, Field, Memory, Tableau, march
 
 
 def program(motion):

@@ -10,13 +10,13 @@ import pytest
 
 import ephs
 from ephs import library as lib
-from ephs.mechanics.methods import METHODS
+from ephs.mechanics.methods.registry import METHODS
 from ephs.mechanics.scene.state import Snapshot
-from ephs.mechanics.solve.audit import CLOSED, COARSE, LAWFUL, LAWS, LEAST, PRODUCTION, Bounds, audit
-from ephs.mechanics.solve.breakpoints import MOST_FOUND
-from ephs.mechanics.solve.control import Control, Tolerance
-from ephs.mechanics.solve.findings import Audit, Finding
-from ephs.mechanics.solve.resolution import natural_trials
+from ephs.solve.auditing.audit import CLOSED, COARSE, LAWFUL, LAWS, LEAST, PRODUCTION, Bounds, audit
+from ephs.solve.auditing.findings import Audit, Finding
+from ephs.solve.auditing.resolution import natural_trials
+from ephs.solve.breakpoints import MOST_FOUND
+from ephs.solve.control import Control, Tolerance
 from examples.failing import oscillator, pendulum
 
 BRAKE = "friction = 20.0"
@@ -258,7 +258,7 @@ def test_the_error_of_constant_steps_is_estimated_for_every_method(name, monkeyp
         found.append(np.nan if error is None else error.size)  # none where energies grow beyond all that steps move
         return audit(sol, bounds, trials)
 
-    monkeypatch.setattr("ephs.mechanics.solve.integrate.audit", judged)
+    monkeypatch.setattr("ephs.solve.integrate.audit", judged)
     for size in (2.0 if order == 2 else 5.0, 0.1 * order, 0.05 * order):
         sol = ephs.simulate(spring, 20.0 * size / rate, method=name, step=size / rate, audit="off")
         assert size < 1.0 or not sol.audit.passed

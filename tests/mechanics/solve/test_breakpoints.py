@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 import ephs
 from benchmarks.hard.case import WEIGHTLESS, read
 from benchmarks.hard.pushes import MASS, OMEGA, SPRING, TIMES, error, motion, push, sprung
-from ephs.mechanics.methods import METHODS
-from ephs.mechanics.solve import probe
-from ephs.mechanics.solve.breakpoints import Breakpoints
-from ephs.mechanics.solve.probe import WIDTH, Asked
+from ephs.mechanics.methods.registry import METHODS
+from ephs.solve import probe
+from ephs.solve.breakpoints import Breakpoints
+from ephs.solve.probe import WIDTH, Asked
 
 SCENE = sprung()
 UNTIL = 1.0
@@ -144,7 +144,7 @@ def test_jumps_that_are_none_are_one_clear_error(jumps):
 
 def test_noise_is_found_to_be_no_input(monkeypatch):
     for module in ("breakpoints", "audit"):
-        monkeypatch.setattr(f"ephs.mechanics.solve.{module}.MOST_FOUND", 50)
+        monkeypatch.setattr(f"ephs.solve.{module}.MOST_FOUND", 50)
     rng = np.random.default_rng(1)
     with pytest.raises(ephs.AuditError, match=r"input: .* at joints\.rail"):
         run("rk54", function=lambda t: float(rng.standard_normal() ** 9), max_step=0.3, rtol=1e-1, atol=1e9)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from ephs.mechanics.solve.collocation import moments, values
-from ephs.mechanics.solve.radau import COEFFICIENTS, DEFECT, GAMMA, NODES, T_INVERSE, VALUES, T
+from ephs.solve.methods.collocation import moments, values
+from ephs.solve.methods.radau import COEFFICIENTS, DEFECT, GAMMA, NODES, T_INVERSE, VALUES, T
 
 SETS = {
     "radau": NODES,

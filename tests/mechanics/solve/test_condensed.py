@@ -7,15 +7,15 @@ from hypothesis import strategies as st
 
 from benchmarks.parts import FAMILIES
 from ephs import Reference
-from ephs.mechanics.solve import condensed
-from ephs.mechanics.solve.condensed import solved_by_parts
-from ephs.mechanics.solve.errors import SolveError
-from ephs.mechanics.solve.model import compile_model, evaluate_at
-from ephs.mechanics.solve.natural import Natural
-from ephs.mechanics.solve.sparse import equilibrate
 from ephs.semantics.descriptor import Descriptor, Input, assemble
 from ephs.semantics.kinds import number_by_kinds
 from ephs.semantics.laws import random_probe
+from ephs.solve.errors import SolveError
+from ephs.solve.methods import condensed
+from ephs.solve.methods.condensed import solved_by_parts
+from ephs.solve.methods.natural import Natural
+from ephs.solve.model import compile_model, evaluate_at
+from ephs.solve.sparse import equilibrate
 from tests.semantics.test_kinds import repeating
 
 ROUNDING = float(np.finfo(float).eps)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy import linalg
 
 import ephs
-from ephs.mechanics.solve.analysis import exchanged
+from ephs.solve.methods.analysis import exchanged
 
 ROOT = Path(__file__).parents[3]
 BRICARD = ROOT / "scenes/bricard.toml"

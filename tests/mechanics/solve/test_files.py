@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import ephs
-from ephs.mechanics.solve.labels import freedoms, labels_of
 from ephs.semantics.spaces import PAIRS, pair
+from ephs.solve.result.labels import freedoms, labels_of
 from ephs.testing import mechanisms, systems
 
 BOOKS = {"kinetic", "potential", "thermal", "environment", "exergy", "entropy", "heat", "work", "supplied", "made"}

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 import ephs
-from ephs.mechanics.solve import forecast
-from ephs.mechanics.solve.forecast import Forecast
+from ephs.solve.auditing import forecast
+from ephs.solve.auditing.forecast import Forecast
 from examples.failing import pendulum
 
 SPRING = pendulum(1.0, "stiffness = 100.0")

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import ephs
-from ephs.mechanics.simulate import problem_of_scene
-from ephs.mechanics.solve.model import compile_model
-from ephs.mechanics.solve.natural4 import Natural4
+from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.semantics.spaces import SE3
+from ephs.solve.methods.natural4 import Natural4
+from ephs.solve.model import compile_model
 
 TOP = """format = 1
 name = "top"

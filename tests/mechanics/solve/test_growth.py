@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import ephs
-from ephs.mechanics.methods import METHODS
-from ephs.mechanics.solve import audit, growth
-from ephs.mechanics.solve.growth import FEW, Again, global_error
+from ephs.mechanics.methods.registry import METHODS
 from ephs.show.charts import family_scenes as scenes
+from ephs.solve.auditing import audit, growth
+from ephs.solve.auditing.growth import FEW, Again, global_error
 
 ALLOWED = 0.1
 END = 3.0

@@ -8,11 +8,11 @@ from hypothesis import strategies as st
 import ephs
 from ephs import library as lib
 from ephs import quantity as Q
-from ephs.mechanics.solve.integrate import Grid
-from ephs.mechanics.solve.model import compile_model
-from ephs.mechanics.solve.natural import Natural
 from ephs.semantics import Reference
 from ephs.semantics.natural import step as oracle_step
+from ephs.solve.integrate import Grid
+from ephs.solve.methods.natural import Natural
+from ephs.solve.model import compile_model
 
 START = {"osc.pe.q": 1.0}
 

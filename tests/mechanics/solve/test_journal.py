@@ -14,11 +14,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import ephs
-from ephs.mechanics.methods import METHODS
-from ephs.mechanics.reduced.method import ReducedMethod
-from ephs.mechanics.solve import journal
-from ephs.mechanics.solve.errors import Outcome
-from ephs.mechanics.solve.journal import read_journal
+from ephs.mechanics.methods.method import ReducedMethod
+from ephs.mechanics.methods.registry import METHODS
+from ephs.solve import journal
+from ephs.solve.errors import Outcome
+from ephs.solve.journal import read_journal
 from examples.failures import runs
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -93,8 +93,8 @@ def copies(monkeypatch, tmp_path):
     monkeypatch.setattr(journal, "EVERY", -1.0)
     monkeypatch.setattr(journal.os, "fsync", lambda handle: None)
     monkeypatch.setattr(journal.Written, "write", copied)
-    monkeypatch.setattr("ephs.mechanics.solve.integrate.LARGEST_CHUNK", 4)
-    monkeypatch.setattr("ephs.mechanics.solve.loop.BURST", 3)
+    monkeypatch.setattr("ephs.solve.integrate.LARGEST_CHUNK", 4)
+    monkeypatch.setattr("ephs.solve.loop.BURST", 3)
     return made
 
 
@@ -165,13 +165,13 @@ class Restless(ReducedMethod):
     name, exponent = "restless", 2.0
 
     def step(self, state, h):
-        from ephs.mechanics.reduced.explicit import Explicit, tableau
+        from ephs.mechanics.methods.explicit import Explicit, tableau
 
         return Explicit(self.equations, self.control, tableau("rk54")).step(state, h)
 
 
 def test_a_method_that_cannot_say_where_it_stands_begins_anew(copies, tmp_path):
-    from ephs.mechanics.methods import Method, on_joints
+    from ephs.mechanics.methods.registry import Method, on_joints
 
     method = Method("restless", 5, False, True, False, True, "one's own", on_joints(Restless))
     options = {"method": method, "step": 0.02}
@@ -189,7 +189,7 @@ def written(tmp_path_factory):
     file = tmp_path_factory.mktemp("journal") / "run.journal"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(journal, "EVERY", -1.0)
-        patch.setattr("ephs.mechanics.solve.integrate.LARGEST_CHUNK", 2)
+        patch.setattr("ephs.solve.integrate.LARGEST_CHUNK", 2)
         return file, simulate(SCENE, RUNS["natural, constant steps"], journal=file)
 
 

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from ephs.mechanics.solve.sparse import order
 from ephs.semantics.linear.sparse import sparse_lu
+from ephs.solve.sparse import order
 
 RUNS = {"compiled": sparse_lu().compiled(), "plain": sparse_lu().plain()}
 factorise, solve = RUNS["compiled"]["factorise"], RUNS["compiled"]["solve"]

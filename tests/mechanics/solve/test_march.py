@@ -10,10 +10,10 @@ from scipy.integrate import solve_ivp
 
 import ephs
 from benchmarks import families
-from ephs.mechanics.solve.control import Proportional
-from ephs.mechanics.solve.march import STEPS, Control, Ending, Motion
-from ephs.mechanics.solve.march.control import PATIENCE, held_back, length
 from ephs.semantics.stage import Entry, Program, Vector, real, table
+from ephs.solve.control import Proportional
+from ephs.solve.march import STEPS, Control, Ending, Motion
+from ephs.solve.march.control import PATIENCE, held_back, length
 from tests.mechanics.solve.marching import field, program, start
 
 

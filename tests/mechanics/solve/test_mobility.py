@@ -7,9 +7,9 @@ from hypothesis import given, settings
 
 import ephs
 from benchmarks import families
-from ephs.mechanics.simulate import problem_of_scene
-from ephs.mechanics.solve import instant
-from ephs.mechanics.solve.mobility import mobility
+from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.solve import instant
+from ephs.solve.mobility import mobility
 from ephs.testing import mechanisms
 
 ROOT = Path(__file__).parents[3]

@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import ephs
-from ephs.mechanics.simulate import problem_of_scene
-from ephs.mechanics.solve.model import compile_model
-from ephs.mechanics.solve.natural_kernels import SPREAD, TAKES_PART, measure, reach, weigh
-from ephs.mechanics.solve.restraint_kernels import tighten
+from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.solve.methods.natural_kernels import SPREAD, TAKES_PART, measure, reach, weigh
+from ephs.solve.methods.restraint_kernels import tighten
+from ephs.solve.model import compile_model
 
 ROOT = Path(__file__).resolve().parents[3]
 seeds = st.integers(0, 2**32 - 1)

@@ -8,10 +8,10 @@ import pytest
 import ephs
 from ephs import Pattern, junction, library
 from ephs import quantity as Q
-from ephs.mechanics.methods import METHODS
-from ephs.mechanics.simulate import problem_of_system
-from ephs.mechanics.solve.errors import Outcome, SolveError
-from ephs.mechanics.solve.production import Production
+from ephs.mechanics.methods.registry import METHODS
+from ephs.mechanics.runs.simulate import problem_of_system
+from ephs.solve.auditing.production import Production
+from ephs.solve.errors import Outcome, SolveError
 from examples.failing import driving
 
 SYSTEMS = [method.name for method in METHODS.values() if method.systems]

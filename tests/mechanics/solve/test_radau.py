@@ -6,9 +6,9 @@ from scipy.integrate import solve_ivp
 
 import ephs
 from ephs import Pattern, library
-from ephs.mechanics.solve.errors import Outcome
-from ephs.mechanics.solve.heats import Heats
-from ephs.mechanics.solve.radau import COEFFICIENTS, NODES
+from ephs.solve.errors import Outcome
+from ephs.solve.heats import Heats
+from ephs.solve.methods.radau import COEFFICIENTS, NODES
 from examples import oscillator, physics
 
 K, M, D, T0 = 1.5, 1.0, 0.1, 293.15

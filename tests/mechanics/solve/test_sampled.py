@@ -7,8 +7,8 @@ import pytest
 from scipy.linalg import expm
 
 import ephs
-from ephs.mechanics.methods import METHODS
-from ephs.mechanics.solve.errors import OptionError
+from ephs.mechanics.methods.registry import METHODS
+from ephs.solve.errors import OptionError
 
 MASS, STIFFNESS, START = 2.0, 8.0, 0.3
 PERIOD, UNTIL = 0.05, 1.0

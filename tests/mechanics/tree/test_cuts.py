@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ephs.mechanics.tree.cuts import Place, Relative
-from ephs.mechanics.tree.loops import kinds_of, loop_program
+from ephs.mechanics.tree.sweeps.cuts import Place, Relative
+from ephs.mechanics.tree.sweeps.loops import kinds_of, loop_program
 from ephs.semantics.spaces import codes, se3, so3
 from ephs.semantics.stage import PLAIN
 

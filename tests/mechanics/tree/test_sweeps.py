@@ -8,12 +8,12 @@ from hypothesis import strategies as st
 
 import ephs
 from benchmarks import families
-from ephs.mechanics.engine.links import links_of
-from ephs.mechanics.reduced.equations import Equations
-from ephs.mechanics.reduced.tangent import Linearised
-from ephs.mechanics.simulate import problem_of_scene
-from ephs.mechanics.tree.programs import sweeps
-from ephs.mechanics.tree.unrolled import unrolled
+from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.tree.engine.links import links_of
+from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.equations.tangent import Linearised
+from ephs.mechanics.tree.sweeps.programs import sweeps
+from ephs.mechanics.tree.sweeps.unrolled import unrolled
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.testing import mechanisms
 from tests.mechanics.dynamics.pinocchio_models import KINDS, PinModel

@@ -50,7 +50,7 @@ def unconditional() -> set[str]:
     return found
 
 
-REACHING = {f"ephs.mechanics.engine.programs:{name}" for name in ("motion_of_trees", "motion_of_loops")}
+REACHING = {f"ephs.mechanics.tree.engine.programs:{name}" for name in ("motion_of_trees", "motion_of_loops")}
 """Programs that call others by address: the emulator of arm64 has no others, so their bits there are not known."""
 
 

@@ -9,7 +9,7 @@ from ephs import Pattern, junction
 from ephs import library as lib
 from ephs import quantity as Q
 from ephs.mechanics import joint, rigid_body
-from ephs.mechanics.joints import mbs_pattern
+from ephs.mechanics.elements.joints import mbs_pattern
 from ephs.operad import Path
 from ephs.semantics import AssemblyError, Reference
 from ephs.semantics.behaviour import Continuous

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import ephs
 from ephs import library
 from ephs import quantity as Q
-from ephs.mechanics import components
+from ephs.mechanics.elements import components
 from ephs.operad import Path
 from ephs.semantics import Reference
 from ephs.semantics.checks import random_point

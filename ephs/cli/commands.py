@@ -1,0 +1,243 @@
+"""The command line: parses, calls, prints.
+
+Exit codes: 0 done; 1 a law fails (``check``); 2 bad input; 3 the run failed part-way; 4 its result
+does not pass its audit; 130 interrupted.
+"""
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from cyclopts import App, CycloptsError, Parameter
+
+from ephs.cli.animate import animate
+from ephs.cli.charts import charts
+from ephs.cli.equilibrium import resting
+from ephs.cli.input import (
+    AS_GIVEN,
+    TEXTS,
+    BadInput,
+    Loading,
+    addressed,
+    complain,
+    heard,
+    initial_values,
+    load_model,
+    noted,
+)
+from ephs.cli.linear import linearizing
+from ephs.cli.nearest import did_you_mean
+from ephs.cli.new import news
+from ephs.cli.next import known_command, welcome, with_examples
+from ephs.cli.run import run
+from ephs.cli.sweep import sweeps
+
+if TYPE_CHECKING:
+    pass
+
+__all__ = ["main"]
+
+_PICTURES = (".svg", ".tex", ".png")
+
+
+def _version() -> str:
+    from importlib.metadata import version
+
+    return version("ephs")
+
+
+app = App(
+    name="ephs",
+    help="Compose physical models by pattern, simulate them with both laws of thermodynamics exact.",
+    version=_version,
+    help_format="plaintext",
+    exit_on_error=False,
+    result_action="return_value",
+    suppress_keyboard_interrupt=False,
+)
+
+
+app.command(run)
+app.command(animate)
+app.command(charts)
+app.command(sweeps)
+app.command(linearizing)
+app.command(resting)
+app.command(news)
+app.register_install_completion_command(help="Teach your shell the names of commands and options.")
+
+
+@app.default
+def _welcome() -> int:
+    """Say what one can do next."""
+    print(welcome(app))
+    return 0
+
+
+@app.command
+def check(scene: str, /, *, initial: list[str] | None = None, loading: Loading = AS_GIVEN) -> int:
+    """Check the model, not the trajectory; exit code 1 if a law fails.
+
+    Parameters
+    ----------
+    scene
+        A scene file (.toml), a model (.urdf, .xml, .sdf), or FILE.py:NAME.
+    initial
+        Initial value of a state, PATH=NUMBER or PATH=NUMBER,NUMBER,...; may be given several times.
+    """
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    model = load_model(scene, loading)
+    with addressed(scene):
+        from ephs.mechanics.runs.check import check_model
+
+        report = check_model(model, initial_values(initial or []))
+    table = Table("law", "", "detail", title=scene, title_justify="left", box=None, pad_edge=False)
+    for name, holds, detail in report.items:
+        verdict = Text("holds", "green") if holds else Text("FAILS", "bold red")
+        table.add_row(Text(name), verdict, Text(detail))
+    Console().print(table)
+    return 0 if report.ok else 1
+
+
+@app.command
+def equations(
+    scene: str,
+    /,
+    *,
+    form: Literal["relation", "descriptor", "reduced"] = "reduced",
+    latex: bool = False,
+    loading: Loading = AS_GIVEN,
+) -> int:
+    """Print the equations, with the names of junctions.
+
+    Parameters
+    ----------
+    scene
+        A scene file (.toml), a model (.urdf, .xml, .sdf), or FILE.py:NAME.
+    form
+        relation: what the pattern says of each junction and each component of its ports; descriptor: efforts of
+        storages, balances and conditions; reduced: interface variables eliminated.
+    latex
+        As LaTeX, an align environment.
+    """
+    import ephs
+
+    model = load_model(scene, loading)
+    with addressed(scene):
+        system = model.system() if isinstance(model, ephs.Scene) else model
+        found = system.equations(form)
+    print(found.latex() if latex else found)
+    return 0
+
+
+@app.command
+def reduce(scene: str, /, *, loading: Loading = AS_GIVEN) -> int:
+    """List the eliminated variables, the justification, and the unknowns that remain.
+
+    Parameters
+    ----------
+    scene
+        A scene file (.toml), a model (.urdf, .xml, .sdf), or FILE.py:NAME.
+    """
+    import ephs
+
+    model = load_model(scene, loading)
+    with addressed(scene):
+        found = ephs.reduce(model)
+    print(found)
+    return 0
+
+
+@app.command
+def draw(
+    scene: str,
+    /,
+    *,
+    output: Annotated[Path, Parameter(name=["--output", "-o"])],
+    flat: bool = False,
+    opened: bool = False,
+    loading: Loading = AS_GIVEN,
+) -> int:
+    """Draw the interconnection pattern.
+
+    Parameters
+    ----------
+    scene
+        A scene file (.toml), a model (.urdf, .xml, .sdf), or FILE.py:NAME.
+    output
+        The picture to write; its ending chooses SVG, TikZ or PNG: .svg, .tex, .png.
+    flat
+        Draw the flattened pattern instead of the outermost level.
+    opened
+        Draw what is inside the composites of the outermost level.
+    """
+    import ephs
+
+    if output.suffix not in _PICTURES:
+        hint = did_you_mean(output.suffix, _PICTURES)
+        raise BadInput(TEXTS["suffix"].format(found=output, expected=", ".join(_PICTURES)) + hint)
+    model = load_model(scene, loading)
+    with addressed(scene, output):
+        from ephs.show import draw as draw_pattern
+
+        system = model.system() if isinstance(model, ephs.Scene) else model
+        output.parent.mkdir(parents=True, exist_ok=True)
+        drawing = draw_pattern(system.flatten() if flat else system, output, opened=opened)
+    print(output)
+    if drawing.faults:
+        print(f"names and wires that lie on something else, as there is no room: {len(drawing.faults)}")
+    return 0
+
+
+@app.command
+def convert(
+    model: str,
+    /,
+    *,
+    output: Annotated[Path, Parameter(name=["--output", "-o"])],
+    loading: Loading = AS_GIVEN,
+) -> int:
+    """Write a model in another format as a scene file.
+
+    Parameters
+    ----------
+    model
+        A URDF (.urdf), an MJCF (.xml) or an SDF (.sdf).
+    output
+        The scene file (.toml) to write.
+    """
+    with addressed(model, output), heard():
+        from ephs.mechanics.imports import convert as convert_model
+
+        output.parent.mkdir(parents=True, exist_ok=True)
+        convert_model(model, output, loading.base, loading.adjust, loading.inertia or "warn", contact=loading.contact)
+    print(output)
+    return 0
+
+
+with_examples(app)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line on the words after the program's name, those of the process unless given.
+
+    Returns the exit code, see the module.
+    """
+    from rich.console import Console
+
+    try:
+        known_command(app, sys.argv[1:] if arguments is None else arguments)
+        with noted(complain):
+            return int(app(arguments, error_console=Console(stderr=True)) or 0)
+    except CycloptsError:
+        return 2
+    except BadInput as error:
+        complain(str(error))
+        return 2
+    except KeyboardInterrupt:
+        complain("interrupted")
+        return 130

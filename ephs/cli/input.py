@@ -1,0 +1,306 @@
+"""Input and output of the command line: files to models, user errors to clear texts, results."""
+
+import math
+import runpy
+import sys
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal, final
+
+from cyclopts import Parameter
+
+from ephs.cli.nearest import beside, did_you_mean
+
+if TYPE_CHECKING:
+    from ephs import Scene, System
+
+__all__ = [
+    "AS_CHOSEN",
+    "AS_GIVEN",
+    "EXTRAS",
+    "TEXTS",
+    "BadInput",
+    "Loading",
+    "Positive",
+    "Stepping",
+    "addressed",
+    "complain",
+    "heard",
+    "initial_values",
+    "load_model",
+    "naming",
+    "noted",
+    "positive",
+    "say",
+]
+
+TEXTS = {
+    "initial": "--initial {found}: expected PATH=NUMBER or PATH=NUMBER,NUMBER,..., as in osc.pe.q=1.0",
+    "jumps": "--jumps {found}: expected TIME,TIME,... in seconds, as in 0.1,0.25",
+    "suffix": "{found}: expected one of {expected}; choose the file name's ending accordingly",
+    "no-file": "{found}: no such file; expected a scene file (.toml), a model (.urdf, .xml, .sdf) or FILE.py:NAME",
+    "no-result": "{found}: no solution.nc in it; expected a result folder, as ephs run writes it",
+    "no-name": "{file}: no {name} in it; found {found}. Give one as {file}:NAME",
+    "not-a-model": "{file}: {name} is a {found}, expected a System or a Scene",
+    "user-code": "{file}: line {line}: {found}; mend the file, then run again",
+    "extra": "{file}: the module {found} is not installed; python -m pip install 'ephs[{extra}]'",
+    "no-report": "report.html was not written: the module {found} is not installed; "
+    "python -m pip install 'ephs[{extra}]' and run again (the solution is saved)",
+    "out": "{file}: {found}; choose another folder or file",
+    "failed": "{file}: the run failed: {found}",
+    "audit": "{file}: {found}",
+    "interrupted": "{file}: interrupted{at}",
+}
+EXTRAS = {"matplotlib": "viz", "pygraphviz": "viz", "viser": "viz", "mujoco": "models", "distributed": "cluster"}
+
+
+class BadInput(Exception):
+    """Input that cannot be used; the text is for the user."""
+
+
+@Parameter(name="*")
+@final
+@dataclass(frozen=True, slots=True)
+class Loading:
+    """Options for reading files as scenes.
+
+    Parameters
+    ----------
+    base
+        How the root of a URDF meets the ground.
+    adjust
+        Assemble a scene that does not quite close.
+    inertia
+        Whether an inertia that no distribution of mass has is refused, kept, or replaced by the nearest that one has;
+        unless given, as the scene file says, and kept for other formats.
+    contact
+        Take limits of joints and contacts from models in other formats.
+    """
+
+    base: Literal["fixed", "free"] = "fixed"
+    adjust: bool = False
+    inertia: Literal["strict", "warn", "nearest"] | None = None
+    contact: bool = False
+
+
+AS_GIVEN = Loading()
+
+
+def positive(_type: object, value: float | None) -> None:
+    """Accept nothing, or a number above 0: a validator of options.
+
+    Raises
+    ------
+    ValueError
+        It is another number.
+    """
+    if value is not None and not (value > 0 and math.isfinite(value)):
+        raise ValueError(f"found {value:g}, expected a positive finite number")
+
+
+Positive = Annotated[float | None, Parameter(validator=positive)]
+
+
+@Parameter(name="*")
+@final
+@dataclass(frozen=True, slots=True)
+class Stepping:
+    """Options of time stepping.
+
+    Parameters
+    ----------
+    method
+        Integration method, for example natural.
+    rtol
+        Relative tolerance, for methods that choose their step.
+    atol
+        Absolute tolerance, for methods that choose their step.
+    step
+        Constant step size, in seconds.
+    form
+        Which form of the equations is integrated.
+    jumps
+        Times in seconds at which steps end and start anew, TIME,TIME,...: jumps of what the model is given.
+    """
+
+    method: str | None = None
+    rtol: Positive = None
+    atol: Positive = None
+    step: Positive = None
+    form: Literal["paper", "folded", "reduced"] | None = None
+    jumps: str | None = None
+
+    def options(self) -> dict[str, Any]:
+        """Options that were given, as keywords of ``simulate``.
+
+        Raises
+        ------
+        BadInput
+            A time is no number.
+        """
+        values = ((field.name, getattr(self, field.name)) for field in fields(self))
+        found = {name: value for name, value in values if value is not None}
+        if self.jumps is not None:
+            try:
+                found["jumps"] = [float(time) for time in self.jumps.split(",")]
+            except ValueError as error:
+                raise BadInput(TEXTS["jumps"].format(found=self.jumps)) from error
+        return found
+
+
+AS_CHOSEN = Stepping()
+
+
+def load_model(scene: str, loading: Loading = AS_GIVEN) -> "Scene | System":
+    """A scene file, a model in another format, or FILE.py:NAME, as a model.
+
+    Raises
+    ------
+    BadInput
+        There is no such file or name, or it is faulty.
+    """
+    import ephs
+
+    file, separator, name = scene.rpartition(":")
+    if separator and file.endswith(".py"):
+        return _from_python(Path(file), name)
+    if scene.endswith(".py"):
+        raise BadInput(TEXTS["no-name"].format(file=scene, name="name was given", found=scene))
+    if not Path(scene).is_file():
+        raise BadInput(TEXTS["no-file"].format(found=scene) + beside(Path(scene)))
+    options: dict[str, Any] = {"base": loading.base, "adjust": loading.adjust}
+    if loading.contact:
+        options["contact"] = True
+    if loading.inertia is not None:
+        options["inertia"] = loading.inertia
+    with addressed(scene), heard():
+        return ephs.load(scene, **options)
+
+
+def _from_python(file: Path, name: str) -> "Scene | System":
+    import ephs
+
+    if not file.is_file():
+        raise BadInput(TEXTS["no-file"].format(found=file) + beside(file))
+    sys.path.insert(0, str(file.parent.resolve()))  # as `python FILE.py` does, for modules beside the file
+    try:
+        names = runpy.run_path(str(file), run_name="__ephs__")
+    except (Exception, SystemExit) as error:
+        found = f"{type(error).__name__}: {error}"
+        raise BadInput(TEXTS["user-code"].format(file=file, line=_line(error, file), found=found)) from error
+    finally:
+        sys.path.remove(str(file.parent.resolve()))
+    models = [key for key, value in names.items() if isinstance(value, (ephs.System, ephs.Scene))]
+    if name not in names:
+        found = ", ".join(models) or "no System and no Scene"
+        told = TEXTS["no-name"].format(file=file, name=name or "name was given", found=found)
+        raise BadInput(told + did_you_mean(name, models))
+    if name not in models:
+        raise BadInput(TEXTS["not-a-model"].format(file=file, name=name, found=type(names[name]).__name__))
+    return names[name]
+
+
+def _line(error: BaseException, file: Path) -> int | str:
+    """Return the deepest line of the user's own file that the error went through."""
+    if isinstance(error, SyntaxError) and error.filename == str(file) and error.lineno:
+        return error.lineno
+    line: int | str = "?"
+    trace = error.__traceback__
+    while trace is not None:
+        if trace.tb_frame.f_code.co_filename == str(file):
+            line = trace.tb_lineno
+        trace = trace.tb_next
+    return line
+
+
+@contextmanager
+def addressed(scene: str, target: Path | None = None) -> Iterator[None]:
+    """Turn the errors that speak to the user into ``BadInput`` that names the file."""
+    import ephs
+
+    try:
+        yield
+    except (BadInput, ephs.SimulationError):
+        raise
+    except ModuleNotFoundError as error:
+        module = (error.name or "").partition(".")[0]
+        if module not in EXTRAS:
+            raise
+        raise BadInput(TEXTS["extra"].format(file=scene, found=module, extra=EXTRAS[module])) from error
+    except OSError as error:
+        where = error.filename or target or scene
+        raise BadInput(TEXTS["out"].format(file=where, found=error.strerror or error)) from error
+    except Exception as error:
+        # The exception classes of this package are addressed to the user; all others are defects.
+        if type(error).__module__.partition(".")[0] != "ephs":
+            raise
+        raise BadInput(naming(scene, str(error))) from error
+
+
+@contextmanager
+def noted(say: Callable[[str], None]) -> Iterator[None]:
+    """Say what this package warns of, instead of warning."""
+    with warnings.catch_warnings():
+        otherwise = warnings.showwarning
+
+        def show(message: Warning | str, category: type[Warning], *rest: Any) -> None:
+            if category.__module__.partition(".")[0] == "ephs":
+                say(str(message))
+            else:
+                otherwise(message, category, *rest)
+
+        warnings.showwarning = show
+        yield
+
+
+@contextmanager
+def heard() -> Iterator[None]:
+    """Let every warning of models and scenes through, whatever the user's filters are."""
+    import ephs
+
+    with warnings.catch_warnings():
+        for kind in (ephs.ModelWarning, ephs.SceneWarning):
+            warnings.simplefilter("always", kind)
+        yield
+
+
+def initial_values(entries: Sequence[str]) -> dict[str, list[float]] | None:
+    """Values of PATH=NUMBER,NUMBER,...; None where none are given.
+
+    Raises
+    ------
+    BadInput
+        An entry is not of that form.
+    """
+    values: dict[str, list[float]] = {}
+    for entry in entries:
+        path, _, numbers = entry.partition("=")
+        try:
+            values[path] = [float(number) for number in numbers.split(",")]
+        except ValueError as error:
+            raise BadInput(TEXTS["initial"].format(found=entry)) from error
+    return values or None
+
+
+def naming(scene: str, message: str) -> str:
+    """A message that names the file, once."""
+    return message if str(Path(scene)) in message else f"{scene}: {message}"
+
+
+def say(*lines: str) -> None:
+    """Print results, those after the first line indented."""
+    _print(lines, errors=False)
+
+
+def complain(*lines: str) -> None:
+    """Print to stderr what went otherwise than asked."""
+    _print(lines, errors=True)
+
+
+def _print(lines: Sequence[str], *, errors: bool) -> None:
+    from rich.console import Console
+
+    Console(stderr=errors, soft_wrap=True, highlight=False, markup=False, emoji=False).print("\n  ".join(lines))

@@ -1,0 +1,51 @@
+"""The bar of a run: the time left, steps a second, the energy balance so far."""
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+__all__ = ["progress_bar", "said_of"]
+
+
+@contextmanager
+def progress_bar(name: str) -> Iterator[Callable[[float, float, Mapping[str, Any]], None]]:
+    """Show a bar with the time left, and what is compiled before, on a terminal only."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    from ephs.mechanics.runs.compiling import compiling
+
+    console = Console(stderr=True)
+    note = TextColumn("{task.fields[note]}", markup=False)
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(bar_width=20),
+        note,
+        TimeRemainingColumn(compact=True),
+    )
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task(name, total=1.0, note="")
+        begin = time.perf_counter()
+
+        def progress(t: float, until: float, stats: Mapping[str, Any]) -> None:
+            spent = float(stats.get("integrate_s") or time.perf_counter() - begin)
+            bar.update(task, total=until, completed=t, note=said_of(t, until, stats, spent))
+
+        def say(function: str) -> None:
+            bar.update(task, note=f"compiling {function}, kept for the next run" if function else "")
+
+        with compiling(say):
+            yield progress
+
+
+def said_of(t: float, until: float, stats: Mapping[str, Any], spent: float) -> str:
+    """Where a run stands, in words: time, steps, steps a second, and by how much energy is not balanced so far."""
+    words = [f"t = {t:.3g} of {until:g} s"]
+    if "steps" in stats:
+        words.append(f"{stats['steps']} steps")
+        if spent > 0.0:
+            words.append(f"{stats['steps'] / spent:.3g}/s")
+    if "energy_error" in stats:
+        words.append(f"energy error {stats['energy_error']:.0e}")
+    return ", ".join(words)

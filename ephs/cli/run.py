@@ -1,0 +1,214 @@
+"""`ephs run`: from a scene to its result folder, and on from where a run was interrupted."""
+
+import hashlib
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from cyclopts import Parameter
+
+from ephs.cli.input import (
+    AS_CHOSEN,
+    AS_GIVEN,
+    TEXTS,
+    BadInput,
+    Loading,
+    Positive,
+    Stepping,
+    addressed,
+    complain,
+    initial_values,
+    load_model,
+    naming,
+    say,
+)
+from ephs.cli.next import after
+from ephs.cli.progress import progress_bar
+from ephs.cli.results import write_results
+
+if TYPE_CHECKING:
+    from ephs import Scene, Solution, System
+
+__all__ = ["run"]
+
+JOURNAL = "run.journal"
+RUN = "run.json"
+"""Request of a run, kept beside the results of a run that has reached its end."""
+KEPT = 500
+"""Parts of the time at whose ends results are kept where steps are chosen."""
+_TEXTS = {
+    "until": "--until is missing; expected the end of the simulated time in seconds, as in ephs run {file} --until 5",
+    "no-journal": f"{{file}}: no {JOURNAL} in it; expected the result folder of a run that was interrupted",
+    "own": "{file}: its model is {scene}; the code of that file is run only where you name it: "
+    "ephs run {scene} --until {until!r} --out {file} --resume",
+    "kept": f"{{found}} holds a run that did not end; it is kept as {JOURNAL}.old (--resume would go on with it)",
+    "ended": "{folder}: that run has reached its end; nothing is left to do",
+    "other": "{folder}: its results are another run's, whose {key} was {found}; now it is {wanted}. "
+    "Take another --out, or leave out --resume and they are replaced",
+    "again": "what was computed is kept; go on: ephs run {folder} --resume",
+}
+
+
+def run(
+    scene: str,
+    /,
+    *,
+    until: Positive = None,
+    stepping: Stepping = AS_CHOSEN,
+    keep: Annotated[int | None, Parameter(validator=lambda _, n: _counted(n))] = None,
+    initial: list[str] | None = None,
+    out: Path | None = None,
+    resume: bool = False,
+    audit: Literal["fail", "warn", "off"] = "fail",
+    loading: Loading = AS_GIVEN,
+) -> int:
+    """Simulate a scene and write its result folder.
+
+    Parameters
+    ----------
+    scene
+        A scene file (.toml), a model (.urdf, .xml, .sdf), or FILE.py:NAME; with --resume also the result folder of a
+        run that was interrupted.
+    until
+        End of the simulated time, in seconds.
+    keep
+        Into how many equal parts the time is cut, at whose ends results are kept: 500 unless given. With --step every
+        step is kept unless given.
+    initial
+        Initial value of a state, PATH=NUMBER or PATH=NUMBER,NUMBER,...; may be given several times.
+    out
+        Result folder; out/NAME unless given.
+    resume
+        Go on where a run into this folder was interrupted.
+    audit
+        What findings of the run's audit become: exit code 4, lines on stderr only, or an entry in the summary only.
+    """
+    import ephs
+
+    if resume and Path(scene).is_dir():
+        return _run_on(Path(scene), audit)
+    if until is None:
+        raise BadInput(_TEXTS["until"].format(file=scene))
+    model = load_model(scene, loading)
+    name = model.name if isinstance(model, ephs.Scene) else scene.rpartition(":")[2]
+    folder = out or Path("out", name)
+    with addressed(scene, folder):
+        folder.mkdir(parents=True, exist_ok=True)
+    asked: dict[str, Any] = {"until": until, **stepping.options()}
+    if initial:
+        asked["initial"] = initial_values(initial)
+    if stepping.step is None or keep is not None:  # steps that are chosen may be long: pictures want more
+        asked["keep"] = keep or KEPT
+    if resume and not (folder / JOURNAL).exists() and _ended(folder, _identity(model, scene, asked)):
+        say(_TEXTS["ended"].format(folder=folder))
+        return 0
+    if not resume and (folder / JOURNAL).exists():
+        with addressed(scene, folder):
+            os.replace(folder / JOURNAL, folder / f"{JOURNAL}.old")
+        complain(_TEXTS["kept"].format(found=folder / JOURNAL))
+    return _simulate(model, scene, folder, asked, audit)
+
+
+def _run_on(folder: Path, audit: str) -> int:
+    """Go on with the run whose result folder this is; its model is in the journal."""
+    from ephs.mechanics.scene.document import scene_from_text
+    from ephs.solve.journal import read_journal
+
+    file = folder / JOURNAL
+    if not file.is_file() and (folder / "solution.nc").is_file():
+        say(_TEXTS["ended"].format(folder=folder))
+        return 0
+    if not file.is_file():
+        raise BadInput(_TEXTS["no-journal"].format(file=folder))
+    with addressed(str(file)):
+        heading = read_journal(file).heading
+    note = heading["note"]
+    if not heading["model"]:
+        raise BadInput(_TEXTS["own"].format(file=folder, scene=note["scene"], until=note["asked"]["until"]))
+    return _simulate(scene_from_text(heading["model"]), note["scene"], folder, note["asked"], audit)
+
+
+def _simulate(model: "Scene | System", scene: str, folder: Path, asked: Mapping[str, Any], audit: str) -> int:
+    """Simulate as asked, journal and all; the exit code."""
+    import ephs
+    from ephs.solve.journal import Journal
+
+    options = dict(asked)
+    until, parts = options.pop("until"), options.pop("keep", None)
+    if parts is not None:
+        options["save_at"] = [until * k / parts for k in range(parts + 1)]
+    journal = Journal(folder / JOURNAL, {"scene": scene, "asked": asked})
+    name = model.name if isinstance(model, ephs.Scene) else scene.rpartition(":")[2]
+    try:
+        with addressed(scene, folder), progress_bar(name) as progress:
+            solution = ephs.simulate(model, until, progress=progress, journal=journal, audit="off", **options)
+    except ephs.SimulationError as error:
+        if error.partial is None:
+            raise BadInput(naming(scene, str(error))) from error
+        stopped, begun = isinstance(error, ephs.Interrupted), len(error.partial.t) > 0
+        if stopped:
+            at = f" at t = {error.partial.t[-1]:.6g} s" if begun else ""
+            complain(TEXTS["interrupted"].format(file=scene, at=at))
+        else:
+            complain(TEXTS["failed"].format(file=scene, found=error))
+        if not begun:  # not even the first state could be set up
+            return 130 if stopped else 3
+        with addressed(scene, folder):
+            _write(error.partial, folder)
+        complain(f"saved what was computed: {folder}")
+        if stopped:
+            complain(_TEXTS["again"].format(folder=folder))
+        return 130 if stopped else 3
+    with addressed(scene, folder):
+        _write(solution, folder)
+        whole = json.dumps(_identity(model, scene, asked), indent=1)
+        (folder / RUN).write_text(f"{whole}\n", encoding="utf-8")
+        (folder / JOURNAL).unlink(missing_ok=True)
+    findings = solution.audit.findings if audit != "off" else ()
+    for finding in findings:
+        complain(TEXTS["audit"].format(file=scene, found=finding))
+    return 4 if findings and audit == "fail" else 0
+
+
+def _identity(model: "Scene | System", scene: str, asked: Mapping[str, Any]) -> dict[str, Any]:
+    """Identity of a run; of code the name only."""
+    import ephs
+    from ephs.mechanics.scene.document import scene_to_text
+
+    text = scene_to_text(model) if isinstance(model, ephs.Scene) else scene
+    return json.loads(json.dumps({**asked, "model": hashlib.blake2b(text.encode(), digest_size=16).hexdigest()}))
+
+
+def _ended(folder: Path, wanted: Mapping[str, Any]) -> bool:
+    """Whether the results in a folder are those of this run, which has reached its end.
+
+    Raises
+    ------
+    BadInput
+        They are those of another run that reached the same end.
+    """
+    try:
+        found = json.loads((folder / RUN).read_text(encoding="utf-8"))
+        reached = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["t_end"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return False
+    if not isinstance(found, dict) or reached != wanted["until"]:
+        return False
+    for key in (*wanted, *found):
+        if found.get(key) != wanted.get(key):
+            told = {"folder": folder, "key": key, "found": found.get(key), "wanted": wanted.get(key)}
+            raise BadInput(_TEXTS["other"].format(**told))
+    return True
+
+
+def _write(solution: "Solution", folder: Path) -> None:
+    """Write the result folder and say what to look at next."""
+    report = write_results(solution, folder)
+    say("next:", *after(folder, moves=solution.scene is not None, report=report))
+
+
+def _counted(parts: int | None) -> None:
+    if parts is not None and parts < 1:
+        raise ValueError(f"found {parts}, expected a number of parts, at least 1")

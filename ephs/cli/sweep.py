@@ -1,0 +1,157 @@
+"""`ephs sweep`: one model with many values of some numbers, one table."""
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import App, Parameter
+
+from ephs.cli.input import AS_CHOSEN, AS_GIVEN, BadInput, Loading, Stepping, addressed, load_model, positive, say
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["sweeps"]
+
+_TEXTS = {
+    "vary": "--vary {found}: expected PATH=FROM:TO:COUNT or PATH=VALUE,VALUE,..., as in bodies.crank.mass=0.1:0.5:9",
+    "none": "ephs sweep {file}: nothing is varied; expected --vary PATH=FROM:TO:COUNT, bodies.crank.mass=0.1:0.5:9",
+    "dask": "--dask {address}: {found}; start a scheduler there, then run again",
+}
+LISTED = 5
+"""Different reasons of failure that are printed."""
+
+sweeps = App(name="sweep", help="Run an ensemble of a model, in parallel.")
+
+
+@sweeps.default
+def sweep(
+    scene: str,
+    /,
+    *,
+    vary: list[str] | None = None,
+    until: Annotated[float, Parameter(validator=positive)],
+    output: Annotated[Path, Parameter(name=["--output", "-o"])],
+    paired: bool = False,
+    output_of: Annotated[list[str] | None, Parameter(name=["--output-of"])] = None,
+    instants: int = 100,
+    stepping: Stepping = AS_CHOSEN,
+    workers: int | None = None,
+    dask: str | None = None,
+    loading: Loading = AS_GIVEN,
+) -> int:
+    """Run a model with many values of some numbers; writes sweep.nc into a folder.
+
+    Parameters
+    ----------
+    scene
+        A scene file (.toml), a model (.urdf, .xml, .sdf), or FILE.py:NAME.
+    vary
+        PATH=FROM:TO:COUNT or PATH=VALUE,VALUE,...; may be given several times.
+    until
+        End of the simulated time, in seconds.
+    output
+        Folder for the table.
+    paired
+        Take the values of all paths together, the first with the first; else all are combined with all.
+    output_of
+        Names of what is put out, such as joints.pin.rate or energy; may be given several times.
+    instants
+        Parts into which the time is cut; results are kept at their ends.
+    workers
+        Threads; as many as there are cores unless given.
+    dask
+        Address of a Dask scheduler to run on instead, as in tcp://127.0.0.1:8786.
+    """
+    if not vary:
+        raise BadInput(_TEXTS["none"].format(file=scene))
+    values = dict(_values(entry) for entry in vary)
+    model = load_model(scene, loading)
+    with addressed(scene, output):
+        output.mkdir(parents=True, exist_ok=True)
+    import numpy as np
+
+    from ephs.mechanics.sweep.sweep import SweepInterrupted
+    from ephs.mechanics.sweep.sweep import sweep as run
+
+    stopped = False
+    with addressed(scene, output), _client(dask) as client, _progress() as progress:
+        try:
+            table = run(
+                model, values, until, save_at=until * np.arange(instants + 1) / instants, outputs=output_of,
+                paired=paired, workers=workers, client=client, progress=progress, **stepping.options(),
+            )  # fmt: skip
+        except SweepInterrupted as error:
+            table, stopped = error.partial, True
+    with addressed(scene, output):
+        _write(table, output)
+    return 130 if stopped else 3 if int(table.attrs["failed"]) else 0
+
+
+def _values(entry: str) -> tuple[str, list[float]]:
+    path, separator, text = entry.partition("=")
+    try:
+        if not (separator and path):
+            raise ValueError
+        if ":" not in text:
+            return path, [float(word) for word in text.split(",")]
+        first, last, count = text.split(":")
+        low, high, n = float(first), float(last), int(count)
+        if n < 1:
+            raise ValueError
+        return path, [low + (high - low) * k / max(n - 1, 1) for k in range(n)]
+    except ValueError:
+        raise BadInput(_TEXTS["vary"].format(found=entry)) from None
+
+
+@contextmanager
+def _client(address: str | None) -> Iterator[Any]:
+    if address is None:
+        yield None
+        return
+    from distributed import Client
+
+    try:
+        client = Client(address, timeout="10s")
+    except (OSError, ValueError) as error:
+        raise BadInput(_TEXTS["dask"].format(address=address, found=error)) from error
+    with client:
+        yield client
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[int, int, int], None]]:
+    """A bar with what is done, what failed, and the time left, on a terminal only."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    console = Console(stderr=True)
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        TextColumn("{task.fields[note]}", markup=False),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("members", total=None, note="")
+
+        def progress(done: int, members: int, failed: int) -> None:
+            bar.update(task, total=members, completed=done, note=f"{done} of {members}, {failed} failed")
+
+        yield progress
+
+
+def _write(table: "xr.Dataset", folder: Path) -> None:
+    from ephs.solve.result.guard import named_for_file
+
+    file = folder / "sweep.nc"
+    named_for_file(table).to_netcdf(file, engine="h5netcdf")
+    members, failed, seconds = (table.attrs[key] for key in ("members", "failed", "seconds"))
+    reasons = Counter(str(text) for text in table["status"].values.ravel() if text != "done")
+    say(
+        f"{members} members, {failed} failed, in {seconds:.2f} s: {members / seconds:.0f} a second",
+        *(f"{count} × {text}" for text, count in reasons.most_common(LISTED)),
+        f"table: {file}",
+    )

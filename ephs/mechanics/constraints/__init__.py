@@ -1,0 +1,1 @@
+"""Constraints of mechanisms: dependent rows, free directions, and subgroups of joints."""

@@ -1,0 +1,82 @@
+"""The parts of mechanics that documents may name, each made again from its ports and its numbers."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ephs.mechanics.elements import beam, components, springs
+from ephs.operad import Interface, Path, Quantity
+from ephs.semantics.catalogue import Part
+from ephs.semantics.primitives import Primitive
+from ephs.semantics.spaces import Pair, pair
+
+__all__ = ["PARTS"]
+
+Numbers = Mapping[str, Any]
+
+
+def _port(ports: Interface, *, parity: int) -> tuple[str, Quantity]:
+    """The first power port whose quantity has this parity."""
+    return next((str(p), t.quantity) for p, t in ports.items() if t.power and t.quantity.parity == parity)
+
+
+def _group(ports: Interface) -> str:
+    direct = {port.quantity.space.name for port in ports.values()} & {"SO(3)xR3", "so(3)xR3*"}
+    return "SO3xR3" if direct else "SE3"
+
+
+def _pair(ports: Interface, port: str) -> Pair:
+    """The pair that a port of relative poses or joint momenta belongs to."""
+    space = ports[Path.of(port)].quantity.space
+    return pair(space.name.rstrip("*"), **dict(space.parameters))
+
+
+def _no_potential(ports: Interface, _numbers: Numbers) -> Primitive:
+    (port, kind), *_ = ports.items()
+    return components.no_potential(kind.quantity, str(port))
+
+
+def _coupling(ports: Interface, _numbers: Numbers) -> Primitive:
+    (q_port, q), (p_port, p) = _port(ports, parity=1), _port(ports, parity=-1)
+    return components.kinematic_coupling(q, p, q_port, p_port)
+
+
+def _frame_change(ports: Interface, numbers: Numbers) -> Primitive:
+    outer, inner = map(str, ports)
+    return components.frame_change(numbers["offset"], inner, outer)
+
+
+def _friction(ports: Interface, numbers: Numbers) -> Primitive:
+    return components.joint_friction(_pair(ports, "p_r"), np.array(numbers["mu"]))
+
+
+def _kinetic(ports: Interface, numbers: Numbers) -> Primitive:
+    return components.kinetic(numbers["mass"], np.array(numbers["inertia"]).reshape(3, 3), _group(ports))
+
+
+def _pair_spring(ports: Interface, numbers: Numbers) -> Primitive:
+    return components.pair_spring(_pair(ports, "q_r"), numbers["stiffness"], numbers["rest"])
+
+
+def _beam_damper(_ports: Interface, n: Numbers) -> Primitive:
+    return beam.beam_damper(n["length"], n["stiffness"], n["rest"], n["damping"])
+
+
+PARTS: tuple[Part, ...] = (
+    Part("beam_damper", "beam_damper", _beam_damper),
+    Part("beam_spring", "beam_spring", lambda _, n: beam.beam_spring(n["length"], n["stiffness"], n["rest"])),
+    Part("frame_change", "frame_change", _frame_change),
+    Part("gravity", "gravity", lambda ports, numbers: components.gravity(numbers["weight"], _group(ports))),
+    Part("ground", "ground", lambda ports, _: components.ground(next(iter(ports.values())).quantity)),
+    Part("holonomic", "holonomic", lambda ports, _: components.holonomic(_pair(ports, "q_r"))),
+    Part("joint_friction", "joint_friction", _friction),
+    Part("kinematic_coupling", "pkc", _coupling),
+    Part("kinetic", "kinetic", _kinetic),
+    Part("lie_poisson", "lie_poisson", lambda ports, _: components.lie_poisson(_group(ports))),
+    Part("no_potential", "no_potential", _no_potential),
+    Part("pair_spring", "pair_spring", _pair_spring),
+    Part("point_damper", "point_damper", lambda _, numbers: springs.point_damper(numbers["damping"])),
+    Part("point_spring", "point_spring", lambda _, n: springs.point_spring(n["stiffness"], n["length"])),
+    Part("thermal_node", "thermal_node", lambda _, n: components.thermal_node(n["capacity"], n["temperature"])),
+)

@@ -1,0 +1,320 @@
+"""The primitives of rigid-body mechanics: what the boxes of bodies, joints and springs are filled with.
+
+Each function makes one primitive from the one function that says what it is. Fibres are left-trivialised; 6-vectors are
+(angular, linear). Equations of Lohmayer, Capobianco, Leyendecker, sections 4 and 5.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from ephs.mechanics.elements import notation
+from ephs.operad import Directory, Path, PortType, Quantity, quantity
+from ephs.semantics import formulas, structures
+from ephs.semantics.bundle import Array
+from ephs.semantics.checks import STATEMENTS
+from ephs.semantics.derive.linear import Linear
+from ephs.semantics.errors import StructureError
+from ephs.semantics.forms import coupled, stored
+from ephs.semantics.primitives import Formula, Irreversible, Kernel, Point, Reversible, Storage, power_ports
+from ephs.semantics.spaces import SE3, Pair, codes, manifold
+from ephs.semantics.special import squared_turn
+from ephs.semantics.verdict import proved
+
+__all__ = [
+    "frame_change",
+    "gravity",
+    "ground",
+    "holonomic",
+    "joint_friction",
+    "joint_momentum",
+    "kinematic_coupling",
+    "kinetic",
+    "lie_poisson",
+    "no_potential",
+    "pair_spring",
+    "potential",
+    "relative",
+    "thermal_node",
+]
+
+HOLONOMIC = "ephs.mechanics.elements.holonomic_kernels"
+POSES = {"SE3": quantity.pose, "SO3xR3": quantity.direct_pose}
+MOMENTA = {"SE3": quantity.body_momentum, "SO3xR3": quantity.direct_momentum}
+
+
+def kinetic(mass: float, inertia: Array, group: str = "SE3") -> Storage:
+    """Kinetic energy ½⟨p|𝕀⁻¹p⟩ of a rigid body about its centre of mass; port p, its effort is the twist.
+
+    Parameters
+    ----------
+    mass, inertia
+        In kg; (3, 3) in kg m².
+    """
+    whole = np.zeros((6, 6))
+    whole[:3, :3] = inertia
+    whole[3:, 3:] = mass * np.eye(3)
+    inverse = np.linalg.inv(whole)
+    inverse = 0.5 * (inverse + inverse.T)
+    entries = (("mass", float(mass)), ("inertia", tuple(np.asarray(inertia, dtype=float).ravel().tolist())))
+    made = structures.quadratic("kinetic", power_ports(p=MOMENTA[group]), inverse, entries, trusted=True)
+    return replace(made, notation=notation.kinetic)
+
+
+def gravity(weight: Array, group: str = "SE3") -> Storage:
+    """Potential ⟨w|r⟩ of a constant force −w on the centre of mass; port q.
+
+    Parameters
+    ----------
+    weight
+        (3,) −m g in N, in world axes.
+    """
+    w = np.array(weight, dtype=float)
+    return stored(
+        "gravity",
+        power_ports(q=POSES[group]),
+        lambda q, weight: weight @ q[4:],
+        {"weight": w},
+        (("weight", tuple(w.tolist())),),
+        printed=False,
+        proof=lambda: proved("a pose is even; E reads the position alone, dE = (0, Rᵀ w)", *STATEMENTS["storage"]),
+        trusted=True,
+    )
+
+
+def potential(of: Quantity, port: str, energy: Callable[[Array], float], name: str = "potential") -> Storage:
+    """Any potential, from a Python function of the coordinates: of a pose the 7-vector, of a joint its coordinates."""
+    read = Pair.from_space(of.space).coordinates if of.kind == "relative_pose" else np.array
+    return stored(
+        name,
+        power_ports(**{port: of}),
+        lambda **x: energy(read(np.atleast_1d(x[port]))),
+        {},
+        (("energy", getattr(energy, "__name__", "function")),),
+        printed=False,
+    )
+
+
+@cache
+def no_potential(of: Quantity, port: str) -> Storage:
+    """No energy, yet the state is kept; port as named."""
+    n = of.space.dim
+    return Storage(
+        "no_potential",
+        power_ports(**{port: of}),
+        energy=lambda _x: 0.0,
+        gradient=lambda _x: np.zeros(n),
+        discrete_gradient=lambda _x, _v: np.zeros(n),
+        kernel=Kernel("", "no_effort", (), Linear("no_effort")),
+        notation=notation.nothing,
+        proof=lambda: proved("E = 0", *STATEMENTS["storage"]),
+        trusted=True,
+    )
+
+
+def pair_spring(of: Pair, stiffness: Array, rest: Array) -> Storage:
+    """Springs ½ k (coordinate − rest)² on the freedoms of a joint; port q_r.
+
+    Raises
+    ------
+    StructureError
+        A rotation vector whose stiffness is not isotropic, or whose rest is not zero.
+    """
+    k, zero = np.array(stiffness, dtype=float), np.array(rest, dtype=float)
+    if of.code in (codes.SO3, codes.SE3):
+        if np.ptp(k[:3]):
+            raise StructureError(
+                "parameter", of.name, key="stiffness", found=k.tolist(), expected="equal for rotations"
+            )
+        if np.any(zero[:3]):
+            raise StructureError("parameter", of.name, key="rest", found=zero.tolist(), expected="0 for rotations")
+
+    return stored(
+        "pair_spring",
+        power_ports(q_r=relative(of)),
+        lambda q_r: coordinate_energy(of, q_r, k, zero),
+        {},
+        (("stiffness", tuple(k.tolist())), ("rest", tuple(zero.tolist()))),
+        printed=False,
+        proof=lambda: proved(
+            "poses are even, coordinates are of the rotation itself; d(½ k c²) = k c dc, and d(½ θ²) = θ n",
+            *STATEMENTS["storage"],
+        ),
+        trusted=bool(np.all(np.isfinite(k)) and np.all(np.isfinite(zero))),
+    )
+
+
+def coordinate_energy(of: Pair, q: Any, stiffness: Array, rest: Array) -> Any:
+    """½ k (coordinate − rest)² of an element of a joint's group; of a rotation vector ½ k θ²."""
+    turns = of.code in (codes.SO3, codes.SE3)
+    rotation = 0.5 * stiffness[0] * squared_turn(q[:4]) if turns else 0.0
+    first, numbers = (3, q[4:]) if turns else (0, np.atleast_1d(q))
+    off = numbers - rest[first:]
+    return rotation + 0.5 * sum((k * each * each for k, each in zip(stiffness[first:], off, strict=True)), 0.0)
+
+
+@cache
+def kinematic_coupling(q: Quantity, p: Quantity, q_port: str, p_port: str) -> Reversible:
+    """q.f = −p.e, p.f = q.e, trivialised; ports as named."""
+    return structures.coupling("pkc", power_ports(**{q_port: q, p_port: p}), trusted=True)
+
+
+@cache
+def lie_poisson(group: str = "SE3") -> Reversible:
+    """Gyroscopic forces p.f = −ad*_{p.e} p.x; port p, whose state it reads."""
+    space = manifold(POSES[group].space)
+    units = [space.ad(unit) for unit in np.eye(6)]
+
+    def structure(p: Any) -> Any:
+        columns = [[-_product(column, p) for column in unit.T] for unit in units]
+        return np.array(columns).T, None
+
+    return coupled(
+        "lie_poisson",
+        power_ports(p=MOMENTA[group]),
+        structure,
+        reads=(Path.of("p"),),
+        label="lie_poisson" if group == "SE3" else "direct_lie_poisson",
+        notation=notation.lie_poisson,
+        trusted=True,
+    )
+
+
+def _product(row: Array, x: Any) -> Any:
+    """Σ rowᵢ xᵢ over the entries that are not zero."""
+    return sum((float(a) * b for a, b in zip(row, x, strict=True) if a), 0.0)
+
+
+def frame_change(offset: Array, inner: str, outer: str) -> Reversible:
+    """Momentum carried from a body's frame (port ``outer``) to a joint frame (port ``inner``) at a constant offset o.
+
+    inner.e = Ad_{o⁻¹} outer.e, outer.f = −Ad*_{o⁻¹} inner.f.
+    """
+    carried = SE3.adjoint(SE3.inverse(np.asarray(offset, dtype=float)))
+    interface = power_ports(**{outer: quantity.body_momentum, inner: quantity.body_momentum})
+    parameters = (("offset", tuple(np.asarray(offset, dtype=float).tolist())),)
+    constraint = np.hstack([-carried, np.eye(6)])
+    made = structures.constant_structure(
+        "frame_change", interface, np.zeros((12, 12)), constraint, parameters, trusted=True
+    )
+    return replace(made, notation=notation.frame_change)
+
+
+@cache
+def holonomic(of: Pair) -> Reversible:
+    """The joint's relation: f = C*λ, 0 = C e, C = [Ad_{I(q_r)⁻¹}, −1, B]; ports p_j1, p_j2, p_r, state port q_r.
+
+    λ is the wrench of body 1 on body 2 in the frame C2, p_r.e the twist of C2 relative to C1 in the axes of C2. Over a
+    step it holds on the group: q_1 o_1 I(q_r) = q_2 o_2 stays true exactly.
+    """
+    q_r = Path.of("q_r")
+    n, d = 12 + of.dim, of.dim
+    interface = Directory(
+        {
+            "p_j1": PortType(quantity.body_momentum, True),
+            "p_j2": PortType(quantity.body_momentum, True),
+            "p_r": PortType(joint_momentum(of), True),
+            "q_r": PortType(relative(of), False),
+        }
+    )
+
+    def constraint(pose: Array) -> Array:
+        return np.hstack([SE3.adjoint(SE3.inverse(pose)), -np.eye(6), of.basis])
+
+    def structure(x: Point) -> tuple[Array, Array]:
+        return np.zeros((n, n)), constraint(of.include(x[q_r]))
+
+    def discrete(h: float, x0: Point, v: Point, e: Array) -> tuple[Array, Array]:
+        middle = constraint(of.include(of.manifold.retract(x0[q_r], 0.5 * v[q_r])))
+        along = [-0.5 * h * e[6:12], 0.5 * h * of.basis @ e[12:], h * middle[:, :6] @ e[:6]]
+        if any(w[:3] @ w[:3] >= np.pi**2 for w in along):
+            raise StructureError("rotation", of.name)
+        side, half, inner = (SE3.exp(w) for w in along)
+        around = side
+        for factor in (half, inner, half, side):
+            around = SE3.compose(around, factor)
+        residual = SE3.log(around) / h
+        square = float(e @ e)
+        if square <= 1e-280:  # only to keep the quotient from overflowing
+            return middle, residual
+        return middle + np.outer(residual - middle @ e, e) / square, residual
+
+    kernel = Kernel(HOLONOMIC, "holonomic", (float(of.code), *of.basis.reshape(6, d).ravel().tolist()))
+    parameters = (("pair", of.name), *of.parameters)
+    return Reversible(
+        "holonomic",
+        interface,
+        structure,
+        (q_r,),
+        discrete,
+        parameters,
+        6,
+        kernel,
+        notation=notation.holonomic,
+        proof=lambda: proved(
+            "L = 0, all efforts are odd, q_r is even, and C is made of Ad of a pose, which is even in its quaternion",
+            *STATEMENTS["reversible"],
+        ),
+        trusted=True,
+    )
+
+
+def joint_friction(
+    of: Pair, mu: Array | Callable[[Array, Array, float], Array], name: str = "joint_friction"
+) -> Irreversible:
+    """Friction p_r.f = μ u_r of a joint, s.f = −μ(u_r, u_r)/θ; ports p_r, s.
+
+    Parameters
+    ----------
+    mu
+        (d, d) symmetric and non-negative, or a Python function of (coordinates, u_r, θ), which reads q_r.
+    """
+    ports = {"p_r": PortType(joint_momentum(of), True), "s": PortType(quantity.entropy, True)}
+    if not callable(mu):
+        matrix = np.array(mu, dtype=float).reshape(of.dim, of.dim)
+        entries = (("mu", tuple(matrix.ravel().tolist())),)
+        sound = bool(np.all(np.isfinite(matrix))) and _dissipates(matrix)
+        made = structures.dissipation(name, Directory(ports), matrix, parameters=entries, trusted=sound)
+        return replace(made, notation=notation.friction)
+    q_r = Path.of("q_r")
+    resistance = mu
+    ports["q_r"] = PortType(relative(of), False)
+    made = structures.dissipation(
+        name,
+        Directory(ports),
+        lambda x, u, theta: np.asarray(resistance(of.coordinates(x[q_r]), u, theta)).reshape(of.dim, of.dim),
+        parameters=(("mu", getattr(mu, "__name__", "function")),),
+    )
+    return replace(made, notation=notation.friction)
+
+
+def _dissipates(mu: Array) -> bool:
+    """Whether μ is exactly symmetric and certainly non-negative."""
+    return not mu.any() or (np.array_equal(mu, mu.T) and float(np.linalg.eigvalsh(mu)[0]) >= 0.0)
+
+
+@cache
+def ground(of: Quantity = quantity.body_momentum) -> Reversible:
+    """A frame that stands still: e = 0, f = λ; port p."""
+    n = of.space.dim
+    return structures.constant_structure("ground", power_ports(p=of), np.zeros((n, n)), np.eye(n))
+
+
+def thermal_node(capacity: float, temperature: float) -> Storage:
+    """Heat capacity C from temperature T₀ at s = 0: E = C T₀ (exp(s/C) − 1); port s. C in J/K, T₀ in K."""
+    entries = (("capacity", float(capacity)), ("temperature", float(temperature)))
+    formula = Formula(formulas.thermal_node, ("capacity", "temperature"), formulas.thermal_node_slope)
+    return structures.exponential("thermal_node", capacity * temperature, capacity, entries, formula)
+
+
+def relative(of: Pair) -> Quantity:
+    """The quantity of a joint's q_r."""
+    return quantity.relative_pose(of.name, **dict(of.parameters))
+
+
+def joint_momentum(of: Pair) -> Quantity:
+    """The quantity of a joint's p_r."""
+    return quantity.joint_momentum(of.name, **dict(of.parameters))

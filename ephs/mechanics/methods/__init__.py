@@ -1,0 +1,1 @@
+"""Methods in joint coordinates, and the registry of all methods by name."""

@@ -1,0 +1,99 @@
+"""The method that chooses by what it meets: explicit until steps are held back by stability, then implicit.
+
+Stiffness is what Hairer and Wanner test in DOPRI5 and DOP853: the last two stages of a step show how fast its fastest
+mode is, and a step that this holds at the limit of stability again and again serves stability, not accuracy.
+"""
+
+from typing import TYPE_CHECKING, Any, final
+
+from ephs.mechanics.methods.explicit import Explicit, tableau
+from ephs.mechanics.methods.method import ReducedMethod
+from ephs.mechanics.tree.equations.equations import Equations, ReducedState
+from ephs.solve.control import Control
+from ephs.solve.errors import SolveError
+from ephs.solve.loop import FINAL
+from ephs.solve.march.control import PATIENCE
+from ephs.solve.snapshot import Snapshot
+from ephs.solve.stepping import Attempt, Leg, Span
+
+if TYPE_CHECKING:
+    from ephs.mechanics.methods.radau import Implicit
+
+__all__ = ["Auto"]
+
+LIMITS = {"rk54": 3.25, "rk87": 6.1}
+"""h·|λ| at the limit of stability."""
+DIGITS = 1e-5
+"""Tolerances below this are for order 8."""
+
+
+@final
+class Auto(ReducedMethod):
+    """rk54 or rk87 by the tolerance, and radau from where the problem shows itself stiff."""
+
+    name = "auto"
+
+    def __init__(self, equations: Equations, control: Control) -> None:
+        super().__init__(equations, control)
+        name = "rk87" if control.rtol.value < DIGITS else "rk54"
+        self._explicit = Explicit(equations, control, tableau(name))
+        self._implicit: Implicit | None = None
+        self._held = self._free = self._failures = 0
+        self.name, self.exponent, self.share = name, self._explicit.exponent, self._explicit.share
+        self.counts: dict[str, Any] = {"chosen": name, "switches": []}
+
+    def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
+        """One step of h seconds."""
+        if self._implicit is not None:
+            found = self._implicit.step(state, h)
+            self.counts |= self._implicit.counts
+            return found
+        try:
+            found = self._explicit.step(state, h)
+        except SolveError as error:
+            self._failures += 1
+            if self._failures > PATIENCE and error.outcome not in FINAL:
+                self._switch(state.t, h, "its steps fail")
+            raise
+        if found.error <= 1.0:
+            self._failures = 0
+            if self._explicit.stiffness > LIMITS[self._explicit.name]:
+                self._held, self._free = self._held + 1, 0
+                if self._held == PATIENCE:
+                    self._switch(found.end.t, h, f"h·|λ| = {self._explicit.stiffness:.1f} holds its steps")
+            else:
+                self._free += 1
+                if self._free == 6:
+                    self._held = 0
+        return found
+
+    def many(self, span: Span[ReducedState]) -> Leg[ReducedState] | None:
+        """Explicit steps, many in one compiled call, until the problem shows itself stiff."""
+        return self._explicit.many(span, LIMITS[self._explicit.name], self._switch)
+
+    def _switch(self, t: float, h: float, reason: str) -> None:
+        self._go_implicit()
+        self.counts["switches"].append({"t": float(t), "to": "radau", "step": float(h), "reason": reason})
+
+    def _go_implicit(self) -> "Implicit":
+        from ephs.mechanics.methods.radau import Implicit  # with its derivatives, which explicit runs do not need
+
+        self._implicit = Implicit(self.equations, self.control)
+        self.exponent = self._implicit.exponent
+        self.name = f"{self._explicit.name}, radau"
+        return self._implicit
+
+    def taken(self, state: ReducedState) -> Snapshot:
+        """Memory of its present method, and its distance to a switch."""
+        return {
+            "explicit": self._explicit.taken(state),
+            "implicit": self._implicit.snapshot(state) if self._implicit is not None else None,
+            "nearness": [self._held, self._free, self._failures],
+        }
+
+    def take(self, own: Snapshot, state: ReducedState) -> None:
+        """Take along what `taken` said."""
+        self._explicit.take(own["explicit"], state)
+        if own["implicit"] is not None:
+            self._go_implicit().restore(own["implicit"], state)
+        self._held, self._free, self._failures = own["nearness"]

@@ -1,0 +1,335 @@
+"""Explicit Runge-Kutta methods on the reduced form: adaptive, loops projected back after each step.
+
+Steps of a mechanism on which nothing but given constants acts are taken many in one compiled call.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, final
+
+import numpy as np
+
+from ephs.mechanics.methods import tableaux as t
+from ephs.mechanics.methods.method import ReducedMethod
+from ephs.mechanics.tree.equations.equations import Equations, ReducedState
+from ephs.mechanics.tree.finding.naming import within
+from ephs.semantics.bundle import Array
+from ephs.solve.control import Control, Proportional
+from ephs.solve.errors import LARGEST, Outcome, SolveError
+from ephs.solve.march import STEPS, Ending, Status
+from ephs.solve.march import Control as Steering
+from ephs.solve.march.control import PATIENCE
+from ephs.solve.snapshot import Snapshot
+from ephs.solve.stepping import Attempt, Counts, Leg, Span
+
+__all__ = ["Explicit", "Tableau", "tableau"]
+
+ROWS = 1024
+"""Rows that are kept before they are handed over."""
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Tableau:
+    """The coefficients of an explicit method.
+
+    Attributes
+    ----------
+    arrays
+        By the names of `ephs.solve.march.Tableau`.
+    c
+        Its nodes.
+    exponent
+        The power of the step with which its estimate falls.
+    """
+
+    name: str
+    order: int
+    arrays: Mapping[str, Any]
+    c: Array
+    exponent: float
+
+    @property
+    def estimates(self) -> tuple[Array, ...]:
+        """(stages + 1,) weights of the estimates: of order 8 two."""
+        return tuple(self.arrays[name] for name in ("error", "coarse")[: self.order // 4])
+
+
+@cache
+def tableau(name: str) -> Tableau:
+    """The method rk54 or rk87."""
+    if name == "rk87":
+        arrays = {"a": _steps(t.A8, t.B8), "error": np.array(t.E8_5), "coarse": np.array(t.E8_3)}
+        return Tableau(name, 8, arrays | {"eighth": np.ones(1, dtype=np.int64)}, np.array(t.C8), 8.0)
+    arrays = {"a": _steps(t.A5, t.B5), "error": np.array(t.E5), "coarse": np.zeros(len(t.B5) + 1)}
+    return Tableau(name, 5, arrays | {"eighth": np.zeros(1, dtype=np.int64)}, np.array(t.C5), 5.0)
+
+
+def _steps(rows: tuple[tuple[float, ...], ...], last: tuple[float, ...]) -> Array:
+    out = np.zeros((len(rows) + 2, len(rows) + 1))
+    for i, row in enumerate((*rows, last), 1):
+        out[i, : len(row)] = row
+    return out
+
+
+@final
+class Explicit(ReducedMethod):
+    """The method of a tableau on one mechanism.
+
+    Attributes
+    ----------
+    stiffness
+        h·|λ| of the fastest mode, as the last step showed it.
+    rough
+        Elements of the last step's start and end, each where constraints nearly repeat each other: rates there carry
+        rounding over the least singular value, so that drift says nothing.
+    """
+
+    def __init__(self, equations: Equations, control: Control, method: Tableau) -> None:
+        super().__init__(equations, control)
+        self.method, self.name, self.exponent = method, method.name, method.exponent
+        self.share = 0.5
+        self._known: tuple[Array, Array] | None = None
+        self.stiffness = 0.0
+        self.rough: tuple[Array, ...] = ()
+
+    def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
+        """One step of h seconds."""
+        eq, scheme = self.equations, self.method.arrays
+        if self._known is None or self._known[0] is not state.q:
+            self._known = state.q, eq.rates(state.t, state.q, eq.vector(state))
+        y0, y1 = eq.vector(state), np.empty(eq.size)
+        k = np.zeros((scheme["a"].shape[0], eq.size))
+        k[0] = self._known[1]
+        before = eq.stages(state, scheme, self.method.c, h, y0, k, y1)
+        end = eq.state(state, y1, state.t + h)
+        allowed, steps = self.atol + self.rtol * eq.sizes(y0, y1), STEPS.compiled()
+        closed = eq.closed(end)
+        estimates = [eq.along(h * (weights @ k)[eq.counted]) for weights in self.method.estimates]
+        error = float(steps["measure"](estimates[0], np.array(estimates[-1]), allowed, scheme["eighth"]))
+        rough = any(q is state.q for q in self.rough)
+        if eq.engine.looped and not (rough or eq.careful):
+            error = max(error, float(steps["drift"](end.r, closed.r, allowed)))
+        self.rough = (*((state.q,) if rough else ()), *((closed.q,) if eq.careful else ()))
+        rise, run = (k[-1] - k[-2])[eq.counted], (y1 - before)[eq.counted]
+        self.stiffness = float(steps["stiffness"](rise, run, allowed, h))
+        if closed is end and closed.q is not state.q:  # nothing was projected: the last rates are the next first ones
+            first = k[-1].copy()
+            first[: eq.nv] = closed.r
+            self._known = closed.q, first
+        return Attempt(state, closed, h, error, eq.least(state, closed))
+
+    def taken(self, state: ReducedState) -> Snapshot:
+        """The rates at the state, where they are known, and how stiff the last step was."""
+        known = self._known[1] if self._known is not None and self._known[0] is state.q else None
+        return {"known": known, "stiffness": self.stiffness, "rough": any(q is state.q for q in self.rough)}
+
+    def take(self, own: Snapshot, state: ReducedState) -> None:
+        """Take along what `taken` said."""
+        self._known = None if own["known"] is None else (state.q, own["known"])
+        self.stiffness = own["stiffness"]
+        self.rough = (state.q,) if own["rough"] else ()
+
+    def many(
+        self, span: Span[ReducedState], limit: float = 0.0, left: Callable[[float, float, str], None] | None = None
+    ) -> Leg[ReducedState] | None:
+        """Takes many steps in one compiled call, where nothing has to be asked of Python at each.
+
+        Where stability, whose limit is h·|λ| = ``limit``, holds its steps back, it calls left(t, h, reason) and ends.
+        """
+        return _March(self, span, limit, left) if self.equations.constant else None
+
+
+@final
+class _March:
+    """One run in compiled steps. Times in it are counted from the start and grow."""
+
+    def __init__(
+        self,
+        method: Explicit,
+        span: Span[ReducedState],
+        limit: float,
+        left: Callable[[float, float, str], None] | None,
+    ) -> None:
+        eq, tableau = method.equations, method.method
+        self.method, self.span, self.left, self._leave = method, span, False, left
+        self._handed = 0
+        size, q, times = eq.size, span.state.q, span.save_at
+        rows = ROWS if times is None else max(times.size, 1)
+        self.times = np.zeros(0) if times is None else np.abs(times - span.t0)
+        stages, counted = tableau.arrays["a"].shape[0], method.atol.size
+        shapes: dict[str, tuple[int, ...]] = {
+            "k": (stages, size), "q1": (q.size,), "y1": (size,), "q2": (q.size,), "y2": (size,), "k2": (stages, size),
+            "last": (size,), "allowed": (counted,), "open": (eq.n,), "fine": (counted,), "coarse": (counted,),
+            "rows_t": (rows, 2), "rows_q": (rows, q.size), "rows_y": (rows, size - eq.nv),
+        }  # fmt: skip
+        self.memory = {name: np.zeros(shape) for name, shape in shapes.items()} | {
+            "q": np.array(q), "y": eq.vector(span.state), "atol": np.array(method.atol), "rtol": np.array(method.rtol),
+            "times": self.times,
+        }  # fmt: skip
+        self._control = Steering.table(1)
+        self._march = eq.engine.bind("march", tableau.arrays, self.memory, self._control, 0)
+        c, policy, control = self.control, span.policy, span.control
+        c.end, c.span, c.origin = span.until - span.t0, abs(span.until - span.t0), span.t0
+        c.step, c.least_step, c.most_step = span.h, control.least, control.most
+        c.before, c.shortest, c.least = 1e-4, np.inf, np.inf
+        c.exponent, c.share, c.damping, c.strict = method.exponent, method.share, 0.4, Proportional.STRICT
+        c.saved = -1 if times is None else span.saved
+        c.limit, c.grid = limit, 0.0 if policy else float(control.step or 0.0)
+
+    @property
+    def control(self) -> Any:
+        """Where the march stands, a record of `Steering`; its numbers are known here."""
+        return self._control[0]
+
+    def advance(self, steps: int) -> bool:
+        """Up to so many steps; whether the end is reached.
+
+        Raises
+        ------
+        SolveError
+            The steps get too short, or a state cannot be evaluated.
+        """
+        eq, c = self.method.equations, self.control
+        before, sound = c.evaluations, float(c.time)
+        found = int(self._march(steps))
+        eq.evaluations += c.evaluations - before
+        self._hold(sound)
+        self.method.stiffness = float(c.stiff)
+        if found == Ending.CAREFUL:
+            self._step()
+        elif found == Ending.STIFF and self._leave is not None:
+            failing = c.refusals > PATIENCE
+            reason = "its steps fail" if failing else f"h·|λ| = {c.stiff:.1f} holds its steps"
+            self._leave(self.time, float(c.step), reason)
+            self.left = True
+        elif found == Ending.SHORT:
+            raise SolveError(Outcome.TINY, "", f"{c.step:.3g} s")
+        elif found >= Ending.REFUSED:
+            self._refused(found - Ending.REFUSED)
+        return found == Ending.DONE
+
+    def _hold(self, sound: float) -> None:
+        """Give up the rows that left the range of numbers; ``sound``: the time before.
+
+        Raises
+        ------
+        SolveError
+            It names the joint.
+        """
+        eq, c, q, y = self.method.equations, self.control, self.memory["q"], self.memory["y"]
+        sizes = (np.abs(q), np.abs(y[eq.nv : eq.nv + eq.n + eq.ns]))
+        if all(size.max(initial=0.0) < LARGEST for size in sizes) and np.isfinite(y[eq.nv :]).all():
+            return
+        beyond = self._state(0.0, q, y[eq.nv :])
+        times, q, y = self.kept()
+        good = np.isfinite(y).all(axis=1)
+        good &= np.abs(np.hstack([q, y[:, : eq.n + eq.ns]])).max(axis=1, initial=0.0) < LARGEST
+        rows = int(np.argmin(good)) if not good.all() else good.size
+        c.rows, c.time = rows, times[rows - 1, 0] if rows else sound
+        within(eq.reduced, beyond.q, beyond.r, beyond.heats)
+        raise SolveError(Outcome.RANGE, "", "heat, work or entropy made")
+
+    def _refused(self, status: int) -> None:
+        eq = self.method.equations
+        if status == Status.OPEN:
+            residual = eq.dense.gaps(self.memory["q"], self.memory["y"][eq.nv : eq.nv + eq.n])[0]
+            raise eq.dense.opened(residual, float(np.abs(residual).max(initial=0.0)))
+        eq.refuse(status, eq.engine.failed)
+
+    def _step(self) -> None:
+        """One step with the careful elimination, where constraints nearly repeat each other."""
+        c, s, h = self.control, self.memory, float(self.control.tried)
+        state, eq, grid = self.state, self.method.equations, float(c.grid)
+        sign, latest = self._sign, max(abs(state.t), abs(self.span.until))
+        self.method.rough = (state.q,) if c.rough else ()
+        try:
+            attempt = self.method.step(state, sign * h)
+        except SolveError as error:
+            if grid:
+                raise
+            c.step, c.rejected = 0.25 * h, c.rejected + 1
+            self.span.control.allowed(float(c.step), latest, error)
+            return
+        if not (grid or STEPS.compiled()["judge"](self._control, h, attempt.error)):
+            c.rejected += 1
+            self.span.control.allowed(float(c.step), latest, None)
+            return
+        now, whole = float(c.time), float(abs(c.end))
+        after = whole if h >= whole - now else now + h
+        wanted = [(after, attempt.end)]
+        if c.saved >= 0:
+            last = int(np.searchsorted(self.times, after, side="right"))
+            wanted = [
+                (when, attempt.end if when == after else self.method.inside(attempt, state.t + sign * (when - now)))
+                for when in self.times[c.saved : last].tolist()
+            ]
+            c.saved = last
+        for when, found in wanted:
+            s["rows_t"][c.rows] = when, attempt.least
+            s["rows_q"][c.rows], s["rows_y"][c.rows] = found.q, eq.vector(found)[eq.nv :]
+            c.rows += 1
+        s["q"][:], s["y"][:] = attempt.end.q, eq.vector(attempt.end)
+        c.time, c.steps, c.fresh, c.rough = after, c.steps + 1, 0, int(eq.careful)
+        c.shortest, c.longest = min(c.shortest, h), max(c.longest, h)
+        c.least = min(c.least, attempt.least)
+
+    @property
+    def _sign(self) -> float:
+        return 1.0 if self.control.end >= 0.0 else -1.0
+
+    @property
+    def time(self) -> float:
+        """The time reached."""
+        done = self.control.time >= abs(self.control.end)
+        return self.span.until if done else self.span.t0 + self._sign * float(self.control.time)
+
+    @property
+    def state(self) -> ReducedState:
+        """The state reached."""
+        return self._state(self.time, self.memory["q"], self.memory["y"][self.method.equations.nv :])
+
+    def _state(self, t: float, q: Array, rest: Array) -> ReducedState:
+        n, ns = self.method.equations.n, self.method.equations.ns
+        return ReducedState(t, q.copy(), rest[:n].copy(), rest[n : n + ns].copy(), rest[n + ns :].copy())
+
+    def rows(self) -> list[tuple[float, ReducedState, float]]:
+        """Records since the last call: time, state, the step's least production."""
+        end = abs(float(self.control.end))
+        out: list[tuple[float, ReducedState, float]] = []
+        for row, (times, q, y) in enumerate(zip(*self.kept(), strict=True)):
+            passed, least = times.tolist()
+            t = self.span.until if passed == end else self.span.t0 + self._sign * passed
+            if self.span.save_at is not None:
+                t = float(self.span.save_at[self.span.saved + self._handed + row])
+            out.append((t, self._state(t, q, y), least))
+        self._handed += len(out)
+        self.control.rows = 0
+        return out
+
+    def kept(self) -> tuple[Array, Array, Array]:
+        """The rows that `rows` would hand over: (n, 2) time from the start and least production, (n, ·) elements, and
+        (n, ·) rates, entropies and books; views of the memory."""
+        count, memory = int(self.control.rows), self.memory
+        return memory["rows_t"][:count], memory["rows_q"][:count], memory["rows_y"][:count]
+
+    def snapshot(self) -> Snapshot:
+        """Where it stands: the state, the rates there, and what chooses the steps."""
+        return dict(self._taken())
+
+    def _taken(self) -> list[tuple[str, Any]]:
+        (counts, control), s = self._control.arrays, self.memory
+        parts = control, counts, s["q"], s["y"], s["k"][0]
+        return list(zip(("control", "counts", "q", "y", "rates"), parts, strict=True))
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go on from a snapshot."""
+        for name, array in self._taken():
+            array[:] = snapshot[name]
+
+    @property
+    def counts(self) -> Counts:
+        """Statistics so far."""
+        c = self.control
+        return Counts(c.steps, c.rejected, float(c.shortest), float(c.longest), float(c.least), float(c.step))

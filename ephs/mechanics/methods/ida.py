@@ -1,0 +1,131 @@
+"""IDA of SUNDIALS on the reduced form: an independent integrator, to check the others against.
+
+Its unknowns are the increments from a base that is moved, with the loops closed, where they have grown or a loop has
+opened by rounding; each move starts IDA anew, at order 1. Needs the package scikit-sundae.
+"""
+
+import os
+from collections.abc import Generator
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any, final
+
+import numpy as np
+
+from ephs.mechanics.methods.method import ReducedMethod
+from ephs.mechanics.tree.equations.equations import Equations, ReducedState
+from ephs.semantics.bundle import Array
+from ephs.solve.control import Control
+from ephs.solve.errors import OptionError, Outcome, SolveError
+from ephs.solve.stepping import Attempt
+
+__all__ = ["Ida"]
+
+LOG = "SUNLOGGER_ERROR_FILENAME"
+"""Where SUNDIALS writes errors to, if not to stderr: an environment variable, read when a solver is made."""
+FAR = 1.5
+"""Increments beyond this on a group ask for another base, in rad or m."""
+OPEN = 10.0
+"""Loops open by more than this, relative to the tolerance, ask for another base."""
+PART = 1e-2
+"""IDA's share of the tolerances: it keeps them a step, and its many steps' errors add up."""
+
+
+@final
+class Ida(ReducedMethod):
+    """The integrator on one mechanism. It takes its own steps, at most as long as the loop proposes."""
+
+    name = "ida"
+    exponent = 5.0
+
+    def __init__(self, equations: Equations, control: Control) -> None:
+        try:
+            from sksundae.ida import IDA
+        except ImportError as error:
+            raise OptionError("method", "ida", "another, or ephs[ida] installed, which brings scikit-sundae") from error
+        super().__init__(equations, control)
+        self._make: Any = IDA
+        self._failure: SolveError | None = None
+        self._base: ReducedState | None = None
+        self._last: Array | None = None
+        self._y = np.zeros(equations.size)
+        self._solver: Any = None
+        self.counts = {"restarts": 0}
+
+    def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
+        """One of IDA's steps, h seconds or less."""
+        if self._last is not state.q or self._base is None:
+            self._restart(state)
+        base, self._failure = self._base, None
+        assert base is not None
+        self._base = None  # until this step is taken: the solver cannot go back
+        try:
+            found = self._solver.step(state.t + h - base.t, method="onestep", tstop=state.t + h - base.t)
+        except RuntimeError as error:
+            raise self._failure or SolveError(Outcome.DIVERGED, "", f"IDA: {error}") from error
+        if not found.success:
+            if self._failure is not None:
+                raise self._failure
+            raise SolveError(Outcome.DIVERGED, "", f"IDA: {found.message}")
+        t, y = float(np.ravel(found.t)[-1]) + base.t, np.array(found.y[-1] if found.y.ndim > 1 else found.y)
+        if t == state.t:
+            raise self._failure or SolveError(Outcome.TINY, "", "IDA's step")
+        return self._attempt(state, base, y, t)
+
+    def inside(self, attempt: Attempt[ReducedState], t: float) -> ReducedState:
+        """The state at a time within a step, by a run of its own from the step's start."""
+        own = Ida(self.equations, self.control)
+        state = attempt.start
+        while state.t != t:
+            state = own.step(state, t - state.t).end
+        return state
+
+    def _attempt(self, state: ReducedState, base: ReducedState, y: Array, t: float) -> Attempt[ReducedState]:
+        eq = self.equations
+        made = slice(eq.size - len(eq.reduced.made), eq.size)
+        passed, self._y = y[made] - self._y[made], y.copy()
+        y[made] = state.books[2:] + passed
+        free = eq.state(replace(state, q=base.q), y, t)
+        closed = eq.closed(free)
+        moved = float(np.abs(eq.gaps(free.q, free.r)[0]).max(initial=0.0)) if closed is not free else 0.0
+        self._last = closed.q
+        if np.max(np.abs(y[eq.curved]), initial=0.0) <= FAR and moved <= OPEN * float(np.min(self.rtol)):
+            self._base = base
+        return Attempt(state, closed, t - state.t, 0.0, eq.least(state, closed))
+
+    def _restart(self, state: ReducedState) -> None:
+        eq = self.equations
+        self._base = state
+        self.counts["restarts"] += 1
+        y0 = self._y = eq.vector(state)
+        rtol = PART * float(np.min(self.rtol, initial=1.0))
+        atol = np.full(y0.size, PART * float(np.min(self.atol, initial=1.0)))
+        atol[eq.nv + eq.n :] *= eq.model.reference.temperature  # J, of J/K
+        self._failure = None
+
+        def residual(t: float, y: Array, yp: Array, out: Array) -> None:
+            try:
+                out[:] = yp - eq.rates(state.t + t, state.q, np.asarray(y))
+            except SolveError as error:
+                self._failure = error
+                out[:] = np.nan
+
+        first = eq.rates(state.t, state.q, y0)
+        with _unlogged():
+            self._solver = self._make(
+                residual, rtol=max(rtol, 1e-14), atol=np.maximum(atol, 1e-15), max_num_steps=100000
+            )
+            self._solver.init_step(0.0, y0, first)
+
+
+@contextmanager
+def _unlogged() -> Generator[None, None, None]:
+    """SUNDIALS made here writes no errors to stderr, which it would beside those that are raised."""
+    if LOG in os.environ:
+        yield
+        return
+    os.environ[LOG] = os.devnull
+    try:
+        yield
+    finally:
+        del os.environ[LOG]

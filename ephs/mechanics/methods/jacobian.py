@@ -1,0 +1,103 @@
+"""The Jacobian of the reduced form, exact, and kept while it serves."""
+
+from dataclasses import replace
+from typing import Any, final
+
+import numpy as np
+
+from ephs.mechanics.tree.equations.equations import Equations, ReducedState
+from ephs.mechanics.tree.equations.tangent import Linearised
+from ephs.mechanics.tree.finding.tables import SPRING
+from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.codes import VECTOR
+from ephs.solve.snapshot import Snapshot, like, parts
+
+__all__ = ["Jacobian"]
+
+RELATIVE = 2e-8
+"""Of the differences by which inputs that are Python functions of the state are differentiated."""
+
+
+@final
+class Jacobian:
+    """∂ẏ/∂y of y = (v, r, heats) at v = 0: by tangents; of inputs that are functions, by differences of their values.
+
+    With ``counts`` the matrices are counted there, as ``jacobians``.
+    """
+
+    def __init__(self, equations: Equations, counts: dict[str, Any] | None = None) -> None:
+        self.equations = equations
+        self.size = equations.nv + equations.n + equations.ns
+        self._counts = {} if counts is None else counts
+        self._counts["jacobians"] = 0
+        self._linear = Linearised(equations)
+        self._at: ReducedState | None = None
+        self._value = np.zeros((self.size, self.size))
+
+    def fresh(self, state: ReducedState) -> bool:
+        """Whether the matrix was made at this state."""
+        return self._at is not None and self._at.q is state.q
+
+    def at(self, state: ReducedState, *, renew: bool = False) -> Array:
+        """The matrix (size, size), made anew where asked for or where there is none.
+
+        Raises
+        ------
+        SolveError
+            A component cannot be evaluated there, or the mass matrix is singular.
+        """
+        if self._at is not None and not renew:
+            return self._value
+        eq, linear = self.equations, self._linear
+        n, nv = eq.n, eq.nv
+        s, warmth = eq.heats.entropies(state.heats), eq.heats.temperatures(state.heats)
+        eq.load(state.t, state.q, state.r, state.heats)
+        linear.forward(state.q, state.r, s)
+        columns = linear.columns(solve=True, fit=False)
+        rates = np.concatenate([state.r, linear.cut_rates])
+        value = np.zeros((self.size, self.size))
+        value[:n, nv : nv + n] = np.eye(n)
+        value[n:nv], value[nv : nv + n], value[nv + n :] = columns[n:nv], columns[:n], columns[nv:]
+        heat = slice(nv + n, self.size)  # of entropies so far: ds = dE/θ, and Ė = θ ṡ
+        value[:, heat] /= warmth
+        value[heat] *= warmth[:, None]
+        value[heat, heat] += np.diag(linear.entropy_rates * eq.heats.slopes())
+        if not eq.problem.constant:
+            value[nv : nv + n] += self._inputs(state)
+        t = eq.reduced.tables
+        for i, edge in enumerate(eq.reduced.edges):
+            if t.kind[i] != SPRING and t.code[i] != VECTOR:  # v̇ = dexp⁻¹(v) r turns with v: r + ½ [v, r] + …
+                where = slice(int(t.r_at[i]), int(t.r_at[i] + t.dim[i]))
+                value[where, where] -= 0.5 * edge.pair.manifold.ad(rates[where])
+        self._value, self._at = value, state
+        self._counts["jacobians"] += 1
+        return value
+
+    def snapshot(self, state: ReducedState) -> Snapshot:
+        """Where the matrix was made, and whether that is at ``state``."""
+        return {"made": parts(self._at), "fresh": self.fresh(state)}
+
+    def restore(self, snapshot: Snapshot, state: ReducedState) -> None:
+        """Make the matrix where it was made."""
+        self._at, found = None, snapshot["made"]
+        if found is not None:
+            made = like(state, found)
+            self.at(replace(made, q=state.q) if snapshot["fresh"] else made)
+
+    def _inputs(self, state: ReducedState) -> Array:
+        """(n, size) what the inputs' dependence on the state adds to ∂ṙ/∂y."""
+        eq = self.equations
+        y = eq.vector(state)[: self.size]
+        middle = eq.drive.copy(), eq.wrench.copy()
+        changes: list[tuple[Array, Array]] = []
+        for j in range(self.size):
+            moved = y.copy()
+            moved[j] += RELATIVE * max(1.0, abs(y[j]))
+            v, r, heats = np.split(moved, [eq.nv, eq.nv + eq.n])
+            eq.load(state.t, eq.advance(state.q, v), r, heats)
+            by = moved[j] - y[j]
+            changes.append(((eq.drive - middle[0]) / by, (eq.wrench - middle[1]) / by))
+        eq.drive[:], eq.wrench[:] = middle
+        self._linear.forward(state.q, state.r, eq.heats.entropies(state.heats))
+        drive, wrench = (np.moveaxis(np.array(parts), 0, -1) for parts in zip(*changes, strict=True))
+        return self._linear.pushed(drive, wrench)

@@ -1,0 +1,125 @@
+"""Base of the methods on the reduced form: a step, and the contract of the time loop around it."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+from ephs.mechanics.tree.equations.equations import Equations, ReducedState
+from ephs.solve.control import Control
+from ephs.solve.errors import SolveError
+from ephs.solve.snapshot import Snapshot
+from ephs.solve.stepping import Attempt, Leg, Row, Span
+
+__all__ = ["ReducedMethod"]
+
+HALVINGS = 4
+"""Number of halvings of a failing part of a step whose whole succeeded."""
+
+
+class ReducedMethod(ABC):
+    """A method on a mechanism in joint coordinates; one's own has to say `step`.
+
+    Parameters
+    ----------
+    equations
+        The mechanism.
+    control
+        Tolerances and limits.
+
+    Attributes
+    ----------
+    name
+        What the registry calls it.
+    exponent
+        The power of the step with which its estimate of the error falls.
+    share
+        How a step's part of the tolerance depends on its length, see `Proportional`.
+    counts
+        Its own counts, for the solution's statistics.
+    """
+
+    name: str
+    exponent: float
+    share: float = 0.0
+
+    def __init__(self, equations: Equations, control: Control) -> None:
+        self.equations, self.control = equations, control
+        self.rtol, self.atol = equations.allowed(control.rtol, control.atol)
+        self.counts: dict[str, Any] = {}
+
+    @abstractmethod
+    def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
+        """One step of h seconds, which may be negative.
+
+        Raises
+        ------
+        SolveError
+            The step has no solution.
+        """
+
+    def start(self, t: float, h: float) -> ReducedState:
+        """The initial state with its loops closed."""
+        return self.equations.start(t)
+
+    def prepare(self, state: ReducedState, h: float) -> None:
+        """Compile what is not in the cache, before time counts."""
+        self.equations.prepare(state)
+
+    def many(self, span: Span[ReducedState]) -> Leg[ReducedState] | None:
+        """None: one step a call."""
+        return None
+
+    def inside(self, attempt: Attempt[ReducedState], t: float) -> ReducedState:
+        """A shorter step from the same start, or several where that fails or errs: dense output of full order."""
+        return self._part(attempt.start, t - attempt.start.t, HALVINGS)
+
+    def _part(self, state: ReducedState, h: float, halvings: int) -> ReducedState:
+        found = None
+        try:
+            found = self.step(state, h)
+        except SolveError:
+            if not halvings:
+                raise
+        if found is not None and not (halvings and found.error > 1.0 and self.control.step is None):
+            return found.end
+        middle = self._part(state, 0.5 * h, halvings - 1)
+        return self._part(middle, 0.5 * h, halvings - 1)
+
+    def at(self, state: ReducedState, t: float) -> ReducedState:
+        """The same state at a time that differs by rounding."""
+        return replace(state, t=t)
+
+    def anew(self, state: ReducedState) -> ReducedState:
+        """The same state as one to start from: without memory, and none that a method has met before."""
+        return replace(state, q=state.q.copy(), memory=())
+
+    def row(self, state: ReducedState) -> Row:
+        """Record of a state."""
+        return self.equations.row(state)
+
+    def rows(self, states: Sequence[ReducedState]) -> list[Row]:
+        """Records of many states."""
+        return self.equations.rows_of(states)
+
+    def stats(self) -> dict[str, Any]:
+        """Counts, for the solution's statistics."""
+        return self.equations.stats() | self.counts
+
+    def snapshot(self, state: ReducedState) -> Snapshot | None:
+        """Memory from step to step besides the state, with its counts; None where it is unknown."""
+        own = self.taken(state)
+        return None if own is None else {"own": own, "counts": self.counts, "evaluations": self.equations.evaluations}
+
+    def restore(self, snapshot: Snapshot, state: ReducedState) -> None:
+        """Go on from a snapshot."""
+        self.take(snapshot["own"], state)
+        self.counts.update(snapshot["counts"])
+        self.equations.evaluations = snapshot["evaluations"]
+
+    def taken(self, state: ReducedState) -> Snapshot | None:
+        """None: a method of one's own that can be resumed says what it takes along, be it nothing: an empty mapping."""
+        return None
+
+    def take(self, own: Snapshot, state: ReducedState) -> None:  # noqa: B027 - of a method that takes nothing along
+        """Take along what `taken` said."""

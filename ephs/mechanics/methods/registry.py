@@ -1,0 +1,306 @@
+"""The methods by name: what each is, whom it serves, and how it is made for a problem."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, final
+
+from ephs.mechanics.tree.finding.frames import Unplaced
+from ephs.semantics.spaces import manifold
+from ephs.semantics.spaces.codes import VECTOR
+from ephs.solve.control import Control, Policy, Proportional, Symmetric
+from ephs.solve.errors import OptionError, nearest_of
+from ephs.solve.methods.driven import ComponentMethod
+from ephs.solve.methods.natural import Natural
+from ephs.solve.model import Model, compile_model
+from ephs.solve.problem import Problem
+from ephs.solve.stepping import Stepper
+
+__all__ = ["METHODS", "Method", "Setting", "on_joints", "register_method"]
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Setting:
+    """Class of problems of a method.
+
+    Parameters
+    ----------
+    t0
+        The start in s.
+    control
+        Tolerances and limits; without ``control.step`` the method has to choose its steps.
+    options
+        The method's own, by name.
+    equations
+        The reduced form of the problem, where it is there already.
+    method
+        Name of the method, for messages.
+    """
+
+    problem: Problem
+    t0: float
+    control: Control
+    options: Mapping[str, Any]
+    equations: Any = None
+    method: str = ""
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Method:
+    """Properties of a method for its choice, and its constructor.
+
+    Parameters
+    ----------
+    order
+        With which power of the step its error falls.
+    adaptive, fixed
+        Whether it runs by rtol and atol, and with a constant step.
+    systems, scenes
+        Whether it solves any System; and mechanisms: scenes, and systems that have joint coordinates.
+    summary
+        In words.
+    make
+        The method for a setting, and what chooses its steps: None where they are constant.
+    options
+        Names of the options that it takes.
+    many
+        Makes, for a compiled model, what takes many constant steps in one compiled call; None where there is no such.
+    forms
+        Forms of the equations that it takes besides the least, which is what ``"reduced"`` asks for.
+    lawful
+        Whether every step keeps the energy balance to rounding, whatever its length.
+    undamped
+        Of a method that damps nothing at infinity: makes, for a compiled model, what estimates the error of its
+        constant steps; None of others.
+    """
+
+    name: str
+    order: int
+    adaptive: bool
+    fixed: bool
+    systems: bool
+    scenes: bool
+    summary: str
+    make: Callable[[Setting], tuple[Stepper[Any], Policy | None]]
+    options: tuple[str, ...] = ()
+    many: Callable[[Model], ComponentMethod] | None = None
+    forms: tuple[str, ...] = ()
+    lawful: bool = False
+    undamped: Callable[[Model], ComponentMethod] | None = None
+
+
+def on_joints(make: Callable[..., Any]) -> Callable[[Setting], tuple[Stepper[Any], Policy | None]]:
+    """Constructor of a method on the reduced form of a problem, from ``make(equations, control, **options)``.
+
+    Its steps follow proportional-integral control by its ``exponent`` and its ``share``.
+    """
+
+    def made(setting: Setting) -> tuple[Stepper[Any], Policy | None]:
+        from ephs.mechanics.tree.equations.equations import Equations  # its kernels take a quarter of a second to load
+
+        try:
+            equations = setting.equations or Equations(setting.problem, setting.t0)
+        except Unplaced as error:
+            serving = ", ".join(m.name for m in METHODS.values() if m.systems and m.name != setting.method)
+            raise OptionError("method", setting.method, f"{serving}: {error}") from None
+        stepper = make(equations, setting.control, **setting.options)
+        return stepper, None if setting.control.step is not None else Proportional(
+            lambda: stepper.exponent, stepper.share
+        )
+
+    return made
+
+
+def _tableau(name: str) -> Callable[..., Any]:
+    def make(equations: Any, control: Control) -> Any:
+        from ephs.mechanics.methods.explicit import Explicit, tableau
+
+        return Explicit(equations, control, tableau(name))
+
+    return make
+
+
+def _alpha(equations: Any, control: Control, **options: Any) -> Any:
+    from ephs.mechanics.methods.alpha import Alpha
+
+    return Alpha(equations, control, **options)
+
+
+def _implicit(equations: Any, control: Control) -> Any:
+    from ephs.mechanics.methods.radau import Implicit
+
+    return Implicit(equations, control)
+
+
+def _variational(equations: Any, control: Control) -> Any:
+    from ephs.mechanics.methods.variational import Variational
+
+    return Variational(equations, control)
+
+
+def _ida(equations: Any, control: Control) -> Any:
+    from ephs.mechanics.methods.ida import Ida
+
+    return Ida(equations, control)
+
+
+def _auto(equations: Any, control: Control) -> Any:
+    from ephs.mechanics.methods.auto import Auto
+
+    return Auto(equations, control)
+
+
+def _component_wise(
+    make: Callable[[Model], ComponentMethod],
+) -> Callable[[Setting], tuple[Stepper[Any], Policy | None]]:
+    def made(setting: Setting) -> tuple[Stepper[Any], Policy | None]:
+        from ephs.solve.methods.paced import Paced
+
+        problem = setting.problem
+        model = compile_model(problem.descriptor, problem.reference, problem.inputs(setting.t0, problem.initial))
+        method, free = make(model), setting.control.step is None
+        return Paced(problem, method, setting.control, doubled=free), Symmetric(method.order + 1.0) if free else None
+
+    return made
+
+
+def _of_order_4(model: Model) -> ComponentMethod:
+    from ephs.solve.methods.natural4 import Natural4
+
+    return Natural4(model)
+
+
+def _radau(setting: Setting) -> tuple[Stepper[Any], Policy | None]:
+    if setting.problem.scene is not None or not _flat(setting.problem):
+        return on_joints(_implicit)(setting)
+    from ephs.solve.methods.radau import Radau
+
+    stepper = Radau(setting.problem, setting.t0, setting.control)
+    return stepper, None if setting.control.step is not None else Proportional(lambda: stepper.exponent)
+
+
+METHODS: dict[str, Method] = {}
+"""The methods that there are."""
+
+
+def register_method(method: Method) -> None:
+    """Make a method known to `simulate` by its name.
+
+    Raises
+    ------
+    OptionError
+        The name is taken, or it neither chooses its steps nor takes constant ones.
+    """
+    if method.name in METHODS or method.name == "auto":
+        raise OptionError("method", method.name, "a name that is not taken")
+    if not (method.adaptive or method.fixed) or not (method.systems or method.scenes):
+        raise OptionError("method", method.name, "steps chosen or constant, systems or scenes")
+    METHODS[method.name] = method
+
+
+for _method in (
+    Method(
+        "natural",
+        2,
+        True,
+        True,
+        True,
+        True,
+        "balances and positions of joints exact, any system",
+        _component_wise(Natural),
+        many=Natural,
+        forms=("paper", "folded"),
+        lawful=True,
+        undamped=Natural,
+    ),
+    Method(
+        "natural4",
+        4,
+        True,
+        True,
+        True,
+        True,
+        "the same of order 4",
+        _component_wise(_of_order_4),
+        many=_of_order_4,
+        forms=("paper", "folded"),
+        lawful=True,
+        undamped=_of_order_4,
+    ),
+    Method(
+        "variational",
+        2,
+        False,
+        True,
+        False,
+        True,
+        "symplectic, momentum maps exact",
+        on_joints(_variational),
+        undamped=Natural,
+    ),
+    Method("radau", 5, True, True, True, True, "Radau IIA, stiff", _radau),
+    Method("alpha", 2, True, True, False, True, "generalised-α, damps what is fast", on_joints(_alpha), ("rho",)),
+    Method("rk54", 5, True, True, False, True, "Dormand and Prince, explicit", on_joints(_tableau("rk54"))),
+    Method(
+        "rk87", 8, True, True, False, True, "Dormand and Prince, explicit, many digits", on_joints(_tableau("rk87"))
+    ),
+    Method("ida", 5, True, False, False, True, "IDA of SUNDIALS, an independent check", on_joints(_ida)),
+):
+    register_method(_method)
+
+
+def _for_scenes(setting: Setting) -> tuple[Stepper[Any], Policy | None]:
+    try:
+        return on_joints(_auto)(setting)
+    except OptionError:  # joints that the reduced form cannot have, such as loops of prescribed ones
+        return METHODS["natural"].make(setting)
+
+
+AUTO = Method("auto", 8, True, False, False, True, "rk54 or rk87, radau where stiff", _for_scenes)
+"""Method behind `auto` for mechanisms in joint coordinates."""
+
+
+def chosen(name: str | Method, problem: Problem, *, step: float | None) -> tuple[Method, str]:
+    """The method of a name, and why where the name is ``auto``; a method that is given as a value is itself.
+
+    Raises
+    ------
+    OptionError
+        There is no such method, or it does not serve this problem.
+    """
+    if name == "auto":
+        return _for_all(problem, step)
+    if not isinstance(name, Method) and name not in METHODS:
+        known = ("auto", *METHODS)
+        raise OptionError("method", name, f"one of {', '.join(known)}" + nearest_of(name, known))
+    method = name if isinstance(name, Method) else METHODS[name]
+    name = method.name
+    if problem.scene is not None and not method.scenes:
+        raise OptionError("method", name, f"{', '.join(m.name for m in METHODS.values() if m.scenes)} for a scene")
+    if step is not None and not method.fixed:
+        raise OptionError("step", step, f"none: {name} chooses its steps")
+    if step is None and not method.adaptive:
+        raise OptionError("step", step, f"a number of seconds: {name} takes constant steps")
+    return method, ""
+
+
+def _for_all(problem: Problem, step: float | None) -> tuple[Method, str]:
+    if step is not None:
+        return METHODS["natural"], "a constant step is given"
+    if problem.scene is not None:
+        return AUTO, "a scene without a constant step"
+    if _flat(problem):
+        return METHODS["radau"], "a system on vector spaces without a constant step"
+    from ephs.mechanics.tree.finding.parts import parts_of
+
+    try:
+        parts_of(problem)
+    except Unplaced as error:
+        return METHODS["natural4"], f"a system on Lie groups without a constant step, where {error}"
+    return AUTO, "a mechanism without a constant step"
+
+
+def _flat(problem: Problem) -> bool:
+    """Whether all states lie in vector spaces."""
+    return all(manifold(slot.quantity.space).code == VECTOR for slot in problem.descriptor.states)

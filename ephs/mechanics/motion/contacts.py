@@ -1,0 +1,119 @@
+"""Contacts of a motion: gaps, forces, slip and heat at all instants, and the wrenches on bodies."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, final
+
+import numpy as np
+
+from ephs.mechanics.elements.contact import lever, losses
+from ephs.mechanics.motion.batch import adjoint_inverse, compose, inverse, turned
+from ephs.mechanics.motion.loads import Read
+from ephs.mechanics.scene.build import contact_points
+from ephs.mechanics.scene.model import GROUND, Scene
+from ephs.mechanics.scene.surfaces import Contact
+from ephs.mechanics.shapes.gap import ramp
+from ephs.mechanics.shapes.pairs import Touch
+from ephs.semantics.bundle import Array
+
+__all__ = ["ContactMotion", "contact_motion", "contact_wrenches"]
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class ContactMotion:
+    """A contact of two surfaces.
+
+    Parameters
+    ----------
+    gap
+        (n,) least gap of its points in m, negative where the surfaces overlap.
+    force
+        (n, 3) on the second body, in N and world axes.
+    slip
+        (n,) largest velocity of a touching point along the surfaces in m/s; 0 where none touches.
+    heat
+        (n,) power in W that it turns into heat.
+    """
+
+    gap: Array
+    force: Array
+    slip: Array
+    heat: Array
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class _Point:
+    """One point of a contact: what `ContactMotion` says, and wrenches (n, 6) on bodies 1 and 2 in their frames."""
+
+    gap: Array
+    force: Array
+    slip: Array
+    heat: Array
+    wrenches: tuple[Array, Array]
+
+
+def contact_motion(scene: Scene, of: Contact, read: Read) -> ContactMotion:
+    """Read a contact's motion."""
+    points = [point for _, point in _points(scene, of, read)]
+    return ContactMotion(
+        np.min([point.gap for point in points], axis=0),
+        np.sum([point.force for point in points], axis=0),
+        np.max([point.slip for point in points], axis=0),
+        np.sum([point.heat for point in points], axis=0),
+    )
+
+
+def contact_wrenches(scene: Scene, read: Read) -> Iterator[tuple[str, Array]]:
+    """Wrenches (n, 6) of all contacts on bodies, in the bodies' frames."""
+    for _, contact in scene.all_contacts():
+        for bodies, point in _points(scene, contact, read):
+            for name, wrench in zip(bodies, point.wrenches, strict=True):
+                if name != GROUND:
+                    yield name, wrench
+
+
+def _points(scene: Scene, of: Contact, read: Read) -> Iterator[tuple[tuple[str, str], _Point]]:
+    bodies, touches = contact_points(scene, of)
+    for touch in touches:
+        yield bodies, _point(bodies, touch, of, read)
+
+
+def _point(bodies: tuple[str, str], touch: Touch, of: Contact, read: Read) -> _Point:
+    frame1, frame2, gap = touch
+    poses = [read.poses(name) for name in bodies]
+    ends = [compose(pose, np.broadcast_to(o, pose.shape)) for pose, o in zip(poses, (frame1, frame2), strict=True)]
+    relative = compose(inverse(ends[0]), ends[1])
+    twist1, twist2 = (_twist(read.twists, name, len(relative)) for name in bodies)
+    offset1 = compose(np.broadcast_to(frame1, relative.shape), relative)
+    twist = np.einsum("nij,nj->ni", adjoint_inverse(np.broadcast_to(frame2, relative.shape)), twist2)
+    twist -= np.einsum("nij,nj->ni", adjoint_inverse(offset1), twist1)
+    normal, point = gap.contact(relative.T)
+    distance = np.asarray(gap.distance(relative.T))
+    wrench = _rows(lever(normal, point), len(relative)) * of.law.force(ramp(-distance))[:, None]
+    heat = np.zeros(len(relative))
+    for factor, w in losses(gap, of.law, relative.T, twist.T):
+        direction = _rows(w, len(relative))
+        rate = np.einsum("ni,ni->n", direction, twist)
+        wrench -= direction * (factor * rate)[:, None]
+        heat += factor * rate**2
+    velocity = twist[:, 3:] + np.cross(twist[:, :3], _rows(point, len(relative)))
+    slip = np.linalg.norm(np.cross(_rows(normal, len(relative)), velocity), axis=1)
+    one, two = (_carried(o, wrench) for o in (offset1, np.broadcast_to(frame2, relative.shape)))
+    return _Point(distance, turned(poses[1], two[:, 3:]), np.where(distance < 0.0, slip, 0.0), heat, (-one, two))
+
+
+def _rows(components: Sequence[Any], count: int) -> Array:
+    """(n, k) of components that are numbers or (n,)."""
+    return np.column_stack([np.broadcast_to(x, count) for x in components])
+
+
+def _twist(twists: Mapping[str, Array], name: str, count: int) -> Array:
+    return np.zeros((count, 6)) if name == GROUND else twists[name]
+
+
+def _carried(offset: Array, wrench: Array) -> Array:
+    """Wrenches (n, 6) in a frame at offsets (n, 7) in a body, as seen in the body."""
+    force, moment = turned(offset, wrench[:, 3:]), turned(offset, wrench[:, :3])
+    return np.column_stack([moment + np.cross(offset[:, 4:], force), force])

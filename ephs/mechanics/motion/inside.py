@@ -1,0 +1,91 @@
+"""A mechanism that is a part of a larger system, read from the solution of the whole."""
+
+from typing import TYPE_CHECKING, Any, cast, final
+
+import numpy as np
+
+from ephs.mechanics.motion.motion import BodyMotion, JointMotion, MarkerMotion, SceneMotion, ThermalMotion
+from ephs.operad import Path
+from ephs.semantics.bundle import Array
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from ephs.mechanics.scene.model import Scene
+    from ephs.solve.result.solution import Solution
+
+__all__ = ["Inside"]
+
+
+@final
+class Inside:
+    """The motion of a scene that is a box of a larger system; it reads like the solution of the scene alone.
+
+    `ephs.show.animate` takes it, too. Wrenches of joints are not known: others act on the mechanism through its ports.
+
+    Parameters
+    ----------
+    solution
+        Of the whole system.
+    path
+        Where the scene's system is in it, as ``"engine"``.
+    scene
+        Whose system it is.
+
+    Raises
+    ------
+    KeyError
+        A state of the scene is not there; the message names the nearest.
+    """
+
+    def __init__(self, solution: "Solution", path: str | Path, scene: "Scene") -> None:
+        self._solution, self._path, self.scene = solution, Path.of(path), scene
+        self.t, self.name = solution.t, f"{solution.name}.{path}"
+        self.problem = None  # what acts on the mechanism is not a problem of its own
+        self._motion = SceneMotion(scene, cast(Any, self))
+        for name, _ in scene.all_bodies():
+            self._motion.poses(name)
+
+    def __len__(self) -> int:
+        return len(self._solution)
+
+    def __getitem__(self, path: str | Path) -> Array:
+        """The state at a path of the scene's system."""
+        return self._solution[self._path / path]
+
+    @property
+    def inputs(self) -> Any:
+        """What acts at the ports, which nobody has written down.
+
+        Raises
+        ------
+        TypeError
+            Always.
+        """
+        raise TypeError(f"{self.name} is a part of a system: what acts at its ports is not known, nor joint wrenches")
+
+    @property
+    def constraint_error(self) -> Array:
+        """(n,) largest position residual of any joint, in m or rad."""
+        return self._motion.constraint_error()
+
+    def body(self, name: str) -> BodyMotion:
+        """The motion of a body: position, quaternion, rotation, velocity, angular_velocity."""
+        return self._motion.body(name)
+
+    def joint(self, name: str) -> JointMotion:
+        """The motion of a joint: coordinate, rate."""
+        return self._motion.joint(name)
+
+    def thermal(self, name: str) -> ThermalMotion:
+        """The temperature of a thermal node."""
+        return self._motion.thermal(name)
+
+    def marker(self, name: str) -> MarkerMotion:
+        """The motion of a marker: position and velocity in the world."""
+        return self._motion.marker(name)
+
+    def point(self, body: str, xyz: "ArrayLike") -> Array:
+        """(n, 3) world position of a point that is given in the body's frame."""
+        motion = self.body(body)
+        return motion.position + motion.rotation @ np.asarray(xyz, dtype=float)

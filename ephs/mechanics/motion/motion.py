@@ -1,0 +1,394 @@
+"""How a solution reads as mechanics: poses, velocities and joints of a scene, for all instants at once.
+
+Velocities are those of the continuous relations: the stored momenta projected on the joints in the mass metric.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, final
+
+import numpy as np
+
+from ephs.mechanics.motion.batch import adjoint_inverse, compose, included, rotations
+from ephs.mechanics.motion.beams import BeamMotion, beam_motion
+from ephs.mechanics.motion.contacts import ContactMotion, contact_motion
+from ephs.mechanics.motion.gaps import open_by
+from ephs.mechanics.motion.moving import Moving
+from ephs.mechanics.motion.own_motion import OwnMotion, own_motion
+from ephs.mechanics.motion.projection import Held, project, project_dense
+from ephs.mechanics.motion.readout import summary, variables
+from ephs.mechanics.motion.wrenches import root_of, wrenches
+from ephs.mechanics.scene.build import component_path
+from ephs.mechanics.scene.geometry import Coupling, coupling_of
+from ephs.mechanics.scene.model import GROUND, Joint, Scene
+from ephs.mechanics.scene.state import Snapshot
+from ephs.operad import Path
+from ephs.semantics.bundle import Array
+from ephs.semantics.spaces import SE3
+from ephs.solve.result.dataset import Variable
+from ephs.solve.threads import in_one_thread
+
+if TYPE_CHECKING:
+    from ephs.solve.result.solution import Solution
+
+__all__ = ["BodyMotion", "JointMotion", "MarkerMotion", "SceneMotion", "ThermalMotion"]
+
+CHUNK = 512
+"""Instants that are projected together; bounds the memory."""
+MANY = 40
+"""Joints beyond which velocities are projected by sparse matrices."""
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class ThermalMotion:
+    """A thermal node: temperature in K, entropy in J/K since the start; (n,) each."""
+
+    temperature: Array
+    entropy: Array
+
+
+@final
+class BodyMotion:
+    """The motion of a body.
+
+    Attributes
+    ----------
+    position
+        (n, 3) centre of mass in the world, in m.
+    quaternion, rotation
+        (n, 4) and (n, 3, 3), body to world.
+    velocity
+        (n, 3) of the centre of mass in the world basis, in m/s.
+    angular_velocity
+        (n, 3) in the body basis, in rad/s.
+    """
+
+    def __init__(self, motion: Moving, name: str) -> None:
+        self._motion, self._name = motion, name
+        pose = motion.poses(name)
+        self.quaternion, self.position = pose[:, :4], pose[:, 4:]
+
+    @cached_property
+    def rotation(self) -> Array:
+        """(n, 3, 3), body to world."""
+        return rotations(self.quaternion)
+
+    @cached_property
+    def twist(self) -> Array:
+        """(n, 6) angular and linear velocity in the body frame."""
+        return self._motion.twists[self._name]
+
+    @property
+    def velocity(self) -> Array:
+        """(n, 3) of the centre of mass in the world basis, in m/s."""
+        return np.einsum("nij,nj->ni", self.rotation, self.twist[:, 3:])
+
+    @property
+    def angular_velocity(self) -> Array:
+        """(n, 3) in the body basis, in rad/s."""
+        return self.twist[:, :3]
+
+
+@final
+class JointMotion:
+    """The motion of a joint.
+
+    Attributes
+    ----------
+    coordinate, rate
+        (n, d) coordinates of C2 in C1, and the twist u_r; m, rad, seconds.
+    wrench
+        (n, 6) λ on body 2 in the joint frame C2 (moment, force), NaN where statically indeterminate.
+    """
+
+    def __init__(self, motion: Moving, name: str, coordinate: Array) -> None:
+        self._motion, self._name, self.coordinate = motion, name, coordinate
+
+    @property
+    def rate(self) -> Array:
+        """(n, d) the twist u_r, in the axes of C2."""
+        return self._motion.rates[self._name]
+
+    @cached_property
+    def wrench(self) -> Array:
+        """(n, 6) λ on body 2 in the joint frame C2 (moment, force), NaN where statically indeterminate."""
+        return self._motion.wrench(self._name)
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class MarkerMotion:
+    """A marker: position in m and velocity in m/s, in the world; (n, 3) each."""
+
+    position: Array
+    velocity: Array
+
+
+@final
+class SceneMotion:
+    """The motion of a scene, read from a solution."""
+
+    def __init__(self, scene: Scene, solution: "Solution") -> None:
+        self._scene, self._solution = scene, solution
+        self._bodies = dict(scene.all_bodies())
+        self._joints = dict(scene.all_joints())
+        self._implicit = dict(scene.implicit_joints())
+        self._couplings = {name: coupling_of(joint) for name, joint in self._joints.items()}
+
+    # ---- reading -----------------------------------------------------------------------------------------------
+
+    def body(self, name: str) -> BodyMotion:
+        """The motion of a body."""
+        self._scene.body(name)
+        return BodyMotion(self, name)
+
+    def joint(self, name: str) -> JointMotion:
+        """The motion of a joint, or of a body's implicit free joint."""
+        joint = self._scene.joint(name)
+        if name in self._implicit:
+            pair = coupling_of(joint).pair
+            coordinate = np.array([pair.coordinates(row) for row in self.poses(name)]).reshape(-1, pair.dim)
+            return JointMotion(self, name, coordinate)
+        return JointMotion(self, name, self.coordinates(name))
+
+    def thermal(self, name: str) -> ThermalMotion:
+        """The temperature of a thermal node."""
+        nodes = dict(self._scene.all_thermal())
+        if name not in nodes:
+            raise KeyError(f"{name}: no such thermal node; the nodes are {', '.join(nodes) or 'none'}")
+        node = nodes[name]
+        s = self._solution[component_path("thermal", name) / "s"]
+        return ThermalMotion(node.temperature * np.exp(s / node.capacity), s)
+
+    def contact(self, name: str) -> ContactMotion:
+        """Gap, force, slip and heat of a contact."""
+        contacts = dict(self._scene.all_contacts())
+        if name not in contacts:
+            raise KeyError(f"{name}: no such contact; the contacts are {', '.join(contacts) or 'none'}")
+        return contact_motion(self._scene, contacts[name], self)
+
+    def beam(self, name: str) -> BeamMotion:
+        """Nodes, strains, forces and moments of a beam."""
+        beams = dict(self._scene.all_beams())
+        if name not in beams:
+            raise KeyError(f"{name}: no such beam; the beams are {', '.join(beams) or 'none'}")
+        return beam_motion(self._scene, beams[name], self.poses, self.inclusion)
+
+    def marker(self, name: str) -> MarkerMotion:
+        """The motion of a marker."""
+        markers = dict(self._scene.all_markers())
+        if name not in markers:
+            raise KeyError(f"{name}: no such marker; the markers are {', '.join(markers) or 'none'}")
+        at, carrier = markers[name].at, markers[name].body
+        if carrier == GROUND:
+            still = np.tile(at, (len(self._solution), 1))
+            return MarkerMotion(still, np.zeros_like(still))
+        body = self.body(carrier)
+        swung = body.twist[:, 3:] + np.cross(body.twist[:, :3], at)
+        return MarkerMotion(body.position + body.rotation @ at, np.einsum("nij,nj->ni", body.rotation, swung))
+
+    def poses(self, name: str) -> Array:
+        """(n, 7) of a body, or of the ground."""
+        if name == GROUND:
+            return np.broadcast_to(SE3.identity(), (len(self._solution), 7))
+        return self._solution[component_path("bodies", name) / "pe" / "q"]
+
+    def coordinates(self, name: str) -> Array:
+        """(n, d) of a joint: of the pose of C2 in C1, in the axes of C1."""
+        at = component_path("joints", name)
+        if self._joints[name].middle is not None:
+            parts = [self._solution[at / part / "pe" / "q_r"] for part in ("first", "second")]
+            return np.column_stack(parts)
+        return self._solution[at / "pe" / "q_r"].reshape(len(self._solution), self._couplings[name].dim)
+
+    # ---- residuals ---------------------------------------------------------------------------------------------
+
+    def constraint_error(self) -> Array:
+        """(n,) largest distance or angle between where a joint's coordinates and its bodies put the frame C2."""
+        if not self._joints:
+            return np.zeros(len(self._solution))
+        return np.max(open_by(self._joints, self, self.chunks()), axis=(0, 1), initial=0.0)
+
+    def gaps(self, every: int) -> dict[Path, Array]:
+        """Per joint the residual of its position at every so many instants: rad, or a part of the mechanism's length.
+
+        The last instant is the first of these.
+        """
+        angles, distances = open_by(self._joints, self, [slice(None, None, -every)])
+        worst = np.maximum(angles, distances / Snapshot.of(self._scene).scale(self._scene.world.gravity).length)
+        return {component_path("joints", name): row for name, row in zip(self._joints, worst, strict=True)}
+
+    def velocity_error(self) -> Array:
+        """(n,) largest component of any joint's velocity residual."""
+        worst = np.zeros(len(self._solution))
+        for at, name, first, second, basis in self._rows():
+            joint = self._joints[name]
+            residual = np.zeros((first.shape[0], 6))
+            for body, rows in ((joint.body1, first), (joint.body2, second)):
+                if body != GROUND:
+                    residual += np.einsum("nij,nj->ni", rows, self.twists[body][at])
+            residual += np.einsum("nij,nj->ni", basis, self.rates[name][at])
+            worst[at] = np.maximum(worst[at], np.abs(residual).max(axis=1))
+        return worst
+
+    # ---- velocities --------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _own(self) -> "OwnMotion | None":
+        return own_motion(self._solution, SceneMotion)
+
+    @property
+    def twists(self) -> dict[str, Array]:
+        """(n, 6) by body."""
+        return self._projected[0]
+
+    @property
+    def rates(self) -> dict[str, Array]:
+        """(n, d) by joint, implicit free joints included."""
+        return self._projected[1]
+
+    @cached_property
+    @in_one_thread
+    def _projected(self) -> tuple[dict[str, Array], dict[str, Array]]:
+        """Twists nearest to the stored momenta in the mass metric that satisfy the joints, and the joints' rates."""
+        if self._own is not None:
+            return self._own.velocities()
+        n = len(self._solution)
+        heavy = [name for name, body in self._bodies.items() if body.mass > 0.0]
+        light = [name for name, body in self._bodies.items() if not body.mass > 0.0]
+        twists = {name: np.zeros((n, 6)) for name in self._bodies}
+        rates = {name: np.zeros((n, c.dim)) for name, c in self._couplings.items()}
+        root: dict[str, Array] = {}
+        for name in heavy:
+            body = self._bodies[name]
+            p = self._solution[component_path("bodies", name) / "ke" / "p"]
+            twists[name][:] = np.column_stack([np.linalg.solve(body.inertia, p[:, :3].T).T, p[:, 3:] / body.mass])
+            root[name] = root_of(body)
+        if len(self._joints) > MANY and not light and all(j.middle is None for j in self._joints.values()):
+            return self._of_many(heavy, root, twists, rates)
+        columns = {name: 6 * i for i, name in enumerate(heavy)}
+        free: dict[str, int] = {}
+        width = 0
+        for name in [*light, *rates]:
+            free[name], width = width, width + (6 if name in light else self._couplings[name].dim)
+        for at in self.chunks():
+            size = at.stop - at.start
+            rows = 6 * len(self._joints) + sum(j.motion is not None for j in self._joints.values())
+            known, unknown = np.zeros((size, rows, 6 * len(heavy))), np.zeros((size, rows, width))
+            right = np.zeros((size, rows))
+            row = 0
+            for name, first, second, basis in self.joint_rows(at):
+                joint = self._joints[name]
+                for body, block in ((joint.body1, first), (joint.body2, second)):
+                    if body in columns:
+                        known[:, row : row + 6, columns[body] : columns[body] + 6] += block
+                    elif body != GROUND:
+                        unknown[:, row : row + 6, free[body] : free[body] + 6] += block
+                unknown[:, row : row + 6, free[name] : free[name] + self._couplings[name].dim] = basis
+                row += 6
+                if joint.motion is not None:
+                    unknown[:, row, free[name]] = 1.0
+                    right[:, row] = joint.motion
+                    row += 1
+            stacked = np.column_stack([twists[name][at] for name in heavy]) if heavy else np.zeros((size, 0))
+            u, rest = project_dense(known, unknown, right, stacked, [root[name] for name in heavy])
+            for name in heavy:
+                twists[name][at] = u[:, columns[name] : columns[name] + 6]
+            for name in light:
+                twists[name][at] = rest[:, free[name] : free[name] + 6]
+            for name in rates:
+                rates[name][at] = rest[:, free[name] : free[name] + self._couplings[name].dim]
+        for name in self._implicit:
+            rates[name] = twists[name]
+        return twists, rates
+
+    def _of_many(
+        self, names: list[str], root: dict[str, Array], twists: dict[str, Array], rates: dict[str, Array]
+    ) -> tuple[dict[str, Array], dict[str, Array]]:
+        """The same of a large mechanism without massless bodies and universal joints, by sparse matrices."""
+        number = {name: i for i, name in enumerate(names)}
+        roots = np.array([root[name] for name in names])
+        for at in self.chunks():
+            held: list[Held] = []
+            for name, first, second, basis in self.joint_rows(at):
+                joint = self._joints[name]
+                ends = ((joint.body1, first), (joint.body2, second))
+                rows = {number[body]: block for body, block in ends if body != GROUND}
+                held.append(Held(rows, basis[0], joint.motion))
+            given = np.stack([twists[name][at] for name in names], axis=1)
+            found, turned = project(held, roots, given)
+            for name, i in number.items():
+                twists[name][at] = found[:, i]
+            for name, rate in zip(self._joints, turned, strict=True):
+                rates[name][at] = rate
+        for name in self._implicit:
+            rates[name] = twists[name]
+        return twists, rates
+
+    def wrench(self, name: str) -> Array:
+        """(n, 6) of a joint; see `JointMotion`."""
+        return np.zeros((len(self._solution), 6)) if name in self._implicit else self._wrenches[name]
+
+    @cached_property
+    def _wrenches(self) -> dict[str, Array]:
+        if self._own is not None:
+            return self._own.wrenches()
+        return wrenches(self._scene, {path: given.values for path, given in self._solution.inputs.items()}, self)
+
+    def variables(self, *, wrenches: bool) -> dict[str, Variable]:
+        """Bodies, joints, thermal nodes and markers as labelled arrays."""
+        return variables(self._scene, self, wrenches=wrenches)
+
+    def state(self, i: int) -> dict[Path, Array]:
+        """The states at the i-th instant, momenta projected on the joints."""
+        state = self._solution.state_at(i)
+        for name, body in self._bodies.items():
+            if body.mass > 0.0:
+                u = self.twists[name][i]
+                state[component_path("bodies", name) / "ke" / "p"] = np.concatenate(
+                    [body.inertia @ u[:3], body.mass * u[3:]]
+                )
+        return state
+
+    def _rows(self) -> Iterator[tuple[slice, str, Array, Array, Array]]:
+        for at in self.chunks():
+            for name, first, second, basis in self.joint_rows(at):
+                yield at, name, first, second, basis
+
+    def joint_rows(self, at: slice) -> Iterator[tuple[str, Array, Array, Array]]:
+        """Per joint: Ad_{I⁻¹}Ad_{o₁⁻¹}, −Ad_{o₂⁻¹}, B, each (size, 6, ·), at some instants."""
+        for name, joint in self._joints.items():
+            coupling = self._couplings[name]
+            relative = self.inclusion(name)[at]
+            first = adjoint_inverse(compose(np.broadcast_to(joint.frame1, relative.shape), relative))
+            second = -np.broadcast_to(SE3.adjoint(SE3.inverse(joint.frame2)), first.shape)
+            yield name, first, second, self._basis(joint, coupling, name, at)
+
+    def _basis(self, joint: Joint, coupling: Coupling, name: str, at: slice) -> Array:
+        x = self.coordinates(name)[at]
+        if joint.middle is None:
+            return np.broadcast_to(coupling.basis(coupling.identity()), (x.shape[0], 6, coupling.dim))
+        return np.array([coupling.basis(row) for row in x])
+
+    def inclusion(self, name: str) -> Array:
+        """(n, 7) poses of C2 in C1 by the joint's coordinates."""
+        return self._inclusions[name]
+
+    @cached_property
+    def _inclusions(self) -> dict[str, Array]:
+        return {name: included(coupling, self.coordinates(name)) for name, coupling in self._couplings.items()}
+
+    def chunks(self) -> Iterator[slice]:
+        """Instants that are treated together, which bounds the memory."""
+        n = len(self._solution)
+        size = max(1, CHUNK * MANY // max(MANY, len(self._joints)))
+        for start in range(0, n, size):
+            yield slice(start, min(n, start + size))
+
+    # ---- summary -----------------------------------------------------------------------------------------------
+
+    def summary(self) -> dict[str, Any]:
+        """Values at the end, mobility, and the number of redundant constraints."""
+        return summary(self._scene, self._solution, self, [*self._joints, *self._implicit])

@@ -1,0 +1,65 @@
+"""Velocities and wrenches of a mechanism far from metres, kilograms and seconds: found in units of its own."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, final
+
+import numpy as np
+
+from ephs.mechanics.scene.geometry import coupling_of
+from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.scene.own_units import SI, Units, in_own_units, units_of_states
+from ephs.mechanics.scene.rescaled import freedom_units
+from ephs.semantics.bundle import Array
+from ephs.solve.result.solution import Solution
+
+__all__ = ["OwnMotion", "own_motion"]
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class OwnMotion:
+    """A motion in units of its own.
+
+    Parameters
+    ----------
+    motion
+        The same in these units.
+    scene
+        That was given.
+    """
+
+    motion: Any
+    scene: Scene
+    units: Units
+
+    def velocities(self) -> tuple[dict[str, Array], dict[str, Array]]:
+        """(n, 6) twists by body and (n, d) rates by joint, implicit free joints included."""
+        length, time = self.units.length, self.units.time
+        twist = np.array([1.0] * 3 + [length] * 3) / time
+        joints = dict(self.scene.all_joints()) | dict(self.scene.implicit_joints())
+        rates = {
+            name: rate * freedom_units(coupling_of(joints[name]), joints[name].coordinate, length) / time
+            for name, rate in self.motion.rates.items()
+        }
+        return {name: u * twist for name, u in self.motion.twists.items()}, rates
+
+    def wrenches(self) -> dict[str, Array]:
+        """(n, 6) by joint."""
+        units = np.array([self.units.energy] * 3 + [self.units.energy / self.units.length] * 3)
+        return {name: self.motion.wrench(name) * units for name, _ in self.scene.all_joints()}
+
+
+def own_motion(solution: Solution, make: Callable[[Scene, Solution], Any]) -> OwnMotion | None:
+    """The motion of a solution in units of its own, as ``make`` reads scenes; None where its units are near."""
+    problem = solution.problem
+    if problem is None or problem.scene is None or (units := Units.of(problem.scene)) == SI:
+        return None
+    own = in_own_units(problem)
+    own = replace(own, shown=None, motion=lambda seen: make(own.scene, seen))
+    sizes = units_of_states(own.descriptor, units, read=True)
+    states = {path: value / sizes[path] for path, value in solution.states.items()}
+    there = Solution(
+        solution.name, solution.t / units.time, states, solution.ledgers, solution.stats, own, solution.labels
+    )
+    return OwnMotion(make(own.scene, there), problem.scene, units)

@@ -1,1 +1,0 @@
-"""Scenes in joint coordinates: a spanning tree with its loops cut, and methods on that."""

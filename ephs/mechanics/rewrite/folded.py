@@ -1,0 +1,44 @@
+"""The folded form of an initial value problem: fewer unknowns, the same steps, and all that the other one shows."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ephs.mechanics.rewrite.folding import FOLD
+from ephs.mechanics.rewrite.rewrite import rewrite
+from ephs.solve.problem import Problem
+from ephs.solve.result.record import Record
+
+__all__ = ["folded_problem"]
+
+
+def folded_problem(problem: Problem) -> Problem:
+    """The problem with its transformers folded; runs of it are shown as runs of the problem that was given.
+
+    All states are kept, so that inputs and events read what they did.
+    """
+    done = rewrite(problem.system, [FOLD])
+    descriptor = done.system.descriptor()
+    paper = problem.descriptor
+    number = {slot.path: i for i, slot in enumerate(paper.components)}
+    columns = [number[slot.path] for slot in descriptor.components]
+    places = {slot.path: slot.point for slot in paper.states}
+    order = [i for slot in descriptor.states for i in range(places[slot.path].start, places[slot.path].stop)]
+
+    def shown(record: Record, stats: Mapping[str, Any]) -> tuple[Problem, Record, Mapping[str, Any]]:
+        x = np.zeros_like(record.x)
+        x[:, order] = record.x
+        energies = np.zeros((record.energies.shape[0], len(paper.components)))
+        energies[:, columns] = record.energies
+        return problem, replace(record, x=x, energies=energies), stats
+
+    return replace(
+        problem,
+        system=done.system,
+        descriptor=descriptor,
+        initial=done.states.forward(problem.initial),
+        shown=shown,
+        remarks={"form": "folded", "paper_unknowns": paper.unknowns(problem.inputs(0.0, problem.initial))},
+    )

@@ -1,0 +1,10 @@
+"""The rewrites that there are, in the order in which `ephs.reduce` does them."""
+
+from ephs.mechanics.rewrite.dropping import DROP_FRICTION, DROP_GYROSCOPIC, DROP_JOINT, DROP_POSE
+from ephs.mechanics.rewrite.folding import FOLD
+from ephs.mechanics.rewrite.merging import MERGE
+from ephs.mechanics.rewrite.rewrite import Rule
+
+__all__ = ["RULES"]
+
+RULES: tuple[Rule, ...] = (FOLD, DROP_FRICTION, MERGE, DROP_JOINT, DROP_GYROSCOPIC, DROP_POSE)

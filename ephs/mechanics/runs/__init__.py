@@ -1,0 +1,1 @@
+"""Runs of models: methods by name, inputs, journals, checks."""

@@ -1,0 +1,156 @@
+"""Checks of a model, not of a trajectory: types, structure, assembly, laws, mobility."""
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ephs.mechanics.constraints.redundancy import dependences, in_words, indeterminate, wrenches_in_words
+from ephs.mechanics.runs.simulate import problem_of_scene, problem_of_system
+from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.scene.own_units import in_own_units, mobility_of
+from ephs.mechanics.scene.state import Snapshot
+from ephs.semantics.errors import SemanticsError
+from ephs.semantics.laws import Probe, system_law
+from ephs.semantics.report import CheckItem, CheckReport, check_structure
+from ephs.semantics.spaces.rank import ASSEMBLY
+from ephs.semantics.system import System
+from ephs.solve.errors import SolveError
+from ephs.solve.integrate import Grid, integrate
+from ephs.solve.problem import Problem
+from ephs.solve.threads import in_one_thread
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+__all__ = ["CheckItem", "CheckReport", "check_model"]
+
+LARGEST = 600
+"""Rows of the largest relation that is composed by both routes; the work grows with the third power."""
+STEP, STEPS = 1e-3, 100
+"""Seconds and number of the steps over which balances are measured: in the first ones little may have moved yet."""
+
+ROUNDING = 1e-13
+"""Of the energies that are stored or could be: what rounding may change their sum by in these steps."""
+
+
+@in_one_thread
+def check_model(model: System | Scene, initial: Mapping[str, "ArrayLike"] | None = None) -> CheckReport:
+    """Check a system or a scene in its initial state.
+
+    A system's open ports are held at zero flow.
+
+    Parameters
+    ----------
+    initial
+        Values of states by path; a system's others at the identity, a scene's as it says.
+    """
+    return CheckReport(tuple(_items(model, initial)))
+
+
+def _items(model: System | Scene, initial: Mapping[str, "ArrayLike"] | None) -> Iterator[CheckItem]:
+    try:
+        problem = problem_of_scene(model, initial) if isinstance(model, Scene) else _closed(model, initial)
+    except SemanticsError as error:
+        yield CheckItem("assembly", False, str(error))
+        return
+    system, d = problem.system, problem.descriptor
+    flat = d.system.flatten().pattern
+    remarks = "; ".join(map(str, flat.lint()))
+    boxes, junctions = len(flat.boxes), len(flat.junctions)
+    yield CheckItem("types", True, f"{boxes} boxes at {junctions} junctions" + (f"; {remarks}" if remarks else ""))
+    yield check_structure(system)
+    unknowns = d.unknowns(problem.inputs(0.0, problem.initial))
+    yield CheckItem("assembly", True, f"{len(d.states)} states, {unknowns} equations for as many unknowns")
+    if problem.scene is not None and problem.scene.adjusted is not None:
+        yield CheckItem("adjusted", True, str(problem.scene.adjusted).removeprefix("adjusted: "))
+    probe = Probe(system, problem.initial, reference=problem.reference)
+    yield _law("Tellegen", probe)
+    if d.rate_size + d.effort_size + d.multiplier_size <= LARGEST:
+        yield _law("functoriality", probe)
+    else:
+        yield from _parts(problem)
+    yield from _motion(problem)
+
+
+def _closed(system: System, initial: Mapping[str, "ArrayLike"] | None) -> Problem:
+    ports = [port for port, t in system.interface.items() if t.power]
+    inputs = {str(port): {"flow": np.zeros(system.interface[port].quantity.space.dim)} for port in ports}
+    return problem_of_system(system, initial, inputs)
+
+
+def _law(name: str, probe: Probe) -> CheckItem:
+    law = system_law(name)
+    verdict = law(probe)
+    return CheckItem(f"{name}: {law.statement}", verdict.holds, verdict.detail)
+
+
+def _parts(problem: Problem) -> Iterator[CheckItem]:
+    """Functoriality of each subsystem by itself, where the whole is large."""
+    law = system_law("functoriality")
+    worst, count = 0.0, 0
+    for box, part in problem.system.fillings.items():
+        if isinstance(part, System) and all(t.power for t in part.interface.values()):
+            state = {p.relative_to(box): v for p, v in problem.initial.items() if box.is_prefix_of(p)}
+            verdict = law(Probe(part, state, reference=problem.reference))
+            worst, count = max(worst, verdict.defect), count + 1
+            if not verdict.holds:
+                yield CheckItem(f"functoriality: {law.statement}", False, f"{box}: {verdict.detail}")
+    detail = f"each of {count} subsystems by itself: projectors differ by {worst:.1e}; the whole is large"
+    yield CheckItem(f"functoriality: {law.statement}", True, detail)
+
+
+def _motion(problem: Problem) -> Iterator[CheckItem]:
+    """Mobility, redundancy, closure, and the balances over some steps."""
+    own = in_own_units(problem)
+    found = mobility_of(problem)
+    motions = f"{found.mobility or 'no'} independent motion{'s' if found.mobility != 1 else ''}"
+    yield CheckItem("mobility", True, f"{motions} in this configuration")
+    yield from _redundancy(problem, found.redundant)
+    try:
+        start = integrate(own, Grid(0.0, STEPS * STEP, STEP))
+    except (SolveError, RuntimeError) as error:
+        yield CheckItem("motion", False, str(error))
+        return
+    gap, slip = float(start.constraint_error[0]), float(start.velocity_error[0])
+    if problem.scene is not None:
+        now = Snapshot.of(problem.scene)
+        near = ASSEMBLY * now.scale(problem.scene.world.gravity).length
+        yield CheckItem("closure", gap < near, f"joints are closed to {gap:.1e} m or rad, velocities fit to {slip:.1e}")
+    elif problem.gaps is not None:
+        yield CheckItem("closure", gap < ASSEMBLY, f"joints are closed to {gap:.1e} m or rad")
+    error, books = float(start.energy_error.max()), start.ledgers
+    stored = float(np.max(np.sum([np.abs(energy) for energy in books.storages.values()], axis=0), initial=0.0))
+    stored += _weight(problem.scene) if problem.scene is not None else 0.0
+    detail = f"energy over {STEPS} steps of {STEP * own.seconds:g} s is balanced to {error:.1e} of what moves"
+    balanced = error < 1e-10 or error * books.scale < ROUNDING * stored
+    if error >= 1e-10 and balanced:  # next to nothing moves
+        detail += f", {error * books.scale / stored:.1e} of what is stored or could be"
+    yield CheckItem("power balance", balanced, detail)
+    least = float(start.stats["least_production"])
+    yield CheckItem("entropy production", least >= 0.0, f"the least of a component in these steps is {least:.1e} J/K")
+
+
+def _weight(scene: Scene) -> float:
+    """The energy, in J, of all masses lifted by the longest arm of a joint: the size of energies where all are zero."""
+    arms = [
+        float(np.linalg.norm(frame[4:])) for _, joint in scene.all_joints() for frame in (joint.frame1, joint.frame2)
+    ]
+    mass = sum(body.mass for _, body in scene.all_bodies())
+    return mass * float(np.linalg.norm(scene.world.gravity)) * max(arms, default=0.0)
+
+
+def _redundancy(problem: Problem, count: int) -> Iterator[CheckItem]:
+    """Dependent constraints; of a system without a scene, only their number."""
+    if problem.scene is None:
+        detail = f"{count} of the constraint equations depend on others"
+        if count:
+            detail += "; the motion is unique, their multipliers are not"
+        yield CheckItem("redundant constraints", True, detail)
+        return
+    repeated = dependences(problem.scene)
+    detail = in_words(repeated) or "none"
+    if repeated and not any(each.here for each in repeated):  # where motions part, none is unique
+        detail += "; the motion is unique all the same"
+    yield CheckItem("redundant constraints", True, detail)
+    yield CheckItem("joint wrenches", True, wrenches_in_words(indeterminate(problem.scene)))

@@ -1,0 +1,58 @@
+"""References to cite for a run: entries of the packaged bibliography, by the method and the form used."""
+
+import re
+from collections.abc import Mapping
+from importlib.resources import files
+from types import MappingProxyType
+
+from ephs.solve.result.solution import Solution
+
+__all__ = ["METHOD_SOURCES", "bibliography", "cite"]
+
+ALWAYS = ("ephs", "LohmayerCapobiancoLeyendecker2024", "LohmayerLynchLeyendecker2024")
+"""The program and the theory of its models."""
+METHOD_SOURCES: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        "natural": ("Gonzalez1996", "McLachlanQuispelRobidoux1999"),
+        "natural4": ("Gonzalez1996", "McLachlanQuispelRobidoux1999", "HairerLubichRoche1989"),
+        "variational": ("MarsdenWest2001",),
+        "radau": ("HairerWanner1996",),
+        "alpha": ("ChungHulbert1993", "BrulsCardonaArnold2012"),
+        "rk54": ("DormandPrince1980",),
+        "rk87": ("PrinceDormand1981", "HairerNorsettWanner1993"),
+        "ida": ("HindmarshEtAl2005",),
+    }
+)
+"""Keys in ``references.bib`` of what each method is made after."""
+FORM_SOURCES: Mapping[str, tuple[str, ...]] = MappingProxyType({"reduced": ("Featherstone2008",)})
+"""The same of the forms of the equations."""
+
+_ENTRY = re.compile(r"^@\w+\{([^,\s]+),\n.*?^\}$", re.MULTILINE | re.DOTALL)
+
+
+def bibliography() -> dict[str, str]:
+    """The BibTeX entries of ``references.bib`` by key, in the file's order."""
+    text = files("ephs.mechanics").joinpath("references.bib").read_text(encoding="utf-8")
+    return {entry.group(1): entry.group(0) for entry in _ENTRY.finditer(text)}
+
+
+def cite(solution: Solution) -> str:
+    """BibTeX of what a run used: the program, the theory, the method, the form of the equations.
+
+    Parameters
+    ----------
+    solution
+        What `ephs.simulate` or `ephs.load_solution` gave. Where ``auto`` went on with another method, both are in.
+
+    Returns
+    -------
+    str
+        Entries with an empty line between. A method of one's own adds none: its author knows its sources.
+    """
+    stats = solution.stats
+    used = [*ALWAYS]
+    for method in str(stats.get("method")).split(", "):
+        used += METHOD_SOURCES.get(method, ())
+    used += FORM_SOURCES.get(str(stats.get("form")), ())
+    entries = bibliography()
+    return "\n\n".join(entries[key] for key in dict.fromkeys(used)) + "\n"

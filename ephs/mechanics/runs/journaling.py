@@ -1,0 +1,96 @@
+"""Journals of runs: whose a journal is, by its model, what was asked for, and the programs that take part."""
+
+import hashlib
+import platform
+import sys
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager
+from importlib.metadata import version
+from os import PathLike
+from typing import Any
+
+import numpy as np
+
+from ephs.operad import Path
+from ephs.solve.journal import Journal, Written
+from ephs.solve.problem import Problem
+
+__all__ = ["heading_of", "journaled"]
+
+_PROGRAMS = ("ephs", "numpy", "scipy", "numba", "llvmlite")
+
+
+@contextmanager
+def journaled(
+    journal: "Journal | str | PathLike[str] | None", problem: Problem, asked: Mapping[str, Any]
+) -> Generator[Written | None, None, None]:
+    """The journal of a run, open while it goes on; None of None.
+
+    Raises
+    ------
+    OptionError
+        The file is no journal, is another run's, or is being written by another process.
+    """
+    given = Journal.of(journal)
+    if given is None:
+        yield None
+        return
+    written = given.open(heading_of(problem, asked))
+    try:
+        yield written
+    finally:
+        written.close()
+
+
+def heading_of(problem: Problem, asked: Mapping[str, Any]) -> dict[str, Any]:
+    """Heading of a journal: only the same run, by the same programs, goes on to the same numbers.
+
+    Functions among the options are told by their names; whether they do the same, nobody can know.
+    """
+    programs = {name: version(name) for name in _PROGRAMS}
+    machine = f"{platform.system()} {platform.machine()}"
+    return {
+        "name": problem.name,
+        "model": problem.document,
+        "run": {
+            **{key: _plain(value) for key, value in asked.items()},
+            "model": _digest(problem),
+            "programs": {**programs, "python": ".".join(map(str, sys.version_info[:3])), "machine": machine},
+        },
+    }
+
+
+def _digest(problem: Problem) -> str:
+    """Of every component with its numbers, the initial states and the surroundings."""
+    d = problem.descriptor
+    parts: list[Any] = [problem.document, problem.reference]
+    for slot in d.components:
+        kernel = slot.primitive.kernel
+        numbers = (kernel.name, kernel.parameters) if kernel is not None else ()
+        parts.append((str(slot.path), slot.primitive.name, slot.primitive.parameters, numbers))
+    for path, signal in sorted(problem.signals.items()):
+        parts.append((str(path), _plain(signal.value), signal.effort))
+    made = hashlib.blake2b(repr(parts).encode(), digest_size=16)
+    made.update(d.pack(problem.initial).tobytes())
+    return made.hexdigest()
+
+
+def _plain(value: Any) -> Any:
+    """As JSON can hold it; of long arrays a digest."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist()) if value.size <= 16 else f"{value.shape} {_sum(value)}"
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, np.generic):
+        return value.item()
+    if value is None or isinstance(value, str | int | float | bool):
+        return value
+    if callable(value):
+        return f"{getattr(value, '__module__', '')}.{getattr(value, '__qualname__', type(value).__name__)}"
+    return str(value) if isinstance(value, Path) else type(value).__name__
+
+
+def _sum(value: Any) -> str:
+    return hashlib.blake2b(np.ascontiguousarray(value).tobytes(), digest_size=16).hexdigest()

@@ -1,0 +1,120 @@
+"""Forces on a scene's joints, bodies and markers, as users give them."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any, final
+
+import numpy as np
+
+from ephs.mechanics.runs.signals import View, signal
+from ephs.mechanics.scene.build import component_path
+from ephs.mechanics.scene.flexible import Load
+from ephs.mechanics.scene.model import Marker, Scene
+from ephs.operad import Path
+from ephs.semantics.bundle import Array
+from ephs.semantics.errors import AssemblyError
+from ephs.semantics.spaces.rotations import quaternion_to_matrix
+from ephs.solve.problem import Signal, State
+
+__all__ = ["part_of", "scene_signals", "sum_of"]
+
+
+def part_of(whole: Signal, where: slice) -> Signal:
+    """Some of a signal's numbers."""
+    if whole.constant:
+        return Signal(whole.at(0.0, {})[where])
+    return Signal(lambda t, state: whole.at(t, state)[where], held=whole.held)
+
+
+def sum_of(one: Signal, other: Signal) -> Signal:
+    """The sum of two signals."""
+    if one.constant and other.constant:
+        return Signal(one.at(0.0, {}) + other.at(0.0, {}))
+    held = all(signal.constant or signal.held for signal in (one, other))
+    return Signal(lambda t, state: one.at(t, state) + other.at(t, state), held=held)
+
+
+def scene_signals(scene: Scene, inputs: Mapping[Any, Any], view: View) -> tuple[dict[str, Signal], dict[str, Signal]]:
+    """Forces on joints and wrenches on bodies, by name: the loads, and what a user gives by joint, body and marker.
+
+    A key may be a tuple of names, whose input gives the numbers of all of them in a row.
+
+    Raises
+    ------
+    AssemblyError
+        There is no such joint, body or marker.
+    """
+    forces: dict[str, Signal] = {}
+    wrenches: dict[str, Signal] = {}
+    joints, bodies, markers = dict(scene.all_joints()), dict(scene.all_bodies()), dict(scene.all_markers())
+    sizes = {f"joints.{name}": j.dim for name, j in joints.items()} | {f"bodies.{name}": 6 for name in bodies}
+    sizes |= {f"markers.{name}": 3 for name, marker in markers.items() if marker.body in bodies}
+    for _, load in scene.all_loads():
+        push = _of_load(load)
+        wrenches[load.body] = sum_of(wrenches[load.body], push) if load.body in wrenches else push
+    for key, given in _single(inputs, sizes, view):
+        kind, _, name = key.partition(".")
+        if kind == "joints":
+            forces[name] = sum_of(forces[name], given) if name in forces else given
+            continue
+        if kind == "markers":
+            name, given = markers[name].body, _at_marker(markers[name], given)
+        wrenches[name] = sum_of(wrenches[name], given) if name in wrenches else given
+    return forces, wrenches
+
+
+def _single(inputs: Mapping[Any, Any], sizes: Mapping[str, int], view: View) -> Iterator[tuple[str, Signal]]:
+    """The signal of each joint, body or marker, of ``sizes`` numbers by key."""
+    for key, value in inputs.items():
+        keys = key if isinstance(key, tuple) else (key,)
+        for one in keys:
+            if one not in sizes:
+                raise AssemblyError("unknown-input", one, expected=", ".join(sizes))
+        ends = np.cumsum([0, *(sizes[one] for one in keys)])
+        whole = signal(value, effort=False, name=", ".join(keys), size=int(ends[-1]), view=view)
+        if len(keys) == 1:
+            yield keys[0], whole
+            continue
+        shared = whole if whole.constant else Signal(_Latest(whole).at, held=whole.held)
+        for one, first, last in zip(keys, ends[:-1], ends[1:], strict=True):
+            yield one, part_of(shared, slice(int(first), int(last)))
+
+
+@final
+class _Latest:
+    """A signal that several ports share: evaluated once for each time and state."""
+
+    def __init__(self, signal: Signal) -> None:
+        self._signal, self._found = signal, np.zeros(0)
+        self._t = float("nan")
+        self._state: State = {}
+
+    def at(self, t: float, state: State) -> Array:
+        if t != self._t or state is not self._state:
+            self._found = self._signal.at(t, state)
+            self._t, self._state = t, state
+        return self._found
+
+
+def _at_marker(marker: Marker, force: Signal) -> Signal:
+    """A force in world axes at a marker as a wrench in the body's frame."""
+    pose = component_path("bodies", marker.body) / "pe" / "q"
+
+    def wrench(t: float, state: Mapping[Path, Array]) -> Array:
+        own = quaternion_to_matrix(state[pose][:4]).T @ force.at(t, state)
+        return np.concatenate([np.cross(marker.at, own), own])
+
+    return Signal(wrench)
+
+
+def _of_load(load: Load) -> Signal:
+    """A load as a wrench in the body's frame."""
+    full, pose = np.concatenate([load.moment, load.force]), component_path("bodies", load.body) / "pe" / "q"
+
+    def wrench(t: float, state: Mapping[Path, Array]) -> Array:
+        share = 1.0 if t >= load.ramp else max(t, 0.0) / load.ramp
+        if load.follower:
+            return share * full
+        turn = quaternion_to_matrix(state[pose][:4]).T
+        return share * np.concatenate([turn @ load.moment, turn @ load.force])
+
+    return Signal(full) if load.follower and not load.ramp else Signal(wrench)

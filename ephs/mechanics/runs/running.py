@@ -1,0 +1,112 @@
+"""Runs of a problem by a method: many compiled steps in one call where the method has them, else step after step."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, final
+
+import numpy as np
+
+from ephs.mechanics.methods.registry import METHODS, Method, Setting
+from ephs.semantics.bundle import Array
+from ephs.solve.auditing.audit import Bounds
+from ephs.solve.auditing.growth import Again
+from ephs.solve.breakpoints import Breakpoints
+from ephs.solve.control import Control, Tolerance
+from ephs.solve.events import Event
+from ephs.solve.integrate import Grid, Progress, integrate
+from ephs.solve.journal import Written
+from ephs.solve.loop import integrate_stepwise
+from ephs.solve.problem import Problem
+from ephs.solve.result.solution import Solution
+
+__all__ = ["Course"]
+
+CLOSE = 1e-6
+"""Tolerance of the steps of an independent run."""
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Course:
+    """A problem, a method, and from when to when; in the problem's unit of time.
+
+    Parameters
+    ----------
+    options
+        The method's own.
+    """
+
+    problem: Problem
+    method: Method
+    start: float
+    end: float
+    control: Control
+    options: Mapping[str, Any]
+
+    def run(
+        self,
+        breakpoints: Breakpoints,
+        *,
+        events: tuple[Event, ...] = (),
+        save_at: Array | None = None,
+        progress: Progress | None = None,
+        remarks: Mapping[str, Any] | None = None,
+        journal: Written | None = None,
+        bounds: Bounds | None = None,
+    ) -> Solution:
+        """Run it.
+
+        Raises
+        ------
+        SimulationError
+            The run failed part-way; ``.partial`` is the solution up to there.
+        """
+        control, seen = self.control, breakpoints.of(self.problem)
+        if self.method.many is not None and control.step is not None and not events and self.end > self.start:
+            return integrate(
+                seen,
+                Grid(self.start, self.end, control.step),
+                make=self.method.many,
+                save_at=save_at,
+                max_steps=control.max_steps,
+                progress=progress,
+                journal=journal,
+                bounds=bounds,
+                breakpoints=breakpoints,
+            )
+        setting = Setting(seen, self.start, control, self.options, method=self.method.name)
+        return integrate_stepwise(
+            seen,
+            self.start,
+            self.end,
+            make=lambda: self.method.make(setting),
+            control=control,
+            events=events,
+            save_at=save_at,
+            progress=progress,
+            remarks=remarks or {},
+            journal=journal,
+            bounds=bounds,
+            breakpoints=breakpoints,
+        )
+
+    def again(self, known: Breakpoints) -> Again | None:
+        """Further runs of the problem, over the jumps that a run has known; None where steps are chosen."""
+        if self.control.step is None:
+            return None
+        explicit = self.problem.scene is not None and not self.method.name.startswith("rk")
+        return Again(lambda h, to: self._coarser(known, h, to), partial(self._independent, known) if explicit else None)
+
+    def _coarser(self, known: Breakpoints, h: float, to: float) -> Solution:
+        unit = self.problem.seconds
+        end = to / unit
+        course = replace(self, end=end, control=replace(self.control, step=h / unit, max_steps=None))
+        return course.run(Breakpoints(self.start, end, np.array(known.times)))
+
+    def _independent(self, known: Breakpoints, times: Array, most: int) -> Solution:
+        kept = times / self.problem.seconds
+        tolerance = Tolerance(CLOSE, {})
+        control = Control(tolerance, tolerance, None, 0.0, self.control.most, most)
+        course = replace(self, end=float(kept[-1]), control=control, method=METHODS["rk87"], options={})
+        return course.run(Breakpoints(self.start, course.end, np.array(known.times)), save_at=kept)

@@ -1,0 +1,381 @@
+"""`simulate`: from a system or a scene to its motion."""
+
+from collections.abc import Callable, Mapping, Sequence
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ephs.mechanics.constraints.redundancy import explain
+from ephs.mechanics.methods.registry import METHODS, Method, chosen
+from ephs.mechanics.motion.links import LinkMotion
+from ephs.mechanics.motion.motion import SceneMotion
+from ephs.mechanics.motion.views import Names
+from ephs.mechanics.rewrite.folded import folded_problem
+from ephs.mechanics.runs.assembling import assembled, flat_joints
+from ephs.mechanics.runs.journaling import journaled
+from ephs.mechanics.runs.pace import longest_step
+from ephs.mechanics.runs.pushes import part_of, scene_signals, sum_of
+from ephs.mechanics.runs.running import Course
+from ephs.mechanics.runs.signals import asked_of, jumps_of, signal, times_of
+from ephs.mechanics.scene.build import drive_ports, initial_state, scene_inputs, scene_names, scene_system, wrench_port
+from ephs.mechanics.scene.document import scene_to_text
+from ephs.mechanics.scene.meant import is_shaky
+from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.scene.own_units import in_own_units, seen_from
+from ephs.mechanics.scene.state import Snapshot
+from ephs.operad import Path
+from ephs.semantics import extents
+from ephs.semantics.bundle import Reference
+from ephs.semantics.checks import random_efforts
+from ephs.semantics.errors import AssemblyError
+from ephs.semantics.primitives import Irreversible
+from ephs.semantics.system import System
+from ephs.solve.auditing.audit import Bounds
+from ephs.solve.auditing.findings import POLICIES, judged
+from ephs.solve.breakpoints import Breakpoints
+from ephs.solve.control import Control, Tolerance, told_apart
+from ephs.solve.errors import OptionError, failing_at, nearest_of, number_of
+from ephs.solve.events import events_of
+from ephs.solve.integrate import solution_of
+from ephs.solve.journal import Journal
+from ephs.solve.problem import Problem, Signal
+from ephs.solve.result.record import Record
+from ephs.solve.result.solution import Solution
+from ephs.solve.sampled import Sampling, holding
+from ephs.solve.threads import in_one_thread
+from ephs.solve.watching import guarded
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+__all__ = ["control_of", "problem_of_scene", "problem_of_system", "simulate"]
+
+OPEN = 1e-6
+"""m or rad by which given initial states may leave a joint open."""
+OFF = 1e-3
+"""Part by which a given momentum may contradict the joints: nodal momenta of some methods do, to their order."""
+FORMS = ("paper", "folded", "reduced")
+
+
+@in_one_thread
+def simulate(
+    model: System | Scene,
+    until: float,
+    *,
+    t0: float = 0.0,
+    initial: Mapping[str, "ArrayLike"] | None = None,
+    method: str | Method = "auto",
+    rtol: "float | Mapping[str, float]" = 1e-6,
+    atol: "float | Mapping[str, float]" = 1e-9,
+    step: float | None = None,
+    max_step: float | None = None,
+    min_step: float | None = None,
+    max_steps: int | None = None,
+    save_at: "ArrayLike | None" = None,
+    form: str = "reduced",
+    inputs: Mapping[Any, Any] | None = None,
+    jumps: "ArrayLike | Mapping[str, ArrayLike] | None" = None,
+    events: Sequence[Any] | None = None,
+    options: Mapping[str, Any] | None = None,
+    reference: Reference | None = None,
+    progress: Callable[[float, float, Mapping[str, Any]], None] | None = None,
+    journal: "Journal | str | PathLike[str] | None" = None,
+    audit: str = "fail",
+) -> Solution:
+    """Simulate a system or a scene.
+
+    Parameters
+    ----------
+    until, t0
+        End and start in s. An end before the start runs backward in time, where nothing produces entropy.
+    initial
+        Values of states by path; a system's others at the identity, a scene's as it says.
+    method
+        One of `ephs.mechanics.methods.registry.METHODS`: ``"natural"``, ``"natural4"``, ``"variational"``, ``"radau"``,
+        ``"alpha"``, ``"rk54"``, ``"rk87"``, ``"ida"``; or ``"auto"``: natural with ``step``; without it explicit, and
+        radau from where the problem shows itself stiff, for scenes, radau for systems on vector spaces. Or a
+        `Method` of one's own.
+    rtol, atol
+        Without ``step``: each state x is wanted to ``atol + rtol·|x|``, atol in the state's own unit, of the
+        mechanism's own length, mass and time where these are far from 1 m, 1 kg and 1 s. Either may be
+        a mapping from kinds of quantities or paths to numbers, ``"*"`` for all others.
+    step
+        The grid is t₀ + k·step, the last step shortened to end on ``until``. Without it rtol and atol steer.
+    max_step, min_step, max_steps
+        Limits for the steps in s that are chosen, and for their number.
+    save_at
+        Times to keep, met by dense output; every step where None.
+    form
+        ``"paper"``: as flattened, what the natural methods solve; ``"folded"``: the same with transformers and the
+        junctions behind them taken out, for them too; ``"reduced"``, the default: the least that a method can use.
+    events
+        `ephs.Event` values or functions f(t, state) -> number, whose zeros are located, recorded in ``sol.events``,
+        and end the run where they say so.
+    options
+        The method's own: ``{"rho": 0.8}`` of alpha.
+    inputs
+        ``{port: {"effort": f}}`` or ``{"flow": f}`` at outer ports; of a scene also ``{"joints.pin": f}``, a
+        generalised force on u_r, ``{"bodies.crank": f}``, a wrench in the body frame, and ``{"markers.tip": f}``, a
+        force in world axes; f a constant, f(t), f(t, state), or `ephs.Sampled`. A tuple of such names has the numbers
+        of all in a row. The state is read by path, that of a scene by name too: ``state.joints.pin.rate``; see
+        `ephs.mechanics.motion.views.StateView`.
+    jumps
+        Ascending times in s at which inputs jump, or a mapping from inputs to such times: steps end there, and go on
+        from the other side. Functions are searched for others; see `ephs.solve.probe`.
+    reference
+        The reference environment of a system; a scene's world gives its own.
+    progress
+        Called as progress(t, until, stats) a few times a second.
+    journal
+        A file that receives the run while it goes on. Whatever ends the run, the same call goes on from there, to the
+        very numbers of a run that nothing disturbed; `load_solution` reads what it holds.
+    audit
+        What findings of the run's audit become: ``"fail"`` an `AuditError`, ``"warn"`` an `AuditWarning`, ``"off"``
+        nothing but the record in ``sol.audit`` and the summary.
+
+    Raises
+    ------
+    AuditError
+        The run reached its end, and its result breaks a law; ``.partial`` is the whole solution.
+    SimulationError
+        The run failed part-way; ``.partial`` is the solution up to there.
+    SemanticsError
+        The model has no square system of equations, a state or an input does not fit.
+    OptionError
+        An option is not known, or not possible with the method; a ValueError.
+    """
+    if form not in FORMS:
+        raise OptionError("form", form, f"one of {', '.join(FORMS)}" + nearest_of(form, FORMS))
+    if audit not in POLICIES:
+        raise OptionError("audit", audit, f"one of {', '.join(POLICIES)}" + nearest_of(audit, POLICIES))
+    start, end = number_of("t0", t0), number_of("until", until)
+    if not (np.isfinite(start) and np.isfinite(end) and end != start):
+        raise OptionError("until", until, f"a finite time other than t0 = {t0!r} s")
+    given = inputs or {}
+    inputs, held = holding(given, start, end)
+    if isinstance(model, Scene):
+        if reference is not None:
+            raise OptionError("reference", reference, "none: a scene's [world] has its own")
+        problem = in_own_units(problem_of_scene(model, initial, inputs))
+    else:
+        problem = problem_of_system(model, initial, inputs, reference)
+    method_of = METHODS["natural4"] if method == "auto" and form != "reduced" and step is None else None
+    chosen_method, reason = (method_of, f"the {form} form") if method_of else chosen(method, problem, step=step)
+    _fits(form, chosen_method)
+    if form == "folded":
+        problem = folded_problem(problem)
+    if end < start:
+        _reversible(problem, end)
+    order, unit = chosen_method.order, problem.seconds
+    control = control_of(problem, order, rtol, atol, step, min_step, max_step, max_steps)
+    told_apart(start / unit, end / unit, control.step)
+    if options is not None and not isinstance(options, Mapping):
+        raise OptionError("options", options, "a mapping from names to values")
+    if unknown := [key for key in options or {} if key not in chosen_method.options]:
+        known = ", ".join(chosen_method.options) or "none"
+        near = nearest_of(unknown[0], chosen_method.options)
+        raise OptionError("options", unknown[0], f"options of {chosen_method.name}: {known}{near}")
+    times, watched = times_of(save_at, start, end), events_of(events)
+    declared = np.unique(np.concatenate([jumps_of(jumps, inputs, start, end), *(one.times for one in held)]))
+    asked = {
+        "until": end, "t0": start, "method": chosen_method.name, "form": form, "rtol": rtol, "atol": atol,
+        "step": step, "min_step": min_step, "max_step": max_step, "save_at": times,
+        "options": options, "inputs": given, "jumps": jumps, "events": [event.name for event in watched],
+    }  # fmt: skip
+    for one in held:
+        if one.sampled.period < control.least * unit:
+            raise OptionError("min_step", min_step, f"at most the period of {one.name}, {one.sampled.period!r} s")
+    functions = asked_of(problem, inputs)
+    breakpoints = Breakpoints(
+        start / unit, end / unit, declared / unit, functions, [Sampling(one, problem) for one in held]
+    )
+    with failing_at(start):
+        breakpoints.enter(start / unit, lambda: problem.initial)
+        problem.inputs(start / unit, problem.initial)
+    watched, told = seen_from(problem, watched, guarded(progress))
+    course = Course(problem, chosen_method, start / unit, end / unit, control, dict(options or {}))
+    again = None if held or any(each.stateful for each in functions) else course.again(breakpoints)
+    bounds = Bounds.of(
+        control,
+        step,
+        lawful=chosen_method.lawful,
+        undamped=chosen_method.undamped,
+        order=order,
+        again=again,
+    )
+    with journaled(journal, problem, asked) as written:
+        solution = course.run(
+            breakpoints,
+            events=watched,
+            save_at=None if times is None else times / unit,
+            progress=told,
+            remarks={"auto": reason} if method == "auto" else {},
+            journal=written,
+            bounds=bounds,
+        )
+    return judged(solution, audit)
+
+
+def _fits(form: str, method: Method) -> None:
+    forms = (*method.forms, "reduced")
+    if form not in forms:
+        raise OptionError("form", form, f"{' or '.join(forms)}, which {method.name} solves")
+
+
+def control_of(
+    problem: Problem,
+    order: int,
+    rtol: "float | Mapping[str, float]",
+    atol: "float | Mapping[str, float]",
+    step: float | None,
+    min_step: float | None,
+    max_step: float | None,
+    max_steps: int | None,
+) -> Control:
+    """Control of the steps of a problem, by a method of an order.
+
+    Raises
+    ------
+    OptionError
+        A tolerance is no number, or is given for what the problem does not have.
+    """
+    relative, absolute = Tolerance.of("rtol", rtol, 1e-6), Tolerance.of("atol", atol, 1e-9)
+    states = [(slot.path, slot.quantity.kind) for slot in problem.descriptor.states]
+    relative.known("rtol", states)
+    absolute.known("atol", states)
+    unit = problem.seconds
+    least = 0.0 if min_step is None else number_of("min_step", min_step) / unit
+    most = np.inf if max_step is None else number_of("max_step", max_step) / unit
+    if problem.scene is not None and step is None:
+        tightest = min(relative.value, *relative.special.values(), np.inf)
+        most = min(most, max(longest_step(problem.scene, order, tightest), least))
+    return Control(
+        relative,
+        absolute,
+        None if step is None else number_of("step", step) / unit,
+        least,
+        most,
+        None if max_steps is None else int(number_of("max_steps", max_steps, "a number > 0")),
+    )
+
+
+def _reversible(problem: Problem, until: float) -> None:
+    """Refuse to run backward what produces entropy.
+
+    Raises
+    ------
+    OptionError
+        It names the component.
+    """
+    rng, d = np.random.default_rng(1), problem.descriptor
+    x = d.pack(problem.initial)
+    for slot in d.components:
+        if isinstance(slot.primitive, Irreversible):
+            e = random_efforts(slot.primitive.bundle, rng)
+            if np.any(slot.primitive.flow(d.point(slot, x), e, problem.reference)):
+                expected = f"a time after t0: {slot.path} produces entropy, which does not run backward"
+                raise OptionError("until", until, expected)
+
+
+def problem_of_system(
+    system: System,
+    initial: Mapping[str, "ArrayLike"] | None = None,
+    inputs: Mapping[str, Any] | None = None,
+    reference: Reference | None = None,
+    *,
+    name: str = "system",
+    assemble: bool = True,
+) -> Problem:
+    """The initial value problem of a system.
+
+    ``assemble``: bodies and joints whose poses are not given are put where the others want them.
+    """
+    descriptor = system.descriptor()
+    signals: dict[Path, Signal] = {}
+    for port, given in (inputs or {}).items():
+        if not isinstance(given, Mapping) or len(given) != 1 or not set(given) <= {"effort", "flow"}:
+            raise AssemblyError("input", port, found=given, expected="{'effort': f} or {'flow': f}")
+        ((side, value),) = given.items()
+        path = Path.of(port)
+        size = system.interface[path].quantity.space.dim if path in system.interface else None
+        signals[path] = signal(value, effort=side == "effort", name=str(path), size=size)
+    state = system.state(initial)
+    for slot in descriptor.states:
+        given, of = state[slot.path], slot.quantity
+        if not extents.inside(of, given):
+            found = float(given[0]) if given.size == 1 else given
+            raise AssemblyError("outside", slot.path, quantity=of.kind, found=found, expected=extents.expected(of))
+    joints = flat_joints(descriptor)
+    if assemble and joints.links:
+        state = assembled(joints, state, {Path.of(path) for path in initial or {}})
+    gaps = joints.gaps if joints.links else None
+    linked = (lambda solution: LinkMotion(joints.frames, solution)) if joints.frames.links else None
+    given = reference or Reference()
+    return Problem(name, system, descriptor, state, signals, given, gaps=gaps, linked=linked)
+
+
+def problem_of_scene(
+    scene: Scene, initial: Mapping[str, "ArrayLike"] | None = None, inputs: Mapping[Any, Any] | None = None
+) -> Problem:
+    """The initial value problem of a scene."""
+    view = Names(scene).view
+    forces, wrenches = scene_signals(scene, inputs or {}, view)
+    system = scene_system(scene, driven=frozenset(forces), wrenches=frozenset(wrenches))
+    state = initial_state(scene)
+    if initial:
+        changed = system.state(initial)
+        state |= {Path.of(path): changed[Path.of(path)] for path in initial}
+    signals = {path: Signal(given.value, given.effort) for path, given in scene_inputs(scene).items()}
+    for name, force in forces.items():
+        for port, where in drive_ports(scene.joint(name)):
+            extra = part_of(force, where)
+            if port in signals and signals[port].effort:
+                raise AssemblyError(
+                    "input", f"joints.{name}", found="a force", expected="none: its motion is prescribed"
+                )
+            signals[port] = sum_of(signals[port], extra) if port in signals else extra
+    signals |= {wrench_port(body): wrench for body, wrench in wrenches.items()}
+    world = scene.world
+    problem = Problem(
+        scene.name,
+        system,
+        system.descriptor(),
+        state,
+        signals,
+        Reference(world.temperature, world.pressure),
+        motion=lambda solution: SceneMotion(scene, solution),
+        scene=scene,
+        document=scene_to_text(scene),
+        dependences=lambda: explain(scene),
+        shaky=lambda: is_shaky(scene),
+        length=Snapshot.of(scene).scale(world.gravity).length,
+        view=view,
+        names=scene_names(scene),
+    )
+    if initial:
+        _on_joints(problem)
+    return problem
+
+
+def _on_joints(problem: Problem) -> None:
+    """Hold initial states that were given against the joints.
+
+    Raises
+    ------
+    AssemblyError
+        A joint is open, or a momentum contradicts the joints by more than methods leave it off them.
+    """
+    d = problem.descriptor
+    x = d.pack(problem.initial)
+    once = Record(np.zeros(1), x[None, :], np.zeros((1, len(d.components))), np.zeros((1, 5)))
+    motion = SceneMotion(problem.scene, solution_of(problem, once, {}))
+    gap = float(motion.constraint_error()[0])
+    if gap > OPEN:
+        raise AssemblyError("open-joint", problem.name, found=f"{gap:.1e} m or rad")
+    for path, value in motion.state(0).items():
+        given = problem.initial[path]
+        if value.shape == given.shape and path[-1] == "p":
+            off = float(np.abs(value - given).max()) / max(1.0, float(np.abs(given).max()))
+            if off > OFF:
+                raise AssemblyError("off-joint", path, found=off)

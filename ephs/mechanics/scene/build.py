@@ -1,0 +1,320 @@
+"""Scenes as hierarchical systems.
+
+Boxes are ``bodies.NAME``, ``joints.NAME``, ``springs.NAME``, ``contacts.NAME``, ``thermal.NAME``, ``conduction.NAME``,
+``parts.NAME``, ``ground`` and ``environment``; they meet at the junctions ``momenta.BODY`` and ``entropies.NODE``. A
+driven joint's momentum is the outer port ``drives.JOINT``. What a part exposes is joined at ``momenta.PART.BODY`` and
+so on; a part's name is not taken by anything else of its level, so these never clash.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, final
+
+import numpy as np
+
+from ephs.mechanics.elements import components
+from ephs.mechanics.elements.beam import elastic
+from ephs.mechanics.elements.bodies import rigid_body
+from ephs.mechanics.elements.contact import contact
+from ephs.mechanics.elements.joints import between_frames, joint, spring_damper, universal_joint
+from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Body, Joint, Scene, Spring
+from ephs.mechanics.scene.surfaces import Contact, Surface
+from ephs.mechanics.shapes.pairs import Touch, touches
+from ephs.operad import Path, Pattern, Quantity, junction, quantity
+from ephs.semantics import library
+from ephs.semantics.bundle import Array
+from ephs.semantics.descriptor import Input
+from ephs.semantics.spaces import SE3
+from ephs.semantics.system import Filling, System
+
+__all__ = [
+    "component_path",
+    "contact_points",
+    "drive_ports",
+    "initial_state",
+    "scene_inputs",
+    "scene_names",
+    "scene_system",
+    "wrench_port",
+]
+
+
+def component_path(kind: str, name: str) -> Path:
+    """Where a (dotted) body, joint, … lies: ``left.crank`` is the box ``parts.left.bodies.crank``."""
+    *parts, last = name.split(".")
+    return Path([*(word for part in parts for word in ("parts", part)), kind, last])
+
+
+def wrench_port(body: str) -> Path:
+    """The outer port at which a wrench acts on a body."""
+    return _at("momenta", body)
+
+
+def drive_ports(of: Joint) -> tuple[tuple[Path, slice], ...]:
+    """The outer ports of a driven joint, and which of its freedoms each of them moves."""
+    at = _at("drives", of.name)
+    if of.middle is None:
+        return ((at, slice(0, of.dim)),)
+    return ((at / "first", slice(0, 1)), (at / "second", slice(1, 2)))
+
+
+def scene_system(scene: Scene, *, driven: Iterable[str] = (), wrenches: Iterable[str] = ()) -> System:
+    """The scene as a hierarchical system.
+
+    Parameters
+    ----------
+    driven
+        Joints whose momentum is to be an outer port, beside those that the scene drives itself.
+    wrenches
+        Bodies whose momentum is to be an outer port.
+    """
+    own = {name for name, j in scene.all_joints() if _is_driven(j)}
+    return _level(scene, _Demands(frozenset(wrenches), frozenset(), own | set(driven)), top=True)
+
+
+def initial_state(scene: Scene) -> dict[Path, Array]:
+    """Values of all states of the scene's system at the start."""
+    out: dict[Path, Array] = {}
+    poses: dict[str, Array] = {GROUND: SE3.identity()}
+    for name, body in scene.all_bodies():
+        at = component_path("bodies", name)
+        out[at / "pe" / "q"] = poses[name] = np.array(body.pose)
+        if body.mass > 0.0:
+            out[at / "ke" / "p"] = np.concatenate([body.inertia @ body.twist[:3], body.mass * body.twist[3:]])
+    for name, j in scene.all_joints():
+        at = component_path("joints", name)
+        halves = [(at, np.array(j.coordinate))]
+        if j.middle is not None:
+            halves = [(at / part, j.coordinate[i : i + 1].copy()) for i, part in enumerate(("first", "second"))]
+        for place, value in halves:
+            out[place / "pe" / "q_r"] = value
+            if j.heat == ENVIRONMENT:
+                out[place / "env" / "s"] = np.zeros(1)
+    between = [
+        (component_path("springs", name), (s.body1, s.body2), (_point(s.at1), _point(s.at2)), s.heat)
+        for name, s in scene.all_springs()
+    ]
+    for name, c in scene.all_contacts():
+        bodies, touches = contact_points(scene, c)
+        at = component_path("contacts", name)
+        between += [(at / f"point{i}", bodies, (one, two), c.heat) for i, (one, two, _) in enumerate(touches)]
+    for at, bodies, frames, heat in between:
+        first, second = (SE3.compose(poses[body], frame) for body, frame in zip(bodies, frames, strict=True))
+        out[at / "pe" / "q_r"] = SE3.normalise(SE3.compose(SE3.inverse(first), second))
+        if heat == ENVIRONMENT:
+            out[at / "env" / "s"] = np.zeros(1)
+    for name, _ in scene.all_thermal():
+        out[component_path("thermal", name) / "s"] = np.zeros(1)
+    for prefix, part in _levels(scene):
+        if _needs_environment(part):
+            out[prefix / "environment" / "s"] = np.zeros(1)
+    return out
+
+
+def _point(at: Array) -> Array:
+    return np.concatenate([[1.0, 0.0, 0.0, 0.0], at])
+
+
+def contact_points(scene: Scene, of: Contact) -> tuple[tuple[str, str], tuple[Touch, ...]]:
+    """Bodies 1 and 2 of a contact, and its gaps with their frames on these."""
+    surfaces: Mapping[str, Surface] = dict(scene.all_surfaces())
+    one, other = (surfaces[name] for name in of.surfaces)
+    points, swapped = touches(one.shape, one.frame, other.shape, other.frame)
+    return ((other.body, one.body) if swapped else (one.body, other.body)), points
+
+
+def scene_inputs(scene: Scene) -> dict[Path, Input]:
+    """What the scene prescribes: drives as flows, motions as efforts, at the ports of `drive_ports`."""
+    out: dict[Path, Input] = {}
+    for _, j in scene.all_joints():
+        if _is_driven(j):
+            for port, where in drive_ports(j):
+                value = j.drive[where] if j.motion is None else np.array([j.motion])
+                out[port] = Input(np.array(value), j.motion is not None)
+    return out
+
+
+def scene_names(scene: Scene) -> dict[Path, str]:
+    """Box in the scene's system -> the name of what it stands for: of bodies, joints, springs, contacts."""
+    out: dict[Path, str] = {component_path("bodies", name): name for name, _ in scene.all_bodies()}
+    out |= {component_path("springs", name): name for name, _ in scene.all_springs()}
+    for name, c in scene.all_contacts():
+        points = range(len(contact_points(scene, c)[1]))
+        out |= {component_path("contacts", name) / f"point{i}": name for i in points}
+    for name, j in scene.all_joints():
+        at = component_path("joints", name)
+        out |= {part: name for part in ([at] if j.middle is None else [at / "first", at / "second"])}
+    return out
+
+
+def _is_driven(j: Joint) -> bool:
+    return j.motion is not None or bool(np.any(j.drive))
+
+
+def _at(group: str, name: str) -> Path:
+    return Path([group, *name.split(".")])
+
+
+def _levels(scene: Scene, prefix: Path = Path()) -> Iterable[tuple[Path, Scene]]:  # noqa: B008 - a frozen value
+    yield prefix, scene
+    for name, part in scene.parts.items():
+        yield from _levels(part, prefix / "parts" / name)
+
+
+def _needs_environment(scene: Scene) -> bool:
+    return any(ENVIRONMENT in c.between for c in scene.conduction.values())
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class _Demands:
+    """What the level above wants to reach, by names as seen from this level: bodies, thermal nodes, driven joints."""
+
+    bodies: frozenset[str]
+    nodes: frozenset[str]
+    joints: set[str]
+
+    def of_part(self, part: str) -> "_Demands":
+        """The same, as seen from a part."""
+        start = part + "."
+
+        def inside(names: Iterable[str]) -> set[str]:
+            return {name[len(start) :] for name in names if name.startswith(start)}
+
+        return _Demands(frozenset(inside(self.bodies)), frozenset(inside(self.nodes)), inside(self.joints))
+
+
+@dataclass(slots=True)
+class _Builder:
+    """Collects the boxes of one level."""
+
+    demands: _Demands
+    junctions: dict[Path, Any] = field(default_factory=dict)
+    boxes: dict[Path, dict[Any, str]] = field(default_factory=dict)
+    fillings: dict[Path, Filling] = field(default_factory=dict)
+
+    def momentum(self, body: str) -> str:
+        """The junction of a body's momentum."""
+        path = _at("momenta", body)
+        self.junctions[path] = junction(quantity.body_momentum, exposed=body in self.demands.bodies)
+        return str(path)
+
+    def entropy(self, node: str) -> str:
+        """The junction of a thermal node."""
+        path = _at("entropies", node)
+        self.junctions[path] = junction(quantity.entropy, exposed=node in self.demands.nodes)
+        return str(path)
+
+    def drive(self, path: Path, of: Quantity) -> str:
+        """An exposed junction of a driven joint."""
+        self.junctions[path] = junction(of, exposed=True)
+        return str(path)
+
+    def add(self, path: Path, filling: Filling, ports: Mapping[Any, str]) -> None:
+        """A box with its filling."""
+        self.boxes[path], self.fillings[path] = dict(ports), filling
+
+
+def _level(scene: Scene, demands: _Demands, *, top: bool) -> System:
+    inner = _demands_on_parts(scene, demands)
+    grounded = _uses_ground(scene)
+    if grounded and not top:
+        demands = _Demands(demands.bodies | {GROUND}, demands.nodes, demands.joints)
+    b = _Builder(demands)
+    gravity = scene.world.gravity
+    for name, body in scene.bodies.items():
+        b.add(Path(["bodies", name]), _body(body, gravity), {"p": b.momentum(name)})
+    for name, j in scene.joints.items():
+        ports = {"p1": b.momentum(j.body1), "p2": b.momentum(j.body2)}
+        if j.heat != ENVIRONMENT:
+            ports["s"] = b.entropy(j.heat)
+        system = _joint(j, driven=name in demands.joints)
+        if name in demands.joints:
+            names = ("p_r",) if j.middle is None else ("p_r1", "p_r2")
+            for port, (path, _) in zip(names, drive_ports(j), strict=True):
+                ports[port] = b.drive(path, system.interface[Path.of(port)].quantity)
+        b.add(Path(["joints", name]), system, ports)
+    for name, s in scene.springs.items():
+        ports = {"p1": b.momentum(s.body1), "p2": b.momentum(s.body2)}
+        if s.heat != ENVIRONMENT:
+            ports["s"] = b.entropy(s.heat)
+        b.add(Path(["springs", name]), _spring(s), ports)
+    for name, c in scene.contacts.items():
+        ends, points = contact_points(scene, c)
+        ports = {"p1": b.momentum(ends[0]), "p2": b.momentum(ends[1])}
+        if c.heat != ENVIRONMENT:
+            ports["s"] = b.entropy(c.heat)
+        b.add(Path(["contacts", name]), contact(points, c.law, heat=c.heat != ENVIRONMENT), ports)
+    for name, node in scene.thermal.items():
+        filling = components.thermal_node(node.capacity, node.temperature)
+        b.add(Path(["thermal", name]), filling, {"s": b.entropy(name)})
+    for name, c in scene.conduction.items():
+        ports = {"s1": b.entropy(c.between[0]), "s2": b.entropy(c.between[1])}
+        b.add(Path(["conduction", name]), library.heat_transfer(h=c.conductance), ports)
+    if _needs_environment(scene):
+        b.add(Path(["environment"]), library.environment(), {"s": b.entropy(ENVIRONMENT)})
+    for name, part in scene.parts.items():
+        system = _level(part, inner.of_part(name), top=False)
+        ports = {port: _joined(b, name, port, system.interface[port].quantity) for port in system.interface}
+        b.add(Path(["parts", name]), system, ports)
+    if grounded and top:
+        b.add(Path(["ground"]), components.ground(), {"p": b.momentum(GROUND)})
+    return System.of(Pattern(junctions=b.junctions, boxes=b.boxes), b.fillings)
+
+
+def _joined(b: _Builder, part: str, port: Path, of: Quantity) -> str:
+    """The junction at this level that a part's outer port lies on."""
+    group, *rest = tuple(port)
+    if rest == [GROUND]:
+        return b.momentum(GROUND)
+    name = ".".join([part, *rest])
+    if group == "momenta":
+        return b.momentum(name)
+    if group == "entropies":
+        return b.entropy(name)
+    return b.drive(Path(["drives", part, *rest]), of)
+
+
+def _demands_on_parts(scene: Scene, demands: _Demands) -> _Demands:
+    """What the level above and this level's own joints, springs and conductions want of its parts."""
+    pairs = [*scene.joints.values(), *scene.springs.values()]
+    bodies = {name for x in pairs for name in (x.body1, x.body2)} | _touching(scene)
+    nodes = {x.heat for x in (*pairs, *scene.contacts.values())} | {
+        name for c in scene.conduction.values() for name in c.between
+    }
+    return _Demands(demands.bodies | bodies, demands.nodes | nodes, demands.joints)
+
+
+def _uses_ground(scene: Scene) -> bool:
+    mine = [*scene.joints.values(), *scene.springs.values()]
+    if GROUND in _touching(scene):
+        return True
+    return any(GROUND in (x.body1, x.body2) for x in mine) or any(map(_uses_ground, scene.parts.values()))
+
+
+def _touching(scene: Scene) -> set[str]:
+    """The bodies of this level's own contacts, as seen from it."""
+    surfaces = dict(scene.all_surfaces())
+    return {surfaces[name].body for c in scene.contacts.values() for name in c.surfaces}
+
+
+def _body(body: Body, gravity: Array) -> System:
+    return rigid_body(body.mass, body.inertia, gravity, strict=False)  # the scene's reader has seen to it
+
+
+def _joint(j: Joint, *, driven: bool) -> System:
+    heat = j.heat != ENVIRONMENT
+    if j.middle is not None:
+        return universal_joint(j.frame1, j.middle, j.frame2, j.friction, j.stiffness, j.rest, heat=heat, driven=driven)
+    if j.strain is not None:
+        of = j.strain
+        parts = elastic(of.length, of.stiffness, of.rest, of.damping)
+        return between_frames(j.frame1, j.frame2, *parts, heat=heat)
+    return joint(
+        j.kind, j.frame1, j.frame2, j.friction, j.stiffness, j.rest, pitch=j.pitch, heat=heat, driven=driven,
+        limits=j.limits, stop=j.stop,
+    )  # fmt: skip
+
+
+def _spring(s: Spring) -> System:
+    return spring_damper(s.at1, s.at2, s.stiffness, s.length, s.damping, heat=s.heat != ENVIRONMENT)

@@ -1,0 +1,183 @@
+"""Mechanisms far from metres, kilograms and seconds are solved in units of their own, and shown in these.
+
+All thresholds of assembly, of loops, of iterations and of errors then count in the mechanism's own length, mass and
+time. The units are powers of two, so that nothing is rounded on the way there and back; near metres, kilograms and
+seconds they are these.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, final
+
+import numpy as np
+
+from ephs.mechanics.scene.build import drive_ports, scene_system, wrench_port
+from ephs.mechanics.scene.geometry import coupling_of
+from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.scene.rescaled import element_units, freedom_units, rescaled
+from ephs.mechanics.scene.state import Snapshot
+from ephs.operad import Path
+from ephs.semantics.bundle import Array
+from ephs.semantics.descriptor import Descriptor
+from ephs.semantics.spaces import Pair
+from ephs.solve.events import Event
+from ephs.solve.instant import Mobility
+from ephs.solve.integrate import Progress
+from ephs.solve.mobility import mobility
+from ephs.solve.problem import Problem, Signal, State
+from ephs.solve.result.record import Record
+
+__all__ = ["SI", "Units", "in_own_units", "mobility_of", "seen_from", "units_of_states"]
+
+NEAR = 16, 20, 20
+"""Powers of two that one unit of length, mass and time is from the next: within the first ones from m, kg and s, runs
+are in these. At half of it, all methods agree with runs in units of one to rounding, or to their tolerance."""
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Units:
+    """A length in m, a mass in kg, a time in s."""
+
+    length: float
+    mass: float
+    time: float
+
+    @staticmethod
+    def of(scene: Scene) -> "Units":
+        """Those of a scene: of its length and rate, and its mass as a whole."""
+        scale = Snapshot.of(scene).scale(scene.world.gravity)
+        mass = sum(body.mass for _, body in scene.all_bodies()) or 1.0
+        sizes = scale.length, mass, 1.0 / scale.rate
+        return Units(*(2.0 ** (near * round(np.log2(x) / near)) for x, near in zip(sizes, NEAR, strict=True)))
+
+    @property
+    def energy(self) -> float:
+        """In J; that of an entropy in J/K, too."""
+        return self.mass * self.length**2 / self.time**2
+
+
+SI = Units(1.0, 1.0, 1.0)
+
+
+def in_own_units(problem: Problem) -> Problem:
+    """The problem of a scene in units of its own, whose runs are shown as those of the problem that was given.
+
+    That problem itself where its units are near, or where there is no scene.
+    """
+    scene: Scene | None = problem.scene
+    if scene is None or (units := Units.of(scene)) == SI:
+        return problem
+    small = rescaled(scene, 1.0 / units.length, 1.0 / units.mass, 1.0 / units.time)
+    ports = {port: where for _, j in scene.all_joints() for port, where in _ports(j, units)}
+    bodies = {wrench_port(name): np.array([units.length] * 3 + [1.0] * 3) for name, _ in scene.all_bodies()}
+    forces = bodies | ports
+    driven = frozenset(n for n, j in scene.all_joints() if any(port in problem.signals for port, _ in drive_ports(j)))
+    pushed = frozenset(name for name, _ in scene.all_bodies() if wrench_port(name) in problem.signals)
+    system = scene_system(small, driven=driven, wrenches=pushed)
+    descriptor = system.descriptor()
+    factors = units_of_states(descriptor, units)
+
+    def given(state: State) -> dict[Path, Array]:
+        return {path: value * factors[path] for path, value in state.items()}
+
+    def scaled(port: Path, signal: Signal) -> Signal:
+        force = units.mass * units.length / units.time**2 * forces[port]
+        unit = units.energy / units.time / force if signal.effort else force
+        if not callable(signal.value):
+            return replace(signal, value=np.asarray(signal.value) / unit)
+        return replace(signal, value=lambda t, state: signal.at(t * units.time, given(state)) / unit)
+
+    whole = np.concatenate([factors[slot.path] for slot in descriptor.states])
+
+    def shown(record: Record, stats: Mapping[str, Any]) -> tuple[Problem, Record, dict[str, Any]]:
+        of = Record(
+            record.t * units.time, record.x * whole, record.energies * units.energy, record.ledgers * units.energy
+        )
+        return problem, of, _stats(stats, units, factors)
+
+    return replace(
+        problem,
+        system=system,
+        descriptor=descriptor,
+        initial={path: np.asarray(value) / factors[path] for path, value in problem.initial.items()},
+        signals={port: scaled(port, signal) for port, signal in problem.signals.items()},
+        reference=replace(problem.reference, pressure=small.world.pressure),
+        scene=small,
+        shown=shown,
+        given=given,
+        seconds=units.time,
+    )
+
+
+def seen_from(problem: Problem, events: tuple[Event, ...], progress: Progress | None) -> tuple[Any, Any]:
+    """Events and progress on times of the problem that was given, and on what its users read of its states."""
+    given, seconds, view = problem.given, problem.seconds, problem.view
+
+    def seen(event: Event) -> Event:
+        function = event.function
+
+        def read(t: float, state: State) -> float:
+            return function(t * seconds, view(state if given is None else given(state)))
+
+        return replace(event, function=read)
+
+    if given is None:
+        return tuple(map(seen, events)), progress
+    told = None if progress is None else lambda t, until, stats: progress(t * seconds, until * seconds, stats)
+    return tuple(map(seen, events)), told
+
+
+def mobility_of(problem: Problem) -> Mobility:
+    """Mobility and redundant constraints of a problem in its initial state."""
+    own = in_own_units(problem)
+    return mobility(own.descriptor, own.descriptor.pack(own.initial), own.prescribed)
+
+
+def _ports(j: Any, units: Units) -> list[tuple[Path, Array]]:
+    """The outer ports of a driven joint, and its forces there in units of one force."""
+    of = units.length / freedom_units(coupling_of(j), j.coordinate, units.length)
+    return [(port, of[where]) for port, where in drive_ports(j)]
+
+
+def units_of_states(descriptor: Descriptor, units: Units, *, read: bool = False) -> dict[Path, Array]:
+    """By path, the unit of each number of a state: (size,) as it is stored, or as users read it."""
+    out: dict[Path, Array] = {}
+    momentum = units.mass * units.length / units.time
+    for slot in descriptor.states:
+        space, kind = slot.quantity.space, slot.quantity.kind
+        if kind == "relative_pose":
+            pair = Pair.from_space(space)
+            unit = np.where(np.any(pair.basis[:3], axis=0), 1.0, units.length)
+            out[slot.path] = unit if read else element_units(space.size, unit, units.length)
+        elif kind == "pose":
+            out[slot.path] = np.array([1.0] * 4 + [units.length] * 3)
+        elif kind == "entropy":
+            out[slot.path] = np.array([units.energy])
+        else:
+            out[slot.path] = momentum * np.array([units.length] * 3 + [1.0] * 3)
+    return out
+
+
+def _stats(stats: Mapping[str, Any], units: Units, factors: Mapping[Path, Array]) -> dict[str, Any]:
+    out = dict(stats)
+    for key in ("step", "shortest_step", "longest_step"):
+        if out.get(key) is not None:
+            out[key] *= units.time
+    if "least_production" in out:
+        out["least_production"] *= units.energy
+    if "work_apart" in out:
+        out["work_apart"], out["work_apart_at"] = out["work_apart"] * units.energy, out["work_apart_at"] * units.time
+    if "jumps" in out:
+        found = [{**one, "t": one["t"] * units.time} for one in out["jumps"]["found"]]
+        out["jumps"] = {**out["jumps"], "found": found}
+    if "events" in out:
+        out["events"] = [
+            {
+                **event,
+                "t": event["t"] * units.time,
+                "state": {path: (np.array(x) * factors[Path.of(path)]).tolist() for path, x in event["state"].items()},
+            }
+            for event in out["events"]
+        ]
+    return out

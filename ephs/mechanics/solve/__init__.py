@@ -1,1 +1,0 @@
-"""Solvers: the compiled model of a system, integrators, solutions. Nothing here knows of bodies or joints."""

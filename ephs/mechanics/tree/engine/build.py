@@ -1,0 +1,204 @@
+"""From the tables of a reduced scene to those of the engine: links at their joints, rigid groups merged."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ephs.mechanics.tree.engine.closing import Closing, closing
+from ephs.mechanics.tree.engine.links import Frames, links_of
+from ephs.mechanics.tree.engine.programs import Engine
+from ephs.mechanics.tree.engine.tables import Forces, table_of
+from ephs.mechanics.tree.finding.tables import CUT, SPRING, TREE
+from ephs.mechanics.tree.sweeps.acting import ON_BODIES, ON_CUT, ON_TREE, Component, Own
+from ephs.mechanics.tree.sweeps.cuts import Chart, Relative
+from ephs.mechanics.tree.sweeps.loops import kinds_of, loop_program
+from ephs.mechanics.tree.sweeps.programs import PLACE, Sweeps, sweeps
+from ephs.semantics.bundle import Array
+from ephs.semantics.spaces import SE3
+from ephs.semantics.spaces.rotations import quaternion_to_matrix
+from ephs.semantics.stage import Program, Table
+from ephs.solve.sparse import Index
+
+if TYPE_CHECKING:
+    from ephs.mechanics.tree.finding.mechanism import Reduced
+
+__all__ = ["engine_of", "whole_tables"]
+
+
+def engine_of(
+    reduced: "Reduced",
+    gravity: Array,
+    drive: Array,
+    wrench: Array,
+    scal: Array,
+    acted: tuple[frozenset[int], frozenset[int]] = (frozenset(), frozenset()),
+    kept: Sequence[Array] | None = None,
+) -> Engine:
+    """The engine of a reduced scene.
+
+    Parameters
+    ----------
+    gravity
+        (3,) in world axes.
+    drive, wrench, scal
+        Given forces (joints' freedoms,), given wrenches (bodies, 6), and (h, θ₀, π₀), which are read where they are.
+    acted
+        Edges and bodies on which given forces act.
+    kept
+        Of each cut joint, which of its rows are kept: those that others imply are left out. None: all.
+    """
+    found = links_of(reduced)
+    bodies, ground = found.bodies, found.ground
+    cut, cut_frame, cut_basis, ends = _cut(reduced, bodies, ground, kept)
+    charts = _chart(reduced, cut)
+    forces = _forces(reduced, bodies, ground, cut, acted)
+    forced = bool(forces.edge.size or forces.conduction.size or np.any(forces.body != -1))
+    driven = any(part.joint.driven for part in found.parts)
+    records = found.packed(gravity)
+    program = sweeps(records.kind, general=bool(forced or driven or len(cut)))
+    eliminated = closing([part.parent for part in found.parts], ends)
+    joints = kinds_of([*charts[:, [0, 3, 1]].tolist(), *cut[:, [2, 5, 3]].tolist()])
+    tables: dict[str, Any] = {
+        "own": _own(len(found.parts), program, loop_program(joints), forced=forced, driven=driven),
+        "integers": records.integers,
+        "reals": records.reals,
+        "gravity": records.gravity,
+        "chart": table_of(Chart, charts),
+        "cut": cut[:, :-1].ravel(),
+        "cut_numbers": np.hstack([cut_frame, cut_basis]).ravel(),
+        **{name: getattr(eliminated, name).ravel() for name in ("at", "slot", "row", "flat", "end")},
+        **forces.tables(),
+        "drive": drive,
+        "wrench": wrench,
+        "scal": scal,
+    }
+    freedoms, entropies = sum(part.joint.dim for part in found.parts), len(reduced.entropies)
+    sizes = reduced.coordinates, drive.size + freedoms + entropies + 2 + len(reduced.made)
+    work = _work(program, len(found.parts), freedoms, drive.size, len(cut), entropies, eliminated)
+    return Engine(tables, work, eliminated, sizes, looped=len(cut) > 0)
+
+
+def _own(links: int, program: Sweeps, loops: Program, *, forced: bool, driven: bool) -> Table[Own]:
+    made = Own.table(1)
+    own, sweep, loop = made[0], program.program.compiled(), loops.compiled()
+    own.links, own.forced, own.driven, own.falls = links, int(forced), int(driven), int("accelerations" in sweep)
+    for name in ("accelerations", "move", "fold", "unfold", "resolve", "spread", "power", "dependent"):
+        setattr(own, name, sweep[name].address if name in sweep else 0)
+    for name in ("rows", "poses", "fit", "gaps", "relative_rates", "across", "advance", "velocities"):
+        setattr(own, name, loop[name].address)
+    own.displace = loop["move"].address
+    return made
+
+
+def _work(
+    program: Sweeps, links: int, freedoms: int, joints: int, cuts: int, entropies: int, closing: Closing
+) -> dict[str, Any]:
+    """Memory for one thread."""
+    rows, slots = len(closing.row), len(closing.slot)
+    shapes: dict[str, tuple[int, ...]] = {
+        "work": ((links + 1) * program.width,), "place": (links + 1, PLACE), "change": (links + 1, 6),
+        "pushed": (links, 6), "force": (freedoms,), "zero": (freedoms,), "relative": (cuts, Relative.real_width),
+        "value": (rows, 4), "entry": (closing.entries,), "covector": (slots, 6), "along": (slots, 12),
+        "largest": (max(closing.blocks, 1),), "temperature": (max(entropies, 1),), "entropy": (entropies,),
+        "x": (16,), "v": (64,), "e": (16,), "lam": (64,), "f": (256,), "c": (16,), "jac": (512,), "scratch": (2048,),
+        "alter": (freedoms,), "moved": (joints,), "answer": (1,),
+    }  # fmt: skip
+    return {name: np.zeros(shape) for name, shape in shapes.items()} | {"fault": np.zeros(1, dtype=np.int64)}
+
+
+def whole_tables(reduced: "Reduced", bodies: Frames, ground: Array) -> tuple[Index, Index, Array, Forces]:
+    """Charts, cut joints with all their rows, and the tables of forces where anything may act."""
+    cut, frames, basis, _ = _cut(reduced, bodies, ground, None)
+    every = frozenset(range(len(reduced.edges))), frozenset(range(reduced.links))
+    forces = _forces(reduced, bodies, ground, cut, every)
+    return _chart(reduced, cut), cut[:, :-1], np.hstack([frames, basis]), forces
+
+
+def _matrix(pose: Array) -> Array:
+    """(12,): rows of R, and p, of a pose."""
+    return np.concatenate([quaternion_to_matrix(pose[:4]).ravel(), pose[4:]])
+
+
+def _ends(reduced: "Reduced", bodies: Frames, ground: Array, i: int) -> tuple[int, int, Array]:
+    """Links of an edge, and (24,) its frames there."""
+    t = reduced.tables
+    links, frames = [], []
+    for body, offset in ((int(t.first[i]), t.offset1[i]), (int(t.second[i]), t.offset2[i])):
+        link, inside = (bodies.link[body], bodies.inside[body]) if body >= 0 else (-1, ground)
+        links.append(link)
+        frames.append(_matrix(SE3.compose(inside, offset)))
+    return links[0], links[1], np.concatenate(frames)
+
+
+def _cut(
+    reduced: "Reduced", bodies: Frames, ground: Array, kept: Sequence[Array] | None
+) -> tuple[Index, Array, Array, list[tuple[int, int]]]:
+    t = reduced.tables
+    found = [i for i in range(len(reduced.edges)) if t.kind[i] == CUT]
+    cut, frames, numbers = np.zeros((len(found), 10), dtype=np.int64), np.zeros((len(found), 24)), []
+    ends: list[tuple[int, int]] = []
+    for k, i in enumerate(found):
+        one, two, frames[k] = _ends(reduced, bodies, ground, i)
+        chosen = np.arange(int(t.rows[i])) if kept is None else kept[k]
+        if one == two:
+            chosen = chosen[:0]
+        covectors = np.zeros((6, 6))
+        covectors[: chosen.size] = t.normal[i][chosen]
+        numbers.append(np.concatenate([t.basis[i].ravel(), t.left[i].ravel(), covectors.ravel()]))
+        cut[k] = (
+            one, two, t.code[i], t.dim[i], t.q_at[i], t.q_size[i], t.r_at[i], len(ends), chosen.size, i
+        )  # fmt: skip
+        ends += [(one, two)] * chosen.size
+    return cut, frames, np.array(numbers).reshape(-1, 108), ends
+
+
+def _chart(reduced: "Reduced", cut: Index) -> Index:
+    t = reduced.tables
+    joints = [i for i in range(len(reduced.edges)) if t.kind[i] != SPRING]
+    number = {int(i): k for k, i in enumerate(cut[:, 9])}
+    found = [
+        [t.code[i], t.dim[i], t.q_at[i], t.q_size[i], t.r_at[i], t.r_at[i], number.get(i, -1)]
+        for i in joints
+        if t.dim[i]
+    ]
+    return np.array(found, dtype=np.int64).reshape(-1, 7)
+
+
+def _forces(
+    reduced: "Reduced", bodies: Frames, ground: Array, cut: Index, acted: tuple[frozenset[int], frozenset[int]]
+) -> Forces:
+    t = reduced.tables
+    number = {int(i): k for k, i in enumerate(cut[:, 9])}
+    edges: list[list[int]] = []
+    parts: list[list[int]] = []
+    frames: list[Array] = []
+    left: list[Array] = []
+    for i in range(len(reduced.edges)):
+        friction = int(t.friction[i])
+        if t.dim[i] == 0 or (t.spring[i] < 0 and friction < 0 and i not in acted[0]):
+            continue
+        one, two, frame = _ends(reduced, bodies, ground, i)
+        kind = {TREE: ON_TREE, CUT: ON_CUT, SPRING: ON_BODIES}[int(t.kind[i])]
+        edges.append(
+            [kind, one, two, int(t.dim[i]), int(t.q_at[i]), int(t.q_size[i]), int(t.r_at[i]), number.get(i, -1)]
+        )
+        parts.append([int(t.spring[i]), friction, int(t.heat[i])])
+        frames.append(frame)
+        left.append(t.left[i].ravel())
+    return Forces(
+        edge=np.array(edges, dtype=np.int64).reshape(-1, 8),
+        part=np.array(parts, dtype=np.int64).reshape(-1, 3),
+        frame=np.array(frames).reshape(-1, 24),
+        left=np.array(left).reshape(-1, 36),
+        body=np.array([bodies.link[b] if b in acted[1] else -1 for b in range(reduced.links)], dtype=np.int64),
+        body_frame=np.array([_matrix(inside) for inside in bodies.inside]).reshape(-1, 12),
+        node=reduced.nodes,
+        conduction=t.conduction,
+        sink=t.sink,
+        component=table_of(
+            Component,
+            np.hstack([t.address[:, None], t.dims, t.parameter_at[: len(t.address), None], t.made_at[:, None]]),
+        ),
+        parameters=t.parameters,
+    )

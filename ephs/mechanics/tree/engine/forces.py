@@ -1,0 +1,208 @@
+"""What acts on a mechanism besides inertia and gravity: springs, friction and its heat, conduction, given wrenches."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import final
+
+from ephs.mechanics.tree.sweeps.acting import ON_BODIES, ON_TREE, Acting, Component, Conduction, Tables, Work
+from ephs.mechanics.tree.sweeps.cuts import Relative, between, motion_of, place_of
+from ephs.mechanics.tree.sweeps.needs import NO_INTEGERS
+from ephs.semantics.linear.dense import copy
+from ephs.semantics.spaces import se3, so3
+from ephs.semantics.spaces.vectors import apply_transposed, dot, product, scale, sub, transposed
+from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Variable, Vector, staged
+
+__all__ = ["act"]
+
+
+def _grow(pushed: Matrix, link: Integer, by: list[Real]) -> None:
+    for k, x in enumerate(by):
+        pushed[link, k] = pushed[link, k] + x
+
+
+@staged
+def act(
+    on: Evaluator, tables: Tables, work: Work, q: Vector, r: Vector, s_rate: Vector, made: Vector, books: Vector
+) -> Integer:
+    """Write forces on joints and wrenches on links, rates of entropies, entropies made and powers; return a status.
+
+    Entropies are those in the memory; ``books`` (2,) receives the powers of friction and of what drives.
+    """
+    acting = _Acting(on, tables, work, q, r, s_rate, made, books, on.counter(0))
+    books[0], books[1] = 0.0, 0.0
+    on.loop(tables.node.size, acting.warm)
+    on.loop(tables.body.size, acting.push)
+    on.loop(tables.acting.size, lambda i: acting.unless_refused(lambda: acting.edge(tables.acting[i])))
+    on.loop(tables.conduction.size, lambda i: acting.unless_refused(lambda: acting.conduct(tables.conduction[i])))
+    return acting.status.value
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class _Acting:
+    """One evaluation of what acts."""
+
+    on: Evaluator
+    tables: Tables
+    work: Work
+    q: Vector
+    r: Vector
+    s_rate: Vector
+    made: Vector
+    books: Vector
+    status: Variable[Integer]
+
+    def unless_refused(self, following: Callable[[], None]) -> None:
+        """Go on where no component has refused."""
+        self.on.when(self.on.same(self.status.value, 0), following)
+
+    def _evaluate(self, number: Integer) -> None:
+        """Call a component at the states in the memory, without increments: efforts go to e, flows to f."""
+        on, tables, w, row = self.on, self.tables, self.work, self.tables.component[number]
+        dims = Integers(row.integers, row.integer_start + Component.dims.offset, 4)
+        parameters = tables.parameters.part(row.at, tables.parameters.size - row.at)
+        found = on.reach(
+            row.law, dims, tables.scal, parameters, w.x, w.v, w.e, w.lam, w.f, w.c, w.jac, w.scratch
+        )  # fmt: skip
+
+        def refuse() -> None:
+            self.status.value = found
+            w.fault[0] = number
+
+        on.when(on.negate(on.same(found, 0)), refuse)
+
+    def warm(self, k: Integer) -> None:
+        """Write the effort of an entropy to the memory."""
+        number, w = self.tables.node[k].component, self.work
+        w.temperature[k] = 0.0
+        self.s_rate[k] = 0.0
+
+        def stored() -> None:
+            w.x[0] = w.entropy[k]
+            self._evaluate(number)
+            w.temperature[k] = w.e[0]
+
+        self.unless_refused(lambda: self.on.when(number >= 0, stored))
+
+    def push(self, b: Integer) -> None:
+        """Add a given wrench on a body to its link."""
+        body, w = self.tables.body[b], self.work
+
+        def given() -> None:
+            here = se3.wrench_outward(body.turn, body.at, [self.tables.wrench[b, k] for k in range(6)])
+            self.books[1] = self.books[1] + dot(here, place_of(self.on, w.place, body.link).twist)
+            _grow(w.pushed, body.link, here)
+
+        self.on.when(body.link >= 0, given)
+
+    def edge(self, edge: Acting) -> None:
+        """Add what acts in an edge to the forces on joints, or to the wrenches on links."""
+        on, w = self.on, self.work
+        rate, pull = on.scratch(6), on.scratch(6)
+        motion = Relative(NO_INTEGERS, 0, on.scratch(Relative.real_width).cells, 0)
+        tree, between_bodies = on.same(edge.kind, ON_TREE), on.same(edge.kind, ON_BODIES)
+
+        def in_tree() -> None:
+            copy(on, self.r.part(edge.r_at, edge.dim), rate.part(0, edge.dim))
+
+        def aside() -> None:
+            on.when(between_bodies, lambda: self._between(edge, motion), lambda: self._cut(edge, motion))
+            self._along(edge, motion.twist, rate)
+
+        on.when(tree, in_tree, aside)
+        on.when(between_bodies, lambda: None, lambda: self._drive(edge, rate, pull))
+        on.when(edge.spring >= 0, lambda: self._spring(edge, pull))
+        self.unless_refused(lambda: on.when(edge.friction >= 0, lambda: self._friction(edge, rate, pull)))
+
+        def in_joint() -> None:
+            def one(j: Integer) -> None:
+                w.force[edge.r_at + j] = w.force[edge.r_at + j] + pull[j]
+
+            on.loop(edge.dim, one)
+
+        on.when(tree, in_joint, lambda: self._on_links(edge, motion, pull))
+
+    def _cut(self, edge: Acting, motion: Relative) -> None:
+        found = motion_of(self.work.relative, edge.cut)
+        motion.turn, motion.at, motion.twist = found.turn, found.at, found.twist
+
+    def _between(self, edge: Acting, motion: Relative) -> None:
+        """The motion of a spring's frames; its pose goes to the states of components."""
+        on, places, outer, at = self.on, self.work.place, edge.outer_turn, edge.outer_at
+        near, far = place_of(on, places, edge.first), place_of(on, places, edge.second)
+        turn, there = between(near, far, outer, at)
+        motion.turn, motion.at = turn, there
+        motion.twist = sub(se3.twist_inward(outer, at, far.twist), se3.twist_inward(turn, there, near.twist))
+        inner = edge.inner_turn
+        pose = [
+            *so3.quaternion(on, product(transposed(inner), turn)),
+            *apply_transposed(inner, sub(there, edge.inner_at)),
+        ]
+        for k, x in enumerate(pose):
+            self.work.x[k] = x
+
+    def _left(self, edge: Acting, j: Integer) -> list[Real]:
+        row = Vector(edge.reals, edge.real_start + Acting.left.offset + 6 * j, 6)
+        return [row[k] for k in range(6)]
+
+    def _along(self, edge: Acting, twist: list[Real], rate: Vector) -> None:
+        def one(j: Integer) -> None:
+            rate[j] = dot(self._left(edge, j), twist)
+
+        self.on.loop(edge.dim, one)
+
+    def _drive(self, edge: Acting, rate: Vector, pull: Vector) -> None:
+        """Start from the given forces on a joint, whose element goes to the states of components."""
+        copy(self.on, self.q.part(edge.q_at, edge.size), self.work.x.part(0, edge.size))
+
+        def one(j: Integer) -> None:
+            pull[j] = self.tables.drive[edge.r_at + j]
+            self.books[1] = self.books[1] + pull[j] * rate[j]
+
+        self.on.loop(edge.dim, one)
+
+    def _spring(self, edge: Acting, pull: Vector) -> None:
+        self._evaluate(edge.spring)
+
+        def one(j: Integer) -> None:
+            pull[j] = pull[j] - self.work.e[j]
+
+        self.on.loop(edge.dim, one)
+
+    def _friction(self, edge: Acting, rate: Vector, pull: Vector) -> None:
+        w, d, heat = self.work, edge.dim, edge.heat
+        copy(self.on, rate.part(0, d), w.e.part(0, d))
+        w.e[d] = w.temperature[heat]
+        self._evaluate(edge.friction)
+
+        def one(j: Integer) -> None:
+            pull[j] = pull[j] - w.f[j]
+            self.books[0] = self.books[0] + w.f[j] * rate[j]
+
+        self.on.loop(d, one)
+        self.s_rate[heat] = self.s_rate[heat] - w.f[d]
+        self.made[self.tables.component[edge.friction].made] = -w.f[d]
+
+    def _on_links(self, edge: Acting, motion: Relative, pull: Vector) -> None:
+        """Add a pull in an edge to the wrenches on its links."""
+        on, wide, pushed = self.on, [self.on.variable(0.0) for _ in range(6)], self.work.pushed
+
+        def one(j: Integer) -> None:
+            for total, x in zip(wide, self._left(edge, j), strict=True):
+                total.value = total.value + x * pull[j]
+
+        on.loop(edge.dim, one)
+        whole = [total.value for total in wide]
+        outer = se3.wrench_outward(edge.outer_turn, edge.outer_at, whole)
+        inner = se3.wrench_outward(motion.turn, motion.at, scale(-1.0, whole))
+        on.when(edge.second >= 0, lambda: _grow(pushed, edge.second, outer))
+        on.when(edge.first >= 0, lambda: _grow(pushed, edge.first, inner))
+
+    def conduct(self, row: Conduction) -> None:
+        """Add what a component conducts to the rates of two entropies."""
+        w, rate = self.work, self.s_rate
+        w.e[0], w.e[1] = w.temperature[row.one], w.temperature[row.two]
+        self._evaluate(row.component)
+        rate[row.one] = rate[row.one] - w.f[0]
+        rate[row.two] = rate[row.two] - w.f[1]
+        self.made[self.tables.component[row.component].made] = -w.f[0] - w.f[1]

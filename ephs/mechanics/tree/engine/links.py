@@ -1,0 +1,147 @@
+"""Links of a reduced scene: frames at their joints, bodies that are fixed to each other as one."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, final
+
+import numpy as np
+
+from ephs.mechanics.constraints.subgroup import Subgroup, generated
+from ephs.mechanics.tree.finding.tables import SPRING, TREE
+from ephs.mechanics.tree.sweeps.pack import SLIDE, TURN, Packed, Part, packed
+from ephs.mechanics.tree.sweeps.records import Joint
+from ephs.semantics.bundle import Array
+from ephs.semantics.spaces import SE3
+from ephs.semantics.spaces.codes import VECTOR
+from ephs.semantics.spaces.rotations import matrix_to_quaternion, quaternion_to_matrix
+
+if TYPE_CHECKING:
+    from ephs.mechanics.tree.finding.mechanism import Reduced
+
+__all__ = ["Found", "Frames", "links_of", "plane_of"]
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Frames:
+    """Poses of bodies in the frames of the links that they belong to, found outwards along the tree."""
+
+    link: list[int]
+    inside: list[Array]
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Found:
+    """The links of a reduced scene, parents first.
+
+    Attributes
+    ----------
+    parts
+        What the sweeps' records are made of.
+    bodies
+        Where the bodies are in them.
+    ground
+        Pose of the world in the ground's frame, whose z axis is the normal of a planar mechanism.
+    planar
+        Whether everything moves in that plane.
+    """
+
+    parts: Sequence[Part]
+    bodies: Frames
+    ground: Array
+    planar: bool
+
+    def packed(self, gravity: Array) -> Packed:
+        """The sweeps' records under gravity (3,) in world axes."""
+        pull = quaternion_to_matrix(self.ground[:4]) @ np.asarray(gravity, dtype=float)
+        return packed(self.parts, pull, planar=self.planar)
+
+
+def links_of(reduced: "Reduced") -> Found:
+    """The links of a reduced scene."""
+    t = reduced.tables
+    joints = [i for i in range(len(reduced.edges)) if t.kind[i] != SPRING]
+    normal = _plane(reduced, joints)
+    ground = SE3.identity() if normal is None else np.concatenate([matrix_to_quaternion(_onto(normal)), np.zeros(3)])
+    bodies = Frames([], [])
+    parts: list[Part] = []
+    for i in range(reduced.links):
+        parent = int(t.parent[i])
+        above, inside = (bodies.link[parent], bodies.inside[parent]) if parent >= 0 else (-1, ground)
+        forward = bool(t.forward[i])
+        near, far = (t.offset1[i], t.offset2[i]) if forward else (t.offset2[i], t.offset1[i])
+        edge = reduced.edges[i]
+        if edge.pair.dim == 0:
+            bodies.link.append(above)
+            bodies.inside.append(SE3.compose(SE3.compose(inside, near), SE3.inverse(far)))
+            if above >= 0:
+                parts[above].numbers[:] += _inertia(t.inertia[i], bodies.inside[i])
+            continue
+        turn = SE3.identity()
+        joint = SE3.compose(inside, near)
+        if normal is not None:
+            turn = np.concatenate([matrix_to_quaternion(_flat(joint, edge.pair.name)), np.zeros(3)])
+        joint = SE3.compose(joint, turn)
+        bodies.link.append(len(parts))
+        bodies.inside.append(SE3.compose(SE3.inverse(turn), SE3.inverse(far)))
+        sign, driven = 1 if forward else -1, bool(t.driven[t.r_at[i]])
+        if normal is not None:
+            kind = replace(TURN if edge.pair.name == "revolute" else SLIDE, driven=driven)
+            sign *= -1 if kind.revolute and quaternion_to_matrix(turn[:4])[2, 2] < 0.0 else 1
+        else:
+            columns = tuple(tuple(column) for column in edge.pair.basis.T.tolist())
+            inverted = not forward and edge.pair.code != VECTOR
+            kind, sign = Joint(edge.pair.code, edge.pair.size, columns, inverted, driven), 1 if inverted else sign
+        matrix = quaternion_to_matrix(joint[:4])
+        numbers = np.concatenate([matrix.ravel(), joint[4:], np.zeros(10)])
+        numbers += _inertia(t.inertia[i], bodies.inside[-1])
+        parts.append(Part(kind, above, int(t.q_at[i]), int(t.r_at[i]), sign, numbers))
+    return Found(parts, bodies, ground, normal is not None)
+
+
+def plane_of(twists: Array) -> Array | None:
+    """The normal (3,) of the plane parallel to which world twists (n, 6) move, None where there is no such plane."""
+    group = generated(twists)
+    if not _planar(group):
+        return None
+    return group.turning[:, 0]
+
+
+def _planar(group: Subgroup) -> bool:
+    if group.turning.shape[1] != 1 or group.dim > 3 or abs(group.pitch()) > 1e-9:
+        return False
+    return not np.any(np.abs(group.turning[:, 0] @ group.translations) > 1e-9)
+
+
+def _inertia(own: Array, inside: Array) -> Array:
+    """(22,): the inertia of a body at a pose in its link; zeros where the pose stands."""
+    turn, at, m = quaternion_to_matrix(inside[:4]), inside[4:], float(own[3, 3])
+    about = turn @ own[:3, :3] @ turn.T + m * (float(at @ at) * np.eye(3) - np.outer(at, at))
+    upper = about[np.triu_indices(3)]
+    return np.concatenate([np.zeros(12), [m], m * at, upper])
+
+
+def _plane(reduced: "Reduced", joints: list[int]) -> Array | None:
+    """The normal of the plane in which everything moves, for mechanisms of pins and slides only."""
+    kinds = {reduced.edges[i].pair.name for i in joints if reduced.tables.kind[i] == TREE and reduced.tables.dim[i]}
+    if not kinds or not kinds <= {"revolute", "prismatic"}:
+        return None
+    return plane_of(np.concatenate([reduced.twists[i].T for i in joints]))
+
+
+def _onto(normal: Array) -> Array:
+    """The rotation that takes world axes to those of a plane, its normal to z."""
+    least = np.eye(3)[int(np.argmin(np.abs(normal)))]
+    x = np.cross(normal, least)
+    x /= np.linalg.norm(x)
+    return np.array([x, np.cross(normal, x), normal], dtype=float)
+
+
+def _flat(joint: Array, kind: str) -> Array:
+    """The frame, its axes as columns in those of a joint, that has the plane's normal as z and what slides as x."""
+    matrix = quaternion_to_matrix(joint[:4])
+    if kind == "revolute":
+        return np.eye(3) if matrix[2, 2] > 0.0 else np.diag([1.0, -1.0, -1.0])
+    slide, normal = np.array([0.0, 0.0, 1.0]), matrix[2]
+    return np.column_stack([slide, np.cross(normal, slide), normal])

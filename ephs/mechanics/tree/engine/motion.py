@@ -1,0 +1,347 @@
+"""A mechanism's equations of motion: accelerations, rates of all that a step advances, loops closed after it."""
+
+from dataclasses import dataclass
+from typing import final
+
+from ephs.mechanics.tree.engine.forces import act
+from ephs.mechanics.tree.engine.heats import count, entropies, heat_rates
+from ephs.mechanics.tree.sweeps.acting import Tables, Work
+from ephs.mechanics.tree.sweeps.closing import SIZE
+from ephs.mechanics.tree.sweeps.records import Link
+from ephs.semantics.spaces.rank import CLOSED, GAP
+from ephs.semantics.stage import Argument, Evaluator, Integer, Matrix, Real, Truth, Vector, staged
+from ephs.solve.march.records import Motion, Status
+
+__all__ = ["Mechanism", "close"]
+
+ROUNDS = 20
+"""Iterations that close loops."""
+
+
+def _clear(on: Evaluator, x: Vector) -> None:
+    def one(j: Integer) -> None:
+        x[j] = 0.0
+
+    on.loop(x.size, one)
+
+
+def _whole(x: Matrix) -> Vector:
+    return Vector(x.cells, x.start, x.rows * x.columns)
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Mechanism(Motion):
+    """A mechanism in joint coordinates: y = (v, r, heats, heat, work, flows).
+
+    Parameters
+    ----------
+    tables, work
+        Its tables, and memory.
+    looped
+        Whether loops are closed, or joints have prescribed motions in them; known while staging.
+    """
+
+    tables: Tables
+    work: Work
+    looped: bool
+
+    @property
+    def increments(self) -> Integer:
+        return self.tables.drive.size
+
+    @property
+    def freedoms(self) -> Integer:
+        return self.work.force.size
+
+    @property
+    def counted(self) -> Integer:
+        return 2 * self.freedoms + self.tables.node.size
+
+    @property
+    def closes(self) -> bool:
+        return self.looped
+
+    # ---- sweeps ----------------------------------------------------------------------------------------------------
+
+    @property
+    def _tree(self) -> tuple[Argument, ...]:
+        e = self.tables
+        return e.own[0].links, e.integers, e.reals, self.work.work, e.gravity
+
+    @property
+    def _rows(self) -> tuple[Argument, ...]:
+        e, w = self.tables, self.work
+        return e.at, e.slot, e.row, e.flat, w.value, w.entry, w.covector, w.along
+
+    @property
+    def _cuts(self) -> tuple[Argument, ...]:
+        return self.tables.cut, self.tables.cut_numbers, self.work.relative
+
+    def _move(self, on: Evaluator, q: Vector, r: Vector) -> None:
+        """The outward sweep: poses, twists, loads of all links, and the rows that close loops."""
+        e, w, own = self.tables, self.work, self.tables.own[0]
+        on.reach(own.move, *self._tree, q, r, w.place)
+        _clear(on, _whole(w.pushed))
+        if not self.looped:
+            return
+        _clear(on, w.entry)
+        _clear(on, _whole(w.covector))
+
+        def forget(a: Integer) -> None:
+            w.value[a, SIZE] = 0.0
+
+        on.loop(w.value.rows, forget)
+        on.reach(own.rows, e.cut, e.cut_numbers, w.place, w.relative, e.end, w.value, w.covector)
+
+    def _fold(self, on: Evaluator, q: Vector, force: Vector) -> Integer:
+        """The inward sweep; return a status."""
+        still = on.reach(self.tables.own[0].fold, *self._tree, *self._rows, q, force, self.work.pushed)
+        return self._still(on, still)
+
+    def _still(self, on: Evaluator, still: Integer) -> Integer:
+        """Status where a sweep says 1 + the link whose joint moves no mass, else 0."""
+
+        def blame() -> None:
+            at = (still - 1) * Link.integer_width + Link.r_at.offset
+            self.work.fault[0] = self.tables.integers[at]
+
+        on.when(still > 0, blame)
+        return on.select(still > 0, int(Status.STILL), 0)
+
+    def _sound(self, on: Evaluator) -> Integer:
+        """`Status.DEPENDENT` where a row, without those it is coupled to, is nearly nothing beside them; else 0."""
+        found = on.counter(0)
+
+        def look() -> None:
+            found.value = on.reach(self.tables.own[0].dependent, *self._rows, self.work.largest)
+
+        on.when(self.work.value.rows > 0, look)
+        return on.select(found.value > 0, int(Status.DEPENDENT), 0)
+
+    def _resolve(self, on: Evaluator, q: Vector) -> Vector:
+        """The least change of rates, in the mass metric, that meets the targets, with the factors at hand."""
+        on.reach(self.tables.own[0].resolve, *self._tree, *self._rows, q, self.work.alter, self.work.change)
+        return self.work.alter
+
+    def accelerate(
+        self, on: Evaluator, q: Vector, r: Vector, rate: Vector, s_rate: Vector, made: Vector, books: Vector
+    ) -> Integer:
+        """Write ṙ, ṡ, what each component makes, and the powers of friction and of what drives; return a status."""
+        w, own, status = self.work, self.tables.own[0], on.counter(0)
+
+        def fall() -> None:
+            still = on.reach(own.accelerations, *self._tree, q, r, w.zero, rate)
+            status.value = self._still(on, still)
+
+        def general() -> None:
+            self._move(on, q, r)
+            _clear(on, w.force)
+
+            def forced() -> None:
+                status.value = act(on, self.tables, w, q, r, s_rate, made, books)
+
+            def inward() -> None:
+                status.value = self._fold(on, q, w.force)
+
+            def separate() -> None:
+                status.value = self._sound(on)
+
+            def outward() -> None:
+                on.reach(own.unfold, *self._tree, *self._rows, q, rate, w.change)
+                on.when(own.driven > 0, drive)
+
+            def drive() -> None:
+                on.reach(own.power, *self._tree, *self._rows, q, r, w.force, w.answer)
+                books[1] = books[1] + w.answer[0]
+
+            on.when(own.forced > 0, forced)
+            on.when(on.same(status.value, 0), inward)
+            if self.looped:
+                on.when(on.same(status.value, 0), separate)
+            on.when(on.same(status.value, 0), outward)
+
+        if self.looped:
+            general()
+        else:
+            on.when(own.falls > 0, fall, general)
+        return status.value
+
+    # ---- what a march asks for ---------------------------------------------------------------------------------------
+
+    def rates(self, on: Evaluator, base: Vector, y: Vector, q: Vector, out: Vector) -> tuple[Integer, Integer]:
+        e, w, nv, n, ns = self.tables, self.work, self.increments, self.freedoms, self.tables.node.size
+        at, status = nv + n + ns, on.counter(0)
+        _clear(on, out.part(at, out.size - at))
+        self.advance(on, base, y, q)
+        r, made = y.part(nv, n), out.part(at + 2, out.size - (at + 2))
+        s_rate = out.part(nv + n, ns)
+        status.value = entropies(on, e, w, y.part(nv + n, ns))
+
+        def accelerate() -> None:
+            status.value = self.accelerate(on, q, r, out.part(nv, n), s_rate, made, out.part(at, 2))
+
+        def finish() -> None:
+            heat_rates(on, e, w, s_rate, made)
+            self.velocities(on, y, r, out)
+
+        on.when(on.same(status.value, 0), accelerate)
+        on.when(on.same(status.value, 0), finish)
+        return status.value, w.fault[0]
+
+    def advance(self, on: Evaluator, base: Vector, v: Vector, q: Vector) -> None:
+        """Write base·exp(v), joint by joint, to q."""
+        on.reach(self.tables.own[0].advance, self.tables.charts, base, v, q)
+
+    def velocities(self, on: Evaluator, y: Vector, r: Vector, out: Vector) -> None:
+        """Write v̇ = dexp⁻¹(v) r of all joints, that of cut ones from the outward sweep."""
+        on.reach(self.tables.own[0].velocities, self.tables.charts, *self._cuts, y, r, out)
+
+    def settle(self, on: Evaluator, base: Vector, start: Vector, y: Vector, q: Vector) -> Integer:
+        self.book(on, start, y)
+        self.advance(on, base, y, q)
+        if not self.looped:
+            return 0
+        return close(on, self, q, y.part(self.increments, self.freedoms))
+
+    def book(self, on: Evaluator, y0: Vector, y1: Vector) -> None:
+        """Put what components made in a step from y0 to y1 in place of what they passed on."""
+        after = self.increments + self.freedoms
+        size = y0.size - after
+        count(on, self.tables, self.work, y0.part(after, size), y1.part(after, size))
+
+    def sizes(self, on: Evaluator, y0: Vector, y1: Vector, out: Vector) -> None:
+        """1 rad or m of increments; of rates the largest in their joint; energies of heat."""
+        n, nv, charts = self.freedoms, self.increments, self.tables.chart
+
+        def larger(j: Integer) -> Real:
+            return on.maximum(on.absolute(y0[j]), on.absolute(y1[j]))
+
+        def unit(j: Integer) -> None:
+            out[j] = 1.0
+
+        def joint(i: Integer) -> None:
+            chart, most = charts[i], on.variable(0.0)
+
+            def widen(j: Integer) -> None:
+                most.value = on.maximum(most.value, larger(nv + chart.r_at + j))
+
+            def put(j: Integer) -> None:
+                out[n + chart.r_at + j] = most.value
+
+            def on_tree() -> None:
+                on.loop(chart.dim, widen)
+                on.loop(chart.dim, put)
+
+            on.when(chart.cut < 0, on_tree)
+
+        def energy(k: Integer) -> None:
+            out[2 * n + k] = larger(nv + n + k)
+
+        on.loop(n, unit)
+        on.loop(charts.size, joint)
+        on.loop(self.tables.node.size, energy)
+
+    def project(self, on: Evaluator, q: Vector, change: Vector) -> None:
+        own, w = self.tables.own[0], self.work
+        on.reach(own.spread, *self._tree, q, change, w.change)
+        on.reach(own.across, *self._cuts, w.change, w.value)
+        alter = self._resolve(on, q)
+
+        def add(j: Integer) -> None:
+            change[j] = change[j] + alter[j]
+
+        on.loop(change.size, add)
+
+    def least(self, on: Evaluator, y0: Vector, y1: Vector) -> Real:
+        first = self.increments + self.freedoms + self.tables.node.size + 2
+        least = on.variable(0.0)
+
+        def one(j: Integer) -> None:
+            made = y1[j] - y0[j]
+            least.value = on.select(on.same(j, first), made, on.minimum(made, least.value))
+
+        on.loop(y0.size, one, start=first)
+        return least.value
+
+    # ---- loops -----------------------------------------------------------------------------------------------------
+
+    def open(self, on: Evaluator, q: Vector) -> Real:
+        """Write targets that close the cut joints in one step of Newton's method; how far they are open, in m, rad."""
+        on.reach(self.tables.own[0].gaps, *self._cuts, q, self.work.value, self.work.answer)
+        return self.work.answer[0]
+
+    def newton(self, on: Evaluator, q: Vector, r: Vector, before: Real) -> tuple[Integer, Real, Truth]:
+        """Fit the cut joints, factorise, and move the tree if that helps; a status, the gap, and whether it is done."""
+        own, w, status = self.tables.own[0], self.work, on.counter(0)
+        self._move(on, q, r)
+        on.reach(own.poses, *self._cuts)
+        on.reach(own.fit, *self._cuts, q)
+        gap = self.open(on, q)
+        status.value = self._fold(on, q, w.zero)
+
+        def separate() -> None:
+            status.value = self._sound(on)
+
+        on.when(on.same(status.value, 0), separate)
+        unsound = on.negate(on.same(status.value, 0))
+        done = on.either(unsound, on.either(gap <= GAP, gap > 0.5 * before))
+
+        def go() -> None:
+            self.open(on, q)
+            self._displace(on, self._resolve(on, q), q)
+
+        on.when(on.negate(done), go)
+        return status.value, gap, done
+
+    def _displace(self, on: Evaluator, alter: Vector, q: Vector) -> None:
+        """Move the joints of the tree by a change of their increments, cut ones at rest."""
+        e, moved = self.tables, self.work.moved
+
+        def joint(i: Integer) -> None:
+            chart = e.chart[i]
+
+            def one(j: Integer) -> None:
+                moved[chart.v_at + j] = 0.0
+
+                def on_tree() -> None:
+                    moved[chart.v_at + j] = alter[chart.r_at + j]
+
+                on.when(chart.cut < 0, on_tree)
+
+            on.loop(chart.dim, one)
+
+        on.loop(e.chart.size, joint)
+        on.reach(e.own[0].displace, e.charts, moved, q)
+
+    def straighten(self, on: Evaluator, q: Vector, r: Vector) -> None:
+        """Put the rates on the constraints, with the factors at hand."""
+        on.reach(self.tables.own[0].relative_rates, *self._cuts, self.work.value)
+        alter = self._resolve(on, q)
+
+        def add(j: Integer) -> None:
+            r[j] = r[j] + alter[j]
+
+        on.loop(r.size, add)
+
+
+@staged
+def close(on: Evaluator, motion: Mechanism, q: Vector, r: Vector) -> Integer:
+    """Close the loops and put the rates on them, by the least change in the mass metric; return a status.
+
+    The gap that is left, in m or rad, is the answer in the memory. Prescribed rates are as they should be.
+    """
+    before, status, rounds = on.variable(1e300), on.counter(0), on.counter(0)
+
+    def once() -> Truth:
+        status.value, gap, done = motion.newton(on, q, r, before.value)
+        before.value = gap
+        rounds.value = rounds.value + 1
+        return on.either(done, rounds.value >= ROUNDS)
+
+    on.repeat(once)
+    opened = on.negate(before.value <= CLOSED)
+    status.value = on.select(on.both(on.same(status.value, 0), opened), int(Status.OPEN), status.value)
+    on.when(on.same(status.value, 0), lambda: motion.straighten(on, q, r))
+    motion.work.answer[0] = before.value
+    return status.value

@@ -1,0 +1,234 @@
+"""The program of all mechanisms' equations of motion, with loops or without; and one mechanism's part of it."""
+
+from collections.abc import Mapping
+from functools import cache
+from typing import Any, cast, final
+
+import numpy as np
+
+from ephs.mechanics.tree.engine.closing import Closing
+from ephs.mechanics.tree.engine.motion import Mechanism, close
+from ephs.mechanics.tree.sweeps.acting import TABLES, WORK, Tables, Work
+from ephs.semantics.bundle import Array
+from ephs.semantics.stage import (
+    Entry,
+    Evaluator,
+    Integer,
+    Matrix,
+    Program,
+    Real,
+    Record,
+    Table,
+    Vector,
+    group,
+    integer,
+    matrix,
+    real,
+    table,
+    vector,
+)
+from ephs.semantics.stage.calling import Bound
+from ephs.solve.march import MEMORY, TABLEAU, Control, Memory, Tableau, march
+from ephs.solve.march.steps import attempt
+
+__all__ = ["Engine", "motion_of_loops", "motion_of_trees", "motion_program"]
+
+
+@cache
+def motion_program(*, looped: bool) -> Program:
+    """Return the program: what is the same for all mechanisms; what is not it calls by addresses in their tables."""
+
+    def moving(tables: Tables, work: Work) -> Mechanism:
+        return Mechanism(tables, work, looped)
+
+    def marched(
+        on: Evaluator, tables: Tables, work: Work, tableau: Tableau, memory: Memory, control: Table[Control],
+        steps: Integer,
+    ) -> Integer:  # fmt: skip
+        return march(on, moving(tables, work), tableau, memory, control[0], steps)
+
+    def stages(
+        on: Evaluator, tables: Tables, work: Work, tableau: Tableau, control: Table[Control], base: Vector,
+        start: Vector, k: Matrix, last: Vector, y: Vector, q: Vector, h: Real,
+    ) -> Integer:  # fmt: skip
+        return attempt(on, moving(tables, work), tableau, control[0], base, start, h, k, last, y, q)
+
+    def rates(on: Evaluator, tables: Tables, work: Work, base: Vector, y: Vector, q: Vector, out: Vector) -> Integer:
+        return moving(tables, work).rates(on, base, y, q, out)[0]
+
+    def closed(on: Evaluator, tables: Tables, work: Work, q: Vector, r: Vector) -> Integer:
+        return close(on, moving(tables, work), q, r)
+
+    def project(on: Evaluator, tables: Tables, work: Work, q: Vector, change: Vector) -> None:
+        moving(tables, work).project(on, q, change)
+
+    def velocities(on: Evaluator, tables: Tables, work: Work, y: Vector, r: Vector, out: Vector) -> None:
+        moving(tables, work).velocities(on, y, r, out)
+
+    def book(on: Evaluator, tables: Tables, work: Work, before: Vector, after: Vector) -> None:
+        moving(tables, work).book(on, before, after)
+
+    def advance(on: Evaluator, tables: Tables, work: Work, base: Vector, v: Vector, q: Vector) -> None:
+        moving(tables, work).advance(on, base, v, q)
+
+    def evaluations(
+        on: Evaluator, tables: Tables, work: Work, q: Matrix, r: Matrix, out: Vector, rates: Matrix, repeats: Integer
+    ) -> None:
+        motion, books = moving(tables, work), out.part(0, 2)
+
+        def one(k: Integer) -> None:
+            motion.accelerate(on, q.row(k), r.row(k), rates.row(k), out, out, books)
+
+        on.loop(repeats, lambda _: on.loop(q.rows, one))
+
+    of: dict[str, Any] = {"tables": group(Tables, **TABLES), "work": group(Work, **WORK)}
+    tried: dict[str, Any] = {"tableau": group(Tableau, **TABLEAU)}
+    entries = {
+        "march": Entry(
+            marched, **of, **tried, memory=group(Memory, **MEMORY), control=table(Control), steps=integer()
+        ),
+        "stages": Entry(
+            stages, **of, **tried, control=table(Control), base=vector(), start=vector(), k=matrix(), last=vector(),
+            y=vector(), q=vector(), h=real(),
+        ),
+        "rates": Entry(rates, **of, base=vector(), y=vector(), q=vector(), out=vector()),
+        "advance": Entry(advance, **of, base=vector(), v=vector(), q=vector()),
+        "velocities": Entry(velocities, **of, y=vector(), r=vector(), out=vector()),
+        "book": Entry(book, **of, before=vector(), after=vector()),
+        "evaluations": Entry(
+            evaluations, **of, q=matrix(), r=matrix(), out=vector(), rates=matrix(), repeats=integer()
+        ),
+    }  # fmt: skip
+    if looped:
+        entries["close"] = Entry(closed, **of, q=vector(), r=vector())
+        entries["project"] = Entry(project, **of, q=vector(), change=vector())
+    return Program("motion_of_loops" if looped else "motion_of_trees", **entries)
+
+
+def motion_of_trees() -> Program:
+    """Return the program without loops."""
+    return motion_program(looped=False)
+
+
+def motion_of_loops() -> Program:
+    """Return the program with loops."""
+    return motion_program(looped=True)
+
+
+@final
+class Engine:
+    """One mechanism's equations of motion in machine code. It keeps memory: use one for each thread.
+
+    Parameters
+    ----------
+    tables, work
+        Arrays by the names of `Tables` and `Work`.
+    closing
+        The elimination of its loops.
+    sizes
+        Numbers of elements, and of y.
+
+    Attributes
+    ----------
+    looped
+        Whether loops are closed.
+    """
+
+    def __init__(
+        self, tables: Mapping[str, Any], work: Mapping[str, Any], closing: Closing, sizes: tuple[int, int], *,
+        looped: bool,
+    ) -> None:  # fmt: skip
+        self.tables, self.work, self.closing, self.looped = tables, work, closing, looped
+        coordinates, size = sizes
+        self._calls = motion_program(looped=looped).compiled()
+        self._base, self._q = np.zeros(coordinates), np.zeros(coordinates)
+        self._start, self._y, self._out = np.zeros(size), np.zeros(size), np.zeros(size)
+        self._r, self._change = np.zeros(work["force"].size), np.zeros(work["force"].size)
+        self._rates = self.bind("rates", self._base, self._y, self._q, self._out)
+        self._advance = self.bind("advance", self._base, self._y, self._q)
+        self._velocities = self.bind("velocities", self._y, self._r, self._out)
+        self._book = self.bind("book", self._start, self._y)
+        self._stages: dict[int, tuple[Table[Control], Array, Array, Bound]] = {}
+        self._close = self.bind("close", self._q, self._r) if looped else None
+        self._project = self.bind("project", self._q, self._change) if looped else None
+
+    def bind(self, name: str, *arguments: Any) -> Bound:
+        """Return an entry function of the program, bound to this mechanism and to further arguments."""
+        return self._calls[name].bind(self.tables, self.work, *arguments)
+
+    def array(self, name: str) -> Array:
+        """Return an array of the memory."""
+        return self.work[name]
+
+    @property
+    def failed(self) -> int:
+        """Number of the component or freedom at which an evaluation failed last."""
+        return int(self.work["fault"][0])
+
+    def arrays(self) -> list[Array]:
+        """Return all arrays of the tables."""
+        out: list[Any] = []
+        for value in self.tables.values():
+            out += cast("Table[Record]", value).arrays if isinstance(value, Table) else [value]
+        return [*out, *(np.asarray(value) for value in self.closing)]
+
+    def advance(self, base: Array, v: Array) -> Array:
+        """Return base·exp(v), joint by joint; v may stand at the head of y."""
+        self._base[:], self._y[: v.size] = base, v
+        self._advance()
+        return self._q.copy()
+
+    def rates(self, base: Array, y: Array) -> tuple[int, Array, Array]:
+        """Return a status, the elements base·exp(v), and ẏ of y = (v, r, heats, heat, work, flows)."""
+        self._base[:], self._y[:] = base, y
+        status = int(self._rates())
+        return status, self._q.copy(), self._out.copy()
+
+    def stages(
+        self, tableau: Mapping[str, Any], base: Array, start: Array, h: float, k: Array, y: Array
+    ) -> tuple[int, int, Array]:
+        """Evaluate the stages of a step of length h from (base, start) into k, whose first row is known, and y.
+
+        Returns
+        -------
+        tuple[int, int, Array]
+            A status, how many evaluations there were, and y at the last stage.
+        """
+        if len(k) not in self._stages:
+            control, rows, last = Control.table(1), np.zeros(k.shape), np.zeros(y.size)
+            bound = self.bind(
+                "stages", tableau, control, self._base, self._start, rows, last, self._y, self._q, 0.0
+            )  # fmt: skip
+            self._stages[len(k)] = control, rows, last, bound
+        control, rows, last, bound = self._stages[len(k)]
+        self._base[:], self._start[:], rows[0] = base, start, k[0]
+        before = cast("int", control[0].evaluations)
+        status = int(bound(h))
+        k[:], y[:] = rows, self._y
+        return status, cast("int", control[0].evaluations) - before, last.copy()
+
+    def velocities(self, y: Array, r: Array, out: Array) -> None:
+        """Write v̇ of all joints to ``out``, where an outward sweep has been."""
+        self._y[:], self._r[:], self._out[:] = y, r, out
+        self._velocities()
+        out[:] = self._out
+
+    def book(self, y0: Array, y1: Array) -> Array:
+        """Return the end y1 of a step from y0 with what components made in place of what they passed on."""
+        self._start[:], self._y[:] = y0, y1
+        self._book()
+        return self._y.copy()
+
+    def close(self, q: Array, r: Array) -> tuple[int, float, Array, Array]:
+        """Return a status, how far constraints are open, elements with loops closed, and rates on them."""
+        assert self._close is not None
+        self._q[:], self._r[:] = q, r
+        status = int(self._close())
+        return status, float(self.work["answer"][0]), self._q.copy(), self._r.copy()
+
+    def along(self, q: Array, change: Array) -> Array:
+        """Return a change of the rates without its part across the constraints, where loops were closed last, at q."""
+        assert self._project is not None
+        self._q[:], self._change[:] = q, change
+        self._project()
+        return self._change.copy()

@@ -1,0 +1,383 @@
+"""A mechanism in joint coordinates: its equations of motion, the closing of its loops, and the paper's states.
+
+What every method on the reduced form shares. A step moves q = q⁰·exp(v): the increments v and all else live in vector
+spaces, v̇ = dexp⁻¹(v) r.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, final
+
+import numpy as np
+
+from ephs.mechanics.tree.engine.build import engine_of
+from ephs.mechanics.tree.equations.booking import Booking
+from ephs.mechanics.tree.equations.dense import Dense, unmoved
+from ephs.mechanics.tree.equations.given import Given
+from ephs.mechanics.tree.equations.heat import heats_of
+from ephs.mechanics.tree.equations.led import Led
+from ephs.mechanics.tree.equations.paper import PaperStates
+from ephs.mechanics.tree.equations.reading import JointStates
+from ephs.mechanics.tree.finding.layout import Layout
+from ephs.mechanics.tree.finding.mechanism import reduce_system
+from ephs.mechanics.tree.finding.naming import tolerances, within
+from ephs.mechanics.tree.finding.tables import SPRING
+from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.codes import VECTOR
+from ephs.semantics.spaces.rank import SPARSE
+from ephs.solve.control import Tolerance
+from ephs.solve.errors import Outcome, SolveError
+from ephs.solve.march import Status
+from ephs.solve.model import compile_model
+from ephs.solve.problem import Problem
+from ephs.solve.stepping import Row
+
+__all__ = ["Equations", "ReducedState"]
+
+ASIDE = 0.1
+"""Displacement, in rad or m, that finds the constraints which repeat others in every configuration."""
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class ReducedState:
+    """Where a mechanism is: joints' elements q, rates r of the tree, heats, and what was counted since the start.
+
+    Parameters
+    ----------
+    heats
+        Energies in J of what stores entropy, from s = 0; of the environment θ₀ s.
+    books
+        Heat and work in J, then the entropy that each component made in J/K.
+    memory
+        What a method takes along from step to step; none after a start.
+    """
+
+    t: float
+    q: Array
+    r: Array
+    heats: Array
+    books: Array
+    memory: tuple[Array, ...] = ()
+
+
+@final
+class Equations:
+    """The reduced form of one problem. It keeps scratch memory: use one for each thread.
+
+    With ``pushed`` forces may be put into ``drive`` at every joint, not only where the problem has an input.
+
+    Attributes
+    ----------
+    careful
+        Whether the loops were closed last at constraints that nearly repeat each other.
+    """
+
+    def __init__(self, problem: Problem, t0: float, *, pushed: bool = False) -> None:
+        self.problem = problem
+        self.model = model = compile_model(
+            problem.descriptor, problem.reference, problem.inputs(t0, problem.initial), matrix=False
+        )
+        self.reduced = reduced = reduce_system(problem, model)
+        self._dense: Dense | None = None
+        t = reduced.tables
+        self._moving = [i for i in range(len(reduced.edges)) if t.kind[i] != SPRING]
+        self.careful = self._factored = False
+        self._closed_at = np.zeros(0), np.zeros(0)
+        self._q = np.zeros(reduced.coordinates)
+        self.nv, self.n, self.ns = int(t.dim[self._moving].sum()), reduced.freedoms, len(reduced.entropies)
+        self.size = self.nv + self.n + self.ns + 2 + len(reduced.made)
+        driven = [i for i in range(reduced.links) if t.driven[t.r_at[i] : t.r_at[i] + t.dim[i]].any()]
+        self.prescribed = np.array([float(reduced.edges[i].motion or 0.0) for i in driven])
+        groups = [i for i in self._moving if t.code[i] != VECTOR]
+        self.curved = np.array([int(t.r_at[i]) + j for i in groups for j in range(int(t.dim[i]))], dtype=int)
+        self.counted = np.r_[np.arange(self.n), self.nv : self.nv + self.n + self.ns]
+        number = {slot.path: i for i, slot in enumerate(problem.descriptor.components)}
+        self.heats = heats_of(reduced, model.reference.temperature)
+        self.led = Led(problem, moved=bool(driven))
+        self._makers = np.array([number[path] for path in reduced.made], dtype=int)
+        self.scal = model.scal(0.0)
+        self.given = Given(problem, reduced, self.nv)
+        self.drive, self.wrench = self.given.drive, self.given.wrench
+        self.constant, self.held = problem.constant, problem.held and not problem.constant
+        self._paper, self.layout = PaperStates(reduced, problem), Layout.of(reduced)
+        self.booking = Booking(self, self._paper)
+        self.evaluations = 0
+        self.gravity = reduced.gravity
+        self._driven = np.flatnonzero(t.driven)
+        self._acted = self.given.acted(set(self._moving) if pushed else set())
+        self._build(None)
+
+    def _build(self, kept: "list[Array] | None") -> None:
+        """The engine, with all rows of the cut joints or those that are kept."""
+        self.engine = engine_of(
+            self.reduced, self.gravity, self.drive, self.wrench, self.scal, self._acted, kept
+        )  # fmt: skip
+
+    # ---- the equations -----------------------------------------------------------------------------------------
+
+    def advance(self, q: Array, v: Array) -> Array:
+        """q·exp(v), joint by joint."""
+        return self.engine.advance(q, v)
+
+    def rates(self, t: float, base: Array, y: Array) -> Array:
+        """ẏ of y = (v, r, heats, books), of the books heat, work and flows, at q = base·exp(v).
+
+        Raises
+        ------
+        SolveError
+            A component cannot be evaluated there, or the mass matrix is singular.
+        """
+        nv, n, ns = self.nv, self.n, self.ns
+        self.evaluations += 1
+        self._factored = False
+        if self.held:
+            self.given.place(t, {})
+        elif not self.constant:
+            v, r, heats, books = np.split(y, [nv, nv + n, nv + n + ns])
+            self.given.place(t, self.states(ReducedState(t, self.advance(base, v), r, heats, books)))
+        status, q, out = self.engine.rates(base, y)
+        component = self.engine.failed
+        if status == Status.DEPENDENT:
+            status, component = self.dense.rates(q, y, self.given, self.heats, out)
+            self.engine.velocities(y, y[self.nv : self.nv + self.n], out)
+        self.refuse(status, component)
+        return out
+
+    def stages(
+        self, state: ReducedState, tableau: Mapping[str, Array], c: Array, h: float, y0: Array, k: Array, y1: Array
+    ) -> Array:
+        """The rates k (stages + 1, size) at an explicit method's stages and end, k[0] known; y at the end into y1.
+
+        Returns y at the last stage.
+        """
+        a = tableau["a"]
+        count = a.shape[1]
+        if self.held:
+            self.given.place(state.t, {})
+        if self.constant or self.held:
+            status, evaluations, before = self.engine.stages(tableau, state.q, y0, h, k, y1)
+            self.evaluations += evaluations
+            if status != Status.DEPENDENT:
+                self.refuse(status, self.engine.failed)
+                return before
+        before = y0
+        for i in range(1, count):
+            before = y0 + h * (a[i, :i] @ k[:i])
+            k[i] = self.rates(state.t + c[i] * h, state.q, before)
+        y1[:] = y0 + h * (a[count] @ k[:count])
+        k[-1] = self.rates(state.t + h, state.q, y1)
+        return before
+
+    def prepare(self, state: ReducedState) -> None:
+        """Compile what is not in the cache."""
+        self.rates(state.t, state.q, self.vector(state))
+        self.evaluations = 0
+
+    def refuse(self, status: int, component: int) -> None:
+        """Raise what a compiled function reported, if it did."""
+        if status == Status.STILL and not np.all(np.isfinite(self.engine.array("work"))):
+            raise SolveError(Outcome.RANGE, "", "the rates of the joints")
+        if status == Status.STILL:
+            raise unmoved(self.reduced, int(component))
+        if status:
+            raise SolveError.of_component(int(status), self.model, int(component))
+
+    def moved(self, q: Array, change: Array) -> Array:
+        """q·exp(change), the change given for the tree's joints; cut ones stay."""
+        v = np.zeros(self.nv)
+        v[: self.n] = change
+        return self.advance(q, v)
+
+    # ---- closing loops -----------------------------------------------------------------------------------------
+
+    def closed(self, state: ReducedState) -> ReducedState:
+        """The state with loops closed and rates on the constraints, by the least change in the mass metric.
+
+        Raises
+        ------
+        SolveError
+            The loops do not close near by, or the state has left the range of numbers.
+        """
+        within(self.reduced, state.q, state.r, state.heats)
+        if np.any(state.r[self._driven] != self.prescribed):  # all rates give way, in the mass metric
+            return self._closed_carefully(state)
+        self.careful = False
+        if not self.engine.looped:
+            return state
+        status, gap, q, r = self.engine.close(state.q, state.r)
+        if status == Status.OPEN:
+            raise self.dense.opened(self.dense.gaps(q, r)[0], gap)
+        self.careful = status != 0
+        if status != 0:
+            return self._closed_carefully(state)
+        self._closed_at, self._factored = (q, r), True
+        return ReducedState(state.t, q, r, state.heats, state.books)
+
+    def separation(self) -> Array:
+        """Squared part of each loop constraint off those before it, relative to the largest constraint, (m,).
+
+        In the mass metric, where loops were closed last; not below what calls for care.
+        """
+        rows = self.engine.array("value")
+        known = self._closed_at[0].size > 0 and not self.careful
+        return np.maximum(SPARSE, known * rows[:, 3] / max(rows[:, 2].max(initial=0.0), 1e-300))
+
+    def _closed_carefully(self, state: ReducedState) -> ReducedState:
+        """`closed`, for constraints that nearly repeat each other."""
+        self.careful = True
+        q, r = self.dense.closed(state.q, state.r, self.prescribed, self.moved)
+        r[self._driven] = self.prescribed
+        return ReducedState(state.t, q, r, state.heats, state.books)
+
+    # ---- the same over dense matrices --------------------------------------------------------------------------
+
+    @property
+    def dense(self) -> Dense:
+        """Sweeps over dense matrices, made when they are first asked for."""
+        if self._dense is None:
+            self._dense = Dense(self.reduced, self.gravity, self.scal)
+        return self._dense
+
+    def refilled(self) -> None:
+        """Forget what was made of the tables, after other numbers were put into them."""
+        self._dense, self._closed_at = None, (np.zeros(0), np.zeros(0))
+
+    def mass(self, q: Array, r: Array) -> Array:
+        """(n, n) the mass matrix at q."""
+        return self.dense.mass(q, r)
+
+    def rows(self) -> Array:
+        """(m, n) rows of prescribed joints, then of loops, on the tree's rates, where the mass matrix was made last."""
+        return self.dense.rows()
+
+    def gaps(self, q: Array, r: Array) -> tuple[Array, Array]:
+        """Position residuals of loops at q, zeros for prescribed joints before them; and the rows (m, n) there."""
+        return self.dense.gaps(q, r)
+
+    def fitted(self, q: Array, r: Array) -> Array:
+        """q with the cut joints' elements nearest to where their bodies put them."""
+        return self.dense.fitted(q, r)
+
+    def load(self, t: float, q: Array, r: Array, heats: Array) -> None:
+        """Put what drives at a time and state into ``drive`` and ``wrench``."""
+        if not self.constant:
+            books = np.zeros(2 + len(self.reduced.made))
+            self.given.place(t, self.states(ReducedState(t, q, r, heats, books)))
+
+    # ---- a step ------------------------------------------------------------------------------------------------
+
+    def vector(self, state: ReducedState) -> Array:
+        """y at the state: increments zero."""
+        return np.concatenate([np.zeros(self.nv), state.r, state.heats, state.books])
+
+    def state(self, base: ReducedState, y: Array, t: float) -> ReducedState:
+        """The state that the vector y means at the end of a step from ``base``; its loops are as they come."""
+        nv, n, ns = self.nv, self.n, self.ns
+        y = self.settled(self.vector(base), y)
+        v, r, heats, books = np.split(y, [nv, nv + n, nv + n + ns])
+        return ReducedState(t, self.advance(base.q, v), r, heats, books)
+
+    def settled(self, y0: Array, y1: Array) -> Array:
+        """The end y1 of a step from y0 with what components made in place of what they passed on."""
+        return self.engine.book(y0, y1) if self.ns else y1
+
+    def allowed(self, rtol: Tolerance, atol: Tolerance) -> tuple[Array, Array]:
+        """rtol and atol of what counts in an error: the tree's increments, its rates, the heats."""
+        theta = self.model.reference.temperature
+        return tolerances(self.reduced, rtol, 1.0), tolerances(self.reduced, atol, theta)
+
+    def sizes(self, y0: Array, y1: Array) -> Array:
+        """Reference of a relative tolerance: for increments 1 rad or m, for rates the joint's as a whole."""
+        size = np.maximum(np.abs(y0), np.abs(y1))[self.counted]
+        size[: self.n] = 1.0
+        for i in range(self.reduced.links):
+            at = self.n + int(self.reduced.tables.r_at[i])
+            where = slice(at, at + int(self.reduced.tables.dim[i]))
+            size[where] = size[where].max(initial=0.0)
+        return size
+
+    def along(self, estimate: Array) -> Array:
+        """An estimate for (v of the tree, r, s) without its parts across the constraints, where loops were closed last.
+
+        Closing the loops takes those out; near a singular configuration they are most of the estimate.
+        """
+        if not (self.engine.looped or self.careful):
+            return estimate
+        if not (self.careful or self._factored):
+            self.engine.close(*self._closed_at)
+        out = np.array(estimate)
+        for part in (slice(0, self.n), slice(self.n, 2 * self.n)):
+            if self.careful:
+                out[part] += self.dense.back(out[part])
+            else:
+                out[part] = self.engine.along(self._closed_at[0], out[part])
+        return out
+
+    def row(self, state: ReducedState) -> Row:
+        """Record of a state."""
+        return self.rows_of([state])[0]
+
+    def rows_of(self, states: Sequence[ReducedState]) -> list[Row]:
+        """What is kept of many states."""
+        if not states:
+            return []
+        x, energies = self.booking.energies(states)
+        out: list[Row] = []
+        for state, point, energy in zip(states, x, energies, strict=True):
+            heat, work = state.books[0], self.led.work(state.t, energy, state.books)
+            energy[self._makers] = state.books[2:]
+            out.append(Row(point, energy, np.array([heat, work, work, state.books[2:].sum()])))
+        return out
+
+    def least(self, start: ReducedState, end: ReducedState) -> float:
+        """The least entropy that a component made between two states, in J/K."""
+        made = end.books[2:] - start.books[2:]
+        return float(made.min()) if made.size else 0.0
+
+    def stats(self) -> dict[str, Any]:
+        """Counts, for the solution's statistics."""
+        return {
+            "form": "reduced",
+            "evaluations": self.evaluations,
+            "cut_joints": [edge.name for edge in self.reduced.cut],
+            "unknowns": self.unknowns,
+            "paper_unknowns": self.model.unknowns,
+            **self.led.stats(),
+        }
+
+    @property
+    def unknowns(self) -> int:
+        """Places and rates of the tree's freedoms, and a multiplier for each equation of a loop that is kept."""
+        return 2 * self.n + len(self.engine.closing.end)
+
+    def states(self, state: ReducedState) -> JointStates:
+        """All states of the system."""
+        return JointStates(self._paper, self.layout, state.q, state.r, self.heats.entropies(state.heats))
+
+    def start(self, t: float) -> ReducedState:
+        """The state that the problem begins with, its loops closed.
+
+        Raises
+        ------
+        SolveError
+            The initial states contradict the joints.
+        """
+        q, r, s = self._paper.initial()
+        state = self.closed(ReducedState(t, q, r, self.heats.energies(s), np.zeros(2 + len(self.reduced.made))))
+        self.led.start(self.row(state).energies)
+        self._paper.check(state.q, state.r, self.heats.entropies(state.heats))
+        if self.careful:
+            self._without_repeated(state)
+        return state
+
+    def _without_repeated(self, state: ReducedState) -> None:
+        """Leave out of the engine the rows that others imply, where that is so aside of the initial state, too."""
+        push = np.random.default_rng(1).standard_normal(self.n)
+        push += self.dense.back(push)
+        q = self.moved(state.q, ASIDE * push / max(1e-9, np.abs(push).max()))
+        try:
+            aside = self._closed_carefully(replace(state, q=q))
+        except SolveError:
+            return
+        self._build(self.dense.independent(aside.q, aside.r))

@@ -1,0 +1,66 @@
+"""External inputs: forces on joints and wrenches on bodies, in the arrays that the sweeps read."""
+
+from collections.abc import Mapping
+from typing import final
+
+import numpy as np
+
+from ephs.mechanics.tree.finding.frames import GROUND
+from ephs.mechanics.tree.finding.mechanism import Reduced
+from ephs.mechanics.tree.finding.tables import SPRING
+from ephs.operad import Path
+from ephs.semantics.bundle import Array
+from ephs.semantics.spaces import SE3
+from ephs.solve.problem import Problem
+
+__all__ = ["Given"]
+
+
+@final
+class Given:
+    """The inputs of one problem that are flows.
+
+    Attributes
+    ----------
+    drive
+        (joints' freedoms,) forces on the rates of all joints.
+    wrench
+        (links, 6) in body frames.
+    """
+
+    def __init__(self, problem: Problem, reduced: Reduced, freedoms: int) -> None:
+        self._signals, self._reduced = problem.signals, reduced
+        self.drive, self.wrench = np.zeros(freedoms), np.zeros((reduced.links, 6))
+        self._drives: list[tuple[Path, slice]] = []
+        self._wrenches: list[tuple[Path, int, Array | None]] = []
+        for port, frame in ((one.port, one.frame) for one in reduced.acting):
+            if frame.link != GROUND:
+                centre = np.array_equal(frame.offset, SE3.identity())
+                seen = None if centre else SE3.adjoint(SE3.inverse(frame.offset)).T
+                self._wrenches.append((port, frame.link, seen))
+        t = reduced.tables
+        for i, edge in enumerate(reduced.edges):
+            if edge.port is not None and not self._signals[edge.port].effort:
+                self._drives.append((edge.port, slice(int(t.r_at[i]), int(t.r_at[i] + t.dim[i]))))
+        self.place(0.0, None)
+
+    def place(self, t: float, state: Mapping[Path, Array] | None) -> None:
+        """Put the inputs at a time and state into the arrays; without a state those that are constant."""
+        for port, where in self._drives:
+            self.drive[where] = self._value(port, t, state)
+        self.wrench[[link for _, link, _ in self._wrenches]] = 0.0
+        for port, link, seen in self._wrenches:
+            value = self._value(port, t, state)
+            self.wrench[link] += value if seen is None else seen @ value
+
+    def _value(self, port: Path, t: float, state: Mapping[Path, Array] | None) -> Array | float:
+        signal = self._signals[port]
+        return signal.at(t, {} if state is None else state) if state is not None or signal.constant else 0.0
+
+    def acted(self, edges: set[int]) -> tuple[frozenset[int], frozenset[int]]:
+        """Edges, beside those given, and links on which they act."""
+        t = self._reduced.tables
+        at = {int(t.r_at[i]): i for i in range(len(self._reduced.edges)) if t.kind[i] != SPRING and t.dim[i]}
+        links = {link for _, link, _ in self._wrenches}
+        pushed = {at[where.start] for _, where in self._drives if where.start in at}
+        return frozenset(edges | pushed), frozenset(links)

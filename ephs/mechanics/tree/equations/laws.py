@@ -1,0 +1,61 @@
+"""The components of one mechanism about a point: tables and memory of the staged program of laws."""
+
+from typing import final
+
+import numpy as np
+
+from ephs.mechanics.tree.engine.laws import BUFFERS, laws_call
+from ephs.mechanics.tree.engine.tables import Forces
+from ephs.mechanics.tree.sweeps.edges import Edge, Law
+from ephs.semantics.bundle import Array
+from ephs.solve.sparse import Index
+
+__all__ = ["Laws"]
+
+
+@final
+class Laws:
+    """Laws of the edges, storages of heat and conductions of one mechanism.
+
+    Parameters
+    ----------
+    forces
+        Tables of the components.
+    edge
+        (edges · width,): records of `ephs.mechanics.tree.sweeps.edges.Edge`.
+    makers
+        How many components make entropy.
+    scal
+        (h, θ₀, π₀), as the components' kernels take it.
+
+    Attributes
+    ----------
+    law
+        (edges · width,): records of `Law`.
+    warming, flow
+        As the equations read them: (entropies, 3) and (conductions, 8).
+    made
+        (makers,) entropy that components make a second, in W/K.
+    """
+
+    def __init__(self, forces: Forces, edge: Index, makers: int, scal: Array) -> None:
+        entropies, conductions = forces.node.size, len(forces.conduction)
+        self.law, self._s = np.zeros(edge.size // Edge.integer_width * Law.real_width), np.zeros(entropies)
+        self.warming, self.flow = np.zeros((entropies, 3)), np.zeros((conductions, 8))
+        self.made, self._heat = np.zeros(makers), np.zeros(1)
+        tables, buffers = forces.tables(), [np.zeros(size) for size in BUFFERS.values()]
+        self._call = laws_call().bind(
+            edge, self.law, tables["node"], tables["conduction"], tables["component"], tables["parameters"], scal,
+            self._s, self.warming, self.flow, self.made, self._heat, *buffers,
+        )  # fmt: skip
+
+    @property
+    def heat(self) -> float:
+        """Power of all friction in W."""
+        return float(self._heat[0])
+
+    def about(self, s: Array) -> tuple[int, int]:
+        """Evaluate all components at entropies s, and where laws have their points; (status, component)."""
+        self._s[:] = s
+        fault = int(self._call())
+        return fault % 64, fault // 64

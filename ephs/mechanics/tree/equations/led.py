@@ -1,0 +1,69 @@
+"""The work of prescribed motions where they leave no freedom: the energy that the mechanism gained, and the heat.
+
+Positions and velocities, and so energies, are then known but for the closing of loops. The multiplier of the motion
+grows without bound near dead centres, where a quadrature of its power fails. How far that is from the work is counted
+all the same: where a mechanism takes the other way out of a dead centre, velocities jump, and the two part.
+"""
+
+from typing import Any, final
+
+import numpy as np
+
+from ephs.semantics.bundle import Array
+from ephs.semantics.primitives import Storage
+from ephs.solve.mobility import mobility
+from ephs.solve.problem import Problem
+
+__all__ = ["Led"]
+
+
+@final
+class Led:
+    """The work of a mechanism that is led, counted from its start; of others it says nothing.
+
+    Parameters
+    ----------
+    moved
+        Whether any motion is prescribed.
+    """
+
+    def __init__(self, problem: Problem, *, moved: bool) -> None:
+        self._problem, self._moved = problem, moved
+        self._from: float | None = None
+        self.apart = 0.0, 0.0
+        """By how many J work and quadrature differ most, and the time in s."""
+        self.mechanical = np.array(
+            [
+                float(isinstance(slot.primitive, Storage) and not any(s.quantity.environment for s in slot.reads))
+                for slot in problem.descriptor.components
+            ]
+        )
+        """(components,) 1 for storages of energy that is not heat."""
+
+    @property
+    def holds(self) -> bool:
+        """Whether no freedom is left."""
+        d = self._problem.descriptor
+        return self._moved and not mobility(d, d.pack(self._problem.initial), self._problem.prescribed).mobility
+
+    @property
+    def counting(self) -> bool:
+        """Whether work is what the energies say."""
+        return self._from is not None
+
+    def start(self, energies: Array) -> None:
+        """Count from here, where no freedom is left; energies (components,) in J."""
+        self._from = float(energies @ self.mechanical) if self.holds else None
+
+    def work(self, t: float, energies: Array, books: Array) -> float:
+        """The work in J since the start by energies (components,) and the heat, the first of the books; the second, the
+        sum of power, where the mechanism is not led."""
+        if self._from is None:
+            return float(books[1])
+        found = float(energies @ self.mechanical) - self._from + float(books[0])
+        self.apart = max(self.apart, (abs(found - float(books[1])), t))
+        return found
+
+    def stats(self) -> dict[str, Any]:
+        """Statistics of a mechanism that is led."""
+        return {} if self._from is None else {"work_apart": self.apart[0], "work_apart_at": self.apart[1]}

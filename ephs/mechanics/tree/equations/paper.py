@@ -1,0 +1,160 @@
+"""Between the reduced form and the paper's states: every state of the system from joints' elements, and back."""
+
+from collections.abc import Iterator
+from typing import Any, final
+
+import numpy as np
+
+from ephs.mechanics.tree.engine.states import ELEMENT, ENTROPY, MOMENTUM, POSE, RELATIVE, STATES, Ends, Source, Walked
+from ephs.mechanics.tree.engine.tables import table_of
+from ephs.mechanics.tree.finding.mechanism import Reduced
+from ephs.mechanics.tree.finding.tables import SPRING
+from ephs.operad import Path
+from ephs.semantics.bundle import Array
+from ephs.semantics.spaces import SE3, manifold
+from ephs.solve.errors import Outcome, SolveError
+from ephs.solve.problem import Problem
+
+__all__ = ["PaperStates"]
+
+NEAR, OFF = 1e-6, 1e-3
+"""Initial positions and momenta may differ by this from what the joints make of them, relative to their size where that
+is above 1: nodal momenta of some methods do differ, to their order."""
+
+
+@final
+class PaperStates:
+    """The map of states for one problem."""
+
+    def __init__(self, reduced: Reduced, problem: Problem) -> None:
+        self.reduced, self.problem = reduced, problem
+        slots = {slot.path: slot for slot in problem.descriptor.states}
+        self._paths: list[Path] = []
+        t, plan = reduced.tables, []
+        for path, source, number in self._sources():
+            if path in slots:
+                self._paths.append(path)
+                start = int(t.q_at[number]) if source == ELEMENT else number
+                plan.append([source, start, slots[path].at, slots[path].quantity.space.size, 0])
+        self._plan = np.array(plan, dtype=np.int64).reshape(-1, Source.integer_width)
+        walked, springs = slice(0, reduced.links), np.flatnonzero(t.kind == SPRING)
+        joints = np.stack(
+            [t.parent, *(column[walked] for column in (t.forward, t.code, t.dim, t.q_at, t.r_at))], axis=1
+        )
+        frames = [t.offset1, t.offset2, t.basis.reshape(-1, 36)]
+        bodies = np.hstack([*(column[walked] for column in frames), t.inertia.reshape(-1, 36)])
+        ends = np.stack([t.first[springs], t.second[springs]], axis=1)
+        offsets = np.hstack([t.offset1[springs], t.offset2[springs]])
+        self._tables = table_of(Walked, joints, bodies), table_of(Ends, ends, offsets)
+        self._memory = np.zeros((reduced.links + 1, 7)), np.zeros((reduced.links + 1, 6))
+        self._known = False
+        self._rest = problem.descriptor.pack(problem.initial)
+
+    def _sources(self) -> Iterator[tuple[Path, int, int]]:
+        """(path, where it comes from, number of the link, edge or entropy) of the states."""
+        for number, path in enumerate(self.reduced.entropies):
+            yield path, ENTROPY, number
+        for number, link in enumerate(self.reduced.places):
+            if link.pose is not None:
+                yield link.pose.path, POSE, number
+            if link.momentum is not None:
+                yield link.momentum.path, MOMENTUM, number
+        for number, edge in enumerate(self.reduced.edges):
+            if edge.path is not None and edge.state is not None:
+                spring = self.reduced.tables.kind[number] == SPRING
+                first = number - int(np.count_nonzero(self.reduced.tables.kind[:number] != SPRING))
+                yield edge.state, RELATIVE if spring else ELEMENT, first if spring else number
+
+    def arrays(self) -> list[Any]:
+        """All arrays of the tables, of whole and of real numbers."""
+        return [array for table in self._tables for array in table.arrays]
+
+    def rows(self, q: Array, r: Array, s: Array) -> Array:
+        """(rows, point_size) all states, of rows of joints' elements, rates and entropies."""
+        out = np.tile(self._rest, (q.shape[0], 1))
+        if not self._known and q.shape[0]:
+            self._known = True
+            first = self.rows(q[:1], r[:1], s[:1])[0]
+            for row in self._plan:
+                source, _, at, *_ = row.tolist()
+                # a pose has two quaternions: that one which is continuous with the initial one
+                row[-1] = source in (POSE, RELATIVE) and float(first[at : at + 4] @ self._rest[at : at + 4]) < 0.0
+        plan = table_of(Source, self._plan)
+        STATES.compiled()["rows"](*self._tables, plan, q, r, s, *self._memory, out)
+        return out
+
+    def at(self, q: Array, r: Array, s: Array) -> dict[Path, Array]:
+        """All states of the system."""
+        x = self.rows(q[None], r[None], s[None])[0]
+        return {
+            path: x[at : at + size] for path, (_, _, at, size, _) in zip(self._paths, self._plan.tolist(), strict=True)
+        }
+
+    def initial(self) -> tuple[Array, Array, Array]:
+        """(q, r, s) of the problem's initial states."""
+        tables, reduced, initial = self.reduced.tables, self.reduced, self.problem.initial
+        q = np.zeros(reduced.coordinates)
+        for i, edge in enumerate(reduced.edges):
+            if tables.kind[i] != SPRING:
+                given = edge.pair.manifold.identity() if edge.state is None else initial[edge.state]
+                q[int(tables.q_at[i]) : int(tables.q_at[i] + tables.q_size[i])] = given
+        s = np.array([float(initial[path][0]) for path in reduced.entropies])
+        return q, self._rates_of(q), s
+
+    def check(self, q: Array, r: Array, s: Array) -> None:
+        """Hold the closed initial state against what was given.
+
+        Raises
+        ------
+        SolveError
+            They differ: the initial states contradict the joints.
+        """
+        made = self.at(q, r, s)
+        for slot in self.problem.descriptor.states:
+            if slot.path not in made or not slot.quantity.space.dim:
+                continue
+            given = self.problem.initial[slot.path]
+            found = float(np.abs(manifold(slot.quantity.space).increment(made[slot.path], given)).max())
+            near = OFF if slot.quantity.parity < 0 else NEAR
+            if found > near * max(1.0, float(np.abs(given).max())):
+                raise SolveError(Outcome.INCONSISTENT, str(slot.path), f"it is off by {found:.1e}")
+
+    def _rates_of(self, q: Array) -> Array:
+        """The tree's rates from the bodies' momenta: from each body to the nearest one with inertia before it."""
+        tables, reduced, initial = self.reduced.tables, self.reduced, self.problem.initial
+        rates = np.zeros(reduced.freedoms)
+        twists: dict[int, Array] = {-1: np.zeros(6)}
+        for i, link in enumerate(reduced.places):
+            if link.momentum is None:
+                continue
+            twists[i] = np.linalg.solve(tables.inertia[i], initial[link.momentum.path])
+            columns: list[Array] = []
+            freedoms: list[int] = []
+            carried, here = np.eye(6), i
+            while here == i or here not in twists:
+                d, at = int(tables.dim[here]), int(tables.r_at[here])
+                inner, motion = self._joint(q, here)
+                columns.append(carried @ motion)
+                freedoms += range(at, at + d)
+                carried = carried @ SE3.adjoint(SE3.inverse(inner))
+                here = int(tables.parent[here])
+            own = twists[i] - carried @ twists[here]
+            root = _root(tables.inertia[i])  # what hardly has inertia knows little of its twist
+            rates[freedoms] = np.linalg.lstsq(root @ np.column_stack(columns), root @ own, rcond=None)[0]
+        return rates
+
+    def _joint(self, q: Array, i: int) -> tuple[Array, Array]:
+        """Pose of a body in the one before it, and (6, d) the twists that its joint's rates make."""
+        t, pair = self.reduced.tables, self.reduced.edges[i].pair
+        near, far = t.offset1[i], t.offset2[i]
+        there = SE3.compose(near, pair.include(q[int(t.q_at[i]) : int(t.q_at[i] + t.q_size[i])]))
+        ahead = SE3.compose(there, SE3.inverse(far))
+        if t.forward[i]:
+            return ahead, SE3.adjoint(far) @ pair.basis
+        return SE3.inverse(ahead), -SE3.adjoint(there) @ pair.basis
+
+
+def _root(inertia: Array) -> Array:
+    """A symmetric root (6, 6) of an inertia, its size taken where it is negative."""
+    moments, axes = np.linalg.eigh(inertia)
+    return (axes * np.sqrt(np.abs(moments))) @ axes.T

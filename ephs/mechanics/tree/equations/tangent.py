@@ -1,0 +1,124 @@
+"""Exact derivatives of a mechanism's equations at a state, by the equations themselves over dual numbers."""
+
+from typing import final
+
+import numpy as np
+
+from ephs.mechanics.rewrite.coordinates import unread
+from ephs.mechanics.tree.equations.equations import Equations
+from ephs.semantics.bundle import Array
+
+__all__ = ["Linearised"]
+
+
+@final
+class Linearised:
+    """The equations of one mechanism and their derivatives at a state. It shares the equations' memory."""
+
+    def __init__(self, equations: Equations) -> None:
+        self.equations = equations
+        self._dense = dense = equations.dense
+        self._residual = found = dense.residual
+        self._slopes = found.slopes()
+        first = found.nv + found.n
+        still = np.flatnonzero(unread(equations.reduced))
+        environment = first + np.flatnonzero(equations.reduced.tables.node < 0)  # it is as warm as it is
+        self._known = np.concatenate([still, environment])
+
+    def forward(self, q: Array, r: Array, s: Array) -> Array:
+        """(nv,) the accelerations of all joints under what drives at present: tree joints, then cut ones.
+
+        Raises
+        ------
+        SolveError
+            A component cannot be evaluated there, or the mass matrix is singular.
+        """
+        eq = self.equations
+        eq.refuse(*self._dense.forward(q, r, s, eq.drive, eq.wrench))
+        settled = self._dense.settle()
+        return np.concatenate([self._dense.rate, settled[self._residual.cut_changes]])
+
+    def inverse(self, q: Array, r: Array, s: Array, a: Array) -> Array:
+        """(n,) the forces on the tree's freedoms, beside what drives at present, that make its accelerations a (n,).
+
+        Raises
+        ------
+        SolveError
+            A component cannot be evaluated there.
+        """
+        eq, found = self.equations, self._residual
+        eq.refuse(*found.about(q, r, s, eq.drive, eq.wrench))
+        return found.at(a, np.zeros(found.m))[found.forces].copy()
+
+    def columns(self, *, solve: bool, fit: bool) -> Array:
+        """(nv + ns, nv + n + ns) the derivatives where `forward` (with ``solve``) or `inverse` was called last.
+
+        Columns are changes of the elements of tree and cut joints, left-trivialised, of the tree's rates, of entropies;
+        rows are the tree's accelerations (or forces), the cut joints' rates, ṡ.
+
+        Parameters
+        ----------
+        fit
+            Cut joints' elements follow the tree's; else they change on their own.
+        """
+        found = self._residual
+        n, nv, ns = found.n, found.nv, found.ns
+        wanted = np.setdiff1d(np.arange(nv + n + ns), self._known)
+        slopes = np.zeros((found.out.size, nv + n + ns))
+        slopes[:, wanted] = self._slopes.along("residual", ("v", "r", "s"), wanted)
+        if fit:
+            slopes[:, :n] += slopes[:, n:nv] @ slopes[found.cut_rates, nv : nv + n]
+            slopes[:, n:nv] = 0.0
+            slopes[:, self._known] = 0.0
+        forces = slopes[found.forces]
+        if solve:
+            forces = self._dense.solved(-forces, self._rows(slopes))
+        return np.concatenate([forces, slopes[found.cut_rates], slopes[found.entropy_rates]])
+
+    def _rows(self, slopes: Array) -> Array:
+        """Slopes of all rows' accelerations: those that are prescribed stay."""
+        driven = self._dense.multiplier.size - self._residual.m
+        return np.concatenate([np.zeros((driven, slopes.shape[1])), slopes[self._residual.rows]])
+
+    def mobility(self) -> Array:
+        """(n, n) the derivatives of the tree's accelerations by forces on its freedoms, after `forward`."""
+        n = self._residual.n
+        return self._dense.solved(np.eye(n), np.zeros((self._dense.multiplier.size, n)))
+
+    def action(self, q: Array, r: Array, s: Array) -> tuple[Array, Array]:
+        """((n, 2n), (n, 2n)) ∂/∂(q, r) of the momenta ∂L/∂r and of ∂L/∂q with the forces that no potential has.
+
+        Raises
+        ------
+        SolveError
+            A component cannot be evaluated there.
+        """
+        eq, found = self.equations, self._residual
+        eq.refuse(*found.about(q, r, s, eq.drive, eq.wrench))
+        n, nv = found.n, found.nv
+        slopes = self._slopes.along("action", ("v", "r"))
+        slopes[:, :n] += slopes[:, n:nv] @ slopes[2 * n : n + nv, nv:]
+        kept = np.concatenate([slopes[:, :n], slopes[:, nv:]], axis=1)
+        return kept[:n], kept[n : 2 * n]
+
+    def pushed(self, drive: Array, wrench: Array) -> Array:
+        """(n, k) the changes of the tree's accelerations under further forces (nv, k) on all joints and wrenches
+        (links, 6, k) on the links, after `forward`."""
+        found = self._residual
+        slopes = self._slopes.of("residual", {"drive": drive, "wrench": wrench}, drive.shape[-1])
+        return self._dense.solved(-slopes[found.forces], self._rows(slopes))
+
+    @property
+    def cut_rates(self) -> Array:
+        """(nv − n,) the rates of cut joints where `forward` or `inverse` was called last."""
+        return self._residual.cut_twists()
+
+    @property
+    def entropy_rates(self) -> Array:
+        """(entropies,) ṡ in J/(K s) where `forward` or `inverse` was called last."""
+        return self._residual.out[self._residual.entropy_rates].copy()
+
+    def targets(self, q: Array, r: Array, s: Array) -> tuple[Array, int]:
+        """(m,) what the constraints' rows on the accelerations are to be, −(d rows/dt)·r; and the rows' rank."""
+        self.forward(q, r, s)
+        return self._dense.targets()

@@ -1,0 +1,242 @@
+"""From a flat system to the tables of its reduced form: a spanning tree of joints, the rest cut."""
+
+from dataclasses import dataclass
+from typing import Any, final
+
+import numpy as np
+
+from ephs.mechanics.tree.finding.frames import GROUND, Frame, Link
+from ephs.mechanics.tree.finding.parts import Acting, Parts, parts_of
+from ephs.mechanics.tree.finding.spanning import Edge, frames_of_joints, loop_algebra, spanning_tree, twists_of
+from ephs.mechanics.tree.finding.tables import CUT, SPRING, TREE, Mechanism
+from ephs.mechanics.tree.sweeps.acting import Node
+from ephs.operad import Path
+from ephs.semantics.bundle import Array
+from ephs.semantics.primitives import Irreversible, Storage
+from ephs.semantics.stage import Table
+from ephs.solve.errors import OptionError
+from ephs.solve.heats import exponential_law
+from ephs.solve.model import Model
+from ephs.solve.problem import Problem
+from ephs.solve.sparse import Index
+
+__all__ = ["Reduced", "reduce_system"]
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Reduced:
+    """A flat system in joint coordinates.
+
+    Parameters
+    ----------
+    edges
+        Tree joints in walking order, each of which leads to the link of its number; cut joints; springs.
+    bodies
+        Link -> name of the body, None for a frame without one, as inside a universal joint.
+    places
+        The links in that order.
+    entropies
+        Paths of the states of entropy, in the order of s.
+    made
+        Paths of the components that make entropy.
+    nodes
+        What stores entropy, in the order of s.
+    unknowns
+        How many numbers have to be found.
+    twists
+        Of each edge, (6, d): its freedoms in the world, at the initial configuration.
+    gravity
+        (3,) in world axes, m/s².
+    acting
+        The outer ports at which wrenches act on links.
+    """
+
+    tables: Mechanism
+    edges: tuple[Edge, ...]
+    bodies: tuple[str | None, ...]
+    places: tuple[Link, ...]
+    entropies: tuple[Path, ...]
+    made: tuple[Path, ...]
+    nodes: Table[Node]
+    unknowns: int
+    twists: tuple[Array, ...]
+    gravity: Array
+    acting: tuple[Acting, ...]
+
+    @property
+    def links(self) -> int:
+        """The number of links."""
+        return len(self.places)
+
+    def path(self, link: int) -> Path:
+        """Of the joint that leads to a link; of a free one the body's."""
+        edge = self.edges[link]
+        return edge.path or self.places[link].path or Path()
+
+    @property
+    def cut(self) -> tuple[Edge, ...]:
+        """The joints at which loops are closed by constraints."""
+        return tuple(e for e, kind in zip(self.edges, self.tables.kind, strict=True) if kind == CUT)
+
+    @property
+    def coordinates(self) -> int:
+        """Number of reals that store the joints' elements."""
+        return sum(int(size) for size, kind in zip(self.tables.q_size, self.tables.kind, strict=True) if kind != SPRING)
+
+    @property
+    def freedoms(self) -> int:
+        """The number of the tree's freedoms."""
+        return int(self.tables.driven.size)
+
+
+def reduce_system(problem: Problem, model: Model) -> Reduced:
+    """The tables of a problem's reduced form; the kernels of its components are those of the compiled model.
+
+    Raises
+    ------
+    Unplaced
+        A component has no place in joint coordinates.
+    OptionError
+        A loop of prescribed joints.
+    """
+    parts = parts_of(problem)
+    tree, cut = spanning_tree(parts.joints, [link.light for link in parts.links])
+    over = [edge.name for edge in cut if edge.motion is not None]
+    if over:  # prescribed joints are cut last: only a loop of nothing else is left over
+        found = f"that of {', '.join(over)}, which closes a loop of prescribed joints"
+        raise OptionError("motion", found, "one joint of each loop without prescribed motion, or the method natural")
+    order = [child for _, child, _ in tree]
+    edges = (*(edge for edge, _, _ in tree), *cut, *parts.forces)
+    poses = [None if link.pose is None else np.array(problem.initial[link.pose.path]) for link in parts.links]
+    frames = frames_of_joints(edges[: len(tree) + len(cut)], poses)
+    twists = twists_of(edges, frames, len(tree) + len(cut))
+    made = tuple(slot.path for slot in problem.descriptor.components if isinstance(slot.primitive, Irreversible))
+    kinds = np.array([TREE] * len(tree) + [CUT] * len(cut) + [SPRING] * len(parts.forces), dtype=np.int64)
+    mechanism = _tables(model, parts, edges, kinds, [f for *_, f in tree], order, made, frames, twists)
+    links = [parts.links[body] for body in order]
+    names = tuple(parts.names[body] for body in order)
+    place = {body: i for i, body in enumerate(order)} | {GROUND: GROUND}
+    acting = tuple(Acting(one.port, Frame(place[one.frame.link], one.frame.offset)) for one in parts.acting)
+    unknowns = 2 * int(mechanism.driven.size) + int(mechanism.rows.sum())
+    return Reduced(
+        mechanism, edges, names, tuple(links), tuple(parts.entropies), made, _nodes(model, parts), unknowns,
+        tuple(twists), parts.gravity, acting,
+    )  # fmt: skip
+
+
+def _nodes(model: Model, parts: Parts) -> Table[Node]:
+    nodes = Node.table(len(parts.entropies))
+    for k, number in enumerate(parts.entropies.values()):
+        primitive, node = model.descriptor.components[number].primitive, nodes[k]
+        node.component = -1 if isinstance(primitive, Storage) and primitive.environment else number
+        if node.component >= 0 and (law := exponential_law(primitive)) is not None:
+            node.c1, node.c2 = law
+    return nodes
+
+
+def _tables(
+    model: Model,
+    parts: Parts,
+    edges: tuple[Edge, ...],
+    kinds: Index,
+    forward: list[bool],
+    order: list[int],
+    made: tuple[Path, ...],
+    frames: list[Array],
+    twists: list[Array],
+) -> Mechanism:
+    links, count = len(order), len(edges)
+    place = {body: i for i, body in enumerate(order)} | {GROUND: GROUND}
+    parents = [place[e.body1 if f else e.body2] for e, f in zip(edges[:links], forward, strict=True)]
+    basis, left, normal = (np.zeros((count, 6, 6)) for _ in range(3))
+    rows, q_at, r_at = np.zeros(count, dtype=int), np.zeros(count, dtype=int), np.zeros(count, dtype=int)
+    length = _length(edges)
+    at_q = at_r = 0
+    driven: list[int] = []
+    spring, friction, heat = (np.full(count, -1) for _ in range(3))
+    for i, (edge, kind) in enumerate(zip(edges, kinds, strict=True)):
+        b, d = edge.pair.basis, edge.pair.dim
+        basis[i, :, :d], left[i, :d] = b, np.linalg.pinv(b)
+        if kind == CUT:
+            found = _complement(b, loop_algebra(i, edges, parents, place, twists, frames[i]), length)
+            rows[i] = len(found)
+            normal[i, : len(found)] = found
+        if kind != SPRING:
+            q_at[i], r_at[i] = at_q, at_r
+            at_q, at_r = at_q + edge.pair.size, at_r + d
+        if kind == TREE:
+            driven += [int(edge.motion is not None)] * d
+        heat[i] = edge.heat
+        spring[i] = -1 if edge.spring < 0 or _stores_nothing(model, edge.spring) else edge.spring
+        friction[i] = -1 if edge.friction < 0 or _idle(model, edge.friction) else edge.friction
+    t, components = model.tables, model.descriptor.components
+    making = {path: i for i, path in enumerate(made)}
+    storages = [(number, components[number].primitive) for number in parts.entropies.values()]
+    return Mechanism(
+        parent=np.array(parents, dtype=np.int64),
+        inertia=np.array([parts.links[body].inertia for body in order]).reshape(links, 6, 6),
+        weight=np.array([parts.weights[body] for body in order], dtype=np.int64),
+        kind=kinds,
+        first=np.array([place[e.body1] for e in edges], dtype=np.int64),
+        second=np.array([place[e.body2] for e in edges], dtype=np.int64),
+        forward=np.array([*forward, *[True] * (count - links)], dtype=np.int64),
+        code=np.array([e.pair.code for e in edges], dtype=np.int64),
+        dim=np.array([e.pair.dim for e in edges], dtype=np.int64),
+        q_at=q_at,
+        q_size=np.array([e.pair.size for e in edges], dtype=np.int64),
+        r_at=r_at,
+        offset1=np.array([e.offset1 for e in edges]).reshape(count, 7),
+        offset2=np.array([e.offset2 for e in edges]).reshape(count, 7),
+        basis=basis,
+        left=left,
+        normal=normal,
+        rows=rows,
+        spring=spring,
+        friction=friction,
+        heat=heat,
+        driven=np.array(driven, dtype=np.int64),
+        node=np.array([-1 if isinstance(p, Storage) and p.environment else i for i, p in storages], dtype=np.int64),
+        conduction=np.array(parts.conduction, dtype=np.int64).reshape(-1, 3),
+        sink=np.array(
+            [
+                [making[components[c].path], taking]
+                for c, taking in zip(friction.tolist(), heat.tolist(), strict=True)
+                if c >= 0
+            ],
+            dtype=np.int64,
+        ).reshape(-1, 2),
+        address=t.address,
+        dims=t.dims,
+        parameters=t.parameters,
+        parameter_at=t.parameter_at,
+        made_at=np.array([making.get(s.path, -1) for s in components], dtype=np.int64),
+    )
+
+
+def _length(edges: tuple[Edge, ...]) -> float:
+    """Mean distance of joints from their bodies' centres: the length that makes rotations comparable to distances."""
+    far = [float(np.linalg.norm(offset[4:])) for edge in edges for offset in (edge.offset1, edge.offset2)]
+    return float(np.mean([x for x in far if x > 0.0])) if any(x > 0.0 for x in far) else 1.0
+
+
+def _complement(basis: Array, group: Array, length: float) -> Array:
+    """Rows (k − d, 6) that vanish on the columns of B, d of k in a group's algebra; rotations count times a length."""
+    scale = np.array([length] * 3 + [1.0] * 3)
+    whole = np.linalg.qr(scale[:, None] * group)[0] if group.shape[1] < 6 else np.eye(6)
+    if basis.shape[1]:
+        left, sizes, _ = np.linalg.svd(whole.T @ (scale[:, None] * basis), full_matrices=True)
+        whole = whole @ left[:, sizes.size :]
+    return scale * whole.T
+
+
+def _idle(model: Model, component: int) -> bool:
+    """Whether a joint's friction or a damper resists nothing."""
+    entries: dict[str, Any] = dict(model.descriptor.components[component].primitive.parameters)
+    given = entries.get("mu", entries.get("damping"))
+    return given is not None and not isinstance(given, str) and not np.any(given)
+
+
+def _stores_nothing(model: Model, component: int) -> bool:
+    kernel = model.descriptor.components[component].primitive.kernel
+    return kernel is not None and kernel.name == "no_effort"

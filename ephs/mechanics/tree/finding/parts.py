@@ -1,0 +1,279 @@
+"""The parts of a problem's flat system in joint coordinates: links, joints as edges, forces, heat and what acts.
+
+Whatever has no place among them is refused by its path.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from ephs.mechanics.tree.finding.frames import Frame, Frames, Link, LinkJoint, Unplaced, frames_of
+from ephs.mechanics.tree.finding.roles import Role
+from ephs.mechanics.tree.finding.spanning import Edge, islands
+from ephs.operad import Path
+from ephs.semantics.bundle import Array
+from ephs.semantics.primitives import Primitive, Storage
+from ephs.semantics.spaces import SE3, pair
+from ephs.solve.problem import Problem
+
+__all__ = ["Acting", "Parts", "parts_of"]
+
+FREE = pair("free")
+OF_COORDINATES = ("no_potential", "pair_spring", "beam_spring")
+"""Energies of a free joint that may lead to a body; with others it is a force between two frames."""
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Acting:
+    """An outer port at which a wrench acts on a frame of a link."""
+
+    port: Path
+    frame: Frame
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Parts:
+    """What a flat system is made of.
+
+    Parameters
+    ----------
+    names
+        (links,) what solutions call each; None of frames without a body.
+    weights
+        (links,) component of the potential of a weight, −1.
+    gravity
+        (3,) in m/s², of all links with a mass.
+    joints, forces
+        Edges that may carry a link, and those that only act between frames.
+    entropies
+        State -> component that stores it.
+    conduction
+        (component, entropy, entropy).
+    """
+
+    links: tuple[Link, ...]
+    names: tuple[str | None, ...]
+    weights: tuple[int, ...]
+    gravity: Array
+    joints: tuple[Edge, ...]
+    forces: tuple[Edge, ...]
+    entropies: dict[Path, int]
+    conduction: tuple[tuple[int, int, int], ...]
+    acting: tuple[Acting, ...]
+
+
+def parts_of(problem: Problem) -> Parts:
+    """The parts of a problem's system.
+
+    Raises
+    ------
+    Unplaced
+        A component, or what is prescribed at a port, has no place in joint coordinates.
+    """
+    return _Reader(problem).parts()
+
+
+@final
+class _Reader:
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.found: Frames = frames_of(problem.descriptor)
+        self.wiring, self.roles = self.found.wiring, self.found.roles
+        self.placed = set(self.found.placed)
+        self.ports: set[Path] = set()
+        self.entropy: dict[int, int] = {}
+        self.entropies: dict[Path, int] = {}
+        for number, role in enumerate(self.roles):
+            if role in (Role.HEAT, Role.ENVIRONMENT):
+                self.entropy[next(iter(self.wiring.ports[number].values()))] = len(self.entropies)
+                self.entropies[self.wiring.components[number].reads[0].path] = number
+                self.placed.add(number)
+
+    def parts(self) -> Parts:
+        links = self.found.links
+        if self.found.faults:
+            raise self.found.faults[0]
+        if not links:
+            raise Unplaced(Path(), "has no body")
+        names = tuple(None if link.path is None else self._name(link.path) for link in links)
+        joints: list[Edge] = []
+        forces: list[Edge] = []
+        taken: dict[str, int] = {}
+        for joint in self.found.joints:
+            edge = self._edge(joint, taken)
+            (forces if self._is_force(joint) else joints).append(edge)
+        held = {body for edge in joints for body in (edge.body1, edge.body2)}
+        joints += [self._free(i, str(names[i])) for i in range(len(links)) if i not in held]
+        for group in islands(len(links), joints):  # those that nothing ties to the ground move with their first one
+            joints.append(self._free(min(group, key=lambda i: (links[i].pose is None, i)), ""))
+        weights, gravity = self._weights()
+        forces += [*self._potentials(weights), *self._drags()]
+        conduction = tuple(self._conduction())
+        acting = tuple(self._acting())
+        for number, slot in enumerate(self.wiring.components):
+            if number not in self.placed:
+                raise Unplaced(slot.path, _reason(self.roles[number], slot.primitive))
+        return Parts(
+            links, names, tuple(weights), gravity, tuple(joints), tuple(forces), self.entropies, conduction, acting
+        )
+
+    # ---- joints ------------------------------------------------------------------------------------------------
+
+    def _name(self, path: Path) -> str:
+        return self.problem.names.get(path, str(path))
+
+    def _edge(self, joint: LinkJoint, taken: dict[str, int]) -> Edge:
+        """A joint with what lies on its momentum: a potential, friction, an outer port."""
+        name, d = self._name(joint.path), joint.pair.dim
+        start = taken.get(name, 0)
+        taken[name] = start + d
+        friction = heat = -1
+        for number, _ in self.wiring.neighbours(joint.rate, joint.relation):
+            if self.roles[number] is not Role.FRICTION:
+                continue
+            read = {state.path for state in self.wiring.components[number].reads}
+            if friction >= 0 or read - {joint.state.path}:
+                raise Unplaced(self.wiring.components[number].path, "is a second friction of a joint, or reads another")
+            friction, heat = number, self._heat(number)
+            self.placed.add(number)
+        port = self.wiring.outer.get(joint.rate)
+        return Edge(
+            name, joint.path, joint.first.link, joint.second.link, joint.first.offset, joint.second.offset, joint.pair,
+            None if port is None else self._motion(port, d), np.array(self.problem.initial[joint.state.path]),
+            slice(start, start + d), joint.state.path, port, joint.potential, friction, heat,
+        )  # fmt: skip
+
+    def _motion(self, port: Path, freedoms: int) -> float | None:
+        """The rate that is prescribed at a joint's port; None where a force is."""
+        self.ports.add(port)
+        signal = self.problem.signals[port]
+        if not signal.effort:
+            return None
+        if freedoms != 1 or callable(signal.value):
+            raise Unplaced(port, "prescribes rates of several freedoms, or one that changes")
+        return float(np.atleast_1d(signal.value)[0])
+
+    def _is_force(self, joint: LinkJoint) -> bool:
+        """Whether a joint is a force between two frames, which carries neither."""
+        energy = self.wiring.components[joint.potential].primitive
+        return joint.pair == FREE and energy.name not in OF_COORDINATES and joint.rate not in self.wiring.outer
+
+    def _free(self, link: int, name: str) -> Edge:
+        """The free joint of a link that nothing else ties to the ground."""
+        pose, unit = self.found.links[link].pose, SE3.identity()
+        start = unit if pose is None else np.array(self.problem.initial[pose.path])
+        state = None if pose is None else pose.path
+        return Edge(name, None, -1, link, unit, unit, FREE, None, start, slice(0, 6), state, None, -1, -1, -1)
+
+    # ---- forces ------------------------------------------------------------------------------------------------
+
+    def _weights(self) -> tuple[list[int], Array]:
+        """Component of each link's weight, and the acceleration that all have: zero where they differ."""
+        weights = [-1] * len(self.found.links)
+        accelerations: list[set[tuple[float, ...]]] = []
+        for i, link in enumerate(self.found.links):
+            if link.light:
+                continue
+            component = None if link.potential < 0 else self.wiring.components[link.potential].primitive
+            if component is None or component.name != "gravity":
+                return [-1] * len(weights), np.zeros(3)
+            weights[i] = link.potential
+            accelerations.append(_accelerations(component, float(link.inertia[5, 5])))
+        common = set.intersection(*accelerations) if accelerations else set[tuple[float, ...]]()
+        if not common:
+            return [-1] * len(weights), np.zeros(3)
+        return weights, np.array(min(common, key=lambda one: len(repr(one))))
+
+    def _potentials(self, weights: list[int]) -> Iterator[Edge]:
+        """Potentials of poses that are no common weight, as forces between the ground and the link."""
+        for i, (link, weight) in enumerate(zip(self.found.links, weights, strict=True)):
+            if link.potential >= 0 and weight < 0 and not _idle(self.wiring.components[link.potential].primitive):
+                yield self._on_link(Frame(i, SE3.identity()), link.potential, -1, -1)
+
+    def _drags(self) -> Iterator[Edge]:
+        """Friction on the twists of frames."""
+        for number, role in enumerate(self.roles):
+            if role is not Role.DRAG:
+                continue
+            slot = self.wiring.components[number]
+            frame = self.found.frames[next(iter(self.wiring.ports[number].values()))]
+            pose = None if frame.link < 0 else self.found.links[frame.link].pose
+            at_centre = np.array_equal(frame.offset, SE3.identity())
+            if slot.reads and not (at_centre and pose is not None and slot.reads[0].path == pose.path):
+                raise Unplaced(slot.path, "reads another pose than that of the body that it slows down")
+            self.placed.add(number)
+            yield self._on_link(frame, -1, number, self._heat(number))
+
+    def _on_link(self, frame: Frame, spring: int, friction: int, heat: int) -> Edge:
+        path = self.wiring.components[max(spring, friction)].path
+        unit = SE3.identity()
+        return Edge(
+            str(path), path, -1, frame.link, unit, frame.offset, FREE, None, unit, slice(0, 6), None, None, spring,
+            friction, heat,
+        )  # fmt: skip
+
+    # ---- heat and ports ----------------------------------------------------------------------------------------
+
+    def _heat(self, number: int) -> int:
+        """The entropy that takes what a component heats."""
+        *_, junction = self.wiring.ports[number].values()
+        if junction not in self.entropy:
+            raise Unplaced(self.wiring.components[number].path, "heats what is no store of heat")
+        return self.entropy[junction]
+
+    def _conduction(self) -> Iterator[tuple[int, int, int]]:
+        for number, role in enumerate(self.roles):
+            if role is Role.CONDUCTION:
+                ends = [self.entropy.get(junction, -1) for junction in self.wiring.ports[number].values()]
+                if -1 in ends:
+                    raise Unplaced(self.wiring.components[number].path, "conducts to what is no store of heat")
+                self.placed.add(number)
+                yield number, ends[0], ends[1]
+
+    def _acting(self) -> Iterator[Acting]:
+        """The outer ports of links, where wrenches act.
+
+        Raises
+        ------
+        Unplaced
+            A twist is prescribed, or the port is none of a joint or a link.
+        """
+        for junction, port in self.wiring.outer.items():
+            if port in self.ports:
+                continue
+            frame = self.found.frames.get(junction)
+            if frame is None:
+                raise Unplaced(port, "is a port of neither a joint nor a body")
+            if self.problem.signals[port].effort:
+                raise Unplaced(port, "prescribes the motion of a body; a joint's can be prescribed")
+            yield Acting(port, frame)
+
+
+def _accelerations(weight: Primitive, mass: float) -> set[tuple[float, ...]]:
+    """The accelerations a, a few roundings apart, whose m a is a weight to the last bit."""
+    force = -np.array(dict(weight.parameters)["weight"], dtype=float)
+    near = force / mass
+    found = [
+        sorted({x for x in (np.nextafter(a, -np.inf), a, np.nextafter(a, np.inf)) if mass * x == f})
+        for a, f in zip(near, force, strict=True)
+    ]
+    return {(float(x), float(y), float(z)) for x in found[0] for y in found[1] for z in found[2]} or {
+        tuple(near.tolist())
+    }
+
+
+def _idle(primitive: object) -> bool:
+    return isinstance(primitive, Storage) and primitive.kernel is not None and primitive.kernel.name == "no_effort"
+
+
+def _reason(role: Role, primitive: object) -> str:
+    if isinstance(primitive, Storage):
+        kinds = " and ".join(dict.fromkeys(q.kind for _, _, q in primitive.bundle.items()))
+        return f"stores {kinds} in another way than bodies, joints and heat do"
+    if role is Role.OTHER:
+        return "is none of the relations that bodies, joints, friction and conduction have"
+    return "belongs to no body and no joint"

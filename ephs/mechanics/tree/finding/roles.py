@@ -1,0 +1,127 @@
+"""The part that a primitive can play in a mechanism, read from its structure."""
+
+from enum import Enum, auto
+from typing import final
+
+import numpy as np
+
+from ephs.operad import quantity
+from ephs.semantics.primitives import Irreversible, Primitive, Reversible, Storage
+from ephs.semantics.pullback import pulled_ports
+from ephs.solve.heats import exponential_law
+
+__all__ = ["Role", "Roles", "offset_of"]
+
+
+class Role(Enum):
+    """Part of a primitive in a mechanism."""
+
+    KINETIC = auto()
+    """Stores the momentum of a body, quadratically."""
+    POSE = auto()
+    """Stores the pose of a body, with a potential or none."""
+    GYROSCOPIC = auto()
+    """The Lie–Poisson structure of a body's momentum."""
+    COUPLING = auto()
+    """Lets a pose, or a relative pose, follow from its twist."""
+    OFFSET = auto()
+    """Carries a momentum to a frame at a constant offset."""
+    GROUND = auto()
+    """Holds a frame still."""
+    JOINT = auto()
+    """The relation of a joint between two frames."""
+    RELATIVE = auto()
+    """Stores the relative pose of a joint, with a potential or none."""
+    FRICTION = auto()
+    """Resists the rate of a joint, and heats."""
+    DRAG = auto()
+    """Resists the twist of a body, and heats."""
+    CONDUCTION = auto()
+    """Conducts heat between two stores of it."""
+    HEAT = auto()
+    """Stores heat: E = c₁ (exp(s/c₂) − 1)."""
+    ENVIRONMENT = auto()
+    """Takes up heat at the temperature of the reference."""
+    OTHER = auto()
+    """What joint coordinates have no place for."""
+
+
+@final
+class Roles:
+    """Roles of primitives; each primitive is looked at once."""
+
+    def __init__(self) -> None:
+        self._known: dict[int, Role] = {}
+
+    def of(self, primitive: Primitive) -> Role:
+        """The role of a primitive."""
+        found = self._known.get(id(primitive))
+        if found is None:
+            found = self._known[id(primitive)] = _role(primitive)
+        return found
+
+
+def offset_of(primitive: Primitive) -> np.ndarray | None:
+    """(7,) the pose of the frame that a frame change leads to, in the frame of its first port; None of others."""
+    offset = dict(primitive.parameters).get("offset")
+    return None if offset is None else np.array(offset, dtype=float)
+
+
+def _role(primitive: Primitive) -> Role:
+    quantities = [q for _, _, q in primitive.bundle.items()]
+    kinds, on_bodies = [q.kind for q in quantities], [q == quantity.body_momentum for q in quantities]
+    if isinstance(primitive, Storage):
+        return _of_storage(primitive, kinds, on_bodies)
+    if isinstance(primitive, Irreversible):
+        return _of_irreversible(primitive, kinds, on_bodies)
+    return _of_reversible(primitive, kinds, on_bodies)
+
+
+def _of_storage(primitive: Storage, kinds: list[str], on_bodies: list[bool]) -> Role:
+    kernel = primitive.kernel
+    if len(kinds) != 1 or kernel is None:
+        return Role.OTHER
+    if on_bodies[0]:
+        return Role.KINETIC if kernel.name == "quadratic" else Role.OTHER
+    if kinds[0] == "entropy":
+        return Role.ENVIRONMENT if primitive.environment else Role.HEAT if exponential_law(primitive) else Role.OTHER
+    if kinds[0] == "pose" and next(iter(primitive.bundle.items()))[2] == quantity.pose:
+        return Role.POSE
+    return Role.RELATIVE if kinds[0] == "relative_pose" else Role.OTHER
+
+
+def _of_irreversible(primitive: Irreversible, kinds: list[str], on_bodies: list[bool]) -> Role:
+    if primitive.kernel is None or len(kinds) != 2 or kinds[1] != "entropy":
+        return Role.OTHER
+    read = {primitive.interface[port].quantity.kind for port in primitive.reads}
+    if kinds[0] == "entropy":
+        return Role.OTHER if read else Role.CONDUCTION
+    if kinds[0] != "momentum":
+        return Role.OTHER
+    if on_bodies[0]:
+        return Role.DRAG if read <= {"pose"} and len(primitive.reads) < 2 else Role.OTHER
+    joint = next(iter(primitive.bundle.items()))[2].space.name.endswith("*")
+    return Role.FRICTION if joint and read <= {"relative_pose"} and len(primitive.reads) < 2 else Role.OTHER
+
+
+def _of_reversible(primitive: Reversible, kinds: list[str], on_bodies: list[bool]) -> Role:
+    if primitive.kernel is not None and primitive.kernel.name == "holonomic":
+        whole = {"p_j1", "p_j2", "p_r"} == {str(port) for port in primitive.bundle.ports}
+        return Role.JOINT if whole and not list(pulled_ports(primitive.kernel)) else Role.OTHER
+    if primitive.name == "lie_poisson" and on_bodies == [True]:
+        return Role.GYROSCOPIC
+    if primitive.reads or primitive.discrete is not None:
+        return Role.OTHER
+    skew, constraint = primitive.structure({})
+    n = primitive.bundle.size
+    if all(on_bodies) and not np.any(skew):
+        if len(kinds) == 1 and np.array_equal(constraint, np.eye(6)):
+            return Role.GROUND
+        if len(kinds) == 2 and offset_of(primitive) is not None:
+            return Role.OFFSET
+    if kinds in (["pose", "momentum"], ["relative_pose", "momentum"]) and not constraint.size:
+        half = np.eye(n // 2)
+        zero = np.zeros_like(half)
+        if np.array_equal(skew, np.block([[zero, -half], [half, zero]])):
+            return Role.COUPLING
+    return Role.OTHER

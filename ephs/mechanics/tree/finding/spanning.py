@@ -1,0 +1,166 @@
+"""Joints as edges between links, the spanning tree of least cost, and what carries the motion of a loop."""
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import final
+
+import networkx as nx
+import numpy as np
+
+from ephs.mechanics.constraints.subgroup import generated
+from ephs.operad import Path
+from ephs.semantics.bundle import Array
+from ephs.semantics.spaces import SE3, Pair
+
+__all__ = ["Edge", "frames_of_joints", "islands", "loop_algebra", "spanning_tree", "twists_of"]
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Edge:
+    """A joint between two links, or a spring.
+
+    Parameters
+    ----------
+    name
+        Of the joint, as inputs and messages call it.
+    path
+        Of its box in the system; None for the free joint that no box stands for.
+    body1, body2
+        Numbers of the links, −1 for the ground.
+    motion
+        The prescribed rate of a single freedom, or None.
+    coordinate
+        Initial element of the pair's group.
+    freedoms
+        Which of the joint's freedoms this edge has: a universal joint is two edges.
+    state
+        Of its element: the joint's relative pose, or the pose of a body that is free; None where that is not stored.
+    port
+        Outer port of its momentum, or None.
+    spring, friction, heat
+        Components of its potential and its friction, and the entropy that the latter heats; −1 where there is none.
+    """
+
+    name: str
+    path: Path | None
+    body1: int
+    body2: int
+    offset1: Array
+    offset2: Array
+    pair: Pair
+    motion: float | None
+    coordinate: Array
+    freedoms: slice
+    state: Path | None
+    port: Path | None
+    spring: int
+    friction: int
+    heat: int
+
+
+def frames_of_joints(edges: Sequence[Edge], poses: Sequence[Array | None]) -> list[Array]:
+    """The pose in the world of each joint's frame on body 2, where bodies have these poses.
+
+    A frame without one follows from the other body of a joint.
+    """
+    known = {body: pose for body, pose in enumerate(poses) if pose is not None} | {-1: SE3.identity()}
+    out: dict[int, Array] = {}
+    left = deque(range(len(edges)))
+    while left:
+        before = len(left)
+        for _ in range(before):
+            i = left.popleft()
+            edge = edges[i]
+            relative = edge.pair.include(edge.coordinate)
+            if edge.body2 in known:
+                out[i] = edge.offset2 if edge.body2 < 0 else SE3.compose(known[edge.body2], edge.offset2)
+            elif edge.body1 in known:
+                first = edge.offset1 if edge.body1 < 0 else SE3.compose(known[edge.body1], edge.offset1)
+                out[i] = SE3.compose(first, relative)
+                known[edge.body2] = SE3.compose(out[i], SE3.inverse(edge.offset2))
+            else:
+                left.append(i)
+                continue
+            if edge.body1 not in known:
+                first = SE3.compose(out[i], SE3.inverse(relative))
+                known[edge.body1] = SE3.compose(first, SE3.inverse(edge.offset1))
+        if len(left) == before:  # bodies that nothing ties to one with a pose
+            known[edges[left[0]].body1] = SE3.identity()
+    return [out[i] for i in range(len(edges))]
+
+
+def twists_of(edges: Sequence[Edge], frames: Sequence[Array], joints: int) -> list[Array]:
+    """The freedoms of all joints in the world, where joints have these frames; none of springs."""
+    out = [SE3.adjoint(frame) @ edge.pair.basis for edge, frame in zip(edges[:joints], frames, strict=True)]
+    return out + [np.zeros((6, 0))] * (len(edges) - joints)
+
+
+def _graph(count: int, edges: Sequence[Edge]) -> nx.Graph:
+    """Bodies and the ground, −1, with an edge where there is a joint."""
+    graph = nx.Graph()
+    graph.add_nodes_from(range(-1, count))
+    graph.add_edges_from((edge.body1, edge.body2) for edge in edges)
+    return graph
+
+
+def islands(count: int, edges: Sequence[Edge]) -> list[list[int]]:
+    """The bodies of each group that has no joint with the ground, in order."""
+    return sorted(sorted(group) for group in nx.connected_components(_graph(count, edges)) if -1 not in group)
+
+
+def spanning_tree(joints: Sequence[Edge], light: Sequence[bool]) -> tuple[list[tuple[Edge, int, bool]], list[Edge]]:
+    """The tree as (edge, body that it leads to, walked forward), parents first; and the edges left.
+
+    Prescribed joints and those of frames without mass come into the tree first, then those of few freedoms: a joint of
+    many freedoms costs the fewest constraints where it is cut. Among equals those near the ground come first: then
+    branches are short, and few loops are open at one body.
+    """
+    depth = nx.single_source_shortest_path_length(_graph(len(light), joints), -1)
+    groups = nx.utils.UnionFind(range(-1, len(light)))
+
+    def cost(edge: Edge) -> tuple[bool, bool, int, int]:
+        beside = any(body >= 0 and light[body] for body in (edge.body1, edge.body2))
+        return (edge.motion is None, not beside, edge.pair.dim, min(depth[edge.body1], depth[edge.body2]))
+
+    kept: list[Edge] = []
+    cut: list[Edge] = []
+    for edge in sorted(joints, key=cost):
+        if groups[edge.body1] == groups[edge.body2]:
+            cut.append(edge)
+        else:
+            groups.union(edge.body1, edge.body2)
+            kept.append(edge)
+    at: dict[int, list[Edge]] = {}
+    for edge in kept:
+        at.setdefault(edge.body1, []).append(edge)
+        at.setdefault(edge.body2, []).append(edge)
+    out: list[tuple[Edge, int, bool]] = []
+    queue, reached = deque([-1]), {-1}
+    while queue:
+        here = queue.popleft()
+        for edge in at.get(here, []):
+            there = edge.body2 if edge.body1 == here else edge.body1
+            if there not in reached:
+                reached.add(there)
+                queue.append(there)
+                out.append((edge, there, edge.body1 == here))
+    return out, cut
+
+
+def loop_algebra(
+    cut: int, edges: Sequence[Edge], parents: list[int], place: Mapping[int, int], twists: list[Array], frame: Array
+) -> Array:
+    """(6, k): the algebra, in the ``frame`` C2 of a cut joint, of the group that the joints of its loop generate.
+
+    The bodies of the loop never leave it relative to each other, so rows beyond it would say nothing.
+    """
+    ends = [place[edges[cut].body1], place[edges[cut].body2]]
+    passed: list[int] = []
+    while ends[0] != ends[1]:
+        later = int(ends[1] > ends[0])
+        passed.append(ends[later])
+        ends[later] = parents[ends[later]]
+    seen = SE3.adjoint(SE3.inverse(frame)) @ np.column_stack([twists[i] for i in [*passed, cut]])
+    return generated(seen.T).basis

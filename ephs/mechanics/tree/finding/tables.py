@@ -1,0 +1,46 @@
+"""The tables of a mechanism in joint coordinates."""
+
+from typing import NamedTuple
+
+from ephs.semantics.bundle import Array
+from ephs.solve.sparse import Index
+
+__all__ = ["CUT", "SPRING", "TREE", "Mechanism"]
+
+TREE, CUT, SPRING = 0, 1, 2
+"""Kinds of edges."""
+
+
+class Mechanism(NamedTuple):
+    """Tables of a mechanism. Links are bodies, parents first; edges are joints of the tree, then cut ones, springs."""
+
+    parent: Index  # (links,): −1 for the ground
+    inertia: Array  # (links, 6, 6)
+    weight: Index  # (links,): component of the potential, −1: none
+    kind: Index  # (edges,)
+    first: Index  # (edges,): link of body 1, −1 for the ground; of a tree edge the parent in walking order
+    second: Index
+    forward: Index  # (edges,): 1 where walked from body 1 to body 2
+    code: Index  # (edges,)
+    dim: Index
+    q_at: Index
+    q_size: Index
+    r_at: Index  # tree edges: place in r; others: place in what is derived from it
+    offset1: Array  # (edges, 7)
+    offset2: Array
+    basis: Array  # (edges, 6, 6): B in its first dim columns
+    left: Array  # (edges, 6, 6): (BᵀB)⁻¹Bᵀ in its first dim rows
+    normal: Array  # (edges, 6, 6): rows that are constrained, of cut edges
+    rows: Index  # (edges,): how many
+    spring: Index  # (edges,): component of the potential, −1: none
+    friction: Index  # (edges,): component, −1: none
+    heat: Index  # (edges,): entropy that takes the friction's heat
+    driven: Index  # (tree freedoms,): 1 where the rate is prescribed
+    node: Index  # (entropies,): component of the storage, −1: the environment
+    conduction: Index  # (conductions, 3): component, entropy, entropy
+    sink: Index  # (frictions, 2): place of what it makes, entropy that takes its heat
+    address: Index  # (components,)
+    dims: Index  # (components, 4)
+    parameters: Array
+    parameter_at: Index
+    made_at: Index  # (components,): place of what it makes, −1

@@ -1,0 +1,316 @@
+"""What a mechanism's equations of motion read: tables of records, addresses of its sweeps, memory of one evaluation."""
+
+from dataclasses import dataclass
+from typing import Any, Final, final
+
+from ephs.mechanics.tree.sweeps import loops, programs
+from ephs.mechanics.tree.sweeps.cuts import Chart, Relative
+from ephs.mechanics.tree.sweeps.programs import PLACE
+from ephs.semantics.stage import (
+    Integer,
+    Integers,
+    Matrix,
+    Record,
+    Signature,
+    Table,
+    Vector,
+    function,
+    indices,
+    integer,
+    integers,
+    matrix,
+    real,
+    reals,
+    signature_of,
+    table,
+    vector,
+)
+from ephs.semantics.stage.reaching import Atom
+
+__all__ = [
+    "KERNEL",
+    "ON_BODIES",
+    "ON_CUT",
+    "ON_TREE",
+    "TABLES",
+    "WORK",
+    "Acting",
+    "Body",
+    "Component",
+    "Conduction",
+    "Node",
+    "Own",
+    "Sink",
+    "Tables",
+    "Work",
+]  # fmt: skip
+
+ON_TREE, ON_CUT, ON_BODIES = range(3)
+"""Kinds of edges in which something acts: a joint of the tree, a cut one, a spring between bodies."""
+_REALS: Final[tuple[Atom, ...]] = ("reals",)
+KERNEL: Final = Signature((("integers",), *[_REALS] * 10))
+"""How components are called: see `ephs.semantics.kernel_table`."""
+
+
+def _sweep(name: str) -> Any:
+    returns = name in ("accelerations", "fold", "dependent")
+    return function(signature_of(returns=returns, **programs.ARGUMENTS[name]))
+
+
+def _loop(name: str) -> Any:
+    return function(signature_of(returns=False, **loops.ARGUMENTS[name]))
+
+
+class Own(Record):
+    """What one mechanism has of its own: the functions of its class, and what there is to do.
+
+    Attributes
+    ----------
+    links
+        How many.
+    forced, driven
+        1 where more than gravity acts; where joints have prescribed motions.
+    falls
+        1 where `accelerations` is all there is to do; else it has no address, or else the other sweeps have none.
+    """
+
+    links = integer()
+    forced = integer()
+    driven = integer()
+    falls = integer()
+    accelerations = _sweep("accelerations")
+    move = _sweep("move")
+    fold = _sweep("fold")
+    unfold = _sweep("unfold")
+    resolve = _sweep("resolve")
+    spread = _sweep("spread")
+    power = _sweep("power")
+    dependent = _sweep("dependent")
+    rows = _loop("rows")
+    poses = _loop("poses")
+    fit = _loop("fit")
+    gaps = _loop("gaps")
+    relative_rates = _loop("relative_rates")
+    across = _loop("across")
+    advance = _loop("advance")
+    displace = _loop("move")
+    velocities = _loop("velocities")
+
+
+class Component(Record):
+    """A component: its relation in machine code, and what it is called with.
+
+    Attributes
+    ----------
+    law
+        The function.
+    dims
+        Numbers of efforts, multipliers, increments and states.
+    at
+        Where its parameters start.
+    made
+        Place of the entropy that it makes, −1: none.
+    """
+
+    law = function(KERNEL)
+    dims = integers(4)
+    at = integer()
+    made = integer()
+
+
+class Acting(Record):
+    """An edge in which components or given forces act.
+
+    Attributes
+    ----------
+    kind
+        `ON_TREE`, `ON_CUT` or `ON_BODIES`.
+    first, second
+        Links of its bodies, −1 for the ground.
+    dim, q_at, size, r_at
+        Freedoms; where its element and its freedoms start.
+    cut
+        Number among the cut joints, −1: none.
+    spring, friction
+        Components of the potential and of friction, −1: none.
+    heat
+        The entropy that takes its heat.
+    inner_turn, inner_at, outer_turn, outer_at
+        Its first frame in the first link's, its second in the second's.
+    left
+        (BᵀB)⁻¹Bᵀ in its first ``dim`` rows.
+    """
+
+    kind = integer()
+    first = integer()
+    second = integer()
+    dim = integer()
+    q_at = integer()
+    size = integer()
+    r_at = integer()
+    cut = integer()
+    spring = integer()
+    friction = integer()
+    heat = integer()
+    inner_turn = reals(3, 3)
+    inner_at = reals(3)
+    outer_turn = reals(3, 3)
+    outer_at = reals(3)
+    left = reals(6, 6)
+
+
+class Body(Record):
+    """A body on which a given wrench acts: its link, −1 where none does, and its frame in the link's."""
+
+    link = integer()
+    turn = reals(3, 3)
+    at = reals(3)
+
+
+class Node(Record):
+    """What stores entropy: E = c1 (exp(s/c2) − 1), or the environment's θ₀ s where there is no component, −1."""
+
+    component = integer()
+    c1 = real()
+    c2 = real()
+
+
+class Conduction(Record):
+    """A component that conducts between two entropies."""
+
+    component = integer()
+    one = integer()
+    two = integer()
+
+
+class Sink(Record):
+    """The entropy that takes the heat of a friction, which makes entropy at a place."""
+
+    maker = integer()
+    entropy = integer()
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Tables:
+    """A mechanism. Links are groups of bodies, parents first, in frames at their tree joints.
+
+    Attributes
+    ----------
+    own
+        One row.
+    integers, reals, gravity
+        Of the sweeps, see `ephs.mechanics.tree.sweeps.records`; gravity (3,) in the ground's frame.
+    chart, cut, cut_numbers
+        Joints, and those at which loops are cut, see `ephs.mechanics.tree.sweeps.cuts`.
+    at, slot, row, flat, end
+        The elimination of loops, see `ephs.mechanics.tree.engine.closing.Closing`.
+    drive, wrench, scal
+        Given forces on the freedoms of all joints, given wrenches (bodies, 6) in body frames, and (h, θ₀, π₀).
+    """
+
+    own: Table[Own]
+    integers: Integers
+    reals: Vector
+    gravity: Vector
+    chart: Table[Chart]
+    cut: Integers
+    cut_numbers: Vector
+    at: Integers
+    slot: Integers
+    row: Integers
+    flat: Integers
+    end: Integers
+    acting: Table[Acting]
+    body: Table[Body]
+    node: Table[Node]
+    conduction: Table[Conduction]
+    sink: Table[Sink]
+    component: Table[Component]
+    parameters: Vector
+    drive: Vector
+    wrench: Matrix
+    scal: Vector
+
+    @property
+    def links(self) -> Integer:
+        """How many links."""
+        return self.own[0].links
+
+    @property
+    def charts(self) -> Integers:
+        """The integers of all charts."""
+        return Integers(self.chart.integers, 0, self.chart.size * Chart.integer_width)
+
+
+TABLES: Final[dict[str, Any]] = {
+    "own": table(Own), "integers": indices(), "reals": vector(), "gravity": vector(3), "chart": table(Chart),
+    "cut": indices(), "cut_numbers": vector(), "at": indices(), "slot": indices(), "row": indices(), "flat": indices(),
+    "end": indices(), "acting": table(Acting), "body": table(Body), "node": table(Node),
+    "conduction": table(Conduction), "sink": table(Sink), "component": table(Component), "parameters": vector(),
+    "drive": vector(), "wrench": matrix(6), "scal": vector(3),
+}  # fmt: skip
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Work:
+    """What one evaluation writes.
+
+    Attributes
+    ----------
+    work, place, change
+        The sweeps' own; links in the world, and their accelerations beyond the bias; the ground's last.
+    pushed, force, zero
+        Wrenches (links, 6) on links, in their frames; forces on the tree's rates; zeros.
+    relative
+        (cut joints, width): see `ephs.mechanics.tree.sweeps.cuts.Relative`.
+    value, entry, covector, along, largest
+        Of the rows of loops, see `ephs.mechanics.tree.sweeps.closing.Rows`.
+    temperature, entropy
+        Efforts and entropies of the nodes.
+    x, v, e, lam, f, c, jac, scratch
+        Memory of components: v and lam stay zero.
+    alter, moved
+        Changes of the tree's rates, and of all joints' increments.
+    books
+        Powers of friction and of what drives.
+    answer, fault
+        A number that a function writes; the component or freedom that an evaluation failed at.
+    """
+
+    work: Vector
+    place: Matrix
+    change: Matrix
+    pushed: Matrix
+    force: Vector
+    zero: Vector
+    relative: Matrix
+    value: Matrix
+    entry: Vector
+    covector: Matrix
+    along: Matrix
+    largest: Vector
+    temperature: Vector
+    entropy: Vector
+    x: Vector
+    v: Vector
+    e: Vector
+    lam: Vector
+    f: Vector
+    c: Vector
+    jac: Vector
+    scratch: Vector
+    alter: Vector
+    moved: Vector
+    answer: Vector
+    fault: Integers
+
+
+WORK: Final[dict[str, Any]] = {
+    "work": vector(), "place": matrix(PLACE), "change": matrix(6), "pushed": matrix(6), "force": vector(),
+    "zero": vector(), "relative": matrix(Relative.real_width), "value": matrix(4), "entry": vector(),
+    "covector": matrix(6), "along": matrix(12), "largest": vector(), "temperature": vector(), "entropy": vector(),
+    "x": vector(), "v": vector(), "e": vector(), "lam": vector(), "f": vector(), "c": vector(), "jac": vector(),
+    "scratch": vector(), "alter": vector(), "moved": vector(), "answer": vector(1), "fault": indices(1),
+}  # fmt: skip

@@ -1,0 +1,104 @@
+"""Cut joints beside dense equations: rows on links, wrenches of multipliers, rates and accelerations."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import final
+
+from ephs.mechanics.tree.sweeps import cuts
+from ephs.mechanics.tree.sweeps.cuts import Chart, Cut, Kind, Place, Relative
+from ephs.mechanics.tree.sweeps.records import Tree
+from ephs.semantics.spaces.vectors import add, dot, scale
+from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Table, Vector
+
+__all__ = ["Closures"]
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Closures:
+    """Cut joints, and what is found of them.
+
+    Attributes
+    ----------
+    places
+        (links + 1, 24): places of links and the ground, with their accelerations where `cuts.Place` has biases.
+    motions
+        (cuts, 31): see `cuts.Relative`.
+    end
+        (2 rows,): 0, 1, 2, …: where the covectors of a row on its first and its second link are.
+    value
+        (rows, 4): minus the rows' accelerations, in the first column.
+    covector
+        (2 rows, 6).
+    """
+
+    kinds: tuple[Kind, ...]
+    cuts: Table[Cut]
+    charts: Table[Chart]
+    places: Matrix
+    motions: Matrix
+    end: Integers
+    value: Matrix
+    covector: Matrix
+
+    def place(self, on: Evaluator, tree: Tree) -> None:
+        """Write the places of links, and the motions and rows of cut joints."""
+
+        def show(i: Integer) -> None:
+            state, row = tree.states[i], self.places.row(i)
+            found = Place(self.cuts.integers, 0, row.cells, row.start)
+            found.turn, found.at, found.twist = state.turn, state.at, state.twist
+            found.bias = add(state.bias, state.change)
+
+        def clear(e: Integer) -> None:
+            for k in range(6):
+                self.covector[e, k] = 0.0
+
+        on.loop(tree.size + 1, show)
+        on.loop(self.covector.rows, clear)
+        cuts.rows(on, self.cuts, self.places, self.motions, self.end, self.value, self.covector)
+        cuts.poses(on, self.cuts, self.motions)
+
+    def each_row(self, on: Evaluator, body: Callable[[Cut, Integer], None]) -> None:
+        """Call body(joint, row) for all rows."""
+
+        def of(i: Integer) -> None:
+            cut = self.cuts[i]
+            on.loop(cut.rows, lambda j: body(cut, cut.row + j))
+
+        on.loop(self.cuts.size, of)
+
+    def at_end(self, e: Integer) -> list[Real]:
+        """The covector of a row on one of its links."""
+        return [self.covector[e, k] for k in range(6)]
+
+    def push(self, on: Evaluator, tree: Tree, multiplier: Vector) -> None:
+        """Take the wrenches of multipliers off the links' loads."""
+
+        def one(cut: Cut, row: Integer) -> None:
+            for link, e in ((cut.first, 2 * row), (cut.second, 2 * row + 1)):
+                on.when(link >= 0, lambda link=link, e=e: _load(tree, link, scale(-multiplier[row], self.at_end(e))))
+
+        self.each_row(on, one)
+
+    def along(self, on: Evaluator, rates: Vector, changes: Vector, first: Integer) -> None:
+        """The cut joints' rates and accelerations along their freedoms; ``first`` is the place of the first in v."""
+
+        def of(i: Integer) -> None:
+            cut, start = self.cuts[i], i * self.motions.columns
+            motion = Relative(self.cuts.integers, 0, self.motions.cells, self.motions.start + start)
+            twist, change = motion.twist, motion.change
+
+            def freedom(j: Integer) -> None:
+                left = Vector(cut.reals, cut.real_start + Cut.left.offset + 6 * j, 6)
+                row = [left[k] for k in range(6)]
+                rates[cut.v_at - first + j], changes[cut.v_at - first + j] = dot(row, twist), dot(row, change)
+
+            on.loop(cut.dim, freedom)
+
+        on.loop(self.cuts.size, of)
+
+
+def _load(tree: Tree, link: Integer, by: list[Real]) -> None:
+    state = tree.states[link]
+    state.load = add(state.load, by)

@@ -1,0 +1,388 @@
+"""Joints at which loops are cut: their relative motion, the rows that close them, how far they are open.
+
+A cut joint lets twists B r pass in its second frame; a row n of the complement, n·B = 0, forbids one. With the twists
+u₁, u₂ of both links in that frame and the relative one u = u₂ − u₁, its acceleration is u̇₂ − u̇₁ + [u, u₁].
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import final
+
+from ephs.mechanics.tree.sweeps.needs import NO_INTEGERS
+from ephs.semantics.spaces import codes, se3, so3
+from ephs.semantics.spaces.staged_groups import STAGED
+from ephs.semantics.spaces.vectors import add, apply, apply_transposed, combine, dot, product, scale, sub, transposed
+from ephs.semantics.stage import (
+    Evaluator,
+    Integer,
+    Integers,
+    Matrix,
+    Real,
+    Record,
+    Table,
+    Variable,
+    Vector,
+    integer,
+    reals,
+)
+
+__all__ = [
+    "Chart",
+    "Cut",
+    "Kind",
+    "Place",
+    "Relative",
+    "across",
+    "advance",
+    "between",
+    "fit",
+    "gaps",
+    "motion_of",
+    "place_of",
+    "poses",
+    "relative_rates",
+    "rows",
+    "velocities",
+    "visit_kind",
+]
+
+
+@final
+@dataclass(frozen=True, slots=True, order=True)
+class Kind:
+    """A group, and how many numbers an element and an increment have; known while staging."""
+
+    code: int
+    size: int
+    dim: int
+
+
+class Chart(Record):
+    """Where a joint's element, increment and rates lie; ``cut`` is its number among the cut joints, −1 on the tree."""
+
+    code = integer()
+    dim = integer()
+    q_at = integer()
+    size = integer()
+    v_at = integer()
+    r_at = integer()
+    cut = integer()
+
+
+class Cut(Record):
+    """A cut joint.
+
+    Attributes
+    ----------
+    first, second
+        Links of its bodies, −1 for the ground.
+    code, dim, q_at, size, v_at
+        As in `Chart`.
+    row, rows
+        Its first row, and how many.
+    inner_turn, inner_at
+        Its first frame in the first link's.
+    outer_turn, outer_at
+        Its second frame in the second link's.
+    basis
+        B (6, 6) in its first ``dim`` columns.
+    left
+        (BᵀB)⁻¹Bᵀ in its first ``dim`` rows.
+    normal
+        (6, 6): its rows.
+    """
+
+    first = integer()
+    second = integer()
+    code = integer()
+    dim = integer()
+    q_at = integer()
+    size = integer()
+    v_at = integer()
+    row = integer()
+    rows = integer()
+    inner_turn = reals(3, 3)
+    inner_at = reals(3)
+    outer_turn = reals(3, 3)
+    outer_at = reals(3)
+    basis = reals(6, 6)
+    left = reals(6, 6)
+    normal = reals(6, 6)
+
+
+class Place(Record):
+    """A link in the world: frame, twist, and acceleration at ṙ = 0 in its own axes."""
+
+    turn = reals(3, 3)
+    at = reals(3)
+    twist = reals(6)
+    bias = reals(6)
+
+
+class Relative(Record):
+    """Motion of a cut joint's second frame: pose in its first frame, frame in the first link, relative twist.
+
+    ``change`` is the twist's derivative at the accelerations that the links' places have.
+    """
+
+    pose = reals(7)
+    turn = reals(3, 3)
+    at = reals(3)
+    twist = reals(6)
+    change = reals(6)
+
+
+def place_of(on: Evaluator, places: Matrix, link: Integer) -> Place:
+    """Row of a link; the ground's is the last."""
+    row = on.select(link < 0, places.rows - 1, link)
+    return Place(NO_INTEGERS, 0, places.cells, places.start + row * places.columns)
+
+
+def motion_of(motion: Matrix, i: Integer) -> Relative:
+    """Row of a cut joint."""
+    return Relative(NO_INTEGERS, 0, motion.cells, motion.start + i * motion.columns)
+
+
+def between(near: Place, far: Place, turn: list[list[Real]], at: list[Real]) -> tuple[list[list[Real]], list[Real]]:
+    """A frame of the far link, given in it, as the near link has it."""
+    back = transposed(near.turn)
+    there = apply(back, add(sub(far.at, near.at), apply(far.turn, at)))
+    return product(back, product(far.turn, turn)), there
+
+
+def _each_row(on: Evaluator, cut: Cut, body: Callable[[Integer, list[Real]], None]) -> None:
+    """Call body(row, n) for the rows of a cut joint."""
+
+    def one(j: Integer) -> None:
+        normal = Vector(cut.reals, cut.real_start + Cut.normal.offset + 6 * j, 6)
+        body(cut.row + j, [normal[k] for k in range(6)])
+
+    on.loop(cut.rows, one)
+
+
+def visit_kind(
+    on: Evaluator, kinds: tuple[Kind, ...], code: Integer, dim: Integer, body: Callable[[Kind], None]
+) -> None:
+    """Call body(kind) with the kind of a joint, which is then known."""
+
+    def among(first: int) -> None:
+        kind = kinds[first]
+        if first == len(kinds) - 1:
+            body(kind)
+        else:
+            same = on.both(on.same(code, kind.code), on.same(dim, kind.dim))
+            on.when(same, lambda: body(kind), lambda: among(first + 1))
+
+    if kinds:
+        among(0)
+
+
+def _pose(on: Evaluator, kind: Kind, cut: Cut, q: Vector) -> list[Real]:
+    """The pose that an element of a joint stands for."""
+    x = [q[cut.q_at + k] for k in range(kind.size)]
+    if kind.code == codes.SO3:
+        return [*x, 0.0, 0.0, 0.0]
+    if kind.code == codes.SE3:
+        return x
+    if kind.code == codes.SE2:
+        half = 0.5 * x[0]
+        return [on.cos(half), 0.0, 0.0, on.sin(half), x[1], x[2], 0.0]
+    columns = transposed(cut.basis)[: kind.dim]
+    return se3.exp(on, combine(columns, x) if kind.dim else [0.0] * 6)
+
+
+def _gap(on: Evaluator, kind: Kind, cut: Cut, motion: Relative, q: Vector) -> list[Real]:
+    """log of the pose that is from the one that the joint's element stands for."""
+    return se3.increment(on, _pose(on, kind, cut, q), motion.pose)
+
+
+def rows(
+    on: Evaluator, cuts: Table[Cut], places: Matrix, motions: Matrix, end: Integers, value: Matrix, covector: Matrix
+) -> None:
+    """Write relative motions, targets of rows, and rows on links, to what the outward sweep found.
+
+    Parameters
+    ----------
+    places
+        (links + 1, 24): `Place` of each link and the ground.
+    motions
+        (cuts, 31): receives `Relative`, but for poses.
+    end
+        (2 rows,): the slots of a row on its first and on its second link.
+    value, covector
+        Targets go to the first column of ``value``; rows are added to ``covector``.
+    """
+
+    def grow(slot: Integer, by: list[Real]) -> None:
+        for k in range(6):
+            covector[slot, k] = covector[slot, k] + by[k]
+
+    def one(i: Integer) -> None:
+        cut, motion = cuts[i], motion_of(motions, i)
+        near, far = place_of(on, places, cut.first), place_of(on, places, cut.second)
+        outer_turn, outer_at = cut.outer_turn, cut.outer_at
+        turn, at = between(near, far, outer_turn, outer_at)
+        motion.turn, motion.at = turn, at
+        first = se3.twist_inward(turn, at, near.twist)
+        twist = sub(se3.twist_inward(outer_turn, outer_at, far.twist), first)
+        motion.twist = twist
+        bias = sub(se3.twist_inward(outer_turn, outer_at, far.bias), se3.twist_inward(turn, at, near.bias))
+        total = add(se3.bracket(twist, first), bias)
+        motion.change = total
+
+        def row(a: Integer, normal: list[Real]) -> None:
+            value[a, 0] = -dot(normal, total)
+            grow(end[2 * a + 1], se3.wrench_outward(outer_turn, outer_at, normal))
+            grow(end[2 * a], scale(-1.0, se3.wrench_outward(turn, at, normal)))
+
+        _each_row(on, cut, row)
+
+    on.loop(cuts.size, one)
+
+
+def poses(on: Evaluator, cuts: Table[Cut], motions: Matrix) -> None:
+    """Write poses of second frames in first ones, where `rows` has been."""
+
+    def one(i: Integer) -> None:
+        cut, motion = cuts[i], motion_of(motions, i)
+        inner = cut.inner_turn
+        turn = product(transposed(inner), motion.turn)
+        motion.pose = [*so3.quaternion(on, turn), *apply_transposed(inner, sub(motion.at, cut.inner_at))]
+
+    on.loop(cuts.size, one)
+
+
+def fit(on: Evaluator, kinds: tuple[Kind, ...], cuts: Table[Cut], motions: Matrix, q: Vector) -> None:
+    """Move the cut joints' elements to where their bodies put them."""
+
+    def one(i: Integer) -> None:
+        cut, motion = cuts[i], motion_of(motions, i)
+
+        def of(kind: Kind) -> None:
+            def closer(_: Integer) -> None:
+                log, left = _gap(on, kind, cut, motion, q), cut.left
+                change = [dot(left[j], log) for j in range(kind.dim)]
+                element = [q[cut.q_at + k] for k in range(kind.size)]
+                for k, x in enumerate(STAGED[kind.code].retract(on, element, change)):
+                    q[cut.q_at + k] = x
+
+            if kind.dim:
+                on.loop(3 if kind.dim > 1 or kind.code != codes.VECTOR else 2, closer)
+
+        visit_kind(on, kinds, cut.code, cut.dim, of)
+
+    on.loop(cuts.size, one)
+
+
+def gaps(on: Evaluator, kinds: tuple[Kind, ...], cuts: Table[Cut], motions: Matrix, q: Vector, value: Matrix) -> Real:
+    """Write targets that close the joints in one step of Newton's method; return how far they are open (m, rad)."""
+    worst = on.variable(0.0)
+
+    def one(i: Integer) -> None:
+        cut, motion = cuts[i], motion_of(motions, i)
+
+        def of(kind: Kind) -> None:
+            log = _gap(on, kind, cut, motion, q)
+
+            def row(a: Integer, normal: list[Real]) -> None:
+                target = -dot(normal, log)
+                value[a, 0] = target
+                _widen(on, worst, target)
+
+            _each_row(on, cut, row)
+
+        visit_kind(on, kinds, cut.code, cut.dim, of)
+
+    on.loop(cuts.size, one)
+    return worst.value
+
+
+def _widen(on: Evaluator, worst: Variable[Real], x: Real) -> None:
+    """Keep the largest size; what is not a number stays."""
+    size = on.absolute(x)
+    worst.value = on.select(size <= worst.value, worst.value, size)
+
+
+def relative_rates(on: Evaluator, cuts: Table[Cut], motions: Matrix, value: Matrix) -> None:
+    """Write targets that take the cut joints' forbidden velocities away, where `rows` has been."""
+
+    def one(i: Integer) -> None:
+        twist = motion_of(motions, i).twist
+
+        def row(a: Integer, normal: list[Real]) -> None:
+            value[a, 0] = -dot(normal, twist)
+
+        _each_row(on, cuts[i], row)
+
+    on.loop(cuts.size, one)
+
+
+def across(on: Evaluator, cuts: Table[Cut], motions: Matrix, change: Matrix, value: Matrix) -> None:
+    """Write targets that take changes of links' twists (links, 6) back across the constraints."""
+
+    def of(link: Integer) -> list[Real]:
+        row, there = on.select(link < 0, 0, link), link >= 0
+        return [on.select(there, change[row, k], 0.0) for k in range(6)]
+
+    def one(i: Integer) -> None:
+        cut, motion = cuts[i], motion_of(motions, i)
+        near = se3.twist_inward(motion.turn, motion.at, of(cut.first))
+        moved = sub(se3.twist_inward(cut.outer_turn, cut.outer_at, of(cut.second)), near)
+
+        def row(a: Integer, normal: list[Real]) -> None:
+            value[a, 0] = -dot(normal, moved)
+
+        _each_row(on, cut, row)
+
+    on.loop(cuts.size, one)
+
+
+def advance(on: Evaluator, kinds: tuple[Kind, ...], charts: Table[Chart], base: Vector, v: Vector, q: Vector) -> None:
+    """q = base·exp(v), joint by joint."""
+
+    def one(i: Integer) -> None:
+        chart = charts[i]
+
+        def of(kind: Kind) -> None:
+            element = [base[chart.q_at + k] for k in range(kind.size)]
+            change = [v[chart.v_at + j] for j in range(kind.dim)]
+            for k, x in enumerate(STAGED[kind.code].retract(on, element, change)):
+                q[chart.q_at + k] = x
+
+        visit_kind(on, kinds, chart.code, chart.dim, of)
+
+    on.loop(charts.size, one)
+
+
+def velocities(
+    on: Evaluator, kinds: tuple[Kind, ...], charts: Table[Chart], cuts: Table[Cut], motions: Matrix, v: Vector,
+    r: Vector, out: Vector,
+) -> None:  # fmt: skip
+    """v̇ = dexp⁻¹(v) r of all joints, that of cut ones from their relative motions, into ``out``."""
+
+    def one(i: Integer) -> None:
+        chart = charts[i]
+
+        def of(kind: Kind) -> None:
+            rates = [on.variable(0.0) for _ in range(kind.dim)]
+
+            def on_tree() -> None:
+                for j, rate in enumerate(rates):
+                    rate.value = r[chart.r_at + j]
+
+            def on_cut() -> None:
+                left, twist = cuts[chart.cut].left, motion_of(motions, chart.cut).twist
+                for j, rate in enumerate(rates):
+                    rate.value = dot(left[j], twist)
+
+            on.when(chart.cut < 0, on_tree, on_cut)
+            found = [rate.value for rate in rates]
+            group = STAGED[kind.code]
+            if not group.abelian:
+                found = apply(group.dexp_left_inv(on, [v[chart.v_at + j] for j in range(kind.dim)]), found)
+            for j, x in enumerate(found):
+                out[chart.v_at + j] = x
+
+        visit_kind(on, kinds, chart.code, chart.dim, of)
+
+    on.loop(charts.size, one)

@@ -1,0 +1,180 @@
+"""Inverse dynamics: forces on the rates that accelerations need, and what is linear in them.
+
+The same gathering of loads gives the forces that accelerations need, columns of the mass matrix (the accelerations are
+units, all else is zero), and covectors on links as rows on the rates.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import TypeAlias
+
+from ephs.mechanics.tree.sweeps.joints import force_outside, rate_inside
+from ephs.mechanics.tree.sweeps.outward import momentum
+from ephs.mechanics.tree.sweeps.records import Joint, Link, Tree
+from ephs.mechanics.tree.sweeps.spreading import spread
+from ephs.semantics.spaces.se3 import bracket, wrench_outward
+from ephs.semantics.spaces.vectors import add, apply_transposed, combine, dot, sub
+from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Vector
+
+__all__ = ["Take", "action", "gather", "masses", "needed_forces", "row_of_covector", "weigh"]
+
+Take: TypeAlias = Callable[[Integer, Joint, Link, list[Real], list[Real]], None]
+"""Called with a link's number, joint and constants, the load on it, and the force that this is on the joint's rates."""
+
+
+def gather(on: Evaluator, tree: Tree, q: Vector, take: Take) -> None:
+    """Carry the links' loads inwards, and let ``take`` see what each joint bears."""
+
+    def one(i: Integer) -> None:
+        def through(joint: Joint, link: Link) -> None:
+            state = tree.states[i]
+            load = state.load
+            force = force_outside(on, joint, link, q, [dot(column, load) for column in joint.basis])
+            take(i, joint, link, load, force)
+
+            def take_up() -> None:
+                parent = tree.states[link.parent]
+                parent.load = add(parent.load, wrench_outward(state.rotation, state.place, load))
+
+            on.when(link.parent < tree.size, take_up)
+
+        tree.visit(on, i, through)
+
+    tree.each(on, one, down=True)
+
+
+def _accelerated(on: Evaluator, tree: Tree, *, alone: bool) -> None:
+    """Add I δa of all links to their loads; alone: in place of them."""
+
+    def one(i: Integer) -> None:
+        def through(joint: Joint, link: Link) -> None:
+            state = tree.states[i]
+            inertial = momentum(link, state.change)
+            state.load = inertial if alone else add(state.load, inertial)
+
+        tree.visit(on, i, through)
+
+    tree.each(on, one)
+
+
+def needed_forces(on: Evaluator, tree: Tree, q: Vector, out: Vector) -> None:
+    """Add the forces on the rates (n,) that the links need, where `outward` and `spread` have been.
+
+    Wrenches on links are taken off their loads before.
+    """
+    _accelerated(on, tree, alone=False)
+
+    def take(i: Integer, joint: Joint, link: Link, load: list[Real], force: list[Real]) -> None:
+        for j, value in enumerate(force):
+            out[link.r_at + j] = out[link.r_at + j] + value
+
+    gather(on, tree, q, take)
+
+
+def weigh(on: Evaluator, tree: Tree) -> None:
+    """Put the weights of links alone into their loads, where `outward` has been."""
+    ground = tree.states[tree.size].bias[3:]
+
+    def one(i: Integer) -> None:
+        def through(joint: Joint, link: Link) -> None:
+            state = tree.states[i]
+            state.load = momentum(link, [0.0, 0.0, 0.0, *apply_transposed(state.turn, ground)])
+
+        tree.visit(on, i, through)
+
+    tree.each(on, one)
+
+
+def action(on: Evaluator, tree: Tree, q: Vector, r: Vector, p: Vector, g: Vector) -> None:
+    """The momenta ∂L/∂r, and ∂L/∂q with other forces, left-trivialised, where loads are what acts, negated.
+
+    A change δ of a joint's element moves its link by S δ, and with it all that is carried further out: δu = [u, S δ]
+    for the link's twist u, without the joint's own part S r where S does not move with the joint.
+
+    Parameters
+    ----------
+    g
+        (n,): holds what acts on the rates, negated.
+    """
+
+    def take(i: Integer, joint: Joint, link: Link, load: list[Real], force: list[Real]) -> None:
+        for j, value in enumerate(force):
+            g[link.r_at + j] = -(g[link.r_at + j] + value)
+
+    gather(on, tree, q, take)
+
+    def moving(i: Integer) -> None:
+        def through(joint: Joint, link: Link) -> None:
+            state = tree.states[i]
+            state.load = momentum(link, state.twist)
+
+        tree.visit(on, i, through)
+
+    tree.each(on, moving)
+
+    def one(i: Integer, joint: Joint, link: Link, load: list[Real], force: list[Real]) -> None:
+        twist = tree.states[i].twist
+        if not joint.backward:
+            rate = rate_inside(on, joint, link, q, [r[link.r_at + k] for k in range(joint.dim)])
+            twist = sub(twist, combine(joint.basis, rate)) if joint.dim else twist
+        for j, value in enumerate(force):
+            unit: list[Real] = [float(j == k) for k in range(joint.dim)]
+            axis = combine(joint.basis, rate_inside(on, joint, link, q, unit))
+            p[link.r_at + j] = value
+            g[link.r_at + j] = g[link.r_at + j] + dot(load, bracket(twist, axis))
+
+    gather(on, tree, q, one)
+
+
+def masses(on: Evaluator, tree: Tree, q: Vector, unit: Vector, mass: Matrix) -> None:
+    """The mass matrix (n, n), where `outward` has been; ``unit`` (n,) is memory."""
+
+    def clear(k: Integer) -> None:
+        unit[k] = 0.0
+
+    def column(k: Integer) -> None:
+        unit[k] = 1.0
+        spread(on, tree, q, unit)
+        unit[k] = 0.0
+        _accelerated(on, tree, alone=True)
+
+        def take(i: Integer, joint: Joint, link: Link, load: list[Real], force: list[Real]) -> None:
+            for j, value in enumerate(force):
+                mass[k, link.r_at + j] = value
+
+        gather(on, tree, q, take)
+
+    on.loop(unit.size, clear)
+    on.loop(unit.size, column)
+
+
+def row_of_covector(
+    on: Evaluator, tree: Tree, q: Vector, link: Integer, seen: Sequence[int], covector: list[Real], row: Vector,
+    count: Callable[[Integer, Real], None],
+) -> None:  # fmt: skip
+    """Add a covector on a link's twist to a row on the rates.
+
+    Parameters
+    ----------
+    link
+        −1: the ground, whose twist no rate changes.
+    seen
+        Entries of a twist that the mechanism's motion has.
+    count
+        Called with the place of each rate and what the row's entry there is at most.
+    """
+
+    def clear(i: Integer) -> None:
+        tree.states[i].load = [0.0] * 6
+
+    def put() -> None:
+        tree.states[link].load = covector
+
+    def take(i: Integer, joint: Joint, at: Link, load: list[Real], force: list[Real]) -> None:
+        size = on.sqrt(sum((load[k] * load[k] for k in seen), 0.0))
+        for j, (column, value) in enumerate(zip(joint.basis, force, strict=True)):
+            row[at.r_at + j] = row[at.r_at + j] + value
+            count(at.r_at + j, size * sum(x * x for x in column) ** 0.5)
+
+    on.loop(tree.size, clear)
+    on.when(link >= 0, put)
+    gather(on, tree, q, take)

@@ -1,0 +1,109 @@
+"""The program of cut joints and charts, specialised by the groups that a mechanism has."""
+
+from collections.abc import Callable, Iterable
+from functools import cache
+from typing import Any, Final
+
+import numpy as np
+
+from ephs.mechanics.tree.sweeps import cuts
+from ephs.mechanics.tree.sweeps.cuts import Chart, Cut, Kind
+from ephs.semantics.spaces import codes
+from ephs.semantics.stage import (
+    Entry,
+    Evaluator,
+    Integers,
+    Matrix,
+    Program,
+    Table,
+    Vector,
+    indices,
+    matrix,
+    vector,
+)
+from ephs.semantics.stage.memory import ArrayReals
+
+__all__ = ["ARGUMENTS", "common_loops", "kinds_of", "loop_program"]
+
+
+def kinds_of(joints: Iterable[tuple[int, int, int]]) -> tuple[Kind, ...]:
+    """The kinds among joints (code, size, dim), in order."""
+    return tuple(sorted({Kind(int(code), int(size), int(dim)) for code, size, dim in joints}))
+
+
+NO_REALS: Final = ArrayReals(np.zeros(0))
+JOINT: Final[dict[str, Any]] = {"cut": indices(), "numbers": vector(), "motions": matrix(cuts.Relative.real_width)}
+VALUE: Final = matrix(4)
+ARGUMENTS: Final[dict[str, dict[str, Any]]] = {
+    "rows": {
+        "cut": indices(), "numbers": vector(), "places": matrix(cuts.Place.real_width), "motions": JOINT["motions"],
+        "end": indices(), "value": VALUE, "covector": matrix(6),
+    },
+    "poses": JOINT,
+    "fit": {**JOINT, "q": vector()},
+    "gaps": {**JOINT, "q": vector(), "value": VALUE, "worst": vector(1)},
+    "relative_rates": {**JOINT, "value": VALUE},
+    "across": {**JOINT, "change": matrix(6), "value": VALUE},
+    "advance": {"chart": indices(), "base": vector(), "v": vector(), "q": vector()},
+    "move": {"chart": indices(), "v": vector(), "q": vector()},
+    "velocities": {"chart": indices(), **JOINT, "v": vector(), "r": vector(), "out": vector()},
+}  # fmt: skip
+"""What the entry functions take; none returns anything."""
+
+
+@cache
+def loop_program(kinds: tuple[Kind, ...]) -> Program:
+    """Return the program for joints of these kinds."""
+
+    def joints(cut: Integers, numbers: Vector) -> Table[Cut]:
+        return Table(Cut, cut.cells, numbers.cells, cut.size // Cut.integer_width)
+
+    def charted(chart: Integers) -> Table[Chart]:
+        return Table(Chart, chart.cells, NO_REALS, chart.size // Chart.integer_width)
+
+    def rows(
+        on: Evaluator, cut: Integers, numbers: Vector, places: Matrix, motions: Matrix, end: Integers, value: Matrix,
+        covector: Matrix,
+    ) -> None:  # fmt: skip
+        cuts.rows(on, joints(cut, numbers), places, motions, end, value, covector)
+
+    def poses(on: Evaluator, cut: Integers, numbers: Vector, motions: Matrix) -> None:
+        cuts.poses(on, joints(cut, numbers), motions)
+
+    def fit(on: Evaluator, cut: Integers, numbers: Vector, motions: Matrix, q: Vector) -> None:
+        cuts.fit(on, kinds, joints(cut, numbers), motions, q)
+
+    def gaps(
+        on: Evaluator, cut: Integers, numbers: Vector, motions: Matrix, q: Vector, value: Matrix, worst: Vector
+    ) -> None:
+        worst[0] = cuts.gaps(on, kinds, joints(cut, numbers), motions, q, value)
+
+    def relative_rates(on: Evaluator, cut: Integers, numbers: Vector, motions: Matrix, value: Matrix) -> None:
+        cuts.relative_rates(on, joints(cut, numbers), motions, value)
+
+    def across(on: Evaluator, cut: Integers, numbers: Vector, motions: Matrix, change: Matrix, value: Matrix) -> None:
+        cuts.across(on, joints(cut, numbers), motions, change, value)
+
+    def advance(on: Evaluator, chart: Integers, base: Vector, v: Vector, q: Vector) -> None:
+        cuts.advance(on, kinds, charted(chart), base, v, q)
+
+    def move(on: Evaluator, chart: Integers, v: Vector, q: Vector) -> None:
+        cuts.advance(on, kinds, charted(chart), q, v, q)
+
+    def velocities(
+        on: Evaluator, chart: Integers, cut: Integers, numbers: Vector, motions: Matrix, v: Vector, r: Vector,
+        out: Vector,
+    ) -> None:  # fmt: skip
+        cuts.velocities(on, kinds, charted(chart), joints(cut, numbers), motions, v, r, out)
+
+    functions: dict[str, Callable[..., Any]] = {
+        "rows": rows, "poses": poses, "fit": fit, "gaps": gaps, "relative_rates": relative_rates, "across": across,
+        "advance": advance, "move": move, "velocities": velocities,
+    }  # fmt: skip
+    name = "_".join(["loops", *(f"{kind.code}_{kind.dim}" for kind in kinds)])
+    return Program(name, **{name: Entry(function, **ARGUMENTS[name]) for name, function in functions.items()})
+
+
+def common_loops() -> Program:
+    """Return the program of the most common loops: of joints that turn about an axis or slide along one."""
+    return loop_program(kinds_of([(codes.VECTOR, 1, 1)]))

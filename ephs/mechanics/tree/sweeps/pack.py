@@ -1,0 +1,155 @@
+"""From a mechanism's links to the records of the sweeps, and to what is known of its class."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ephs.mechanics.tree.sweeps.records import Joint, Link
+from ephs.semantics.bundle import Array
+from ephs.semantics.spaces import codes, pair
+from ephs.semantics.stage import Table
+
+__all__ = ["SLIDE", "STANDARD", "TURN", "Class", "Packed", "Part", "packed"]
+
+TURN = Joint(codes.VECTOR, 1, ((0.0, 0.0, 1.0, 0.0, 0.0, 0.0),))
+"""A joint that turns about z."""
+SLIDE = Joint(codes.VECTOR, 1, ((0.0, 0.0, 0.0, 1.0, 0.0, 0.0),))
+"""A joint that slides along x, as planar mechanisms have it."""
+
+
+def _of(name: str, *, backward: bool) -> Joint:
+    found = pair(name)
+    return Joint(found.code, found.size, tuple(tuple(column) for column in found.basis.T.tolist()), backward)
+
+
+STANDARD: tuple[Joint, ...] = (
+    TURN,
+    SLIDE,
+    *(_of(name, backward=False) for name in ("prismatic", "cylindrical", "planar", "spherical", "free")),
+    *(_of(name, backward=True) for name in ("planar", "spherical", "free")),
+)
+"""Joints without parameters: one looped program serves all mechanisms of these."""
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Part:
+    """A link on its way into the records.
+
+    Attributes
+    ----------
+    joint
+        Its tree joint.
+    parent
+        Number of the parent, −1 for the ground.
+    q_at, r_at, sense
+        As in `Link`.
+    numbers
+        (22,): rows of R and p of the joint in the parent's frame, mass, first moments, inertia about the frame (upper
+        triangle).
+    """
+
+    joint: Joint
+    parent: int
+    q_at: int
+    r_at: int
+    sense: int
+    numbers: Array
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Class:
+    """Mechanisms that one looped program serves.
+
+    Attributes
+    ----------
+    joints
+        The kinds of joints.
+    planar
+        All moves parallel to the plane of x and y.
+    """
+
+    joints: tuple[Joint, ...]
+    planar: bool
+
+    def constants(self, kind: int) -> dict[int, float]:
+        """What all links with a kind of joints have in common: offset in `Link` and the value, 0 or 1."""
+        turn, moment, inertia = Link.rotation.offset, Link.moment.offset, Link.inertia.offset
+        if not self.planar:
+            return {Link.shift.offset: 0.0}
+        out = {turn + k: float(k == 8) for k in (2, 5, 6, 7, 8)}
+        if self.joints[kind].revolute:
+            out |= {turn + k: float(k in (0, 4)) for k in (0, 1, 3, 4)}
+        else:
+            out[Link.shift.offset] = 0.0
+        return out | {moment + 2: 0.0} | {inertia + k: 0.0 for k in range(5)}
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Packed:
+    """A mechanism's records: its class, constants of its links, gravity (3,) in the ground's frame."""
+
+    kind: Class
+    links: Table[Link]
+    gravity: Array
+
+    @property
+    def size(self) -> int:
+        """How many links."""
+        return int(self.integers.size // Link.integer_width)
+
+    @property
+    def integers(self) -> NDArray[np.int64]:
+        """(links · width,) their integers."""
+        return self.links.arrays[0]
+
+    @property
+    def reals(self) -> Array:
+        """(links · width,) their numbers."""
+        return self.links.arrays[1]
+
+
+def packed(parts: Sequence[Part], gravity: Array, *, planar: bool, among: Sequence[Joint] = ()) -> Packed:
+    """The records of a mechanism's tree, whose parts stand after their parents.
+
+    Parameters
+    ----------
+    gravity
+        (3,) in the ground's frame.
+    planar
+        All joints turn about z or slide along x, and all z axes are parallel.
+    among
+        Further kinds of joints that the class has.
+    """
+    count, joints = len(parts), tuple(sorted({part.joint for part in parts} | set(among), key=repr))
+    links = Link.table(count)
+    for i, part in enumerate(parts):
+        link, c = links[i], [float(x) for x in part.numbers]
+        link.parent = part.parent if part.parent >= 0 else count
+        link.kind = joints.index(part.joint)
+        link.q_at, link.r_at, link.sense = part.q_at, part.r_at, float(part.sense)
+        link.place, link.mass, link.moment, link.inertia = _clean(c[9:12]), c[12], _clean(c[13:16]), _clean(c[16:22])
+        link.rotation = [_clean(c[k : k + 3]) for k in (0, 3, 6)]
+        if planar:
+            angle, turning = math.atan2(c[3], c[0]), part.joint.revolute
+            link.shift = angle if turning else 0.0
+            link.rotation = _about_z(0.0 if turning else angle)
+            link.moment, link.inertia = [c[13], c[14], 0.0], [0.0, 0.0, 0.0, 0.0, 0.0, c[21]]
+    return Packed(Class(joints, planar), links, np.array(gravity, dtype=float))
+
+
+def _clean(numbers: list[float]) -> list[float]:
+    """Numbers with those that are rounding beside the others, or beside 1, as zeros and ones."""
+    near = 4.0 * float(np.finfo(float).eps) * max(abs(x) for x in numbers)
+    return [0.0 if abs(x) <= near else math.copysign(1.0, x) if abs(abs(x) - 1.0) <= near else x for x in numbers]
+
+
+def _about_z(angle: float) -> list[list[float]]:
+    c, s = math.cos(angle), math.sin(angle)
+    return [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]

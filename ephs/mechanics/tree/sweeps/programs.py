@@ -1,0 +1,330 @@
+"""Looped programs of the sweeps, specialised by what a class of mechanisms has in common."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from hashlib import sha256
+from typing import Any, Final, final
+
+from ephs.mechanics.tree.sweeps import closing
+from ephs.mechanics.tree.sweeps.accelerations import Force, accelerate_outward, accelerations, no_force
+from ephs.mechanics.tree.sweeps.closing import Rows
+from ephs.mechanics.tree.sweeps.inward import inward, load_inward
+from ephs.mechanics.tree.sweeps.needs import NO_INTEGERS, Compact, LaidOut, Layout, Survey, layout_of
+from ephs.mechanics.tree.sweeps.outward import outward
+from ephs.mechanics.tree.sweeps.pack import SLIDE, TURN, Class
+from ephs.mechanics.tree.sweeps.records import Link, State, States, Tree
+from ephs.mechanics.tree.sweeps.spreading import driven_power, spread
+from ephs.semantics.spaces.rank import SPARSE
+from ephs.semantics.stage import (
+    Entry,
+    Evaluator,
+    Integer,
+    Integers,
+    Matrix,
+    Program,
+    Vector,
+    indices,
+    integer,
+    matrix,
+    vector,
+)
+from ephs.semantics.stage.memory import IntegerCells, RealCells
+
+__all__ = [
+    "ARGUMENTS", "ENTRIES", "FREE", "GENERAL", "MECHANISM", "PLACE", "Sweeps", "common_sweeps", "given_force", "sweeps",
+]  # fmt: skip
+
+PLACE: Final = 24
+"""Numbers of a link that rows and forces read: R and p in the world, twist, bias."""
+FREE: Final = ("accelerations", "evaluations")
+"""Entry functions for trees on which nothing but gravity and forces on the rates act."""
+GENERAL: Final = ("move", "fold", "unfold", "resolve", "spread", "power", "dependent")
+"""Entry functions for mechanisms with loops, wrenches on links or prescribed motions."""
+ENTRIES: Final = (*FREE, *GENERAL)
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class _Links:
+    """Constants of links, of which those that a kind of joints has in common are known."""
+
+    constants: tuple[Layout, ...]
+    integers: IntegerCells
+    reals: RealCells
+
+    def of(self, i: Integer, kind: int | None) -> Link:
+        start = i * Link.real_width
+        cells = self.reals if kind is None else LaidOut(self.constants[kind], self.reals, start)
+        return Link(self.integers, i * Link.integer_width, cells, start if kind is None else 0)
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class _Whole:
+    """Memory of a survey: all rows are one."""
+
+    cells: RealCells
+
+    def __getitem__(self, i: Integer) -> State:
+        return State(NO_INTEGERS, 0, self.cells, 0)
+
+
+MECHANISM: Final[dict[str, Any]] = {
+    "size": integer(), "integers": indices(), "reals": vector(), "memory": vector(), "gravity": vector(3),
+}  # fmt: skip
+"""A mechanism, as all entry functions take it: how many links, their integers and numbers, memory, gravity."""
+ROWS: Final[dict[str, Any]] = {
+    "at": indices(), "slot": indices(), "row": indices(), "flat": indices(), "value": matrix(4), "entry": vector(),
+    "covector": matrix(6), "along": matrix(12),
+}  # fmt: skip
+"""The rows of its loops: see `ephs.mechanics.tree.sweeps.closing.Rows`."""
+ARGUMENTS: Final[dict[str, dict[str, Any]]] = {
+    "accelerations": {**MECHANISM, "q": vector(), "r": vector(), "force": vector(), "rate": vector()},
+    "move": {**MECHANISM, "q": vector(), "r": vector(), "places": matrix(PLACE)},
+    "fold": {**MECHANISM, **ROWS, "q": vector(), "force": vector(), "wrench": matrix(6)},
+    "unfold": {**MECHANISM, **ROWS, "q": vector(), "rate": vector(), "change": matrix(6)},
+    "resolve": {**MECHANISM, **ROWS, "q": vector(), "rate": vector(), "change": matrix(6)},
+    "spread": {**MECHANISM, "q": vector(), "x": vector(), "change": matrix(6)},
+    "power": {**MECHANISM, **ROWS, "q": vector(), "r": vector(), "force": vector(), "out": vector()},
+    "dependent": {**ROWS, "largest": vector()},
+}
+"""What the entry functions take; `accelerations`, `fold` and `dependent` return an integer."""
+
+
+@final
+class Sweeps:
+    """The sweeps of a class of mechanisms as a program.
+
+    Parameters
+    ----------
+    kind
+        The class.
+    general
+        Loops, wrenches on links and prescribed motions are there; else a tree under forces on its rates.
+    others
+        Entry functions in place of those, made with these sweeps' `tree`.
+
+    Attributes
+    ----------
+    width
+        Numbers of memory that a link takes; the ground takes as many.
+    program
+        The entry functions of `FREE` or `GENERAL`.
+    """
+
+    def __init__(
+        self, kind: Class, *, general: bool = True, others: "Callable[[Sweeps], dict[str, Entry]] | None" = None
+    ) -> None:
+        self._class = kind
+        self._zeros = (0, 1, 5) if kind.planar else ()
+        self._constants = tuple(
+            Layout(known, {k: k for k in range(Link.real_width) if k not in known})
+            for known in (kind.constants(number) for number in range(len(kind.joints)))
+        )
+        entries = others(self) if others is not None else self._general() if general else self._free()
+        self._layout: Layout | None = None
+        self._layout = layout_of(State.real_width, lambda survey: self._survey(survey, entries))
+        self.width = self._layout.width
+        self.program = Program(_name(kind, general=general), **entries)
+
+    def tangent(self, directions: int = 1) -> Program:
+        """The program of ``accelerations`` with exact derivatives along directions.
+
+        Memory, q, r, force and rate come with an array of their slopes each; those of quaternions are the quaternions'.
+        """
+        entry = self.program.entries["accelerations"]
+        return Program(
+            "tangents", accelerations=entry.tangent("memory", "q", "r", "force", "rate", directions=directions)
+        )
+
+    def _survey(self, survey: Survey, entries: dict[str, Entry]) -> None:
+        self._states: States | None = _Whole(survey.memory())
+        for entry in entries.values():
+            survey.returned(entry.function(survey, *(survey.argument(kind) for kind in entry.kinds.values())))
+        self._states = None
+
+    def tree(self, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector) -> Tree:
+        """The tree of links that tables describe, with ``width`` numbers of memory for each link and the ground."""
+        states, pull = self._states, [gravity[k] for k in range(3)]
+        if states is None:
+            assert self._layout is not None
+            states = Compact(State, self._layout, memory)
+        return Tree(self._class.joints, size, _Links(self._constants, integers.cells, reals.cells), states, pull)
+
+    def _rows(
+        self, at: Integers, slot: Integers, row: Integers, flat: Integers, value: Matrix, entry: Vector,
+        covector: Matrix, along: Matrix,
+    ) -> Rows:  # fmt: skip
+        whole = Vector(covector.cells, covector.start, covector.rows * 6)
+        return Rows(at, slot, row, flat, value, entry, whole, along, self._zeros)
+
+    # ---- trees on which nothing but gravity and forces on the rates act ------------------------------------------
+
+    def _free(self) -> dict[str, Entry]:
+        def accelerate(
+            on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector, q: Vector,
+            r: Vector, force: Vector, rate: Vector,
+        ) -> Integer:  # fmt: skip
+            tree = self.tree(size, integers, reals, memory, gravity)
+            return accelerations(on, tree, q, r, rate, given_force(force))
+
+        def evaluations(
+            on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector, q: Matrix,
+            r: Matrix, rates: Matrix, repeats: Integer,
+        ) -> None:  # fmt: skip
+            tree = self.tree(size, integers, reals, memory, gravity)
+
+            def one(k: Integer) -> None:
+                accelerations(on, tree, q.row(k), r.row(k), rates.row(k))
+
+            on.loop(repeats, lambda _: on.loop(q.rows, one))
+
+        return {
+            "accelerations": Entry(accelerate, **ARGUMENTS["accelerations"]),
+            "evaluations": Entry(evaluations, **MECHANISM, q=matrix(), r=matrix(), rates=matrix(), repeats=integer()),
+        }
+
+    # ---- mechanisms with loops, wrenches on links, prescribed motions --------------------------------------------
+
+    def _general(self) -> dict[str, Entry]:
+        def move(
+            on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector, q: Vector,
+            r: Vector, places: Matrix,
+        ) -> None:  # fmt: skip
+            tree = self.tree(size, integers, reals, memory, gravity)
+            outward(on, tree, q, r)
+
+            def show(i: Integer) -> None:
+                state = tree.states[i]
+                turn = [x for row in state.turn for x in row]
+                for k, x in enumerate([*turn, *state.at, *state.twist, *state.bias]):
+                    places[i, k] = x
+
+            on.loop(size + 1, show)
+
+        def fold(
+            on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector,
+            at: Integers, slot: Integers, row: Integers, flat: Integers, value: Matrix, entry: Vector,
+            covector: Matrix, along: Matrix, q: Vector, force: Vector, wrench: Matrix,
+        ) -> Integer:  # fmt: skip
+            tree = self.tree(size, integers, reals, memory, gravity)
+            rows, fault = self._rows(at, slot, row, flat, value, entry, covector, along), on.counter(0)
+
+            def one(i: Integer) -> None:
+                state = tree.states[i]
+                state.load = [x - wrench[i, k] for k, x in enumerate(state.load)]
+                closing.eliminate(on, rows, i, state)
+                closing.eliminate_load(on, rows, i, state)
+                inward(on, tree, i, fault)
+                load_inward(on, tree, q, given_force(force), i)
+                closing.carry(on, tree, rows, i)
+                closing.carry_load(on, tree, rows, i)
+
+            tree.each(on, one, down=True)
+            closing.eliminate(on, rows, size, None)
+            closing.eliminate_load(on, rows, size, None)
+            return fault.value
+
+        def outwards(on: Evaluator, tree: Tree, rows: Rows, q: Vector, rate: Vector, change: Matrix) -> None:
+            closing.multipliers(on, rows, tree.size, None)
+
+            def one(i: Integer) -> None:
+                closing.push(on, tree, rows, i)
+                accelerate_outward(on, tree, q, rate, i)
+                closing.multipliers(on, rows, i, tree.states[i])
+
+            tree.each(on, one)
+            _show_changes(on, tree, change)
+
+        def unfold(
+            on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector,
+            at: Integers, slot: Integers, row: Integers, flat: Integers, value: Matrix, entry: Vector,
+            covector: Matrix, along: Matrix, q: Vector, rate: Vector, change: Matrix,
+        ) -> None:  # fmt: skip
+            tree = self.tree(size, integers, reals, memory, gravity)
+            outwards(on, tree, self._rows(at, slot, row, flat, value, entry, covector, along), q, rate, change)
+
+        def resolve(
+            on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector,
+            at: Integers, slot: Integers, row: Integers, flat: Integers, value: Matrix, entry: Vector,
+            covector: Matrix, along: Matrix, q: Vector, rate: Vector, change: Matrix,
+        ) -> None:  # fmt: skip
+            tree = self.tree(size, integers, reals, memory, gravity)
+            rows = self._rows(at, slot, row, flat, value, entry, covector, along)
+
+            def unloaded(i: Integer) -> None:
+                tree.states[i].load = [0.0] * 6
+
+            def one(i: Integer) -> None:
+                closing.eliminate_load(on, rows, i, tree.states[i])
+                load_inward(on, tree, q, no_force, i)
+                closing.carry_load(on, tree, rows, i)
+
+            on.loop(size, unloaded)
+            tree.each(on, one, down=True)
+            closing.eliminate_load(on, rows, size, None)
+            outwards(on, tree, rows, q, rate, change)
+
+        def spread_out(
+            on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector, q: Vector,
+            x: Vector, change: Matrix,
+        ) -> None:  # fmt: skip
+            tree = self.tree(size, integers, reals, memory, gravity)
+            spread(on, tree, q, x)
+            _show_changes(on, tree, change)
+
+        def power(
+            on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector,
+            at: Integers, slot: Integers, row: Integers, flat: Integers, value: Matrix, entry: Vector,
+            covector: Matrix, along: Matrix, q: Vector, r: Vector, force: Vector, out: Vector,
+        ) -> None:  # fmt: skip
+            tree = self.tree(size, integers, reals, memory, gravity)
+            rows = self._rows(at, slot, row, flat, value, entry, covector, along)
+            out[0] = driven_power(on, tree, rows, q, r, force)
+
+        def dependent(
+            on: Evaluator, at: Integers, slot: Integers, row: Integers, flat: Integers, value: Matrix, entry: Vector,
+            covector: Matrix, along: Matrix, largest: Vector,
+        ) -> Integer:  # fmt: skip
+            rows = self._rows(at, slot, row, flat, value, entry, covector, along)
+            return on.select(closing.dependent(on, rows, largest, SPARSE), 1, 0)
+
+        functions: dict[str, Callable[..., Any]] = {
+            "move": move, "fold": fold, "unfold": unfold, "resolve": resolve, "spread": spread_out, "power": power,
+            "dependent": dependent,
+        }  # fmt: skip
+        return {name: Entry(function, **ARGUMENTS[name]) for name, function in functions.items()}
+
+
+def _show_changes(on: Evaluator, tree: Tree, change: Matrix) -> None:
+    def show(i: Integer) -> None:
+        for k, x in enumerate(tree.states[i].change):
+            change[i, k] = x
+
+    on.loop(tree.size, show)
+
+
+def given_force(force: Vector) -> Force:
+    """The forces on the rates that a vector holds."""
+    return lambda i, joint, link: [force[link.r_at + j] for j in range(joint.dim)]
+
+
+@cache
+def sweeps(kind: Class, *, general: bool = False) -> Sweeps:
+    """The program of a class, made once; it lives as long as the process, since tables keep its addresses."""
+    return Sweeps(kind, general=general)
+
+
+def _name(kind: Class, *, general: bool) -> str:
+    """Name of a class: object code of several may be linked together."""
+    known = {TURN: "turn", SLIDE: "slide"}
+    joints = [known.get(joint) or sha256(repr(joint).encode()).hexdigest()[:8] for joint in kind.joints]
+    return "_".join(["sweeps", "planar" if kind.planar else "spatial", *joints, "loops" if general else "trees"])
+
+
+def common_sweeps() -> tuple[Program, ...]:
+    """Return the programs of the most common classes: mechanisms in a plane, whose joints turn or slide."""
+    turning, sliding = Class((TURN,), True), Class((SLIDE, TURN), True)
+    wanted = [(turning, False), (turning, True), (sliding, True)]
+    return tuple(sweeps(kind, general=general).program for kind, general in wanted)

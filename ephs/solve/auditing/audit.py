@@ -1,0 +1,356 @@
+"""The audit of a run: laws that its result is held against, and what breaks them.
+
+Sizes are relative to the run's own: energies to the largest K + |V − V₀| + |heat| + |work|, entropies to what was made
+and exchanged, positions to the length of the mechanism. A law without anything to hold is kept.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, final
+
+import numpy as np
+
+from ephs.operad import Path
+from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.rank import CLOSED
+from ephs.solve.auditing.findings import Audit, Finding
+from ephs.solve.auditing.growth import Again, GlobalError, global_error
+from ephs.solve.auditing.resolution import Trials
+from ephs.solve.breakpoints import MOST_FOUND
+from ephs.solve.control import Control
+from ephs.solve.methods.driven import ComponentMethod
+from ephs.solve.model import Model
+
+if TYPE_CHECKING:
+    from ephs.solve.result.solution import Solution
+
+__all__ = ["LAWS", "Bounds", "audit"]
+
+LAWFUL, LEAST, COARSE, MANY_TIMES = 1e-10, 1e-9, 1e-2, 100.0
+"""Allowed parts of the gross energies: where steps keep the balance; the least and the constant steps' where they do
+not; and how many times rtol where steps are chosen."""
+MOTION = 0.1
+"""Parts of the mechanism's length, or rad, by which constant steps may put bodies wrong at the end, as estimated: the
+estimate adds up errors of steps, which may cancel, so that fewer digits would be guesses."""
+PRODUCTION = 1e-12
+"""Part of its scale by which an entropy may fall: what rounding leaves of a difference of flows."""
+INSTANTS = 125
+"""Instants, evenly spread, at which the positions of joints are looked at."""
+ROUNDING = 8.0 * float(np.finfo(float).eps)
+"""Part of what is stored that rounding leaves of a difference."""
+SOLVED = 100.0 * float(np.finfo(float).eps)
+"""The same of energies after the equations of a step were solved, times the root of the number of steps: 10 κ ε with a
+condition κ of 10."""
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """Allowed errors of a run, relative to its scales.
+
+    Parameters
+    ----------
+    energy
+        Of the gross energies.
+    accuracy
+        Of what moves: the estimated error.
+    ledger
+        Of what is booked.
+    step
+        The length of constant steps in s; None where they are chosen.
+    undamped
+        Makes the natural method that estimates the error of constant steps, of a method that damps nothing at
+        infinity; None of others, which do so by steps of their own.
+    order
+        With which power of the step the method's error falls.
+    again
+        Further runs of the same problem; None where its inputs cannot be given again.
+    """
+
+    energy: float
+    accuracy: float
+    ledger: float
+    step: float | None = None
+    undamped: Callable[[Model], ComponentMethod] | None = None
+    order: int = 1
+    again: Again | None = None
+
+    @classmethod
+    def of(
+        cls,
+        control: Control,
+        step: float | None,
+        *,
+        lawful: bool,
+        undamped: Callable[[Model], ComponentMethod] | None = None,
+        order: int = 1,
+        again: Again | None = None,
+    ) -> "Bounds":
+        """Of a run with these tolerances, and constant steps in s where given.
+
+        Parameters
+        ----------
+        lawful
+            Whether every step of the method keeps the balance.
+        undamped, order, again
+            See `Bounds`.
+        """
+        rtol, atol = (max(given.value, *given.special.values(), 0.0) for given in (control.rtol, control.atol))
+        chosen = max(MANY_TIMES * (rtol or atol), LEAST)
+        error = chosen if step is None else COARSE
+        return cls(LAWFUL if lawful else error, error, chosen, step, undamped, order, again)
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Breach:
+    """The largest excess over a law in a run: size, what is allowed on top, instant, component, end of the advice."""
+
+    size: float
+    slack: float
+    instant: int
+    path: Path | None = None
+    hint: str = ""
+
+
+def _energy(solution: "Solution", _bounds: Bounds, _trials: Trials | None) -> Iterator[Breach]:
+    """The balance of kinetic + potential + heat − work, and of all energies − work."""
+    books = solution.ledgers
+    worst = _worst(solution.energy_error)
+    # what is destroyed counts as energy; the environment's is what others gave it
+    destroyed = {path: books.temperature * made for path, made in books.makers.items()}
+    parts = {path: energy for path, energy in books.storages.items() if books.exergies[path].any()} | destroyed
+    jump = 1 + int(np.argmax(np.abs(np.diff(solution.energy_error)))) if len(solution) > 1 else 0
+    busiest = max(parts, key=lambda path: _step(parts[path], jump), default=None)
+    yield Breach(float(solution.energy_error[worst]), _rounded(solution) / books.scale, worst, busiest)
+
+
+def _rounded(solution: "Solution") -> float:
+    """Rounding of an energy balance, in J."""
+    books = solution.ledgers
+    stored = sum(float(np.abs(books.storages[path]).max()) for path, held in books.exergies.items() if held.any())
+    return SOLVED * float(solution.stats["steps"] or 1) ** 0.5 * stored
+
+
+def _step(values: Array, instant: int) -> float:
+    return abs(float(values[instant] - values[instant - 1])) if instant else 0.0
+
+
+def _accuracy(solution: "Solution", bounds: Bounds, trials: Trials | None) -> Iterator[Breach]:
+    """Constant steps put bodies where they belong, and resolve what moves."""
+    if bounds.step is None or trials is None:
+        return
+    steps = int(solution.stats["steps"])
+    own = trials.own or trials
+    slack = MOTION - min(MOTION, bounds.accuracy)
+    off = own.motion(bounds.step, steps)
+    if off is not None:
+        hint = ""
+        if off.size > MOTION:  # of order p + 1 in a step, over as many steps more
+            hint = f" of {0.9 * bounds.step * (MOTION / off.size) ** (1.0 / bounds.order):.2g} s"
+        instant = int(np.argmin(np.abs(solution.t - own.times[off.trial])))
+        yield Breach(off.size, slack, instant, off.path, hint)
+    if trials.again is not None:
+        summed = 0.0 if off is None else off.size
+        grown = global_error(solution, bounds.order, bounds.step, summed, MOTION, trials.again)
+        if grown is not None:
+            yield Breach(grown.size, slack, grown.instant, grown.path, _shorter(bounds, grown))
+    found = trials.error(bounds.step, steps, solution.ledgers.scale)
+    if found is not None:
+        hint, at = "", trials.times[found.trial]
+        if found.size > bounds.accuracy:
+            h = trials.sufficient(found.trial, bounds.step, bounds.accuracy)
+            hint = f" of {h:.1g} s" + (", or radau, which damps what is too fast" if bounds.undamped else "")
+        yield Breach(found.size, 0.0, int(np.argmin(np.abs(solution.t - at))), found.path, hint)
+
+
+def _shorter(bounds: Bounds, found: GlobalError) -> str:
+    """End of the advice to take shorter steps."""
+    if found.size <= MOTION or bounds.step is None:
+        return ""
+    if not found.resolved:
+        return f" of {0.25 * bounds.step:.2g} s or less: one of twice its length leads elsewhere"
+    return f" of {0.9 * bounds.step * (MOTION / found.size) ** (1.0 / bounds.order):.2g} s"
+
+
+def _entropy(solution: "Solution", _bounds: Bounds, _trials: Trials | None) -> Iterator[Breach]:
+    """No component, and no system without entropy's outer ports, loses entropy in a step."""
+    books = solution.ledgers
+    least = -float(solution.stats["least_production"])
+    scale, rounding = _exchanged(solution, "entropy")
+    if not scale:
+        return
+    falls = {path: -np.diff(made, prepend=made[:1]) for path, made in books.makers.items()}
+    path = max(falls, key=lambda each: float(falls[each].max()), default=None)
+    instant = _worst(falls[path]) if path is not None else 0
+    yield Breach(least / scale, rounding, instant, path)
+    if _isolated(solution, "entropy"):
+        fall = -np.diff(books.entropy, prepend=books.entropy[:1])
+        instant = _worst(fall)
+        yield Breach(float(fall[instant]) / scale, rounding, instant)
+
+
+def _constraint(solution: "Solution", _bounds: Bounds, _trials: Trials | None) -> Iterator[Breach]:
+    """Joints are closed."""
+    every = len(solution) // INSTANTS + 1
+    for path, residual in solution.motion.gaps(every).items() if solution.motion is not None else ():
+        worst = _worst(residual)
+        yield Breach(float(residual[worst]), 0.0, len(solution) - 1 - worst * every, path)
+
+
+def _ledger(solution: "Solution", bounds: Bounds, _trials: Trials | None) -> Iterator[Breach]:
+    """Stored entropies and volumes change by what was made; work is a sum of power."""
+    books = solution.ledgers
+    if "work_apart" in solution.stats:
+        instant = int(np.argmin(np.abs(solution.t - solution.stats["work_apart_at"])))
+        size, hint = float(solution.stats["work_apart"]) / books.scale, ": near a dead centre of what is prescribed"
+        yield Breach(size, COARSE - min(COARSE, bounds.ledger), instant, hint=hint)
+    for kind, held, made in (("entropy", books.entropies, books.made), ("volume", books.volumes, None)):
+        scale, rounding = _exchanged(solution, kind)
+        if not scale or not _isolated(solution, kind):
+            continue
+        rest = sum((values - values[0] for values in held.values()), start=np.zeros(len(solution)))
+        if made is not None:
+            rest = rest - (made - made[0])
+        worst = _worst(np.abs(rest))
+        path = max(held, key=lambda each: abs(float(held[each][worst] - held[each][0])))
+        yield Breach(abs(float(rest[worst])) / scale, rounding, worst, path)
+
+
+def _input(solution: "Solution", _bounds: Bounds, _trials: Trials | None) -> Iterator[Breach]:
+    """Inputs are smooth but for some jumps."""
+    found = solution.stats.get("jumps", {}).get("found", ())
+    if found:
+        last = int(np.argmin(np.abs(solution.t - found[-1]["t"])))
+        yield Breach(float(len(found)), 0.0, last, Path.of(found[-1]["input"]))
+
+
+def _exchanged(solution: "Solution", kind: str) -> tuple[float, float]:
+    """The largest amount of a kind that was made and exchanged, and the rounding of what is stored, relative to it."""
+    books = solution.ledgers
+    held = books.entropies if kind == "entropy" else books.volumes
+    moved = [np.abs(values - values[0]) for values in held.values()]
+    if kind == "entropy":
+        moved.append(np.abs(books.made - books.made[0]))
+    scale = float(np.max(np.sum(moved, axis=0))) if moved else 0.0
+    rounding = ROUNDING * sum(float(np.abs(values).max()) for values in held.values())
+    if kind == "entropy":  # of what stands still, heat is rounding
+        rounding += _rounded(solution) / books.temperature
+    return scale, rounding / scale if scale else 0.0
+
+
+def _isolated(solution: "Solution", kind: str) -> bool:
+    """Whether no outer power port carries a kind."""
+    problem = solution.problem
+    return problem is not None and all(slot.quantity.kind != kind for slot in problem.descriptor.outer)
+
+
+def _worst(values: Array) -> int:
+    """The index of the largest, or of the first that is no number."""
+    return int(np.argmax(np.where(np.isnan(values), np.inf, values)))
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Law:
+    """A law of the audit.
+
+    Parameters
+    ----------
+    holds, scale, limit
+        In words what it holds, what sizes are relative to, and how much is allowed.
+    breaches
+        Of a solution, the largest excesses.
+    allowed
+        What the bounds of a run allow.
+    advice
+        What to do where steps are constant, and where they are chosen.
+    """
+
+    holds: str
+    scale: str
+    limit: str
+    breaches: "Callable[[Solution, Bounds, Trials | None], Iterator[Breach]]"
+    allowed: Callable[[Bounds], float]
+    advice: tuple[str, str]
+
+
+LAWS: Mapping[str, Law] = {
+    "energy": Law(
+        "energy changes by heat and work only",
+        "largest K + |V − V₀| + |heat| + |work|",
+        f"{LAWFUL:g} where a method's steps are lawful; else {MANY_TIMES:g} rtol (atol where that is 0), "
+        f"at least {LEAST:g}; {COARSE:g} at constant steps",
+        _energy,
+        lambda bounds: bounds.energy,
+        ("take a smaller step, or natural, which keeps the balance", "lower rtol, or take natural, which keeps it"),
+    ),
+    "accuracy": Law(
+        "constant steps resolve what moves, and put bodies where they belong: the difference of a step and two of half "
+        "its length, its sum over the run, and the difference from a run with longer steps",
+        "what such steps move between storages; length of the mechanism, 1 rad",
+        f"{COARSE:g}; {MOTION:g} at the end",
+        _accuracy,
+        lambda bounds: bounds.accuracy,
+        ("take a step", "lower rtol"),
+    ),
+    "entropy": Law(
+        "no component, and no system without entropy from outside, loses entropy in a step",
+        "entropy made and exchanged",
+        f"{PRODUCTION:g}",
+        _entropy,
+        lambda _: PRODUCTION,
+        ("take a smaller step, or natural, which makes entropy only", "lower rtol, or take natural"),
+    ),
+    "constraint": Law(
+        "joints are closed",
+        "length of the mechanism; 1 rad",
+        f"{CLOSED:g}",
+        _constraint,
+        lambda _: CLOSED,
+        ("take a smaller step, or check that the joints fit together", "lower rtol, or check that the joints fit"),
+    ),
+    "ledger": Law(
+        "what is stored changes by what was made and supplied: entropy, volume; work of motions that leave no freedom, "
+        "which is what the energies gain and the heat, is the sum of their power",
+        "what was made and exchanged; gross energies",
+        f"{MANY_TIMES:g} rtol, at least {LEAST:g}; of work {COARSE:g}",
+        _ledger,
+        lambda bounds: bounds.ledger,
+        ("take a smaller step", "lower rtol"),
+    ),
+    "input": Law(
+        "inputs are smooth but for some jumps: functions of time are searched for these",
+        "jumps that were found; the search ends with more",
+        f"{MOST_FOUND}",
+        _input,
+        lambda _: float(MOST_FOUND),
+        ("say in jumps where it jumps, or give a function that is smooth", "say in jumps where it jumps, or smooth it"),
+    ),
+}
+"""The laws by name."""
+
+
+def _size(breach: Breach) -> float:
+    """Its size as files can hold it, where it is beyond the range of numbers the largest that there is."""
+    return float(np.nan_to_num(breach.size, nan=np.finfo(float).max))
+
+
+def audit(solution: "Solution", bounds: Bounds, trials: Trials | None = None) -> Audit:
+    """Hold a solution, whose first instant is the start of its run, against the laws.
+
+    ``trials`` are those of its constant steps.
+    """
+    if not len(solution):
+        return Audit()
+    found: list[Finding] = []
+    with np.errstate(all="ignore"):
+        for name, law in LAWS.items():
+            allowed = law.allowed(bounds)
+            broken = [b for b in law.breaches(solution, bounds, trials) if not b.size <= allowed + b.slack < np.inf]
+            if broken:
+                worst = max(broken, key=lambda breach: _size(breach) / (allowed + breach.slack))
+                where = str(worst.path) if worst.path is not None else ""
+                at, advice = float(solution.t[worst.instant]), law.advice[int(bounds.step is None)] + worst.hint
+                found.append(Finding(name, _size(worst), allowed + worst.slack, at, where, advice))
+    return Audit(tuple(found))

@@ -1,0 +1,108 @@
+"""Forecast of the work of a run whose steps are chosen: after its first steps, by counts of steps and iterations.
+
+Methods of order 2 need ten times the steps for a hundredth of the error. At a small tolerance a run by `natural` takes
+minutes where an explicit method of order 8 takes a tenth of a second; that is told before the minutes have passed.
+"""
+
+import math
+import warnings
+from collections.abc import Callable, Mapping
+from typing import Any, final
+
+from ephs.solve.auditing.findings import CostWarning
+from ephs.solve.problem import Problem
+from ephs.solve.snapshot import Snapshot
+
+__all__ = ["MANY", "Forecast"]
+
+FIRST = 32
+"""Steps after which the first forecast is made, from the later half of them; again after twice as many each time."""
+MANY = 20_000
+"""Iterations of Newton's method from which on a run is said to be long: some ten seconds of a mechanism of five bodies
+on one core."""
+
+STEADY = 1.2
+"""Growth of a quarter of the steps over the one before up to which they count as steady."""
+LOW = 4
+"""Orders up to which another method is better at small tolerances."""
+
+
+@final
+class Forecast:
+    """Watches the steps of one run by an implicit method of a low order; others are as fast as there are.
+
+    Parameters
+    ----------
+    name, order
+        Of the method.
+    until
+        End of the run in its unit of time.
+
+    Attributes
+    ----------
+    long
+        What was forecast of a long run: steps, iterations, and after how many steps; empty of others.
+    """
+
+    def __init__(self, problem: Problem, name: str, order: int, until: float) -> None:
+        self.long: dict[str, int] = {}
+        self._name, self._until, self._next = name, until, FIRST if order <= LOW else 0
+        self._from = self._middle = 0.0
+        self._advice = (
+            "rk87, rk54 and auto reach the same error in a part of that, a constant step keeps the balances as well"
+            if problem.scene is not None
+            else "on vector spaces radau reaches the same error in a part of that, a constant step keeps the balances"
+        )
+
+    def look(self, steps: int, t: float, counts: Callable[[], Mapping[str, Any]]) -> None:
+        """After a step: so many were taken up to t in s.
+
+        Warns
+        -----
+        CostWarning
+            It will be a long run. This is said once.
+        """
+        if 2 * steps == self._next:
+            self._from = t
+        if 4 * steps == 3 * self._next:
+            self._middle = t
+        if steps != self._next or self.long:
+            return
+        rest = _steps(abs(self._until - t), abs(self._middle - self._from), abs(t - self._middle), steps // 4)
+        iterations = int(counts().get("iterations", 0) * (1.0 + rest / steps))
+        self._next, self._from = 2 * self._next, t
+        if iterations >= MANY:
+            self.long = {"steps": int(steps + rest), "iterations": iterations, "after": steps}
+            told = f"about {_round(steps + rest)} steps and {_round(iterations)} iterations at these tolerances"
+            warnings.warn(f"{self._name} will take {told}; {self._advice}", CostWarning, stacklevel=2)
+
+    def stats(self) -> dict[str, Any]:
+        """Statistics of a run that was forecast to be long."""
+        return {"forecast": self.long} if self.long else {}
+
+    def snapshot(self) -> Snapshot:
+        """Snapshot for `restore`."""
+        return {"long": self.long, "next": self._next, "from": self._from, "middle": self._middle}
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go on from a snapshot."""
+        self.long, self._next = dict(snapshot["long"]), snapshot["next"]
+        self._from, self._middle = snapshot["from"], snapshot["middle"]
+
+
+def _steps(rest: float, before: float, last: float, steps: int) -> float:
+    """How many steps a rest of a run takes, whose last steps covered ``last`` s and as many before them ``before`` s.
+
+    After a transient steps grow, and are taken to go on to do so.
+    """
+    linear = rest / max(before + last, 1e-300) * 2.0 * steps
+    growth = last / max(before, 1e-300)
+    if growth <= STEADY:
+        return linear
+    return min(linear, steps * math.log1p(rest * (growth - 1.0) / (growth * last)) / math.log(growth))
+
+
+def _round(number: float) -> str:
+    """A count to two digits."""
+    digits = max(len(str(int(number))) - 2, 0)
+    return f"{int(round(number / 10**digits) * 10**digits):,}".replace(",", " ")

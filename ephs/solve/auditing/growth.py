@@ -1,0 +1,157 @@
+"""Global error of constant steps: the run against one of fewer, longer steps.
+
+A method of order p errs at a time t by C(t) hᵖ, where C holds how errors of steps have grown and cancelled until then.
+So runs with steps h and k h are (kᵖ − 1) C hᵖ apart. What they are apart bounds the error of the shorter steps, so a
+few long steps are enough where these are good: the first k is the largest for which they should be, by the errors of
+single steps. Where runs are far apart C hᵖ is not all of the error, and k is made smaller; where they are at k = 2, a
+run with h / 2 decides if the run could be right by its order, or longer steps fail; otherwise it counts as not
+resolved. Long runs are held against one by an explicit method of high order first, which takes few steps: if it agrees,
+nothing more is run.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, final
+
+import numpy as np
+
+from ephs.operad import Path
+from ephs.semantics.bundle import Array
+from ephs.solve.errors import Interrupted
+
+if TYPE_CHECKING:
+    from ephs.solve.result.solution import Solution
+
+__all__ = ["Again", "GlobalError", "apart", "global_error"]
+
+LEAST = 4
+"""Steps of the longer kind that a run has at least."""
+MARGIN = 3.0
+"""Runs are expected to be this many times nearer than they may be: the errors of single steps may have grown."""
+SHORTER = 3
+"""Steps that are too long are shortened by this factor, as far as to two of the run's."""
+FEW = 300
+"""Steps of a run for which one by another method is not worth its setting up."""
+INSTANTS = 16
+"""Times at which a run by another method is compared."""
+SHARE = 2
+"""Steps of the run for one of the other method at most."""
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Again:
+    """Further runs of the same problem.
+
+    Parameters
+    ----------
+    coarser
+        With constant steps of so many s, up to a time in s.
+    independent
+        By an explicit method of high order with steps of its own, so many at most, kept at some times in s; None where
+        that is not cheaper.
+    """
+
+    coarser: Callable[[float, float], "Solution"]
+    independent: Callable[[Array, int], "Solution"] | None
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class GlobalError:
+    """The estimated error of a run.
+
+    Parameters
+    ----------
+    size
+        In lengths of the mechanism or rad, of heat and work in parts of the gross energies.
+    instant
+        Index of the time where it is largest.
+    path
+        The body that is off most; None of heat and work.
+    resolved
+        Whether it is of the method's order, so that shorter steps are known to help.
+    """
+
+    size: float
+    instant: int
+    path: Path | None
+    resolved: bool
+
+
+def global_error(
+    solution: "Solution", order: int, h: float, summed: float, allowed: float, again: Again
+) -> GlobalError | None:
+    """The error of a run with constant steps of h s, by one with longer steps or another method; None where these fail.
+
+    Parameters
+    ----------
+    summed, allowed
+        The sum of the errors of single steps, and the largest error that is allowed.
+    """
+    steps, times = int(solution.stats["steps"]), 2.0**order
+    wanted = (allowed / (MARGIN * max(summed, 1e-300))) ** (1.0 / order)
+    k = max(2, int(min(wanted, steps // LEAST)))
+    independent = again.independent
+    if independent is not None and steps > FEW:
+        kept = solution.t[np.unique(np.linspace(0, len(solution) - 1, INSTANTS).astype(int))]
+        found = _distance(solution, lambda: independent(kept, steps // SHARE))
+        if found is not None and found[0] <= allowed:
+            return GlobalError(*found, resolved=True)
+    end = float(solution.t[-1])
+    while True:
+        found = _distance(solution, lambda h=k * h: again.coarser(h, end))
+        size, instant, path = found or (np.inf, 0, None)
+        if size <= allowed:
+            return GlobalError(size / (float(k) ** order - 1.0), instant, path, resolved=True)
+        if k == 2:
+            break
+        k = max(2, k // SHORTER)
+    finer = None
+    if found is None or size <= allowed * (times - 1.0):  # the run could still be right, by its order
+        finer = _distance(solution, lambda: again.coarser(0.5 * h, end))
+    if finer is not None and finer[0] <= allowed:
+        return GlobalError(finer[0] * times / (times - 1.0), *finer[1:], resolved=True)
+    found = found or finer
+    return GlobalError(*found, resolved=False) if found is not None else None
+
+
+def _distance(one: "Solution", run: Callable[[], "Solution"]) -> tuple[float, int, Path | None] | None:
+    """How far a solution and that of a run are apart at the times that both have: how much, when, which body.
+
+    None where the run fails.
+    """
+    try:
+        other = run()
+    except Interrupted:
+        raise
+    except Exception:  # no solution of such steps, or an input that fails between the old ones
+        return None
+    problem = one.problem
+    near = 1e-9 * abs(one.t[-1] - one.t[0])
+    at = np.clip(np.searchsorted(one.t, other.t - near), 0, len(one) - 1)
+    common = np.abs(one.t[at] - other.t) <= near
+    mine, its = at[common], np.flatnonzero(common)
+    if problem is None or not its.size:
+        return None
+    found: list[tuple[float, int, Path | None]] = []
+    bodies = [slot.path for slot in problem.descriptor.states if slot.quantity.kind == "pose"]
+    shifts: list[tuple[Array, Path | None]] = [
+        (apart(one.states[path][mine], other.states[path][its], problem.length), path) for path in bodies
+    ]
+    for name in ("heat", "work"):
+        a, b = getattr(one.ledgers, name), getattr(other.ledgers, name)
+        shifts.append((np.abs((a[mine] - a[0]) - (b[its] - b[0])) / one.ledgers.scale, None))
+    for shift, path in shifts:
+        worst = int(np.argmax(np.where(np.isnan(shift), np.inf, shift)))
+        found.append((float(np.nan_to_num(shift[worst], nan=np.inf)), int(mine[worst]), path))
+    return max(found, key=lambda each: each[0])
+
+
+def apart(one: Array, other: Array, length: float) -> Array:
+    """(n,) distances of (n, 7) poses: in parts of a length, or the angles in rad between them."""
+    moved = np.linalg.norm(one[..., 4:] - other[..., 4:], axis=-1) / length
+    chord = np.minimum(
+        np.linalg.norm(one[..., :4] - other[..., :4], axis=-1), np.linalg.norm(one[..., :4] + other[..., :4], axis=-1)
+    )
+    return np.maximum(moved, 4.0 * np.arcsin(np.minimum(1.0, 0.5 * chord)))

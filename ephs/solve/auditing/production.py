@@ -1,0 +1,115 @@
+"""The entropy that irreversible components make, looked at in every step where their structure is not proved."""
+
+from dataclasses import replace
+from typing import final
+
+import numpy as np
+
+from ephs.semantics.bundle import Array
+from ephs.semantics.primitives import Irreversible, Point, Storage
+from ephs.solve.errors import Outcome, SolveError
+from ephs.solve.methods.natural import Chunk
+from ephs.solve.problem import Problem
+
+__all__ = ["Production"]
+
+SHARE = 1e-12
+"""Of the entropies exchanged and made in a step: a production that is less negative is rounding."""
+ROUNDING = 8.0 * float(np.finfo(float).eps)
+"""Of the entropy made so far, from which the production of a step is a difference; and of the heat capacities: what
+changes temperatures by their rounding."""
+DECADES = range(-12, 13)
+"""Of entropies in J/K, among which a capacity is looked for."""
+
+
+@final
+class Production:
+    """Watches the components whose verdict is only ``"searched"``.
+
+    Parameters
+    ----------
+    sign
+        −1 of a run backward in time.
+    """
+
+    def __init__(self, problem: Problem, sign: float = 1.0) -> None:
+        slots = list(enumerate(problem.descriptor.components))
+        watched = [
+            (i, slot.path)
+            for i, slot in slots
+            if isinstance(slot.primitive, Irreversible) and slot.primitive.verdict != "proved"
+        ]
+        self._sign = sign
+        self._paths = [path for _, path in watched]
+        self._watched = np.array([i for i, _ in watched], dtype=int)
+        self._makers = np.array([i for i, slot in slots if isinstance(slot.primitive, Irreversible)], dtype=int)
+        hot = [slot.point.start for slot in problem.descriptor.states if slot.quantity.kind == "entropy"]
+        self._entropies = np.array(hot, dtype=int)
+        self.active = bool(watched)
+        self._still = ROUNDING * _capacity(problem) if watched else 0.0
+
+    def start(self, x: Array, energies: Array) -> None:
+        """The states and the entropies made, (point_size,) and (components,), from which the next step starts."""
+        self._last = (x, energies)
+
+    def step(self, t: float, x: Array, energies: Array) -> None:
+        """Look at a step that ended at t in s.
+
+        Raises
+        ------
+        SolveError
+            A component destroyed entropy in it.
+        """
+        failure = self._fault(t, x, energies)
+        if failure is not None:
+            raise failure
+        self._last = (x, energies)
+
+    def cut(self, times: Array, chunk: Chunk) -> Chunk:
+        """Steps up to the first in which a component destroyed entropy, and that as their failure."""
+        if not self.active:
+            return chunk
+        for k in range(chunk.steps):
+            failure = self._fault(float(times[k]), chunk.x[k], chunk.energies[k])
+            if failure is not None:
+                kept = {name: getattr(chunk, name)[:k] for name in ("x", "energies", "ledgers")}
+                return replace(chunk, failure=failure, **kept)
+            self._last = (chunk.x[k], chunk.energies[k])
+        return chunk
+
+    def _fault(self, t: float, x: Array, energies: Array) -> SolveError | None:
+        before, made_before = self._last
+        made = self._sign * (energies[self._watched] - made_before[self._watched])
+        exchanged = float(np.abs(x[self._entropies] - before[self._entropies]).sum())
+        exchanged += float(np.abs(energies[self._makers] - made_before[self._makers]).sum())
+        allowed = SHARE * exchanged + ROUNDING * np.abs(energies[self._watched]) + self._still
+        excess = made + allowed
+        worst = int(np.argmin(excess))
+        if excess[worst] >= 0.0:
+            return None
+        size = f"{made[worst]:.3g} J/K in the step to t = {t:.9g} s"
+        return SolveError(Outcome.ENTROPY, str(self._paths[worst]), size)
+
+
+def _capacity(problem: Problem) -> float:
+    """Sum of the heat capacities ds/d(log θ) of what stores entropy, at the initial states, in J/K."""
+    d = problem.descriptor
+    x, total = d.pack(problem.initial), 0.0
+    for slot in d.components:
+        storage = slot.primitive
+        if not isinstance(storage, Storage) or storage.environment:
+            continue
+        point = d.point(slot, x)
+        for _, where, quantity in storage.bundle.items():
+            if quantity.kind == "entropy":
+                total += next(filter(None, (_share(storage, point, where, 10.0**k) for k in DECADES)), 0.0)
+    return total
+
+
+def _share(storage: Storage, point: Point, where: slice, step: float) -> float:
+    """The capacity by a difference over an entropy in J/K; 0 where that changes the temperature too little, or ends."""
+    v = np.zeros(storage.bundle.size)
+    v[where] = step
+    before, after = (float(storage.energy_gradient(x)[where][0]) for x in (point, storage.retract(point, v)))
+    ratio = abs(np.log(after / before)) if before > 0.0 and np.isfinite(after) and after > 0.0 else 0.0
+    return step / ratio if ratio > 1e-3 else 0.0

@@ -1,0 +1,308 @@
+"""Whether constant steps resolve a motion: a step against two of half its length, at some times of a run.
+
+Methods of Gauss type and others that damp nothing at infinity keep their balances whatever a step leaves out: a stiff
+brake then stops in a thousand steps instead of one. What shows it is what a step moves from storage to storage. Where
+a step and its halves differ in that by a part d, the error of a method of order p is d / (2ᵖ − 1) of it.
+
+Natural methods try steps from the states of the solution; methods whose steps are taken one by one try their own, from
+states that they were in.
+
+What steps err by in the poses of bodies adds up, too: its sum over all steps, as if errors neither grew nor cancelled,
+estimates how far bodies are off at the end, and how much coarser a second run may be that says how they grew
+(`growth`).
+"""
+
+from bisect import bisect_right
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, final
+
+import numpy as np
+
+from ephs.operad import Path
+from ephs.semantics.bundle import Array
+from ephs.semantics.primitives import Irreversible, Storage
+from ephs.solve.auditing.growth import Again, apart
+from ephs.solve.breakpoints import Breakpoints
+from ephs.solve.methods.driven import ComponentMethod, advance_driven
+from ephs.solve.model import Model, compile_model
+from ephs.solve.problem import Problem
+from ephs.solve.result.record import Record, Rows, record_of
+from ephs.solve.snapshot import Snapshot, like, parts
+from ephs.solve.stepping import Stepper
+
+if TYPE_CHECKING:
+    from ephs.solve.result.solution import Solution
+
+__all__ = ["Samples", "StepError", "Trials", "natural_trials", "trials_of"]
+
+S = TypeVar("S")
+Tried = tuple[Array, Array]
+"""States and energies."""
+EACH, LEAST, MOST = 600, 4, 6
+"""One time is looked at in so many steps, at least and at most so many in all: three steps each."""
+STILL = 1e-6
+"""Part of the gross energies below which a run of such steps moves nothing."""
+SHORTER = 16
+"""How often a step is divided by four to find one that would do."""
+ROUNDED = 1e4 * float(np.finfo(float).eps)
+"""Part of the energies that differences of solved steps have lost to rounding."""
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class StepError:
+    """The estimated error of a step.
+
+    Parameters
+    ----------
+    size
+        Relative to what steps move between storages.
+    trial
+        The number of the trial where it is largest.
+    path
+        The component whose share is largest there.
+    """
+
+    size: float
+    trial: int
+    path: Path
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Trials:
+    """Steps and their halves from some times of a run.
+
+    Parameters
+    ----------
+    problem
+        Whose components the energies are of.
+    order
+        Of the method.
+    times
+        In s.
+    tried
+        Of the number of a time and a step in s, at the start, after the step, and after its halves: (point_size,)
+        states; (components,) energies of the storages, and entropies that the others made.
+    own
+        Those by the method's own steps, where these are by another's.
+    again
+        Further runs of the problem, where this one reached its end.
+    """
+
+    problem: Problem
+    order: int
+    times: tuple[float, ...]
+    tried: Callable[[int, float], tuple[Tried, Tried, Tried]]
+    own: "Trials | None" = None
+    again: Again | None = None
+
+    def error(self, h: float, steps: int, gross: float) -> StepError | None:
+        """The estimated error of constant steps of h s; None where nothing moves, or nothing can be tried.
+
+        Parameters
+        ----------
+        steps, gross
+            How many there were, and the gross energies of the run in J.
+        """
+        found = [self._trial(k, h) for k in range(len(self.times))]
+        missed, moved = sum(float(trial[0].sum()) for trial in found), sum(trial[1] for trial in found)
+        stored = sum(trial[2] for trial in found)
+        if not found or moved * steps < STILL * gross * len(found) or missed < ROUNDED * stored:
+            return None
+        worst = max(range(len(found)), key=lambda k: float(np.sum(found[k][0])))
+        path = self.problem.descriptor.components[int(np.argmax(found[worst][0]))].path
+        return StepError(missed / moved / (2.0**self.order - 1.0), worst, path)
+
+    def motion(self, h: float, steps: int) -> StepError | None:
+        """The error of bodies after so many constant steps of h s, in lengths of the mechanism or rad.
+
+        None where there are no bodies, or nothing can be tried.
+        """
+        bodies = [slot for slot in self.problem.descriptor.states if slot.quantity.kind == "pose"]
+        found: list[tuple[float, int, Path]] = []
+        for k in range(len(self.times)) if bodies else ():
+            try:
+                _, coarse, fine = (x for x, _ in self.tried(k, h))
+            except Exception:  # no solution, or an input that fails beyond the end of the run
+                continue
+            off = [float(apart(coarse[slot.point], fine[slot.point], self.problem.length)) for slot in bodies]
+            worst = int(np.argmax(off))
+            found.append((off[worst], k, bodies[worst].path))
+        if not found:
+            return None
+        times = 2.0**self.order / (2.0**self.order - 1.0)
+        size = times * steps * sum(off for off, _, _ in found) / len(found)
+        _, k, path = max(found, key=lambda each: each[0])
+        return StepError(size, k, path)
+
+    def sufficient(self, k: int, h: float, allowed: float) -> float:
+        """A step in s, some h / 4ᵏ, that would resolve what moves at a time."""
+        for _ in range(SHORTER):
+            h *= 0.25
+            missed, moved, _ = self._trial(k, h)
+            if float(np.sum(missed)) <= allowed * (2.0**self.order - 1.0) * moved:
+                break
+        return h
+
+    def _trial(self, k: int, h: float) -> tuple[Array, float, float]:
+        """(components,) by how many J a step and its halves differ; what they moved, and what is stored, in J.
+
+        Nothing of steps that have no solution.
+        """
+        kinds = [slot.primitive for slot in self.problem.descriptor.components]
+        stores = np.array([float(isinstance(kind, Storage)) for kind in kinds])
+        theta = self.problem.reference.temperature
+        joules = stores + np.array([theta * isinstance(kind, Irreversible) for kind in kinds])
+        try:
+            start, coarse, fine = (energies for _, energies in self.tried(k, h))
+        except Exception:  # no solution, or an input that fails beyond the end of the run
+            return np.zeros_like(joules), 0.0, 0.0
+        moved = float(np.sum(np.abs(joules * (fine - start))))
+        return np.abs(joules * (fine - coarse)), moved, float(np.sum(np.abs(stores * start)))
+
+
+def _clear(t: float, h: float, until: float, jumps: Sequence[float]) -> bool:
+    """Whether a step from t ends within the run and meets no jump but at its ends."""
+    first, last = min(t, t + h), max(t, t + h)
+    k = bisect_right(jumps, first)
+    return min(t, until) <= first and last <= max(t, until) and (k == len(jumps) or jumps[k] >= last)
+
+
+def natural_trials(
+    solution: "Solution",
+    make: Callable[[Model], ComponentMethod],
+    h: float,
+    own: ComponentMethod | None = None,
+    jumps: Sequence[float] = (),
+) -> Trials | None:
+    """Steps of h s by a natural method from states of a solution; None where there are none.
+
+    Parameters
+    ----------
+    own
+        The method of the run, which serves where its model is that of the solution; ``make`` makes one else.
+    jumps
+        Times in s that no step goes over.
+    """
+    problem = solution.problem
+    if problem is None or len(solution) < 2:
+        return None
+    t, d = solution.t, problem.descriptor
+    count = int(np.clip(int(solution.stats["steps"]) // EACH, LEAST, MOST))
+    spread = np.unique(np.linspace(0, len(solution) - 1, count, endpoint=False).astype(int)).tolist()
+    instants = [i for i in spread if _clear(float(t[i]), h, np.inf, jumps)]
+    if own is None or own.model.descriptor is not d:
+        own = make(compile_model(d, problem.reference, problem.inputs(float(t[0]), problem.initial)))
+    method, makers = own, np.array([isinstance(slot.primitive, Irreversible) for slot in d.components])
+
+    @lru_cache(len(instants))
+    def tried(k: int, h: float) -> tuple[Tried, Tried, Tried]:
+        x, when = d.pack(solution.state_at(instants[k])), float(t[instants[k]])
+        coarse, fine = (_after(problem, method, x, when, h, count) for count in (1, 2))
+        return (x, np.where(makers, 0.0, method.energies(x))), coarse, fine
+
+    return Trials(problem, method.order, tuple(float(t[i]) for i in instants), tried)
+
+
+def _after(problem: Problem, method: ComponentMethod, x: Array, t: float, h: float, count: int) -> Tried:
+    """States, (components,) energies, and the entropy made since, after h seconds in so many steps.
+
+    Raises
+    ------
+    SolveError
+        A step has no solution.
+    """
+    state, energies = method.init(x), np.zeros(0)
+    for k in range(count):
+        state, chunk = advance_driven(problem, method, state, t + k * h / count, h / count)
+        if chunk.failure is not None:
+            raise chunk.failure
+        energies = chunk.energies[-1]
+    return state.x, energies
+
+
+@final
+class Samples(Generic[S]):
+    """Some of the states that a run was in, evenly spread: one in 2ᵏ, at most twice `MOST`; none if not ``wanted``."""
+
+    def __init__(self, *, wanted: bool) -> None:
+        self._wanted = wanted
+        self.states: list[tuple[float, S]] = []
+        self._rows, self._stride = 0, 1
+
+    def add(self, rows: Iterable[tuple[float, S, float]]) -> None:
+        """Times and states in order, with what a step made at least."""
+        for t, state, _ in rows if self._wanted else ():
+            if not self._rows % self._stride:
+                if len(self.states) == 2 * MOST:
+                    self.states, self._stride = self.states[::2], 2 * self._stride
+                if not self._rows % self._stride:
+                    self.states.append((t, state))
+            self._rows += 1
+
+    def snapshot(self) -> Snapshot:
+        """Snapshot for `restore`."""
+        states = [[t, parts(state)] for t, state in self.states]
+        return {"states": states, "counts": [self._rows, self._stride]}
+
+    def restore(self, snapshot: Snapshot, template: S) -> None:
+        """Go on from a snapshot of states like the template."""
+        self.states = [(t, like(template, found)) for t, found in snapshot["states"]]
+        self._rows, self._stride = snapshot["counts"]
+
+
+def trials_of(
+    solution: "Solution",
+    make: Callable[[Model], ComponentMethod] | None,
+    problem: Problem,
+    stepper: Stepper[Any],
+    order: int,
+    samples: Sequence[tuple[float, Any]],
+    h: float,
+    until: float,
+    breakpoints: Breakpoints,
+) -> Trials | None:
+    """Constant steps of a method of an order from states that it was in; a natural method's where ``make`` makes one.
+
+    Parameters
+    ----------
+    problem
+        As it is solved; in its unit of time are the samples, the step h, negative backward, ``until`` and the jumps.
+    """
+    jumps = breakpoints.times
+    seconds, steps = problem.seconds, int(solution.stats["steps"])
+    natural = None
+    if make is not None:
+        natural = natural_trials(solution, make, abs(h) * seconds, jumps=[seconds * t for t in jumps])
+    clear = [(t, state) for t, state in samples if _clear(t, h, until, jumps)]
+    if not clear:
+        return natural
+    count = int(np.clip(steps // EACH, LEAST, MOST))
+    chosen = [clear[i] for i in np.unique(np.linspace(0, len(clear), count, endpoint=False).astype(int))]
+    sign = float(np.sign(h))
+
+    @lru_cache(len(chosen))
+    def tried(k: int, h: float) -> tuple[Tried, Tried, Tried]:
+        h = sign * h / seconds
+        breakpoints.stand(chosen[k][0])
+        start = stepper.anew(chosen[k][1])
+        whole = stepper.step(start, h).end
+        half = stepper.step(stepper.anew(start), 0.5 * h).end
+        rows = stepper.rows([start, whole, stepper.step(half, 0.5 * h).end])
+        _, shown = _shown(problem, record_of([start.t] * 3, rows, [0.0] * 3))
+        first, second, third = zip(shown.x, shown.energies, strict=True)
+        return first, second, third
+
+    none = Rows().whole(problem.descriptor)
+    own = Trials(_shown(problem, none)[0], order, tuple(t * seconds for t, _ in chosen), tried)
+    return own if natural is None else replace(natural, own=own)
+
+
+def _shown(problem: Problem, record: Record) -> tuple[Problem, Record]:
+    """Problem and rows as a solution shows them."""
+    while problem.shown is not None:
+        problem, record, _ = problem.shown(record, {})
+    return problem, record

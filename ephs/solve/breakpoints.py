@@ -1,0 +1,173 @@
+"""Times at which inputs jump: steps end there, and start anew from the other side.
+
+A time within rounding of a jump means the side that the run is on: before it until a step has ended there, then after.
+So a step never mixes both, whatever rounding its own points have, and whatever that of a user's function.
+"""
+
+from bisect import bisect_left, insort
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any, final
+
+import numpy as np
+
+from ephs.semantics.bundle import Array
+from ephs.solve.probe import Asked, Change, Probe
+from ephs.solve.problem import Problem, Signal, State
+from ephs.solve.sampled import Sampling
+from ephs.solve.snapshot import Snapshot
+
+__all__ = ["MOST_FOUND", "Breakpoints"]
+
+NEAR = 16.0
+"""Roundings of the time that count as the time itself."""
+MOST_FOUND = 1000
+"""Changes that are looked for in one run: a function with more is no piecewise smooth one."""
+
+
+@final
+class Breakpoints:
+    """The jumps of one run: those that were declared, and those that are found on the way.
+
+    Parameters
+    ----------
+    t0, until
+        Start and end in s; the run may go backward.
+    declared
+        (n,) ascending times.
+    asked
+        Functions that are searched for jumps.
+    held
+        Sampled inputs, whose times are among those declared.
+    """
+
+    def __init__(
+        self,
+        t0: float,
+        until: float,
+        declared: Array | None = None,
+        asked: Sequence[Asked] = (),
+        held: Sequence[Sampling] = (),
+    ) -> None:
+        self._held = held
+        self._until, self._sign, self._at = until, 1.0 if until > t0 else -1.0, t0
+        self.near = NEAR * float(np.spacing(max(abs(t0), abs(until))))
+        self._times: list[float] = [] if declared is None else declared.tolist()
+        self._declared = frozenset(self._times)
+        self._found: list[Change] = []
+        self._split = 0
+        self._probe = Probe(asked, t0, until, self.within) if asked else None
+
+    @property
+    def times(self) -> tuple[float, ...]:
+        """All that are known, ascending."""
+        return tuple(self._times)
+
+    @property
+    def active(self) -> bool:
+        """Whether there are any, or may be."""
+        return bool(self._times) or self._probe is not None
+
+    def of(self, problem: Problem) -> Problem:
+        """The problem whose inputs stay on the run's side of jumps; its runs are shown as the problem's own."""
+        if not self.active or problem.constant:
+            return problem
+        signals = {path: self._sided(signal) for path, signal in problem.signals.items()}
+        return replace(problem, signals=signals, shown=lambda record, stats: (problem, record, stats))
+
+    def _sided(self, signal: Signal) -> Signal:
+        value = signal.value
+        if not callable(value):
+            return signal
+        return replace(signal, value=lambda t, state: value(self.within(t), state))
+
+    def within(self, t: float) -> float:
+        """The time on the run's side of a jump that rounding does not tell it from."""
+        if not self._times:
+            return t
+        k = bisect_left(self._times, t - self.near)
+        if k == len(self._times) or self._times[k] > t + self.near:
+            return t
+        jump = self._times[k]
+        ahead = self._sign * (jump - self._at) > 0.0
+        return jump - self._sign * self.near if ahead else jump + self._sign * self.near
+
+    def end(self, t: float, h: float, state: Callable[[], State]) -> float:
+        """Latest end of a step of h seconds from t: the next jump, or the end of the run."""
+        limit = self._next(t)
+        if self._probe is None or len(self._found) > MOST_FOUND:
+            return limit
+        if limit != self._until and limit not in self._declared:  # one that was found: the search goes on from there
+            return limit
+        change = self._probe.look(t + self._sign * h, limit, h, state)
+        if change is None:
+            return limit
+        apart = [
+            when
+            for when in {change.start, change.end}
+            if self._sign * (when - t) > self.near and self._sign * (limit - when) > self.near
+        ]
+        for when in apart:
+            insort(self._times, when)
+        if apart:
+            self._found.append(change)
+        return self._next(t)
+
+    def _next(self, t: float) -> float:
+        if self._sign > 0.0:
+            k = bisect_left(self._times, t + self.near)
+            return min(self._times[k], self._until) if k < len(self._times) else self._until
+        k = bisect_left(self._times, t - self.near) - 1
+        return max(self._times[k], self._until) if k >= 0 else self._until
+
+    def stand(self, t: float) -> None:
+        """Stand at a time, from where all later jumps are ahead."""
+        self._at = t
+
+    def enter(self, t: float, state: Callable[[], State], *, split: bool = False) -> None:
+        """A step has ended at a jump, in a state; ``split``: it is part of a constant one.
+
+        Raises
+        ------
+        SolveError
+            The function of a sampled input has no value there.
+        """
+        for sampling in self._held:
+            sampling.take(t, self.near, state)
+        self._at = t
+        self._split += split
+        if self._probe is not None:
+            self._probe.begin(t)
+
+    @property
+    def split(self) -> int:
+        """Constant steps that were taken in parts count so many more."""
+        return self._split
+
+    def stats(self) -> dict[str, Any]:
+        """Statistics: the number of declared jumps, the jumps found, the number of divided steps."""
+        if not (self._times or self._found):
+            return {}
+        sampled = {"samples": {one.held.name: one.held.count for one in self._held}} if self._held else {}
+        found = [{"t": change.end, "input": change.name} for change in self._found]
+        return {"jumps": {"declared": len(self._declared), "found": found, "divided_steps": self._split, **sampled}}
+
+    def snapshot(self) -> Snapshot:
+        """Snapshot for `restore`."""
+        return {
+            "at": self._at,
+            "times": self._times,
+            "found": [[change.name, change.start, change.end] for change in self._found],
+            "split": self._split,
+            "held": [one.held.snapshot() for one in self._held],
+            "probe": self._probe.snapshot() if self._probe is not None else None,
+        }
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go on from a snapshot."""
+        self._at, self._times, self._split = snapshot["at"], list(snapshot["times"]), snapshot["split"]
+        self._found = [Change(*change) for change in snapshot["found"]]
+        for one, found in zip(self._held, snapshot["held"], strict=True):
+            one.held.restore(found)
+        if self._probe is not None:
+            self._probe.restore(snapshot["probe"])

@@ -1,0 +1,295 @@
+"""Step control: tolerances by quantity, limits, and the controllers."""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Protocol, final
+
+import numpy as np
+
+from ephs.operad import Path
+from ephs.semantics.bundle import Array
+from ephs.semantics.descriptor import Descriptor
+from ephs.solve.errors import OptionError, Outcome, SolveError
+from ephs.solve.snapshot import Snapshot
+
+__all__ = ["Control", "Policy", "Proportional", "Symmetric", "Tolerance", "first_step", "told_apart"]
+
+SHORTEST = 16.0
+"""Roundings of the time that a step has at least."""
+NEAREST = 1e6
+"""The same of a whole run, whose first steps are a small part of it."""
+FIRST = 1e-4
+"""Part of the time span that the first step takes: too long it is rejected, too short it grows fast."""
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Tolerance:
+    """A tolerance for every state: one number, or others by quantity and by path.
+
+    Parameters
+    ----------
+    value
+        For all states that nothing else is said of.
+    special
+        Kind of quantity (``"entropy"``), or path of a state or of what contains it (``"joints.pin"``) -> number; the
+        longest path that fits counts, a path before a kind.
+    """
+
+    value: float
+    special: Mapping[str, float]
+
+    @classmethod
+    def of(cls, name: str, given: "float | Mapping[str, float]", default: float) -> "Tolerance":
+        """From what a user gave as the option ``name``; the key ``"*"`` stands for all others.
+
+        Raises
+        ------
+        OptionError
+            It is negative, or no number.
+        """
+        entries = dict(given) if isinstance(given, Mapping) else {"*": given}
+        out: dict[str, float] = {}
+        for key, number in entries.items():
+            label = name if not isinstance(given, Mapping) else f"{name}[{key!r}]"
+            try:
+                out[str(key)] = float(number)
+            except (TypeError, ValueError):
+                raise OptionError(label, number, "a number ≥ 0") from None
+            if not (np.isfinite(out[str(key)]) and out[str(key)] >= 0.0):
+                raise OptionError(label, number, "a number ≥ 0")
+        return cls(out.pop("*", default), out)
+
+    def at(self, path: Path | str, kind: str) -> float:
+        """The tolerance of one state."""
+        text = str(path)
+        fits = [key for key in self.special if text == key or text.startswith(f"{key}.")]
+        if fits:
+            return self.special[max(fits, key=len)]
+        return self.special.get(kind, self.value)
+
+    def known(self, name: str, states: Iterable[tuple[Path, str]]) -> None:
+        """Refuse keys that no state answers to.
+
+        Raises
+        ------
+        OptionError
+            It names the key.
+        """
+        listed = [(str(path), kind) for path, kind in states]
+        for key in self.special:
+            if not any(key == kind or text == key or text.startswith(f"{key}.") for text, kind in listed):
+                kinds = ", ".join(sorted({kind for _, kind in listed}))
+                raise OptionError(f"{name}[{key!r}]", self.special[key], f"the path of a state, or one of {kinds}")
+
+    def rates(self, descriptor: Descriptor) -> Array:
+        """(rate_size,): the tolerance of every entry of a left-trivialised change of the states."""
+        out = np.empty(descriptor.rate_size)
+        for slot in descriptor.states:
+            out[slot.rates] = self.at(slot.path, slot.quantity.kind)
+        return out
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Control:
+    """Step control.
+
+    Parameters
+    ----------
+    rtol, atol
+        A state x is wanted to atol + rtol·|x| a step.
+    step
+        Constant steps of so many seconds, where given.
+    least, most
+        Limits for a step in s.
+    max_steps
+        Limit for their number, None: no limit.
+    """
+
+    rtol: Tolerance
+    atol: Tolerance
+    step: float | None
+    least: float
+    most: float
+    max_steps: int | None
+
+    def __post_init__(self) -> None:
+        if self.rtol.value == 0.0 and self.atol.value == 0.0:
+            raise OptionError("rtol", self.rtol.value, "rtol or atol > 0")
+        for name, value in (("step", self.step), ("max_step", self.most)):
+            if value is not None and not value > 0.0:
+                raise OptionError(name, value, "a number of seconds > 0")
+        if self.step is not None and not np.isfinite(self.step):
+            raise OptionError("step", self.step, "a number of seconds > 0")
+        if not (self.least >= 0.0 and np.isfinite(self.least)):
+            raise OptionError("min_step", self.least, "a number of seconds ≥ 0")
+        if self.least > self.most:
+            raise OptionError("min_step", self.least, f"at most max_step = {self.most!r}")
+        if self.max_steps is not None and not self.max_steps > 0:
+            raise OptionError("max_steps", self.max_steps, "a number > 0")
+
+    def allowed(self, h: float, latest: float, cause: SolveError | None, finest: float = 0.0) -> float:
+        """A shorter step h, at times up to ``latest``.
+
+        Raises
+        ------
+        SolveError
+            It is below the least that is allowed, ``finest`` or what rounding leaves: the cause, if there is one.
+        """
+        if h < max(self.least, SHORTEST * np.spacing(latest), finest):
+            raise cause or SolveError(Outcome.TINY, "", f"{h:.3g} s")
+        return h
+
+
+def first_step(control: Control, span: float) -> float:
+    """The length of the first step, in s, of a run over ``span`` seconds."""
+    return control.step or min(max(FIRST * span, control.least), control.most, span)
+
+
+def told_apart(t0: float, until: float, step: float | None) -> None:
+    """Refuse a run whose times rounding would not tell apart.
+
+    Raises
+    ------
+    OptionError
+        The end is too near to the start for the numbers that times are there, or the step is too short.
+    """
+    rounding = float(np.spacing(max(abs(t0), abs(until))))
+    if step is not None and step < SHORTEST * rounding:
+        expected = f"at least {SHORTEST * rounding:.3g} s: times up to {max(abs(t0), abs(until)):g} s are no finer"
+        raise OptionError("step", step, expected)
+    if abs(until - t0) < NEAREST * rounding:
+        raise OptionError("until", until, f"a time at least {NEAREST * rounding:.3g} s from t0 = {t0!r} s")
+
+
+class Policy(Protocol):
+    """Verdict on a step by its estimated error relative to the tolerance."""
+
+    finest: float
+    """Part of a run below which no step can be."""
+
+    def judge(self, h: float, error: float, span: float) -> tuple[bool, float]:
+        """(whether it is accepted, the length of the next one or of the next try); span is that of the whole run."""
+        ...
+
+    def wanted(self, h: float, error: float, span: float) -> float:
+        """Length of the step, however short, whose error would be what is aimed at, by the estimate's power."""
+        ...
+
+    def snapshot(self) -> Snapshot:
+        """Memory of earlier steps."""
+        ...
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Remember what a snapshot says."""
+        ...
+
+
+@final
+class Proportional:
+    """Proportional-integral control: the next step by this error and the last one.
+
+    Hairer and Wanner, *Solving Ordinary Differential Equations II*, IV.2.
+
+    Parameters
+    ----------
+    exponent
+        Says with which power of the step the estimate falls, which may change from step to step.
+    share
+        A step of h in a run of T aims at (h/T)^share of the tolerance: with 0 errors add up over the steps, with 1
+        they make the tolerance together.
+    damping
+        How much the last error counts, 0 for none.
+    """
+
+    STRICT = 30.0
+    finest = 0.0
+
+    def __init__(self, exponent: Callable[[], float], share: float = 0.0, damping: float = 0.4) -> None:
+        self._exponent, self._share, self._damping, self._before = exponent, share, damping, 1e-4
+        self._failed = False
+
+    def judge(self, h: float, error: float, span: float) -> tuple[bool, float]:
+        """Accept what is at most 1; a step after a failure does not grow.
+
+        What is accepted knows the share up to a limit only: where rates jump, no step would be short enough.
+        """
+        part = (span / h) ** self._share
+        exponent = self._exponent() - self._share
+        strict = error * min(part, self.STRICT)
+        error *= part
+        if not strict <= 1.0:
+            self._failed = True
+            return False, h * (max(0.2, 0.9 * strict ** (-1.0 / exponent)) if np.isfinite(strict) else 0.1)
+        main = (1.0 - 0.75 * self._damping) / exponent
+        factor = 0.9 * max(error, 1e-10) ** -main * self._before ** (self._damping / exponent)
+        self._before = max(error, 1e-4)
+        most = 1.0 if self._failed else 6.0
+        self._failed = False
+        return True, h * min(most, max(0.3, factor))
+
+    def wanted(self, h: float, error: float, span: float) -> float:
+        """Length of the step, however short, whose error would be the tolerance."""
+        part = min((span / h) ** self._share, self.STRICT)
+        return h * (error * part) ** (-1.0 / (self._exponent() - self._share))
+
+    def snapshot(self) -> Snapshot:
+        """Memory of earlier steps."""
+        return {"before": float(self._before), "failed": self._failed}
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Remember what a snapshot says."""
+        self._before, self._failed = snapshot["before"], snapshot["failed"]
+
+
+@final
+class Symmetric:
+    """The step is what its own error makes it, not what the steps before it were.
+
+    Each is tried again until its error is within a factor of what was aimed at: to that factor the step's length is a
+    function of the step alone, and the same backward in time.
+
+    Parameters
+    ----------
+    exponent
+        The power of the step with which the estimate falls.
+    """
+
+    AIM, NEAR, TRIES, GROWTH = 0.5, 1.6, 4, 4.0
+    finest = 1e-11
+    """Such a part of the tolerance is below the rounding of states, and nobody waits for so many steps."""
+
+    def __init__(self, exponent: float) -> None:
+        self._exponent, self._tries = exponent - 1.0, 0
+
+    def judge(self, h: float, error: float, span: float) -> tuple[bool, float]:
+        """Accept what is within a factor of the aim, or after some tries what is allowed.
+
+        A step of h in a run of T may have h/T of the tolerance.
+        """
+        error *= span / h
+        if not np.isfinite(error):
+            return False, 0.25 * h
+        wanted = float(np.clip(self._wanted(h, error), 0.1 * h, self.GROWTH * h))
+        near = self.AIM / self.NEAR <= error <= self.AIM * self.NEAR
+        self._tries += 1
+        if near or (error <= 1.0 and (self._tries >= self.TRIES or wanted >= self.GROWTH * h)):
+            self._tries = 0
+            return True, wanted
+        return False, wanted
+
+    def wanted(self, h: float, error: float, span: float) -> float:
+        """Length of the step, however short, whose error would be what is aimed at."""
+        return self._wanted(h, error * span / h)
+
+    def _wanted(self, h: float, error: float) -> float:
+        return h * (self.AIM / max(error, 1e-12)) ** (1.0 / self._exponent)
+
+    def snapshot(self) -> Snapshot:
+        """Memory of earlier steps."""
+        return {"tries": self._tries}
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Remember what a snapshot says."""
+        self._tries = snapshot["tries"]

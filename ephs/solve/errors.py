@@ -1,0 +1,193 @@
+"""Failures of a run: named outcomes with time, component, equation, advice, and the partial solution."""
+
+from collections.abc import Generator, Iterable
+from contextlib import contextmanager
+from enum import StrEnum
+from typing import TYPE_CHECKING, final
+
+if TYPE_CHECKING:
+    from ephs.solve.model import Model
+    from ephs.solve.result.solution import Solution
+
+__all__ = [
+    "LARGEST",
+    "Interrupted",
+    "OptionError",
+    "Outcome",
+    "SimulationError",
+    "SolveError",
+    "failing_at",
+    "nearest_of",
+    "number_of",
+    "solve_error_of",
+]
+
+
+class Outcome(StrEnum):
+    """Cause that ended a run, in words; `advice` says what to do."""
+
+    DIVERGED = "the step's equations have no solution near by"
+    SINGULAR = "the step's equations stay singular"
+    CONTRADICTION = "a constraint contradicts the others"
+    OPEN = "a loop that does not close near by"
+    SHAKY = "a mechanism that moves to first order only"
+    TURN = "a rotation of π or more in one step"
+    TEMPERATURE = "an absolute temperature that is not positive"
+    ENTROPY = "a component that destroys entropy"
+    EXTENT = "a length or a volume that is not positive"
+    DOMAIN = "an energy or a flow that is not a finite number"
+    RANGE = "a state beyond the range of numbers"
+    PYTHON = "a Python function of the model raised an exception"
+    INCONSISTENT = "an initial state that contradicts the constraints"
+    TINY = "a step below the least that is allowed"
+    MANY = "more steps than are allowed"
+    UNDETERMINED = "the motion is not determined"
+    RESTLESS = "no state in which nothing moves"
+    INPUT = "an input's function has no value"
+    EVENT = "an event's function has no value"
+    UNWRITTEN = "the journal cannot be written"
+    PROGRESS = "the function that is told of progress raised an exception"
+    UNLAWFUL = "the result does not pass its audit"
+    MEMORY = "more memory than there is"
+    INTERRUPTED = "interrupted"
+
+    @property
+    def advice(self) -> str:
+        """Advice for the user."""
+        return _ADVICE[self]
+
+
+_ADVICE = {
+    Outcome.DIVERGED: "take a smaller step",
+    Outcome.SINGULAR: "take a smaller step, start elsewhere, or use natural, which leaves out what repeats",
+    Outcome.CONTRADICTION: "check prescribed motions and initial values, or take a smaller step",
+    Outcome.OPEN: "take a smaller step, or check what is prescribed: the mechanism may be at the end of its travel",
+    Outcome.SHAKY: "change its geometry or hold it by springs: rigid joints carry nothing across their line",
+    Outcome.TURN: "take a smaller step: h·|ω| must stay below π",
+    Outcome.TEMPERATURE: "check initial temperatures and heat capacities, or take a smaller step",
+    Outcome.ENTROPY: "mend the component's function there; if it is right, take a smaller step",
+    Outcome.EXTENT: "check initial values, or take a smaller step",
+    Outcome.DOMAIN: "check initial values and the component's function there, or take a smaller step",
+    Outcome.RANGE: "check initial values and inputs, or take a smaller step",
+    Outcome.PYTHON: "see the exception above this one",
+    Outcome.INCONSISTENT: "give initial values that satisfy the constraints",
+    Outcome.TINY: "loosen rtol and atol, lower min_step, or look for a singularity at this time",
+    Outcome.MANY: "raise max_steps, or loosen rtol and atol",
+    Outcome.UNDETERMINED: "add what determines it there: a storage, friction, or a constraint",
+    Outcome.RESTLESS: "start nearer to one, or add what holds it: a spring, a stop of the drive, an environment",
+    Outcome.INPUT: "see the exception above this one, or give a function of as many finite numbers as are wanted",
+    Outcome.EVENT: "see the exception above this one, or give a function that is a number everywhere",
+    Outcome.UNWRITTEN: "make room on the disk, then let the run go on with the same journal",
+    Outcome.PROGRESS: "see the exception above this one",
+    Outcome.UNLAWFUL: 'the whole solution is in .partial; audit="warn" returns it with a warning',
+    Outcome.MEMORY: "keep fewer times with save_at, or take longer steps",
+    Outcome.INTERRUPTED: "what was computed is in .partial",
+}
+LARGEST = 1e150
+"""States beyond this have left the range of numbers: their squares are none."""
+_OF_KERNEL = {1: Outcome.TURN, 2: Outcome.TEMPERATURE, 3: Outcome.PYTHON, 4: Outcome.EXTENT, 5: Outcome.DOMAIN}
+
+
+@final
+class OptionError(ValueError):
+    """An option that a run cannot have: which, what was found, what is expected."""
+
+    def __init__(self, key: str, found: object, expected: str) -> None:
+        super().__init__(f"{key} is {found!r}, expected {expected}")
+        self.key, self.found, self.expected = key, found, expected
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return (OptionError, (self.key, self.found, self.expected))
+
+
+def nearest_of(found: object, known: Iterable[str]) -> str:
+    """A hint at the known word that a misspelled one is nearest to, to end a message with; nothing where none is."""
+    from difflib import get_close_matches
+
+    near = get_close_matches(str(found), list(known), n=1, cutoff=0.6)
+    return f"; did you mean {near[0]!r}?" if near else ""
+
+
+def number_of(key: str, given: object, expected: str = "a number of seconds") -> float:
+    """The number that was given as the option ``key``.
+
+    Raises
+    ------
+    OptionError
+        It is none.
+    """
+    try:
+        return float(given)  # pyright: ignore[reportArgumentType] - this is what is tried
+    except (TypeError, ValueError, OverflowError):
+        raise OptionError(key, given, expected) from None
+
+
+class SimulationError(RuntimeError):
+    """A run that failed part-way.
+
+    Attributes
+    ----------
+    outcome, time, path, equation, advice
+        What happened, at which time in s, in which component and equation, and what to do.
+    partial
+        The Solution up to there, or None where not even the first step was set up.
+    """
+
+    def __init__(self, outcome: Outcome, time: float, path: str, equation: str, partial: "Solution | None") -> None:
+        self.outcome, self.time, self.path, self.equation = outcome, time, path, equation
+        self.advice = outcome.advice
+        self.partial = partial
+        where = f" at {path}" if path else ""
+        what = f" ({equation})" if equation else ""
+        super().__init__(f"t = {time:.9g} s{where}: {outcome.value}{what}; {self.advice}")
+
+
+@final
+class Interrupted(SimulationError):
+    """A run that the user stopped."""
+
+
+@final
+class SolveError(Exception):
+    """A failed step inside the solver, before time and partial solution are known."""
+
+    def __init__(self, outcome: Outcome, path: str, equation: str, cause: BaseException | None = None) -> None:
+        super().__init__(outcome.value, path, equation)
+        self.outcome, self.path, self.equation, self.cause = outcome, path, equation, cause
+
+    @classmethod
+    def of_component(cls, status: int, model: "Model", component: int) -> "SolveError":
+        """Outcome by the status of a component's kernel."""
+        callback = model.callbacks.get(component)
+        cause = callback.raised if callback else None
+        outcome = _OF_KERNEL.get(status % 10, Outcome.DIVERGED)
+        if outcome is Outcome.PYTHON and isinstance(cause, KeyboardInterrupt):
+            outcome = Outcome.INTERRUPTED
+        told = f"{type(cause).__name__}: {cause}" if outcome is Outcome.PYTHON and cause is not None else ""
+        return cls(outcome, str(model.path_of(component)), told, cause)
+
+    def of_iteration(self) -> "SolveError":
+        """The same of an iteration that left a domain which the motion does not leave."""
+        return SolveError(Outcome.DIVERGED, self.path, f"its iteration comes to {self.outcome.value}", self.cause)
+
+    @classmethod
+    def undetermined(cls, model: "Model", unknown: int) -> "SolveError":
+        """An unknown without equation."""
+        return cls(Outcome.UNDETERMINED, model.row_path(unknown), model.unknown_name(unknown))
+
+
+def solve_error_of(error: Exception) -> SolveError:
+    """Arithmetic errors of a step: NumPy's and Python's own exceptions by the names of outcomes."""
+    if isinstance(error, SolveError):
+        return error
+    outcome = Outcome.RANGE if isinstance(error, ArithmeticError) else Outcome.SINGULAR
+    return SolveError(outcome, "", str(error), error)
+
+
+@contextmanager
+def failing_at(t: float) -> Generator[None, None, None]:
+    """A failure inside the solver at a time t in s as an error for users, without a partial solution."""
+    try:
+        yield
+    except SolveError as error:
+        raise SimulationError(error.outcome, t, error.path, error.equation, None) from error.cause

@@ -1,0 +1,173 @@
+"""Events: functions of time and state whose zeros are located while a system is solved."""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, final
+
+import numpy as np
+
+from ephs.operad import Path
+from ephs.semantics.bundle import Array
+from ephs.solve.errors import OptionError, Outcome, SolveError
+from ephs.solve.problem import States
+from ephs.solve.snapshot import Snapshot
+
+__all__ = ["Crossing", "Event", "Watch", "events_of"]
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something that happens where a function of time and state crosses zero.
+
+    Parameters
+    ----------
+    function
+        f(t, state) -> number; the state is read by path, as in inputs.
+    name
+        What the solution calls it.
+    direction
+        +1: only where it rises in time, −1: only where it falls, 0: both.
+    stop
+        Whether the run ends there.
+    """
+
+    function: Callable[[float, Mapping[Any, Array]], float]
+    name: str = "event"
+    direction: int = 0
+    stop: bool = False
+
+    def __post_init__(self) -> None:
+        if not callable(self.function):
+            raise OptionError("events", self.function, "functions f(t, state)")
+        if self.direction not in (-1, 0, 1):
+            raise OptionError("events", self.direction, f"a direction of {self.name}: −1, 0 or 1")
+
+    def value(self, t: float, state: Mapping[Any, Array]) -> float:
+        """The function's value.
+
+        Raises
+        ------
+        SolveError
+            It raised an exception, or gave no finite number.
+        """
+        try:
+            found = float(np.asarray(self.function(t, state), dtype=float).reshape(()))
+        except MemoryError:
+            raise
+        except Exception as error:
+            raise SolveError(Outcome.EVENT, "", f"{self.name}: {type(error).__name__}: {error}", error) from error
+        if not np.isfinite(found):
+            raise SolveError(Outcome.EVENT, "", f"{self.name} = {found}")
+        return found
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Crossing:
+    """An event that happened: its name, when in s, and the states then by path."""
+
+    name: str
+    t: float
+    state: Mapping[Path, Array]
+
+    def record(self) -> dict[str, Any]:
+        """As plain data, for statistics and files."""
+        state = {str(path): np.atleast_1d(value).tolist() for path, value in self.state.items()}
+        return {"name": self.name, "t": float(self.t), "state": state}
+
+    @classmethod
+    def of_record(cls, record: Mapping[str, Any]) -> "Crossing":
+        """From plain data."""
+        state = {Path.of(path): np.array(value, dtype=float) for path, value in record["state"].items()}
+        return cls(record["name"], float(record["t"]), States(state))
+
+
+def events_of(given: Iterable[Any] | None) -> tuple[Event, ...]:
+    """Events from what a user gave: `Event` values, or functions, whose attributes ``terminal`` and ``direction`` count
+    as in SciPy.
+
+    Raises
+    ------
+    OptionError
+        Something else is among them, or two have one name.
+    """
+    out: list[Event] = []
+    for number, item in enumerate(given or ()):
+        if isinstance(item, Event):
+            out.append(item)
+        elif callable(item):
+            function: Any = item
+            name = getattr(function, "__name__", "event")
+            name = f"event {number}" if name == "<lambda>" else name
+            terminal, direction = getattr(function, "terminal", False), getattr(function, "direction", 0)
+            out.append(Event(function, name, int(np.sign(direction)), bool(terminal)))
+        else:
+            raise OptionError("events", item, "functions f(t, state) or ephs.Event values")
+    names = [event.name for event in out]
+    for name in names:
+        if names.count(name) > 1:
+            raise OptionError("events", name, "names that differ")
+    return tuple(out)
+
+
+@final
+class Watch:
+    """Looks for events from step to step."""
+
+    def __init__(self, events: tuple[Event, ...], t: float, state: Mapping[Path, Array]) -> None:
+        self.events = events
+        self.crossings: list[Crossing] = []
+        self._before = [event.value(t, state) for event in events]
+
+    def step(
+        self, t0: float, t1: float, end: Mapping[Path, Array], inside: Callable[[float], Mapping[Path, Array]]
+    ) -> float | None:
+        """Record what happened after t0 and up to t1; the time at which the run has to stop, if so.
+
+        A function that is zero at t0 has crossed there already; it counts again only after it has left zero.
+        """
+        after = [event.value(t1, end) for event in self.events]
+        found: list[tuple[float, int]] = []
+        for i, (event, a, b) in enumerate(zip(self.events, self._before, after, strict=True)):
+            rising = (b > a) == (t1 > t0)
+            crossed = a != 0.0 and (b == 0.0 or (a < 0.0) != (b < 0.0))
+            if crossed and (event.direction == 0 or (event.direction > 0) == rising):
+                found.append((t1 if b == 0.0 else self._locate(event, t0, t1, a, b, end, inside), i))
+        self._before = after
+        found.sort(key=lambda pair: abs(pair[0] - t0))
+        for t, i in found:
+            self.crossings.append(Crossing(self.events[i].name, t, end if t == t1 else inside(t)))
+            if self.events[i].stop:
+                return t
+        return None
+
+    def snapshot(self) -> Snapshot:
+        """Events so far, and the functions' values."""
+        return {"before": self._before, "crossings": [crossing.record() for crossing in self.crossings]}
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go on from a snapshot."""
+        self._before = list(snapshot["before"])
+        self.crossings = [Crossing.of_record(record) for record in snapshot["crossings"]]
+
+    @staticmethod
+    def _locate(
+        event: Event,
+        t0: float,
+        t1: float,
+        a: float,
+        b: float,
+        end: Mapping[Path, Array],
+        inside: Callable[[float], Mapping[Path, Array]],
+    ) -> float:
+        from scipy.optimize import brentq
+
+        def value(t: float) -> float:
+            if t == t0:
+                return a
+            return b if t == t1 else event.value(t, inside(t))
+
+        precision = 4.0 * float(np.spacing(max(abs(t0), abs(t1))))
+        root: Any = brentq(value, t0, t1, xtol=precision, maxiter=200)
+        return float(root)

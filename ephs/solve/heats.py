@@ -1,0 +1,175 @@
+"""Heat as energy: storages of heat advanced by it, and friction's heat by the energy that the motion lost.
+
+**Energies.** A storage of heat is advanced by the energy that it takes up, E = c1 (exp(s/c2) − 1); its entropy
+follows, with it the mean temperature θ̄ = ΔE/Δs of the step. A component makes flow · (1/θ̄ at its sink − 1/θ̄ at its
+source), so entropies change by what is made, to rounding, and friction never makes less than nothing.
+
+**Friction.** The heat H of a step is a quadrature of powers, which says nothing of a motion that decays in the step.
+There D = E⁰ + W − E¹ of all that is not heat is right, where Radau IIA finds a hundredth of it at hλ = 2000 and the
+trapezoidal rule thousands of times as much. So the heat Q of each friction goes from H towards D: no further than the
+estimated error of its quadrature, which is its difference to an embedded one, and not below zero. As |Q − H| ≤ |D − H|
+and D − H is of the order of the method's error, the order stays. What remains of D − H is an error of the motion, such
+as vibrations that the method damped: it stays in the balance, and the audit sees it.
+"""
+
+from collections.abc import Callable
+from typing import final
+
+import numpy as np
+
+from ephs.operad import Path
+from ephs.semantics.bundle import Array
+from ephs.semantics.numbering import Index
+from ephs.semantics.primitives import Primitive, Storage
+from ephs.solve.errors import Outcome, SolveError
+
+__all__ = ["Heats", "exponential_law"]
+
+
+def exponential_law(primitive: Primitive) -> tuple[float, float] | None:
+    """c1 in J and c2 in J/K of E = c1 (exp(s/c2) − 1); None of storages of other laws and of the environment."""
+    if not isinstance(primitive, Storage) or len(primitive.interface) != 1:
+        return None
+    match dict(primitive.parameters):
+        case {"capacity": float(capacity), "temperature": float(temperature)}:
+            c1, c2 = capacity * temperature, capacity
+        case {"c1": float(c1), "c2": float(c2)}:
+            pass
+        case _:
+            return None
+    points = c2 * np.array([-0.7, 1.1])  # others may call their numbers so
+    found = [float(primitive.energy({port: np.array([s])})) for port in primitive.bundle.ports for s in points]
+    return (c1, c2) if np.allclose(found, c1 * np.expm1(points / c2), rtol=1e-12, atol=0.0) else None
+
+
+@final
+class Heats:
+    """What stores heat in one system, and what its components pass on to it.
+
+    Energies are in J and count from s = 0. Flows, in W or J, are what components pass: the heat of friction; of
+    conduction what goes from one end to the other.
+
+    Parameters
+    ----------
+    paths
+        Of the states, entropies.
+    components
+        (entropies,) the storages of an exponential law, by their numbers; −1 of the environment.
+    laws
+        c1 in J and c2 in J/K of these storages, as they are at present.
+    incidence
+        (entropies, flows): 1 where a flow goes, −1 where it comes from.
+    frictions
+        (frictions,) the flows that are heat of friction.
+    theta
+        Temperature of the environment in K.
+    """
+
+    def __init__(
+        self,
+        paths: tuple[Path, ...],
+        components: Index,
+        laws: Callable[[], tuple[Array, Array]],
+        incidence: Array,
+        frictions: Index,
+        theta: float,
+    ) -> None:
+        self._paths, self._components, self._present, self._theta = paths, components, laws, theta
+        self._nodes = components >= 0
+        self._incidence, self.frictions = incidence, frictions
+        self._sources, self._sinks = np.maximum(-incidence, 0.0).T, np.maximum(incidence, 0.0).T
+
+    @property
+    def _laws(self) -> tuple[Array, Array]:
+        """c1 in J and c2 in J/K of the nodes at present."""
+        return self._present()
+
+    def temperatures(self, heats: Array) -> Array:
+        """(entropies,) in K."""
+        out = np.full(heats.shape, self._theta)
+        k, (c1, c2) = self._nodes, self._laws
+        out[..., k] = (c1 + heats[..., k]) / c2
+        return out
+
+    def frozen(self, heats: Array) -> int | None:
+        """Component of a storage whose temperature is not above zero; None: there is none."""
+        cold = np.flatnonzero(~(self.temperatures(heats) > 0.0))
+        return int(self._components[cold[0]]) if cold.size else None
+
+    def coldest(self, heats: Array) -> Array:
+        """(entropies,) energies at a hundredth of the present temperatures, without bound of the environment."""
+        out = np.full(heats.shape, -np.inf)
+        k, (c1, _) = self._nodes, self._laws
+        out[k] = 0.01 * (c1 + heats[k]) - c1
+        return out
+
+    def entropies(self, heats: Array) -> Array:
+        """(..., entropies) in J/K, of energies."""
+        out = heats / self._theta
+        k, (c1, c2) = self._nodes, self._laws
+        out[..., k] = c2 * np.log1p(heats[..., k] / c1)
+        return out
+
+    def energies(self, s: Array) -> Array:
+        """(..., entropies) in J, of entropies."""
+        out = s * self._theta
+        k, (c1, c2) = self._nodes, self._laws
+        out[..., k] = c1 * np.expm1(s[..., k] / c2)
+        return out
+
+    def slopes(self) -> Array:
+        """(entropies,) dθ/dE in K/J, zero of the environment."""
+        out = np.zeros(self._nodes.size)
+        out[self._nodes] = 1.0 / self._laws[1]
+        return out
+
+    def flows(self, heats: Array, made: Array) -> Array:
+        """(makers,) flows where components make so much entropy."""
+        theta = self.temperatures(heats)
+        one, two = self._sources @ theta, self._sinks @ theta
+        drop = np.where(self._sources.any(axis=1), one - two, 1.0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            carried = made * one * two / drop
+        carried[drop == 0.0] = 0.0
+        carried[self.frictions] = made[self.frictions] * two[self.frictions]
+        return carried
+
+    def booked(self, flows: Array, missed: Array, lost: float | None) -> Array:
+        """Flows of a step with friction's heat moved towards the energy that the motion lost.
+
+        Parameters
+        ----------
+        flows, missed
+            (makers,) in J by a quadrature, and its differences to an embedded one.
+        lost
+            E⁰ + W − E¹ in J; None where the work is what the energies say.
+        """
+        if lost is None or not self.frictions.size:
+            return flows
+        out, k = flows.copy(), self.frictions
+        short = lost - float(flows[k].sum())
+        made = np.maximum(0.0, flows[k])  # a component that destroys entropy is not covered up
+        room = np.abs(missed[k]) if short > 0.0 else np.minimum(np.abs(missed[k]), made)
+        whole = float(room.sum())
+        if whole > 0.0:
+            out[k] = np.maximum(flows[k] - made, flows[k] + room * (np.sign(short) * min(1.0, abs(short) / whole)))
+        return out
+
+    def taken(self, heats: Array, flows: Array) -> tuple[Array, Array]:
+        """Energies after the flows of a step in J, and the entropy that each component made in J/K.
+
+        Raises
+        ------
+        SolveError
+            More heat was carried away than there is.
+        """
+        change = self._incidence @ flows
+        k, theta = self._nodes, self.temperatures(heats)
+        share = np.zeros(heats.size)
+        share[k] = change[k] / (self._laws[1] * theta[k])
+        if not np.all(share > -1.0):
+            raise SolveError(Outcome.TEMPERATURE, str(self._paths[int(np.argmin(share > -1.0))]), "")
+        small = np.abs(share) < 1e-8  # θ̄/θ = x / log(1 + x)
+        ratio = np.where(small, 1.0 + 0.5 * share, share / np.log1p(np.where(small, 1.0, share)))
+        cold = 1.0 / (theta * ratio)
+        return heats + change, flows * (self._sinks @ cold - self._sources @ cold)

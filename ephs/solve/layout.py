@@ -1,0 +1,182 @@
+"""The layout of the matrix of a descriptor form: where each entry of each component's Jacobian goes.
+
+What vanishes of a component's Jacobian is found once for all components of one formula, and components of one pattern
+are placed at once.
+"""
+
+import ctypes
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, final
+
+import numpy as np
+
+from ephs.semantics.bundle import Array, Reference
+from ephs.semantics.checks import random_efforts, random_point
+from ephs.semantics.kernel_table import Callback, address_of, prototype
+from ephs.semantics.numbering import Index, spans, starts
+from ephs.semantics.primitives import Primitive, Reversible, Storage
+from ephs.solve.methods.natural_kernels import IRREVERSIBLE, REVERSIBLE, STORING, Tables
+
+__all__ = ["Entry", "entry_of", "laid_out"]
+
+LINEAR = frozenset({"constant_structure", "quadratic"})
+"""Kernels whose Jacobian's entries are their parameters: what vanishes depends on which parameters do."""
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Entry:
+    """A primitive as the tables know it.
+
+    Parameters
+    ----------
+    counts
+        Kind, numbers, efforts, multipliers, read ports.
+    """
+
+    primitive: Primitive
+    address: int
+    numbers: Array
+    callback: Callback | None
+    counts: tuple[int, int, int, int, int]
+
+
+def entry_of(primitive: Primitive, reference: Reference, *, reversible: bool = True) -> Entry:
+    """The entry of a primitive; its kernel is compiled if need be, of reversible ones where they are asked for."""
+    if reversible or not isinstance(primitive, Reversible):
+        address, numbers, callback = address_of(primitive, reference)
+    else:
+        address, numbers, callback = 0, (), None
+    kind = REVERSIBLE if isinstance(primitive, Reversible) else IRREVERSIBLE
+    multipliers = primitive.multipliers if isinstance(primitive, Reversible) else 0
+    bundle = primitive.bundle
+    counts = (
+        STORING if isinstance(primitive, Storage) else kind,
+        len(numbers), bundle.size, multipliers, len(primitive.reads),
+    )  # fmt: skip
+    return Entry(primitive, address, np.array(numbers, dtype=float), callback, counts)
+
+
+def laid_out(t: Tables, primitive: Index, entries: Sequence[Entry], reference: Reference) -> Tables:
+    """The tables with the layout of the matrix.
+
+    Parameters
+    ----------
+    primitive
+        (components,) which of the entries each component is.
+    """
+    size = int(t.counts[3])
+    flat, j_at = _places(t, primitive, [_local_pattern(entry, reference) for entry in entries])
+    constant_at, values = _constant_entries(t, size)
+    place, found = _numbered(np.concatenate([constant_at, flat, np.full(1, -1)]))
+    template = np.zeros(place.size + size)
+    np.add.at(template, found[: values.size], values)
+    diagonal = np.arange(size, dtype=np.int64)  # entries of their own, which hold what the loop adds
+    return t._replace(
+        jacobian=np.append(found[values.size : -1], 0),
+        jacobian_at=j_at,
+        row=np.concatenate([place // size, diagonal]),
+        column=np.concatenate([place % size, diagonal]),
+        template=template,
+    )
+
+
+def _numbered(keys: Index) -> tuple[Index, Index]:
+    """The keys ≥ 0, each once, in the order of their first appearance; and each key's number there, or −1."""
+    there = keys >= 0
+    unique, first, inverse = np.unique(keys[there], return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    number, found = np.empty_like(order), np.full(keys.size, -1)
+    number[order] = np.arange(order.size)
+    found[there] = number[inverse]
+    return unique[order], found
+
+
+def _constant_entries(t: Tables, size: int) -> tuple[Index, Array]:
+    """Places, row · size + column, and values of the entries that never change."""
+    n_rate, storing = t.counts[0], t.kind == STORING
+    rates = t.read_w[spans(t.read_w_at[storing], t.dims[storing, 2])]
+    efforts = n_rate + t.e_index[spans(t.e_at[storing], t.dims[storing, 0])]
+    stored = np.stack([rates * size + efforts, efforts * size + rates], axis=1).ravel()
+    at, dim, _, unknown = t.outer[t.outer[:, 2] == 1].T
+    junctions, flows = n_rate + spans(at, dim), spans(unknown, dim)
+    prescribed = np.stack([flows * size + junctions, junctions * size + flows], axis=1).ravel()
+    values = np.concatenate([np.ones(stored.size), np.tile([1.0, -1.0], junctions.size)])
+    return np.concatenate([stored, prescribed]), values
+
+
+def _places(t: Tables, primitive: Index, patterns: list[Array]) -> tuple[Index, Index]:
+    """Where each local Jacobian entry goes in the matrix, row · size + column, −1 where it is structurally zero; and
+    where those of each component begin. Components of one pattern are placed at once."""
+    n_rate, n_effort, size = t.counts[0], t.counts[1], t.counts[3]
+    same = {id(pattern): pattern for pattern in patterns}
+    number = {key: i for i, key in enumerate(same)}
+    of = np.array([number[id(pattern)] for pattern in patterns], dtype=np.int64)[primitive]
+    j_at = starts(np.array([pattern.size for pattern in same.values()], dtype=np.int64)[of])
+    out = np.full(sum(pattern.size * int((of == i).sum()) for i, pattern in enumerate(same.values())), -1)
+    for i, pattern in enumerate(same.values()):
+        these = np.flatnonzero(of == i)
+        rates = t.read_w[t.read_w_at[these, None] + np.arange(t.dims[these[0], 2])]
+        rows = columns = rates
+        if t.kind[these[0]] != STORING:
+            efforts = n_rate + t.e_index[t.e_at[these, None] + np.arange(t.dims[these[0], 0])]
+            lam = n_rate + n_effort + t.multiplier_at[these, None] + np.arange(t.dims[these[0], 1])
+            rows, columns = np.hstack([efforts, lam]), np.hstack([efforts, lam, rates])
+        at = np.where(pattern, rows[:, :, None] * size + columns[:, None, :], -1)
+        out[j_at[these, None] + np.arange(pattern.size)] = at.reshape(these.size, -1)
+    return out, j_at
+
+
+def _local_pattern(entry: Entry, reference: Reference) -> Array:
+    """Which entries of a component's Jacobian are not identically zero.
+
+    Compiled kernels are analytic in their arguments, so what vanishes at three random points vanishes. Callbacks may
+    have branches: all their entries count.
+    """
+    primitive, (kind, _, n, k, _) = entry.primitive, entry.counts
+    read = tuple(primitive.interface[port].quantity for port in primitive.reads)
+    nv = sum(quantity.space.dim for quantity in read)
+    shape = (n, n) if kind == STORING else (n + k, n + k + nv)
+    kernel = primitive.kernel
+    numbers = kernel.parameters if kernel is not None else ()
+    if kernel is not None and kernel.name in LINEAR:
+        numbers = tuple(number != 0.0 for number in numbers)
+    names = None if kernel is None else (kernel.module, kernel.name, kernel.relation)
+    key = (names, numbers, read, kind, n, k)
+    if key not in _patterns:
+        plain = entry.callback is not None or not shape[0]
+        _patterns[key] = np.ones(shape, dtype=bool) if plain else _sample_pattern(entry, reference, shape)
+    return _patterns[key]
+
+
+_patterns: dict[Any, Array] = {}  # a cache: the pattern is a function of the key
+
+
+def _sample_pattern(entry: Entry, reference: Reference, shape: tuple[int, int]) -> Array:
+    rng = np.random.default_rng(5)
+    primitive, (_, _, n, k, _) = entry.primitive, entry.counts
+    call = prototype(entry.address)
+    nv = sum(primitive.interface[port].quantity.space.dim for port in primitive.reads)
+    found = np.zeros(shape, dtype=bool)
+    for _ in range(3):
+        point = random_point(primitive.bundle, primitive.reads, rng)
+        x = np.concatenate([*(point[p] for p in primitive.reads), np.zeros(1)])
+        dims = np.array([n, k, nv, x.size - 1], dtype=np.int64)
+        arrays = [
+            np.array([1e-2, reference.temperature, reference.pressure]),
+            np.append(entry.numbers, 0.0),
+            x,
+            1e-2 * rng.standard_normal(nv + 1),
+            np.concatenate([random_efforts(primitive.bundle, rng), np.zeros(1)]),
+            rng.standard_normal(k + 1),
+            np.zeros(n * n + n + 1),
+            np.zeros(k + 2),
+            np.zeros((n + k) * (n + k + nv) + 1),
+            np.zeros(4096),
+        ]
+        pointers = [a.ctypes.data_as(ctypes.POINTER(ctypes.c_double)) for a in arrays]
+        call(dims.ctypes.data_as(ctypes.POINTER(ctypes.c_int64)), *pointers)
+        out = arrays[6] if isinstance(primitive, Storage) else arrays[8]
+        found |= out[: shape[0] * shape[1]].reshape(shape) != 0.0
+    return found

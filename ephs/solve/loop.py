@@ -1,0 +1,399 @@
+"""The time loop of methods that take one step a call: control, events, what is kept, progress and interruption."""
+
+import time
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+
+from ephs.operad import Path
+from ephs.semantics.bundle import Array
+from ephs.solve.auditing.audit import Bounds
+from ephs.solve.auditing.forecast import Forecast
+from ephs.solve.auditing.production import Production
+from ephs.solve.auditing.resolution import Samples, Trials, trials_of
+from ephs.solve.breakpoints import Breakpoints
+from ephs.solve.control import Control, Policy, first_step
+from ephs.solve.errors import OptionError, Outcome, SolveError, solve_error_of
+from ephs.solve.events import Crossing, Event, Watch
+from ephs.solve.integrate import Grid, Progress, audited, failures_of, repeatable
+from ephs.solve.journal import Written
+from ephs.solve.problem import Problem, States
+from ephs.solve.result.record import Record, Rows, record_of
+from ephs.solve.result.solution import Solution
+from ephs.solve.snapshot import Snapshot, like, parts
+from ephs.solve.stepping import Attempt, Leg, Row, Span, Stepper, too_fast
+from ephs.solve.watching import Balance
+
+__all__ = ["integrate_stepwise"]
+
+S = TypeVar("S")
+RESPONSE = 0.1
+BURST = 1000
+"""Steps in one compiled call at most, for progress and interruption."""
+BLOCK = 1024
+"""Rows that wait until they are made what is kept."""
+FINAL = (Outcome.PYTHON, Outcome.INPUT, Outcome.EVENT, Outcome.INCONSISTENT, Outcome.INTERRUPTED)
+"""Failures that a shorter step does not mend."""
+
+
+def integrate_stepwise(
+    problem: Problem,
+    t0: float,
+    until: float,
+    *,
+    make: Callable[[], tuple[Stepper[S], Policy | None]],
+    control: Control,
+    events: tuple[Event, ...] = (),
+    save_at: Array | None = None,
+    progress: Progress | None = None,
+    remarks: Mapping[str, Any] | None = None,
+    journal: Written | None = None,
+    bounds: Bounds | None = None,
+    breakpoints: Breakpoints | None = None,
+) -> Solution:
+    """Solve an initial value problem, forward or backward in time.
+
+    Parameters
+    ----------
+    make
+        Makes the method, and what chooses its steps; None: they are constant.
+    remarks
+        What else the statistics are to say.
+    journal
+        Where the run is written down, and what an earlier part of it left there.
+    bounds
+        What the audit of the run allows; None: there is none.
+    breakpoints
+        Where inputs jump, and steps end; None: nowhere.
+
+    Raises
+    ------
+    SimulationError
+        The run failed part-way; ``.partial`` holds the solution up to there. `Interrupted` where the user stopped it.
+    """
+    begin = time.perf_counter()
+    if not (np.isfinite(until) and until != t0):
+        raise OptionError("until", until, f"a time other than t0 = {t0!r} s")
+    run = _Run(
+        problem, t0, until, *make(), control, events, save_at, progress, remarks or {}, begin, journal, bounds,
+        breakpoints or Breakpoints(t0, until),
+    )  # fmt: skip
+    with failures_of(run):
+        run.start()
+        run.setup = time.perf_counter() - begin
+        run.advance(run.restore())
+        run.write(end=True)
+    return run.solution()
+
+
+class _Run(Generic[S]):
+    """One run in progress."""
+
+    state: S
+
+    def __init__(
+        self,
+        problem: Problem,
+        t0: float,
+        until: float,
+        stepper: Stepper[S],
+        policy: Policy | None,
+        control: Control,
+        events: tuple[Event, ...],
+        save_at: Array | None,
+        progress: Progress | None,
+        remarks: Mapping[str, Any],
+        begin: float,
+        journal: Written | None,
+        bounds: Bounds | None,
+        breakpoints: Breakpoints,
+    ) -> None:
+        self.breakpoints = breakpoints
+        self.problem, self.until, self.stepper, self.control = problem, until, stepper, control
+        self.policy, self.events, self.progress, self.begin = policy, events, progress, begin
+        self.remarks, self.journal, self.bounds = remarks, journal, bounds
+        self.t = self.t0 = t0
+        self.sign = 1.0 if until > t0 else -1.0
+        self.save_at = save_at
+        self.setup = 0.0
+        self.steps = self.rejected = self.saved = 0
+        self.looked = begin
+        self.least = np.inf
+        self.shortest, self.longest = np.inf, 0.0
+        self.pending: list[tuple[float, S, float]] = []
+        self.kept = Rows()
+        self.samples: Samples[S] = Samples(wanted=policy is None)
+        self.watch: Watch | None = None
+        self.forecast = Forecast(problem, stepper.name, bounds.order if bounds else 1, until)
+        self.leg: Leg[S] | None = None
+        self.ended = False
+        self.first: Row | None = None
+        self.cause: SolveError | None = None  # why this step was refused when it was longer
+
+    def start(self) -> None:
+        """The initial state, and the first row."""
+        self.h = first_step(self.control, abs(self.until - self.t0))
+        self.state = self.stepper.start(self.t0, self.sign * self.h)
+        row = self.first = self.stepper.row(self.state)
+        self.balance = Balance(self.problem, row.x, row.energies, row.sums)
+        self.production = Production(self.problem, self.sign)
+        self.production.start(row.x, row.energies)
+        if self.save_at is None or (self.save_at.size and self.save_at[0] == self.t0):
+            self.pending.append((self.t0, self.state, 0.0))
+            self.saved = 1
+        self.samples.add([(self.t0, self.state, 0.0)])
+        self.stepper.prepare(self.state, self.sign * self.h)
+        if self.events:
+            self.watch = Watch(self.events, self.t0, self._states(row))
+
+    def advance(self, stood: Snapshot | None) -> None:
+        """To the end, or to an event that stops the run: in compiled code as far as that goes, then step after step.
+
+        ``stood`` is where the compiled part of an earlier run did, None where it was left.
+        """
+        # nothing has to be looked at in each step
+        alone = self.watch is None and not self.production.active and not self.breakpoints.active
+        if alone and (self.journal is None or self.journal.snapshot is None or stood is not None):
+            span = Span(self.state, self.t0, self.until, self.h, self.control, self.policy, self.save_at, self.saved)
+            self.leg = self.stepper.many(span)
+            if self.leg is not None:
+                if stood is not None:
+                    self.leg.restore(stood)
+                self._follow(self.leg)
+                self.leg = None
+        if not self.ended:
+            self._advance_stepwise()
+
+    def _follow(self, leg: Leg[S]) -> None:
+        """Compiled steps until the end, or where they leave off."""
+        done, most = False, BURST
+        while not (done or leg.left):
+            if self.control.max_steps is not None and self.steps >= self.control.max_steps:
+                raise SolveError(Outcome.MANY, "", f"{self.control.max_steps}")
+            burst = most if self.control.max_steps is None else min(most, self.control.max_steps - self.steps)
+            begin = time.perf_counter()
+            try:
+                done = leg.advance(burst)
+            finally:
+                fresh, counts = leg.rows(), leg.counts
+                self.pending += fresh
+                self.samples.add(fresh)
+                self.saved += len(fresh)
+                self.t, self.steps, self.rejected, self.h = leg.time, counts.steps, counts.rejected, counts.h
+                self.shortest, self.longest, self.least = counts.shortest, counts.longest, counts.least
+                self.state = leg.state
+            spent = time.perf_counter() - begin
+            most = int(np.clip(most * np.clip(RESPONSE / max(spent, 1e-9), 0.5, 2.0), 1, BURST))
+            self._look()
+
+    def _advance_stepwise(self) -> None:
+        control = self.control
+        grid = None if self.policy else Grid(0.0, abs(self.until - self.t0), float(control.step or 0.0))
+        while self.t != self.until and not self.ended:
+            if control.max_steps is not None and self.steps >= control.max_steps:
+                raise SolveError(Outcome.MANY, "", f"{control.max_steps}")
+            if grid:
+                self.h = grid.time(self.steps - self.breakpoints.split + 1) - abs(self.t - self.t0)
+            end = self.breakpoints.end(self.t, self.h, self._here)
+            rest = abs(end - self.t)
+            if grid and rest - self.h <= 1e-9 * grid.h:
+                self.h, whole = rest, rest - self.h >= -1e-9 * grid.h
+            else:
+                whole = True
+            # No sliver is left for a last step.
+            h = self.h if rest > 1.01 * self.h else rest if rest <= 1.0000001 * self.h or grid else 0.5 * rest
+            cut = end != self.until and h < self.h
+            try:
+                attempt = self.stepper.step(self.state, self.sign * h)
+            except (SolveError, ArithmeticError, np.linalg.LinAlgError) as error:
+                failure = self.cause = solve_error_of(error)
+                if grid or failure.outcome in FINAL:
+                    raise failure from error
+                self._shrink(0.25 * h, failure)
+                continue
+            if self.policy:
+                accepted, wanted = self.policy.judge(h, attempt.error, abs(self.until - self.t0))
+                if not accepted and not (cut and wanted > h):
+                    asked = self.policy.wanted(h, attempt.error, abs(self.until - self.t0))
+                    cause = too_fast(self.stepper.name, attempt.worst, asked * self.problem.seconds)
+                    self._shrink(min(wanted, control.most), cause)
+                    continue
+                # a step that was cut for an end says nothing of longer ones
+                if h == self.h or wanted < (min(self.h, 2.0 * h) if cut else self.h):
+                    self.h = max(min(wanted, control.most), min(control.least, h))
+            there = h == rest and abs(abs(attempt.h) - h) <= self.breakpoints.near
+            self.ended = self._accept(attempt, end if there else None)
+            if self.t == end != self.until and not self.ended:
+                self.state = self.stepper.anew(self.state)
+                self.breakpoints.enter(end, self._here, split=not whole)
+
+    def _shrink(self, h: float, cause: SolveError | None) -> None:
+        self.rejected += 1
+        finest = self.policy.finest if self.policy else 0.0
+        self.h = self.control.allowed(h, max(abs(self.t), abs(self.until)), cause, finest * abs(self.until - self.t0))
+
+    def _accept(self, attempt: Attempt[S], end: float | None) -> bool:
+        """Keep a step; whether an event ends the run with it."""
+        t = self.t + attempt.h if end is None else end
+        if end is None and self.policy is None:
+            t = self.t0 + self.sign * (self.steps - self.breakpoints.split + 1) * float(self.control.step or 0.0)
+        after = self.stepper.at(attempt.end, t)
+        stopped = None
+        if self.watch:
+
+            def inside(when: float) -> Mapping[Path, Array]:
+                return self._states(self.stepper.row(self.stepper.inside(attempt, when)))
+
+            stopped = self.watch.step(self.t, t, self._states(self.stepper.row(after)), inside)
+            if stopped is not None and stopped != t:
+                t, after = stopped, self.stepper.at(self.stepper.inside(attempt, stopped), stopped)
+        if self.production.active:
+            row = self.stepper.row(after)
+            self.production.step(t, row.x, row.energies)
+        self.least = min(self.least, attempt.least)
+        self.shortest, self.longest = min(self.shortest, abs(attempt.h)), max(self.longest, abs(attempt.h))
+        if self.save_at is None:
+            self.pending.append((t, after, attempt.least))
+        else:
+            last = int(np.searchsorted(self.sign * self.save_at, self.sign * t, side="right"))
+            for when in self.save_at[self.saved : last]:
+                found = after if when == t else self.stepper.inside(attempt, float(when))
+                self.pending.append((float(when), found, attempt.least))
+            self.saved = last
+        self.samples.add([(t, after, attempt.least)])
+        self.state, self.t, self.cause = after, t, None
+        self.steps += 1
+        if self.policy is not None:
+            self.forecast.look(self.steps, t, self.stepper.stats)
+        self._look()
+        return stopped is not None
+
+    def _look(self) -> None:
+        """Tell the progress and write the journal, from time to time."""
+        if self.journal is not None and self.journal.due:
+            self.write()
+        elif len(self.pending) >= BLOCK:
+            self._settle()
+        now = time.perf_counter()
+        if self.progress is not None and now - self.looked > RESPONSE:
+            self.looked = now
+            row = self.stepper.row(self.state)
+            error = self.balance.error(row.x, row.energies, row.sums)
+            self.progress(self.t, self.until, {**self.stats(), "energy_error": error})
+
+    def _states(self, row: Row) -> Mapping[Path, Array]:
+        return States(self.problem.descriptor.unpack(row.x))
+
+    def _here(self) -> Mapping[Path, Array]:
+        return self._states(self.stepper.row(self.state))
+
+    def stats(self) -> dict[str, Any]:
+        """Statistics of the run so far."""
+        least = float(self.least) if np.isfinite(self.least) else 0.0
+        crossings: list[Crossing] = self.watch.crossings if self.watch else []
+        return {
+            "method": self.stepper.name,
+            "steps": self.steps,
+            "rejected": self.rejected,
+            "shortest_step": float(self.shortest) if self.steps else 0.0,
+            "longest_step": self.longest,
+            "dependent_equations": 0,
+            **({"step": self.control.step} if self.policy is None else {}),
+            **self.stepper.stats(),
+            **self.remarks,
+            **self.breakpoints.stats(),
+            **self.forecast.stats(),
+            "setup_s": self.setup,
+            "integrate_s": time.perf_counter() - self.begin - self.setup,
+            "least_production": least,
+            **({"events": [crossing.record() for crossing in crossings]} if self.watch else {}),
+        }
+
+    def solution(self) -> Solution:
+        """The solution so far."""
+        stats = self.stats()
+        self._settle()
+        ends = self._ends()
+        stats |= {**self.stepper.stats(), **self.remarks}  # what rows tell, too
+        return audited(self.problem, self.kept.whole(self.problem.descriptor), stats, self.bounds, ends, self._trials)
+
+    def _trials(self, solution: Solution) -> Trials | None:
+        step = self.control.step
+        if self.bounds is None or step is None:
+            return None
+        trials = trials_of(
+            solution, self.bounds.undamped, self.problem, self.stepper, self.bounds.order, self.samples.states,
+            self.sign * step, self.until, self.breakpoints,
+        )  # fmt: skip
+        return repeatable(trials, self.bounds, ended=self.ended or self.t == self.until)
+
+    def _ends(self) -> list[Record]:
+        """The first and the last row, kept or not; none of a run that did not start, or stands outside all numbers."""
+        with suppress(SolveError):  # a failed run can stand where nothing can be evaluated
+            rows = [(self.t, self.stepper.row(self.state))] if self.first else []
+            return [record_of([t], [row], [0.0]) for t, row in ((self.t0, self.first), *rows) if row]
+        return []
+
+    def _settle(self) -> None:
+        """Pending part, as it is kept."""
+        if self.pending:
+            rows = self.stepper.rows([state for _, state, _ in self.pending])
+            self.kept.add(record_of([t for t, _, _ in self.pending], rows, [least for _, _, least in self.pending]))
+            self.pending.clear()
+
+    def write(self, *, end: bool = False) -> None:
+        """An entry in the journal, if there is one."""
+        if self.journal is not None:
+            self._settle()
+            self.ended = self.ended or end
+            self.journal.write(self.kept.fresh(), self.snapshot(), self.stats())
+
+    def snapshot(self) -> Snapshot | None:
+        """Where the run stands; None where its method cannot say."""
+        method = self.stepper.snapshot(self.state)
+        if method is None:
+            return None
+        return {
+            "t": self.t,
+            "h": self.h,
+            "counts": [self.steps, self.rejected, self.saved],
+            "lengths": [float(self.shortest), float(self.longest), float(self.least)],
+            "elapsed": time.perf_counter() - self.begin - self.setup,
+            "ended": self.ended,
+            "state": parts(self.state),
+            "method": method,
+            "policy": self.policy.snapshot() if self.policy is not None else None,
+            "watch": self.watch.snapshot() if self.watch is not None else None,
+            "breakpoints": self.breakpoints.snapshot(),
+            "forecast": self.forecast.snapshot(),
+            "samples": self.samples.snapshot(),
+            "leg": self.leg.snapshot() if self.leg is not None else None,
+        }
+
+    def restore(self) -> Snapshot | None:
+        """Go on from where the journal says that the run stood; where its compiled part did."""
+        found = self.journal.snapshot if self.journal is not None else None
+        if self.journal is None or found is None:
+            return None
+        self.t, self.h = found["t"], found["h"]
+        self.steps, self.rejected, self.saved = found["counts"]
+        self.shortest, self.longest, self.least = found["lengths"]
+        self.begin = time.perf_counter() - self.setup - found["elapsed"]
+        self.ended = found["ended"]
+        self.state = like(self.state, found["state"])
+        self.breakpoints.restore(found["breakpoints"])
+        self.stepper.restore(found["method"], self.state)
+        row = self.stepper.row(self.state)
+        self.production.start(row.x, row.energies)
+        if self.policy is not None:
+            self.policy.restore(found["policy"])
+        if self.watch is not None:
+            self.watch.restore(found["watch"])
+        self.pending.clear()
+        self.forecast.restore(found["forecast"])
+        self.samples.restore(found["samples"], self.state)
+        if self.journal.rows is not None:
+            self.kept.add(self.journal.rows, written=True)
+        return found["leg"]

@@ -1,0 +1,13 @@
+"""Explicit Runge-Kutta steps as staged functions, many in one call."""
+
+from ephs.solve.march.march import march as march
+from ephs.solve.march.records import MEMORY as MEMORY
+from ephs.solve.march.records import TABLEAU as TABLEAU
+from ephs.solve.march.records import Control as Control
+from ephs.solve.march.records import Ending as Ending
+from ephs.solve.march.records import Field as Field
+from ephs.solve.march.records import Memory as Memory
+from ephs.solve.march.records import Motion as Motion
+from ephs.solve.march.records import Status as Status
+from ephs.solve.march.records import Tableau as Tableau
+from ephs.solve.march.steps import STEPS as STEPS

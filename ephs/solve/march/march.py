@@ -1,0 +1,256 @@
+"""Explicit steps, many in one call: stages, constraints closed, error, the next step's length, what is kept."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import final
+
+from ephs.semantics.linear.dense import copy
+from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Truth, Variable, Vector
+from ephs.solve.march.control import PATIENCE, held_back, judge, length
+from ephs.solve.march.records import Control, Ending, Memory, Motion, Status, Tableau
+from ephs.solve.march.steps import allow, attempt, drift, error_of, first, stiffness_of
+
+__all__ = ["march"]
+
+GOING = -1
+"""No ending yet."""
+ROUNDING = 16.0 * 2.220446049250313e-16
+"""Step beside the time below which it is too short."""
+
+
+def march(on: Evaluator, motion: Motion, tableau: Tableau, memory: Memory, control: Control, steps: Integer) -> Integer:
+    """Take steps from the state in (memory.q, memory.y) until the end, or ``steps`` of them.
+
+    Instants in memory.times are kept where control.saved is not negative, else every step is.
+
+    Returns
+    -------
+    Integer
+        An `Ending`.
+    """
+    run = _Run(on, motion, tableau, memory, control, on.counter(GOING), on.counter(0), on.counter(0))
+    tries = on.counter(0)
+
+    def one() -> Truth:
+        run.step()
+        tries.value = tries.value + 1
+        return on.either(run.ended, tries.value >= steps)
+
+    on.when(steps > 0, lambda: on.repeat(one))
+    reached = on.select(control.time >= on.absolute(control.end), int(Ending.DONE), int(Ending.PAUSED))
+    return on.select(run.ended, run.ending.value, reached)
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class _Run:
+    """A try of a step and what follows from it; `ending` says where the march has to end."""
+
+    on: Evaluator
+    motion: Motion
+    tableau: Tableau
+    memory: Memory
+    control: Control
+    ending: Variable[Integer]
+    status: Variable[Integer]
+    accepted: Variable[Integer]
+
+    @property
+    def ended(self) -> Truth:
+        return self.ending.value >= 0
+
+    @property
+    def sound(self) -> Truth:
+        return self.on.same(self.status.value, int(Status.SOUND))
+
+    @property
+    def sign(self) -> Real:
+        return self.on.select(self.control.end >= 0.0, 1.0, -1.0)
+
+    def end(self, ending: Integer) -> None:
+        self.ending.value = ending
+
+    def unless_ended(self, following: Callable[[], None]) -> None:
+        """Go on where there is no ending yet."""
+        self.on.when(self.on.negate(self.ended), following)
+
+    def step(self) -> None:
+        """Try one step."""
+        on, c = self.on, self.control
+        rest = on.absolute(c.end) - c.time
+
+        def go() -> None:
+            h = c.tried = length(on, c, rest)
+            on.when(on.same(c.fresh, 0), self._begin)
+            self.unless_ended(lambda: self._try(h, rest))
+
+        def look() -> None:
+            on.when(c.rows >= self.memory.rows_t.rows, lambda: self.end(Ending.FULL), go)
+
+        on.when(rest <= 0.0, lambda: self.end(Ending.DONE), look)
+
+    def _begin(self) -> None:
+        """Evaluate the rates at the state."""
+        on = self.on
+        self.status.value = first(on, self.motion, self.memory, self.control)
+
+        def known() -> None:
+            self.control.fresh = 1
+
+        def refused() -> None:
+            dependent = on.same(self.status.value, int(Status.DEPENDENT))
+            self.end(on.select(dependent, int(Ending.CAREFUL), int(Ending.REFUSED) + self.status.value))
+
+        on.when(self.sound, known, refused)
+
+    def _try(self, h: Real, rest: Real) -> None:
+        """Take a step of length h, measure its error, and accept it or not."""
+        on, motion, m, c = self.on, self.motion, self.memory, self.control
+        self.accepted.value = 0
+        self.status.value = attempt(on, motion, self.tableau, c, m.q, m.y, self.sign * h, m.k, m.last, m.y1, m.q1)
+
+        def look() -> None:
+            allow(on, motion, m, m.y1)
+            c.stiff = stiffness_of(on, motion, self.tableau, m, h)
+
+        on.when(self.sound, look)
+        error = self._finish(m.k, self.sign * h, m.y1, m.q1)
+
+        def weigh() -> None:
+            def always() -> None:
+                self.accepted.value = 1
+
+            def ask() -> None:
+                self.accepted.value = judge(on, c, h, error)
+
+            on.when(c.grid > 0.0, always, ask)
+
+        def refused() -> None:
+            def shorten() -> None:
+                c.step = 0.25 * h
+
+            def other() -> None:
+                on.when(c.grid > 0.0, lambda: self.end(Ending.REFUSED + self.status.value), shorten)
+
+            dependent = on.same(self.status.value, int(Status.DEPENDENT))
+            on.when(dependent, lambda: self.end(Ending.CAREFUL), other)
+
+        on.when(self.sound, weigh, refused)
+        taken = on.same(self.accepted.value, 1)
+        self.unless_ended(lambda: on.when(taken, lambda: self._take(h, rest), self._reject))
+
+    def _finish(self, k: Matrix, h: Real, y: Vector, q: Vector) -> Real:
+        """Take the end of a step to a state, and return its error."""
+        on, motion, m, c = self.on, self.motion, self.memory, self.control
+        n, nv, error = motion.freedoms, motion.increments, on.variable(0.0)
+
+        def settle() -> None:
+            if motion.closes:
+                copy(on, y.part(nv, n), m.open)
+            self.status.value = motion.settle(on, m.q, m.y, y, q)
+
+        def measure() -> None:
+            error.value = error_of(on, motion, self.tableau, m, k, h, q)
+
+            def reveal() -> None:
+                error.value = on.maximum(error.value, drift(on, m.open, y.part(nv, n), m.allowed))
+
+            if motion.closes:
+                on.when(on.same(c.rough, 0), reveal)
+
+        on.when(self.sound, settle)
+        on.when(self.sound, measure)
+        return error.value
+
+    def _reject(self) -> None:
+        """Count a step that is tried again; end where it gets too short or keeps failing."""
+        on, c = self.on, self.control
+        c.rejected = c.rejected + 1
+
+        def count() -> None:
+            c.refusals = c.refusals + 1
+            on.when(c.refusals > PATIENCE, lambda: self.end(Ending.STIFF))
+
+        on.when(on.both(on.negate(self.sound), c.limit > 0.0), count)
+        latest = on.maximum(on.absolute(c.origin + self.sign * c.time), on.absolute(c.origin + c.end))
+        tiny = c.step < on.maximum(c.least_step, ROUNDING * latest)
+        short = on.select(self.sound, int(Ending.SHORT), int(Ending.REFUSED) + self.status.value)
+        self.unless_ended(lambda: on.when(tiny, lambda: self.end(short)))
+
+    def _take(self, h: Real, rest: Real) -> None:
+        """Keep what is wanted of a step that is accepted, and go to its end."""
+        on, motion, m, c = self.on, self.motion, self.memory, self.control
+        on_grid = on.select(c.grid > 0.0, c.grid * (on.real(c.steps) + 1.0), c.time + h)
+        after = on.select(h >= rest, on.absolute(c.end), on_grid)
+        least = motion.least(on, m.y, m.y1)
+        on.when(c.saved < 0, lambda: self._keep(after, least, m.q1, m.y1), lambda: self._instants(after, least))
+        self.unless_ended(lambda: self._go(h, after, least))
+
+    def _keep(self, time: Real, least: Real, q: Vector, y: Vector) -> None:
+        """Keep a state as the next row."""
+        m, row = self.memory, self.control.rows
+        m.rows_t[row, 0], m.rows_t[row, 1] = time, least
+        copy(self.on, q, m.rows_q.row(row))
+        nv = self.motion.increments
+        copy(self.on, y.part(nv, y.size - nv), m.rows_y.row(row))
+        self.control.rows = row + 1
+
+    def _instants(self, after: Real, least: Real) -> None:
+        """Keep the instants within a step: each by a step of its own from the start of this one."""
+        on, motion, m, c = self.on, self.motion, self.memory, self.control
+
+        def inside(wanted: Real) -> None:
+            copy(on, m.k.row(0), m.k2.row(0))
+            part = self.sign * (wanted - c.time)
+            self.status.value = attempt(on, motion, self.tableau, c, m.q, m.y, part, m.k2, m.last, m.y2, m.q2)
+
+            # Near a change of rank a part may be wrong though the whole is right: closing takes out what is across.
+            on.when(self.sound, lambda: allow(on, motion, m, m.y2))
+            error = self._finish(m.k2, part, m.y2, m.q2)
+            right = on.either(c.grid > 0.0, on.negate(error > 1.0)) if motion.closes else True
+            # Where it is not, the step is taken again carefully, and its part in shorter ones.
+            kept = on.both(self.sound, right)
+            on.when(kept, lambda: self._keep(wanted, least, m.q2, m.y2), lambda: self.end(Ending.CAREFUL))
+
+        def one() -> Truth:
+            wanted = m.times[c.saved]
+
+            def keep() -> None:
+                on.when(wanted >= after, lambda: self._keep(wanted, least, m.q1, m.y1), lambda: inside(wanted))
+
+                def count() -> None:
+                    c.saved = c.saved + 1
+
+                self.unless_ended(count)
+
+            due = wanted <= after
+            on.when(due, keep)
+            return on.either(on.either(on.negate(due), self.ended), c.saved >= m.times.size)
+
+        on.when(c.saved < m.times.size, lambda: on.repeat(one))
+
+    def _go(self, h: Real, after: Real, least: Real) -> None:
+        """Make the step's end the state."""
+        on, motion, m, c = self.on, self.motion, self.memory, self.control
+        nv, size = motion.increments, m.y.size
+        c.time, c.steps = after, c.steps + 1
+        c.shortest, c.longest = on.minimum(c.shortest, h), on.maximum(c.longest, h)
+        c.least = on.minimum(c.least, least)
+        copy(on, m.q1, m.q)
+
+        def clear(j: Integer) -> None:
+            m.y[j] = 0.0
+
+        on.loop(nv, clear)
+        copy(on, m.y1.part(nv, size - nv), m.y.part(nv, size - nv))
+        c.rough = 0
+        c.fresh = 0 if motion.closes else 1
+        if not motion.closes:  # Nothing was projected: the last rates are the next first ones.
+            copy(on, m.k.row(self.tableau.a.columns), m.k.row(0))
+            copy(on, m.y.part(nv, nv), m.k.row(0).part(0, nv))
+        c.refusals = 0
+
+        def watch() -> None:
+            on.when(held_back(on, c), lambda: self.end(Ending.STIFF))
+
+        on.when(c.limit > 0.0, watch)

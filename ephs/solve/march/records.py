@@ -1,0 +1,311 @@
+"""What a march works on: equations of motion, a tableau, its control, its memory."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any, Final, final
+
+from ephs.semantics.stage import (
+    Evaluator,
+    Integer,
+    Integers,
+    Matrix,
+    Real,
+    Record,
+    Vector,
+    indices,
+    integer,
+    matrix,
+    real,
+    vector,
+)
+
+__all__ = ["MEMORY", "TABLEAU", "Control", "Ending", "Field", "Memory", "Motion", "Status", "Tableau"]
+
+
+class Ending(IntEnum):
+    """How a march ends.
+
+    Beyond REFUSED: by the status of an evaluation, REFUSED + status.
+    """
+
+    DONE = 0
+    """At the end."""
+    PAUSED = 1
+    """After as many steps as asked."""
+    CAREFUL = 2
+    """Where constraints nearly repeat each other: the next step needs a careful elimination."""
+    SHORT = 3
+    """Where the step gets too short."""
+    FULL = 4
+    """Where no more rows fit."""
+    STIFF = 5
+    """Where stability, or failed evaluations, hold the steps back."""
+    REFUSED = 6
+
+
+class Status(IntEnum):
+    """What an evaluation of a motion says; other numbers are those of its components."""
+
+    SOUND = 0
+    STILL = 20
+    """A freedom moves no mass."""
+    DEPENDENT = 21
+    """Constraints nearly repeat each other."""
+    OPEN = 22
+    """Loops do not close."""
+
+
+class Motion(ABC):
+    """Equations of motion: elements q on a manifold, and y = (v, r, rest) with increments v of q from a base.
+
+    Subclasses are frozen dataclasses whose fields are memory and known values, so that staged functions take them.
+    An error counts the tree's increments, the first `freedoms` of v, its rates r, and what follows r in y.
+    """
+
+    __slots__ = ()
+
+    @property
+    @abstractmethod
+    def increments(self) -> Integer:
+        """Size of v."""
+
+    @property
+    @abstractmethod
+    def freedoms(self) -> Integer:
+        """Size of r."""
+
+    @property
+    @abstractmethod
+    def counted(self) -> Integer:
+        """How many numbers an error counts."""
+
+    @property
+    @abstractmethod
+    def closes(self) -> bool:
+        """Whether steps are closed: projected onto constraints."""
+
+    @abstractmethod
+    def rates(self, on: Evaluator, base: Vector, y: Vector, q: Vector, out: Vector) -> tuple[Integer, Integer]:
+        """Write ẏ at q = base·exp(v) into ``out``, and leave q; return a status and the component that it is of."""
+
+    @abstractmethod
+    def settle(self, on: Evaluator, base: Vector, start: Vector, y: Vector, q: Vector) -> Integer:
+        """Take the end y of a step from ``start`` to a state: base·exp(v) to q, closed, rates in y; return a status."""
+
+    @abstractmethod
+    def sizes(self, on: Evaluator, y0: Vector, y1: Vector, out: Vector) -> None:
+        """Write the sizes of counted numbers over a step to ``out``: relative tolerances are parts of them."""
+
+    @abstractmethod
+    def project(self, on: Evaluator, q: Vector, change: Vector) -> None:
+        """Take the part across the constraints, at q, out of a change (freedoms,) of the rates."""
+
+    @abstractmethod
+    def least(self, on: Evaluator, y0: Vector, y1: Vector) -> Real:
+        """Return the least entropy that a component makes in a step."""
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Field(Motion):
+    """A plain right-hand side ẏ = f(y) on ℝⁿ.
+
+    Parameters
+    ----------
+    function
+        Called with the evaluator, y, the vector for ẏ and the parameters; returns a status.
+    parameters
+        Memory that it reads.
+    size
+        n.
+    """
+
+    function: Callable[[Evaluator, Vector, Vector, Any], Integer]
+    parameters: Any
+    size: Integer
+
+    @property
+    def increments(self) -> Integer:
+        return 0
+
+    @property
+    def freedoms(self) -> Integer:
+        return 0
+
+    @property
+    def counted(self) -> Integer:
+        return self.size
+
+    @property
+    def closes(self) -> bool:
+        return False
+
+    def rates(self, on: Evaluator, base: Vector, y: Vector, q: Vector, out: Vector) -> tuple[Integer, Integer]:
+        return self.function(on, y, out, self.parameters), 0
+
+    def settle(self, on: Evaluator, base: Vector, start: Vector, y: Vector, q: Vector) -> Integer:
+        return 0
+
+    def sizes(self, on: Evaluator, y0: Vector, y1: Vector, out: Vector) -> None:
+        def one(j: Integer) -> None:
+            out[j] = on.maximum(on.absolute(y0[j]), on.absolute(y1[j]))
+
+        on.loop(self.size, one)
+
+    def project(self, on: Evaluator, q: Vector, change: Vector) -> None:
+        """There are no constraints."""
+
+    def least(self, on: Evaluator, y0: Vector, y1: Vector) -> Real:
+        return 0.0
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Tableau:
+    """Coefficients of an explicit method.
+
+    Attributes
+    ----------
+    a
+        (stages + 1, stages): its last row leads to the step's end.
+    error, coarse
+        (stages + 1,): weights of the estimates; `coarse` is taken where eighth[0] is 1.
+    eighth
+        (1,): 1 for estimates of orders 5 and 3 that are combined.
+    """
+
+    a: Matrix
+    error: Vector
+    coarse: Vector
+    eighth: Integers
+
+
+TABLEAU: Final[dict[str, Any]] = {"a": matrix(), "error": vector(), "coarse": vector(), "eighth": indices(1)}
+
+
+class Control(Record):
+    """Where a march stands, and what chooses its steps. Times are counted from the start and grow.
+
+    Attributes
+    ----------
+    time, end
+        Time reached; where it ends, negative for a run backward.
+    origin, span
+        Time at the start; length of the run.
+    step, tried, grid
+        Next step; the one that was tried last; step of a fixed grid, 0 for none.
+    least_step, most_step
+        Bounds of steps.
+    exponent, share, damping, strict
+        As of `ephs.solve.control.Proportional`.
+    before
+        Error of the step before.
+    stiff, limit
+        h·|λ| of the last step; the limit from which stability holds steps back, 0 to leave it.
+    shortest, longest, least
+        Of steps taken: lengths, and least entropy made.
+    failed
+        1 after a step that was rejected.
+    fresh
+        1 where the first rates are known.
+    rough
+        1 where constraints nearly repeated each other at the start: drift says nothing there.
+    saved
+        Number of the next instant to keep, −1 to keep every step.
+    rows
+        Rows kept since they were handed over.
+    held, free
+        Steps that stability held back, and steps since that it did not.
+    refusals
+        Steps without solution, one after the other.
+    component
+        Number of the component that refused an evaluation.
+    steps, rejected, evaluations
+        Counts.
+    """
+
+    time = real()
+    end = real()
+    origin = real()
+    span = real()
+    step = real()
+    tried = real()
+    grid = real()
+    least_step = real()
+    most_step = real()
+    exponent = real()
+    share = real()
+    damping = real()
+    strict = real()
+    before = real()
+    stiff = real()
+    limit = real()
+    shortest = real()
+    longest = real()
+    least = real()
+    failed = integer()
+    fresh = integer()
+    rough = integer()
+    saved = integer()
+    rows = integer()
+    held = integer()
+    free = integer()
+    refusals = integer()
+    component = integer()
+    steps = integer()
+    rejected = integer()
+    evaluations = integer()
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Memory:
+    """The state of a march, and memory for its next step.
+
+    Attributes
+    ----------
+    q, y, k
+        Elements, (v = 0, rates, rest), and rates at the stages (stages + 1, size).
+    q1, y1, q2, y2, k2
+        The same at a step's end, and of a part of a step.
+    last
+        y at the last stage.
+    open
+        (freedoms,): rates before they are put on the constraints.
+    atol, rtol, allowed, fine, coarse
+        (counted,): tolerances, what they allow, estimates.
+    times
+        (instants,): to keep.
+    rows_t, rows_q, rows_y
+        Rows that were kept: (rows, 2) time and least entropy made, (rows, ·) elements, (rows, ·) y without v.
+    """
+
+    q: Vector
+    y: Vector
+    k: Matrix
+    q1: Vector
+    y1: Vector
+    q2: Vector
+    y2: Vector
+    k2: Matrix
+    last: Vector
+    atol: Vector
+    rtol: Vector
+    allowed: Vector
+    open: Vector
+    fine: Vector
+    coarse: Vector
+    times: Vector
+    rows_t: Matrix
+    rows_q: Matrix
+    rows_y: Matrix
+
+
+MEMORY: Final[dict[str, Any]] = {
+    "q": vector(), "y": vector(), "k": matrix(), "q1": vector(), "y1": vector(), "q2": vector(), "y2": vector(),
+    "k2": matrix(), "last": vector(), "atol": vector(), "rtol": vector(), "allowed": vector(), "open": vector(),
+    "fine": vector(), "coarse": vector(), "times": vector(), "rows_t": matrix(2), "rows_q": matrix(),
+    "rows_y": matrix(),
+}  # fmt: skip

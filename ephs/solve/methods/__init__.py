@@ -1,0 +1,1 @@
+"""Methods on the descriptor form of any system: the natural discretisations and Radau IIA."""

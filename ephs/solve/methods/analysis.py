@@ -1,0 +1,224 @@
+"""Rank of the constraints and order of the elimination, decided once and again where a matrix turns singular.
+
+Rank is decided on the constraint matrix, its columns scaled by the square root of the compliance that the storages
+show over a step, (mass/h)^(−1/2); never on the saddle-point matrix, whose pivots are squares of singular values.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ephs.semantics.bundle import Array
+from ephs.semantics.linear.sparse import sparse_lu
+from ephs.semantics.spaces.rank import FOLLOWED, IMPLICIT, REGULAR, rank_of
+from ephs.solve.errors import SolveError
+from ephs.solve.methods.natural_kernels import STORING, Order
+from ephs.solve.model import Model, evaluate_at
+from ephs.solve.sparse import Index, lu_addresses, order
+
+__all__ = ["Analysis", "analyse", "dependent_rows", "exchanged"]
+
+SHRUNK = 1e-6
+DEFECT = 1e-11
+"""Tolerance for a dropped equation, relative to its terms; more asks for another rank decision."""
+
+OTHERWISE = 1e-3
+"""Weight of equations that are not preferred where some are left out: others take part that much more."""
+
+ALIKE = 1e-6
+"""Unknowns that null vectors move by the same but for this share are moved alike."""
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Analysis:
+    """A pivot order for the present values, and the dependent equations that it leaves out.
+
+    Parameters
+    ----------
+    dropped
+        (rows,) 1 where an equation depends on others and is replaced by "this multiplier does not change".
+    redundant
+        The equations left out, in words.
+    """
+
+    order: Order
+    dropped: Index
+    redundant: tuple[str, ...]
+    fill: int
+
+
+def analyse(model: Model, x: Array, z: Array, h: float, before: Index | None = None) -> Analysis:
+    """Decide rank and order at a state and unknowns.
+
+    The pivots that it finds set the order's floor: a pivot that has shrunk to a millionth asks for another order.
+    ``before`` are the equations that were left out so far.
+
+    Raises
+    ------
+    SolveError
+        The motion is not determined: some junction's effort or some state's rate has no equation.
+    """
+    t = model.tables
+    size = model.unknowns
+    status, component, memory = evaluate_at(model, x, z, h)
+    if status:
+        raise SolveError.of_component(status, model, component)
+    values = memory.data
+    dropped = dependent_rows(model, values, before)
+    diagonal = np.arange(size) + t.row.size - size
+    active = np.ones(t.row.size, dtype=bool)
+    active[diagonal] = dropped == 1
+    active &= ~((dropped[t.row] == 1) & (np.arange(t.row.size) < t.row.size - size))
+    data = values.copy()
+    data[diagonal] = 1.0
+    chosen = np.flatnonzero(active)
+    entries = np.where(data[chosen] == 0.0, 1e-300, data[chosen])  # a place that is zero now may fill later
+    try:
+        elimination = order(size, t.row[chosen], t.column[chosen], entries)
+    except RuntimeError as error:
+        raise SolveError.undetermined(model, _null_unknown(model, chosen, data)) from error
+    place = np.full(t.row.size, -1, dtype=np.int64)
+    place[chosen] = elimination.place
+    compiled = Order(
+        rows=elimination.rows,
+        columns=elimination.columns,
+        start=elimination.start,
+        entry=elimination.column,
+        diagonal=elimination.diagonal,
+        place=place,
+        dropped=dropped,
+        floor=np.zeros(size),
+        tolerance=np.array([DEFECT]),
+        lu=lu_addresses(),
+    )
+    c, ratio = compiled, np.zeros(size)
+    factors, scratch = np.zeros(elimination.fill), np.zeros(size)
+    factorise = sparse_lu().compiled()["factorise"]
+    if not factorise(c.place, c.start, c.entry, c.diagonal, data, factors, scratch, c.floor, ratio):
+        raise SolveError.undetermined(model, _null_unknown(model, chosen, data))
+    compiled = compiled._replace(floor=SHRUNK * ratio)
+    redundant = tuple(model.row_name(int(row)) for row in np.flatnonzero(dropped))
+    return Analysis(compiled, dropped, redundant, elimination.fill)
+
+
+def dependent_rows(
+    model: Model, values: Array, before: Index | None = None, rather: NDArray[np.bool_] | None = None
+) -> Index:
+    """Marks constraint equations that depend on the others: (rows,) of 0 and 1.
+
+    Rows that share no effort cannot depend on each other, so that the rank is decided part by part.
+
+    Parameters
+    ----------
+    before
+        (rows,) those marked last time.
+    rather
+        (rows,) those to be marked where there is a choice.
+    """
+    from scipy import linalg
+    from scipy.sparse import block_array, csr_array
+    from scipy.sparse.csgraph import connected_components
+
+    t = model.tables
+    n_rate, n_effort, size = int(t.counts[0]), int(t.counts[1]), model.unknowns
+    out = np.zeros(size, dtype=np.int64)
+    rows = model.constraint_rows
+    if not rows.size:
+        return out
+    of = np.full(size, -1)
+    of[rows] = np.arange(rows.size)
+    inside = (of[t.row] >= 0) & (t.column >= n_rate) & (t.column < n_rate + n_effort)
+    entries = (values[inside], (of[t.row[inside]], t.column[inside] - n_rate))
+    matrix = csr_array(entries, shape=(rows.size, n_effort)) @ _compliance(model, values)
+    count, part = connected_components(block_array([[None, matrix], [matrix.T, None]]), directed=False)
+    for members in _groups(part[: rows.size], count):
+        local = matrix[members]
+        dense = local[:, np.unique(local.indices)].toarray()
+        if not dense.size:  # equations without efforts hold of themselves, or contradict
+            out[rows[members]] = 1
+            continue
+        norms = np.linalg.norm(dense, axis=1)
+        dense /= np.where(norms > 0.0, norms, 1.0)[:, None]
+        factors: Any = linalg.qr(dense.T, mode="r", pivoting=True)
+        triangle, pivots = factors
+        sizes = np.zeros(members.size)
+        sizes[: min(triangle.shape)] = np.abs(np.diag(triangle))
+        rank = rank_of(sizes, IMPLICIT)
+        if before is not None:
+            held = members.size - int(before[rows[members]].sum())
+            rank = min(rank, max(held, rank_of(sizes, FOLLOWED)))
+        left = pivots[rank:]
+        if rather is not None and left.size:
+            left = exchanged(triangle, pivots, rank, np.where(rather[rows[members]], 1.0, OTHERWISE))
+        out[rows[members[left]]] = 1
+    return out
+
+
+def exchanged(triangle: Array, pivots: Index, rank: int, weights: Array) -> Index:
+    """Rows without which as many independent ones are left: those of the largest weighted part in the dependences.
+
+    The dependences are the null vectors (of the transpose) of a matrix whose rows have this pivoted triangle.
+    """
+    from scipy import linalg
+
+    dependences = np.zeros((pivots.size - rank, pivots.size))
+    dependences[:, pivots[rank:]] = np.eye(pivots.size - rank)
+    if rank:
+        dependences[:, pivots[:rank]] = -linalg.solve_triangular(triangle[:rank, :rank], triangle[:rank, rank:]).T
+    found: Any = linalg.qr(dependences * weights, mode="r", pivoting=True)
+    return found[1][: pivots.size - rank]
+
+
+def _groups(part: Index, count: int) -> list[Index]:
+    """The places of each number below count that occurs."""
+    order = np.argsort(part, kind="stable")
+    cuts = np.searchsorted(part[order], np.arange(count + 1))
+    return [order[a:b] for a, b in pairwise(cuts) if b > a]
+
+
+def _compliance(model: Model, values: Array) -> Any:
+    """Block-diagonal square root of ∂e/∂w at storages, the identity at efforts that no storage gives; sparse."""
+    from scipy.sparse import csr_array
+
+    t = model.tables
+    rows: list[Index] = []
+    columns: list[Index] = []
+    entries: list[Array] = []
+    plain = np.ones(int(t.counts[1]), dtype=bool)
+    storing = np.flatnonzero(t.kind == STORING)
+    for n in np.unique(t.dims[storing, 0]):
+        if not n:  # of a fixed joint
+            continue
+        these = storing[t.dims[storing, 0] == n]
+        places = t.jacobian[t.jacobian_at[these, None] + np.arange(n * n)]
+        block = -np.where(places >= 0, values[places], 0.0).reshape(-1, n, n)
+        sigma, vectors = np.linalg.eigh(0.5 * (block + block.swapaxes(1, 2)))
+        sound = (sigma[:, -1] > 0.0) & (sigma[:, 0] > REGULAR * sigma[:, -1])
+        index = t.e_index[t.e_at[these[sound], None] + np.arange(n)]
+        rows.append(np.repeat(index, n, axis=1).ravel())
+        columns.append(np.tile(index, (1, n)).ravel())
+        root = np.sqrt(sigma[sound])[:, None, :]
+        entries.append(((vectors[sound] * root) @ vectors[sound].swapaxes(1, 2)).ravel())
+        plain[index.ravel()] = False
+    rest = np.flatnonzero(plain)
+    whole = (
+        np.concatenate([*entries, np.ones(rest.size)]),
+        (np.concatenate([*rows, rest]), np.concatenate([*columns, rest])),
+    )
+    return csr_array(whole, shape=(plain.size, plain.size))
+
+
+def _null_unknown(model: Model, chosen: Index, data: Array) -> int:
+    """The first of the unknowns that null vectors of the matrix move most, whichever of them span its null space."""
+    t, size = model.tables, model.unknowns
+    matrix = np.zeros((size, size))
+    np.add.at(matrix, (t.row[chosen], t.column[chosen]), data[chosen])
+    matrix /= np.maximum(np.abs(matrix).max(axis=1, initial=0.0), 1e-300)[:, None]
+    _, sizes, vectors = np.linalg.svd(matrix)
+    least = min(rank_of(sizes, IMPLICIT), size - 1)
+    moved = np.linalg.norm(vectors[least:], axis=0)
+    return int(np.flatnonzero(moved >= (1.0 - ALIKE) * moved.max())[0])

@@ -1,0 +1,172 @@
+"""Methods that discretise component by component, and one step of theirs with inputs that change."""
+
+from dataclasses import replace
+from typing import Protocol
+
+import numpy as np
+
+from ephs.semantics.bundle import Array
+from ephs.solve.errors import LARGEST, Outcome, SolveError
+from ephs.solve.methods.natural import Chunk, NaturalState
+from ephs.solve.model import Model, evaluate_at
+from ephs.solve.problem import Problem
+from ephs.solve.snapshot import Snapshot
+
+__all__ = ["ComponentMethod", "advance_driven", "advance_whole", "started"]
+
+ROUNDS = 12
+CUTS = 6
+"""How often a step without solution is halved."""
+_CURABLE = (Outcome.DIVERGED, Outcome.SINGULAR, Outcome.CONTRADICTION)
+_DOMAINS = (Outcome.TURN, Outcome.TEMPERATURE, Outcome.EXTENT, Outcome.DOMAIN)
+
+
+class ComponentMethod(Protocol):
+    """A method that discretises component by component: `Natural`, `Natural4`."""
+
+    model: Model
+    name: str
+    order: int
+    nodes: tuple[float, ...]
+    changes: int
+
+    @property
+    def redundant(self) -> tuple[str, ...]:
+        """The equations that the method leaves out, in words."""
+        ...
+
+    def init(self, x: Array) -> NaturalState:
+        """The state of the method at the states x."""
+        ...
+
+    def energies(self, x: Array) -> Array:
+        """(components,): energy of each storage at the states x."""
+        ...
+
+    def prepare(self, state: NaturalState, h: float) -> None:
+        """Compile what is not in the cache, before time counts."""
+        ...
+
+    def advance(
+        self, state: NaturalState, h: float, steps: int, inputs: Array | None = None
+    ) -> tuple[NaturalState, Chunk]:
+        """Up to so many steps of h seconds."""
+        ...
+
+    def snapshot(self) -> Snapshot:
+        """Memory from step to step besides the state."""
+        ...
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go on from a snapshot."""
+        ...
+
+    def points(self, state: NaturalState, h: float, x: Array) -> list[Array]:
+        """The states at the nodes of a step of h seconds from x, by the rates that ``state`` holds."""
+        ...
+
+    def stage_points(self, state: NaturalState, h: float, x: Array) -> list[Array]:
+        """The states at the nodes of the step from x that led to ``state``."""
+        ...
+
+
+def started(method: ComponentMethod, x: Array, sums: Array) -> NaturalState:
+    """The state of a method that starts at the states x, with what was counted before."""
+    return replace(method.init(x), sums=sums)
+
+
+def advance_whole(
+    method: ComponentMethod, state: NaturalState, h: float, steps: int, inputs: Array | None = None, cuts: int = CUTS
+) -> tuple[NaturalState, Chunk]:
+    """Up to so many steps of h seconds; one that has no solution is taken in halves, and these so on ``cuts`` times.
+
+    A part keeps every balance and every joint as a whole step does. A step in which the motion itself leaves the domain
+    of a component, as by half a turn, is not cut; one whose iteration does is.
+    """
+    chunks: list[Chunk] = []
+    while steps:
+        state, chunk = method.advance(state, h, steps, inputs)
+        chunk = _finite(method.model, chunk)
+        chunks.append(chunk)
+        steps -= chunk.steps
+        failure = chunk.failure
+        if failure is None or not cuts or failure.outcome not in (*_CURABLE, *_DOMAINS):
+            break
+        after, parts = advance_whole(method, state, 0.5 * h, 2, inputs, cuts - 1)
+        if failure.outcome in _DOMAINS:
+            if _leaves(method.model, state.x, after.z if parts.failure is None else state.z, h):
+                break
+            if parts.failure is not None and failure.outcome in (Outcome.TURN, Outcome.DOMAIN):
+                chunks[-1] = replace(chunk, failure=failure.of_iteration())
+        if parts.failure is not None:
+            break
+        ledgers = parts.ledgers[-1:].copy()
+        ledgers[0, 4] = parts.ledgers[:, 4].min()
+        chunks[-1] = replace(chunk, failure=None)
+        chunks.append(Chunk(parts.x[-1:], parts.energies[-1:], ledgers, parts.iterations, None, 1))
+        state, steps = after, steps - 1
+    if len(chunks) == 1:
+        return state, chunks[0]
+    return state, Chunk(
+        np.concatenate([chunk.x for chunk in chunks]),
+        np.concatenate([chunk.energies for chunk in chunks]),
+        np.concatenate([chunk.ledgers for chunk in chunks]),
+        sum(chunk.iterations for chunk in chunks),
+        chunks[-1].failure,
+        sum(chunk.cut for chunk in chunks),
+    )
+
+
+def _leaves(model: Model, x: Array, z: Array, h: float) -> bool:
+    """Whether a step of h seconds from the states x leaves a component's domain by the unknowns z of another step.
+
+    It counts as if it did where z holds no rates yet.
+    """
+    last = z.reshape(-1, model.unknowns)[-1]
+    return not last[: int(model.tables.counts[0])].any() or bool(evaluate_at(model, x, last, h)[0])
+
+
+def _finite(model: Model, chunk: Chunk) -> Chunk:
+    """The chunk up to the first step whose states are beyond the range of numbers, and that as its failure."""
+    sound = np.abs(chunk.x).max(axis=1, initial=0.0) < LARGEST
+    if sound.all():
+        return chunk
+    first = int(np.argmin(sound))
+    entry = int(np.argmin(np.abs(chunk.x[first]) < LARGEST))
+    state = next(s for s in model.descriptor.states if s.point.start <= entry < s.point.stop)
+    failure = SolveError(Outcome.RANGE, str(state.path), "")
+    return replace(
+        chunk, x=chunk.x[:first], energies=chunk.energies[:first], ledgers=chunk.ledgers[:first], failure=failure
+    )
+
+
+def advance_driven(
+    problem: Problem, method: ComponentMethod, state: NaturalState, t: float, h: float
+) -> tuple[NaturalState, Chunk]:
+    """One step with inputs at the method's nodes; of the state they are taken at the step's own, by iteration."""
+    if problem.constant:
+        return advance_whole(method, state, h, 1)
+    d = problem.descriptor
+
+    def given(points: list[Array]) -> Array:
+        rows: list[Array] = []
+        for node, x in zip(method.nodes, points, strict=True):
+            inputs = problem.inputs(t + node * h, d.unpack(x))
+            rows.append(np.concatenate([*(inputs[slot.path].value for slot in d.outer), np.zeros(1)]))
+        return np.array(rows)
+
+    inputs = given(method.points(state, h, state.x))
+    first, last = advance_whole(method, state, h, 1, inputs), np.inf
+    found = first
+    for _ in range(ROUNDS):
+        if found[1].failure is not None:
+            return found
+        again = given(method.stage_points(found[0], h, state.x))
+        change = float(np.max(np.abs(again - inputs), initial=0.0))
+        if change <= 1e-13 * float(np.max(np.abs(again), initial=0.0)):
+            return found
+        if change >= 0.9 * last:  # a feedback too stiff for this step: what was guessed first is what is left
+            return first
+        last, inputs = change, again
+        found = advance_whole(method, state, h, 1, inputs)
+    return found

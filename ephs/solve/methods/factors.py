@@ -1,0 +1,26 @@
+"""Factors of a dense matrix, or the failure that says that there are none."""
+
+from typing import Any
+
+import numpy as np
+from scipy.linalg import get_lapack_funcs
+
+from ephs.semantics.bundle import Array
+from ephs.solve.errors import Outcome, SolveError
+
+__all__ = ["factors"]
+
+
+def factors(matrix: Any, equation: str = "") -> tuple[Array, Array]:
+    """(LU, pivots) of a real or complex square matrix, for `scipy.linalg.lu_solve`.
+
+    Raises
+    ------
+    SolveError
+        The matrix is singular, or holds numbers that are not finite.
+    """
+    (factorise,) = get_lapack_funcs(("getrf",), (matrix,))
+    lu, pivots, info = factorise(matrix)
+    if info > 0 or not np.isfinite(lu).all():
+        raise SolveError(Outcome.SINGULAR, "", equation)
+    return lu, pivots

@@ -1,0 +1,297 @@
+"""The natural method: every component discretised on its own, order 2, energy and holonomic relations exact.
+
+The state of the method is a value; advancing it is compiled, and gives one row of results a step.
+"""
+
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from ephs.semantics.bundle import Array
+from ephs.semantics.kernel_table import RAISED
+from ephs.semantics.numbering import spans
+from ephs.solve.errors import Outcome, SolveError
+from ephs.solve.methods.analysis import Analysis, analyse
+from ephs.solve.methods.blame import Blame
+from ephs.solve.methods.natural_kernels import COMPONENT, DIVERGED, DONE, INCONSISTENT, PIVOT, Memory, advance
+from ephs.solve.model import Model, evaluate_at
+from ephs.solve.snapshot import Snapshot, parts
+from ephs.solve.sparse import Index
+
+__all__ = [
+    "Chunk",
+    "Decided",
+    "Natural",
+    "NaturalState",
+    "guessed_efforts",
+    "has_choice",
+    "of_status",
+    "stored_energies",
+]
+
+SETTLING = 16
+"""Steps after a change of order until the next: the values at the change itself may be exceptional."""
+_OUTCOMES = {DIVERGED: Outcome.DIVERGED, PIVOT: Outcome.SINGULAR, INCONSISTENT: Outcome.CONTRADICTION}
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class NaturalState:
+    """Where the method stands.
+
+    Parameters
+    ----------
+    x
+        (point_size,) the states.
+    z, previous
+        (unknowns,) the unknowns of the last two steps, from which the next are guessed.
+    sums
+        (4 + components,): heat, energy supplied, exergy supplied, entropy made; entropy made by each component.
+    """
+
+    x: Array
+    z: Array
+    previous: Array
+    sums: Array
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Decided:
+    """Where an order of elimination was decided: states, unknowns, the step in s, the equations left out before."""
+
+    x: Array
+    z: Array
+    h: float
+    before: Index | None
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Chunk:
+    """Results of some steps, one row each, and what stopped them early.
+
+    Parameters
+    ----------
+    x
+        (steps, point_size).
+    energies
+        (steps, components): energy of each storage in J, entropy made so far by each irreversible component in J/K.
+    ledgers
+        (steps, 5): heat, energy supplied, exergy supplied, entropy made, least entropy production in the step.
+    cut
+        How many of the steps were taken in parts.
+    """
+
+    x: Array
+    energies: Array
+    ledgers: Array
+    iterations: int
+    failure: SolveError | None
+    cut: int = 0
+
+    @property
+    def steps(self) -> int:
+        """Number of steps taken."""
+        return int(self.x.shape[0])
+
+
+@final
+class Natural:
+    """The natural method for one model.
+
+    Parameters
+    ----------
+    model
+        The compiled model. The method keeps scratch memory: use one for each thread.
+
+    Attributes
+    ----------
+    analysis
+        The present order of elimination, None before the first step.
+    changes
+        How often the order was decided anew.
+    nodes
+        Where in a step inputs are wanted.
+    """
+
+    name = "natural"
+    order = 2
+    nodes = (0.5,)
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        self.analysis: Analysis | None = None
+        self.changes = 0
+        self._memory: Memory = model.memory()
+        self._unsettled = 0
+        self._dropped: Index | None = None
+        self._decided: Decided | None = None
+
+    def init(self, x: Array) -> NaturalState:
+        """The state of the method at the states x; unknowns are guessed from the efforts there."""
+        z = guessed_efforts(self.model, x)
+        return NaturalState(x.copy(), z, z.copy(), np.zeros(4 + len(self.model.descriptor.components)))
+
+    def energies(self, x: Array) -> Array:
+        """(components,): energy of each storage at the states x, zero elsewhere."""
+        return stored_energies(self.model, x)
+
+    def prepare(self, state: NaturalState, h: float) -> None:
+        """Decide the order of elimination and compile what is not in the cache, before time counts."""
+        model = self.model
+        x, z, previous, sums = (a.copy() for a in (state.x, state.z, state.previous, state.sums))
+        order, rows = self._order(x, z, h).order, np.empty((0, x.size))
+        energies, ledgers = np.empty((0, model.tables.kind.size)), np.empty((0, 5))
+        advance(
+            model.tables, order, x, z, previous, model.scal(h), model.input_values(), self._memory, sums, 0,
+            rows, energies, ledgers,
+        )  # fmt: skip
+
+    def step(self, state: NaturalState, h: float, inputs: Array | None = None) -> NaturalState:
+        """One step of h seconds.
+
+        Raises
+        ------
+        SolveError
+            The step has no solution, or lies outside the method's domain.
+        """
+        after, chunk = self.advance(state, h, 1, inputs)
+        if chunk.failure is not None:
+            raise chunk.failure
+        return after
+
+    def advance(
+        self, state: NaturalState, h: float, steps: int, inputs: Array | None = None
+    ) -> tuple[NaturalState, Chunk]:
+        """Up to ``steps`` steps of h seconds; the chunk says what stopped them early.
+
+        Parameters
+        ----------
+        inputs
+            (1, …) values at the outer ports during these steps, the model's own where None.
+        """
+        model, t = self.model, self.model.tables
+        given = model.input_values() if inputs is None else inputs[0]
+        x, z, previous, sums = (a.copy() for a in (state.x, state.z, state.previous, state.sums))
+        rows = np.empty((steps, x.size))
+        energies, ledgers = np.empty((steps, t.kind.size)), np.empty((steps, 5))
+        scal = model.scal(h)
+        done = iterations = 0
+        failure: SolveError | None = None
+        fresh = False
+        while done < steps and failure is None:
+            try:
+                analysis = self._order(x, z, h)
+            except SolveError as error:
+                failure = error
+                break
+            order = analysis.order
+            wanted = steps - done
+            if fresh:  # nothing better is to be had: take this one step with whatever pivots there are
+                order, wanted = order._replace(floor=np.zeros_like(order.floor)), 1
+            elif self._unsettled:
+                wanted = min(wanted, self._unsettled)
+            status, component, taken, spent = advance(
+                t, order, x, z, previous, scal, given, self._memory, sums, wanted,
+                rows[done:], energies[done:], ledgers[done:],
+            )  # fmt: skip
+            done, iterations = done + taken, iterations + spent
+            if status == DONE:
+                fresh = False
+                self._settle(taken)
+            elif status >= COMPONENT and (fresh or not has_choice(order.dropped, status)):
+                failure = SolveError.of_component(status, model, component)
+            elif fresh:
+                blame = Blame(model, order.dropped)
+                failure = blame.contradicted(x, z, h) if status == INCONSISTENT else of_status(status)
+                if status == DIVERGED:
+                    failure = blame.diverged(self._memory.residual, self._memory.scale)
+            else:
+                self.analysis, fresh, self._unsettled = None, True, SETTLING
+        after = NaturalState(x, z, previous, sums)
+        return after, Chunk(rows[:done], energies[:done], ledgers[:done], int(iterations), failure)
+
+    @property
+    def redundant(self) -> tuple[str, ...]:
+        """The equations that the method leaves out, in words."""
+        return self.analysis.redundant if self.analysis is not None else ()
+
+    def snapshot(self) -> Snapshot:
+        """Where the present order of elimination was decided, and the equations left out before."""
+        return {
+            "decided": parts(self._decided) if self.analysis is not None else None,
+            "dropped": self._dropped,
+            "unsettled": self._unsettled,
+            "changes": self.changes,
+        }
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Decide the order as it was decided."""
+        self.analysis, found = None, snapshot["decided"]
+        if found is not None:
+            self._dropped = found["before"]
+            self._order(found["x"], found["z"], found["h"])
+        self._dropped, self._unsettled = snapshot["dropped"], snapshot["unsettled"]
+        self.changes = snapshot["changes"]
+
+    def points(self, state: NaturalState, h: float, x: Array) -> list[Array]:
+        """The state in the middle of a step from x, by the rates that ``state`` holds."""
+        return self.stage_points(state, h, x)
+
+    def stage_points(self, state: NaturalState, h: float, x: Array) -> list[Array]:
+        """The state in the middle of the step from x that led to ``state``."""
+        d = self.model.descriptor
+        return [d.advance(x, 0.5 * h * state.z[: d.rate_size])]
+
+    def _order(self, x: Array, z: Array, h: float) -> Analysis:
+        if self.analysis is None:
+            self._decided = Decided(x.copy(), z.copy(), float(h), self._dropped)
+            self.analysis = analyse(self.model, x, z, h, self._dropped)
+            self._dropped = self.analysis.dropped
+            self.changes += 1
+            self._memory = self._memory._replace(factors=np.zeros(self.analysis.fill))
+        return self.analysis
+
+    def _settle(self, taken: int) -> None:
+        if self._unsettled:
+            self._unsettled = max(0, self._unsettled - taken)
+            if not self._unsettled:
+                self.analysis = None
+
+
+def guessed_efforts(model: Model, x: Array) -> Array:
+    """Unknowns at the states x: the efforts of storages, zero where one has none; all else zero."""
+    d, n_rate = model.descriptor, int(model.tables.counts[0])
+    z, storages = np.zeros(model.unknowns), model.storages()
+    status, _, memory = evaluate_at(storages, x, z, 0.0)
+    if not status:
+        t = storages.tables
+        rates = t.read_w[spans(t.read_w_at, t.dims[:, 2])]
+        z[n_rate + t.e_index[spans(t.e_at, t.dims[:, 0])]] = -memory.residual[rates]
+        return z
+    for slot in d.components:  # one after the other, as one of them has no effort there
+        if slot.primitive.kind == "storage":
+            with suppress(Exception):
+                z[[n_rate + i for i in slot.efforts]] = slot.primitive.effort(d.point(slot, x), model.reference)
+    return z
+
+
+def stored_energies(model: Model, x: Array) -> Array:
+    """(components,): energy of each storage at the states x, zero elsewhere."""
+    status, component, memory = evaluate_at(model, x, guessed_efforts(model, x), 0.0)
+    if status:
+        raise SolveError.of_component(status, model, component)
+    return memory.energy
+
+
+def has_choice(dropped: Index, status: int) -> bool:
+    """Whether leaving out other equations may keep a step within the domain of the component that gave this status."""
+    return bool(dropped.any()) and status != COMPONENT + RAISED
+
+
+def of_status(status: int) -> SolveError:
+    """Outcome of a step as a whole by the compiled loop's status."""
+    return SolveError(_OUTCOMES[status], "", "")

@@ -1,0 +1,332 @@
+"""The natural method of order 4: three Gauss stages, energy and holonomic relations exact, friction included.
+
+The corrections that make it so are one term a component (see `gauss_kernels`), so that discretising commutes with
+composing as it does at order 2. A composition of steps of order 2 would have to step backwards through dissipation.
+"""
+
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ephs.semantics.bundle import Array
+from ephs.semantics.linear.sparse import sparse_lu
+from ephs.semantics.primitives import Kernel
+from ephs.semantics.pullback import pulled_ports
+from ephs.semantics.spaces.codes import SE3
+from ephs.solve.errors import Outcome, SolveError
+from ephs.solve.methods.analysis import DEFECT, SHRUNK, analyse, dependent_rows
+from ephs.solve.methods.blame import Blame
+from ephs.solve.methods.collocation import moments, values
+from ephs.solve.methods.gauss_kernels import Groups, Scheme, Stages, gauss_advance, linearise
+from ephs.solve.methods.natural import (
+    Chunk,
+    Decided,
+    NaturalState,
+    guessed_efforts,
+    has_choice,
+    of_status,
+    stored_energies,
+)
+from ephs.solve.methods.natural_kernels import COMPONENT, DIVERGED, DONE, INCONSISTENT, STORING, Memory, Order
+from ephs.solve.model import Model, evaluate_at
+from ephs.solve.snapshot import Snapshot, parts
+from ephs.solve.sparse import Index, lu_addresses, order
+
+__all__ = ["Natural4"]
+
+INSTANT = 1e-7
+"""The step, in s, over which derivatives by increments are taken at a stage: so short that it is an instant."""
+
+AS_BEFORE, AT_START, WITHIN = 0, 1, 2
+"""Where the order of elimination of a step was decided: for a step before it, at its start, by its unknowns."""
+
+_STAGES = 3
+_NODES = 0.5 * (1.0 + np.polynomial.legendre.leggauss(_STAGES)[0])
+SCHEME = Scheme(np.array([moments(_NODES, c) for c in _NODES]), moments(_NODES, 1.0))
+AHEAD = np.array([values(_NODES, 1.0 + c) for c in _NODES])
+
+
+@final
+class Natural4:
+    """The method for one model. It keeps scratch memory: use one for each thread.
+
+    Attributes
+    ----------
+    nodes
+        Where in a step inputs are wanted.
+    changes
+        How often the order of elimination was decided anew.
+    redundant
+        The equations that it leaves out, in words.
+    """
+
+    name = "natural4"
+    order = 4
+    nodes = tuple(_NODES.tolist())
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        self.changes = 0
+        self.redundant: tuple[str, ...] = ()
+        t, n = model.tables, model.unknowns
+        self._memory: Memory = model.memory()
+        self._where = _entries(model)
+        self._groups = _groups(model, self._where)
+        self._closing = _closing(model, self._groups)
+        size, entries, rates = int(model.descriptor.point_size), int(t.row.size), int(t.counts[0])
+        k, nodes = _STAGES, len(self._groups.node)
+        self._scratch = Stages(
+            x=np.zeros((k, size)), v=np.zeros((k, rates)), turn=np.zeros((k, 8)), outer=np.zeros((k, 8)),
+            whole=np.zeros(rates), mean=np.zeros(n), gradient=np.zeros(rates),
+            share=np.zeros((nodes, k)), factor=np.zeros(nodes), end=np.zeros(nodes), gap=np.zeros(n),
+            energy=np.zeros(t.kind.size), residual=np.zeros((k, n)), scale=np.zeros((k, n)),
+            data=np.zeros((k, entries)), slope=np.zeros((k, entries)), matrix=np.zeros(len(self._where)),
+            change=np.zeros(k * n), dense=np.zeros(k * n), factors=np.zeros(1), pivot=np.zeros(k * n),
+            small=np.zeros(200),
+        )  # fmt: skip
+        self._order: Order | None = None
+        self._dropped: Index | None = None
+        self._decided: Decided | None = None
+        self._inputs, self._tried = np.zeros(0), AS_BEFORE
+
+    def init(self, x: Array) -> NaturalState:
+        """The state of the method at the states x; unknowns are guessed from the efforts there."""
+        z = np.tile(guessed_efforts(self.model, x), (_STAGES, 1))
+        return NaturalState(x.copy(), z, z.copy(), np.zeros(4 + len(self.model.descriptor.components)))
+
+    def energies(self, x: Array) -> Array:
+        """(components,): energy of each storage at the states x, zero elsewhere."""
+        return stored_energies(self.model, x)
+
+    def prepare(self, state: NaturalState, h: float) -> None:
+        """Decide the order of elimination and compile what is not in the cache, before time counts."""
+        self.advance(state, h, 0)
+
+    def points(self, state: NaturalState, h: float, x: Array) -> list[Array]:
+        """The states at the nodes of a step from x, by the rates that ``state`` holds, continued."""
+        d, rates = self.model.descriptor, int(self.model.tables.counts[0])
+        ahead = [moments(_NODES, 1.0 + c) - SCHEME.b for c in self.nodes]
+        return [d.advance(x, h * (weights @ state.z[:, :rates])) for weights in ahead]
+
+    def stage_points(self, state: NaturalState, h: float, x: Array) -> list[Array]:
+        """The states at the nodes of the step that was solved last."""
+        return list(self._scratch.x.copy())
+
+    def advance(
+        self, state: NaturalState, h: float, steps: int, inputs: Array | None = None
+    ) -> tuple[NaturalState, Chunk]:
+        """Up to ``steps`` steps of h seconds; the chunk says what stopped them early.
+
+        Parameters
+        ----------
+        inputs
+            (3, …) values at the outer ports at the nodes of these steps, the model's own where None.
+        """
+        model, t = self.model, self.model.tables
+        given = np.tile(model.input_values(), (_STAGES, 1)) if inputs is None else np.ascontiguousarray(inputs)
+        x, z, previous, sums = (a.copy() for a in (state.x, state.z, state.previous, state.sums))
+        rows, energies, ledgers = np.empty((steps, x.size)), np.empty((steps, t.kind.size)), np.empty((steps, 5))
+        scal, still, unit = (model.scal(value) for value in (h, 0.0, INSTANT))
+        parts = np.array([model.scal(h * weight) for weight in SCHEME.b])
+        done = iterations = 0
+        failure: SolveError | None = None
+        tried = AT_START if self._order is None else AS_BEFORE
+        while failure is None:
+            try:
+                if self._order is None:
+                    self._decide(x, z, h, given, tried)
+            except SolveError as error:
+                failure = error
+                break
+            assert self._order is not None
+            o = self._order._replace(floor=np.zeros_like(self._order.floor)) if tried else self._order
+            wanted = min(steps - done, 1) if tried else steps - done
+            status, component, taken, spent = gauss_advance(
+                t, self._groups, SCHEME, o, self._where, x, z, previous, scal, still, unit, parts, given, AHEAD,
+                self._memory, self._scratch, sums, wanted, rows[done:], energies[done:], ledgers[done:],
+            )  # fmt: skip
+            done, iterations = done + taken, iterations + spent
+            if status == DONE:
+                tried = AS_BEFORE
+                if done >= steps:
+                    break
+            elif status >= COMPONENT and (tried == WITHIN or not has_choice(o.dropped, status)):
+                failure = SolveError.of_component(status, model, component)
+            elif tried == WITHIN:
+                blame = Blame(model, o.dropped[: model.unknowns])
+                failure = blame.contradicted(x, z[-1], h) if status == INCONSISTENT else of_status(status)
+                if status == DIVERGED:
+                    failure = blame.diverged(self._scratch.residual, self._scratch.scale)
+            else:  # another order, at these values
+                self._order, tried = None, tried + 1
+        after = NaturalState(x, z, previous, sums)
+        return after, Chunk(rows[:done], energies[:done], ledgers[:done], int(iterations), failure)
+
+    def snapshot(self) -> Snapshot:
+        """Where the present order of elimination was decided, and the equations left out before."""
+        return {
+            "decided": parts(self._decided) if self._order is not None else None,
+            "inputs": self._inputs,
+            "tried": self._tried,
+            "dropped": self._dropped,
+            "changes": self.changes,
+        }
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Decide the order as it was decided."""
+        self._order, found = None, snapshot["decided"]
+        if found is not None:
+            self._dropped = found["before"]
+            self._decide(found["x"], found["z"], found["h"], snapshot["inputs"], snapshot["tried"])
+        self._dropped, self.changes = snapshot["dropped"], snapshot["changes"]
+
+    def _decide(self, x: Array, z: Array, h: float, inputs: Array, tried: int) -> None:
+        """Rank of the constraints, and an order of elimination for all stages, at these values.
+
+        Where loops are closed, at the start, equations follow from others that do not in a step that is not solved yet;
+        but some follow there only, such as in alignment.
+        """
+        model, t, n = self.model, self.model.tables, self.model.unknowns
+        self._decided, self._inputs = Decided(x.copy(), z.copy(), float(h), self._dropped), inputs.copy()
+        self._tried = tried
+        status, component, memory = evaluate_at(model, x, z[0], h)
+        if status:
+            raise SolveError.of_component(status, model, component)
+        values = memory.data
+        if tried == AT_START:
+            status, component, memory = evaluate_at(model, x, z[0], 0.0)
+            if status:
+                raise SolveError.of_component(status, model, component)
+            values = np.where(np.isin(t.row, model.constraint_rows), memory.data, values)
+        dropped = self._dropped = dependent_rows(model, values, self._dropped, self._closing)
+        s = self._scratch
+        status, component = linearise(
+            t,
+            self._groups,
+            SCHEME,
+            dropped,
+            x,
+            z,
+            model.scal(h),
+            model.scal(0.0),
+            model.scal(INSTANT),
+            inputs,
+            self._memory,
+            s,
+            True,
+        )
+        if status:
+            raise SolveError.of_component(int(status), model, int(component))
+        where = self._where
+        i, j, source = where.T
+        inside = source >= 0
+        rows = np.where(inside, t.row[source], -source - 1) + i * n
+        columns = np.where(inside, t.column[source], -source - 1) + j * n
+        in_rates = inside & (t.column[source] < t.counts[0])
+        data = np.where(inside & (i == j), s.data[i, source], 0.0)
+        data += np.where(in_rates, h * SCHEME.a[i, j] * s.slope[i, source], 0.0)
+        out = dropped[np.where(inside, t.row[source], -source - 1)] == 1
+        data[~inside] = 1.0
+        active = np.where(inside, ~out, out)
+        chosen = np.flatnonzero(active)
+        entries = np.where(data[chosen] == 0.0, 1e-300, data[chosen])  # a place that is zero now may fill later
+        try:
+            found = order(_STAGES * n, rows[chosen], columns[chosen], entries)
+        except RuntimeError as error:
+            raise self._singular(x, z, h) from error
+        place = np.full(len(where), -1, dtype=np.int64)
+        place[chosen] = found.place
+        made = Order(
+            found.rows, found.columns, found.start, found.column, found.diagonal, place, np.tile(dropped, _STAGES),
+            np.zeros(_STAGES * n), np.array([DEFECT]), lu_addresses(),
+        )  # fmt: skip
+        self._scratch = s._replace(factors=np.zeros(found.fill))
+        ratio = np.zeros(_STAGES * n)
+        matrix = np.where(active, data, 0.0)
+        factorise = sparse_lu().compiled()["factorise"]
+        if not factorise(
+            place, made.start, made.entry, made.diagonal, matrix, self._scratch.factors, s.dense, made.floor, ratio
+        ):
+            raise self._singular(x, z, h)
+        self._order = made._replace(floor=SHRUNK * ratio)
+        self.redundant = tuple(model.row_name(int(row)) for row in np.flatnonzero(dropped))
+        self.changes += 1
+
+    def _singular(self, x: Array, z: Array, h: float) -> SolveError:
+        """Why there is no order of elimination: an unknown without equation, or only these values."""
+        try:
+            analyse(self.model, x, z[0], h, self._dropped)
+        except SolveError as error:
+            return error
+        return SolveError(Outcome.SINGULAR, "", "")
+
+
+def _groups(model: Model, where: Index) -> Groups:
+    """The velocities of joints: twists of two frames, and a velocity on the pair's group; storages of entropy alone."""
+    rows: list[tuple[int, int, int, int]] = []
+    metrics: list[Array] = []
+    for number, slot in enumerate(model.descriptor.components):
+        kernel = slot.primitive.kernel
+        inside = kernel.inner or kernel if kernel is not None else None
+        if kernel is not None and inside is not None and inside.name == "holonomic":
+            code, efforts = int(inside.parameters[0]), list(slot.efforts)
+            for (first, matrix), group in zip(_ports(kernel, len(efforts)), (SE3, SE3, code), strict=True):
+                dim = matrix.shape[1]
+                if dim:
+                    rows.append((number, group, efforts[first], dim))
+                    metric = np.zeros((6, 6))
+                    metric[:dim, :dim] = matrix.T @ matrix
+                    metrics.append(metric)
+    table = np.array(rows, dtype=np.int64).reshape(-1, 4)
+    number, code, effort, dim = (np.ascontiguousarray(column) for column in table.T)
+    node, slope = _nodes(model)
+    place = {source: k for k, source in enumerate(slope.tolist())}
+    entry = np.zeros((len(node), _STAGES, _STAGES), dtype=np.int64)
+    for k, (i, j, source) in enumerate(where.tolist()):
+        if source in place:
+            entry[place[source], i, j] = k
+    return Groups(number, code, effort, dim, np.array(metrics).reshape(-1, 6, 6), node, slope, entry)
+
+
+def _nodes(model: Model) -> tuple[Index, Index]:
+    """(nodes, 3) and (nodes,): storages of entropy alone whose temperature depends on it, as `Groups` has them."""
+    t = model.tables
+    found: list[tuple[int, int, int]] = []
+    slopes: list[int] = []
+    for c in np.flatnonzero((t.kind == STORING) & (t.dims[:, 0] == 1)).tolist():
+        effort, slope = int(t.e_index[t.e_at[c]]), int(t.jacobian[t.jacobian_at[c]])
+        if t.entropy[effort] == 1.0 and slope >= 0:
+            found.append((c, int(t.read_w[t.read_w_at[c]]), int(t.counts[0]) + effort))
+            slopes.append(slope)
+    return np.array(found, dtype=np.int64).reshape(-1, 3), np.array(slopes, dtype=np.int64)
+
+
+def _closing(model: Model, groups: Groups) -> NDArray[np.bool_]:
+    """(rows,) the equations of components whose relation holds over a step."""
+    t, out = model.tables, np.zeros(model.unknowns, dtype=np.bool_)
+    for number in np.unique(groups.component):
+        first = int(t.counts[0] + t.counts[1] + t.multiplier_at[number])
+        out[first : first + int(t.dims[number, 1])] = True
+    return out
+
+
+def _ports(kernel: Kernel, size: int) -> list[tuple[int, Array]]:
+    """(first of its efforts, the map by which the relation sees them) of the two frames and the freedoms of a joint."""
+    if kernel.inner is None:
+        return [(0, np.eye(6)), (6, np.eye(6)), (12, np.eye(size - 12))]
+    found = [(at, matrix) for _, _, at, _, matrix in pulled_ports(kernel)]
+    return found if len(found) == 3 else [*found, (size, np.zeros((0, 0)))]
+
+
+def _entries(model: Model) -> Index:
+    """(entries, 3): stage of the row, stage of the column, entry of the model's matrix; −1 − row: its place holder."""
+    t, n = model.tables, model.unknowns
+    plain, rates = t.row.size - n, int(t.counts[0])
+    out: list[tuple[int, int, int]] = []
+    for i in range(_STAGES):
+        for source in range(plain):
+            others = range(_STAGES) if t.column[source] < rates else (i,)
+            out += [(i, j, source) for j in others]
+        out += [(i, i, -1 - row) for row in range(n)]
+    return np.array(out, dtype=np.int64).reshape(-1, 3)

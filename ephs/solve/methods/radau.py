@@ -1,0 +1,348 @@
+"""Radau IIA of order 5 on the descriptor form: stiff, adaptive, constraints met at every step.
+
+The collocation method of Hairer and Wanner, *Solving Ordinary Differential Equations II*, IV.8, written for implicit
+equations g(x, ẋ, e, λ) = 0: the unknowns of a stage are its rates, efforts and multipliers, so neither a mass matrix
+nor a choice of causality is needed, and what is algebraic in them is met at the end of the step, which is a stage.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, final
+
+import numpy as np
+from scipy.linalg import get_lapack_funcs
+from scipy.sparse.linalg import splu
+
+from ephs.semantics.bundle import Array
+from ephs.solve.control import Control
+from ephs.solve.errors import LARGEST, Outcome, SolveError
+from ephs.solve.methods.collocation import moments, values
+from ephs.solve.methods.continuous import Continuous, Matrices
+from ephs.solve.methods.natural import guessed_efforts
+from ephs.solve.methods.natural_kernels import IRREVERSIBLE
+from ephs.solve.methods.passages import Passages
+from ephs.solve.model import compile_model
+from ephs.solve.problem import Problem
+from ephs.solve.snapshot import Snapshot, like, parts
+from ephs.solve.stepping import Attempt, Row, Span
+
+__all__ = ["COEFFICIENTS", "DEFECT", "GAMMA", "NODES", "T_INVERSE", "VALUES", "Radau", "RadauState", "T"]
+
+_S6 = 6.0**0.5
+NODES = np.array([(4.0 - _S6) / 10.0, (4.0 + _S6) / 10.0, 1.0])
+DENSE = 48
+"""Unknowns up to which factorising without regard to zeros is faster."""
+ITERATIONS = 10
+
+
+COEFFICIENTS = np.array([moments(NODES, node) for node in NODES])
+_EIGENVALUES, _VECTORS = np.linalg.eig(COEFFICIENTS)
+_ORDER = [
+    int(np.argmin(np.abs(np.imag(_EIGENVALUES)))),
+    int(np.argmax(np.imag(_EIGENVALUES))),
+    int(np.argmin(np.imag(_EIGENVALUES))),
+]
+VALUES = _EIGENVALUES[_ORDER]
+"""Eigenvalues of the coefficients: the real one, then the pair."""
+GAMMA = float(VALUES[0].real)
+T = _VECTORS[:, _ORDER]
+T_INVERSE = np.linalg.inv(T)
+# The embedded method of order 3 takes γ₀ of the rate at the start; its defect, weight by weight.
+_ORDER_3 = np.array([1.0 - GAMMA, 1.0 / 2.0, 1.0 / 3.0])
+DEFECT = np.linalg.solve(np.vander(NODES, increasing=True).T, _ORDER_3) - COEFFICIENTS[-1]
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class RadauState:
+    """Where the method stands.
+
+    Parameters
+    ----------
+    x, z
+        The states, and the unknowns there: rates, efforts, multipliers, outer flows.
+    sums
+        (4 + components,): heat, energy supplied, exergy supplied, entropy made; entropy made by each component.
+    """
+
+    t: float
+    x: Array
+    z: Array
+    sums: Array
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Books:
+    """Powers of a step.
+
+    Parameters
+    ----------
+    powers
+        (stages, 4 + components) rates of the ledgers at the stages.
+    passed
+        (1 + stages, 2, passages) heat in W and entropy in W/K that is passed at the start and the stages.
+    """
+
+    powers: Array
+    passed: Array
+
+
+@final
+class Radau:
+    """The method for one problem whose states are on vector spaces."""
+
+    name = "radau"
+    order = 5
+    exponent = 4.0
+
+    def __init__(self, problem: Problem, t0: float, control: Control) -> None:
+        self.problem = problem
+        self.model = compile_model(problem.descriptor, problem.reference, problem.inputs(t0, problem.initial))
+        self.equations = Continuous(self.model)
+        self._passages = Passages(self.model)
+        self.rtol, self.atol = control.rtol.rates(problem.descriptor), control.atol.rates(problem.descriptor)
+        self.evaluations = self.factorisations = self.iterations = 0
+        self._rates = int(self.model.tables.counts[0])
+        self._makers = self.model.tables.kind == IRREVERSIBLE
+        self._matrices: Matrices | None = None
+        self._solvers: tuple[float, Any, Any] | None = None
+        self._current: RadauState | None = None
+        self._last: tuple[RadauState, Array, Array] | None = None
+
+    def inputs(self, t: float, x: Array) -> Array:
+        """Values at the outer ports, one after the other."""
+        given = self.problem.inputs(t, self.problem.descriptor.unpack(x))
+        return np.concatenate([*(given[slot.path].value for slot in self.problem.descriptor.outer), np.zeros(1)])
+
+    def start(self, t: float, h: float) -> RadauState:
+        """The initial state; rates and multipliers there come from a step too short to move anything.
+
+        Raises
+        ------
+        SolveError
+            The states contradict the constraints: however short the step, they jump.
+        """
+        d = self.model.descriptor
+        x = d.pack(self.problem.initial)
+        z = guessed_efforts(self.model, x)
+        start = RadauState(t, x.copy(), z, np.zeros(4 + len(d.components)))
+        first, second = (self._solved(start, 1e-7 * h * part)[1] for part in (1.0, 0.5))
+        jumps = [self._size(end - x, x) for end in (first, second)]
+        if jumps[1] > 0.75 * jumps[0] and jumps[1] > 1.0:
+            entry = int(np.argmax(np.abs(second - x) / (self.atol + self.rtol * np.abs(x))))
+            raise SolveError(Outcome.INCONSISTENT, self._path(entry), "the constraints do not hold at the start")
+        z = self._solved(start, 0.5e-7 * h)[0][-1]
+        self._matrices = None
+        return replace(start, z=z)
+
+    def prepare(self, state: RadauState, h: float) -> None:
+        """Nothing is left to do: the start has evaluated everything."""
+
+    def many(self, span: Span[RadauState]) -> None:
+        """None: one step a call."""
+
+    def step(self, state: RadauState, h: float) -> Attempt[RadauState]:
+        """One step of h seconds, solved to a fraction of the tolerances.
+
+        Raises
+        ------
+        SolveError
+            The stages have no solution near by, or lie outside the domain of a component.
+        """
+        stages, x, iterations = self._solved(state, h)
+        if not np.abs(x).max(initial=0.0) < LARGEST:
+            raise SolveError(Outcome.RANGE, self._path(int(np.argmin(np.abs(x) < LARGEST))), "")
+        books = self._books(state, h, stages)
+        error = self._error(state, h, stages, x)
+        end = self._end(state, h, 1.0, x, stages[-1].copy(), books)
+        made = (end.sums - state.sums)[4:][self._makers]
+        self.iterations += iterations
+        if iterations > 4:
+            self._matrices = None
+        return Attempt(state, end, h, error, float(made.min(initial=np.inf)) if made.size else 0.0, (stages, books))
+
+    def inside(self, attempt: Attempt[RadauState], t: float) -> RadauState:
+        """The state at a time within the step, by its collocation polynomial."""
+        stages, books = attempt.detail
+        start, h = attempt.start, attempt.h
+        theta = (t - start.t) / h
+        x = start.x + h * moments(NODES, theta) @ stages[:, : self._rates]
+        return self._end(start, h, theta, x, values(NODES, theta) @ stages, books)
+
+    def at(self, state: RadauState, t: float) -> RadauState:
+        """The same state at a time that differs by rounding."""
+        return replace(state, t=t)
+
+    def anew(self, state: RadauState) -> RadauState:
+        """The same state as one to start from; what it holds of the step before is a first guess only."""
+        return replace(state)
+
+    def rows(self, states: Sequence[RadauState]) -> list[Row]:
+        """Records of many states."""
+        return [self.row(state) for state in states]
+
+    def row(self, state: RadauState) -> Row:
+        """Record of a state."""
+        energies = self.equations.energies(state.x, state.z, self.inputs(state.t, state.x))
+        return Row(state.x, np.where(self._makers, state.sums[4:], energies), state.sums[:4])
+
+    def stats(self) -> dict[str, Any]:
+        """Counts, for the solution's statistics."""
+        return {
+            "form": "paper",
+            "iterations": self.iterations,
+            "evaluations": self.evaluations,
+            "factorisations": self.factorisations,
+            "unknowns": self.model.unknowns,
+        }
+
+    def snapshot(self, state: RadauState) -> Snapshot:
+        """Where the matrices were made, and for which step they were factorised."""
+        made = self._current if self._matrices is not None else None
+        return {
+            "made": parts(made),
+            "here": made is state,
+            "step": self._solvers[0] if self._solvers is not None and made is not None else None,
+            "counts": [self.evaluations, self.factorisations, self.iterations],
+        }
+
+    def restore(self, snapshot: Snapshot, state: RadauState) -> None:
+        """Make the matrices where they were made."""
+        self._matrices, self._solvers, found = None, None, snapshot["made"]
+        if found is not None:
+            self._refresh(state if snapshot["here"] else like(state, found))
+            if snapshot["step"] is not None:
+                self._solve(snapshot["step"])
+        self.evaluations, self.factorisations, self.iterations = snapshot["counts"]
+
+    def _solved(self, state: RadauState, h: float) -> tuple[Array, Array, int]:
+        """Stages, the states at the end, and how many iterations that took."""
+        if self._matrices is None:
+            self._refresh(state)
+        try:
+            stages, iterations = self._stages(state, h)
+        except SolveError:
+            if self._current is state:
+                raise
+            self._refresh(state)
+            stages, iterations = self._stages(state, h)
+        return stages, state.x + h * COEFFICIENTS[-1] @ stages[:, : self._rates], iterations
+
+    def _books(self, state: RadauState, h: float, stages: Array) -> Books:
+        """What the ledgers get at the stages, and the heat that is passed there and at the start."""
+        xs = state.x + h * COEFFICIENTS @ stages[:, : self._rates]
+        powers, passed = list[Array](), list[Array]()
+        for x, z, c in zip(xs, stages, NODES, strict=True):
+            sums, flows = self.equations.powers(x, z, self.inputs(state.t + c * h, x))
+            powers.append(sums)
+            passed.append(self._passages.powers(flows, z))
+        first = self._passages.powers(self._known(state)[1], state.z)
+        return Books(np.array(powers), np.array([first, *passed]))
+
+    def _known(self, state: RadauState) -> tuple[Array, Array]:
+        """(components,) stored energies, and the flows into all components."""
+        if self._last is None or self._last[0] is not state:
+            given = self.model.input_values()  # neither depends on them
+            energies = self.equations.energies(state.x, state.z, given)
+            self._last = state, energies, self.equations.powers(state.x, state.z, given)[1]
+        return self._last[1:]
+
+    def _end(self, state: RadauState, h: float, theta: float, x: Array, z: Array, books: Books) -> RadauState:
+        """The state at a part of a step of h seconds: its heat is booked by energy, see `Heats`."""
+        t, weights, passages = state.t + theta * h, h * moments(NODES, theta), self._passages
+        sums = state.sums + weights @ books.powers
+        if passages.states.size:
+            x[passages.states] = state.x[passages.states]
+            energies = [self._known(state)[0], self.equations.energies(x, z, self.model.input_values())]
+            missed = theta * h * (GAMMA * books.passed[0, 0] + DEFECT @ books.passed[1:, 0])
+            booked = passages.booked(
+                state.x, np.tensordot(weights, books.passed[1:], 1), missed, np.array(energies), sums[1] - state.sums[1]
+            )
+            x[passages.states] = booked.entropies
+            sums[0] += booked.heat
+            sums[3] += booked.made.sum()
+            sums[4:] += booked.made
+        return RadauState(t, x, z, sums)
+
+    def _refresh(self, state: RadauState) -> None:
+        self._matrices = self.equations.matrices(state.x, state.z, self.inputs(state.t, state.x))
+        self._current = state
+        self._solvers = None
+
+    def _solve(self, h: float) -> tuple[Any, Any]:
+        """Solvers with ∂g/∂z + h·μ·∂g/∂x for the real and the complex eigenvalue μ."""
+        if self._solvers is None or self._solvers[0] != h:
+            m = self._matrices
+            assert m is not None
+            real = _solver(m.unknowns + (h * GAMMA) * m.states, self.model.unknown_name)
+            rest = _solver(m.unknowns + (h * complex(VALUES[1])) * m.states, self.model.unknown_name)
+            self._solvers = h, real, rest
+            self.factorisations += 1
+        return self._solvers[1], self._solvers[2]
+
+    def _stages(self, state: RadauState, h: float) -> tuple[Array, int]:
+        real, rest = self._solve(h)
+        stages = np.tile(state.z, (3, 1))
+        rates = self._rates
+        parts, before = np.zeros((1, rates)), np.inf
+        for iteration in range(1, ITERATIONS + 1):
+            xs = state.x + h * COEFFICIENTS @ stages[:, :rates]
+            found = np.array(
+                [
+                    self.equations.residual(x, z, self.inputs(state.t + c * h, x))
+                    for x, z, c in zip(xs, stages, NODES, strict=True)
+                ]
+            )
+            self.evaluations += 3
+            turned = T_INVERSE @ found
+            pair = rest(turned[1])
+            change = np.real(T @ np.array([real(np.real(turned[0])), pair, np.conj(pair)]))
+            stages -= change
+            parts = np.abs(h * COEFFICIENTS @ change[:, :rates]) / (self.atol + self.rtol * np.abs(state.x))
+            moved = float(np.max(parts, initial=0.0))
+            if not np.isfinite(moved):
+                break
+            # Rounding stops the iteration where the tolerances are beyond it.
+            if moved <= 1e-3 or (iteration > 2 and moved > 0.3 * before and moved <= 1e-1):
+                return stages, iteration
+            if iteration > 2 and moved > 2.0 * before:
+                break
+            before = moved
+        entry = int(np.argmax(np.nan_to_num(parts.max(axis=0), nan=np.inf)))
+        raise SolveError(Outcome.DIVERGED, self._path(entry), "its rate at the stages")
+
+    def _path(self, entry: int) -> str:
+        """The state that an entry of x belongs to."""
+        states = self.model.descriptor.states
+        return str(next(slot.path for slot in states if slot.point.start <= entry < slot.point.stop))
+
+    def _error(self, state: RadauState, h: float, stages: Array, x: Array) -> float:
+        """The difference to the embedded method, filtered by the equations as the stiff part of it must be."""
+        real, _ = self._solve(h)
+        m = self._matrices
+        assert m is not None
+        rates = self._rates
+        raw = np.zeros(state.z.size)
+        raw[:rates] = h * (GAMMA * state.z[:rates] + DEFECT @ stages[:, :rates])
+        correction = real(-(m.states @ raw))
+        difference = raw[:rates] + h * GAMMA * correction[:rates]
+        return self._size(difference, np.maximum(np.abs(state.x), np.abs(x)))
+
+    def _size(self, difference: Array, x: Array) -> float:
+        """Largest entry relative to its tolerance."""
+        return float(np.max(np.abs(difference) / (self.atol + self.rtol * np.abs(x)), initial=0.0))
+
+
+def _solver(matrix: Any, name: Callable[[int], str]) -> Callable[[Array], Array]:
+    if matrix.shape[0] <= DENSE:
+        whole = matrix.toarray()
+        factorise, solve = get_lapack_funcs(("getrf", "getrs"), (whole,))
+        factors, pivots, info = factorise(whole, overwrite_a=True)
+        if info > 0 or not np.isfinite(factors).all():
+            raise SolveError(Outcome.SINGULAR, "", name(info - 1) if info > 0 else "")
+        return lambda right: solve(factors, pivots, right)[0]
+    try:
+        return splu(matrix.tocsc()).solve
+    except RuntimeError as error:  # what SuperLU says of a singular matrix
+        raise SolveError(Outcome.SINGULAR, "", "") from error

@@ -1,0 +1,206 @@
+"""Mobility and redundant constraints of large systems: solved along the constraints, dense where loops close.
+
+`instant.mobility` counts the same on one dense matrix, for tests. Here a constraint that has as many rows as one of its
+ports has efforts gives this port's effort from the others'; that is a block of full rank. What is left over are the
+constraints that close loops: only they are written in the efforts that remained free, and their rank is computed, group
+by group of those that have free efforts in common.
+"""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from ephs.operad import Path
+from ephs.semantics.bundle import Array
+from ephs.semantics.descriptor import Descriptor
+from ephs.semantics.primitives import Reversible
+from ephs.semantics.spaces.rank import CONSTRAINT
+from ephs.solve.instant import Mobility
+from ephs.solve.sparse import Index
+
+__all__ = ["mobility"]
+
+SOUND = 1e-3
+"""A block whose least singular value is below this fraction of its row norms is not divided by."""
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class _Condition:
+    """Rows on the efforts of some junctions, 0 = Σ block · effort; ``size`` (k,) are the rows' norms."""
+
+    blocks: Mapping[int, Array]
+    size: Array
+
+
+@final
+class _Solved:
+    """Efforts of junctions as linear functions of free ones."""
+
+    def __init__(self) -> None:
+        self.given: dict[int, dict[int, Array]] = {}  # junction -> the junctions before it, with a matrix each
+        self._whole: dict[int, dict[int, Array]] = {}
+
+    def by_free(self, junction: int, dims: Index) -> dict[int, Array]:
+        """The effort of a junction: free junction -> matrix; of a free junction itself the identity."""
+        stack = [junction]
+        while stack:
+            here = stack[-1]
+            before = self.given[here]
+            missing = [other for other in before if other not in self._whole and other != here]
+            if here in self._whole or not missing:
+                stack.pop()
+                if here not in self._whole:
+                    self._whole[here] = self._sum(here, before, int(dims[here]))
+            else:
+                stack += missing
+        return self._whole[junction]
+
+    def _sum(self, here: int, before: Mapping[int, Array], dim: int) -> dict[int, Array]:
+        if here in before:
+            return {here: np.eye(dim)}
+        out: dict[int, Array] = {}
+        for other, matrix in before.items():
+            for free, whole in self._whole[other].items():
+                term = matrix @ whole
+                out[free] = out[free] + term if free in out else term
+        return out
+
+
+def mobility(descriptor: Descriptor, x: Array, prescribed: Collection[Path] = ()) -> Mobility:
+    """Count motions and redundant constraints at a state.
+
+    Motions are efforts of odd quantities (velocities, currents) that satisfy all constraints and vanish at ports whose
+    effort is prescribed.
+    """
+    odd = [slot for slot in descriptor.junctions if slot.quantity.parity < 0]
+    dims = np.array([slot.quantity.space.dim for slot in odd], dtype=np.int64)
+    conditions = _conditions(descriptor, x, prescribed, {slot.at: i for i, slot in enumerate(odd)}, dims)
+    solved, left = _solve(conditions, dims)
+    rows = sum(condition.size.size for condition in conditions)
+    rank = rows - sum(condition.size.size for condition in left) + _rank_of_loops(left, solved, dims)
+    return Mobility(int(dims.sum()) - rank, rows - rank)
+
+
+def _conditions(
+    d: Descriptor, x: Array, prescribed: Collection[Path], number: Mapping[int, int], dims: Index
+) -> list[_Condition]:
+    """All constraints on odd efforts; rows that have none are left out."""
+    out: list[_Condition] = []
+    junction_of = {at + i: (junction, i) for at, junction in number.items() for i in range(int(dims[junction]))}
+    for slot in d.outer:
+        if slot.path in prescribed and slot.at in number:
+            dim = int(dims[number[slot.at]])
+            out.append(_Condition({number[slot.at]: np.eye(dim)}, np.ones(dim)))
+    for slot in d.components:
+        if not (slot.multipliers and isinstance(slot.primitive, Reversible)):
+            continue
+        _, constraint = slot.primitive.structure(d.point(slot, x))
+        blocks: dict[int, Array] = {}
+        for column, effort in enumerate(slot.efforts):
+            if effort in junction_of:
+                junction, i = junction_of[effort]
+                block = blocks.setdefault(junction, np.zeros((slot.multipliers, int(dims[junction]))))
+                block[:, i] += constraint[:, column]
+        whole = np.hstack([np.zeros((slot.multipliers, 0)), *blocks.values()])
+        kept = np.abs(whole).max(axis=1, initial=0.0) > 0.0
+        if kept.any():
+            size = np.linalg.norm(whole[kept], axis=1)
+            out.append(_Condition({junction: block[kept] for junction, block in blocks.items()}, size))
+    return out
+
+
+def _solve(conditions: list[_Condition], dims: Index) -> tuple[_Solved, list[_Condition]]:
+    """Walk from what is known outwards; where nothing more follows, let an effort be free and go on.
+
+    A condition serves when all its ports but those of one square block are known, or can be let free for it: conditions
+    on one port first, then those that touch what is known.
+    """
+    solved, used = _Solved(), set[int]()
+    touching: dict[int, list[int]] = {}
+    for i, condition in enumerate(conditions):
+        for junction in condition.blocks:
+            touching.setdefault(junction, []).append(i)
+    queue = [i for i, condition in enumerate(conditions) if len(condition.blocks) == 1]
+    seeds = iter(range(dims.size))
+    while True:
+        while queue:
+            i = queue.pop()
+            if i in used:
+                continue
+            fresh = _use(conditions[i], solved, dims)
+            if fresh:
+                used.add(i)
+                queue += [j for junction in fresh for j in touching[junction] if j not in used]
+        seed = next((j for j in seeds if j not in solved.given), None)
+        if seed is None:
+            break
+        solved.given[seed] = {seed: np.eye(int(dims[seed]))}
+        queue += [j for j in touching.get(seed, []) if j not in used]
+    return solved, [condition for i, condition in enumerate(conditions) if i not in used]
+
+
+def _use(condition: _Condition, solved: _Solved, dims: Index) -> list[int]:
+    """The junctions that a condition settles, one by its rows and the others free; none if it does not serve."""
+    unknown = [junction for junction in condition.blocks if junction not in solved.given]
+    square = [j for j in unknown if condition.blocks[j].shape[0] == condition.blocks[j].shape[1]]
+    for junction in square:
+        block = condition.blocks[junction]
+        scaled = block / condition.size[:, None]
+        if np.linalg.svd(scaled, compute_uv=False)[-1] < SOUND:
+            continue
+        for free in unknown:
+            if free != junction:
+                solved.given[free] = {free: np.eye(int(dims[free]))}
+        inverse = np.linalg.inv(block)
+        others = {other: -inverse @ matrix for other, matrix in condition.blocks.items() if other != junction}
+        solved.given[junction] = others
+        return unknown
+    return []
+
+
+def _rank_of_loops(left: list[_Condition], solved: _Solved, dims: Index) -> int:
+    """The rank of what closes loops, in free efforts."""
+    written: list[tuple[Mapping[int, Array], Array]] = []
+    leader: dict[int, int] = {}
+
+    def find(junction: int) -> int:
+        leader.setdefault(junction, junction)
+        while leader[junction] != junction:
+            leader[junction] = leader[leader[junction]]
+            junction = leader[junction]
+        return junction
+
+    for condition in left:
+        terms: dict[int, Array] = {}
+        for junction, block in condition.blocks.items():
+            for free, matrix in solved.by_free(junction, dims).items():
+                term = block @ matrix
+                terms[free] = terms[free] + term if free in terms else term
+        written.append((terms, condition.size))
+        roots = [find(free) for free in terms]
+        for root in roots:
+            leader[root] = roots[0]
+    groups: dict[int, list[tuple[Mapping[int, Array], Array]]] = {}
+    for written_terms, size in written:
+        if written_terms:
+            groups.setdefault(find(next(iter(written_terms))), []).append((written_terms, size))
+    return sum(_rank(group, dims) for group in groups.values())
+
+
+def _rank(group: list[tuple[Mapping[int, Array], Array]], dims: Index) -> int:
+    at: dict[int, int] = {}
+    width = 0
+    for terms, _ in group:
+        for free in terms:
+            if free not in at:
+                at[free], width = width, width + int(dims[free])
+    matrix, row = np.zeros((sum(size.size for _, size in group), width)), 0
+    for terms, size in group:
+        for free, block in terms.items():
+            matrix[row : row + size.size, at[free] : at[free] + block.shape[1]] = block / size[:, None]
+        row += size.size
+    sigma = np.linalg.svd(matrix, compute_uv=False)
+    return int(np.sum(sigma > CONSTRAINT * max(float(sigma[0]), 1.0))) if sigma.size else 0

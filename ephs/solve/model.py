@@ -1,0 +1,263 @@
+"""The compiled model of a system: its descriptor form as tables of numbers and addresses."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import final
+
+import numpy as np
+
+from ephs.operad import Path
+from ephs.semantics.bundle import Array, Reference
+from ephs.semantics.descriptor import Descriptor, Input
+from ephs.semantics.kernel_table import Callback
+from ephs.semantics.numbering import spans, starts, sums
+from ephs.semantics.spaces import manifold
+from ephs.solve.layout import entry_of, laid_out
+from ephs.solve.methods.natural_kernels import STORING, Memory, Tables, evaluate
+from ephs.solve.sparse import Index
+
+__all__ = ["Model", "compile_model"]
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Model:
+    """A system ready for the time loop.
+
+    Parameters
+    ----------
+    descriptor
+        The flat system and the places of its unknowns.
+    inputs
+        What is prescribed at the outer ports.
+    tables
+        The same for compiled code.
+    callbacks
+        Python primitives by component number; they must outlive the tables that hold their addresses.
+    constraint_rows
+        The rows of the equations that may depend on one another: constraints and prescribed efforts.
+    """
+
+    descriptor: Descriptor
+    reference: Reference
+    inputs: Mapping[Path, Input]
+    tables: Tables
+    callbacks: Mapping[int, Callback]
+    constraint_rows: Index
+
+    @property
+    def unknowns(self) -> int:
+        """Number of unknowns and equations."""
+        return int(self.tables.counts[3])
+
+    def scal(self, h: float) -> Array:
+        """(h, θ₀, π₀) as kernels want it."""
+        return np.array([h, self.reference.temperature, self.reference.pressure])
+
+    def input_values(self) -> Array:
+        """The values of the inputs, port by port."""
+        values = [self.inputs[slot.path].value for slot in self.descriptor.outer]
+        return np.concatenate([*values, np.zeros(1)])
+
+    def memory(self, fill: int = 1) -> Memory:
+        """Scratch memory for the loop, for factors of ``fill`` entries."""
+        t = self.tables
+        n, k, nv, nx = (int(t.dims[:, i].max(initial=0)) for i in range(4))
+        size, rows = int(t.row.size), self.unknowns
+        return Memory(
+            e=np.zeros(n + 1),
+            lam=np.zeros(k + 1),
+            v=np.zeros(max(nv, 6) + 1),
+            x=np.zeros(nx + 8),
+            f=np.zeros(n * n + n + 1),
+            c=np.zeros(k + 2),
+            jac=np.zeros((n + k) * (n + k + nv) + 1),
+            work=np.zeros(4096),
+            data=np.zeros(size),
+            factors=np.zeros(fill),
+            residual=np.zeros(rows),
+            scale=np.zeros(rows),
+            block=np.zeros(t.group.size),
+            group=np.zeros(int(t.group.max(initial=0)) + 1),
+            step=np.zeros(rows),
+            dense=np.zeros(rows),
+            flows=np.zeros(int(t.e_index.size) + 1),
+            energy=np.zeros(t.kind.size),
+            defect=np.zeros(1),
+            pivot=np.zeros(rows),
+        )
+
+    def storages(self) -> "Model":
+        """The model without what is no storage."""
+        t, stored = self.tables, np.flatnonzero(self.tables.kind == STORING)
+        keys = (
+            "kind", "address", "dims", "parameter_at", "e_at", "multiplier_at", "read_x_at", "read_w_at", "jacobian_at"
+        )  # fmt: skip
+        return replace(self, tables=t._replace(**{key: getattr(t, key)[stored] for key in keys}))
+
+    def path_of(self, component: int) -> Path:
+        """The path of a component by its number."""
+        return self.descriptor.components[component].path
+
+    def unknown_name(self, column: int) -> str:
+        """An unknown, in words."""
+        n_rate, n_effort = int(self.tables.counts[0]), int(self.tables.counts[1])
+        if column < n_rate:
+            return (
+                f"the rate of {next(s for s in self.descriptor.states if s.rates.start <= column < s.rates.stop).path}"
+            )
+        if column < n_rate + n_effort:
+            at = column - n_rate
+            junctions = self.descriptor.junctions
+            return f"the effort at junction {next(j for j in junctions if j.efforts.start <= at < j.efforts.stop).path}"
+        return self.row_name(column).replace("the constraint of", "a multiplier of")
+
+    def row_path(self, row: int) -> str:
+        """The path of the state, junction or component that the equation of a row, or its unknown, belongs to."""
+        n_rate, n_effort = int(self.tables.counts[0]), int(self.tables.counts[1])
+        d, at = self.descriptor, row - n_rate - n_effort
+        if row < n_rate:
+            return str(next(s for s in d.states if s.rates.start <= row < s.rates.stop).path)
+        if at < 0:
+            return str(next(j for j in d.junctions if j.efforts.start <= row - n_rate < j.efforts.stop).path)
+        return next((str(s.path) for s in d.components if s.multiplier <= at < s.multiplier + s.multipliers), "")
+
+    def row_name(self, row: int) -> str:
+        """The equation of a row, in words."""
+        n_rate, n_effort = int(self.tables.counts[0]), int(self.tables.counts[1])
+        d = self.descriptor
+        if row < n_rate:
+            state = next(s for s in d.states if s.rates.start <= row < s.rates.stop)
+            return f"the effort of storage {state.path}"
+        if row < n_rate + n_effort:
+            junction = next(j for j in d.junctions if j.efforts.start <= row - n_rate < j.efforts.stop)
+            return f"the balance of flows at junction {junction.path}"
+        at = row - n_rate - n_effort
+        for slot in d.components:
+            if slot.multiplier <= at < slot.multiplier + slot.multipliers:
+                return f"the constraint of {slot.path}"
+        return "the prescribed effort of an outer port"
+
+
+def compile_model(
+    descriptor: Descriptor, reference: Reference, inputs: Mapping[Path, Input] | None, *, matrix: bool = True
+) -> Model:
+    """Tabulate a descriptor form. Kernels are compiled where needed, and cached on disk.
+
+    Parameters
+    ----------
+    matrix
+        Whether to lay out the Jacobian, which most of the tables is; without it storages and irreversible components
+        are there, and the whole cannot be evaluated.
+
+    Raises
+    ------
+    AssemblyError
+        An outer port without input, or an input without port.
+    """
+    d, n = descriptor, descriptor.numbering
+    given = d.complete_inputs(inputs)
+    n_rate, n_effort, n_lam = d.rate_size, d.effort_size, d.multiplier_size
+    size = d.unknowns(given)
+    each = [entry_of(primitive, reference, reversible=matrix) for primitive in n.primitives]
+    counts = np.array([entry.counts for entry in each], dtype=np.int64).reshape(-1, 5)[n.primitive]
+    kinds, numbers, reads = counts[:, 0], counts[:, 1], counts[:, 4]
+    junction_dims, state_dims, state_sizes = n.dims(n.junctions), n.dims(n.states), n.sizes(n.states)
+    effort_at, rate_at, point_at = starts(junction_dims), starts(state_dims), starts(state_sizes)
+    e_flat = spans(effort_at[n.wires], junction_dims[n.wires])
+    x_flat = spans(point_at[n.reads], state_sizes[n.reads])
+    w_flat = spans(rate_at[n.reads], state_dims[n.reads])
+    dims = np.stack(
+        [counts[:, 2], counts[:, 3], sums(state_dims[n.reads], reads), sums(state_sizes[n.reads], reads)], axis=1
+    )
+    known = np.concatenate([*(entry.numbers for entry in each), np.zeros(1)])
+    known_at = starts(np.array([entry.numbers.size for entry in each], dtype=np.int64))[n.primitive]
+    callbacks = {
+        int(i): callback
+        for number, entry in enumerate(each)
+        if (callback := entry.callback) is not None
+        for i in np.flatnonzero(n.primitive == number)
+    }
+    there = np.concatenate([np.zeros(0), *(reference.intensive(q) for q in n.quantities)])
+    there_at = starts(np.array([q.space.dim for q in n.quantities], dtype=np.int64))
+    intensive = there[spans(there_at[n.junctions], junction_dims)]
+    entropy = np.array([float(q.kind == "entropy") for q in n.quantities])[n.junctions]
+    codes = np.array([manifold(q.space).code for q in n.quantities], dtype=np.int64)[n.states]
+    outer, input_at, at, unknown = [], [], 0, n_rate + n_effort + n_lam
+    for junction in d.outer:
+        dim, prescribed = junction.quantity.space.dim, given[junction.path].effort
+        outer.append([junction.at, dim, int(prescribed), unknown if prescribed else -1])
+        input_at.append(at)
+        at += dim
+        unknown += dim if prescribed else 0
+    block, group = _blocks(d, given)
+    table = Tables(
+        counts=np.array([n_rate, n_effort, n_lam, size], dtype=np.int64),
+        kind=kinds,
+        address=np.array([entry.address for entry in each], dtype=np.int64)[n.primitive],
+        dims=dims,
+        parameters=np.append(known[spans(known_at, numbers)], 0.0),
+        parameter_at=starts(numbers),
+        e_index=np.append(e_flat, 0),
+        e_at=starts(dims[:, 0]),
+        multiplier_at=starts(n.multipliers),
+        read_x=np.append(x_flat, 0),
+        read_x_at=starts(dims[:, 3]),
+        read_w=np.append(w_flat, 0),
+        read_w_at=starts(dims[:, 2]),
+        jacobian=np.zeros(1, dtype=np.int64),
+        jacobian_at=np.zeros(kinds.size, dtype=np.int64),
+        states=np.stack([codes, point_at, state_sizes, rate_at, state_dims], axis=1),
+        intensive=intensive,
+        entropy=np.repeat(entropy, junction_dims),
+        row=np.zeros(1, dtype=np.int64),
+        column=np.zeros(1, dtype=np.int64),
+        template=np.zeros(1),
+        block=block,
+        group=group,
+        outer=np.array(outer, dtype=np.int64).reshape(-1, 4),
+        input_at=np.array(input_at, dtype=np.int64),
+    )
+    first = n_rate + n_effort
+    model = Model(d, reference, given, table, callbacks, np.arange(first, size, dtype=np.int64))
+    if not matrix:
+        return model
+    return replace(model, tables=laid_out(table, n.primitive, each, reference))
+
+
+def _blocks(d: Descriptor, given: Mapping[Path, Input]) -> tuple[Index, Index]:
+    """Rows whose residuals share one scale, those of one storage port, junction, component, outer port; and blocks of
+    one kind: the same quantity in the same sort of equation."""
+    n = d.numbering
+    words: list[tuple[str, str]] = []
+    lengths: list[Index] = []
+    of: list[Index] = []
+
+    def add(sort: str, kinds: Iterable[str], number: Index, length: Index) -> None:
+        named = [(sort, kind) for kind in kinds]
+        words.extend(word for word in dict.fromkeys(named) if word not in words)
+        of.append(np.array([words.index(word) for word in named], dtype=np.int64)[number])
+        lengths.append(length)
+
+    kinds = [quantity.kind for quantity in n.quantities]
+    firsts = [next((q.kind for _, _, q in primitive.bundle.items()), "") for primitive in n.primitives]
+    constrained = n.multipliers > 0
+    prescribed = [junction for junction in d.outer if given[junction.path].effort]
+    add("effort", kinds, n.states, n.dims(n.states))
+    add("balance", kinds, n.junctions, n.dims(n.junctions))
+    add("effort", firsts, n.primitive[constrained], n.multipliers[constrained])
+    add(
+        "effort",
+        [junction.quantity.kind for junction in prescribed],
+        np.arange(len(prescribed)),
+        np.array([junction.quantity.space.dim for junction in prescribed], dtype=np.int64),
+    )
+    group, length = np.concatenate(of), np.concatenate(lengths)
+    return np.repeat(np.arange(length.size), length), group
+
+
+def evaluate_at(model: Model, x: Array, z: Array, h: float) -> tuple[int, int, Memory]:
+    """Residual and matrix at a point, for analysis and tests: (status, component, memory that holds them)."""
+    memory = model.memory()
+    status, component = evaluate(model.tables, x, z, model.scal(h), model.input_values(), memory)
+    return int(status), int(component), memory

@@ -1,0 +1,203 @@
+"""Search of inputs, which are functions of time, for changes that steps could pass over.
+
+Every function is asked at points of its own, ahead of the steps, at most a given width apart. Where it changes from
+one point to the next much faster than before, the place is found by bisection. Shorter changes stay unseen.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, final
+
+import numpy as np
+
+from ephs.solve.problem import State
+from ephs.solve.snapshot import Snapshot
+
+__all__ = ["WIDTH", "Asked", "Change", "Probe"]
+
+WIDTH = 1.0 / 2000.0
+"""Part of a run between two points at which a function is asked."""
+FIRST, GROWTH = 1.0 / 64.0, 4.0
+"""The first points after a jump are nearer: by this part of the width, and each by this factor farther than the last,
+so that there is a rate of change to compare with."""
+SHARP = 4.0
+"""A change this many times as fast as the last two is looked at; parabolas reach 3 times where they turn."""
+SMALL = 1e-6
+"""Part of the largest value so far below which a change is left alone."""
+SHARE = 0.1
+"""A jump has at least this share of the change between two points, however near they come."""
+RESOLVED = 0.25
+"""Part of a step that a steep change takes at least for the step to see it."""
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """A function that a user gave as an input.
+
+    Parameters
+    ----------
+    name
+        What the user calls it.
+    value
+        Of the time in the units of the run, and the states where it wants them.
+    stateful
+        Whether it wants the states.
+    """
+
+    name: str
+    value: Callable[[float, State | None], Any]
+    stateful: bool
+
+    def at(self, t: float, state: State | None) -> list[float]:
+        """Its numbers at a time."""
+        found = self.value(t, state)
+        return [found] if isinstance(found, float) else np.ravel(np.asarray(found, dtype=float)).tolist()
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Change:
+    """A fast change of an input, from one time to another: the same ones for a jump."""
+
+    name: str
+    start: float
+    end: float
+
+
+@dataclass(slots=True)
+class _Course:
+    """Course of one function: its last values, their rates of change in the last two intervals, the largest so far."""
+
+    asked: Asked
+    values: list[float] = field(default_factory=list[float])
+    last: list[float] = field(default_factory=list[float])
+    before: list[float] = field(default_factory=list[float])
+    largest: list[float] = field(default_factory=list[float])
+
+    def begin(self, t: float, state: State | None) -> None:
+        """Forget what was before t."""
+        self.follow(self.asked.at(t, state))
+        if not self.largest:
+            self.largest = [0.0] * len(self.values)
+
+    def follow(self, values: list[float]) -> None:
+        """Go on from these values as from a start."""
+        self.values, self.last, self.before = values, [], []
+
+    def sharp(self, values: list[float], width: float) -> bool:
+        """Whether the change to these values, over a width in s, is one to be looked at; if not, they are the last."""
+        rates: list[float] = []
+        found = False
+        for j, value in enumerate(values):
+            change = abs(value - self.values[j])
+            if abs(value) > self.largest[j]:
+                self.largest[j] = abs(value)
+            rates.append(change / width)
+            if self.last and change > SMALL * self.largest[j] and rates[j] > SHARP * self.last[j]:
+                found = found or not self.before or rates[j] > SHARP * self.before[j]
+        if not found:
+            self.values, self.last, self.before = values, rates, self.last
+        return found
+
+
+@final
+class Probe:
+    """The search along one run.
+
+    Parameters
+    ----------
+    asked
+        The functions.
+    t0, until
+        Start and end of the run in s; it may go backward.
+    within
+        Keeps times on one side of what is known to jump.
+    """
+
+    def __init__(self, asked: Sequence[Asked], t0: float, until: float, within: Callable[[float], float]) -> None:
+        self._courses = [_Course(one) for one in asked]
+        self._sign, self._width, self._within = float(np.sign(until - t0)), WIDTH * abs(until - t0), within
+        self._nearest = 4.0 * float(np.spacing(max(abs(t0), abs(until))))
+        self._at, self._spacing = t0, 0.0
+
+    def begin(self, t: float) -> None:
+        """Look from here on, as nothing is known of what is before."""
+        self._at, self._spacing = t, 0.0
+
+    def look(self, to: float, limit: float, h: float, state: Callable[[], State]) -> Change | None:
+        """The first fast change on the way to a time that steps of h seconds would not see; None where there is none.
+
+        It looks beyond that time to its own next point, but not beyond ``limit``. The states are those where the next
+        step starts. A function that fails is left to the step that asks for it.
+        """
+        to = min(to, limit) if self._sign > 0.0 else max(to, limit)
+        if self._sign * (to - self._at) <= 0.0:
+            return None
+        now = state() if any(course.asked.stateful for course in self._courses) else None
+        try:
+            if not self._spacing:
+                for course in self._courses:
+                    course.begin(self._within(self._at), now)
+                self._spacing = FIRST * self._width
+            else:
+                for course in self._courses:
+                    if course.asked.stateful:
+                        course.values = course.asked.at(self._within(self._at), now)
+            while self._sign * (to - self._at) > 0.0:
+                rest = abs(limit - self._at)
+                after = limit if self._spacing >= rest else self._at + self._sign * self._spacing
+                found = self._changes(after, h, now)
+                self._at, self._spacing = after, min(GROWTH * self._spacing, self._width)
+                if found:
+                    return min(found, key=lambda change: self._sign * change.start)
+        except Exception:  # whatever a user's function raises, it raises again where a step asks
+            return None
+        return None
+
+    def _changes(self, after: float, h: float, state: State | None) -> list[Change]:
+        """Fast changes between the last point and the next."""
+        found: list[Change] = []
+        when, width = self._within(after), max(abs(after - self._at), self._nearest)
+        for course in self._courses:
+            before, values = course.values, course.asked.at(when, state)
+            if course.sharp(values, width):
+                change = self._located(course.asked, before, values, when, h, state)
+                course.follow(values)
+                if change is not None:
+                    found.append(change)
+        return found
+
+    def _located(
+        self, asked: Asked, first: list[float], last: list[float], when: float, h: float, state: State | None
+    ) -> Change | None:
+        """The change between the last point and a time, by halving; None where steps of h seconds see it."""
+        before, after, a, b = self._within(self._at), when, first, last
+        j = int(np.argmax(np.abs(np.subtract(b, a))))
+        whole = abs(b[j] - a[j])
+        most = before, after
+        while abs(after - before) > self._nearest:
+            middle = 0.5 * (before + after)
+            c = asked.at(middle, state)
+            if abs(c[j] - a[j]) > abs(b[j] - c[j]):
+                after, b = middle, c
+            else:
+                before, a = middle, c
+            share = abs(b[j] - a[j])
+            if share < SHARE * whole:
+                steep = abs(most[1] - most[0]) < RESOLVED * h
+                return Change(asked.name, *most) if steep else None
+            if share > 0.5 * whole:
+                most = before, after
+        return Change(asked.name, after, after)
+
+    def snapshot(self) -> Snapshot:
+        """Snapshot for `restore`."""
+        courses = [[course.values, course.last, course.before, course.largest] for course in self._courses]
+        return {"at": self._at, "spacing": self._spacing, "courses": courses}
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go on from a snapshot."""
+        self._at, self._spacing = snapshot["at"], snapshot["spacing"]
+        for course, found in zip(self._courses, snapshot["courses"], strict=True):
+            course.values, course.last, course.before, course.largest = map(list, found)

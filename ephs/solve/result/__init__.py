@@ -1,0 +1,1 @@
+"""Solutions: states, ledgers, labelled arrays, and their files."""

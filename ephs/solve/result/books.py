@@ -1,0 +1,158 @@
+"""The books of a component or subsystem: what it stores, what it destroys, and so what crossed its boundary.
+
+Balances hold step by step: energy is supplied or stays; exergy is supplied, stays, or is destroyed, θ₀ times the
+entropy made; entropy is supplied, stays, or is made; volume is supplied or stays. What the whole was supplied with is
+known; what its changes leave beside that is the defect of the method's steps. What crossed the boundary of a part is
+what its own changes leave, so a part's share of the defect is in there, and the parts' supplies add up to supply and
+defect of the whole.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import reduce
+from typing import final
+
+import numpy as np
+
+from ephs.operad import Path
+from ephs.semantics.bundle import Array
+from ephs.solve.result.ledger import Ledgers
+
+__all__ = ["Entry", "entry_of"]
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Entry:
+    """The ledger of a component or subsystem, (n,) each.
+
+    Parameters
+    ----------
+    path
+        Where it is in the hierarchy; the root for the whole system.
+    energy, exergy
+        Stored, in J; of the reference environment the energy θ₀ s − π₀ v + Σ μ₀ n, and no exergy.
+    entropy, volume, momentum
+        Stored, in J/K, m³, N s; momenta are those of point masses, which add up.
+    made, destroyed
+        Entropy made since the start in J/K, and the exergy that this destroyed in J.
+    defect, exergy_defect
+        Of the whole: energy and exergy since the start, in J, that nothing supplied and nothing destroyed accounts for;
+        zero of its parts.
+    parts
+        Entries one level below, by name.
+    """
+
+    path: Path
+    energy: Array
+    exergy: Array
+    entropy: Array
+    volume: Array
+    momentum: Array
+    made: Array
+    destroyed: Array
+    defect: Array
+    exergy_defect: Array
+    parts: Mapping[str, "Entry"] = field(default_factory=dict[str, "Entry"])
+
+    @property
+    def energy_supplied(self) -> Array:
+        """(n,) energy that came in through the boundary since the start, in J."""
+        return self.energy - self.energy[:1] - self.defect
+
+    @property
+    def exergy_supplied(self) -> Array:
+        """(n,) exergy that came in through the boundary since the start, in J."""
+        return self.exergy - self.exergy[:1] + self.destroyed - self.exergy_defect
+
+    @property
+    def entropy_supplied(self) -> Array:
+        """(n,) entropy that came in through the boundary since the start, in J/K."""
+        return self.entropy - self.entropy[:1] - self.made
+
+    def __str__(self) -> str:
+        """Totals from the first to the last instant, here and one level below."""
+        cells = self.rows()
+        widths = [max(len(row[i]) for row in cells) for i in range(len(cells[0]))]
+        return "\n".join(
+            "  ".join(
+                cell.ljust(w) if i == 0 else cell.rjust(w) for i, (cell, w) in enumerate(zip(row, widths, strict=True))
+            )
+            for row in cells
+        )
+
+    def _repr_html_(self) -> str:  # pyright: ignore[reportUnusedFunction] - notebooks call it
+        from ephs.solve.result.tables import ledger_table
+
+        return ledger_table(self)
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """The same in cells: heads, units, then here and each part one level below."""
+        head = ("", "exergy stored", "supplied", "destroyed", "defect", "energy stored", "entropy stored", "made")
+        units = ("", "J", "J", "J", "J", "J", "J/K", "J/K")
+        rows = [
+            (str(self.path) if self.path else "all", self),
+            *((f"  {name}", part) for name, part in self.parts.items()),
+        ]
+        return [head, units, *((name, *map(_number, entry.changes())) for name, entry in rows)]
+
+    def changes(self) -> tuple[float, ...]:
+        """From first to last: exergy stored, supplied, destroyed, its defect; energy stored; entropy stored, made."""
+
+        def change(values: Array) -> float:
+            return float(values[-1] - values[0]) if values.size else 0.0
+
+        exergies = (self.exergy, self.exergy_supplied, self.destroyed, self.exergy_defect)
+        books = (*exergies, self.energy, self.entropy, self.made)
+        return tuple(change(values) for values in books)
+
+
+def entry_of(books: Ledgers, path: Path) -> Entry | None:
+    """The entry of a component or subsystem, None where nothing keeps books at or below the path."""
+    leaves = {leaf: entry for leaf, entry in _leaves(books).items() if path.is_prefix_of(leaf)}
+    if not leaves:
+        return None
+    found = _tree(path, leaves)
+    if path or not found.energy.size:
+        return found
+    first = slice(None, 1)
+    energy = found.energy - found.energy[first] - (books.work - books.work[first])
+    exergy = found.exergy_supplied - found.exergy_supplied[first] - (books.supplied - books.supplied[first])
+    return replace(found, defect=energy, exergy_defect=exergy)
+
+
+def _tree(path: Path, leaves: Mapping[Path, Entry]) -> Entry:
+    if path in leaves:
+        return leaves[path]
+    below: dict[str, dict[Path, Entry]] = {}
+    for leaf, entry in leaves.items():
+        below.setdefault(next(iter(leaf.relative_to(path))), {})[leaf] = entry
+    parts = {name: _tree(path / Path((name,)), inner) for name, inner in below.items()}
+    names = ("energy", "exergy", "entropy", "volume", "momentum", "made", "destroyed", "defect", "exergy_defect")
+    sums = {name: reduce(np.add, [getattr(part, name) for part in parts.values()]) for name in names}
+    return Entry(path, **sums, parts=parts)
+
+
+def _leaves(books: Ledgers) -> dict[Path, Entry]:
+    n = books.heat.size
+    nothing = np.zeros(n)
+    out: dict[Path, Entry] = {}
+    for path in dict.fromkeys([*books.storages, *books.makers]):
+        made = books.makers.get(path, nothing)
+        out[path] = Entry(
+            path,
+            books.storages.get(path, nothing),
+            books.exergies.get(path, nothing),
+            books.entropies.get(path, nothing),
+            books.volumes.get(path, nothing),
+            books.momenta.get(path, nothing),
+            made,
+            books.temperature * made,
+            nothing,
+            nothing,
+        )
+    return out
+
+
+def _number(value: float) -> str:
+    return f"{value:.5g}"

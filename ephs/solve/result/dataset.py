@@ -1,0 +1,162 @@
+"""Solutions as labelled arrays: named dimensions, names of components, units."""
+
+import json
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING, Any, final
+
+import numpy as np
+
+from ephs.operad import Path
+from ephs.semantics.bundle import Array
+from ephs.solve.problem import Problem, State
+from ephs.solve.result.labels import Labels, power_labels
+from ephs.solve.result.ledger import Ledgers
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from ephs.solve.result.solution import Solution
+
+__all__ = ["FORMAT", "TIME", "Content", "Variable", "content", "dataset", "sampled_inputs"]
+
+FORMAT = 3
+_LEDGERS = {
+    "kinetic": ("J", "energy of what holds momenta or fluxes"),
+    "potential": ("J", "energy of what holds neither momenta nor entropies"),
+    "thermal": ("J", "energy of what holds entropies or volumes"),
+    "environment": ("J", "energy of the reference environment"),
+    "exergy": ("J", "exergy of the storages"),
+    "entropy": ("J/K", "entropy, of the environment too"),
+    "heat": ("J", "what friction and damping made since the start"),
+    "work": ("J", "energy supplied since the start"),
+    "supplied": ("J", "exergy supplied since the start"),
+    "made": ("J/K", "entropy made since the start"),
+    "least": ("J/K", "least entropy production of a component in the step before"),
+    "storages": ("J", "energy"),
+    "makers": ("J/K", "entropy made since the start"),
+    "entropies": ("J/K", "entropy"),
+    "volumes": ("m³", "volume"),
+    "momenta": ("N s", "momentum"),
+    "exergies": ("J", "exergy"),
+}
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Variable:
+    """An array over time, with what its other axes count.
+
+    Parameters
+    ----------
+    values
+        (n, ...).
+    axes
+        One for each axis but the first: a name, and the names of its entries.
+    units, says
+        Its unit, and what it is.
+    """
+
+    values: Array
+    units: str
+    says: str
+    axes: tuple[tuple[str, tuple[str, ...]], ...] = field(default=())
+
+    @property
+    def dimensions(self) -> tuple[str, ...]:
+        """Names of all axes."""
+        return ("t", *(axis for axis, _ in self.axes))
+
+    @property
+    def attributes(self) -> dict[str, str]:
+        """Its unit and meaning under the names of the CF conventions."""
+        return {"units": self.units, "long_name": self.says}
+
+    @classmethod
+    def of(cls, values: Array, labels: Labels, says: str) -> "Variable":
+        """Of a state's values."""
+        axes = ((labels.dimension, labels.names),) if values.ndim > 1 else ()
+        return cls(values, labels.unit, says, axes)
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Content:
+    """A solution as arrays over time: variables by name, instants in s, attributes."""
+
+    t: Array
+    variables: dict[str, Variable]
+    attributes: dict[str, Any]
+
+    @property
+    def axes(self) -> dict[str, tuple[str, ...]]:
+        """Names of the entries of each axis but the time."""
+        return {axis: names for variable in self.variables.values() for axis, names in variable.axes}
+
+
+TIME = {"units": "s", "long_name": "time"}
+"""Attributes of the instants."""
+
+
+def content(solution: "Solution", *, wrenches: bool = True) -> Content:
+    """States under ``state:PATH``, ledgers under their names, inputs under ``input:PORT``, and derived arrays."""
+    variables = dict(_variables(solution))
+    if solution.motion is not None:
+        variables |= solution.motion.variables(wrenches=wrenches)
+    attributes = {
+        "ephs_format": FORMAT,
+        "name": solution.name,
+        "reference_temperature": solution.ledgers.temperature,
+        "stats": json.dumps(dict(solution.stats)),
+        "model": solution.problem.document if solution.problem is not None else "",
+    }
+    return Content(solution.t, variables, attributes)
+
+
+def dataset(solution: "Solution", *, wrenches: bool = True) -> "xr.Dataset":
+    """The `content` of a solution as labelled arrays."""
+    import xarray as xr
+
+    found = content(solution, wrenches=wrenches)
+    coordinates: dict[str, Any] = {"t": ("t", found.t, TIME)}
+    coordinates |= {axis: (axis, np.array(names, dtype=object)) for axis, names in found.axes.items()}
+    entries = {
+        name: (variable.dimensions, variable.values, variable.attributes) for name, variable in found.variables.items()
+    }
+    return xr.Dataset(entries, coordinates, found.attributes)
+
+
+def _variables(solution: "Solution") -> Iterable[tuple[str, Variable]]:
+    for path, values in solution.states.items():
+        yield f"state:{path}", Variable.of(values, solution.labels[path], f"state at {path}")
+    for name, values in _books(solution.ledgers):
+        group, _, path = name.partition(":")
+        units, says = _LEDGERS[group]
+        yield name, Variable(values, units, f"{says} of {path}" if path else says)
+    yield "energy", Variable(solution.energy, "J", "energy of everything")
+    yield "energy_error", Variable(solution.energy_error, "1", "relative defect of the energy balance")
+    yield "constraint_error", Variable(solution.constraint_error, "m, rad", "largest position residual of a joint")
+    yield "velocity_error", Variable(solution.velocity_error, "m/s, rad/s", "largest velocity residual of a joint")
+    yield from ((f"input:{path}", variable) for path, variable in solution.inputs.items())
+
+
+def _books(ledgers: Ledgers) -> Iterable[tuple[str, Array]]:
+    for entry in fields(ledgers):
+        value = getattr(ledgers, entry.name)
+        if isinstance(value, Mapping):
+            yield from ((f"{entry.name}:{path}", values) for path, values in value.items())
+        elif isinstance(value, np.ndarray):
+            yield entry.name, value
+
+
+def sampled_inputs(problem: Problem, t: Array, state: Callable[[int], State]) -> dict[Path, Variable]:
+    """What is prescribed at each outer port, at some instants; ``state(i)`` gives the states that inputs read."""
+    out: dict[Path, Variable] = {}
+    states = [state(i) for i in range(t.size)] if not problem.constant else [{}] * t.size
+    for slot in problem.descriptor.outer:
+        if (signal := problem.signals.get(slot.path)) is not None:
+            labels = power_labels(slot.quantity, effort=signal.effort)
+            rows = [signal.at(float(time), now) for time, now in zip(t, states, strict=True)]
+            values = np.array(rows, dtype=float).reshape(t.size, slot.quantity.space.dim)
+            out[slot.path] = Variable.of(values, labels, f"{'effort' if signal.effort else 'flow'} at {slot.path}")
+    return out

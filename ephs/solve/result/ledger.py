@@ -1,0 +1,148 @@
+"""Ledgers of a motion: where the energy is, what was supplied, what became heat, how much entropy was made."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from ephs.operad import Path
+from ephs.operad.charges import ENTROPY, VOLUME
+from ephs.semantics.bundle import Array
+from ephs.semantics.primitives import Irreversible, Storage
+from ephs.solve.problem import Problem
+from ephs.solve.result.record import Record
+
+__all__ = ["Ledgers", "ledgers"]
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Ledgers:
+    """Ledgers of a motion, all (n,).
+
+    Parameters
+    ----------
+    kinetic, potential, thermal
+        Energies in J of storages with momenta, with entropies or volumes, and of the others.
+    environment
+        θ₀ s − π₀ v + Σ μ₀ n of the reference environment, in J.
+    exergy
+        Σ H over the storages, in J.
+    entropy
+        Sum of all entropies, the environment's included, in J/K.
+    heat, work, supplied
+        What friction turned into heat; energy and exergy supplied through outer ports: J since the start.
+    made, least
+        Entropy made since the start; least production of a component in the step before: J/K.
+    storages, makers
+        Energy of each storage in J, entropy made by each irreversible component in J/K, by path.
+    entropies, volumes, momenta
+        Entropy in J/K, volume in m³ and momentum in N s of each storage that has one, by path.
+    exergies
+        Exergy of each storage in J, by path.
+    temperature
+        θ₀ of the reference environment, in K.
+    """
+
+    kinetic: Array
+    potential: Array
+    thermal: Array
+    environment: Array
+    exergy: Array
+    entropy: Array
+    heat: Array
+    work: Array
+    supplied: Array
+    made: Array
+    least: Array
+    storages: Mapping[Path, Array]
+    makers: Mapping[Path, Array]
+    entropies: Mapping[Path, Array]
+    volumes: Mapping[Path, Array]
+    momenta: Mapping[Path, Array]
+    exergies: Mapping[Path, Array]
+    temperature: float
+
+    @property
+    def energy(self) -> Array:
+        """Energy of everything, in J."""
+        return self.kinetic + self.potential + self.thermal + self.environment
+
+    @property
+    def scale(self) -> float:
+        """Largest K + |V − V₀| + |heat| + |work| over the run; where nothing moves, what the storages exchange; in J.
+
+        What stands still moves by rounding: a billionth of the energies is the least that counts.
+        """
+        v = self.potential
+        if not v.size:
+            return 1.0
+        moved = float(np.max(self.kinetic + np.abs(v - v[0]) + np.abs(self.heat) + np.abs(self.work)))
+        still = 1e-9 * float(np.abs(v).max())
+        if moved > still:
+            return moved
+        exchanged = [np.abs(energy - energy[0]) for energy in self.storages.values()]
+        return max(still, float(np.max(np.sum(exchanged, axis=0), initial=0.0))) or 1.0
+
+    def defect(self, mechanical: bool) -> Array:
+        """Relative defect of the energy balance since the first row, (n,); ``mechanical``: of K + V + heat − work."""
+        if not self.heat.size:
+            return np.zeros(0)
+        work, heat = self.work - self.work[0], self.heat - self.heat[0]
+        defects = [self._change(self.kinetic, self.potential, self.thermal, self.environment) - work]
+        if mechanical:
+            defects.append(self._change(self.kinetic, self.potential) + heat - work)
+        return np.max(np.abs(defects), axis=0) / self.scale
+
+    @staticmethod
+    def _change(*energies: Array) -> Array:
+        return np.sum([e - e[0] for e in energies], axis=0)  # differences first: a sum of large energies would round
+
+
+def ledgers(problem: Problem, record: Record) -> Ledgers:
+    """The books of what a run kept."""
+    n = record.t.size
+    reference = problem.reference
+    kinetic, potential, thermal, environment, exergy, entropy = (np.zeros(n) for _ in range(6))
+    storages: dict[Path, Array] = {}
+    makers: dict[Path, Array] = {}
+    entropies: dict[Path, Array] = {}
+    amounts: dict[str, dict[Path, Array]] = {"entropy": entropies, "volume": {}, "momentum": {}}
+    exergies: dict[Path, Array] = {}
+    for number, slot in enumerate(problem.descriptor.components):
+        primitive = slot.primitive
+        if isinstance(primitive, Irreversible):
+            makers[slot.path] = record.energies[:, number]
+        if not isinstance(primitive, Storage):
+            continue
+        exchanged: Array | None = None  # most storages have no part in it: nothing is made for them
+        for state in slot.reads:
+            if state.quantity.environment:
+                share = record.x[:, state.point] @ reference.intensive(state.quantity)
+                exchanged = share if exchanged is None else exchanged + share
+            values = record.x[:, state.point]
+            if state.quantity.kind in amounts and values.shape[1] == 1:
+                book = amounts[state.quantity.kind]
+                book[slot.path] = book.get(slot.path, 0.0) + values[:, 0]
+            if state.quantity.kind == "entropy":
+                entropy = entropy + values[:, 0]
+        if primitive.environment:
+            storages[slot.path] = np.zeros(n) if exchanged is None else exchanged
+            environment = environment + storages[slot.path]
+            exergies[slot.path] = np.zeros(n)
+            continue
+        energy = storages[slot.path] = record.energies[:, number]
+        exergies[slot.path] = energy if exchanged is None else energy - exchanged
+        exergy = exergy + exergies[slot.path]
+        if any({ENTROPY, VOLUME} & dict(state.quantity.charges).keys() for state in slot.reads):
+            thermal = thermal + energy
+        elif any(state.quantity.parity < 0 for state in slot.reads):
+            kinetic = kinetic + energy
+        else:
+            potential = potential + energy
+    heat, work, supplied, made, least = record.ledgers.T
+    return Ledgers(
+        kinetic, potential, thermal, environment, exergy, entropy, heat, work, supplied, made, least,
+        storages, makers, entropies, amounts["volume"], amounts["momentum"], exergies, reference.temperature,
+    )  # fmt: skip

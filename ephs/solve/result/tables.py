@@ -1,0 +1,49 @@
+"""Small HTML tables, as notebooks show solutions and ledgers."""
+
+from collections.abc import Iterable, Sequence
+from html import escape
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ephs.solve.result.books import Entry
+    from ephs.solve.result.solution import Solution
+
+__all__ = ["ledger_table", "solution_table", "table"]
+
+
+def table(title: str, head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """An HTML table; the first cell of a row is its name."""
+    top = f"<thead><tr>{''.join(f'<th>{escape(word)}</th>' for word in head)}</tr></thead>" if head else ""
+    body = "".join(
+        f'<tr><th style="text-align:left">{escape(name)}</th>'
+        + "".join(f'<td style="text-align:right">{escape(cell)}</td>' for cell in cells)
+        + "</tr>"
+        for name, *cells in rows
+    )
+    caption = f'<caption style="text-align:left">{escape(title)}</caption>'
+    return f"<table>{caption}{top}<tbody>{body}</tbody></table>"
+
+
+def solution_table(solution: "Solution") -> str:
+    """Summary of a run in a few lines: time, steps, balances."""
+    if not len(solution):
+        return table(repr(solution), (), ())
+    made = float(solution.entropy[-1] - solution.entropy[0])
+    rows = [
+        ("time", f"{solution.t[0]:g} … {solution.t[-1]:g} s, {len(solution)} instants"),
+        ("method", f"{solution.stats['method']}, {solution.stats['steps']} steps"),
+        ("energy error, relative", f"{solution.energy_error.max():.1e}"),
+        *([("joint gap", f"{solution.constraint_error.max():.1e} m, rad")] if solution.scene is not None else []),
+        ("heat", f"{solution.heat[-1]:.4g} J"),
+        ("work", f"{solution.work[-1]:.4g} J"),
+        ("exergy", f"{solution.exergy[0]:.5g} → {solution.exergy[-1]:.5g} J"),
+        ("entropy made", f"{made:.4g} J/K"),
+    ]
+    return table(f"Solution of {solution.name}", (), rows)
+
+
+def ledger_table(entry: "Entry") -> str:
+    """A ledger with those one level below."""
+    (_, *head), (_, *units), *rows = entry.rows()
+    words = [f"{word} [{unit}]" for word, unit in zip(head, units, strict=True)]
+    return table("Ledger", ("", *words), rows)

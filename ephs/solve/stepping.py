@@ -1,0 +1,209 @@
+"""Contract between the time loop and a method: steps one a call, or many; steps and records."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Generic, Protocol, TypeVar, final
+
+import numpy as np
+
+from ephs.semantics.bundle import Array
+from ephs.solve.control import Control, Policy
+from ephs.solve.errors import Outcome, SolveError
+from ephs.solve.snapshot import Snapshot
+
+__all__ = ["Attempt", "Counts", "Leg", "Row", "Span", "Stepper", "too_fast"]
+
+S = TypeVar("S")
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Row:
+    """Record of one instant.
+
+    Parameters
+    ----------
+    x
+        (point_size,) the states.
+    energies
+        (components,): energy of each storage in J, entropy made by each irreversible component in J/K.
+    sums
+        (4,): heat, energy supplied, exergy supplied in J, entropy made in J/K.
+    """
+
+    x: Array
+    energies: Array
+    sums: Array
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Attempt(Generic[S]):
+    """A step that was solved.
+
+    Parameters
+    ----------
+    start, end
+        The method's state before and after it.
+    h
+        Its length in s.
+    error
+        Estimated error relative to the tolerances; 0 where the method has no estimate.
+    least
+        The least entropy production of a component in it, in J/K.
+    detail
+        What dense output needs.
+    worst
+        Path of the state of the largest error, where it is known.
+    """
+
+    start: S
+    end: S
+    h: float
+    error: float
+    least: float
+    detail: Any = None
+    worst: str = ""
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Span(Generic[S]):
+    """Remainder of a run: from a state to a time, by steps of which the next one is h seconds long.
+
+    ``save_at`` are the times to keep, of which ``saved`` are kept already; None: every step. Without a ``policy`` steps
+    are constant.
+    """
+
+    state: S
+    t0: float
+    until: float
+    h: float
+    control: Control
+    policy: Policy | None
+    save_at: Array | None
+    saved: int
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Counts:
+    """Steps that were taken, tries that were rejected, lengths in s, the least entropy production, the next step."""
+
+    steps: int
+    rejected: int
+    shortest: float
+    longest: float
+    least: float
+    h: float
+
+
+def too_fast(method: str, worst: str, asked: float) -> SolveError:
+    """Refusal of steps that a tolerance asks for at a state, of about so many seconds; it names methods to use."""
+    others = {"natural": "use radau or natural4", "natural4": "use radau"}.get(method, "")
+    told = f"{method} would need steps of about {asked:.1g} s" if np.isfinite(asked) else "its error is not finite"
+    return SolveError(Outcome.TINY, worst, "; ".join(part for part in (told, others) if part))
+
+
+class Leg(Protocol[S]):
+    """A run in compiled code, some steps a call. It is ``left`` where it will not go on before the end."""
+
+    left: bool
+
+    def advance(self, steps: int) -> bool:
+        """Up to so many steps; whether the end is reached.
+
+        Raises
+        ------
+        SolveError
+            A step has no solution.
+        """
+        ...
+
+    def rows(self) -> list[tuple[float, S, float]]:
+        """Records since the last call: time, state, the least production in its step."""
+        ...
+
+    @property
+    def time(self) -> float:
+        """The time reached."""
+        ...
+
+    @property
+    def state(self) -> S:
+        """The state reached."""
+        ...
+
+    @property
+    def counts(self) -> Counts:
+        """Statistics so far."""
+        ...
+
+    def snapshot(self) -> Snapshot:
+        """Where it stands, for `restore` of a leg of the same run."""
+        ...
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go on from a snapshot."""
+        ...
+
+
+class Stepper(Protocol[S]):
+    """A method on one problem: it starts, steps, and says what is where. States are values with a time ``t``."""
+
+    name: str
+
+    def start(self, t: float, h: float) -> S:
+        """The method's state at the initial values; h is the length of the first step."""
+        ...
+
+    def prepare(self, state: S, h: float) -> None:
+        """Compile what is not in the cache, before time counts."""
+        ...
+
+    def step(self, state: S, h: float) -> Attempt[S]:
+        """One step of h seconds, which may be negative.
+
+        Raises
+        ------
+        SolveError
+            The step has no solution.
+        """
+        ...
+
+    def many(self, span: Span[S]) -> Leg[S] | None:
+        """Compiled run of many steps; None where there is none, or where inputs must be evaluated in Python."""
+        ...
+
+    def inside(self, attempt: Attempt[S], t: float) -> S:
+        """The state at a time within a step, to the method's order."""
+        ...
+
+    def at(self, state: S, t: float) -> S:
+        """The same state at a time that differs by rounding."""
+        ...
+
+    def anew(self, state: S) -> S:
+        """The same state as one to start from, where inputs jump: what is known of rates before it says nothing."""
+        ...
+
+    def row(self, state: S) -> Row:
+        """Record of a state."""
+        ...
+
+    def rows(self, states: Sequence[S]) -> list[Row]:
+        """Records of many states."""
+        ...
+
+    def stats(self) -> dict[str, Any]:
+        """Counts, for the solution's statistics."""
+        ...
+
+    def snapshot(self, state: S) -> Snapshot | None:
+        """Memory from step to step besides the state ``state``: from both a method made
+        anew takes the very same steps. None where it cannot say; a run that is resumed then begins anew."""
+        ...
+
+    def restore(self, snapshot: Snapshot, state: S) -> None:
+        """Go on from a snapshot."""
+        ...

@@ -1,0 +1,48 @@
+"""Progress of a run: the defect of its energy balance, and the callback for it."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, final
+
+import numpy as np
+
+from ephs.semantics.bundle import Array
+from ephs.solve.errors import Outcome, SolveError
+from ephs.solve.problem import Problem
+from ephs.solve.result.ledger import ledgers
+from ephs.solve.result.record import Record
+
+__all__ = ["Balance", "guarded"]
+
+Told = Callable[[float, float, Mapping[str, Any]], None]
+
+
+@final
+class Balance:
+    """The energy balance since a first row (states, energies, and the first four sums of a `Record`)."""
+
+    def __init__(self, problem: Problem, x: Array, energies: Array, sums: Array) -> None:
+        self._problem = problem
+        self._first = (x.copy(), energies.copy(), sums[:4].copy())
+        self._scale = 0.0
+
+    def error(self, x: Array, energies: Array, sums: Array) -> float:
+        """The defect now, relative to the largest K + |V − V₀| + |heat| + |work| that was seen."""
+        rows = [np.array(pair) for pair in zip(self._first, (x, energies, sums[:4]), strict=True)]
+        books = ledgers(self._problem, Record(np.zeros(2), rows[0], rows[1], np.pad(rows[2], ((0, 0), (0, 1)))))
+        self._scale = max(self._scale, books.scale)
+        return float(books.defect(mechanical=self._problem.scene is not None)[-1]) * books.scale / self._scale
+
+
+def guarded(progress: Told | None) -> Told | None:
+    """A function that is told of progress, whose exceptions end the run by name and lose nothing."""
+    if progress is None:
+        return None
+    asked = progress
+
+    def tell(t: float, until: float, stats: Mapping[str, Any]) -> None:
+        try:
+            asked(t, until, stats)
+        except Exception as error:
+            raise SolveError(Outcome.PROGRESS, "", f"{type(error).__name__}: {error}", error) from error
+
+    return tell
