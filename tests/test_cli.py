@@ -14,7 +14,7 @@ import pytest
 
 import ephs
 from ephs import Outcome
-from ephs.cli import main as cli
+from ephs.cli import commands as cli
 from ephs.cli.input import Loading, Stepping
 from ephs.cli.linear import linearize
 from ephs.cli.run import run

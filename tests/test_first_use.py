@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import ephs
-from ephs.cli import main as cli
+from ephs.cli import commands as cli
 from ephs.cli.new import TEMPLATES
 from ephs.cli.next import EXAMPLES, commands
 from ephs.cli.progress import said_of

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 
 import ephs
 from benchmarks import families
-from ephs.mechanics.motion.motion import motion
+from ephs.mechanics.motion import motion
 from ephs.testing import mechanisms
 
 # κ of the constraints of a few bodies, in the mass metric; see the rule for linear solves

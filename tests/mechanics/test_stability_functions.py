@@ -12,8 +12,9 @@ import pytest
 import ephs
 from ephs import Pattern, junction, library
 from ephs import quantity as Q
+from ephs.mechanics.methods import tableaux
 from ephs.mechanics.methods.explicit import tableau
-from ephs.mechanics.methods.registry import METHODS, Setting, tableaux
+from ephs.mechanics.methods.registry import METHODS, Setting
 from ephs.mechanics.runs.simulate import problem_of_system
 from ephs.solve.control import Control, Tolerance
 from ephs.solve.methods.radau import COEFFICIENTS, NODES

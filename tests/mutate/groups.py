@@ -40,12 +40,12 @@ class Group:
 PARTS = (f"{MECHANICS}/test_components.py", f"{MECHANICS}/test_models.py", f"{MECHANICS}/test_variational.py")
 RUNS = (
     f"{MECHANICS}/test_stability_functions.py",
-    f"{MECHANICS}/engine",
-    f"{MECHANICS}/reduced",
-    f"{MECHANICS}/solve/test_collocation.py",
-    f"{MECHANICS}/solve/test_lu.py",
-    f"{MECHANICS}/solve/test_radau.py",
-    f"{MECHANICS}/solve/test_integrate.py",
+    f"{MECHANICS}/tree/engine",
+    f"{MECHANICS}/methods",
+    "tests/solve/test_collocation.py",
+    "tests/solve/test_lu.py",
+    "tests/solve/test_radau.py",
+    "tests/solve/test_integrate.py",
 )
 
 LONG = Pace(each=10.0, file=90.0, budget=40.0)
@@ -124,9 +124,9 @@ GROUPS = {
         ),
         (
             *RUNS,
-            f"{MECHANICS}/solve/test_books.py",
-            f"{MECHANICS}/solve/test_journal.py",
-            f"{MECHANICS}/reduction/test_folding.py",
+            "tests/solve/test_books.py",
+            "tests/solve/test_journal.py",
+            f"{MECHANICS}/rewrite/test_folding.py",
             f"{MECHANICS}/test_methods.py",
             f"{MECHANICS}/test_outcomes.py",
             f"{MECHANICS}/test_pace.py",
@@ -144,8 +144,8 @@ GROUPS = {
         (
             *RUNS,
             f"{MECHANICS}/dynamics/test_dynamics.py",
-            f"{MECHANICS}/solve/test_gauss_kernels.py",
-            f"{MECHANICS}/solve/test_natural_kernels.py",
+            "tests/solve/test_gauss_kernels.py",
+            "tests/solve/test_natural_kernels.py",
             f"{MECHANICS}/test_redundancy.py",
         ),
         pace=LONG,
@@ -163,27 +163,28 @@ GROUPS = {
             "ephs/mechanics/tree/engine/motion.py",
             "ephs/solve/march/*.py",
         ),
-        (f"{MECHANICS}/tree", f"{MECHANICS}/engine", f"{MECHANICS}/solve/test_march.py"),
+        (f"{MECHANICS}/tree", f"{MECHANICS}/tree/engine", "tests/solve/test_march.py"),
     ),
     "derivatives": Group(
         DERIVATIVES,
         (
             f"{MECHANICS}/dynamics",
-            f"{MECHANICS}/reduced/test_error_estimates.py",
-            f"{MECHANICS}/reduced/test_variational_steps.py",
+            f"{MECHANICS}/methods/test_error_estimates.py",
+            f"{MECHANICS}/methods/test_variational_steps.py",
         ),
         pace=LONG,
     ),
     "reductions": Group(
         (
             "ephs/mechanics/rewrite/*.py",
+            "ephs/mechanics/constraints/subgroup.py",
             "ephs/mechanics/tree/engine/build.py",
             "ephs/mechanics/tree/engine/closing.py",
             "ephs/mechanics/tree/engine/tables.py",
             "ephs/mechanics/tree/finding/mechanism.py",
             "ephs/mechanics/tree/finding/spanning.py",
         ),
-        (f"{MECHANICS}/reduction", f"{MECHANICS}/engine", f"{MECHANICS}/test_stability_functions.py"),
+        (f"{MECHANICS}/rewrite", f"{MECHANICS}/tree/engine", f"{MECHANICS}/test_stability_functions.py"),
     ),
     "named": Group(
         (),
@@ -191,10 +192,10 @@ GROUPS = {
             "tests/operad",
             "tests/semantics",
             *PARTS,
-            f"{MECHANICS}/reduced",
+            f"{MECHANICS}/methods",
             f"{MECHANICS}/imports",
-            f"{MECHANICS}/solve/test_books.py",
-            f"{MECHANICS}/solve/test_journal.py",
+            "tests/solve/test_books.py",
+            "tests/solve/test_journal.py",
         ),
     ),
 }

@@ -16,7 +16,7 @@ from ephs.mechanics.tree.equations.equations import Equations
 from ephs.semantics.spaces import SE3
 from ephs.solve.instant import instant
 from ephs.testing import mechanisms
-from tests.mechanics.reduced.systems import renamed
+from tests.mechanics.methods.systems import renamed
 
 FOUR_BAR = File(ephs.__file__).parents[1] / "scenes" / "four-bar.toml"
 

@@ -14,7 +14,7 @@ from ephs.semantics.stage import Entry, Program, Vector, real, table
 from ephs.solve.control import Proportional
 from ephs.solve.march import STEPS, Control, Ending, Motion
 from ephs.solve.march.control import PATIENCE, held_back, length
-from tests.mechanics.solve.marching import field, program, start
+from tests.solve.marching import field, program, start
 
 
 def kepler(on, y, out, parameters):

@@ -21,7 +21,7 @@ from ephs.semantics import library, structures
 from ephs.semantics.primitives import power_ports
 from ephs.solve.model import compile_model
 from ephs.testing import mechanisms
-from tests.mechanics.reduced.systems import problem_of, renamed
+from tests.mechanics.methods.systems import problem_of, renamed
 
 REDUCED = File(ephs.__file__).parent / "mechanics" / "reduced"
 FROM_MODEL = ("address", "dims", "parameters", "parameter_at")
