@@ -15,7 +15,7 @@ import numpy as np
 import ephs
 from ephs.solve import journal
 
-ROOT = Path(__file__).resolve().parents[3]
+ROOT = Path(__file__).resolve().parents[2]
 RUNS = (
     {"method": "natural", "step": 5e-4},
     {"method": "rk87", "rtol": 1e-12, "atol": 1e-12},

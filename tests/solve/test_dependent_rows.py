@@ -11,7 +11,7 @@ from scipy import linalg
 import ephs
 from ephs.solve.methods.analysis import exchanged
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[2]
 BRICARD = ROOT / "scenes/bricard.toml"
 NAMES = ("a", "b", "c", "d", "e")
 

@@ -26,7 +26,7 @@ def test_a_motion_that_repeats_itself_takes_what_was_forecast(method, rtol, monk
 
 
 def test_long_runs_are_told_after_their_first_steps():
-    scene = ephs.load(Path(__file__).resolve().parents[3] / "scenes/four-bar.toml")
+    scene = ephs.load(Path(__file__).resolve().parents[2] / "scenes/four-bar.toml")
     with pytest.warns(ephs.CostWarning), pytest.raises(ephs.SimulationError, match="33"):
         ephs.simulate(scene, 2.0, method="natural", max_steps=33)
 

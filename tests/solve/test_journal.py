@@ -21,7 +21,7 @@ from ephs.solve.errors import Outcome
 from ephs.solve.journal import read_journal
 from examples.failures import runs
 
-ROOT = Path(__file__).resolve().parents[3]
+ROOT = Path(__file__).resolve().parents[2]
 SCENE = ephs.load(ROOT / "scenes/slider-crank.toml")
 TIMES = np.linspace(0.0, 0.2, 23)
 LOOSE = {"rtol": 1e-4, "atol": 1e-6}

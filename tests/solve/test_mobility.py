@@ -12,7 +12,7 @@ from ephs.solve import instant
 from ephs.solve.mobility import mobility
 from ephs.testing import mechanisms
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[2]
 FILES = sorted([*ROOT.glob("scenes/*.toml"), *ROOT.glob("benchmarks/scenes/*.toml")])
 
 

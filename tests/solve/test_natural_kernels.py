@@ -13,7 +13,7 @@ from ephs.solve.methods.natural_kernels import SPREAD, TAKES_PART, measure, reac
 from ephs.solve.methods.restraint_kernels import tighten
 from ephs.solve.model import compile_model
 
-ROOT = Path(__file__).resolve().parents[3]
+ROOT = Path(__file__).resolve().parents[2]
 seeds = st.integers(0, 2**32 - 1)
 
 

@@ -15,7 +15,7 @@ from ephs.mechanics.tree.equations.equations import Equations
 from ephs.solve.errors import SolveError
 from ephs.testing import mechanisms
 
-ROOT = File(__file__).parents[3]
+ROOT = File(__file__).parents[4]
 SCENES = {file.stem: file for file in sorted((ROOT / "scenes").glob("*.toml"))} | {
     case.name: ROOT / "benchmarks" / "scenes" / f"{case.name}.toml" for case in CASES
 }
