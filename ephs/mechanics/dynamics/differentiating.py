@@ -1,11 +1,12 @@
 """Exact derivatives of a mechanism's dynamics, and its constraints, from the linearised equations."""
 
-from ephs.mechanics.dynamics.results import Constraints, Derivatives
+from ephs.mechanics.dynamics.links import Links
+from ephs.mechanics.dynamics.results import Constraints, Derivatives, VelocityDerivatives
 from ephs.mechanics.tree.equations.tangent import Linearised
 from ephs.mechanics.tree.finding.tables import CUT
 from ephs.semantics.bundle import Array
 
-__all__ = ["constraints_of", "derivatives_of", "forward_slopes"]
+__all__ = ["constraints_of", "derivatives_of", "forward_slopes", "velocity_derivatives_of"]
 
 Slopes = tuple[Array, Array, Array]
 """(n,) accelerations, their derivatives as `Linearised.columns` has them, and those by forces (n, n)."""
@@ -44,3 +45,11 @@ def constraints_of(linear: Linearised, q: Array, r: Array, s: Array) -> Constrai
     ]
     cut = [e.name for i, e in enumerate(edges) if t.kind[i] == CUT for _ in range(int(t.rows[i]))]
     return Constraints(rows, target, gaps, (*driven, *cut), rank)
+
+
+def velocity_derivatives_of(linear: Linearised, links: Links, q: Array, r: Array) -> VelocityDerivatives:
+    """Those of rows, cut joints and bodies; see `VelocityDerivatives`."""
+    rows, cut, twists = linear.turning(q, r)
+    layout, n = linear.equations.layout, linear.equations.n
+    joints = {name: cut[where - n] for name, where in layout.freedoms.items() if where.size and where[0] >= n}
+    return VelocityDerivatives(rows, joints, links.inside(twists))

@@ -50,6 +50,11 @@ class Links:
         turn = quaternion_to_matrix(self._residual.pose(i)[:4])
         return turn @ (out[3:] - np.cross(point, out[:3], axisb=0).T)
 
+    def inside(self, twists: Array) -> dict[str, Array]:
+        """Body -> (6, k) twists in its frame, from (links + 1, 6, k) of the links and the ground."""
+        found = self._residual
+        return {name: found.inside(i, twists[found.link(i)].T).T for name, i in self._ordered()}
+
     def bias(self) -> Array:
         """(n,) C r: inertia forces at ṙ = 0."""
         return self._residual.rigid(self._q, self._r, gravity=False)

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, final, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ephs.mechanics.dynamics import differentiating
 from ephs.mechanics.dynamics.control import Task, computed_torque, task_of
-from ephs.mechanics.dynamics.differentiating import constraints_of, derivatives_of, forward_slopes
 from ephs.mechanics.dynamics.links import Links
 from ephs.mechanics.dynamics.loading import Loading
 from ephs.mechanics.dynamics.placing import ByJoint, Placing
-from ephs.mechanics.dynamics.results import Constraints, Derivatives, Energies
+from ephs.mechanics.dynamics.results import Constraints, Derivatives, Energies, VelocityDerivatives
 from ephs.mechanics.dynamics.state import State
 from ephs.mechanics.dynamics.stepping import Steps
 from ephs.mechanics.motion.views import BodyState, Names, StateView
@@ -253,9 +253,8 @@ class Dynamics:
 
     def mass_matrix(self, state: State) -> Array:
         """(n, n) M: kinetic energy is ½ rᵀM r. A `SimulationError` where a freedom moves no mass."""
-        q, r, _ = self.layout.split(state.array)
         with failing_at(0.0):
-            return self._equations.mass(q, r)
+            return self._equations.mass(state.q, state.r)
 
     def bias(self, state: State, *, gravity: bool = True) -> Array:
         """(n,) forces that keep the rates as they are against inertia, C(q, r) r, and gravity, g(q)."""
@@ -301,7 +300,7 @@ class Dynamics:
             A component cannot be evaluated there.
         """
         with failing_at(0.0):
-            return constraints_of(self._linear, *self.layout.split(state.array))
+            return differentiating.constraints_of(self._linear, *self.layout.split(state.array))
 
     def energies(self, state: State) -> Energies:
         """Kinetic, potential and thermal energy."""
@@ -330,9 +329,13 @@ class Dynamics:
         q, r, s = self.layout.split(state.array)
         self.loading.place(q, r)
         with self._pushed(forces):
-            under = forward_slopes(self._linear, q, r, s)
+            under = differentiating.forward_slopes(self._linear, q, r, s)
         with failing_at(0.0):
-            return self.loading.stiffened(derivatives_of(self._linear, under, q, r, s, given), q, r)
+            return self.loading.stiffened(differentiating.derivatives_of(self._linear, under, q, r, s, given), q, r)
+
+    def velocity_derivatives(self, state: State) -> VelocityDerivatives:
+        """Exact derivatives, by the configuration, of what the rates make: constraints' rows, cut joints, bodies."""
+        return differentiating.velocity_derivatives_of(self._linear, self._links, state.q, state.r)
 
     # ---- steps -------------------------------------------------------------------------------------------------
 
@@ -357,11 +360,10 @@ class Dynamics:
             found = self._steps.step(self._reduced(state), h, method, forces)
             return self._state(found) if isinstance(found, ReducedState) else self._of_states(found)
 
-    # ---- inside ------------------------------------------------------------------------------------------------
-
     def _counted(self, q: Array, r: Array, s: Array) -> ReducedState:
-        eq = self._equations
-        return ReducedState(0.0, q, r, eq.heats.energies(s), np.zeros(2 + len(eq.reduced.made)))
+        return ReducedState(
+            0.0, q, r, self._equations.heats.energies(s), np.zeros(2 + len(self._equations.reduced.made))
+        )
 
     def _reduced(self, state: State) -> ReducedState:
         return self._counted(*self.layout.split(state.array))

@@ -1,5 +1,6 @@
 """Results of the dynamics functions: constraints, energies, derivatives."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import final
 
@@ -7,7 +8,7 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.primitives import Storage
 from ephs.solve.model import Model
 
-__all__ = ["Constraints", "Derivatives", "Energies"]
+__all__ = ["Constraints", "Derivatives", "Energies", "VelocityDerivatives"]
 
 
 @final
@@ -99,3 +100,26 @@ class Derivatives:
     entropy_q: Array
     entropy_r: Array
     entropy_s: Array
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class VelocityDerivatives:
+    """Exact derivatives of velocities J(q) r by the tree's elements, the tree's rates r held.
+
+    Increments are those of `Derivatives`. A Jacobian's own change with time is that along the motion: J̇ r is the
+    derivative times r.
+
+    Parameters
+    ----------
+    rows
+        (m, n) of what `Constraints.rows` make of the rates.
+    joints
+        Joint that closes a loop -> (d, n) of its rates.
+    bodies
+        Body -> (6, n) of its twist, in its frame.
+    """
+
+    rows: Array
+    joints: Mapping[str, Array]
+    bodies: Mapping[str, Array]

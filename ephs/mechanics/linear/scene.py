@@ -3,11 +3,10 @@
 Small motions about a state are η, increments of a choice of independent freedoms, and ρ, of their rates: the tree's
 joints move by δq = Z η (left-trivialised) and change their rates by δr = Z ρ + Y η, so that loops stay closed and
 prescribed joints follow their motion. Freedoms are chosen so that Z, the identity on them, is small: by pivots of the
-constraints' rows in the mass metric. With δq' = δr − ad_r δq the derivatives of `Dynamics` give A; nothing is
-differenced but outputs' own turning, and that only where the mechanism moves.
+constraints' rows in the mass metric. With δq' = δr − ad_r δq the derivatives of `Dynamics` give A.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from types import MappingProxyType
@@ -23,6 +22,7 @@ from ephs.mechanics.scene.errors import did_you_mean, listing
 from ephs.mechanics.scene.model import GROUND, Scene
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.rank import ELIMINATION
+from ephs.semantics.spaces.rotations import hat
 from ephs.solve.errors import OptionError
 from ephs.solve.methods.natural import stored_energies
 from ephs.solve.model import compile_model
@@ -104,6 +104,18 @@ def linear_scene(
 
 
 @final
+@dataclass(frozen=True, slots=True, eq=False)
+class _Port:
+    """A port: (d, n) its rates by the tree's, (d, n) their derivatives by the configuration at the state's rates, and
+    whether its place is meant, not its rate.
+    """
+
+    jacobian: Array
+    turning: Array
+    of_place: bool
+
+
+@final
 class _Linear:
     """One linearisation: what its parts share."""
 
@@ -115,6 +127,7 @@ class _Linear:
         self.k, self.n = self.free.which.size, model.layout.n
         _, self.r, _ = _split(model, state)
         self.moving = bool(np.any(self.r))
+        self.velocities = model.velocity_derivatives(self.state)
         self.nodes = [i for i, path in enumerate(model.layout.entropies) if tuple(path)[-3:-2] == ("thermal",)]
         self.ad = self._ad()
         self.turned = self._turned()
@@ -141,26 +154,13 @@ class _Linear:
         return out
 
     def _turned(self) -> Array:
-        """(n, k) Y: how the dependent rates change with the configuration while the independent ones do not.
-
-        The rows G on the rates obey X_v(G r) = ¼ (b(v + r) − b(v − r)) + ½ G ad_v r with b(r) = Ġ r quadratic.
-        """
+        """(n, k) Y: how the dependent rates change with the configuration while the independent ones do not."""
         out = np.zeros((self.n, self.k))
         found = self.model.constraints(self.state)
         if not (self.moving and found.rank):
             return out
-        q, r, s = _split(self.model, self.state)
-        size = max(1e-3, float(np.abs(r).max()))
-
-        def turning(rates: Array) -> Array:
-            return -self.model.constraints(self.model.unpack(np.concatenate([q, rates, s]))).target
-
-        change = np.zeros((found.rows.shape[0], self.k))
-        for j in range(self.k):
-            v = size * self.free.Z[:, j]
-            sym = 0.25 * (turning(v + r) - turning(v - r))
-            change[:, j] = (sym - 0.5 * found.rows @ (self.ad @ v)) / size
         dependent = np.setdiff1d(np.arange(self.n), self.free.which)
+        change = self.velocities.rows @ self.free.Z
         out[dependent] = -np.linalg.lstsq(found.rows[:, dependent], change, rcond=ELIMINATION)[0]
         return out
 
@@ -192,15 +192,14 @@ class _Linear:
     def _ports(self, by_force: Array) -> tuple[Array, Array, tuple[str, ...], tuple[str, ...]]:
         B, C, given, seen = [], [], [], []
         for name in self.inputs:
-            jacobian, of_place = self._port(name)
-            if of_place:
+            port = self._port(name)
+            if port.of_place:
                 raise OptionError("inputs", name, "a joint, a body or a marker")
-            force = by_force @ jacobian(self.state).T
+            force = by_force @ port.jacobian.T
             B.append(np.vstack([np.zeros((self.k, force.shape[1])), force[self.free.which], self._still(force)]))
             given += _numbered(name, force.shape[1])
         for name in self.outputs:
-            jacobian, of_place = self._port(name)
-            C.append(self._seen(jacobian, of_place))
+            C.append(self._seen(self._port(name)))
             seen += _numbered(name, C[-1].shape[0])
         size = 2 * self.k + len(self.nodes)
         return (
@@ -213,26 +212,15 @@ class _Linear:
     def _still(self, force: Array) -> Array:
         return np.zeros((len(self.nodes), force.shape[1]))
 
-    def _seen(self, jacobian: Callable[[State], Array], of_place: bool) -> Array:
+    def _seen(self, port: "_Port") -> Array:
         """Rows of C of a displacement, or of a rate."""
-        here, warm = jacobian(self.state), np.zeros((jacobian(self.state).shape[0], len(self.nodes)))
-        if of_place:
+        here, warm = port.jacobian, np.zeros((port.jacobian.shape[0], len(self.nodes)))
+        if port.of_place:
             return np.hstack([here @ self.free.Z, np.zeros((here.shape[0], self.k)), warm])
-        by_place = here @ self.turned
-        if self.moving:
-            by_place = by_place + self._along(lambda state: jacobian(state) @ self.r)
-        return np.hstack([by_place, here @ self.free.Z, warm])
+        return np.hstack([here @ self.turned + port.turning @ self.free.Z, here @ self.free.Z, warm])
 
-    def _along(self, function: Callable[[State], Array]) -> Array:
-        """The derivative of a function of the configuration along the freedoms, by differences of fourth order."""
-        columns = []
-        for column in self.free.Z.T:
-            at = {k: function(self.model.moved(self.state, 1e-3 * k * column)) for k in (-2, -1, 1, 2)}
-            columns.append((8.0 * (at[1] - at[-1]) - (at[2] - at[-2])) / 12e-3)
-        return np.array(columns).T.reshape(-1, self.k)
-
-    def _port(self, name: str) -> tuple[Callable[[State], Array], bool]:
-        """The Jacobian (d, n) of a port from the tree's rates, and whether its place is meant, not its rate."""
+    def _port(self, name: str) -> "_Port":
+        """A port by its name."""
         kind, _, rest = name.partition(".")
         words = {"joints": ".coordinate", "bodies": ".position", "markers": ".position"}
         scene, model = self.model.scene, self.model
@@ -245,24 +233,34 @@ class _Linear:
             own = rest.removesuffix(suffix) if rest.endswith(suffix) else rest
             if own in known.get(kind, ()) and (own + suffix == rest):
                 if kind == "joints":
-                    return partial(self._joint, own), bool(suffix)
+                    jacobian = self._joint(own)
+                    turning = self.velocities.joints.get(own, np.zeros_like(jacobian))
+                    return _Port(jacobian, turning, bool(suffix))
                 if kind == "markers":
                     marker = dict(scene.all_markers())[own]
-                    return partial(_point, model, marker.body, marker.at), bool(suffix)
+                    return self._point(marker.body, marker.at, of_place=bool(suffix))
                 if suffix:
-                    return partial(_point, model, own, np.zeros(3)), True
-                return partial(_twist, model, own), False
+                    return self._point(own, np.zeros(3), of_place=True)
+                return _Port(model.jacobian(self.state, own), self.velocities.bodies[own], of_place=False)
         every = [f"{key}.{n}" for key, found in known.items() for n in found]
         raise OptionError("port", name, f"{did_you_mean(name, every, listing(every))}")
 
-    def _joint(self, name: str, state: State) -> Array:
+    def _joint(self, name: str) -> Array:
         """(d, n) a joint's rates by the tree's: some of them, or of a joint that closes a loop what they do to it."""
         where = self.model.layout.freedoms[name]
         if name not in self.model.cut or where[0] < self.n:
             return np.eye(self.n)[where]
-        q, _, s = _split(self.model, state)
+        q, _, s = _split(self.model, self.state)
         columns = [self.model.unpack(np.concatenate([q, unit, s])).rates[name] for unit in np.eye(self.n)]
         return np.array(columns).T
+
+    def _point(self, body: str, at: Array, *, of_place: bool) -> "_Port":
+        """A point of a body: its velocity R (v + ω × at) in the world."""
+        jacobian, by_twist = self.model.jacobian(self.state, body, at), self.model.jacobian(self.state, body)
+        turn = self.model.bodies(self.state)[body].rotation
+        (w, v), (dw, dv) = np.split(by_twist @ self.r, 2), np.split(self.velocities.bodies[body], 2)
+        change = dv - hat(at) @ dw - hat(v + np.cross(w, at)) @ by_twist[:3]
+        return _Port(jacobian, turn @ change, of_place)
 
     # ---- energy and dissipation --------------------------------------------------------------------------------
 
@@ -324,18 +322,10 @@ class _Linear:
         rest = np.zeros((self.n, self.k + len(self.nodes)))
         whole = np.hstack([self.free.Z, rest])
         model = self.model
-        out = {f"joints.{name}": self._joint(name, self.state) @ whole for name in model.joints if self._dim(name)}
+        out = {f"joints.{name}": self._joint(name) @ whole for name in model.joints if self._dim(name)}
         out |= {f"bodies.{name}": model.jacobian(self.state, name) @ whole for name in model.bodies(self.state)}
         warm = np.eye(2 * self.k + len(self.nodes))[2 * self.k :]
         return out | {str(model.layout.entropies[i]): warm[j : j + 1] for j, i in enumerate(self.nodes)}
-
-
-def _point(model: Dynamics, body: str, at: Array, state: State) -> Array:
-    return model.jacobian(state, body, at)
-
-
-def _twist(model: Dynamics, body: str, state: State) -> Array:
-    return model.jacobian(state, body)
 
 
 def _split(model: Dynamics, state: State) -> tuple[Array, Array, Array]:

@@ -11,6 +11,7 @@ from ephs.mechanics.methods.jacobian import Jacobian
 from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.tree.equations.equations import Equations
 from ephs.mechanics.tree.equations.tangent import Linearised
+from ephs.semantics.spaces import SE3
 from ephs.testing import mechanisms
 from tests.mechanics.dynamics.drawn import moving
 
@@ -31,6 +32,11 @@ def difference(function, size, step=1e-3):
 def close(found, expected, tolerance=GOOD):
     assert found.shape == expected.shape
     assert np.abs(found - expected).max(initial=0.0) <= tolerance * max(1.0, np.abs(expected).max(initial=0.0))
+
+
+def assert_near(found, expected, rates):
+    """Equal to rounding of what is quadratic in rates, of lengths of a few metres."""
+    assert np.abs(found - expected).max(initial=0.0) <= 1e-12 * (1.0 + float(rates @ rates))
 
 
 def shifted(model, state, part, by):
@@ -231,3 +237,46 @@ def test_columns_add_up_along_any_direction(drawn):
     columns, whole = slopes.along("residual", tuple(sizes)), np.concatenate(list(seeds.values()))
     size = 1.0 + np.abs(columns) @ np.abs(whole)
     assert np.all(np.abs(columns @ whole - along) <= 1e-13 * whole.shape[0] * size)
+
+
+@settings(max_examples=30)
+@given(drawn=moving())
+def test_twists_change_along_the_motion_as_brackets_say(drawn):
+    """(d/dq J r) r = J̇ r is the sum of ad(twist of the joints before) J_i r_i, joint by joint from the ground."""
+    _, model, state, _ = drawn
+    found = model.velocity_derivatives(state)
+    for body in model.bodies(state):
+        jacobian = model.jacobian(state, body)
+        twist, drift = np.zeros(6), np.zeros(6)
+        for where in model.placing.outwards:
+            step = jacobian[:, where] @ state.r[where]
+            drift += SE3.ad(twist) @ step
+            twist += step
+        assert_near(found.bodies[body] @ state.r, drift, state.r)
+
+
+@settings(max_examples=30)
+@given(drawn=moving())
+def test_rows_change_as_the_quadratic_form_of_their_targets(drawn):
+    """X_v(G r) = ¼ (b(v + r) − b(v − r)) + ½ G [r, v] for motions v and b(r) = Ġ r, minus the constraints' targets."""
+    _, model, state, rng = drawn
+    found = model.constraints(state)
+    assume(found.target.size)
+    v, r = rng.standard_normal(model.layout.n), state.r
+    v -= np.linalg.lstsq(found.rows, found.rows @ v, rcond=1e-9)[0]
+
+    def turning(rates):
+        array = np.array(state.array)
+        array[model.layout.elements_end : model.layout.elements_end + r.size] = rates
+        return -model.constraints(model.unpack(array)).target
+
+    bracket = np.zeros_like(r)
+    for name, parts in model.layout.edges.items():
+        at = 0
+        for _, edge in parts:
+            own = model.layout.freedoms[name][at : at + edge.pair.dim]
+            at += edge.pair.dim
+            if own.size and own[0] < r.size:
+                bracket[own] = edge.pair.manifold.ad(r[own]) @ v[own]
+    expected = 0.25 * (turning(v + r) - turning(v - r)) + 0.5 * found.rows @ bracket
+    assert_near(model.velocity_derivatives(state).rows @ v, expected, np.concatenate([v, r]))

@@ -147,19 +147,24 @@ class Residual:
         at = self._ground.T @ place[9:12] + turn @ frame[9:]
         return np.concatenate([matrix_to_quaternion(turn @ frame[:9].reshape(3, 3)), at])
 
+    def link(self, body: int) -> int:
+        """Number of a body's link, −1 for the ground."""
+        return self._bodies.link[body]
+
     def twist(self, body: int) -> Array:
         """(6,) of a body in its frame, where `place` has been."""
-        return self._inside(body, self.arrays["places"][self._bodies.link[body], 12:18])
+        return self.inside(body, self.arrays["places"][self._bodies.link[body], 12:18])
 
     def twists(self, body: int) -> Array:
         """(6, n) a body's twist by the tree's rates, where `place` has been."""
-        link = self._bodies.link[body]
+        link = self.link(body)
         if link < 0:
             return np.zeros((6, self.n))
         self._calls["twists"](self.size, link)
-        return self._inside(body, self.arrays["rows"]).T
+        return self.inside(body, self.arrays["rows"]).T
 
-    def _inside(self, body: int, twist: Array) -> Array:
+    def inside(self, body: int, twist: Array) -> Array:
+        """(…, 6) twists of a body in its frame, from those of its link."""
         frame = self.arrays["body_frame"][body]
         turn, at = frame[:9].reshape(3, 3), frame[9:]
         turning, moving = twist[..., :3], twist[..., 3:]

@@ -46,9 +46,13 @@ class Slopes:
         name
             ``residual`` or ``action``.
         """
-        call = self._call(name)
+        return self.both(name, seeds, count)[0]
+
+    def both(self, name: str, seeds: Mapping[str, Array], count: int, beside: str = "value") -> tuple[Array, Array]:
+        """The same, and the derivatives of an argument that the function writes, with ``count`` as its last axis."""
+        call, written = self._call(name), self._slopes[beside]
         out = self._outs[name]
-        found = np.empty((out.shape[0], count))
+        found, other = np.empty((out.shape[0], count)), np.empty((*written.shape[:-1], count))
         for first in range(0, count, DIRECTIONS):
             here = min(DIRECTIONS, count - first)
             for key, seed in seeds.items():
@@ -56,9 +60,10 @@ class Slopes:
                 self._slopes[key][..., here:] = 0.0
             call()
             found[:, first : first + here] = out[:, :here]
+            other[..., first : first + here] = written[..., :here]
         for key in seeds:
             self._slopes[key][:] = 0.0
-        return found
+        return found, other
 
     def along(self, name: str, arguments: Sequence[str], wanted: Index | None = None) -> Array:
         """(size, k) derivatives by all entries of vectors, in their order, or by those that are wanted."""

@@ -6,6 +6,7 @@ import numpy as np
 
 from ephs.mechanics.rewrite.coordinates import unread
 from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.sweeps.cuts import Place
 from ephs.semantics.bundle import Array
 
 __all__ = ["Linearised"]
@@ -107,6 +108,28 @@ class Linearised:
         found = self._residual
         slopes = self._slopes.of("residual", {"drive": drive, "wrench": wrench}, drive.shape[-1])
         return self._dense.solved(-slopes[found.forces], self._rows(slopes))
+
+    def turning(self, q: Array, r: Array) -> tuple[Array, Array, Array]:
+        """((m, n), (nv − n, n), (links + 1, 6, n)) derivatives by the tree's elements, at fixed rates r, of what the
+        rates make: of all rows, of cut joints' rates, of links' twists; cut joints' elements follow the tree's.
+
+        At rest the accelerations of what the rows, joints and links have are what they make of the tree's: J a, so that
+        a in place of r gives J r.
+        """
+        found = self._residual
+        n, nv, gravity = found.n, found.nv, found.arrays["gravity"]
+        pull = gravity.copy()
+        gravity[:] = 0.0
+        found.place(q, np.zeros(n))
+        found.arrays["base"][:] = q
+        found.at(r, np.zeros(found.m))
+        units = np.eye(nv + n)
+        slopes, places = self._slopes.both("residual", {"v": units[:nv], "r": units[nv:]}, nv + n, "places")
+        gravity[:] = pull
+        following = slopes[found.cut_rates, nv:]
+        slopes[:, :n] += slopes[:, n:nv] @ following
+        twists = places[:, Place.bias.offset : Place.bias.offset + 6]
+        return self._rows(slopes[:, :n]), slopes[found.cut_changes, :n], twists[..., :n]
 
     @property
     def cut_rates(self) -> Array:
