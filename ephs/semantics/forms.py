@@ -283,7 +283,7 @@ def _limited(numbers: int) -> None:
 def _kernel(name: str, relation: relations.Relation, carried: Carried, parameters: Sequence[float]) -> Kernel:
     """The relation with its numbers: reference potentials first, known when the environment is."""
     numbers = (*[0.0] * len(carried), *parameters)
-    return Kernel("", name, numbers, relation, potentials=tuple(enumerate(carried.values())))
+    return Kernel(name, relation, numbers, potentials=tuple(enumerate(carried.values())))
 
 
 def _vector(size: int) -> int | None:

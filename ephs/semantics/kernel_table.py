@@ -8,17 +8,17 @@ back in Python through the same signature, with a differenced Jacobian.
 import ctypes
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache
-from importlib import import_module
-from typing import Any, final
+from typing import Any, Final, final
 
 import numpy as np
 
 from ephs.semantics.behaviour import Natural, Storing
 from ephs.semantics.bundle import Array, Reference
+from ephs.semantics.derive.relations import compiled
 from ephs.semantics.errors import SemanticsError
-from ephs.semantics.primitives import Kernel, Primitive, Reversible, Storage
+from ephs.semantics.primitives import Primitive, Reversible, Storage
 from ephs.semantics.spaces import manifold
+from ephs.semantics.stage import Signature
 
 __all__ = [
     "DOMAIN",
@@ -37,10 +37,7 @@ OK, TURN, TEMPERATURE, RAISED, EXTENT, DOMAIN = 0, 1, 2, 3, 4, 5
 """What a kernel returns: done; half a turn in a step; θ ≤ 0; a Python function raised; a length or volume ≤ 0; a value
 that is not a finite number."""
 
-SIGNATURE = (
-    "int64(CPointer(int64), CPointer(float64), CPointer(float64), CPointer(float64), CPointer(float64), "
-    "CPointer(float64), CPointer(float64), CPointer(float64), CPointer(float64), CPointer(float64), CPointer(float64))"
-)
+SIGNATURE: Final = Signature((("integers",), *[("reals",)] * 10))
 """(dims, (h, θ₀, π₀), parameters, x⁰, v, e, λ, f, c, J, work); dims = n, k, dim of v, size of x⁰."""
 
 _POINTER = ctypes.POINTER(ctypes.c_double)
@@ -50,13 +47,6 @@ _PROTOTYPE = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.POINTER(ctypes.c_int64), *[
 def prototype(address: int) -> Any:
     """A kernel at an address, to be called from Python with pointers."""
     return _PROTOTYPE(address)
-
-
-@cache
-def _compiled(module: str, name: str) -> Any:
-    from ephs.semantics.spaces.jit import cfunc_kernel
-
-    return cfunc_kernel(SIGNATURE)(getattr(import_module(module), name))
 
 
 @final
@@ -91,25 +81,9 @@ def address_of(
     """
     given = reference or Reference()
     if primitive.kernel is not None:
-        return *_of_kernel(primitive.kernel, given), None
+        return compiled(primitive.kernel.relation).address, primitive.kernel.numbers(given), None
     callback = _callback(primitive, given.potentials)
     return callback.address, (), callback
-
-
-def _of_kernel(kernel: Kernel, reference: Reference) -> tuple[int, tuple[float, ...]]:
-    """Address and parameters, with those of what runs inside."""
-    if kernel.relation is not None:
-        from ephs.semantics.derive.relations import compiled
-
-        return compiled(kernel.relation).address, kernel.numbers(reference)
-    try:
-        own = int(_compiled(kernel.module, kernel.name).address)
-    except AttributeError as error:
-        raise SemanticsError("uncompiled", kernel.name) from error
-    if kernel.inner is not None:
-        inner, numbers = _of_kernel(kernel.inner, reference)
-        return own, (float(inner), *kernel.numbers(reference), *numbers)
-    return own, kernel.numbers(reference)
 
 
 def _callback(primitive: Primitive, potentials: Mapping[str, float]) -> Callback:

@@ -34,24 +34,22 @@ Proof = Callable[[], tuple[Condition, ...]]
 @final
 @dataclass(frozen=True, slots=True)
 class Kernel:
-    """The compiled counterpart of a primitive's discrete relation: a function in a module, or derived; its numbers.
+    """The compiled counterpart of a primitive's discrete relation, and its numbers.
 
     Parameters
     ----------
+    name
+        What kind of relation it is.
     relation
-        Derived from the primitive's function; the module has no name then.
-    inner
-        A kernel that this one calls: its address comes before the parameters, its own numbers after them.
+        What is compiled.
     potentials
         Places among the parameters that hold reference potentials, each with what it is the potential of: amounts by
         charge. They are zero until a reference environment is known.
     """
 
-    module: str
     name: str
+    relation: "Relation | Linear"
     parameters: tuple[float, ...] = ()
-    relation: "Relation | Linear | None" = None
-    inner: "Kernel | None" = None
     potentials: tuple[tuple[int, tuple[tuple[str, float], ...]], ...] = ()
 
     def numbers(self, reference: Reference) -> tuple[float, ...]:

@@ -4,8 +4,8 @@ With e' = T e the relation (f', e') becomes f = Tᵀ f': Dirac structures stay D
 Onsager structures, and over a step the same relation holds that the two components have together.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import final
 
 import numpy as np
@@ -13,13 +13,13 @@ import numpy as np
 from ephs.operad import Directory, Interface, Path, PortType
 from ephs.semantics import structures
 from ephs.semantics.bundle import Array, Reference
+from ephs.semantics.derive.linear import Linear
+from ephs.semantics.derive.maps import Maps
+from ephs.semantics.derive.relations import Storage
 from ephs.semantics.primitives import Irreversible, Kernel, Point, Reversible
 from ephs.semantics.verdict import Condition
 
 __all__ = ["Map", "pull_back", "pulled_ports"]
-
-KERNELS = "ephs.semantics.pullback_kernels"
-
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
@@ -111,19 +111,16 @@ def pull_back(process: Reversible | Irreversible, maps: Mapping[Path, Map]) -> R
 
 def pulled_ports(kernel: Kernel) -> tuple[tuple[int, int, int, int, Array], ...]:
     """(inner at, inner dim, at, dim, matrix (inner dim, dim)) of each port of a kernel that `pull_back` made."""
-    if kernel.inner is None:
+    maps = None if isinstance(kernel.relation, Linear | Storage) else kernel.relation.maps
+    if maps is None:
         return ()
-    numbers = kernel.parameters
-    count = int(numbers[1])
+    numbers = kernel.parameters[len(kernel.parameters) - maps.numbers :]
     out: list[tuple[int, int, int, int, Array]] = []
-    at = 2 + 5 * count
-    for i in range(count):
-        a, da, b, db, is_matrix = (int(value) for value in numbers[2 + 5 * i : 7 + 5 * i])
-        matrix = np.eye(da)
-        if is_matrix:
-            matrix = np.array(numbers[at : at + da * db]).reshape(da, db)
-            at += da * db
-        out.append((a, da, b, db, matrix))
+    inside = outside = 0
+    for block, rows in zip(maps.blocks, maps.rows(numbers), strict=True):
+        matrix = np.array(rows, dtype=float).reshape(block.inside, block.outside)
+        out.append((inside, block.inside, outside, block.outside, matrix))
+        inside, outside = inside + block.inside, outside + block.outside
     return tuple(out)
 
 
@@ -145,34 +142,20 @@ def _matrix(process: Reversible | Irreversible, maps: Mapping[Path, Map]) -> Arr
 
 def _kernel(process: Reversible | Irreversible, maps: Mapping[Path, Map]) -> Kernel | None:
     kernel = process.kernel
-    if kernel is None or any(m.matrix.shape[1] > m.matrix.shape[0] for m in maps.values()):
+    if kernel is None or isinstance(kernel.relation, Linear | Storage):
         return None
-    before = pulled_ports(kernel) if kernel.module == KERNELS else _plain(process)
-    inside = kernel.inner if kernel.module == KERNELS and kernel.inner is not None else kernel
-    blocks: list[tuple[int, int, Array]] = []
+    if any(m.matrix.shape[1] > m.matrix.shape[0] for m in maps.values()):
+        return None
+    before = [(matrix.shape[1], matrix) for *_, matrix in pulled_ports(kernel)] or [
+        (dim, np.eye(dim)) for dim in (where.stop - where.start for _, where, _ in process.bundle.items()) if dim
+    ]
     # a port whose efforts vanish is none of the process' any more, but still one of the relation inside
     ports = iter([port for port, where, _ in process.bundle.items() if where.stop > where.start])
-    for a, da, _, db, matrix in before:
-        port = next(ports) if db else None
-        blocks.append((a, da, matrix @ maps[port].matrix if port is not None and port in maps else matrix))
-    return _tabulate(inside, blocks)
-
-
-def _plain(process: Reversible | Irreversible) -> Sequence[tuple[int, int, int, int, Array]]:
-    spans = [(where.start, where.stop - where.start) for _, where, _ in process.bundle.items()]
-    return [(at, dim, at, dim, np.eye(dim)) for at, dim in spans if dim]
-
-
-def _tabulate(inside: Kernel, blocks: Sequence[tuple[int, int, Array]]) -> Kernel:
-    layout: list[float] = []
-    matrices: list[float] = []
-    at = 0
-    for a, da, matrix in blocks:
-        db = matrix.shape[1]
-        plain = da == db and np.array_equal(matrix, np.eye(da))
-        layout += [a, da, at, db, 0.0 if plain else 1.0]
-        if not plain:
-            matrices += matrix.ravel().tolist()
-        at += db
-    inner = sum(da for _, da, _ in blocks)
-    return Kernel(KERNELS, "pulled", (float(inner), float(len(blocks)), *layout, *matrices), inner=inside)
+    matrices: list[Array] = []
+    for dim, matrix in before:
+        port = next(ports) if dim else None
+        matrices.append(matrix @ maps[port].matrix if port is not None and port in maps else matrix)
+    made, numbers = Maps.of(matrices)
+    old = kernel.relation.maps
+    own = kernel.parameters[: len(kernel.parameters) - (0 if old is None else old.numbers)]
+    return replace(kernel, relation=replace(kernel.relation, maps=made), parameters=(*own, *numbers))

@@ -42,7 +42,7 @@ def quadratic(
         discrete_gradient=lambda x0, v: q @ (vector(x0) + 0.5 * v),
         parameters=parameters,
         # the kernel knows no reference environment
-        kernel=None if Bundle.of(interface).charges else Kernel("", "quadratic", tuple(q.ravel()), Linear("quadratic")),
+        kernel=None if Bundle.of(interface).charges else Kernel("quadratic", Linear("quadratic"), tuple(q.ravel())),
         formula=formula,
         proof=lambda: _quadratic_proof(interface, q),
         trusted=trusted,
@@ -109,7 +109,7 @@ def constant_structure(
         structure=lambda _x: (skew, constraint),
         parameters=parameters,
         multipliers=k,
-        kernel=Kernel("", "constant_structure", tuple(entry or 0.0 for entry in entries), Linear("constant_structure")),
+        kernel=Kernel("constant_structure", Linear("constant_structure"), tuple(entry or 0.0 for entry in entries)),
         formula=formula or Formula(lambda: (skew, constraint)),
         trusted=trusted,
     )

@@ -142,7 +142,7 @@ def _local_pattern(entry: Entry, reference: Reference) -> Array:
     numbers = kernel.parameters if kernel is not None else ()
     if kernel is not None and kernel.name in LINEAR:
         numbers = tuple(number != 0.0 for number in numbers)
-    names = None if kernel is None else (kernel.module, kernel.name, kernel.relation)
+    names = None if kernel is None else (kernel.name, kernel.relation)
     key = (names, numbers, read, kind, n, k)
     if key not in _patterns:
         plain = entry.callback is not None or not shape[0]

@@ -16,6 +16,7 @@ from ephs.operad import Directory, Path, PortType, Quantity, quantity
 from ephs.semantics import formulas, structures
 from ephs.semantics.bundle import Array
 from ephs.semantics.checks import STATEMENTS
+from ephs.semantics.derive.holonomic import Holonomic
 from ephs.semantics.derive.linear import Linear
 from ephs.semantics.errors import StructureError
 from ephs.semantics.forms import coupled, stored
@@ -41,7 +42,6 @@ __all__ = [
     "thermal_node",
 ]
 
-HOLONOMIC = "ephs.mechanics.elements.holonomic_kernels"
 POSES = {"SE3": quantity.pose, "SO3xR3": quantity.direct_pose}
 MOMENTA = {"SE3": quantity.body_momentum, "SO3xR3": quantity.direct_momentum}
 
@@ -108,7 +108,7 @@ def no_potential(of: Quantity, port: str) -> Storage:
         energy=lambda _x: 0.0,
         gradient=lambda _x: np.zeros(n),
         discrete_gradient=lambda _x, _v: np.zeros(n),
-        kernel=Kernel("", "no_effort", (), Linear("no_effort")),
+        kernel=Kernel("no_effort", Linear("no_effort")),
         notation=notation.nothing,
         proof=lambda: proved("E = 0", *STATEMENTS["storage"]),
         trusted=True,
@@ -242,7 +242,7 @@ def holonomic(of: Pair) -> Reversible:
             return middle, residual
         return middle + np.outer(residual - middle @ e, e) / square, residual
 
-    kernel = Kernel(HOLONOMIC, "holonomic", (float(of.code), *of.basis.reshape(6, d).ravel().tolist()))
+    basis = tuple(tuple(column) for column in of.basis.reshape(6, d).T.tolist())
     parameters = (("pair", of.name), *of.parameters)
     return Reversible(
         "holonomic",
@@ -252,7 +252,7 @@ def holonomic(of: Pair) -> Reversible:
         discrete,
         parameters,
         6,
-        kernel,
+        Kernel("holonomic", Holonomic(of.code, of.size, basis)),
         notation=notation.holonomic,
         proof=lambda: proved(
             "L = 0, all efforts are odd, q_r is even, and C is made of Ad of a pose, which is even in its quaternion",

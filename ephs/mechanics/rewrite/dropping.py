@@ -46,8 +46,7 @@ def _resists(part: Irreversible) -> bool:
     kernel = part.kernel
     if kernel is None:
         return True
-    inside = kernel.inner or kernel
-    if inside.name != "dissipation" or part.reads:
+    if kernel.name != "dissipation" or part.reads:
         return True
     efforts = np.ones(part.bundle.size)
     return bool(np.any(part.matrix({}, efforts, Reference())[:, :-1]))

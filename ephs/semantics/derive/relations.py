@@ -11,7 +11,9 @@ from typing import Any, Final, TypeAlias, final
 
 from ephs.semantics.derive.arguments import Arguments, pointer
 from ephs.semantics.derive.charts import moved, over
+from ephs.semantics.derive.holonomic import Holonomic
 from ephs.semantics.derive.linear import Linear
+from ephs.semantics.derive.maps import Maps
 from ephs.semantics.derive.slopes import Slopes, lifted
 from ephs.semantics.derive.tape import Tape, evaluate
 from ephs.semantics.spaces.vectors import dot
@@ -149,33 +151,40 @@ class Reversible:
         Those that are read.
     domain
         As of a `Storage`, at the middle of the step.
+    maps
+        Of the efforts: the relation is that of T e and Tᵀ f.
     """
 
     structure: Tape
     ports: tuple[Port, ...]
     domain: Bounds = ()
+    maps: Maps | None = None
 
     @property
     def dimensions(self) -> tuple[int, int, int, int]:
         """How many efforts, conditions, increments and numbers of states there are."""
         rows, n = self.structure.shape
-        return n, rows - n, sum(port.dim for port in self.ports), sum(port.size for port in self.ports)
+        outside = n if self.maps is None else self.maps.outside
+        return outside, rows - n, sum(port.dim for port in self.ports), sum(port.size for port in self.ports)
 
     @property
     def numbers(self) -> int:
         """How many parameters there are."""
-        return self.structure.parameters
+        return self.structure.parameters + (0 if self.maps is None else self.maps.numbers)
 
     def stage(self, on: Evaluator, a: Arguments) -> Integer:
         """Write flows, conditions and their derivatives by efforts, multipliers and increments."""
-        n, k, m, _ = self.dimensions
-        partials = Duals(on, n + k + m)
+        n, k = self.structure.shape[1], self.structure.shape[0] - self.structure.shape[1]
+        partials = Duals(on, sum(self.dimensions[:3]))
         p, x, e, lam = _given(partials, self, a)
-        rows = evaluate(partials, self.structure, x, p)
-        values: list[Real] = []
+        own, through = self.structure.parameters, _Through(self.maps, p[self.structure.parameters :])
+        e = through.inward(e)
+        rows = evaluate(partials, self.structure, x, p[:own])
+        flows: list[Real] = []
         for i in range(n):
             flow = dot(rows[i * n : i * n + n], e)
-            values.append(flow + dot([rows[(n + j) * n + i] for j in range(k)], lam))
+            flows.append(flow + dot([rows[(n + j) * n + i] for j in range(k)], lam))
+        values = through.outward(flows)
         values += [dot(rows[i * n : i * n + n], e) for i in range(n, n + k)]
         good = on.both(
             _written(partials, self, a, values), _inside(on, self.domain, [partials.dual(each).value for each in x])
@@ -200,6 +209,8 @@ class Irreversible:
         As of a `Storage`.
     domain, between
         Bounds of the numbers of the states, and of the energy efforts, at the middle of the step.
+    maps
+        As of a `Reversible`.
     """
 
     matrix: Tape
@@ -210,23 +221,29 @@ class Irreversible:
     potentials: tuple[int, ...] = ()
     domain: Bounds = ()
     between: Bounds = ()
+    maps: Maps | None = None
 
     @property
     def dimensions(self) -> tuple[int, int, int, int]:
         """How many efforts, conditions, increments and numbers of states there are."""
-        n = len(self.reference)
+        n = len(self.reference) if self.maps is None else self.maps.outside
         return n, 0, sum(port.dim for port in self.ports), sum(port.size for port in self.ports)
 
     @property
     def numbers(self) -> int:
         """How many parameters there are."""
+        return self._own + (0 if self.maps is None else self.maps.numbers)
+
+    @property
+    def _own(self) -> int:
         return len(self.potentials) + self.matrix.parameters
 
     def stage(self, on: Evaluator, a: Arguments) -> Integer:
         """Write flows and their derivatives by efforts and increments."""
-        n, _, m, _ = self.dimensions
-        partials = Duals(on, n + m)
+        n, partials = len(self.reference), Duals(on, sum(self.dimensions[:3]))
         p, x, e, _ = _given(partials, self, a)
+        through = _Through(self.maps, p[self._own :])
+        e = through.inward(e)
         energy: list[Real] = []
         cold: Truth = False
         for i, (hot, wide) in enumerate(self.reference):
@@ -237,9 +254,9 @@ class Irreversible:
             if i in self.hot:
                 cold = on.either(cold, partials.dual(energy[i]).value <= 0.0)
         inputs = [energy[i] if effort else x[i] for effort, i in self.takes]
-        rows = evaluate(partials, self.matrix, inputs, p[len(self.potentials) :])
+        rows = evaluate(partials, self.matrix, inputs, p[len(self.potentials) : self._own])
         theta = partials.dual(a.scal[1])
-        values = [dot(rows[i * n : i * n + n], e) / theta for i in range(n)]
+        values = through.outward([dot(rows[i * n : i * n + n], e) / theta for i in range(n)])
         good = on.both(
             _written(partials, self, a, values), _inside(on, self.domain, [partials.dual(each).value for each in x])
         )
@@ -247,7 +264,23 @@ class Irreversible:
         return on.select(cold, TEMPERATURE, on.select(good, OK, DOMAIN))
 
 
-Relation: TypeAlias = Storage | Reversible | Irreversible
+Relation: TypeAlias = Storage | Reversible | Irreversible | Holonomic
+
+
+@final
+class _Through:
+    """Efforts and flows seen through the maps of a relation, with the maps' numbers."""
+
+    def __init__(self, maps: Maps | None, numbers: Numbers) -> None:
+        self.maps, self.rows = maps, [] if maps is None else maps.rows(numbers)
+
+    def inward(self, efforts: list[Real]) -> list[Real]:
+        """T e."""
+        return efforts if self.maps is None else self.maps.inward(self.rows, efforts)
+
+    def outward(self, flows: list[Real]) -> list[Real]:
+        """Tᵀ f."""
+        return flows if self.maps is None else self.maps.outward(self.rows, flows)
 
 
 def _along(value: Real, directions: int, direction: int, slope: float = 1.0) -> Dual:
@@ -272,7 +305,7 @@ def _given(
     return [on.dual(a.p[i]) for i in range(relation.numbers)], x, e, lam
 
 
-def _written(on: Duals, relation: Relation, a: Arguments, values: Numbers) -> Truth:
+def _written(on: Duals, relation: Reversible | Irreversible, a: Arguments, values: Numbers) -> Truth:
     """Store flows, conditions and their derivatives; whether all values are finite."""
     n, k, m, _ = relation.dimensions
     width = n + k + m

@@ -151,7 +151,7 @@ def environment(**ports: Quantity) -> Storage:
         power_ports(**(ports or {"s": quantity.entropy})),
         energy=lambda x: 0.0,
         environment=True,
-        kernel=Kernel("", "no_effort", (), Linear("no_effort")),
+        kernel=Kernel("no_effort", Linear("no_effort")),
     )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ephs.semantics.bundle import Array
+from ephs.semantics.derive.holonomic import Holonomic
 from ephs.semantics.linear.sparse import sparse_lu
 from ephs.semantics.primitives import Kernel
 from ephs.semantics.pullback import pulled_ports
@@ -268,9 +269,8 @@ def _groups(model: Model, where: Index) -> Groups:
     metrics: list[Array] = []
     for number, slot in enumerate(model.descriptor.components):
         kernel = slot.primitive.kernel
-        inside = kernel.inner or kernel if kernel is not None else None
-        if kernel is not None and inside is not None and inside.name == "holonomic":
-            code, efforts = int(inside.parameters[0]), list(slot.efforts)
+        if kernel is not None and isinstance(kernel.relation, Holonomic):
+            code, efforts = kernel.relation.code, list(slot.efforts)
             for (first, matrix), group in zip(_ports(kernel, len(efforts)), (SE3, SE3, code), strict=True):
                 dim = matrix.shape[1]
                 if dim:
@@ -313,9 +313,9 @@ def _closing(model: Model, groups: Groups) -> NDArray[np.bool_]:
 
 def _ports(kernel: Kernel, size: int) -> list[tuple[int, Array]]:
     """(first of its efforts, the map by which the relation sees them) of the two frames and the freedoms of a joint."""
-    if kernel.inner is None:
-        return [(0, np.eye(6)), (6, np.eye(6)), (12, np.eye(size - 12))]
     found = [(at, matrix) for _, _, at, _, matrix in pulled_ports(kernel)]
+    if not found:
+        return [(0, np.eye(6)), (6, np.eye(6)), (12, np.eye(size - 12))]
     return found if len(found) == 3 else [*found, (size, np.zeros((0, 0)))]
 
 
