@@ -1,7 +1,6 @@
 """The commands on real models, from the file to the result folder."""
 
 import json
-import os
 import shutil
 import signal
 import subprocess
@@ -235,15 +234,3 @@ def test_resuming_what_is_not_there_is_bad_input(tmp_path, capsys):
     assert main(["run", str(ROOT / "scenes/heavy-top.toml")]) == 2
     assert "--until is missing" in capsys.readouterr().err
     assert main(["run", str(ROOT / "scenes/heavy-top.toml"), "--until", "1", "--keep", "0"]) == 2
-
-
-@pytest.mark.parametrize("command", ["run --until 1 --method natural --step 0.01", "check"])
-def test_kernels_that_are_not_compiled_are_told(tmp_path, command):
-    words = [*command.split()[:1], str(ROOT / "scenes/heavy-top.toml"), *command.split()[1:]]
-    environment = os.environ | {"NUMBA_DISABLE_JIT": "1"}
-    done = subprocess.run(
-        [sys.executable, "-m", "ephs", *words], capture_output=True, text=True, env=environment, cwd=tmp_path
-    )
-    assert done.returncode == 2
-    assert "NUMBA_DISABLE_JIT is set; unset it" in done.stderr
-    assert "Traceback" not in done.stderr

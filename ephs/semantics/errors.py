@@ -8,10 +8,6 @@ if TYPE_CHECKING:
 __all__ = ["AssemblyError", "SemanticsError", "StructureError"]
 
 _TEXTS = {
-    "uncompiled": (
-        "{path}: the kernel is plain Python, expected a compiled one, which has an address: NUMBA_DISABLE_JIT is set; "
-        "unset it"
-    ),
     "fillings": ("{path}: the boxes to fill are {expected}, the fillings given are {found}; fill each box once"),
     "interface": ("{path}: the filling's interface is {found}, the box wants {expected}; rename the filling's ports"),
     "finite": "{path}: {what} is {found}, expected finite numbers (witness: {witness})",

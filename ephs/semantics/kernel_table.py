@@ -19,6 +19,7 @@ from ephs.semantics.errors import SemanticsError
 from ephs.semantics.primitives import Primitive, Reversible, Storage
 from ephs.semantics.spaces import manifold
 from ephs.semantics.stage import Signature
+from ephs.semantics.stage.reaching import Atom
 
 __all__ = [
     "DOMAIN",
@@ -37,7 +38,8 @@ OK, TURN, TEMPERATURE, RAISED, EXTENT, DOMAIN = 0, 1, 2, 3, 4, 5
 """What a kernel returns: done; half a turn in a step; θ ≤ 0; a Python function raised; a length or volume ≤ 0; a value
 that is not a finite number."""
 
-SIGNATURE: Final = Signature((("integers",), *[("reals",)] * 10))
+_REALS: Final[tuple[Atom, ...]] = ("reals",)
+SIGNATURE: Final = Signature((("integers",), *[_REALS] * 10))
 """(dims, (h, θ₀, π₀), parameters, x⁰, v, e, λ, f, c, J, work); dims = n, k, dim of v, size of x⁰."""
 
 _POINTER = ctypes.POINTER(ctypes.c_double)

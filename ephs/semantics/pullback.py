@@ -21,6 +21,7 @@ from ephs.semantics.verdict import Condition
 
 __all__ = ["Map", "pull_back", "pulled_ports"]
 
+
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Map:

@@ -70,7 +70,7 @@ GROUPS = {
             "ephs/mechanics/elements/joints.py",
             "ephs/mechanics/elements/components.py",
             "ephs/mechanics/constraints/directions.py",
-            "ephs/mechanics/elements/holonomic_kernels.py",
+            "ephs/semantics/derive/holonomic.py",
             "ephs/mechanics/elements/springs.py",
         ),
         (

@@ -57,9 +57,9 @@ BREAKS = {
         "np.hstack([SE3.adjoint(SE3.inverse(pose)), np.eye(6), of.basis])",
     ),
     "hc, compiled": Break(
-        "ephs/mechanics/elements/holonomic_kernels.py",
-        "side[i], mid[i], inner[i] = -0.5 * h * effort[6 + i], 0.5 * h * bi, h * ai",
-        "side[i], mid[i], inner[i] = 0.5 * h * effort[6 + i], 0.5 * h * bi, h * ai",
+        "ephs/semantics/derive/holonomic.py",
+        "side, mid, inner = scale(-0.5 * h, two)",
+        "side, mid, inner = scale(0.5 * h, two)",
     ),
     "mf": Break("ephs/semantics/structures.py", "[-pull]", "[pull]"),
     "substitution": Break(

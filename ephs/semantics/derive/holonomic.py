@@ -1,4 +1,4 @@
-"""The relation of a joint over a step, as it holds on the group of its pair: `ephs.mechanics.components.holonomic`.
+"""The relation of a joint over a step, as it holds on the group of its pair: the one of primitives named "holonomic".
 
 The derivatives are written out: those of the product of five exponentials by their logarithms are carried to its left
 end. Matrices of SE(3) that are Ad, ad and differentials have the form [[D, 0], [B, D]], and are kept as (D, B).

@@ -5,13 +5,14 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias, final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.vectors import Entries, Rows, combine, dot
 from ephs.semantics.stage.numbers import Real
 
 __all__ = ["Block", "Maps"]
 
+Array: TypeAlias = NDArray[np.float64]
 Sort: TypeAlias = Literal["same", "frame", "any"]
 
 

@@ -5,7 +5,7 @@ Poses are quaternions that are continuous along the motion, and bodies are those
 
 from typing import Final
 
-from ephs.mechanics.tree.sweeps.acting import KERNEL
+from ephs.semantics.kernel_table import SIGNATURE
 from ephs.semantics.linear.dense import copy
 from ephs.semantics.spaces import codes, se3
 from ephs.semantics.spaces.vectors import add, apply, scale
@@ -95,7 +95,7 @@ class Source(Record):
 class Stored(Record):
     """A storage: its relation, its number, where its parameters and the places of its states start."""
 
-    law = function(KERNEL)
+    law = function(SIGNATURE)
     dims = integers(4)
     number = integer()
     at = integer()

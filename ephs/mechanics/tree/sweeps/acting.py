@@ -6,12 +6,12 @@ from typing import Any, Final, final
 from ephs.mechanics.tree.sweeps import loops, programs
 from ephs.mechanics.tree.sweeps.cuts import Chart, Relative
 from ephs.mechanics.tree.sweeps.programs import PLACE
+from ephs.semantics.kernel_table import SIGNATURE
 from ephs.semantics.stage import (
     Integer,
     Integers,
     Matrix,
     Record,
-    Signature,
     Table,
     Vector,
     function,
@@ -25,10 +25,8 @@ from ephs.semantics.stage import (
     table,
     vector,
 )
-from ephs.semantics.stage.reaching import Atom
 
 __all__ = [
-    "KERNEL",
     "ON_BODIES",
     "ON_CUT",
     "ON_TREE",
@@ -47,9 +45,6 @@ __all__ = [
 
 ON_TREE, ON_CUT, ON_BODIES = range(3)
 """Kinds of edges in which something acts: a joint of the tree, a cut one, a spring between bodies."""
-_REALS: Final[tuple[Atom, ...]] = ("reals",)
-KERNEL: Final = Signature((("integers",), *[_REALS] * 10))
-"""How components are called: see `ephs.semantics.kernel_table`."""
 
 
 def _sweep(name: str) -> Any:
@@ -112,7 +107,7 @@ class Component(Record):
         Place of the entropy that it makes, −1: none.
     """
 
-    law = function(KERNEL)
+    law = function(SIGNATURE)
     dims = integers(4)
     at = integer()
     made = integer()
