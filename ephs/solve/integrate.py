@@ -12,7 +12,7 @@ from ephs.operad import Quantity
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import Pair
 from ephs.semantics.spaces.codes import VECTOR
-from ephs.solve.auditing.audit import Bounds, audit
+from ephs.solve.auditing.audit import Bounds, Tests, audit
 from ephs.solve.auditing.production import Production
 from ephs.solve.auditing.resolution import Trials, natural_trials
 from ephs.solve.breakpoints import Breakpoints
@@ -199,7 +199,7 @@ def audited(
     stats: Mapping[str, Any],
     bounds: Bounds | None,
     ends: list[Record],
-    trials: Callable[[Solution], Trials | None],
+    trials: Callable[[Solution], Tests | None],
 ) -> Solution:
     """Kept part of a run, with the audit from its start to the present time.
 

@@ -9,10 +9,10 @@ import numpy as np
 
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
-from ephs.solve.auditing.audit import Bounds
+from ephs.solve.auditing.audit import Bounds, Tests
 from ephs.solve.auditing.forecast import Forecast
 from ephs.solve.auditing.production import Production
-from ephs.solve.auditing.resolution import Samples, Trials, trials_of
+from ephs.solve.auditing.resolution import Samples, trials_of
 from ephs.solve.breakpoints import Breakpoints
 from ephs.solve.control import Control, Policy, first_step
 from ephs.solve.errors import OptionError, Outcome, SolveError, solve_error_of
@@ -124,7 +124,7 @@ class _Run(Generic[S]):
         self.shortest, self.longest = np.inf, 0.0
         self.pending: list[tuple[float, S, float]] = []
         self.kept = Rows()
-        self.samples: Samples[S] = Samples(wanted=policy is None)
+        self.samples: Samples[S] = Samples(wanted=policy is None, retaken=bounds is not None and bounds.retaken)
         self.watch: Watch | None = None
         self.forecast = Forecast(problem, stepper.name, bounds.order if bounds else 1, until)
         self.leg: Leg[S] | None = None
@@ -263,6 +263,7 @@ class _Run(Generic[S]):
                 self.pending.append((float(when), found, attempt.least))
             self.saved = last
         self.samples.add([(t, after, attempt.least)])
+        self.samples.retaken.add(self.t, attempt)
         self.state, self.t, self.cause = after, t, None
         self.steps += 1
         if self.policy is not None:
@@ -319,10 +320,10 @@ class _Run(Generic[S]):
         stats |= {**self.stepper.stats(), **self.remarks}  # what rows tell, too
         return audited(self.problem, self.kept.whole(self.problem.descriptor), stats, self.bounds, ends, self._trials)
 
-    def _trials(self, solution: Solution) -> Trials | None:
+    def _trials(self, solution: Solution) -> Tests | None:
         step = self.control.step
         if self.bounds is None or step is None:
-            return None
+            return self.samples.retaken.missed(self.stepper, self.breakpoints, self.problem.seconds)
         trials = trials_of(
             solution, self.bounds.undamped, self.problem, self.stepper, self.bounds.order, self.samples.states,
             self.sign * step, self.until, self.breakpoints,

@@ -179,6 +179,10 @@ class Stepper(Protocol[S]):
         """The state at a time within a step, to the method's order."""
         ...
 
+    def missed(self, attempt: Attempt[S]) -> float | None:
+        """Error of a step, by others of another length, in tolerances; None where the balance of energy shows it."""
+        ...
+
     def at(self, state: S, t: float) -> S:
         """The same state at a time that differs by rounding."""
         ...

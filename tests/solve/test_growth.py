@@ -22,7 +22,7 @@ def estimates(monkeypatch):
 
     def kept(solution, order, h, summed, allowed, again):
         estimate = global_error(solution, order, h, summed, allowed, again)
-        found.append((estimate, summed))
+        found.append((estimate, summed()))
         return estimate
 
     monkeypatch.setattr(audit, "global_error", kept)
@@ -101,7 +101,7 @@ def test_errors_of_the_order_are_found_exactly(order, summed):
         taken.append(step / h)
         return drift(order, size / h**order, step)
 
-    found = global_error(drift(order, size / h**order, h), order, h, summed, ALLOWED, Again(again, None))
+    found = global_error(drift(order, size / h**order, h), order, h, lambda: summed, ALLOWED, Again(again, None))
     assert found.resolved
     assert found.size == pytest.approx(size, rel=1e-9)
     assert found.path == "body"
@@ -113,7 +113,7 @@ def test_what_is_far_apart_is_not_resolved():
         return drift(2, 3e6, step, far=2.0)
 
     h = 0.01
-    found = global_error(drift(2, 1e6, h, far=0.5), 2, h, 1e-3, ALLOWED, Again(elsewhere, None))
+    found = global_error(drift(2, 1e6, h, far=0.5), 2, h, lambda: 1e-3, ALLOWED, Again(elsewhere, None))
     assert not found.resolved
     assert found.size > ALLOWED
 
@@ -125,7 +125,7 @@ def test_steps_that_fail_are_made_shorter_and_say_nothing_where_none_succeeds():
         tried.append(round(step / h, 9))
         raise ArithmeticError
 
-    assert global_error(drift(2, 1.0, h), 2, h, 1e-6, ALLOWED, Again(fails, None)) is None
+    assert global_error(drift(2, 1.0, h), 2, h, lambda: 1e-6, ALLOWED, Again(fails, None)) is None
     assert tried == [25, 8, 2, 0.5]
 
 
@@ -141,7 +141,7 @@ def test_another_method_that_agrees_is_enough(far, agrees):
         assert most == FEW
         return drift(0, far, h)
 
-    found = global_error(drift(2, 0.0, h), 2, h, 1e-1, ALLOWED, Again(coarser, independent))
+    found = global_error(drift(2, 0.0, h), 2, h, lambda: 1e-1, ALLOWED, Again(coarser, independent))
     assert found.size == 0.0
     assert (not tried) == agrees
 

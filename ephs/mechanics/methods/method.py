@@ -86,6 +86,10 @@ class ReducedMethod(ABC):
         middle = self._part(state, 0.5 * h, halvings - 1)
         return self._part(middle, 0.5 * h, halvings - 1)
 
+    def missed(self, attempt: Attempt[ReducedState]) -> float | None:
+        """None: the balance of energy shows it."""
+        return None
+
     def at(self, state: ReducedState, t: float) -> ReducedState:
         """The same state at a time that differs by rounding."""
         return replace(state, t=t)

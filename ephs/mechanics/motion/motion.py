@@ -22,7 +22,6 @@ from ephs.mechanics.motion.wrenches import root_of, wrenches
 from ephs.mechanics.scene.build import component_path
 from ephs.mechanics.scene.geometry import Coupling, coupling_of
 from ephs.mechanics.scene.model import GROUND, Joint, Scene
-from ephs.mechanics.scene.state import Snapshot
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
@@ -217,7 +216,8 @@ class SceneMotion:
         The last instant is the first of these.
         """
         angles, distances = open_by(self._joints, self, [slice(None, None, -every)])
-        worst = np.maximum(angles, distances / Snapshot.of(self._scene).scale(self._scene.world.gravity).length)
+        problem = self._solution.problem
+        worst = np.maximum(angles, distances / (1.0 if problem is None else problem.length))
         return {component_path("joints", name): row for name, row in zip(self._joints, worst, strict=True)}
 
     def velocity_error(self) -> Array:

@@ -22,7 +22,7 @@ from ephs.solve.result.solution import Solution
 
 __all__ = ["Course"]
 
-CLOSE = 1e-6
+CLOSE = 1e-4
 """Tolerance of the steps of an independent run."""
 
 

@@ -195,7 +195,8 @@ def simulate(
         problem.inputs(start / unit, problem.initial)
     watched, told = seen_from(problem, watched, guarded(progress))
     course = Course(problem, chosen_method, start / unit, end / unit, control, dict(options or {}))
-    again = None if held or any(each.stateful for each in functions) else course.again(breakpoints)
+    repeatable = not (held or any(each.stateful for each in functions))
+    again = course.again(breakpoints) if repeatable else None
     bounds = Bounds.of(
         control,
         step,
@@ -203,6 +204,7 @@ def simulate(
         undamped=chosen_method.undamped,
         order=order,
         again=again,
+        repeatable=repeatable,
     )
     with journaled(journal, problem, asked) as written:
         solution = course.run(

@@ -5,7 +5,7 @@ and exchanged, positions to the length of the mechanism. A law without anything 
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, final
 
 import numpy as np
@@ -15,7 +15,8 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.rank import CLOSED
 from ephs.solve.auditing.findings import Audit, Finding
 from ephs.solve.auditing.growth import Again, GlobalError, global_error
-from ephs.solve.auditing.resolution import Trials
+from ephs.solve.auditing.resolution import StepError, Trials
+from ephs.solve.auditing.retaken import Missed
 from ephs.solve.breakpoints import MOST_FOUND
 from ephs.solve.control import Control
 from ephs.solve.methods.driven import ComponentMethod
@@ -24,7 +25,10 @@ from ephs.solve.model import Model
 if TYPE_CHECKING:
     from ephs.solve.result.solution import Solution
 
-__all__ = ["LAWS", "Bounds", "audit"]
+__all__ = ["LAWS", "Bounds", "Tests", "audit"]
+
+Tests = Trials | Missed
+"""Steps that were tried again: of constant ones, or what is missed by chosen ones."""
 
 LAWFUL, LEAST, COARSE, MANY_TIMES = 1e-10, 1e-9, 1e-2, 100.0
 """Allowed parts of the gross energies: where steps keep the balance; the least and the constant steps' where they do
@@ -65,6 +69,10 @@ class Bounds:
         With which power of the step the method's error falls.
     again
         Further runs of the same problem; None where its inputs cannot be given again.
+    tolerance
+        That chosen steps are held to.
+    retaken
+        Whether some chosen steps are taken again.
     """
 
     energy: float
@@ -74,6 +82,8 @@ class Bounds:
     undamped: Callable[[Model], ComponentMethod] | None = None
     order: int = 1
     again: Again | None = None
+    tolerance: float = 0.0
+    retaken: bool = False
 
     @classmethod
     def of(
@@ -85,6 +95,7 @@ class Bounds:
         undamped: Callable[[Model], ComponentMethod] | None = None,
         order: int = 1,
         again: Again | None = None,
+        repeatable: bool = False,
     ) -> "Bounds":
         """Of a run with these tolerances, and constant steps in s where given.
 
@@ -94,11 +105,16 @@ class Bounds:
             Whether every step of the method keeps the balance.
         undamped, order, again
             See `Bounds`.
+        repeatable
+            Whether inputs may be asked again.
         """
         rtol, atol = (max(given.value, *given.special.values(), 0.0) for given in (control.rtol, control.atol))
-        chosen = max(MANY_TIMES * (rtol or atol), LEAST)
+        tolerance = rtol or atol
+        chosen = max(MANY_TIMES * tolerance, LEAST)
         error = chosen if step is None else COARSE
-        return cls(LAWFUL if lawful else error, error, chosen, step, undamped, order, again)
+        retaken = step is None and repeatable
+        energy = LAWFUL if lawful else error
+        return cls(energy, error, chosen, step, undamped, order, again, tolerance, retaken)
 
 
 @final
@@ -113,7 +129,7 @@ class Breach:
     hint: str = ""
 
 
-def _energy(solution: "Solution", _bounds: Bounds, _trials: Trials | None) -> Iterator[Breach]:
+def _energy(solution: "Solution", _bounds: Bounds, _trials: Tests | None) -> Iterator[Breach]:
     """The balance of kinetic + potential + heat − work, and of all energies − work."""
     books = solution.ledgers
     worst = _worst(solution.energy_error)
@@ -136,25 +152,21 @@ def _step(values: Array, instant: int) -> float:
     return abs(float(values[instant] - values[instant - 1])) if instant else 0.0
 
 
-def _accuracy(solution: "Solution", bounds: Bounds, trials: Trials | None) -> Iterator[Breach]:
-    """Constant steps put bodies where they belong, and resolve what moves."""
-    if bounds.step is None or trials is None:
+def _accuracy(solution: "Solution", bounds: Bounds, trials: Tests | None) -> Iterator[Breach]:
+    """Steps put bodies where they belong, and resolve what moves."""
+    plain = solution.stats.get("plain_defect")
+    if plain is not None:
+        instant = int(np.argmin(np.abs(solution.t - plain["at"])))
+        yield Breach(plain["largest"] / solution.ledgers.scale, _rounded(solution) / solution.ledgers.scale, instant)
+    if isinstance(trials, Missed):
+        yield Breach(trials.size * bounds.tolerance, 0.0, int(np.argmin(np.abs(solution.t - trials.at))))
+    if bounds.step is None or not isinstance(trials, Trials):
         return
     steps = int(solution.stats["steps"])
-    own = trials.own or trials
     slack = MOTION - min(MOTION, bounds.accuracy)
-    off = own.motion(bounds.step, steps)
-    if off is not None:
-        hint = ""
-        if off.size > MOTION:  # of order p + 1 in a step, over as many steps more
-            hint = f" of {0.9 * bounds.step * (MOTION / off.size) ** (1.0 / bounds.order):.2g} s"
-        instant = int(np.argmin(np.abs(solution.t - own.times[off.trial])))
-        yield Breach(off.size, slack, instant, off.path, hint)
-    if trials.again is not None:
-        summed = 0.0 if off is None else off.size
-        grown = global_error(solution, bounds.order, bounds.step, summed, MOTION, trials.again)
-        if grown is not None:
-            yield Breach(grown.size, slack, grown.instant, grown.path, _shorter(bounds, grown))
+    grown = _grown(solution, bounds, trials)
+    if grown is not None:
+        yield Breach(grown.size, slack, grown.instant, grown.path, _shorter(bounds, grown))
     found = trials.error(bounds.step, steps, solution.ledgers.scale)
     if found is not None:
         hint, at = "", trials.times[found.trial]
@@ -162,6 +174,24 @@ def _accuracy(solution: "Solution", bounds: Bounds, trials: Trials | None) -> It
             h = trials.sufficient(found.trial, bounds.step, bounds.accuracy)
             hint = f" of {h:.1g} s" + (", or radau, which damps what is too fast" if bounds.undamped else "")
         yield Breach(found.size, 0.0, int(np.argmin(np.abs(solution.t - at))), found.path, hint)
+
+
+def _grown(solution: "Solution", bounds: Bounds, trials: Trials) -> GlobalError | None:
+    """The error of bodies at the end: by another run, or the sum of what steps err by where there is none."""
+    h, steps, own = bounds.step or 0.0, int(solution.stats["steps"]), trials.own or trials
+
+    def summed() -> StepError | None:
+        return own.motion(h, steps)
+
+    if trials.again is not None:
+        grown = global_error(solution, bounds.order, h, lambda: getattr(summed(), "size", 0.0), MOTION, trials.again)
+        if grown is not None:
+            return grown
+    off = summed()
+    if off is None:
+        return None
+    # of order p + 1 in a step, over as many steps more where it is shorter
+    return GlobalError(off.size, int(np.argmin(np.abs(solution.t - own.times[off.trial]))), off.path, resolved=True)
 
 
 def _shorter(bounds: Bounds, found: GlobalError) -> str:
@@ -173,7 +203,7 @@ def _shorter(bounds: Bounds, found: GlobalError) -> str:
     return f" of {0.9 * bounds.step * (MOTION / found.size) ** (1.0 / bounds.order):.2g} s"
 
 
-def _entropy(solution: "Solution", _bounds: Bounds, _trials: Trials | None) -> Iterator[Breach]:
+def _entropy(solution: "Solution", _bounds: Bounds, _trials: Tests | None) -> Iterator[Breach]:
     """No component, and no system without entropy's outer ports, loses entropy in a step."""
     books = solution.ledgers
     least = -float(solution.stats["least_production"])
@@ -190,7 +220,7 @@ def _entropy(solution: "Solution", _bounds: Bounds, _trials: Trials | None) -> I
         yield Breach(float(fall[instant]) / scale, rounding, instant)
 
 
-def _constraint(solution: "Solution", _bounds: Bounds, _trials: Trials | None) -> Iterator[Breach]:
+def _constraint(solution: "Solution", _bounds: Bounds, _trials: Tests | None) -> Iterator[Breach]:
     """Joints are closed."""
     every = len(solution) // INSTANTS + 1
     for path, residual in solution.motion.gaps(every).items() if solution.motion is not None else ():
@@ -198,7 +228,7 @@ def _constraint(solution: "Solution", _bounds: Bounds, _trials: Trials | None) -
         yield Breach(float(residual[worst]), 0.0, len(solution) - 1 - worst * every, path)
 
 
-def _ledger(solution: "Solution", bounds: Bounds, _trials: Trials | None) -> Iterator[Breach]:
+def _ledger(solution: "Solution", bounds: Bounds, _trials: Tests | None) -> Iterator[Breach]:
     """Stored entropies and volumes change by what was made; work is a sum of power."""
     books = solution.ledgers
     if "work_apart" in solution.stats:
@@ -217,7 +247,7 @@ def _ledger(solution: "Solution", bounds: Bounds, _trials: Trials | None) -> Ite
         yield Breach(abs(float(rest[worst])) / scale, rounding, worst, path)
 
 
-def _input(solution: "Solution", _bounds: Bounds, _trials: Trials | None) -> Iterator[Breach]:
+def _input(solution: "Solution", _bounds: Bounds, _trials: Tests | None) -> Iterator[Breach]:
     """Inputs are smooth but for some jumps."""
     found = solution.stats.get("jumps", {}).get("found", ())
     if found:
@@ -270,7 +300,7 @@ class Law:
     holds: str
     scale: str
     limit: str
-    breaches: "Callable[[Solution, Bounds, Trials | None], Iterator[Breach]]"
+    breaches: "Callable[[Solution, Bounds, Tests | None], Iterator[Breach]]"
     allowed: Callable[[Bounds], float]
     advice: tuple[str, str]
 
@@ -286,10 +316,12 @@ LAWS: Mapping[str, Law] = {
         ("take a smaller step, or natural, which keeps the balance", "lower rtol, or take natural, which keeps it"),
     ),
     "accuracy": Law(
-        "constant steps resolve what moves, and put bodies where they belong: the difference of a step and two of half "
-        "its length, its sum over the run, and the difference from a run with longer steps",
-        "what such steps move between storages; length of the mechanism, 1 rad",
-        f"{COARSE:g}; {MOTION:g} at the end",
+        "steps resolve what moves, and put bodies where they belong. Constant ones: the difference of a step and two "
+        "of half its length, and of the run from one with longer steps; chosen ones that keep the balance whatever "
+        "they leave out: the difference of a step and three of a third of its length; steps that are corrected to "
+        "keep it: the defect that they had before",
+        "what such steps move between storages; length of the mechanism, 1 rad; sizes of states; gross energies",
+        f"{COARSE:g}, and {MOTION:g} at the end, at constant steps; {MANY_TIMES:g} rtol at chosen ones",
         _accuracy,
         lambda bounds: bounds.accuracy,
         ("take a step", "lower rtol"),
@@ -336,13 +368,15 @@ def _size(breach: Breach) -> float:
     return float(np.nan_to_num(breach.size, nan=np.finfo(float).max))
 
 
-def audit(solution: "Solution", bounds: Bounds, trials: Trials | None = None) -> Audit:
+def audit(solution: "Solution", bounds: Bounds, trials: Tests | None = None) -> Audit:
     """Hold a solution, whose first instant is the start of its run, against the laws.
 
     ``trials`` are those of its constant steps.
     """
     if not len(solution):
         return Audit()
+    if "plain_defect" in solution.stats:  # steps are corrected: the balance is kept, the defect says how well
+        bounds = replace(bounds, energy=LAWFUL)
     found: list[Finding] = []
     with np.errstate(all="ignore"):
         for name, law in LAWS.items():

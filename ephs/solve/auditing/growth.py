@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Again", "GlobalError", "apart", "global_error"]
 
+TINY = float(np.finfo(float).tiny)
 LEAST = 4
 """Steps of the longer kind that a run has at least."""
 MARGIN = 3.0
@@ -80,24 +81,24 @@ class GlobalError:
 
 
 def global_error(
-    solution: "Solution", order: int, h: float, summed: float, allowed: float, again: Again
+    solution: "Solution", order: int, h: float, summed: Callable[[], float], allowed: float, again: Again
 ) -> GlobalError | None:
     """The error of a run with constant steps of h s, by one with longer steps or another method; None where these fail.
 
     Parameters
     ----------
     summed, allowed
-        The sum of the errors of single steps, and the largest error that is allowed.
+        Gives the sum of the errors of single steps, where it is asked for; the largest error that is allowed.
     """
     steps, times = int(solution.stats["steps"]), 2.0**order
-    wanted = (allowed / (MARGIN * max(summed, 1e-300))) ** (1.0 / order)
-    k = max(2, int(min(wanted, steps // LEAST)))
     independent = again.independent
     if independent is not None and steps > FEW:
         kept = solution.t[np.unique(np.linspace(0, len(solution) - 1, INSTANTS).astype(int))]
         found = _distance(solution, lambda: independent(kept, steps // SHARE))
         if found is not None and found[0] <= allowed:
             return GlobalError(*found, resolved=True)
+    wanted = (allowed / (MARGIN * max(summed(), TINY))) ** (1.0 / order)
+    k = max(2, int(min(wanted, steps // LEAST)))
     end = float(solution.t[-1])
     while True:
         found = _distance(solution, lambda h=k * h: again.coarser(h, end))

@@ -24,6 +24,7 @@ from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.primitives import Irreversible, Storage
 from ephs.solve.auditing.growth import Again, apart
+from ephs.solve.auditing.retaken import Retaken
 from ephs.solve.breakpoints import Breakpoints
 from ephs.solve.methods.driven import ComponentMethod, advance_driven
 from ephs.solve.model import Model, compile_model
@@ -226,10 +227,14 @@ def _after(problem: Problem, method: ComponentMethod, x: Array, t: float, h: flo
 
 @final
 class Samples(Generic[S]):
-    """Some of the states that a run was in, evenly spread: one in 2ᵏ, at most twice `MOST`; none if not ``wanted``."""
+    """Some of the states that a run was in, evenly spread: one in 2ᵏ, at most twice `MOST`; none if not ``wanted``.
 
-    def __init__(self, *, wanted: bool) -> None:
+    Besides some of its steps where these are to be ``retaken``.
+    """
+
+    def __init__(self, *, wanted: bool, retaken: bool = False) -> None:
         self._wanted = wanted
+        self.retaken: Retaken[S] = Retaken(wanted=retaken)
         self.states: list[tuple[float, S]] = []
         self._rows, self._stride = 0, 1
 
@@ -246,12 +251,13 @@ class Samples(Generic[S]):
     def snapshot(self) -> Snapshot:
         """Snapshot for `restore`."""
         states = [[t, parts(state)] for t, state in self.states]
-        return {"states": states, "counts": [self._rows, self._stride]}
+        return {"states": states, "counts": [self._rows, self._stride], "retaken": self.retaken.snapshot()}
 
     def restore(self, snapshot: Snapshot, template: S) -> None:
         """Go on from a snapshot of states like the template."""
         self.states = [(t, like(template, found)) for t, found in snapshot["states"]]
         self._rows, self._stride = snapshot["counts"]
+        self.retaken.restore(snapshot["retaken"], template)
 
 
 def trials_of(

@@ -9,6 +9,7 @@ import numpy as np
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.codes import VECTOR
+from ephs.solve.auditing.retaken import PARTS, share_missed
 from ephs.solve.control import Control
 from ephs.solve.methods.driven import ComponentMethod, advance_driven, started
 from ephs.solve.methods.natural import NaturalState
@@ -76,12 +77,19 @@ class Paced:
         coarse, _ = self._single(state, h)
         middle, first = self._single(state, 0.5 * h)
         end, second = self._single(middle, 0.5 * h)
-        error, worst = self._error(state, coarse, end)
-        return Attempt(state, end, h, error, min(first, second), worst=worst)
+        off, worst = self._off(state, coarse, end)
+        return Attempt(state, end, h, off / (2.0**self.method.order - 1.0), min(first, second), worst=worst)
 
     def inside(self, attempt: Attempt[PacedState], t: float) -> PacedState:
         """A shorter step from the same start."""
         return self._single(attempt.start, t - attempt.start.t)[0]
+
+    def missed(self, attempt: Attempt[PacedState]) -> float:
+        """By how many tolerances a step is off, by steps of a third of its length."""
+        end = attempt.start
+        for _ in range(PARTS):
+            end, _ = self._single(end, attempt.h / PARTS)
+        return self._off(attempt.start, attempt.end, end)[0] / share_missed(self.method.order)
 
     def at(self, state: PacedState, t: float) -> PacedState:
         """The same state at a time that differs by rounding."""
@@ -126,8 +134,8 @@ class Paced:
         sums = chunk.ledgers[-1]
         return PacedState(state.t + h, inner, Row(chunk.x[-1], chunk.energies[-1], sums[:4])), float(sums[4])
 
-    def _error(self, state: PacedState, coarse: PacedState, fine: PacedState) -> tuple[float, str]:
-        """The error of the two half steps, by Richardson, relative to the tolerances, and the state where it is."""
+    def _off(self, state: PacedState, coarse: PacedState, fine: PacedState) -> tuple[float, str]:
+        """By how many tolerances two ends of a step are apart, and the state where they are."""
         worst, where = 0.0, ""
         for slot in self.problem.descriptor.states:
             space = manifold(slot.quantity.space)
@@ -141,7 +149,7 @@ class Paced:
             error = float(np.max(np.abs(space.increment(a, b)) / allowed))
             if not error <= worst:
                 worst, where = error, str(slot.path)
-        return worst / (2.0**self.method.order - 1.0), where
+        return worst, where
 
 
 def _counted(problem: Problem) -> Array:

@@ -170,6 +170,9 @@ class Radau:
         x = start.x + h * moments(NODES, theta) @ stages[:, : self._rates]
         return self._end(start, h, theta, x, values(NODES, theta) @ stages, books)
 
+    def missed(self, attempt: Attempt[RadauState]) -> None:
+        """None: the balance of energy shows it."""
+
     def at(self, state: RadauState, t: float) -> RadauState:
         """The same state at a time that differs by rounding."""
         return replace(state, t=t)

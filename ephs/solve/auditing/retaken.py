@@ -1,0 +1,109 @@
+"""Whether chosen steps err as was estimated: some steps of a run, and the longest, taken again in thirds.
+
+Methods that keep their balances whatever a step leaves out are steered by the difference of a step and two of half its
+length. Where a step is so long that both leave out the same, that difference is small and the result is wrong. Thirds
+of the step meet the motion at other times. What they add up to is the error of a run in tolerances, as the tolerance
+is meant: without what an unstable motion makes of it.
+"""
+
+from dataclasses import dataclass
+from typing import Generic, TypeVar, final
+
+import numpy as np
+
+from ephs.solve.breakpoints import Breakpoints
+from ephs.solve.errors import SolveError
+from ephs.solve.snapshot import Snapshot, like, parts
+from ephs.solve.stepping import Attempt, Stepper
+
+__all__ = ["PARTS", "Missed", "Retaken", "share_missed"]
+
+S = TypeVar("S")
+PARTS = 3
+"""Steps in place of one: no multiple of the two that the estimate has."""
+EACH, MOST = 60, 6
+"""One in so many steps is taken again, at most so many and the longest: three steps in place of three times 60."""
+
+
+def share_missed(order: int) -> float:
+    """Part of the error of two half steps by which thirds of a step differ from them, of a method of this order."""
+    return 1.0 - (2.0 / PARTS) ** order
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Missed:
+    """The error of chosen steps: its size in tolerances, and the time where a step's is largest."""
+
+    size: float
+    at: float
+
+
+@final
+class Retaken(Generic[S]):
+    """Some of the steps of a run, evenly spread, with the longest."""
+
+    def __init__(self, *, wanted: bool) -> None:
+        self._wanted = wanted
+        self._spread: list[tuple[float, Attempt[S]]] = []
+        self._longest: tuple[float, Attempt[S]] | None = None
+        self._steps, self._stride = 0, 1
+
+    def add(self, t: float, attempt: Attempt[S]) -> None:
+        """A step from t that was accepted."""
+        if not self._wanted:
+            return
+        if self._longest is None or abs(attempt.h) > abs(self._longest[1].h):
+            self._longest = t, attempt
+        if not self._steps % self._stride:
+            if len(self._spread) == 2 * MOST:
+                self._spread, self._stride = self._spread[::2], 2 * self._stride
+            if not self._steps % self._stride:
+                self._spread.append((t, attempt))
+        self._steps += 1
+
+    def missed(self, stepper: Stepper[S], breakpoints: Breakpoints, seconds: float) -> Missed | None:
+        """The error of the run: that of its longest step, or of all by those that are spread, whichever is larger.
+
+        None where no step was kept, or the method needs no such test.
+
+        Parameters
+        ----------
+        stepper, breakpoints
+            Those of the run.
+        seconds
+            Of its unit of time.
+        """
+        if self._longest is None:
+            return None
+        count = min(MOST, self._steps // EACH)
+        chosen = np.unique(np.linspace(0, len(self._spread), count, endpoint=False).astype(int))
+        found: list[tuple[float, float]] = []
+        for t, attempt in [self._longest, *(self._spread[i] for i in chosen)]:
+            breakpoints.stand(t)
+            try:
+                size = stepper.missed(attempt)
+            except (SolveError, ArithmeticError, np.linalg.LinAlgError):  # thirds have no solution: nothing is said
+                size = 0.0
+            if size is None:
+                return None
+            found.append((size, t))
+        mean = float(np.mean([size for size, _ in found[1:]])) if len(found) > 1 else 0.0
+        return Missed(max(found[0][0], self._steps * mean), max(found)[1] * seconds)
+
+    def snapshot(self) -> Snapshot:
+        """Snapshot for `restore`."""
+        kept = [self._longest, *self._spread] if self._longest is not None else []
+        return {
+            "attempts": [[t, parts(of.start), parts(of.end), of.h, of.error, of.least] for t, of in kept],
+            "counts": [self._steps, self._stride],
+        }
+
+    def restore(self, snapshot: Snapshot, template: S) -> None:
+        """Go on from a snapshot of states like the template."""
+        found = [
+            (t, Attempt(like(template, start), like(template, end), *rest))
+            for t, start, end, *rest in snapshot["attempts"]
+        ]
+        self._longest, self._spread = (found[0] if found else None), found[1:]
+        self._steps, self._stride = snapshot["counts"]
