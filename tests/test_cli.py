@@ -282,7 +282,7 @@ def test_draw_takes_the_hierarchy_or_its_flattening(house, capsys):
     assert cli.main(["draw", "crank.toml", "--opened", "-o", "c.svg"]) == 0
     assert capsys.readouterr().out.splitlines() == [
         "c.svg",
-        "names and wires that lie on something else, as there is no room: 1",
+        "overlapping names and wires: 1",
     ]
 
 
@@ -303,7 +303,7 @@ def test_a_model_from_a_python_file(house):
     ("text", "name", "expected"),
     [
         ("model = 1", "model", ["model is a int", "System or a Scene"]),
-        ("import ephs\nosc = ephs.System()", "ocs", ["no ocs in it", "found osc"]),
+        ("import ephs\nosc = ephs.System()", "ocs", ["no System or Scene ocs in it", "expected one of osc"]),
         ("x = 1", "model", ["no System and no Scene"]),
         ("x = 1\ny = 1 / 0", "x", ["line 2", "ZeroDivisionError: division by zero"]),
         ("x = 1\ny = (", "x", ["line 2", "SyntaxError"]),
@@ -320,9 +320,9 @@ def test_a_bad_python_file_is_told_without_a_traceback(house, capsys, text, name
 
 
 def test_a_python_file_without_a_name_says_how(house, capsys):
-    Path("mine.py").write_text("")
+    Path("mine.py").write_text("import ephs\nosc = ephs.System()")
     assert cli.main(["check", "mine.py"]) == 2
-    assert "mine.py:NAME" in capsys.readouterr().err
+    assert "mine.py:osc" in capsys.readouterr().err
 
 
 def test_alone_it_says_what_can_be_done_next():

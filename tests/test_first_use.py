@@ -63,7 +63,7 @@ def test_lengths_of_the_closed_loops_can_be_changed(here):
 def test_new_never_writes_over_a_file(here, capsys):
     Path("taken.toml").write_text("mine")
     assert cli.main(["new", "taken"]) == 2
-    assert "taken.toml: it exists" in capsys.readouterr().err
+    assert "taken.toml: the file exists" in capsys.readouterr().err
     assert Path("taken.toml").read_text() == "mine"
 
 
@@ -83,7 +83,7 @@ def test_new_never_writes_over_a_file(here, capsys):
         ("run scene --until 1", ["scene: no such file", 'did you mean "scene.toml"?']),
         ("check mine.pi:model", ["no such file"]),
         ("check mime.py:model", ["mime.py: no such file", 'did you mean "mine.py"?']),
-        ("check mine.py:modle", ["no modle in it", 'did you mean "model"?']),
+        ("check mine.py:modle", ["no System or Scene modle in it", 'did you mean "model"?']),
         ("draw scene.toml -o a.sgv", ["a.sgv", 'did you mean ".svg"?']),
         ("run scene.toml --until 1 --method natral", ["natral", "did you mean 'natural'?"]),
         ("run scene.toml --until 1 --form redced", ["redced", "reduced"]),

@@ -5,7 +5,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from ephs.cli.input import TEXTS, BadInput, addressed
+from ephs.cli.input import TEXTS, BadInput, addressed, solution_of
 
 __all__ = ["animate"]
 
@@ -22,38 +22,31 @@ def animate(
     fps: float = 30.0,
     duration: float | None = None,
 ) -> int:
-    """Make one page with the moving mechanism, which needs no network.
+    """Write the moving mechanism as one page, which needs no network.
 
     Parameters
     ----------
     folder
-        A result folder, as run writes it.
+        Result folder of ephs run.
     output
-        The page to write, FILE.html.
+        Page to write, FILE.html.
     wrenches
         Draw joint forces and moments as arrows.
     heat
-        Colour what thermal nodes warm.
+        Colour bodies by the temperature of their thermal nodes.
     fps
         Frames a second.
     duration
-        Playing time, in seconds; that of the model unless given.
+        Playing time in seconds. Default: the simulated time.
     """
     from rich.console import Console
 
-    import ephs
     from ephs.show import animate as animated
 
-    file = folder / "solution.nc"
-    if not file.is_file():
-        raise BadInput(TEXTS["no-result"].format(found=folder))
     if output.suffix != ".html":
         raise BadInput(TEXTS["suffix"].format(found=output, expected=".html"))
-    try:
-        sol = ephs.load_solution(file)
-    except ValueError as error:
-        raise BadInput(str(error)) from error
-    with addressed(str(file), output):
+    sol = solution_of(folder)
+    with addressed(str(folder), output):
         animated(sol, output, wrenches=wrenches, heat=heat, fps=fps, duration=duration)
     Console().print(str(output), highlight=False, markup=False, soft_wrap=True)
     return 0

@@ -1,4 +1,4 @@
-"""`ephs chart`: measures, draws, and writes the figures with their data into a folder."""
+"""`ephs chart`: work-precision and stability charts of the methods, with their data."""
 
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -26,11 +26,11 @@ _TEXTS = {
     "twice": "{found}: found two of this name, expected different names, after which the files are called",
 }
 UNTIL = 1.0
-"""Simulated time in s unless something else says it."""
+"""Default simulated time in s."""
 LIMIT = 1.5
-"""Processor time in s of a run in a chart of stability, unless something else says it."""
+"""Default limit of processor time in s of a run in a stability chart."""
 
-charts = App(name="chart", help="Measure and draw speed against accuracy, or where which method fails.")
+charts = App(name="chart", help="Measure and draw work-precision or stability charts of the methods.")
 Model = TypeVar("Model", bound=Any)  # a Scene or a Family, loaded when they are needed
 Output = Annotated[Path, Parameter(name=["--output", "-o"])]
 
@@ -52,11 +52,11 @@ def work_precision(
     output
         Folder for the figures (PNG, SVG) and the data (CSV, JSON).
     until
-        End of the simulated time, in seconds; 1 s, or the reference's earliest time, unless given.
+        End of the simulated time in seconds. Default: 1 s, or the reference's earliest time.
     method
-        A method or program to measure; may be given several times; all unless given.
+        Method or program to measure; may be given several times. Default: all.
     reference
-        JSON with the bodies' states at some times; a run with tight tolerances unless given.
+        JSON with the bodies' states at some times. Default: a run with tight tolerances.
     """
     if not scenes:
         raise BadInput(_TEXTS["none"])
@@ -99,22 +99,22 @@ def stability(
     limit: float = LIMIT,
     resume: bool = False,
 ) -> int:
-    """Draw what becomes of every method where scenes get difficult.
+    """Draw the outcome of every method on scenes of growing difficulty.
 
     Parameters
     ----------
     families
-        Names of families, or scene files of yours, whose parameter is then the step; all families unless given.
+        Names of families, or scene files, whose parameter is then the step. Default: all families.
     output
         Folder for the figures (PNG, SVG) and the data (CSV, JSON).
     until
-        End of the simulated time of scenes of yours, in seconds.
+        End of the simulated time of given scene files, in seconds.
     quick
         Only the easiest and the most difficult value of each family.
     limit
         Processor time of one run, in seconds.
     resume
-        Go on with the cells that an earlier, interrupted command left in the folder.
+        Continue an interrupted command in its folder.
     """
     _check_time(until)
     chosen = _named({name: _family(name, until) for name in families or _all()})

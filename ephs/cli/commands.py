@@ -7,13 +7,14 @@ does not pass its audit; 130 interrupted.
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 from cyclopts import App, CycloptsError, Parameter
 
 from ephs.cli.animate import animate
 from ephs.cli.charts import charts
 from ephs.cli.equilibrium import resting
+from ephs.cli.info import info
 from ephs.cli.input import (
     AS_GIVEN,
     TEXTS,
@@ -30,11 +31,9 @@ from ephs.cli.linear import linearizing
 from ephs.cli.nearest import did_you_mean
 from ephs.cli.new import news
 from ephs.cli.next import known_command, welcome, with_examples
+from ephs.cli.plot import plot
 from ephs.cli.run import run
 from ephs.cli.sweep import sweeps
-
-if TYPE_CHECKING:
-    pass
 
 __all__ = ["main"]
 
@@ -59,30 +58,32 @@ app = App(
 
 
 app.command(run)
+app.command(info)
+app.command(plot)
 app.command(animate)
 app.command(charts)
 app.command(sweeps)
 app.command(linearizing)
 app.command(resting)
 app.command(news)
-app.register_install_completion_command(help="Teach your shell the names of commands and options.")
+app.register_install_completion_command(help="Install completion of commands and options in your shell.")
 
 
 @app.default
 def _welcome() -> int:
-    """Say what one can do next."""
+    """Print an overview of the commands."""
     print(welcome(app))
     return 0
 
 
 @app.command
 def check(scene: str, /, *, initial: list[str] | None = None, loading: Loading = AS_GIVEN) -> int:
-    """Check the model, not the trajectory; exit code 1 if a law fails.
+    """Check the laws of a model in its initial state; exit code 1 if one fails.
 
     Parameters
     ----------
     scene
-        A scene file (.toml), a model (.urdf, .xml, .sdf), or FILE.py:NAME.
+        Scene file (.toml), model (.urdf, .xml, .sdf), or FILE.py:NAME.
     initial
         Initial value of a state, PATH=NUMBER or PATH=NUMBER,NUMBER,...; may be given several times.
     """
@@ -117,12 +118,12 @@ def equations(
     Parameters
     ----------
     scene
-        A scene file (.toml), a model (.urdf, .xml, .sdf), or FILE.py:NAME.
+        Scene file (.toml), model (.urdf, .xml, .sdf), or FILE.py:NAME.
     form
-        relation: what the pattern says of each junction and each component of its ports; descriptor: efforts of
-        storages, balances and conditions; reduced: interface variables eliminated.
+        relation: equations of each junction and component; descriptor: effort functions of storages, balances and
+        constraints; reduced: interface variables eliminated.
     latex
-        As LaTeX, an align environment.
+        Print a LaTeX align environment.
     """
     import ephs
 
@@ -141,7 +142,7 @@ def reduce(scene: str, /, *, loading: Loading = AS_GIVEN) -> int:
     Parameters
     ----------
     scene
-        A scene file (.toml), a model (.urdf, .xml, .sdf), or FILE.py:NAME.
+        Scene file (.toml), model (.urdf, .xml, .sdf), or FILE.py:NAME.
     """
     import ephs
 
@@ -167,13 +168,13 @@ def draw(
     Parameters
     ----------
     scene
-        A scene file (.toml), a model (.urdf, .xml, .sdf), or FILE.py:NAME.
+        Scene file (.toml), model (.urdf, .xml, .sdf), or FILE.py:NAME.
     output
-        The picture to write; its ending chooses SVG, TikZ or PNG: .svg, .tex, .png.
+        Picture to write: .svg, .tex (TikZ) or .png.
     flat
         Draw the flattened pattern instead of the outermost level.
     opened
-        Draw what is inside the composites of the outermost level.
+        Draw the contents of the composites of the outermost level.
     """
     import ephs
 
@@ -189,7 +190,7 @@ def draw(
         drawing = draw_pattern(system.flatten() if flat else system, output, opened=opened)
     print(output)
     if drawing.faults:
-        print(f"names and wires that lie on something else, as there is no room: {len(drawing.faults)}")
+        print(f"overlapping names and wires: {len(drawing.faults)}")
     return 0
 
 
@@ -206,9 +207,9 @@ def convert(
     Parameters
     ----------
     model
-        A URDF (.urdf), an MJCF (.xml) or an SDF (.sdf).
+        URDF (.urdf), MJCF (.xml) or SDF (.sdf).
     output
-        The scene file (.toml) to write.
+        Scene file (.toml) to write.
     """
     with addressed(model, output), heard():
         from ephs.mechanics.imports import convert as convert_model
@@ -223,9 +224,9 @@ with_examples(app)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line on the words after the program's name, those of the process unless given.
+    """Run the command line on these arguments, by default the process's own.
 
-    Returns the exit code, see the module.
+    Returns the exit code; see the module.
     """
     from rich.console import Console
 

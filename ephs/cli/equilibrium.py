@@ -17,14 +17,14 @@ resting = App(name="equilibrium", help="Find the shape of a scene at rest under 
 
 @resting.default
 def equilibrium(scene: str, /, *, out: Path | None = None, loading: Loading = AS_GIVEN) -> int:
-    """Find the shape of a scene at rest, loads growing from nothing; prints where bodies are, and buckling loads.
+    """Find the static equilibrium by continuation of the loads; prints positions of bodies and buckling loads.
 
     Parameters
     ----------
     scene
-        A scene file (.toml), a model (.urdf, .xml, .sdf), or FILE.py:NAME.
+        Scene file (.toml), model (.urdf, .xml, .sdf), or FILE.py:NAME.
     out
-        Folder for equilibrium.json: bodies, joints, the path of the loads and where it is critical.
+        Folder for equilibrium.json: bodies, joints, load path and its critical points.
     """
     import ephs
 

@@ -15,7 +15,7 @@ from cyclopts import Parameter
 from ephs.cli.nearest import beside, did_you_mean
 
 if TYPE_CHECKING:
-    from ephs import Scene, System
+    from ephs import Scene, Solution, System
 
 __all__ = [
     "AS_CHOSEN",
@@ -35,6 +35,7 @@ __all__ = [
     "noted",
     "positive",
     "say",
+    "solution_of",
 ]
 
 TEXTS = {
@@ -42,13 +43,15 @@ TEXTS = {
     "jumps": "--jumps {found}: expected TIME,TIME,... in seconds, as in 0.1,0.25",
     "suffix": "{found}: expected one of {expected}; choose the file name's ending accordingly",
     "no-file": "{found}: no such file; expected a scene file (.toml), a model (.urdf, .xml, .sdf) or FILE.py:NAME",
-    "no-result": "{found}: no solution.nc in it; expected a result folder, as ephs run writes it",
-    "no-name": "{file}: no {name} in it; found {found}. Give one as {file}:NAME",
+    "no-result": "{found}: found no solution.nc in it, expected a result folder of ephs run",
+    "no-name": "{file}: found no System or Scene {name} in it, expected one of {found}",
+    "nameless": "{file}: found no NAME after the file; it holds {found}; give one as {file}:{example}",
+    "no-model": "{file}: found no System and no Scene in it; bind one to a name at the top level of the file",
     "not-a-model": "{file}: {name} is a {found}, expected a System or a Scene",
-    "user-code": "{file}: line {line}: {found}; mend the file, then run again",
+    "user-code": "{file}: line {line}: {found}; correct the file, then run again",
     "extra": "{file}: the module {found} is not installed; python -m pip install 'ephs[{extra}]'",
-    "no-report": "report.html was not written: the module {found} is not installed; "
-    "python -m pip install 'ephs[{extra}]' and run again (the solution is saved)",
+    "no-report": "report.html was not written: the module {found} is not installed; the solution is saved; "
+    "python -m pip install 'ephs[{extra}]' and run again, or give --no-report",
     "out": "{file}: {found}; choose another folder or file",
     "failed": "{file}: the run failed: {found}",
     "audit": "{file}: {found}",
@@ -70,14 +73,14 @@ class Loading:
     Parameters
     ----------
     base
-        How the root of a URDF meets the ground.
+        Root of a URDF: fixed to the ground, or free.
     adjust
-        Assemble a scene that does not quite close.
+        Move bodies so that joints close, where the given poses leave gaps.
     inertia
-        Whether an inertia that no distribution of mass has is refused, kept, or replaced by the nearest that one has;
-        unless given, as the scene file says, and kept for other formats.
+        Treatment of an inertia that no distribution of mass has: strict refuses it, warn keeps it, nearest replaces it
+        by the nearest physical one. Default: the scene file's own key; warn for other formats.
     contact
-        Take limits of joints and contacts from models in other formats.
+        Import joint limits and contacts of models in other formats.
     """
 
     base: Literal["fixed", "free"] = "fixed"
@@ -113,17 +116,18 @@ class Stepping:
     Parameters
     ----------
     method
-        Integration method, for example natural.
+        Integration method, for example natural. Default: auto.
     rtol
-        Relative tolerance, for methods that choose their step.
+        Relative tolerance of methods with step-size control.
     atol
-        Absolute tolerance, for methods that choose their step.
+        Absolute tolerance of methods with step-size control.
     step
-        Constant step size, in seconds.
+        Constant step size in seconds.
     form
-        Which form of the equations is integrated.
+        Form of the equations: paper (maximal coordinates, as flattened), folded, or reduced (joint coordinates).
+        Default: that of the method.
     jumps
-        Times in seconds at which steps end and start anew, TIME,TIME,...: jumps of what the model is given.
+        Times in seconds of discontinuous inputs, TIME,TIME,...; steps end there.
     """
 
     method: str | None = None
@@ -168,7 +172,7 @@ def load_model(scene: str, loading: Loading = AS_GIVEN) -> "Scene | System":
     if separator and file.endswith(".py"):
         return _from_python(Path(file), name)
     if scene.endswith(".py"):
-        raise BadInput(TEXTS["no-name"].format(file=scene, name="name was given", found=scene))
+        return _from_python(Path(scene), "")
     if not Path(scene).is_file():
         raise BadInput(TEXTS["no-file"].format(found=scene) + beside(Path(scene)))
     options: dict[str, Any] = {"base": loading.base, "adjust": loading.adjust}
@@ -194,13 +198,34 @@ def _from_python(file: Path, name: str) -> "Scene | System":
     finally:
         sys.path.remove(str(file.parent.resolve()))
     models = [key for key, value in names.items() if isinstance(value, (ephs.System, ephs.Scene))]
-    if name not in names:
-        found = ", ".join(models) or "no System and no Scene"
-        told = TEXTS["no-name"].format(file=file, name=name or "name was given", found=found)
-        raise BadInput(told + did_you_mean(name, models))
-    if name not in models:
+    if name in names and name not in models:
         raise BadInput(TEXTS["not-a-model"].format(file=file, name=name, found=type(names[name]).__name__))
+    if not models:
+        raise BadInput(TEXTS["no-model"].format(file=file))
+    if name not in names:
+        case = "no-name" if name else "nameless"
+        told = TEXTS[case].format(file=file, name=name, found=", ".join(models), example=models[0])
+        raise BadInput(told + did_you_mean(name, models))
     return names[name]
+
+
+def solution_of(folder: Path) -> "Solution":
+    """Solution in a result folder.
+
+    Raises
+    ------
+    BadInput
+        There is none, or its file is damaged.
+    """
+    import ephs
+
+    file = folder / "solution.nc"
+    if not file.is_file():
+        raise BadInput(TEXTS["no-result"].format(found=folder))
+    try:
+        return ephs.load_solution(file)
+    except ValueError as error:
+        raise BadInput(str(error)) from error
 
 
 def _line(error: BaseException, file: Path) -> int | str:
@@ -242,7 +267,7 @@ def addressed(scene: str, target: Path | None = None) -> Iterator[None]:
 
 @contextmanager
 def noted(say: Callable[[str], None]) -> Iterator[None]:
-    """Say what this package warns of, instead of warning."""
+    """Print this package's warnings as lines of the command line."""
     with warnings.catch_warnings():
         otherwise = warnings.showwarning
 
@@ -258,7 +283,7 @@ def noted(say: Callable[[str], None]) -> Iterator[None]:
 
 @contextmanager
 def heard() -> Iterator[None]:
-    """Let every warning of models and scenes through, whatever the user's filters are."""
+    """Show every warning about models and scenes, against the user's filters."""
     import ephs
 
     with warnings.catch_warnings():
@@ -296,7 +321,7 @@ def say(*lines: str) -> None:
 
 
 def complain(*lines: str) -> None:
-    """Print to stderr what went otherwise than asked."""
+    """Print errors and warnings to stderr."""
     _print(lines, errors=True)
 
 

@@ -33,24 +33,24 @@ def linearize(
     output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
     loading: Loading = AS_GIVEN,
 ) -> int:
-    """Linearise a model about a state; prints eigenvalues with frequency, damping ratio and what moves most.
+    """Linearise a model about a state; prints eigenvalues with frequency, damping ratio and mode shape.
 
     Parameters
     ----------
     scene
-        A scene file (.toml), a model (.urdf, .xml, .sdf), or FILE.py:NAME.
+        Scene file (.toml), model (.urdf, .xml, .sdf), or FILE.py:NAME.
     at
-        Seconds that the model runs before, or the word equilibrium for a state of rest near by; the initial state
-        unless given.
+        State: a time in seconds, up to which the model is simulated, or the word equilibrium for the state of rest
+        nearest to the initial state. Default: the initial state.
     input
-        What is pushed: joints.NAME, bodies.NAME or markers.NAME of a scene; PORT=effort:NUMBER or PORT=flow:NUMBER of a
-        system. May be given several times; all joints, or flows at all ports, unless given.
+        Force or moment input: joints.NAME, bodies.NAME or markers.NAME of a scene; PORT=effort:NUMBER or
+        PORT=flow:NUMBER of a system. May be given several times. Default: all joints; flows at all ports.
     output_of
-        What is put out, by the same names; what the inputs do power with unless given.
+        Output, by the same names; may be given several times. Default: the quantities power-conjugate to the inputs.
     form
         reduced: independent joint coordinates; paper: the states of the scene's system.
     output
-        File for the matrices; its ending chooses JSON, NumPy or netCDF: .json, .npz, .nc.
+        File for the matrices; .json, .npz (NumPy) or .nc (netCDF).
     """
     import ephs
 
@@ -71,7 +71,7 @@ def linearize(
 
 
 def _state(model: "Scene | System", at: str | None) -> tuple[Any, Any]:
-    """The model, and where it is linearised."""
+    """The model and the state about which it is linearised."""
     import ephs
 
     if at is None or at == "equilibrium":

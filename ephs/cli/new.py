@@ -1,4 +1,4 @@
-"""`ephs new`: a first file, commented, that runs."""
+"""`ephs new`: a commented scene file to start from."""
 
 import json
 from importlib.resources import files
@@ -12,36 +12,35 @@ from ephs.cli.input import BadInput, addressed, say
 __all__ = ["TEMPLATES", "news"]
 
 TEMPLATES = {
-    "pendulum": ("pendulum.toml", "a rod on a pin with friction, a bearing that warms up; every line explained"),
-    "double-pendulum": ("double-pendulum.toml", "two rods, two pins, chaos"),
-    "spinning-body": ("spinning-body.toml", "a free body that turns over"),
-    "four-bar": ("four-bar.toml", "a loop of four bars, closed for you when lengths change"),
+    "pendulum": ("pendulum.toml", "a rod on a pin with friction, which warms the bearing; every line explained"),
+    "double-pendulum": ("double-pendulum.toml", "two rods on two pins: chaotic motion"),
+    "spinning-body": ("spinning-body.toml", "a free rigid body that spins about its middle axis"),
+    "four-bar": ("four-bar.toml", "a closed loop of four bars, assembled anew when lengths change"),
     "slider-crank": ("slider-crank.toml", "a small engine with friction and heat"),
-    "oscillator": ("oscillator.py", "a System in Python: a spring, a mass and a damper, by a pattern"),
+    "oscillator": ("oscillator.py", "a System in Python: spring, mass and damper, composed by a pattern"),
 }
 _TEXTS = {
-    "taken": "{file}: it exists; choose another name, or move it away",
-    "suffix": "{file}: found the ending {found}, expected {expected}, or none: --like {like} writes such a file",
+    "taken": "{file}: the file exists; choose another name, or move the file",
+    "suffix": "{file}: found the ending {found}, expected {expected} or none for --like {like}",
     "name": "ephs new {file}: expected a name, as in ephs new my-pendulum",
 }
 Like = Literal["pendulum", "double-pendulum", "spinning-body", "four-bar", "slider-crank", "oscillator"]
 
-news = App(name="new", help="Write a commented scene that runs, to change into your own.")
+news = App(name="new", help="Write a commented scene file to start from.")
 
 
 @news.default
 def new(name: str, /, *, like: Annotated[Like, Parameter(name=["--like", "-l"])] = "pendulum") -> int:
-    """Write a commented scene that runs, to change into your own.
+    """Write a commented scene file to start from.
 
-    A file that exists is never written over.
+    Existing files are never overwritten.
 
     Parameters
     ----------
     name
         Name of the scene, or of the file: my-pendulum writes my-pendulum.toml.
     like
-        What it starts from: pendulum, of which every line is explained; double-pendulum; spinning-body; four-bar;
-        slider-crank; oscillator, a System in Python.
+        Example to copy: pendulum explains every line; oscillator is a System in Python.
     """
     template, about = TEMPLATES[like]
     expected = Path(template).suffix

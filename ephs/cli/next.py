@@ -24,6 +24,8 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
     "draw": ("ephs draw scenes/slider-crank.toml -o pattern.svg", "ephs draw scenes/mbs.toml --flat -o flat.tex"),
     "equations": ("ephs equations scenes/mbs.toml", "ephs equations scenes/mbs.toml --form descriptor --latex"),
     "reduce": ("ephs reduce scenes/four-bar.toml",),
+    "info": ("ephs info scenes/slider-crank.toml",),
+    "plot": ("ephs plot out/slider-crank joints.bearing.rate energy", "ephs plot out/slider-crank"),
     "animate": ("ephs animate out/slider-crank -o slider-crank.html",),
     "sweep": ("ephs sweep scenes/heavy-top.toml --vary bodies.top.mass=5:25:9 --until 1 -o out/sweep",),
     "equilibrium": ("ephs equilibrium scenes/four-bar.toml --out out/rest",),
@@ -41,7 +43,7 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
 _TEXTS = {
     "command": "ephs {found}: no such command; did you mean ephs {near}? ephs alone lists them",
     "no command": "ephs {found}: no such command; expected one of {known}",
-    "scene": "ephs {found}: a command comes first, as in ephs run {found} --until 5",
+    "scene": "ephs {found}: found no command before the file; expected one, as in ephs run {found} --until 5",
 }
 
 
@@ -55,8 +57,8 @@ def commands(app: Any) -> list[str]:
 def welcome(app: Any) -> str:
     """An example and a description of every command."""
     lines = [
-        "Exergetic port-Hamiltonian systems: compose physical models by pattern, simulate them, check both laws.",
-        "Begin with a scene of your own: ephs new my-pendulum, then ephs run my-pendulum.toml --until 5.",
+        "Multibody dynamics and exergetic port-Hamiltonian systems: compose, simulate, check both laws.",
+        "Start with ephs new my-pendulum, then ephs run my-pendulum.toml --until 5.",
         "",
     ]
     for name in commands(app):
@@ -66,9 +68,9 @@ def welcome(app: Any) -> str:
     return "\n".join([
         *lines,
         "",
-        "SCENE is a scene file (.toml), a model (URDF, MJCF, SDF: .urdf, .xml, .sdf), or FILE.py:NAME, a System",
-        "or Scene of that name in a Python file of yours.",
-        "ephs COMMAND --help explains a command; ephs --install-completion teaches your shell their names.",
+        "SCENE is a scene file (.toml), a model (URDF, MJCF, SDF: .urdf, .xml, .sdf), or FILE.py:NAME: a System",
+        "or Scene in a Python file.",
+        "ephs COMMAND --help explains a command; ephs --install-completion completes them in your shell.",
     ])  # fmt: skip
 
 
@@ -109,8 +111,9 @@ def after(folder: Path, *, moves: bool, report: bool) -> list[str]:
     """Suggested commands after a run, for its result folder."""
     lines: list[str] = []
     if report:
-        lines.append(f"{folder / 'report.html'}: plots, ledgers, the motion; open it in a browser")
+        lines.append(f"{folder / 'report.html'}: animation, plots, balances; open it in a browser")
     if moves:
-        lines.append(f"ephs animate {folder} -o {folder.name}.html: the motion alone, as a page")
-    lines.append(f'sol = ephs.load_solution("{folder / "solution.nc"}"): everything, from Python')
+        lines.append(f"ephs animate {folder} -o {folder.name}.html: the animation alone, as a page")
+    lines.append(f"ephs plot {folder}: names of the signals; ephs plot {folder} SIGNAL …: their plot")
+    lines.append(f'sol = ephs.load_solution("{folder / "solution.nc"}"): all results in Python')
     return lines

@@ -1,4 +1,4 @@
-"""Results of a run: the folder, the data before the pictures, and the messages."""
+"""Result folder of a run: solution, summary, report."""
 
 import json
 from pathlib import Path
@@ -25,8 +25,8 @@ _FIGURES = {
 }
 
 
-def write_results(solution: "Solution", folder: Path) -> bool:
-    """Write the result folder and say what came out; whether there is a report."""
+def write_results(solution: "Solution", folder: Path, *, report: bool = True) -> bool:
+    """Write the result folder and print the summary; whether a report was written."""
     from ephs.solve.result.durable import durable
 
     summary = solution.summary()
@@ -38,6 +38,8 @@ def write_results(solution: "Solution", folder: Path) -> bool:
             say(f"{label:38}{summary[key]:>12{form}}")
     if solution.scene is not None and solution.scene.adjusted is not None:
         say(str(solution.scene.adjusted))
+    if not report:
+        return False
     try:
         from ephs.show.report import write_report
 

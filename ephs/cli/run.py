@@ -1,4 +1,4 @@
-"""`ephs run`: from a scene to its result folder, and on from where a run was interrupted."""
+"""`ephs run`: simulate a scene into a result folder, or continue an interrupted run."""
 
 import hashlib
 import json
@@ -37,17 +37,17 @@ JOURNAL = "run.journal"
 RUN = "run.json"
 """Request of a run, kept beside the results of a run that has reached its end."""
 KEPT = 500
-"""Parts of the time at whose ends results are kept where steps are chosen."""
+"""Default number of intervals at whose ends results are kept, with step-size control."""
 _TEXTS = {
     "until": "--until is missing; expected the end of the simulated time in seconds, as in ephs run {file} --until 5",
     "no-journal": f"{{file}}: no {JOURNAL} in it; expected the result folder of a run that was interrupted",
-    "own": "{file}: its model is {scene}; the code of that file is run only where you name it: "
+    "own": "{file}: its model is {scene}; Python files run only when named on the command line: "
     "ephs run {scene} --until {until!r} --out {file} --resume",
-    "kept": f"{{found}} holds a run that did not end; it is kept as {JOURNAL}.old (--resume would go on with it)",
-    "ended": "{folder}: that run has reached its end; nothing is left to do",
-    "other": "{folder}: its results are another run's, whose {key} was {found}; now it is {wanted}. "
-    "Take another --out, or leave out --resume and they are replaced",
-    "again": "what was computed is kept; go on: ephs run {folder} --resume",
+    "kept": f"{{found}} holds an unfinished run; it is kept as {JOURNAL}.old (--resume would have continued it)",
+    "ended": "{folder}: that run has reached its end already",
+    "other": "{folder}: found results of another run with {key} = {found}, expected {wanted}; "
+    "give another --out, or leave out --resume to replace them",
+    "again": "continue with: ephs run {folder} --resume",
 }
 
 
@@ -60,6 +60,7 @@ def run(
     keep: Annotated[int | None, Parameter(validator=lambda _, n: _counted(n))] = None,
     initial: list[str] | None = None,
     out: Path | None = None,
+    report: bool = True,
     resume: bool = False,
     audit: Literal["fail", "warn", "off"] = "fail",
     loading: Loading = AS_GIVEN,
@@ -69,26 +70,27 @@ def run(
     Parameters
     ----------
     scene
-        A scene file (.toml), a model (.urdf, .xml, .sdf), or FILE.py:NAME; with --resume also the result folder of a
-        run that was interrupted.
+        Scene file (.toml), model (.urdf, .xml, .sdf), or FILE.py:NAME; with --resume also the result folder of an
+        interrupted run.
     until
-        End of the simulated time, in seconds.
+        End of the simulated time in seconds.
     keep
-        Into how many equal parts the time is cut, at whose ends results are kept: 500 unless given. With --step every
-        step is kept unless given.
+        Number of equal intervals at whose ends results are kept. Default: 500; every step with --step.
     initial
         Initial value of a state, PATH=NUMBER or PATH=NUMBER,NUMBER,...; may be given several times.
     out
-        Result folder; out/NAME unless given.
+        Result folder. Default: out/NAME.
+    report
+        Write report.html into the result folder.
     resume
-        Go on where a run into this folder was interrupted.
+        Continue an interrupted run in its result folder.
     audit
-        What findings of the run's audit become: exit code 4, lines on stderr only, or an entry in the summary only.
+        Treatment of audit findings: fail ends with exit code 4, warn prints them, off records them in the summary.
     """
     import ephs
 
     if resume and Path(scene).is_dir():
-        return _run_on(Path(scene), audit)
+        return _run_on(Path(scene), audit, report=report)
     if until is None:
         raise BadInput(_TEXTS["until"].format(file=scene))
     model = load_model(scene, loading)
@@ -99,7 +101,7 @@ def run(
     asked: dict[str, Any] = {"until": until, **stepping.options()}
     if initial:
         asked["initial"] = initial_values(initial)
-    if stepping.step is None or keep is not None:  # steps that are chosen may be long: pictures want more
+    if stepping.step is None or keep is not None:  # controlled steps may be too long for pictures
         asked["keep"] = keep or KEPT
     if resume and not (folder / JOURNAL).exists() and _ended(folder, _identity(model, scene, asked)):
         say(_TEXTS["ended"].format(folder=folder))
@@ -108,11 +110,11 @@ def run(
         with addressed(scene, folder):
             os.replace(folder / JOURNAL, folder / f"{JOURNAL}.old")
         complain(_TEXTS["kept"].format(found=folder / JOURNAL))
-    return _simulate(model, scene, folder, asked, audit)
+    return _simulate(model, scene, folder, asked, audit, report=report)
 
 
-def _run_on(folder: Path, audit: str) -> int:
-    """Go on with the run whose result folder this is; its model is in the journal."""
+def _run_on(folder: Path, audit: str, *, report: bool) -> int:
+    """Continue the interrupted run of a result folder; its model is in the journal."""
     from ephs.mechanics.scene.document import scene_from_text
     from ephs.solve.journal import read_journal
 
@@ -127,11 +129,13 @@ def _run_on(folder: Path, audit: str) -> int:
     note = heading["note"]
     if not heading["model"]:
         raise BadInput(_TEXTS["own"].format(file=folder, scene=note["scene"], until=note["asked"]["until"]))
-    return _simulate(scene_from_text(heading["model"]), note["scene"], folder, note["asked"], audit)
+    return _simulate(scene_from_text(heading["model"]), note["scene"], folder, note["asked"], audit, report=report)
 
 
-def _simulate(model: "Scene | System", scene: str, folder: Path, asked: Mapping[str, Any], audit: str) -> int:
-    """Simulate as asked, journal and all; the exit code."""
+def _simulate(
+    model: "Scene | System", scene: str, folder: Path, asked: Mapping[str, Any], audit: str, *, report: bool
+) -> int:
+    """Simulate with a journal, write the results; the exit code."""
     import ephs
     from ephs.solve.journal import Journal
 
@@ -156,13 +160,13 @@ def _simulate(model: "Scene | System", scene: str, folder: Path, asked: Mapping[
         if not begun:  # not even the first state could be set up
             return 130 if stopped else 3
         with addressed(scene, folder):
-            _write(error.partial, folder)
+            _write(error.partial, folder, report=report)
         complain(f"saved what was computed: {folder}")
         if stopped:
             complain(_TEXTS["again"].format(folder=folder))
         return 130 if stopped else 3
     with addressed(scene, folder):
-        _write(solution, folder)
+        _write(solution, folder, report=report)
         whole = json.dumps(_identity(model, scene, asked), indent=1)
         (folder / RUN).write_text(f"{whole}\n", encoding="utf-8")
         (folder / JOURNAL).unlink(missing_ok=True)
@@ -203,10 +207,10 @@ def _ended(folder: Path, wanted: Mapping[str, Any]) -> bool:
     return True
 
 
-def _write(solution: "Solution", folder: Path) -> None:
-    """Write the result folder and say what to look at next."""
-    report = write_results(solution, folder)
-    say("next:", *after(folder, moves=solution.scene is not None, report=report))
+def _write(solution: "Solution", folder: Path, *, report: bool) -> None:
+    """Write the result folder and suggest next commands."""
+    written = write_results(solution, folder, report=report)
+    say("next:", *after(folder, moves=solution.scene is not None, report=written))
 
 
 def _counted(parts: int | None) -> None:

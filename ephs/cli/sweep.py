@@ -1,4 +1,4 @@
-"""`ephs sweep`: one model with many values of some numbers, one table."""
+"""`ephs sweep`: simulations over a grid of parameter values, as one table."""
 
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -17,7 +17,7 @@ __all__ = ["sweeps"]
 
 _TEXTS = {
     "vary": "--vary {found}: expected PATH=FROM:TO:COUNT or PATH=VALUE,VALUE,..., as in bodies.crank.mass=0.1:0.5:9",
-    "none": "ephs sweep {file}: nothing is varied; expected --vary PATH=FROM:TO:COUNT, bodies.crank.mass=0.1:0.5:9",
+    "none": "ephs sweep {file}: found nothing to vary, expected --vary PATH=FROM:TO:COUNT, bodies.crank.mass=0.1:0.5:9",
     "dask": "--dask {address}: {found}; start a scheduler there, then run again",
 }
 LISTED = 5
@@ -42,28 +42,29 @@ def sweep(
     dask: str | None = None,
     loading: Loading = AS_GIVEN,
 ) -> int:
-    """Run a model with many values of some numbers; writes sweep.nc into a folder.
+    """Simulate a model over a grid of parameter values; writes sweep.nc into a folder.
 
     Parameters
     ----------
     scene
-        A scene file (.toml), a model (.urdf, .xml, .sdf), or FILE.py:NAME.
+        Scene file (.toml), model (.urdf, .xml, .sdf), or FILE.py:NAME.
     vary
         PATH=FROM:TO:COUNT or PATH=VALUE,VALUE,...; may be given several times.
     until
-        End of the simulated time, in seconds.
+        End of the simulated time in seconds.
     output
         Folder for the table.
     paired
-        Take the values of all paths together, the first with the first; else all are combined with all.
+        Pair the values of all paths, first with first; by default all combinations are run.
     output_of
-        Names of what is put out, such as joints.pin.rate or energy; may be given several times.
+        Output, such as joints.pin.rate or energy; may be given several times. Default: coordinates and rates of
+        joints, heat and work.
     instants
-        Parts into which the time is cut; results are kept at their ends.
+        Number of equal intervals at whose ends outputs are kept.
     workers
-        Threads; as many as there are cores unless given.
+        Number of threads. Default: the number of cores.
     dask
-        Address of a Dask scheduler to run on instead, as in tcp://127.0.0.1:8786.
+        Address of a Dask scheduler, such as tcp://127.0.0.1:8786.
     """
     if not vary:
         raise BadInput(_TEXTS["none"].format(file=scene))

@@ -1,10 +1,11 @@
-"""Pictures: of patterns, of motions, of ledgers. Values show themselves by it, through doors.
+"""Pictures of patterns, motions and ledgers, which notebooks show by themselves.
 
 matplotlib, drawsvg, Graphviz and viser are imported where they are used, not here.
 """
 
 from ephs.show.animation import animate as animate
 from ephs.show.beside import plot_mechanism as plot_mechanism
+from ephs.show.chosen import plot_signals as plot_signals
 from ephs.show.drawing import Drawing as Drawing
 from ephs.show.drawing import draw as draw
 from ephs.show.efforts import plot_wrenches as plot_wrenches
@@ -39,6 +40,7 @@ __all__ = [
     "plot_mechanism",
     "plot_motion",
     "plot_phase",
+    "plot_signals",
     "plot_wrenches",
     "write_report",
 ]

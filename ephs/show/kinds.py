@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from ephs.mechanics.scene.errors import did_you_mean
 from ephs.show.beside import plot_mechanism
+from ephs.show.chosen import plot_signals
 from ephs.show.efforts import plot_wrenches
 from ephs.show.errors import ShowError
 from ephs.show.flows import plot_exergy_flow
@@ -26,6 +27,7 @@ KINDS: "dict[str, Callable[..., Figure]]" = {
     "constraints": plot_constraints,
     "wrenches": plot_wrenches,
     "mechanism": plot_mechanism,
+    "signals": plot_signals,
 }
 
 

@@ -48,8 +48,12 @@ STYLE = {
 
 def plot_motion(sol: Any) -> "Figure":
     """Joint coordinates, positions of the centres of mass and temperatures; for any other system, its states."""
-    panels = motion_panels(sol)
-    figure, axes = _panels(sol, "motion" if sol.scene is not None else "states", panels)
+    return panel_figure(sol, "motion" if sol.scene is not None else "states", motion_panels(sol))
+
+
+def panel_figure(sol: Any, what: str, panels: list[Panel]) -> "Figure":
+    """Panels above each other over the same time, names of curves to their right."""
+    figure, axes = _panels(sol, what, panels)
     for each, panel in zip(axes, panels, strict=True):
         _curves(each, sol, panel)
         if len(panel.curves) > _MOST_NAMES:

@@ -1,6 +1,6 @@
 """Outputs of every member by name, and their readers."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, final
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ephs.semantics.system import System
     from ephs.solve.result.solution import Solution
 
-__all__ = ["BOOKS", "JOINT", "Output", "outputs_of"]
+__all__ = ["BOOKS", "JOINT", "Output", "known_outputs", "outputs_of", "unknown_output"]
 
 BOOKS = {
     "heat": "J", "work": "J", "kinetic": "J", "potential": "J", "energy": "J", "exergy": "J", "entropy": "J/K",
@@ -81,7 +81,7 @@ def outputs_of(model: "Scene | System", names: Sequence[str] | None) -> tuple[Ou
     OptionError
         There is no such output; the nearest name is told.
     """
-    known = dict(_known(model))
+    known = known_outputs(model)
     if names is None:
         if isinstance(model, Scene):
             names = [name for name in known if name.startswith("joints.") and name.endswith((".coordinate", ".rate"))]
@@ -90,9 +90,21 @@ def outputs_of(model: "Scene | System", names: Sequence[str] | None) -> tuple[Ou
             names = [name for name in known if name not in BOOKS]
     for name in names:
         if name not in known:
-            hint = did_you_mean(name, list(known), f"one of {listing(list(known))}")
-            raise OptionError("outputs", name, f"the name of an output; {hint}")
+            raise unknown_output("outputs", name, known)
     return tuple(Output(name, known[name]) for name in dict.fromkeys(names))
+
+
+def known_outputs(model: "Scene | System") -> dict[str, Labels]:
+    """Labels of every output of a model, by its name."""
+    return dict(_known(model))
+
+
+def unknown_output(option: str, name: str, known: Iterable[str]) -> OptionError:
+    """Error of a name that no output has; suggestions are of the same kind: a joint's for a joint's."""
+    kind = name.partition(".")[0]
+    alike = [other for other in known if other.partition(".")[0] == kind] or list(known)
+    hint = did_you_mean(name, alike, f"one of {listing(alike)}")
+    return OptionError(option, name, f"the name of an output; {hint}")
 
 
 def _known(model: "Scene | System") -> "Iterator[tuple[str, Labels]]":

@@ -346,8 +346,9 @@ class Solution:
     def plot(self, kind: str = "motion", *arguments: Any, **options: Any) -> "Figure":
         """A matplotlib figure that shows itself in notebooks: of the motion, or of another `kind`.
 
-        Kinds are motion, phase, energy, exergy, entropy, flow, constraints, wrenches and mechanism; the functions of
-        `ephs.show` with these names, as ``plot_phase``, say what their options are.
+        Kinds are motion, signals, phase, energy, exergy, entropy, flow, constraints, wrenches and mechanism; the
+        functions of `ephs.show` with these names, as ``plot_phase``, document their options:
+        ``sol.plot("signals", "joints.bearing.rate", "energy")``.
 
         Raises
         ------

@@ -1,0 +1,77 @@
+"""`ephs info`, `ephs plot` and `--no-report`."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import ephs
+from ephs.cli import main
+from ephs.mechanics.sweep.outputs import known_outputs
+from ephs.show.chosen import plot_signals
+
+ROOT = Path(__file__).resolve().parents[1]
+CRANK = str(ROOT / "scenes/slider-crank.toml")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    made = tmp_path_factory.mktemp("out")
+    assert main(["run", CRANK, "--until", "0.2", "--no-report", "--out", str(made)]) == 0
+    return made
+
+
+def test_no_report_writes_everything_else(folder):
+    assert {path.name for path in folder.iterdir()} == {"solution.nc", "summary.json", "run.json"}
+
+
+def test_info_names_everything_that_the_scene_names(capsys):
+    assert main(["info", CRANK]) == 0
+    said = capsys.readouterr().out
+    scene = ephs.load(CRANK)
+    for name in [*scene.bodies, *scene.joints, *scene.thermal]:
+        assert name in said
+    assert "degrees of freedom 1;" in said
+    assert len(said.splitlines()) <= 24
+
+
+def test_info_lists_states_of_a_system(capsys):
+    assert main(["info", f"{ROOT / 'examples/oscillator.py'}:damped_oscillator"]) == 0
+    said = capsys.readouterr().out
+    assert all(path in said for path in ("osc.pe.q", "osc.ke.p", "env.s", "kg m/s"))
+
+
+def test_plot_lists_every_signal_and_each_can_be_plotted(folder, capsys):
+    assert main(["plot", str(folder)]) == 0
+    said = capsys.readouterr().out
+    sol = ephs.load_solution(folder / "solution.nc")
+    for name in known_outputs(sol.scene):
+        assert name.rpartition(".")[2] in said
+        (axes, *_) = plot_signals(sol, name).axes
+        assert len(axes.lines) >= 1
+
+
+def test_plotted_values_are_those_of_the_solution(folder):
+    sol = ephs.load_solution(folder / "solution.nc")
+    figure = sol.plot("signals", "joints.bearing", "joints.bearing.rate", "bodies.rod.position.z")
+    shown = [axes.lines[0].get_ydata() for axes in figure.axes]
+    wanted = [sol.joint("bearing").coordinate, sol.joint("bearing").rate, sol.body("rod").position[:, 2]]
+    for one, other in zip(shown, wanted, strict=True):
+        assert np.array_equal(one, np.ravel(other))
+
+
+@pytest.mark.parametrize(("wrong", "near"), [("joints.bering.rate", "joints.bearing.rate"), ("enrgy", "energy")])
+def test_plot_suggests_signals_of_the_same_kind(folder, capsys, wrong, near):
+    assert main(["plot", str(folder), wrong]) == 2
+    assert near in capsys.readouterr().err
+
+
+def test_suggestions_for_a_joint_are_joints(folder, capsys):
+    assert main(["plot", str(folder), "joints.rod.position"]) == 2
+    assert "bodies." not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["", ":", ":dam"])
+def test_a_python_file_without_a_name_tells_its_models(capsys, name):
+    assert main(["info", f"{ROOT / 'examples/oscillator.py'}{name}"]) == 2
+    assert "free_oscillator, damped_oscillator" in capsys.readouterr().err
