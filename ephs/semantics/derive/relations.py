@@ -17,7 +17,7 @@ from ephs.semantics.derive.maps import Maps
 from ephs.semantics.derive.slopes import Slopes, lifted
 from ephs.semantics.derive.tape import Tape, evaluate
 from ephs.semantics.spaces.vectors import dot
-from ephs.semantics.stage.duals import Dual, Duals
+from ephs.semantics.stage.duals import Duals
 from ephs.semantics.stage.evaluator import Evaluator
 from ephs.semantics.stage.numbers import Integer, Real, Truth
 from ephs.semantics.stage.programs import Call, Entry, Program
@@ -106,7 +106,7 @@ class Storage:
         n, _, _, size = self.dimensions
         x, p = [a.x0[i] for i in range(size)], [a.p[i] for i in range(self.numbers)]
         duals = Duals(on, n)
-        step = [_along(a.v[i], n, i) for i in range(n)]
+        step = [duals.along(a.v[i], i) for i in range(n)]
         start, numbers = [duals.dual(each) for each in x], [duals.dual(each) for each in p[len(self.potentials) :]]
         efforts, energy, end = self.slopes(duals, start, step, numbers)
         good = _finite(on, [duals.dual(energy).value])
@@ -283,19 +283,14 @@ class _Through:
         return flows if self.maps is None else self.maps.outward(self.rows, flows)
 
 
-def _along(value: Real, directions: int, direction: int, slope: float = 1.0) -> Dual:
-    """A number that changes with one direction."""
-    return Dual(value, tuple(slope if i == direction else 0.0 for i in range(directions)))
-
-
 def _given(
     on: Duals, relation: Reversible | Irreversible, a: Arguments
 ) -> tuple[list[Real], list[Real], list[Real], list[Real]]:
     """Parameters, states at the middle, efforts and multipliers, with directions (e, λ, v)."""
     n, k, m, size = relation.dimensions
-    e: list[Real] = [_along(a.e[i], n + k + m, i) for i in range(n)]
-    lam: list[Real] = [_along(a.lam[i], n + k + m, n + i) for i in range(k)]
-    half: list[Real] = [_along(0.5 * a.v[i], n + k + m, n + k + i, 0.5) for i in range(m)]
+    e: list[Real] = [on.along(a.e[i], i) for i in range(n)]
+    lam: list[Real] = [on.along(a.lam[i], n + i) for i in range(k)]
+    half: list[Real] = [on.along(0.5 * a.v[i], n + k + i, 0.5) for i in range(m)]
     start: list[Real] = [on.dual(a.x0[i]) for i in range(size)]
     x: list[Real] = []
     at = first = 0

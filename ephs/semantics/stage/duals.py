@@ -8,7 +8,7 @@ from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.evaluator import Evaluator, Function
 from ephs.semantics.stage.memory import Cells, IntegerCells, RealCells
 from ephs.semantics.stage.numbers import Condition, Integer, Number, Operation, Order, Real, Truth
-from ephs.semantics.stage.reaching import Part, Reached
+from ephs.semantics.stage.reaching import Atom, Part, Reached, Signature
 
 __all__ = ["Dual", "DualCells", "Duals"]
 
@@ -19,36 +19,57 @@ Ruled: TypeAlias = tuple[Real, tuple[Real, ...]]
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Dual(Number):
-    """A value, and its derivative along each direction."""
+    """A value, and its derivative along each direction.
+
+    Attributes
+    ----------
+    level
+        1, or beyond that of the numbers that value and slopes are: a number of a lower level is a constant.
+    """
 
     value: Real
     slopes: tuple[Real, ...]
+    level: int = 0
+
+    def __post_init__(self) -> None:
+        if not self.level:
+            object.__setattr__(self, "level", 1 + (self.value.level if isinstance(self.value, Dual) else 0))
 
     def _split(self, number: Real) -> tuple[Real, tuple[Real, ...]]:
-        if isinstance(number, Dual):
+        if isinstance(number, Dual) and number.level == self.level:
             return number.value, number.slopes
         return number, (0.0,) * len(self.slopes)
 
     def _apply(self, operation: Operation, left: Real, right: Real) -> Real:
-        (a, da), (b, db) = self._split(left), self._split(right)
+        (a, da), (b, db), level = *_pair(left, right), _level(left, right)
         pairs = list(zip(da, db, strict=True))
         match operation:
             case "+":
-                return Dual(a + b, tuple(_plus(x, y) for x, y in pairs))
+                return Dual(a + b, tuple(_plus(x, y) for x, y in pairs), level)
             case "-":
-                return Dual(a - b, tuple(_plus(x, -y) for x, y in pairs))
+                return Dual(a - b, tuple(_plus(x, -y) for x, y in pairs), level)
             case "*":
-                return Dual(a * b, tuple(_plus(_times(x, b), _times(y, a)) for x, y in pairs))
+                return Dual(a * b, tuple(_plus(_times(x, b), _times(y, a)) for x, y in pairs), level)
             case "/":
                 quotient = a / b
-                return Dual(quotient, tuple(_over(_plus(x, -_times(y, quotient)), b) for x, y in pairs))
+                return Dual(quotient, tuple(_over(_plus(x, -_times(y, quotient)), b) for x, y in pairs), level)
 
     def _order(self, order: Order, left: Real, right: Real) -> Truth:
-        (a, _), (b, _) = self._split(left), self._split(right)
+        (a, _), (b, _) = _pair(left, right)
         return _ORDERS[order](a, b)
 
     def _negative(self) -> Real:
-        return Dual(-self.value, tuple(-slope for slope in self.slopes))
+        return Dual(-self.value, tuple(-slope for slope in self.slopes), self.level)
+
+
+def _level(left: Real, right: Real) -> int:
+    return max(number.level for number in (left, right) if isinstance(number, Dual))
+
+
+def _pair(left: Real, right: Real) -> tuple[Ruled, Ruled]:
+    """Both numbers as ones of the higher level."""
+    top = max((number for number in (left, right) if isinstance(number, Dual)), key=lambda number: number.level)
+    return top._split(left), top._split(right)  # pyright: ignore[reportPrivateUsage]
 
 
 def _nought(slope: Real) -> bool:
@@ -93,18 +114,23 @@ class DualCells(Cells[Real]):
     slopes: RealCells | None
     directions: int
 
+    @property
+    def level(self) -> int:
+        """Level of the numbers."""
+        return 1 + (self.values.level if isinstance(self.values, DualCells) else 0)
+
     def load(self, index: Integer) -> Real:
         """Return the number at an index."""
         value, slopes = self.values.load(index), self.slopes
         if slopes is None:
-            return Dual(value, (0.0,) * self.directions)
+            return Dual(value, (0.0,) * self.directions, self.level)
         first = index * self.directions
-        return Dual(value, tuple(slopes.load(first + k) for k in range(self.directions)))
+        return Dual(value, tuple(slopes.load(first + k) for k in range(self.directions)), self.level)
 
     def store(self, index: Integer, value: Real) -> None:
         """Keep a number at an index."""
         slopes: tuple[Real, ...] = (0.0,) * self.directions
-        if isinstance(value, Dual):
+        if isinstance(value, Dual) and value.level == self.level:
             value, slopes = value.value, value.slopes
         self.values.store(index, value)
         for k, slope in enumerate(slopes):
@@ -130,9 +156,20 @@ class Duals(Evaluator):
     base: Evaluator
     directions: int = 1
 
-    def dual(self, number: Real) -> Dual:
-        """Return a number as a dual one, a constant without slopes."""
-        return number if isinstance(number, Dual) else Dual(number, (0.0,) * self.directions)
+    @property
+    def level(self) -> int:
+        """Level of the numbers: 1, or one more than that of the numbers below."""
+        return 1 + (self.base.level if isinstance(self.base, Duals) else 0)
+
+    def dual(self, number: Real, slopes: tuple[Real, ...] | None = None) -> Dual:
+        """Return a number of the base with slopes as a dual one; a constant has none, and a dual number its own."""
+        if slopes is None and isinstance(number, Dual) and number.level == self.level:
+            return number
+        return Dual(number, (0.0,) * self.directions if slopes is None else slopes, self.level)
+
+    def along(self, value: Real, direction: int, slope: float = 1.0) -> Dual:
+        """Return a number that changes with one direction."""
+        return self.dual(value, tuple(slope if k == direction else 0.0 for k in range(self.directions)))
 
     def cells(self, values: RealCells, slopes: RealCells | None = None) -> RealCells:
         """Return cells of dual numbers."""
@@ -144,17 +181,17 @@ class Duals(Evaluator):
         slopes: tuple[Real, ...] = (0.0,) * self.directions
         for factor, number in zip(factors, numbers, strict=True):
             slopes = tuple(_plus(s, _times(n, factor)) for s, n in zip(slopes, number.slopes, strict=True))
-        return Dual(value, slopes)
+        return self.dual(value, slopes)
 
     def scale(self, real: Real, power: Integer) -> Real:
         x = self.dual(real)
-        return Dual(self.base.scale(x.value, power), tuple(self.base.scale(slope, power) for slope in x.slopes))
+        return self.dual(self.base.scale(x.value, power), tuple(self.base.scale(slope, power) for slope in x.slopes))
 
     def _choose(self, truth: Condition, one: Any, other: Any) -> Any:
         if not isinstance(one, float | Number) and not isinstance(other, float | Number):
             return self.base.select(truth, one, other)
         a, b = self.dual(one), self.dual(other)
-        return Dual(self.base.select(truth, a.value, b.value), self.base.select(truth, a.slopes, b.slopes))
+        return self.dual(self.base.select(truth, a.value, b.value), self.base.select(truth, a.slopes, b.slopes))
 
     def _both(self, one: Truth, other: Truth) -> Truth:
         return self.base.both(one, other)
@@ -194,7 +231,26 @@ class Duals(Evaluator):
         self.base._rehearse(body)
 
     def _reach(self, function: Reached, parts: list[Part]) -> Integer:
-        raise StageError("unreached", what="a derivative")
+        """Call the tangent of a function: its address is what a table holds where programs run with dual numbers."""
+        rest, passed = iter(parts), list[Part]()
+        arguments: list[tuple[Atom, ...]] = []
+        for atoms in function.signature.arguments:
+            slopes: list[Part] = []
+            for atom, value in (next(rest) for _ in atoms):
+                if atom == "real":
+                    raise StageError("unreached", what="the derivative of a number that is handed over by itself")
+                if atom != "reals":
+                    passed.append((atom, value))
+                    continue
+                cells, start = value
+                if not isinstance(cells, DualCells) or cells.slopes is None:
+                    raise StageError("passive")
+                passed.append((atom, (cells.values, start)))
+                slopes.append((atom, (cells.slopes, start * self.directions)))
+            passed += slopes
+            arguments.append((*atoms, *(atom for atom, _ in slopes)))
+        signature = Signature(tuple(arguments), function.signature.returns)
+        return self.base._reach(Reached(signature, function.address), passed)
 
     def _call(self, on: Evaluator, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
         return self.base._call(on, function, arguments)

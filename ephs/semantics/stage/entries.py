@@ -80,8 +80,10 @@ class Entry:
         Parameters
         ----------
         *active
-            The arguments that have derivatives, read or written; each is given as a pair: the argument, and an array
-            of its slopes, of its shape, and the number of directions after it where there are several.
+            The arguments that have derivatives, read or written, all where none is named; each is given as a pair: the
+            argument, and an array of its slopes, of its shape, and the number of directions after it where there are
+            several. Parts of a group are pairs each; integers have no slopes. A function that is called by its address
+            is then to be the tangent of all its arguments, along as many directions.
         directions
             How many derivatives are computed at once.
 
@@ -91,12 +93,13 @@ class Entry:
             An argument is not there. Later: a number with a derivative is stored in memory that is not active.
         """
         self._known(active)
+        chosen = active or tuple(self.kinds)
 
         @wraps(self.function)
         def run(on: Evaluator, *arguments: Any) -> Any:
             return self.function(Duals(on, directions), *arguments)
 
-        return Entry(run, **{name: dual(kind, directions, name in active) for name, kind in self.kinds.items()})
+        return Entry(run, **{name: dual(kind, directions, name in chosen) for name, kind in self.kinds.items()})
 
     def given(self, **values: Any) -> "Entry":
         """Return this function for some arguments given while staging, unrolled over what they say.

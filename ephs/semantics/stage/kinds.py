@@ -47,12 +47,15 @@ class Kind:
         numbers, and real numbers, have a shape of members after their own.
     join
         Returns the argument that cells and numbers make.
+    mapped
+        Of a group: returns the group of its parts changed by a function.
     """
 
     expected: str
     atoms: tuple[Atom, ...]
     split: Callable[[Any, Shape], tuple[Any, ...] | None]
     join: Callable[[list[Any]], Any]
+    mapped: "Callable[[Callable[[Kind], Kind]], Kind] | None" = None
 
 
 def _array(value: Any, dtype: type[np.generic], shape: Shape) -> bool:
@@ -164,7 +167,10 @@ def group(cls: Callable[..., Any], **kinds: "Kind | Any") -> Kind:
         return cls(**{name: kind.join([next(rest) for _ in kind.atoms]) for name, kind in parts.items()})
 
     atoms: tuple[Atom, ...] = tuple(atom for kind in parts.values() for atom in kind.atoms)
-    return Kind(f"a mapping with the names {', '.join(parts)}", atoms, split, join)
+    return Kind(
+        f"a mapping with the names {', '.join(parts)}", atoms, split, join,
+        lambda change: group(cls, **{name: change(kind) for name, kind in parts.items()}),
+    )  # fmt: skip
 
 
 def of_field(kind: "Kind | RealField | IntegerField") -> Kind:
@@ -173,7 +179,13 @@ def of_field(kind: "Kind | RealField | IntegerField") -> Kind:
 
 
 def dual(kind: Kind, directions: int, active: bool) -> Kind:
-    """Return the kind of an argument of dual numbers: a value and its slopes, or, not active, a constant."""
+    """Return the kind of an argument of dual numbers: a value and its slopes, or, not active, a constant.
+
+    Parts of a group are pairs each.
+    """
+    if kind.mapped is not None:
+        return kind.mapped(lambda part: dual(part, directions, active))
+    active = active and not {"reals", "real"}.isdisjoint(kind.atoms)
 
     def split(value: Any, trail: Shape) -> tuple[Any, ...] | None:
         match value:
@@ -200,7 +212,7 @@ def dual(kind: Kind, directions: int, active: bool) -> Kind:
                 made.append(part)
         return kind.join(made)
 
-    if not active or not {"reals", "real"}.intersection(kind.atoms):
+    if not active:
         return Kind(kind.expected, kind.atoms, kind.split, join)
     shape = "of its shape" if directions == 1 else f"of its shape and {directions} directions after it"
     return Kind(f"a pair: {kind.expected}, and its slopes, float64 {shape}", (*kind.atoms, "reals"), split, join)

@@ -41,6 +41,10 @@ class Program:
             raise StageError("entries", where=name, found=", ".join(entries) or "none")
         self.name, self.entries = name, MappingProxyType(entries)
 
+    def tangent(self, directions: int = 1) -> "Program":
+        """Return the program of all entry functions' tangents, see `Entry.tangent`: what tangents reach."""
+        return _tangent(self, directions)
+
     def text(self, members: int = 1, shared: tuple[str, ...] = ()) -> str:
         """Return the program as assembly text of LLVM."""
         return _staged(self, members, shared)[0]
@@ -154,6 +158,12 @@ def _made(atom: Atom, part: Any, wide: bool) -> Any:
             return Batch(part) if wide else np.float64(part)
         case "integer":
             return part
+
+
+@cache
+def _tangent(program: Program, directions: int) -> Program:
+    made = {name: entry.tangent(directions=directions) for name, entry in program.entries.items()}
+    return Program(f"{program.name}_along_{directions}", **made)
 
 
 @cache

@@ -1,6 +1,6 @@
 """From the tables of a reduced scene to those of the engine: links at their joints, rigid groups merged."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -59,8 +59,9 @@ def engine_of(
     program = sweeps(records.kind, general=bool(forced or driven or len(cut)))
     eliminated = closing([part.parent for part in found.parts], ends)
     joints = kinds_of([*charts[:, [0, 3, 1]].tolist(), *cut[:, [2, 5, 3]].tolist()])
+    reached = _reached(program.program, loop_program(joints))
     tables: dict[str, Any] = {
-        "own": _own(len(found.parts), program, loop_program(joints), forced=forced, driven=driven),
+        "own": _own(len(found.parts), reached, forced=forced, driven=driven),
         "integers": records.integers,
         "reals": records.reals,
         "gravity": records.gravity,
@@ -76,18 +77,23 @@ def engine_of(
     freedoms, entropies = sum(part.joint.dim for part in found.parts), len(reduced.entropies)
     sizes = reduced.coordinates, drive.size + freedoms + entropies + 2 + len(reduced.made)
     work = _work(program, len(found.parts), freedoms, drive.size, len(cut), entropies, eliminated)
-    return Engine(tables, work, eliminated, sizes, looped=len(cut) > 0)
+    return Engine(tables, work, eliminated, sizes, reached, looped=len(cut) > 0)
 
 
-def _own(links: int, program: Sweeps, loops: Program, *, forced: bool, driven: bool) -> Table[Own]:
+def _reached(sweeps: Program, loops: Program) -> dict[str, tuple[Program, str]]:
+    """Function of `Own` -> the program and the entry that it is; sweeps of a free tree have one of their own."""
+    own = ("accelerations", "move", "fold", "unfold", "resolve", "spread", "power", "dependent")
+    cut = ("rows", "poses", "fit", "gaps", "relative_rates", "across", "advance", "velocities")
+    found = {name: (sweeps, name) for name in own if name in sweeps.entries}
+    return found | {name: (loops, name) for name in cut} | {"displace": (loops, "move")}
+
+
+def _own(links: int, reached: Mapping[str, tuple[Program, str]], *, forced: bool, driven: bool) -> Table[Own]:
     made = Own.table(1)
-    own, sweep, loop = made[0], program.program.compiled(), loops.compiled()
-    own.links, own.forced, own.driven, own.falls = links, int(forced), int(driven), int("accelerations" in sweep)
-    for name in ("accelerations", "move", "fold", "unfold", "resolve", "spread", "power", "dependent"):
-        setattr(own, name, sweep[name].address if name in sweep else 0)
-    for name in ("rows", "poses", "fit", "gaps", "relative_rates", "across", "advance", "velocities"):
-        setattr(own, name, loop[name].address)
-    own.displace = loop["move"].address
+    own = made[0]
+    own.links, own.forced, own.driven, own.falls = links, int(forced), int(driven), int("accelerations" in reached)
+    for name, (program, entry) in reached.items():
+        setattr(own, name, program.compiled()[entry].address)
     return made
 
 

@@ -271,8 +271,13 @@ class Mechanism(Motion):
         on.reach(self.tables.own[0].gaps, *self._cuts, q, self.work.value, self.work.answer)
         return self.work.answer[0]
 
-    def newton(self, on: Evaluator, q: Vector, r: Vector, before: Real) -> tuple[Integer, Real, Truth]:
-        """Fit the cut joints, factorise, and move the tree if that helps; a status, the gap, and whether it is done."""
+    def newton(
+        self, on: Evaluator, q: Vector, r: Vector, before: Real, *, always: bool = False
+    ) -> tuple[Integer, Real, Truth]:
+        """Fit the cut joints, factorise, and move the tree if that helps; a status, the gap, and whether it is done.
+
+        With ``always`` it is moved in any case: the tangent of closing is that of a round that was taken.
+        """
         own, w, status = self.tables.own[0], self.work, on.counter(0)
         self._move(on, q, r)
         on.reach(own.poses, *self._cuts)
@@ -285,7 +290,7 @@ class Mechanism(Motion):
 
         on.when(on.same(status.value, 0), separate)
         unsound = on.negate(on.same(status.value, 0))
-        done = on.either(unsound, on.either(gap <= GAP, gap > 0.5 * before))
+        done = unsound if always else on.either(unsound, on.either(gap <= GAP, gap > 0.5 * before))
 
         def go() -> None:
             self.open(on, q)

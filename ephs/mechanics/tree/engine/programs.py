@@ -127,6 +127,8 @@ class Engine:
         The elimination of its loops.
     sizes
         Numbers of elements, and of y.
+    reached
+        Function of `Own` -> the program and the entry that it is.
 
     Attributes
     ----------
@@ -135,10 +137,11 @@ class Engine:
     """
 
     def __init__(
-        self, tables: Mapping[str, Any], work: Mapping[str, Any], closing: Closing, sizes: tuple[int, int], *,
-        looped: bool,
+        self, tables: Mapping[str, Any], work: Mapping[str, Any], closing: Closing, sizes: tuple[int, int],
+        reached: Mapping[str, tuple[Program, str]], *, looped: bool,
     ) -> None:  # fmt: skip
         self.tables, self.work, self.closing, self.looped = tables, work, closing, looped
+        self.sizes, self.reached = sizes, reached
         coordinates, size = sizes
         self._calls = motion_program(looped=looped).compiled()
         self._base, self._q = np.zeros(coordinates), np.zeros(coordinates)

@@ -1,0 +1,227 @@
+"""Explicit steps of a mechanism with exact derivatives along several directions: the steps over dual numbers.
+
+A program over dual numbers calls the tangents of the sweeps and components that the program itself calls. What the
+step does (stages, books, loops closed at its end) is stated where marches take it from.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+from typing import Any, Final, cast, final
+
+import numpy as np
+
+from ephs.mechanics.tree.engine.motion import Mechanism, close
+from ephs.mechanics.tree.engine.programs import Engine
+from ephs.mechanics.tree.sweeps.acting import TABLES, WORK, Tables, Work
+from ephs.semantics.bundle import Array
+from ephs.semantics.stage import (
+    Entry,
+    Evaluator,
+    Integer,
+    Matrix,
+    Program,
+    Real,
+    Record,
+    Table,
+    Vector,
+    group,
+    matrix,
+    real,
+    table,
+    vector,
+)
+from ephs.semantics.stage.memory import ArrayIntegers
+from ephs.solve.march import TABLEAU, Control, Tableau
+from ephs.solve.march.steps import attempt
+
+__all__ = ["DIRECTIONS", "StepTangent", "step_program"]
+
+DIRECTIONS: Final = 4
+"""Directions of one call: vector units take four."""
+
+
+@cache
+def step_program(*, looped: bool) -> Program:
+    """Return the program of one step of a given length, and of its parts."""
+
+    def step(
+        on: Evaluator, tables: Tables, work: Work, tableau: Tableau, control: Table[Control], base: Vector,
+        start: Vector, k: Matrix, last: Vector, y: Vector, q: Vector, h: Real,
+    ) -> Integer:  # fmt: skip
+        motion = Mechanism(tables, work, looped)
+        status = on.counter(motion.rates(on, base, start, q, k.row(0))[0])
+
+        def stages() -> None:
+            status.value = attempt(on, motion, tableau, control[0], base, start, h, k, last, y, q)
+
+        def end() -> None:
+            status.value = _settled(on, motion, base, start, y, q)
+
+        on.when(on.same(status.value, 0), stages)
+        on.when(on.same(status.value, 0), end)
+        return status.value
+
+    def rates(on: Evaluator, tables: Tables, work: Work, base: Vector, start: Vector, q: Vector, k: Vector) -> Integer:
+        return Mechanism(tables, work, looped).rates(on, base, start, q, k)[0]
+
+    def settle(on: Evaluator, tables: Tables, work: Work, base: Vector, start: Vector, y: Vector, q: Vector) -> Integer:
+        return _settled(on, Mechanism(tables, work, looped), base, start, y, q)
+
+    def shut(on: Evaluator, tables: Tables, work: Work, y: Vector, q: Vector) -> Integer:
+        return _closed(on, Mechanism(tables, work, looped), y, q)
+
+    of: dict[str, Any] = {"tables": group(Tables, **TABLES), "work": group(Work, **WORK)}
+    return Program(
+        "steps_of_loops" if looped else "steps_of_trees",
+        step=Entry(
+            step, **of, tableau=group(Tableau, **TABLEAU), control=table(Control), base=vector(), start=vector(),
+            k=matrix(), last=vector(), y=vector(), q=vector(), h=real(),
+        ),
+        rates=Entry(rates, **of, base=vector(), start=vector(), q=vector(), k=vector()),
+        settle=Entry(settle, **of, base=vector(), start=vector(), y=vector(), q=vector()),
+        close=Entry(shut, **of, y=vector(), q=vector()),
+    )  # fmt: skip
+
+
+def _settled(on: Evaluator, motion: Mechanism, base: Vector, start: Vector, y: Vector, q: Vector) -> Integer:
+    """Take the end y of a step to a state whose derivatives are on the constraints, too."""
+    status = on.counter(motion.settle(on, base, start, y, q))
+
+    def close() -> None:
+        status.value = _closed(on, motion, y, q)
+
+    on.when(on.same(status.value, 0), close)
+    return status.value
+
+
+def _closed(on: Evaluator, motion: Mechanism, y: Vector, q: Vector) -> Integer:
+    """Close loops that are closed to rounding once more: what closing does to the derivatives, whatever the gap."""
+    if not motion.closes:
+        return 0
+    r = y.part(motion.increments, motion.freedoms)
+    status = on.counter(motion.newton(on, q, r, 1e300, always=True)[0])
+
+    def again() -> None:
+        status.value = close(on, motion, q, r)
+
+    on.when(on.same(status.value, 0), again)
+    return status.value
+
+
+@final
+class StepTangent:
+    """Steps of one mechanism, and their derivatives along `DIRECTIONS` directions.
+
+    Parameters
+    ----------
+    engine
+        Its equations, whose tables are read where they are.
+    relation
+        Called with the number of a component; returns the program and the entry that it is in machine code.
+    tableau
+        Coefficients, by the names of `Tableau`.
+
+    Attributes
+    ----------
+    slopes
+        Of the real numbers of each table, (…, directions), by its name: set before steps.
+    """
+
+    def __init__(
+        self, engine: Engine, relation: Callable[[int], tuple[Program, str]], tableau: Mapping[str, Any]
+    ) -> None:
+        coordinates, size = engine.sizes
+        stages = tableau["a"].shape[0]
+        self.slopes: dict[str, Array] = {}
+        tables = {**engine.tables, **_of_tangents(engine, relation)}
+        arguments: dict[str, Any] = {"tables": {}, "work": {}, "tableau": {}}
+        for key, values in (("tables", tables), ("work", engine.work), ("tableau", tableau)):
+            for name, value in values.items():
+                kept = self.slopes if key == "tables" else {}
+                arguments[key][name] = _paired(value, kept, name)
+        shapes: dict[str, tuple[int, ...]] = {
+            "base": (coordinates,), "start": (size,), "k": (stages, size), "last": (size,), "y": (size,),
+            "q": (coordinates,),
+        }  # fmt: skip
+        self.pairs = {name: _pair(np.zeros(shape)) for name, shape in shapes.items()}
+        self.stage = _pair(np.zeros(size))
+        arguments |= {"control": _paired(Control.table(1), {}, ""), "h": 0.0, **self.pairs}
+        program = _tangents(engine.looped).compiled()
+
+        def bound(name: str, **others: Any) -> Any:
+            given = {**arguments, **others}
+            return program[name].bind(*(given[key] for key in step_program(looped=engine.looped).entries[name].kinds))
+
+        self._step, self._settle, self._close = bound("step"), bound("settle"), bound("close")
+        self._rates = bound("rates", k=self.stage)
+
+    def step(self, h: float) -> int:
+        """Take a step of h seconds from (base, start) to (q, y); return a status. Inputs are constant in it."""
+        return int(self._step(h))
+
+    def close(self) -> int:
+        """Put the derivatives of the state (q, y), whose loops are closed, on the constraints; return a status."""
+        return int(self._close())
+
+    def rates(self) -> int:
+        """Write the rates at (base, start) to ``stage``; return a status."""
+        return int(self._rates())
+
+    def settle(self) -> int:
+        """Take the end y of a step from (base, start) to a state; return a status."""
+        return int(self._settle())
+
+
+@cache
+def _tangents(looped: bool) -> Program:
+    program = step_program(looped=looped)
+    return Program(
+        f"{program.name}_along_{DIRECTIONS}",
+        **{
+            name: entry.tangent(*(key for key in entry.kinds if key != "h"), directions=DIRECTIONS)
+            for name, entry in program.entries.items()
+        },
+    )
+
+
+def _pair(array: Array) -> tuple[Array, Array]:
+    return array, np.zeros((*array.shape, DIRECTIONS))
+
+
+def _paired(value: Any, kept: dict[str, Array], name: str) -> Any:
+    """Return an argument with memory for its slopes, which is kept by its name; integers as they are."""
+    if isinstance(value, Table):
+        rows = cast("Table[Record]", value)
+        kept[name] = np.zeros((rows.arrays[1].size, DIRECTIONS))
+        return rows, kept[name]
+    if value.dtype != np.float64:
+        return value
+    kept[name] = np.zeros((*value.shape, DIRECTIONS))
+    return value, kept[name]
+
+
+def _of_tangents(engine: Engine, relation: Callable[[int], tuple[Program, str]]) -> dict[str, Any]:
+    """The tables that hold addresses, with those of tangents."""
+    own, component = _copied(engine.tables["own"]), _copied(engine.tables["component"])
+    for name, (program, entry) in engine.reached.items():
+        setattr(own[0], name, program.tangent(DIRECTIONS).compiled()[entry].address)
+    for number in _evaluated(engine.tables):
+        program, entry = relation(number)
+        component[number].law = program.tangent(DIRECTIONS).compiled()[entry].address
+    return {"own": own, "component": component}
+
+
+def _copied(rows: Table[Any]) -> Table[Any]:
+    return Table(rows.record, ArrayIntegers(rows.arrays[0].copy()), rows.reals, rows.size)
+
+
+def _evaluated(tables: Mapping[str, Any]) -> Sequence[int]:
+    """Numbers of the components that the equations evaluate."""
+    acting, node, conduction = tables["acting"], tables["node"], tables["conduction"]
+    found = {int(row.component) for rows in (node, conduction) for row in _rows(rows)}
+    found |= {int(number) for row in _rows(acting) for number in (row.spring, row.friction)}
+    return sorted(found - {-1})
+
+
+def _rows(rows: Table[Any]) -> list[Any]:
+    return [rows[i] for i in range(int(rows.size))]  # pyright: ignore[reportArgumentType]
