@@ -1,34 +1,40 @@
-"""The tangent of explicit Runge-Kutta steps on the reduced form of a scene.
+"""The tangent of explicit Runge-Kutta steps on the reduced form of a scene: the steps over dual numbers.
 
-A step is the map of the method, loops closed at its end, with its length given. Its tangent takes the derivative of
-every stage: of the equations along the stage's own tangent, by differences of fourth order over a thousandth of the
-state's size, and by the parameters, see `Family`. Increments of elements are left-trivialised.
+A step is the map of the method, loops closed at its end, with its length given. What it is evaluated from (elements,
+rates, books; masses, lengths, stiffnesses, …) comes with its derivatives by the parameters.
 """
 
-from collections.abc import Callable
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import final
+from typing import Any, Never, final
 
 import numpy as np
 
 from ephs.mechanics.methods.explicit import tableau
-from ephs.mechanics.sensitivity.family import CENTRAL, Family, difference, same_shape
+from ephs.mechanics.sensitivity.family import Family, difference, same_shape
+from ephs.mechanics.tree.engine.tangents import DIRECTIONS, StepTangent
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.mechanics.tree.finding.tables import SPRING
+from ephs.mechanics.tree.sweeps.cuts import Cut
+from ephs.operad import Path
 from ephs.semantics.bundle import Array
+from ephs.semantics.derive.relations import entry_of
+from ephs.semantics.stage import Program, Table
+from ephs.solve.errors import OptionError, SolveError
+from ephs.solve.march import Status
 from ephs.solve.problem import Problem
 from ephs.solve.stepping import Row
 
 __all__ = ["ExplicitTangent"]
 
-SMALL = 1e-3
-"""Step along a tangent, in rad, m, or relative to the rates."""
-
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Point:
-    """A state and its derivatives by the parameters: (p, nv) of elements, (p, size − nv) of rates and all else."""
+    """A state and its derivatives by the parameters: (p, coordinates) of elements, (p, size − nv) of rates and books.
+
+    Derivatives of elements are those of their numbers.
+    """
 
     state: ReducedState
     q: Array
@@ -41,153 +47,169 @@ class Point:
 
 
 @final
+class _Unread(Mapping[Path, Array]):
+    """States that nothing may read."""
+
+    def __getitem__(self, path: Path) -> Never:
+        raise _Read
+
+    def __iter__(self) -> Iterator[Path]:
+        raise _Read
+
+    def __len__(self) -> int:
+        raise _Read
+
+
+class _Read(Exception):
+    """A function of time has read a state."""
+
+
+@final
 class ExplicitTangent:
     """Steps of a method with their tangents, for one family."""
 
     def __init__(self, family: Family, t0: float, method: str) -> None:
         self.family, self.t0, self.method = family, t0, tableau(method)
         self.equations = Equations(family.problem, t0)
-        self._others: dict[tuple[int, float], tuple[Problem, Equations]] = {}
-        eq = self.equations
-        t = eq.reduced.tables
-        self._parts = [
-            (
-                slice(int(t.r_at[i]), int(t.r_at[i] + t.dim[i])),
-                slice(int(t.q_at[i]), int(t.q_at[i] + t.q_size[i])),
-                edge,
-            )
-            for i, edge in enumerate(eq.reduced.edges)
-            if t.kind[i] != SPRING
-        ]
+        self._others: dict[tuple[int, float], tuple[Problem, Equations, ReducedState]] = {}
+        self._tangents: list[tuple[slice, StepTangent]] = []
 
     # ---- steps -------------------------------------------------------------------------------------------------
 
     def start(self) -> Point:
         """The initial state."""
-        state = self.equations.start(self.t0)
-        found = [
-            self._by(j, lambda of, _: self._joined(state, of.start(self.t0)))
-            for j in range(len(self.family.parameters))
-        ]
-        nv = self.equations.nv
-        return Point(state, np.array([x[:nv] for x in found]), np.array([x[nv:] for x in found]))
+        eq, count = self.equations, len(self.family.parameters)
+        state = eq.start(self.t0)
+        if not (eq.constant or eq.held):
+            self._of_time(self.t0)
+        found = [self._by(j, lambda of, at: np.concatenate([at.q, of.vector(at)[eq.nv :]])) for j in range(count)]
+        slopes = np.array(found)
+        point = Point(state, slopes[:, : state.q.size], slopes[:, state.q.size :])
+        for first in range(0, count, DIRECTIONS):
+            which = slice(first, min(first + DIRECTIONS, count))
+            made = StepTangent(eq.engine, self._relation, self.method.arrays)
+            for name in made.slopes:
+                for k, j in enumerate(range(which.start, which.stop)):
+                    made.slopes[name][..., k] = self._by(j, lambda of, _, name=name: self._numbers(of, name))
+            self._tangents.append((which, made))
+        return self._closed(point)
 
     def step(self, point: Point, h: float) -> Point:
         """One step of h seconds."""
-        eq, a, c = self.equations, self.method.arrays["a"], self.method.c
-        base, count = point.state, a.shape[1]
-        numbers = range(len(self.family.parameters))
-        y0, books = eq.vector(base), slice(eq.nv + eq.n + eq.ns, eq.size)
-        dy0 = np.hstack([np.zeros_like(point.q), point.y])
-        k, dk = np.zeros((count, eq.size)), np.zeros((count, len(numbers), eq.size))
-        for i in range(count):
-            y = y0 + h * (a[i, :i] @ k[:i])
-            dy = dy0 + h * np.einsum("s,spn->pn", a[i, :i], dk[:i])
-            time = base.t + c[i] * h
-            k[i] = eq.rates(time, base.q, y)
-            for j in numbers:
-                dk[i, j] = self._change(
-                    j, point.q[j], dy[j], base.q, y, lambda of, q, v, time=time: of.rates(time, q, v)
-                )
-        y1, dy1 = y0 + h * (a[count] @ k), dy0 + h * np.einsum("s,spn->pn", a[count], dk)
-        dy1[:, books] = [self._made(base, j, y0, dy0[j], y1, dy1[j]) for j in numbers]
-        end = eq.state(base, y1, base.t + h)
-        dq = np.array([self._carried(y1[: eq.nv], point.q[j], dy1[j, : eq.nv]) for j in numbers])
-        return self._closed(Point(end, dq, dy1[:, eq.nv :]))
-
-    def _made(self, base: ReducedState, number: int, y0: Array, dy0: Array, y1: Array, dy1: Array) -> Array:
-        """The tangent of the books after a step, by those of (v, r, heats, books) before it and of flows in it."""
-        size = y0.size
-
-        def counted(of: Equations, _: Array, both: Array) -> Array:
-            return of.settled(both[size:], both[:size])[of.nv + of.n + of.ns :]
-
-        along, at = np.concatenate([dy1, dy0]), np.concatenate([y1, y0])
-        return self._change(number, np.zeros(self.equations.nv), along, base.q, at, counted)
+        eq, base = self.equations, point.state
+        if eq.held:
+            eq.given.place(base.t, {})
+        out = Point(base, np.empty_like(point.q), np.empty_like(point.y))
+        for which, tangent in self._tangents:
+            self._put(tangent, point, which, "base", "start")
+            status = tangent.step(h) if eq.constant or eq.held else self._staged(tangent, base.t, h)
+            self._refuse(status)
+            state = self._taken(tangent, out, which, base.t + h)
+            out = replace(out, state=state)
+        return out
 
     def _closed(self, point: Point) -> Point:
-        """The state with loops closed, and the tangent of that."""
-        eq, end = self.equations, point.state
-        closed = eq.closed(end)
-        if closed is end:
-            return point
-        q, y = np.empty_like(point.q), np.array(point.y)
-        moving = eq.nv + eq.n
-        for j in range(len(point.q)):
-            still = np.concatenate([np.zeros(eq.nv), point.y[j]])
+        out = Point(point.state, np.empty_like(point.q), np.empty_like(point.y))
+        for which, tangent in self._tangents:
+            self._put(tangent, point, which, "q", "y")
+            self._refuse(tangent.close())
+            self._taken(tangent, out, which, point.t)
+        return out
 
-            def shut(of: Equations, at: Array, v: Array) -> Array:
-                found = of.closed(replace(end, q=at, r=v[eq.nv : moving]))
-                return self._joined(closed, found)[:moving]
+    def _staged(self, tangent: StepTangent, t: float, h: float) -> int:
+        """One step with inputs that are functions of time: stage by stage."""
+        a, c, start, y = self.method.arrays["a"], self.method.c, tangent.pairs["start"], tangent.pairs["y"]
+        count = a.shape[1]
+        first, rates = [array.copy() for array in start], [list[Array](), list[Array]()]
+        for i in range(count + 1):
+            for part in range(2):
+                grown = sum((h * weight * k for weight, k in zip(a[i], rates[part], strict=False)), np.zeros(1))
+                start[part][:] = first[part] + grown
+            if i == count:
+                break
+            self._of_time(t + c[i] * h)
+            if status := tangent.rates():
+                return status
+            for part in range(2):
+                rates[part].append(tangent.stage[part].copy())
+        for part in range(2):
+            y[part][:], start[part][:] = start[part], first[part]
+        return tangent.settle()
 
-            change = self._change(j, point.q[j], still, end.q, eq.vector(end), shut)
-            q[j], y[j, : eq.n] = change[: eq.nv], change[eq.nv :]
-        return Point(closed, q, y)
+    def _of_time(self, t: float) -> None:
+        """Put inputs in place that are functions of time.
 
-    # ---- derivatives -------------------------------------------------------------------------------------------
+        Raises
+        ------
+        OptionError
+            One reads the state.
+        """
+        try:
+            self.equations.given.place(t, _Unread())
+        except SolveError as error:
+            if isinstance(error.__cause__, _Read):
+                raise OptionError(
+                    "inputs", "a function that reads the state", "functions of time, or constants"
+                ) from error
+            raise
 
-    def _change(
-        self,
-        number: int,
-        dq: Array,
-        dy: Array,
-        q: Array,
-        y: Array,
-        function: Callable[[Equations, Array, Array], Array],
-    ) -> Array:
-        """The derivative of a function of (equations, elements, y) by a parameter and along a tangent: at once, where
-        the parameter's neighbours move the state little enough, else one after the other."""
-        eq, parameter = self.equations, self.family.parameters[number]
-        rates = slice(eq.nv, eq.nv + eq.n)
-        heats = slice(rates.stop, rates.stop + eq.ns)
-        fast = max(1.0, float(np.abs(y[rates]).max(initial=0.0)))
-        size = max(
-            float(np.abs(dq).max(initial=0.0)),
-            float(np.abs(dy[: eq.nv]).max(initial=0.0)),
-            float(np.abs(dy[rates]).max(initial=0.0)) / fast,
-            float(np.abs(dy[heats] * eq.heats.slopes() / eq.heats.temperatures(y[heats])).max(initial=0.0)),
-        )
+    def _put(self, tangent: StepTangent, point: Point, which: slice, elements: str, others: str) -> None:
+        nv, q, y = self.equations.nv, tangent.pairs[elements], tangent.pairs[others]
+        used = which.stop - which.start
+        q[0][:], y[0][:] = point.state.q, self.equations.vector(point.state)
+        q[1][:, :used], y[1][:] = point.q[which].T, 0.0
+        y[1][nv:, :used] = point.y[which].T
 
-        def beside(of: Equations, by: float) -> Array:
-            return function(of, eq.advance(q, by * dq) if by else q, y + by * dy)
+    def _taken(self, tangent: StepTangent, out: Point, which: slice, t: float) -> ReducedState:
+        """The state that a step ended in; its derivatives go to a point."""
+        eq, q, y = self.equations, tangent.pairs["q"], tangent.pairs["y"]
+        used = which.stop - which.start
+        out.q[which], out.y[which] = q[1][:, :used].T, y[1][eq.nv :, :used].T
+        r, heats, books = np.split(y[0][eq.nv :], [eq.n, eq.n + eq.ns])
+        return ReducedState(t, q[0].copy(), r.copy(), heats.copy(), books.copy())
 
-        if parameter.step * size <= 2.0 * SMALL:
-            return self._by(number, lambda of, by: beside(of, by))
-        step = SMALL / size
-        return difference(lambda k: beside(eq, k * step), CENTRAL, step) + self._by(
-            number, lambda of, _: beside(of, 0.0)
-        )
+    def _refuse(self, status: int) -> None:
+        if status == Status.DEPENDENT:
+            raise OptionError("method", self.method.name, "a motion whose constraints do not nearly repeat each other")
+        self.equations.refuse(status, self.equations.engine.failed)
 
-    def _by(self, number: int, function: Callable[[Equations, float], Array]) -> Array:
-        """The derivative of a function of (equations, offset) by a parameter."""
+    # ---- neighbours --------------------------------------------------------------------------------------------
+
+    def _relation(self, number: int) -> tuple[Program, str]:
+        slot = self.family.problem.descriptor.components[number]
+        if slot.primitive.kernel is None:
+            raise OptionError("parameters", str(slot.path), "relations that can be recorded: this one is called back")
+        return entry_of(slot.primitive.kernel.relation)
+
+    def _by(self, number: int, function: Any) -> Array:
+        """The derivative of a function of (equations, initial state) by a parameter."""
         step, stencil = self.family.parameters[number].step, self.family.parameters[number].stencil
-        return difference(lambda k: function(self._other(number, k * step)[1], k * step), stencil, step)
+        return difference(lambda k: function(*self._other(number, k * step)[1:]), stencil, step)
 
-    def _other(self, number: int, offset: float) -> tuple[Problem, Equations]:
-        if not offset:
-            return self.family.problem, self.equations
+    def _other(self, number: int, offset: float) -> tuple[Problem, Equations, ReducedState]:
         if (number, offset) not in self._others:
             problem = self.family.at(number, offset)
             found = Equations(problem, self.t0)
-            same_shape(self.equations._q, found._q, self.family.parameters[number].path)
-            found.start(self.t0)
-            self._others[number, offset] = problem, found
+            path = self.family.parameters[number].path
+            start = found.start(self.t0)
+            for one, other in zip(self.equations.engine.arrays(), found.engine.arrays(), strict=False):
+                same_shape(one, other, path)
+            self._others[number, offset] = problem, found, start
         return self._others[number, offset]
 
-    def _joined(self, of: ReducedState, other: ReducedState) -> Array:
-        """Another state as increments from one: of elements, then of rates, heats and books as they are."""
-        v = np.zeros(self.equations.nv)
-        for freedoms, elements, edge in self._parts:
-            v[freedoms] = edge.pair.manifold.increment(of.q[elements], other.q[elements])
-        return np.concatenate([v, other.r, other.heats, other.books])
-
-    def _carried(self, v: Array, dq: Array, dv: Array) -> Array:
-        """The tangent of q·exp(v)."""
-        out = np.empty_like(dv)
-        for freedoms, _, edge in self._parts:
-            group, by = edge.pair.manifold, v[freedoms]
-            out[freedoms] = group.adjoint(group.exp(-by)) @ dq[freedoms] + group.dexp_left(by) @ dv[freedoms]
-        return out
+    def _numbers(self, of: Equations, name: str) -> Array:
+        """The real numbers of a table of a neighbour's engine. Rows that close loops may be any that span the same:
+        taken are those that are nearest to this problem's."""
+        value = of.engine.tables[name]
+        numbers = np.asarray(value.arrays[1] if isinstance(value, Table) else value, dtype=float)
+        if name != "cut_numbers" or of is self.equations:
+            return numbers
+        out, first = numbers.reshape(-1, Cut.real_width).copy(), self.equations.engine.tables[name]
+        where = slice(Cut.normal.offset, Cut.normal.offset + 36)
+        for row, own in zip(out, first.reshape(-1, Cut.real_width), strict=True):
+            rows = row[where].reshape(6, 6)
+            row[where] = (own[where].reshape(6, 6) @ np.linalg.pinv(rows) @ rows).ravel()
+        return out.ravel()
 
     # ---- what is kept ------------------------------------------------------------------------------------------
 
@@ -201,11 +223,20 @@ class ExplicitTangent:
 
     def beside(self, number: int, offset: float, points: list[Point]) -> tuple[Problem, list[Row]]:
         """The same of a neighbour, by the tangents; and its problem."""
-        problem, eq = self._other(number, offset)
+        problem, eq, _ = self._other(number, offset)
         states: list[ReducedState] = []
         for point in points:
-            state, dy = point.state, offset * point.y[number]
-            r, heats, books = np.split(dy, [eq.n, eq.n + eq.ns])
-            q = eq.advance(state.q, offset * point.q[number])
+            state = point.state
+            r, heats, books = np.split(offset * point.y[number], [eq.n, eq.n + eq.ns])
+            q = self._normalised(state.q + offset * point.q[number])
             states.append(replace(state, q=q, r=state.r + r, heats=state.heats + heats, books=state.books + books))
         return problem, eq.rows_of(states)
+
+    def _normalised(self, q: Array) -> Array:
+        """Elements, their quaternions of length one."""
+        reduced, out = self.equations.reduced, q.copy()
+        for i, edge in enumerate(reduced.edges):
+            if reduced.tables.kind[i] != SPRING:
+                where = slice(int(reduced.tables.q_at[i]), int(reduced.tables.q_at[i] + reduced.tables.q_size[i]))
+                out[where] = edge.pair.manifold.normalise(q[where])
+        return out

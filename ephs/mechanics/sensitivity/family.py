@@ -1,7 +1,8 @@
-"""One problem and its neighbours in the parameters, and differences along them.
+"""One problem and its neighbours in the parameters: how a model's tables and initial values change with them.
 
-Derivatives by a parameter are differences of fourth order over neighbours a thousandth of its size apart: exact for
-what is polynomial in it to that order, as equations of motion mostly are, and good to 1e-11 for what is not.
+Tables of a model are polynomials of low degree in each of its parameters, whose derivative follows from values exactly:
+of degree six and less by the stencils here, to rounding. Initial values that close loops are smooth: there the
+next term is below rounding at these steps.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -28,11 +29,17 @@ __all__ = ["CENTRAL", "Family", "Parameter", "Stencil", "difference"]
 
 Stencil = tuple[tuple[int, float], ...]
 """Multiples of a step, and their weights in a first derivative."""
-CENTRAL: Stencil = ((-2, 1.0 / 12.0), (-1, -2.0 / 3.0), (1, 2.0 / 3.0), (2, -1.0 / 12.0))
-FORWARD: Stencil = ((0, -25.0 / 12.0), (1, 4.0), (2, -3.0), (3, 4.0 / 3.0), (4, -0.25))
-RELATIVE = 1e-3
+CENTRAL: Stencil = ((-3, -1 / 60), (-2, 0.15), (-1, -0.75), (1, 0.75), (2, -0.15), (3, 1 / 60))
+FORWARD: Stencil = ((0, -2.45), (1, 6.0), (2, -7.5), (3, 20 / 3), (4, -3.75), (5, 1.2), (6, -1 / 6))
+RELATIVE = 2.0**-8
 """A neighbour's distance, relative to the parameter, or absolute where that is zero."""
+WIDE = 2.0**-4
+"""The same for numbers in which equations in joint coordinates are linear: the farther, the less rounding."""
+LINEAR = ("mass", "inertia", "friction", "stiffness", "damping", "conductance", "drive", "rest", "gravity")
 SIGNED = ("position", "at", "at1", "at2", "coordinate", "rate", "rest", "drive", "gravity", "velocity")
+RESISTING = ("friction", "stiffness", "damping", "conductance")
+NEXT_TO_NOTHING = 1e-200
+"""In place of zeros of these: what resists nothing is no part of a model, and its neighbours would be others."""
 LEAST = 0.1
 """Least magnitudes for numbers of a scene with either sign, in m, rad, s, N: near zero they say nothing of
 their own size."""
@@ -58,6 +65,11 @@ class Parameter:
 class Family:
     """A model with what determines its motion, and the same with other parameters.
 
+    Parameters
+    ----------
+    joints
+        The model is a scene whose motion is computed in joint coordinates.
+
     Attributes
     ----------
     parameters
@@ -73,10 +85,12 @@ class Family:
         initial: "Mapping[str, ArrayLike] | None",
         inputs: Mapping[str, Any] | None,
         reference: Reference | None,
+        *,
+        joints: bool = False,
     ) -> None:
         if isinstance(paths, str) or not paths or len(set(paths)) < len(paths):
             raise OptionError("parameters", paths, "one path or several, each once, as a list")
-        self.model, self._reference = model, reference
+        self.model, self._reference, self._joints = model, reference, joints
         self._initial, self._inputs = dict(initial or {}), dict(inputs or {})
         for path in paths:  # a drive that is zero has no port of its own
             joint = path.removeprefix("joints.").rpartition(".drive")[0]
@@ -86,6 +100,10 @@ class Family:
         self._neighbours: dict[tuple[str, float], Problem] = {}
         self.problem = self._made({})
         self._states = {str(slot.path): slot for slot in self.problem.descriptor.states}
+        idle = {path: NEXT_TO_NOTHING for path in paths if path.rpartition(".")[2].partition("[")[0] in RESISTING}
+        idle = {path: value for path, value in idle.items() if not self._read(path)}
+        if idle:
+            self.problem = self._made(idle)
         self.parameters = tuple(self._parameter(path) for path in paths)
 
     def at(self, number: int, offset: float) -> Problem:
@@ -101,7 +119,8 @@ class Family:
     def _parameter(self, path: str) -> Parameter:
         value = self._read(path)
         signed = isinstance(self.model, Scene) and path.partition("[")[0].endswith(SIGNED)
-        step = RELATIVE * max(abs(value) or 1.0, LEAST if signed else 0.0)
+        linear = self._joints and path.partition("[")[0].endswith(LINEAR)
+        step = (WIDE if linear else RELATIVE) * max(abs(value) or 1.0, LEAST if signed else 0.0)
         for stencil in (CENTRAL, FORWARD):
             try:
                 for k, _ in stencil:

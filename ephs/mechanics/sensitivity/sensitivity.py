@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 __all__ = ["METHODS", "Sensitivity", "sensitivity"]
 
 METHODS = ("rk54", "rk87", "natural")
-NEAR = 1e-3
+NEAR = 2.0**-7
 """Step of readings along a tangent, as states move."""
 
 
@@ -78,7 +78,7 @@ class Sensitivity:
         """(…, p) the derivative of anything that is read from a `Solution`: its final state, an integral over its
         times, heat or work; numbers, or an array.
 
-        The function is differenced along the trajectory's tangents, to fourth order; it should be smooth.
+        The function is differenced along the trajectory's tangents, to sixth order: of smooth ones rounding is left.
         """
         columns: list[Array] = []
         for number, parameter in enumerate(self.parameters):
@@ -115,7 +115,7 @@ def sensitivity(
     """The motion of a model with its derivatives by parameters: of the method's own discrete steps.
 
     Lengths of steps are chosen by a run of `simulate` and then held, so that what is differentiated is a smooth
-    function of the parameters: the derivative is that of the computed motion, to about 1e-9.
+    function of the parameters: the derivative is that of the computed motion, to rounding.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def sensitivity(
         ``"rk54"`` or ``"rk87"`` of scenes, with or without ``step``; ``"natural"`` of scenes and systems, with
         ``step``. ``"auto"``: rk87 for scenes without a step, natural with one.
     inputs
-        As for `simulate`; constant ones for natural.
+        As for `simulate`: functions of time alone, constant ones for natural.
 
     Raises
     ------
@@ -138,7 +138,7 @@ def sensitivity(
     """
     name = _method(model, method, step)
     run: dict[str, Any] = {"t0": t0, "initial": initial, "method": name, "inputs": inputs, "reference": reference}
-    family = Family(model, parameters, initial, inputs, reference)
+    family = Family(model, parameters, initial, inputs, reference, joints=name != "natural")
     control: dict[str, Any] = {"step": step} if step is not None else {"rtol": rtol, "atol": atol}
     times = None if save_at is None else numbers_of(save_at)
     if save_at is not None and times is None:
@@ -193,5 +193,5 @@ def _along(family: Family, method: str, grid: Array, times: Array | None) -> Sen
     offsets: list[float] = []
     for j, parameter in enumerate(family.parameters):
         size = max((stepper.size(p, j) for p in kept), default=0.0)
-        offsets.append(parameter.step if parameter.step * size <= 2.0 * NEAR else NEAR / size)
+        offsets.append(parameter.step if parameter.step * size <= NEAR else NEAR / size)
     return Sensitivity(family.model, solution, family.parameters, neighbour, np.array(offsets))

@@ -12,7 +12,7 @@ from ephs.semantics.derive.arguments import pointer
 from ephs.semantics.stage.evaluator import Evaluator
 from ephs.semantics.stage.memory import Integers, Vector
 from ephs.semantics.stage.numbers import Integer, Real
-from ephs.semantics.stage.programs import Call, Entry, Program
+from ephs.semantics.stage.programs import Entry, Program
 
 __all__ = ["Linear", "linear_program"]
 
@@ -123,7 +123,3 @@ class Linear:
     def program(self) -> Program:
         """The program of all of them."""
         return linear_program()
-
-    def compiled(self) -> Call:
-        """The relation in machine code."""
-        return linear_program().compiled()[self.name]

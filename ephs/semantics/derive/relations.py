@@ -22,7 +22,7 @@ from ephs.semantics.stage.evaluator import Evaluator
 from ephs.semantics.stage.numbers import Integer, Real, Truth
 from ephs.semantics.stage.programs import Call, Entry, Program
 
-__all__ = ["Irreversible", "Port", "Relation", "Reversible", "Storage", "compiled", "program", "sizes"]
+__all__ = ["Irreversible", "Port", "Relation", "Reversible", "Storage", "compiled", "entry_of", "program", "sizes"]
 
 OK: Final = 0
 TEMPERATURE: Final = 2
@@ -350,7 +350,13 @@ def program(relation: Relation) -> Program:
     return Program("element", value=Entry(value, dims=pointer("integers", 4), **kinds))
 
 
+def entry_of(relation: Relation | Linear) -> tuple[Program, str]:
+    """The program of a relation, and the name of its entry."""
+    return (relation.program, relation.name) if isinstance(relation, Linear) else (program(relation), "value")
+
+
 @cache
 def compiled(relation: Relation | Linear) -> Call:
     """The relation in machine code; its `address` is good as long as the result lives, which is kept here."""
-    return relation.compiled() if isinstance(relation, Linear) else program(relation).compiled()["value"]
+    made, name = entry_of(relation)
+    return made.compiled()[name]

@@ -14,10 +14,12 @@ from ephs.semantics.stage import (
     Program,
     Record,
     StageError,
+    function,
     integer,
     matrix,
     real,
     reals,
+    signature_of,
     staged,
     table,
     vector,
@@ -212,3 +214,45 @@ def test_members_have_derivatives_of_their_own():
         y, dy = np.zeros(1), np.zeros(1)
         straight.plain()["product"]((values[0][:, k].copy(), slopes[0]), (y, dy))
         assert all(np.array_equal(one[:, k], y) and np.array_equal(d[:, k], dy) for one, d in found)
+
+
+def test_constants_of_a_lower_level_are_constants():
+    """d/dx (x · d/dy (x y²)) at (2, 3): the inner derivative 2 x y is differentiated by x, and y is not."""
+    outer = Duals(PLAIN)
+    inner = Duals(outer)
+    x = outer.along(np.float64(2.0), 0)
+    y = inner.along(np.float64(3.0), 0)
+    along = (x * y * y).slopes[0]
+    assert outer.dual(along).value == 12.0
+    assert (x * along).slopes[0] == 2.0 * 2.0 * 2.0 * 3.0
+    assert outer.dual(inner.sqrt(x * y * y).slopes[0]).slopes[0] == pytest.approx(0.5 / np.sqrt(2.0))
+
+
+class Reaching(Record):
+    """A function that another program calls."""
+
+    law = function(signature_of(x=vector(2), out=vector(1)))
+
+
+def test_tangents_go_through_functions_that_are_called_by_address():
+    def law(on, x, out):
+        out[0] = x[0] * on.sin(x[1])
+        return 0
+
+    def outer(on, table, x, out):
+        on.reach(table[0].law, x, out)
+        out[0] = out[0] * out[0]
+
+    inside = Program("inside", law=Entry(law, x=vector(2), out=vector(1)))
+    entry = Entry(outer, table=table(Reaching), x=vector(2), out=vector(1))
+    tangent = Program("along", outer=entry.tangent("x", "out", directions=2))
+    rows = Reaching.table(1)
+    rows[0].law = inside.tangent(2).compiled()["law"].address
+    x, out = (np.array([1.5, 0.4]), np.eye(2)), (np.zeros(1), np.zeros((1, 2)))
+    for calls in (tangent.compiled(), tangent.plain()):
+        calls["outer"](rows, x, out)
+        s, c = np.sin(0.4), np.cos(0.4)
+        assert out[1][0] == pytest.approx([2.0 * 1.5 * s * s, 2.0 * 1.5 * s * 1.5 * c], rel=1e-14)
+    passive = Program("passive", outer=entry.tangent("out", directions=2))
+    with pytest.raises(StageError):
+        passive.compiled()

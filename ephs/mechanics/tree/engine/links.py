@@ -101,11 +101,15 @@ def links_of(reduced: "Reduced") -> Found:
 
 
 def plane_of(twists: Array) -> Array | None:
-    """The normal (3,) of the plane parallel to which world twists (n, 6) move, None where there is no such plane."""
+    """The normal (3,) of the plane parallel to which world twists (n, 6) move, None where there is no such plane.
+
+    Its largest component is positive.
+    """
     group = generated(twists)
     if not _planar(group):
         return None
-    return group.turning[:, 0]
+    normal = group.turning[:, 0]
+    return normal * np.sign(normal[int(np.argmax(np.abs(normal)))])
 
 
 def _planar(group: Subgroup) -> bool:
@@ -132,7 +136,7 @@ def _plane(reduced: "Reduced", joints: list[int]) -> Array | None:
 
 def _onto(normal: Array) -> Array:
     """The rotation that takes world axes to those of a plane, its normal to z."""
-    least = np.eye(3)[int(np.argmin(np.abs(normal)))]
+    least = np.eye(3)[int(np.argmin(np.abs(normal).round(6)))]  # the same one for all that differ by rounding
     x = np.cross(normal, least)
     x /= np.linalg.norm(x)
     return np.array([x, np.cross(normal, x), normal], dtype=float)
