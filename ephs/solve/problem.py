@@ -1,6 +1,6 @@
 """Problem of a solver: a system, its initial states, inputs at its outer ports, and its surroundings."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol, final
 
@@ -145,6 +145,10 @@ class Motion(Protocol):
     def gaps(self, every: int) -> Mapping[Path, Array]:
         """Per joint the residual of its position at every so many instants, the last one first: rad, or a part of the
         mechanism's length."""
+        ...
+
+    def leaps(self, h: float) -> Iterable[tuple[Path, int, float]]:
+        """Contacts that a step of at most h s passed: path, instant after it, the step's way in thicknesses."""
         ...
 
     def velocity_error(self) -> Array:

@@ -14,6 +14,7 @@ from ephs.mechanics.motion.batch import adjoint_inverse, compose, included, rota
 from ephs.mechanics.motion.beams import BeamMotion, beam_motion
 from ephs.mechanics.motion.contacts import ContactMotion, contact_motion
 from ephs.mechanics.motion.gaps import open_by
+from ephs.mechanics.motion.leaps import leaps
 from ephs.mechanics.motion.moving import Moving
 from ephs.mechanics.motion.own_motion import OwnMotion, own_motion
 from ephs.mechanics.motion.projection import Held, project, project_dense
@@ -219,6 +220,11 @@ class SceneMotion:
         problem = self._solution.problem
         worst = np.maximum(angles, distances / (1.0 if problem is None else problem.length))
         return {component_path("joints", name): row for name, row in zip(self._joints, worst, strict=True)}
+
+    def leaps(self, h: float) -> Iterator[tuple[Path, int, float]]:
+        """Contacts that a step of at most h s passed: path, instant after it, the step's way in thicknesses."""
+        for leap in leaps(self._scene, self, self._solution.t, h):
+            yield component_path("contacts", leap.name), leap.instant, leap.size
 
     def velocity_error(self) -> Array:
         """(n,) largest component of any joint's velocity residual."""

@@ -6,6 +6,7 @@ import numpy as np
 
 from ephs.mechanics.scene.geometry import coupling
 from ephs.mechanics.shapes.pairs import touches
+from ephs.solve.auditing.audit import LEAP
 
 if TYPE_CHECKING:
     from ephs.mechanics.scene.model import Scene
@@ -25,7 +26,7 @@ def longest_step(scene: "Scene", order: int, rtol: float) -> float:
 
 
 def _contact_step(scene: "Scene") -> float:
-    """Time in which no body passes half of a surface that it may meet, at the speeds of the start and of a fall.
+    """Time in which no body passes more than `LEAP` of a surface, at the speeds of the start and of a fall.
 
     A step that begins before a thin surface and ends behind it sees no contact; behind a plane it does.
     """
@@ -41,7 +42,7 @@ def _contact_step(scene: "Scene") -> float:
     twists = [body.twist for body in bodies.values()]
     start = sum(sorted((_speed(twist, reach) for twist in twists), reverse=True)[:2])
     fall = np.sqrt(2.0 * float(np.linalg.norm(scene.world.gravity)) * _extent(scene))
-    return float(0.5 * thick / (start + fall)) if start + fall > 0.0 else np.inf
+    return float(LEAP * thick / (start + fall)) if start + fall > 0.0 else np.inf
 
 
 def _speed(twist: "Array", reach: float) -> float:

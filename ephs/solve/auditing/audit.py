@@ -25,7 +25,7 @@ from ephs.solve.model import Model
 if TYPE_CHECKING:
     from ephs.solve.result.solution import Solution
 
-__all__ = ["LAWS", "Bounds", "Tests", "audit"]
+__all__ = ["LAWS", "LEAP", "Bounds", "Tests", "audit"]
 
 Tests = Trials | Missed
 """Steps that were tried again: of constant ones, or what is missed by chosen ones."""
@@ -36,6 +36,8 @@ not; and how many times rtol where steps are chosen."""
 MOTION = 0.1
 """Parts of the mechanism's length, or rad, by which constant steps may put bodies wrong at the end, as estimated: the
 estimate adds up errors of steps, which may cancel, so that fewer digits would be guesses."""
+LEAP = 0.5
+"""Parts of a surface's thickness that a step may pass: an instant lies inside it then."""
 PRODUCTION = 1e-12
 """Part of its scale by which an entropy may fall: what rounding leaves of a difference of flows."""
 INSTANTS = 125
@@ -158,6 +160,11 @@ def _accuracy(solution: "Solution", bounds: Bounds, trials: Tests | None) -> Ite
     if plain is not None:
         instant = int(np.argmin(np.abs(solution.t - plain["at"])))
         yield Breach(plain["largest"] / solution.ledgers.scale, _rounded(solution) / solution.ledgers.scale, instant)
+    longest = abs(float(solution.stats.get("longest_step", bounds.step or 0.0)))
+    for path, instant, size in solution.motion.leaps(longest) if solution.motion is not None else ():
+        short = f"{0.9 * longest * LEAP / size:.2g} s: a contact was passed"
+        hint = f" of {short}" if bounds.step else f", or max_step = {short}"
+        yield Breach(size, LEAP - min(LEAP, bounds.accuracy), instant, path, hint)
     if isinstance(trials, Missed):
         yield Breach(trials.size * bounds.tolerance, 0.0, int(np.argmin(np.abs(solution.t - trials.at))))
     if bounds.step is None or not isinstance(trials, Trials):

@@ -1,0 +1,86 @@
+"""Steps that pass a thin surface: one side before, the other after, and no contact between them.
+
+The way of the second surface through the axes of the first is straight within a step that is long for them. Gaps of
+convex shapes are convex along it, so that a search by thirds finds the least.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from ephs.mechanics.motion.batch import compose, inverse
+from ephs.mechanics.motion.loads import Read
+from ephs.mechanics.scene.build import contact_points
+from ephs.mechanics.scene.model import Scene
+from ephs.semantics.bundle import Array
+from ephs.solve.auditing.audit import LEAP
+
+__all__ = ["Leap", "leaps"]
+
+THIRDS = 48
+"""Rounds of the search, each of which keeps two thirds: (2/3)⁴⁸ of the way is 4e-9 of it."""
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Leap:
+    """A contact that a step passed.
+
+    Parameters
+    ----------
+    name, instant
+        The contact, and the index of the instant after it.
+    size
+        The step's way in thicknesses.
+    """
+
+    name: str
+    instant: int
+    size: float
+
+
+def leaps(scene: Scene, read: Read, t: Array, h: float) -> Iterator[Leap]:
+    """The longest leap over each contact between instants t (n,) in s of a run whose steps are at most h s long.
+
+    Where fewer instants are kept than steps, the way between two is divided among its steps.
+    """
+    share = np.minimum(1.0, h / np.maximum(np.abs(np.diff(t)), float(np.finfo(float).tiny)))
+    for name, contact in scene.all_contacts():
+        bodies, touches = contact_points(scene, contact)
+        longest = Leap(name, 0, 0.0)
+        for frame1, frame2, gap in touches if len(t) > 1 else ():
+            if gap.thickness == np.inf:
+                continue
+            first, second = (
+                compose(read.poses(body), np.broadcast_to(frame, (len(t), 7)))
+                for body, frame in zip(bodies, (frame1, frame2), strict=True)
+            )
+            pose = compose(inverse(first), second)
+            ways = np.linalg.norm(np.diff(pose[:, 4:], axis=0), axis=1)
+            outside = np.asarray(gap.distance(pose.T))
+            near = np.minimum(outside[:-1], outside[1:])
+            long = share * ways / gap.thickness
+            at = np.flatnonzero((near >= 0.0) & (near <= ways) & (long > LEAP))
+            passed = at[_least(gap.distance, pose[at], pose[at + 1]) < 0.0]
+            if passed.size:
+                worst = int(passed[np.argmax(long[passed])])
+                longest = max(longest, Leap(name, worst + 1, float(long[worst])), key=lambda leap: leap.size)
+        if longest.size:
+            yield longest
+
+
+def _least(distance: Callable[[Array], Array], start: Array, end: Array) -> Array:
+    """(k,) least gaps on straight ways between poses (k, 7), which keep the turning of the start."""
+    low, high = np.zeros(len(start)), np.ones(len(start))
+
+    def gaps(share: Array) -> Array:
+        places = start[:, 4:] + share[:, None] * (end - start)[:, 4:]
+        return np.asarray(distance(np.column_stack([start[:, :4], places]).T))
+
+    for _ in range(THIRDS if len(start) else 0):
+        one, two = low + (high - low) / 3.0, high - (high - low) / 3.0
+        left = gaps(one) < gaps(two)
+        low, high = np.where(left, low, one), np.where(left, two, high)
+    return gaps(0.5 * (low + high)) if len(start) else np.zeros(0)

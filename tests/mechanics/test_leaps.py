@@ -1,0 +1,74 @@
+"""Steps that pass a thin surface without an instant inside are found; steps that meet it are not."""
+
+import numpy as np
+import pytest
+
+import ephs
+from ephs.solve.auditing.audit import LEAP
+
+THICK, RADIUS, SPEED, START = 0.02, 0.01, 10.0, 0.26
+SCENE = f"""
+format = 1
+[world]
+gravity = [0.0, 0.0, 0.0]
+[bodies.ball]
+mass = 1.0
+inertia = [4e-5, 4e-5, 4e-5]
+position = [SIDE, 0.0, START]
+velocity = [0.0, 0.0, -{SPEED}]
+[surfaces.ball]
+body = "ball"
+shape = {{ sphere = {RADIUS} }}
+stiffness = 1e7
+[surfaces.plate]
+body = "ground"
+shape = {{ box = [1.0, 1.0, {THICK}] }}
+stiffness = 1e7
+"""
+WAY = THICK + 2.0 * RADIUS
+METHODS = ("natural", "alpha", "radau")
+"""None of their stages of such a step lies inside the plate."""
+
+
+@pytest.fixture
+def ball(tmp_path):
+    def scene(side=0.0):
+        file = tmp_path / "ball.toml"
+        file.write_text(SCENE.replace("SIDE", repr(side)).replace("START", repr(START)))
+        return ephs.load(file)
+
+    return scene
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("kept", [None, 5])
+def test_a_ball_that_passes_a_plate_in_a_step_is_found(method, kept, ball):
+    """0.1 m a step through 0.04 m: the motion is that of a free body, and every balance is kept."""
+    step, until = 0.0097, 0.06
+    times = None if kept is None else np.linspace(0.0, until, kept)
+    run = ephs.simulate(ball(), until, method=method, step=step, save_at=times, audit="off")
+    assert run.body("ball").position[-1, 2] == pytest.approx(START - SPEED * until), "the control: it went through"
+    (finding,) = run.audit.findings
+    assert (finding.law, finding.path) == ("accuracy", "contacts.ball_plate")
+    assert finding.size == pytest.approx(SPEED * step / WAY, rel=1e-6)
+    assert finding.allowed == LEAP
+    assert START - SPEED * finding.at < 0.0, "the instant after it"
+
+
+def test_the_step_that_is_advised_meets_the_plate(ball):
+    run = ephs.simulate(ball(), 0.06, method="natural", step=0.0097, audit="off")
+    short = float(run.audit.findings[0].advice.split(" of ")[1].split()[0])
+    met = ephs.simulate(ball(), 0.06, method="natural", step=short, audit="off")
+    assert met.contact("ball_plate").gap.min() < 0.0
+    assert not any("passed" in finding.advice for finding in met.audit.findings)
+
+
+@pytest.mark.parametrize("side", [0.6, 0.52])
+def test_a_ball_that_passes_beside_the_plate_is_not(side, ball):
+    assert ephs.simulate(ball(side), 0.06, method="natural", step=0.0097).audit.passed
+
+
+def test_a_ball_that_bounces_is_not_where_few_instants_are_kept(ball):
+    run = ephs.simulate(ball(), 0.06, method="rk54", save_at=np.linspace(0.0, 0.06, 4))
+    assert run.audit.passed
+    assert run.body("ball").velocity[-1, 2] > 0.0
