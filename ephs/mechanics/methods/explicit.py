@@ -143,7 +143,13 @@ class Explicit(ReducedMethod):
 
 @final
 class _March:
-    """One run in compiled steps. Times in it are counted from the start and grow."""
+    """One run in compiled steps. Times in it are counted from the start and grow.
+
+    Attributes
+    ----------
+    march
+        The compiled function, bound to all that it reads and writes.
+    """
 
     def __init__(
         self,
@@ -169,7 +175,7 @@ class _March:
             "times": self.times,
         }  # fmt: skip
         self._control = Steering.table(1)
-        self._march = eq.engine.bind("march", tableau.arrays, self.memory, self._control, 0)
+        self.march = eq.engine.bind("march", tableau.arrays, self.memory, self._control, 0)
         c, policy, control = self.control, span.policy, span.control
         c.end, c.span, c.origin = span.until - span.t0, abs(span.until - span.t0), span.t0
         c.step, c.least_step, c.most_step = span.h, control.least, control.most
@@ -193,7 +199,7 @@ class _March:
         """
         eq, c = self.method.equations, self.control
         before, sound = c.evaluations, float(c.time)
-        found = int(self._march(steps))
+        found = int(self.march(steps))
         eq.evaluations += c.evaluations - before
         self._hold(sound)
         self.method.stiffness = float(c.stiff)

@@ -16,6 +16,7 @@ TARGETS: Final = {
     "macos-arm64": Target("arm64-apple-macosx11.0.0", "apple-m1", ""),
     "macos-x86-64": Target("x86_64-apple-macosx11.0.0", "x86-64-v2", ""),
     "windows-x86-64": Target("x86_64-pc-windows-msvc", "x86-64-v2", ""),
+    "webassembly": Target("wasm32-unknown-unknown", "generic", "+bulk-memory"),
 }
 """Machines that object code can be emitted for on any machine. Only those of `FITTING` are tested."""
 FITTING: Final = {

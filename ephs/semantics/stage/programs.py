@@ -19,9 +19,11 @@ from ephs.semantics.stage.objects import compiled
 from ephs.semantics.stage.plain import PLAIN
 from ephs.semantics.stage.reaching import Atom
 
-__all__ = ["Program"]
+__all__ = ["Program", "located"]
 
 _COMPILING: Final = RLock()
+_PLACES: Final["dict[int, tuple[Program, str]]"] = {}
+"""Program and entry of each address of machine code that was made; such code lives as long as the process."""
 
 
 @final
@@ -86,6 +88,11 @@ class Program:
         number may be an array of one for each member.
         """
         return MappingProxyType({name: _interpreted(entry, True) for name, entry in self.entries.items()})
+
+
+def located(address: int) -> tuple[Program, str] | None:
+    """Return the program and the name of the entry function that lies at an address, None where none does."""
+    return _PLACES.get(address)
 
 
 _HEADER = """\
@@ -195,12 +202,13 @@ def _compiled(program: Program, members: int, shared: tuple[str, ...]) -> Mappin
     def trail(name: str) -> tuple[int | None, ...]:
         return () if members == 1 or name in shared else (members,)
 
-    return MappingProxyType(
-        {
-            name: Call(entry, library, f"{program.name}_{name}", results[name], trail)
-            for name, entry in program.entries.items()
-        }
-    )
+    calls = {
+        name: Call(entry, library, f"{program.name}_{name}", results[name], trail)
+        for name, entry in program.entries.items()
+    }
+    if members == 1:
+        _PLACES.update({call.address: (program, name) for name, call in calls.items()})
+    return MappingProxyType(calls)
 
 
 def _parameter(atom: Atom, wide: bool) -> str:

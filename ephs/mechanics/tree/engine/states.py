@@ -30,7 +30,20 @@ from ephs.semantics.stage import (
     vector,
 )
 
-__all__ = ["ELEMENT", "ENTROPY", "MOMENTUM", "POSE", "RELATIVE", "STATES", "Ends", "Source", "Stored", "Walked"]
+__all__ = [
+    "ELEMENT",
+    "ENTROPY",
+    "MOMENTUM",
+    "POSE",
+    "RELATIVE",
+    "STATES",
+    "Ends",
+    "Source",
+    "Stored",
+    "Walked",
+    "energies",
+    "rows",
+]  # fmt: skip
 
 POSE, MOMENTUM, ELEMENT, RELATIVE, ENTROPY = range(5)
 """Where a state comes from: a link's pose or momentum, a joint's element, a spring's relative pose, an entropy."""
@@ -187,7 +200,7 @@ def _relative(on: Evaluator, ends: Ends, poses: Matrix) -> list[Real]:
     return se3.between(on, frame(ends.one, ends.first), frame(ends.other, ends.second))
 
 
-def _rows(
+def rows(
     on: Evaluator, bodies: Table[Walked], springs: Table[Ends], plan: Table[Source], q: Matrix, r: Matrix, s: Matrix,
     poses: Matrix, twists: Matrix, x: Matrix,
 ) -> None:  # fmt: skip
@@ -227,7 +240,7 @@ def _rows(
     on.loop(x.rows, one)
 
 
-def _energies(
+def energies(
     on: Evaluator, storages: Table[Stored], reads: Integers, parameters: Vector, scal: Vector, x: Matrix, x0: Vector,
     v: Vector, e: Vector, lam: Vector, f: Vector, c: Vector, jac: Vector, work: Vector, out: Matrix, fault: Integers,
 ) -> Integer:  # fmt: skip
@@ -272,11 +285,11 @@ def _energies(
 STATES: Final = Program(
     "states",
     rows=Entry(
-        _rows, bodies=table(Walked), springs=table(Ends), plan=table(Source), q=matrix(), r=matrix(), s=matrix(),
+        rows, bodies=table(Walked), springs=table(Ends), plan=table(Source), q=matrix(), r=matrix(), s=matrix(),
         poses=matrix(7), twists=matrix(6), x=matrix(),
     ),
     energies=Entry(
-        _energies, storages=table(Stored), reads=indices(), parameters=vector(), scal=vector(3), x=matrix(),
+        energies, storages=table(Stored), reads=indices(), parameters=vector(), scal=vector(3), x=matrix(),
         **dict.fromkeys(("x0", "v", "e", "lam", "f", "c", "jac", "work"), vector()), out=matrix(), fault=indices(1),
     ),
 )  # fmt: skip

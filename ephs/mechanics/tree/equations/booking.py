@@ -23,11 +23,11 @@ class Booking:
     """The books of one mechanism's steps."""
 
     def __init__(self, equations: "Equations", paper: PaperStates) -> None:
-        self._equations, self._paper = equations, paper
+        self._equations, self.paper = equations, paper
         t, m = equations.model.tables, equations.model.memory()
         kept = np.flatnonzero(t.kind == STORING)
         places = np.stack([kept, t.parameter_at[kept], t.read_x_at[kept]], axis=1)
-        self._storages = table_of(Stored, np.hstack([t.address[kept, None], t.dims[kept], places]))
+        self.storages = table_of(Stored, np.hstack([t.address[kept, None], t.dims[kept], places]))
         self._memory = m.x, m.v, m.e, m.lam, m.f, m.c, m.jac, m.work
         self._last = np.zeros(0), np.zeros(0)
 
@@ -56,17 +56,17 @@ class Booking:
 
     def arrays(self) -> list[Any]:
         """All arrays of the tables that states are made from."""
-        return self._paper.arrays()
+        return self.paper.arrays()
 
     def energies(self, states: Sequence["ReducedState"]) -> tuple[Array, Array]:
         """(rows, point_size) all states of the scene's system, and (rows, components) the energies that they hold."""
         eq = self._equations
         q, r, heats = zip(*((state.q, state.r, state.heats) for state in states), strict=True)
-        x = self._paper.rows(np.array(q), np.array(r), eq.heats.entropies(np.array(heats)))
+        x = self.paper.rows(np.array(q), np.array(r), eq.heats.entropies(np.array(heats)))
         energies = np.zeros((len(states), len(eq.problem.descriptor.components)))
         t, fault = eq.model.tables, np.zeros(1, dtype=np.int64)
         status = STATES.compiled()["energies"](
-            self._storages, t.read_x, t.parameters, eq.scal, x, *self._memory, energies, fault
+            self.storages, t.read_x, t.parameters, eq.scal, x, *self._memory, energies, fault
         )
         eq.refuse(status, int(fault[0]))
         return x, energies

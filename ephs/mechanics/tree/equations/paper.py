@@ -48,7 +48,7 @@ class PaperStates:
         self._tables = table_of(Walked, joints, bodies), table_of(Ends, ends, offsets)
         self._memory = np.zeros((reduced.links + 1, 7)), np.zeros((reduced.links + 1, 6))
         self._known = False
-        self._rest = problem.descriptor.pack(problem.initial)
+        self.rest = problem.descriptor.pack(problem.initial)
 
     def _sources(self) -> Iterator[tuple[Path, int, int]]:
         """(path, where it comes from, number of the link, edge or entropy) of the states."""
@@ -69,16 +69,25 @@ class PaperStates:
         """All arrays of the tables, of whole and of real numbers."""
         return [array for table in self._tables for array in table.arrays]
 
+    def parts(self) -> dict[str, Any]:
+        """Tables and memory of the program of states, by the names of its arguments; after `rows` has run once."""
+        bodies, springs = self._tables
+        poses, twists = self._memory
+        return {
+            "bodies": bodies, "springs": springs, "plan": table_of(Source, self._plan), "poses": poses,
+            "twists": twists,
+        }  # fmt: skip
+
     def rows(self, q: Array, r: Array, s: Array) -> Array:
         """(rows, point_size) all states, of rows of joints' elements, rates and entropies."""
-        out = np.tile(self._rest, (q.shape[0], 1))
+        out = np.tile(self.rest, (q.shape[0], 1))
         if not self._known and q.shape[0]:
             self._known = True
             first = self.rows(q[:1], r[:1], s[:1])[0]
             for row in self._plan:
                 source, _, at, *_ = row.tolist()
                 # a pose has two quaternions: that one which is continuous with the initial one
-                row[-1] = source in (POSE, RELATIVE) and float(first[at : at + 4] @ self._rest[at : at + 4]) < 0.0
+                row[-1] = source in (POSE, RELATIVE) and float(first[at : at + 4] @ self.rest[at : at + 4]) < 0.0
         plan = table_of(Source, self._plan)
         STATES.compiled()["rows"](*self._tables, plan, q, r, s, *self._memory, out)
         return out

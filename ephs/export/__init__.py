@@ -1,0 +1,1 @@
+"""Mechanisms as programs without Python: object code, C text, WebAssembly, FMI units, and pages that simulate."""

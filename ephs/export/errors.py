@@ -1,0 +1,34 @@
+"""The one exception of this room and the texts that it carries."""
+
+from typing import Final, final
+
+__all__ = ["ExportError"]
+
+TEXTS: Final = {
+    "method": "method {found!r} cannot be exported, expected {expected}",
+    "input": "input {found!r}: expected a joint with a free coordinate, one of {expected}",
+    "function": "the input at {where} is a function of Python, expected a constant: name it as an input of the export",
+    "python": "{where}: a component is evaluated by Python, expected staged functions",
+    "suffix": "output file {found!r}: expected a name that ends in {expected}",
+    "target": "target {found!r}: expected one of {expected}",
+    "tool": "{what} needs {tool}, which is not installed: pip install {package}",
+    "refused": "{tool} refuses the program: {found}",
+    "name": "name {found!r}: expected a name of C, of letters, digits and _",
+}
+
+
+@final
+class ExportError(ValueError):
+    """A model that cannot be exported as asked.
+
+    Parameters
+    ----------
+    fault
+        The key of the text.
+    **details
+        What the text names.
+    """
+
+    def __init__(self, fault: str, /, **details: object) -> None:
+        super().__init__(TEXTS[fault].format(**details))
+        self.fault: str = fault

@@ -1,0 +1,186 @@
+"""One mechanism's run as functions of machine code and the arrays that they are called with."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, final
+
+import numpy as np
+
+from ephs.export.errors import ExportError
+from ephs.export.outputs import outputs_program
+from ephs.mechanics.methods.explicit import Explicit, tableau
+from ephs.mechanics.runs.simulate import control_of, problem_of_scene, problem_of_system
+from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.finding.tables import SPRING
+from ephs.semantics.bundle import Array
+from ephs.semantics.stage.calling import Bound
+from ephs.semantics.stage.records import Table
+from ephs.semantics.system import System
+from ephs.solve.control import Proportional, first_step
+from ephs.solve.march import Control as Steering
+from ephs.solve.problem import Problem
+from ephs.solve.stepping import Span
+
+__all__ = ["METHODS", "Image", "Variable", "image_of"]
+
+METHODS = ("rk54", "rk87")
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """A number that goes in or comes out.
+
+    Attributes
+    ----------
+    place
+        Of an input: its place in the array of given forces. Of an output: its place among the outputs.
+    start
+        Its value at the start.
+    """
+
+    name: str
+    unit: str
+    place: int
+    start: float
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Image:
+    """A run at its start.
+
+    Attributes
+    ----------
+    march, read, rates
+        Calls with all their arrays: many steps, outputs, rates of change of the state.
+    control
+        What chooses the steps.
+    drive
+        (forces,) given forces.
+    q, y
+        The state in the memory of the march.
+    out
+        The array that `read` writes.
+    acceleration
+        The array that `rates` writes, and where the accelerations of the tree's joints start and how many there are.
+    """
+
+    name: str
+    march: Bound
+    read: Bound
+    rates: Bound
+    control: Table[Steering]
+    drive: Array
+    out: Array
+    acceleration: tuple[Array, int, int]
+    inputs: tuple[Variable, ...]
+    outputs: tuple[Variable, ...]
+
+
+def image_of(
+    model: Scene | System, *, inputs: Sequence[str] = (), method: str = "rk87", rtol: float = 1e-6,
+    atol: float = 1e-9, step: float | None = None, until: float = 10.0,
+) -> Image:  # fmt: skip
+    """Return the run of a model from its initial state.
+
+    Parameters
+    ----------
+    inputs
+        Names of joints, as ``joints.pin``, on whose free coordinates a force or torque is given from outside.
+    until
+        Time in s over which errors are to stay within the tolerances.
+
+    Raises
+    ------
+    ExportError
+        The method has constant memory of another kind, or an input has no place.
+    """
+    if method not in METHODS:
+        raise ExportError("method", found=method, expected=" or ".join(METHODS))
+    given = dict.fromkeys(inputs, 0.0)
+    if isinstance(model, Scene):
+        joints = [f"joints.{name}" for name in model.joints]
+        for name in inputs:
+            if name not in joints:
+                raise ExportError("input", found=name, expected=", ".join(joints))
+        problem = problem_of_scene(model, None, given)
+    else:
+        problem = problem_of_system(model)
+    for path, signal in problem.signals.items():
+        if not signal.constant:
+            raise ExportError("function", where=path)
+    equations = Equations(problem, 0.0)
+    control = control_of(problem, tableau(method).order, rtol, atol, step, None, None, None)
+    state = equations.start(0.0)
+    explicit = Explicit(equations, control, tableau(method))
+    policy = None if step is not None else Proportional(lambda: explicit.exponent, explicit.share)
+    span = Span(state, 0.0, until, first_step(control, until), control, policy, np.zeros(0), 0)
+    leg = explicit.many(span)
+    if leg is None:
+        raise ExportError("python", where=problem.name)
+    return _image(problem, equations, leg, inputs)
+
+
+def _image(problem: Problem, eq: Equations, leg: Any, inputs: Sequence[str]) -> Image:
+    memory, control = leg.memory, leg._control
+    reduced, t = eq.reduced, eq.reduced.tables
+    out = np.zeros(reduced.coordinates + eq.n + 7 * reduced.links + 1)
+    state = leg.state
+    eq.rows_of([state])  # which of a pose's two quaternions is meant
+    model = eq.model.tables
+    parts = {
+        "tables": eq.engine.tables, "work": eq.engine.work, **eq.booking.paper.parts(),
+        "storages": eq.booking.storages, "reads": model.read_x, "parameters": np.array(model.parameters),
+        "s": np.zeros((1, eq.ns)), "x": np.array(eq.booking.paper.rest[None]),
+        "stored": np.zeros((1, len(problem.descriptor.components))), "q": memory["q"], "y": memory["y"], "out": out,
+    }  # fmt: skip
+    read = outputs_program().compiled()["read"].bind(*parts.values())
+    change = np.zeros(eq.size)
+    rates = eq.engine.bind("rates", memory["q"], memory["y"], np.zeros(reduced.coordinates), change)
+    found = int(read())
+    if found:
+        eq.refuse(found, eq.engine.failed)
+    return Image(
+        problem.name, leg.march, read, rates, control, eq.drive, out, (change, eq.nv, eq.n),
+        tuple(_inputs(eq, inputs)), tuple(_outputs(eq, out)),
+    )  # fmt: skip
+
+
+def _inputs(eq: Equations, names: Sequence[str]) -> list[Variable]:
+    t, out = eq.reduced.tables, []
+    for name in names:
+        edge = next(i for i, edge in enumerate(eq.reduced.edges) if str(edge.path) == name)
+        first, size = int(t.r_at[edge]), int(t.dim[edge])
+        for k in range(size):
+            whole = name if size == 1 else f"{name}.{k}"
+            out.append(Variable(whole, "", first + k, float(eq.drive[first + k])))
+    return out
+
+
+def _outputs(eq: Equations, values: Array) -> list[Variable]:
+    t, names = eq.reduced.tables, [""] * values.size
+
+    def put(first: int, size: int, name: str) -> None:
+        for k in range(size):
+            names[first + k] = name if size == 1 else f"{name}.{k}"
+
+    for i, edge in enumerate(eq.reduced.edges):
+        path = edge.path or edge.state or edge.name
+        if t.kind[i] != SPRING:
+            put(int(t.q_at[i]), int(t.q_size[i]), f"{path}.coordinate")
+        if i < eq.reduced.links:
+            put(eq.reduced.coordinates + int(t.r_at[i]), int(t.dim[i]), f"{path}.rate")
+    first = eq.reduced.coordinates + eq.n
+    for i in range(eq.reduced.links):
+        body = eq.reduced.places[i].path
+        for k, part in enumerate(("w", "x", "y", "z")):
+            names[first + 7 * i + k] = f"{body}.quaternion.{part}"
+        for k, part in enumerate("xyz"):
+            names[first + 7 * i + 4 + k] = f"{body}.position.{part}"
+    names[-1] = "energy"
+    return [
+        Variable(name, "J" if name == "energy" else "m" if ".position." in name else "", k, float(values[k]))
+        for k, name in enumerate(names)
+    ]
