@@ -8,6 +8,8 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from ephs.exporting.errors import ExportError as ExportError
+    from ephs.exporting.write import export as export
     from ephs.mechanics.dynamics import dynamics as dynamics
     from ephs.mechanics.linear import equilibrium as equilibrium
     from ephs.mechanics.linear import linearize as linearize
@@ -94,6 +96,8 @@ _HOMES = {
     "ephs.solve.auditing.findings": ("AuditError", "AuditWarning", "CostWarning"),
     "ephs.solve.result.solution": ("Solution",),
     "ephs.mechanics.sweep.sweep": ("SweepInterrupted", "sweep"),
+    "ephs.exporting.errors": ("ExportError",),
+    "ephs.exporting.write": ("export",),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 _PACKAGES = ("mechanics", "operad", "semantics", "show", "testing")

@@ -15,6 +15,7 @@ from ephs.cli.animate import animate
 from ephs.cli.charts import charts
 from ephs.cli.equilibrium import resting
 from ephs.cli.info import info
+from ephs.cli.export import exports
 from ephs.cli.input import (
     AS_GIVEN,
     TEXTS,
@@ -65,6 +66,7 @@ app.command(charts)
 app.command(sweeps)
 app.command(linearizing)
 app.command(resting)
+app.command(exports)
 app.command(news)
 app.register_install_completion_command(help="Install completion of commands and options in your shell.")
 

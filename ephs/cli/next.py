@@ -29,6 +29,7 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
     "animate": ("ephs animate out/slider-crank -o slider-crank.html",),
     "sweep": ("ephs sweep scenes/heavy-top.toml --vary bodies.top.mass=5:25:9 --until 1 -o out/sweep",),
     "equilibrium": ("ephs equilibrium scenes/four-bar.toml --out out/rest",),
+    "export": ("ephs export scenes/slider-crank.toml -o crank.c --inputs joints.bearing",),
     "linearize": ("ephs linearize scenes/four-bar.toml --at equilibrium",),
     "convert": ("ephs convert examples/arm.urdf -o arm.toml",),
     "chart": (

@@ -149,6 +149,8 @@ class _March:
     ----------
     march
         The compiled function, bound to all that it reads and writes.
+    memory, steering
+        Its state and memory, and what chooses its steps.
     """
 
     def __init__(
@@ -174,8 +176,8 @@ class _March:
             "q": np.array(q), "y": eq.vector(span.state), "atol": np.array(method.atol), "rtol": np.array(method.rtol),
             "times": self.times,
         }  # fmt: skip
-        self._control = Steering.table(1)
-        self.march = eq.engine.bind("march", tableau.arrays, self.memory, self._control, 0)
+        self.steering = Steering.table(1)
+        self.march = eq.engine.bind("march", tableau.arrays, self.memory, self.steering, 0)
         c, policy, control = self.control, span.policy, span.control
         c.end, c.span, c.origin = span.until - span.t0, abs(span.until - span.t0), span.t0
         c.step, c.least_step, c.most_step = span.h, control.least, control.most
@@ -187,7 +189,7 @@ class _March:
     @property
     def control(self) -> Any:
         """Where the march stands, a record of `Steering`; its numbers are known here."""
-        return self._control[0]
+        return self.steering[0]
 
     def advance(self, steps: int) -> bool:
         """Up to so many steps; whether the end is reached.
@@ -258,7 +260,7 @@ class _March:
             c.step, c.rejected = 0.25 * h, c.rejected + 1
             self.span.control.allowed(float(c.step), latest, error)
             return
-        if not (grid or STEPS.compiled()["judge"](self._control, h, attempt.error)):
+        if not (grid or STEPS.compiled()["judge"](self.steering, h, attempt.error)):
             c.rejected += 1
             self.span.control.allowed(float(c.step), latest, None)
             return
@@ -325,7 +327,7 @@ class _March:
         return dict(self._taken())
 
     def _taken(self) -> list[tuple[str, Any]]:
-        (counts, control), s = self._control.arrays, self.memory
+        (counts, control), s = self.steering.arrays, self.memory
         parts = control, counts, s["q"], s["y"], s["k"][0]
         return list(zip(("control", "counts", "q", "y", "rates"), parts, strict=True))
 

@@ -116,6 +116,13 @@ class _Function:
         self.given = set(self.kinds)
         self.entering: dict[str, list[tuple[str, str, str]]] = {}
         self.lines: list[str] = []
+        self._operations: dict[str, Callable[[str | None, str, str], None]] = {
+            "fneg": self._fneg, "fcmp": self._fcmp, "icmp": self._icmp, "select": self._select, "load":
+            self._load, "store": self._store, "getelementptr": self._getelementptr, "alloca": self._alloca,
+            "phi": self._phi, "br": self._br, "ret": self._ret, "call": self._call, "sitofp": self._sitofp,
+            "uitofp": self._uitofp, "sext": self._sext, "zext": self._zext, "inttoptr": self._inttoptr,
+            "bitcast": self._bitcast,
+        }  # fmt: skip
 
     def text(self) -> str:
         """Return the definition."""
@@ -129,9 +136,7 @@ class _Function:
                 self.lines += [f"  {_name(x)} = {_name(x)}_in;" for x in self._joined.get(block, [])]
             else:
                 self._line(line, block)
-        variables = [
-            f"  {_TYPES[kind]} {_name(word)};" for word, kind in self.kinds.items() if word not in self.given
-        ]
+        variables = [f"  {_TYPES[kind]} {_name(word)};" for word, kind in self.kinds.items() if word not in self.given]
         variables += [f"  {_TYPES[self.kinds[x]]} {_name(x)}_in;" for found in self._joined.values() for x in found]
         return "\n".join([f"{self.declaration} {{", *variables, *self.slots, *self.lines, "}"])
 
@@ -192,17 +197,15 @@ class _Function:
             return lambda word, rest, _: self._binary(word, rest, f"{{}} {_SIGNED[operation]} {{}}")
         if operation in _WRAPPING:
             sign = _WRAPPING[operation]
-            return lambda word, rest, _: self._binary(
-                word, rest, f"{{}} {sign} {{}}" if rest.startswith("i1 ") else f"(int64_t)((uint64_t){{}} {sign} (uint64_t){{}})"
-            )
-        return getattr(self, f"_on_{operation}", None)
+            return lambda word, rest, _: self._binary(word, rest, _wrapping(sign, rest))
+        return self._operations.get(operation)
 
     def _binary(self, word: str | None, rest: str, form: str) -> None:
         kind, _, operands = rest.partition(" ")
         one, other = _split(operands)
         self._put(word, kind, form.format(self._value(one, kind), self._value(other, kind)))
 
-    def _on_fneg(self, word: str | None, rest: str, block: str) -> None:
+    def _fneg(self, word: str | None, rest: str, block: str) -> None:
         kind, value = self._typed(rest)
         self._put(word, kind, f"-{value}")
 
@@ -213,41 +216,41 @@ class _Function:
         sign = _ORDER.get(order) or _ORDER[order.lstrip(prefixes)]
         self._put(word, "i1", f"{self._value(one, kind)} {sign} {self._value(other, kind)}")
 
-    def _on_fcmp(self, word: str | None, rest: str, block: str) -> None:
+    def _fcmp(self, word: str | None, rest: str, block: str) -> None:
         self._compare(word, rest, "o")
 
-    def _on_icmp(self, word: str | None, rest: str, block: str) -> None:
+    def _icmp(self, word: str | None, rest: str, block: str) -> None:
         self._compare(word, rest, "s")
 
-    def _on_select(self, word: str | None, rest: str, block: str) -> None:
+    def _select(self, word: str | None, rest: str, block: str) -> None:
         (_, truth), (kind, one), (_, other) = map(self._typed, _split(rest))
         self._put(word, kind, f"{truth} ? {one} : {other}")
 
-    def _on_load(self, word: str | None, rest: str, block: str) -> None:
+    def _load(self, word: str | None, rest: str, block: str) -> None:
         kind, pointer, *_ = _split(rest)
         self._put(word, kind, f"*({_TYPES[kind]} *){self._typed(pointer)[1]}")
 
-    def _on_store(self, word: str | None, rest: str, block: str) -> None:
+    def _store(self, word: str | None, rest: str, block: str) -> None:
         value, pointer, *_ = _split(rest)
         kind, written = self._typed(value)
         self._put(None, "void", f"*({_TYPES[kind]} *){self._typed(pointer)[1]} = {written}")
 
-    def _on_getelementptr(self, word: str | None, rest: str, block: str) -> None:
+    def _getelementptr(self, word: str | None, rest: str, block: str) -> None:
         kind, pointer, index = _split(rest)
         size = 1 if kind == "i8" else 8
         self._put(word, "ptr", f"{self._typed(pointer)[1]} + {size} * {self._typed(index)[1]}")
 
-    def _on_alloca(self, word: str | None, rest: str, block: str) -> None:
+    def _alloca(self, word: str | None, rest: str, block: str) -> None:
         found = re.match(r"\[(\d+) x (\w+)\]|(\w+)", rest)
         size, kind = (found[1] or "1", found[2] or found[3]) if found else ("1", "i64")
         name = _name(word or "")
         self.slots.append(f"  {_TYPES[kind]} {name}_slot[{max(int(size), 1)}];")
         self._put(word, "ptr", f"(char *){name}_slot")
 
-    def _on_phi(self, word: str | None, rest: str, block: str) -> None:
+    def _phi(self, word: str | None, rest: str, block: str) -> None:
         """Its value was handed over where the block was entered."""
 
-    def _on_br(self, word: str | None, rest: str, block: str) -> None:
+    def _br(self, word: str | None, rest: str, block: str) -> None:
         parts = _split(rest)
         if len(parts) == 1:
             self.lines.append(f"  {self._jump(block, parts[0].split('%')[1])}")
@@ -256,10 +259,10 @@ class _Function:
         truth = self._typed(parts[0])[1]
         self.lines.append(f"  if ({truth}) {{ {self._jump(block, yes)} }} else {{ {self._jump(block, no)} }}")
 
-    def _on_ret(self, word: str | None, rest: str, block: str) -> None:
+    def _ret(self, word: str | None, rest: str, block: str) -> None:
         self.lines.append("  return;" if rest == "void" else f"  return {self._typed(rest)[1]};")
 
-    def _on_call(self, word: str | None, rest: str, block: str) -> None:
+    def _call(self, word: str | None, rest: str, block: str) -> None:
         found = re.match(r"(\S+) ([@%][\w.]+)\((.*)\)$", rest)
         if found is None:
             raise StageError("machine", where="c_text", found=rest)
@@ -280,23 +283,28 @@ class _Function:
         given, _, kind = rest.rpartition(" to ")
         self._put(word, kind, form.format(self._typed(given)[1]))
 
-    def _on_sitofp(self, word: str | None, rest: str, block: str) -> None:
+    def _sitofp(self, word: str | None, rest: str, block: str) -> None:
         self._cast(word, rest, "(double){}")
 
-    def _on_uitofp(self, word: str | None, rest: str, block: str) -> None:
+    def _uitofp(self, word: str | None, rest: str, block: str) -> None:
         self._cast(word, rest, "(double)(uint64_t){}")
 
-    def _on_sext(self, word: str | None, rest: str, block: str) -> None:
+    def _sext(self, word: str | None, rest: str, block: str) -> None:
         self._cast(word, rest, "-(int64_t){}")
 
-    def _on_zext(self, word: str | None, rest: str, block: str) -> None:
+    def _zext(self, word: str | None, rest: str, block: str) -> None:
         self._cast(word, rest, "(int64_t){}")
 
-    def _on_inttoptr(self, word: str | None, rest: str, block: str) -> None:
+    def _inttoptr(self, word: str | None, rest: str, block: str) -> None:
         self._cast(word, rest, "(char *)(intptr_t){}")
 
-    def _on_bitcast(self, word: str | None, rest: str, block: str) -> None:
+    def _bitcast(self, word: str | None, rest: str, block: str) -> None:
         self._cast(word, rest, "bits_to_double({})" if rest.endswith("double") else "double_to_bits({})")
+
+
+def _wrapping(sign: str, rest: str) -> str:
+    """Return how two operands are joined: conditions as they are, integers without sign."""
+    return f"{{}} {sign} {{}}" if rest.startswith("i1 ") else f"(int64_t)((uint64_t){{}} {sign} (uint64_t){{}})"
 
 
 def _label(block: str) -> str:

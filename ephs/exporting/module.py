@@ -10,8 +10,8 @@ from typing import Any, Final, final
 
 import numpy as np
 
-from ephs.export.errors import ExportError
-from ephs.export.image import Image, Variable
+from ephs.exporting.errors import ExportError
+from ephs.exporting.image import Image, Variable
 from ephs.semantics.stage import Program
 from ephs.semantics.stage.calling import Bound
 from ephs.semantics.stage.programs import located
@@ -49,7 +49,9 @@ class Exported:
         """Return declarations in C."""
 
         def table(kind: str, variables: tuple[Variable, ...]) -> str:
-            rows = "".join(f'\n * {k:4} {each.name}{each.unit and f" [{each.unit}]"}' for k, each in enumerate(variables))
+            rows = "".join(
+                f"\n * {k:4} {each.name}{each.unit and f' [{each.unit}]'}" for k, each in enumerate(variables)
+            )
             return f"/* {kind}:{rows or ' none'}\n */"
 
         return _HEADER.format(
@@ -241,7 +243,10 @@ class _Writer:
         lines: list[str] = []
         where = self._field("time", numbers, lines)
         return _function(
-            "double", f"{self.name}_time", "ptr %memory", [*lines, f"  %t = load double, ptr {where}", "  ret double %t"]
+            "double",
+            f"{self.name}_time",
+            "ptr %memory",
+            [*lines, f"  %t = load double, ptr {where}", "  ret double %t"],
         )
 
 
@@ -262,8 +267,8 @@ extern "C" {{
 #endif
 /* A mechanism that moves in memory of its caller: {upper}_BYTES bytes an instance, aligned to 8. Calls for several
  * instances are independent. Functions that return a number return 0 where all is well; else
- * {careful}: constraints nearly repeat each other; {short}: steps get too short; {refused} or more: a component cannot be
- * evaluated, or loops do not close. */
+ * {careful}: constraints nearly repeat each other; {short}: steps get too short; {refused} or more: a component
+ * cannot be evaluated, or loops do not close. */
 #define {upper}_BYTES {bytes}
 #define {upper}_INPUTS {n_inputs}
 #define {upper}_OUTPUTS {n_outputs}

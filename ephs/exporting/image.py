@@ -1,13 +1,13 @@
 """One mechanism's run as functions of machine code and the arrays that they are called with."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, final
 
 import numpy as np
 
-from ephs.export.errors import ExportError
-from ephs.export.outputs import outputs_program
+from ephs.exporting.errors import ExportError
+from ephs.exporting.outputs import outputs_program
 from ephs.mechanics.methods.explicit import Explicit, tableau
 from ephs.mechanics.runs.simulate import control_of, problem_of_scene, problem_of_system
 from ephs.mechanics.scene.model import Scene
@@ -124,8 +124,8 @@ def image_of(
 
 
 def _image(problem: Problem, eq: Equations, leg: Any, inputs: Sequence[str]) -> Image:
-    memory, control = leg.memory, leg._control
-    reduced, t = eq.reduced, eq.reduced.tables
+    memory, control = leg.memory, leg.steering
+    reduced = eq.reduced
     out = np.zeros(reduced.coordinates + eq.n + 7 * reduced.links + 1)
     state = leg.state
     eq.rows_of([state])  # which of a pose's two quaternions is meant

@@ -32,7 +32,8 @@ def _row(x: Vector) -> Matrix:
 
 def _read(
     on: Evaluator, tables: Tables, work: Work, bodies: Table[Walked], springs: Table[Ends], plan: Table[Source],
-    poses: Matrix, twists: Matrix, storages: Table[Stored], reads: Integers, parameters: Vector, s: Matrix, x: Matrix, stored: Matrix, q: Vector, y: Vector, out: Vector,
+    poses: Matrix, twists: Matrix, storages: Table[Stored], reads: Integers, parameters: Vector, s: Matrix, x: Matrix,
+    stored: Matrix, q: Vector, y: Vector, out: Vector,
 ) -> Integer:  # fmt: skip
     """Write (q, r, poses of bodies, energy in J) at a state to ``out``; return a status."""
     increments, freedoms, nodes = tables.drive.size, work.force.size, tables.node.size
@@ -73,6 +74,7 @@ def outputs_program() -> Program:
     of: dict[str, Any] = {
         "tables": group(Tables, **TABLES), "work": group(Work, **WORK), "bodies": table(Walked),
         "springs": table(Ends), "plan": table(Source), "poses": matrix(7), "twists": matrix(6),
-        "storages": table(Stored), "reads": indices(), "parameters": vector(), "s": matrix(), "x": matrix(), "stored": matrix(), "q": vector(), "y": vector(), "out": vector(),
+        "storages": table(Stored), "reads": indices(), "parameters": vector(), "s": matrix(), "x": matrix(),
+        "stored": matrix(), "q": vector(), "y": vector(), "out": vector(),
     }  # fmt: skip
     return Program("outputs", read=Entry(_read, **of))

@@ -1,0 +1,68 @@
+"""`ephs export`: a mechanism as a program without Python."""
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import App, Parameter
+
+from ephs.cli.input import AS_GIVEN, BadInput, Loading, addressed, load_model, naming, say
+
+__all__ = ["exports"]
+
+exports = App(name="export", help="Write a mechanism as a program without Python: C, object code, WebAssembly.")
+
+
+@exports.default
+def export(
+    scene: str,
+    /,
+    *,
+    out: Annotated[Path, Parameter(name=["--out", "-o"])],
+    inputs: str = "",
+    method: str = "rk87",
+    rtol: float = 1e-6,
+    atol: float = 1e-9,
+    step: float | None = None,
+    until: float = 10.0,
+    target: str | None = None,
+    loading: Loading = AS_GIVEN,
+) -> int:
+    """Write a mechanism as a program without Python; prints its inputs and outputs.
+
+    Parameters
+    ----------
+    scene
+        A scene file (.toml), a model (.urdf, .xml, .sdf), or FILE.py:NAME.
+    out
+        File to write: .c or .o, with a header .h beside it; .wasm.
+    inputs
+        Joints on which forces are given from outside, between commas: joints.waist,joints.elbow.
+    method
+        rk54 or rk87.
+    rtol
+        Relative tolerance of steps.
+    atol
+        Absolute tolerance of steps.
+    step
+        Length of constant steps, in s.
+    until
+        Time in s over which the error is to stay within the tolerances.
+    target
+        Machine of object code, as linux-arm64; left out, this one.
+    """
+    import ephs
+
+    model = load_model(scene, loading)
+    names = [name.strip() for name in inputs.split(",") if name.strip()]
+    try:
+        with addressed(scene, out):
+            made = ephs.export(
+                model, out, inputs=names, method=method, rtol=rtol, atol=atol, step=step, until=until, target=target
+            )
+    except ephs.ExportError as error:
+        raise BadInput(naming(scene, str(error))) from error
+    for kind, variables in (("input", made.inputs), ("output", made.outputs)):
+        for place, variable in enumerate(variables):
+            say(f"{kind} {place:4} {variable.name:40} {variable.start:>14.6g} {variable.unit}".rstrip())
+    say(f"{out}: functions {made.name}_*, {made.bytes} bytes an instance")
+    return 0

@@ -1,0 +1,120 @@
+"""`export`: a model as a program without Python, in one file or two."""
+
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from importlib.util import find_spec
+from os import PathLike
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Final
+
+from ephs.exporting.errors import ExportError
+from ephs.exporting.image import image_of
+from ephs.exporting.module import Exported, exported
+from ephs.mechanics.scene.model import Scene
+from ephs.semantics.stage.ctext import c_text
+from ephs.semantics.stage.llvm import compile_text
+from ephs.semantics.stage.objects import TARGETS, emitted
+from ephs.semantics.system import System
+from ephs.solve.result.durable import durable
+
+__all__ = ["CALLS", "export", "tool"]
+
+CALLS: Final = ("start", "inputs", "advance", "time", "outputs", "accelerations")
+"""Functions of an exported mechanism."""
+
+
+def export(
+    model: Scene | System,
+    file: str | PathLike[str],
+    *,
+    name: str | None = None,
+    inputs: Sequence[str] = (),
+    method: str = "rk87",
+    rtol: float = 1e-6,
+    atol: float = 1e-9,
+    step: float | None = None,
+    until: float = 10.0,
+    target: str | None = None,
+) -> Exported:
+    """Write a mechanism as a program that needs no Python: its motion from its initial state, bit for bit.
+
+    Parameters
+    ----------
+    file
+        ``.c``: C text; ``.o``: object code; both with a header ``.h`` beside it, which lists inputs and outputs.
+        ``.wasm``: WebAssembly, whose functions are those of the header.
+    name
+        Beginning of the names of its functions; left out, the file's.
+    inputs
+        Joints, as ``joints.pin``, on whose free coordinates forces in N or N m are given from outside.
+    method, rtol, atol, step
+        As of `ephs.simulate`: rk54 or rk87.
+    until
+        Time in s over which the error is to stay within the tolerances; the program runs on beyond.
+    target
+        Machine of object code, of `ephs.semantics.stage.objects.TARGETS`; left out, this one.
+
+    Returns
+    -------
+    Exported
+        Names, places and units of inputs and outputs, and the module's text.
+
+    Raises
+    ------
+    ExportError
+        The model, the name of the file or an option does not allow it.
+    """
+    path = Path(file)
+    writers: dict[str, Callable[[Exported], bytes]] = {
+        ".c": lambda made: c_text(made.text).encode(),
+        ".o": lambda made: emitted(made.text, target) if target else compile_text(made.text),
+        ".wasm": webassembly,
+    }
+    if path.suffix not in writers:
+        raise ExportError("suffix", found=path.name, expected=", ".join(writers))
+    if target is not None and (path.suffix != ".o" or target not in TARGETS):
+        raise ExportError("target", found=target, expected=", ".join(TARGETS) + ", with a file .o")
+    image = image_of(model, inputs=inputs, method=method, rtol=rtol, atol=atol, step=step, until=until)
+    made = exported(image, name or path.stem.replace("-", "_"))
+    with durable(path) as temporary:
+        temporary.write_bytes(writers[path.suffix](made))
+    if path.suffix != ".wasm":
+        with durable(path.with_suffix(".h")) as temporary:
+            temporary.write_text(made.header(), encoding="utf-8")
+    return made
+
+
+def webassembly(made: Exported) -> bytes:
+    """Return an exported mechanism as a module of WebAssembly, which exports its memory and functions.
+
+    Raises
+    ------
+    ExportError
+        There is no linker.
+    """
+    with TemporaryDirectory() as folder:
+        code, linked = Path(folder, "code.o"), Path(folder, "code.wasm")
+        code.write_bytes(emitted(made.text, "webassembly"))
+        exports = [f"--export={made.name}_{call}" for call in CALLS]
+        tool("WebAssembly", "wasm-ld", code, "-o", linked, "--no-entry", "--strip-all", "--gc-sections",
+             "--export=__heap_base", *exports)  # fmt: skip
+        return linked.read_bytes()
+
+
+def tool(what: str, *words: str | Path) -> None:
+    """Run a tool of the cross compiler.
+
+    Raises
+    ------
+    ExportError
+        It is not installed, or refuses.
+    """
+    if find_spec("ziglang") is None:
+        raise ExportError("tool", what=what, tool="ziglang", package="ephs[export]")
+    done = subprocess.run(
+        [sys.executable, "-m", "ziglang", *map(str, words)], capture_output=True, text=True, check=False
+    )
+    if done.returncode:
+        raise ExportError("refused", tool=f"ziglang {words[0]}", found=done.stderr.strip()[:2000])

@@ -1,0 +1,150 @@
+"""Exported mechanisms take the steps of the package, bit for bit: as object code, as C text, as WebAssembly."""
+
+import ctypes
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import wasmtime
+
+import ephs
+from ephs.exporting.image import image_of
+from ephs.exporting.module import exported
+from ephs.semantics.stage.llvm import compile_text, load
+
+ROOT = Path(__file__).resolve().parents[2]
+POINTER = ctypes.c_void_p
+MAIN = """
+#include <stdio.h>
+#include <stdlib.h>
+#include "{name}.h"
+int main(void) {{
+  double out[{upper}_OUTPUTS], *in = malloc(({upper}_INPUTS + 1) * sizeof(double));
+  void *memory = malloc({upper}_BYTES);
+  for (int k = 0; k < {upper}_INPUTS; k++) in[k] = 0.25;
+  {name}_start(memory);
+  {name}_inputs(memory, in);
+  if ({name}_advance(memory, {until}) || {name}_outputs(memory, out)) return 1;
+  for (int k = 0; k < {upper}_OUTPUTS; k++) printf("%a\\n", out[k]);
+  return 0;
+}}
+"""
+
+
+class Run:
+    """An exported mechanism in the memory of this process."""
+
+    def __init__(self, made) -> None:
+        self.made, self.library = made, load(compile_text(made.text))
+        self.memory = np.zeros(made.bytes // 8)
+        self.call("start", None)
+
+    def call(self, name, result=ctypes.c_int64, *arguments):
+        kinds = [ctypes.c_double if isinstance(each, float) else POINTER for each in arguments]
+        function = ctypes.CFUNCTYPE(result, POINTER, *kinds)(self.library.address(f"{self.made.name}_{name}"))
+        values = [each if isinstance(each, float) else each.ctypes.data for each in arguments]
+        return function(self.memory.ctypes.data, *values)
+
+    def outputs(self):
+        values = np.zeros(len(self.made.outputs))
+        assert self.call("outputs", ctypes.c_int64, values) == 0
+        return dict(zip((each.name for each in self.made.outputs), values, strict=True))
+
+
+def wanted(solution, name):
+    """The number of a solution's last instant that an output names."""
+    kind, of, what, *part = name.split(".")
+    if kind == "joints":
+        values = np.atleast_1d(getattr(solution.joint(of), what)[-1])
+        return values[int(part[0]) if part else 0]
+    return getattr(solution.body(of), what)[-1][("wxyz" if what == "quaternion" else "xyz").index(part[0])]
+
+
+@pytest.mark.parametrize("scene", ["slider-crank", "heavy-top", "four-bar", "chain", "mbs"])
+def test_the_steps_are_those_of_the_package(scene):
+    model = ephs.load(ROOT / f"scenes/{scene}.toml")
+    run = Run(exported(image_of(model, until=0.3), "made"))
+    assert run.call("advance", ctypes.c_int64, 0.3) == 0
+    assert run.call("time", ctypes.c_double) == 0.3
+    solution = ephs.simulate(model, 0.3, method="rk87", save_at=[0.3], audit="off")
+    for name, value in run.outputs().items():
+        if name.endswith("coordinate"):
+            assert value == wanted(solution, name), name
+        elif ".position." in name:
+            np.testing.assert_allclose(value, wanted(solution, name), rtol=1e-13, atol=1e-13)
+
+
+def test_forces_from_outside_are_inputs():
+    model = ephs.load(ROOT / "scenes/slider-crank.toml")
+    run = Run(exported(image_of(model, inputs=["joints.bearing"], until=0.2), "made"))
+    force = np.array([0.5])
+    run.call("inputs", None, force)
+    run.call("advance", ctypes.c_int64, 0.2)
+    pushed = ephs.simulate(model, 0.2, method="rk87", inputs={"joints.bearing": 0.5 - 0.06}, save_at=[0.2])
+    free = ephs.simulate(model, 0.2, method="rk87", save_at=[0.2])
+    found = run.outputs()["joints.bearing.coordinate"]
+    assert found == pytest.approx(pushed.joint("bearing").coordinate[-1], rel=1e-12)
+    assert abs(found - free.joint("bearing").coordinate[-1]) > 1e-2
+
+
+def test_many_short_advances_stay_within_the_tolerance():
+    model = ephs.load(ROOT / "scenes/chain.toml")
+    made = exported(image_of(model, rtol=1e-10, atol=1e-12), "made")
+    short, long = Run(made), Run(made)
+    for k in range(1, 51):
+        assert short.call("advance", ctypes.c_int64, 0.02 * k) == 0
+    assert long.call("advance", ctypes.c_int64, 1.0) == 0
+    for name, value in long.outputs().items():
+        assert short.outputs()[name] == pytest.approx(value, abs=1e-7)
+
+
+@pytest.fixture(scope="module")
+def crank(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("crank")
+    model = ephs.load(ROOT / "scenes/slider-crank.toml")
+    made = ephs.export(model, folder / "crank.c", inputs=["joints.bearing"], until=0.3)
+    run = Run(made)
+    run.call("inputs", None, np.array([0.25]))
+    assert run.call("advance", ctypes.c_int64, 0.3) == 0
+    return folder, model, made, np.array(list(run.outputs().values()))
+
+
+def test_c_text_gives_the_same_bits(crank):
+    folder, _, _, expected = crank
+    (folder / "main.c").write_text(MAIN.format(name="crank", upper="CRANK", until=0.3))
+    program = folder / "program"
+    compiler = [sys.executable, "-m", "ziglang", "cc", "-std=c99", "-O1", "-w"]
+    subprocess.run([*compiler, folder / "main.c", folder / "crank.c", "-o", program, "-lm"], check=True)
+    told = subprocess.run([program], capture_output=True, text=True, check=True).stdout.split()
+    np.testing.assert_array_equal([float.fromhex(each) for each in told], expected)
+
+
+@pytest.mark.parametrize("fault", [{"file": "a.txt"}, {"target": "moon"}, {"inputs": ["joints.no"]}, {"method": "ida"},
+                                   {"name": "1 a"}])  # fmt: skip
+def test_what_cannot_be_exported_is_refused_by_name(crank, tmp_path, fault):
+    given = {"file": "a.o", **fault}
+    with pytest.raises(ephs.ExportError) as caught:
+        ephs.export(crank[1], tmp_path / given.pop("file"), **given)
+    (value,) = fault.values()
+    assert str(value if isinstance(value, str) else value[0]) in str(caught.value)
+    assert not list(tmp_path.iterdir())
+
+
+def test_webassembly_gives_the_same_bits(crank, tmp_path):
+    _, model, made, expected = crank
+    ephs.export(model, tmp_path / "crank.wasm", inputs=["joints.bearing"], until=0.3)
+    store = wasmtime.Store()
+    calls = wasmtime.Instance(store, wasmtime.Module.from_file(store.engine, tmp_path / "crank.wasm"), []).exports(
+        store
+    )
+    memory, base = calls["memory"], calls["__heap_base"].value(store)
+    given, out = base + made.bytes, base + made.bytes + 8
+    memory.grow(store, 1 + (out + expected.nbytes) // 65536)
+    calls["crank_start"](store, base)
+    memory.write(store, np.array([0.25]).tobytes(), given)
+    calls["crank_inputs"](store, base, given)
+    assert calls["crank_advance"](store, base, 0.3) == 0
+    assert calls["crank_outputs"](store, base, out) == 0
+    np.testing.assert_array_equal(np.frombuffer(memory.read(store, out, out + expected.nbytes)), expected)
