@@ -194,7 +194,7 @@ def test_arm_would_not_if_sums_and_products_were_fused():
 @pytest.mark.parametrize("target", TARGETS)
 def test_object_code_is_emitted_for_other_machines(target):
     code = emitted(SMALL.text(), target)
-    starts = {"linux": b"\x7fELF", "macos": b"\xcf\xfa\xed\xfe", "windows": b"\x64\x86"}
+    starts = {"linux": b"\x7fELF", "macos": b"\xcf\xfa\xed\xfe", "windows": b"\x64\x86", "webassembly": b"\0asm"}
     assert code.startswith(starts[target.partition("-")[0]])
     assert code == emitted(SMALL.text(), target)
 
