@@ -6,6 +6,7 @@ from typing import Annotated
 from cyclopts import App, Parameter
 
 from ephs.cli.input import AS_GIVEN, BadInput, Loading, addressed, load_model, naming, say
+from ephs.solve.control import ATOL, RTOL
 
 __all__ = ["exports"]
 
@@ -20,8 +21,8 @@ def export(
     out: Annotated[Path, Parameter(name=["--out", "-o"])],
     inputs: str = "",
     method: str = "rk87",
-    rtol: float = 1e-6,
-    atol: float = 1e-9,
+    rtol: float = RTOL,
+    atol: float = ATOL,
     step: float | None = None,
     until: float = 10.0,
     target: str | None = None,

@@ -17,7 +17,7 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.stage.calling import Bound
 from ephs.semantics.stage.records import Table
 from ephs.semantics.system import System
-from ephs.solve.control import Proportional, first_step
+from ephs.solve.control import ATOL, RTOL, Proportional, first_step
 from ephs.solve.march import Control as Steering
 from ephs.solve.problem import Problem
 from ephs.solve.stepping import Span
@@ -80,8 +80,8 @@ class Image:
 
 
 def image_of(
-    model: Scene | System, *, inputs: Sequence[str] = (), method: str = "rk87", rtol: float = 1e-6,
-    atol: float = 1e-9, step: float | None = None, until: float = 10.0,
+    model: Scene | System, *, inputs: Sequence[str] = (), method: str = "rk87", rtol: float = RTOL,
+    atol: float = ATOL, step: float | None = None, until: float = 10.0,
 ) -> Image:  # fmt: skip
     """Return the run of a model from its initial state.
 

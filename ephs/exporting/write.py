@@ -17,6 +17,7 @@ from ephs.semantics.stage.ctext import c_text
 from ephs.semantics.stage.llvm import compile_text
 from ephs.semantics.stage.objects import TARGETS, emitted
 from ephs.semantics.system import System
+from ephs.solve.control import ATOL, RTOL
 from ephs.solve.result.durable import durable
 
 __all__ = ["CALLS", "export", "tool"]
@@ -32,8 +33,8 @@ def export(
     name: str | None = None,
     inputs: Sequence[str] = (),
     method: str = "rk87",
-    rtol: float = 1e-6,
-    atol: float = 1e-9,
+    rtol: float = RTOL,
+    atol: float = ATOL,
     step: float | None = None,
     until: float = 10.0,
     target: str | None = None,

@@ -12,12 +12,14 @@ from ephs.semantics.descriptor import Descriptor
 from ephs.solve.errors import OptionError, Outcome, SolveError
 from ephs.solve.snapshot import Snapshot
 
-__all__ = ["Control", "Policy", "Proportional", "Symmetric", "Tolerance", "first_step", "told_apart"]
+__all__ = ["ATOL", "RTOL", "Control", "Policy", "Proportional", "Symmetric", "Tolerance", "first_step", "told_apart"]
 
 SHORTEST = 16.0
 """Roundings of the time that a step has at least."""
 NEAREST = 1e6
 """The same of a whole run, whose first steps are a small part of it."""
+RTOL, ATOL = 1e-6, 1e-9
+"""Tolerances of steps that are not given: six digits, and nothing below a billionth of a unit."""
 FIRST = 1e-4
 """Part of the time span that the first step takes: too long it is rejected, too short it grows fast."""
 

@@ -34,7 +34,7 @@ from ephs.semantics.system import System
 from ephs.solve.auditing.audit import Bounds
 from ephs.solve.auditing.findings import POLICIES, judged
 from ephs.solve.breakpoints import Breakpoints
-from ephs.solve.control import Control, Tolerance, told_apart
+from ephs.solve.control import ATOL, RTOL, Control, Tolerance, told_apart
 from ephs.solve.errors import OptionError, failing_at, nearest_of, number_of
 from ephs.solve.events import events_of
 from ephs.solve.integrate import solution_of
@@ -66,8 +66,8 @@ def simulate(
     t0: float = 0.0,
     initial: Mapping[str, "ArrayLike"] | None = None,
     method: str | Method = "auto",
-    rtol: "float | Mapping[str, float]" = 1e-6,
-    atol: "float | Mapping[str, float]" = 1e-9,
+    rtol: "float | Mapping[str, float]" = RTOL,
+    atol: "float | Mapping[str, float]" = ATOL,
     step: float | None = None,
     max_step: float | None = None,
     min_step: float | None = None,
@@ -242,7 +242,7 @@ def control_of(
     OptionError
         A tolerance is no number, or is given for what the problem does not have.
     """
-    relative, absolute = Tolerance.of("rtol", rtol, 1e-6), Tolerance.of("atol", atol, 1e-9)
+    relative, absolute = Tolerance.of("rtol", rtol, RTOL), Tolerance.of("atol", atol, ATOL)
     states = [(slot.path, slot.quantity.kind) for slot in problem.descriptor.states]
     relative.known("rtol", states)
     absolute.known("atol", states)
