@@ -6,7 +6,6 @@ from typing import Annotated
 from cyclopts import App, Parameter
 
 from ephs.cli.input import AS_GIVEN, BadInput, Loading, addressed, load_model, naming, say
-from ephs.solve.control import ATOL, RTOL
 
 __all__ = ["exports"]
 
@@ -21,8 +20,8 @@ def export(
     out: Annotated[Path, Parameter(name=["--out", "-o"])],
     inputs: str = "",
     method: str = "rk87",
-    rtol: float = RTOL,
-    atol: float = ATOL,
+    rtol: float | None = None,
+    atol: float | None = None,
     step: float | None = None,
     until: float = 10.0,
     target: str | None = None,
@@ -41,9 +40,9 @@ def export(
     method
         rk54 or rk87.
     rtol
-        Relative tolerance of steps.
+        Relative tolerance of steps; 1e-6 unless given.
     atol
-        Absolute tolerance of steps.
+        Absolute tolerance of steps; 1e-9 unless given.
     step
         Length of constant steps, in s.
     until
@@ -58,8 +57,9 @@ def export(
     try:
         with addressed(scene, out):
             made = ephs.export(
-                model, out, inputs=names, method=method, rtol=rtol, atol=atol, step=step, until=until, target=target
-            )
+                model, out, inputs=names, method=method, step=step, until=until, target=target,
+                **{name: given for name, given in (("rtol", rtol), ("atol", atol)) if given is not None},
+            )  # fmt: skip
     except ephs.ExportError as error:
         raise BadInput(naming(scene, str(error))) from error
     for kind, variables in (("input", made.inputs), ("output", made.outputs)):
