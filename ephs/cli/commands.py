@@ -14,8 +14,8 @@ from cyclopts import App, CycloptsError, Parameter
 from ephs.cli.animate import animate
 from ephs.cli.charts import charts
 from ephs.cli.equilibrium import resting
-from ephs.cli.info import info
 from ephs.cli.export import exports
+from ephs.cli.info import info
 from ephs.cli.input import (
     AS_GIVEN,
     TEXTS,
