@@ -23,7 +23,10 @@ from ephs.semantics.numbering import Index
 from ephs.semantics.primitives import Primitive, Storage
 from ephs.solve.errors import Outcome, SolveError
 
-__all__ = ["Heats", "exponential_law"]
+__all__ = ["PLAIN", "Heats", "exponential_law"]
+
+PLAIN = -2
+"""In place of a component: a state of an attachment, which is advanced as it is and not as energy."""
 
 
 def exponential_law(primitive: Primitive) -> tuple[float, float] | None:
@@ -54,7 +57,8 @@ class Heats:
     paths
         Of the states, entropies.
     components
-        (entropies,) the storages of an exponential law, by their numbers; −1 of the environment.
+        (entropies,) the storages of an exponential law, by their numbers; −1 of the environment, −2 of other states,
+        which count as they are: as energies at 1 K.
     laws
         c1 in J and c2 in J/K of these storages, as they are at present.
     incidence
@@ -63,6 +67,8 @@ class Heats:
         (frictions,) the flows that are heat of friction.
     theta
         Temperature of the environment in K.
+    owners
+        (flows,) the first flow of each one's component, for which the entropy that it makes counts.
     """
 
     def __init__(
@@ -73,11 +79,17 @@ class Heats:
         incidence: Array,
         frictions: Index,
         theta: float,
+        owners: Index,
     ) -> None:
         self._paths, self._components, self._present, self._theta = paths, components, laws, theta
-        self._nodes = components >= 0
-        self._incidence, self.frictions = incidence, frictions
+        self._nodes, self.plain = components >= 0, components == PLAIN
+        self._incidence, self.frictions, self._owners = np.where(self.plain[:, None], 0.0, incidence), frictions, owners
         self._sources, self._sinks = np.maximum(-incidence, 0.0).T, np.maximum(incidence, 0.0).T
+        self._loose = 1.0 - np.abs(incidence).max(axis=0, initial=0.0)
+        single = self._incidence.sum(axis=0)
+        single[frictions] = 0.0
+        self.carried = single
+        """(flows,) 1 where a flow that is no friction takes energy to what is booked, from what is not."""
 
     @property
     def _laws(self) -> tuple[Array, Array]:
@@ -86,7 +98,7 @@ class Heats:
 
     def temperatures(self, heats: Array) -> Array:
         """(entropies,) in K."""
-        out = np.full(heats.shape, self._theta)
+        out = np.where(self.plain, 1.0, np.full(heats.shape, self._theta))
         k, (c1, c2) = self._nodes, self._laws
         out[..., k] = (c1 + heats[..., k]) / c2
         return out
@@ -105,14 +117,14 @@ class Heats:
 
     def entropies(self, heats: Array) -> Array:
         """(..., entropies) in J/K, of energies."""
-        out = heats / self._theta
+        out = heats / np.where(self.plain, 1.0, self._theta)
         k, (c1, c2) = self._nodes, self._laws
         out[..., k] = c2 * np.log1p(heats[..., k] / c1)
         return out
 
     def energies(self, s: Array) -> Array:
         """(..., entropies) in J, of entropies."""
-        out = s * self._theta
+        out = s * np.where(self.plain, 1.0, self._theta)
         k, (c1, c2) = self._nodes, self._laws
         out[..., k] = c1 * np.expm1(s[..., k] / c2)
         return out
@@ -126,12 +138,12 @@ class Heats:
     def flows(self, heats: Array, made: Array) -> Array:
         """(makers,) flows where components make so much entropy."""
         theta = self.temperatures(heats)
-        one, two = self._sources @ theta, self._sinks @ theta
-        drop = np.where(self._sources.any(axis=1), one - two, 1.0)
+        one, two = self._sources @ theta, self._sinks @ theta + self._loose
+        between = self._sources.any(axis=1)
+        drop = np.where(between, one - two, 1.0)
         with np.errstate(divide="ignore", invalid="ignore"):
-            carried = made * one * two / drop
+            carried = np.where(between, made * one * two / drop, made * two)
         carried[drop == 0.0] = 0.0
-        carried[self.frictions] = made[self.frictions] * two[self.frictions]
         return carried
 
     def booked(self, flows: Array, missed: Array, lost: float | None) -> Array:
@@ -156,7 +168,8 @@ class Heats:
         return out
 
     def taken(self, heats: Array, flows: Array) -> tuple[Array, Array]:
-        """Energies after the flows of a step in J, and the entropy that each component made in J/K.
+        """Energies after the flows of a step in J, those of other states as they were; and the entropy that each
+        component made in J/K.
 
         Raises
         ------
@@ -172,4 +185,6 @@ class Heats:
         small = np.abs(share) < 1e-8  # θ̄/θ = x / log(1 + x)
         ratio = np.where(small, 1.0 + 0.5 * share, share / np.log1p(np.where(small, 1.0, share)))
         cold = 1.0 / (theta * ratio)
-        return heats + change, flows * (self._sinks @ cold - self._sources @ cold)
+        made = np.zeros(flows.size)
+        np.add.at(made, self._owners, flows * (self._sinks @ cold - self._sources @ cold + self._loose))
+        return heats + change, made

@@ -11,6 +11,7 @@ from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.descriptor import Descriptor, Input
 from ephs.semantics.kernel_table import Callback
 from ephs.semantics.numbering import spans, starts, sums
+from ephs.semantics.primitives import Primitive
 from ephs.semantics.spaces import manifold
 from ephs.solve.layout import entry_of, laid_out
 from ephs.solve.methods.natural_kernels import STORING, Memory, Tables, evaluate
@@ -147,8 +148,8 @@ def compile_model(
     Parameters
     ----------
     matrix
-        Whether to lay out the Jacobian, which most of the tables is; without it storages and irreversible components
-        are there, and the whole cannot be evaluated.
+        Whether to lay out the Jacobian, which most of the tables is; without it storages, irreversible components, and
+        those that read nothing but numbers are there, and the whole cannot be evaluated.
 
     Raises
     ------
@@ -159,7 +160,7 @@ def compile_model(
     given = d.complete_inputs(inputs)
     n_rate, n_effort, n_lam = d.rate_size, d.effort_size, d.multiplier_size
     size = d.unknowns(given)
-    each = [entry_of(primitive, reference, reversible=matrix) for primitive in n.primitives]
+    each = [entry_of(one, reference, reversible=matrix or _reads_numbers(one)) for one in n.primitives]
     counts = np.array([entry.counts for entry in each], dtype=np.int64).reshape(-1, 5)[n.primitive]
     kinds, numbers, reads = counts[:, 0], counts[:, 1], counts[:, 4]
     junction_dims, state_dims, state_sizes = n.dims(n.junctions), n.dims(n.states), n.sizes(n.states)
@@ -223,6 +224,10 @@ def compile_model(
     if not matrix:
         return model
     return replace(model, tables=laid_out(table, n.primitive, each, reference))
+
+
+def _reads_numbers(primitive: Primitive) -> bool:
+    return bool(primitive.reads) and all(primitive.interface[port].quantity.space.size == 1 for port in primitive.reads)
 
 
 def _blocks(d: Descriptor, given: Mapping[Path, Input]) -> tuple[Index, Index]:

@@ -305,7 +305,7 @@ class Dynamics:
     def energies(self, state: State) -> Energies:
         """Kinetic, potential and thermal energy."""
         eq = self._equations
-        taken = state.entropies[eq.reduced.tables.node < 0]  # by the environment, whose energy no component counts
+        taken = state.entropies[eq.reduced.tables.node == -1]  # by the environment, whose energy no component counts
         return Energies.of(eq.model, eq.row(self._reduced(state)).energies, float(taken.sum()))
 
     def derivatives(

@@ -101,6 +101,7 @@ class Ida(ReducedMethod):
         rtol = PART * float(np.min(self.rtol, initial=1.0))
         atol = np.full(y0.size, PART * float(np.min(self.atol, initial=1.0)))
         atol[eq.nv + eq.n :] *= eq.model.reference.temperature  # J, of J/K
+        atol[eq.nv + eq.n : eq.nv + eq.n + eq.ns][eq.heats.plain] = PART * float(np.min(self.atol, initial=1.0))
         self._failure = None
 
         def residual(t: float, y: Array, yp: Array, out: Array) -> None:

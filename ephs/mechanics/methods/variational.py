@@ -76,12 +76,13 @@ class Variational(ReducedMethod):
         except SolveError:
             self._matrix = None
             xi, push, middle = self._solved(state, h, momentum, before, h * state.r)
-        middle_momentum, force, flows, powers = middle
+        middle_momentum, force, flows, powers, states = middle
         after = self._turned(xi, middle_momentum + 0.5 * h * self._untwisted(0.5 * xi, force))
         q = eq.moved(state.q, xi)
         mass = eq.mass(q, state.r)
         free = np.asarray(np.linalg.solve(mass, after), dtype=float)
-        closed = eq.closed(ReducedState(state.t + h, q, free, state.heats, state.books))
+        heats = np.where(eq.heats.plain, 2.0 * states - state.heats, state.heats)
+        closed = eq.closed(ReducedState(state.t + h, q, free, heats, state.books))
         work = h * powers[1]
         if self._driven.size:  # the work of what is prescribed: its impulses at both ends of the step
             impulse = mass @ closed.r - after
@@ -105,7 +106,7 @@ class Variational(ReducedMethod):
 
     def _solved(
         self, state: ReducedState, h: float, momentum: Array, before: Array, xi: Array
-    ) -> tuple[Array, Array, tuple[Array, Array, Array, Array]]:
+    ) -> tuple[Array, Array, tuple[Array, ...]]:
         """ξ, the impulses G⁰ᵀλ, and what the middle of the step gives, to rounding."""
         eq, m, n = self.equations, self._rows, xi.size
         push, last, residual = np.zeros(m), np.inf, np.zeros(n)
@@ -134,26 +135,33 @@ class Variational(ReducedMethod):
         path, what = counted(eq.reduced, n + int(np.argmax(np.nan_to_num(np.abs(residual), nan=np.inf))))
         raise SolveError(Outcome.DIVERGED, path, f"{what} in the middle of the step")
 
-    def _start(self, xi: Array, h: float, middle: tuple[Array, Array, Array, Array]) -> Array:
+    def _start(self, xi: Array, h: float, middle: tuple[Array, ...]) -> Array:
         """The momentum at the step's start that the middle of the step stands for."""
         momentum, force = middle[:2]
         return self._turned(-xi, momentum - 0.5 * h * self._untwisted(-0.5 * xi, force))
 
-    def _middle(self, state: ReducedState, h: float, xi: Array) -> tuple[Array, Array, Array, Array]:
-        """p̄, g, the flows of heat in W, heat and work per second, in the middle of a step."""
+    def _middle(self, state: ReducedState, h: float, xi: Array) -> tuple[Array, ...]:
+        """p̄, g, the flows of heat in W, heat and work per second, and heats, in the middle of a step."""
         eq = self.equations
         q, r = eq.moved(state.q, 0.5 * xi), xi / h
         if self._bent:
             q = eq.fitted(q, r)
         heats, found = state.heats, eq.dense.residual
-        flows = np.zeros(len(eq.reduced.made))
-        for _ in range(2 if eq.ns else 1):  # temperatures in the middle, by two passes
+        flows, plain = np.zeros(len(eq.reduced.made)), eq.heats.plain
+        least, last = 2 if eq.ns else 1, np.inf
+        for passes in range(1, ITERATIONS):  # temperatures in the middle, by two passes
             eq.load(state.t + 0.5 * h, q, r, heats)
             eq.refuse(*found.about(q, r, eq.heats.entropies(heats), eq.drive, eq.wrench))
             flows = eq.heats.flows(heats, found.laws.made)
-            heats = eq.heats.taken(state.heats, 0.5 * h * flows)[0]
+            before, heats = heats, eq.heats.taken(state.heats, 0.5 * h * flows)[0]
+            if plain.any():
+                heats[plain] = found.follow(state.heats[plain], before[plain], h)
+            moved = float(np.max(np.abs(heats - before)[plain] / np.maximum(np.abs(heats[plain]), 1e-300), initial=0.0))
+            if passes >= least and (moved <= ROUNDING or (moved <= STAGNANT and moved > 0.5 * last)):
+                break
+            last = moved
         eq.evaluations += 1
-        return *found.momenta(), flows, np.array([found.laws.heat, found.power()])
+        return *found.momenta(), flows, np.array([found.laws.heat, found.power()]), heats
 
     def _gap(self, state: ReducedState, xi: Array, h: float) -> tuple[Array, Array]:
         """Residuals of prescribed joints and loops at the end of the step, and their rows on changes of ξ."""
@@ -170,7 +178,7 @@ class Variational(ReducedMethod):
         momentum, force = middle[:2]
         q, r = eq.moved(state.q, 0.5 * xi), xi / h
         eq.load(state.t + 0.5 * h, q, r, state.heats)
-        by_momentum, by_force = self._linear.action(eq.fitted(q, r), r, eq.heats.entropies(state.heats))
+        by_momentum, by_force = self._linear.action(eq.fitted(q, r), r, eq.heats.entropies(middle[4]), h)
         along = np.eye(n)
         for code, where in self._groups:
             dexp_left(code, 0.5 * xi[where], along[where, where])

@@ -86,7 +86,7 @@ class Passages:
         components = np.where(laws[:, 1] > 0.0, [store.component for store in stores], -1).astype(np.int64)
         self._heats = Heats(
             tuple(d.components[store.component].path for store in stores), components, lambda: (c1, c2), incidence,
-            np.flatnonzero([port.friction for port in ports]), model.reference.temperature,
+            np.flatnonzero([port.friction for port in ports]), model.reference.temperature, np.arange(len(ports)),
         )  # fmt: skip
         self._rest = (t.kind == STORING).astype(float)
         self._rest[[store.component for store in stores]] = 0.0

@@ -84,13 +84,14 @@ def test_what_joint_coordinates_have_no_place_for_is_refused_by_name():
     momentum = quantity.body_momentum
     pattern = Pattern(
         junctions={"p": junction(momentum), "q": junction(quantity.displacement), "x": junction(quantity.momentum)},
-        boxes={"body": {"p": "p"}, "mass": {"p": "x"}, "spring": {"q": "q"}, "pkc": {"q": "q", "p": "x"}},
+        boxes={"body": {"p": "p"}, "rope": {"p": "p", "x": "x"}, "spring": {"q": "q"}, "pkc": {"q": "q", "p": "x"}},
     )
-    parts = {"mass": library.point_mass(m=1.0), "spring": library.spring(k=1.0), "pkc": library.pkc()}
+    rope = ephs.transformer({"p": momentum, "x": quantity.momentum}, [[0.0, 0.0, 0.0, 1.0, 0.0, 0.0]])
+    parts = {"rope": rope, "spring": library.spring(k=1.0), "pkc": library.pkc()}
     system = pattern(body=rigid_body(1.0, [1, 1, 1]), **parts)
-    with pytest.raises(ephs.OptionError, match="'rk87', expected natural, natural4, radau: mass stores momentum in"):
+    with pytest.raises(ephs.OptionError, match="'rk87', expected natural, natural4, radau: rope acts on the twist of"):
         ephs.simulate(system, 0.1, method="rk87")
-    assert "mass stores momentum" in ephs.simulate(system, 1e-3).stats["auto"]
+    assert "rope acts on the twist" in ephs.simulate(system, 1e-3).stats["auto"]
 
 
 # ---- the general form ------------------------------------------------------------------------------------------

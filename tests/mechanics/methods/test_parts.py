@@ -17,7 +17,7 @@ from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.tree.finding.frames import Unplaced, inertia_of
 from ephs.mechanics.tree.finding.mechanism import reduce_system
 from ephs.operad import Path
-from ephs.semantics import library, structures
+from ephs.semantics import structures
 from ephs.semantics.primitives import power_ports
 from ephs.solve.model import compile_model
 from ephs.testing import mechanisms
@@ -61,6 +61,7 @@ def test_no_module_of_joint_coordinates_knows_scenes():
 # ---- by hand ---------------------------------------------------------------------------------------------------
 
 MOMENTUM = quantity.body_momentum
+ROPE = ephs.transformer({"p": MOMENTUM, "x": quantity.momentum}, [[0.0, 0.0, 0.0, 1.0, 0.0, 0.0]])
 
 
 def hung(of, **more):
@@ -95,8 +96,8 @@ def test_weights_that_differ_are_forces_of_their_own():
 @pytest.mark.parametrize(
     ("name", "filling", "ports", "words"),
     [
-        ("spin", library.point_mass(m=1.0), {"p": "x"}, "stores momentum"),
-        ("spring", library.spring(k=1.0), {"q": "x"}, "stores displacement"),
+        ("rope", ROPE, {"p": "p", "x": "x"}, "acts on the twist of a body"),
+        ("many", structures.quadratic("many", power_ports(p=MOMENTUM), np.eye(6), ()), {"p": "x"}, "no number|belongs"),
         ("weld", components.frame_change([1, 0, 0, 0, 1, 0, 0], "p_j", "p"), {"p": "p", "p_j": "g"}, "without a joint"),
     ],
 )

@@ -5,12 +5,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ephs.mechanics.tree.engine.attachment import attachment_of
 from ephs.mechanics.tree.engine.closing import Closing, closing
 from ephs.mechanics.tree.engine.links import Frames, links_of
 from ephs.mechanics.tree.engine.programs import Engine
 from ephs.mechanics.tree.engine.tables import Forces, table_of
 from ephs.mechanics.tree.finding.tables import CUT, SPRING, TREE
 from ephs.mechanics.tree.sweeps.acting import ON_BODIES, ON_CUT, ON_TREE, Component, Own
+from ephs.mechanics.tree.sweeps.balances import network_program
 from ephs.mechanics.tree.sweeps.cuts import Chart, Relative
 from ephs.mechanics.tree.sweeps.loops import kinds_of, loop_program
 from ephs.mechanics.tree.sweeps.programs import PLACE, Sweeps, sweeps
@@ -32,6 +34,7 @@ def engine_of(
     drive: Array,
     wrench: Array,
     scal: Array,
+    supply: Array,
     acted: tuple[frozenset[int], frozenset[int]] = (frozenset(), frozenset()),
     kept: Sequence[Array] | None = None,
 ) -> Engine:
@@ -43,6 +46,8 @@ def engine_of(
         (3,) in world axes.
     drive, wrench, scal
         Given forces (joints' freedoms,), given wrenches (bodies, 6), and (h, θ₀, π₀), which are read where they are.
+    supply
+        What is given to what is attached, which is read there, too.
     acted
         Edges and bodies on which given forces act.
     kept
@@ -53,15 +58,19 @@ def engine_of(
     cut, cut_frame, cut_basis, ends = _cut(reduced, bodies, ground, kept)
     charts = _chart(reduced, cut)
     forces = _forces(reduced, bodies, ground, cut, acted)
-    forced = bool(forces.edge.size or forces.conduction.size or np.any(forces.body != -1))
+    net = attachment_of(reduced)
+    attached = bool(reduced.attaching.network.attached) or bool(reduced.attaching.network.known)
+    forced = bool(forces.edge.size or forces.conduction.size or np.any(forces.body != -1) or attached)
     driven = any(part.joint.driven for part in found.parts)
     records = found.packed(gravity)
     program = sweeps(records.kind, general=bool(forced or driven or len(cut)))
     eliminated = closing([part.parent for part in found.parts], ends)
     joints = kinds_of([*charts[:, [0, 3, 1]].tolist(), *cut[:, [2, 5, 3]].tolist()])
     reached = _reached(program.program, loop_program(joints))
+    if attached:
+        reached["attach"] = network_program(), "solve"
     tables: dict[str, Any] = {
-        "own": _own(len(found.parts), reached, forced=forced, driven=driven),
+        "own": _own(len(found.parts), reached, forced=forced, driven=driven, attached=attached),
         "integers": records.integers,
         "reals": records.reals,
         "gravity": records.gravity,
@@ -73,6 +82,9 @@ def engine_of(
         "drive": drive,
         "wrench": wrench,
         "scal": scal,
+        "net": net.integers,
+        "numbers": net.reals,
+        "supply": supply,
     }
     freedoms, entropies = sum(part.joint.dim for part in found.parts), len(reduced.entropies)
     sizes = reduced.coordinates, drive.size + freedoms + entropies + 2 + len(reduced.made)
@@ -88,10 +100,13 @@ def _reached(sweeps: Program, loops: Program) -> dict[str, tuple[Program, str]]:
     return found | {name: (loops, name) for name in cut} | {"displace": (loops, "move")}
 
 
-def _own(links: int, reached: Mapping[str, tuple[Program, str]], *, forced: bool, driven: bool) -> Table[Own]:
+def _own(
+    links: int, reached: Mapping[str, tuple[Program, str]], *, forced: bool, driven: bool, attached: bool
+) -> Table[Own]:
     made = Own.table(1)
     own = made[0]
     own.links, own.forced, own.driven, own.falls = links, int(forced), int(driven), int("accelerations" in reached)
+    own.attached = int(attached)
     for name, (program, entry) in reached.items():
         setattr(own, name, program.compiled()[entry].address)
     return made
@@ -104,7 +119,8 @@ def _work(
     rows, slots = len(closing.row), len(closing.slot)
     shapes: dict[str, tuple[int, ...]] = {
         "work": ((links + 1) * program.width,), "place": (links + 1, PLACE), "change": (links + 1, 6),
-        "pushed": (links, 6), "force": (freedoms,), "zero": (freedoms,), "relative": (cuts, Relative.real_width),
+        "pushed": (links, 6), "force": (freedoms,), "zero": (freedoms,), "attached": (joints,),
+        "relative": (cuts, Relative.real_width),
         "value": (rows, 4), "entry": (closing.entries,), "covector": (slots, 6), "along": (slots, 12),
         "largest": (max(closing.blocks, 1),), "temperature": (max(entropies, 1),), "entropy": (entropies,),
         "x": (16,), "v": (64,), "e": (16,), "lam": (64,), "f": (256,), "c": (16,), "jac": (512,), "scratch": (2048,),
@@ -180,11 +196,14 @@ def _forces(
     parts: list[list[int]] = []
     frames: list[Array] = []
     left: list[Array] = []
+    port: dict[int, list[int]] = {}
     for i in range(len(reduced.edges)):
         friction = int(t.friction[i])
         if t.dim[i] == 0 or (t.spring[i] < 0 and friction < 0 and i not in acted[0]):
             continue
         one, two, frame = _ends(reduced, bodies, ground, i)
+        if t.kind[i] != SPRING:
+            port |= {int(t.r_at[i]) + j: [int(t.r_at[i]) + j, len(edges), j] for j in range(int(t.dim[i]))}
         kind = {TREE: ON_TREE, CUT: ON_CUT, SPRING: ON_BODIES}[int(t.kind[i])]
         edges.append(
             [kind, one, two, int(t.dim[i]), int(t.q_at[i]), int(t.q_size[i]), int(t.r_at[i]), number.get(i, -1)]
@@ -202,6 +221,7 @@ def _forces(
         node=reduced.nodes,
         conduction=t.conduction,
         sink=t.sink,
+        port=np.array([port[int(place)] for place in reduced.attaching.ports], dtype=np.int64).reshape(-1, 3),
         component=table_of(
             Component,
             np.hstack([t.address[:, None], t.dims, t.parameter_at[: len(t.address), None], t.made_at[:, None]]),

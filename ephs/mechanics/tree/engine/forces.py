@@ -4,9 +4,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import final
 
-from ephs.mechanics.tree.sweeps.acting import ON_BODIES, ON_TREE, Acting, Component, Conduction, Tables, Work
+from ephs.mechanics.tree.sweeps.acting import ON_BODIES, ON_TREE, Acting, Component, Conduction, Port, Tables, Work
 from ephs.mechanics.tree.sweeps.cuts import Relative, between, motion_of, place_of
 from ephs.mechanics.tree.sweeps.needs import NO_INTEGERS
+from ephs.mechanics.tree.sweeps.network import Net
 from ephs.semantics.linear.dense import copy
 from ephs.semantics.spaces import se3, so3
 from ephs.semantics.spaces.vectors import apply_transposed, dot, product, scale, sub, transposed
@@ -32,6 +33,7 @@ def act(
     books[0], books[1] = 0.0, 0.0
     on.loop(tables.node.size, acting.warm)
     on.loop(tables.body.size, acting.push)
+    on.when(tables.own[0].attached > 0, lambda: acting.unless_refused(acting.attach))
     on.loop(tables.acting.size, lambda i: acting.unless_refused(lambda: acting.edge(tables.acting[i])))
     on.loop(tables.conduction.size, lambda i: acting.unless_refused(lambda: acting.conduct(tables.conduction[i])))
     return acting.status.value
@@ -95,6 +97,57 @@ class _Acting:
 
         self.on.when(body.link >= 0, given)
 
+    def attach(self) -> None:
+        """Evaluate what is attached: forces on joints, rates of entropies and of its states."""
+        on, t, w = self.on, self.tables, self.work
+        net = Net.of(t.net, t.numbers, t.parameters, t.scal, t.supply)
+
+        def meet(k: Integer) -> None:
+            net.effort[k] = self._rate(t.port[k])
+
+        on.loop(t.port.size, meet)
+        found = on.reach(
+            t.own[0].attach, t.net, t.numbers, t.parameters, t.scal, t.supply, self.q, w.entropy, w.temperature,
+            self.made,
+        )  # fmt: skip
+
+        def refuse() -> None:
+            self.status.value = found
+            w.fault[0] = net.fault[0]
+
+        on.when(on.negate(on.same(found, 0)), refuse)
+        rates, nodes = net.head[0], net.head[1]
+
+        def push(k: Integer) -> None:
+            w.attached[t.port[k].place] = -net.flow[k]
+
+        def heat(k: Integer) -> None:
+            at = net.temperature[k]
+            self.s_rate[at] = self.s_rate[at] - net.flow[rates + k]
+            self.books[0] = self.books[0] - net.flow[rates + k] * (w.temperature[at] + t.scal[1])
+
+        def fill(k: Integer) -> None:
+            self.s_rate[net.head[5] + k] = -net.flow[net.first_state + k]
+
+        on.loop(rates, push)
+        on.loop(nodes, heat)
+        on.loop(net.head[3], fill)
+        self.books[1] = self.books[1] + net.power[0]
+
+    def _rate(self, port: Port) -> Real:
+        """The rate of a joint's freedom."""
+        on, edge, rate = self.on, self.tables.acting[port.edge], self.on.variable(0.0)
+
+        def in_tree() -> None:
+            rate.value = self.r[port.place]
+
+        def aside() -> None:
+            twist = motion_of(self.work.relative, edge.cut).twist
+            rate.value = dot(self._left(edge, port.freedom), twist)
+
+        on.when(on.same(edge.kind, ON_TREE), in_tree, aside)
+        return rate.value
+
     def edge(self, edge: Acting) -> None:
         """Add what acts in an edge to the forces on joints, or to the wrenches on links."""
         on, w = self.on, self.work
@@ -156,8 +209,9 @@ class _Acting:
         copy(self.on, self.q.part(edge.q_at, edge.size), self.work.x.part(0, edge.size))
 
         def one(j: Integer) -> None:
-            pull[j] = self.tables.drive[edge.r_at + j]
-            self.books[1] = self.books[1] + pull[j] * rate[j]
+            given = self.tables.drive[edge.r_at + j]
+            pull[j] = given + self.work.attached[edge.r_at + j]
+            self.books[1] = self.books[1] + given * rate[j]
 
         self.on.loop(edge.dim, one)
 

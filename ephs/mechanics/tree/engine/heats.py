@@ -3,6 +3,7 @@
 from ephs.mechanics.tree.sweeps.acting import Tables, Work
 from ephs.semantics.kernel_table import TEMPERATURE
 from ephs.semantics.stage import Evaluator, Integer, Real, Vector
+from ephs.solve.heats import PLAIN
 
 __all__ = ["count", "entropies", "heat_rates"]
 
@@ -38,7 +39,7 @@ def entropies(on: Evaluator, tables: Tables, work: Work, heats: Vector) -> Integ
             work.entropy[k] = node.c2 * (safe * _log_ratio(on, safe))
 
         def outside() -> None:
-            work.entropy[k] = energy / tables.scal[1]
+            work.entropy[k] = on.select(on.same(node.component, PLAIN), energy, energy / tables.scal[1])
 
         on.when(node.component < 0, outside, stored)
 
@@ -54,14 +55,19 @@ def heat_rates(on: Evaluator, tables: Tables, work: Work, rates: Vector, made: V
     around = tables.scal[1]
 
     def theta(k: Integer) -> Real:
-        return work.temperature[k] + around
+        plain = on.same(tables.node[k].component, PLAIN)
+        return on.select(plain, 1.0, work.temperature[k] + around)
 
     def node(k: Integer) -> None:
         rates[k] = rates[k] * theta(k)
 
     def friction(i: Integer) -> None:
         sink = tables.sink[i]
-        made[sink.maker] = made[sink.maker] * theta(sink.entropy)
+
+        def stored() -> None:
+            made[sink.maker] = made[sink.maker] * theta(sink.entropy)
+
+        on.when(sink.entropy >= 0, stored)
 
     def conduction(i: Integer) -> None:
         row = tables.conduction[i]
@@ -86,7 +92,7 @@ def count(on: Evaluator, tables: Tables, work: Work, before: Vector, after: Vect
         row = tables.node[k]
 
         def outside() -> None:
-            cold[k] = 1.0 / tables.scal[1]
+            cold[k] = on.select(on.same(row.component, PLAIN), 1.0, 1.0 / tables.scal[1])
 
         def stored() -> None:
             held = row.c1 + before[k]
@@ -100,7 +106,19 @@ def count(on: Evaluator, tables: Tables, work: Work, before: Vector, after: Vect
         after[at] = before[at] + (after[at] - before[at]) * factor
 
     def friction(i: Integer) -> None:
-        passed(tables.sink[i].maker, cold[tables.sink[i].entropy])
+        sink = tables.sink[i]
+        on.when(sink.entropy >= 0, lambda: passed(sink.maker, cold[sink.entropy]))
+
+    def gather(i: Integer) -> None:
+        """Add what a component makes at its further places to its first."""
+        sink = tables.sink[i]
+        at, first = nodes + 2 + sink.maker, nodes + 2 + sink.owner
+
+        def move() -> None:
+            after[first] = after[first] + (after[at] - before[at])
+            after[at] = before[at]
+
+        on.when(on.negate(on.same(at, first)), move)
 
     def conduction(i: Integer) -> None:
         row = tables.conduction[i]
@@ -108,4 +126,5 @@ def count(on: Evaluator, tables: Tables, work: Work, before: Vector, after: Vect
 
     on.loop(nodes, node)
     on.loop(tables.sink.size, friction)
+    on.loop(tables.sink.size, gather)
     on.loop(tables.conduction.size, conduction)

@@ -96,7 +96,9 @@ def links_of(reduced: "Reduced") -> Found:
         matrix = quaternion_to_matrix(joint[:4])
         numbers = np.concatenate([matrix.ravel(), joint[4:], np.zeros(10)])
         numbers += _inertia(t.inertia[i], bodies.inside[-1])
-        parts.append(Part(kind, above, int(t.q_at[i]), int(t.r_at[i]), sign, numbers))
+        own = float(t.armature[t.r_at[i]])
+        kind = replace(kind, armature=own > 0.0 and not driven)
+        parts.append(Part(kind, above, int(t.q_at[i]), int(t.r_at[i]), sign, numbers, own))
     return Found(parts, bodies, ground, normal is not None)
 
 

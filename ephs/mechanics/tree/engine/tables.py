@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ephs.mechanics.tree.sweeps.acting import Acting, Body, Component, Conduction, Node, Sink
+from ephs.mechanics.tree.sweeps.acting import Acting, Body, Component, Conduction, Node, Port, Sink
 from ephs.semantics.bundle import Array
 from ephs.semantics.stage import Record, Table
 from ephs.semantics.stage.memory import ArrayIntegers, ArrayReals
@@ -24,7 +24,8 @@ class Forces(NamedTuple):
     body_frame: Array  # (bodies, 12): R and p of the body in its link's frame
     node: Table[Node]
     conduction: Index  # (conductions, 3): component, entropy, entropy
-    sink: Index  # (frictions, 2): place of what it makes, entropy that takes its heat
+    sink: Index  # (sinks, 3): place of what it makes, entropy that takes it or −1, first place of its component
+    port: Index  # (rates, 3): place of the freedom, edge, freedom in it
     component: Table[Component]
     parameters: Array
 
@@ -36,6 +37,7 @@ class Forces(NamedTuple):
             "node": self.node,
             "conduction": table_of(Conduction, self.conduction),
             "sink": table_of(Sink, self.sink),
+            "port": table_of(Port, self.port),
             "component": self.component,
             "parameters": self.parameters,
         }

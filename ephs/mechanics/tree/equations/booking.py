@@ -47,12 +47,14 @@ class Booking:
         heats, led, lost = eq.heats, eq.led, None
         if heats.frictions.size and not led.counting:
             before, after = self._energies(start), self._energies(end)
-            lost = work - float((after - before) @ led.mechanical)
+            lost = work - float((after - before) @ led.mechanical + flows @ heats.carried)
             self._last = end.q, after
         flows = heats.booked(flows, missed, lost)
         taken, made = heats.taken(start.heats, flows)
-        heat = float(flows[heats.frictions].sum())
-        return replace(end, heats=taken, books=start.books + np.concatenate([[heat, work], made]))
+        heat = float(flows[heats.frictions].sum() + flows @ heats.carried)
+        return replace(
+            end, heats=np.where(heats.plain, end.heats, taken), books=start.books + np.concatenate([[heat, work], made])
+        )
 
     def arrays(self) -> list[Any]:
         """All arrays of the tables that states are made from."""

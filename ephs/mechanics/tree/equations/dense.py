@@ -48,8 +48,8 @@ class Dense:
         (n,) and (m,) the accelerations and multipliers that `forward` found last: of prescribed rates, then of loops.
     """
 
-    def __init__(self, reduced: Reduced, gravity: Array, scal: Array) -> None:
-        self.reduced, self.residual = reduced, Residual(reduced, gravity, scal)
+    def __init__(self, reduced: Reduced, gravity: Array, scal: Array, supply: Array) -> None:
+        self.reduced, self.residual = reduced, Residual(reduced, gravity, scal, supply)
         t, found, arrays = reduced.tables, self.residual, self.residual.arrays
         self._driven = int(t.driven.sum())
         self._m, self._rank = found.m + self._driven, 0

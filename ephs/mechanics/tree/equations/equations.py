@@ -94,7 +94,9 @@ class Equations:
         self.counted = np.r_[np.arange(self.n), self.nv : self.nv + self.n + self.ns]
         number = {slot.path: i for i, slot in enumerate(problem.descriptor.components)}
         self.heats = heats_of(reduced, model.reference.temperature)
-        self.led = Led(problem, moved=bool(driven))
+        self.led = Led(
+            problem, frozenset(reduced.entropies[: self.ns - len(reduced.attaching.network.states)]), moved=bool(driven)
+        )
         self._makers = np.array([number[path] for path in reduced.made], dtype=int)
         self.scal = model.scal(0.0)
         self.given = Given(problem, reduced, self.nv)
@@ -111,7 +113,7 @@ class Equations:
     def _build(self, kept: "list[Array] | None") -> None:
         """The engine, with all rows of the cut joints or those that are kept."""
         self.engine = engine_of(
-            self.reduced, self.gravity, self.drive, self.wrench, self.scal, self._acted, kept
+            self.reduced, self.gravity, self.drive, self.wrench, self.scal, self.given.supply, self._acted, kept
         )  # fmt: skip
 
     # ---- the equations -----------------------------------------------------------------------------------------
@@ -236,7 +238,7 @@ class Equations:
     def dense(self) -> Dense:
         """Sweeps over dense matrices, made when they are first asked for."""
         if self._dense is None:
-            self._dense = Dense(self.reduced, self.gravity, self.scal)
+            self._dense = Dense(self.reduced, self.gravity, self.scal, self.given.supply)
         return self._dense
 
     def refilled(self) -> None:
@@ -326,7 +328,8 @@ class Equations:
         out: list[Row] = []
         for state, point, energy in zip(states, x, energies, strict=True):
             heat, work = state.books[0], self.led.work(state.t, energy, state.books)
-            energy[self._makers] = state.books[2:]
+            energy[self._makers] = 0.0
+            np.add.at(energy, self._makers, state.books[2:])
             out.append(Row(point, energy, np.array([heat, work, work, state.books[2:].sum()])))
         return out
 

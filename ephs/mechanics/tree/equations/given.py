@@ -26,6 +26,8 @@ class Given:
         (joints' freedoms,) forces on the rates of all joints.
     wrench
         (links, 6) in body frames.
+    supply
+        Efforts that are prescribed to what is attached, then flows by the efforts of its network.
     """
 
     def __init__(self, problem: Problem, reduced: Reduced, freedoms: int) -> None:
@@ -38,6 +40,8 @@ class Given:
                 centre = np.array_equal(frame.offset, SE3.identity())
                 seen = None if centre else SE3.adjoint(SE3.inverse(frame.offset)).T
                 self._wrenches.append((port, frame.link, seen))
+        net = reduced.attaching.network
+        self.supply = np.zeros(len(net.inputs) + net.skew.shape[0])
         t = reduced.tables
         for i, edge in enumerate(reduced.edges):
             if edge.port is not None and not self._signals[edge.port].effort:
@@ -53,6 +57,13 @@ class Given:
             value = self._value(port, t, state)
             self.wrench[link] += value if seen is None else seen @ value
 
+        net = self._reduced.attaching.network
+        for i, (port, k) in enumerate(net.inputs):
+            self.supply[i] = np.atleast_1d(self._value(port, t, state))[k]
+        self.supply[len(net.inputs) :] = 0.0
+        for one in net.injections:
+            self.supply[len(net.inputs) :] += np.atleast_1d(self._value(one.port, t, state))[one.place] * one.row
+
     def _value(self, port: Path, t: float, state: Mapping[Path, Array] | None) -> Array | float:
         signal = self._signals[port]
         return signal.at(t, {} if state is None else state) if state is not None or signal.constant else 0.0
@@ -63,4 +74,5 @@ class Given:
         at = {int(t.r_at[i]): i for i in range(len(self._reduced.edges)) if t.kind[i] != SPRING and t.dim[i]}
         links = {link for _, link, _ in self._wrenches}
         pushed = {at[where.start] for _, where in self._drives if where.start in at}
+        pushed |= {i for first, i in at.items() if first in self._reduced.attaching.edges}
         return frozenset(edges | pushed), frozenset(links)

@@ -54,6 +54,10 @@ class Laws:
         """Power of all friction in W."""
         return float(self._heat[0])
 
+    def warm(self, power: float) -> None:
+        """Add to the power of friction what comes from what is attached."""
+        self._heat[0] += power
+
     def about(self, s: Array) -> tuple[int, int]:
         """Evaluate all components at entropies s, and where laws have their points; (status, component)."""
         self._s[:] = s

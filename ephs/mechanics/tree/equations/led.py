@@ -5,10 +5,12 @@ grows without bound near dead centres, where a quadrature of its power fails. Ho
 all the same: where a mechanism takes the other way out of a dead centre, velocities jump, and the two part.
 """
 
+from collections.abc import Container
 from typing import Any, final
 
 import numpy as np
 
+from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.primitives import Storage
 from ephs.solve.mobility import mobility
@@ -23,22 +25,24 @@ class Led:
 
     Parameters
     ----------
+    booked
+        States of heat that is booked as energy.
     moved
         Whether any motion is prescribed.
     """
 
-    def __init__(self, problem: Problem, *, moved: bool) -> None:
+    def __init__(self, problem: Problem, booked: Container[Path], *, moved: bool) -> None:
         self._problem, self._moved = problem, moved
         self._from: float | None = None
         self.apart = 0.0, 0.0
         """By how many J work and quadrature differ most, and the time in s."""
         self.mechanical = np.array(
             [
-                float(isinstance(slot.primitive, Storage) and not any(s.quantity.environment for s in slot.reads))
+                float(isinstance(slot.primitive, Storage) and not any(s.path in booked for s in slot.reads))
                 for slot in problem.descriptor.components
             ]
         )
-        """(components,) 1 for storages of energy that is not heat."""
+        """(components,) 1 for storages of energy that is not booked as heat."""
 
     @property
     def holds(self) -> bool:

@@ -28,6 +28,10 @@ class PaperStates:
 
     def __init__(self, reduced: Reduced, problem: Problem) -> None:
         self.reduced, self.problem = reduced, problem
+        network = reduced.attaching.network
+        self._inertias = network.inertias
+        self._turning = reduced.attaching.ports[[one.rate for one in network.inertias]]
+        self._momentum = np.array([one.inertia * one.ratio for one in network.inertias])
         slots = {slot.path: slot for slot in problem.descriptor.states}
         self._paths: list[Path] = []
         t, plan = reduced.tables, []
@@ -52,7 +56,8 @@ class PaperStates:
 
     def _sources(self) -> Iterator[tuple[Path, int, int]]:
         """(path, where it comes from, number of the link, edge or entropy) of the states."""
-        for number, path in enumerate(self.reduced.entropies):
+        inertial = (one.state.path for one in self._inertias)
+        for number, path in enumerate([*self.reduced.entropies, *inertial]):
             yield path, ENTROPY, number
         for number, link in enumerate(self.reduced.places):
             if link.pose is not None:
@@ -89,8 +94,12 @@ class PaperStates:
                 # a pose has two quaternions: that one which is continuous with the initial one
                 row[-1] = source in (POSE, RELATIVE) and float(first[at : at + 4] @ self.rest[at : at + 4]) < 0.0
         plan = table_of(Source, self._plan)
-        STATES.compiled()["rows"](*self._tables, plan, q, r, s, *self._memory, out)
+        STATES.compiled()["rows"](*self._tables, plan, q, r, self._stored(r, s), *self._memory, out)
         return out
+
+    def _stored(self, r: Array, s: Array) -> Array:
+        """(rows, …): s, then the states of storages that are inertia of joints."""
+        return np.hstack([s, r[:, self._turning] * self._momentum]) if self._inertias else s
 
     def at(self, q: Array, r: Array, s: Array) -> dict[Path, Array]:
         """All states of the system."""

@@ -7,6 +7,7 @@ import numpy as np
 
 from ephs.mechanics.tree.engine.build import whole_tables
 from ephs.mechanics.tree.engine.links import links_of
+from ephs.mechanics.tree.equations.attached import Attached
 from ephs.mechanics.tree.equations.laws import Laws
 from ephs.mechanics.tree.equations.slopes import Slopes
 from ephs.mechanics.tree.finding.mechanism import Reduced
@@ -37,6 +38,8 @@ class Residual:
         (3,) in world axes.
     scal
         (h, θ₀, π₀), as the components' kernels take it.
+    supply
+        What is given to what is attached.
 
     Attributes
     ----------
@@ -48,10 +51,12 @@ class Residual:
         Rows of each cut joint.
     """
 
-    def __init__(self, reduced: Reduced, gravity: Array, scal: Array) -> None:
+    def __init__(self, reduced: Reduced, gravity: Array, scal: Array, supply: Array) -> None:
         t, found = reduced.tables, links_of(reduced)
         self._bodies, self._ground = found.bodies, quaternion_to_matrix(found.ground[:4])
-        parts = [replace(part, joint=replace(part.joint, driven=False)) for part in found.parts]
+        parts = [
+            replace(part, joint=replace(part.joint, driven=False, armature=part.armature > 0.0)) for part in found.parts
+        ]
         usual = {part.joint for part in parts} <= set(STANDARD)  # others have programs of their own class
         tree = packed(parts, self._ground @ gravity, planar=False, among=STANDARD if usual else ())
         chart, cut, numbers, forces = whole_tables(reduced, found.bodies, found.ground)
@@ -65,6 +70,7 @@ class Residual:
         kinds = kinds_of([*edge[:, [3, 5, 4]].tolist(), *cut[:, [2, 5, 3]].tolist()])
         self.program = residuals(tree.kind, tuple(sorted({*kinds, *(ALL if usual else ())})))
         self.laws = Laws(forces, edge.ravel(), len(reduced.made), scal)
+        self.attached = Attached(reduced, scal, supply)
         self.counts: list[int] = cut[:, 8].tolist()
         self.n, self.m, self.ns = reduced.freedoms, sum(self.counts), t.node.size
         c = int(t.dim[t.kind == CUT].sum())
@@ -83,7 +89,9 @@ class Residual:
             "edge_numbers": np.hstack([forces.frame, forces.left]).ravel(), "law": self.laws.law,
             "body": np.array(bodies.link, dtype=np.int64), "body_frame": _frames(bodies.inside),
             "warming": self.laws.warming, "passage": np.ascontiguousarray(t.conduction[:, 1:]).ravel(),
-            "flow": self.laws.flow, "base": np.zeros(reduced.coordinates), "v": np.zeros(self.nv),
+            "flow": self.laws.flow, "tie": self.attached.tie, "tied": self.attached.tied,
+            "beyond": np.zeros(len(self.attached.tied)), "pulls": np.zeros(self.nv),
+            "base": np.zeros(reduced.coordinates), "v": np.zeros(self.nv),
             "q": np.zeros(reduced.coordinates), "r": np.zeros(n), "s": np.zeros(self.ns),
             "drive": np.zeros(self.nv), "wrench": np.zeros((reduced.links, 6)), "warmth": np.zeros(self.ns),
             "a": np.zeros(n), "multiplier": np.zeros(m), "unit": np.zeros(n), "mass": np.zeros((n, n)),
@@ -197,7 +205,11 @@ class Residual:
         a = self.arrays
         self.place(q, r)
         a["base"][:], a["s"][:], a["drive"][:], a["wrench"][:] = q, s, drive, wrench
-        return self.laws.about(s)
+        status, component = self.laws.about(s)
+        if status or not self.attached.there:
+            return status, component
+        rates = np.concatenate([a["r"], self.cut_twists()])
+        return self.attached.about(q, rates, s, a["warming"][:, 0].copy(), self.laws)
 
     def at(self, a: Array, multiplier: Array) -> Array:
         """The residual where `about` has been: forces, accelerations of rows, and so on; see the slices."""
@@ -219,8 +231,14 @@ class Residual:
     def power(self) -> float:
         """Power in W of what is given, forces on joints and wrenches on bodies, where `about` has been."""
         a = self.arrays
-        work = float(a["drive"] @ np.concatenate([a["r"], self.cut_twists()]))
+        work = float(a["drive"] @ np.concatenate([a["r"], self.cut_twists()])) + self.attached.power
         return work + sum(float(a["wrench"][b] @ self.twist(int(b))) for b in np.flatnonzero(a["wrench"].any(axis=1)))
+
+    def follow(self, x0: Array, x: Array, h: float) -> Array:
+        """States of what is attached in the middle of a step of h seconds from x0: a step of Newton's method from x,
+        where `about` has been."""
+        rates, slopes = self.attached.states()
+        return x + np.linalg.solve(np.eye(x.size) - 0.5 * h * slopes, x0 + 0.5 * h * rates - x)
 
     def momenta(self) -> tuple[Array, Array]:
         """((n,), (n,)) ∂L/∂r, and ∂L/∂q with the forces that no potential has, where `about` has been."""

@@ -23,7 +23,7 @@ class Linearised:
         self._slopes = found.slopes()
         first = found.nv + found.n
         still = np.flatnonzero(unread(equations.reduced))
-        environment = first + np.flatnonzero(equations.reduced.tables.node < 0)  # it is as warm as it is
+        environment = first + np.flatnonzero(equations.reduced.tables.node == -1)  # it is as warm as it is
         self._known = np.concatenate([still, environment])
 
     def forward(self, q: Array, r: Array, s: Array) -> Array:
@@ -86,8 +86,10 @@ class Linearised:
         n = self._residual.n
         return self._dense.solved(np.eye(n), np.zeros((self._dense.multiplier.size, n)))
 
-    def action(self, q: Array, r: Array, s: Array) -> tuple[Array, Array]:
+    def action(self, q: Array, r: Array, s: Array, h: float) -> tuple[Array, Array]:
         """((n, 2n), (n, 2n)) ∂/∂(q, r) of the momenta ∂L/∂r and of ∂L/∂q with the forces that no potential has.
+
+        States of what is attached follow by the midpoint rule over a step of h seconds, in whose middle this is.
 
         Raises
         ------
@@ -97,7 +99,13 @@ class Linearised:
         eq, found = self.equations, self._residual
         eq.refuse(*found.about(q, r, s, eq.drive, eq.wrench))
         n, nv = found.n, found.nv
-        slopes = self._slopes.along("action", ("v", "r"))
+        slopes = self._slopes.along("action", ("v", "r", "s"))
+        plain = np.flatnonzero(eq.heats.plain)
+        if plain.size:
+            rates, columns = 2 * nv + plain, nv + n + plain
+            left = np.eye(plain.size) - 0.5 * h * slopes[np.ix_(rates, columns)]
+            slopes += slopes[:, columns] @ np.linalg.solve(left, 0.5 * h * slopes[rates])
+        slopes = slopes[:, : nv + n]
         slopes[:, :n] += slopes[:, n:nv] @ slopes[2 * n : n + nv, nv:]
         kept = np.concatenate([slopes[:, :n], slopes[:, nv:]], axis=1)
         return kept[:n], kept[n : 2 * n]

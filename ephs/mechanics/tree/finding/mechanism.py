@@ -5,17 +5,18 @@ from typing import Any, final
 
 import numpy as np
 
-from ephs.mechanics.tree.finding.frames import GROUND, Frame, Link
+from ephs.mechanics.tree.finding.attaching import Attaching, attaching_of, makers_of
+from ephs.mechanics.tree.finding.frames import GROUND, Frame, Link, Unplaced
 from ephs.mechanics.tree.finding.parts import Acting, Parts, parts_of
 from ephs.mechanics.tree.finding.spanning import Edge, frames_of_joints, loop_algebra, spanning_tree, twists_of
 from ephs.mechanics.tree.finding.tables import CUT, SPRING, TREE, Mechanism
 from ephs.mechanics.tree.sweeps.acting import Node
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
-from ephs.semantics.primitives import Irreversible, Storage
+from ephs.semantics.primitives import Storage
 from ephs.semantics.stage import Table
 from ephs.solve.errors import OptionError
-from ephs.solve.heats import exponential_law
+from ephs.solve.heats import PLAIN, exponential_law
 from ephs.solve.model import Model
 from ephs.solve.problem import Problem
 from ephs.solve.sparse import Index
@@ -37,11 +38,11 @@ class Reduced:
     places
         The links in that order.
     entropies
-        Paths of the states of entropy, in the order of s.
+        Paths of the states in s: of heat that is booked as energy, then of what is attached.
     made
-        Paths of the components that make entropy.
+        Paths of the components that make entropy; one for each further port of entropy of what is attached.
     nodes
-        What stores entropy, in the order of s.
+        What stores s, in its order.
     unknowns
         How many numbers have to be found.
     twists
@@ -50,6 +51,8 @@ class Reduced:
         (3,) in world axes, m/s².
     acting
         The outer ports at which wrenches act on links.
+    attaching
+        What is attached.
     """
 
     tables: Mechanism
@@ -63,6 +66,7 @@ class Reduced:
     twists: tuple[Array, ...]
     gravity: Array
     acting: tuple[Acting, ...]
+    attaching: Attaching
 
     @property
     def links(self) -> int:
@@ -101,7 +105,11 @@ def reduce_system(problem: Problem, model: Model) -> Reduced:
         A loop of prescribed joints.
     """
     parts = parts_of(problem)
-    tree, cut = spanning_tree(parts.joints, [link.light for link in parts.links])
+    inertial = [parts.attached[parts.network.rates[one.rate][0]] for one in parts.network.inertias]
+    tree, cut = spanning_tree(parts.joints, [link.light for link in parts.links], inertial)
+    for one, edge in zip(parts.network.inertias, inertial, strict=True):
+        if any(edge is other for other in cut):
+            raise Unplaced(model.descriptor.components[one.component].path, "is inertia of a joint that closes a loop")
     over = [edge.name for edge in cut if edge.motion is not None]
     if over:  # prescribed joints are cut last: only a loop of nothing else is left over
         found = f"that of {', '.join(over)}, which closes a loop of prescribed joints"
@@ -111,22 +119,26 @@ def reduce_system(problem: Problem, model: Model) -> Reduced:
     poses = [None if link.pose is None else np.array(problem.initial[link.pose.path]) for link in parts.links]
     frames = frames_of_joints(edges[: len(tree) + len(cut)], poses)
     twists = twists_of(edges, frames, len(tree) + len(cut))
-    made = tuple(slot.path for slot in problem.descriptor.components if isinstance(slot.primitive, Irreversible))
+    slots = problem.descriptor.components
+    made, flows = makers_of(slots, parts.network)
     kinds = np.array([TREE] * len(tree) + [CUT] * len(cut) + [SPRING] * len(parts.forces), dtype=np.int64)
-    mechanism = _tables(model, parts, edges, kinds, [f for *_, f in tree], order, made, frames, twists)
+    mechanism = _tables(model, parts, edges, kinds, [f for *_, f in tree], order, made, flows, frames, twists)
     links = [parts.links[body] for body in order]
     names = tuple(parts.names[body] for body in order)
     place = {body: i for i, body in enumerate(order)} | {GROUND: GROUND}
     acting = tuple(Acting(one.port, Frame(place[one.frame.link], one.frame.offset)) for one in parts.acting)
     unknowns = 2 * int(mechanism.driven.size) + int(mechanism.rows.sum())
+    stored = (*parts.entropies, *(state.path for state in parts.network.states))
     return Reduced(
-        mechanism, edges, names, tuple(links), tuple(parts.entropies), made, _nodes(model, parts), unknowns,
-        tuple(twists), parts.gravity, acting,
+        mechanism, edges, names, tuple(links), stored, made, _nodes(model, parts), unknowns,
+        tuple(twists), parts.gravity, acting, attaching_of(slots, parts, edges, mechanism, stored, flows),
     )  # fmt: skip
 
 
 def _nodes(model: Model, parts: Parts) -> Table[Node]:
-    nodes = Node.table(len(parts.entropies))
+    nodes = Node.table(len(parts.entropies) + len(parts.network.states))
+    for k in range(len(parts.entropies), nodes.size):
+        nodes[k].component = PLAIN
     for k, number in enumerate(parts.entropies.values()):
         primitive, node = model.descriptor.components[number].primitive, nodes[k]
         node.component = -1 if isinstance(primitive, Storage) and primitive.environment else number
@@ -143,6 +155,7 @@ def _tables(
     forward: list[bool],
     order: list[int],
     made: tuple[Path, ...],
+    flows: tuple[Index, ...],
     frames: list[Array],
     twists: list[Array],
 ) -> Mechanism:
@@ -171,7 +184,18 @@ def _tables(
         spring[i] = -1 if edge.spring < 0 or _stores_nothing(model, edge.spring) else edge.spring
         friction[i] = -1 if edge.friction < 0 or _idle(model, edge.friction) else edge.friction
     t, components = model.tables, model.descriptor.components
-    making = {path: i for i, path in enumerate(made)}
+    armature = np.zeros(len(driven))
+    for one in parts.network.inertias:
+        edge = parts.attached[parts.network.rates[one.rate][0]]
+        armature[r_at[next(i for i, other in enumerate(edges) if other is edge)]] += one.inertia * one.ratio**2
+    making = {path: i for i, path in reversed(list(enumerate(made)))}
+    sinks = [
+        [making[components[c].path], taking, making[components[c].path]]
+        for c, taking in zip(friction.tolist(), heat.tolist(), strict=True)
+        if c >= 0
+    ]
+    for called, mine in zip(parts.network.attached, flows, strict=True):
+        sinks += [[int(flow), taken, int(mine[0])] for flow, (_, taken) in zip(mine, called.heated, strict=True)]
     storages = [(number, components[number].primitive) for number in parts.entropies.values()]
     return Mechanism(
         parent=np.array(parents, dtype=np.int64),
@@ -196,16 +220,14 @@ def _tables(
         friction=friction,
         heat=heat,
         driven=np.array(driven, dtype=np.int64),
-        node=np.array([-1 if isinstance(p, Storage) and p.environment else i for i, p in storages], dtype=np.int64),
-        conduction=np.array(parts.conduction, dtype=np.int64).reshape(-1, 3),
-        sink=np.array(
-            [
-                [making[components[c].path], taking]
-                for c, taking in zip(friction.tolist(), heat.tolist(), strict=True)
-                if c >= 0
-            ],
+        armature=armature,
+        node=np.array(
+            [-1 if isinstance(p, Storage) and p.environment else i for i, p in storages]
+            + [PLAIN] * len(parts.network.states),
             dtype=np.int64,
-        ).reshape(-1, 2),
+        ),
+        conduction=np.array(parts.conduction, dtype=np.int64).reshape(-1, 3),
+        sink=np.array(sinks, dtype=np.int64).reshape(-1, 3),
         address=t.address,
         dims=t.dims,
         parameters=t.parameters,

@@ -36,16 +36,21 @@ def counted(reduced: Reduced, entry: int) -> tuple[str, str]:
     """Path and words for an entry of what counts in errors: the tree's increments, its rates, the heats."""
     n = reduced.freedoms
     if entry >= 2 * n:
-        return str(reduced.entropies[entry - 2 * n]), "its heat"
+        return str(reduced.entropies[entry - 2 * n]), "its heat" if reduced.tables.node[
+            entry - 2 * n
+        ] >= -1 else "its state"
     link = int(np.flatnonzero(reduced.tables.r_at[: reduced.links] <= entry % n)[-1])
     return str(reduced.path(link)), "its position" if entry < n else "its rate"
 
 
 def tolerances(reduced: Reduced, tolerance: Tolerance, heat: float) -> Array:
-    """A tolerance of what counts in errors: the tree's increments, its rates, the heats, in ``heat`` J per J/K."""
+    """A tolerance of what counts in errors: increments and rates of the tree, heats, in ``heat`` J per J/K, states."""
     of_joints: list[Array] = []
     for edge in reduced.edges[: reduced.links]:
         path, kind = edge.state or Path(), "pose" if edge.path is None else "relative_pose"
         of_joints.append(np.full(edge.pair.dim, tolerance.at(path, kind)))
-    heats = [heat * tolerance.at(path, "entropy") for path in reduced.entropies]
-    return np.concatenate([*of_joints, *of_joints, np.array(heats)])
+    states = reduced.attaching.network.states
+    booked = reduced.entropies[: len(reduced.entropies) - len(states)]
+    heats = [heat * tolerance.at(path, "entropy") for path in booked]
+    plain = [tolerance.at(state.path, state.quantity.kind) for state in states]
+    return np.concatenate([*of_joints, *of_joints, np.array([*heats, *plain])])

@@ -9,12 +9,14 @@ from typing import final
 
 import numpy as np
 
+from ephs.mechanics.tree.finding.contraction import network_of
 from ephs.mechanics.tree.finding.frames import Frame, Frames, Link, LinkJoint, Unplaced, frames_of
+from ephs.mechanics.tree.finding.network import Network
 from ephs.mechanics.tree.finding.roles import Role
 from ephs.mechanics.tree.finding.spanning import Edge, islands
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
-from ephs.semantics.primitives import Primitive, Storage
+from ephs.semantics.primitives import Irreversible, Primitive, Storage
 from ephs.semantics.spaces import SE3, pair
 from ephs.solve.problem import Problem
 
@@ -50,9 +52,13 @@ class Parts:
     joints, forces
         Edges that may carry a link, and those that only act between frames.
     entropies
-        State -> component that stores it.
+        State -> component that stores it, of heat that is booked as energy.
     conduction
         (component, entropy, entropy).
+    network
+        What is attached at joints and heat.
+    attached
+        Edges at which it is, by their junctions.
     """
 
     links: tuple[Link, ...]
@@ -64,6 +70,8 @@ class Parts:
     entropies: dict[Path, int]
     conduction: tuple[tuple[int, int, int], ...]
     acting: tuple[Acting, ...]
+    network: Network
+    attached: dict[int, Edge]
 
 
 def parts_of(problem: Problem) -> Parts:
@@ -87,8 +95,9 @@ class _Reader:
         self.ports: set[Path] = set()
         self.entropy: dict[int, int] = {}
         self.entropies: dict[Path, int] = {}
+        self.rates = {joint.rate: joint.pair.dim for joint in self.found.joints}
         for number, role in enumerate(self.roles):
-            if role in (Role.HEAT, Role.ENVIRONMENT):
+            if role in (Role.HEAT, Role.ENVIRONMENT) and self._booked(number):
                 self.entropy[next(iter(self.wiring.ports[number].values()))] = len(self.entropies)
                 self.entropies[self.wiring.components[number].reads[0].path] = number
                 self.placed.add(number)
@@ -103,23 +112,60 @@ class _Reader:
         joints: list[Edge] = []
         forces: list[Edge] = []
         taken: dict[str, int] = {}
+        edges = {joint.rate: self._edge(joint, taken) for joint in self.found.joints}
+        potentials, drags, conduction = self._weights(), list(self._drags()), tuple(self._conduction())
+        network = self._network()
+        attached = {junction: edges[junction] for junction, _ in network.rates}
         for joint in self.found.joints:
-            edge = self._edge(joint, taken)
-            (forces if self._is_force(joint) else joints).append(edge)
+            (forces if self._is_force(joint) and joint.rate not in attached else joints).append(edges[joint.rate])
         held = {body for edge in joints for body in (edge.body1, edge.body2)}
         joints += [self._free(i, str(names[i])) for i in range(len(links)) if i not in held]
         for group in islands(len(links), joints):  # those that nothing ties to the ground move with their first one
             joints.append(self._free(min(group, key=lambda i: (links[i].pose is None, i)), ""))
-        weights, gravity = self._weights()
-        forces += [*self._potentials(weights), *self._drags()]
-        conduction = tuple(self._conduction())
+        weights, gravity = potentials
+        forces += [*self._potentials(weights), *drags]
         acting = tuple(self._acting())
-        for number, slot in enumerate(self.wiring.components):
-            if number not in self.placed:
-                raise Unplaced(slot.path, _reason(self.roles[number], slot.primitive))
         return Parts(
-            links, names, tuple(weights), gravity, tuple(joints), tuple(forces), self.entropies, conduction, acting
-        )
+            links, names, tuple(weights), gravity, tuple(joints), tuple(forces), self.entropies, conduction, acting,
+            network, attached,
+        )  # fmt: skip
+
+    # ---- attachments -------------------------------------------------------------------------------------------
+
+    def _booked(self, number: int) -> bool:
+        """Whether heat comes to a store of it by irreversible components only: then it is booked as energy."""
+        (junction,) = self.wiring.ports[number].values()
+        others = (self.wiring.components[other].primitive for other, _ in self.wiring.neighbours(junction, number))
+        return junction not in self.wiring.outer and all(isinstance(other, Irreversible) for other in others)
+
+    def _network(self) -> Network:
+        """All that is neither a link, a joint, a force, nor heat.
+
+        Raises
+        ------
+        Unplaced
+            It meets what is no joint.
+        """
+        left = [number for number in range(len(self.roles)) if number not in self.placed]
+        for number in left:
+            if self.roles[number] not in (Role.OTHER, Role.FRICTION, Role.CONDUCTION, Role.HEAT, Role.ENVIRONMENT):
+                raise Unplaced(self.wiring.components[number].path, "belongs to no body and no joint")
+        found = network_of(self.wiring, left, self.rates, self.entropy, self._prescribed, self._bare)
+        self.placed |= set(left)
+        self.ports |= found.ports()
+        return found
+
+    def _prescribed(self, port: Path) -> bool:
+        return self.problem.signals[port].effort
+
+    def _bare(self, junction: int) -> str | None:
+        """Why nothing can be attached to a junction; None where it can."""
+        if junction in self.found.frames:
+            return "acts on the twist of a body; a joint's rate can be acted on"
+        on = {self.roles[number] for number, _ in self.wiring.on[junction]}
+        if on & {Role.POSE, Role.RELATIVE, Role.KINETIC, Role.JOINT} and junction not in self.rates:
+            return "acts on the state of a body or a joint; a joint's rate can be acted on"
+        return None
 
     # ---- joints ------------------------------------------------------------------------------------------------
 
@@ -136,9 +182,10 @@ class _Reader:
             if self.roles[number] is not Role.FRICTION:
                 continue
             read = {state.path for state in self.wiring.components[number].reads}
-            if friction >= 0 or read - {joint.state.path}:
-                raise Unplaced(self.wiring.components[number].path, "is a second friction of a joint, or reads another")
-            friction, heat = number, self._heat(number)
+            *_, hot = self.wiring.ports[number].values()
+            if friction >= 0 or read - {joint.state.path} or hot not in self.entropy:
+                continue
+            friction, heat = number, self.entropy[hot]
             self.placed.add(number)
         port = self.wiring.outer.get(joint.rate)
         return Edge(
@@ -230,7 +277,7 @@ class _Reader:
             if role is Role.CONDUCTION:
                 ends = [self.entropy.get(junction, -1) for junction in self.wiring.ports[number].values()]
                 if -1 in ends:
-                    raise Unplaced(self.wiring.components[number].path, "conducts to what is no store of heat")
+                    continue
                 self.placed.add(number)
                 yield number, ends[0], ends[1]
 
@@ -268,12 +315,3 @@ def _accelerations(weight: Primitive, mass: float) -> set[tuple[float, ...]]:
 
 def _idle(primitive: object) -> bool:
     return isinstance(primitive, Storage) and primitive.kernel is not None and primitive.kernel.name == "no_effort"
-
-
-def _reason(role: Role, primitive: object) -> str:
-    if isinstance(primitive, Storage):
-        kinds = " and ".join(dict.fromkeys(q.kind for _, _, q in primitive.bundle.items()))
-        return f"stores {kinds} in another way than bodies, joints and heat do"
-    if role is Role.OTHER:
-        return "is none of the relations that bodies, joints, friction and conduction have"
-    return "belongs to no body and no joint"

@@ -43,7 +43,7 @@ class Role(Enum):
     ENVIRONMENT = auto()
     """Takes up heat at the temperature of the reference."""
     OTHER = auto()
-    """What joint coordinates have no place for."""
+    """What may be attached."""
 
 
 @final

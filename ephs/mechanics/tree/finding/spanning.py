@@ -110,19 +110,24 @@ def islands(count: int, edges: Sequence[Edge]) -> list[list[int]]:
     return sorted(sorted(group) for group in nx.connected_components(_graph(count, edges)) if -1 not in group)
 
 
-def spanning_tree(joints: Sequence[Edge], light: Sequence[bool]) -> tuple[list[tuple[Edge, int, bool]], list[Edge]]:
+def spanning_tree(
+    joints: Sequence[Edge], light: Sequence[bool], inertial: Sequence[Edge] = ()
+) -> tuple[list[tuple[Edge, int, bool]], list[Edge]]:
     """The tree as (edge, body that it leads to, walked forward), parents first; and the edges left.
 
-    Prescribed joints and those of frames without mass come into the tree first, then those of few freedoms: a joint of
-    many freedoms costs the fewest constraints where it is cut. Among equals those near the ground come first: then
-    branches are short, and few loops are open at one body.
+    Prescribed joints, those of frames without mass and those with inertia of their own come into the tree first, then
+    those of few freedoms: a joint of many freedoms costs the fewest constraints where it is cut. Among equals those
+    near the ground come first: then branches are short, and few loops are open at one body.
     """
     depth = nx.single_source_shortest_path_length(_graph(len(light), joints), -1)
     groups = nx.utils.UnionFind(range(-1, len(light)))
 
-    def cost(edge: Edge) -> tuple[bool, bool, int, int]:
+    weighty = {id(edge) for edge in inertial}
+
+    def cost(edge: Edge) -> tuple[bool, bool, bool, int, int]:
         beside = any(body >= 0 and light[body] for body in (edge.body1, edge.body2))
-        return (edge.motion is None, not beside, edge.pair.dim, min(depth[edge.body1], depth[edge.body2]))
+        near = min(depth[edge.body1], depth[edge.body2])
+        return edge.motion is None, not beside, id(edge) not in weighty, edge.pair.dim, near
 
     kept: list[Edge] = []
     cut: list[Edge] = []

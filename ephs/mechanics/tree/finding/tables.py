@@ -36,9 +36,10 @@ class Mechanism(NamedTuple):
     friction: Index  # (edges,): component, −1: none
     heat: Index  # (edges,): entropy that takes the friction's heat
     driven: Index  # (tree freedoms,): 1 where the rate is prescribed
-    node: Index  # (entropies,): component of the storage, −1: the environment
+    armature: Array  # (tree freedoms,): inertia on the rate itself
+    node: Index  # (entropies,): component of the storage, −1: the environment, −2: a state of an attachment
     conduction: Index  # (conductions, 3): component, entropy, entropy
-    sink: Index  # (frictions, 2): place of what it makes, entropy that takes its heat
+    sink: Index  # (sinks, 3): place of what it makes, entropy that takes it or −1, first place of its component
     address: Index  # (components,)
     dims: Index  # (components, 4)
     parameters: Array

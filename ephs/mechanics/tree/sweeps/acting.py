@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Any, Final, final
 
 from ephs.mechanics.tree.sweeps import loops, programs
+from ephs.mechanics.tree.sweeps.balances import ATTACH
 from ephs.mechanics.tree.sweeps.cuts import Chart, Relative
 from ephs.mechanics.tree.sweeps.programs import PLACE
 from ephs.semantics.kernel_table import SIGNATURE
@@ -38,6 +39,7 @@ __all__ = [
     "Conduction",
     "Node",
     "Own",
+    "Port",
     "Sink",
     "Tables",
     "Work",
@@ -65,6 +67,8 @@ class Own(Record):
         How many.
     forced, driven
         1 where more than gravity acts; where joints have prescribed motions.
+    attached
+        1 where there is a network, which `attach` evaluates.
     falls
         1 where `accelerations` is all there is to do; else it has no address, or else the other sweeps have none.
     """
@@ -72,6 +76,7 @@ class Own(Record):
     links = integer()
     forced = integer()
     driven = integer()
+    attached = integer()
     falls = integer()
     accelerations = _sweep("accelerations")
     move = _sweep("move")
@@ -90,6 +95,7 @@ class Own(Record):
     advance = _loop("advance")
     displace = _loop("move")
     velocities = _loop("velocities")
+    attach = function(ATTACH)
 
 
 class Component(Record):
@@ -163,7 +169,10 @@ class Body(Record):
 
 
 class Node(Record):
-    """What stores entropy: E = c1 (exp(s/c2) − 1), or the environment's θ₀ s where there is no component, −1."""
+    """What stores entropy: E = c1 (exp(s/c2) − 1), or the environment's θ₀ s where there is no component, −1.
+
+    Or, −2, a state of what is attached, which is advanced as it is.
+    """
 
     component = integer()
     c1 = real()
@@ -179,10 +188,19 @@ class Conduction(Record):
 
 
 class Sink(Record):
-    """The entropy that takes the heat of a friction, which makes entropy at a place."""
+    """The entropy, or −1, that takes what a component makes at a place; ``owner``: its component's first place."""
 
     maker = integer()
     entropy = integer()
+    owner = integer()
+
+
+class Port(Record):
+    """A rate at which something is attached: its place among all freedoms, its edge, and which freedom of it."""
+
+    place = integer()
+    edge = integer()
+    freedom = integer()
 
 
 @final
@@ -200,8 +218,11 @@ class Tables:
         Joints, and those at which loops are cut, see `ephs.mechanics.tree.sweeps.cuts`.
     at, slot, row, flat, end
         The elimination of loops, see `ephs.mechanics.tree.engine.closing.Closing`.
-    drive, wrench, scal
-        Given forces on the freedoms of all joints, given wrenches (bodies, 6) in body frames, and (h, θ₀, π₀).
+    port, net, numbers
+        What is attached, and where: see `ephs.mechanics.tree.sweeps.network.Net`.
+    drive, wrench, scal, supply
+        Given forces on the freedoms of all joints, given wrenches (bodies, 6) in body frames, (h, θ₀, π₀), and what is
+        given to what is attached.
     """
 
     own: Table[Own]
@@ -223,9 +244,13 @@ class Tables:
     sink: Table[Sink]
     component: Table[Component]
     parameters: Vector
+    port: Table[Port]
+    net: Integers
+    numbers: Vector
     drive: Vector
     wrench: Matrix
     scal: Vector
+    supply: Vector
 
     @property
     def links(self) -> Integer:
@@ -243,7 +268,8 @@ TABLES: Final[dict[str, Any]] = {
     "cut": indices(), "cut_numbers": vector(), "at": indices(), "slot": indices(), "row": indices(), "flat": indices(),
     "end": indices(), "acting": table(Acting), "body": table(Body), "node": table(Node),
     "conduction": table(Conduction), "sink": table(Sink), "component": table(Component), "parameters": vector(),
-    "drive": vector(), "wrench": matrix(6), "scal": vector(3),
+    "port": table(Port), "net": indices(), "numbers": vector(), "drive": vector(), "wrench": matrix(6),
+    "scal": vector(3), "supply": vector(),
 }  # fmt: skip
 
 
@@ -258,6 +284,8 @@ class Work:
         The sweeps' own; links in the world, and their accelerations beyond the bias; the ground's last.
     pushed, force, zero
         Wrenches (links, 6) on links, in their frames; forces on the tree's rates; zeros.
+    attached
+        Forces of what is attached on the freedoms of all joints.
     relative
         (cut joints, width): see `ephs.mechanics.tree.sweeps.cuts.Relative`.
     value, entry, covector, along, largest
@@ -280,6 +308,7 @@ class Work:
     pushed: Matrix
     force: Vector
     zero: Vector
+    attached: Vector
     relative: Matrix
     value: Matrix
     entry: Vector
@@ -304,8 +333,9 @@ class Work:
 
 WORK: Final[dict[str, Any]] = {
     "work": vector(), "place": matrix(PLACE), "change": matrix(6), "pushed": matrix(6), "force": vector(),
-    "zero": vector(), "relative": matrix(Relative.real_width), "value": matrix(4), "entry": vector(),
-    "covector": matrix(6), "along": matrix(12), "largest": vector(), "temperature": vector(), "entropy": vector(),
-    "x": vector(), "v": vector(), "e": vector(), "lam": vector(), "f": vector(), "c": vector(), "jac": vector(),
-    "scratch": vector(), "alter": vector(), "moved": vector(), "answer": vector(1), "fault": indices(1),
+    "zero": vector(), "attached": vector(), "relative": matrix(Relative.real_width), "value": matrix(4),
+    "entry": vector(), "covector": matrix(6), "along": matrix(12), "largest": vector(), "temperature": vector(),
+    "entropy": vector(), "x": vector(), "v": vector(), "e": vector(), "lam": vector(),
+    "f": vector(), "c": vector(), "jac": vector(), "scratch": vector(), "alter": vector(), "moved": vector(),
+    "answer": vector(1), "fault": indices(1),
 }  # fmt: skip

@@ -15,7 +15,7 @@ from ephs.semantics.spaces.se3 import bracket, wrench_outward
 from ephs.semantics.spaces.vectors import add, apply_transposed, combine, dot, sub
 from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Vector
 
-__all__ = ["Take", "action", "gather", "masses", "needed_forces", "row_of_covector", "weigh"]
+__all__ = ["Take", "action", "armatures", "gather", "masses", "needed_forces", "row_of_covector", "weigh"]
 
 Take: TypeAlias = Callable[[Integer, Joint, Link, list[Real], list[Real]], None]
 """Called with a link's number, joint and constants, the load on it, and the force that this is on the joint's rates."""
@@ -68,6 +68,20 @@ def needed_forces(on: Evaluator, tree: Tree, q: Vector, out: Vector) -> None:
             out[link.r_at + j] = out[link.r_at + j] + value
 
     gather(on, tree, q, take)
+
+
+def armatures(on: Evaluator, tree: Tree, rates: Vector, out: Vector) -> None:
+    """Add the inertias that joints' rates have themselves, times rates (n,), to forces or momenta (n,)."""
+
+    def one(i: Integer) -> None:
+        def through(joint: Joint, link: Link) -> None:
+            if joint.armature:
+                out[link.r_at] = out[link.r_at] + link.armature * rates[link.r_at]
+
+        tree.visit(on, i, through)
+
+    if any(joint.armature for joint in tree.joints):
+        tree.each(on, one)
 
 
 def weigh(on: Evaluator, tree: Tree) -> None:
@@ -123,6 +137,7 @@ def action(on: Evaluator, tree: Tree, q: Vector, r: Vector, p: Vector, g: Vector
             g[link.r_at + j] = g[link.r_at + j] + dot(load, bracket(twist, axis))
 
     gather(on, tree, q, one)
+    armatures(on, tree, r, p)
 
 
 def masses(on: Evaluator, tree: Tree, q: Vector, unit: Vector, mass: Matrix) -> None:
@@ -142,6 +157,9 @@ def masses(on: Evaluator, tree: Tree, q: Vector, unit: Vector, mass: Matrix) -> 
                 mass[k, link.r_at + j] = value
 
         gather(on, tree, q, take)
+        unit[k] = 1.0
+        armatures(on, tree, unit, mass.row(k))
+        unit[k] = 0.0
 
     on.loop(unit.size, clear)
     on.loop(unit.size, column)

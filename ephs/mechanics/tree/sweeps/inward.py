@@ -40,7 +40,7 @@ def inward(on: Evaluator, tree: Tree, i: Integer, fault: Variable[Integer]) -> N
         state = tree.states[i]
         inertia = _blocks(state)
         if joint.dim and not joint.driven:
-            inertia, sound = _eliminated(on, joint, state, inertia)
+            inertia, sound = _eliminated(on, joint, link, state, inertia)
             fault.value = on.select(on.either(sound, fault.value > 0), fault.value, i + 1)
         on.when(link.parent < tree.size, lambda: _take_up(tree.states[link.parent], state, inertia))
 
@@ -56,10 +56,14 @@ def _blocks(state: State) -> Rows:
     ]
 
 
-def _eliminated(on: Evaluator, joint: Joint, state: State, inertia: Rows) -> tuple[Rows, Truth]:
+def _eliminated(on: Evaluator, joint: Joint, link: Link, state: State, inertia: Rows) -> tuple[Rows, Truth]:
     """I − U D⁻¹ Uᵀ, and whether D is positive definite; rows of freedoms that are entries of a twist are zero."""
     force = [apply(inertia, column) for column in joint.basis]
-    inverse, sound = symmetric_inverse(on, [[dot(column, f) for f in force] for column in joint.basis])
+    own = [link.armature if joint.armature else 0.0] * joint.dim
+    met = [
+        [dot(column, f) + float(i == j) * own[i] for j, f in enumerate(force)] for i, column in enumerate(joint.basis)
+    ]
+    inverse, sound = symmetric_inverse(on, met)
     units = joint.units
     gain = [
         [float(units[k] == j) if k in units else value for k, value in enumerate(row)]

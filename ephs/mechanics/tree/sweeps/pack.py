@@ -51,6 +51,8 @@ class Part:
     numbers
         (22,): rows of R and p of the joint in the parent's frame, mass, first moments, inertia about the frame (upper
         triangle).
+    armature
+        Inertia of its joint's rate itself.
     """
 
     joint: Joint
@@ -59,6 +61,7 @@ class Part:
     r_at: int
     sense: int
     numbers: Array
+    armature: float = 0.0
 
 
 @final
@@ -80,9 +83,10 @@ class Class:
     def constants(self, kind: int) -> dict[int, float]:
         """What all links with a kind of joints have in common: offset in `Link` and the value, 0 or 1."""
         turn, moment, inertia = Link.rotation.offset, Link.moment.offset, Link.inertia.offset
+        own = {} if self.joints[kind].armature else {Link.armature.offset: 0.0}
         if not self.planar:
-            return {Link.shift.offset: 0.0}
-        out = {turn + k: float(k == 8) for k in (2, 5, 6, 7, 8)}
+            return own | {Link.shift.offset: 0.0}
+        out = own | {turn + k: float(k == 8) for k in (2, 5, 6, 7, 8)}
         if self.joints[kind].revolute:
             out |= {turn + k: float(k in (0, 4)) for k in (0, 1, 3, 4)}
         else:
@@ -133,6 +137,7 @@ def packed(parts: Sequence[Part], gravity: Array, *, planar: bool, among: Sequen
         link, c = links[i], [float(x) for x in part.numbers]
         link.parent = part.parent if part.parent >= 0 else count
         link.kind = joints.index(part.joint)
+        link.armature = part.armature
         link.q_at, link.r_at, link.sense = part.q_at, part.r_at, float(part.sense)
         link.place, link.mass, link.moment, link.inertia = _clean(c[9:12]), c[12], _clean(c[13:16]), _clean(c[16:22])
         link.rotation = [_clean(c[k : k + 3]) for k in (0, 3, 6)]

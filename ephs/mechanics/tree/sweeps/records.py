@@ -30,6 +30,8 @@ class Link(Record):
         Angle in rad of a revolute joint's first frame about z, beyond `rotation`.
     mass, moment, inertia
         In kg, kg m, and kg m² about the frame's origin (upper triangle).
+    armature
+        Inertia of the joint's rate itself, as of a rotor that it turns.
     """
 
     parent = integer()
@@ -43,6 +45,7 @@ class Link(Record):
     mass = real()
     moment = reals(3)
     inertia = reals(6)
+    armature = real()
 
 
 class State(Record):
@@ -97,6 +100,8 @@ class Joint:
         Walked from its second to its first body, in a group that is not abelian: its element is inverted.
     driven
         Its motion is prescribed.
+    armature
+        Its rate has inertia of its own.
     """
 
     code: int
@@ -104,6 +109,7 @@ class Joint:
     basis: tuple[tuple[float, ...], ...]
     backward: bool = False
     driven: bool = False
+    armature: bool = False
 
     @property
     def dim(self) -> int:
@@ -117,7 +123,9 @@ class Joint:
 
     @property
     def units(self) -> dict[int, int]:
-        """Entries of a twist that are freedoms by themselves -> number of the freedom."""
+        """Entries of a twist that are freedoms -> number of the freedom; none where rates have inertia."""
+        if self.armature:
+            return {}
         return {column.index(1.0): j for j, column in enumerate(self.basis) if sorted(column) == [0.0] * 5 + [1.0]}
 
 

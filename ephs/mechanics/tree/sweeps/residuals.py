@@ -6,6 +6,7 @@ momenta p = ∂L/∂r, and ∂L/∂q with the forces that no potential has. Run 
 derivatives.
 """
 
+from collections.abc import Callable
 from functools import cache
 from typing import Any, Final, final
 
@@ -13,7 +14,7 @@ from ephs.mechanics.tree.sweeps import cuts
 from ephs.mechanics.tree.sweeps.closures import Closures
 from ephs.mechanics.tree.sweeps.cuts import Chart, Cut, Kind, Relative
 from ephs.mechanics.tree.sweeps.edges import Edge, Edges, Law
-from ephs.mechanics.tree.sweeps.inverse import action, masses, needed_forces, row_of_covector, weigh
+from ephs.mechanics.tree.sweeps.inverse import action, armatures, masses, needed_forces, row_of_covector, weigh
 from ephs.mechanics.tree.sweeps.loops import NO_REALS
 from ephs.mechanics.tree.sweeps.outward import outward
 from ephs.mechanics.tree.sweeps.pack import Class
@@ -48,17 +49,21 @@ LOOPS: Final[dict[str, Any]] = {
 """The cut joints of a mechanism, charts of all joints, and memory: see `Closures`."""
 ACTING: Final[dict[str, Any]] = {
     "edge": indices(), "edge_numbers": vector(), "law": vector(), "body": indices(), "body_frame": matrix(12),
-    "warming": matrix(3), "passage": indices(), "flow": matrix(8),
+    "warming": matrix(3), "passage": indices(), "flow": matrix(8), "tie": indices(), "tied": matrix(),
 }  # fmt: skip
 """What acts: see `Edges`; links and frames of bodies, on which wrenches are given; of each entropy the temperature over
 the environment's, its derivative, and the entropy there; of conductions two entropies each, what these lose, its
-derivatives by their temperatures, and the temperatures."""
+derivatives by their temperatures, and the temperatures; of what is attached see `_attach`."""
 POINT: Final[dict[str, Any]] = {
     "base": vector(), "v": vector(), "q": vector(), "r": vector(), "s": vector(), "drive": vector(),
-    "wrench": matrix(6), "warmth": vector(),
+    "wrench": matrix(6), "warmth": vector(), "beyond": vector(), "pulls": vector(),
 }  # fmt: skip
-"""Where functions are evaluated: q is written; forces on all joints, wrenches on bodies; memory (entropies,)."""
-ACTIVE: Final = ("memory", "places", "motions", "value", "covector", "v", "q", "r", "s", "drive", "wrench", "warmth")
+"""Where functions are evaluated: q is written; forces on all joints, wrenches on bodies; memory (entropies,), (ties,),
+(joints' freedoms,)."""
+ACTIVE: Final = (
+    "memory", "places", "motions", "value", "covector", "v", "q", "r", "s", "drive", "wrench", "warmth", "beyond",
+    "pulls",
+)  # fmt: skip
 """Arguments that have derivatives, beside those that only one of the functions has."""
 
 
@@ -184,10 +189,11 @@ class Residuals:
 
         def acted(
             on: Evaluator, tree: Tree, closing: Closures, acting: Edges, body: Integers, body_frame: Matrix,
-            warming: Matrix, passage: Integers, flow: Matrix, q: Vector, r: Vector, s: Vector,
-            drive: Vector, wrench: Matrix, warmth: Vector, force: Vector, heat: Vector,
+            warming: Matrix, passage: Integers, flow: Matrix, tie: Integers, tied: Matrix, q: Vector, r: Vector,
+            s: Vector, drive: Vector, wrench: Matrix, warmth: Vector, beyond: Vector, pulls: Vector, force: Vector,
+            heat: Vector, cut: Vector,
         ) -> None:  # fmt: skip
-            """Take what acts off the links' loads and the forces on the rates, which are set; heat: ṡ."""
+            """Take what acts off the links' loads and the forces on the rates, which are set; heat: ṡ; cut: rates."""
             on.loop(force.size, lambda k: _put(force, k))
             on.loop(heat.size, lambda k: _put(heat, k))
 
@@ -214,16 +220,17 @@ class Residuals:
 
             on.loop(warmth.size, warm)
             on.loop(body.size, push)
-            acting.act(on, tree, q, r, warmth, drive, force, heat)
+            _attach(on, tie, tied, (q, r, cut, s, warmth, drive), beyond, pulls, heat)
+            acting.act(on, tree, q, r, warmth, pulls, force, heat)
             on.loop(flow.rows, pass_on)
 
         def residual(
             on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector,
             cut: Integers, cut_numbers: Vector, chart: Integers, places: Matrix, motions: Matrix, end: Integers,
             value: Matrix, covector: Matrix, edge: Integers, edge_numbers: Vector, law: Vector, body: Integers,
-            body_frame: Matrix, warming: Matrix, passage: Integers, flow: Matrix, base: Vector,
-            v: Vector, q: Vector, r: Vector, s: Vector, drive: Vector, wrench: Matrix, warmth: Vector, a: Vector,
-            multiplier: Vector, out: Vector,
+            body_frame: Matrix, warming: Matrix, passage: Integers, flow: Matrix, tie: Integers, tied: Matrix,
+            base: Vector, v: Vector, q: Vector, r: Vector, s: Vector, drive: Vector, wrench: Matrix, warmth: Vector,
+            beyond: Vector, pulls: Vector, a: Vector, multiplier: Vector, out: Vector,
         ) -> None:  # fmt: skip
             tree = sweeps.tree(size, integers, reals, memory, gravity)
             closing = closures(cut, cut_numbers, chart, places, motions, end, value, covector)
@@ -233,25 +240,28 @@ class Residuals:
             outward(on, tree, q, r)
             spread(on, tree, q, a)
             closing.place(on, tree)
+            rates = out.part(n + m, c)
+            closing.along(on, rates, out.part(n + m + c, c), n)
             acted(
                 on, tree, closing, edges(edge, edge_numbers, law, places), body, body_frame, warming, passage, flow,
-                q, r, s, drive, wrench, warmth, force, heat,
+                tie, tied, q, r, s, drive, wrench, warmth, beyond, pulls, force, heat, rates,
             )  # fmt: skip
             closing.push(on, tree, multiplier)
             needed_forces(on, tree, q, force)
+            armatures(on, tree, a, force)
 
             def accelerated(k: Integer) -> None:
                 out[n + k] = -value[k, 0]
 
             on.loop(m, accelerated)
-            closing.along(on, out.part(n + m, c), out.part(n + m + c, c), n)
 
         def momenta(
             on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector,
             cut: Integers, cut_numbers: Vector, chart: Integers, places: Matrix, motions: Matrix, end: Integers,
             value: Matrix, covector: Matrix, edge: Integers, edge_numbers: Vector, law: Vector, body: Integers,
-            body_frame: Matrix, warming: Matrix, passage: Integers, flow: Matrix, base: Vector,
-            v: Vector, q: Vector, r: Vector, s: Vector, drive: Vector, wrench: Matrix, warmth: Vector, out: Vector,
+            body_frame: Matrix, warming: Matrix, passage: Integers, flow: Matrix, tie: Integers, tied: Matrix,
+            base: Vector, v: Vector, q: Vector, r: Vector, s: Vector, drive: Vector, wrench: Matrix, warmth: Vector,
+            beyond: Vector, pulls: Vector, out: Vector,
         ) -> None:  # fmt: skip
             tree = sweeps.tree(size, integers, reals, memory, gravity)
             closing = closures(cut, cut_numbers, chart, places, motions, end, value, covector)
@@ -263,12 +273,13 @@ class Residuals:
             _at_rest(on, tree)
             closing.place(on, tree)
             weigh(on, tree)
+            rates = out.part(2 * n, c)
+            closing.along(on, rates, out.part(2 * n + c, c), n)
             acted(
                 on, tree, closing, edges(edge, edge_numbers, law, places), body, body_frame, warming, passage, flow,
-                q, r, s, drive, wrench, warmth, force, heat,
+                tie, tied, q, r, s, drive, wrench, warmth, beyond, pulls, force, heat, rates,
             )  # fmt: skip
             action(on, tree, q, r, momentum, force)
-            closing.along(on, out.part(2 * n, c), out.part(2 * n + c, c), n)
 
         at: dict[str, Any] = {"q": vector(), "r": vector()}
         whole: dict[str, Any] = {**MECHANISM, **LOOPS, **ACTING, **POINT}
@@ -283,6 +294,67 @@ class Residuals:
             "residual": Entry(residual, **whole, a=vector(), multiplier=vector(), out=vector()),
             "action": Entry(momenta, **whole, out=vector()),
         }  # fmt: skip
+
+
+def _attach(
+    on: Evaluator, tie: Integers, tied: Matrix, point: tuple[Vector, ...], beyond: Vector, pulls: Vector, heat: Vector
+) -> None:
+    """Write the forces of what drives and of what is attached to ``pulls``, and add to heat what it takes up.
+
+    Parameters
+    ----------
+    tie
+        (ties, 2): what each depends on, a rate, a temperature, nothing that changes, a state, an element; its place.
+    tied
+        (ties, 2 + ties): the flow about a point, what it depended on there, its derivatives.
+    point
+        Elements, rates of the tree and of cut joints, states, temperatures, forces that are given.
+    beyond
+        Memory: by how much what they depend on is off the point.
+    """
+    q, r, cut, s, warmth, drive = point
+
+    def start(j: Integer) -> None:
+        pulls[j] = drive[j]
+
+    def visit(k: Integer, *branches: Callable[[Integer], None]) -> None:
+        def among(kind: int) -> None:
+            if kind < len(branches):
+                on.when(on.same(tie[2 * k], kind), lambda: branches[kind](tie[2 * k + 1]), lambda: among(kind + 1))
+
+        among(0)
+
+    def enter(k: Integer) -> None:
+        def off(value: Real) -> None:
+            beyond[k] = value - tied[k, 1]
+
+        def rate(j: Integer) -> None:
+            on.when(j < r.size, lambda: off(r[j]), lambda: off(cut[j - r.size]))
+
+        def still(_: Integer) -> None:
+            beyond[k] = 0.0
+
+        visit(k, rate, lambda j: off(warmth[j]), still, lambda j: off(s[j]), lambda j: off(q[j]))
+
+    def leave(k: Integer) -> None:
+        flow = on.variable(tied[k, 0])
+
+        def add(i: Integer) -> None:
+            flow.value = flow.value + tied[k, 2 + i] * beyond[i]
+
+        on.loop(beyond.size, add)
+
+        def pull(j: Integer) -> None:
+            pulls[j] = pulls[j] - flow.value
+
+        def take(j: Integer) -> None:
+            heat[j] = heat[j] - flow.value
+
+        visit(k, pull, take, lambda _: None, take)
+
+    on.loop(drive.size, start)
+    on.loop(beyond.size, enter)
+    on.loop(beyond.size, leave)
 
 
 def _put(row: Vector, k: Integer) -> None:

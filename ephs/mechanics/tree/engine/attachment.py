@@ -1,0 +1,100 @@
+"""What is attached to a mechanism, as the arrays of `ephs.mechanics.tree.sweeps.network.Net`."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, final
+
+import numpy as np
+
+from ephs.mechanics.tree.sweeps.network import INTEGERS, REALS
+from ephs.semantics.bundle import Array
+from ephs.semantics.numbering import starts
+from ephs.solve.sparse import Index
+
+if TYPE_CHECKING:
+    from ephs.mechanics.tree.finding.mechanism import Reduced
+
+__all__ = ["Attachment", "attachment_of"]
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Attachment:
+    """The two arrays of a network; one's own, as they hold memory."""
+
+    integers: Index
+    reals: Array
+
+    def part(self, name: str) -> Array:
+        """A part of the reals, as it is there."""
+        at, size = self.integers[2 * (len(INTEGERS) + REALS.index(name)) :][:2]
+        return self.reals[at : at + size]
+
+    def whole(self, name: str) -> Index:
+        """A part of the integers, as it is there."""
+        at, size = self.integers[2 * INTEGERS.index(name) :][:2]
+        return self.integers[at : at + size]
+
+
+def attachment_of(reduced: "Reduced") -> Attachment:
+    """The arrays of a mechanism's network."""
+    t, there = reduced.tables, reduced.attaching
+    net = there.network
+    size, nodes = net.skew.shape[0], len(reduced.entropies) - len(net.states)
+    rows: list[tuple[Index, Array]] = []
+    places: list[int] = []
+    called, reads, kept = list[list[int]](), list[int](), 0
+    stores: list[list[int]] = []
+    for component, first in net.storages:
+        n = int(t.dims[component, 0])
+        stores.append([*_head(reduced, component), first, net.state_at + first, kept])
+        kept += n * n
+    for one, read, flows in zip(net.attached, there.reads, there.flows, strict=True):
+        called.append([*_head(reduced, one.component), len(rows), len(reads), kept])
+        reads += read.tolist()
+        n, k, nv, _ = t.dims[one.component].tolist()
+        kept += (n + k) * (n + k + nv)
+        made = {effort: int(flow) for (effort, _), flow in zip(one.heated, flows, strict=True)}
+        for j, row in enumerate(one.rows):
+            rows.append(_sparse(row))
+            places.append(made.get(j, -1))
+    rows += [_sparse(row) for row in net.skew]
+    places += [-1] * size
+    at = np.cumsum([0, *(where.size for where, _ in rows)])
+    dims = t.dims[[one[6] for one in (*stores, *called)]] if stores or called else np.zeros((0, 4), dtype=np.int64)
+    n, k, nv, nx = (int(column.max(initial=0)) for column in dims.T)
+    named = called[0][6] if called else -1
+    lists: dict[str, Any] = {
+        "head": [len(net.rates), len(net.nodes), len(net.inputs), len(net.states), net.unknown, nodes, named],
+        "store": stores, "called": called,
+        "row": [[at[i], where.size, place] for i, ((where, _), place) in enumerate(zip(rows, places, strict=True))],
+        "term": [place for where, _ in rows for place in where], "read": reads, "bent": there.bent,
+        "temperature": net.nodes, "pivot": [0] * net.unknown, "fault": [0],
+    }  # fmt: skip
+    integers = {name: np.array(values, dtype=np.int64).ravel() for name, values in lists.items()}
+    sizes = {
+        "effort": size, "flow": size, "gross": size, "kept": kept, "x": nx + 8, "v": max(nv, 6) + 1, "e": n + k + 1,
+        "f": n * n + n + k + 8, "work": 4096, "matrix": net.unknown**2, "step": net.unknown, "turned": size,
+        "changed": size, "moved": len(reads), "power": 1,
+    }  # fmt: skip
+    reals = {"weight": np.concatenate([by for _, by in rows]) if rows else np.zeros(0)}
+    reals |= {name: np.zeros(count) for name, count in sizes.items()}
+    whole, numbers = [integers[name] for name in INTEGERS], [reals[name] for name in REALS]
+    head = np.concatenate([_places(whole, 2 * (len(INTEGERS) + len(REALS))), _places(numbers, 0)])
+    return Attachment(np.concatenate([head, *whole]).astype(np.int64), np.concatenate(numbers))
+
+
+def _places(parts: Sequence[Array | Index], first: int) -> Index:
+    """(2 parts,): where each starts, and its size, one after the other from a place on."""
+    size = np.array([part.size for part in parts], dtype=np.int64)
+    return np.column_stack([first + starts(size), size]).ravel()
+
+
+def _head(reduced: "Reduced", component: int) -> list[int]:
+    t = reduced.tables
+    return [int(t.address[component]), *t.dims[component].tolist(), int(t.parameter_at[component]), component]
+
+
+def _sparse(row: Array) -> tuple[Index, Array]:
+    where = np.flatnonzero(row)
+    return where, row[where]

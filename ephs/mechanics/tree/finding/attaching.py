@@ -1,0 +1,108 @@
+"""Where the network of what is attached meets a mechanism: freedoms, states that components read, entropies made."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from ephs.mechanics.tree.finding.frames import Unplaced
+from ephs.mechanics.tree.finding.network import Network
+from ephs.mechanics.tree.finding.parts import Parts
+from ephs.mechanics.tree.finding.spanning import Edge
+from ephs.mechanics.tree.finding.tables import SPRING, Mechanism
+from ephs.operad import Path
+from ephs.semantics.descriptor import ComponentSlot
+from ephs.semantics.primitives import Irreversible
+from ephs.semantics.spaces.codes import VECTOR
+from ephs.solve.sparse import Index
+
+__all__ = ["Attaching", "attaching_of", "makers_of"]
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Attaching:
+    """A network at a mechanism.
+
+    Parameters
+    ----------
+    ports
+        (rates,) freedoms of joints.
+    reads
+        Of each component that is called: places in s of the states that it reads; −1 − place of a joint's element.
+    flows
+        Of each component that is called: the places of the entropies that its ports make.
+    bent
+        (elements that are read, 2): their places, and those of their freedoms.
+    edges
+        First freedoms of the joints at which something is attached.
+    """
+
+    network: Network
+    ports: Index
+    reads: tuple[Index, ...]
+    flows: tuple[Index, ...]
+    bent: Index
+    edges: frozenset[int]
+
+
+def makers_of(components: Sequence[ComponentSlot], network: Network) -> tuple[tuple[Path, ...], tuple[Index, ...]]:
+    """Components that make entropy, one place each, and a further one for each further port of what is called.
+
+    Returns
+    -------
+    made, flows
+        Path of each place; of each component that is called, the places of its ports of entropy.
+    """
+    made = [slot.path for slot in components if isinstance(slot.primitive, Irreversible)]
+    first = {path: i for i, path in enumerate(made)}
+    flows: list[Index] = []
+    for one in network.attached:
+        path, more = components[one.component].path, len(one.heated)
+        places = [first[path], *range(len(made), len(made) + more - 1)][:more] if more else []
+        flows.append(np.array(places, dtype=np.int64))
+        made += [path] * (more - 1)
+    return tuple(made), tuple(flows)
+
+
+def attaching_of(
+    components: Sequence[ComponentSlot],
+    parts: Parts,
+    edges: Sequence[Edge],
+    tables: Mechanism,
+    stored: Sequence[Path],
+    flows: tuple[Index, ...],
+) -> Attaching:
+    """A system's network at its mechanism.
+
+    Raises
+    ------
+    Unplaced
+        A component reads states that have no place.
+    """
+    network, moving = parts.network, [i for i in range(len(edges)) if tables.kind[i] != SPRING]
+    at = {id(edges[i]): int(tables.r_at[i]) for i in moving}
+    known = {path: k for k, path in enumerate(stored)}
+    freedom: dict[int, int] = {}
+    for i in moving:
+        edge = edges[i]
+        if edge.path is not None and edge.state is not None and (edge.pair.code, edge.pair.dim) == (VECTOR, 1):
+            known[edge.state] = -1 - int(tables.q_at[i])
+            freedom[int(tables.q_at[i])] = int(tables.r_at[i])
+    reads: list[Index] = []
+    for one in network.attached:
+        for path in one.reads:
+            if path not in known:
+                reason = f"reads {path}, which is neither attached nor the single coordinate of a joint"
+                raise Unplaced(components[one.component].path, reason)
+        reads.append(np.array([known[path] for path in one.reads], dtype=np.int64))
+    bent = sorted({-1 - int(read) for places in reads for read in places if read < 0})
+    return Attaching(
+        network,
+        np.array([at[id(parts.attached[junction])] + k for junction, k in network.rates], dtype=np.int64),
+        tuple(reads),
+        flows,
+        np.array([[place, freedom[place]] for place in bent], dtype=np.int64).reshape(-1, 2),
+        frozenset(at[id(edge)] for edge in parts.attached.values()),
+    )

@@ -1,0 +1,182 @@
+"""What is attached to a mechanism: circuits, rotors, gases and heat, with states of their own, by every method."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import ephs
+from ephs import Pattern, junction
+from ephs import library as lib
+from ephs import quantity as Q
+from ephs.mechanics import joint, rigid_body
+from ephs.mechanics.elements import components
+from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.equations.tangent import Linearised
+from ephs.mechanics.tree.finding.frames import Unplaced
+from ephs.operad import Path
+from ephs.solve.problem import Signal
+from tests.mechanics.methods.systems import problem_of
+from tests.mechanics.tree import machines
+
+UNTIL = 0.3
+
+
+def equations_of(system, start, signals=None):
+    states = system.state() | {Path.of(path): np.atleast_1d(np.array(x, dtype=float)) for path, x in start.items()}
+    given = {Path.of(p): Signal(np.atleast_1d(x), effort) for p, (x, effort) in (signals or {}).items()}
+    return Equations(problem_of(system, states, given), 0.0)
+
+
+def motor():
+    system, start, inputs = machines.motor_on_four_bar()
+    return system, start, {port: (one["effort"], True) for port, one in inputs.items()}
+
+
+# ---- against equations by hand --------------------------------------------------------------------------------------
+
+
+def ended(method, **options):
+    """(rate of the crank, current, temperature of the housing) at the end, and the solution."""
+    system, start, inputs = machines.motor_on_four_bar()
+    run = ephs.simulate(system, UNTIL, initial=start, inputs=inputs, method=method, save_at=[0.0, UNTIL], **options)
+    assert run.stats["form"] == "reduced"
+    rate, current = run["rotor.p"][-1] / machines.ROTOR * machines.GEAR, run["coil.b"][-1] / machines.INDUCTANCE
+    return np.array([rate, current, machines.THETA * np.exp(run["housing.s"][-1] / machines.HEAT)]).ravel(), run
+
+
+@pytest.mark.parametrize("method", ["rk54", "rk87", "auto", "radau", "ida"])
+def test_a_motor_on_a_four_bar_moves_as_equations_by_hand_say(method):
+    found, run = ended(method, rtol=1e-11, atol=1e-12)
+    assert np.allclose(found, machines.motor_by_hand(UNTIL)[1:], rtol=1e-9, atol=0.0)
+    assert run.energy_error.max() < 1e-9
+
+
+@pytest.mark.parametrize("method", ["alpha", "variational"])
+def test_methods_of_order_two_come_to_the_same_motion(method):
+    exact = machines.motor_by_hand(UNTIL)[1:]
+    coarse, fine = (ended(method, step=step, audit="off")[0] - exact for step in (1e-3, 5e-4))
+    assert np.all(np.abs(coarse) < 2e-3 * np.abs(exact))
+    assert np.allclose(coarse, 4.0 * fine, rtol=0.05, atol=1e-9)
+
+
+# ---- derivatives ----------------------------------------------------------------------------------------------------
+
+
+def test_derivatives_of_what_is_attached_are_those_of_the_equations():
+    eq = equations_of(*motor())
+    state = eq.start(0.0)
+    linear, rng = Linearised(eq), np.random.default_rng(3)
+    r, s = rng.standard_normal(eq.n), eq.heats.entropies(state.heats) + 0.1 * rng.standard_normal(eq.ns)
+    r = eq.closed(type(state)(0.0, state.q, r, state.heats, state.books)).r
+
+    def rates(z):
+        v, r, s = np.split(z, [eq.nv, eq.nv + eq.n])
+        linear.forward(eq.advance(state.q, v), r, s)
+        return np.concatenate([eq.dense.rate, linear.cut_rates, linear.entropy_rates])
+
+    linear.forward(state.q, r, s)
+    exact, middle = linear.columns(solve=True, fit=False), np.concatenate([np.zeros(eq.nv), r, s])
+    for j, column in enumerate(exact.T):
+        step = 1e-5 * np.eye(middle.size)[j]
+        near = (rates(middle + step) - rates(middle - step)) / 2e-5
+        assert np.allclose(column, near, rtol=0.0, atol=1e-5 * max(1.0, np.abs(near).max()))
+
+
+def test_both_evaluations_are_one():
+    eq = equations_of(*motor())
+    state = eq.start(0.0)
+    y = eq.vector(state)
+    fast, slow = eq.rates(0.0, state.q, y), np.zeros(eq.size)
+    assert eq.dense.rates(state.q, y, eq.given, eq.heats, slow) == (0, 0)
+    scale = np.maximum(1.0, np.abs(fast[eq.nv :]))
+    assert np.all(np.abs(fast[eq.nv :] - slow[eq.nv :]) <= 1e-11 * scale)
+
+
+# ---- what has no place ----------------------------------------------------------------------------------------------
+
+
+def with_circuit(**parts):
+    """A pendulum's hinge with further boxes: their filling, and their ports' junctions; ``p_r`` is the hinge's."""
+    hinge = joint("revolute", driven=True)
+    port = next(str(p) for p, of in hinge.interface.items() if str(p) not in ("p1", "p2"))
+    junctions = {"g": junction(Q.body_momentum), "p": junction(Q.body_momentum)}
+    junctions["p_r"] = junction(hinge.interface[port].quantity)
+    boxes = {"ground": {"p": "g"}, "body": {"p": "p"}, "hinge": {"p1": "g", "p2": "p", port: "p_r"}}
+    fillings = {"ground": components.ground(), "body": rigid_body(1.0, [0.3, 0.4, 0.5]), "hinge": hinge}
+    for name, (filling, ports) in parts.items():
+        boxes[name], fillings[name] = ports, filling
+        for own, at in ports.items():
+            junctions.setdefault(at, junction(filling.interface[Path.of(own)].quantity))
+    return Pattern(junctions=junctions, boxes=boxes)(**fillings), junctions["p_r"].quantity
+
+
+def turning(ratio, quantity):
+    return ephs.transformer({"p": Q.angular_momentum, "p_r": quantity}, [[ratio]], name="gear")
+
+
+@pytest.mark.parametrize(
+    ("parts", "effort", "words"),
+    [
+        (lambda q: {"gear": (turning(0.5, q), {"p": "x", "p_r": "p_r"})}, True, "prescribes the motion of a joint"),
+        (
+            lambda q: {
+                "gear": (turning(0.5, q), {"p": "x", "p_r": "p_r"}),
+                "coil": (lib.inductor(l=1.0), {"b": "b"}),
+                "other": (lib.inductor(l=2.0), {"b": "c"}),
+                "series": (ephs.transformer({"b": Q.flux_linkage, "c": Q.flux_linkage}, [[1]]), {"b": "b", "c": "c"}),
+            },
+            None,
+            "stores what other states",
+        ),
+        (lambda q: {"rope": (_rope(), {"p": "p", "x": "x"})}, None, "twist of a body"),
+    ],
+)
+def test_what_has_no_place_is_refused_by_path(parts, effort, words):
+    quantity = with_circuit()[1]
+    system, _ = with_circuit(**parts(quantity))
+    signals = {}
+    if effort is not None:
+        pattern = system.pattern
+        junctions = {n: junction(of.quantity, exposed=str(n) == "x") for n, of in pattern.junctions.items()}
+        system = Pattern(junctions=junctions, boxes=pattern.boxes)(**{str(b): f for b, f in system.fillings.items()})
+        signals = {"x": (1.0, effort)}
+    with pytest.raises(Unplaced, match=words):
+        equations_of(system, {}, signals)
+
+
+def _rope():
+    return ephs.transformer({"p": Q.body_momentum, "x": Q.momentum}, [[0.0, 0.0, 0.0, 1.0, 0.0, 0.0]])
+
+
+# ---- efforts that only balances determine ---------------------------------------------------------------------------
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.lists(st.floats(0.1, 10.0), min_size=2, max_size=5), st.floats(0.2, 3.0))
+def test_efforts_without_a_storage_follow_from_balances(resistances, ratio):
+    """Pairs of brakes in series, side by side on the shaft of a gear: balances divide its rate between each two."""
+    quantity = with_circuit()[1]
+    parts = {"gear": (turning(ratio, quantity), {"p": "x", "p_r": "p_r"}), "heat": (lib.environment(), {"s": "s"})}
+    for i, r in enumerate(resistances):
+        parts[f"split{i}"] = (_share(), {"p": "x", "b": f"b{i}", "c": f"c{i}"})
+        parts[f"r{i}"] = (lib.rotational_friction(d=r), {"p": f"b{i}", "s": "s"})
+        parts[f"t{i}"] = (lib.rotational_friction(d=2.0 * r), {"p": f"c{i}", "s": "s"})
+    system, _ = with_circuit(**parts)
+    eq = equations_of(system, {})
+    assert eq.reduced.attaching.network.unknown == len(resistances)
+    state = eq.start(0.0)
+    y = eq.vector(state)
+    y[eq.nv] = 1.7
+    braked = eq.rates(0.0, state.q, y)[eq.nv]
+    y[eq.nv] = -1.7
+    other = eq.rates(0.0, state.q, y)[eq.nv]
+    # each pair is in series: rates add up to the shaft's 1.7/ratio, torques are equal
+    torque = sum(1.0 / (1.0 / r + 0.5 / r) for r in resistances) * 1.7 / ratio**2
+    assert np.isclose(0.5 * (other - braked) * eq.mass(state.q, state.r)[0, 0], torque, rtol=1e-12)
+
+
+def _share():
+    """The rate of a shaft is the sum of two rates."""
+    ports = {"p": Q.angular_momentum, "b": Q.angular_momentum, "c": Q.angular_momentum}
+    return ephs.constraint(ports, [[1.0, -1.0, -1.0]], name="share")
