@@ -9,9 +9,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar, final, get_args
 
-from pydantic import ValidationError
+from pydantic import ValidationError, WrapValidator
 
 from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing
+from ephs.mechanics.scene.rotations import FORMS
 from ephs.mechanics.scene.schema import SECTIONS, AssemblyEntry, SceneFile, SurfaceShapeEntry, WorldEntry
 from ephs.mechanics.scene.schema_flexible import SectionEntry
 from ephs.mechanics.scene.schema_numbers import LARGEST, Entry
@@ -21,8 +22,6 @@ E = TypeVar("E", bound=Entry)
 
 # Neutral values for required keys that are missing or faulty.
 _NEUTRAL: dict[str, Any] = {
-    "mass": 1.0,
-    "inertia": [1.0, 1.0, 1.0],
     "type": "free",
     "bodies": ["ground", "ground"],
     "at1": [0.0, 0.0, 0.0],
@@ -48,6 +47,8 @@ _EXPECTED: dict[str, Callable[[Mapping[str, Any]], tuple[str, str]]] = {
     "numbers": lambda ctx: ("type", "a number or a list of numbers"),
     "limits": lambda ctx: ("range", "[lower, upper], lower < upper, nan for none"),
     "inertia_length": lambda ctx: ("length", "3 or 6 numbers: xx yy zz [xy xz yz]"),
+    "rotation": lambda ctx: ("range", FORMS),
+    "rotation_type": lambda ctx: ("type", f"a unit quaternion [w, x, y, z], or a table with {FORMS}"),
     "too_short": lambda ctx: ("length", f"{ctx['min_length']} entries"),
     "too_long": lambda ctx: ("length", f"{ctx['max_length']} entries"),
     "greater_than": lambda ctx: ("range", f"a number above {ctx['gt']:g}"),
@@ -152,7 +153,9 @@ def _translate(model: type[Entry], key: str, item: Any) -> Fault:
     """One of pydantic's errors in this project's words."""
     code, location, context = item["type"], item["loc"], item.get("ctx", {})
     path = key + "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location)
-    owner = _nested(model, str(location[0])) if len(location) > 1 else model
+    owner = model
+    for part in location[:-1]:
+        owner = _nested(owner, str(part)) if str(part) in owner.model_fields else owner
     if code == "extra_forbidden":
         return _unknown_key(path, str(location[-1]), list(owner.model_fields))
     if code == "missing":
@@ -174,12 +177,12 @@ def _translate(model: type[Entry], key: str, item: Any) -> Fault:
 
 def _nested(model: type[Entry], key: str) -> type[Entry]:
     """The table that a key of a table holds, itself where there is none."""
-    kinds: list[Any] = [model.model_fields[key].annotation]
+    kinds: list[Any] = [model.model_fields[key].annotation, *model.model_fields[key].metadata]
     while kinds:
         kind = kinds.pop()
         if isinstance(kind, type) and issubclass(kind, Entry):
             return kind
-        kinds += get_args(kind)
+        kinds += [kind.json_schema_input_type] if isinstance(kind, WrapValidator) else get_args(kind)
     return model
 
 

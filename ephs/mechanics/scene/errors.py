@@ -143,6 +143,12 @@ TEXTS: dict[str, tuple[str, str]] = {
     "mesh": ("a file in the scene's folder or below", "move it there, and give its path from the scene file"),
     "mesh kind": ("a mesh that ends in one of {known}", "convert it to one of these"),
     "both shapes": ("either shape or shapes", "take one of the two out"),
+    "density": ("density without mass and inertia", "leave out mass and inertia, or density"),
+    "density shape": ("box, sphere or cylinder shapes", "give mass and inertia, or such shapes"),
+    "centre": (
+        "shapes whose common centre of mass is the origin of the body's frame",
+        "shift the positions of the shapes by {shift}",
+    ),
     "only mesh": ("no scale for a {kind}", "scale belongs to meshes only"),
     "shape": ("one of box, sphere, cylinder, mesh", "a shape has exactly one of these keys"),
     # bodies

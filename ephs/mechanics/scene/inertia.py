@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from ephs.mechanics.scene.entries import shown
 from ephs.mechanics.scene.errors import Fault, fault
-from ephs.mechanics.scene.schema import BodyEntry
 from ephs.mechanics.scene.values import TOLERANCE
 
 Array = NDArray[np.float64]
@@ -23,39 +22,41 @@ GYRATION = 1e-20
 
 
 def mass_and_inertia(
-    entry: BodyEntry, key: str, mode: str, faults: list[Fault], odd: list[Fault]
+    mass: float, moments: list[float], key: str, mode: str, faults: list[Fault], odd: list[Fault]
 ) -> tuple[float, Array]:
     """The mass, and the inertia tensor (3, 3), of a body.
 
     Parameters
     ----------
+    moments
+        xx yy zz [xy xz yz].
     mode
         ``"strict"``: what is impossible is appended to ``faults``; ``"warn"``: it is kept, and appended to ``odd``;
         ``"nearest"``: the possible tensor nearest to it is taken, and both are appended to ``odd``.
     """
-    xx, yy, zz, xy, xz, yz = (*entry.inertia, 0.0, 0.0, 0.0)[:6]
+    xx, yy, zz, xy, xz, yz = (*moments, 0.0, 0.0, 0.0)[:6]
     tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    mass, strict, where = entry.mass, mode == "strict", f"{key}.inertia"
+    strict, where = mode == "strict", f"{key}.inertia"
     if mass == 0.0 and strict and tensor.any():
-        faults.append(fault("massless", where, shown(entry.inertia)))
+        faults.append(fault("massless", where, shown(moments)))
         return mass, tensor
     if not tensor.any() and mass == 0.0:
         return mass, tensor
-    moments = np.linalg.eigvalsh(tensor)
-    wrong = _wrong(moments)
+    principal = np.linalg.eigvalsh(tensor)
+    wrong = _wrong(principal)
     if strict:
-        if not wrong and moments[0] <= 0.1 * TINY * moments[2]:
+        if not wrong and principal[0] <= 0.1 * TINY * principal[2]:
             wrong = "inertia singular"
         if wrong:
-            faults.append(fault(wrong, where, _text(moments)))
+            faults.append(fault(wrong, where, _text(principal)))
         return mass, tensor
     if wrong and mode == "nearest":
         tensor = nearest_inertia(tensor)
-        odd.append(fault("inertia nearest", where, _text(moments), taken=_text(np.linalg.eigvalsh(tensor))))
+        odd.append(fault("inertia nearest", where, _text(principal), taken=_text(np.linalg.eigvalsh(tensor))))
     mass, tensor = _regular(mass, tensor, key, odd)
-    moments = np.linalg.eigvalsh(tensor)
-    if mode == "warn" and _wrong(moments):
-        odd.append(fault("inertia kept", where, _text(moments)))
+    principal = np.linalg.eigvalsh(tensor)
+    if mode == "warn" and _wrong(principal):
+        odd.append(fault("inertia kept", where, _text(principal)))
     return mass, tensor
 
 

@@ -16,6 +16,7 @@ from ephs.mechanics.scene.entries import Checked, Document, shown
 from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing
 from ephs.mechanics.scene.flexible import Load, Strain
 from ephs.mechanics.scene.geometry import Coupling, coupling, joint_types
+from ephs.mechanics.scene.homogeneous import mass_and_moments
 from ephs.mechanics.scene.inertia import mass_and_inertia
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Conduction, Marker, Spring, ThermalNode, World, frozen
 from ephs.mechanics.scene.placing import Place, resolve_place
@@ -100,9 +101,9 @@ def resolve_body(
 ) -> BodyDraft:
     """A body with its inertia checked; what ``mode`` lets through of it is appended to ``odd``."""
     entry, key = table.entry, f"bodies.{name}"
-    mass, tensor = entry.mass, np.eye(3)
-    if table.sound("inertia"):  # a faulty mass stands as 1 here
-        mass, tensor = mass_and_inertia(entry, key, mode, faults, odd)
+    mass, tensor = 1.0, np.eye(3)
+    if found := mass_and_moments(table, key, faults):
+        mass, tensor = mass_and_inertia(*found, key, mode, faults, odd)
     shape = [_shape(entry.shape, f"{key}.shape", folder, faults)] if entry.shape and table.sound("shape") else [None]
     shapes: list[Mapping[str, Any] | None] = []
     if entry.shapes and table.sound("shapes"):

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
+from ephs.mechanics.scene.rotations import Rotation
 from ephs.mechanics.scene.schema_flexible import BeamEntry, LoadEntry
 from ephs.mechanics.scene.schema_numbers import (
     Entry,
@@ -20,7 +21,6 @@ from ephs.mechanics.scene.schema_numbers import (
     Numbers,
     Pair,
     Positive,
-    Quaternion,
     Sizes,
     Text,
     Vector,
@@ -48,7 +48,7 @@ class AssemblyEntry(Entry):
 
 
 class ShapeEntry(Entry):
-    """``shape``, for pictures only: one of four, and where it is in the body."""
+    """``shape``: one of four, and its pose in the body."""
 
     box: Annotated[list[Positive], Field(min_length=3, max_length=3)] | None = Field(
         default=None, description="edge lengths, m"
@@ -62,19 +62,28 @@ class ShapeEntry(Entry):
     )
     scale: Vector | None = Field(default=None, description="of a mesh, along its axes")
     position: Vector | None = Field(default=None, description="in the centre-of-mass frame, m")
-    rotation: Quaternion | None = Field(default=None, description="likewise, unit quaternion [w, x, y, z]")
+    rotation: Rotation | None = Field(default=None, description="likewise, [w, x, y, z] or a table")
 
 
 class BodyEntry(Entry):
     """``[bodies.NAME]``"""
 
-    mass: NonNegative = Field(description="kg; 0 needs inertia 0")
-    inertia: Inertia = Field(description="about the centre of mass, body axes: xx yy zz [xy xz yz], kg m²")
+    mass: NonNegative | None = Field(default=None, description="kg; 0 needs inertia 0; needed without density")
+    inertia: Inertia | None = Field(
+        default=None,
+        description="about the centre of mass, body axes: xx yy zz [xy xz yz], kg m²; "
+        "default: that of the shapes, homogeneous",
+    )
+    density: Positive | None = Field(
+        default=None, description="of the shapes, kg/m³; gives mass and inertia, which are then left out"
+    )
     position: Vector | None = Field(default=None, description="centre of mass in the world, m")
-    rotation: Quaternion | None = Field(default=None, description="body to world, unit quaternion [w, x, y, z]")
+    rotation: Rotation | None = Field(default=None, description="body to world, [w, x, y, z] or a table")
     velocity: Vector | None = Field(default=None, description="of the centre of mass, world basis, m/s")
     angular_velocity: Vector | None = Field(default=None, description="body basis, rad/s")
-    shape: ShapeEntry | None = Field(default=None, description="for pictures only")
+    shape: ShapeEntry | None = Field(
+        default=None, description="drawn; also the distribution of mass where no inertia is given"
+    )
     shapes: list[ShapeEntry] | None = Field(default=None, description="instead of shape: several")
 
 
@@ -82,7 +91,7 @@ class FrameEntry(Entry):
     """A pose in a body's centre-of-mass frame."""
 
     position: Vector = Field(default=[0.0, 0.0, 0.0], description="m")
-    rotation: Quaternion = Field(default=[1.0, 0.0, 0.0, 0.0], description="unit quaternion [w, x, y, z]")
+    rotation: Rotation = Field(default=[1.0, 0.0, 0.0, 0.0], description="[w, x, y, z] or a table")
 
 
 class MotionEntry(Entry):
@@ -171,7 +180,7 @@ class SurfaceEntry(ContactLawEntry):
     body: Text = Field(description='the body that has it, or "ground"')
     shape: SurfaceShapeEntry = Field(description="sphere, capsule, cylinder, box or plane")
     position: Vector | None = Field(default=None, description="in the centre-of-mass frame (ground: world), m")
-    rotation: Quaternion | None = Field(default=None, description="likewise, unit quaternion [w, x, y, z]")
+    rotation: Rotation | None = Field(default=None, description="likewise, [w, x, y, z] or a table")
 
 
 class ContactEntry(ContactLawEntry):
@@ -206,7 +215,7 @@ class PartEntry(Entry):
 
     use: Text = Field(description="another scene file or model, in the folder of the file that is read, or below")
     position: Vector = Field(default=[0.0, 0.0, 0.0], description="of the part's ground in this world, m")
-    rotation: Quaternion = Field(default=[1.0, 0.0, 0.0, 0.0], description="unit quaternion [w, x, y, z]")
+    rotation: Rotation = Field(default=[1.0, 0.0, 0.0, 0.0], description="[w, x, y, z] or a table")
 
 
 class SceneFile(Entry):

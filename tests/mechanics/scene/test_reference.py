@@ -1,14 +1,13 @@
 """The reference of scene files says all that the schema says, in the schema's words."""
 
 import re
-from pathlib import Path
 
 import pytest
 
 from ephs.mechanics.scene import schema
 from ephs.mechanics.scene.reference import TOP, scene_tables
+from tests.scene_page import PAGE, written
 
-PAGE = Path(__file__).resolve().parents[3] / "docs" / "scene-file.md"
 MODELS = [each for each in vars(schema).values() if isinstance(each, type) and issubclass(each, schema.Entry)]
 
 
@@ -44,6 +43,8 @@ def test_types_are_in_words():
     )
 
 
-def test_the_page_shows_every_table_once():
-    shown = re.findall(r'^show\("(.*)"\)$', PAGE.read_text(encoding="utf-8"), re.MULTILINE)
+def test_the_page_shows_every_table_once_as_the_schema_has_it():
+    page = PAGE.read_text(encoding="utf-8")
+    shown = re.findall(r"^<!-- table (.+) -->$", page, re.MULTILINE)
     assert sorted(shown) == sorted(scene_tables())
+    assert written(page) == page, "run python -m tests.scene_page"
