@@ -55,7 +55,10 @@ DERIVATIVES = (
     "ephs/mechanics/tree/sweeps/edges.py",
     "ephs/mechanics/tree/sweeps/inverse.py",
     "ephs/mechanics/tree/engine/laws.py",
+    "ephs/mechanics/tree/engine/tangents.py",
     "ephs/mechanics/tree/equations/slopes.py",
+    "ephs/mechanics/sensitivity/explicit.py",
+    "ephs/semantics/stage/duals.py",
 )
 
 GROUPS = {
@@ -171,6 +174,8 @@ GROUPS = {
             f"{MECHANICS}/dynamics",
             f"{MECHANICS}/methods/test_error_estimates.py",
             f"{MECHANICS}/methods/test_variational_steps.py",
+            f"{MECHANICS}/sensitivity/test_exact.py",
+            "tests/semantics/stage/test_duals.py",
         ),
         pace=LONG,
     ),

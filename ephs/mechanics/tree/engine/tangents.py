@@ -34,7 +34,7 @@ from ephs.semantics.stage.memory import ArrayIntegers
 from ephs.solve.march import TABLEAU, Control, Tableau
 from ephs.solve.march.steps import attempt
 
-__all__ = ["DIRECTIONS", "StepTangent", "step_program"]
+__all__ = ["DIRECTIONS", "StepTangent", "evaluated", "step_program", "step_tangents"]
 
 DIRECTIONS: Final = 4
 """Directions of one call: vector units take four."""
@@ -125,6 +125,10 @@ class StepTangent:
     ----------
     slopes
         Of the real numbers of each table, (…, directions), by its name: set before steps.
+    arguments
+        What the programs take, by name: pairs of numbers and slopes.
+    pairs, stage
+        States, rates and memory among them; rates at (base, start).
     """
 
     def __init__(
@@ -135,6 +139,7 @@ class StepTangent:
         self.slopes: dict[str, Array] = {}
         tables = {**engine.tables, **_of_tangents(engine, relation)}
         arguments: dict[str, Any] = {"tables": {}, "work": {}, "tableau": {}}
+        self.arguments = arguments
         for key, values in (("tables", tables), ("work", engine.work), ("tableau", tableau)):
             for name, value in values.items():
                 kept = self.slopes if key == "tables" else {}
@@ -145,8 +150,8 @@ class StepTangent:
         }  # fmt: skip
         self.pairs = {name: _pair(np.zeros(shape)) for name, shape in shapes.items()}
         self.stage = _pair(np.zeros(size))
-        arguments |= {"control": _paired(Control.table(1), {}, ""), "h": 0.0, **self.pairs}
-        program = _tangents(engine.looped).compiled()
+        arguments.update({"control": _paired(Control.table(1), {}, ""), "h": 0.0, **self.pairs})
+        program = step_tangents(engine.looped).compiled()
 
         def bound(name: str, **others: Any) -> Any:
             given = {**arguments, **others}
@@ -173,7 +178,8 @@ class StepTangent:
 
 
 @cache
-def _tangents(looped: bool) -> Program:
+def step_tangents(looped: bool) -> Program:
+    """Return the same over dual numbers."""
     program = step_program(looped=looped)
     return Program(
         f"{program.name}_along_{DIRECTIONS}",
@@ -205,7 +211,7 @@ def _of_tangents(engine: Engine, relation: Callable[[int], tuple[Program, str]])
     own, component = _copied(engine.tables["own"]), _copied(engine.tables["component"])
     for name, (program, entry) in engine.reached.items():
         setattr(own[0], name, program.tangent(DIRECTIONS).compiled()[entry].address)
-    for number in _evaluated(engine.tables):
+    for number in evaluated(engine.tables):
         program, entry = relation(number)
         component[number].law = program.tangent(DIRECTIONS).compiled()[entry].address
     return {"own": own, "component": component}
@@ -215,8 +221,8 @@ def _copied(rows: Table[Any]) -> Table[Any]:
     return Table(rows.record, ArrayIntegers(rows.arrays[0].copy()), rows.reals, rows.size)
 
 
-def _evaluated(tables: Mapping[str, Any]) -> Sequence[int]:
-    """Numbers of the components that the equations evaluate."""
+def evaluated(tables: Mapping[str, Any]) -> Sequence[int]:
+    """Return the numbers of the components that equations with these tables evaluate."""
     acting, node, conduction = tables["acting"], tables["node"], tables["conduction"]
     found = {int(row.component) for rows in (node, conduction) for row in _rows(rows)}
     found |= {int(number) for row in _rows(acting) for number in (row.spring, row.friction)}
