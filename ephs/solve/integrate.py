@@ -20,7 +20,7 @@ from ephs.solve.errors import Interrupted, OptionError, Outcome, SimulationError
 from ephs.solve.journal import Written
 from ephs.solve.methods.driven import ComponentMethod, advance_driven, advance_whole, started
 from ephs.solve.methods.natural import Chunk, Natural, NaturalState
-from ephs.solve.methods.natural_kernels import IRREVERSIBLE
+from ephs.solve.methods.records import IRREVERSIBLE
 from ephs.solve.model import Model, compile_model
 from ephs.solve.problem import Problem, States
 from ephs.solve.result.labels import labels_of

@@ -6,7 +6,7 @@ are placed at once.
 
 import ctypes
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, final
 
 import numpy as np
@@ -16,7 +16,7 @@ from ephs.semantics.checks import random_efforts, random_point
 from ephs.semantics.kernel_table import Callback, address_of, prototype
 from ephs.semantics.numbering import Index, spans, starts
 from ephs.semantics.primitives import Primitive, Reversible, Storage
-from ephs.solve.methods.natural_kernels import IRREVERSIBLE, REVERSIBLE, STORING, Tables
+from ephs.solve.methods.records import IRREVERSIBLE, REVERSIBLE, STORING, Tables
 
 __all__ = ["Entry", "entry_of", "laid_out"]
 
@@ -73,12 +73,17 @@ def laid_out(t: Tables, primitive: Index, entries: Sequence[Entry], reference: R
     template = np.zeros(place.size + size)
     np.add.at(template, found[: values.size], values)
     diagonal = np.arange(size, dtype=np.int64)  # entries of their own, which hold what the loop adds
-    return t._replace(
+    row, column = place // size, place % size
+    by_effort = (column >= t.counts[0]) & (column < t.counts[0] + t.counts[1])
+    return replace(
+        t,
         jacobian=np.append(found[values.size : -1], 0),
         jacobian_at=j_at,
-        row=np.concatenate([place // size, diagonal]),
-        column=np.concatenate([place % size, diagonal]),
+        row=np.concatenate([row, diagonal]),
+        column=np.concatenate([column, diagonal]),
         template=template,
+        constraining=np.flatnonzero(by_effort & (row >= t.counts[0] + t.counts[1])),
+        balancing=np.flatnonzero(by_effort & (row >= t.counts[0]) & (row < t.counts[0] + t.counts[1])),
     )
 
 

@@ -14,10 +14,12 @@ from ephs.semantics.numbering import spans, starts, sums
 from ephs.semantics.primitives import Primitive
 from ephs.semantics.spaces import manifold
 from ephs.solve.layout import entry_of, laid_out
-from ephs.solve.methods.natural_kernels import STORING, Memory, Tables, evaluate
+from ephs.solve.methods.newton import natural_program
+from ephs.solve.methods.records import STORING, Memory, MemoryOf, Tables, TablesOf, parts_of
+from ephs.solve.methods.residuals import FAULTS
 from ephs.solve.sparse import Index
 
-__all__ = ["Model", "compile_model"]
+__all__ = ["Evaluation", "Model", "compile_model", "evaluate_at"]
 
 
 @final
@@ -65,7 +67,7 @@ class Model:
         t = self.tables
         n, k, nv, nx = (int(t.dims[:, i].max(initial=0)) for i in range(4))
         size, rows = int(t.row.size), self.unknowns
-        return Memory(
+        return MemoryOf(
             e=np.zeros(n + 1),
             lam=np.zeros(k + 1),
             v=np.zeros(max(nv, 6) + 1),
@@ -94,7 +96,7 @@ class Model:
         keys = (
             "kind", "address", "dims", "parameter_at", "e_at", "multiplier_at", "read_x_at", "read_w_at", "jacobian_at"
         )  # fmt: skip
-        return replace(self, tables=t._replace(**{key: getattr(t, key)[stored] for key in keys}))
+        return replace(self, tables=replace(t, **{key: getattr(t, key)[stored] for key in keys}))
 
     def path_of(self, component: int) -> Path:
         """The path of a component by its number."""
@@ -192,9 +194,9 @@ def compile_model(
         at += dim
         unknown += dim if prescribed else 0
     block, group = _blocks(d, given)
-    table = Tables(
+    table = TablesOf(
         counts=np.array([n_rate, n_effort, n_lam, size], dtype=np.int64),
-        kind=kinds,
+        kind=np.ascontiguousarray(kinds),
         address=np.array([entry.address for entry in each], dtype=np.int64)[n.primitive],
         dims=dims,
         parameters=np.append(known[spans(known_at, numbers)], 0.0),
@@ -214,6 +216,8 @@ def compile_model(
         row=np.zeros(1, dtype=np.int64),
         column=np.zeros(1, dtype=np.int64),
         template=np.zeros(1),
+        constraining=np.zeros(0, dtype=np.int64),
+        balancing=np.zeros(0, dtype=np.int64),
         block=block,
         group=group,
         outer=np.array(outer, dtype=np.int64).reshape(-1, 4),
@@ -261,8 +265,53 @@ def _blocks(d: Descriptor, given: Mapping[Path, Input]) -> tuple[Index, Index]:
     return np.repeat(np.arange(length.size), length), group
 
 
+@final
+class Evaluation:
+    """Residual, matrix and ledgers of a model at points, in memory of its own: use one for each thread.
+
+    Attributes
+    ----------
+    memory
+        Holds what was found last.
+    """
+
+    def __init__(self, model: Model) -> None:
+        self.model, self.memory = model, model.memory()
+        d, inputs = model.descriptor, model.input_values()
+        self._x, self._z = np.zeros(d.point_size), np.zeros(model.unknowns)
+        self._scal, self._inputs, self._sums = model.scal(0.0), inputs, np.zeros(4 + model.tables.kind.size)
+        calls, t, m = natural_program().compiled(), parts_of(model.tables), parts_of(self.memory)
+        self._evaluate = calls["evaluate"].bind(t, self._x, self._z, self._scal, self._inputs, m)
+        self._calls, self._parts = calls, (t, m)
+
+    def at(self, x: Array, z: Array, h: float, inputs: Array | None = None) -> tuple[int, int]:
+        """Evaluate at states and unknowns, over a step: (status, component).
+
+        Parameters
+        ----------
+        inputs
+            Values at the outer ports, the model's own where None.
+        """
+        self._x[:], self._z[:], self._scal[0] = x, z, h
+        given = self.model.input_values() if inputs is None else inputs
+        self._inputs[: given.size] = given
+        fault = int(self._evaluate())
+        return fault % FAULTS, fault // FAULTS
+
+    def ledgers(self, h: float) -> Array:
+        """(4 + components,): heat, energy and exergy supplied, entropy made in a step of h, and by each component."""
+        t, m = self._parts
+        self._sums[:] = 0.0
+        self._calls["account"](t, self._z, h, self._inputs, m, self._sums)
+        return self._sums.copy()
+
+    def measure(self, dropped: Index) -> float:
+        """The largest residual relative to its scale; those that are dropped become the unknown itself."""
+        t, m = self._parts
+        return float(self._calls["measure"](t, self._z, dropped, m))
+
+
 def evaluate_at(model: Model, x: Array, z: Array, h: float) -> tuple[int, int, Memory]:
     """Residual and matrix at a point, for analysis and tests: (status, component, memory that holds them)."""
-    memory = model.memory()
-    status, component = evaluate(model.tables, x, z, model.scal(h), model.input_values(), memory)
-    return int(status), int(component), memory
+    evaluation = Evaluation(model)
+    return *evaluation.at(x, z, h), evaluation.memory

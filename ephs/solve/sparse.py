@@ -5,7 +5,6 @@ is then known, and each later factorisation only computes numbers in fixed place
 """
 
 from dataclasses import dataclass
-from functools import cache
 from typing import final
 
 import numpy as np
@@ -43,13 +42,6 @@ class Elimination:
     def fill(self) -> int:
         """Number of entries of both factors."""
         return int(self.column.size)
-
-
-@cache
-def lu_addresses() -> Index:
-    """Return the addresses of factorise and solve in machine code."""
-    calls = sparse_lu().compiled()
-    return np.array([calls["factorise"].address, calls["solve"].address])
 
 
 def order(n: int, row: Index, column: Index, value: Array) -> Elimination:

@@ -141,14 +141,18 @@ GROUPS = {
     ),
     "kernels": Group(
         (
-            "ephs/solve/methods/natural_kernels.py",
-            "ephs/solve/methods/gauss_kernels.py",
+            "ephs/solve/methods/corrections.py",
+            "ephs/solve/methods/gauss.py",
+            "ephs/solve/methods/newton.py",
+            "ephs/solve/methods/residuals.py",
+            "ephs/solve/methods/scales.py",
+            "ephs/solve/methods/stages.py",
         ),
         (
             *RUNS,
             f"{MECHANICS}/dynamics/test_dynamics.py",
-            "tests/solve/test_gauss_kernels.py",
-            "tests/solve/test_natural_kernels.py",
+            "tests/solve/test_natural4.py",
+            "tests/solve/test_residuals.py",
             f"{MECHANICS}/test_redundancy.py",
         ),
         pace=LONG,

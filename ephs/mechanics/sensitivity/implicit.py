@@ -18,8 +18,8 @@ from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.rank import IMPLICIT
 from ephs.solve.errors import OptionError, SolveError
 from ephs.solve.methods.natural import Natural, NaturalState, stored_energies
-from ephs.solve.methods.natural_kernels import Memory, account, evaluate
-from ephs.solve.model import Model, compile_model
+from ephs.solve.methods.records import Memory
+from ephs.solve.model import Evaluation, Model, compile_model
 from ephs.solve.problem import Problem
 from ephs.solve.stepping import Row
 
@@ -43,27 +43,33 @@ class Point:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class _Side:
-    """A problem, its model, and memory to evaluate it in."""
+    """A problem, and the evaluation of its model."""
 
     problem: Problem
-    model: Model
-    memory: Memory
-    given: Array
+    evaluation: Evaluation
 
     @staticmethod
     def of(problem: Problem, t0: float) -> "_Side":
         model = compile_model(problem.descriptor, problem.reference, problem.inputs(t0, problem.initial))
-        return _Side(problem, model, model.memory(), model.input_values())
+        return _Side(problem, Evaluation(model))
+
+    @property
+    def model(self) -> Model:
+        """The model."""
+        return self.evaluation.model
+
+    @property
+    def memory(self) -> Memory:
+        """What was evaluated last."""
+        return self.evaluation.memory
 
     def whole(self, x: Array, z: Array, h: float) -> Array:
         """The residual, then what the step adds to the ledgers."""
-        m, scal = self.memory, self.model.scal(h)
-        status, component = evaluate(self.model.tables, x, z, scal, self.given, m)
+        status, component = self.evaluation.at(x, z, h)
         if status:
-            raise SolveError.of_component(int(status), self.model, int(component))
-        sums = np.zeros(4 + self.model.tables.kind.size)
-        account(self.model.tables, z, scal, self.given, m, sums)
-        return np.concatenate([m.residual, sums])
+            raise SolveError.of_component(status, self.model, component)
+        sums = self.evaluation.ledgers(h)
+        return np.concatenate([self.memory.residual, sums])
 
 
 @final

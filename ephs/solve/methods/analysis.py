@@ -4,7 +4,7 @@ Rank is decided on the constraint matrix, its columns scaled by the square root 
 show over a step, (mass/h)^(−1/2); never on the saddle-point matrix, whose pivots are squares of singular values.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, final
 
@@ -15,9 +15,9 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.linear.sparse import sparse_lu
 from ephs.semantics.spaces.rank import FOLLOWED, IMPLICIT, REGULAR, rank_of
 from ephs.solve.errors import SolveError
-from ephs.solve.methods.natural_kernels import STORING, Order
+from ephs.solve.methods.records import STORING, Order, OrderOf
 from ephs.solve.model import Model, evaluate_at
-from ephs.solve.sparse import Index, lu_addresses, order
+from ephs.solve.sparse import Index, order
 
 __all__ = ["Analysis", "analyse", "dependent_rows", "exchanged"]
 
@@ -83,7 +83,7 @@ def analyse(model: Model, x: Array, z: Array, h: float, before: Index | None = N
         raise SolveError.undetermined(model, _null_unknown(model, chosen, data)) from error
     place = np.full(t.row.size, -1, dtype=np.int64)
     place[chosen] = elimination.place
-    compiled = Order(
+    compiled = OrderOf(
         rows=elimination.rows,
         columns=elimination.columns,
         start=elimination.start,
@@ -93,14 +93,13 @@ def analyse(model: Model, x: Array, z: Array, h: float, before: Index | None = N
         dropped=dropped,
         floor=np.zeros(size),
         tolerance=np.array([DEFECT]),
-        lu=lu_addresses(),
     )
     c, ratio = compiled, np.zeros(size)
     factors, scratch = np.zeros(elimination.fill), np.zeros(size)
     factorise = sparse_lu().compiled()["factorise"]
     if not factorise(c.place, c.start, c.entry, c.diagonal, data, factors, scratch, c.floor, ratio):
         raise SolveError.undetermined(model, _null_unknown(model, chosen, data))
-    compiled = compiled._replace(floor=SHRUNK * ratio)
+    compiled = replace(compiled, floor=SHRUNK * ratio)
     redundant = tuple(model.row_name(int(row)) for row in np.flatnonzero(dropped))
     return Analysis(compiled, dropped, redundant, elimination.fill)
 

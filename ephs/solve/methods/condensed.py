@@ -17,8 +17,7 @@ from ephs.semantics.numbering import Index, starts
 from ephs.semantics.spaces.rank import IMPLICIT
 from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.methods.natural import guessed_efforts
-from ephs.solve.methods.natural_kernels import measure
-from ephs.solve.model import Model, evaluate_at
+from ephs.solve.model import Evaluation, Model
 from ephs.solve.sparse import equilibrate
 
 __all__ = ["condensed", "solved_by_parts"]
@@ -40,11 +39,13 @@ def solved_by_parts(model: Model, x: Array, h: float) -> Array:
     """
     z, before = guessed_efforts(model, x), np.inf
     kept = np.zeros(model.unknowns, dtype=np.int64)
+    evaluation = Evaluation(model)
+    memory = evaluation.memory
     for _ in range(MOST):
-        status, component, memory = evaluate_at(model, x, z, h)
+        status, component = evaluation.at(x, z, h)
         if status:
             raise SolveError.of_component(status, model, component)
-        ratio = float(measure(model.tables, z, kept, memory))
+        ratio = evaluation.measure(kept)
         if not np.isfinite(ratio):
             break
         if ratio <= SOLVED or (ratio < STALLED and ratio > 0.7 * before):

@@ -12,8 +12,8 @@ from scipy.sparse import csc_array
 
 from ephs.semantics.bundle import Array
 from ephs.solve.errors import SolveError
-from ephs.solve.methods.natural_kernels import STORING, Memory, account, evaluate
-from ephs.solve.model import Model
+from ephs.solve.methods.records import STORING
+from ephs.solve.model import Evaluation, Model
 
 __all__ = ["Continuous", "Matrices"]
 
@@ -41,8 +41,8 @@ class Continuous:
 
     def __init__(self, model: Model) -> None:
         self.model = model
-        self._memory: Memory = model.memory()
-        self._still, self._unit = model.scal(0.0), model.scal(1.0)
+        self._evaluation = Evaluation(model)
+        self._memory = self._evaluation.memory
 
     def residual(self, x: Array, z: Array, inputs: Array) -> Array:
         """g(x, z), (n,).
@@ -52,7 +52,7 @@ class Continuous:
         SolveError
             A component cannot be evaluated there.
         """
-        self._evaluate(x, z, self._still, inputs)
+        self._evaluate(x, z, 0.0, inputs)
         return self._memory.residual.copy()
 
     def matrices(self, x: Array, z: Array, inputs: Array) -> Matrices:
@@ -63,29 +63,27 @@ class Continuous:
         def whole(data: Array) -> csc_array:
             return csc_array((data, (t.row, t.column)), shape=(n, n))
 
-        self._evaluate(x, z, self._still, inputs)
+        self._evaluate(x, z, 0.0, inputs)
         unknowns = self._memory.data.copy()
         # Increments of unit length but zero size: what is added are derivatives by the increments.
         rest = z.copy()
         rest[: t.counts[0]] = 0.0
-        self._evaluate(x, rest, self._unit, inputs)
+        self._evaluate(x, rest, 1.0, inputs)
         states = 2.0 * (self._memory.data - unknowns)
         return Matrices(whole(unknowns), whole(states))
 
     def powers(self, x: Array, z: Array, inputs: Array) -> tuple[Array, Array]:
         """Rates of the ledgers, per second, (4 + components,): heat, energy, exergy supplied, entropy made, and
         the entropy made by each component; and the flows into the ports of all components but storages."""
-        self._evaluate(x, z, self._still, inputs)
-        sums = np.zeros(4 + self.model.tables.kind.size)
-        account(self.model.tables, z, self._unit, inputs, self._memory, sums)
-        return sums, self._memory.flows.copy()
+        self._evaluate(x, z, 0.0, inputs)
+        return self._evaluation.ledgers(1.0), self._memory.flows.copy()
 
     def energies(self, x: Array, z: Array, inputs: Array) -> Array:
         """(components,): energy of each storage at the states x, zero elsewhere."""
-        self._evaluate(x, z, self._still, inputs)
+        self._evaluate(x, z, 0.0, inputs)
         return np.where(self.model.tables.kind == STORING, self._memory.energy, 0.0)
 
-    def _evaluate(self, x: Array, z: Array, scal: Array, inputs: Array) -> None:
-        status, component = evaluate(self.model.tables, x, z, scal, inputs, self._memory)
+    def _evaluate(self, x: Array, z: Array, h: float, inputs: Array) -> None:
+        status, component = self._evaluation.at(x, z, h, inputs)
         if status:
             raise SolveError.of_component(status, self.model, component)

@@ -3,8 +3,9 @@
 The state of the method is a value; advancing it is compiled, and gives one row of results a step.
 """
 
+from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import final
 
 import numpy as np
@@ -15,7 +16,8 @@ from ephs.semantics.numbering import spans
 from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.methods.analysis import Analysis, analyse
 from ephs.solve.methods.blame import Blame
-from ephs.solve.methods.natural_kernels import COMPONENT, DIVERGED, DONE, INCONSISTENT, PIVOT, Memory, advance
+from ephs.solve.methods.newton import natural_program
+from ephs.solve.methods.records import COMPONENT, DIVERGED, DONE, INCONSISTENT, PIVOT, Memory, Order, parts_of
 from ephs.solve.model import Model, evaluate_at
 from ephs.solve.snapshot import Snapshot, parts
 from ephs.solve.sparse import Index
@@ -99,6 +101,43 @@ class Chunk:
 
 
 @final
+class _Loop:
+    """The compiled loop over steps, bound to arrays of its own.
+
+    Attributes
+    ----------
+    order, room
+        The order of elimination, and how many steps there is room for.
+    rows
+        States, energies and ledgers, a row for each step that was taken last.
+    """
+
+    def __init__(self, model: Model, order: Order, memory: Memory, room: int) -> None:
+        components = model.tables.kind.size
+        self.order, self.room, self._scal, self._inputs = order, room, model.scal(0.0), model.input_values()
+        sizes = (model.descriptor.point_size, model.unknowns, model.unknowns, 4 + components)
+        self._state = [np.zeros(size) for size in sizes]
+        self.rows = [np.zeros((room, width)) for width in (sizes[0], components, 5)]
+        self._outcome = np.zeros(4, dtype=np.int64)
+        x, z, previous, sums = self._state
+        self._call = natural_program().compiled()["advance"].bind(
+            parts_of(model.tables), parts_of(order), parts_of(memory), x, z, previous, self._scal, self._inputs, sums,
+            *self.rows, self._outcome, 0,
+        )  # fmt: skip
+
+    def run(self, state: Sequence[Array], h: float, inputs: Array, steps: int) -> tuple[int, int, int, int]:
+        """Take steps in place of a state (x, z, previous, sums): status, component, steps done, iterations."""
+        self._scal[0], self._inputs[: inputs.size] = h, inputs
+        for own, given in zip(self._state, state, strict=True):
+            own[:] = given
+        self._call(steps)
+        for own, given in zip(self._state, state, strict=True):
+            given[:] = own
+        status, component, done, iterations = self._outcome.tolist()
+        return status, component, done, iterations
+
+
+@final
 class Natural:
     """The natural method for one model.
 
@@ -129,6 +168,7 @@ class Natural:
         self._unsettled = 0
         self._dropped: Index | None = None
         self._decided: Decided | None = None
+        self._bound: _Loop | None = None
 
     def init(self, x: Array) -> NaturalState:
         """The state of the method at the states x; unknowns are guessed from the efforts there."""
@@ -141,14 +181,7 @@ class Natural:
 
     def prepare(self, state: NaturalState, h: float) -> None:
         """Decide the order of elimination and compile what is not in the cache, before time counts."""
-        model = self.model
-        x, z, previous, sums = (a.copy() for a in (state.x, state.z, state.previous, state.sums))
-        order, rows = self._order(x, z, h).order, np.empty((0, x.size))
-        energies, ledgers = np.empty((0, model.tables.kind.size)), np.empty((0, 5))
-        advance(
-            model.tables, order, x, z, previous, model.scal(h), model.input_values(), self._memory, sums, 0,
-            rows, energies, ledgers,
-        )  # fmt: skip
+        self._loop(self._order(state.x, state.z, h).order, 1)
 
     def step(self, state: NaturalState, h: float, inputs: Array | None = None) -> NaturalState:
         """One step of h seconds.
@@ -173,12 +206,11 @@ class Natural:
         inputs
             (1, …) values at the outer ports during these steps, the model's own where None.
         """
-        model, t = self.model, self.model.tables
+        model = self.model
         given = model.input_values() if inputs is None else inputs[0]
         x, z, previous, sums = (a.copy() for a in (state.x, state.z, state.previous, state.sums))
         rows = np.empty((steps, x.size))
-        energies, ledgers = np.empty((steps, t.kind.size)), np.empty((steps, 5))
-        scal = model.scal(h)
+        energies, ledgers = np.empty((steps, model.tables.kind.size)), np.empty((steps, 5))
         done = iterations = 0
         failure: SolveError | None = None
         fresh = False
@@ -191,13 +223,13 @@ class Natural:
             order = analysis.order
             wanted = steps - done
             if fresh:  # nothing better is to be had: take this one step with whatever pivots there are
-                order, wanted = order._replace(floor=np.zeros_like(order.floor)), 1
+                order, wanted = replace(order, floor=np.zeros_like(order.floor)), 1
             elif self._unsettled:
                 wanted = min(wanted, self._unsettled)
-            status, component, taken, spent = advance(
-                t, order, x, z, previous, scal, given, self._memory, sums, wanted,
-                rows[done:], energies[done:], ledgers[done:],
-            )  # fmt: skip
+            loop = self._loop(order, wanted)
+            status, component, taken, spent = loop.run((x, z, previous, sums), h, given, wanted)
+            for out, found in zip((rows, energies, ledgers), loop.rows, strict=True):
+                out[done : done + taken] = found[:taken]
             done, iterations = done + taken, iterations + spent
             if status == DONE:
                 fresh = False
@@ -252,8 +284,14 @@ class Natural:
             self.analysis = analyse(self.model, x, z, h, self._dropped)
             self._dropped = self.analysis.dropped
             self.changes += 1
-            self._memory = self._memory._replace(factors=np.zeros(self.analysis.fill))
+            self._memory = replace(self._memory, factors=np.zeros(self.analysis.fill))
         return self.analysis
+
+    def _loop(self, order: Order, steps: int) -> "_Loop":
+        """The compiled loop in an order, with room for so many steps."""
+        if self._bound is None or self._bound.order is not order or self._bound.room < steps:
+            self._bound = _Loop(self.model, order, self._memory, steps)
+        return self._bound
 
     def _settle(self, taken: int) -> None:
         if self._unsettled:

@@ -1,9 +1,11 @@
 """The natural method of order 4: three Gauss stages, energy and holonomic relations exact, friction included.
 
-The corrections that make it so are one term a component (see `gauss_kernels`), so that discretising commutes with
+The corrections that make it so are one term a component (see `stages`), so that discretising commutes with
 composing as it does at order 2. A composition of steps of order 2 would have to step backwards through dissipation.
 """
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import final
 
 import numpy as np
@@ -18,8 +20,8 @@ from ephs.semantics.spaces.codes import SE3
 from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.methods.analysis import DEFECT, SHRUNK, analyse, dependent_rows
 from ephs.solve.methods.blame import Blame
-from ephs.solve.methods.collocation import moments, values
-from ephs.solve.methods.gauss_kernels import Groups, Scheme, Stages, gauss_advance, linearise
+from ephs.solve.methods.collocation import moments
+from ephs.solve.methods.gauss import gauss_program
 from ephs.solve.methods.natural import (
     Chunk,
     Decided,
@@ -29,10 +31,31 @@ from ephs.solve.methods.natural import (
     of_status,
     stored_energies,
 )
-from ephs.solve.methods.natural_kernels import COMPONENT, DIVERGED, DONE, INCONSISTENT, STORING, Memory, Order
+from ephs.solve.methods.records import (
+    COMPONENT,
+    DIVERGED,
+    DONE,
+    INCONSISTENT,
+    STORING,
+    Memory,
+    Order,
+    OrderOf,
+    parts_of,
+)
+from ephs.solve.methods.residuals import FAULTS
+from ephs.solve.methods.scheme import (
+    NODES,
+    SCHEME,
+    STAGES,
+    WEIGHTS,
+    Groups,
+    GroupsOf,
+    Stages,
+    StagesOf,
+)
 from ephs.solve.model import Model, evaluate_at
 from ephs.solve.snapshot import Snapshot, parts
-from ephs.solve.sparse import Index, lu_addresses, order
+from ephs.solve.sparse import Index, order
 
 __all__ = ["Natural4"]
 
@@ -42,10 +65,46 @@ INSTANT = 1e-7
 AS_BEFORE, AT_START, WITHIN = 0, 1, 2
 """Where the order of elimination of a step was decided: for a step before it, at its start, by its unknowns."""
 
-_STAGES = 3
-_NODES = 0.5 * (1.0 + np.polynomial.legendre.leggauss(_STAGES)[0])
-SCHEME = Scheme(np.array([moments(_NODES, c) for c in _NODES]), moments(_NODES, 1.0))
-AHEAD = np.array([values(_NODES, 1.0 + c) for c in _NODES])
+
+@final
+class _Loop:
+    """The compiled loop over steps of one model, bound to arrays of its own.
+
+    Attributes
+    ----------
+    order, room
+        The order of elimination, and how many steps there is room for.
+    rows
+        States, energies and ledgers, a row for each step that was taken last.
+    """
+
+    def __init__(self, model: Model, order: Order, groups: Groups, memory: Memory, stages: Stages, room: int) -> None:
+        components, n = model.tables.kind.size, model.unknowns
+        self.order, self.room, self._scal = order, room, model.scal(0.0)
+        self._inputs = np.zeros((STAGES, model.input_values().size))
+        self._state = [
+            np.zeros(model.descriptor.point_size), np.zeros((STAGES, n)), np.zeros((STAGES, n)),
+            np.zeros(4 + components),
+        ]  # fmt: skip
+        self.rows = [np.zeros((room, width)) for width in (self._state[0].size, components, 5)]
+        self._outcome = np.zeros(4, dtype=np.int64)
+        x, z, previous, sums = self._state
+        self._call = gauss_program().compiled()["advance"].bind(
+            parts_of(model.tables), parts_of(groups), parts_of(order), parts_of(memory), parts_of(stages), x, z,
+            previous, self._scal, model.scal(0.0), model.scal(INSTANT), self._inputs, SCHEME.ravel(), sums, *self.rows,
+            self._outcome, 0,
+        )  # fmt: skip
+
+    def run(self, state: Sequence[Array], h: float, inputs: Array, steps: int) -> tuple[int, int, int, int]:
+        """Take steps in place of a state (x, z, previous, sums): status, component, steps done, iterations."""
+        self._scal[0], self._inputs[:, : inputs.shape[1]] = h, inputs
+        for own, given in zip(self._state, state, strict=True):
+            own[:] = given
+        self._call(steps)
+        for own, given in zip(self._state, state, strict=True):
+            given[:] = own
+        status, component, done, iterations = self._outcome.tolist()
+        return status, component, done, iterations
 
 
 @final
@@ -64,7 +123,7 @@ class Natural4:
 
     name = "natural4"
     order = 4
-    nodes = tuple(_NODES.tolist())
+    nodes = tuple(NODES.tolist())
 
     def __init__(self, model: Model) -> None:
         self.model = model
@@ -72,28 +131,27 @@ class Natural4:
         self.redundant: tuple[str, ...] = ()
         t, n = model.tables, model.unknowns
         self._memory: Memory = model.memory()
-        self._where = _entries(model)
-        self._groups = _groups(model, self._where)
+        self._groups = _groups(model, _entries(model))
         self._closing = _closing(model, self._groups)
         size, entries, rates = int(model.descriptor.point_size), int(t.row.size), int(t.counts[0])
-        k, nodes = _STAGES, len(self._groups.node)
-        self._scratch = Stages(
+        k, nodes = STAGES, len(self._groups.node)
+        self._scratch = StagesOf(
             x=np.zeros((k, size)), v=np.zeros((k, rates)), turn=np.zeros((k, 8)), outer=np.zeros((k, 8)),
             whole=np.zeros(rates), mean=np.zeros(n), gradient=np.zeros(rates),
             share=np.zeros((nodes, k)), factor=np.zeros(nodes), end=np.zeros(nodes), gap=np.zeros(n),
             energy=np.zeros(t.kind.size), residual=np.zeros((k, n)), scale=np.zeros((k, n)),
-            data=np.zeros((k, entries)), slope=np.zeros((k, entries)), matrix=np.zeros(len(self._where)),
-            change=np.zeros(k * n), dense=np.zeros(k * n), factors=np.zeros(1), pivot=np.zeros(k * n),
-            small=np.zeros(200),
+            data=np.zeros((k, entries)), slope=np.zeros((k, entries)), matrix=np.zeros(len(self._groups.where)),
+            change=np.zeros(k * n), dense=np.zeros(k * n), pivot=np.zeros(k * n), one=np.zeros(8),
         )  # fmt: skip
         self._order: Order | None = None
+        self._bound: _Loop | None = None
         self._dropped: Index | None = None
         self._decided: Decided | None = None
         self._inputs, self._tried = np.zeros(0), AS_BEFORE
 
     def init(self, x: Array) -> NaturalState:
         """The state of the method at the states x; unknowns are guessed from the efforts there."""
-        z = np.tile(guessed_efforts(self.model, x), (_STAGES, 1))
+        z = np.tile(guessed_efforts(self.model, x), (STAGES, 1))
         return NaturalState(x.copy(), z, z.copy(), np.zeros(4 + len(self.model.descriptor.components)))
 
     def energies(self, x: Array) -> Array:
@@ -107,7 +165,7 @@ class Natural4:
     def points(self, state: NaturalState, h: float, x: Array) -> list[Array]:
         """The states at the nodes of a step from x, by the rates that ``state`` holds, continued."""
         d, rates = self.model.descriptor, int(self.model.tables.counts[0])
-        ahead = [moments(_NODES, 1.0 + c) - SCHEME.b for c in self.nodes]
+        ahead = [moments(NODES, 1.0 + c) - WEIGHTS for c in self.nodes]
         return [d.advance(x, h * (weights @ state.z[:, :rates])) for weights in ahead]
 
     def stage_points(self, state: NaturalState, h: float, x: Array) -> list[Array]:
@@ -125,11 +183,9 @@ class Natural4:
             (3, …) values at the outer ports at the nodes of these steps, the model's own where None.
         """
         model, t = self.model, self.model.tables
-        given = np.tile(model.input_values(), (_STAGES, 1)) if inputs is None else np.ascontiguousarray(inputs)
+        given = np.tile(model.input_values(), (STAGES, 1)) if inputs is None else np.ascontiguousarray(inputs)
         x, z, previous, sums = (a.copy() for a in (state.x, state.z, state.previous, state.sums))
         rows, energies, ledgers = np.empty((steps, x.size)), np.empty((steps, t.kind.size)), np.empty((steps, 5))
-        scal, still, unit = (model.scal(value) for value in (h, 0.0, INSTANT))
-        parts = np.array([model.scal(h * weight) for weight in SCHEME.b])
         done = iterations = 0
         failure: SolveError | None = None
         tried = AT_START if self._order is None else AS_BEFORE
@@ -141,12 +197,12 @@ class Natural4:
                 failure = error
                 break
             assert self._order is not None
-            o = self._order._replace(floor=np.zeros_like(self._order.floor)) if tried else self._order
+            o = replace(self._order, floor=np.zeros_like(self._order.floor)) if tried else self._order
             wanted = min(steps - done, 1) if tried else steps - done
-            status, component, taken, spent = gauss_advance(
-                t, self._groups, SCHEME, o, self._where, x, z, previous, scal, still, unit, parts, given, AHEAD,
-                self._memory, self._scratch, sums, wanted, rows[done:], energies[done:], ledgers[done:],
-            )  # fmt: skip
+            loop = self._loop(o, wanted)
+            status, component, taken, spent = loop.run((x, z, previous, sums), h, given, wanted)
+            for out, found in zip((rows, energies, ledgers), loop.rows, strict=True):
+                out[done : done + taken] = found[:taken]
             done, iterations = done + taken, iterations + spent
             if status == DONE:
                 tried = AS_BEFORE
@@ -182,6 +238,12 @@ class Natural4:
             self._decide(found["x"], found["z"], found["h"], snapshot["inputs"], snapshot["tried"])
         self._dropped, self.changes = snapshot["dropped"], snapshot["changes"]
 
+    def _loop(self, o: Order, steps: int) -> _Loop:
+        """The compiled loop in an order, with room for so many steps."""
+        if self._bound is None or self._bound.order is not o or self._bound.room < steps:
+            self._bound = _Loop(self.model, o, self._groups, self._memory, self._scratch, steps)
+        return self._bound
+
     def _decide(self, x: Array, z: Array, h: float, inputs: Array, tried: int) -> None:
         """Rank of the constraints, and an order of elimination for all stages, at these values.
 
@@ -202,55 +264,43 @@ class Natural4:
             values = np.where(np.isin(t.row, model.constraint_rows), memory.data, values)
         dropped = self._dropped = dependent_rows(model, values, self._dropped, self._closing)
         s = self._scratch
-        status, component = linearise(
-            t,
-            self._groups,
-            SCHEME,
-            dropped,
-            x,
-            z,
-            model.scal(h),
-            model.scal(0.0),
-            model.scal(INSTANT),
-            inputs,
-            self._memory,
-            s,
-            True,
-        )
-        if status:
-            raise SolveError.of_component(int(status), model, int(component))
-        where = self._where
+        fault = gauss_program().compiled()["linearise"](
+            parts_of(t), parts_of(self._groups), dropped, x, z, model.scal(h), model.scal(0.0), model.scal(INSTANT),
+            inputs, parts_of(self._memory), parts_of(s), 1,
+        )  # fmt: skip
+        if fault:
+            raise SolveError.of_component(fault % FAULTS, model, fault // FAULTS)
+        where = self._groups.where
         i, j, source = where.T
         inside = source >= 0
         rows = np.where(inside, t.row[source], -source - 1) + i * n
         columns = np.where(inside, t.column[source], -source - 1) + j * n
         in_rates = inside & (t.column[source] < t.counts[0])
         data = np.where(inside & (i == j), s.data[i, source], 0.0)
-        data += np.where(in_rates, h * SCHEME.a[i, j] * s.slope[i, source], 0.0)
+        data += np.where(in_rates, h * SCHEME[i, j] * s.slope[i, source], 0.0)
         out = dropped[np.where(inside, t.row[source], -source - 1)] == 1
         data[~inside] = 1.0
         active = np.where(inside, ~out, out)
         chosen = np.flatnonzero(active)
         entries = np.where(data[chosen] == 0.0, 1e-300, data[chosen])  # a place that is zero now may fill later
         try:
-            found = order(_STAGES * n, rows[chosen], columns[chosen], entries)
+            found = order(STAGES * n, rows[chosen], columns[chosen], entries)
         except RuntimeError as error:
             raise self._singular(x, z, h) from error
         place = np.full(len(where), -1, dtype=np.int64)
         place[chosen] = found.place
-        made = Order(
-            found.rows, found.columns, found.start, found.column, found.diagonal, place, np.tile(dropped, _STAGES),
-            np.zeros(_STAGES * n), np.array([DEFECT]), lu_addresses(),
+        made = OrderOf(
+            found.rows, found.columns, found.start, found.column, found.diagonal, place, np.tile(dropped, STAGES),
+            np.zeros(STAGES * n), np.array([DEFECT]),
         )  # fmt: skip
-        self._scratch = s._replace(factors=np.zeros(found.fill))
-        ratio = np.zeros(_STAGES * n)
+        self._memory, ratio = replace(self._memory, factors=np.zeros(found.fill)), np.zeros(STAGES * n)
         matrix = np.where(active, data, 0.0)
         factorise = sparse_lu().compiled()["factorise"]
         if not factorise(
-            place, made.start, made.entry, made.diagonal, matrix, self._scratch.factors, s.dense, made.floor, ratio
+            place, made.start, made.entry, made.diagonal, matrix, self._memory.factors, s.dense, made.floor, ratio
         ):
             raise self._singular(x, z, h)
-        self._order = made._replace(floor=SHRUNK * ratio)
+        self._order = replace(made, floor=SHRUNK * ratio)
         self.redundant = tuple(model.row_name(int(row)) for row in np.flatnonzero(dropped))
         self.changes += 1
 
@@ -279,33 +329,30 @@ def _groups(model: Model, where: Index) -> Groups:
                     metric[:dim, :dim] = matrix.T @ matrix
                     metrics.append(metric)
     table = np.array(rows, dtype=np.int64).reshape(-1, 4)
-    number, code, effort, dim = (np.ascontiguousarray(column) for column in table.T)
-    node, slope = _nodes(model)
-    place = {source: k for k, source in enumerate(slope.tolist())}
-    entry = np.zeros((len(node), _STAGES, _STAGES), dtype=np.int64)
+    node = _nodes(model)
+    place = {source: k for k, source in enumerate(node[:, 3].tolist())}
+    entry = np.zeros((len(node), STAGES, STAGES), dtype=np.int64)
     for k, (i, j, source) in enumerate(where.tolist()):
         if source in place:
             entry[place[source], i, j] = k
-    return Groups(number, code, effort, dim, np.array(metrics).reshape(-1, 6, 6), node, slope, entry)
+    return GroupsOf(table, np.array(metrics).ravel(), node, entry, where)
 
 
-def _nodes(model: Model) -> tuple[Index, Index]:
-    """(nodes, 3) and (nodes,): storages of entropy alone whose temperature depends on it, as `Groups` has them."""
+def _nodes(model: Model) -> Index:
+    """(nodes, 4): storages of entropy alone whose temperature depends on it, as `Groups` has them."""
     t = model.tables
-    found: list[tuple[int, int, int]] = []
-    slopes: list[int] = []
+    found: list[tuple[int, int, int, int]] = []
     for c in np.flatnonzero((t.kind == STORING) & (t.dims[:, 0] == 1)).tolist():
         effort, slope = int(t.e_index[t.e_at[c]]), int(t.jacobian[t.jacobian_at[c]])
         if t.entropy[effort] == 1.0 and slope >= 0:
-            found.append((c, int(t.read_w[t.read_w_at[c]]), int(t.counts[0]) + effort))
-            slopes.append(slope)
-    return np.array(found, dtype=np.int64).reshape(-1, 3), np.array(slopes, dtype=np.int64)
+            found.append((c, int(t.read_w[t.read_w_at[c]]), int(t.counts[0]) + effort, slope))
+    return np.array(found, dtype=np.int64).reshape(-1, 4)
 
 
 def _closing(model: Model, groups: Groups) -> NDArray[np.bool_]:
     """(rows,) the equations of components whose relation holds over a step."""
     t, out = model.tables, np.zeros(model.unknowns, dtype=np.bool_)
-    for number in np.unique(groups.component):
+    for number in np.unique(groups.velocity[:, 0]):
         first = int(t.counts[0] + t.counts[1] + t.multiplier_at[number])
         out[first : first + int(t.dims[number, 1])] = True
     return out
@@ -324,9 +371,9 @@ def _entries(model: Model) -> Index:
     t, n = model.tables, model.unknowns
     plain, rates = t.row.size - n, int(t.counts[0])
     out: list[tuple[int, int, int]] = []
-    for i in range(_STAGES):
+    for i in range(STAGES):
         for source in range(plain):
-            others = range(_STAGES) if t.column[source] < rates else (i,)
+            others = range(STAGES) if t.column[source] < rates else (i,)
             out += [(i, j, source) for j in others]
         out += [(i, i, -1 - row) for row in range(n)]
     return np.array(out, dtype=np.int64).reshape(-1, 3)

@@ -9,7 +9,7 @@ import numpy as np
 from ephs.semantics.bundle import Array
 from ephs.semantics.primitives import Storage
 from ephs.solve.heats import Heats, exponential_law
-from ephs.solve.methods.natural_kernels import IRREVERSIBLE, STORING
+from ephs.solve.methods.records import IRREVERSIBLE, STORING
 from ephs.solve.model import Model
 
 __all__ = ["Booked", "Passages"]

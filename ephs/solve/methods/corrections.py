@@ -1,0 +1,182 @@
+"""The corrections of the stages: one term a storage and one a joint, so that energy and positions are kept."""
+
+from collections.abc import Callable
+from typing import Final
+
+from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Truth, Vector
+from ephs.solve.methods.places import add_to, raise_to
+from ephs.solve.methods.records import STORING, Columns, Dims, row_of
+from ephs.solve.methods.scheme import SCHEME, STAGES, WEIGHTS, GroupColumns, Node, StageScratch, Velocity
+
+__all__ = ["bend", "correct_joints", "correct_storages", "rest"]
+
+_A: Final[list[list[float]]] = SCHEME.tolist()
+_B: Final[list[float]] = WEIGHTS.tolist()
+_NONE: Final = 1e-280
+"""Squares up to which there is nothing to correct along."""
+
+
+def rest(on: Evaluator, t: Columns, h: Real, slope: Vector, scale: Vector) -> None:
+    """At rest no effort has a size of its own: what the flows change it by in a step is one."""
+
+    def component(c: Integer) -> None:
+        n, e_at, w_at, j_at = row_of(Dims, t.dims, c).efforts, t.e_at[c], t.read_w_at[c], t.jacobian_at[c]
+
+        def row(j: Integer) -> None:
+            def entry(q: Integer) -> None:
+                place = t.jacobian[j_at + j * n + q]
+
+                def there() -> None:
+                    flow = scale[t.counts[0] + t.e_index[e_at + q]]
+                    raise_to(on, scale, t.read_w[w_at + j], on.absolute(h) * on.absolute(slope[place]) * flow)
+
+                on.when(place >= 0, there)
+
+            on.loop(n, entry)
+
+        on.when(on.same(t.kind[c], STORING), lambda: on.loop(n, row))
+
+    on.loop(t.kind.size, component)
+
+
+def bend(on: Evaluator, g: GroupColumns, h: Real, z: Matrix, s: StageScratch) -> None:
+    """Derivatives of the factors α of storages of entropy by the rates: their energies bend too much to leave them out.
+
+    A small capacity warms by orders of magnitude in a step; of other storages α is of the quadrature's order.
+    """
+
+    def node(k: Integer) -> None:
+        row = row_of(Node, g.node, k)
+        rate, effort = row.rate, row.effort
+        rates = [z[i, rate] for i in range(STAGES)]
+        defect, square = s.gradient[rate] * s.whole[rate] / h, 0.0
+        for i in range(STAGES):
+            defect = defect - _B[i] * (z[i, effort] - s.residual[i, rate]) * rates[i]
+            square = square + _B[i] * rates[i] * rates[i]
+        s.factor[k] = 0.0
+        for j in range(STAGES):
+            s.share[k, j] = 0.0
+
+        def bent() -> None:
+            factor = defect / square
+            s.factor[k] = factor
+            slopes = [s.slope[i, row.slope] for i in range(STAGES)]
+            for j in range(STAGES):
+                by = _B[j] * (s.end[k] - z[j, effort] + s.residual[j, rate])
+                for i in range(STAGES):
+                    by = by + h * _B[i] * _A[i][j] * rates[i] * slopes[i]
+                s.share[k, j] = (by - 2.0 * factor * _B[j] * rates[j]) / square
+
+        on.when(square > _NONE, bent)
+
+    on.loop(g.node.size // Node.integer_width, node)
+
+
+def correct_storages(on: Evaluator, t: Columns, h: Real, z: Matrix, s: StageScratch) -> None:
+    """Put the one-term corrections of the storages into the residuals of the stages."""
+    n_rate = t.counts[0]
+
+    def component(c: Integer) -> None:
+        n, e_at, w_at = row_of(Dims, t.dims, c).efforts, t.e_at[c], t.read_w_at[c]
+
+        def storing() -> None:
+            defect, square = on.variable(0.0), on.variable(0.0)
+
+            def port(j: Integer) -> None:
+                rate, effort = t.read_w[w_at + j], n_rate + t.e_index[e_at + j]
+                lost, moved = defect.value + s.gradient[rate] * s.whole[rate] / h, square.value
+                for i in range(STAGES):
+                    lost = lost - _B[i] * (z[i, effort] - s.residual[i, rate]) * z[i, rate]
+                    moved = moved + _B[i] * z[i, rate] * z[i, rate]
+                defect.value, square.value = lost, moved
+
+            def share(j: Integer) -> None:
+                rate = t.read_w[w_at + j]
+                for i in range(STAGES):
+                    s.residual[i, rate] = s.residual[i, rate] - defect.value / square.value * z[i, rate]
+
+            on.loop(n, port)
+            on.when(square.value > _NONE, lambda: on.loop(n, share))
+
+        on.when(on.same(t.kind[c], STORING), storing)
+
+    on.loop(t.kind.size, component)
+
+
+def correct_joints(on: Evaluator, t: Columns, g: GroupColumns, dropped: Integers, z: Matrix, s: StageScratch) -> None:
+    """Put the one-term corrections of the joints into the residuals of the stages.
+
+    Stages are off the positions of joints by the order of the quadrature. An equation that follows from the others
+    only where loops are closed (Bricard's linkage) is missed there by as much; over the step it holds, and that is its
+    residual.
+    """
+    n_rate, count = t.counts[0], g.velocity.size // Velocity.integer_width
+    at = on.counter(0)
+    square, power = on.variable(0.0), on.variable(0.0)
+
+    def velocity(k: Integer) -> Velocity:
+        return row_of(Velocity, g.velocity, k)
+
+    def pairs(k: Integer, do: Callable[[Integer, Integer, Real], None]) -> None:
+        row = velocity(k)
+        first = n_rate + row.effort
+
+        def left(j: Integer) -> None:
+            def right(q: Integer) -> None:
+                do(first + j, first + q, g.metric[36 * k + 6 * j + q])
+
+            on.loop(row.dim, right)
+
+        on.loop(row.dim, left)
+
+    def joint() -> Truth:
+        begin, component = at.value, velocity(at.value).component
+        first = n_rate + t.counts[1] + t.multiplier_at[component]
+        square.value, power.value = 0.0, 0.0
+
+        def squared(j: Integer, q: Integer, weight: Real) -> None:
+            def sum_up() -> None:
+                found = square.value
+                for i in range(STAGES):
+                    found = found + _B[i] * z[i, j] * weight * z[i, q]
+                square.value = found
+
+            on.when(on.absolute(weight) > 0.0, sum_up)
+
+        def another() -> Truth:
+            pairs(at.value, squared)
+            at.value = at.value + 1
+            more = on.variable(0.0)
+
+            def same() -> None:
+                more.value = on.select(on.same(velocity(at.value).component, component), 1.0, 0.0)
+
+            on.when(at.value < count, same)
+            return more.value <= 0.0
+
+        def condition(j: Integer) -> None:
+            row = first + j
+            delta, force = s.gap[row], 0.0
+            for i in range(STAGES):
+                delta = delta - _B[i] * s.residual[i, row]
+                force = force + _B[i] * z[i, row]
+            power.value = power.value + delta * force
+            closing = on.same(dropped[row], 1)
+            for i in range(STAGES):
+                s.residual[i, row] = on.select(closing, s.gap[row], s.residual[i, row] + delta)
+
+        def shared(j: Integer, q: Integer, weight: Real) -> None:
+            share = power.value / square.value * weight
+
+            def give() -> None:
+                for i in range(STAGES):
+                    add_to(s.residual.row(i), j, share * z[i, q])
+
+            on.when(on.absolute(share) > 0.0, give)
+
+        on.repeat(another)
+        on.loop(row_of(Dims, t.dims, component).multipliers, condition)
+        on.when(square.value > _NONE, lambda: on.loop(at.value, lambda k: pairs(k, shared), start=begin))
+        return at.value >= count
+
+    on.when(count > 0, lambda: on.repeat(joint))

@@ -1,0 +1,74 @@
+"""Places of a component in the tables, and what is done with vectors place by place."""
+
+from dataclasses import dataclass
+from typing import final
+
+from ephs.semantics.stage import Evaluator, Integer, Real, Vector
+from ephs.solve.methods.records import Columns, Dims, row_of
+
+__all__ = ["Part", "add_to", "copy", "fill", "raise_to"]
+
+
+def copy(on: Evaluator, source: Vector, out: Vector) -> None:
+    """out = source, of one length."""
+
+    def one(i: Integer) -> None:
+        out[i] = source[i]
+
+    on.loop(out.size, one)
+
+
+def fill(on: Evaluator, out: Vector, value: Real) -> None:
+    """Write a number into all places."""
+
+    def one(i: Integer) -> None:
+        out[i] = value
+
+    on.loop(out.size, one)
+
+
+def raise_to(on: Evaluator, out: Vector, i: Integer, value: Real) -> None:
+    """The larger of an entry and a number."""
+    out[i] = on.maximum(out[i], value)
+
+
+def add_to(out: Vector, i: Integer, value: Real) -> None:
+    """The sum of an entry and a number."""
+    out[i] = out[i] + value
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Part:
+    """A component at the tables: how many efforts, multipliers and increments it has, and where its places begin."""
+
+    t: Columns
+    i: Integer
+    n: Integer
+    k: Integer
+    m: Integer
+    e_at: Integer
+    w_at: Integer
+    j_at: Integer
+    first: Integer
+
+    @staticmethod
+    def of(t: Columns, i: Integer) -> "Part":
+        """The component of a number."""
+        dims = row_of(Dims, t.dims, i)
+        first = t.counts[0] + t.counts[1] + t.multiplier_at[i]
+        return Part(
+            t, i, dims.efforts, dims.multipliers, dims.increments, t.e_at[i], t.read_w_at[i], t.jacobian_at[i], first
+        )
+
+    def effort(self, j: Integer) -> Integer:
+        """The effort of a port."""
+        return self.t.e_index[self.e_at + j]
+
+    def balance(self, j: Integer) -> Integer:
+        """The unknown that is this effort, and the equation that is the balance there."""
+        return self.t.counts[0] + self.effort(j)
+
+    def rate(self, j: Integer) -> Integer:
+        """The rate of a state."""
+        return self.t.read_w[self.w_at + j]

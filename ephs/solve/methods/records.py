@@ -1,0 +1,238 @@
+"""A model's tables, an order of elimination and scratch memory: arrays, and what programs see of them."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
+from typing import Any, Final, Generic, TypeAlias, TypeVar, final
+
+import numpy as np
+
+from ephs.semantics.bundle import Array
+from ephs.semantics.numbering import Index
+from ephs.semantics.stage import Integer, Integers, Record, Vector, integer, vector
+from ephs.semantics.stage.kinds import Kind, group
+from ephs.semantics.stage.memory import Held
+
+__all__ = [
+    "COMPONENT", "DIVERGED", "DONE", "INCONSISTENT", "IRREVERSIBLE", "MEMORY", "ORDER", "PIVOT", "REVERSIBLE",
+    "STORING", "TABLES", "Columns", "Dims", "Elimination", "Memory", "Order", "Outer", "Scratch", "State", "Tables",
+    "flat", "kind_of", "parts_of", "row_of",
+]  # fmt: skip
+
+DONE, DIVERGED, PIVOT, INCONSISTENT, COMPONENT = 0, 1, 2, 3, 10
+"""How a step ends: COMPONENT + what a component's kernel returned (see `ephs.semantics.kernel_table`)."""
+
+STORING, REVERSIBLE, IRREVERSIBLE = 0, 1, 2
+"""Kinds of components."""
+
+Whole = TypeVar("Whole")
+Numbers = TypeVar("Numbers")
+
+
+@final
+class Dims(Record):
+    """How many efforts and multipliers a component has, and how many increments and numbers of states it reads."""
+
+    efforts = integer()
+    multipliers = integer()
+    increments = integer()
+    numbers = integer()
+
+
+@final
+class State(Record):
+    """A state: its group, its place and how many numbers it has, the place and number of its rates."""
+
+    code = integer()
+    at = integer()
+    size = integer()
+    rate = integer()
+    dim = integer()
+
+
+@final
+class Outer(Record):
+    """An outer port: place and number of its efforts, 1 where they are prescribed, then the place of its flows."""
+
+    at = integer()
+    dim = integer()
+    prescribed = integer()
+    unknown = integer()
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class TablesOf(Generic[Whole, Numbers]):
+    """The model as arrays. Unknowns: rates, efforts, multipliers, outer flows; rows in the same order.
+
+    Attributes
+    ----------
+    counts
+        Rates, efforts, multipliers, unknowns.
+    kind, address
+        Of each component, and where its kernel is.
+    dims
+        (components, 4): `Dims`.
+    parameters, parameter_at
+        Numbers of all components, and where each one's begin.
+    e_index, e_at
+        Effort of each local effort, in the same order as flows.
+    multiplier_at
+        First multiplier of each component.
+    read_x, read_x_at, read_w, read_w_at
+        Number of the states of each local x⁰; rate of each local v.
+    jacobian, jacobian_at
+        Place in the matrix' entries of each entry of a component's Jacobian, −1 where it is structurally zero.
+    states
+        (states, 5): `State`.
+    intensive, entropy
+        (efforts,): what turns an exergetic effort into the energy effort; 1 on entropy.
+    row, column, template
+        Of each entry of the matrix; what of it is constant. The last entries, one a row, hold what the loop adds.
+    constraining, balancing
+        Entries at efforts in the equations after the balances, and in the balances.
+    block, group
+        (rows,): residuals are measured block by block; (blocks,): blocks of one kind, whose scales do not differ
+        beyond reason.
+    outer, input_at
+        (outer ports, 4): `Outer`; where inputs begin.
+    """
+
+    counts: Whole
+    kind: Whole
+    address: Whole
+    dims: Whole
+    parameters: Numbers
+    parameter_at: Whole
+    e_index: Whole
+    e_at: Whole
+    multiplier_at: Whole
+    read_x: Whole
+    read_x_at: Whole
+    read_w: Whole
+    read_w_at: Whole
+    jacobian: Whole
+    jacobian_at: Whole
+    states: Whole
+    intensive: Numbers
+    entropy: Numbers
+    row: Whole
+    column: Whole
+    template: Numbers
+    constraining: Whole
+    balancing: Whole
+    block: Whole
+    group: Whole
+    outer: Whole
+    input_at: Whole
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class OrderOf(Generic[Whole, Numbers]):
+    """`ephs.solve.sparse.Elimination` as arrays, and which constraint rows are left out.
+
+    Attributes
+    ----------
+    dropped
+        (rows,): 1 where the equation is replaced by "this multiplier is zero".
+    floor
+        (rows,): the least |pivot|/|largest of its row| that this order accepts.
+    tolerance
+        (1,): the relative residual that dropped equations may keep.
+    """
+
+    rows: Whole
+    columns: Whole
+    start: Whole
+    entry: Whole
+    diagonal: Whole
+    place: Whole
+    dropped: Whole
+    floor: Numbers
+    tolerance: Numbers
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class MemoryOf(Generic[Numbers]):
+    """All scratch memory of the loop, allocated once.
+
+    Attributes
+    ----------
+    e, lam, v, x, f, c, jac, work
+        Arguments of components.
+    data, factors, residual, scale, step, dense, pivot
+        Entries of the matrix and of its factors, and vectors of a number for each row.
+    block, group
+        Scales.
+    flows, energy
+        Of all ports, and of each component.
+    defect
+        (1,): largest relative residual of a dropped equation.
+    """
+
+    e: Numbers
+    lam: Numbers
+    v: Numbers
+    x: Numbers
+    f: Numbers
+    c: Numbers
+    jac: Numbers
+    work: Numbers
+    data: Numbers
+    factors: Numbers
+    residual: Numbers
+    scale: Numbers
+    block: Numbers
+    group: Numbers
+    step: Numbers
+    dense: Numbers
+    flows: Numbers
+    energy: Numbers
+    defect: Numbers
+    pivot: Numbers
+
+
+Tables: TypeAlias = TablesOf[Index, Array]
+Order: TypeAlias = OrderOf[Index, Array]
+Memory: TypeAlias = MemoryOf[Array]
+Columns: TypeAlias = TablesOf[Integers, Vector]
+Elimination: TypeAlias = OrderOf[Integers, Vector]
+Scratch: TypeAlias = MemoryOf[Vector]
+
+
+def flat() -> Kind:
+    """An argument that is an array of integers of any shape, seen as one row."""
+
+    def split(value: Any, _trail: object) -> tuple[Any, ...] | None:
+        fits = isinstance(value, np.ndarray) and value.dtype == np.int64 and value.flags.c_contiguous
+        return (value, value.size) if fits else None
+
+    return Kind(
+        "a contiguous array of int64", ("integers", "integer"), split, lambda parts: Integers(parts[0], 0, parts[1])
+    )
+
+
+def parts_of(value: Any) -> dict[str, Any]:
+    """The arrays of tables, of an order or of memory, by name: an argument of a program."""
+    return {field.name: getattr(value, field.name) for field in fields(value)}
+
+
+def kind_of(cls: Any, numbers: Iterable[str] | None = None) -> Kind:
+    """The kind of argument that is all the arrays of a class, those of these names, or all, of real numbers."""
+    names = [field.name for field in fields(cls)]
+    reals = set(names if numbers is None else numbers)
+    return group(cls, **{name: vector() if name in reals else flat() for name in names})
+
+
+TABLES: Final = kind_of(TablesOf, ("parameters", "intensive", "entropy", "template"))
+ORDER: Final = kind_of(OrderOf, ("floor", "tolerance"))
+MEMORY: Final = kind_of(MemoryOf)
+
+Row = TypeVar("Row", bound=Record)
+_NO_REALS: Final[Held[Any]] = Held([])
+
+
+def row_of(record: type[Row], integers: Integers, i: Integer) -> Row:
+    """Row i of a table of integers as a record."""
+    return record(integers.cells, integers.start + i * record.integer_width, _NO_REALS, 0)

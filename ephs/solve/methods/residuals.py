@@ -1,0 +1,241 @@
+"""Residual, scale and matrix of a model's equations over a step, and ledgers, as staged functions."""
+
+from typing import Final
+
+from ephs.semantics.kernel_table import SIGNATURE
+from ephs.semantics.stage import Evaluator, Integer, Integers, Real, Vector
+from ephs.semantics.stage.reaching import Reached
+from ephs.solve.methods.places import Part, add_to, copy, fill
+from ephs.solve.methods.records import COMPONENT, IRREVERSIBLE, STORING, Columns, Dims, Outer, Scratch, row_of
+from ephs.solve.methods.scales import FAR, reach, still, weigh
+
+__all__ = ["FAULTS", "account", "evaluate"]
+
+FAULTS: Final = 64
+"""A fault is a component's number times this, and a status; 0 is none."""
+
+
+def evaluate(on: Evaluator, t: Columns, x: Vector, z: Vector, scal: Vector, inputs: Vector, m: Scratch) -> Integer:
+    """Residual, its scale, and the matrix at z; 0, or COMPONENT + status + FAULTS · component."""
+    h, fault = scal[0], on.counter(0)
+    copy(on, t.template, m.data)
+    fill(on, m.residual, 0.0)
+    fill(on, m.scale, 0.0)
+
+    def component(i: Integer) -> None:
+        def sound() -> None:
+            part = Part.of(t, i)
+            status = _called(on, part, x, z, scal, m)
+
+            def fail() -> None:
+                fault.value = COMPONENT + status + FAULTS * i
+
+            def stored() -> None:
+                _store(on, part, z, h, m)
+
+            def related() -> None:
+                _relate(on, part, z, h, m)
+
+            on.when(on.same(status, 0), lambda: on.when(on.same(t.kind[i], STORING), stored, related), fail)
+
+        on.when(on.same(fault.value, 0), sound)
+
+    def rest() -> None:
+        _prescribe(on, t, z, inputs, m)
+        reach(on, t, m)
+        still(on, t, z, m)
+        weigh(on, t, m)
+
+    on.loop(t.kind.size, component)
+    on.when(on.same(fault.value, 0), rest)
+    return fault.value
+
+
+def _called(on: Evaluator, part: Part, x: Vector, z: Vector, scal: Vector, m: Scratch) -> Integer:
+    """The status of a component's kernel, called at the unknowns."""
+    t, i = part.t, part.i
+    numbers, x_at, at = row_of(Dims, t.dims, i).numbers, t.read_x_at[i], t.parameter_at[i]
+
+    def effort(j: Integer) -> None:
+        m.e[j] = z[part.balance(j)]
+
+    def multiplier(j: Integer) -> None:
+        m.lam[j] = z[part.first + j]
+
+    def increment(j: Integer) -> None:
+        m.v[j] = scal[0] * z[part.rate(j)]
+
+    def state(j: Integer) -> None:
+        m.x[j] = x[t.read_x[x_at + j]]
+
+    on.loop(part.n, effort)
+    on.loop(part.k, multiplier)
+    on.loop(part.m, increment)
+    on.loop(numbers, state)
+    dims = Integers(t.dims.cells, t.dims.start + Dims.integer_width * i, Dims.integer_width)
+    parameters = t.parameters.part(at, t.parameters.size - at)
+    return on.reach(
+        Reached(SIGNATURE, t.address[i]), dims, scal, parameters, m.x, m.v, m.e, m.lam, m.f, m.c, m.jac, m.work
+    )
+
+
+def _store(on: Evaluator, part: Part, z: Vector, h: Real, m: Scratch) -> None:
+    """e = ∂H, and the rate as a flow."""
+    t, n = part.t, part.n
+    m.energy[part.i] = m.c[0]
+
+    def row(j: Integer) -> None:
+        balance, rate = part.balance(j), part.rate(j)
+        m.residual[rate] = z[balance] - m.e[j]
+        m.scale[rate] = on.absolute(z[balance]) + on.absolute(m.e[j])
+        add_to(m.residual, balance, z[rate])
+        add_to(m.scale, balance, on.absolute(z[rate]))
+
+        def entry(q: Integer) -> None:
+            place = t.jacobian[part.j_at + j * n + q]
+            on.when(place >= 0, lambda: add_to(m.data, place, -(h * m.f[j * n + q])))
+
+        on.loop(n, entry)
+
+    on.loop(n, row)
+
+
+def _relate(on: Evaluator, part: Part, z: Vector, h: Real, m: Scratch) -> None:
+    """Flows into the balances, and conditions."""
+    t, n, k = part.t, part.n, part.k
+    own = n + k
+    width = own + part.m
+
+    def derivatives(j: Integer) -> None:
+        first = part.j_at + j * width
+
+        def by_unknown(q: Integer) -> None:
+            place = t.jacobian[first + q]
+            on.when(place >= 0, lambda: add_to(m.data, place, m.jac[j * width + q]))
+
+        def by_increment(q: Integer) -> None:
+            place = t.jacobian[first + q]
+            on.when(place >= 0, lambda: add_to(m.data, place, h * m.jac[j * width + q]))
+
+        on.loop(own, by_unknown)
+        on.loop(width, by_increment, start=own)
+
+    on.loop(own, derivatives)
+    force = on.variable(0.0)
+
+    def multiplier(j: Integer) -> None:
+        force.value = on.maximum(force.value, on.absolute(m.lam[j]))
+
+    on.loop(k, multiplier)
+
+    def flow(j: Integer) -> None:
+        balance, scale = part.balance(j), on.variable(0.0)
+        add_to(m.residual, balance, m.f[j])
+        # a balance of one term, Bᵀλ = 0, would be measured by itself: the largest multiplier counts
+        scale.value = m.scale[balance] + on.absolute(m.f[j])
+
+        def held(q: Integer) -> None:
+            scale.value = on.maximum(scale.value, on.absolute(m.jac[j * width + n + q]) * force.value)
+
+        def warm(q: Integer) -> None:
+            whole = on.absolute(z[part.balance(q)] + t.intensive[part.effort(q)])
+            scale.value = on.maximum(scale.value, on.absolute(m.jac[j * width + q]) * whole)
+
+        on.loop(k, held)
+        # near equilibrium a flow is a difference of large terms: temperatures, not their differences
+        on.when(on.same(t.kind[part.i], IRREVERSIBLE), lambda: on.loop(n, warm))
+        m.scale[balance] = scale.value
+        m.flows[part.e_at + j] = m.f[j]
+
+    def condition(j: Integer) -> None:
+        row, scale = part.first + j, on.variable(m.scale[part.first + j])
+        add_to(m.residual, row, m.c[j])
+
+        def term(q: Integer) -> None:
+            scale.value = scale.value + on.absolute(m.jac[(n + j) * width + q] * m.e[q])
+
+        on.loop(n, term)
+        m.scale[row] = scale.value
+
+    on.loop(n, flow)
+    on.loop(k, condition)
+
+
+def _prescribe(on: Evaluator, t: Columns, z: Vector, inputs: Vector, m: Scratch) -> None:
+    """What outer ports are given: flows, or efforts whose flows are unknown."""
+
+    def port(i: Integer) -> None:
+        outer = row_of(Outer, t.outer, i)
+        at, unknown, first = t.counts[0] + outer.at, outer.unknown, t.input_at[i]
+
+        def one(j: Integer) -> None:
+            row, given = at + j, inputs[first + j]
+
+            def take(flow: Real) -> None:
+                add_to(m.residual, row, -flow)
+                add_to(m.scale, row, on.absolute(flow))
+
+            def effort() -> None:
+                m.residual[unknown + j] = z[row] - given
+                m.scale[unknown + j] = on.absolute(z[row]) + on.absolute(given)
+                take(z[unknown + j])
+
+            on.when(on.same(outer.prescribed, 1), effort, lambda: take(given))
+
+        on.loop(outer.dim, one)
+
+    on.loop(t.input_at.size, port)
+
+
+def account(on: Evaluator, t: Columns, z: Vector, h: Real, inputs: Vector, m: Scratch, sums: Vector) -> Real:
+    """Add the ledgers of a step of h to sums; return the least entropy production of a component in it.
+
+    sums = heat, supplied energy, supplied exergy, entropy made, and the entropy made by each component.
+    """
+    n_rate, least = t.counts[0], on.variable(FAR)
+
+    def component(i: Integer) -> None:
+        def produced() -> None:
+            part, heat, made = Part.of(t, i), on.variable(0.0), on.variable(0.0)
+
+            def one(j: Integer) -> None:
+                effort, flow = part.effort(j), m.flows[part.e_at + j]
+
+                def warm() -> None:
+                    made.value = made.value - flow
+
+                def work() -> None:
+                    heat.value = heat.value + (z[n_rate + effort] + t.intensive[effort]) * flow
+
+                on.when(t.entropy[effort] > 0.0, warm, work)
+
+            on.loop(part.n, one)
+            add_to(sums, 0, h * heat.value)
+            add_to(sums, 3, h * made.value)
+            add_to(sums, 4 + i, h * made.value)
+            m.energy[i] = sums[4 + i]
+            least.value = on.minimum(least.value, h * made.value)
+
+        on.when(on.same(t.kind[i], IRREVERSIBLE), produced)
+
+    def port(i: Integer) -> None:
+        outer, first = row_of(Outer, t.outer, i), t.input_at[i]
+
+        def one(j: Integer) -> None:
+            effort, at, flow = z[n_rate + outer.at + j], outer.at + j, on.variable(0.0)
+
+            def unknown() -> None:
+                flow.value = z[outer.unknown + j]
+
+            def given() -> None:
+                flow.value = inputs[first + j]
+
+            on.when(on.same(outer.prescribed, 1), unknown, given)
+            add_to(sums, 1, h * (effort + t.intensive[at]) * flow.value)
+            add_to(sums, 2, h * effort * flow.value)
+
+        on.loop(outer.dim, one)
+
+    on.loop(t.kind.size, component)
+    on.loop(t.input_at.size, port)
+    return on.select(least.value < FAR, least.value, 0.0)

@@ -1,0 +1,147 @@
+"""The collocation method of order 4: its coefficients, and tables and memory of its stages."""
+
+from dataclasses import dataclass
+from typing import Final, Generic, TypeAlias, TypeVar, final
+
+import numpy as np
+
+from ephs.semantics.bundle import Array
+from ephs.semantics.numbering import Index
+from ephs.semantics.stage import Integers, Matrix, Record, Vector, integer, matrix, vector
+from ephs.semantics.stage.kinds import group
+from ephs.solve.methods.collocation import moments, values
+from ephs.solve.methods.records import flat
+
+__all__ = [
+    "AHEAD", "GROUPS", "NODES", "SCHEME", "STAGES", "STAGE_MEMORY", "WEIGHTS", "GroupColumns", "Groups", "GroupsOf",
+    "Node", "Place", "StageScratch", "Stages", "StagesOf", "Velocity",
+]  # fmt: skip
+
+STAGES: Final = 3
+NODES: Final = 0.5 * (1.0 + np.polynomial.legendre.leggauss(STAGES)[0])
+SCHEME: Final = np.array([moments(NODES, c) for c in NODES])
+WEIGHTS: Final = moments(NODES, 1.0)
+AHEAD: Final = np.array([values(NODES, 1.0 + c) for c in NODES])
+"""A polynomial through the stages, continued into the next step."""
+
+Whole = TypeVar("Whole")
+Numbers = TypeVar("Numbers")
+Rows = TypeVar("Rows")
+
+
+@final
+class Velocity(Record):
+    """Efforts that are a velocity on a group, of a component whose relation holds on the group over a step."""
+
+    component = integer()
+    code = integer()
+    effort = integer()
+    dim = integer()
+
+
+@final
+class Node(Record):
+    """A storage of entropy alone: component, rate, effort among the unknowns; place of ∂θ/∂s in a stage's entries."""
+
+    component = integer()
+    rate = integer()
+    effort = integer()
+    slope = integer()
+
+
+@final
+class Place(Record):
+    """An entry of the system of all stages: stages of its row and column, entry of the model's matrix.
+
+    Its source is −1 − row where it holds the place of a row.
+    """
+
+    row = integer()
+    column = integer()
+    source = integer()
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class GroupsOf(Generic[Whole, Numbers]):
+    """What the corrections need of the model.
+
+    Attributes
+    ----------
+    velocity, metric
+        (groups, 4): `Velocity`; (groups, 36): in which its component measures it, the identity but where its frame is
+        another.
+    node, entry
+        (nodes, 4): `Node`; (nodes, 9): its places in the system of all stages.
+    where
+        (entries, 3): `Place`.
+    """
+
+    velocity: Whole
+    metric: Numbers
+    node: Whole
+    entry: Whole
+    where: Whole
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class StagesOf(Generic[Numbers, Rows]):
+    """Scratch memory of the stages, and of the step as a whole.
+
+    Attributes
+    ----------
+    x, v
+        (stages, …): states, and increments from the step's start.
+    turn, outer
+        (stages, 8): velocities in the coordinates of the increments; increments of one group.
+    whole, mean
+        (rates,): increment over the step; (unknowns,): that over h, and the efforts' exponents over h.
+    gradient
+        (rates,): discrete gradients over the step.
+    share, factor, end
+        (nodes, stages): derivatives of the factors α; the factors; temperatures at the end.
+    gap
+        (unknowns,): what the relations over the step miss, in the constraints' rows.
+    energy
+        (components,).
+    residual, scale, data, slope
+        (stages, …): residuals and their scales; entries of ∂g/∂z, and of ∂g/∂x in the rates' columns.
+    matrix, change, dense, pivot
+        Entries of the system of all stages, and vectors of a number for each of its rows.
+    one
+        (8,): the increment of one group over the step.
+    """
+
+    x: Rows
+    v: Rows
+    turn: Rows
+    outer: Rows
+    whole: Numbers
+    mean: Numbers
+    gradient: Numbers
+    share: Rows
+    factor: Numbers
+    end: Numbers
+    gap: Numbers
+    energy: Numbers
+    residual: Rows
+    scale: Rows
+    data: Rows
+    slope: Rows
+    matrix: Numbers
+    change: Numbers
+    dense: Numbers
+    pivot: Numbers
+    one: Numbers
+
+
+Groups: TypeAlias = GroupsOf[Index, Array]
+Stages: TypeAlias = StagesOf[Array, Array]
+GroupColumns: TypeAlias = GroupsOf[Integers, Vector]
+StageScratch: TypeAlias = StagesOf[Vector, Matrix]
+_ROWS: Final = {"x", "v", "turn", "outer", "share", "residual", "scale", "data", "slope"}
+GROUPS: Final = group(GroupsOf, velocity=flat(), metric=vector(), node=flat(), entry=flat(), where=flat())
+STAGE_MEMORY: Final = group(
+    StagesOf, **{name: matrix() if name in _ROWS else vector() for name in StagesOf.__dataclass_fields__}
+)

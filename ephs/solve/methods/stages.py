@@ -1,0 +1,213 @@
+"""Steps of the natural method of order 4 as staged functions: Gauss stages, corrected component by component.
+
+At the stages every component has its continuous relation. Over the step the stages' increments of each state make one
+increment V; the relations of order 2, evaluated at V, say by how much a storage's energy changes and whether a joint
+closes. What the stages miss of that is of high order and is put in as one term a component:
+
+    e_i = dH(x_i) + α f_i                 with Σ b_i ⟨e_i|h f_i⟩ = H(x¹) − H(x⁰)
+    0 = C_i e_i + δ,  f_i = C_i*λ_i + e_i ⟨δ|Σ b_j λ_j⟩/Σ b_j ⟨e_j|e_j⟩     with δ = F − Σ b_j C_j e_j
+
+so that storages store what flows into them, joints make no power and stay closed, and dissipation, which is left as it
+is, takes place at the stages with positive weights.
+
+There are three stages: with an even number what momenta have across the constraints would add up from step to step and
+the order fall to 2 (Hairer, Lubich and Roche, *Lecture Notes in Mathematics* 1409, table 2.3: with three it is 4).
+"""
+
+from collections.abc import Callable
+from typing import Final
+
+from ephs.semantics.spaces import codes
+from ephs.semantics.spaces.staged_groups import STAGED
+from ephs.semantics.spaces.vectors import apply
+from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Truth, Vector, staged
+from ephs.solve.methods.corrections import bend, correct_joints, correct_storages, rest
+from ephs.solve.methods.newton import retract, somewhere
+from ephs.solve.methods.places import copy
+from ephs.solve.methods.records import STORING, Columns, Dims, Scratch, State, row_of
+from ephs.solve.methods.residuals import evaluate
+from ephs.solve.methods.scheme import SCHEME, STAGES, WEIGHTS, GroupColumns, Node, StageScratch, Velocity
+
+__all__ = ["evaluated", "exponents", "linearise"]
+
+_A: Final[list[list[float]]] = SCHEME.tolist()
+_B: Final[list[float]] = WEIGHTS.tolist()
+_FIXED: Final = 30
+"""Rounds of the iteration for the exponents on a group."""
+evaluated = staged(evaluate)
+"""The relations at one point, emitted once for all of them."""
+
+
+def _over_stages(entry: Callable[[int], Real]) -> Real:
+    """Σ of an entry of each stage."""
+    found: Real = 0.0
+    for i in range(STAGES):
+        found = found + entry(i)
+    return found
+
+
+@staged
+def exponents(
+    on: Evaluator, code: Integer, h: Real, z: Matrix, first: Integer, dim: Integer, v: Matrix, at: Integer,
+    whole: Vector, turn: Matrix,
+) -> None:  # fmt: skip
+    """Increments to the stages, v_i = h Σ a_ij D(v_j) w_j with D = dexp⁻¹, and over the step; velocities w are in z."""
+    change, size = on.variable(0.0), on.variable(0.0)
+
+    def begin(j: Integer) -> None:
+        for i in range(STAGES):
+            turn[i, j] = z[i, first + j]
+
+    def increments(j: Integer) -> None:
+        turns = [turn[m, j] for m in range(STAGES)]
+        for i in range(STAGES):
+            entry = _over_stages(lambda m, i=i: h * _A[i][m] * turns[m])
+            change.value = on.maximum(change.value, on.absolute(entry - v[i, at + j]))
+            size.value = on.maximum(size.value, on.absolute(entry))
+            v[i, at + j] = entry
+
+    def on_group(number: int, dims: int) -> None:
+        rounds = on.counter(0)
+
+        def turned(i: Integer) -> None:
+            rows = STAGED[number].dexp_left_inv(on, [v[i, at + j] for j in range(dims)])
+            for j, entry in enumerate(apply(rows, [z[i, first + j] for j in range(dims)])):
+                turn[i, j] = entry
+
+        def once() -> Truth:
+            change.value, size.value = 0.0, 0.0
+            on.loop(dims, increments)
+            done = on.both(rounds.value > 0, change.value <= 2e-16 * size.value)
+            on.when(on.negate(done), lambda: on.loop(STAGES, turned))
+            rounds.value = rounds.value + 1
+            return on.either(done, rounds.value >= _FIXED)
+
+        on.when(on.same(code, number), lambda: on.repeat(once))
+
+    def sum_up(j: Integer) -> None:
+        whole[j] = _over_stages(lambda i: h * _B[i] * turn[i, j])
+
+    on.loop(dim, begin)
+    on.when(on.same(code, codes.VECTOR), lambda: on.loop(dim, increments))
+    for number, dims in ((codes.SO3, 3), (codes.SE2, 3), (codes.SE3, 6), (codes.SO3xR3, 6)):
+        on_group(number, dims)
+    on.loop(dim, sum_up)
+
+
+@staged
+def linearise(
+    on: Evaluator, t: Columns, g: GroupColumns, dropped: Integers, x: Vector, z: Matrix, scal: Vector, still: Vector,
+    unit: Vector, inputs: Matrix, m: Scratch, s: StageScratch, fresh: Integer,
+) -> Integer:  # fmt: skip
+    """Residuals of the stages with their corrections, and where fresh their matrices; 0 or a fault as of `evaluate`."""
+    n_rate, n, h = t.counts[0], z.columns, scal[0]
+    fault, zero, mean_at = on.counter(0), on.counter(0).value, somewhere(on, s.mean)
+
+    def state(k: Integer) -> None:
+        row = row_of(State, t.states, k)
+        rate, dim = row.rate, row.dim
+        exponents(on, row.code, h, z, rate, dim, s.v, rate, s.whole.part(rate, dim), s.turn)
+
+        def stage(i: Integer) -> None:
+            retract(
+                on, row.code, x.part(row.at, row.size), s.v.row(i).part(rate, dim), s.x.row(i).part(row.at, row.size)
+            )
+
+        on.loop(STAGES, stage)
+
+    def mean_rate(j: Integer) -> None:
+        s.mean[j] = s.whole[j] / h
+
+    def mean(j: Integer) -> None:
+        s.mean[j] = _over_stages(lambda i: _B[i] * z[i, j])
+
+    def velocity(k: Integer) -> None:
+        row = row_of(Velocity, g.velocity, k)
+        first = n_rate + row.effort
+
+        def exponent() -> None:
+            exponents(on, row.code, h, z, first, row.dim, s.outer, zero, somewhere(on, s.one), s.turn)
+
+            def write(j: Integer) -> None:
+                s.mean[first + j] = s.one[j] / h
+
+            on.loop(row.dim, write)
+
+        on.when(on.negate(on.same(row.code, codes.VECTOR)), exponent)
+
+    on.loop(t.states.size // State.integer_width, state)
+    on.loop(n_rate, mean_rate)
+    on.loop(n, mean, start=n_rate)
+    on.loop(g.velocity.size // Velocity.integer_width, velocity)
+    # the step as a whole: discrete gradients, and whether joints close
+    fault.value = evaluated(on, t, somewhere(on, x), mean_at, scal, inputs.row(zero), m)
+
+    def stage(i: Integer) -> None:
+        def still_there() -> None:
+            fault.value = evaluated(on, t, s.x.row(i), z.row(i), still, inputs.row(i), m)
+            on.when(on.same(fault.value, 0), keep)
+
+        def keep() -> None:
+            copy(on, m.residual, s.residual.row(i))
+            copy(on, m.scale, s.scale.row(i))
+            on.when(on.same(fresh, 1), derivatives)
+            on.when(on.same(fault.value, 0), lambda: rest(on, t, h, s.slope.row(i), s.scale.row(i)))
+
+        def derivatives() -> None:
+            copy(on, m.data, s.data.row(i))
+
+            def none(j: Integer) -> None:
+                s.mean[j] = 0.0
+
+            def take(j: Integer) -> None:
+                s.mean[j] = z[i, j]
+
+            def slope(j: Integer) -> None:
+                s.slope[i, j] = 2.0 / unit[0] * (m.data[j] - s.data[i, j])
+
+            on.loop(n_rate, none)
+            on.loop(n, take, start=n_rate)
+            fault.value = evaluated(on, t, s.x.row(i), mean_at, unit, inputs.row(i), m)
+            on.when(on.same(fault.value, 0), lambda: on.loop(s.data.columns, slope))
+
+        on.when(on.same(fault.value, 0), still_there)
+
+    def over_the_step() -> None:
+        _over_the_step(on, t, g, h, n, m, s)
+        on.loop(STAGES, stage)
+
+    def correct() -> None:
+        on.when(on.same(fresh, 1), lambda: bend(on, g, h, z, s))
+        correct_storages(on, t, h, z, s)
+        correct_joints(on, t, g, dropped, z, s)
+
+    on.when(on.same(fault.value, 0), over_the_step)
+    on.when(on.same(fault.value, 0), correct)
+    return fault.value
+
+
+def _over_the_step(
+    on: Evaluator, t: Columns, g: GroupColumns, h: Real, n: Integer, m: Scratch, s: StageScratch
+) -> None:
+    """Energies, discrete gradients, temperatures at the end and gaps, as `evaluate` left them in m."""
+    n_rate = t.counts[0]
+
+    def component(i: Integer) -> None:
+        s.energy[i] = m.energy[i]
+
+        def port(j: Integer) -> None:
+            rate = t.read_w[t.read_w_at[i] + j]
+            s.gradient[rate] = s.mean[n_rate + t.e_index[t.e_at[i] + j]] - m.residual[rate]
+
+        on.when(on.same(t.kind[i], STORING), lambda: on.loop(row_of(Dims, t.dims, i).efforts, port))
+
+    def node(k: Integer) -> None:
+        row = row_of(Node, g.node, k)
+        s.end[k] = s.gradient[row.rate] - s.whole[row.rate] / h * m.data[row.slope]
+
+    def gap(j: Integer) -> None:
+        s.gap[j] = m.residual[j]
+
+    on.loop(t.kind.size, component)
+    on.loop(g.node.size // Node.integer_width, node)
+    on.loop(n, gap, start=n_rate + t.counts[1])
