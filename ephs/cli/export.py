@@ -1,7 +1,7 @@
 """`ephs export`: a mechanism as a program without Python."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from cyclopts import App, Parameter
 
@@ -19,6 +19,7 @@ def export(
     *,
     out: Annotated[Path, Parameter(name=["--out", "-o"])],
     inputs: str = "",
+    parameters: str = "",
     method: str = "rk87",
     rtol: float | None = None,
     atol: float | None = None,
@@ -37,6 +38,8 @@ def export(
         File to write: .c or .o, with a header .h beside it; .wasm.
     inputs
         Joints on which forces are given from outside, between commas: joints.waist,joints.elbow.
+    parameters
+        Numbers that may be changed at the start, between commas: bodies.rod.mass,joints.bearing.friction.
     method
         rk54 or rk87.
     rtol
@@ -53,17 +56,18 @@ def export(
     import ephs
 
     model = load_model(scene, loading)
-    names = [name.strip() for name in inputs.split(",") if name.strip()]
+    names, numbers = ([one.strip() for one in given.split(",") if one.strip()] for given in (inputs, parameters))
+    tolerances: dict[str, Any] = {key: x for key, x in (("rtol", rtol), ("atol", atol)) if x is not None}
     try:
         with addressed(scene, out):
             made = ephs.export(
-                model, out, inputs=names, method=method, step=step, until=until, target=target,
-                **{name: given for name, given in (("rtol", rtol), ("atol", atol)) if given is not None},
+                model, out, inputs=names, parameters=numbers, method=method, step=step, until=until, target=target,
+                **tolerances,
             )  # fmt: skip
     except ephs.ExportError as error:
         raise BadInput(naming(scene, str(error))) from error
-    for kind, variables in (("input", made.inputs), ("output", made.outputs)):
+    for kind, variables in (("input", made.inputs), ("parameter", made.parameters), ("output", made.outputs)):
         for place, variable in enumerate(variables):
-            say(f"{kind} {place:4} {variable.name:40} {variable.start:>14.6g} {variable.unit}".rstrip())
+            say(f"{kind:9} {place:4} {variable.name:40} {variable.start:>14.6g} {variable.unit}".rstrip())
     say(f"{out}: functions {made.name}_*, {made.bytes} bytes an instance")
     return 0

@@ -13,6 +13,9 @@ TEXTS: Final = {
     "target": "target {found!r}: expected one of {expected}",
     "tool": "{what} needs {tool}, which is not installed: pip install {package}",
     "refused": "{tool} refuses the program: {found}",
+    "structure": "parameters {found}: they change what the mechanism is made of, expected numbers only",
+    "polynomial": "parameter {found}: the program's numbers are no polynomials of degree 2 in it, expected one such as "
+    "a mass, a stiffness, a friction or a force",
     "name": "name {found!r}: expected a name of C, of letters, digits and _",
 }
 

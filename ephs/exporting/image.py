@@ -1,16 +1,18 @@
 """One mechanism's run as functions of machine code and the arrays that they are called with."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, final
 
 import numpy as np
 
 from ephs.exporting.errors import ExportError
 from ephs.exporting.outputs import outputs_program
+from ephs.exporting.parameters import Dependence, dependence
 from ephs.mechanics.methods.explicit import Explicit, tableau
 from ephs.mechanics.runs.simulate import control_of, problem_of_scene, problem_of_system
 from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.scene.parameters import read, varied
 from ephs.mechanics.tree.equations.equations import Equations
 from ephs.mechanics.tree.finding.tables import SPRING
 from ephs.semantics.bundle import Array
@@ -25,6 +27,8 @@ from ephs.solve.stepping import Span
 __all__ = ["METHODS", "Image", "Variable", "image_of"]
 
 METHODS = ("rk54", "rk87")
+MEMORY = ("poses", "twists", "s", "stored", "out", "drive", "wrench")
+"""Arrays that evaluations or callers write."""
 
 
 @final
@@ -63,6 +67,8 @@ class Image:
         The state in the memory of the march.
     out
         The array that `read` writes.
+    numbers, dependences
+        The arrays that determine the run, and which of their numbers depend on the parameters.
     acceleration
         The array that `rates` writes, and where the accelerations of the tree's joints start and how many there are.
     """
@@ -77,11 +83,14 @@ class Image:
     acceleration: tuple[Array, int, int]
     inputs: tuple[Variable, ...]
     outputs: tuple[Variable, ...]
+    parameters: tuple[Variable, ...]
+    numbers: tuple[Array, ...]
+    dependences: tuple[Dependence, ...]
 
 
 def image_of(
-    model: Scene | System, *, inputs: Sequence[str] = (), method: str = "rk87", rtol: float = RTOL,
-    atol: float = ATOL, step: float | None = None, until: float = 10.0,
+    model: Scene | System, *, inputs: Sequence[str] = (), parameters: Sequence[str] = (), method: str = "rk87",
+    rtol: float = RTOL, atol: float = ATOL, step: float | None = None, until: float = 10.0,
 ) -> Image:  # fmt: skip
     """Return the run of a model from its initial state.
 
@@ -89,6 +98,8 @@ def image_of(
     ----------
     inputs
         Names of joints, as ``joints.pin``, on whose free coordinates a force or torque is given from outside.
+    parameters
+        Paths of numbers of the model that may be changed, as of `ephs.sweep`.
     until
         Time in s over which errors are to stay within the tolerances.
 
@@ -99,7 +110,29 @@ def image_of(
     """
     if method not in METHODS:
         raise ExportError("method", found=method, expected=" or ".join(METHODS))
-    given = dict.fromkeys(inputs, 0.0)
+
+    def changed(values: Mapping[str, float]) -> Scene | System:
+        if isinstance(model, System):
+            return varied(model, values, strict=False)
+        return varied(model, values, strict=False)
+
+    def made(values: Mapping[str, float]) -> Image:
+        return _started(changed(values), inputs, method, (rtol, atol, step), until)
+
+    found = _started(model, inputs, method, (rtol, atol, step), until)
+    if not parameters:
+        return found
+    start = {path: read(model, path) for path in parameters}
+    dependences = dependence(start, lambda values: made(values).numbers)
+    variables = tuple(Variable(path, "", k, value) for k, (path, value) in enumerate(start.items()))
+    return replace(found, parameters=variables, dependences=tuple(dependences))
+
+
+def _started(
+    model: Scene | System, inputs: Sequence[str], method: str, steps: tuple[float, float, float | None], until: float
+) -> Image:
+    """Return the run without parameters."""
+    (rtol, atol, step), given = steps, dict.fromkeys(inputs, 0.0)
     if isinstance(model, Scene):
         joints = [f"joints.{name}" for name in model.joints]
         for name in inputs:
@@ -144,8 +177,17 @@ def _image(problem: Problem, eq: Equations, leg: Any, inputs: Sequence[str]) -> 
         eq.refuse(found, eq.engine.failed)
     return Image(
         problem.name, leg.march, read, rates, control, eq.drive, out, (change, eq.nv, eq.n),
-        tuple(_inputs(eq, inputs)), tuple(_outputs(eq, out)),
+        tuple(_inputs(eq, inputs)), tuple(_outputs(eq, out)), (), tuple(_numbers(parts)), (),
     )  # fmt: skip
+
+
+def _numbers(parts: Mapping[str, Any]) -> Iterator[Array]:
+    """Yield the arrays of real numbers that determine a run: tables and the state, not the memory of evaluations."""
+    for name, part in (*parts["tables"].items(), *parts.items()):
+        if isinstance(part, Table):
+            yield part.arrays[1]
+        elif isinstance(part, np.ndarray) and part.dtype == np.float64 and name not in MEMORY:
+            yield part
 
 
 def _inputs(eq: Equations, names: Sequence[str]) -> list[Variable]:

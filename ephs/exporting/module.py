@@ -43,6 +43,7 @@ class Exported:
     bytes: int
     inputs: tuple[Variable, ...]
     outputs: tuple[Variable, ...]
+    parameters: tuple[Variable, ...]
     accelerations: int
 
     def header(self) -> str:
@@ -57,6 +58,7 @@ class Exported:
         return _HEADER.format(
             guard=f"{self.name.upper()}_H", name=self.name, upper=self.name.upper(), bytes=self.bytes,
             n_inputs=len(self.inputs), n_outputs=len(self.outputs), n_accelerations=self.accelerations,
+            n_parameters=len(self.parameters), parameters=table("Parameters", self.parameters),
             inputs=table("Inputs", self.inputs), outputs=table("Outputs", self.outputs), paused=int(Ending.PAUSED),
             careful=int(Ending.CAREFUL), short=int(Ending.SHORT), refused=int(Ending.REFUSED),
         )  # fmt: skip
@@ -163,6 +165,7 @@ class _Writer:
             self._advance(image, numbers, counts),
             self._outputs(image),
             self._inputs(image),
+            self._parameters(image),
             self._accelerations(image),
             self._time(numbers),
         ]
@@ -170,7 +173,7 @@ class _Writer:
             *self.declared, "declare void @llvm.memcpy.p0.p0.i64(ptr, ptr, i64, i1)", *self._data(), *self.texts,
             *functions,
         ])  # fmt: skip
-        return Exported(self.name, text, size, image.inputs, image.outputs, image.acceleration[2])
+        return Exported(self.name, text, size, image.inputs, image.outputs, image.parameters, image.acceleration[2])
 
     def _data(self) -> list[str]:
         reals = np.concatenate([np.zeros(0), *(each.ravel() for each in self.reals)])
@@ -229,6 +232,30 @@ class _Writer:
             lines.append(f"  store double %x{k}, ptr {where}")
         return _function("void", f"{self.name}_inputs", "ptr %memory, ptr %values", [*lines, "  ret void"])
 
+    def _parameters(self, image: Image) -> str:
+        """Write the numbers that depend on parameters, by their polynomials in the changes %d0, %d1, …"""
+        lines: list[str] = []
+        for k, each in enumerate(image.parameters):
+            lines.append(f"  %i{k} = getelementptr double, ptr %values, i64 {k}")
+            lines.append(f"  %x{k} = load double, ptr %i{k}")
+            lines.append(f"  %d{k} = fsub double %x{k}, {_hexadecimal(each.start)}")
+        for each in image.dependences:
+            total = _hexadecimal(each.constant)
+            for key, coefficient in each.terms.items():
+                term = _hexadecimal(coefficient)
+                for k in key:
+                    lines.append(f"  %m{len(lines)} = fmul double {term}, %d{k}")
+                    term = f"%m{len(lines) - 1}"
+                lines.append(f"  %a{len(lines)} = fadd double {total}, {term}")
+                total = f"%a{len(lines) - 1}"
+            if each.reciprocal:
+                lines.append(f"  %a{len(lines)} = fdiv double {_hexadecimal(1.0)}, {total}")
+                total = f"%a{len(lines) - 1}"
+            kind, first = self.place(image.numbers[each.array])
+            where = self.pointer(kind, first + each.entry, lines)
+            lines.append(f"  store double {total}, ptr {where}")
+        return _function("void", f"{self.name}_parameters", "ptr %memory, ptr %values", [*lines, "  ret void"])
+
     def _accelerations(self, image: Image) -> str:
         lines: list[str] = []
         array, first, count = image.acceleration
@@ -272,9 +299,12 @@ extern "C" {{
 #define {upper}_BYTES {bytes}
 #define {upper}_INPUTS {n_inputs}
 #define {upper}_OUTPUTS {n_outputs}
+#define {upper}_PARAMETERS {n_parameters}
 #define {upper}_ACCELERATIONS {n_accelerations}
 /* Begin at the initial state, at 0 s. */
 void {name}_start(void *memory);
+/* Give other values to the parameters: right after the start. */
+void {name}_parameters(void *memory, const double *values);
 /* Forces or torques, in N or N m, that act until they are given anew. */
 void {name}_inputs(void *memory, const double *values);
 /* Take steps until a time in s, with an error within the tolerances of the export. */
@@ -287,6 +317,7 @@ int64_t {name}_outputs(void *memory, double *values);
 int64_t {name}_accelerations(void *memory, double *values);
 {inputs}
 {outputs}
+{parameters}
 #ifdef __cplusplus
 }}
 #endif

@@ -22,7 +22,7 @@ from ephs.solve.result.durable import durable
 
 __all__ = ["CALLS", "export", "tool"]
 
-CALLS: Final = ("start", "inputs", "advance", "time", "outputs", "accelerations")
+CALLS: Final = ("start", "parameters", "inputs", "advance", "time", "outputs", "accelerations")
 """Functions of an exported mechanism."""
 
 
@@ -32,6 +32,7 @@ def export(
     *,
     name: str | None = None,
     inputs: Sequence[str] = (),
+    parameters: Sequence[str] = (),
     method: str = "rk87",
     rtol: float = RTOL,
     atol: float = ATOL,
@@ -50,6 +51,9 @@ def export(
         Beginning of the names of its functions; left out, the file's.
     inputs
         Joints, as ``joints.pin``, on whose free coordinates forces in N or N m are given from outside.
+    parameters
+        Numbers of the model that may be changed at the start, by their paths, as ``bodies.rod.mass``: those that the
+        program's numbers are polynomials of degree 2 in, so that nothing is approximated.
     method, rtol, atol, step
         As of `ephs.simulate`: rk54 or rk87.
     until
@@ -77,7 +81,9 @@ def export(
         raise ExportError("suffix", found=path.name, expected=", ".join(writers))
     if target is not None and (path.suffix != ".o" or target not in TARGETS):
         raise ExportError("target", found=target, expected=", ".join(TARGETS) + ", with a file .o")
-    image = image_of(model, inputs=inputs, method=method, rtol=rtol, atol=atol, step=step, until=until)
+    image = image_of(
+        model, inputs=inputs, parameters=parameters, method=method, rtol=rtol, atol=atol, step=step, until=until
+    )
     made = exported(image, name or path.stem.replace("-", "_"))
     with durable(path) as temporary:
         temporary.write_bytes(writers[path.suffix](made))

@@ -12,6 +12,7 @@ import wasmtime
 import ephs
 from ephs.exporting.image import image_of
 from ephs.exporting.module import exported
+from ephs.mechanics.scene.parameters import varied
 from ephs.semantics.stage.llvm import compile_text, load
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -98,6 +99,31 @@ def test_many_short_advances_stay_within_the_tolerance():
     assert long.call("advance", ctypes.c_int64, 1.0) == 0
     for name, value in long.outputs().items():
         assert short.outputs()[name] == pytest.approx(value, abs=1e-7)
+
+
+MASSES = {"bodies.rod.mass": 0.2, "bodies.slider.mass": 0.2, "joints.bearing.friction": 3e-3}
+
+
+@pytest.mark.parametrize(("values", "near"), [(MASSES, 1e-12), ({"world.gravity[2]": -3.0}, 1e-6)])
+def test_parameters_make_the_program_of_the_changed_model(values, near):
+    """Steps are limited by the gravity at hand, so that with other gravity they are others, within the tolerance."""
+    model = ephs.load(ROOT / "scenes/slider-crank.toml")
+    run, plain = (Run(exported(image_of(model, parameters=list(values), until=0.3), "made")) for _ in range(2))
+    run.call("parameters", None, np.array(list(values.values())))
+    other = Run(exported(image_of(varied(model, values), until=0.3), "other"))
+    for each in (run, other, plain):
+        assert each.call("advance", ctypes.c_int64, 0.3) == 0
+    found, expected, unchanged = run.outputs(), other.outputs(), plain.outputs()
+    for name, value in found.items():
+        assert value == pytest.approx(expected[name], rel=near, abs=near), name
+    name = "joints.bearing.coordinate"
+    assert abs(unchanged[name] - expected[name]) > 1e-3, "the control"
+
+
+def test_parameters_that_are_no_polynomial_are_refused():
+    model = ephs.load(ROOT / "scenes/slider-crank.toml")
+    with pytest.raises(ephs.ExportError, match=r"joints\.wrist\.at"):
+        image_of(model, parameters=["bodies.rod.mass", "joints.wrist.at[0]"])
 
 
 @pytest.fixture(scope="module")

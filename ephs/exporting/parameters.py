@@ -1,0 +1,113 @@
+"""How the numbers of an exported mechanism depend on parameters of its model: by polynomials of degree two, checked."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import final
+
+import numpy as np
+
+from ephs.exporting.errors import ExportError
+from ephs.semantics.bundle import Array
+
+__all__ = ["Dependence", "dependence"]
+
+NEAR = 0.25
+"""Part of a parameter, or of 1 where it is 0, by which it is moved: far enough for rounding, near enough for ranges."""
+EXACT = 1e-12
+"""Part of an array's largest number that a polynomial may miss by: rounding of some hundred operations."""
+Key = tuple[int, ...]
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Dependence:
+    """A number of an array as a polynomial in the parameters' changes d, or as its reciprocal.
+
+    Attributes
+    ----------
+    array, entry
+        Number of the array, and place in it.
+    constant
+        The polynomial at the start.
+    terms
+        Coefficients by the parameters whose changes they multiply: (i,) for d_i, (i, j) for d_i d_j.
+    reciprocal
+        Whether the number is 1 over the polynomial, as an inverse mass is.
+    """
+
+    array: int
+    entry: int
+    constant: float
+    terms: Mapping[Key, float]
+    reciprocal: bool
+
+
+def dependence(
+    start: Mapping[str, float], arrays: Callable[[Mapping[str, float]], Sequence[Array]]
+) -> list[Dependence]:
+    """Return the numbers that depend on parameters.
+
+    Parameters
+    ----------
+    start
+        The parameters at the start, by name.
+    arrays
+        The arrays that determine a run, at values of the parameters.
+
+    Raises
+    ------
+    ExportError
+        The arrays change their sizes, or some number is neither such a polynomial nor a reciprocal of one.
+    """
+    names, first = list(start), np.array(list(start.values()))
+    moves = NEAR * np.where(first == 0.0, 1.0, np.abs(first))
+    sizes = [each.size for each in arrays(start)]
+
+    def at(shares: Array) -> Array:
+        found = arrays(dict(zip(names, (first + shares * moves).tolist(), strict=True)))
+        if [each.size for each in found] != sizes:
+            raise ExportError("structure", found=", ".join(names))
+        return np.concatenate([np.zeros(0), *(each.ravel() for each in found)])
+
+    unit, rng = np.eye(len(names)), np.random.default_rng(1)
+    pairs = list(combinations(range(len(names)), 2))
+    base = at(0.0 * first)
+    fitted = [*unit, *-unit, *(unit[i] + unit[j] for i, j in pairs)]
+    held = [*(0.6 * unit), *rng.uniform(-1.0, 1.0, (2, len(names)))]
+    seen, tried = np.array([at(shares) for shares in fitted]), np.array([at(shares) for shares in held])
+    scale = np.repeat([np.abs(each).max(initial=0.0) for each in np.split(base, np.cumsum(sizes)[:-1])], sizes)
+    moving = np.flatnonzero(np.abs(np.vstack([seen, tried]) - base).max(axis=0) > EXACT * scale)
+    out: list[Dependence] = []
+    of_array = np.repeat(np.arange(len(sizes)), sizes)
+    inside = np.concatenate([np.zeros(0, dtype=int), *(np.arange(size) for size in sizes)])
+    for place in moving.tolist():
+        samples = base[place], seen[:, place], tried[:, place]
+        terms, constant, reciprocal = _fit(samples, held, pairs, scale[place]), float(base[place]), False
+        if terms is None and min(np.abs(each).min() for each in samples) > 0.0:
+            samples = 1.0 / base[place], 1.0 / seen[:, place], 1.0 / tried[:, place]
+            terms, constant, reciprocal = _fit(samples, held, pairs, abs(samples[0])), float(samples[0]), True
+        if terms is None:
+            changed = np.abs(seen[: len(names), place] - base[place])
+            raise ExportError("polynomial", found=names[int(np.argmax(changed))])
+        own = {key: float(value / np.prod(moves[list(key)])) for key, value in terms.items() if value}
+        out.append(Dependence(int(of_array[place]), int(inside[place]), constant, own, reciprocal))
+    return out
+
+
+def _fit(
+    samples: tuple[Array, Array, Array], held: Sequence[Array], pairs: Sequence[tuple[int, int]], scale: float
+) -> dict[Key, float] | None:
+    """Coefficients of a polynomial through samples at ±1 and at pairs of 1, None where it misses the others."""
+    base, seen, tried = samples
+    count = (len(seen) - len(pairs)) // 2
+    terms: dict[Key, float] = {}
+    for i in range(count):
+        more, less = seen[i], seen[count + i]
+        terms[i,], terms[i, i] = 0.5 * (more - less), 0.5 * (more + less) - base
+    for k, (i, j) in enumerate(pairs):
+        terms[i, j] = seen[2 * count + k] - base - terms[i,] - terms[i, i] - terms[j,] - terms[j, j]
+    terms = {key: value for key, value in terms.items() if abs(value) > EXACT * scale}
+    found = [base + sum(value * np.prod(shares[list(key)]) for key, value in terms.items()) for shares in held]
+    missed = np.abs(np.array(found) - tried).max()
+    return terms if missed <= len(found) * EXACT * max(scale, np.abs(tried).max()) else None
