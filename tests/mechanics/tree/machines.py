@@ -118,3 +118,106 @@ def _four_bar(angle):
     slope = 2.0 * (1.8 * centre @ turned + bar * k2 * d2 + swing * k3 * d3)
     pull = 9.81 * (0.6 * 0.5 * A * np.cos(angle) + 1.8 * centre[1] + 1.4 * 0.5 * C * np.cos(rocker) * k3)
     return mass, slope, pull, k3
+
+
+# ---- a gas spring and a damper with hot oil on a slider-crank -----------------------------------------------------
+
+AREA, GAS, EXPONENT, HOT, DAMPING, OIL, WALL, FINS = 2e-3, 2.0e-4, 2.5, 600.0, 60.0, 5.0, 0.3, 0.8
+PRESSURE = 101325.0
+CRANK, ROD, SPEED = 0.04, 0.14, 10.0
+SHAFT = 0.06
+
+
+def slider_crank():
+    """The mechanism of the scene without friction, the momentum of its cylinder joint an outer port."""
+    scene = ephs.load(SCENES / "slider-crank.toml")
+    joints = {name: replace(j, friction=0.0 * j.friction, heat="environment") for name, j in scene.joints.items()}
+    scene = replace(scene, joints=joints, thermal={}, conduction={})
+    return scene_system(scene, driven=["cylinder"]), {f"engine.{path}": x for path, x in initial_state(scene).items()}
+
+
+@cache
+def gas_spring_on_slider_crank():
+    """(system, initial values, inputs): hot gas before the piston, the atmosphere behind, oil that a damper warms."""
+    engine, start = slider_crank()
+    port, shaft = "drives.cylinder", "drives.bearing"
+    energy = EXPONENT * PRESSURE * GAS
+    capacity = energy / THETA
+    junctions = {
+        "v": junction(Q.volume),
+        "w": junction(Q.volume),
+        "s": junction(Q.entropy),
+        "hot": junction(Q.entropy),
+        "around": junction(Q.entropy),
+        "p": junction(Q.momentum),
+        "p_r": junction(engine.interface[port].quantity),
+        "shaft": junction(engine.interface[shaft].quantity, exposed=True),
+    }
+    boxes = {
+        "gas": {"v": "v", "s": "s"},
+        "atmosphere": {"v": "w"},
+        "piston": {"v1": "v", "v2": "w", "p": "p"},
+        "rod": {"p": "p", "p_r": "p_r"},
+        "damper": {"p": "p", "s": "hot"},
+        "oil": {"s": "hot"},
+        "wall": {"s1": "s", "s2": "hot"},
+        "fins": {"s1": "hot", "s2": "around"},
+        "air": {"s": "around"},
+        "engine": {port: "p_r", shaft: "shaft"},
+    }
+    system = Pattern(junctions=junctions, boxes=boxes)(
+        gas=lib.ideal_gas(c1=energy, c2=capacity, v0=GAS, c=EXPONENT),
+        atmosphere=lib.environment(v=Q.volume),
+        piston=lib.piston(a=AREA),
+        rod=ephs.transformer({"p": Q.momentum, "p_r": engine.interface[port].quantity}, [[1.0]], name="rod"),
+        damper=lib.friction(d=DAMPING),
+        oil=lib.thermal_capacity(c1=THETA * OIL, c2=OIL),
+        wall=lib.heat_transfer(h=WALL),
+        fins=lib.heat_transfer(h=FINS),
+        air=lib.environment(),
+        engine=engine,
+    )
+    start = start | {"atmosphere.v": 1.0, "gas.v": GAS, "gas.s": capacity * np.log(HOT / THETA)}
+    return system, start, {"shaft": {"flow": SHAFT}}
+
+
+@cache
+def gas_spring_by_hand(until):
+    """(angle and rate of the crank, volume and temperature of the gas, temperature of the oil) at the end."""
+    first = [np.pi / 2, -SPEED, GAS, HOT, THETA]
+    end = solve_ivp(_gas_spring, (0.0, until), first, method="DOP853", rtol=1e-13, atol=1e-15)
+    return end.y[:, -1]
+
+
+def _gas_spring(_, y):
+    angle, rate, volume, gas, oil = y
+    mass, slope, pull, along = _slider_crank(angle)
+    capacity = EXPONENT * PRESSURE * GAS / THETA
+    pressure = capacity * gas / (EXPONENT * volume)
+    speed = along * rate
+    force = (pressure - PRESSURE) * AREA - DAMPING * speed
+    torque = force * along - SHAFT - pull - 0.5 * slope * rate**2
+    growth, warmed = AREA * speed, WALL * (oil - gas)
+    heat = DAMPING * speed**2 - warmed - FINS * (oil - THETA)
+    return [rate, torque / mass, growth, (warmed - pressure * growth) / capacity, heat / OIL]
+
+
+def _slider_crank(angle):
+    """Inertia on the crank, its derivative, the gravity torque, and the slider's speed by the crank's rate."""
+    s, c = np.sin(angle), np.cos(angle)
+    lean = np.arcsin(CRANK * s / ROD)  # of the rod, below the line of the slider
+    k = -CRANK * c / (ROD * np.cos(lean))  # rate of the rod's angle by the crank's
+    dk = (CRANK * s + ROD * np.sin(-lean) * k**2) / (ROD * np.cos(lean))
+    along = -CRANK * s - ROD * np.sin(-lean) * k
+    turned = -CRANK * c - ROD * np.cos(lean) * k**2 - ROD * np.sin(-lean) * dk
+    far = 0.5 * ROD
+    centre = np.array([-CRANK * s - far * np.sin(-lean) * k, CRANK * c + far * np.cos(lean) * k])
+    bent = np.array(
+        [
+            -CRANK * c - far * np.cos(lean) * k**2 - far * np.sin(-lean) * dk,
+            -CRANK * s - far * np.sin(-lean) * k**2 + far * np.cos(lean) * dk,
+        ]
+    )
+    mass = 9e-4 + 0.15 * centre @ centre + 2.5e-4 * k**2 + 0.25 * along**2
+    slope = 2.0 * (0.15 * centre @ bent + 2.5e-4 * k * dk + 0.25 * along * turned)
+    return mass, slope, 9.81 * 0.15 * centre[1], along

@@ -60,6 +60,24 @@ def test_methods_of_order_two_come_to_the_same_motion(method):
     assert np.allclose(coarse, 4.0 * fine, rtol=0.05, atol=1e-9)
 
 
+def sprung(method, **options):
+    """(volume and temperature of the gas, temperature of the oil) at the end, and the solution."""
+    m = machines
+    system, start, inputs = m.gas_spring_on_slider_crank()
+    run = ephs.simulate(system, UNTIL, initial=start, inputs=inputs, method=method, save_at=[0.0, UNTIL], **options)
+    assert run.stats["form"] == "reduced"
+    volume, capacity = run["gas.v"][-1], m.EXPONENT * m.PRESSURE * m.GAS / m.THETA
+    hot = m.THETA * (m.GAS / volume) ** (1.0 / m.EXPONENT) * np.exp(run["gas.s"][-1] / capacity)
+    return np.array([volume, hot, m.THETA * np.exp(run["oil.s"][-1] / m.OIL)]).ravel(), run
+
+
+@pytest.mark.parametrize("method", ["rk54", "rk87", "auto", "ida"])
+def test_a_gas_spring_and_hot_oil_on_a_slider_crank_do_as_equations_by_hand_say(method):
+    found, run = sprung(method, rtol=1e-11, atol=1e-12)
+    assert np.allclose(found, machines.gas_spring_by_hand(UNTIL)[2:], rtol=1e-9, atol=0.0)
+    assert run.energy_error.max() < 1e-9
+
+
 # ---- derivatives ----------------------------------------------------------------------------------------------------
 
 

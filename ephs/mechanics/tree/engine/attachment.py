@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
-from ephs.mechanics.tree.sweeps.network import INTEGERS, REALS
+from ephs.mechanics.tree.sweeps.network import INTEGERS, REALS, Called, Stores
 from ephs.semantics.bundle import Array
 from ephs.semantics.numbering import starts
 from ephs.solve.sparse import Index
@@ -14,7 +14,7 @@ from ephs.solve.sparse import Index
 if TYPE_CHECKING:
     from ephs.mechanics.tree.finding.mechanism import Reduced
 
-__all__ = ["Attachment", "attachment_of"]
+__all__ = ["Attachment", "attachment_of", "laws_in"]
 
 
 @final
@@ -75,10 +75,10 @@ def attachment_of(reduced: "Reduced") -> Attachment:
     sizes = {
         "effort": size, "flow": size, "gross": size, "kept": kept, "x": nx + 8, "v": max(nv, 6) + 1, "e": n + k + 1,
         "f": n * n + n + k + 8, "work": 4096, "matrix": net.unknown**2, "step": net.unknown, "turned": size,
-        "changed": size, "moved": len(reads), "power": 1,
+        "changed": size, "moved": len(reads), "power": 2,
     }  # fmt: skip
     reals = {"weight": np.concatenate([by for _, by in rows]) if rows else np.zeros(0)}
-    reals |= {name: np.zeros(count) for name, count in sizes.items()}
+    reals |= {name: np.zeros(count) for name, count in sizes.items()} | {"outer": there.outer}
     whole, numbers = [integers[name] for name in INTEGERS], [reals[name] for name in REALS]
     head = np.concatenate([_places(whole, 2 * (len(INTEGERS) + len(REALS))), _places(numbers, 0)])
     return Attachment(np.concatenate([head, *whole]).astype(np.int64), np.concatenate(numbers))
@@ -98,3 +98,13 @@ def _head(reduced: "Reduced", component: int) -> list[int]:
 def _sparse(row: Array) -> tuple[Index, Array]:
     where = np.flatnonzero(row)
     return where, row[where]
+
+
+def laws_in(integers: Index) -> list[tuple[int, int]]:
+    """Where a network's integers hold the address of a component's relation, and that component."""
+    found: list[tuple[int, int]] = []
+    for name, record in (("store", Stores), ("called", Called)):
+        at, size = integers[2 * INTEGERS.index(name) :][:2].tolist()
+        rows = range(at, at + size, record.integer_width)
+        found += [(row + record.law.offset, int(integers[row + record.component.offset])) for row in rows]
+    return found

@@ -10,6 +10,7 @@ from typing import Any, Final, cast, final
 
 import numpy as np
 
+from ephs.mechanics.tree.engine.attachment import laws_in
 from ephs.mechanics.tree.engine.motion import Mechanism, close
 from ephs.mechanics.tree.engine.programs import Engine
 from ephs.mechanics.tree.sweeps.acting import TABLES, WORK, Tables, Work
@@ -31,6 +32,7 @@ from ephs.semantics.stage import (
     vector,
 )
 from ephs.semantics.stage.memory import ArrayIntegers
+from ephs.solve.heats import PLAIN
 from ephs.solve.march import TABLEAU, Control, Tableau
 from ephs.solve.march.steps import attempt
 
@@ -214,7 +216,11 @@ def _of_tangents(engine: Engine, relation: Callable[[int], tuple[Program, str]])
     for number in evaluated(engine.tables):
         program, entry = relation(number)
         component[number].law = program.tangent(DIRECTIONS).compiled()[entry].address
-    return {"own": own, "component": component}
+    net = engine.tables["net"].copy()
+    for place, number in laws_in(net):
+        program, entry = relation(number)
+        net[place] = program.tangent(DIRECTIONS).compiled()[entry].address
+    return {"own": own, "component": component, "net": net}
 
 
 def _copied(rows: Table[Any]) -> Table[Any]:
@@ -226,7 +232,7 @@ def evaluated(tables: Mapping[str, Any]) -> Sequence[int]:
     acting, node, conduction = tables["acting"], tables["node"], tables["conduction"]
     found = {int(row.component) for rows in (node, conduction) for row in _rows(rows)}
     found |= {int(number) for row in _rows(acting) for number in (row.spring, row.friction)}
-    return sorted(found - {-1})
+    return sorted(found - {-1, PLAIN})
 
 
 def _rows(rows: Table[Any]) -> list[Any]:

@@ -30,6 +30,7 @@ class Booking:
         self.storages = table_of(Stored, np.hstack([t.address[kept, None], t.dims[kept], places]))
         self._memory = m.x, m.v, m.e, m.lam, m.f, m.c, m.jac, m.work
         self._last = np.zeros(0), np.zeros(0)
+        self._outer = equations.reduced.attaching.outer
 
     def step(
         self, start: "ReducedState", end: "ReducedState", flows: Array, missed: Array, work: float
@@ -47,7 +48,8 @@ class Booking:
         heats, led, lost = eq.heats, eq.led, None
         if heats.frictions.size and not led.counting:
             before, after = self._energies(start), self._energies(end)
-            lost = work - float((after - before) @ led.mechanical + flows @ heats.carried)
+            outside = self._outer @ (end.heats - start.heats)[heats.plain]
+            lost = work - float((after - before) @ led.mechanical + outside + flows @ heats.carried)
             self._last = end.q, after
         flows = heats.booked(flows, missed, lost)
         taken, made = heats.taken(start.heats, flows)

@@ -12,8 +12,9 @@ from ephs.mechanics.tree.finding.parts import Parts
 from ephs.mechanics.tree.finding.spanning import Edge
 from ephs.mechanics.tree.finding.tables import SPRING, Mechanism
 from ephs.operad import Path
+from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.descriptor import ComponentSlot
-from ephs.semantics.primitives import Irreversible
+from ephs.semantics.primitives import Irreversible, Storage
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.solve.sparse import Index
 
@@ -37,6 +38,8 @@ class Attaching:
         (elements that are read, 2): their places, and those of their freedoms.
     edges
         First freedoms of the joints at which something is attached.
+    outer
+        (states,) energy of the environment by a state in it, as −π₀ of a volume; 0 of others.
     """
 
     network: Network
@@ -45,6 +48,7 @@ class Attaching:
     flows: tuple[Index, ...]
     bent: Index
     edges: frozenset[int]
+    outer: Array
 
 
 def makers_of(components: Sequence[ComponentSlot], network: Network) -> tuple[tuple[Path, ...], tuple[Index, ...]]:
@@ -73,6 +77,7 @@ def attaching_of(
     tables: Mechanism,
     stored: Sequence[Path],
     flows: tuple[Index, ...],
+    reference: Reference,
 ) -> Attaching:
     """A system's network at its mechanism.
 
@@ -105,4 +110,16 @@ def attaching_of(
         flows,
         np.array([[place, freedom[place]] for place in bent], dtype=np.int64).reshape(-1, 2),
         frozenset(at[id(edge)] for edge in parts.attached.values()),
+        _outer(components, network, reference),
     )
+
+
+def _outer(components: Sequence[ComponentSlot], network: Network, reference: Reference) -> Array:
+    """(states,) energy of the environment by its states."""
+    out = np.zeros(len(network.states))
+    for component, first in network.storages:
+        primitive = components[component].primitive
+        if isinstance(primitive, Storage) and primitive.environment:
+            here = [float(reference.intensive(of)[0]) for _, _, of in primitive.bundle.items()]
+            out[first : first + len(here)] = here
+    return out

@@ -131,7 +131,8 @@ def reduce_system(problem: Problem, model: Model) -> Reduced:
     stored = (*parts.entropies, *(state.path for state in parts.network.states))
     return Reduced(
         mechanism, edges, names, tuple(links), stored, made, _nodes(model, parts), unknowns,
-        tuple(twists), parts.gravity, acting, attaching_of(slots, parts, edges, mechanism, stored, flows),
+        tuple(twists), parts.gravity, acting,
+        attaching_of(slots, parts, edges, mechanism, stored, flows, model.reference),
     )  # fmt: skip
 
 

@@ -67,7 +67,7 @@ class Called(Record):
 INTEGERS: Final = ("head", "store", "called", "row", "term", "read", "bent", "temperature", "pivot", "fault")
 REALS: Final = (
     "weight", "effort", "flow", "gross", "kept", "x", "v", "e", "f", "work", "matrix", "step", "turned",
-    "changed", "moved", "power",
+    "changed", "moved", "power", "outer",
 )  # fmt: skip
 """Parts of a network, in the order in which they lie in its arrays."""
 
@@ -106,7 +106,9 @@ class Net:
     turned, changed, moved
         (z,), (z,) and (reads,): changes of efforts, of flows, and of what is read.
     power
-        (1,): what is given, in W.
+        (2,): what is given, in W; what is stored, in J.
+    outer
+        (states,) energy of the environment by a state in it, as −π₀ of a volume; 0 of others.
     fault
         The component that failed.
     """
@@ -139,6 +141,7 @@ class Net:
     changed: Vector
     moved: Vector
     power: Vector
+    outer: Vector
     fault: Integers
 
     @staticmethod
@@ -217,17 +220,22 @@ class Net:
         )  # fmt: skip
 
     def store_efforts(self, on: Evaluator, s: Vector) -> Integer:
-        """Write efforts of storages, and keep their slopes; return a status."""
-        status = on.counter(0)
+        """Write efforts of storages and their energy, and keep their slopes; return a status."""
+        status, first = on.counter(0), self.head[5]
+        self.power[1] = 0.0
+
+        def surroundings(k: Integer) -> None:
+            self.power[1] = self.power[1] + self.outer[k] * s[first + k]
 
         def one(it: Stores) -> None:
-            n, first = it.dims[0], self.head[5]
+            n = it.dims[0]
 
             def read(j: Integer) -> None:
                 self.x[j] = s[first + it.state + j]
 
             on.loop(n, read)
             found = self._call(on, it, n * n, self.work)
+            self.power[1] = self.power[1] + self.f[n * n]
 
             def put(j: Integer) -> None:
                 self.effort[it.effort + j] = self.e[j]
@@ -239,6 +247,7 @@ class Net:
             on.loop(n * n, keep)
             self.failed(on, status, found, it.component)
 
+        on.loop(self.outer.size, surroundings)
         self.stores(on, one)
         return status.value
 
