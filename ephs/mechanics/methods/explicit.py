@@ -32,7 +32,7 @@ ROWS = 1024
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Tableau:
-    """The coefficients of an explicit method.
+    """The coefficients of a method, explicit or iterated.
 
     Attributes
     ----------
@@ -52,8 +52,8 @@ class Tableau:
 
     @property
     def estimates(self) -> tuple[Array, ...]:
-        """(stages + 1,) weights of the estimates: of order 8 two."""
-        return tuple(self.arrays[name] for name in ("error", "coarse")[: self.order // 4])
+        """(stages + 1,) weights of the estimates: one, or two that are combined."""
+        return tuple(self.arrays[name] for name in ("error", "coarse")[: 1 + int(self.arrays["eighth"][0])])
 
 
 @cache
@@ -61,9 +61,14 @@ def tableau(name: str) -> Tableau:
     """The method rk54 or rk87."""
     if name == "rk87":
         arrays = {"a": _steps(t.A8, t.B8), "error": np.array(t.E8_5), "coarse": np.array(t.E8_3)}
-        return Tableau(name, 8, arrays | {"eighth": np.ones(1, dtype=np.int64)}, np.array(t.C8), 8.0)
+        return Tableau(name, 8, arrays | _explicit(t.B8, two=True), np.array(t.C8), 8.0)
     arrays = {"a": _steps(t.A5, t.B5), "error": np.array(t.E5), "coarse": np.zeros(len(t.B5) + 1)}
-    return Tableau(name, 5, arrays | {"eighth": np.zeros(1, dtype=np.int64)}, np.array(t.C5), 5.0)
+    return Tableau(name, 5, arrays | _explicit(t.B5, two=False), np.array(t.C5), 5.0)
+
+
+def _explicit(b: tuple[float, ...], *, two: bool) -> dict[str, Any]:
+    """Of stages that are not iterated, with one estimate or two that are combined."""
+    return {"guess": np.zeros((0, len(b))), "eighth": np.array([int(two)], dtype=np.int64)}
 
 
 def _steps(rows: tuple[tuple[float, ...], ...], last: tuple[float, ...]) -> Array:
@@ -102,7 +107,8 @@ class Explicit(ReducedMethod):
         y0, y1 = eq.vector(state), np.empty(eq.size)
         k = np.zeros((scheme["a"].shape[0], eq.size))
         k[0] = self._known[1]
-        before = eq.stages(state, scheme, self.method.c, h, y0, k, y1)
+        tolerances, chosen = (self.atol, self.rtol), self.control.step is None
+        before = eq.stages(state, scheme, self.method.c, h, y0, k, y1, tolerances, chosen=chosen)
         end = eq.state(state, y1, state.t + h)
         allowed, steps = self.atol + self.rtol * eq.sizes(y0, y1), STEPS.compiled()
         closed = eq.closed(end)
@@ -207,8 +213,8 @@ class _March:
         self.method.stiffness = float(c.stiff)
         if found == Ending.CAREFUL:
             self._step()
-        elif found == Ending.STIFF and self._leave is not None:
-            failing = c.refusals > PATIENCE
+        elif self._leave is not None and found in (Ending.STIFF, Ending.REFUSED + Status.UNSETTLED):
+            failing = found != Ending.STIFF or c.refusals > PATIENCE
             reason = "its steps fail" if failing else f"h·|λ| = {c.stiff:.1f} holds its steps"
             self._leave(self.time, float(c.step), reason)
             self.left = True

@@ -133,6 +133,15 @@ def _implicit(equations: Any, control: Control) -> Any:
     return Implicit(equations, control)
 
 
+def _gauss(name: str) -> Callable[..., Any]:
+    def make(equations: Any, control: Control) -> Any:
+        from ephs.mechanics.methods.gauss import Gauss
+
+        return Gauss(equations, control, name)
+
+    return make
+
+
 def _variational(equations: Any, control: Control) -> Any:
     from ephs.mechanics.methods.variational import Variational
 
@@ -244,6 +253,20 @@ for _method in (
     Method("rk54", 5, True, True, False, True, "Dormand and Prince, explicit", on_joints(_tableau("rk54"))),
     Method(
         "rk87", 8, True, True, False, True, "Dormand and Prince, explicit, many digits", on_joints(_tableau("rk87"))
+    ),
+    *(
+        Method(
+            f"gauss{order}",
+            order,
+            True,
+            True,
+            False,
+            True,
+            "Gauss, symmetric, implicit",
+            on_joints(_gauss(f"gauss{order}")),
+            undamped=Natural,
+        )
+        for order in (4, 6, 8)
     ),
     Method("ida", 5, True, False, False, True, "IDA of SUNDIALS, an independent check", on_joints(_ida)),
 ):

@@ -1,10 +1,12 @@
-"""Explicit Runge-Kutta steps as staged functions, many in one call."""
+"""Runge-Kutta steps, explicit or iterated, as staged functions, many in one call."""
 
 from ephs.solve.march.march import march as march
+from ephs.solve.march.records import ERRORS as ERRORS
 from ephs.solve.march.records import MEMORY as MEMORY
 from ephs.solve.march.records import TABLEAU as TABLEAU
 from ephs.solve.march.records import Control as Control
 from ephs.solve.march.records import Ending as Ending
+from ephs.solve.march.records import Errors as Errors
 from ephs.solve.march.records import Field as Field
 from ephs.solve.march.records import Memory as Memory
 from ephs.solve.march.records import Motion as Motion

@@ -107,10 +107,10 @@ class _Run:
         """Take a step of length h, measure its error, and accept it or not."""
         on, motion, m, c = self.on, self.motion, self.memory, self.control
         self.accepted.value = 0
-        self.status.value = attempt(on, motion, self.tableau, c, m.q, m.y, self.sign * h, m.k, m.last, m.y1, m.q1)
+        self.status.value = attempt(on, motion, self.tableau, c, m.q, m.y, self.sign * h, m.k, m.errors, m.last, m.y1, m.q1)
 
         def look() -> None:
-            allow(on, motion, m, m.y1)
+            allow(on, motion, m.errors, m.y, m.y1)
             c.stiff = stiffness_of(on, motion, self.tableau, m, h)
 
         on.when(self.sound, look)
@@ -202,10 +202,10 @@ class _Run:
         def inside(wanted: Real) -> None:
             copy(on, m.k.row(0), m.k2.row(0))
             part = self.sign * (wanted - c.time)
-            self.status.value = attempt(on, motion, self.tableau, c, m.q, m.y, part, m.k2, m.last, m.y2, m.q2)
+            self.status.value = attempt(on, motion, self.tableau, c, m.q, m.y, part, m.k2, m.errors, m.last, m.y2, m.q2)
 
             # Near a change of rank a part may be wrong though the whole is right: closing takes out what is across.
-            on.when(self.sound, lambda: allow(on, motion, m, m.y2))
+            on.when(self.sound, lambda: allow(on, motion, m.errors, m.y, m.y2))
             error = self._finish(m.k2, part, m.y2, m.q2)
             right = on.either(c.grid > 0.0, on.negate(error > 1.0)) if motion.closes else True
             # Where it is not, the step is taken again carefully, and its part in shorter ones.

@@ -21,7 +21,7 @@ from ephs.semantics.stage import (
     vector,
 )
 
-__all__ = ["MEMORY", "TABLEAU", "Control", "Ending", "Field", "Memory", "Motion", "Status", "Tableau"]
+__all__ = ["ERRORS", "MEMORY", "TABLEAU", "Control", "Ending", "Errors", "Field", "Memory", "Motion", "Status", "Tableau"]
 
 
 class Ending(IntEnum):
@@ -55,6 +55,8 @@ class Status(IntEnum):
     """Constraints nearly repeat each other."""
     OPEN = 22
     """Loops do not close."""
+    UNSETTLED = 24
+    """Stages that depend on each other do not come to agree."""
 
 
 class Motion(ABC):
@@ -164,12 +166,15 @@ class Field(Motion):
 @final
 @dataclass(frozen=True, slots=True)
 class Tableau:
-    """Coefficients of an explicit method.
+    """Coefficients of a Runge-Kutta method whose first stage is the step's start.
 
     Attributes
     ----------
     a
         (stages + 1, stages): its last row leads to the step's end.
+    guess
+        (stages, stages), strictly lower: first stages of a method whose stages depend on each other; no rows of an
+        explicit one.
     error, coarse
         (stages + 1,): weights of the estimates; `coarse` is taken where eighth[0] is 1.
     eighth
@@ -177,12 +182,13 @@ class Tableau:
     """
 
     a: Matrix
+    guess: Matrix
     error: Vector
     coarse: Vector
     eighth: Integers
 
 
-TABLEAU: Final[dict[str, Any]] = {"a": matrix(), "error": vector(), "coarse": vector(), "eighth": indices(1)}
+TABLEAU: Final[dict[str, Any]] = {"a": matrix(), "guess": matrix(), "error": vector(), "coarse": vector(), "eighth": indices(1)}
 
 
 class Control(Record):
@@ -261,6 +267,19 @@ class Control(Record):
 
 @final
 @dataclass(frozen=True, slots=True)
+class Errors:
+    """Tolerances of what an error counts, and what they allow in a step: (counted,) each."""
+
+    atol: Vector
+    rtol: Vector
+    allowed: Vector
+
+
+ERRORS: Final[dict[str, Any]] = {"atol": vector(), "rtol": vector(), "allowed": vector()}
+
+
+@final
+@dataclass(frozen=True, slots=True)
 class Memory:
     """The state of a march, and memory for its next step.
 
@@ -301,6 +320,10 @@ class Memory:
     rows_t: Matrix
     rows_q: Matrix
     rows_y: Matrix
+
+    @property
+    def errors(self) -> Errors:
+        return Errors(self.atol, self.rtol, self.allowed)
 
 
 MEMORY: Final[dict[str, Any]] = {

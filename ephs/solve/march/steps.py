@@ -20,8 +20,9 @@ from ephs.semantics.stage import (
     table,
     vector,
 )
+from ephs.solve.march.collocation import combine, evaluate, iterate, place
 from ephs.solve.march.control import judge
-from ephs.solve.march.records import Control, Memory, Motion, Status, Tableau
+from ephs.solve.march.records import Control, Errors, Memory, Motion, Status, Tableau
 
 __all__ = ["DRIFT", "STEPS", "allow", "attempt", "drift", "error_of", "first", "measure", "stiffness_of"]
 
@@ -37,10 +38,7 @@ stage's drift has a part along the motion that the embedded formula misses. Trie
 @staged
 def first(on: Evaluator, motion: Motion, memory: Memory, control: Control) -> Integer:
     """Evaluate the rates at the state into the first row of k; return a status."""
-    control.evaluations = control.evaluations + 1
-    status, component = motion.rates(on, memory.q, memory.y, memory.q1, memory.k.row(0))
-    control.component = component
-    return status
+    return evaluate(on, motion, control, memory.q, memory.y, memory.q1, memory.k.row(0))
 
 
 @staged
@@ -53,11 +51,12 @@ def attempt(
     start: Vector,
     h: Real,
     k: Matrix,
+    errors: Errors,
     last: Vector,
     y: Vector,
     q: Vector,
 ) -> Integer:
-    """Evaluate the stages of a step of length h from (base, start), k[0] known.
+    """Evaluate the stages of a step of length h from (base, start), k[0] known; by iteration where they need it.
 
     The step's end goes to y and q, the rates there to the last row of k, y at the last stage to ``last``.
 
@@ -71,41 +70,32 @@ def attempt(
 
     def one() -> Truth:
         i = stage.value
-        copy(on, start, y)
-
-        def add(s: Integer) -> None:
-            weight = h * tableau.a[i, s]
-
-            def entry(j: Integer) -> None:
-                y[j] = y[j] + weight * k[s, j]
-
-            on.when(on.negate(on.absolute(weight) <= 0.0), lambda: on.loop(y.size, entry))
-
-        on.loop(i, add)
+        combine(on, tableau.a.row(i), i, h, k, start, y)
         on.when(on.same(i, count - 1), lambda: copy(on, y, last))
-        control.evaluations = control.evaluations + 1
-        status.value, component = motion.rates(on, base, y, q, k.row(i))
-        control.component = component
+        status.value = evaluate(on, motion, control, base, y, q, k.row(i))
         stage.value = i + 1
         return on.either(on.negate(on.same(status.value, Status.SOUND)), stage.value > count)
 
-    on.repeat(one)
+    def collocated() -> None:
+        allow(on, motion, errors, start, start)
+        status.value = iterate(on, motion, tableau, control, base, start, h, k, errors.allowed, y, q)
+        copy(on, y, last)
+        stage.value = count
+
+    implicit = tableau.guess.rows > 0
+    on.when(implicit, collocated)
+    on.when(on.same(status.value, Status.SOUND), lambda: on.repeat(one))
     return status.value
 
 
-def allow(on: Evaluator, motion: Motion, memory: Memory, end: Vector) -> None:
-    """Write what errors of a step to ``end`` may be, atol + rtol · size, to ``allowed``."""
-    motion.sizes(on, memory.y, end, memory.allowed)
+def allow(on: Evaluator, motion: Motion, errors: Errors, start: Vector, end: Vector) -> None:
+    """Write what errors of a step from ``start`` to ``end`` may be, atol + rtol · size, to ``allowed``."""
+    motion.sizes(on, start, end, errors.allowed)
 
     def one(j: Integer) -> None:
-        memory.allowed[j] = memory.atol[j] + memory.rtol[j] * memory.allowed[j]
+        errors.allowed[j] = errors.atol[j] + errors.rtol[j] * errors.allowed[j]
 
     on.loop(motion.counted, one)
-
-
-def _place(on: Evaluator, motion: Motion, j: Integer) -> Integer:
-    """Return where the j-th counted number lies in y."""
-    return on.select(j < motion.freedoms, j, j + (motion.increments - motion.freedoms))
 
 
 def _estimate(on: Evaluator, motion: Motion, weights: Vector, k: Matrix, h: Real, q: Vector, out: Vector) -> None:
@@ -118,7 +108,7 @@ def _estimate(on: Evaluator, motion: Motion, weights: Vector, k: Matrix, h: Real
         weight = h * weights[s]
 
         def entry(j: Integer) -> None:
-            out[j] = out[j] + weight * k[s, _place(on, motion, j)]
+            out[j] = out[j] + weight * k[s, place(on, motion, j)]
 
         on.when(on.negate(on.absolute(weight) <= 0.0), lambda: on.loop(out.size, entry))
 
@@ -191,7 +181,7 @@ def stiffness_of(on: Evaluator, motion: Motion, tableau: Tableau, memory: Memory
     count, m = tableau.a.columns, memory
 
     def one(j: Integer) -> None:
-        at = _place(on, motion, j)
+        at = place(on, motion, j)
         m.fine[j], m.coarse[j] = m.k[count, at] - m.k[count - 1, at], m.y1[at] - m.last[at]
 
     on.loop(motion.counted, one)

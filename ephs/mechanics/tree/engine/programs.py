@@ -28,7 +28,7 @@ from ephs.semantics.stage import (
     vector,
 )
 from ephs.semantics.stage.calling import Bound
-from ephs.solve.march import MEMORY, TABLEAU, Control, Memory, Tableau, march
+from ephs.solve.march import ERRORS, MEMORY, TABLEAU, Control, Errors, Memory, Tableau, march
 from ephs.solve.march.steps import attempt
 
 __all__ = ["Engine", "motion_of_loops", "motion_of_trees", "motion_program"]
@@ -49,9 +49,9 @@ def motion_program(*, looped: bool) -> Program:
 
     def stages(
         on: Evaluator, tables: Tables, work: Work, tableau: Tableau, control: Table[Control], base: Vector,
-        start: Vector, k: Matrix, last: Vector, y: Vector, q: Vector, h: Real,
+        start: Vector, k: Matrix, errors: Errors, last: Vector, y: Vector, q: Vector, h: Real,
     ) -> Integer:  # fmt: skip
-        return attempt(on, moving(tables, work), tableau, control[0], base, start, h, k, last, y, q)
+        return attempt(on, moving(tables, work), tableau, control[0], base, start, h, k, errors, last, y, q)
 
     def rates(on: Evaluator, tables: Tables, work: Work, base: Vector, y: Vector, q: Vector, out: Vector) -> Integer:
         return moving(tables, work).rates(on, base, y, q, out)[0]
@@ -88,7 +88,8 @@ def motion_program(*, looped: bool) -> Program:
             marched, **of, **tried, memory=group(Memory, **MEMORY), control=table(Control), steps=integer()
         ),
         "stages": Entry(
-            stages, **of, **tried, control=table(Control), base=vector(), start=vector(), k=matrix(), last=vector(),
+            stages, **of, **tried, control=table(Control), base=vector(), start=vector(), k=matrix(),
+            errors=group(Errors, **ERRORS), last=vector(),
             y=vector(), q=vector(), h=real(),
         ),
         "rates": Entry(rates, **of, base=vector(), y=vector(), q=vector(), out=vector()),
@@ -151,7 +152,8 @@ class Engine:
         self._advance = self.bind("advance", self._base, self._y, self._q)
         self._velocities = self.bind("velocities", self._y, self._r, self._out)
         self._book = self.bind("book", self._start, self._y)
-        self._stages: dict[int, tuple[Table[Control], Array, Array, Bound]] = {}
+        self._counted = 2 * self._r.size + work["entropy"].size
+        self._stages: dict[int, tuple[Table[Control], Array, dict[str, Array], Array, Bound]] = {}
         self._close = self.bind("close", self._q, self._r) if looped else None
         self._project = self.bind("project", self._q, self._change) if looped else None
 
@@ -188,9 +190,17 @@ class Engine:
         return status, self._q.copy(), self._out.copy()
 
     def stages(
-        self, tableau: Mapping[str, Any], base: Array, start: Array, h: float, k: Array, y: Array
-    ) -> tuple[int, int, Array]:
+        self, tableau: Mapping[str, Any], base: Array, start: Array, h: float, k: Array, y: Array,
+        tolerances: tuple[Array, Array] | None = None, *, chosen: bool = True,
+    ) -> tuple[int, int, Array]:  # fmt: skip
         """Evaluate the stages of a step of length h from (base, start) into k, whose first row is known, and y.
+
+        Parameters
+        ----------
+        tolerances
+            atol and rtol of what an error counts, for stages that are iterated.
+        chosen
+            Whether steps are chosen by them.
 
         Returns
         -------
@@ -199,16 +209,20 @@ class Engine:
         """
         if len(k) not in self._stages:
             control, rows, last = Control.table(1), np.zeros(k.shape), np.zeros(y.size)
+            errors = {name: np.zeros(self._counted) for name in ERRORS}
             bound = self.bind(
-                "stages", tableau, control, self._base, self._start, rows, last, self._y, self._q, 0.0
+                "stages", tableau, control, self._base, self._start, rows, errors, last, self._y, self._q, 0.0
             )  # fmt: skip
-            self._stages[len(k)] = control, rows, last, bound
-        control, rows, last, bound = self._stages[len(k)]
+            self._stages[len(k)] = control, rows, errors, last, bound
+        control, rows, errors, last, bound = self._stages[len(k)]
         self._base[:], self._start[:], rows[0] = base, start, k[0]
-        before = cast("int", control[0].evaluations)
+        if tolerances is not None:
+            errors["atol"][:], errors["rtol"][:] = tolerances
+        counts: Any = control[0]
+        before, counts.grid = cast("int", counts.evaluations), float(not chosen)
         status = int(bound(h))
         k[:], y[:] = rows, self._y
-        return status, cast("int", control[0].evaluations) - before, last.copy()
+        return status, cast("int", counts.evaluations) - before, last.copy()
 
     def velocities(self, y: Array, r: Array, out: Array) -> None:
         """Write v̇ of all joints to ``out``, where an outward sweep has been."""

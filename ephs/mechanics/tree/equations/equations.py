@@ -18,6 +18,7 @@ from ephs.mechanics.tree.equations.heat import heats_of
 from ephs.mechanics.tree.equations.led import Led
 from ephs.mechanics.tree.equations.paper import PaperStates
 from ephs.mechanics.tree.equations.reading import JointStates
+from ephs.mechanics.tree.equations.stages import evaluated
 from ephs.mechanics.tree.finding.layout import Layout
 from ephs.mechanics.tree.finding.mechanism import reduce_system
 from ephs.mechanics.tree.finding.naming import tolerances, within
@@ -102,6 +103,7 @@ class Equations:
         self.given = Given(problem, reduced, self.nv)
         self.drive, self.wrench = self.given.drive, self.given.wrench
         self.constant, self.held = problem.constant, problem.held and not problem.constant
+        self.steady = self.constant or self.held
         self._paper, self.layout = PaperStates(reduced, problem), Layout.of(reduced)
         self.booking = Booking(self, self._paper)
         self.evaluations = 0
@@ -147,28 +149,34 @@ class Equations:
         return out
 
     def stages(
-        self, state: ReducedState, tableau: Mapping[str, Array], c: Array, h: float, y0: Array, k: Array, y1: Array
-    ) -> Array:
-        """The rates k (stages + 1, size) at an explicit method's stages and end, k[0] known; y at the end into y1.
+        self, state: ReducedState, scheme: Mapping[str, Array], c: Array, h: float, y0: Array, k: Array, y1: Array,
+        tolerances: tuple[Array, Array] | None = None, *, chosen: bool = True,
+    ) -> Array:  # fmt: skip
+        """The rates k (stages + 1, size) at the stages and the end of a step, k[0] known; y at the end into y1.
 
-        Returns y at the last stage.
+        Returns y at the last stage. See `Engine.stages`.
         """
-        a = tableau["a"]
-        count = a.shape[1]
         if self.held:
             self.given.place(state.t, {})
-        if self.constant or self.held:
-            status, evaluations, before = self.engine.stages(tableau, state.q, y0, h, k, y1)
+        if self.steady:
+            status, evaluations, before = self.engine.stages(scheme, state.q, y0, h, k, y1, tolerances, chosen=chosen)
             self.evaluations += evaluations
+            if status == Status.UNSETTLED:
+                raise SolveError(Outcome.DIVERGED, "", "the stages of a step")
             if status != Status.DEPENDENT:
                 self.refuse(status, self.engine.failed)
                 return before
-        before = y0
-        for i in range(1, count):
-            before = y0 + h * (a[i, :i] @ k[:i])
-            k[i] = self.rates(state.t + c[i] * h, state.q, before)
-        y1[:] = y0 + h * (a[count] @ k[:count])
-        k[-1] = self.rates(state.t + h, state.q, y1)
+
+        def at(part: float, y: Array) -> Array:
+            return self.rates(state.t + part * h, state.q, y)
+
+        def relative(change: Array) -> Array:
+            assert tolerances is not None
+            atol, rtol = tolerances
+            return h * change[self.counted] / (atol + rtol * self.sizes(y0, y0))
+
+        measured = None if tolerances is None else relative
+        before, y1[:] = evaluated(at, scheme, c, h, y0, k, measured, chosen=chosen)
         return before
 
     def prepare(self, state: ReducedState) -> None:

@@ -1,0 +1,182 @@
+"""Stages of a collocation method on the reduced form, by Newton's method with the exact Jacobian, kept while it serves.
+
+Hairer and Wanner, *Solving Ordinary Differential Equations II*, IV.8: the system of all stages falls apart into one of
+the mechanism's size for each eigenvalue of the method's coefficients, complex ones in pairs.
+"""
+
+from typing import Any, final
+
+import numpy as np
+from scipy.linalg import lu_solve
+
+from ephs.mechanics.methods.jacobian import Jacobian
+from ephs.mechanics.tree.equations.equations import Equations, ReducedState
+from ephs.mechanics.tree.finding.naming import counted
+from ephs.semantics.bundle import Array
+from ephs.solve.control import Control
+from ephs.solve.errors import Outcome, SolveError
+from ephs.solve.methods.factors import factors
+from ephs.solve.snapshot import Snapshot
+
+__all__ = ["Stages"]
+
+ITERATIONS = 10
+ROUNDING = 1e-14
+FAST = 2e-3
+"""A rate of convergence that a new matrix would not better: an exact one costs about as much as an iteration."""
+
+
+@final
+class Stages:
+    """The stages of one method on one mechanism.
+
+    Parameters
+    ----------
+    nodes, coefficients
+        (stages,) and (stages, stages).
+    counts
+        Where iterations and factorisations are counted.
+
+    Attributes
+    ----------
+    rtol, atol
+        Of what counts in an error; near rounding where steps are constant.
+    inverse
+        Of the coefficients.
+    """
+
+    def __init__(
+        self, equations: Equations, control: Control, nodes: Array, coefficients: Array, counts: dict[str, Any]
+    ) -> None:
+        self.equations, self._nodes, self.inverse = equations, nodes, np.linalg.inv(coefficients)
+        self.rtol, self.atol = equations.allowed(control.rtol, control.atol)
+        if control.step is None:
+            # As far as Newton's method is taken, relative to the tolerance: less than the method's own error.
+            least = float(np.min(self.rtol, initial=1.0))
+            self._enough, self._rough = max(1e-13 / max(least, 1e-13), min(0.03, least**0.5)), 1e-2
+        else:  # to rounding, and near changes of rank as far as it goes
+            self.rtol, self.atol = np.full_like(self.rtol, ROUNDING), np.full_like(self.atol, ROUNDING)
+            self._enough, self._rough = 1.0, 1e5
+        values, vectors = np.linalg.eig(self.inverse)
+        kept = np.flatnonzero(values.imag >= -1e-12 * np.abs(values))
+        kept = kept[np.argsort(np.abs(values[kept].imag))]
+        self._values, self._into, self._out = values[kept], np.linalg.inv(vectors)[kept], vectors[:, kept]
+        # Of a pair one is solved for: the other is its conjugate.
+        self._twice = np.where(np.abs(self._values.imag) > 1e-12 * np.abs(self._values), 2.0, 1.0)
+        self._solvers: tuple[float, list[Any]] | None = None
+        # Off the constraints the exact matrix grows as one over this: an old one is wrong there by as much.
+        self._separation = equations.separation()
+        self._counts = counts
+        counts |= {"iterations": 0, "factorisations": 0}
+        self.jacobian = Jacobian(equations, counts)
+        self.heat = slice(equations.nv + equations.n, self.jacobian.size)
+
+    def solve(self, state: ReducedState, y0: Array, h: float) -> tuple[Array, Array, bool]:
+        """Increments (stages, size) of (v, r, heats), rates of the books, and whether the iteration was fast.
+
+        Raises
+        ------
+        SolveError
+            The iteration does not converge, or a component cannot be evaluated.
+        """
+        try:
+            return self._solve(state, y0, h)
+        except SolveError:
+            if self.jacobian.fresh(state):
+                raise
+            self._renew(state)
+            return self._solve(state, y0, h)
+
+    def keep(self, state: ReducedState, *, fast: bool) -> None:
+        """Make the matrix anew for steps from a state, where the old one served badly."""
+        if not fast or self._turned():
+            self._renew(state)
+
+    def solvers(self, state: ReducedState, h: float) -> list[Any]:
+        """Factors of μ/h − J, eigenvalue by eigenvalue of the coefficients' inverse, real ones first."""
+        if self._solvers is None or self._solvers[0] != h:
+            matrix, unit = self.jacobian.at(state), np.eye(self.jacobian.size)
+            numbers = [mu if twice > 1.0 else mu.real for mu, twice in zip(self._values, self._twice, strict=True)]
+            self._solvers = h, [factors(mu / h * unit - matrix) for mu in numbers]
+            self._counts["factorisations"] += 1
+        return self._solvers[1]
+
+    def allowed(self, y0: Array, y1: Array) -> Array:
+        """What errors of a step may be, of what is counted."""
+        return self.atol + self.rtol * self.equations.sizes(y0, y1)
+
+    def snapshot(self, state: ReducedState) -> Snapshot:
+        """Where the matrix was made, and the step for which it was factorised."""
+        return {
+            "jacobian": self.jacobian.snapshot(state),
+            "separation": self._separation,
+            "step": self._solvers[0] if self._solvers is not None else None,
+        }
+
+    def restore(self, snapshot: Snapshot, state: ReducedState) -> None:
+        """Go on from a snapshot."""
+        self.jacobian.restore(snapshot["jacobian"], state)
+        self._separation = snapshot["separation"]
+        self._solvers = None
+        if snapshot["step"] is not None:
+            self.solvers(state, snapshot["step"])
+
+    def _turned(self) -> bool:
+        """Whether constraints have come nearer to repeating each other, or gone from it, since the matrix was made."""
+        found = self.equations.separation()
+        if found.shape != self._separation.shape:  # another rank
+            return True
+        return bool(np.any(np.abs(np.log2(found / self._separation)) > 1.0))
+
+    def _renew(self, state: ReducedState) -> None:
+        self.jacobian.at(state, renew=True)
+        self._separation = self.equations.separation()
+        self._solvers = None
+
+    def _change(self, state: ReducedState, h: float, defect: Array) -> Array:
+        """(stages, size) what Newton's method adds to the stages' increments."""
+        parts = self._into @ defect
+        out = np.zeros(defect.shape)
+        for column, twice, part, solver in zip(
+            self._out.T, self._twice, parts, self.solvers(state, h), strict=True
+        ):
+            found = lu_solve(solver, part if twice > 1.0 else np.real(part), check_finite=False)
+            out += twice * np.real(column[:, None] * found)
+        return out
+
+    def _solve(self, state: ReducedState, y0: Array, h: float) -> tuple[Array, Array, bool]:
+        eq, size, count = self.equations, self.jacobian.size, self._nodes.size
+        stages, rates = np.zeros((count, size)), np.zeros((count, eq.size))
+        coldest = eq.heats.coldest(y0[self.heat])  # an iterate may overshoot, a solution is not below
+        books = slice(eq.nv + eq.n + eq.ns, eq.size)
+        worst, before = np.zeros(eq.counted.size), np.inf
+        rate = moved = np.inf
+        for iteration in range(1, ITERATIONS + 1):
+            for i, node in enumerate(self._nodes):
+                y = y0.copy()
+                y[:size] += stages[i]
+                y[self.heat] = np.maximum(y[self.heat], coldest)
+                rates[i] = eq.rates(state.t + node * h, state.q, y)
+            self._counts["iterations"] += 1
+            change = self._change(state, h, rates[:, :size] - self.inverse @ stages / h)
+            reached = np.abs(y0)  # what starts from nothing, as heat does, is measured by what it becomes
+            reached[:size] += np.abs(stages + change).max(axis=0)
+            worst = np.max(np.abs(change[:, eq.counted]) / self.allowed(y0, reached), axis=0, initial=0.0)
+            moved = float(np.max(worst, initial=0.0))
+            if not np.isfinite(moved):
+                break
+            stages += change
+            if iteration > 1:
+                rate = moved / before
+                # heats are quadratic in rates: their first change says nothing of convergence
+                if rate >= 1.0 and iteration > 2 and moved > max(10.0 * self._enough, self._rough):
+                    break
+            if moved <= self._enough or (iteration > 1 and moved * rate <= self._enough * (1.0 - min(rate, 0.9))):
+                return stages, rates[:, books], iteration <= 2 or rate < FAST
+            if iteration > 2 and rate > 0.5 and moved <= self._rough:  # rounding is all that is left
+                return stages, rates[:, books], False
+            before = moved
+        if moved <= self._rough:  # near a change of rank the matrix is no good, and the iteration slow
+            return stages, rates[:, books], False
+        path, what = counted(eq.reduced, int(np.argmax(np.nan_to_num(worst, nan=np.inf))))
+        raise SolveError(Outcome.DIVERGED, path, f"{what} at the stages")
