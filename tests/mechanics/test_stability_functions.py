@@ -34,13 +34,12 @@ def rational(top, bottom, z):
     return np.linalg.solve(under, over)
 
 
-def diagonal(numbers):
-    return rational([1.0, 0.5], [1.0, -0.5], numbers)
-
-
-def gauss(z):
-    """Padé (3, 3): three Gauss stages."""
-    return rational([1.0, 1 / 2, 1 / 10, 1 / 120], [1.0, -1 / 2, 1 / 10, -1 / 120], z)
+def diagonal(stages):
+    """Padé (s, s): s Gauss stages, of which one is the midpoint rule."""
+    top = [
+        math.factorial(2 * stages - j) * math.comb(stages, j) / math.factorial(2 * stages) for j in range(stages + 1)
+    ]
+    return lambda z: rational(top, [(-1) ** j * x for j, x in enumerate(top)], z)
 
 
 def radau(z):
@@ -59,8 +58,11 @@ def explicit(a, b):
 
 
 FUNCTIONS = {
-    "natural": diagonal,
-    "natural4": gauss,
+    "natural": diagonal(1),
+    "natural4": diagonal(3),
+    "gauss4": diagonal(2),
+    "gauss6": diagonal(3),
+    "gauss8": diagonal(4),
     "radau": radau,
     "rk54": explicit(tableaux.A5, tableaux.B5),
     "rk87": explicit(tableaux.A8, tableaux.B8),
@@ -107,7 +109,7 @@ def test_generalised_alpha_is_its_recurrence(scene, rho):
 
 
 def test_the_variational_method_is_the_midpoint_rule_with_friction_in_the_middle(scene):
-    assert np.abs(states(scene, "variational", 0.1, 1)[1] - diagonal(0.1 * A) @ Y).max() <= 1e-12
+    assert np.abs(states(scene, "variational", 0.1, 1)[1] - diagonal(1)(0.1 * A) @ Y).max() <= 1e-12
 
 
 def test_every_method_of_scenes_with_constant_steps_has_its_test():

@@ -25,6 +25,8 @@ from ephs.solve.stepping import Attempt, Counts, Leg, Span
 
 __all__ = ["Explicit", "Tableau", "tableau"]
 
+Solve = Callable[..., Array]
+"""What solves the stages of a step, with the arguments of `Equations.stages`."""
 ROWS = 1024
 """Rows that are kept before they are handed over."""
 
@@ -82,6 +84,11 @@ def _steps(rows: tuple[tuple[float, ...], ...], last: tuple[float, ...]) -> Arra
 class Explicit(ReducedMethod):
     """The method of a tableau on one mechanism.
 
+    Parameters
+    ----------
+    solve
+        Solves the stages of a step as `Equations.stages` does, which is taken where there is none.
+
     Attributes
     ----------
     stiffness
@@ -91,8 +98,11 @@ class Explicit(ReducedMethod):
         rounding over the least singular value, so that drift says nothing.
     """
 
-    def __init__(self, equations: Equations, control: Control, method: Tableau) -> None:
+    def __init__(
+        self, equations: Equations, control: Control, method: Tableau, solve: Solve | None = None
+    ) -> None:
         super().__init__(equations, control)
+        self.solve: Solve = equations.stages if solve is None else solve
         self.method, self.name, self.exponent = method, method.name, method.exponent
         self.share = 0.5
         self._known: tuple[Array, Array] | None = None
@@ -108,7 +118,7 @@ class Explicit(ReducedMethod):
         k = np.zeros((scheme["a"].shape[0], eq.size))
         k[0] = self._known[1]
         tolerances, chosen = (self.atol, self.rtol), self.control.step is None
-        before = eq.stages(state, scheme, self.method.c, h, y0, k, y1, tolerances, chosen=chosen)
+        before = self.solve(state, scheme, self.method.c, h, y0, k, y1, tolerances, chosen=chosen)
         end = eq.state(state, y1, state.t + h)
         allowed, steps = self.atol + self.rtol * eq.sizes(y0, y1), STEPS.compiled()
         closed = eq.closed(end)

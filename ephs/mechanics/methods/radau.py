@@ -53,7 +53,7 @@ class Implicit(ReducedMethod):
         missed = h * (GAMMA * first[eq.size - passed.shape[1] :] + DEFECT @ passed)
         passed = h * (COEFFICIENTS[-1] @ passed)
         closed = eq.booking.step(state, closed, passed[2:], missed[2:], float(passed[1]))
-        self._stages.keep(closed, fast=fast)
+        self._stages.keep(fast=fast)
         return Attempt(state, closed, h, error, eq.least(state, closed))
 
     def taken(self, state: ReducedState) -> Snapshot:

@@ -65,7 +65,7 @@ class Stages:
         self._twice = np.where(np.abs(self._values.imag) > 1e-12 * np.abs(self._values), 2.0, 1.0)
         self._solvers: tuple[float, list[Any]] | None = None
         # Off the constraints the exact matrix grows as one over this: an old one is wrong there by as much.
-        self._separation = equations.separation()
+        self._separation, self._stale = equations.separation(), False
         self._counts = counts
         counts |= {"iterations": 0, "factorisations": 0}
         self.jacobian = Jacobian(equations, counts)
@@ -79,6 +79,8 @@ class Stages:
         SolveError
             The iteration does not converge, or a component cannot be evaluated.
         """
+        if self._stale:
+            self._renew(state)
         try:
             return self._solve(state, y0, h)
         except SolveError:
@@ -87,10 +89,9 @@ class Stages:
             self._renew(state)
             return self._solve(state, y0, h)
 
-    def keep(self, state: ReducedState, *, fast: bool) -> None:
-        """Make the matrix anew for steps from a state, where the old one served badly."""
-        if not fast or self._turned():
-            self._renew(state)
+    def keep(self, *, fast: bool) -> None:
+        """Make the matrix anew at the next step's start, where this one's served badly or constraints have turned."""
+        self._stale = not fast or self._turned()
 
     def solvers(self, state: ReducedState, h: float) -> list[Any]:
         """Factors of μ/h − J, eigenvalue by eigenvalue of the coefficients' inverse, real ones first."""
@@ -111,12 +112,13 @@ class Stages:
             "jacobian": self.jacobian.snapshot(state),
             "separation": self._separation,
             "step": self._solvers[0] if self._solvers is not None else None,
+            "stale": self._stale,
         }
 
     def restore(self, snapshot: Snapshot, state: ReducedState) -> None:
         """Go on from a snapshot."""
         self.jacobian.restore(snapshot["jacobian"], state)
-        self._separation = snapshot["separation"]
+        self._separation, self._stale = snapshot["separation"], snapshot["stale"]
         self._solvers = None
         if snapshot["step"] is not None:
             self.solvers(state, snapshot["step"])
@@ -130,7 +132,7 @@ class Stages:
 
     def _renew(self, state: ReducedState) -> None:
         self.jacobian.at(state, renew=True)
-        self._separation = self.equations.separation()
+        self._separation, self._stale = self.equations.separation(), False
         self._solvers = None
 
     def _change(self, state: ReducedState, h: float, defect: Array) -> Array:

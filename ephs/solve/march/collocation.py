@@ -16,6 +16,8 @@ ROUGH = 0.1
 """Change that is good enough where sweeps no longer make it smaller and steps are chosen."""
 ROUGH_ON_GRID = 1e3
 """The same on a grid, where stages are swept to rounding: tolerances are then 1e-14."""
+STALLED = 0.9
+"""Part of the change of the sweep before from which a sweep no longer makes it smaller."""
 SWEEPS = 50
 """Sweeps after which a step is given up."""
 
@@ -109,7 +111,7 @@ def iterate(
         on.repeat(again)
         now, last = on.sqrt(moved.value), before.value
         sweeps.value = sweeps.value + 1
-        settled = on.either(now <= ENOUGH, on.both(now > 0.5 * last, now <= rough))
+        settled = on.either(now <= ENOUGH, on.both(now > STALLED * last, now <= rough))
         # The first sweeps may bring in what a guess does not have, such as heat, which is quadratic in rates.
         growing = on.both(on.negate(now < last), sweeps.value > 3)
         lost = on.either(on.both(growing, on.negate(settled)), sweeps.value >= SWEEPS)

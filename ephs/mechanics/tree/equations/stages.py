@@ -6,7 +6,7 @@ import numpy as np
 
 from ephs.semantics.bundle import Array
 from ephs.solve.errors import Outcome, SolveError
-from ephs.solve.march.collocation import ENOUGH, ROUGH, ROUGH_ON_GRID, SWEEPS
+from ephs.solve.march.collocation import ENOUGH, ROUGH, ROUGH_ON_GRID, STALLED, SWEEPS
 
 __all__ = ["evaluated"]
 
@@ -59,7 +59,7 @@ def evaluated(
             total += float(np.sum(measured(found - k[i]) ** 2)) if measured is not None else 0.0
             k[i] = found
         now = total**0.5
-        if now <= ENOUGH or (now > 0.5 * before and now <= rough):
+        if now <= ENOUGH or (now > STALLED * before and now <= rough):
             break
         if sweep == SWEEPS or (sweep > 2 and not now < before):
             raise SolveError(Outcome.DIVERGED, "", "the stages of a step")
