@@ -18,6 +18,7 @@ from benchmarks import (
     cost,
     ensemble,
     evaluation,
+    gauss,
     growth,
     honesty,
     implicit,
@@ -58,6 +59,7 @@ TABLES: dict[str, Callable[[Path | None], str | Report]] = {
     "work": work.report,
     "growth": lambda _: growth.report(),
     "start": lambda _: start.report(),
+    "gauss": lambda _: gauss.report(),
     "implicit": lambda _: implicit.report(),
 }
 

@@ -98,9 +98,7 @@ class Explicit(ReducedMethod):
         rounding over the least singular value, so that drift says nothing.
     """
 
-    def __init__(
-        self, equations: Equations, control: Control, method: Tableau, solve: Solve | None = None
-    ) -> None:
+    def __init__(self, equations: Equations, control: Control, method: Tableau, solve: Solve | None = None) -> None:
         super().__init__(equations, control)
         self.solve: Solve = equations.stages if solve is None else solve
         self.method, self.name, self.exponent = method, method.name, method.exponent

@@ -58,11 +58,12 @@ class Stages:
             self.rtol, self.atol = np.full_like(self.rtol, ROUNDING), np.full_like(self.atol, ROUNDING)
             self._enough, self._rough = 1.0, 1e5
         values, vectors = np.linalg.eig(self.inverse)
-        kept = np.flatnonzero(values.imag >= -1e-12 * np.abs(values))
-        kept = kept[np.argsort(np.abs(values[kept].imag))]
+        sizes, turns = np.abs(values), np.imag(values)
+        kept = np.flatnonzero(turns >= -1e-12 * sizes)
+        kept = kept[np.argsort(np.abs(turns[kept]))]
         self._values, self._into, self._out = values[kept], np.linalg.inv(vectors)[kept], vectors[:, kept]
         # Of a pair one is solved for: the other is its conjugate.
-        self._twice = np.where(np.abs(self._values.imag) > 1e-12 * np.abs(self._values), 2.0, 1.0)
+        self._twice = np.where(np.abs(turns[kept]) > 1e-12 * sizes[kept], 2.0, 1.0)
         self._solvers: tuple[float, list[Any]] | None = None
         # Off the constraints the exact matrix grows as one over this: an old one is wrong there by as much.
         self._separation, self._stale = equations.separation(), False
@@ -139,9 +140,7 @@ class Stages:
         """(stages, size) what Newton's method adds to the stages' increments."""
         parts = self._into @ defect
         out = np.zeros(defect.shape)
-        for column, twice, part, solver in zip(
-            self._out.T, self._twice, parts, self.solvers(state, h), strict=True
-        ):
+        for column, twice, part, solver in zip(self._out.T, self._twice, parts, self.solvers(state, h), strict=True):
             found = lu_solve(solver, part if twice > 1.0 else np.real(part), check_finite=False)
             out += twice * np.real(column[:, None] * found)
         return out

@@ -20,6 +20,7 @@ METHOD_SOURCES: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "alpha": ("ChungHulbert1993", "BrulsCardonaArnold2012"),
         "rk54": ("DormandPrince1980",),
         "rk87": ("PrinceDormand1981", "HairerNorsettWanner1993"),
+        **{f"gauss{order}": ("HairerLubichWanner2006",) for order in (4, 6, 8)},
         "ida": ("HindmarshEtAl2005",),
     }
 )

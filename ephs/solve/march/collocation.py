@@ -28,7 +28,9 @@ def place(on: Evaluator, motion: Motion, j: Integer) -> Integer:
 
 
 @staged
-def evaluate(on: Evaluator, motion: Motion, control: Control, base: Vector, y: Vector, q: Vector, out: Vector) -> Integer:
+def evaluate(
+    on: Evaluator, motion: Motion, control: Control, base: Vector, y: Vector, q: Vector, out: Vector
+) -> Integer:
     """Evaluate the rates at base·exp(v) and count it; return a status."""
     control.evaluations = control.evaluations + 1
     status, component = motion.rates(on, base, y, q, out)
@@ -36,9 +38,7 @@ def evaluate(on: Evaluator, motion: Motion, control: Control, base: Vector, y: V
     return status
 
 
-def combine(
-    on: Evaluator, weights: Vector, count: Integer, h: Real, k: Matrix, start: Vector, y: Vector
-) -> None:
+def combine(on: Evaluator, weights: Vector, count: Integer, h: Real, k: Matrix, start: Vector, y: Vector) -> None:
     """Write start + h Σ weights·k of the first ``count`` rates to y."""
     copy(on, start, y)
 

@@ -107,7 +107,9 @@ class _Run:
         """Take a step of length h, measure its error, and accept it or not."""
         on, motion, m, c = self.on, self.motion, self.memory, self.control
         self.accepted.value = 0
-        self.status.value = attempt(on, motion, self.tableau, c, m.q, m.y, self.sign * h, m.k, m.errors, m.last, m.y1, m.q1)
+        self.status.value = attempt(
+            on, motion, self.tableau, c, m.q, m.y, self.sign * h, m.k, m.errors, m.last, m.y1, m.q1
+        )
 
         def look() -> None:
             allow(on, motion, m.errors, m.y, m.y1)

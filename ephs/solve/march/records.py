@@ -21,7 +21,19 @@ from ephs.semantics.stage import (
     vector,
 )
 
-__all__ = ["ERRORS", "MEMORY", "TABLEAU", "Control", "Ending", "Errors", "Field", "Memory", "Motion", "Status", "Tableau"]
+__all__ = [
+    "ERRORS",
+    "MEMORY",
+    "TABLEAU",
+    "Control",
+    "Ending",
+    "Errors",
+    "Field",
+    "Memory",
+    "Motion",
+    "Status",
+    "Tableau",
+]
 
 
 class Ending(IntEnum):
@@ -188,7 +200,13 @@ class Tableau:
     eighth: Integers
 
 
-TABLEAU: Final[dict[str, Any]] = {"a": matrix(), "guess": matrix(), "error": vector(), "coarse": vector(), "eighth": indices(1)}
+TABLEAU: Final[dict[str, Any]] = {
+    "a": matrix(),
+    "guess": matrix(),
+    "error": vector(),
+    "coarse": vector(),
+    "eighth": indices(1),
+}
 
 
 class Control(Record):

@@ -119,14 +119,16 @@ def test_of_radau_it_is_the_filtered_difference_to_the_embedded_method(equations
 
 def test_powers_of_the_step_with_which_estimates_fall(equations):
     found = {}
-    for method, h in (("rk54", 0.05), ("rk87", 0.2), ("alpha", 0.005), ("radau", 0.02)):
+    powers = {"rk54": 5, "rk87": 8, "alpha": 3, "radau": 4, "gauss4": 5, "gauss6": 6, "gauss8": 7}
+    lengths = {"rk54": 0.05, "rk87": 0.2, "alpha": 0.005, "radau": 0.02, "gauss4": 0.2, "gauss6": 0.2, "gauss8": 0.4}
+    for method, h in lengths.items():
         made = stepper(equations, method)
         one, two = (made.step(equations.start(0.0), part * h).error for part in (1.0, 0.5))
         found[method] = (round(math.log2(one / two)), made.exponent)
-    assert found == {"rk54": (5, 5.0), "rk87": (8, 8.0), "alpha": (3, 3.0), "radau": (4, 4.0)}
+    assert found == {name: (power, float(power)) for name, power in powers.items()}
 
 
-@pytest.mark.parametrize("method", ["variational", "radau", "alpha", "rk54", "rk87"])
+@pytest.mark.parametrize("method", ["variational", "radau", "alpha", "rk54", "rk87", "gauss6"])
 @pytest.mark.parametrize("h", [0.02, -0.02])
 def test_a_step_ends_a_step_later(equations, method, h):
     made = stepper(equations, method)
@@ -136,12 +138,13 @@ def test_a_step_ends_a_step_later(equations, method, h):
 
 
 def test_matrices_are_kept_for_steps_of_one_length_and_made_anew_when_asked(equations):
-    made, start = stepper(equations, "radau"), equations.start(0.0)
+    method, start = stepper(equations, "radau"), equations.start(0.0)
+    made, y = method._stages, equations.vector(start)
     for h, factorised in ((0.1, 1), (0.1, 1), (0.2, 2)):
-        made._solve(start, h)
-        assert made.counts["factorisations"] == factorised
-    before = made.counts["jacobians"]
-    made._renew(start)
-    assert made.counts["jacobians"] == before + 1
-    made._solve(start, 0.2)
-    assert made.counts["factorisations"] == 3
+        made.solvers(start, h)
+        assert method.counts["factorisations"] == factorised
+    before = method.counts["jacobians"]
+    made.keep(fast=False)
+    made.solve(start, y, 0.2)
+    assert method.counts["jacobians"] == before + 1
+    assert method.counts["factorisations"] == 3

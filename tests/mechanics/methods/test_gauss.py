@@ -117,7 +117,9 @@ def test_orders_on_a_loop_with_friction(name):
     for step in (h, h / 2):
         sol = ephs.simulate(scene, 0.16, method=name, step=step, save_at=[0.16], audit="off")
         assert not sol.stats["switches"]
-        missed.append(max(np.abs(sol[path][-1] - exact[path][-1]).max() for path in sol.states if "bodies" in str(path)))
+        missed.append(
+            max(np.abs(sol[path][-1] - exact[path][-1]).max() for path in sol.states if "bodies" in str(path))
+        )
     assert 2.0 ** (order - 0.8) <= missed[0] / missed[1]
 
 
