@@ -55,7 +55,7 @@ class Tableau:
     @property
     def estimates(self) -> tuple[Array, ...]:
         """(stages + 1,) weights of the estimates: one, or two that are combined."""
-        return tuple(self.arrays[name] for name in ("error", "coarse")[: 1 + int(self.arrays["eighth"][0])])
+        return tuple(self.arrays[name] for name in ("error", "coarse")[: 1 + min(1, int(self.arrays["eighth"][0]))])
 
 
 @cache

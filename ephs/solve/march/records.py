@@ -188,9 +188,9 @@ class Tableau:
         (stages, stages), strictly lower: first stages of a method whose stages depend on each other; no rows of an
         explicit one.
     error, coarse
-        (stages + 1,): weights of the estimates; `coarse` is taken where eighth[0] is 1.
+        (stages + 1,): weights of the estimates; `coarse` is taken where eighth[0] is not 0.
     eighth
-        (1,): 1 for estimates of orders 5 and 3 that are combined.
+        (1,): 1 for estimates of orders 5 and 3 that are combined; 2 for one times the square of its ratio to the other.
     """
 
     a: Matrix
