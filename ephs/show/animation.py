@@ -13,16 +13,20 @@ from typing import Any, final
 import numpy as np
 
 from ephs.show.errors import ShowError
-from ephs.show.motion import Array, Film, best_side, between, film, frame_all, point_of
-from ephs.show.overlays import ARROWS, GROUND, Heat, Loads, heat_of, loads_of, tint
+from ephs.show.motion import Array, best_side, between, frame_all, point_of
+from ephs.show.overlays import ARROWS, GROUND, Heat, tint
 from ephs.show.page import Page
-from ephs.show.solids import Solid, held_at, solids_of
+from ephs.show.player import player
+from ephs.show.solids import held_at
+from ephs.show.stage import Stage, stage_of
 from ephs.show.symbols import METAL, Colour, add_body, add_joint, add_spring, add_stick, ink
 
 __all__ = ["animate"]
 
 LONGEST = 0.35
 """Length of the longest arrow, in parts of the scene's size."""
+FAR = 4.0
+"""Way in parts of the mechanism's size beyond which the camera frames the start only."""
 THROUGH = 0.6
 """Opacity of bodies with arrows inside."""
 
@@ -71,30 +75,13 @@ def animate(
     ShowError
         If the solution has no scene, or no instants, viser is not installed, or `fps` or `duration` is not positive.
     """
-    if sol.scene is None:
-        raise ShowError("scene", path=str(sol.name))
-    if not len(sol.t):
-        raise ShowError("nothing", path=str(sol.name), found="instants", expected="some to show")
-    for name, value in (("fps", fps), ("duration", duration)):
-        if value is not None and not value > 0:
-            raise ShowError("span", path=name, found=str(value), expected="something above 0")
+    stage = stage_of(sol, wrenches=wrenches, heat=heat, fps=fps, duration=duration)
     if find_spec("viser") is None:
         raise ShowError("viser")
-    bodies = dict(sol.scene.all_bodies())
-    frames = film(sol, list(bodies), fps, duration)
-    solids = solids_of(sol.scene)
-    stage = _Stage(
-        dict(sol.scene.all_joints()),
-        dict(sol.scene.all_springs()),
-        bodies,
-        solids,
-        frames,
-        loads_of(sol, frames, dict(sol.scene.all_joints())) if wrenches else None,
-        heat_of(sol, frames, [name for name, _ in sol.scene.all_thermal()]) if heat else None,
-    )
-    text = stage.recorded(host, port)
+    drawn = _Drawn(stage)
+    text = drawn.recorded(host, port)
     text = text.replace("<title>Viser</title>", f"<title>{html.escape(str(sol.name))}</title>", 1)
-    text = f"{stage.legend()}</body>".join(text.rsplit("</body>", 1))
+    text = f"{drawn.legend()}{_flat(stage, str(sol.name))}</body>".join(text.rsplit("</body>", 1))
     page = Page(text, str(sol.name))
     if path is not None:
         page.save(path)
@@ -103,16 +90,10 @@ def animate(
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class _Stage:
-    """Film that is played."""
+class _Drawn:
+    """A stage as viser draws it."""
 
-    joints: dict[str, Any]
-    springs: dict[str, Any]
-    bodies: dict[str, Any]
-    solids: dict[str, Solid]
-    frames: Film
-    loads: Loads | None
-    heat: Heat | None
+    stage: Stage
 
     def recorded(self, host: str, port: int) -> str:
         """The page as viser makes it."""
@@ -126,66 +107,74 @@ class _Stage:
                 server.stop()
 
     def _played(self, server: Any) -> str:
-        places, reaches = self._places()
-        size = _size(places, reaches)
-        tips = [self._tips(kind, frame, size) for kind in self._kinds() for frame in range(len(self.frames.times))]
+        points, radii = self.stage.places()
+        size = self.stage.size()
+        across = float(np.linalg.norm(np.ptp(points.reshape(-1, 3), axis=0)))
+        some = points if across < FAR * size else points[:1]  # of long ways the start is framed
+        places, reaches = some.reshape(-1, 3), np.tile(radii, len(some))
+        tips = [self._tips(kind, frame, size) for kind in self._kinds() for frame in range(len(some))]
         seen = np.concatenate([places, *(tip[:, 1] for tip in tips)])
-        _set(server, seen, np.concatenate([reaches, np.zeros(len(seen) - len(places))]), size, best_side(places))
+        side = best_side(points.reshape(-1, 3))
+        _set(server, seen, np.concatenate([reaches, np.zeros(len(seen) - len(places))]), size, side)
         nodes: dict[str, Any] = {}
         warm: list[_Warm] = []
-        for index, name in enumerate(self.bodies):
-            pose = self.frames.poses[name][0]
+        for index, name in enumerate(self.stage.bodies):
+            pose = self.stage.frames.poses[name][0]
             nodes[name] = server.scene.add_frame(_node(name), show_axes=False, wxyz=pose[:4], position=pose[4:])
-            solid, opacity = self.solids[name], None if self.loads is None else THROUGH
+            solid, opacity = self.stage.solids[name], None if self.stage.loads is None else THROUGH
             drawn = add_body(server, f"{_node(name)}/shape", solid, ink(index), size, opacity)
             warm += [_Warm(name, part, "color", part.color) for part in drawn]
-            for k, point in enumerate(held_at(name, self.joints.values(), self.springs.values())):
+            for k, point in enumerate(held_at(name, self.stage.joints.values(), self.stage.springs.values())):
                 if stick := solid.stick(point):
                     add_stick(server, f"{_node(name)}/stick {k}", stick, drawn[0].color, 0.008 * size)
-        for name, joint in self.joints.items():
+        for name, joint in self.stage.joints.items():
             parent = "/ground" if joint.body1 == GROUND else _node(joint.body1)
-            metal = add_joint(server, f"{parent}/joint {name}", joint, self._symbol_size(joint, size))
-            warm += [_Warm(joint.heat, drawn, "color", METAL) for drawn in metal] if self.heat else []
-        coils = {name: add_spring(server, f"/springs/{name}", size) for name in self.springs}
-        warm += [_Warm(self.springs[name].heat, coil, "colors", METAL) for name, coil in coils.items() if self.heat]
+            metal = add_joint(server, f"{parent}/joint {name}", joint, self.stage.symbol_size(joint, size))
+            warm += [_Warm(joint.heat, drawn, "color", METAL) for drawn in metal] if self.stage.heat else []
+        coils = {name: add_spring(server, f"/springs/{name}", size) for name in self.stage.springs}
+        warm += [
+            _Warm(self.stage.springs[name].heat, coil, "colors", METAL)
+            for name, coil in coils.items()
+            if self.stage.heat
+        ]
         arrows = self._arrows(server, size)
         recording = server.get_scene_serializer()
-        for frame in range(len(self.frames.times)):
+        for frame in range(len(self.stage.frames.times)):
             for name, node in nodes.items():
-                pose = self.frames.poses[name][frame]
+                pose = self.stage.frames.poses[name][frame]
                 node.wxyz, node.position = pose[:4], pose[4:]
             for name, coil in coils.items():
-                start, end = self._spring_ends(self.springs[name], frame)
+                start, end = self._spring_ends(self.stage.springs[name], frame)
                 turn, length = between(start, end)
                 coil.wxyz, coil.position, coil.scale = turn, start, (1.0, 1.0, max(length, 1e-9))
             for kind, node in arrows.items():
                 node.points = self._tips(kind, frame, size)
             for each in warm:
-                if self.heat is not None:
-                    each.glow(self.heat, frame)
+                if self.stage.heat is not None:
+                    each.glow(self.stage.heat, frame)
             # Only Python's own float will do here.
-            recording.insert_sleep(float(self.frames.pause))
+            recording.insert_sleep(float(self.stage.frames.pause))
         return str(recording.as_html())
 
     def legend(self) -> str:
         """Legend of arrows and colours, and missing meshes, in a corner of the page."""
         rows: list[str] = []
-        if self.loads is not None:
+        if self.stage.loads is not None:
             for kind, unit in (("force", "N"), ("moment", "N m")):
-                if self.loads.largest[kind] > 0.0:
+                if self.stage.loads.largest[kind] > 0.0:
                     colour = "rgb({},{},{})".format(*ARROWS[kind])
-                    most = f"{self.loads.largest[kind]:.3g} {unit}"
+                    most = f"{self.stage.loads.largest[kind]:.3g} {unit}"
                     arrow = f'<b style="color:{colour};font-size:1.4em;line-height:1">→</b>'
                     rows.append(f"{arrow} {kind} on body 2, the longest {most}")
-            if self.loads.loose:
-                rows.append(f"indeterminate, so in part not drawn: {html.escape(', '.join(self.loads.loose))}")
-        if self.heat is not None and self.heat.high > self.heat.low:
+            if self.stage.loads.loose:
+                rows.append(f"indeterminate, so in part not drawn: {html.escape(', '.join(self.stage.loads.loose))}")
+        if self.stage.heat is not None and self.stage.heat.high > self.stage.heat.low:
             stops = ",".join("rgb({},{},{})".format(*tint(k / 8)) for k in range(9))
             bar = f"display:inline-block;width:7em;height:.7em;background:linear-gradient(90deg,{stops})"
-            rows.append(f'{self.heat.low:.2f} K <span style="{bar}"></span> {self.heat.high:.2f} K')
-        elif self.heat is not None:
-            rows.append(f"everything at {self.heat.low:.2f} K")
-        rows += [html.escape(solid.note) for solid in self.solids.values() if solid.note]
+            rows.append(f'{self.stage.heat.low:.2f} K <span style="{bar}"></span> {self.stage.heat.high:.2f} K')
+        elif self.stage.heat is not None:
+            rows.append(f"everything at {self.stage.heat.low:.2f} K")
+        rows += [html.escape(solid.note) for solid in self.stage.solids.values() if solid.note]
         if not rows:
             return ""
         style = (
@@ -209,41 +198,22 @@ class _Stage:
 
     def _kinds(self) -> list[str]:
         """The kinds of arrows that there are."""
-        return [] if self.loads is None else [kind for kind, most in self.loads.largest.items() if most > 0.0]
+        return (
+            [] if self.stage.loads is None else [kind for kind, most in self.stage.loads.largest.items() if most > 0.0]
+        )
 
     def _tips(self, kind: str, frame: int, size: float) -> Any:
         """(n, 2, 3) start and end of each joint's arrow of this kind."""
-        loads = self.loads
+        loads = self.stage.loads
         assert loads is not None
         vectors = (loads.force if kind == "force" else loads.moment)[frame]
         start = loads.places[frame]
         return np.stack([start, start + LONGEST * size / loads.largest[kind] * vectors], axis=1).astype(np.float32)
 
-    def _pose_of(self, name: str) -> Array:
-        still = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-        return np.broadcast_to(still, (len(self.frames.times), 7)) if name == GROUND else self.frames.poses[name]
-
     def _spring_ends(self, spring: Any, frame: int) -> tuple[Array, Array]:
-        start = point_of(self._pose_of(spring.body1)[frame], np.asarray(spring.at1, dtype=float))
-        end = point_of(self._pose_of(spring.body2)[frame], np.asarray(spring.at2, dtype=float))
+        start = point_of(self.stage.pose_of(spring.body1)[frame], np.asarray(spring.at1, dtype=float))
+        end = point_of(self.stage.pose_of(spring.body2)[frame], np.asarray(spring.at2, dtype=float))
         return start, end
-
-    def _places(self) -> tuple[Array, Array]:
-        """Every point (n, 3) that the camera must see at any time, and how far about each."""
-        found = [(self.frames.poses[name][:, 4:], solid.reach) for name, solid in self.solids.items()]
-        ends = [(j.body1, np.asarray(j.frame1, dtype=float)[4:]) for j in self.joints.values()]
-        ends += [(s.body1, np.asarray(s.at1, dtype=float)) for s in self.springs.values()]
-        ends += [(s.body2, np.asarray(s.at2, dtype=float)) for s in self.springs.values()]
-        found += [(point_of(self._pose_of(body), at), 0.0) for body, at in ends]
-        points = np.concatenate([points for points, _ in found]) if found else np.zeros((1, 3))
-        reaches = np.concatenate([np.full(len(points), reach) for points, reach in found]) if found else np.zeros(1)
-        return points, reaches
-
-    def _symbol_size(self, joint: Any, size: float) -> float:
-        """A joint is drawn as large as befits the bodies that it joins."""
-        near = [self.solids[name].reach for name in (joint.body1, joint.body2) if name in self.solids]
-        small = min([reach for reach in near if reach > 0.0], default=0.25 * size)
-        return float(np.clip(0.16 * small, 0.014 * size, 0.05 * size))
 
 
 @final
@@ -283,13 +253,21 @@ def _silence() -> Iterator[None]:
         console.quiet = before
 
 
+def _flat(stage: Stage, title: str) -> str:
+    """The player on a canvas, shown in place of the page where the browser has no WebGL."""
+    return (
+        '<div id="flat" hidden style="position:fixed;inset:0;z-index:99;background:#fff">'
+        f"<template>{player(stage, title, '100vh')}</template></div><script>"
+        'if(!document.createElement("canvas").getContext("webgl2")){const flat=document.getElementById("flat");'
+        'flat.hidden=false;for(const id of ["root","legend"])document.getElementById(id)?.setAttribute("hidden","");'
+        "flat.append(flat.firstElementChild.content);"
+        'for(const old of flat.querySelectorAll("script:not([type])")){const made=document.createElement("script");'
+        "made.textContent=old.textContent;old.replaceWith(made)}}</script>"
+    )
+
+
 def _node(name: str) -> str:
     return f"/bodies/{name.replace('/', '|')}"
-
-
-def _size(places: Array, reaches: Array) -> float:
-    across = float(np.linalg.norm((places + reaches[:, None]).max(axis=0) - (places - reaches[:, None]).min(axis=0)))
-    return across if across > 0 else 1.0
 
 
 def _set(server: Any, places: Array, reaches: Array, size: float, side: Array) -> None:

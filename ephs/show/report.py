@@ -3,17 +3,17 @@
 import html
 import re
 from importlib.resources import files
-from importlib.util import find_spec
 from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
 
-from ephs.show.animation import animate
 from ephs.show.balances import balances
 from ephs.show.drawing import draw
 from ephs.show.panels import constraint_panels, energy_panels, entropy_panels, exergy_panels, motion_panels
+from ephs.show.player import player
 from ephs.show.signals import Group, packed
+from ephs.show.stage import stage_of
 
 _ROWS = (
     ("method", "Method", ""),
@@ -169,14 +169,9 @@ def _pattern(sol: Any) -> str:
 def _animation(sol: Any) -> str:
     if sol.scene is None:
         return ""
-    if find_spec("viser") is None:
-        return (
-            "<h2>Motion</h2><p>There is no animation here, because the package viser is not installed; "
-            "install it with <code>pip install 'ephs[viz]'</code> and write the report again.</p>"
-        )
-    frame = animate(sol, heat=any(True for _ in sol.scene.all_thermal())).frame()
-    times = f'data-start="{float(sol.t[0])!r}" data-end="{float(sol.t[-1])!r}"'
-    return f"<h2>Motion</h2>{frame.replace('<iframe ', f'<iframe {times} ', 1)}"
+    warm = any(True for _ in sol.scene.all_thermal())
+    stage = stage_of(sol, wrenches=False, heat=warm, fps=30.0, duration=None)
+    return f"<h2>Motion</h2>{player(stage, str(sol.name))}"
 
 
 def _plots(sol: Any) -> str:

@@ -94,8 +94,8 @@ class Tab:
 
 
 @contextmanager
-def opened(page: Path, width: int = 900, height: int = 640) -> Iterator[Tab]:
-    """Show a page."""
+def opened(page: Path, *flags: str, width: int = 900, height: int = 640) -> Iterator[Tab]:
+    """Show a page; ``flags`` are further ones of the browser."""
     from websockets.sync.client import connect
 
     program = browser()
@@ -103,7 +103,14 @@ def opened(page: Path, width: int = 900, height: int = 640) -> Iterator[Tab]:
         raise FileNotFoundError("no browser")
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
         port = Path(profile, "DevToolsActivePort")
-        command = [program, *FLAGS, f"--window-size={width},{height}", f"--user-data-dir={profile}", "about:blank"]
+        command = [
+            program,
+            *FLAGS,
+            *flags,
+            f"--window-size={width},{height}",
+            f"--user-data-dir={profile}",
+            "about:blank",
+        ]
         process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         try:
             end = time.monotonic() + 60.0

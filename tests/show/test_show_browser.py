@@ -53,10 +53,50 @@ def test_the_mechanism_is_seen_and_moves_without_a_network(crank, tmp_path, opti
 
 def test_the_report_plays_without_a_network(crank, tmp_path):
     with opened(write_report(crank, tmp_path)) as tab:
-        tab.evaluate("document.querySelector('iframe').scrollIntoView()")
-        tab.until("document.querySelector('iframe').contentDocument.querySelector('canvas') !== null")
+        tab.until("document.querySelector('.player canvas') !== null")
+        first = tab.evaluate("document.querySelector('.player output').textContent")
+        tab.until(f"document.querySelector('.player output').textContent !== {json.dumps(first)}")
+        seen = tab.pixels()
+        assert drawn(seen).sum() > 2000
         assert [url for url in tab.requests if not url.startswith(LOCAL)] == []
         assert tab.complaints == []
+
+
+def looks(tab: Tab) -> str:
+    return tab.evaluate("document.querySelector('.player canvas').toDataURL()")
+
+
+def test_the_player_is_steered(crank, tmp_path):
+    with opened(write_report(crank, tmp_path)) as tab:
+        tab.until("document.querySelector('.player canvas') !== null")
+        tab.evaluate("document.querySelector('.player button').click()")  # pause
+        slider, clock = (
+            "document.querySelector('.player input[type=range]')",
+            "document.querySelector('.player output')",
+        )
+        tab.evaluate(f"{slider}.value = 30; {slider}.dispatchEvent(new Event('input'))")
+        assert tab.evaluate(f"{clock}.textContent") == "1.000 s"
+        still = looks(tab)
+        for name in ("names", "traces", "follow"):
+            tick = f"[...document.querySelectorAll('.player label')].find(each => each.textContent === '{name}')"
+            tab.evaluate(f"{tick}.querySelector('input').click()")
+            assert looks(tab) != still
+            tab.evaluate(f"{tick}.querySelector('input').click()")
+            assert looks(tab) == still
+        canvas = "document.querySelector('.player canvas')"
+        press = "new KeyboardEvent('keydown', {key: 'ArrowRight'})"
+        tab.evaluate(f"{canvas}.dispatchEvent({press})")
+        assert tab.evaluate(f"{clock}.textContent") == "1.033 s"
+        tab.evaluate("document.dispatchEvent(new CustomEvent('seek', {detail: 1.0}))")  # as a click on a plot does
+        assert looks(tab) == still
+        assert tab.complaints == []
+
+
+def test_without_webgl_the_page_is_flat(crank, tmp_path):
+    animate(crank, tmp_path / "film.html", wrenches=True)
+    with opened(tmp_path / "film.html", "--disable-3d-apis") as tab:
+        tab.until("document.querySelector('.player canvas') !== null")
+        assert drawn(tab.pixels()).sum() > 2000
 
 
 def test_plots_are_picked_zoomed_and_follow_the_motion(crank, tmp_path):

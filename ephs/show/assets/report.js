@@ -112,13 +112,14 @@
   panels.forEach(draw);
   addEventListener("resize", () => everywhere((plot) => plot.setSize({ width: host.clientWidth, height: plot.height })));
 
-  // The animation's time bar counts its frames; its position becomes the time of the line.
-  const film = document.querySelector("iframe[data-start]");
-  if (film) setInterval(() => {
-    const bar = film.contentDocument?.querySelector('[role="slider"]');
-    if (!bar) return;
-    const share = Number(bar.getAttribute("aria-valuenow")) / Number(bar.getAttribute("aria-valuemax"));
-    const time = Number(film.dataset.start) + share * (Number(film.dataset.end) - Number(film.dataset.start));
-    if (Number.isFinite(time) && time !== now) { now = time; for (const plot of plots.values()) plot.redraw(false); }
-  }, 66);
+  // The player's time is a line in every plot; a click on a plot sets it.
+  document.addEventListener("frame", (event) => {
+    if (event.detail === now) return;
+    now = event.detail;
+    for (const plot of plots.values()) plot.redraw(false);
+  });
+  host.addEventListener("click", (event) => {
+    const over = event.target.closest(".u-over"), plot = [...plots.values()].find((each) => each.over === over);
+    if (plot && plot.select.width === 0) document.dispatchEvent(new CustomEvent("seek", { detail: plot.posToVal(event.offsetX, "x") }));
+  });
 })();
