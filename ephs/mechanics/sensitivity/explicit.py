@@ -183,7 +183,7 @@ class ExplicitTangent:
 
     def _by(self, number: int, function: Any) -> Array:
         """The derivative of a function of (equations, initial state) by a parameter."""
-        step, stencil = self.family.parameters[number].step, self.family.parameters[number].stencil
+        step, stencil = self.family.parameters[number].step, self.family.parameters[number].tables
         return difference(lambda k: function(*self._other(number, k * step)[1:]), stencil, step)
 
     def _other(self, number: int, offset: float) -> tuple[Problem, Equations, ReducedState]:

@@ -30,6 +30,7 @@ __all__ = ["CENTRAL", "Family", "Parameter", "Stencil", "difference"]
 Stencil = tuple[tuple[int, float], ...]
 """Multiples of a step, and their weights in a first derivative."""
 CENTRAL: Stencil = ((-3, -1 / 60), (-2, 0.15), (-1, -0.75), (1, 0.75), (2, -0.15), (3, 1 / 60))
+STRAIGHT: Stencil = ((-1, -0.5), (1, 0.5))
 FORWARD: Stencil = ((0, -2.45), (1, 6.0), (2, -7.5), (3, 20 / 3), (4, -3.75), (5, 1.2), (6, -1 / 6))
 RELATIVE = 2.0**-8
 """A neighbour's distance, relative to the parameter, or absolute where that is zero."""
@@ -53,12 +54,23 @@ def difference(function: Callable[[int], Array], stencil: Stencil, step: float) 
 @final
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """A number of a model, or an initial value: its path, value, the distance of neighbours, where they are."""
+    """A number of a model, or an initial value.
+
+    Parameters
+    ----------
+    path, value
+        Where it is, and what it is.
+    step, stencil
+        The distance of neighbours, and where they are for derivatives of what is read from motions.
+    tables
+        Where they are for derivatives of the equations' tables and of initial values.
+    """
 
     path: str
     value: float
     step: float
     stencil: Stencil
+    tables: Stencil
 
 
 @final
@@ -123,13 +135,14 @@ class Family:
         step = (WIDE if linear else RELATIVE) * max(abs(value) or 1.0, LEAST if signed else 0.0)
         for stencil in (CENTRAL, FORWARD):
             try:
-                for k, _ in stencil:
+                tables = STRAIGHT if linear and stencil is CENTRAL else stencil
+                for k, _ in (tables[0], tables[-1]):
                     self._beside(path, value, k * step)
             except (SceneError, StructureError):
                 if stencil is FORWARD:
                     raise
                 continue
-            return Parameter(path, value, step, stencil)
+            return Parameter(path, value, step, stencil, tables)
         raise OptionError("parameters", path, "a number that may change")
 
     def _read(self, path: str) -> float:
