@@ -4,7 +4,7 @@ The registry is what the mechanism itself calls: its engine with sweeps and loop
 each as it is, and over dual numbers. Inputs are drawn states, and memory as the calls before left it.
 """
 
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import pytest
@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 import ephs
 from ephs.mechanics.methods.explicit import tableau
 from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.sensitivity.family import relation_of
 from ephs.mechanics.tree.engine.tangents import DIRECTIONS, StepTangent, evaluated, step_program, step_tangents
 from ephs.mechanics.tree.equations.equations import Equations
 from ephs.mechanics.tree.sweeps.residuals import ACTIVE
-from ephs.semantics.derive.relations import entry_of
 from ephs.semantics.stage import PLAIN, Entry, Program, Table, vector
 
 SCENES = ("slider-crank", "heavy-top")
@@ -37,15 +37,10 @@ def equations(name):
     return eq, eq.start(0.0)
 
 
-def relation(eq):
-    components = eq.problem.descriptor.components
-    return lambda number: entry_of(components[number].primitive.kernel.relation)
-
-
 @cache
 def steps(name):
     eq = equations(name)[0]
-    return StepTangent(eq.engine, relation(eq), tableau("rk54").arrays)
+    return StepTangent(eq.engine, partial(relation_of, eq.problem.descriptor), tableau("rk54").arrays)
 
 
 def copied(argument):
@@ -164,7 +159,7 @@ def test_components(name, seed):
     t = eq.model.tables
     for i in evaluated(eq.engine.tables):
         slot = eq.problem.descriptor.components[i]
-        program, entry = relation(eq)(i)
+        program, entry = relation_of(eq.problem.descriptor, i)
         n, k, m, size = (int(d) for d in t.dims[i])
         kernel = slot.primitive.kernel
         p = np.array(kernel.numbers(eq.model.reference))

@@ -6,20 +6,20 @@ rates, books; masses, lengths, stiffnesses, …) comes with its derivatives by t
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, Never, final
 
 import numpy as np
 
 from ephs.mechanics.methods.explicit import tableau
-from ephs.mechanics.sensitivity.family import Family, difference, same_shape
+from ephs.mechanics.sensitivity.family import Family, difference, relation_of, same_shape
 from ephs.mechanics.tree.engine.tangents import DIRECTIONS, StepTangent
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.mechanics.tree.finding.tables import SPRING
 from ephs.mechanics.tree.sweeps.cuts import Cut
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
-from ephs.semantics.derive.relations import entry_of
-from ephs.semantics.stage import Program, Table
+from ephs.semantics.stage import Table
 from ephs.solve.errors import OptionError, SolveError
 from ephs.solve.march import Status
 from ephs.solve.problem import Problem
@@ -87,7 +87,7 @@ class ExplicitTangent:
         point = Point(state, slopes[:, : state.q.size], slopes[:, state.q.size :])
         for first in range(0, count, DIRECTIONS):
             which = slice(first, min(first + DIRECTIONS, count))
-            made = StepTangent(eq.engine, self._relation, self.method.arrays)
+            made = StepTangent(eq.engine, partial(relation_of, self.family.problem.descriptor), self.method.arrays)
             for name in made.slopes:
                 for k, j in enumerate(range(which.start, which.stop)):
                     made.slopes[name][..., k] = self._by(j, lambda of, _, name=name: self._numbers(of, name))
@@ -174,12 +174,6 @@ class ExplicitTangent:
         self.equations.refuse(status, self.equations.engine.failed)
 
     # ---- neighbours --------------------------------------------------------------------------------------------
-
-    def _relation(self, number: int) -> tuple[Program, str]:
-        slot = self.family.problem.descriptor.components[number]
-        if slot.primitive.kernel is None:
-            raise OptionError("parameters", str(slot.path), "relations that can be recorded: this one is called back")
-        return entry_of(slot.primitive.kernel.relation)
 
     def _by(self, number: int, function: Any) -> Array:
         """The derivative of a function of (equations, initial state) by a parameter."""

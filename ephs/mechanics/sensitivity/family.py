@@ -17,7 +17,10 @@ from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.parameters import read, varied
 from ephs.operad import Path
 from ephs.semantics.bundle import Array, Reference
+from ephs.semantics.derive.relations import entry_of
+from ephs.semantics.descriptor import Descriptor
 from ephs.semantics.errors import StructureError
+from ephs.semantics.stage import Program
 from ephs.semantics.system import System
 from ephs.solve.errors import OptionError
 from ephs.solve.problem import Problem
@@ -25,7 +28,7 @@ from ephs.solve.problem import Problem
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-__all__ = ["CENTRAL", "Family", "Parameter", "Stencil", "difference"]
+__all__ = ["CENTRAL", "Family", "Parameter", "Stencil", "difference", "relation_of", "same_shape"]
 
 Stencil = tuple[tuple[int, float], ...]
 """Multiples of a step, and their weights in a first derivative."""
@@ -169,6 +172,20 @@ class Family:
             initial[stem] = state
         system = varied(self.model, numbers) if numbers else self.model
         return problem_of_system(system, initial, self._inputs, self._reference)
+
+
+def relation_of(descriptor: Descriptor, number: int) -> tuple[Program, str]:
+    """The program of a component's relation, and its entry.
+
+    Raises
+    ------
+    OptionError
+        It is a Python function that is called back.
+    """
+    slot = descriptor.components[number]
+    if slot.primitive.kernel is None:
+        raise OptionError("model", str(slot.path), "relations that can be recorded: this one is called back in Python")
+    return entry_of(slot.primitive.kernel.relation, derivatives=False)
 
 
 def _entry(path: str) -> tuple[str, int]:

@@ -1,38 +1,40 @@
 """The tangent of natural steps, of systems and of scenes in the paper's form.
 
 A step solves F(x⁰, z; p) = 0 for the rates, efforts and multipliers z, and leads to x¹ = x⁰·exp(h w). So its tangent
-solves ∂F/∂z dz = −∂F/∂x⁰ dx⁰ − ∂F/∂p with the matrix of Newton's method, exact; the right-hand side is the derivative
-of the residual along (dx⁰, dp), by differences of fourth order.
+solves ∂F/∂z dz = −∂F/∂x⁰ dx⁰ − ∂F/∂p with the matrix of Newton's method; the right-hand side, ledgers and x¹ are the
+step's own functions over dual numbers.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import final
+from functools import cache
+from typing import Any, final
 
 import numpy as np
 
-from ephs.mechanics.sensitivity.family import CENTRAL, Family, difference, same_shape
+from ephs.mechanics.sensitivity.family import Family, difference, relation_of, same_shape
+from ephs.mechanics.tree.engine.tangents import DIRECTIONS
 from ephs.semantics.bundle import Array
 from ephs.semantics.primitives import Irreversible
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.rank import IMPLICIT
+from ephs.semantics.stage import Entry, Evaluator, Integer, Program, Vector, vector
 from ephs.solve.errors import OptionError, SolveError
 from ephs.solve.methods.natural import Natural, NaturalState, stored_energies
-from ephs.solve.methods.records import Memory
+from ephs.solve.methods.newton import settle
+from ephs.solve.methods.records import MEMORY, TABLES, Columns, Scratch, parts_of
+from ephs.solve.methods.residuals import FAULTS, account, evaluate
 from ephs.solve.model import Evaluation, Model, compile_model
 from ephs.solve.problem import Problem
 from ephs.solve.stepping import Row
 
 __all__ = ["NaturalTangent"]
 
-SMALL = 1e-3
-"""Step along a tangent, relative to states where they are large."""
-
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Point:
-    """A state of the method at a time, and its derivatives by the parameters: (p, rates), (p, sums)."""
+    """A state of the method at a time, and its derivatives by the parameters: (p, point_size), (p, sums)."""
 
     t: float
     state: NaturalState
@@ -43,33 +45,91 @@ class Point:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class _Side:
-    """A problem, and the evaluation of its model."""
+    """A problem, and its model."""
 
     problem: Problem
-    evaluation: Evaluation
+    model: Model
 
     @staticmethod
     def of(problem: Problem, t0: float) -> "_Side":
-        model = compile_model(problem.descriptor, problem.reference, problem.inputs(t0, problem.initial))
-        return _Side(problem, Evaluation(model))
+        return _Side(problem, compile_model(problem.descriptor, problem.reference, problem.inputs(t0, problem.initial)))
 
-    @property
-    def model(self) -> Model:
-        """The model."""
-        return self.evaluation.model
+    def numbers(self, name: str) -> Array:
+        """What the equations are evaluated from."""
+        if name == "scal":
+            return self.model.scal(0.0)
+        return self.model.input_values() if name == "inputs" else getattr(self.model.tables, name)
 
-    @property
-    def memory(self) -> Memory:
-        """What was evaluated last."""
-        return self.evaluation.memory
 
-    def whole(self, x: Array, z: Array, h: float) -> Array:
-        """The residual, then what the step adds to the ledgers."""
-        status, component = self.evaluation.at(x, z, h)
-        if status:
-            raise SolveError.of_component(status, self.model, component)
-        sums = self.evaluation.ledgers(h)
-        return np.concatenate([self.memory.residual, sums])
+@cache
+def _program() -> Program:
+    """The program of a step's equations and ledgers, and of its end, over dual numbers."""
+
+    def whole(
+        on: Evaluator, t: Columns, x: Vector, z: Vector, scal: Vector, inputs: Vector, m: Scratch, sums: Vector
+    ) -> Integer:
+        fault = evaluate(on, t, x, z, scal, inputs, m)
+        on.when(on.same(fault, 0), lambda: _counted(on, t, z, scal, inputs, m, sums))
+        return fault
+
+    def end(on: Evaluator, t: Columns, x: Vector, z: Vector, scal: Vector, m: Scratch) -> None:
+        settle(on, t, x, scal[0], z, m.v)
+
+    point: dict[str, Any] = {"t": TABLES, "x": vector(), "z": vector(), "scal": vector(3)}
+    entries = {
+        "whole": Entry(whole, **point, inputs=vector(), m=MEMORY, sums=vector()),
+        "end": Entry(end, **point, m=MEMORY),
+    }
+    return Program("natural_along", **{name: entry.tangent(directions=DIRECTIONS) for name, entry in entries.items()})
+
+
+def _counted(on: Evaluator, t: Columns, z: Vector, scal: Vector, inputs: Vector, m: Scratch, sums: Vector) -> None:
+    account(on, t, z, scal[0], inputs, m, sums)
+
+
+@final
+class _Along:
+    """The equations of one model over a step with derivatives along some directions.
+
+    Attributes
+    ----------
+    slopes
+        Of what the equations are evaluated from, by name: set before steps.
+    """
+
+    def __init__(self, side: _Side) -> None:
+        model = side.model
+        tables, memory = parts_of(model.tables), parts_of(model.memory())
+        tables["address"] = tables["address"].copy()
+        for number in range(tables["address"].size):
+            program, entry = relation_of(model.descriptor, number)
+            tables["address"][number] = program.tangent(DIRECTIONS).compiled()[entry].address
+        given = {name: value for name, value in tables.items() if value.dtype == np.float64}
+        given |= {"scal": model.scal(0.0), "inputs": model.input_values()}
+        pairs = {name: _pair(value) for name, value in given.items()}
+        self.slopes = {name: pair[1] for name, pair in pairs.items()}
+        self.x, self.z = _pair(np.zeros(model.descriptor.point_size)), _pair(np.zeros(model.unknowns))
+        self.sums = _pair(np.zeros(4 + model.tables.kind.size))
+        self.memory = {name: _pair(value) for name, value in memory.items()}
+        self._scal = pairs["scal"][0]
+        calls, t = _program().compiled(), {**tables, **{name: pairs[name] for name in tables if name in pairs}}
+        point = t, self.x, self.z, pairs["scal"]
+        self._whole = calls["whole"].bind(*point, pairs["inputs"], self.memory, self.sums)
+        self._end = calls["end"].bind(*point, self.memory)
+
+    def whole(self, h: float) -> int:
+        """Evaluate the residual and what the step adds to the ledgers; a fault, 0 where there is none."""
+        self._scal[0] = h
+        self.sums[0][:], self.sums[1][:] = 0.0, 0.0
+        return int(self._whole())
+
+    def end(self) -> None:
+        """Move the states to the end of the step."""
+        self._end()
+
+
+def _pair(value: Array) -> tuple[Array, Array]:
+    return value, np.zeros((*value.shape, DIRECTIONS))
 
 
 @final
@@ -81,51 +141,51 @@ class NaturalTangent:
             raise OptionError("inputs", "a function", "constants, with the method natural; or rk54 or rk87, of a scene")
         self.family, self.t0 = family, t0
         self.side = _Side.of(family.problem, t0)
-        self.natural = Natural(self.side.model)
+        self.natural, self._evaluation = Natural(self.side.model), Evaluation(self.side.model)
         self._others: dict[tuple[int, float], _Side] = {}
         d = family.problem.descriptor
         self._groups = [(slot, manifold(slot.quantity.space)) for slot in d.states if slot.quantity.space.dim]
         self._makers = np.array([isinstance(slot.primitive, Irreversible) for slot in d.components], dtype=bool)
+        self._along: list[tuple[slice, _Along]] = []
 
     def start(self) -> Point:
         """The initial state."""
-        d = self.family.problem.descriptor
-        x0 = d.pack(self.family.problem.initial)
-        found = [
-            self._by(j, lambda of, _: self._increment(x0, d.pack(of.problem.initial)))
-            for j in range(len(self.family.parameters))
-        ]
-        state = self.natural.init(x0)
-        return Point(self.t0, state, np.array(found), np.zeros((len(found), state.sums.size)))
+        d, count = self.family.problem.descriptor, len(self.family.parameters)
+        found = [self._by(j, lambda of: d.pack(of.problem.initial)) for j in range(count)]
+        for first in range(0, count, DIRECTIONS):
+            which = slice(first, min(first + DIRECTIONS, count))
+            along = _Along(self.side)
+            for name, slopes in along.slopes.items():
+                for k, j in enumerate(range(which.start, which.stop)):
+                    slopes[:, k] = self._by(j, lambda of, name=name: of.numbers(name))
+            self._along.append((which, along))
+        state = self.natural.init(d.pack(self.family.problem.initial))
+        return Point(self.t0, state, np.array(found), np.zeros((count, state.sums.size)))
 
     def step(self, point: Point, h: float) -> Point:
         """One step of h seconds."""
         after = self.natural.step(point.state, h)
-        x0, z, side = point.state.x, after.z, self.side
-        n = z.size
-        side.whole(x0, z, h)
-        t = side.model.tables
-        matrix = np.zeros((n, n))
-        np.add.at(matrix, (t.row, t.column), side.memory.data)
-        d = self.family.problem.descriptor
-        changes: list[Array] = []
-        for j, tangent in enumerate(point.x):
-            changes.append(
-                self._change(j, tangent, lambda of, by, u=tangent: of.whole(d.advance(x0, by * u) if by else x0, z, h))
-            )
-        right = np.array(changes)
-        dz = -self._solved(matrix, right[:, :n].T).T
-        dx, dsums = np.empty_like(point.x), point.sums + right[:, n:]
-        for j in range(len(point.x)):
-            size = float(np.abs(dz[j]).max(initial=0.0))
-            if size:
-                e = SMALL * max(1.0, float(np.abs(z).max())) / size
-                dsums[j] += difference(lambda k, e=e, j=j: side.whole(x0, z + k * e * dz[j], h)[n:], CENTRAL, e)
-            for slot, group in self._groups:
-                v = h * z[slot.rates]
-                dx[j, slot.rates] = group.adjoint(group.exp(-v)) @ point.x[j, slot.rates]
-                dx[j, slot.rates] += group.dexp_left(v) @ (h * dz[j, slot.rates])
+        x0, z, model = point.state.x, after.z, self.side.model
+        self._sound(*self._evaluation.at(x0, z, h))
+        matrix = np.zeros((z.size, z.size))
+        np.add.at(matrix, (model.tables.row, model.tables.column), self._evaluation.memory.data)
+        dx, dsums = np.empty_like(point.x), np.empty_like(point.sums)
+        for which, along in self._along:
+            used = which.stop - which.start
+            along.x[0][:], along.z[0][:], along.z[1][:] = x0, z, 0.0
+            along.x[1][:, :used] = point.x[which].T
+            fault = along.whole(h)
+            self._sound(fault % FAULTS, fault // FAULTS)
+            along.z[1][:] = -self._solved(matrix, along.memory["residual"][1])
+            along.whole(h)
+            dsums[which] = point.sums[which] + along.sums[1][:, :used].T
+            along.end()
+            dx[which] = along.x[1][:, :used].T
         return Point(point.t + h, after, dx, dsums)
+
+    def _sound(self, status: int, component: int) -> None:
+        if status:
+            raise SolveError.of_component(status, self.side.model, component)
 
     def _solved(self, matrix: Array, right: Array) -> Array:
         """Least-norm where constraints repeat each other."""
@@ -137,35 +197,21 @@ class NaturalTangent:
                 pass
         return np.asarray(np.linalg.lstsq(matrix / rows, right / rows, rcond=IMPLICIT)[0], dtype=float)
 
-    def _change(self, number: int, dx: Array, function: Callable[[_Side, float], Array]) -> Array:
-        """The derivative of a function of (model, share of the tangent) by a parameter and along the tangent: at once,
-        where the parameter's neighbours move the state little enough, else one after the other."""
-        size = float(np.abs(dx).max(initial=0.0))
-        if self.family.parameters[number].step * size <= 2.0 * SMALL:
-            return self._by(number, function)
-        step = SMALL / size
-        along = difference(lambda k: function(self.side, k * step), CENTRAL, step)
-        return along + self._by(number, lambda of, _: function(of, 0.0))
-
-    def _by(self, number: int, function: Callable[[_Side, float], Array]) -> Array:
-        """The derivative of a function of (model, offset) by a parameter."""
-        step, stencil = self.family.parameters[number].step, self.family.parameters[number].stencil
-        return difference(lambda k: function(self._other(number, k * step), k * step), stencil, step)
+    def _by(self, number: int, function: Callable[[_Side], Array]) -> Array:
+        """The derivative of what a model is evaluated from by a parameter."""
+        step, stencil = self.family.parameters[number].step, self.family.parameters[number].tables
+        return difference(lambda k: function(self._other(number, k * step)), stencil, step)
 
     def _other(self, number: int, offset: float) -> _Side:
         if not offset:
             return self.side
         if (number, offset) not in self._others:
             found = _Side.of(self.family.at(number, offset), self.t0)
-            same_shape(self.side.memory.residual, found.memory.residual, self.family.parameters[number].path)
+            for name in ("parameters", "row"):
+                one, other = getattr(self.side.model.tables, name), getattr(found.model.tables, name)
+                same_shape(one, other, self.family.parameters[number].path)
             self._others[number, offset] = found
         return self._others[number, offset]
-
-    def _increment(self, x0: Array, x1: Array) -> Array:
-        out = np.zeros(self.family.problem.descriptor.rate_size)
-        for slot, group in self._groups:
-            out[slot.rates] = group.increment(x0[slot.point], x1[slot.point])
-        return out
 
     # ---- what is kept ------------------------------------------------------------------------------------------
 
@@ -180,12 +226,17 @@ class NaturalTangent:
     def beside(self, number: int, offset: float, points: list[Point]) -> tuple[Problem, list[Row]]:
         """The same of a neighbour, by the tangents; and its problem."""
         side = self._other(number, offset)
-        d = side.problem.descriptor
         rows = [
-            self._row(side.model, d.advance(p.state.x, offset * p.x[number]), p.state.sums + offset * p.sums[number])
+            self._row(side.model, self._moved(p.state.x + offset * p.x[number]), p.state.sums + offset * p.sums[number])
             for p in points
         ]
         return side.problem, rows
+
+    def _moved(self, x: Array) -> Array:
+        """States, their quaternions of length one."""
+        for slot, group in self._groups:
+            x[slot.point] = group.normalise(x[slot.point])
+        return x
 
     def _row(self, model: Model, x: Array, sums: Array) -> Row:
         return Row(x, np.where(self._makers, sums[4:], stored_energies(model, x)), sums[:4])

@@ -22,7 +22,18 @@ from ephs.semantics.stage.evaluator import Evaluator
 from ephs.semantics.stage.numbers import Integer, Real, Truth
 from ephs.semantics.stage.programs import Call, Entry, Program
 
-__all__ = ["Irreversible", "Port", "Relation", "Reversible", "Storage", "compiled", "entry_of", "program", "sizes"]
+__all__ = [
+    "Irreversible",
+    "Port",
+    "Relation",
+    "Reversible",
+    "Storage",
+    "bare",
+    "compiled",
+    "entry_of",
+    "program",
+    "sizes",
+]
 
 OK: Final = 0
 TEMPERATURE: Final = 2
@@ -341,18 +352,34 @@ def sizes(relation: Relation) -> dict[str, int]:
 @cache
 def program(relation: Relation) -> Program:
     """The program of a relation; its entry `value` has the signature of `ephs.semantics.kernel_table`."""
+    return _program(relation, bare=False)
+
+
+@cache
+def bare(relation: Relation) -> Program:
+    """The same without the derivatives that a relation writes, which its tangents do not need."""
+    return _program(relation, bare=True)
+
+
+def _program(relation: Relation, *, bare: bool) -> Program:
+    size = sizes(relation)
 
     def value(on: Evaluator, dims: Any, scal: Any, p: Any, x0: Any, v: Any, e: Any, lam: Any, f: Any, c: Any,
               jac: Any, work: Any) -> Integer:  # fmt: skip
+        if bare:  # what is written to memory that nothing reads vanishes
+            f = on.scratch(size["f"]) if isinstance(relation, Storage) else f
+            jac = on.scratch(max(size["jac"], 1))
         return relation.stage(on, Arguments(scal, p, x0, v, e, lam, f, c, jac, work))
 
-    kinds = {name: pointer("reals", size) for name, size in sizes(relation).items()}
-    return Program("element", value=Entry(value, dims=pointer("integers", 4), **kinds))
+    kinds = {name: pointer("reals", count) for name, count in size.items()}
+    return Program("bare" if bare else "element", value=Entry(value, dims=pointer("integers", 4), **kinds))
 
 
-def entry_of(relation: Relation | Linear) -> tuple[Program, str]:
-    """The program of a relation, and the name of its entry."""
-    return (relation.program, relation.name) if isinstance(relation, Linear) else (program(relation), "value")
+def entry_of(relation: Relation | Linear, *, derivatives: bool = True) -> tuple[Program, str]:
+    """The program of a relation, with the derivatives that it writes or without, and the name of its entry."""
+    if isinstance(relation, Linear):
+        return relation.program, relation.name
+    return program(relation) if derivatives else bare(relation), "value"
 
 
 @cache

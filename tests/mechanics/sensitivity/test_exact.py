@@ -1,5 +1,7 @@
 """Tangents of explicit steps are exact: to rounding those of a complex step, and of the dense equations."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -8,11 +10,10 @@ from ephs.mechanics.methods.explicit import tableau
 from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.scene.parameters import read
 from ephs.mechanics.sensitivity.explicit import ExplicitTangent
-from ephs.mechanics.sensitivity.family import Family
+from ephs.mechanics.sensitivity.family import Family, relation_of
 from ephs.mechanics.tree.engine.tangents import DIRECTIONS, StepTangent
 from ephs.mechanics.tree.equations.equations import Equations
 from ephs.mechanics.tree.equations.tangent import Linearised
-from ephs.semantics.derive.relations import entry_of
 from tests.mechanics.tree.engine.test_engine import moved
 
 EXACT = 1e-12
@@ -84,10 +85,7 @@ def test_rates_along_directions_as_the_dense_equations_say(name):
     linear = Linearised(eq)
     linear.forward(state.q, state.r, eq.heats.entropies(state.heats))
     expected = linear.columns(solve=True, fit=True)[: eq.n]
-    components = eq.problem.descriptor.components
-    tangent = StepTangent(
-        eq.engine, lambda i: entry_of(components[i].primitive.kernel.relation), tableau("rk54").arrays
-    )
+    tangent = StepTangent(eq.engine, partial(relation_of, eq.problem.descriptor), tableau("rk54").arrays)
     base, start = tangent.pairs["base"], tangent.pairs["start"]
     base[0][:], start[0][:] = state.q, eq.vector(state)
     for k in range(2 * eq.n):
