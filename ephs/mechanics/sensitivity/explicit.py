@@ -215,16 +215,16 @@ class ExplicitTangent:
         """Record of a state."""
         return self.equations.row(point.state)
 
-    def beside(self, number: int, offset: float, points: list[Point]) -> tuple[Problem, list[Row]]:
-        """The same of a neighbour, by the tangents; and its problem."""
-        problem, eq, _ = self._other(number, offset)
-        states: list[ReducedState] = []
+    def beside(self, number: int, model: float, states: float, points: list[Point]) -> tuple[Problem, list[Row]]:
+        """The same of states along the tangents by an offset, and the problem of a neighbour by one."""
+        problem, eq, _ = self._other(number, model)
+        found: list[ReducedState] = []
         for point in points:
             state = point.state
-            r, heats, books = np.split(offset * point.y[number], [eq.n, eq.n + eq.ns])
-            q = self._normalised(state.q + offset * point.q[number])
-            states.append(replace(state, q=q, r=state.r + r, heats=state.heats + heats, books=state.books + books))
-        return problem, eq.rows_of(states)
+            r, heats, books = np.split(states * point.y[number], [eq.n, eq.n + eq.ns])
+            q = self._normalised(state.q + states * point.q[number])
+            found.append(replace(state, q=q, r=state.r + r, heats=state.heats + heats, books=state.books + books))
+        return problem, eq.rows_of(found)
 
     def _normalised(self, q: Array) -> Array:
         """Elements, their quaternions of length one."""

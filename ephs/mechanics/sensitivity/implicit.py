@@ -223,11 +223,11 @@ class NaturalTangent:
         """Record of a state."""
         return self._row(self.side.model, point.state.x, point.state.sums)
 
-    def beside(self, number: int, offset: float, points: list[Point]) -> tuple[Problem, list[Row]]:
-        """The same of a neighbour, by the tangents; and its problem."""
-        side = self._other(number, offset)
+    def beside(self, number: int, model: float, states: float, points: list[Point]) -> tuple[Problem, list[Row]]:
+        """The same of states along the tangents by an offset, and the problem of a neighbour by one."""
+        side = self._other(number, model)
         rows = [
-            self._row(side.model, self._moved(p.state.x + offset * p.x[number]), p.state.sums + offset * p.sums[number])
+            self._row(side.model, self._moved(p.state.x + states * p.x[number]), p.state.sums + states * p.sums[number])
             for p in points
         ]
         return side.problem, rows

@@ -9,7 +9,7 @@ import numpy as np
 from ephs.mechanics.runs.signals import numbers_of
 from ephs.mechanics.runs.simulate import simulate
 from ephs.mechanics.scene.model import Scene
-from ephs.mechanics.sensitivity.family import Family, Parameter, difference
+from ephs.mechanics.sensitivity.family import CENTRAL, Family, Parameter, difference
 from ephs.mechanics.sensitivity.readings import reading_of
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.system import System
@@ -42,15 +42,16 @@ class Sensitivity:
     parameters
         What it is differentiated by: path and value of each.
     neighbour
-        The motion beside it: from a parameter's number and an offset in its unit, to first order.
+        The motion beside it: from a parameter's number, an offset of the model and one of the states along their
+        tangents, in its unit.
     offsets
-        (p,) the offsets over which readings are differenced.
+        (p,) steps along the tangents.
     """
 
     model: System | Scene
     solution: Solution
     parameters: tuple[Parameter, ...]
-    neighbour: Callable[[int, float], Solution]
+    neighbour: Callable[[int, float, float], Solution]
     offsets: Array
 
     @property
@@ -81,15 +82,15 @@ class Sensitivity:
         The function is differenced along the trajectory's tangents, to sixth order: of smooth ones rounding is left.
         """
         columns: list[Array] = []
-        for number, parameter in enumerate(self.parameters):
-            step = float(self.offsets[number])
-            columns.append(
-                difference(
-                    lambda k, j=number, e=step: np.asarray(function(self.neighbour(j, k * e)), dtype=float),
-                    parameter.stencil,
-                    step,
-                )
-            )
+        for j, parameter in enumerate(self.parameters):
+            step = float(self.offsets[j])
+
+            def read(model: float, states: float, j: int = j) -> Array:
+                return np.asarray(function(self.neighbour(j, model, states)), dtype=float)
+
+            along = difference(lambda k, e=step, read=read: read(0.0, k * e), CENTRAL, step)
+            own = difference(lambda k, e=parameter.step, read=read: read(k * e, 0.0), parameter.stencil, parameter.step)
+            columns.append(along + own)
         return np.stack(columns, axis=-1)
 
     def __repr__(self) -> str:
@@ -186,12 +187,10 @@ def _along(family: Family, method: str, grid: Array, times: Array | None) -> Sen
             kept.append(point)
     solution = replay(family.problem, wanted, [stepper.row(p) for p in kept], method)
 
-    def neighbour(number: int, offset: float) -> Solution:
-        problem, rows = stepper.beside(number, offset, kept)
+    def neighbour(number: int, model: float, states: float) -> Solution:
+        problem, rows = stepper.beside(number, model, states, kept)
         return replay(problem, wanted, rows, method)
 
-    offsets: list[float] = []
-    for j, parameter in enumerate(family.parameters):
-        size = max((stepper.size(p, j) for p in kept), default=0.0)
-        offsets.append(parameter.step if parameter.step * size <= NEAR else NEAR / size)
-    return Sensitivity(family.model, solution, family.parameters, neighbour, np.array(offsets))
+    sizes = [max((stepper.size(p, j) for p in kept), default=0.0) for j in range(len(family.parameters))]
+    offsets = np.array([NEAR / size if size else 1.0 for size in sizes])
+    return Sensitivity(family.model, solution, family.parameters, neighbour, offsets)
