@@ -14,7 +14,7 @@ from cyclopts import App, CycloptsError, Parameter
 from ephs.cli.animate import animate
 from ephs.cli.charts import charts
 from ephs.cli.equilibrium import resting
-from ephs.cli.export import exports
+from ephs.cli.export import exports, units
 from ephs.cli.info import info
 from ephs.cli.input import (
     AS_GIVEN,
@@ -67,6 +67,7 @@ app.command(sweeps)
 app.command(linearizing)
 app.command(resting)
 app.command(exports)
+app.command(units)
 app.command(news)
 app.register_install_completion_command(help="Install completion of commands and options in your shell.")
 

@@ -1,5 +1,6 @@
-"""`ephs export`: a mechanism as a program without Python."""
+"""`ephs export`, `ephs fmu`: a mechanism as a program without Python, or as a unit of FMI."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -7,9 +8,10 @@ from cyclopts import App, Parameter
 
 from ephs.cli.input import AS_GIVEN, BadInput, Loading, addressed, load_model, naming, say
 
-__all__ = ["exports"]
+__all__ = ["exports", "units"]
 
 exports = App(name="export", help="Write a mechanism as a program without Python: C, object code, WebAssembly.")
+units = App(name="fmu", help="Write a mechanism as a unit of FMI 3.0 for co-simulation.")
 
 
 @exports.default
@@ -55,15 +57,84 @@ def export(
     """
     import ephs
 
+    return _written(
+        lambda model, given: ephs.export(model, out, method=method, step=step, until=until, target=target, **given),
+        scene, out, loading, (inputs, parameters, rtol, atol),
+    )  # fmt: skip
+
+
+@units.default
+def fmu(
+    scene: str,
+    /,
+    *,
+    out: Annotated[Path, Parameter(name=["--out", "-o"])],
+    inputs: str = "",
+    parameters: str = "",
+    outputs: str = "",
+    method: str = "rk87",
+    rtol: float | None = None,
+    atol: float | None = None,
+    step: float | None = None,
+    until: float = 10.0,
+    platforms: str = "",
+    loading: Loading = AS_GIVEN,
+) -> int:
+    """Write a mechanism as a unit of FMI 3.0 for co-simulation; prints its variables.
+
+    Parameters
+    ----------
+    scene
+        A scene file (.toml), a model (.urdf, .xml, .sdf), or FILE.py:NAME.
+    out
+        File to write, that ends in .fmu.
+    inputs
+        Joints on which forces are given from outside, between commas: joints.waist,joints.elbow.
+    parameters
+        Numbers that may be changed before the start, between commas: bodies.rod.mass,joints.bearing.friction.
+    outputs
+        Outputs, or beginnings of their names, between commas: joints,bodies.rod; all unless given.
+    method
+        rk54 or rk87.
+    rtol
+        Relative tolerance of steps; 1e-6 unless given.
+    atol
+        Absolute tolerance of steps; 1e-9 unless given.
+    step
+        Length of constant steps, in s.
+    until
+        Time in s over which the error is to stay within the tolerances.
+    platforms
+        Machines by their names in FMI, between commas: x86_64-linux,x86_64-windows; five unless given.
+    """
+    import ephs
+
+    named = {"outputs": _listed(outputs), "platforms": _listed(platforms)}
+    chosen: dict[str, Any] = {key: names for key, names in named.items() if names}
+    return _written(
+        lambda model, given: ephs.export_fmu(model, out, method=method, step=step, until=until, **chosen, **given),
+        scene, out, loading, (inputs, parameters, rtol, atol),
+    )  # fmt: skip
+
+
+def _listed(names: str) -> list[str]:
+    return [one.strip() for one in names.split(",") if one.strip()]
+
+
+def _written(
+    write: Callable[[Any, dict[str, Any]], Any], scene: str, out: Path, loading: Loading,
+    options: tuple[str, str, float | None, float | None],
+) -> int:  # fmt: skip
+    """Write a model, and print its variables."""
+    import ephs
+
     model = load_model(scene, loading)
-    names, numbers = ([one.strip() for one in given.split(",") if one.strip()] for given in (inputs, parameters))
-    tolerances: dict[str, Any] = {key: x for key, x in (("rtol", rtol), ("atol", atol)) if x is not None}
+    inputs, parameters, rtol, atol = options
+    given = {"inputs": _listed(inputs), "parameters": _listed(parameters)}
+    tolerances = {key: x for key, x in (("rtol", rtol), ("atol", atol)) if x is not None}
     try:
         with addressed(scene, out):
-            made = ephs.export(
-                model, out, inputs=names, parameters=numbers, method=method, step=step, until=until, target=target,
-                **tolerances,
-            )  # fmt: skip
+            made = write(model, {**given, **tolerances})
     except ephs.ExportError as error:
         raise BadInput(naming(scene, str(error))) from error
     for kind, variables in (("input", made.inputs), ("parameter", made.parameters), ("output", made.outputs)):

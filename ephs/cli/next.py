@@ -30,6 +30,7 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
     "sweep": ("ephs sweep scenes/heavy-top.toml --vary bodies.top.mass=5:25:9 --until 1 -o out/sweep",),
     "equilibrium": ("ephs equilibrium scenes/four-bar.toml --out out/rest",),
     "export": ("ephs export scenes/slider-crank.toml -o crank.c --inputs joints.bearing",),
+    "fmu": ("ephs fmu scenes/slider-crank.toml -o crank.fmu --inputs joints.bearing --outputs joints",),
     "linearize": ("ephs linearize scenes/four-bar.toml --at equilibrium",),
     "convert": ("ephs convert examples/arm.urdf -o arm.toml",),
     "chart": (

@@ -7,6 +7,7 @@ __all__ = ["ExportError"]
 TEXTS: Final = {
     "method": "method {found!r} cannot be exported, expected {expected}",
     "input": "input {found!r}: expected a joint with a free coordinate, one of {expected}",
+    "output": "output {found!r}: expected one of {expected}, or the beginning of such a name",
     "function": "the input at {where} is a function of Python, expected a constant: name it as an input of the export",
     "python": "{where}: a component is evaluated by Python, expected staged functions",
     "suffix": "output file {found!r}: expected a name that ends in {expected}",

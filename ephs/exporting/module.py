@@ -36,6 +36,8 @@ class Exported:
         Assembly text of LLVM.
     bytes
         Size of the memory of one instance.
+    functions
+        Places in bytes of the addresses in it: what else it holds says the same in another process.
     """
 
     name: str
@@ -45,6 +47,7 @@ class Exported:
     outputs: tuple[Variable, ...]
     parameters: tuple[Variable, ...]
     accelerations: int
+    functions: tuple[int, ...]
 
     def header(self) -> str:
         """Return declarations in C."""
@@ -173,7 +176,10 @@ class _Writer:
             *self.declared, "declare void @llvm.memcpy.p0.p0.i64(ptr, ptr, i64, i1)", *self._data(), *self.texts,
             *functions,
         ])  # fmt: skip
-        return Exported(self.name, text, size, image.inputs, image.outputs, image.parameters, image.acceleration[2])
+        places = tuple(8 * (at if kind == "double" else self.base + at) for kind, at, _ in self.functions)
+        return Exported(
+            self.name, text, size, image.inputs, image.outputs, image.parameters, image.acceleration[2], places
+        )
 
     def _data(self) -> list[str]:
         reals = np.concatenate([np.zeros(0), *(each.ravel() for each in self.reals)])
