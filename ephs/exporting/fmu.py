@@ -121,7 +121,7 @@ def _description(made: Exported, shown: Sequence[Variable], token: str, experime
     structure = ElementTree.SubElement(root, "ModelStructure")
 
     def add(name: str, reference: int, **more: str) -> None:
-        ElementTree.SubElement(variables, "Float64", name=name, valueReference=str(reference), **more)
+        ElementTree.SubElement(variables, "Float64", {"name": name, "valueReference": str(reference), **more})
 
     add("time", 0, causality="independent", variability="continuous")
     for k, each in enumerate(made.inputs):
