@@ -16,6 +16,7 @@ from ephs.semantics.natural import Solved, solve_flat, solve_nested
 from ephs.semantics.primitives import Irreversible, Storage
 from ephs.semantics.probe import Probe, Verdict
 from ephs.semantics.spaces import manifold
+from ephs.semantics.spaces.rank import TINY
 
 __all__ = [
     "conservation",
@@ -132,8 +133,8 @@ def entropy_production(probe: Probe) -> Verdict:
     found = list(_productions(probe, solved))
     if not found:
         return Verdict(0.0, 0.0, "no irreversible component")
-    path, made, size = max(found, key=lambda entry: -entry[1] / max(entry[2], 1e-300))
-    defect = max(0.0, -made / max(size, 1e-300))
+    path, made, size = max(found, key=lambda entry: -entry[1] / max(entry[2], TINY))
+    defect = max(0.0, -made / max(size, TINY))
     return Verdict(defect, EVALUATION, f"{len(found)} irreversible components, {path} makes the least: {made:.1e} W/K")
 
 

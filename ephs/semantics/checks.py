@@ -14,6 +14,7 @@ from ephs.semantics.bundle import Array, Bundle
 from ephs.semantics.errors import StructureError
 from ephs.semantics.extents import into
 from ephs.semantics.spaces import manifold
+from ephs.semantics.spaces.rank import TINY
 from ephs.semantics.subspace import Subspace
 from ephs.semantics.trials import ROTATING, Trial
 
@@ -31,6 +32,14 @@ __all__ = [
     "random_point",
 ]
 
+LENGTHS = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-14)
+"""Lengths of steps beside the state's, for central differences of energies."""
+SHORT = 1e-8
+"""Length of a step below which rounding may hide a slope."""
+LAST = 1e-14
+"""Rounding of an energy: some tens of ε."""
+SAME = 1e-9
+"""Part of their entries by which two structures may differ and be one: they are functions evaluated twice."""
 TOLERANCE = 1e-12
 """Of the largest entry; evaluations of structure are a few hundred roundings deep at the most."""
 EVENNESS = 1e-9
@@ -184,7 +193,7 @@ def _slope_defect(
     """The gradient along a direction against differences: how far beyond their error it is, both slopes."""
     best = (np.inf, 0.0, 0.0)  # of several lengths of the step: the energy may vary slowly, or fast
     found = float(gradient @ direction)
-    for length in (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-14):
+    for length in LENGTHS:
         step = length * direction
         try:
             there, back = (float(storage.energy(storage.retract(trial.states, k * step))) for k in (1.0, -1.0))
@@ -192,11 +201,11 @@ def _slope_defect(
             continue
         expected = 0.5 * (there - back)
         slope = 1e-4 * float(np.abs(gradient) @ np.abs(step))
-        rounding = 1e-14 * (abs(there) + abs(back) + abs(energy))
-        if length < 1e-8 and rounding > slope:  # so short a step tells no gradient from another
+        rounding = LAST * (abs(there) + abs(back) + abs(energy))
+        if length < SHORT and rounding > slope:  # so short a step tells no gradient from another
             break
         if np.isfinite(expected):
-            off = abs(expected - found * length) / max(slope + rounding, 1e-300)
+            off = abs(expected - found * length) / max(slope + rounding, TINY)
             best = min(best, (off, found, expected / length))
     return best if np.isfinite(best[0]) else (0.0, found, found)
 
@@ -210,10 +219,10 @@ def dirac(skew: Array, constraint: Array) -> Subspace:
 
 def _apart(one: tuple[Array, Array], two: tuple[Array, Array]) -> float:
     """Distance of two Dirac structures (L, C), relative to their entries: 0 where the matrices are equal."""
-    scales = [max(float(np.abs(a).max(initial=0.0)), 1e-300) for a in (one[0], one[1])]
+    scales = [max(float(np.abs(a).max(initial=0.0)), TINY) for a in (one[0], one[1])]
     same = [float(np.abs(a - b).max(initial=0.0)) / s for a, b, s in zip(one, two, scales, strict=True)]
     same[1] = min(same[1], float(np.abs(one[1] + two[1]).max(initial=0.0)) / scales[1])
-    if max(same) <= 1e-9 or not one[1].size:
+    if max(same) <= SAME or not one[1].size:
         return max(same)
     return dirac(*one).distance(dirac(*two))
 
@@ -240,16 +249,16 @@ def _check_reversible(reversible: "Reversible", trial: Trial) -> None:
         scales = np.concatenate([np.full(n, scale), np.abs(constraint).max(axis=1, initial=0.0)])
         terms = scales * np.abs(one).sum()
         if not np.all(np.abs(defect) <= TOLERANCE * terms):
-            entry = _worst(defect / np.maximum(terms, 1e-300))
+            entry = _worst(defect / np.maximum(terms, TINY))
             raise _fail("conservation", reversible, trial, float(defect[entry]), quantity=kind, entry=entry)
     # (f, e) ∈ D(x) ⇔ (−ϵf, ϵe) ∈ D(ϵx)
     there = reversible.structure(_reversed(bundle, x))
     found = _apart((-parity[:, None] * skew * parity, constraint * parity), there) if _finite(*there) else 0.0
-    if not found <= 1e-9:
+    if not found <= SAME:
         raise _fail("parity", reversible, trial, found)
     for port, opposite in _opposite(bundle, x):
         found = _apart((skew, constraint), reversible.structure({**x, port: opposite}))
-        if not found <= 1e-9:
+        if not found <= SAME:
             raise _fail("rotation-sign", reversible, trial, found, what="the structure tells", port=port)
 
 
@@ -286,7 +295,7 @@ def _check_irreversible(irreversible: "Irreversible", trial: Trial) -> None:
     terms = np.abs(matrix) @ np.abs(energy_effort)
     defect = matrix @ energy_effort
     if not np.all(np.abs(defect) <= TOLERANCE * terms):
-        entry = _worst(defect / np.maximum(terms, 1e-300))
+        entry = _worst(defect / np.maximum(terms, TINY))
         raise _fail("energy", irreversible, trial, float(defect[entry]), entry=entry)
     for kind in bundle.charges:
         one = bundle.indicator(kind)

@@ -18,6 +18,7 @@ from ephs.semantics.derive.relations import compiled
 from ephs.semantics.errors import SemanticsError
 from ephs.semantics.primitives import Primitive, Reversible, Storage
 from ephs.semantics.spaces import manifold
+from ephs.semantics.spaces.rank import DIFFERENCE
 from ephs.semantics.stage import Signature
 from ephs.semantics.stage.reaching import Atom
 
@@ -182,6 +183,6 @@ def _differenced(function: Callable[[Array], Array], z: Array) -> Array:
     columns: list[Array] = []
     for i in range(z.size):
         delta = np.zeros(z.size)
-        delta[i] = 1e-6 * max(1.0, abs(float(z[i])))
+        delta[i] = DIFFERENCE * max(1.0, abs(float(z[i])))
         columns.append((function(z + delta) - function(z - delta)) / (2.0 * delta[i]))
     return np.array(columns).T if columns else np.zeros((0, 0))

@@ -15,6 +15,7 @@ from ephs.semantics.primitives import Reversible
 from ephs.semantics.probe import Probe, SystemLaw, Verdict, random_probe
 from ephs.semantics.relations import LinearRelation, Relation, pattern_relation
 from ephs.semantics.relations.base import BasePoint, place
+from ephs.semantics.spaces.rank import APART, PROJECTOR
 from ephs.semantics.subspace import Subspace
 from ephs.semantics.system import System
 
@@ -48,7 +49,7 @@ def _base(relation: Relation) -> str:
 def _rounding(*subspaces: Subspace) -> float:
     """Tolerance for projectors: 1e-13 times the condition of the eliminations; those of other relations differ by
     a tenth and more."""
-    return min(1e-6, 1e-13 * max(10.0, *(subspace.condition for subspace in subspaces)))
+    return min(APART, PROJECTOR * max(10.0, *(subspace.condition for subspace in subspaces)))
 
 
 def _patterns(system: System, path: Path = ROOT) -> Iterator[tuple[Path, Pattern]]:
@@ -68,7 +69,7 @@ def _tellegen(probe: Probe) -> Verdict:
             expected = subspace.ambient // 2
             return Verdict(np.inf, 0.0, f"{path}: dimension {subspace.dimension}, expected {expected}")
         worst = max(worst, isotropy(subspace, form))
-    return Verdict(worst, 1e-13, f"{count} patterns; power is conserved to {worst:.1e}")
+    return Verdict(worst, PROJECTOR, f"{count} patterns; power is conserved to {worst:.1e}")
 
 
 def power_form(pattern: Pattern) -> Array:
@@ -125,7 +126,7 @@ def _dirac(probe: Probe) -> Verdict:
         return Verdict(np.inf, 0.0, f"dimension {found.dimension}, expected {len(kept) // 2}")
     worst = isotropy(found, form[np.ix_(kept, kept)])
     detail = f"dimension {found.dimension} on {len(kept)} flows and efforts, isotropic to {worst:.1e}"
-    return Verdict(worst, 1e-13 * found.condition, detail)
+    return Verdict(worst, PROJECTOR * found.condition, detail)
 
 
 def _renaming(probe: Probe) -> Verdict:

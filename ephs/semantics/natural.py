@@ -20,10 +20,15 @@ from ephs.semantics.primitives import Primitive, Reversible
 from ephs.semantics.relations import relation_of
 from ephs.semantics.relations.base import BasePoint, StateClass, Values, place
 from ephs.semantics.spaces import manifold
-from ephs.semantics.spaces.rank import CONSTRAINT
+from ephs.semantics.spaces.rank import CONSTRAINT, DIFFERENCE
 from ephs.semantics.system import System, fold
 
 __all__ = ["Solved", "solve_flat", "solve_nested", "step"]
+
+NEAR = 1e-9
+"""Error beside the unknowns below which whole steps are taken: Newton's method converges there."""
+SOLVED = 1e-12
+"""Error that may stand where steps no longer help: rounding, with Jacobians of differences."""
 
 
 @final
@@ -241,7 +246,7 @@ def newton(residual: Callable[[Array], Array], z: Array, *, iterations: int = 30
     for _ in range(iterations):
         jacobian = np.empty((r.size, z.size))
         for i in range(z.size):
-            delta = 1e-6 * max(1.0, abs(float(z[i])))
+            delta = DIFFERENCE * max(1.0, abs(float(z[i])))
             up, down = z.copy(), z.copy()
             up[i] += delta
             down[i] -= delta
@@ -250,13 +255,13 @@ def newton(residual: Callable[[Array], Array], z: Array, *, iterations: int = 30
         share = 1.0
         new, r_new, error = _tried(residual, z - step)
         # far from the solution a whole step may lead away from it; near by rounding is all that is left
-        while not error < best and best > 1e-9 and share > 1e-3:
+        while not error < best and best > NEAR and share > 1e-3:
             share *= 0.5
             new, r_new, error = _tried(residual, z - share * step)
         if not error < best:
             break
         z, r, progress, best = new, r_new, error / best, error
-        if error == 0.0 or (progress > 0.5 and error < 1e-12):
+        if error == 0.0 or (progress > 0.5 and error < SOLVED):
             break
     return z, best
 

@@ -11,7 +11,7 @@ from typing import final
 import numpy as np
 
 from ephs.semantics.bundle import Array
-from ephs.semantics.spaces.rank import ELIMINATION, rank_of
+from ephs.semantics.spaces.rank import ELIMINATION, TINY, rank_of
 
 __all__ = ["Subspace"]
 
@@ -103,7 +103,7 @@ class Subspace:
     def contains(self, vector: Array) -> float:
         """Distance of a vector from the subspace, relative to its length."""
         off = vector - self.basis @ (self.basis.T @ vector)
-        return float(np.linalg.norm(off) / max(np.linalg.norm(vector), 1e-300))
+        return float(np.linalg.norm(off) / max(np.linalg.norm(vector), TINY))
 
 
 def _condition(sigma: Array, rank: int) -> float:

@@ -13,6 +13,7 @@ from typing import Any, final
 import numpy as np
 
 from ephs.show.errors import ShowError
+from ephs.show.geometry import POINT
 from ephs.show.motion import Array, best_side, between, frame_all, point_of
 from ephs.show.overlays import ARROWS, GROUND, Heat, tint
 from ephs.show.page import Page
@@ -146,7 +147,7 @@ class _Drawn:
             for name, coil in coils.items():
                 start, end = self._spring_ends(self.stage.springs[name], frame)
                 turn, length = between(start, end)
-                coil.wxyz, coil.position, coil.scale = turn, start, (1.0, 1.0, max(length, 1e-9))
+                coil.wxyz, coil.position, coil.scale = turn, start, (1.0, 1.0, max(length, POINT))
             for kind, node in arrows.items():
                 node.points = self._tips(kind, frame, size)
             for each in warm:

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 __all__ = ["plot_wrenches"]
 
+BLANK = 1e-9
+"""N or N m below which a panel shows a line at zero."""
 MOST = 6
 """Joints that are drawn where none was asked for."""
 
@@ -76,7 +78,7 @@ def _draw(axes: "Axes", t: Any, values: Any, title: str) -> None:
     for k, (column, colour) in enumerate(zip(values.T, (BLUE, RED, GREEN), strict=True)):
         axes.plot(*thinned(t, column), color=colour, linestyle=dashes(k), linewidth=1.2)
     largest = float(np.nanmax(np.abs(values), initial=0.0)) if np.isfinite(values).any() else 0.0
-    if largest < 1e-9:  # rounding would fill the panel
+    if largest < BLANK:  # rounding would fill the panel
         axes.set_ylim(-1.0, 1.0)
     if loose:
         axes.set_title(f"{', '.join(loose)} indeterminate", loc="right", color=GREY, fontsize=7.5, pad=2.0)

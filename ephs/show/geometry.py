@@ -11,6 +11,13 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
+POINT = 1e-9
+"""Length in points below which two places are one."""
+UPRIGHT = 1e-12
+"""Length along an axis below which a segment is across it."""
+BETTER = 1e-6
+"""By how much a drawing's cost must fall to be taken: less is rounding."""
+
 Point = tuple[float, float]
 Points = NDArray[np.float64]
 
@@ -136,7 +143,7 @@ class Placement:
 def distances(point: Points, starts: Points, ends: Points) -> Points:
     """Distance of one point (2,), or of points (n, 2), to segments from `starts` to `ends`, (n, 2) each."""
     along = ends - starts
-    length2 = np.maximum((along * along).sum(axis=-1), 1e-18)
+    length2 = np.maximum((along * along).sum(axis=-1), POINT**2)
     part = np.clip((((point - starts) * along).sum(axis=-1)) / length2, 0.0, 1.0)
     return np.linalg.norm(point - starts - part[..., None] * along, axis=-1)
 
@@ -186,7 +193,7 @@ def overlaps(placement: Placement) -> list[tuple[str, str]]:
 def inside(bounds: tuple[float, float, float, float], starts: Points, ends: Points) -> Points:
     """Length of each segment, from `starts` to `ends`, (n, 2) each, that lies in a rectangle."""
     along = ends - starts
-    still = np.abs(along) < 1e-12
+    still = np.abs(along) < UPRIGHT
     step = np.where(still, 1.0, along)
     first = (np.array(bounds[:2]) - starts) / step
     last = (np.array(bounds[2:]) - starts) / step

@@ -17,6 +17,7 @@ from ephs.operad import Nesting, Pattern
 from ephs.show import opening
 from ephs.show import positions as places
 from ephs.show.geometry import (
+    BETTER,
     PlacedBox,
     PlacedJunction,
     PlacedRegion,
@@ -81,7 +82,7 @@ def place(
         width, height = now.size
         bends = sum(len(wire.points) > 2 for wire in now.wires)
         cost = 300.0 * len(faults(now)) + 12.0 * crossings(now) + 4.0 * bends + (width + height) / 60.0
-        if best is None or cost < best[0] - 1e-6:
+        if best is None or cost < best[0] - BETTER:
             best = cost, points, now
     if best is None:
         return _picture(page, np.zeros((0, 2)))
@@ -199,7 +200,7 @@ def _outer_wires(graph: Graph, field: _Field, wires: list[Wire], rectangle: Rect
             over = sum(_meet(wire, other) for other in (*wires, *found))
             length = sum(math.dist(a, b) for a, b in itertools.pairwise(line))
             cost = length + bent + 80.0 * over + 10.0 * crowd + (25.0 if rank >= 4 else 0.0)
-            if cost < least - 1e-6:
+            if cost < least - BETTER:
                 best, least = wire, cost
         if best is not None:
             taken.append(best.points[-1])

@@ -8,9 +8,11 @@ from typing import final
 
 import numpy as np
 
-from ephs.show.geometry import Point, Points, Text, inside
+from ephs.show.geometry import POINT, Point, Points, Text, inside
 from ephs.show.graph import width_of
 
+LESS = 1e-9
+"""By how much the trouble of a name must fall for it to move."""
 _AIR = 1.5
 Place = tuple[Point, str, float]
 
@@ -37,7 +39,7 @@ class Sheet:
                 continue
             text = Text(*name, centre, size, width, anchor)
             now = dislike + self._trouble(text)
-            if now < cost - 1e-9:
+            if now < cost - LESS:
                 best, cost = text, now
         self.written.append(best.bounds)
         return best
@@ -106,5 +108,5 @@ def _at(line: tuple[Point, ...], along: float) -> tuple[Point, Point]:
             return (a[0] + along * direction[0], a[1] + along * direction[1]), direction
         along -= length
     a, b = line[-2], line[-1]
-    length = max(math.dist(a, b), 1e-9)
+    length = max(math.dist(a, b), POINT)
     return b, ((b[0] - a[0]) / length, (b[1] - a[1]) / length)

@@ -7,6 +7,13 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+from ephs.semantics.spaces.rank import DIRECTION, TINY
+
+OPPOSITE = 1e-9
+"""By how much a cosine is off −1 where a rotation has no axis of its own."""
+PLANAR = 1e-12
+"""Part of the square of their extent that points lie off a line."""
+
 Array = NDArray[np.float64]
 
 
@@ -129,10 +136,10 @@ def between(first: Array, second: Array) -> tuple[Array, float]:
     """Unit quaternion turning z to the way from one point to another, and their distance."""
     way = second - first
     length = float(np.linalg.norm(way))
-    if length < 1e-12:
+    if length < DIRECTION:
         return np.array([1.0, 0.0, 0.0, 0.0]), 0.0
     z = way / length
-    if z[2] < -1.0 + 1e-9:
+    if z[2] < -1.0 + OPPOSITE:
         return np.array([0.0, 1.0, 0.0, 0.0]), length
     turn = np.array([1.0 + z[2], -z[1], z[0], 0.0])
     return turn / np.linalg.norm(turn), length
@@ -154,7 +161,7 @@ def best_side(points: Array) -> Array:
     """(3,) the way from points (n, 3) to where their motion is seen best: flat motions from the front."""
     scatter = points - points.mean(axis=0)
     _, spread, axes = np.linalg.svd(scatter.T @ scatter)
-    if spread[1] > 1e-12 * max(spread[0], 1e-30) and spread[2] < 0.05 * spread[0]:
+    if spread[1] > PLANAR * max(spread[0], TINY) and spread[2] < 0.05 * spread[0]:
         front = np.array([0.0, 0.0, 1.0]) if abs(axes[2, 2]) > 0.3 else np.array([1.0, -1.2, 0.8])
         normal = axes[2] * (1.0 if axes[2] @ front >= 0 else -1.0)
         side = np.cross(normal, np.array([0.0, 0.0, 1.0]))

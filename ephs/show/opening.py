@@ -9,7 +9,7 @@ import numpy as np
 
 from ephs.operad import Nesting, Pattern
 from ephs.show import positions as places
-from ephs.show.geometry import PlacedRegion, Point, Points, Text
+from ephs.show.geometry import BETTER, PlacedRegion, Point, Points, Text
 from ephs.show.graph import TYPE, Graph, read, width_of
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ class Opened:
             c, s = math.cos(step * math.pi / 8), math.sin(step * math.pi / 8)
             now = {p: (centre[0] + c * x - s * y, centre[1] + s * x + c * y) for p, (x, y) in nodes.items()}
             length = sum(math.dist(now[here], there) for here, there in wires)
-            if length < least - 1e-6:
+            if length < least - BETTER:
                 best, least = now, length
         return best
 

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+EMPTY = 1e-17, 1e-15
+"""Range of an axis of errors that are all zero."""
 _WIDTH, _ROW = 7.2, 2.0
 _MOST_NAMES = 14
 STYLE = {
@@ -151,7 +153,7 @@ def _residual(axes: "Axes", sol: Any, panel: Panel) -> None:
             axes.plot(t, values, color=curve.colour, label=curve.name, linewidth=1.1, marker=marker)
     axes.set_yscale("log")
     if not shown:
-        axes.set_ylim(1e-17, 1e-15)
+        axes.set_ylim(*EMPTY)
         middle: Any = {"transform": axes.transAxes, "ha": "center", "va": "center", "color": GREY, "size": 9}
         axes.text(0.5, 0.5, "zero throughout", **middle)
         return

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 __all__ = ["plot_phase"]
 
+STILL = 1e-9
+"""Change of a coordinate in m or rad below which it is not drawn."""
 MOST = 6
 """Portraits that are drawn where none was asked for."""
 
@@ -94,7 +96,7 @@ def _curve(sol: Any, which: str | tuple[str, str], known: dict[str, _Curve]) -> 
 
 def _default(sol: Any, known: dict[str, _Curve]) -> list[_Curve]:
     if sol.scene is not None:
-        moving = [curve for curve in known.values() if float(np.nanmax(curve.x) - np.nanmin(curve.x)) > 1e-9]
+        moving = [curve for curve in known.values() if float(np.nanmax(curve.x) - np.nanmin(curve.x)) > STILL]
         if moving:
             return moving[:MOST]
         raise ShowError("nothing", path=str(sol.name), found="freedom that moves", expected="a joint's")

@@ -11,9 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ephs.show.errors import ShowError
-from ephs.show.geometry import Points, distances
+from ephs.show.geometry import BETTER, POINT, Points, distances
 from ephs.show.graph import Graph
 
+LEFT = 1e-6
+"""Coordinate above which a point counts as right of the middle."""
 GAP = 26.0
 CLEARANCE = 9.0
 GRID = 80.0
@@ -51,7 +53,7 @@ def given(graph: Graph, positions: Mapping[str, tuple[float, float]]) -> Points:
                 known[path] = (known[path][0] + 0.8, known[path][1] + 0.1)
     for index, first in enumerate(paths):
         for second in paths[index + 1 :]:
-            if math.dist(known[first], known[second]) < 1e-9:
+            if math.dist(known[first], known[second]) < POINT:
                 raise ShowError("coincide", path=first, found=second)
     points = np.array([(GRID * known[p][0], -GRID * known[p][1]) for p in paths], dtype=float).reshape(-1, 2)
     free = np.array([path not in placed for path in paths], dtype=bool)
@@ -159,7 +161,7 @@ def _upright(points: Points) -> Points:
     angle = 0.5 * math.atan2(2 * float(moment[0, 1]), float(moment[0, 0] - moment[1, 1]))
     cosine, sine = math.cos(angle), math.sin(angle)
     turned = centred @ np.array([[cosine, -sine], [sine, cosine]])
-    return turned * np.where(turned[0] > 1e-6, -1.0, 1.0)
+    return turned * np.where(turned[0] > BETTER, -1.0, 1.0)
 
 
 def _spread(graph: Graph, points: Points, *, wires: bool, free: NDArray[np.bool_] | None = None) -> Points:
@@ -176,7 +178,7 @@ def _spread(graph: Graph, points: Points, *, wires: bool, free: NDArray[np.bool_
         apart = places[:, None, :] - places[None, :, :]
         distance = np.linalg.norm(apart, axis=-1)
         lacking = np.clip(wanted - distance, 0.0, None)
-        push = (0.5 * lacking / np.maximum(distance, 1e-9))[..., None] * apart
+        push = (0.5 * lacking / np.maximum(distance, POINT))[..., None] * apart
         moved = push.sum(axis=1)
         if wires and len(ends):
             moved += _off_wires(places, radii, ends)
@@ -196,7 +198,7 @@ def _off_wires(places: Points, radii: Points, ends: Points) -> Points:
         lacking = np.clip(radii[node] + CLEARANCE - distances(places[node], starts, stops), 0.0, None)
         for which in np.flatnonzero(lacking):
             along = stops[which] - starts[which]
-            normal = np.array([-along[1], along[0]]) / max(float(np.linalg.norm(along)), 1e-9)
+            normal = np.array([-along[1], along[0]]) / max(float(np.linalg.norm(along)), POINT)
             if (places[node] - starts[which]) @ normal < 0:
                 normal = -normal
             step = 0.4 * min(float(lacking[which]), 8.0)

@@ -15,6 +15,8 @@ from ephs.show.player import player
 from ephs.show.signals import Group, packed
 from ephs.show.stage import stage_of
 
+ZERO = 1e-12
+"""SI number below which a report writes 0."""
 _ROWS = (
     ("method", "Method", ""),
     ("form", "Form of the equations", ""),
@@ -104,7 +106,7 @@ def _settled(value: Any) -> Any:
     """Rounding that stands where nothing moves, in m, rad and their rates, is shown as what it is."""
     if isinstance(value, list | tuple):
         return [_settled(each) for each in value]
-    return 0 if isinstance(value, float) and abs(value) < 1e-12 else value
+    return 0 if isinstance(value, float) and abs(value) < ZERO else value
 
 
 def _summary(summary: dict[str, Any]) -> str:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ephs.show.geometry import Point, Points, distances
+from ephs.show.geometry import POINT, Point, Points, distances
 
 CLEAR = 3.5
 
@@ -87,7 +87,7 @@ def _smooth(line: tuple[Point, ...], obstacles: Points) -> tuple[Point, ...]:
 def bulged(start: Point, end: Point, amount: float) -> tuple[Point, ...]:
     """A bow from `start` to `end`, `amount` off the straight line at its middle: for parallel wires."""
     along = (end[0] - start[0], end[1] - start[1])
-    length = max(math.hypot(*along), 1e-9)
+    length = max(math.hypot(*along), POINT)
     normal = (-along[1] / length, along[0] / length)
     steps = [k / 12 for k in range(13)]
     return tuple(

@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 
 from ephs.mechanics.motion.readout import freedoms_of
 
+MOVES = 1e-9
+"""Part of its size by which a value changes where it is drawn."""
+
 Array = NDArray[np.float64]
 
 
@@ -88,4 +91,6 @@ def scene_panels(sol: Any) -> dict[str, list[tuple[str, Array]]]:
 
 
 def _moves(lines: list[tuple[str, Array]]) -> bool:
-    return any(float(np.ptp(values)) > 1e-9 * (1.0 + float(np.abs(values).max())) for _, values in lines if len(values))
+    return any(
+        float(np.ptp(values)) > MOVES * (1.0 + float(np.abs(values).max())) for _, values in lines if len(values)
+    )

@@ -14,6 +14,12 @@ from ephs.solve.snapshot import Snapshot
 
 __all__ = ["ATOL", "RTOL", "Control", "Policy", "Proportional", "Symmetric", "Tolerance", "first_step", "told_apart"]
 
+SLIVER = 1e-9
+"""Part of a step, or of a time, that is rounding of sums of steps: no step of its own."""
+UNFELT, EXACT = 1e-10, 1e-12
+"""Errors in tolerances below which the next step is what its limits let it be: proportional and symmetric control."""
+FINEST = 1e-11
+"""Part of a run below which no symmetric step is."""
 SHORTEST = 16.0
 """Roundings of the time that a step has at least."""
 NEAREST = 1e6
@@ -225,7 +231,7 @@ class Proportional:
             self._failed = True
             return False, h * (max(0.2, 0.9 * strict ** (-1.0 / exponent)) if np.isfinite(strict) else 0.1)
         main = (1.0 - 0.75 * self._damping) / exponent
-        factor = 0.9 * max(error, 1e-10) ** -main * self._before ** (self._damping / exponent)
+        factor = 0.9 * max(error, UNFELT) ** -main * self._before ** (self._damping / exponent)
         self._before = max(error, 1e-4)
         most = 1.0 if self._failed else 6.0
         self._failed = False
@@ -259,7 +265,7 @@ class Symmetric:
     """
 
     AIM, NEAR, TRIES, GROWTH = 0.5, 1.6, 4, 4.0
-    finest = 1e-11
+    finest = FINEST
     """Such a part of the tolerance is below the rounding of states, and nobody waits for so many steps."""
 
     def __init__(self, exponent: float) -> None:
@@ -286,7 +292,7 @@ class Symmetric:
         return self._wanted(h, error * span / h)
 
     def _wanted(self, h: float, error: float) -> float:
-        return h * (self.AIM / max(error, 1e-12)) ** (1.0 / self._exponent)
+        return h * (self.AIM / max(error, EXACT)) ** (1.0 / self._exponent)
 
     def snapshot(self) -> Snapshot:
         """Memory of earlier steps."""

@@ -25,6 +25,10 @@ from ephs.solve.errors import Outcome, SolveError
 
 __all__ = ["PLAIN", "Heats", "exponential_law"]
 
+EXPONENTIAL = 1e-12
+"""Part by which energies may be off an exponential law that they are taken for: rounding of the functions."""
+LINEAR = 1e-8
+"""Change of a temperature, relative, below which a series is taken: its square is below rounding."""
 PLAIN = -2
 """In place of a component: a state of an attachment, which is advanced as it is and not as energy."""
 
@@ -42,7 +46,7 @@ def exponential_law(primitive: Primitive) -> tuple[float, float] | None:
             return None
     points = c2 * np.array([-0.7, 1.1])  # others may call their numbers so
     found = [float(primitive.energy({port: np.array([s])})) for port in primitive.bundle.ports for s in points]
-    return (c1, c2) if np.allclose(found, c1 * np.expm1(points / c2), rtol=1e-12, atol=0.0) else None
+    return (c1, c2) if np.allclose(found, c1 * np.expm1(points / c2), rtol=EXPONENTIAL, atol=0.0) else None
 
 
 @final
@@ -182,7 +186,7 @@ class Heats:
         share[k] = change[k] / (self._laws[1] * theta[k])
         if not np.all(share > -1.0):
             raise SolveError(Outcome.TEMPERATURE, str(self._paths[int(np.argmin(share > -1.0))]), "")
-        small = np.abs(share) < 1e-8  # θ̄/θ = x / log(1 + x)
+        small = np.abs(share) < LINEAR  # θ̄/θ = x / log(1 + x)
         ratio = np.where(small, 1.0 + 0.5 * share, share / np.log1p(np.where(small, 1.0, share)))
         cold = 1.0 / (theta * ratio)
         made = np.zeros(flows.size)

@@ -14,7 +14,7 @@ from ephs.operad import Path
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.descriptor import ComponentSlot, Descriptor, Input
 from ephs.semantics.primitives import Irreversible, Reversible, Storage
-from ephs.semantics.spaces.rank import CONSTRAINT, ELIMINATION, IMPLICIT, SPANNED, rank_of
+from ephs.semantics.spaces.rank import CONSTRAINT, ELIMINATION, IMPLICIT, SPANNED, TINY, rank_of
 
 __all__ = ["Instant", "Mobility", "instant", "mobility"]
 
@@ -129,7 +129,7 @@ def instant(
     differentiated[:, rise] = constraint
     turning = -_turned_constraints(d, x, _known_rates(d, constraint, flows)) @ efforts
     matrix = np.vstack([balance, growth, differentiated, held])
-    scale = np.maximum(np.abs(matrix).max(axis=1, initial=0.0), 1e-300)
+    scale = np.maximum(np.abs(matrix).max(axis=1, initial=0.0), TINY)
     everything = np.concatenate([right, np.zeros(n_w), turning, lift])
     solution, free = _least_norm(matrix / scale[:, None], everything / scale)
     outer = {slot.path: given[slot.path].value for slot in d.outer}

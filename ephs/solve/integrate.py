@@ -16,6 +16,7 @@ from ephs.solve.auditing.audit import Bounds, Tests, audit
 from ephs.solve.auditing.production import Production
 from ephs.solve.auditing.resolution import Trials, natural_trials
 from ephs.solve.breakpoints import Breakpoints
+from ephs.solve.control import SLIVER
 from ephs.solve.errors import Interrupted, OptionError, Outcome, SimulationError, SolveError, solve_error_of
 from ephs.solve.journal import Written
 from ephs.solve.methods.driven import ComponentMethod, advance_driven, advance_whole, started
@@ -60,13 +61,13 @@ class Grid:
         """Number of steps of full length."""
         count = (self.until - self.t0) / self.h
         nearest = round(count)  # h that divides the time up to rounding makes no extra sliver of a step
-        return int(nearest) if abs(count - nearest) <= 1e-9 * max(1.0, count) else int(count)
+        return int(nearest) if abs(count - nearest) <= SLIVER * max(1.0, count) else int(count)
 
     @property
     def last(self) -> float:
         """Length of the shortened last step, 0 where there is none."""
         rest = self.until - self.time(self.whole)
-        return rest if rest > 1e-9 * self.h else 0.0
+        return rest if rest > SLIVER * self.h else 0.0
 
     def time(self, k: int) -> float:
         """The time after k full steps."""
@@ -277,7 +278,7 @@ class _Run:
                 self.to(self.grid.time(done) if end is None else end, self.grid.h)
             spent = time.perf_counter() - before
             if alone:
-                size = int(np.clip(size * np.clip(RESPONSE / max(spent, 1e-9), 0.5, 4.0), 1, LARGEST_CHUNK))
+                size = int(np.clip(size / np.clip(spent / RESPONSE, 0.25, 2.0), 1, LARGEST_CHUNK))
 
     @property
     def done(self) -> int:
@@ -290,9 +291,9 @@ class _Run:
         while self.done == first:
             at = self.t
             end = self.breakpoints.end(at, target - at, self._states)
-            whole = end - target >= -1e-9 * grid.h  # a jump at the grid's time, to rounding, divides no step
-            jump = end != grid.until and end - target <= 1e-9 * grid.h
-            regular = abs(target - at - h) <= 1e-9 * grid.h and whole
+            whole = end - target >= -SLIVER * grid.h  # a jump at the grid's time, to rounding, divides no step
+            jump = end != grid.until and end - target <= SLIVER * grid.h
+            regular = abs(target - at - h) <= SLIVER * grid.h and whole
             self.take(h if regular else min(end, target) - at, 1, end if jump else target)
             if jump:
                 self.state = started(self.stepper, self.state.x, self.state.sums)
@@ -321,7 +322,6 @@ class _Run:
             error = self.balance.error(*self.recorder.latest)
             self.looked = time.perf_counter()
             self.progress(self.t, self.grid.until, {**self.stats(), "energy_error": error})
-
         if self.journal is not None and (self.t == self.grid.until or self.journal.due):
             self.journal.write(self.recorder.rows.fresh(), self.snapshot(), self.stats())
 

@@ -14,7 +14,7 @@ from ephs.solve.auditing.forecast import Forecast
 from ephs.solve.auditing.production import Production
 from ephs.solve.auditing.resolution import Samples, trials_of
 from ephs.solve.breakpoints import Breakpoints
-from ephs.solve.control import Control, Policy, first_step
+from ephs.solve.control import SLIVER, Control, Policy, first_step
 from ephs.solve.errors import OptionError, Outcome, SolveError, solve_error_of
 from ephs.solve.events import Crossing, Event, Watch
 from ephs.solve.integrate import Grid, Progress, audited, failures_of, repeatable
@@ -185,7 +185,7 @@ class _Run(Generic[S]):
                 self.shortest, self.longest, self.least = counts.shortest, counts.longest, counts.least
                 self.state = leg.state
             spent = time.perf_counter() - begin
-            most = int(np.clip(most * np.clip(RESPONSE / max(spent, 1e-9), 0.5, 2.0), 1, BURST))
+            most = int(np.clip(most / np.clip(spent / RESPONSE, 0.5, 2.0), 1, BURST))
             self._look()
 
     def _advance_stepwise(self) -> None:
@@ -198,8 +198,8 @@ class _Run(Generic[S]):
                 self.h = grid.time(self.steps - self.breakpoints.split + 1) - abs(self.t - self.t0)
             end = self.breakpoints.end(self.t, self.h, self._here)
             rest = abs(end - self.t)
-            if grid and rest - self.h <= 1e-9 * grid.h:
-                self.h, whole = rest, rest - self.h >= -1e-9 * grid.h
+            if grid and rest - self.h <= SLIVER * grid.h:
+                self.h, whole = rest, rest - self.h >= -SLIVER * grid.h
             else:
                 whole = True
             # No sliver is left for a last step.

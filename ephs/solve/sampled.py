@@ -12,6 +12,7 @@ from typing import Any, final
 import numpy as np
 
 from ephs.semantics.bundle import Array
+from ephs.solve.control import SLIVER
 from ephs.solve.errors import OptionError, Outcome, SolveError, number_of
 from ephs.solve.problem import Problem, State
 from ephs.solve.snapshot import Snapshot
@@ -95,7 +96,7 @@ class Held:
             raise OptionError(f"inputs[{name!r}]", "Sampled", "a run forward in time: samples are not undone")
         if sampled.period < least:
             raise OptionError(f"inputs[{name!r}].period", sampled.period, f"at least {least:.3g} s")
-        steps = np.arange(int(np.floor((until - t0) / sampled.period + 1e-9)) + 1)
+        steps = np.arange(int(np.floor((until - t0) / sampled.period + SLIVER)) + 1)
         self.samples: list[float] = (t0 + steps * sampled.period).tolist()
         self._times: list[float] = []
         self._values: list[Array] = []

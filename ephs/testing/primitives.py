@@ -16,6 +16,9 @@ from ephs.semantics.spaces import Pair
 
 __all__ = ["generators", "irreversibles", "reversibles", "storages"]
 
+CLEARED = 1e-12
+"""What rounding leaves of entries of order one."""
+
 
 READING = st.sampled_from((False, True, True, True))
 """Whether a component reads the states that it can."""
@@ -154,7 +157,7 @@ def _kept(bundle: Bundle) -> Array:
 
 def _cleared(matrix: Array) -> Array:
     """A projected matrix of entries of order one without what rounding left where it should be zero."""
-    return np.where(np.abs(matrix) > 1e-12, matrix, 0.0)
+    return np.where(np.abs(matrix) > CLEARED, matrix, 0.0)
 
 
 def _even(matrix: Array, parity: Array) -> Array:

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Steps"]
 
+RTOL, ATOL = 1e-10, 1e-12
+"""Tolerances of the equations of one implicit step: of its rounding, not of its error, which its length decides."""
 EXPLICIT = ("rk54", "rk87")
 
 
@@ -53,7 +55,7 @@ class Steps:
         if method in EXPLICIT:
             return self._explicit(state, h, str(method))
         of, _ = chosen(method, self._problem, step=abs(h))
-        tolerance = Tolerance.of("rtol", 1e-10, 1e-10), Tolerance.of("atol", 1e-12, 1e-12)
+        tolerance = Tolerance.of("rtol", RTOL, RTOL), Tolerance.of("atol", ATOL, ATOL)
         control = Control(*tolerance, abs(h), 0.0, np.inf, None)
         states = {**self._problem.initial, **self._equations.states(state)}
         setting = Setting(replace(self._problem, initial=states), 0.0, control, {}, self._equations)

@@ -10,6 +10,7 @@ from ephs.mechanics.elements import components
 from ephs.operad import Pattern, junction
 from ephs.semantics.bundle import Array
 from ephs.semantics.errors import StructureError
+from ephs.semantics.spaces.rank import INERTIA
 from ephs.semantics.system import System
 
 if TYPE_CHECKING:
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
 
 __all__ = ["body_pattern", "rigid_body"]
 
+SYMMETRIC = 1e-12
+"""Part of its largest entry by which an inertia may differ from its transpose: rounding of what computed it."""
 GRAVITY = (0.0, 0.0, -9.81)
 
 
@@ -99,7 +102,7 @@ def _inertia(mass: float, inertia: "ArrayLike", strict: bool) -> Array:
         raise _bad("inertia", given.tolist(), "3 or 6 numbers, or a (3, 3) matrix")
     if not np.isfinite(mass) or mass < 0.0:
         raise _bad("mass", mass, "a number ≥ 0")
-    if not np.all(np.isfinite(tensor)) or np.abs(tensor - tensor.T).max() > 1e-12 * np.abs(tensor).max():
+    if not np.all(np.isfinite(tensor)) or np.abs(tensor - tensor.T).max() > SYMMETRIC * np.abs(tensor).max():
         raise _bad("inertia", tensor.tolist(), "a finite symmetric matrix")
     if mass == 0.0:
         if np.any(tensor):
@@ -110,7 +113,7 @@ def _inertia(mass: float, inertia: "ArrayLike", strict: bool) -> Array:
         return tensor
     if not least > 0.0:
         raise _bad("inertia", tensor.tolist(), f"positive principal moments; the least is {least:.6g}")
-    if strict and most > (least + middle) * (1.0 + 1e-9):
+    if strict and most > (least + middle) * (1.0 + INERTIA):
         raise _bad("inertia", tensor.tolist(), f"principal moments with {most:.6g} ≤ {least:.6g} + {middle:.6g}")
     return tensor
 

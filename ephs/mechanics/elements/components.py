@@ -22,6 +22,7 @@ from ephs.semantics.errors import StructureError
 from ephs.semantics.forms import coupled, stored
 from ephs.semantics.primitives import Formula, Irreversible, Kernel, Point, Reversible, Storage, power_ports
 from ephs.semantics.spaces import SE3, Pair, codes, manifold
+from ephs.semantics.spaces.rank import TINY
 from ephs.semantics.special import squared_turn
 from ephs.semantics.verdict import proved
 
@@ -238,7 +239,7 @@ def holonomic(of: Pair) -> Reversible:
             around = SE3.compose(around, factor)
         residual = SE3.log(around) / h
         square = float(e @ e)
-        if square <= 1e-280:  # only to keep the quotient from overflowing
+        if square <= TINY:  # only to keep the quotient from overflowing
             return middle, residual
         return middle + np.outer(residual - middle @ e, e) / square, residual
 

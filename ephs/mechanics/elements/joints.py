@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 
 __all__ = ["between_frames", "joint", "joint_pattern", "mbs_pattern", "spring_damper", "universal_joint"]
 
+UNIT = 1e-6
+"""By how much the length of a quaternion may be off 1: what six digits leave; it is made 1."""
+
 Friction = Callable[[Array, Array, float], Array]
 
 
@@ -274,7 +277,7 @@ def _frame(given: Any) -> Array:
         )
         given = np.concatenate([np.asarray(rotation, dtype=float), np.asarray(position, dtype=float)])
     pose = np.asarray(given, dtype=float)
-    if pose.shape != (7,) or not np.all(np.isfinite(pose)) or abs(np.linalg.norm(pose[:4]) - 1.0) > 1e-6:
+    if pose.shape != (7,) or not np.all(np.isfinite(pose)) or abs(np.linalg.norm(pose[:4]) - 1.0) > UNIT:
         raise StructureError(
             "parameter",
             "joint",

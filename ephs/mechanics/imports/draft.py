@@ -12,6 +12,7 @@ from ephs.mechanics.scene.geometry import frame_rotation
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND
 from ephs.mechanics.scene.text import MESHES
 from ephs.semantics.spaces import SE3
+from ephs.semantics.spaces.rank import DIRECTION
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 
 __all__ = ["WORLD", "Draft", "along", "pose", "turned_tensor"]
@@ -213,7 +214,7 @@ def along(axis: ArrayLike, place: Array | None = None) -> Array | None:
     """A frame (7,) at ``place`` whose z axis is a direction there; None where the direction is none."""
     given = np.asarray(axis, dtype=float)
     size = float(np.linalg.norm(given))
-    rotation = frame_rotation(given / size) if size > 1e-12 else None
+    rotation = frame_rotation(given / size) if size > DIRECTION else None
     if rotation is None:
         return None
     turned = np.concatenate([rotation, np.zeros(3)])

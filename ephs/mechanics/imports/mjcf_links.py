@@ -12,6 +12,9 @@ from ephs.mechanics.imports.mjcf_names import Names
 
 __all__ = ["Thread", "loops", "screws"]
 
+ROUNDED_COSINE = 1e-12
+"""By how much the cosine between axes that are one may be off 1: unit vectors round by less."""
+
 
 @final
 @dataclass(frozen=True, slots=True)
@@ -42,7 +45,7 @@ def screws(model: Any, names: Names) -> dict[int, Thread]:
             continue
         hinge, slide = ends["revolute"], ends["prismatic"]
         cosine = float(model.jnt_axis[hinge] @ model.jnt_axis[slide])
-        if abs(abs(cosine) - 1.0) < 1e-12 and not model.jnt_stiffness[slide]:
+        if abs(abs(cosine) - 1.0) < ROUNDED_COSINE and not model.jnt_stiffness[slide]:
             pitch = (ratio if first == slide else 1.0 / ratio) * round(cosine)
             found[min(first, second)] = Thread(hinge, slide, pitch, e)
     return found

@@ -13,6 +13,7 @@ from ephs.mechanics.imports.sdf_frames import MODEL, Frames, read_pose
 from ephs.mechanics.imports.xml import numbers
 from ephs.mechanics.scene.errors import fault
 from ephs.semantics.spaces import SE3
+from ephs.semantics.spaces.rank import DIRECTION
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 
 __all__ = ["read_sdf"]
@@ -213,7 +214,7 @@ def _joint(
     for tag in ("axis", "axis2")[:count]:
         element = joint.find(tag)
         direction = _direction(element, f"{key}.{tag}", origin, frames, version, draft)
-        if not np.linalg.norm(direction) > 1e-12:
+        if not np.linalg.norm(direction) > DIRECTION:
             faults.append(fault("direction", f"{key}.{tag}.xyz", str(direction.tolist())))
             return
         axes.append(direction)

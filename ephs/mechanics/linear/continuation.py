@@ -18,6 +18,12 @@ from ephs.semantics.bundle import Array
 
 __all__ = ["StaticPath", "follow"]
 
+REAL = 1e-9
+"""Part of an eigenvalue that its imaginary part may be and the value count as real."""
+SAME = 1e-12
+"""Part of a load below which the rest of it is rounding."""
+BRACKET, SOFT = 1e-10, 1e-13
+"""Width of the bracket of a critical share, and the least stiffness beside others, at which it is found."""
 LONGEST, SHORTEST = 1.0, 1e-6
 """Bounds of the distance from one equilibrium to the next, in rad, parts of the scene's length, and of the loads."""
 ITERATIONS = 12
@@ -63,7 +69,7 @@ class _Balance:
     @property
     def unstable(self) -> int:
         values = self._values
-        return int(((values.real < 0.0) & (np.abs(values.imag) <= 1e-9 * np.abs(values.real))).sum())
+        return int(((values.real < 0.0) & (np.abs(values.imag) <= REAL * np.abs(values.real))).sum())
 
     @property
     def softest(self) -> float:
@@ -115,7 +121,7 @@ def follow(model: Dynamics, start: State, length: float, until: float = 1.0) -> 
         shares.append(share)
         points.append(here.state)
         unstable.append(here.unstable)
-        if abs(share - until) <= 1e-12 * until:
+        if abs(share - until) <= SAME * until:
             last = _held(model, here.state, until)
             points[-1] = here.state if last is None else last.state
             shares[-1] = until
@@ -240,6 +246,6 @@ def _crossing(model: Dynamics, one: _Balance, low: float, two: _Balance, high: f
             one, low = middle, share
         else:
             two, high = middle, share
-        if abs(high - low) <= 1e-10 or abs(middle.softest) <= 1e-13:
+        if abs(high - low) <= BRACKET or abs(middle.softest) <= SOFT:
             break
     return low + (high - low) * one.softest / (one.softest - two.softest)

@@ -9,6 +9,7 @@ import numpy as np
 from ephs.mechanics.scene.model import Scene
 from ephs.operad import Path
 from ephs.semantics.bundle import Array, Reference
+from ephs.semantics.spaces.rank import ELIMINATION, TINY
 from ephs.semantics.system import System
 from ephs.solve.errors import OptionError, Outcome, SimulationError, SolveError
 from ephs.solve.threads import in_one_thread
@@ -20,6 +21,12 @@ if TYPE_CHECKING:
 
 __all__ = ["Equilibrium", "equilibrium"]
 
+STALLED = 1e-9
+"""Unbalanced part of the forces that may be left where further iterations do not help."""
+UNFELT = 1e-9
+"""Part of the forces along directions without stiffness that is rounding."""
+SHORTEST, LEAST, SETTLED = 1e-12, 1e-9, 1e-12
+"""Of artificial time: the shortest step, the least size of states, the residual at which it ends."""
 ENOUGH = 1e-12
 """Part of the forces that act which may stay unbalanced."""
 STRIDE = 0.3
@@ -148,7 +155,7 @@ def _settled(model: "Dynamics") -> "tuple[State, float, int]":
         free = freedoms_of(model, state)
         by, Z = model.derivatives(state), free.Z
         left = unbalanced(model, state, free, by.force_q)
-        if left <= ENOUGH or (left <= 1e-9 and stalled >= 3):
+        if left <= ENOUGH or (left <= STALLED and stalled >= 3):
             return state, left, step
         best, stalled = (left, 0) if left < 0.5 * best else (best, stalled + 1)
         if left > before:
@@ -161,10 +168,10 @@ def _settled(model: "Dynamics") -> "tuple[State, float, int]":
         K = -M @ (by.acceleration_q @ Z)[free.which]
         values, ways = eigh(0.5 * (K + K.T), 0.5 * (M + M.T))
         size = np.abs(values)
-        flat = size <= 1e-10 * size.max(initial=0.0)
+        flat = size <= ELIMINATION * size.max(initial=0.0)
         push = ways.T @ force
-        push[flat & (np.abs(push) <= 1e-9 * np.abs(push).max(initial=0.0))] = 0.0
-        stretch = push / np.where(flat, max(float(size.max(initial=0.0)), 1e-300), size + shift * size.max(initial=0.0))
+        push[flat & (np.abs(push) <= UNFELT * np.abs(push).max(initial=0.0))] = 0.0
+        stretch = push / np.where(flat, max(float(size.max(initial=0.0)), TINY), size + shift * size.max(initial=0.0))
         change = Z @ (ways @ stretch)
         change /= max(1.0, float(np.abs(change).max(initial=0.0)) / STRIDE)
         state = _without_rates(model, model.closed(model.moved(state, change)))
@@ -226,17 +233,17 @@ def _of_system(
             found = pencil.implicit_step(x, z, h)
             if found is None:
                 h *= 0.25
-                if h < 1e-12:
+                if h < SHORTEST:
                     break
                 continue
             z, before = found, x
             x = d.advance(x, h * z[: pencil.n_w])
-            size = max(float(np.abs(x).max(initial=0.0)), 1e-9)
+            size = max(float(np.abs(x).max(initial=0.0)), LEAST)
             moved = float(np.abs(x - before).max(initial=0.0)) / size
             left = float(np.abs(z[: pencil.n_w][pencil.counted]).max(initial=0.0)) / size
             if not np.isfinite(left) or size > 1e12:
                 break
-            if h >= 1e6 and left <= 1e-12:
+            if h >= 1e6 and left <= SETTLED:
                 return Equilibrium(system, d.unpack(x), left, step)
             h = min(h * (4.0 if moved < 0.5 else 1.5), 1e12)
     except SolveError as error:

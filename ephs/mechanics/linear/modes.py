@@ -11,10 +11,12 @@ from ephs.semantics.bundle import Array
 
 __all__ = ["Complex", "Mode", "modes_of"]
 
+SHOWN = 1e-6
+"""Part of the largest below which a component of a mode is not shown."""
+
 Complex = NDArray[np.complex128]
 STILL = 1e-7
 """Eigenvalues below this part of the largest count as zero: a double one is good to the root of rounding only."""
-
 ROUNDING = 1e-12
 """Real parts below this part of the largest eigenvalue count as zero: what does not decay is not to seem to grow."""
 
@@ -59,7 +61,7 @@ class Mode:
         sizes = {name: float(np.abs(value).max(initial=0.0)) for name, value in self.shape.items()}
         top = max(sizes.values(), default=0.0) or 1.0
         order = sorted(sizes, key=lambda name: -sizes[name])
-        return [(name, sizes[name] / top) for name in order[:count] if sizes[name] > 1e-6 * top]
+        return [(name, sizes[name] / top) for name in order[:count] if sizes[name] > SHOWN * top]
 
 
 def modes_of(A: Array, shapes: Mapping[str, Array]) -> tuple[Mode, ...]:

@@ -13,7 +13,7 @@ import numpy as np
 from ephs.mechanics.runs.simulate import problem_of_system
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.primitives import Storage
-from ephs.semantics.spaces.rank import CONSTRAINT, ELIMINATION, REGULAR, rank_of
+from ephs.semantics.spaces.rank import CONSTRAINT, ELIMINATION, REGULAR, TINY, rank_of
 from ephs.semantics.system import System
 from ephs.solve.errors import OptionError, Outcome, SolveError
 from ephs.solve.methods.continuous import Continuous
@@ -27,6 +27,10 @@ if TYPE_CHECKING:
 
 __all__ = ["Parts", "Pencil", "system_problem"]
 
+SETTLED, LEAST = 1e-12, 1e-6
+"""Step of Newton's method, beside unknowns of this size at least, that ends it."""
+ROUNDING = 1e-13
+"""The same in implicit steps, whose matrices are better conditioned."""
 NOTHING = 1e-12
 """Conditions below this part of the largest stiffness are rounding."""
 
@@ -124,10 +128,10 @@ class Pencil:
             kept = self._conditions(self._parts(matrices.unknowns.toarray(), matrices.states.toarray(), z))
             rows = np.vstack([matrices.unknowns.toarray(), np.hstack([kept, np.zeros((len(kept), z.size - self.n_w))])])
             right = np.concatenate([residual, kept @ z[: self.n_w]])
-            size = np.maximum(np.abs(rows).max(axis=1, initial=0.0), 1e-300)
+            size = np.maximum(np.abs(rows).max(axis=1, initial=0.0), TINY)
             step = np.linalg.lstsq(rows / size[:, None], right / size, rcond=REGULAR)[0]
             z = z - step
-            if np.abs(step).max(initial=0.0) <= 1e-12 * max(1e-6, float(np.abs(z).max(initial=0.0))):
+            if np.abs(step).max(initial=0.0) <= SETTLED * max(LEAST, float(np.abs(z).max(initial=0.0))):
                 return z
         raise SolveError(Outcome.DIVERGED, "", "rates and multipliers in this state")
 
@@ -187,7 +191,7 @@ class Pencil:
     def differentiated(self, parts: Parts) -> list[str]:
         """Outer ports whose input holds states themselves, so that its derivative would act."""
         rows, _, by_inputs = self.algebraic(parts)
-        held = np.abs(self._left(rows).T @ by_inputs).max(axis=0, initial=0.0) > 1e-9
+        held = np.abs(self._left(rows).T @ by_inputs).max(axis=0, initial=0.0) > CONSTRAINT
         names = [str(slot.path) for slot, _ in self.ports for _ in range(slot.quantity.space.dim)]
         return list(dict.fromkeys(name for name, hit in zip(names, held.tolist(), strict=True) if hit))
 
@@ -199,9 +203,9 @@ class Pencil:
         if not rows.size:
             return np.setdiff1d(np.arange(self.n_w), left_out)
         size = np.abs(rows).max(axis=0)
-        rows = rows / np.maximum(np.abs(rows).max(axis=1, initial=0.0), 1e-300)[:, None]
+        rows = rows / np.maximum(np.abs(rows).max(axis=1, initial=0.0), TINY)[:, None]
         # In the metric of the exergy: states of large entries in rows of efforts are as good as those of small ones.
-        stiff = np.maximum(np.abs(np.diag(parts.Q)), 1e-12 * size.max(initial=0.0))
+        stiff = np.maximum(np.abs(np.diag(parts.Q)), SETTLED * size.max(initial=0.0))
         weight = np.where(size > 0.0, stiff**-0.5, 1.0)
         factors: Any = qr(rows * weight, mode="economic", pivoting=True)
         order, diagonal = np.asarray(factors[2], dtype=np.int64), np.abs(np.diag(factors[1]))
@@ -215,7 +219,7 @@ class Pencil:
         rows = self._conditions(parts)
         rest = np.setdiff1d(np.arange(self.n_w), np.concatenate([which, left_out]))
         if rows.size and rest.size:
-            size = np.maximum(np.abs(rows).max(axis=1, initial=0.0), 1e-300)[:, None]
+            size = np.maximum(np.abs(rows).max(axis=1, initial=0.0), TINY)[:, None]
             X[rest] = -np.linalg.lstsq(rows[:, rest] / size, rows[:, which] / size, rcond=ELIMINATION)[0]
         return X
 
@@ -253,7 +257,7 @@ class Pencil:
             columns = np.ones(z.size)
             columns[: self.n_w] = 1.0 / max(1.0, h)  # increments rather than rates: both of one size
             rows = rows * columns
-            size = np.maximum(np.abs(rows).max(axis=1, initial=0.0), 1e-300)
+            size = np.maximum(np.abs(rows).max(axis=1, initial=0.0), TINY)
             step = columns * np.linalg.lstsq(rows / size[:, None], residual / size, rcond=REGULAR)[0]
             if not np.isfinite(step).all():
                 return None
@@ -261,7 +265,7 @@ class Pencil:
             moved = h * float(np.abs(step[: self.n_w]).max(initial=0.0)) + float(
                 np.abs(step[self.n_w :]).max(initial=0.0)
             )
-            if moved <= 1e-13 * (
+            if moved <= ROUNDING * (
                 1.0 + float(np.abs(at).max(initial=0.0)) + float(np.abs(z[self.n_w :]).max(initial=0.0))
             ):
                 return z

@@ -9,6 +9,9 @@ from ephs.semantics.bundle import Array
 
 __all__ = ["Law", "PortHamiltonian", "laws_of"]
 
+ROUNDING = 1e-12
+"""Part of its terms by which a balance of powers may fail: rounding of products of matrices."""
+
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,7 +28,7 @@ class Law:
         """The largest difference of the sides, relative to the terms'."""
         return float(np.abs(self.left - self.right).max(initial=0.0)) / max(self.scale, float(np.finfo(float).tiny))
 
-    def holds(self, rounding: float = 1e-12) -> bool:
+    def holds(self, rounding: float = ROUNDING) -> bool:
         """Whether the sides agree to rounding."""
         return self.defect <= rounding
 

@@ -18,7 +18,7 @@ from ephs.mechanics.scene.errors import did_you_mean, listing
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.primitives import Storage
 from ephs.semantics.spaces import manifold
-from ephs.semantics.spaces.rank import ELIMINATION, IMPLICIT, rank_of
+from ephs.semantics.spaces.rank import ELIMINATION, IMPLICIT, NEIGHBOUR, SPANNED, TINY, rank_of
 from ephs.semantics.system import System
 from ephs.solve.errors import OptionError, failing_at
 from ephs.solve.methods.natural import stored_energies
@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 
 __all__ = ["linear_system"]
 
+RESTS = 1e-12
+"""Rate of change in units of the states below which nothing moves: rounding."""
 NEGATIVE = 1e-9
 """Part of the largest entry by which what must vanish, or not be negative, may be off: rounding of eliminations."""
 
@@ -108,7 +110,7 @@ class _Linear:
         pencil, d = self.pencil, self.pencil.problem.descriptor
         out, w = np.zeros_like(self.X), self.parts.rates
         speed = float(np.abs(w).max(initial=0.0))
-        if speed <= 1e-12:
+        if speed <= RESTS:
             return out
         for slot in d.states:
             out[slot.rates] = manifold(slot.quantity.space).ad(w[slot.rates]) @ self.X[slot.rates]
@@ -180,7 +182,7 @@ def _structure(p: Parts, X: Array, which: Index, A: Array) -> tuple[PortHamilton
     J, R, Q = 0.5 * (whole - whole.T), -0.5 * (whole + whole.T), 0.5 * (Q + Q.T)
     if np.linalg.eigvalsh(R).min(initial=0.0) < -NEGATIVE * np.abs(whole).max(initial=0.0):
         return None, "entropy is produced in this state"
-    if np.abs((J - R) @ Q - A).max(initial=0.0) > 1e-7 * max(size, 1e-300):
+    if np.abs((J - R) @ Q - A).max(initial=0.0) > SPANNED * max(size, TINY):
         return None, "stored exergy does not determine what is dissipated in this state"
     return PortHamiltonian(J, R, Q), ""
 
@@ -201,11 +203,11 @@ def _solved(matrix: Array, right: Array, count: int) -> Array:
     OptionError
         They are not: efforts or rates are not determined by the equations.
     """
-    size = np.maximum(np.abs(matrix).max(axis=1, initial=0.0), 1e-300)[:, None]
+    size = np.maximum(np.abs(matrix).max(axis=1, initial=0.0), TINY)[:, None]
     found = np.linalg.lstsq(matrix / size, right / size, rcond=IMPLICIT)[0]
     loose = _kernel(matrix / size)[:count]
     off = np.abs(matrix @ found - right).max(initial=0.0)
-    if np.abs(loose).max(initial=0.0) > 1e-6 or off > 1e-6 * max(1.0, np.abs(right).max(initial=0.0)):
+    if np.abs(loose).max(initial=0.0) > NEIGHBOUR or off > NEIGHBOUR * max(1.0, np.abs(right).max(initial=0.0)):
         raise OptionError("model", "equations that do not determine its rates", "a system whose motion is determined")
     return found
 

@@ -25,6 +25,8 @@ from ephs.solve.stepping import Attempt
 
 __all__ = ["Alpha"]
 
+CONSTANT = 1e-6
+"""Part of a constant step's change to which its equations are solved: well below the error of order 2."""
 ITERATIONS = 20
 ROUNDING = 1e-14
 
@@ -50,7 +52,7 @@ class Alpha(ReducedMethod):
         self._m, self._f = (2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0)
         self._gamma = 0.5 + self._f - self._m
         self._beta = 0.25 * (0.5 + self._gamma) ** 2
-        self._enough = 1e-4 if control.step is None else 1e-6
+        self._enough = 1e-4 if control.step is None else CONSTANT
         # what is good enough where it gets no better: tolerances near rounding cannot be met a hundred times over
         self._rough = max(1e-2, ROUNDING / max(float(np.min(self.rtol, initial=1.0)), ROUNDING))
         self.counts = {"iterations": 0, "rho": rho}

@@ -21,6 +21,8 @@ from ephs.solve.stepping import Attempt
 
 __all__ = ["Ida"]
 
+LEAST_RTOL, LEAST_ATOL = 1e-14, 1e-15
+"""Least tolerances that IDA is given: smaller ones are rounding, by which it ends."""
 LOG = "SUNLOGGER_ERROR_FILENAME"
 """Where SUNDIALS writes errors to, if not to stderr: an environment variable, read when a solver is made."""
 FAR = 1.5
@@ -114,7 +116,7 @@ class Ida(ReducedMethod):
         first = eq.rates(state.t, state.q, y0)
         with _unlogged():
             self._solver = self._make(
-                residual, rtol=max(rtol, 1e-14), atol=np.maximum(atol, 1e-15), max_num_steps=100000
+                residual, rtol=max(rtol, LEAST_RTOL), atol=np.maximum(atol, LEAST_ATOL), max_num_steps=100000
             )
             self._solver.init_step(0.0, y0, first)
 

@@ -20,6 +20,11 @@ from ephs.solve.snapshot import Snapshot
 
 __all__ = ["Stages"]
 
+SOLVED = 1e-13
+"""Part of the states to which the equations of a step can be solved: rounding, times a condition of some hundreds."""
+REAL = 1e-12
+"""Imaginary part of an eigenvalue, beside its size, that is rounding."""
+
 ITERATIONS = 10
 ROUNDING = 1e-14
 FAST = 2e-3
@@ -53,17 +58,17 @@ class Stages:
         if control.step is None:
             # As far as Newton's method is taken, relative to the tolerance: less than the method's own error.
             least = float(np.min(self.rtol, initial=1.0))
-            self._enough, self._rough = max(1e-13 / max(least, 1e-13), min(0.03, least**0.5)), 1e-2
+            self._enough, self._rough = max(SOLVED / max(least, SOLVED), min(0.03, least**0.5)), 1e-2
         else:  # to rounding, and near changes of rank as far as it goes
             self.rtol, self.atol = np.full_like(self.rtol, ROUNDING), np.full_like(self.atol, ROUNDING)
             self._enough, self._rough = 1.0, 1e5
         values, vectors = np.linalg.eig(self.inverse)
         sizes, turns = np.abs(values), np.imag(values)
-        kept = np.flatnonzero(turns >= -1e-12 * sizes)
+        kept = np.flatnonzero(turns >= -REAL * sizes)
         kept = kept[np.argsort(np.abs(turns[kept]))]
         self._values, self._into, self._out = values[kept], np.linalg.inv(vectors)[kept], vectors[:, kept]
         # Of a pair one is solved for: the other is its conjugate.
-        self._twice = np.where(np.abs(turns[kept]) > 1e-12 * sizes[kept], 2.0, 1.0)
+        self._twice = np.where(np.abs(turns[kept]) > REAL * sizes[kept], 2.0, 1.0)
         self._solvers: tuple[float, list[Any]] | None = None
         # Off the constraints the exact matrix grows as one over this: an old one is wrong there by as much.
         self._separation, self._stale = equations.separation(), False

@@ -20,7 +20,7 @@ from ephs.mechanics.tree.finding.naming import counted
 from ephs.mechanics.tree.finding.tables import CUT
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.codes import VECTOR
-from ephs.semantics.spaces.rank import CONSTRAINT
+from ephs.semantics.spaces.rank import CONSTRAINT, TINY
 from ephs.semantics.spaces.se3_kernels import dexp_left, dexp_left_inv
 from ephs.solve.control import Control
 from ephs.solve.errors import Outcome, SolveError
@@ -29,6 +29,8 @@ from ephs.solve.stepping import Attempt
 
 __all__ = ["Variational"]
 
+EXACT = 4e-16
+"""Residual beside its terms that no further iteration improves: two roundings."""
 ITERATIONS = 40
 FAR = 1e4
 """Residuals beyond this, relative to momenta or in m, are of an iteration that has gone astray."""
@@ -116,11 +118,11 @@ class Variational(ReducedMethod):
             gap, rows = self._gap(state, xi, h)
             scale = max(float(np.abs(momentum).max(initial=0.0)), abs(h) * float(np.abs(middle[1]).max(initial=0.0)))
             worst = max(
-                float(np.abs(residual).max(initial=0.0)) / max(scale, 1e-300), float(np.abs(gap).max(initial=0.0))
+                float(np.abs(residual).max(initial=0.0)) / max(scale, TINY), float(np.abs(gap).max(initial=0.0))
             )
             if not worst < FAR:
                 break
-            if worst <= 4e-16 or (worst < STAGNANT and worst > 0.5 * last):
+            if worst <= EXACT or (worst < STAGNANT and worst > 0.5 * last):
                 return xi, push, middle
             if self._matrix is None or (iteration > 3 and worst > max(0.1 * last, ROUNDING)):
                 self._matrix = self._slope(state, h, xi, middle)
@@ -156,7 +158,7 @@ class Variational(ReducedMethod):
             before, heats = heats, eq.heats.taken(state.heats, 0.5 * h * flows)[0]
             if plain.any():
                 heats[plain] = found.follow(state.heats[plain], before[plain], h)
-            moved = float(np.max(np.abs(heats - before)[plain] / np.maximum(np.abs(heats[plain]), 1e-300), initial=0.0))
+            moved = float(np.max(np.abs(heats - before)[plain] / np.maximum(np.abs(heats[plain]), TINY), initial=0.0))
             if passes >= least and (moved <= ROUNDING or (moved <= STAGNANT and moved > 0.5 * last)):
                 break
             last = moved

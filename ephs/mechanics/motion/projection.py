@@ -12,7 +12,7 @@ from typing import Any, final
 import numpy as np
 
 from ephs.semantics.bundle import Array
-from ephs.semantics.spaces.rank import CONSTRAINT
+from ephs.semantics.spaces.rank import CONSTRAINT, TINY
 from ephs.solve.sparse import Index
 
 __all__ = ["Held", "project", "project_dense"]
@@ -75,7 +75,7 @@ def project(joints: Sequence[Held], roots: Array, twists: Array) -> tuple[Array,
         white = np.linalg.solve(roots, twists[i][:, :, None]).reshape(-1)
         defect = right - scaled @ white
         normal = (scaled @ scaled.T).tocsc()
-        shift = SHIFT * max(float(np.abs(normal.data).max(initial=0.0)), 1e-300)
+        shift = SHIFT * max(float(np.abs(normal.data).max(initial=0.0)), TINY)
         factors: Any = splu(normal + shift * identity(right.size, format="csc"))
         for _ in range(ROUNDS):
             change += scaled.T @ factors.solve(defect - scaled @ change)

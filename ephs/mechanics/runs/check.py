@@ -15,6 +15,7 @@ from ephs.semantics.laws import Probe, system_law
 from ephs.semantics.report import CheckItem, CheckReport, check_structure
 from ephs.semantics.spaces.rank import ASSEMBLY
 from ephs.semantics.system import System
+from ephs.solve.auditing.audit import LAWFUL
 from ephs.solve.errors import SolveError
 from ephs.solve.integrate import Grid, integrate
 from ephs.solve.problem import Problem
@@ -29,7 +30,6 @@ LARGEST = 600
 """Rows of the largest relation that is composed by both routes; the work grows with the third power."""
 STEP, STEPS = 1e-3, 100
 """Seconds and number of the steps over which balances are measured: in the first ones little may have moved yet."""
-
 ROUNDING = 1e-13
 """Of the energies that are stored or could be: what rounding may change their sum by in these steps."""
 
@@ -123,8 +123,8 @@ def _motion(problem: Problem) -> Iterator[CheckItem]:
     stored = float(np.max(np.sum([np.abs(energy) for energy in books.storages.values()], axis=0), initial=0.0))
     stored += _weight(problem.scene) if problem.scene is not None else 0.0
     detail = f"energy over {STEPS} steps of {STEP * own.seconds:g} s is balanced to {error:.1e} of what moves"
-    balanced = error < 1e-10 or error * books.scale < ROUNDING * stored
-    if error >= 1e-10 and balanced:  # next to nothing moves
+    balanced = error < LAWFUL or error * books.scale < ROUNDING * stored
+    if error >= LAWFUL and balanced:  # next to nothing moves
         detail += f", {error * books.scale / stored:.1e} of what is stored or could be"
     yield CheckItem("power balance", balanced, detail)
     least = float(start.stats["least_production"])

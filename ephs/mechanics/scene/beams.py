@@ -22,8 +22,12 @@ from ephs.mechanics.scene.resolve import JointDraft, Names
 from ephs.mechanics.scene.sections import Section, resolve_section
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces import rotations as so3
+from ephs.semantics.spaces.rank import TINY
 
 __all__ = ["BeamDraft", "check_beam", "curve_frames", "resolve_beam"]
+
+ALONG = 1.0 - 1e-9
+"""Cosine above which a direction that was given lies along the beam: its sine is 4e-5, well above rounding."""
 
 Array = NDArray[np.float64]
 PARALLEL = 0.9
@@ -132,7 +136,7 @@ def _frames(table: Checked[Any], key: str, faults: list[Fault]) -> list[Array] |
         return None
     points = np.array(entry.points if entry.points is not None else ends, dtype=float)
     gaps = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    short = np.flatnonzero(gaps <= NOISE * max(float(np.abs(points).max()), 1e-300))
+    short = np.flatnonzero(gaps <= NOISE * max(float(np.abs(points).max()), TINY))
     if short.size:
         where = f"{key}.points[{short[0] + 1}]" if entry.points is not None else f"{key}.to"
         faults.append(fault("beam points", where, shown(points[short[0] + 1].tolist())))
@@ -156,7 +160,7 @@ def curve_frames(points: Array, up: Array | None, elements: int) -> list[Array] 
     """
     tangents = _tangents(points)
     ways = [up] if up is not None else [np.eye(3)[i] for i in (2, 1, 0)]
-    most = 1.0 - 1e-9 if up is not None else PARALLEL
+    most = ALONG if up is not None else PARALLEL
     fits = [u / np.linalg.norm(u) for u in ways if np.linalg.norm(u) > 0.0]
     chosen = next((u for u in fits if np.abs(tangents @ u).max() <= most), None)
     if chosen is None:

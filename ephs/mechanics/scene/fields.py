@@ -12,6 +12,7 @@ from ephs.mechanics.scene.geometry import body_twist, coupling_of
 from ephs.mechanics.scene.model import GROUND, IDENTITY_POSE, Joint, Scene, frozen
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces import rotations as so3
+from ephs.semantics.spaces.rank import INERTIA
 
 __all__ = ["FIELDS", "Field", "placed"]
 
@@ -122,14 +123,14 @@ def _body_faults(scene: Scene, name: str, before: Scene) -> list[Fault]:
     """An inertia that no mass distribution has."""
     body, key = scene.body(name), f"bodies.{name}.inertia"
     moments = np.linalg.eigvalsh(body.inertia)
-    slack = 1e-9 * float(np.abs(moments).max())
+    slack = INERTIA * float(np.abs(moments).max())
     text = "principal moments " + ", ".join(f"{moment:.6g}" for moment in moments)
     if body.mass == 0.0 and body.inertia.any():
         return [fault("massless", key, text)]
     if moments[0] < -slack:
         return [fault("inertia indefinite", key, text)]
     old = np.linalg.eigvalsh(before.body(name).inertia)
-    sound = old[2] <= old[0] + old[1] + 1e-9 * float(np.abs(old).max())
+    sound = old[2] <= old[0] + old[1] + INERTIA * float(np.abs(old).max())
     if sound and moments[2] > moments[0] + moments[1] + slack:
         return [fault("inertia triangle", key, text)]
     return []
@@ -243,7 +244,7 @@ def _stiffness_faults(scene: Scene, name: str, _before: Scene) -> list[Fault]:
 
 def _friction_faults(scene: Scene, name: str, _before: Scene) -> list[Fault]:
     moments = np.linalg.eigvalsh(scene.joint(name).friction)
-    if moments.size and moments[0] < -1e-9 * float(np.abs(moments).max()):
+    if moments.size and moments[0] < -INERTIA * float(np.abs(moments).max()):
         return [fault("friction sign", f"joints.{name}.friction", f"the eigenvalue {moments[0]:.6g}")]
     return []
 

@@ -16,6 +16,7 @@ from ephs.semantics.spaces import rotations as so3
 from ephs.semantics.spaces.codes import SE3 as SE3_CODE
 from ephs.semantics.spaces.codes import SO3 as SO3_CODE
 from ephs.semantics.spaces.pairs import left_inverse
+from ephs.semantics.spaces.rank import ALIGNED, DIRECTION
 
 Array = NDArray[np.float64]
 
@@ -117,7 +118,7 @@ def joint_types() -> list[str]:
 def unit(vector: Array) -> Array | None:
     """The direction of a vector; None where it has none."""
     size = float(np.linalg.norm(vector))
-    return vector / size if size > 1e-12 else None
+    return vector / size if size > DIRECTION else None
 
 
 def frame_rotation(z: Array, x: Array | None = None) -> Array | None:
@@ -131,7 +132,7 @@ def frame_rotation(z: Array, x: Array | None = None) -> Array | None:
     if normal is None:
         return None
     normal = normal - z * (z @ normal)
-    if np.linalg.norm(normal) < 1e-6:
+    if np.linalg.norm(normal) < ALIGNED:
         return None
     normal = normal / np.linalg.norm(normal)
     return so3.matrix_to_quaternion(np.column_stack((normal, np.cross(z, normal), z)))

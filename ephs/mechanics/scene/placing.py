@@ -12,6 +12,7 @@ from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.geometry import ROUND, UNIVERSAL, frame_rotation, unit
 from ephs.mechanics.scene.schema import FrameEntry, JointEntry
 from ephs.semantics.spaces import SE3
+from ephs.semantics.spaces.rank import ALIGNED
 
 Array = NDArray[np.float64]
 
@@ -99,7 +100,7 @@ def _frame(entry: JointEntry, name: str, key: str, faults: list[Fault]) -> Array
 def _second(z: Array, axis2: list[float], key: str, faults: list[Fault]) -> Array:
     """The rotation of the frame whose z axis is the second axis of a universal joint."""
     z2 = _direction(axis2, key, faults)
-    if np.linalg.norm(np.cross(z, z2)) < 1e-6:
+    if np.linalg.norm(np.cross(z, z2)) < ALIGNED:
         faults.append(fault("parallel", key, shown(axis2), other="axis"))
     rotation: Any = frame_rotation(z2)
     return rotation

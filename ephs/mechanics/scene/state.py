@@ -18,6 +18,10 @@ from ephs.mechanics.scene.tree import spanning_hops
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces import rotations as so3
 from ephs.semantics.spaces.rank import ASSEMBLY
+from ephs.solve.control import SLIVER
+
+MOVED = 1e-12
+"""Change of a body's state in m, rad, m/s, rad/s that is told: less is the rounding of poses of size one."""
 
 Array = NDArray[np.float64]
 
@@ -198,7 +202,7 @@ def at_solution(scene: Scene, solution: Any, time: float) -> Scene:
     """See `Scene.at`."""
     times = np.asarray(solution.t)
     k = int(np.argmin(np.abs(times - time)))
-    if abs(times[k] - time) > 1e-9 * max(1.0, abs(time)):
+    if abs(times[k] - time) > SLIVER * max(1.0, abs(time)):
         raise SceneError(scene.name, [fault("no time", "time", time, first=times[0], last=times[-1])])
     now = Snapshot.of(scene)
     poses, twists = now.poses.copy(), now.twists.copy()
@@ -275,7 +279,7 @@ def _displacements(now: Snapshot, poses: Array, given: Array, twists: Array) -> 
         turn = SE3.log(SE3.compose(SE3.inverse(now.poses[i]), poses[i]))[:3]
         spin, speed = twists[i, :3] - given[i, :3], twists[i, 3:] - given[i, 3:]
         sizes = [float(np.linalg.norm(v)) for v in (poses[i, 4:] - now.poses[i, 4:], turn, speed, spin)]
-        if max(sizes) > 1e-12:
+        if max(sizes) > MOVED:
             yield Displacement(name, *sizes)
 
 

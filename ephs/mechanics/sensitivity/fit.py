@@ -11,7 +11,7 @@ from ephs.mechanics.scene.parameters import read, varied
 from ephs.mechanics.sensitivity.readings import reading_of
 from ephs.mechanics.sensitivity.sensitivity import Sensitivity, sensitivity
 from ephs.semantics.bundle import Array
-from ephs.semantics.spaces.rank import ELIMINATION
+from ephs.semantics.spaces.rank import ELIMINATION, NEIGHBOUR, TINY
 from ephs.semantics.system import System
 from ephs.solve.errors import OptionError
 from ephs.solve.result.solution import Solution
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Fit", "fit"]
 
+XTOL, FTOL, GTOL = 1e-9, 1e-12, 1e-14
+"""Changes of parameters, of the sum of squares and its gradient, relative, at which a fit ends."""
 POSITIVE = ("mass", "friction", "stiffness", "damping", "length", "capacity", "temperature", "conductance")
 """Numbers of a scene that are not negative unless bounds say so; so are the diagonal of an inertia, and what the
 components of a system take."""
@@ -125,7 +127,7 @@ def fit(
     jacobian_of: Any = runs.jacobian
     found = least_squares(
         runs.residual, x0, jac=jacobian_of, bounds=(lower / scale, upper / scale), x_scale="jac",
-        xtol=1e-9, ftol=1e-12, gtol=1e-14, max_nfev=max_evaluations,
+        xtol=XTOL, ftol=FTOL, gtol=GTOL, max_nfev=max_evaluations,
     )  # fmt: skip
     values = dict(zip(parameters, (found.x * scale).tolist(), strict=True))
     residual, jacobian = runs.residual(found.x), runs.jacobian(found.x)
@@ -222,12 +224,12 @@ class _Runs:
 
 def _covariance(jacobian: Array, deviation: float) -> tuple[Array, Array]:
     """Of the parameters, and standard errors; infinite along what the record does not determine."""
-    size = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
+    size = np.maximum(np.linalg.norm(jacobian, axis=0), TINY)
     _, sigma, vt = np.linalg.svd(jacobian / size, full_matrices=False)
     seen = sigma > ELIMINATION * sigma.max(initial=0.0)
     half = (vt[seen].T / sigma[seen]) / size[:, None]
     covariance = deviation**2 * half @ half.T
-    lost = np.abs(vt[~seen]).max(axis=0, initial=0.0) > 1e-6
+    lost = np.abs(vt[~seen]).max(axis=0, initial=0.0) > NEIGHBOUR
     covariance[lost, lost] = np.inf
     return covariance, np.sqrt(np.diag(covariance))
 

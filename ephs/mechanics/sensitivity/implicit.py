@@ -17,7 +17,7 @@ from ephs.mechanics.tree.engine.tangents import DIRECTIONS
 from ephs.semantics.bundle import Array
 from ephs.semantics.primitives import Irreversible
 from ephs.semantics.spaces import manifold
-from ephs.semantics.spaces.rank import IMPLICIT
+from ephs.semantics.spaces.rank import IMPLICIT, TINY
 from ephs.semantics.stage import Entry, Evaluator, Integer, Program, Vector, vector
 from ephs.solve.errors import OptionError, SolveError
 from ephs.solve.methods.natural import Natural, NaturalState, stored_energies
@@ -189,7 +189,7 @@ class NaturalTangent:
 
     def _solved(self, matrix: Array, right: Array) -> Array:
         """Least-norm where constraints repeat each other."""
-        rows = np.maximum(np.abs(matrix).max(axis=1, initial=0.0), 1e-300)[:, None]
+        rows = np.maximum(np.abs(matrix).max(axis=1, initial=0.0), TINY)[:, None]
         if not self.natural.redundant:
             try:
                 return np.asarray(np.linalg.solve(matrix / rows, right / rows), dtype=float)

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 __all__ = ["METHODS", "Sensitivity", "sensitivity"]
 
+RTOL, ATOL = 1e-9, 1e-11
+"""Tolerances of runs that are differentiated: of the values and of their derivatives."""
 METHODS = ("rk54", "rk87", "natural")
 NEAR = 2.0**-7
 """Step of readings along a tangent, as states move."""
@@ -106,8 +108,8 @@ def sensitivity(
     t0: float = 0.0,
     initial: "Mapping[str, ArrayLike] | None" = None,
     method: str = "auto",
-    rtol: float = 1e-9,
-    atol: float = 1e-11,
+    rtol: float = RTOL,
+    atol: float = ATOL,
     step: float | None = None,
     save_at: "ArrayLike | None" = None,
     inputs: Mapping[str, Any] | None = None,

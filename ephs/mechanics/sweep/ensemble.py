@@ -34,7 +34,7 @@ from ephs.mechanics.tree.finding.tables import TREE
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import Pair
 from ephs.solve.auditing.audit import Bounds
-from ephs.solve.control import Control, first_step
+from ephs.solve.control import ATOL, RTOL, Control, first_step
 from ephs.solve.stepping import Span
 
 __all__ = ["Ensemble", "Unlike"]
@@ -339,7 +339,7 @@ class Ensemble:
         if equations.led.holds:  # its work is no sum of rows
             return None
         control = control_of(
-            equations.problem, method.order, given.get("rtol", 1e-6), given.get("atol", 1e-9), given.get("step"),
+            equations.problem, method.order, given.get("rtol", RTOL), given.get("atol", ATOL), given.get("step"),
             given.get("min_step"), given.get("max_step"), given.get("max_steps"),
         )  # fmt: skip
         stepper, _ = method.make(Setting(equations.problem, self._t0, control, {}, equations))

@@ -14,6 +14,7 @@ from ephs.semantics.checks import random_point
 from ephs.semantics.primitives import Irreversible, Primitive
 from ephs.semantics.relations import LinearRelation, Relation, relation_of
 from ephs.semantics.relations.base import BasePoint
+from ephs.semantics.spaces.rank import APART, PROJECTOR
 from ephs.semantics.subspace import Subspace
 from ephs.semantics.system import Filling
 
@@ -54,7 +55,7 @@ def _equal(left: Meaning, right: Meaning) -> bool:
         efforts = {path: rng.uniform(-1.0, 1.0, size) for path, size in _arguments(one)}
         found, expected = (each.at(state, ports, efforts=efforts) for each in (one, other))
         condition = max(10.0, found.subspace.condition, expected.subspace.condition)
-        if found.distance(expected) > min(1e-6, 1e-13 * condition):
+        if found.distance(expected) > min(APART, PROJECTOR * condition):
             return False
     return True
 

@@ -34,6 +34,8 @@ __all__ = [
     "reaction",
 ]
 
+BALANCED = 1e-12
+"""Part of a reaction's atoms that its stoichiometric numbers may lose: rounding of their sum."""
 GAS_CONSTANT = 8.31446261815324
 """R in J/(mol K), exact since 2019."""
 Phase = Literal["gas", "solution"]
@@ -185,7 +187,7 @@ def reaction(
     nu = {one.name: after.get(one.name, 0.0) - before.get(one.name, 0.0) for one in taking}
     for element in sorted({element for one in taking for element, _ in one.elements}):
         atoms = [nu[one.name] * dict(one.elements).get(element, 0.0) for one in taking]
-        if abs(sum(atoms)) > 1e-12 * sum(map(abs, atoms)):
+        if abs(sum(atoms)) > BALANCED * sum(map(abs, atoms)):
             raise StructureError("elements", "reaction", equation=equation, element=element, found=f"{sum(atoms):+g}")
 
     def matrix(s: Any, v: Any = 1.0, **mu: Any) -> Any:

@@ -14,6 +14,9 @@ from ephs.semantics.subspace import Subspace
 
 __all__ = ["Coordinates", "LinearRelation", "component_relation", "compose_linear", "linear_parts", "power_ports"]
 
+AFFINE = 1e-8
+"""Last entry of unit vectors of a relation below which it has no affine part: the root of rounding."""
+
 Coordinates: TypeAlias = tuple[tuple[Path, int], ...]
 """Names and dimensions, sorted by name."""
 
@@ -59,7 +62,7 @@ class LinearRelation:
     @property
     def empty(self) -> bool:
         """Whether no rates, flows and efforts are possible: the state violates a constraint, or has several values."""
-        return float(np.abs(self.subspace.basis[-1]).max(initial=0.0)) < 1e-8
+        return float(np.abs(self.subspace.basis[-1]).max(initial=0.0)) < AFFINE
 
     def distance(self, other: "LinearRelation") -> float:
         """Largest entry of the difference of projectors; 0 if both are empty, 1 if one is. The names must agree."""

@@ -26,6 +26,9 @@ from ephs.semantics.spaces.manifold import Array, Manifold, register_manifold
 if TYPE_CHECKING:
     from ephs.operad import Space
 
+SETTLED = 1e-13
+"""Step of Newton's method in rad and m that ends it: its square is below all rounding."""
+
 Basis: TypeAlias = Callable[..., Array]
 
 
@@ -132,7 +135,7 @@ class Pair:
                 groups.SE3.compose(groups.SE3.inverse(self.include(x)), relative)
             )
             x = self.manifold.retract(x, step)
-            if np.linalg.norm(step) < 1e-13:
+            if np.linalg.norm(step) < SETTLED:
                 break
         return x
 

@@ -11,21 +11,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "ALIGNED",
+    "APART",
     "ASSEMBLY",
     "CLOSED",
     "CLOSED_SINGULAR",
     "CONSTRAINT",
+    "DIFFERENCE",
+    "DIRECTION",
     "ELIMINATION",
     "EXPLICIT",
     "FOLLOWED",
     "GAP",
     "IMPLICIT",
+    "INERTIA",
     "LIGHT",
     "NEIGHBOUR",
+    "PROJECTOR",
     "REGULAR",
     "ROUNDED",
     "SPANNED",
     "SPARSE",
+    "TINY",
     "rank_of",
 ]
 
@@ -70,6 +77,22 @@ NEIGHBOUR = 1e-6
 """Rank in configurations near by, which are closed by iterations to `ASSEMBLY` only."""
 LIGHT = 1e-9
 """Mass of what has none, beside the heaviest body, where a metric must be one."""
+TINY = 1e-300
+"""Added to no sum and smaller than any size: quotients by what may be zero stay finite."""
+DIRECTION = 1e-12
+"""Length below which a vector says no direction: components are written with 12 digits at most."""
+ALIGNED = 1e-6
+"""Sine of the angle between two directions below which they are one: a third one that both are to span is then rounding
+over this, 2e-10."""
+INERTIA = 1e-9
+"""Part of the largest principal moment by which moments may miss positivity and the triangle inequality: those of a
+thin plate or rod meet it with equality, and files are written with nine digits."""
+PROJECTOR = 1e-13
+"""Difference of the projectors on two subspaces that are one, times the condition of what computed them."""
+APART = 1e-6
+"""The same at most, whatever the condition: subspaces of other relations differ by a tenth and more."""
+DIFFERENCE = 1e-6
+"""Step of a one-sided difference, beside 1 and the unknown: the root of rounding, over its curvature."""
 
 
 def rank_of(sizes: NDArray[Any], part: float, usual: float = 0.0) -> int:

@@ -12,6 +12,9 @@ __all__ = [
     "polynomial", "quaternion", "rotate",
 ]  # fmt: skip
 
+SMALL = 1e-8
+"""Square of an angle below which the series is taken: its next term is below rounding."""
+
 
 def conjugate(q: Entries) -> list[Real]:
     """The inverse of a unit quaternion."""
@@ -73,7 +76,7 @@ def exp(on: Evaluator, v: Entries) -> list[Real]:
 def log(on: Evaluator, q: Entries) -> Vector3:
     """Principal rotation vector, of length ≤ π, of a unit quaternion."""
     w, square = q[0], dot(q[1:], q[1:])
-    small = square < 1e-8
+    small = square < SMALL
     length = on.sqrt(on.select(small, 1.0, square))
     ratio = square / on.select(small, w * w, 1.0)
     near = (2.0 / on.select(small, w, 1.0)) * (1.0 - ratio / 3.0 + ratio * ratio / 5.0)

@@ -16,6 +16,9 @@ from ephs.semantics.stage.numbers import Real
 
 __all__ = ["COMPOSED", "LARGEST_ANGLE", "WHOLE_TURNS", "atan2", "cos", "exp", "log", "polynomial", "sin"]
 
+LINEAR = 1e-9
+"""Angle in rad below which its sine is the angle: the cube is below rounding."""
+
 LARGEST_ANGLE: Final = 2.0**26
 """Angles in rad up to which errors of sine and cosine are relative; beyond they are absolute, below 1e-15."""
 WHOLE_TURNS: Final = 2.0**55
@@ -142,7 +145,7 @@ def sin(on: Evaluator, x: Real) -> Real:
     odd = on.either(on.both(n > 0.5, n < 1.5), n > 2.5)
     value = on.select(odd, _cosine(r, tail), _sine(r, tail))
     value = on.select(n > 1.5, -value, value)
-    return on.select(on.absolute(x) < 1e-9, x, value)
+    return on.select(on.absolute(x) < LINEAR, x, value)
 
 
 def cos(on: Evaluator, x: Real) -> Real:

@@ -14,6 +14,9 @@ from ephs.semantics.stage.numbers import Condition, Integer, Number, Operation, 
 
 __all__ = ["INTERVALS", "Interval", "Intervals"]
 
+NEAR = 1e-9
+"""Angle in rad by which extrema are taken to lie within an interval: more than turns round by."""
+
 _ULPS: Final = 4
 """Roundings by which elementary functions may be wrong."""
 _FAR: Final = 1e6
@@ -122,7 +125,7 @@ def _wave(low: float, high: float, peak: float) -> Interval:
     """Bound the cosine of x − peak."""
     if max(abs(low), abs(high)) > _FAR:
         return Interval(-1.0, 1.0)
-    turn, near = 2.0 * math.pi, 1e-9
+    turn, near = 2.0 * math.pi, NEAR
     top = math.floor((high - peak + near) / turn) >= math.ceil((low - peak - near) / turn)
     bottom = math.floor((high - peak + math.pi + near) / turn) >= math.ceil((low - peak + math.pi - near) / turn)
     of = math.sin if peak else math.cos

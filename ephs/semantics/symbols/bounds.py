@@ -7,6 +7,13 @@ from ephs.semantics.symbols.algebra import Expr, sp
 
 __all__ = ["Bounds", "Interval", "at_least"]
 
+OUTWARDS = 8e-16
+"""Part by which bounds are moved outwards: two of the last digits, and more than functions err by."""
+NEAR = 1e-9
+"""Angle in rad by which extrema are taken to lie within an interval: more than turns round by."""
+ROUNDING = 1e-15
+"""Error of a cosine."""
+
 Interval = tuple[float, float]
 Bounds = Mapping[Expr, Interval]
 WHOLE: Interval = (-math.inf, math.inf)
@@ -66,7 +73,7 @@ def _out(low: float, high: float) -> Interval:
 
 
 def _moved(value: float, side: float) -> float:
-    return value + side * 8e-16 * abs(value) if math.isfinite(value) else value
+    return value + side * OUTWARDS * abs(value) if math.isfinite(value) else value
 
 
 def _bounds(expression: Expr, box: Bounds) -> Interval:
@@ -159,10 +166,10 @@ def _wave(peak: float) -> Callable[[float, float], Interval]:
             return -1.0, 1.0
         turn = 2.0 * math.pi
         values = [math.cos(low - peak), math.cos(high - peak)]
-        near = 1e-9
+        near = NEAR
         top = math.floor((high - peak + near) / turn) >= math.ceil((low - peak - near) / turn)
         bottom = math.floor((high - peak + math.pi + near) / turn) >= math.ceil((low - peak + math.pi - near) / turn)
-        least, most = -1.0 if bottom else min(values) - 1e-15, 1.0 if top else max(values) + 1e-15
+        least, most = -1.0 if bottom else min(values) - ROUNDING, 1.0 if top else max(values) + ROUNDING
         return max(least, -1.0), min(most, 1.0)
 
     return rule

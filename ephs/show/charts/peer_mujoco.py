@@ -15,6 +15,8 @@ from ephs.show.charts.runs import Array, Ending, Setting
 
 __all__ = ["integrator", "mjcf", "mujoco_model", "silent"]
 
+REACHED = 1e-6
+"""Part of the time that may be missing at the end: steps add up with rounding."""
 IMPEDANCE = 'solimp="0.9999 0.9999 0.001 0.5 2"'
 """Of a closed loop: the most that it takes."""
 
@@ -43,7 +45,7 @@ def integrator(method: str) -> Callable[[Scene, float], Go]:
                 if time.perf_counter() - begin > limit:
                     raise PeerError(f"{limit:g} s of wall time were over", Ending.SLOW)
             seconds = time.perf_counter() - begin
-            if data.time < until * (1.0 - 1e-6):  # it starts again from zero where its state is not finite
+            if data.time < until * (1.0 - REACHED):  # it starts again from zero where its state is not finite
                 raise PeerError("the state was not finite", Ending.FAILED)
             mujoco.mj_kinematics(model, data)
             numbers = [model.body(name).id for name in names]

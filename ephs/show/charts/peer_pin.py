@@ -15,6 +15,8 @@ from ephs.show.charts.runs import Array, Ending, Setting
 
 __all__ = ["SOFT", "TIGHT", "PinModel", "integrator"]
 
+SOLVED = 1e-13
+"""Accuracy to which Pinocchio solves for constraint forces."""
 TIGHT, SOFT = 1e-8, 1e-2
 """Proximal parameters of closed loops: the second passes configurations in which constraints lose rank."""
 GAIN = 100.0
@@ -182,7 +184,7 @@ class PinModel:
             made.setBaumgarteCorrectorParameters(gains)
             self.constraints.append(made)
             self.workspace.append(made.createData())
-        self.settings = pin.ProximalSettings(1e-13, proximal, 100)
+        self.settings = pin.ProximalSettings(SOLVED, proximal, 100)
         if self.loops:
             pin.initConstraintDynamics(self.model, self.data, self.constraints, self.workspace)
 

@@ -13,6 +13,8 @@ from ephs.show.charts.runs import Array, Ending, Setting
 
 __all__ = ["Branch", "Go", "PeerError", "PeerRun", "PeerScene", "peer_scene", "start"]
 
+PARALLEL = 1e-9
+"""By how much the cosine of parallel axes may be off 1."""
 KINDS = ("revolute", "spherical", "free", "fixed")
 CLOSING = ("revolute", "spherical")
 ARM = 0.5
@@ -152,7 +154,7 @@ def _planar(scene: Scene, joints: list[Joint]) -> bool:
         for joint in joints
         if joint.kind == "revolute"
     ]
-    return len(axes) == len(joints) and all(abs(abs(float(axis @ axes[0])) - 1.0) < 1e-9 for axis in axes)
+    return len(axes) == len(joints) and all(abs(abs(float(axis @ axes[0])) - 1.0) < PARALLEL for axis in axes)
 
 
 def _points(joint: Joint, flat: bool) -> Iterator[tuple[str, str, Array, Array]]:

@@ -19,6 +19,8 @@ from ephs.solve.stepping import Attempt
 
 __all__ = ["SPECIMENS", "TrapezoidalIndex3", "VelocityMidpoint"]
 
+STAGNANT = 1e-9
+"""Residual that may stand where iterations no longer help."""
 SOLVED, DIFFERENCE, ITERATIONS = 1e-12, 1e-7, 20
 
 
@@ -48,7 +50,7 @@ class _OnLoops(ReducedMethod):
             size = float(np.abs(here).max())
             if not np.isfinite(size):
                 break
-            if size <= SOLVED or (size <= 1e-9 and size > 0.5 * before):
+            if size <= SOLVED or (size <= STAGNANT and size > 0.5 * before):
                 return z
             before = size
             columns = [(residual(z + DIFFERENCE * unit) - here) / DIFFERENCE for unit in np.eye(z.size)]

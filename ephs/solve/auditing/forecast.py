@@ -9,6 +9,7 @@ import warnings
 from collections.abc import Callable, Mapping
 from typing import Any, final
 
+from ephs.semantics.spaces.rank import TINY
 from ephs.solve.auditing.findings import CostWarning
 from ephs.solve.problem import Problem
 from ephs.solve.snapshot import Snapshot
@@ -95,8 +96,8 @@ def _steps(rest: float, before: float, last: float, steps: int) -> float:
 
     After a transient steps grow, and are taken to go on to do so.
     """
-    linear = rest / max(before + last, 1e-300) * 2.0 * steps
-    growth = last / max(before, 1e-300)
+    linear = rest / max(before + last, TINY) * 2.0 * steps
+    growth = last / max(before, TINY)
     if growth <= STEADY:
         return linear
     return min(linear, steps * math.log1p(rest * (growth - 1.0) / (growth * last)) / math.log(growth))

@@ -17,6 +17,8 @@ import numpy as np
 
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.rank import TINY
+from ephs.solve.control import SLIVER
 from ephs.solve.errors import Interrupted
 
 if TYPE_CHECKING:
@@ -24,7 +26,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Again", "GlobalError", "apart", "global_error"]
 
-TINY = float(np.finfo(float).tiny)
 LEAST = 4
 """Steps of the longer kind that a run has at least."""
 MARGIN = 3.0
@@ -129,7 +130,7 @@ def _distance(one: "Solution", run: Callable[[], "Solution"]) -> tuple[float, in
     except Exception:  # no solution of such steps, or an input that fails between the old ones
         return None
     problem = one.problem
-    near = 1e-9 * abs(one.t[-1] - one.t[0])
+    near = SLIVER * abs(one.t[-1] - one.t[0])
     at = np.clip(np.searchsorted(one.t, other.t - near), 0, len(one) - 1)
     common = np.abs(one.t[at] - other.t) <= near
     mine, its = at[common], np.flatnonzero(common)

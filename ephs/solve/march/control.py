@@ -4,6 +4,7 @@ Hairer and Wanner, *Solving Ordinary Differential Equations II*, IV.2.
 """
 
 from ephs.semantics.stage import Evaluator, Integer, Real, Truth
+from ephs.solve.control import SLIVER, UNFELT
 from ephs.solve.march.records import Control
 
 __all__ = ["PATIENCE", "held_back", "judge", "length"]
@@ -23,7 +24,7 @@ def length(on: Evaluator, control: Control, rest: Real) -> Real:
     free = on.select(rest <= 1.0000001 * h, rest, 0.5 * rest)
     free = on.select(rest > 1.01 * h, h, free)
     fixed = on.minimum(grid * (on.real(control.steps) + 1.0) - control.time, rest)
-    fixed = on.select(rest - fixed <= 1e-9 * grid, rest, fixed)
+    fixed = on.select(rest - fixed <= SLIVER * grid, rest, fixed)
     return on.select(grid > 0.0, fixed, free)
 
 
@@ -42,7 +43,7 @@ def judge(on: Evaluator, control: Control, h: Real, error: Real) -> Integer:
 
     def accept() -> None:
         shared, damping = error * part, control.damping
-        factor = 0.9 * _power(on, on.maximum(shared, 1e-10), -(1.0 - 0.75 * damping) / exponent)
+        factor = 0.9 * _power(on, on.maximum(shared, UNFELT), -(1.0 - 0.75 * damping) / exponent)
         factor = factor * _power(on, control.before, damping / exponent)
         control.before = on.maximum(shared, 1e-4)
         most = on.select(control.failed > 0, 1.0, 6.0)

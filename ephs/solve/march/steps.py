@@ -3,6 +3,7 @@
 from typing import Final
 
 from ephs.semantics.linear.dense import copy
+from ephs.semantics.spaces.rank import TINY
 from ephs.semantics.stage import (
     Entry,
     Evaluator,
@@ -147,7 +148,7 @@ def measure(on: Evaluator, fine: Vector, coarse: Vector, allowed: Vector, eighth
     plain = on.sqrt(first.value / count)
     both = first.value / on.sqrt((first.value + 0.01 * second.value) * count)
     # Differences of rates in a step fall by a ratio: two orders more of it, where it is less than one.
-    falling = plain * on.minimum(first.value / on.maximum(second.value, 1e-300), 1.0)
+    falling = plain * on.minimum(first.value / on.maximum(second.value, TINY), 1.0)
     blended = on.select(on.same(eighth[0], 2), falling, both)
     return on.select(on.both(two, on.negate(first.value <= 0.0)), blended, plain)
 

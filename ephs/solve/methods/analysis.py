@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ephs.semantics.bundle import Array
 from ephs.semantics.linear.sparse import sparse_lu
-from ephs.semantics.spaces.rank import FOLLOWED, IMPLICIT, REGULAR, rank_of
+from ephs.semantics.spaces.rank import FOLLOWED, IMPLICIT, REGULAR, TINY, rank_of
 from ephs.solve.errors import SolveError
 from ephs.solve.methods.records import STORING, Order, OrderOf
 from ephs.solve.model import Model, evaluate_at
@@ -24,7 +24,6 @@ __all__ = ["Analysis", "analyse", "dependent_rows", "exchanged"]
 SHRUNK = 1e-6
 DEFECT = 1e-11
 """Tolerance for a dropped equation, relative to its terms; more asks for another rank decision."""
-
 OTHERWISE = 1e-3
 """Weight of equations that are not preferred where some are left out: others take part that much more."""
 
@@ -76,7 +75,7 @@ def analyse(model: Model, x: Array, z: Array, h: float, before: Index | None = N
     data = values.copy()
     data[diagonal] = 1.0
     chosen = np.flatnonzero(active)
-    entries = np.where(data[chosen] == 0.0, 1e-300, data[chosen])  # a place that is zero now may fill later
+    entries = np.where(data[chosen] == 0.0, TINY, data[chosen])  # a place that is zero now may fill later
     try:
         elimination = order(size, t.row[chosen], t.column[chosen], entries)
     except RuntimeError as error:
@@ -216,7 +215,7 @@ def _null_unknown(model: Model, chosen: Index, data: Array) -> int:
     t, size = model.tables, model.unknowns
     matrix = np.zeros((size, size))
     np.add.at(matrix, (t.row[chosen], t.column[chosen]), data[chosen])
-    matrix /= np.maximum(np.abs(matrix).max(axis=1, initial=0.0), 1e-300)[:, None]
+    matrix /= np.maximum(np.abs(matrix).max(axis=1, initial=0.0), TINY)[:, None]
     _, sizes, vectors = np.linalg.svd(matrix)
     least = min(rank_of(sizes, IMPLICIT), size - 1)
     moved = np.linalg.norm(vectors[least:], axis=0)

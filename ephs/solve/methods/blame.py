@@ -6,6 +6,7 @@ import numpy as np
 
 from ephs.semantics.bundle import Array
 from ephs.solve.errors import Outcome, SolveError
+from ephs.solve.methods.scales import NOTHING
 from ephs.solve.model import Model, evaluate_at
 from ephs.solve.sparse import Index
 
@@ -46,7 +47,7 @@ class Blame:
         block = self.model.tables.block
         whole = np.zeros(int(block.max(initial=-1)) + 1)
         np.maximum.at(whole, block, np.nan_to_num(scale))
-        return np.maximum(whole[block], 1e-200)
+        return np.maximum(whole[block], NOTHING)
 
     def _of(self, outcome: Outcome, ratio: Array) -> SolveError:
         row = int(np.argmax(np.nan_to_num(ratio, nan=np.inf)))

@@ -14,6 +14,8 @@ from ephs.solve.snapshot import Snapshot
 
 __all__ = ["ComponentMethod", "advance_driven", "advance_whole", "started"]
 
+ROUNDED_INPUTS = 1e-13
+"""Part of inputs that read the state by which they may change once more: rounding, times a condition of hundreds."""
 ROUNDS = 12
 CUTS = 6
 """How often a step without solution is halved."""
@@ -163,7 +165,7 @@ def advance_driven(
             return found
         again = given(method.stage_points(found[0], h, state.x))
         change = float(np.max(np.abs(again - inputs), initial=0.0))
-        if change <= 1e-13 * float(np.max(np.abs(again), initial=0.0)):
+        if change <= ROUNDED_INPUTS * float(np.max(np.abs(again), initial=0.0)):
             return found
         if change >= 0.9 * last:  # a feedback too stiff for this step: what was guessed first is what is left
             return first

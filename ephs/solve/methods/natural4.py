@@ -17,6 +17,7 @@ from ephs.semantics.linear.sparse import sparse_lu
 from ephs.semantics.primitives import Kernel
 from ephs.semantics.pullback import pulled_ports
 from ephs.semantics.spaces.codes import SE3
+from ephs.semantics.spaces.rank import TINY
 from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.methods.analysis import DEFECT, SHRUNK, analyse, dependent_rows
 from ephs.solve.methods.blame import Blame
@@ -61,7 +62,6 @@ __all__ = ["Natural4"]
 
 INSTANT = 1e-7
 """The step, in s, over which derivatives by increments are taken at a stage: so short that it is an instant."""
-
 AS_BEFORE, AT_START, WITHIN = 0, 1, 2
 """Where the order of elimination of a step was decided: for a step before it, at its start, by its unknowns."""
 
@@ -282,7 +282,7 @@ class Natural4:
         data[~inside] = 1.0
         active = np.where(inside, ~out, out)
         chosen = np.flatnonzero(active)
-        entries = np.where(data[chosen] == 0.0, 1e-300, data[chosen])  # a place that is zero now may fill later
+        entries = np.where(data[chosen] == 0.0, TINY, data[chosen])  # a place that is zero now may fill later
         try:
             found = order(STAGES * n, rows[chosen], columns[chosen], entries)
         except RuntimeError as error:

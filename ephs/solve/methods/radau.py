@@ -28,6 +28,9 @@ from ephs.solve.stepping import Attempt, Row, Span
 
 __all__ = ["COEFFICIENTS", "DEFECT", "GAMMA", "NODES", "T_INVERSE", "VALUES", "Radau", "RadauState", "T"]
 
+PROBE = 1e-7
+"""Part of the first step by which the start is tried: what contradicts the constraints moves at any length."""
+
 _S6 = 6.0**0.5
 NODES = np.array([(4.0 - _S6) / 10.0, (4.0 + _S6) / 10.0, 1.0])
 DENSE = 48
@@ -127,12 +130,12 @@ class Radau:
         x = d.pack(self.problem.initial)
         z = guessed_efforts(self.model, x)
         start = RadauState(t, x.copy(), z, np.zeros(4 + len(d.components)))
-        first, second = (self._solved(start, 1e-7 * h * part)[1] for part in (1.0, 0.5))
+        first, second = (self._solved(start, PROBE * h * part)[1] for part in (1.0, 0.5))
         jumps = [self._size(end - x, x) for end in (first, second)]
         if jumps[1] > 0.75 * jumps[0] and jumps[1] > 1.0:
             entry = int(np.argmax(np.abs(second - x) / (self.atol + self.rtol * np.abs(x))))
             raise SolveError(Outcome.INCONSISTENT, self._path(entry), "the constraints do not hold at the start")
-        z = self._solved(start, 0.5e-7 * h)[0][-1]
+        z = self._solved(start, 0.5 * PROBE * h)[0][-1]
         self._matrices = None
         return replace(start, z=z)
 

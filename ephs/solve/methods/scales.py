@@ -12,6 +12,9 @@ from ephs.solve.methods.records import IRREVERSIBLE, STORING, Columns, Scratch
 
 __all__ = ["FAR", "SPREAD", "TAKES_PART", "measure", "reach", "still", "weigh"]
 
+NOTHING = 1e-200
+"""Terms of a balance below which it has none: quotients by it stay finite."""
+
 SPREAD: Final = 1e-3
 """A block's scale is at least this fraction of the largest of its kind: e = 0 alone has no scale of its own."""
 
@@ -165,7 +168,7 @@ def measure(on: Evaluator, t: Columns, z: Vector, dropped: Integers, m: Scratch)
     def one(i: Integer) -> None:
         block = t.block[i]
         scale = on.maximum(m.block[block], SPREAD * m.group[t.group[block]])
-        sized = scale > 1e-200
+        sized = scale > NOTHING
         ratio = on.select(sized, on.absolute(m.residual[i]) / on.select(sized, scale, 1.0), 0.0)
 
         def leave() -> None:

@@ -30,6 +30,9 @@ from ephs.solve.methods.scheme import SCHEME, STAGES, WEIGHTS, GroupColumns, Nod
 
 __all__ = ["evaluated", "exponents", "linearise"]
 
+LAST = 2e-16
+"""Change beside its size that is the last digit's."""
+
 _A: Final[list[list[float]]] = SCHEME.tolist()
 _B: Final[list[float]] = WEIGHTS.tolist()
 _FIXED: Final = 30
@@ -77,7 +80,7 @@ def exponents(
         def once() -> Truth:
             change.value, size.value = 0.0, 0.0
             on.loop(dims, increments)
-            done = on.both(rounds.value > 0, change.value <= 2e-16 * size.value)
+            done = on.both(rounds.value > 0, change.value <= LAST * size.value)
             on.when(on.negate(done), lambda: on.loop(STAGES, turned))
             rounds.value = rounds.value + 1
             return on.either(done, rounds.value >= _FIXED)

@@ -15,6 +15,9 @@ from ephs.solve.result.record import Record
 
 __all__ = ["Ledgers", "ledgers"]
 
+STILL = 1e-9
+"""Part of the energies that counts as moving at least: what stands still moves by rounding."""
+
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,7 +82,7 @@ class Ledgers:
         if not v.size:
             return 1.0
         moved = float(np.max(self.kinetic + np.abs(v - v[0]) + np.abs(self.heat) + np.abs(self.work)))
-        still = 1e-9 * float(np.abs(v).max())
+        still = STILL * float(np.abs(v).max())
         if moved > still:
             return moved
         exchanged = [np.abs(energy - energy[0]) for energy in self.storages.values()]

@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 
 __all__ = ["Found", "Frames", "links_of", "plane_of"]
 
+FLAT = 1e-9
+"""Pitch in m, and cosine of axis and translations, of motions in a plane: rounding of axes over `ASSEMBLY`."""
+
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
@@ -115,9 +118,9 @@ def plane_of(twists: Array) -> Array | None:
 
 
 def _planar(group: Subgroup) -> bool:
-    if group.turning.shape[1] != 1 or group.dim > 3 or abs(group.pitch()) > 1e-9:
+    if group.turning.shape[1] != 1 or group.dim > 3 or abs(group.pitch()) > FLAT:
         return False
-    return not np.any(np.abs(group.turning[:, 0] @ group.translations) > 1e-9)
+    return not np.any(np.abs(group.turning[:, 0] @ group.translations) > FLAT)
 
 
 def _inertia(own: Array, inside: Array) -> Array:

@@ -25,7 +25,7 @@ from ephs.mechanics.tree.finding.naming import tolerances, within
 from ephs.mechanics.tree.finding.tables import SPRING
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.codes import VECTOR
-from ephs.semantics.spaces.rank import SPARSE
+from ephs.semantics.spaces.rank import SPARSE, TINY
 from ephs.solve.control import Tolerance
 from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.march import Status
@@ -35,6 +35,8 @@ from ephs.solve.stepping import Row
 
 __all__ = ["Equations", "ReducedState"]
 
+PUSHED = 1e-9
+"""Size of a push below which no freedom is left that it could move."""
 ASIDE = 0.1
 """Displacement, in rad or m, that finds the constraints which repeat others in every configuration."""
 
@@ -231,7 +233,7 @@ class Equations:
         """
         rows = self.engine.array("value")
         known = self._closed_at[0].size > 0 and not self.careful
-        return np.maximum(SPARSE, known * rows[:, 3] / max(rows[:, 2].max(initial=0.0), 1e-300))
+        return np.maximum(SPARSE, known * rows[:, 3] / max(rows[:, 2].max(initial=0.0), TINY))
 
     def _closed_carefully(self, state: ReducedState) -> ReducedState:
         """`closed`, for constraints that nearly repeat each other."""
@@ -386,7 +388,7 @@ class Equations:
         """Leave out of the engine the rows that others imply, where that is so aside of the initial state, too."""
         push = np.random.default_rng(1).standard_normal(self.n)
         push += self.dense.back(push)
-        q = self.moved(state.q, ASIDE * push / max(1e-9, np.abs(push).max()))
+        q = self.moved(state.q, ASIDE * push / max(PUSHED, np.abs(push).max()))
         try:
             aside = self._closed_carefully(replace(state, q=q))
         except SolveError:

@@ -12,6 +12,7 @@ from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.descriptor import StateSlot
 from ephs.semantics.primitives import Irreversible, Primitive, Reversible, Storage
+from ephs.semantics.spaces.rank import TINY
 from ephs.solve.sparse import Index
 
 __all__ = ["network_of"]
@@ -187,7 +188,7 @@ class _Contraction:
         Unplaced
             Relations are left that tie states, or motions, to each other.
         """
-        rows = rows / np.maximum(np.abs(rows).max(axis=1, initial=0.0), 1e-300)[:, None]
+        rows = rows / np.maximum(np.abs(rows).max(axis=1, initial=0.0), TINY)[:, None]
         pivots: dict[int, int] = {}
         _pivot(rows, [at for at, sort in enumerate(self.sort) if sort == FREE], pivots)
         inertial = [

@@ -6,6 +6,7 @@ from typing import Any, Final
 
 from ephs.mechanics.tree.sweeps.network import Net, Stores
 from ephs.semantics.linear.dense import copy, lu, lu_solve
+from ephs.semantics.spaces.rank import TINY
 from ephs.semantics.stage import (
     Entry,
     Evaluator,
@@ -91,7 +92,7 @@ def _newton(on: Evaluator, net: Net, evaluate: Callable[[], None], status: Any) 
 
         def look(k: Integer) -> None:
             at = known + k
-            off = on.absolute(net.flow[at]) / on.maximum(net.gross[at], 1e-300)
+            off = on.absolute(net.flow[at]) / on.maximum(net.gross[at], TINY)
             worst.value = on.maximum(worst.value, off)
 
         on.loop(unknown, look)
