@@ -52,13 +52,14 @@ def attempt(
     start: Vector,
     h: Real,
     k: Matrix,
-    errors: Errors,
+    errors: Errors | None,
     last: Vector,
     y: Vector,
     q: Vector,
 ) -> Integer:
     """Evaluate the stages of a step of length h from (base, start), k[0] known; by iteration where they need it.
 
+    Without errors for iterations to end at, the method is an explicit one.
     The step's end goes to y and q, the rates there to the last row of k, y at the last stage to ``last``.
 
     Returns
@@ -77,14 +78,14 @@ def attempt(
         stage.value = i + 1
         return on.either(on.negate(on.same(status.value, Status.SOUND)), stage.value > count)
 
-    def collocated() -> None:
+    def collocated(errors: Errors) -> None:
         allow(on, motion, errors, start, start)
         status.value = iterate(on, motion, tableau, control, base, start, h, k, errors.allowed, y, q)
         copy(on, y, last)
         stage.value = count
 
-    implicit = tableau.guess.rows > 0
-    on.when(implicit, collocated)
+    if errors is not None:
+        on.when(tableau.guess.rows > 0, lambda: collocated(errors))
     on.when(on.same(status.value, Status.SOUND), lambda: on.repeat(one))
     return status.value
 

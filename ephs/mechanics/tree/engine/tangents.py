@@ -54,7 +54,7 @@ def step_program(*, looped: bool) -> Program:
         status = on.counter(motion.rates(on, base, start, q, k.row(0))[0])
 
         def stages() -> None:
-            status.value = attempt(on, motion, tableau, control[0], base, start, h, k, last, y, q)
+            status.value = attempt(on, motion, tableau, control[0], base, start, h, k, None, last, y, q)
 
         def end() -> None:
             status.value = _settled(on, motion, base, start, y, q)
