@@ -36,7 +36,7 @@ LIMIT = 900.0
 """Seconds for a process; the first one of an installation compiles."""
 BESIDE = 3
 """In a second look, every third of the cases that are not in doubt is measured, too."""
-PACKAGES = ("ephs", "numpy", "scipy", "numba", "sympy", "pin", "mujoco-core")
+PACKAGES = ("ephs", "numpy", "scipy", "llvmlite", "sympy", "pin", "mujoco-core")
 
 
 def measure(names: Sequence[str], rounds: int, seed: int) -> dict[str, Any]:

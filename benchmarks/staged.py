@@ -1,4 +1,4 @@
-"""A staged function beside the same in numba and beside LAPACK: time to compile, time to solve linear equations."""
+"""A staged function beside LAPACK: time to compile, time to solve linear equations."""
 
 import time
 from collections.abc import Callable
@@ -23,35 +23,6 @@ def _solved(on: Evaluator, a: Matrix, pivots: Integers, x: Vector) -> Truth:
     return good
 
 
-def _plain(a: Any, pivots: Any, x: Any) -> None:
-    """The same algorithm as numba takes it."""
-    n = len(x)
-    for k in range(n):
-        best = k
-        for i in range(k + 1, n):
-            if abs(a[i, k]) > abs(a[best, k]):
-                best = i
-        pivots[k] = best
-        if best != k:
-            for j in range(n):
-                a[k, j], a[best, j] = a[best, j], a[k, j]
-        inverse = 1.0 / a[k, k]
-        for i in range(k + 1, n):
-            factor = a[i, k] * inverse
-            a[i, k] = factor
-            for j in range(k + 1, n):
-                a[i, j] -= factor * a[k, j]
-    for k in range(n):
-        x[k], x[pivots[k]] = x[pivots[k]], x[k]
-    for i in range(n):
-        for k in range(i):
-            x[i] -= a[i, k] * x[k]
-    for i in range(n - 1, -1, -1):
-        for k in range(i + 1, n):
-            x[i] -= a[i, k] * x[k]
-        x[i] /= a[i, i]
-
-
 def _lapack(a: Any, pivots: Any, x: Any) -> None:
     lapack: Any = import_module("scipy.linalg.lapack")
     lapack.dgesv(a, x)
@@ -71,20 +42,14 @@ def _best(call: Callable[[], object], reset: Callable[[], None]) -> float:
 
 
 def _compiled() -> tuple[dict[str, Any], dict[str, float]]:
-    """The three ways to solve, and the processor time to compile each."""
-    numba: Any = import_module("numba")
-
-    numba.njit(lambda x: x + 1.0)(1.0)  # what numba and LLVM do once in a process
-    Program("warm", call=Entry(lambda on, x: on.sqrt(x[0]), x=vector())).compiled()
+    """The two ways to solve, and the processor time to compile each."""
+    Program("warm", call=Entry(lambda on, x: on.sqrt(x[0]), x=vector())).compiled()  # what LLVM does once in a process
     program = Program("solved", call=Entry(_solved, a=matrix(), pivots=indices(), x=vector()))
     staged = program.compiled()["call"]  # may come from disk, so that it is compiled once more
     begun = time.process_time()
     compile_text(Program("solved", call=program.entries["call"]).text())
-    middle = time.process_time()
-    jitted = numba.njit(error_model="numpy", nogil=True)(_plain)
-    jitted(np.eye(2), np.zeros(2, dtype=np.int64), np.ones(2))
-    spent = {"staged": middle - begun, "numba": time.process_time() - middle, "LAPACK": 0.0}
-    return {"staged": staged, "numba": jitted, "LAPACK": _lapack}, spent
+    spent = {"staged": time.process_time() - begun, "LAPACK": 0.0}
+    return {"staged": staged, "LAPACK": _lapack}, spent
 
 
 def table() -> str:

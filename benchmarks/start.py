@@ -62,7 +62,7 @@ def report() -> Report:
         key = {"scene": f"{CASES[0][0]}-{CASES[0][1]}"}
         call = f"benchmarks.start:measure({CASES[0][0]!r}, {CASES[0][1]})"
         begin = time.perf_counter()
-        found = run(call, LIMIT, key, {"NUMBA_CACHE_DIR": folder})
+        found = run(call, LIMIT, key, {"XDG_CACHE_HOME": folder})
         rows.append({**key, "cache": "empty", "process": time.perf_counter() - begin, **found})
     columns = {"scene": ("scene", 1.0), "compiled functions": ("cache", 1.0), "whole process [s]": ("process", 1.0)}
     parts = ("import", "load", "first", "first set-up", "second", "second set-up")

@@ -89,7 +89,7 @@ def runs() -> Iterator[tuple[str, dict]]:
 def cold() -> int:
     """Whether what compiles and what is compiled give the same: 0 if so, else 1, having said what differs."""
     with TemporaryDirectory() as folder:
-        empty = os.environ | {"NUMBA_CACHE_DIR": folder}
+        empty = os.environ | {"XDG_CACHE_HOME": folder}
         command = [sys.executable, "-m", "tests.repeat"]
         first, again = (json.loads(subprocess.check_output(command, env=empty, cwd=ROOT)) for _ in range(2))
     differ = sorted(name for name in first if first[name] != again[name])

@@ -174,7 +174,7 @@ def test_completion_is_written_for_a_shell(here, capsys):
 def test_what_is_said_first_loads_nothing_heavy(words):
     script = (
         f"import sys; from ephs.cli import main; main({words!r}); "
-        "print(*[n for n in ('numpy', 'numba', 'scipy', 'sympy', 'pydantic', 'ephs.mechanics') if n in sys.modules],"
+        "print(*[n for n in ('numpy', 'llvmlite', 'scipy', 'sympy', 'pydantic', 'ephs.mechanics') if n in sys.modules],"
         " file=sys.stderr)"
     )
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}

@@ -10,7 +10,6 @@ from tests.rooms import DOORS, PLACE, ROOT, SOURCES, house, imported, imports_of
 HEAVY = (
     "scipy",
     "networkx",
-    "numba",
     "llvmlite",
     "sympy",
     "pydantic",

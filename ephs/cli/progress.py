@@ -14,7 +14,7 @@ def progress_bar(name: str) -> Iterator[Callable[[float, float, Mapping[str, Any
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-    from ephs.mechanics.runs.compiling import compiling
+    from ephs.semantics.stage.objects import telling
 
     console = Console(stderr=True)
     note = TextColumn("{task.fields[note]}", markup=False)
@@ -32,10 +32,10 @@ def progress_bar(name: str) -> Iterator[Callable[[float, float, Mapping[str, Any
             spent = float(stats.get("integrate_s") or time.perf_counter() - begin)
             bar.update(task, total=until, completed=t, note=said_of(t, until, stats, spent))
 
-        def say(function: str) -> None:
-            bar.update(task, note=f"compiling {function}, kept for the next run" if function else "")
+        def say(program: str) -> None:
+            bar.update(task, note=f"compiling {program}, kept for the next run" if program else "")
 
-        with compiling(say):
+        with telling(say):
             yield progress
 
 

@@ -100,10 +100,8 @@ def run(asked: argparse.Namespace, chosen: dict[str, list[Mutant]], known: dict[
 def make(asked: argparse.Namespace, name: str, todo: list[Mutant]) -> None:
     """Make the mutants of one group."""
     group = GROUPS[name]
-    os.environ["NUMBA_DISABLE_JIT"] = "0" if group.compiled else "1"  # read when numba is loaded
     preload()
-    folder = FOLDER / ("compiled" if group.compiled else "plain")
-    reached = reach(group.tests, group.pace, folder, lambda line: print(line, flush=True), keep=asked.keep)
+    reached = reach(group.tests, group.pace, FOLDER, lambda line: print(line, flush=True), keep=asked.keep)
     for i, mutant in enumerate(todo, 1):
         tests = reached.tests(mutant, asked.budget or group.pace.budget, group.tests)
         entry = verdict(mutant, tests, limit(reached, tests)) | {"group": name}

@@ -16,14 +16,12 @@ MECHANICS = "tests/mechanics"
 class Group:
     """Files, as patterns from the root, and the tests that ought to see what is broken in them.
 
-    Where no kernel is changed, tests can be run on compiled kernels: there ``compiled`` is true. ``pace``: how long
-    those tests may take.
+    ``pace``: how long those tests may take.
     """
 
     files: tuple[str, ...]
     tests: tuple[str, ...]
     without: tuple[str, ...] = ()
-    compiled: bool = False
     pace: Pace = field(default_factory=Pace)
 
     def paths(self) -> list[str]:
@@ -65,8 +63,7 @@ GROUPS = {
     "spaces": Group(
         ("ephs/semantics/spaces/*.py",),
         (SPACES, *PARTS),
-        # Compilation and its cache: `tests/semantics/spaces/test_jit.py` runs it in processes of its own.
-        ("ephs/semantics/spaces/jit.py", "ephs/semantics/spaces/errors.py"),
+        ("ephs/semantics/spaces/errors.py",),
     ),
     "pairs": Group(
         (
@@ -136,7 +133,6 @@ GROUPS = {
             f"{MECHANICS}/test_variational.py",
             f"{MECHANICS}/test_work.py",
         ),
-        compiled=True,
         pace=LONG,
     ),
     "kernels": Group(

@@ -19,7 +19,7 @@ from typing import Any
 from tests.mutate.mutants import ROOT, Mutant
 
 HEAVY = (
-    "coverage", "h5netcdf", "hypothesis.extra.numpy", "hypothesis.strategies", "mpmath", "networkx", "numba.extending",
+    "coverage", "h5netcdf", "hypothesis.extra.numpy", "hypothesis.strategies", "mpmath", "networkx",
     "numpy", "pydantic", "pytest", "rich.console", "scipy.integrate", "scipy.optimize", "scipy.sparse.csgraph",
     "scipy.sparse.linalg", "scipy.spatial.transform", "sympy.printing.pycode", "xarray",
 )  # fmt: skip
@@ -156,13 +156,9 @@ class Fewer:
 
 
 def pytest_run(arguments: Sequence[str], plugins: Sequence[Any]) -> int:
-    """Pytest; on kernels in plain Python where they are not compiled."""
+    """Pytest, with fewer examples."""
     import pytest
 
-    from tests.mutate.plain import install
-
-    if os.environ["NUMBA_DISABLE_JIT"] == "1":
-        install()
     import_module("ephs.plugin").register()
     return int(
         pytest.main(

@@ -20,8 +20,8 @@ from ephs.mechanics.tree.finding.naming import counted
 from ephs.mechanics.tree.finding.tables import CUT
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.codes import VECTOR
+from ephs.semantics.spaces.differentials import dexp_left, dexp_left_inv
 from ephs.semantics.spaces.rank import CONSTRAINT, TINY
-from ephs.semantics.spaces.se3_kernels import dexp_left, dexp_left_inv
 from ephs.solve.control import Control
 from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.snapshot import Snapshot
@@ -183,7 +183,7 @@ class Variational(ReducedMethod):
         by_momentum, by_force = self._linear.action(eq.fitted(q, r), r, eq.heats.entropies(middle[4]), h)
         along = np.eye(n)
         for code, where in self._groups:
-            dexp_left(code, 0.5 * xi[where], along[where, where])
+            along[where, where] = dexp_left(code, 0.5 * xi[where])
         slopes = [0.5 * whole[:, :n] @ along + whole[:, n:] / h for whole in (by_momentum, by_force)]
         start = momentum - 0.5 * h * self._untwisted(-0.5 * xi, force)
         change = slopes[0] - 0.5 * h * (self._untwisted(-0.5 * xi, slopes[1]) + 0.25 * self._turning(force))
@@ -201,21 +201,15 @@ class Variational(ReducedMethod):
         """D(ξ)ᵀ of a covector, joint by joint."""
         out = covector.copy()
         for code, where in self._groups:
-            out[where] = _inverse_differential(code, xi[where]).T @ covector[where]
+            out[where] = dexp_left_inv(code, xi[where]).T @ covector[where]
         return out
 
     def _untwisted(self, xi: Array, covector: Array) -> Array:
         """D(ξ)⁻ᵀ of a covector, joint by joint."""
         out = covector.copy()
         for code, where in self._groups:
-            out[where] = np.linalg.solve(_inverse_differential(code, xi[where]).T, covector[where])
+            out[where] = np.linalg.solve(dexp_left_inv(code, xi[where]).T, covector[where])
         return out
-
-
-def _inverse_differential(code: int, xi: Array) -> Array:
-    out = np.empty((xi.size, xi.size))
-    dexp_left_inv(code, xi, out)
-    return out
 
 
 def _least(matrix: Array, before: Array, rows: Array, first: Array, second: Array) -> tuple[Array, Array]:

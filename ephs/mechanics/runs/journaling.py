@@ -17,7 +17,7 @@ from ephs.solve.problem import Problem
 
 __all__ = ["heading_of", "journaled"]
 
-_PROGRAMS = ("ephs", "numpy", "scipy", "numba", "llvmlite")
+_PROGRAMS = ("ephs", "numpy", "scipy", "llvmlite")
 
 
 @contextmanager

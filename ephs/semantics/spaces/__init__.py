@@ -1,6 +1,6 @@
 """Spaces of states: vector spaces and Lie groups, the lower pairs as subgroups of SE(3).
 
-NumPy reference here; compiled kernels in `se3_kernels`, which is imported only where it is used.
+NumPy reference here; formulas over numbers of any kind in `staged_groups`.
 """
 
 from ephs.semantics.spaces.errors import SpaceError as SpaceError

@@ -4,7 +4,7 @@ The states of every quantity form a Lie group: coordinates add, poses multiply. 
 vectors are *left-trivialised*: a twist u at x stands for the tangent vector x·u. So a vector space and SE(3)
 answer to the same few operations, and an integrator written with them works for both.
 
-This is the reference: plain NumPy, one point a call, written for clarity. The compiled kernels are tested
+This is the reference: plain NumPy, one point a call, written for clarity. The staged formulas are tested
 against it. Source: Lohmayer, Capobianco, Leyendecker, "Exergetic Port-Hamiltonian Systems for Multibody
 Dynamics".
 """
@@ -39,7 +39,7 @@ class Manifold(ABC):
     size
         How many numbers a point is stored as.
     code
-        The number by which compiled kernels know the group (see `codes`).
+        The number by which programs know the group (see `codes`).
 
     Notes
     -----

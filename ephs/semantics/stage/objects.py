@@ -1,13 +1,16 @@
 """Object code of modules: from the package, from the store or from LLVM, for this machine or for another."""
 
 import hashlib
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import Final
 
 from ephs.semantics.stage.llvm import LEVEL, Library, Target, compile_text, host, load, version
 from ephs.semantics.stage.shipping import shipped
 from ephs.semantics.stage.store import STORE
 
-__all__ = ["FITTING", "TARGETS", "compiled", "emitted", "fitting", "name_of"]
+__all__ = ["FITTING", "TARGETS", "compiled", "emitted", "fitting", "name_of", "telling"]
 
 TARGETS: Final = {
     "linux-x86-64-v2": Target("x86_64-unknown-linux-gnu", "x86-64-v2", ""),
@@ -33,13 +36,28 @@ def name_of(text: str, target: Target) -> str:
     return f"{hashlib.sha256(key.encode()).hexdigest()[:32]}.o"
 
 
-def compiled(text: str) -> Library:
+_TOLD: Final[ContextVar[Callable[[str], None] | None]] = ContextVar("told", default=None)
+
+
+@contextmanager
+def telling(say: Callable[[str], None]) -> Generator[None]:
+    """Call say(name) where a program begins to be compiled, and say("") at its end."""
+    before = _TOLD.set(say)
+    try:
+        yield
+    finally:
+        _TOLD.reset(before)
+
+
+def compiled(text: str, name: str = "program") -> Library:
     """Return a module in machine code for this process, compiled if neither package nor store has it.
 
     Parameters
     ----------
     text
         Assembly text of LLVM.
+    name
+        What is told where it is compiled.
 
     Raises
     ------
@@ -50,12 +68,19 @@ def compiled(text: str) -> Library:
     code = shipped(text, fitting(target))
     if code is not None:
         return load(code)
-    name = name_of(text, target)
-    code = STORE.read(name)
+    file = name_of(text, target)
+    code = STORE.read(file)
     if code is None:
+        _tell(name)
         code = compile_text(text, target)
-        STORE.write(name, code)
+        _tell("")
+        STORE.write(file, code)
     return load(code)
+
+
+def _tell(name: str) -> None:
+    if (say := _TOLD.get()) is not None:
+        say(name)
 
 
 def fitting(machine: Target) -> list[str]:

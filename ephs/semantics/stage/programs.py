@@ -197,7 +197,7 @@ def _staged(program: Program, members: int, shared: tuple[str, ...]) -> tuple[st
 @cache
 def _compiled(program: Program, members: int, shared: tuple[str, ...]) -> Mapping[str, Call]:
     text, results = _staged(program, members, shared)
-    library = compiled(text)
+    library = compiled(text, program.name)
 
     def trail(name: str) -> tuple[int | None, ...]:
         return () if members == 1 or name in shared else (members,)

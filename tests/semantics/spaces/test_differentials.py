@@ -6,9 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ephs.semantics.spaces import SE2, SE3, SO3, SO3xR3
-from ephs.semantics.spaces import se3_kernels as kernels
+from ephs.semantics.spaces import SE2, SE3, SO3, SO3xR3, se3, so3
+from ephs.semantics.spaces.differentials import dexp_left, dexp_left_inv
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
+from ephs.semantics.stage import PLAIN
 
 GROUPS = [SO3, SE2, SE3, SO3xR3]
 ANGLES = [0.0, 1e-12, 1e-6, 1e-3, 0.1, 0.499, 0.501, 0.999, 1.001, 2.0, 3.1]
@@ -54,9 +55,7 @@ def test_dexp_to_the_last_digits(group, angle):
     exact = series(group.ad(v), 1)
     with mpmath.workdps(40):
         inverse = exact**-1
-    left, left_inv = np.empty((2, group.dim, group.dim))
-    kernels.dexp_left(group.code, -v, left)
-    kernels.dexp_left_inv(group.code, -v, left_inv)
+    left, left_inv = dexp_left(group.code, -v), dexp_left_inv(group.code, -v)
     size = 1.0 + np.abs(v).sum()
     for found in (group.dexp(v), left):
         assert error(found, exact) <= 4 * EPS * size
@@ -67,8 +66,7 @@ def test_dexp_to_the_last_digits(group, angle):
 @pytest.mark.parametrize("angle", [4.0, 5.0, 6.0, 6.2])
 def test_dexp_inv_beyond_half_a_turn(angle):
     v = displacement(SE3, angle)
-    found = np.empty((6, 6))
-    kernels.dexp_inv(v, found)
+    found = np.array(se3.dexp_inv(PLAIN, v.tolist()))
     with mpmath.workdps(40):
         exact = series(SE3.ad(v), 1) ** -1
     # Condition grows like the inverse square of the distance to a full turn.
@@ -83,10 +81,8 @@ def test_exp_to_the_last_digits(angle):
     matrix = np.zeros((4, 4))
     matrix[:3, :3], matrix[:3, 3] = SO3.ad(v[:3]), v[3:]
     exact = series(matrix, 0)
-    pose, rotation = np.empty(7), np.empty((3, 3))
-    kernels.pose_exp(v, pose)
-    kernels.quat_to_matrix(pose, rotation)
-    assert error(np.column_stack((rotation, pose[4:])), exact[:3, :]) <= 8 * EPS * (1 + np.abs(v).sum())
+    pose = se3.exp(PLAIN, v.tolist())
+    assert error(np.column_stack((so3.matrix(pose[:4]), pose[4:])), exact[:3, :]) <= 8 * EPS * (1 + np.abs(v).sum())
     pose = SE3.exp(v)
     found = np.column_stack((quaternion_to_matrix(pose[:4]), pose[4:]))
     assert error(found, exact[:3, :]) <= 8 * EPS * (1 + np.abs(v).sum())
@@ -167,7 +163,7 @@ def test_agrees_with_pinocchio(seed):
 
     rng = np.random.default_rng(seed)
     v = rng.standard_normal(6)
-    v[:3] *= rng.uniform(1e-3, 3.0) / np.linalg.norm(v[:3])
+    v[:3] *= rng.uniform(1e-2, 3.0) / np.linalg.norm(v[:3])
     motion = pinocchio.Motion(v[3:], v[:3])
     placement, pose = pinocchio.exp6(motion), SE3.exp(v)
     size = 1e-12 * (1 + np.abs(v).sum()) ** 2

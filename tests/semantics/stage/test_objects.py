@@ -15,7 +15,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from ephs.semantics.stage import Entry, Program, llvm, objects, store, vector
-from ephs.semantics.stage.objects import TARGETS, compiled, emitted, fitting
+from ephs.semantics.stage.objects import TARGETS, compiled, emitted, fitting, telling
 from ephs.semantics.stage.store import STORE, ObjectCacheWarning
 from tests.semantics.stage.arm import Arm
 from tests.semantics.stage.test_elementary import PROGRAM, inputs, same
@@ -124,6 +124,16 @@ def test_without_a_home_nothing_is_kept(monkeypatch):
     monkeypatch.setattr(STORE, "usable", True)
     with pytest.warns(ObjectCacheWarning, match="no home"):
         assert value(compiled(SMALL.text())) == 2.0
+
+
+def test_what_is_compiled_is_told_while_it_is_and_once(folder):
+    said: list[str] = []
+    with telling(said.append):
+        compiled(SMALL.text(), "small")
+        assert said == ["small", ""]
+        compiled(SMALL.text(), "small")  # from disk
+    compiled(PROGRAM.text(), "another")
+    assert said == ["small", ""]
 
 
 def test_files_that_nobody_uses_are_removed(folder):
