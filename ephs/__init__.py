@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from ephs.exporting.errors import ExportError as ExportError
     from ephs.exporting.fmu import export_fmu as export_fmu
+    from ephs.exporting.page import live_page as live_page
     from ephs.exporting.write import export as export
     from ephs.mechanics.dynamics import dynamics as dynamics
     from ephs.mechanics.linear import equilibrium as equilibrium
@@ -99,6 +100,7 @@ _HOMES = {
     "ephs.mechanics.sweep.sweep": ("SweepInterrupted", "sweep"),
     "ephs.exporting.errors": ("ExportError",),
     "ephs.exporting.fmu": ("export_fmu",),
+    "ephs.exporting.page": ("live_page",),
     "ephs.exporting.write": ("export",),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}

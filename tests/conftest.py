@@ -15,12 +15,12 @@ from tests.show.browser import browser  # noqa: E402
 # The suite of somebody else's package: test_downstream.py runs it, in a process of its own.
 collect_ignore = ["downstream"]
 if browser() is None:
-    collect_ignore.append("show/test_show_browser.py")
+    collect_ignore += ["show/test_show_browser.py", "exporting/test_page_browser.py"]
 
 
 def pytest_report_header() -> str:
     """Say whether pages are looked at as a browser shows them."""
-    return f"browser: {browser() or 'none, so tests/show/test_show_browser.py is left out'}"
+    return f"browser: {browser() or 'none, so tests of pages in it are left out'}"
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -33,7 +33,8 @@ STOREYS: tuple[tuple[frozenset[str], ...], ...] = tuple(
         ([".mechanics", ".mechanics.runs"],),
         ([".mechanics.dynamics"], [".mechanics.sweep"]),
         ([".mechanics.linear"], [".mechanics.sensitivity"]),
-        ([".show", ".show.charts"], [".testing"], [".exporting"]),
+        ([".show", ".show.charts"], [".testing"]),
+        ([".exporting"],),
         (["", ".cli"],),
     )
 )

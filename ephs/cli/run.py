@@ -39,6 +39,7 @@ RUN = "run.json"
 KEPT = 500
 """Default number of intervals at whose ends results are kept, with step-size control."""
 _TEXTS = {
+    "live": "--live: {found}: expected a scene",
     "until": "--until is missing; expected the end of the simulated time in seconds, as in ephs run {file} --until 5",
     "no-journal": f"{{file}}: no {JOURNAL} in it; expected the result folder of a run that was interrupted",
     "own": "{file}: its model is {scene}; Python files run only when named on the command line: "
@@ -61,6 +62,7 @@ def run(
     initial: list[str] | None = None,
     out: Path | None = None,
     report: bool = True,
+    live: bool = False,
     resume: bool = False,
     audit: Literal["fail", "warn", "off"] = "fail",
     loading: Loading = AS_GIVEN,
@@ -82,6 +84,8 @@ def run(
         Result folder. Default: out/NAME.
     report
         Write report.html into the result folder.
+    live
+        Write live.html, too: a page that simulates the scene while its sliders move.
     resume
         Continue an interrupted run in its result folder.
     audit
@@ -110,7 +114,24 @@ def run(
         with addressed(scene, folder):
             os.replace(folder / JOURNAL, folder / f"{JOURNAL}.old")
         complain(_TEXTS["kept"].format(found=folder / JOURNAL))
-    return _simulate(model, scene, folder, asked, audit, report=report)
+    code = _simulate(model, scene, folder, asked, audit, report=report)
+    if live:
+        _write_live(model, scene, folder / "live.html", until)
+    return code
+
+
+def _write_live(model: "Scene | System", scene: str, page: Path, until: float) -> None:
+    """Write a page that simulates."""
+    import ephs
+
+    if not isinstance(model, ephs.Scene):
+        raise BadInput(_TEXTS["live"].format(found=scene))
+    try:
+        with addressed(scene, page):
+            ephs.live_page(model, until=until).save(page)
+    except ephs.ExportError as error:
+        raise BadInput(naming(scene, str(error))) from error
+    say(f"live: {page}")
 
 
 def _run_on(folder: Path, audit: str, *, report: bool) -> int:

@@ -13,8 +13,8 @@ from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 from ephs.exporting.errors import ExportError
 from ephs.exporting.image import Variable, image_of
+from ephs.exporting.linking import tool
 from ephs.exporting.module import Exported, exported
-from ephs.exporting.write import tool
 from ephs.mechanics.scene.model import Scene
 from ephs.semantics.stage.objects import emitted
 from ephs.semantics.system import System

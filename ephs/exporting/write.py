@@ -1,16 +1,12 @@
 """`export`: a model as a program without Python, in one file or two."""
 
-import subprocess
-import sys
 from collections.abc import Callable, Sequence
-from importlib.util import find_spec
 from os import PathLike
 from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import Final
 
 from ephs.exporting.errors import ExportError
 from ephs.exporting.image import image_of
+from ephs.exporting.linking import webassembly
 from ephs.exporting.module import Exported, exported
 from ephs.mechanics.scene.model import Scene
 from ephs.semantics.stage.ctext import c_text
@@ -20,10 +16,7 @@ from ephs.semantics.system import System
 from ephs.solve.control import ATOL, RTOL
 from ephs.solve.result.durable import durable
 
-__all__ = ["CALLS", "export", "tool"]
-
-CALLS: Final = ("start", "parameters", "inputs", "advance", "time", "outputs", "accelerations")
-"""Functions of an exported mechanism."""
+__all__ = ["export"]
 
 
 def export(
@@ -91,37 +84,3 @@ def export(
         with durable(path.with_suffix(".h")) as temporary:
             temporary.write_text(made.header(), encoding="utf-8")
     return made
-
-
-def webassembly(made: Exported) -> bytes:
-    """Return an exported mechanism as a module of WebAssembly, which exports its memory and functions.
-
-    Raises
-    ------
-    ExportError
-        There is no linker.
-    """
-    with TemporaryDirectory() as folder:
-        code, linked = Path(folder, "code.o"), Path(folder, "code.wasm")
-        code.write_bytes(emitted(made.text, "webassembly"))
-        exports = [f"--export={made.name}_{call}" for call in CALLS]
-        tool("WebAssembly", "wasm-ld", code, "-o", linked, "--no-entry", "--strip-all", "--gc-sections",
-             "--export=__heap_base", *exports)  # fmt: skip
-        return linked.read_bytes()
-
-
-def tool(what: str, *words: str | Path) -> None:
-    """Run a tool of the cross compiler.
-
-    Raises
-    ------
-    ExportError
-        It is not installed, or refuses.
-    """
-    if find_spec("ziglang") is None:
-        raise ExportError("tool", what=what, tool="ziglang", package="ephs[export]")
-    done = subprocess.run(
-        [sys.executable, "-m", "ziglang", *map(str, words)], capture_output=True, text=True, check=False
-    )
-    if done.returncode:
-        raise ExportError("refused", tool=f"ziglang {words[0]}", found=done.stderr.strip()[:2000])

@@ -197,6 +197,16 @@ for (const host of document.querySelectorAll(".player:not([data-ready])")) {
     requestAnimationFrame(step);
   }
   play.addEventListener("click", () => toggle());
+  host.addEventListener("motion", ({ detail }) => {
+    const half = bodies * 7;
+    poses.set(detail);
+    for (let n = 0; n < count; n++) for (let k = 0; k < 3; k++) {
+      let low = Infinity, high = -Infinity;
+      for (let at = n * half + 4 + k; at < (n + 1) * half; at += 7) { low = Math.min(low, poses[at]); high = Math.max(high, poses[at]); }
+      if (bodies) middle[3 * n + k] = (low + high) / 2;
+    }
+    draw();
+  });
   slider.addEventListener("input", () => seek(Number(slider.value)));
   speed.addEventListener("change", () => seek(frame));
   home.addEventListener("click", reset);
