@@ -17,6 +17,9 @@ def progress_bar(name: str) -> Iterator[Callable[[float, float, Mapping[str, Any
     from ephs.semantics.stage.objects import telling
 
     console = Console(stderr=True)
+    if not console.is_terminal:
+        yield lambda t, until, stats: None
+        return
     note = TextColumn("{task.fields[note]}", markup=False)
     columns = (
         TextColumn("{task.description}", markup=False),
@@ -24,7 +27,7 @@ def progress_bar(name: str) -> Iterator[Callable[[float, float, Mapping[str, Any
         note,
         TimeRemainingColumn(compact=True),
     )
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+    with Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task(name, total=1.0, note="")
         begin = time.perf_counter()
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ephs.show.balances import balances
-from ephs.show.drawing import draw
+from ephs.show.kept import pattern_svg
 from ephs.show.panels import constraint_panels, energy_panels, entropy_panels, exergy_panels, motion_panels
 from ephs.show.player import player
 from ephs.show.signals import Group, packed
@@ -164,7 +164,7 @@ def _final(summary: dict[str, Any]) -> str:
 def _pattern(sol: Any) -> str:
     if sol.system is None:
         return ""
-    picture = _inline(draw(sol.system).svg)
+    picture = _inline(pattern_svg(sol.system))
     return f"<h2>Interconnection pattern</h2><figure>{picture}</figure>"
 
 

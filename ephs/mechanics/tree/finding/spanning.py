@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import final
 
-import networkx as nx
 import numpy as np
 
 from ephs.mechanics.constraints.subgroup import generated
@@ -97,17 +96,55 @@ def twists_of(edges: Sequence[Edge], frames: Sequence[Array], joints: int) -> li
     return out + [np.zeros((6, 0))] * (len(edges) - joints)
 
 
-def _graph(count: int, edges: Sequence[Edge]) -> nx.Graph:
-    """Bodies and the ground, −1, with an edge where there is a joint."""
-    graph = nx.Graph()
-    graph.add_nodes_from(range(-1, count))
-    graph.add_edges_from((edge.body1, edge.body2) for edge in edges)
-    return graph
+def _depths(start: int, edges: Sequence[Edge]) -> dict[int, int]:
+    """Least number of joints from a body, or the ground −1, to each body that is connected with it."""
+    beside: dict[int, list[int]] = {}
+    for edge in edges:
+        beside.setdefault(edge.body1, []).append(edge.body2)
+        beside.setdefault(edge.body2, []).append(edge.body1)
+    depth, queue = {start: 0}, deque([start])
+    while queue:
+        here = queue.popleft()
+        for there in beside.get(here, []):
+            if there not in depth:
+                depth[there] = depth[here] + 1
+                queue.append(there)
+    return depth
+
+
+@final
+class _Groups:
+    """Connected groups of bodies that grow edge by edge."""
+
+    __slots__ = ("_parent",)
+
+    def __init__(self, count: int) -> None:
+        self._parent = {body: body for body in range(-1, count)}
+
+    def of(self, body: int) -> int:
+        """One body that stands for the group."""
+        while self._parent[body] != body:
+            self._parent[body] = self._parent[self._parent[body]]
+            body = self._parent[body]
+        return body
+
+    def join(self, one: int, other: int) -> bool:
+        """Join the groups of two bodies; False where they are one already."""
+        first, second = self.of(one), self.of(other)
+        self._parent[second] = first
+        return first != second
 
 
 def islands(count: int, edges: Sequence[Edge]) -> list[list[int]]:
     """The bodies of each group that has no joint with the ground, in order."""
-    return sorted(sorted(group) for group in nx.connected_components(_graph(count, edges)) if -1 not in group)
+    groups = _Groups(count)
+    for edge in edges:
+        groups.join(edge.body1, edge.body2)
+    found: dict[int, list[int]] = {}
+    for body in range(count):
+        if groups.of(body) != groups.of(-1):
+            found.setdefault(groups.of(body), []).append(body)
+    return sorted(found.values())
 
 
 def spanning_tree(
@@ -119,8 +156,8 @@ def spanning_tree(
     those of few freedoms: a joint of many freedoms costs the fewest constraints where it is cut. Among equals those
     near the ground come first: then branches are short, and few loops are open at one body.
     """
-    depth = nx.single_source_shortest_path_length(_graph(len(light), joints), -1)
-    groups = nx.utils.UnionFind(range(-1, len(light)))
+    depth = _depths(-1, joints)
+    groups = _Groups(len(light))
 
     weighty = {id(edge) for edge in inertial}
 
@@ -132,11 +169,7 @@ def spanning_tree(
     kept: list[Edge] = []
     cut: list[Edge] = []
     for edge in sorted(joints, key=cost):
-        if groups[edge.body1] == groups[edge.body2]:
-            cut.append(edge)
-        else:
-            groups.union(edge.body1, edge.body2)
-            kept.append(edge)
+        (kept if groups.join(edge.body1, edge.body2) else cut).append(edge)
     at: dict[int, list[Edge]] = {}
     for edge in kept:
         at.setdefault(edge.body1, []).append(edge)

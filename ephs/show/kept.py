@@ -1,0 +1,33 @@
+"""Pictures of patterns, kept on disk by their content and by the code that draws them."""
+
+import hashlib
+from functools import cache
+from importlib.resources import files
+from typing import TYPE_CHECKING
+
+from ephs.semantics.stage.store import STORE
+from ephs.show.drawing import draw
+from ephs.show.graph import read
+
+if TYPE_CHECKING:
+    from ephs.semantics import System
+
+__all__ = ["pattern_svg"]
+
+
+def pattern_svg(system: "System") -> str:
+    """The picture of a system's outermost pattern as the text of an SVG file."""
+    name = f"{hashlib.sha256(_code() + repr(read(system, None)).encode()).hexdigest()}.svg"
+    kept = STORE.read(name)
+    if kept is not None:
+        return kept.decode()
+    made = draw(system).svg
+    STORE.write(name, made.encode())
+    return made
+
+
+@cache
+def _code() -> bytes:
+    """Digest of the modules of this room, by which pictures of other versions are told apart."""
+    sources = sorted((file for file in files("ephs.show").iterdir() if file.name.endswith(".py")), key=lambda f: f.name)
+    return hashlib.sha256(b"".join(file.read_bytes() for file in sources)).digest()
