@@ -13,6 +13,7 @@ from benchmarks import (
     audit,
     balance,
     cells,
+    commands,
     contact,
     control,
     cost,
@@ -59,6 +60,7 @@ TABLES: dict[str, Callable[[Path | None], str | Report]] = {
     "work": work.report,
     "growth": lambda _: growth.report(),
     "start": lambda _: start.report(),
+    "commands": lambda _: commands.report(),
     "gauss": lambda _: gauss.report(),
     "implicit": lambda _: implicit.report(),
 }
