@@ -7,17 +7,18 @@ import numpy as np
 from ephs.mechanics.methods.explicit import tableau
 from ephs.semantics.stage import Entry, Program, group, integer, table, vector
 from ephs.solve.control import Proportional
-from ephs.solve.march import MEMORY, TABLEAU, Control, Ending, Field, Memory, Tableau, march
+from ephs.solve.march import MEMORY, TABLEAU, Account, Control, Ending, Field, Memory, Tableau, march
 
 
 def program(motion):
     """The program of a motion, made of parameters and the size of y."""
 
-    def run(on, parameters, control, tableau, memory, steps):
-        return march(on, motion(parameters, memory.y.size), tableau, memory, control[0], steps)
+    def run(on, parameters, control, tableau, memory, account, steps):
+        return march(on, motion(parameters, memory.y.size), tableau, memory, control[0], account[0], steps)
 
     kinds = {"tableau": group(Tableau, **TABLEAU), "memory": group(Memory, **MEMORY)}
-    return Program("march", run=Entry(run, parameters=vector(), control=table(Control), **kinds, steps=integer()))
+    kinds |= {"account": table(Account), "steps": integer()}
+    return Program("march", run=Entry(run, parameters=vector(), control=table(Control), **kinds))
 
 
 def field(function):
@@ -76,9 +77,10 @@ def start(call, method, y, until, *, parameters=(0.0,), rtol=1e-9, atol=1e-12, s
         "last": np.zeros(size),
         "atol": np.full(size, atol), "rtol": np.full(size, rtol), "allowed": np.zeros(size), "open": np.zeros(0),
         "fine": np.zeros(size),
-        "coarse": np.zeros(size), "times": kept, "rows_t": np.zeros((rows, 2)),
+        "coarse": np.zeros(size), "times": kept, "rows_t": np.zeros((rows, 4)),
         "rows_q": np.zeros((rows, elements.size)),
         "rows_y": np.zeros((rows, size - increments)),
+        **{name: np.zeros(0) for name in ("carry", "carry1", "carry2", "change", "size", "whole", "low")},
     }  # fmt: skip
-    passed = np.array(parameters, dtype=float), control, found.arrays, arrays
+    passed = np.array(parameters, dtype=float), control, found.arrays, arrays, Account.table(1)
     return March(control, arrays, lambda steps: call(*passed, steps))

@@ -50,7 +50,7 @@ class Pendulum(Motion):
     parameters: Vector
 
     increments = freedoms = 1
-    counted = 3
+    summed = counted = 3
     closes = False
 
     def rates(self, on, base, y, q, out):
@@ -58,8 +58,20 @@ class Pendulum(Motion):
         out[0], out[1], out[2] = y[1], -self.parameters[0] * on.sin(q[0]), 0.0
         return 0, 0
 
-    def settle(self, on, base, start, y, q):
+    def settle(self, on, base, y, q):
         q[0] = base[0] + y[0]
+        return 0
+
+    def book(self, on, y0, change, size, sign):
+        return 0
+
+    def hold(self, on, change, low, high):
+        pass
+
+    def open(self, on, account, q, y):
+        return 0
+
+    def correct(self, on, account, h, start, y, q, allowed):
         return 0
 
     def sizes(self, on, y0, y1, out):
@@ -70,7 +82,7 @@ class Pendulum(Motion):
     def project(self, on, q, change):
         raise AssertionError
 
-    def least(self, on, y0, y1):
+    def least(self, on, change):
         return 0.0
 
 

@@ -4,7 +4,7 @@ Steps of a mechanism on which nothing but given constants acts are taken many in
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any, final
 
@@ -17,7 +17,7 @@ from ephs.mechanics.tree.finding.naming import within
 from ephs.semantics.bundle import Array
 from ephs.solve.control import Control, Proportional
 from ephs.solve.errors import LARGEST, Outcome, SolveError
-from ephs.solve.march import STEPS, Ending, Status
+from ephs.solve.march import STEPS, Account, Ending, Status
 from ephs.solve.march import Control as Steering
 from ephs.solve.march.control import PATIENCE
 from ephs.solve.snapshot import Snapshot
@@ -106,10 +106,29 @@ class Explicit(ReducedMethod):
         self._known: tuple[Array, Array] | None = None
         self.stiffness = 0.0
         self.rough: tuple[Array, ...] = ()
+        self._low: tuple[ReducedState, float, Array] | None = None
 
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
         """One step of h seconds."""
+        return self._tried(state, h, part=False)
+
+    def inside(self, attempt: Attempt[ReducedState], t: float) -> ReducedState:
+        """A shorter step from the same start, in which heat is between none and that of the whole."""
+        books, start = self.equations.engine.books, attempt.start
+        after = self._low is not None and self._low[0] is start and abs(t - start.t) >= abs(self._low[1] - start.t)
+        books["whole"][:], books["low"][:] = attempt.detail, self._low[2] if self._low and after else 0.0
+        try:
+            found = self._tried(start, t - start.t, part=True)
+        except SolveError:
+            found = None
+        if found is None or (found.error > 1.0 and self.control.step is None):
+            return super().inside(attempt, t)
+        self._low = start, t, found.detail
+        return found.end
+
+    def _tried(self, state: ReducedState, h: float, *, part: bool) -> Attempt[ReducedState]:
         eq, scheme = self.equations, self.method.arrays
+        state = eq.accounts.opened(state)
         if self._known is None or self._known[0] is not state.q:
             self._known = state.q, eq.rates(state.t, state.q, eq.vector(state))
         y0, y1 = eq.vector(state), np.empty(eq.size)
@@ -117,22 +136,27 @@ class Explicit(ReducedMethod):
         k[0] = self._known[1]
         tolerances, chosen = (self.atol, self.rtol), self.control.step is None
         before = self.solve(state, scheme, self.method.c, h, y0, k, y1, tolerances, chosen=chosen)
-        end = eq.state(state, y1, state.t + h)
         allowed, steps = self.atol + self.rtol * eq.sizes(y0, y1), STEPS.compiled()
+        y1, account = eq.accounts.booked(state, scheme, k, h, y1, part=part)
+        sums = np.array(eq.engine.books["low" if part else "whole"])
+        end = replace(eq.ended(state, y1, state.t + h), account=account)
         closed = eq.closed(end)
         estimates = [eq.along(h * (weights @ k)[eq.counted]) for weights in self.method.estimates]
         error = float(steps["measure"](estimates[0], np.array(estimates[-1]), allowed, scheme["eighth"]))
         rough = any(q is state.q for q in self.rough)
         if eq.engine.looped and not (rough or eq.careful):
             error = max(error, float(steps["drift"](end.r, closed.r, allowed)))
+        if not error > 1.0 or self.control.step is not None:
+            closed, missed = eq.accounts.corrected(state, closed, h, allowed, chosen=self.control.step is None)
+            error = max(error, missed)
         self.rough = (*((state.q,) if rough else ()), *((closed.q,) if eq.careful else ()))
         rise, run = (k[-1] - k[-2])[eq.counted], (y1 - before)[eq.counted]
         self.stiffness = float(steps["stiffness"](rise, run, allowed, h))
-        if closed is end and closed.q is not state.q:  # nothing was projected: the last rates are the next first ones
+        if not (eq.engine.looped or eq.careful):  # nothing was projected: the last rates are the next first ones
             first = k[-1].copy()
             first[: eq.nv] = closed.r
             self._known = closed.q, first
-        return Attempt(state, closed, h, error, eq.least(state, closed))
+        return Attempt(state, closed, h, error, eq.least(state, closed), sums)
 
     def taken(self, state: ReducedState) -> Snapshot:
         """The rates at the state, where they are known, and how stiff the last step was."""
@@ -174,7 +198,8 @@ class _March:
         limit: float,
         left: Callable[[float, float, str], None] | None,
     ) -> None:
-        eq, tableau = method.equations, method.method
+        eq, tableau, start = method.equations, method.method, method.equations.accounts.opened(span.state)
+        summed, eq.accounts.kept = start.account.size - 4, True
         self.method, self.span, self.left, self._leave = method, span, False, left
         self._handed = 0
         size, q, times = eq.size, span.state.q, span.save_at
@@ -184,14 +209,18 @@ class _March:
         shapes: dict[str, tuple[int, ...]] = {
             "k": (stages, size), "q1": (q.size,), "y1": (size,), "q2": (q.size,), "y2": (size,), "k2": (stages, size),
             "last": (size,), "allowed": (counted,), "open": (eq.n,), "fine": (counted,), "coarse": (counted,),
-            "rows_t": (rows, 2), "rows_q": (rows, q.size), "rows_y": (rows, size - eq.nv),
+            "rows_t": (rows, 4), "rows_q": (rows, q.size), "rows_y": (rows, size - eq.nv),
+            **dict.fromkeys(("carry1", "carry2", "change", "size", "whole", "low"), (summed,)),
         }  # fmt: skip
         self.memory = {name: np.zeros(shape) for name, shape in shapes.items()} | {
             "q": np.array(q), "y": eq.vector(span.state), "atol": np.array(method.atol), "rtol": np.array(method.rtol),
-            "times": self.times,
+            "times": self.times, "carry": start.account[4:].copy(),
         }  # fmt: skip
-        self.steering = Steering.table(1)
-        self.march = eq.engine.bind("march", tableau.arrays, self.memory, self.steering, 0)
+        self.steering, self._account = Steering.table(1), Account.table(1)
+        a: Any = self._account[0]
+        a.anchor, a.left, a.put, a.total = start.account[:4].tolist()
+        a.chosen, a.begins = int(span.policy is not None), int(not (eq.led.counting or start.books.any()))
+        self.march = eq.engine.bind("march", tableau.arrays, self.memory, self.steering, self._account, 0)
         c, policy, control = self.control, span.policy, span.control
         c.end, c.span, c.origin = span.until - span.t0, abs(span.until - span.t0), span.t0
         c.step, c.least_step, c.most_step = span.h, control.least, control.most
@@ -244,7 +273,7 @@ class _March:
         sizes = (np.abs(q), np.abs(y[eq.nv : eq.nv + eq.n + eq.ns]))
         if all(size.max(initial=0.0) < LARGEST for size in sizes) and np.isfinite(y[eq.nv :]).all():
             return
-        beyond = self._state(0.0, q, y[eq.nv :])
+        beyond = self.state
         times, q, y = self.kept()
         good = np.isfinite(y).all(axis=1)
         good &= np.abs(np.hstack([q, y[:, : eq.n + eq.ns]])).max(axis=1, initial=0.0) < LARGEST
@@ -289,10 +318,12 @@ class _March:
             ]
             c.saved = last
         for when, found in wanted:
-            s["rows_t"][c.rows] = when, attempt.least
+            s["rows_t"][c.rows] = when, attempt.least, *found.account[2:4]
             s["rows_q"][c.rows], s["rows_y"][c.rows] = found.q, eq.vector(found)[eq.nv :]
             c.rows += 1
         s["q"][:], s["y"][:] = attempt.end.q, eq.vector(attempt.end)
+        a: Any = self._account[0]
+        (a.anchor, a.left, a.put, a.total), s["carry"][:] = attempt.end.account[:4].tolist(), attempt.end.account[4:]
         c.time, c.steps, c.fresh, c.rough = after, c.steps + 1, 0, int(eq.careful)
         c.shortest, c.longest = min(c.shortest, h), max(c.longest, h)
         c.least = min(c.least, attempt.least)
@@ -310,29 +341,33 @@ class _March:
     @property
     def state(self) -> ReducedState:
         """The state reached."""
-        return self._state(self.time, self.memory["q"], self.memory["y"][self.method.equations.nv :])
+        a: Any = self._account[0]
+        account = np.concatenate([[a.anchor, a.left, a.put, a.total], self.memory["carry"]])
+        return self._state(self.time, self.memory["q"], self.memory["y"][self.method.equations.nv :], account)
 
-    def _state(self, t: float, q: Array, rest: Array) -> ReducedState:
+    def _state(self, t: float, q: Array, rest: Array, account: Array) -> ReducedState:
         n, ns = self.method.equations.n, self.method.equations.ns
-        return ReducedState(t, q.copy(), rest[:n].copy(), rest[n : n + ns].copy(), rest[n + ns :].copy())
+        heats, books = rest[n : n + ns].copy(), rest[n + ns :].copy()
+        return ReducedState(t, q.copy(), rest[:n].copy(), heats, books, account=account)
 
     def rows(self) -> list[tuple[float, ReducedState, float]]:
         """Records since the last call: time, state, the step's least production."""
         end = abs(float(self.control.end))
         out: list[tuple[float, ReducedState, float]] = []
         for row, (times, q, y) in enumerate(zip(*self.kept(), strict=True)):
-            passed, least = times.tolist()
+            passed, least, *put = times.tolist()
             t = self.span.until if passed == end else self.span.t0 + self._sign * passed
             if self.span.save_at is not None:
                 t = float(self.span.save_at[self.span.saved + self._handed + row])
-            out.append((t, self._state(t, q, y), least))
+            account = np.concatenate([[self._account[0].anchor, 0.0, *put], np.zeros(self.memory["carry"].size)])
+            out.append((t, self._state(t, q, y, account), least))
         self._handed += len(out)
         self.control.rows = 0
         return out
 
     def kept(self) -> tuple[Array, Array, Array]:
-        """The rows that `rows` would hand over: (n, 2) time from the start and least production, (n, ·) elements, and
-        (n, ·) rates, entropies and books; views of the memory."""
+        """The rows that `rows` would hand over, views of the memory: (n, 4) time from the start, least production, what
+        corrections put in and its sizes; (n, ·) elements; (n, ·) rates, heats and books."""
         count, memory = int(self.control.rows), self.memory
         return memory["rows_t"][:count], memory["rows_q"][:count], memory["rows_y"][:count]
 
@@ -342,8 +377,9 @@ class _March:
 
     def _taken(self) -> list[tuple[str, Any]]:
         (counts, control), s = self.steering.arrays, self.memory
-        parts = control, counts, s["q"], s["y"], s["k"][0]
-        return list(zip(("control", "counts", "q", "y", "rates"), parts, strict=True))
+        parts = control, counts, s["q"], s["y"], s["k"][0], s["carry"], self._account.arrays[1]
+        names = "control", "counts", "q", "y", "rates", "carry", "account"
+        return list(zip(names, parts, strict=True))
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go on from a snapshot."""

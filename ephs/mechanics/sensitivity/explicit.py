@@ -87,7 +87,8 @@ class ExplicitTangent:
         point = Point(state, slopes[:, : state.q.size], slopes[:, state.q.size :])
         for first in range(0, count, DIRECTIONS):
             which = slice(first, min(first + DIRECTIONS, count))
-            made = StepTangent(eq.engine, partial(relation_of, self.family.problem.descriptor), self.method.arrays)
+            relation = partial(relation_of, self.family.problem.descriptor)
+            made = StepTangent(eq.engine, relation, self.method.arrays, corrected=not eq.led.counting)
             for name in made.slopes:
                 for k, j in enumerate(range(which.start, which.stop)):
                     made.slopes[name][..., k] = self._by(j, lambda of, _, name=name: self._numbers(of, name))
@@ -134,7 +135,7 @@ class ExplicitTangent:
                 rates[part].append(tangent.stage[part].copy())
         for part in range(2):
             y[part][:], start[part][:] = start[part], first[part]
-        return tangent.settle()
+        return tangent.settle(h)
 
     def _of_time(self, t: float) -> None:
         """Put inputs in place that are functions of time.

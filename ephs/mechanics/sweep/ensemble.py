@@ -284,9 +284,9 @@ class Ensemble:
         first = int(times.size > 0 and times[0] == self._t0)
         control = stepper.control
         leg = self._leg(stepper, start, control, times, first)
-        _, q, y = leg.kept()
+        passed, q, y = leg.kept()
         end, longer = leg.state, partial(self._longer, stepper, start)
-        if Suspicion(equations, self._bounds(control)).of(start, q, y, end, leg.counts.least, longer):
+        if Suspicion(equations, self._bounds(control)).of(start, passed[:, 2], q, y, end, leg.counts.least, longer):
             raise Unlike
         if first:
             beginning = np.concatenate([start.r, start.heats, start.books])

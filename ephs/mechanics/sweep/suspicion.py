@@ -44,6 +44,7 @@ class Suspicion:
     def of(
         self,
         start: ReducedState,
+        put: Array,
         q: Array,
         y: Array,
         end: ReducedState,
@@ -54,6 +55,8 @@ class Suspicion:
 
         Parameters
         ----------
+        put
+            (n,) energies in J that corrections put in.
         q, y
             (n, …) joints' elements and rates, entropies and ledgers that were kept.
         least
@@ -73,7 +76,8 @@ class Suspicion:
         defect = float(np.max(np.abs(changes.sum(axis=1) + heat - work)))
         if not defect <= self.bounds.energy * gross + ROUNDING * float(np.abs(held).sum(axis=1).max()):
             return True
-        if least < 0.0:
+        plain = float(np.max(np.abs([*put, *end.account[2:3]]), initial=0.0))
+        if least < 0.0 or not plain <= self.bounds.accuracy * gross:
             return True
         if self.bounds.step is None:
             return False

@@ -1,9 +1,12 @@
 """Runge-Kutta steps, explicit or iterated, as staged functions, many in one call."""
 
+from ephs.solve.march.account import Account as Account
 from ephs.solve.march.march import march as march
+from ephs.solve.march.records import BOOKS as BOOKS
 from ephs.solve.march.records import ERRORS as ERRORS
 from ephs.solve.march.records import MEMORY as MEMORY
 from ephs.solve.march.records import TABLEAU as TABLEAU
+from ephs.solve.march.records import Books as Books
 from ephs.solve.march.records import Control as Control
 from ephs.solve.march.records import Ending as Ending
 from ephs.solve.march.records import Errors as Errors

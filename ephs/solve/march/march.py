@@ -6,9 +6,10 @@ from typing import final
 
 from ephs.semantics.linear.dense import copy
 from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Truth, Variable, Vector
+from ephs.solve.march.account import Account, worth
 from ephs.solve.march.control import PATIENCE, held_back, judge, length
-from ephs.solve.march.records import Control, Ending, Memory, Motion, Status, Tableau
-from ephs.solve.march.steps import allow, attempt, drift, error_of, first, stiffness_of
+from ephs.solve.march.records import Books, Control, Ending, Memory, Motion, Status, Tableau
+from ephs.solve.march.steps import allow, attempt, book, drift, error_of, first, stiffness_of
 
 __all__ = ["march"]
 
@@ -18,7 +19,9 @@ ROUNDING = 16.0 * 2.220446049250313e-16
 """Step beside the time below which it is too short."""
 
 
-def march(on: Evaluator, motion: Motion, tableau: Tableau, memory: Memory, control: Control, steps: Integer) -> Integer:
+def march(
+    on: Evaluator, motion: Motion, tableau: Tableau, memory: Memory, control: Control, account: Account, steps: Integer
+) -> Integer:
     """Take steps from the state in (memory.q, memory.y) until the end, or ``steps`` of them.
 
     Instants in memory.times are kept where control.saved is not negative, else every step is.
@@ -28,7 +31,7 @@ def march(on: Evaluator, motion: Motion, tableau: Tableau, memory: Memory, contr
     Integer
         An `Ending`.
     """
-    run = _Run(on, motion, tableau, memory, control, on.counter(GOING), on.counter(0), on.counter(0))
+    run = _Run(on, motion, tableau, memory, control, account, on.counter(GOING), on.counter(0), on.counter(0))
     tries = on.counter(0)
 
     def one() -> Truth:
@@ -51,6 +54,7 @@ class _Run:
     tableau: Tableau
     memory: Memory
     control: Control
+    account: Account
     ending: Variable[Integer]
     status: Variable[Integer]
     accepted: Variable[Integer]
@@ -94,6 +98,12 @@ class _Run:
         on = self.on
         self.status.value = first(on, self.motion, self.memory, self.control)
 
+        def open_account() -> None:
+            self.status.value = self.motion.open(on, self.account, self.memory.q, self.memory.y)
+            self.account.begins = 0
+
+        on.when(on.both(self.sound, on.same(self.account.begins, 1)), open_account)
+
         def known() -> None:
             self.control.fresh = 1
 
@@ -116,7 +126,8 @@ class _Run:
             c.stiff = stiffness_of(on, motion, self.tableau, m, h)
 
         on.when(self.sound, look)
-        error = self._finish(m.k, self.sign * h, m.y1, m.q1)
+        books = Books(m.y, m.y1, m.carry, m.carry1, m.change, m.size, m.whole, m.low)
+        error = self._finish(m.k, self.sign * h, m.q1, books, part=False)
 
         def weigh() -> None:
             def always() -> None:
@@ -141,15 +152,18 @@ class _Run:
         taken = on.same(self.accepted.value, 1)
         self.unless_ended(lambda: on.when(taken, lambda: self._take(h, rest), self._reject))
 
-    def _finish(self, k: Matrix, h: Real, y: Vector, q: Vector) -> Real:
-        """Take the end of a step to a state, and return its error."""
-        on, motion, m, c = self.on, self.motion, self.memory, self.control
+    def _finish(self, k: Matrix, h: Real, q: Vector, books: Books, *, part: bool) -> Real:
+        """Take the end of a step, or a part of one, to a state that obeys the laws, and return its error."""
+        on, motion, m, c, y = self.on, self.motion, self.memory, self.control, books.end
         n, nv, error = motion.freedoms, motion.increments, on.variable(0.0)
+
+        def keep_books() -> None:
+            self.status.value = book(on, motion, self.tableau, k, h, books, part)
 
         def settle() -> None:
             if motion.closes:
                 copy(on, y.part(nv, n), m.open)
-            self.status.value = motion.settle(on, m.q, m.y, y, q)
+            self.status.value = motion.settle(on, m.q, y, q)
 
         def measure() -> None:
             error.value = error_of(on, motion, self.tableau, m, k, h, q)
@@ -160,8 +174,20 @@ class _Run:
             if motion.closes:
                 on.when(on.same(c.rough, 0), reveal)
 
+        def correct() -> None:
+            self.status.value = motion.correct(on, self.account, h, books.start, y, q, m.allowed)
+
+            def weigh() -> None:
+                error.value = on.maximum(error.value, worth(on, self.account))
+
+            on.when(self.sound, weigh)
+
+        on.when(self.sound, keep_books)
         on.when(self.sound, settle)
         on.when(self.sound, measure)
+        # A step that will be refused needs no correction.
+        right = on.either(c.grid > 0.0, error.value <= 1.0)
+        on.when(on.both(self.sound, right), correct)
         return error.value
 
     def _reject(self) -> None:
@@ -184,20 +210,29 @@ class _Run:
         on, motion, m, c = self.on, self.motion, self.memory, self.control
         on_grid = on.select(c.grid > 0.0, c.grid * (on.real(c.steps) + 1.0), c.time + h)
         after = on.select(h >= rest, on.absolute(c.end), on_grid)
-        least = motion.least(on, m.y, m.y1)
-        on.when(c.saved < 0, lambda: self._keep(after, least, m.q1, m.y1), lambda: self._instants(after, least))
+        least, a = motion.least(on, m.change), self.account
+        put, rest = a.moved, a.rest
+        on.when(
+            c.saved < 0, lambda: self._keep(after, least, put, m.q1, m.y1), lambda: self._instants(after, least, put)
+        )
+
+        def account() -> None:
+            a.put, a.total, a.left = a.put + put, a.total + on.absolute(put), rest
+
+        self.unless_ended(account)
         self.unless_ended(lambda: self._go(h, after, least))
 
-    def _keep(self, time: Real, least: Real, q: Vector, y: Vector) -> None:
-        """Keep a state as the next row."""
-        m, row = self.memory, self.control.rows
-        m.rows_t[row, 0], m.rows_t[row, 1] = time, least
+    def _keep(self, time: Real, least: Real, put: Real, q: Vector, y: Vector) -> None:
+        """Keep a state, into which its step put energy, as the next row."""
+        m, row, a = self.memory, self.control.rows, self.account
+        for column, value in enumerate((time, least, a.put + put, a.total + self.on.absolute(put))):
+            m.rows_t[row, column] = value
         copy(self.on, q, m.rows_q.row(row))
         nv = self.motion.increments
         copy(self.on, y.part(nv, y.size - nv), m.rows_y.row(row))
         self.control.rows = row + 1
 
-    def _instants(self, after: Real, least: Real) -> None:
+    def _instants(self, after: Real, least: Real, put: Real) -> None:
         """Keep the instants within a step: each by a step of its own from the start of this one."""
         on, motion, m, c = self.on, self.motion, self.memory, self.control
 
@@ -208,17 +243,22 @@ class _Run:
 
             # Near a change of rank a part may be wrong though the whole is right: closing takes out what is across.
             on.when(self.sound, lambda: allow(on, motion, m.errors, m.y, m.y2))
-            error = self._finish(m.k2, part, m.y2, m.q2)
+            books = Books(m.y, m.y2, m.carry, m.carry2, m.change, m.size, m.whole, m.low)
+            error = self._finish(m.k2, part, m.q2, books, part=True)
             right = on.either(c.grid > 0.0, on.negate(error > 1.0)) if motion.closes else True
             # Where it is not, the step is taken again carefully, and its part in shorter ones.
             kept = on.both(self.sound, right)
-            on.when(kept, lambda: self._keep(wanted, least, m.q2, m.y2), lambda: self.end(Ending.CAREFUL))
+            moved = self.account.moved
+            on.when(kept, lambda: self._keep(wanted, least, moved, m.q2, m.y2), lambda: self.end(Ending.CAREFUL))
 
         def one() -> Truth:
             wanted = m.times[c.saved]
 
             def keep() -> None:
-                on.when(wanted >= after, lambda: self._keep(wanted, least, m.q1, m.y1), lambda: inside(wanted))
+                def whole() -> None:
+                    self._keep(wanted, least, put, m.q1, m.y1)
+
+                on.when(wanted >= after, whole, lambda: inside(wanted))
 
                 def count() -> None:
                     c.saved = c.saved + 1
@@ -239,6 +279,7 @@ class _Run:
         c.shortest, c.longest = on.minimum(c.shortest, h), on.maximum(c.longest, h)
         c.least = on.minimum(c.least, least)
         copy(on, m.q1, m.q)
+        copy(on, m.carry1, m.carry)
 
         def clear(j: Integer) -> None:
             m.y[j] = 0.0

@@ -20,11 +20,14 @@ from ephs.semantics.stage import (
     real,
     vector,
 )
+from ephs.solve.march.account import Account
 
 __all__ = [
+    "BOOKS",
     "ERRORS",
     "MEMORY",
     "TABLEAU",
+    "Books",
     "Control",
     "Ending",
     "Errors",
@@ -67,6 +70,8 @@ class Status(IntEnum):
     """Constraints nearly repeat each other."""
     OPEN = 22
     """Loops do not close."""
+    LAWLESS = 23
+    """A component lost entropy in the step."""
     UNSETTLED = 24
     """Stages that depend on each other do not come to agree."""
 
@@ -74,8 +79,9 @@ class Status(IntEnum):
 class Motion(ABC):
     """Equations of motion: elements q on a manifold, and y = (v, r, rest) with increments v of q from a base.
 
-    Subclasses are frozen dataclasses whose fields are memory and known values, so that staged functions take them.
-    An error counts the tree's increments, the first `freedoms` of v, its rates r, and what follows r in y.
+    From `summed` on, the rest is summed over the run without loss: heats and books, of which `book` makes what a step
+    leaves. Subclasses are frozen dataclasses whose fields are memory and known values, so that staged functions take
+    them. An error counts the tree's increments, the first `freedoms` of v, its rates r, and what follows r in y.
     """
 
     __slots__ = ()
@@ -92,6 +98,11 @@ class Motion(ABC):
 
     @property
     @abstractmethod
+    def summed(self) -> Integer:
+        """Where in y the sums over the run start; its size where there are none."""
+
+    @property
+    @abstractmethod
     def counted(self) -> Integer:
         """How many numbers an error counts."""
 
@@ -105,8 +116,29 @@ class Motion(ABC):
         """Write ẏ at q = base·exp(v) into ``out``, and leave q; return a status and the component that it is of."""
 
     @abstractmethod
-    def settle(self, on: Evaluator, base: Vector, start: Vector, y: Vector, q: Vector) -> Integer:
-        """Take the end y of a step from ``start`` to a state: base·exp(v) to q, closed, rates in y; return a status."""
+    def settle(self, on: Evaluator, base: Vector, y: Vector, q: Vector) -> Integer:
+        """Take the end y of a step to a state: base·exp(v) to q, closed, rates in y; return a status."""
+
+    @abstractmethod
+    def book(self, on: Evaluator, y0: Vector, change: Vector, size: Vector, sign: Real) -> Integer:
+        """Make of a step's sums of rates, with sums of sizes, what changes from y0 on; return a status.
+
+        Sums of rates are h Σ b k of what is summed; ``sign`` is that of h.
+        """
+
+    @abstractmethod
+    def hold(self, on: Evaluator, change: Vector, low: Vector, high: Vector) -> None:
+        """Put a part's sums between those of a shorter part of the step and those of the whole."""
+
+    @abstractmethod
+    def open(self, on: Evaluator, account: Account, q: Vector, y: Vector) -> Integer:
+        """Make the account's anchor that of a state; return a status."""
+
+    @abstractmethod
+    def correct(
+        self, on: Evaluator, account: Account, h: Real, start: Vector, y: Vector, q: Vector, allowed: Vector
+    ) -> Integer:
+        """Move the end (q, y) of a step of h seconds to the energy that is left to it; return a status."""
 
     @abstractmethod
     def sizes(self, on: Evaluator, y0: Vector, y1: Vector, out: Vector) -> None:
@@ -117,8 +149,8 @@ class Motion(ABC):
         """Take the part across the constraints, at q, out of a change (freedoms,) of the rates."""
 
     @abstractmethod
-    def least(self, on: Evaluator, y0: Vector, y1: Vector) -> Real:
-        """Return the least entropy that a component makes in a step."""
+    def least(self, on: Evaluator, change: Vector) -> Real:
+        """Return the least entropy that a component makes in a step, of what `book` leaves."""
 
 
 @final
@@ -149,6 +181,10 @@ class Field(Motion):
         return 0
 
     @property
+    def summed(self) -> Integer:
+        return self.size
+
+    @property
     def counted(self) -> Integer:
         return self.size
 
@@ -159,7 +195,22 @@ class Field(Motion):
     def rates(self, on: Evaluator, base: Vector, y: Vector, q: Vector, out: Vector) -> tuple[Integer, Integer]:
         return self.function(on, y, out, self.parameters), 0
 
-    def settle(self, on: Evaluator, base: Vector, start: Vector, y: Vector, q: Vector) -> Integer:
+    def settle(self, on: Evaluator, base: Vector, y: Vector, q: Vector) -> Integer:
+        return 0
+
+    def book(self, on: Evaluator, y0: Vector, change: Vector, size: Vector, sign: Real) -> Integer:
+        return 0
+
+    def hold(self, on: Evaluator, change: Vector, low: Vector, high: Vector) -> None:
+        """There are no sums."""
+
+    def open(self, on: Evaluator, account: Account, q: Vector, y: Vector) -> Integer:
+        return 0
+
+    def correct(
+        self, on: Evaluator, account: Account, h: Real, start: Vector, y: Vector, q: Vector, allowed: Vector
+    ) -> Integer:
+        account.moved, account.rest, account.size = 0.0, 0.0, 0.0
         return 0
 
     def sizes(self, on: Evaluator, y0: Vector, y1: Vector, out: Vector) -> None:
@@ -171,7 +222,7 @@ class Field(Motion):
     def project(self, on: Evaluator, q: Vector, change: Vector) -> None:
         """There are no constraints."""
 
-    def least(self, on: Evaluator, y0: Vector, y1: Vector) -> Real:
+    def least(self, on: Evaluator, change: Vector) -> Real:
         return 0.0
 
 
@@ -298,6 +349,34 @@ ERRORS: Final[dict[str, Any]] = {"atol": vector(), "rtol": vector(), "allowed": 
 
 @final
 @dataclass(frozen=True, slots=True)
+class Books:
+    """Memory of a step's sums, see `Memory`.
+
+    Attributes
+    ----------
+    start, end
+        y at the start of the step and at its end, of which the sums are written.
+    before, after
+        (summed,): what rounding left of the sums there.
+    """
+
+    start: Vector
+    end: Vector
+    before: Vector
+    after: Vector
+    change: Vector
+    size: Vector
+    whole: Vector
+    low: Vector
+
+
+BOOKS: Final[dict[str, Any]] = {
+    name: vector() for name in ("start", "end", "before", "after", "change", "size", "whole", "low")
+}
+
+
+@final
+@dataclass(frozen=True, slots=True)
 class Memory:
     """The state of a march, and memory for its next step.
 
@@ -313,10 +392,17 @@ class Memory:
         (freedoms,): rates before they are put on the constraints.
     atol, rtol, allowed, fine, coarse
         (counted,): tolerances, what they allow, estimates.
+    carry, carry1, carry2
+        (summed,): what rounding left of the sums.
+    change, size
+        (summed,): what a step adds to the sums, and the sizes of what that adds up.
+    whole, low
+        (summed,): such changes before `Motion.book`, of the whole step and of its part that was kept last.
     times
         (instants,): to keep.
     rows_t, rows_q, rows_y
-        Rows that were kept: (rows, 2) time and least entropy made, (rows, ·) elements, (rows, ·) y without v.
+        Rows that were kept: (rows, 4) time, least entropy made, energies put in and their sizes, (rows, ·) elements,
+        (rows, ·) y without v.
     """
 
     q: Vector
@@ -334,6 +420,13 @@ class Memory:
     open: Vector
     fine: Vector
     coarse: Vector
+    carry: Vector
+    carry1: Vector
+    carry2: Vector
+    change: Vector
+    size: Vector
+    whole: Vector
+    low: Vector
     times: Vector
     rows_t: Matrix
     rows_q: Matrix
@@ -347,6 +440,7 @@ class Memory:
 MEMORY: Final[dict[str, Any]] = {
     "q": vector(), "y": vector(), "k": matrix(), "q1": vector(), "y1": vector(), "q2": vector(), "y2": vector(),
     "k2": matrix(), "last": vector(), "atol": vector(), "rtol": vector(), "allowed": vector(), "open": vector(),
-    "fine": vector(), "coarse": vector(), "times": vector(), "rows_t": matrix(2), "rows_q": matrix(),
-    "rows_y": matrix(),
+    "fine": vector(), "coarse": vector(), "carry": vector(), "carry1": vector(), "carry2": vector(),
+    "change": vector(), "size": vector(), "whole": vector(), "low": vector(), "times": vector(),
+    "rows_t": matrix(4), "rows_q": matrix(), "rows_y": matrix(),
 }  # fmt: skip

@@ -3,6 +3,7 @@
 from typing import Final
 
 from ephs.semantics.linear.dense import copy
+from ephs.semantics.linear.sums import grown
 from ephs.semantics.spaces.rank import TINY
 from ephs.semantics.stage import (
     Entry,
@@ -23,9 +24,9 @@ from ephs.semantics.stage import (
 )
 from ephs.solve.march.collocation import combine, evaluate, iterate, place
 from ephs.solve.march.control import judge
-from ephs.solve.march.records import Control, Errors, Memory, Motion, Status, Tableau
+from ephs.solve.march.records import Books, Control, Errors, Memory, Motion, Status, Tableau
 
-__all__ = ["DRIFT", "STEPS", "allow", "attempt", "drift", "error_of", "first", "measure", "stiffness_of"]
+__all__ = ["DRIFT", "STEPS", "allow", "attempt", "book", "drift", "error_of", "first", "measure", "stiffness_of"]
 
 DRIFT = 1e-2
 """Share of a step's drift off the constraints that counts as its error.
@@ -88,6 +89,44 @@ def attempt(
         on.when(tableau.guess.rows > 0, lambda: collocated(errors))
     on.when(on.same(status.value, Status.SOUND), lambda: on.repeat(one))
     return status.value
+
+
+def book(on: Evaluator, motion: Motion, tableau: Tableau, k: Matrix, h: Real, books: Books, hold: Truth) -> Integer:
+    """Sum what a step of length h with rates k adds to heats and books; return a status.
+
+    What the last row of a tableau weighs are h Σ b k. ``hold`` where the step is a part of one whose sums are known.
+    """
+    at, count = motion.summed, tableau.a.columns
+
+    def one(j: Integer) -> None:
+        total, size = on.variable(0.0), on.variable(0.0)
+
+        def add(s: Integer) -> None:
+            term = tableau.a[count, s] * k[s, at + j]
+            total.value, size.value = total.value + term, size.value + on.absolute(term)
+
+        on.loop(count, add)
+        books.change[j], books.size[j] = h * total.value, on.absolute(h) * size.value
+
+    def part() -> None:
+        motion.hold(on, books.change, books.low, books.whole)
+        copy(on, books.change, books.low)
+
+    def entire() -> None:
+        copy(on, books.change, books.whole)
+        on.loop(books.low.size, clear)
+
+    def clear(j: Integer) -> None:
+        books.low[j] = 0.0
+
+    def grow(j: Integer) -> None:
+        books.end[at + j], books.after[j] = grown(books.start[at + j], books.before[j], books.change[j])
+
+    on.loop(books.change.size, one)
+    on.when(hold, part, entire)
+    status = motion.book(on, books.start, books.change, books.size, on.select(h >= 0.0, 1.0, -1.0))
+    on.loop(books.change.size, grow)
+    return status
 
 
 def allow(on: Evaluator, motion: Motion, errors: Errors, start: Vector, end: Vector) -> None:

@@ -7,6 +7,7 @@ import ephs
 from ephs.mechanics.sweep import job
 from ephs.mechanics.sweep.suspicion import Suspicion
 from ephs.show.charts import family_scenes as scenes
+from ephs.solve.errors import Outcome
 from examples.failing import pendulum
 
 BRAKE = pendulum(6.0, "friction = 20.0")
@@ -34,18 +35,22 @@ def test_members_that_break_a_law_are_run_on_their_own_and_say_so(alone):
     """The limit of stability at this step is at a friction of about 10 N m s."""
     found = status(BRAKE, {"joints.pin.friction": FRICTIONS}, 2.0, method="rk54", step=0.1)
     assert found[0] == "done"
-    assert all(text.startswith("energy: ") for text in found[3:])
+    assert all("energy: " in text or Outcome.ENTROPY in text for text in found[3:])
     for friction, text in zip(FRICTIONS, found, strict=True):
         scene = pendulum(6.0, f"friction = {friction}")
-        sol = ephs.simulate(scene, 2.0, method="rk54", step=0.1, audit="off")
-        assert (text == "done") == sol.audit.passed
+        try:
+            passed = ephs.simulate(scene, 2.0, method="rk54", step=0.1, audit="off").audit.passed
+        except ephs.SimulationError as error:
+            passed = error.outcome is not Outcome.ENTROPY
+        assert (text == "done") == passed
     assert {values[0] for values in alone} >= set(FRICTIONS[3:])
     assert len(alone) < len(FRICTIONS)
 
 
 def test_without_a_look_they_are_silent(alone, monkeypatch):
     monkeypatch.setattr(Suspicion, "of", lambda *_: False)
-    assert set(status(BRAKE, {"joints.pin.friction": FRICTIONS}, 2.0, method="rk54", step=0.1)) == {"done"}
+    found = status(BRAKE, {"joints.pin.friction": FRICTIONS}, 2.0, method="rk54", step=0.1)
+    assert all(text == "done" or Outcome.ENTROPY in text for text in found)
     assert not alone
 
 

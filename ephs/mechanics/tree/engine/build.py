@@ -62,6 +62,7 @@ def engine_of(
     attached = bool(reduced.attaching.network.attached) or bool(reduced.attaching.network.known)
     forced = bool(forces.edge.size or forces.conduction.size or np.any(forces.body != -1) or attached)
     driven = any(part.joint.driven for part in found.parts)
+    between = bool(np.any((forces.edge[:, 0] == ON_BODIES) & (forces.part[:, 0] >= 0)))
     records = found.packed(gravity)
     program = sweeps(records.kind, general=bool(forced or driven or len(cut)))
     eliminated = closing([part.parent for part in found.parts], ends)
@@ -70,7 +71,7 @@ def engine_of(
     if attached:
         reached["attach"] = network_program(), "solve"
     tables: dict[str, Any] = {
-        "own": _own(len(found.parts), reached, forced=forced, driven=driven, attached=attached),
+        "own": _own(len(found.parts), reached, forced=forced, driven=driven, attached=attached, between=between),
         "integers": records.integers,
         "reals": records.reals,
         "gravity": records.gravity,
@@ -88,34 +89,42 @@ def engine_of(
     }
     freedoms, entropies = sum(part.joint.dim for part in found.parts), len(reduced.entropies)
     sizes = reduced.coordinates, drive.size + freedoms + entropies + 2 + len(reduced.made)
-    work = _work(program, len(found.parts), freedoms, drive.size, len(cut), entropies, eliminated)
+    booked = entropies, entropies + 2 + len(reduced.made)
+    work = _work(program, len(found.parts), freedoms, drive.size, len(cut), booked, eliminated)
     return Engine(tables, work, eliminated, sizes, reached, looped=len(cut) > 0)
 
 
 def _reached(sweeps: Program, loops: Program) -> dict[str, tuple[Program, str]]:
     """Function of `Own` -> the program and the entry that it is; sweeps of a free tree have one of their own."""
-    own = ("accelerations", "move", "fold", "unfold", "resolve", "spread", "power", "dependent")
+    own = ("accelerations", "move", "fold", "unfold", "resolve", "spread", "power", "dependent", "energy")
     cut = ("rows", "poses", "fit", "gaps", "relative_rates", "across", "advance", "velocities")
     found = {name: (sweeps, name) for name in own if name in sweeps.entries}
     return found | {name: (loops, name) for name in cut} | {"displace": (loops, "move")}
 
 
 def _own(
-    links: int, reached: Mapping[str, tuple[Program, str]], *, forced: bool, driven: bool, attached: bool
+    links: int,
+    reached: Mapping[str, tuple[Program, str]],
+    *,
+    forced: bool,
+    driven: bool,
+    attached: bool,
+    between: bool,
 ) -> Table[Own]:
     made = Own.table(1)
     own = made[0]
     own.links, own.forced, own.driven, own.falls = links, int(forced), int(driven), int("accelerations" in reached)
-    own.attached = int(attached)
+    own.attached, own.between = int(attached), int(between)
     for name, (program, entry) in reached.items():
         setattr(own, name, program.compiled()[entry].address)
     return made
 
 
 def _work(
-    program: Sweeps, links: int, freedoms: int, joints: int, cuts: int, entropies: int, closing: Closing
+    program: Sweeps, links: int, freedoms: int, joints: int, cuts: int, booked: tuple[int, int], closing: Closing
 ) -> dict[str, Any]:
-    """Memory for one thread."""
+    """Memory for one thread; ``booked`` are the numbers of entropies, and of these and the books."""
+    entropies, books = booked
     rows, slots = len(closing.row), len(closing.slot)
     shapes: dict[str, tuple[int, ...]] = {
         "work": ((links + 1) * program.width,), "place": (links + 1, PLACE), "change": (links + 1, 6),
@@ -125,6 +134,8 @@ def _work(
         "largest": (max(closing.blocks, 1),), "temperature": (max(entropies, 1),), "entropy": (entropies,),
         "x": (16,), "v": (64,), "e": (16,), "lam": (64,), "f": (256,), "c": (16,), "jac": (512,), "scratch": (2048,),
         "alter": (freedoms,), "moved": (joints,), "answer": (1,),
+        "momenta": (links, 6), "spin": (freedoms,), "direction": (freedoms,), "descent": (freedoms,),
+        "still": (joints,), "idle": (books,), "spare": (books,),
     }  # fmt: skip
     return {name: np.zeros(shape) for name, shape in shapes.items()} | {"fault": np.zeros(1, dtype=np.int64)}
 

@@ -13,7 +13,7 @@ from ephs.semantics.spaces import se3, so3
 from ephs.semantics.spaces.vectors import apply_transposed, dot, product, scale, sub, transposed
 from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Variable, Vector, staged
 
-__all__ = ["act"]
+__all__ = ["act", "attached_energy", "strain"]
 
 
 def _grow(pushed: Matrix, link: Integer, by: list[Real]) -> None:
@@ -37,6 +37,34 @@ def act(
     on.loop(tables.acting.size, lambda i: acting.unless_refused(lambda: acting.edge(tables.acting[i])))
     on.loop(tables.conduction.size, lambda i: acting.unless_refused(lambda: acting.conduct(tables.conduction[i])))
     return acting.status.value
+
+
+@staged
+def strain(on: Evaluator, tables: Tables, work: Work, q: Vector, out: Vector) -> Integer:
+    """Add the energies of springs in J to out[1], and their sizes to out[2]; return a status.
+
+    Places of links in the memory are those at q where springs act between bodies.
+    """
+    acting = _Acting(on, tables, work, q, q, work.idle, work.idle, work.idle, on.counter(0))
+
+    def one(i: Integer) -> None:
+        edge = tables.acting[i]
+        on.when(edge.spring >= 0, lambda: acting.unless_refused(lambda: acting.store(edge, out)))
+
+    on.loop(tables.acting.size, one)
+    return acting.status.value
+
+
+def attached_energy(on: Evaluator, tables: Tables, work: Work, out: Vector) -> Integer:
+    """Add what attached storages hold, at the states in the memory, to out[1], and sizes to out[2]; return a status."""
+    net = Net.of(tables.net, tables.numbers, tables.parameters, tables.scal, tables.supply)
+    status = net.energies(on, work.entropy, out)
+
+    def blame() -> None:
+        work.fault[0] = net.fault[0]
+
+    on.when(on.negate(on.same(status, 0)), blame)
+    return status
 
 
 @final
@@ -214,6 +242,20 @@ class _Acting:
             self.books[1] = self.books[1] + given * rate[j]
 
         self.on.loop(edge.dim, one)
+
+    def store(self, edge: Acting, out: Vector) -> None:
+        """Add what a spring stores to the energies."""
+        on, energy = self.on, self.work.c
+
+        def aside() -> None:
+            self._between(edge, Relative(NO_INTEGERS, 0, on.scratch(Relative.real_width).cells, 0))
+
+        def in_joint() -> None:
+            copy(on, self.q.part(edge.q_at, edge.size), self.work.x.part(0, edge.size))
+
+        on.when(on.same(edge.kind, ON_BODIES), aside, in_joint)
+        self._evaluate(edge.spring)
+        out[1], out[2] = out[1] + energy[0], out[2] + on.absolute(energy[0])
 
     def _spring(self, edge: Acting, pull: Vector) -> None:
         self._evaluate(edge.spring)

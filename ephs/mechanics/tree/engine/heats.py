@@ -5,7 +5,10 @@ from ephs.semantics.kernel_table import TEMPERATURE
 from ephs.semantics.stage import Evaluator, Integer, Real, Vector
 from ephs.solve.heats import PLAIN
 
-__all__ = ["count", "entropies", "heat_rates"]
+__all__ = ["count", "entropies", "heat_rates", "hold", "lawless"]
+
+ROUNDING = 100.0 * 2.220446049250313e-16
+"""Part of what a sum of flows adds up by which it may be off: 10 κ ε with a condition κ of 10."""
 
 
 def _log_ratio(on: Evaluator, x: Real) -> Real:
@@ -81,10 +84,11 @@ def heat_rates(on: Evaluator, tables: Tables, work: Work, rates: Vector, made: V
     on.loop(tables.conduction.size, conduction)
 
 
-def count(on: Evaluator, tables: Tables, work: Work, before: Vector, after: Vector) -> None:
-    """Put what components made in a step in place of what they passed on, in ``after`` (heats, heat, work, flows).
+def count(on: Evaluator, tables: Tables, work: Work, before: Vector, change: Vector, size: Vector) -> None:
+    """Put what components made in a step in place of what they passed on, in the changes of (heats, heat, work, flows).
 
-    Mean temperatures of the step are ΔE/Δs: so entropies change by what is made. ``before``: (heats, heat, work, made).
+    Mean temperatures of the step are ΔE/Δs: so entropies change by what is made. ``before``: (heats, …) at the start.
+    ``size``: sums of the sizes of what the changes add up; those of flows become rounding of what was made.
     """
     cold, nodes = work.temperature, tables.node.size
 
@@ -96,18 +100,21 @@ def count(on: Evaluator, tables: Tables, work: Work, before: Vector, after: Vect
 
         def stored() -> None:
             held = row.c1 + before[k]
-            share = (after[k] - before[k]) / held
-            cold[k] = _log_ratio(on, share) * row.c2 / held
+            cold[k] = _log_ratio(on, change[k] / held) * row.c2 / held
 
         on.when(row.component < 0, outside, stored)
 
-    def passed(maker: Integer, factor: Real) -> None:
+    def passed(maker: Integer, factor: Real, most: Real) -> None:
         at = nodes + 2 + maker
-        after[at] = before[at] + (after[at] - before[at]) * factor
+        change[at], size[at] = change[at] * factor, ROUNDING * size[at] * most
 
     def friction(i: Integer) -> None:
         sink = tables.sink[i]
-        on.when(sink.entropy >= 0, lambda: passed(sink.maker, cold[sink.entropy]))
+
+        def heated() -> None:
+            passed(sink.maker, cold[sink.entropy], cold[sink.entropy])
+
+        on.when(sink.entropy >= 0, heated, lambda: passed(sink.maker, 1.0, 1.0))
 
     def gather(i: Integer) -> None:
         """Add what a component makes at its further places to its first."""
@@ -115,16 +122,69 @@ def count(on: Evaluator, tables: Tables, work: Work, before: Vector, after: Vect
         at, first = nodes + 2 + sink.maker, nodes + 2 + sink.owner
 
         def move() -> None:
-            after[first] = after[first] + (after[at] - before[at])
-            after[at] = before[at]
+            change[first], size[first] = change[first] + change[at], size[first] + size[at]
+            change[at], size[at] = 0.0, 0.0
 
         on.when(on.negate(on.same(at, first)), move)
 
     def conduction(i: Integer) -> None:
         row = tables.conduction[i]
-        passed(tables.component[row.component].made, cold[row.two] - cold[row.one])
+        one, two = cold[row.one], cold[row.two]
+        passed(tables.component[row.component].made, two - one, one + two)
 
     on.loop(nodes, node)
     on.loop(tables.sink.size, friction)
     on.loop(tables.sink.size, gather)
+    on.loop(tables.conduction.size, conduction)
+
+
+def lawless(on: Evaluator, tables: Tables, change: Vector, rounding: Vector, sign: Real) -> Integer:
+    """Return 1 + the component that lost entropy in a step beyond rounding, 0: none; ``sign`` is that of time.
+
+    Where none does, neither does the sum of all.
+    """
+    first, found = tables.node.size + 2, on.counter(0)
+
+    def one(place: Integer) -> None:
+        def name(number: Integer) -> None:
+            here = on.same(tables.component[number].made, place - first)
+            found.value = on.select(here, number + 1, found.value)
+
+        sound = sign * change[place] >= -rounding[place]
+        on.when(sound, lambda: None, lambda: on.loop(tables.component.size, name))
+
+    on.loop(change.size, one, start=first)
+    return found.value
+
+
+def hold(on: Evaluator, tables: Tables, change: Vector, low: Vector, high: Vector) -> None:
+    """Put the flows of a part of a step between those of a shorter part and those of the whole, and heats with them.
+
+    So heat does not fall from instant to instant within a step. All are changes of (heats, heat, work, flows).
+    """
+    nodes = tables.node.size
+
+    def held(maker: Integer) -> Real:
+        at = nodes + 2 + maker
+        least, most = on.minimum(low[at], high[at]), on.maximum(low[at], high[at])
+        kept = on.minimum(on.maximum(change[at], least), most)
+        moved = kept - change[at]
+        change[at] = kept
+        return moved
+
+    def friction(i: Integer) -> None:
+        edge = tables.acting[i]
+
+        def rubbed() -> None:
+            moved = held(tables.component[edge.friction].made)
+            change[edge.heat], change[nodes] = change[edge.heat] + moved, change[nodes] + moved
+
+        on.when(edge.friction >= 0, rubbed)
+
+    def conduction(i: Integer) -> None:
+        row = tables.conduction[i]
+        moved = held(tables.component[row.component].made)
+        change[row.one], change[row.two] = change[row.one] - moved, change[row.two] + moved
+
+    on.loop(tables.acting.size, friction)
     on.loop(tables.conduction.size, conduction)

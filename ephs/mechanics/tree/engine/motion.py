@@ -3,13 +3,15 @@
 from dataclasses import dataclass
 from typing import final
 
+from ephs.mechanics.tree.engine.balance import correct, held
 from ephs.mechanics.tree.engine.forces import act
-from ephs.mechanics.tree.engine.heats import count, entropies, heat_rates
+from ephs.mechanics.tree.engine.heats import count, entropies, heat_rates, hold, lawless
 from ephs.mechanics.tree.sweeps.acting import Tables, Work
 from ephs.mechanics.tree.sweeps.closing import SIZE
 from ephs.mechanics.tree.sweeps.records import Link
 from ephs.semantics.spaces.rank import CLOSED, GAP
 from ephs.semantics.stage import Argument, Evaluator, Integer, Matrix, Real, Truth, Vector, staged
+from ephs.solve.march.account import Account
 from ephs.solve.march.records import Motion, Status
 
 __all__ = ["Mechanism", "close"]
@@ -55,6 +57,10 @@ class Mechanism(Motion):
         return self.work.force.size
 
     @property
+    def summed(self) -> Integer:
+        return self.increments + self.freedoms
+
+    @property
     def counted(self) -> Integer:
         return 2 * self.freedoms + self.tables.node.size
 
@@ -65,7 +71,8 @@ class Mechanism(Motion):
     # ---- sweeps ----------------------------------------------------------------------------------------------------
 
     @property
-    def _tree(self) -> tuple[Argument, ...]:
+    def swept(self) -> tuple[Argument, ...]:
+        """What all sweeps take first."""
         e = self.tables
         return e.own[0].links, e.integers, e.reals, self.work.work, e.gravity
 
@@ -78,10 +85,10 @@ class Mechanism(Motion):
     def _cuts(self) -> tuple[Argument, ...]:
         return self.tables.cut, self.tables.cut_numbers, self.work.relative
 
-    def _move(self, on: Evaluator, q: Vector, r: Vector) -> None:
+    def outward(self, on: Evaluator, q: Vector, r: Vector) -> None:
         """The outward sweep: poses, twists, loads of all links, and the rows that close loops."""
         e, w, own = self.tables, self.work, self.tables.own[0]
-        on.reach(own.move, *self._tree, q, r, w.place)
+        on.reach(own.move, *self.swept, q, r, w.place)
         _clear(on, _whole(w.pushed))
         if not self.looped:
             return
@@ -94,10 +101,14 @@ class Mechanism(Motion):
         on.loop(w.value.rows, forget)
         on.reach(own.rows, e.cut, e.cut_numbers, w.place, w.relative, e.end, w.value, w.covector)
 
-    def _fold(self, on: Evaluator, q: Vector, force: Vector) -> Integer:
-        """The inward sweep; return a status."""
-        still = on.reach(self.tables.own[0].fold, *self._tree, *self._rows, q, force, self.work.pushed)
+    def fold(self, on: Evaluator, q: Vector, force: Vector, pushed: Matrix) -> Integer:
+        """The inward sweep under forces on the rates and wrenches on links; return a status."""
+        still = on.reach(self.tables.own[0].fold, *self.swept, *self._rows, q, force, pushed)
         return self._still(on, still)
+
+    def unfold(self, on: Evaluator, q: Vector, rate: Vector) -> None:
+        """The last outward sweep: write accelerations."""
+        on.reach(self.tables.own[0].unfold, *self.swept, *self._rows, q, rate, self.work.change)
 
     def _still(self, on: Evaluator, still: Integer) -> Integer:
         """Status where a sweep says 1 + the link whose joint moves no mass, else 0."""
@@ -121,7 +132,7 @@ class Mechanism(Motion):
 
     def _resolve(self, on: Evaluator, q: Vector) -> Vector:
         """The least change of rates, in the mass metric, that meets the targets, with the factors at hand."""
-        on.reach(self.tables.own[0].resolve, *self._tree, *self._rows, q, self.work.alter, self.work.change)
+        on.reach(self.tables.own[0].resolve, *self.swept, *self._rows, q, self.work.alter, self.work.change)
         return self.work.alter
 
     def accelerate(
@@ -131,28 +142,28 @@ class Mechanism(Motion):
         w, own, status = self.work, self.tables.own[0], on.counter(0)
 
         def fall() -> None:
-            still = on.reach(own.accelerations, *self._tree, q, r, w.zero, rate)
+            still = on.reach(own.accelerations, *self.swept, q, r, w.zero, rate)
             status.value = self._still(on, still)
 
         def general() -> None:
-            self._move(on, q, r)
+            self.outward(on, q, r)
             _clear(on, w.force)
 
             def forced() -> None:
                 status.value = act(on, self.tables, w, q, r, s_rate, made, books)
 
             def inward() -> None:
-                status.value = self._fold(on, q, w.force)
+                status.value = self.fold(on, q, w.force, w.pushed)
 
             def separate() -> None:
                 status.value = self._sound(on)
 
             def outward() -> None:
-                on.reach(own.unfold, *self._tree, *self._rows, q, rate, w.change)
+                self.unfold(on, q, rate)
                 on.when(own.driven > 0, drive)
 
             def drive() -> None:
-                on.reach(own.power, *self._tree, *self._rows, q, r, w.force, w.answer)
+                on.reach(own.power, *self.swept, *self._rows, q, r, w.force, w.answer)
                 books[1] = books[1] + w.answer[0]
 
             on.when(own.forced > 0, forced)
@@ -197,18 +208,55 @@ class Mechanism(Motion):
         """Write v̇ = dexp⁻¹(v) r of all joints, that of cut ones from the outward sweep."""
         on.reach(self.tables.own[0].velocities, self.tables.charts, *self._cuts, y, r, out)
 
-    def settle(self, on: Evaluator, base: Vector, start: Vector, y: Vector, q: Vector) -> Integer:
-        self.book(on, start, y)
+    def settle(self, on: Evaluator, base: Vector, y: Vector, q: Vector) -> Integer:
         self.advance(on, base, y, q)
-        if not self.looped:
-            return 0
-        return close(on, self, q, y.part(self.increments, self.freedoms))
+        return self.shut(on, q, y.part(self.increments, self.freedoms)) if self.looped else 0
 
-    def book(self, on: Evaluator, y0: Vector, y1: Vector) -> None:
-        """Put what components made in a step from y0 to y1 in place of what they passed on."""
-        after = self.increments + self.freedoms
-        size = y0.size - after
-        count(on, self.tables, self.work, y0.part(after, size), y1.part(after, size))
+    def shut(self, on: Evaluator, q: Vector, r: Vector) -> Integer:
+        """Close the loops; return a status."""
+        return close(on, self, q, r)
+
+    def book(self, on: Evaluator, y0: Vector, change: Vector, size: Vector, sign: Real) -> Integer:
+        count(on, self.tables, self.work, y0.part(self.summed, change.size), change, size)
+        lost = lawless(on, self.tables, change, size, sign)
+
+        def blame() -> None:
+            self.work.fault[0] = lost - 1
+
+        on.when(lost > 0, blame)
+        return on.select(lost > 0, int(Status.LAWLESS), 0)
+
+    def count(self, on: Evaluator, start: Vector, y: Vector) -> None:
+        """Put what components made in a step in place of what they passed on, at its end y."""
+        at, change, size = self.summed, self.work.idle, self.work.spare
+
+        def one(j: Integer) -> None:
+            change[j] = y[at + j] - start[at + j]
+
+        def put(j: Integer) -> None:
+            y[at + j] = start[at + j] + change[j]
+
+        on.loop(change.size, one)
+        count(on, self.tables, self.work, start.part(at, change.size), change, size)
+        on.loop(change.size, put)
+
+    def hold(self, on: Evaluator, change: Vector, low: Vector, high: Vector) -> None:
+        hold(on, self.tables, change, low, high)
+
+    def correct(
+        self, on: Evaluator, account: Account, h: Real, start: Vector, y: Vector, q: Vector, allowed: Vector,
+        always: bool = False,
+    ) -> Integer:  # fmt: skip
+        nv, n, at = self.increments, self.freedoms, self.summed + self.tables.node.size
+        target = account.anchor + (y[at + 1] - y[at])
+        heats = y.part(self.summed, self.tables.node.size)
+        return correct(on, self, account, target, h, start.part(nv, n), q, y.part(nv, n), heats, allowed, always)
+
+    def open(self, on: Evaluator, account: Account, q: Vector, y: Vector) -> Integer:
+        energies, at, ns = on.scratch(3), self.summed, self.tables.node.size
+        status = held(on, self, q, y.part(self.increments, self.freedoms), y.part(at, ns), energies)
+        account.anchor = energies[0] + energies[1] + (y[at + ns] - y[at + (ns + 1)])
+        return status
 
     def sizes(self, on: Evaluator, y0: Vector, y1: Vector, out: Vector) -> None:
         """1 rad or m of increments; of rates the largest in their joint; energies of heat."""
@@ -244,7 +292,7 @@ class Mechanism(Motion):
 
     def project(self, on: Evaluator, q: Vector, change: Vector) -> None:
         own, w = self.tables.own[0], self.work
-        on.reach(own.spread, *self._tree, q, change, w.change)
+        on.reach(own.spread, *self.swept, q, change, w.change)
         on.reach(own.across, *self._cuts, w.change, w.value)
         alter = self._resolve(on, q)
 
@@ -253,20 +301,18 @@ class Mechanism(Motion):
 
         on.loop(change.size, add)
 
-    def least(self, on: Evaluator, y0: Vector, y1: Vector) -> Real:
-        first = self.increments + self.freedoms + self.tables.node.size + 2
-        least = on.variable(0.0)
+    def least(self, on: Evaluator, change: Vector) -> Real:
+        first, least = self.tables.node.size + 2, on.variable(0.0)
 
         def one(j: Integer) -> None:
-            made = y1[j] - y0[j]
-            least.value = on.select(on.same(j, first), made, on.minimum(made, least.value))
+            least.value = on.select(on.same(j, first), change[j], on.minimum(change[j], least.value))
 
-        on.loop(y0.size, one, start=first)
+        on.loop(change.size, one, start=first)
         return least.value
 
     # ---- loops -----------------------------------------------------------------------------------------------------
 
-    def open(self, on: Evaluator, q: Vector) -> Real:
+    def gaps(self, on: Evaluator, q: Vector) -> Real:
         """Write targets that close the cut joints in one step of Newton's method; how far they are open, in m, rad."""
         on.reach(self.tables.own[0].gaps, *self._cuts, q, self.work.value, self.work.answer)
         return self.work.answer[0]
@@ -279,11 +325,11 @@ class Mechanism(Motion):
         With ``always`` it is moved in any case: the tangent of closing is that of a round that was taken.
         """
         own, w, status = self.tables.own[0], self.work, on.counter(0)
-        self._move(on, q, r)
+        self.outward(on, q, r)
         on.reach(own.poses, *self._cuts)
         on.reach(own.fit, *self._cuts, q)
-        gap = self.open(on, q)
-        status.value = self._fold(on, q, w.zero)
+        gap = self.gaps(on, q)
+        status.value = self.fold(on, q, w.zero, w.pushed)
 
         def separate() -> None:
             status.value = self._sound(on)
@@ -293,13 +339,13 @@ class Mechanism(Motion):
         done = unsound if always else on.either(unsound, on.either(gap <= GAP, gap > 0.5 * before))
 
         def go() -> None:
-            self.open(on, q)
-            self._displace(on, self._resolve(on, q), q)
+            self.gaps(on, q)
+            self.displace(on, self._resolve(on, q), q)
 
         on.when(on.negate(done), go)
         return status.value, gap, done
 
-    def _displace(self, on: Evaluator, alter: Vector, q: Vector) -> None:
+    def displace(self, on: Evaluator, alter: Vector, q: Vector) -> None:
         """Move the joints of the tree by a change of their increments, cut ones at rest."""
         e, moved = self.tables, self.work.moved
 

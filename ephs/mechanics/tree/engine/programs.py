@@ -6,6 +6,7 @@ from typing import Any, cast, final
 
 import numpy as np
 
+from ephs.mechanics.tree.engine.balance import held
 from ephs.mechanics.tree.engine.closing import Closing
 from ephs.mechanics.tree.engine.motion import Mechanism, close
 from ephs.mechanics.tree.sweeps.acting import TABLES, WORK, Tables, Work
@@ -28,8 +29,21 @@ from ephs.semantics.stage import (
     vector,
 )
 from ephs.semantics.stage.calling import Bound
-from ephs.solve.march import ERRORS, MEMORY, TABLEAU, Control, Errors, Memory, Tableau, march
-from ephs.solve.march.steps import attempt
+from ephs.solve.march import (
+    BOOKS,
+    ERRORS,
+    MEMORY,
+    TABLEAU,
+    Account,
+    Books,
+    Control,
+    Errors,
+    Memory,
+    Tableau,
+    march,
+)
+from ephs.solve.march.account import worth
+from ephs.solve.march.steps import attempt, book
 
 __all__ = ["Engine", "motion_of_loops", "motion_of_trees", "motion_program"]
 
@@ -43,9 +57,9 @@ def motion_program(*, looped: bool) -> Program:
 
     def marched(
         on: Evaluator, tables: Tables, work: Work, tableau: Tableau, memory: Memory, control: Table[Control],
-        steps: Integer,
+        account: Table[Account], steps: Integer,
     ) -> Integer:  # fmt: skip
-        return march(on, moving(tables, work), tableau, memory, control[0], steps)
+        return march(on, moving(tables, work), tableau, memory, control[0], account[0], steps)
 
     def stages(
         on: Evaluator, tables: Tables, work: Work, tableau: Tableau, control: Table[Control], base: Vector,
@@ -65,8 +79,24 @@ def motion_program(*, looped: bool) -> Program:
     def velocities(on: Evaluator, tables: Tables, work: Work, y: Vector, r: Vector, out: Vector) -> None:
         moving(tables, work).velocities(on, y, r, out)
 
-    def book(on: Evaluator, tables: Tables, work: Work, before: Vector, after: Vector) -> None:
-        moving(tables, work).book(on, before, after)
+    def counted(on: Evaluator, tables: Tables, work: Work, before: Vector, after: Vector) -> None:
+        moving(tables, work).count(on, before, after)
+
+    def summed(
+        on: Evaluator, tables: Tables, work: Work, tableau: Tableau, k: Matrix, books: Books, h: Real, part: Integer
+    ) -> Integer:
+        return book(on, moving(tables, work), tableau, k, h, books, on.same(part, 1))
+
+    def corrected(
+        on: Evaluator, tables: Tables, work: Work, account: Table[Account], start: Vector, y: Vector, q: Vector,
+        allowed: Vector, h: Real,
+    ) -> Integer:  # fmt: skip
+        status = moving(tables, work).correct(on, account[0], h, start, y, q, allowed)
+        account[0].size = worth(on, account[0])
+        return status
+
+    def energy(on: Evaluator, tables: Tables, work: Work, q: Vector, r: Vector, heats: Vector, out: Vector) -> Integer:
+        return held(on, moving(tables, work), q, r, heats, out)
 
     def advance(on: Evaluator, tables: Tables, work: Work, base: Vector, v: Vector, q: Vector) -> None:
         moving(tables, work).advance(on, base, v, q)
@@ -85,7 +115,8 @@ def motion_program(*, looped: bool) -> Program:
     tried: dict[str, Any] = {"tableau": group(Tableau, **TABLEAU)}
     entries = {
         "march": Entry(
-            marched, **of, **tried, memory=group(Memory, **MEMORY), control=table(Control), steps=integer()
+            marched, **of, **tried, memory=group(Memory, **MEMORY), control=table(Control), account=table(Account),
+            steps=integer(),
         ),
         "stages": Entry(
             stages, **of, **tried, control=table(Control), base=vector(), start=vector(), k=matrix(),
@@ -95,7 +126,14 @@ def motion_program(*, looped: bool) -> Program:
         "rates": Entry(rates, **of, base=vector(), y=vector(), q=vector(), out=vector()),
         "advance": Entry(advance, **of, base=vector(), v=vector(), q=vector()),
         "velocities": Entry(velocities, **of, y=vector(), r=vector(), out=vector()),
-        "book": Entry(book, **of, before=vector(), after=vector()),
+        "counted": Entry(counted, **of, before=vector(), after=vector()),
+        "summed": Entry(
+            summed, **of, tableau=tried["tableau"], k=matrix(), books=group(Books, **BOOKS), h=real(), part=integer()
+        ),
+        "corrected": Entry(
+            corrected, **of, account=table(Account), start=vector(), y=vector(), q=vector(), allowed=vector(), h=real()
+        ),
+        "energy": Entry(energy, **of, q=vector(), r=vector(), heats=vector(), out=vector(3)),
         "evaluations": Entry(
             evaluations, **of, q=matrix(), r=matrix(), out=vector(), rates=matrix(), repeats=integer()
         ),
@@ -151,7 +189,14 @@ class Engine:
         self._rates = self.bind("rates", self._base, self._y, self._q, self._out)
         self._advance = self.bind("advance", self._base, self._y, self._q)
         self._velocities = self.bind("velocities", self._y, self._r, self._out)
-        self._book = self.bind("book", self._start, self._y)
+        summed = size - self._r.size - work["still"].size
+        self._count = self.bind("counted", self._start, self._y)
+        self._held = np.zeros(3)
+        self._heats = np.zeros(work["entropy"].size)
+        self._energy = self.bind("energy", self._q, self._r, self._heats, self._held)
+        self.books = {name: np.zeros(summed) for name in BOOKS} | {"start": self._start, "end": self._y}
+        self._account, self._allowed = Account.table(1), np.zeros(2 * self._r.size)
+        self._correct = self.bind("corrected", self._account, self._start, self._y, self._q, self._allowed, 0.0)
         self._counted = 2 * self._r.size + work["entropy"].size
         self._stages: dict[int, tuple[Table[Control], Array, dict[str, Array], Array, Bound]] = {}
         self._close = self.bind("close", self._q, self._r) if looped else None
@@ -233,8 +278,46 @@ class Engine:
     def book(self, y0: Array, y1: Array) -> Array:
         """Return the end y1 of a step from y0 with what components made in place of what they passed on."""
         self._start[:], self._y[:] = y0, y1
-        self._book()
+        self._count()
         return self._y.copy()
+
+    def sum(
+        self, tableau: Mapping[str, Any], k: Array, h: float, y0: Array, y1: Array, carry: Array, *, part: bool
+    ) -> tuple[int, Array, Array]:
+        """Sum what a step with rates k adds to heats and books; a part of one is held by ``books``.
+
+        Returns
+        -------
+        tuple[int, Array, Array]
+            A status, the end, and what rounding left.
+        """
+        self._start[:], self._y[:], self.books["before"][:] = y0, y1, carry
+        status = int(self.bind("summed", tableau, k, self.books, h, int(part))())
+        return status, self._y.copy(), self.books["after"].copy()
+
+    def correct(
+        self, account: Array, y0: Array, y: Array, q: Array, allowed: Array, h: float, *, chosen: bool
+    ) -> tuple[int, Array, Array, Array, float]:
+        """Move the end (q, y) of a step from y0 to the energy that is left to it.
+
+        Returns
+        -------
+        tuple[int, Array, Array, Array, float]
+            A status, elements, y, the account (anchor, left, put, total) after it, and the step's error by that.
+        """
+        self._start[:], self._y[:], self._q[:], self._allowed[:] = y0, y, q, allowed[: self._allowed.size]
+        a: Any = self._account[0]
+        a.anchor, a.left, a.put, a.total = account.tolist()
+        a.chosen = int(chosen)
+        status = int(self._correct(h))
+        after = np.array([a.anchor, a.rest, a.put + a.moved, a.total + abs(a.moved)])
+        return status, self._q.copy(), self._y.copy(), after, float(a.size)
+
+    def energy(self, q: Array, r: Array, heats: Array) -> Array:
+        """Return (3,) kinetic energy, all other energy that is not heat, and the sum of its terms' sizes in J."""
+        self._q[:], self._r[:], self._heats[:] = q, r, heats
+        self._energy()
+        return self._held.copy()
 
     def close(self, q: Array, r: Array) -> tuple[int, float, Array, Array]:
         """Return a status, how far constraints are open, elements with loops closed, and rates on them."""

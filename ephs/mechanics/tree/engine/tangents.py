@@ -33,11 +33,13 @@ from ephs.semantics.stage import (
 )
 from ephs.semantics.stage.memory import ArrayIntegers
 from ephs.solve.heats import PLAIN
-from ephs.solve.march import TABLEAU, Control, Tableau
+from ephs.solve.march import TABLEAU, Account, Control, Tableau
 from ephs.solve.march.steps import attempt
 
 __all__ = ["DIRECTIONS", "StepTangent", "evaluated", "step_program", "step_tangents"]
 
+BEYOND: Final = 1e100
+"""Errors that are allowed of a step where its length is given."""
 DIRECTIONS: Final = 4
 """Directions of one call: vector units take four."""
 
@@ -48,7 +50,7 @@ def step_program(*, looped: bool) -> Program:
 
     def step(
         on: Evaluator, tables: Tables, work: Work, tableau: Tableau, control: Table[Control], base: Vector,
-        start: Vector, k: Matrix, last: Vector, y: Vector, q: Vector, h: Real,
+        start: Vector, k: Matrix, last: Vector, account: Table[Account], allowed: Vector, y: Vector, q: Vector, h: Real,
     ) -> Integer:  # fmt: skip
         motion = Mechanism(tables, work, looped)
         status = on.counter(motion.rates(on, base, start, q, k.row(0))[0])
@@ -57,7 +59,7 @@ def step_program(*, looped: bool) -> Program:
             status.value = attempt(on, motion, tableau, control[0], base, start, h, k, None, last, y, q)
 
         def end() -> None:
-            status.value = _settled(on, motion, base, start, y, q)
+            status.value = _settled(on, motion, account[0], allowed, base, start, y, q, h)
 
         on.when(on.same(status.value, 0), stages)
         on.when(on.same(status.value, 0), end)
@@ -66,33 +68,54 @@ def step_program(*, looped: bool) -> Program:
     def rates(on: Evaluator, tables: Tables, work: Work, base: Vector, start: Vector, q: Vector, k: Vector) -> Integer:
         return Mechanism(tables, work, looped).rates(on, base, start, q, k)[0]
 
-    def settle(on: Evaluator, tables: Tables, work: Work, base: Vector, start: Vector, y: Vector, q: Vector) -> Integer:
-        return _settled(on, Mechanism(tables, work, looped), base, start, y, q)
+    def settle(
+        on: Evaluator, tables: Tables, work: Work, account: Table[Account], allowed: Vector, base: Vector,
+        start: Vector, y: Vector, q: Vector, h: Real,
+    ) -> Integer:  # fmt: skip
+        return _settled(on, Mechanism(tables, work, looped), account[0], allowed, base, start, y, q, h)
 
     def shut(on: Evaluator, tables: Tables, work: Work, y: Vector, q: Vector) -> Integer:
         return _closed(on, Mechanism(tables, work, looped), y, q)
 
     of: dict[str, Any] = {"tables": group(Tables, **TABLES), "work": group(Work, **WORK)}
+    balance: dict[str, Any] = {"account": table(Account), "allowed": vector()}
     return Program(
         "steps_of_loops" if looped else "steps_of_trees",
         step=Entry(
             step, **of, tableau=group(Tableau, **TABLEAU), control=table(Control), base=vector(), start=vector(),
-            k=matrix(), last=vector(), y=vector(), q=vector(), h=real(),
+            k=matrix(), last=vector(), **balance, y=vector(), q=vector(), h=real(),
         ),
         rates=Entry(rates, **of, base=vector(), start=vector(), q=vector(), k=vector()),
-        settle=Entry(settle, **of, base=vector(), start=vector(), y=vector(), q=vector()),
+        settle=Entry(
+            settle, **of, **balance, base=vector(), start=vector(), y=vector(), q=vector(), h=real()
+        ),
         close=Entry(shut, **of, y=vector(), q=vector()),
     )  # fmt: skip
 
 
-def _settled(on: Evaluator, motion: Mechanism, base: Vector, start: Vector, y: Vector, q: Vector) -> Integer:
-    """Take the end y of a step to a state whose derivatives are on the constraints, too."""
-    status = on.counter(motion.settle(on, base, start, y, q))
+def _settled(
+    on: Evaluator, motion: Mechanism, account: Account, allowed: Vector, base: Vector, start: Vector, y: Vector,
+    q: Vector, h: Real,
+) -> Integer:  # fmt: skip
+    """Take the end y of a step to a state whose derivatives are on the constraints, and keep the balance, too.
+
+    The account's anchor is made anew, of the start, unless it is not a number.
+    """
+    motion.count(on, start, y)
+    status = on.counter(motion.settle(on, base, y, q))
 
     def close() -> None:
         status.value = _closed(on, motion, y, q)
 
+    def anchored() -> None:
+        motion.open(on, account, base, start)
+
+    def correct() -> None:
+        status.value = motion.correct(on, account, h, start, y, q, allowed, always=True)
+
+    on.when(on.absolute(account.anchor) < 1e300, anchored)
     on.when(on.same(status.value, 0), close)
+    on.when(on.same(status.value, 0), correct)
     return status.value
 
 
@@ -122,6 +145,8 @@ class StepTangent:
         Called with the number of a component; returns the program and the entry that it is in machine code.
     tableau
         Coefficients, by the names of `Tableau`.
+    corrected
+        Whether steps keep the balance of energy: not so where nothing is free to move.
 
     Attributes
     ----------
@@ -134,8 +159,9 @@ class StepTangent:
     """
 
     def __init__(
-        self, engine: Engine, relation: Callable[[int], tuple[Program, str]], tableau: Mapping[str, Any]
-    ) -> None:
+        self, engine: Engine, relation: Callable[[int], tuple[Program, str]], tableau: Mapping[str, Any], *,
+        corrected: bool,
+    ) -> None:  # fmt: skip
         coordinates, size = engine.sizes
         stages = tableau["a"].shape[0]
         self.slopes: dict[str, Array] = {}
@@ -152,7 +178,10 @@ class StepTangent:
         }  # fmt: skip
         self.pairs = {name: _pair(np.zeros(shape)) for name, shape in shapes.items()}
         self.stage = _pair(np.zeros(size))
-        arguments.update({"control": _paired(Control.table(1), {}, ""), "h": 0.0, **self.pairs})
+        account = Account.table(1)
+        account[0].anchor = 0.0 if corrected else np.nan
+        arguments.update({"control": _paired(Control.table(1), {}, ""), "account": _paired(account, {}, "")})
+        arguments.update({"allowed": _pair(np.full(2 * engine.work["force"].size, BEYOND)), "h": 0.0, **self.pairs})
         program = step_tangents(engine.looped).compiled()
 
         def bound(name: str, **others: Any) -> Any:
@@ -174,9 +203,9 @@ class StepTangent:
         """Write the rates at (base, start) to ``stage``; return a status."""
         return int(self._rates())
 
-    def settle(self) -> int:
-        """Take the end y of a step from (base, start) to a state; return a status."""
-        return int(self._settle())
+    def settle(self, h: float) -> int:
+        """Take the end y of a step of h seconds from (base, start) to a state; return a status."""
+        return int(self._settle(h))
 
 
 @cache

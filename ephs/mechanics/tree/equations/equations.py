@@ -5,12 +5,13 @@ spaces, v̇ = dexp⁻¹(v) r.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, final
 
 import numpy as np
 
 from ephs.mechanics.tree.engine.build import engine_of
+from ephs.mechanics.tree.equations.accounts import Accounts
 from ephs.mechanics.tree.equations.booking import Booking
 from ephs.mechanics.tree.equations.dense import Dense, unmoved
 from ephs.mechanics.tree.equations.given import Given
@@ -54,6 +55,10 @@ class ReducedState:
         Heat and work in J, then the entropy that each component made in J/K.
     memory
         What a method takes along from step to step; none after a start.
+    account
+        (4 + heats + books,) energy in J where nothing is booked, what is missing of it, what corrections put in, and
+        the sum of their sizes, see `ephs.solve.march.account.Account`; then what rounding left of sums. Empty where a
+        run starts.
     """
 
     t: float
@@ -62,6 +67,7 @@ class ReducedState:
     heats: Array
     books: Array
     memory: tuple[Array, ...] = ()
+    account: Array = field(default_factory=lambda: np.zeros(0))
 
 
 @final
@@ -109,8 +115,9 @@ class Equations:
         self._paper, self.layout = PaperStates(reduced, problem), Layout.of(reduced)
         self.booking = Booking(self, self._paper)
         self.evaluations = 0
+        self.accounts = Accounts(self)
         self.gravity = reduced.gravity
-        self._driven = np.flatnonzero(t.driven)
+        self.driven = np.flatnonzero(t.driven)
         self._acted = self.given.acted(set(self._moving) if pushed else set())
         self._build(None)
 
@@ -192,6 +199,8 @@ class Equations:
             raise SolveError(Outcome.RANGE, "", "the rates of the joints")
         if status == Status.STILL:
             raise unmoved(self.reduced, int(component))
+        if status == Status.LAWLESS:
+            raise SolveError(Outcome.ENTROPY, str(self.model.path_of(int(component))), "in the step")
         if status:
             raise SolveError.of_component(int(status), self.model, int(component))
 
@@ -212,7 +221,7 @@ class Equations:
             The loops do not close near by, or the state has left the range of numbers.
         """
         within(self.reduced, state.q, state.r, state.heats)
-        if np.any(state.r[self._driven] != self.prescribed):  # all rates give way, in the mass metric
+        if np.any(state.r[self.driven] != self.prescribed):  # all rates give way, in the mass metric
             return self._closed_carefully(state)
         self.careful = False
         if not self.engine.looped:
@@ -224,7 +233,7 @@ class Equations:
         if status != 0:
             return self._closed_carefully(state)
         self._closed_at, self._factored = (q, r), True
-        return ReducedState(state.t, q, r, state.heats, state.books)
+        return replace(state, q=q, r=r, memory=())
 
     def separation(self) -> Array:
         """Squared part of each loop constraint off those before it, relative to the largest constraint, (m,).
@@ -239,8 +248,8 @@ class Equations:
         """`closed`, for constraints that nearly repeat each other."""
         self.careful = True
         q, r = self.dense.closed(state.q, state.r, self.prescribed, self.moved)
-        r[self._driven] = self.prescribed
-        return ReducedState(state.t, q, r, state.heats, state.books)
+        r[self.driven] = self.prescribed
+        return replace(state, q=q, r=r, memory=())
 
     # ---- the same over dense matrices --------------------------------------------------------------------------
 
@@ -285,10 +294,12 @@ class Equations:
 
     def state(self, base: ReducedState, y: Array, t: float) -> ReducedState:
         """The state that the vector y means at the end of a step from ``base``; its loops are as they come."""
-        nv, n, ns = self.nv, self.n, self.ns
-        y = self.settled(self.vector(base), y)
-        v, r, heats, books = np.split(y, [nv, nv + n, nv + n + ns])
-        return ReducedState(t, self.advance(base.q, v), r, heats, books)
+        return self.ended(base, self.settled(self.vector(base), y), t)
+
+    def ended(self, base: ReducedState, y: Array, t: float) -> ReducedState:
+        """The same of a vector whose books are made up already."""
+        v, r, heats, books = np.split(y, np.cumsum([self.nv, self.n, self.ns]))
+        return ReducedState(t, self.advance(base.q, v), r, heats, books, account=base.account)
 
     def settled(self, y0: Array, y1: Array) -> Array:
         """The end y1 of a step from y0 with what components made in place of what they passed on."""
@@ -338,6 +349,7 @@ class Equations:
         out: list[Row] = []
         for state, point, energy in zip(states, x, energies, strict=True):
             heat, work = state.books[0], self.led.work(state.t, energy, state.books)
+            self.accounts.note(state)
             energy[self._makers] = 0.0
             np.add.at(energy, self._makers, state.books[2:])
             out.append(Row(point, energy, np.array([heat, work, work, state.books[2:].sum()])))
@@ -356,6 +368,7 @@ class Equations:
             "cut_joints": [edge.name for edge in self.reduced.cut],
             "unknowns": self.unknowns,
             "paper_unknowns": self.model.unknowns,
+            **self.accounts.stats(),
             **self.led.stats(),
         }
 
@@ -379,6 +392,7 @@ class Equations:
         q, r, s = self._paper.initial()
         state = self.closed(ReducedState(t, q, r, self.heats.energies(s), np.zeros(2 + len(self.reduced.made))))
         self.led.start(self.row(state).energies)
+        state = self.accounts.opened(state)
         self._paper.check(state.q, state.r, self.heats.entropies(state.heats))
         if self.careful:
             self._without_repeated(state)

@@ -69,6 +69,8 @@ class Own(Record):
         1 where more than gravity acts; where joints have prescribed motions.
     attached
         1 where there is a network, which `attach` evaluates.
+    between
+        1 where springs act between bodies.
     falls
         1 where `accelerations` is all there is to do; else it has no address, or else the other sweeps have none.
     """
@@ -77,6 +79,7 @@ class Own(Record):
     forced = integer()
     driven = integer()
     attached = integer()
+    between = integer()
     falls = integer()
     accelerations = _sweep("accelerations")
     move = _sweep("move")
@@ -86,6 +89,7 @@ class Own(Record):
     spread = _sweep("spread")
     power = _sweep("power")
     dependent = _sweep("dependent")
+    energy = _sweep("energy")
     rows = _loop("rows")
     poses = _loop("poses")
     fit = _loop("fit")
@@ -296,6 +300,12 @@ class Work:
         Memory of components: v and lam stay zero.
     alter, moved
         Changes of the tree's rates, and of all joints' increments.
+    momenta, spin
+        Of links (links, 6), in their frames; of rates that have inertia of their own.
+    direction, descent
+        Free part of the rates; accelerations at rest by weight and springs.
+    still, idle, spare
+        Zeros for given forces on all joints; memory for (heats, heat, work, flows).
     books
         Powers of friction and of what drives.
     answer, fault
@@ -327,6 +337,13 @@ class Work:
     scratch: Vector
     alter: Vector
     moved: Vector
+    momenta: Matrix
+    spin: Vector
+    direction: Vector
+    descent: Vector
+    still: Vector
+    idle: Vector
+    spare: Vector
     answer: Vector
     fault: Integers
 
@@ -337,5 +354,6 @@ WORK: Final[dict[str, Any]] = {
     "entry": vector(), "covector": matrix(6), "along": matrix(12), "largest": vector(), "temperature": vector(),
     "entropy": vector(), "x": vector(), "v": vector(), "e": vector(), "lam": vector(),
     "f": vector(), "c": vector(), "jac": vector(), "scratch": vector(), "alter": vector(), "moved": vector(),
-    "answer": vector(1), "fault": indices(1),
+    "momenta": matrix(6), "spin": vector(), "direction": vector(), "descent": vector(), "still": vector(),
+    "idle": vector(), "spare": vector(), "answer": vector(1), "fault": indices(1),
 }  # fmt: skip

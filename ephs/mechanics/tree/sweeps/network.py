@@ -251,6 +251,24 @@ class Net:
         self.stores(on, one)
         return status.value
 
+    def energies(self, on: Evaluator, s: Vector, out: Vector) -> Integer:
+        """Add the energies of storages in J to out[1], and their sizes to out[2]; return a status."""
+        status = on.counter(0)
+
+        def one(it: Stores) -> None:
+            n, first = it.dims[0], self.head[5]
+
+            def read(j: Integer) -> None:
+                self.x[j] = s[first + it.state + j]
+
+            on.loop(n, read)
+            self.failed(on, status, self._call(on, it, n * n, self.work), it.component)
+            energy = self.f[n * n]
+            out[1], out[2] = out[1] + energy, out[2] + on.absolute(energy)
+
+        self.stores(on, one)
+        return status.value
+
     def failed(self, on: Evaluator, status: Any, found: Integer, component: Integer) -> None:
         def blame() -> None:
             status.value = found

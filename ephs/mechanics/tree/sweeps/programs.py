@@ -9,6 +9,7 @@ from typing import Any, Final, final
 from ephs.mechanics.tree.sweeps import closing
 from ephs.mechanics.tree.sweeps.accelerations import Force, accelerate_outward, accelerations, no_force
 from ephs.mechanics.tree.sweeps.closing import Rows
+from ephs.mechanics.tree.sweeps.energy import energy
 from ephs.mechanics.tree.sweeps.inward import inward, load_inward
 from ephs.mechanics.tree.sweeps.needs import NO_INTEGERS, Compact, LaidOut, Layout, Survey, layout_of
 from ephs.mechanics.tree.sweeps.outward import outward
@@ -37,9 +38,9 @@ __all__ = [
 
 PLACE: Final = 24
 """Numbers of a link that rows and forces read: R and p in the world, twist, bias."""
-FREE: Final = ("accelerations", "evaluations")
+FREE: Final = ("accelerations", "evaluations", "energy")
 """Entry functions for trees on which nothing but gravity and forces on the rates act."""
-GENERAL: Final = ("move", "fold", "unfold", "resolve", "spread", "power", "dependent")
+GENERAL: Final = ("move", "fold", "unfold", "resolve", "spread", "power", "dependent", "energy")
 """Entry functions for mechanisms with loops, wrenches on links or prescribed motions."""
 ENTRIES: Final = (*FREE, *GENERAL)
 
@@ -88,6 +89,7 @@ ARGUMENTS: Final[dict[str, dict[str, Any]]] = {
     "spread": {**MECHANISM, "q": vector(), "x": vector(), "change": matrix(6)},
     "power": {**MECHANISM, **ROWS, "q": vector(), "r": vector(), "force": vector(), "out": vector()},
     "dependent": {**ROWS, "largest": vector()},
+    "energy": {**MECHANISM, "q": vector(), "r": vector(), "momenta": matrix(6), "spin": vector(), "out": vector(3)},
 }
 """What the entry functions take; `accelerations`, `fold` and `dependent` return an integer."""
 
@@ -183,7 +185,17 @@ class Sweeps:
         return {
             "accelerations": Entry(accelerate, **ARGUMENTS["accelerations"]),
             "evaluations": Entry(evaluations, **MECHANISM, q=matrix(), r=matrix(), rates=matrix(), repeats=integer()),
+            "energy": self._energy(),
         }
+
+    def _energy(self) -> Entry:
+        def held(
+            on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector, q: Vector,
+            r: Vector, momenta: Matrix, spin: Vector, out: Vector,
+        ) -> None:  # fmt: skip
+            energy(on, self.tree(size, integers, reals, memory, gravity), q, r, momenta, spin, out)
+
+        return Entry(held, **ARGUMENTS["energy"])
 
     # ---- mechanisms with loops, wrenches on links, prescribed motions --------------------------------------------
 
@@ -294,7 +306,8 @@ class Sweeps:
             "move": move, "fold": fold, "unfold": unfold, "resolve": resolve, "spread": spread_out, "power": power,
             "dependent": dependent,
         }  # fmt: skip
-        return {name: Entry(function, **ARGUMENTS[name]) for name, function in functions.items()}
+        entries = {name: Entry(function, **ARGUMENTS[name]) for name, function in functions.items()}
+        return entries | {"energy": self._energy()}
 
 
 def _show_changes(on: Evaluator, tree: Tree, change: Matrix) -> None:

@@ -67,6 +67,8 @@ class State(Record):
         D⁻¹Uᵀ, D⁻¹ (upper triangle) and D⁻¹(τ − SᵀP) of the joint.
     change
         Acceleration beyond the bias.
+    down, level
+        Gravity, and its scalar product with the frame's origin.
     """
 
     rotation = reals(3, 3)
@@ -83,6 +85,8 @@ class State(Record):
     inverse = reals(21)
     push = reals(6)
     change = reals(6)
+    down = reals(3)
+    level = real()
 
 
 @final

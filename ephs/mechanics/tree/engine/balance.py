@@ -1,0 +1,254 @@
+"""The energy of a mechanism, and states moved to where it is what heat and work leave of it.
+
+A state moves along the gradient n = G⁻¹∇E of the energy E with the mass matrix M as metric of the rates, within loops
+and with prescribed motions as they are: rates alone, r + α n with n their free part, which is r itself without
+prescribed motions; where they are no more than what the step changed them by, positions too, along −h² M⁻¹∇V.
+"""
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, final
+
+from ephs.mechanics.tree.engine.forces import attached_energy, strain
+from ephs.mechanics.tree.engine.heats import entropies
+from ephs.mechanics.tree.sweeps.acting import Body
+from ephs.semantics.linear.dense import copy
+from ephs.semantics.stage import Evaluator, Integer, Real, Table, Truth, Variable, Vector, staged
+from ephs.solve.march.account import MOST, ROUNDING, Account, stretch
+
+if TYPE_CHECKING:
+    from ephs.mechanics.tree.engine.motion import Mechanism
+
+__all__ = ["correct", "held"]
+
+ROUNDS = 8
+"""Iterations that move positions."""
+FARTHEST = 0.5
+"""Part of its direction by which a state is moved at most."""
+
+
+@staged
+def held(on: Evaluator, motion: "Mechanism", q: Vector, r: Vector, heats: Vector, out: Vector) -> Integer:
+    """Write kinetic energy, all other energy that is not heat, and the sum of its terms' sizes in J to out (3,).
+
+    Returns
+    -------
+    Integer
+        A status.
+    """
+    own, w, status = motion.tables.own[0], motion.work, on.counter(0)
+    on.reach(own.energy, *motion.swept, q, r, w.momenta, w.spin, out)
+
+    def place() -> None:
+        on.reach(own.move, *motion.swept, q, r, w.place)
+
+    def strained() -> None:
+        on.when(own.between > 0, place)
+        status.value = strain(on, motion.tables, w, q, out)
+        on.when(on.both(own.attached > 0, on.same(status.value, 0)), attached)
+
+    def attached() -> None:
+        entropies(on, motion.tables, w, heats)
+        status.value = attached_energy(on, motion.tables, w, out)
+
+    on.when(own.forced > 0, strained)
+    return status.value
+
+
+@staged
+def correct(
+    on: Evaluator,
+    motion: "Mechanism",
+    account: Account,
+    target: Real,
+    h: Real,
+    before: Vector,
+    q: Vector,
+    r: Vector,
+    heats: Vector,
+    allowed: Vector,
+    always: bool,
+) -> Integer:
+    """Move the end (q, r) of a step of h seconds to an energy in J; return a status.
+
+    How much energy that takes, what it leaves and how far it goes, relative to what is allowed, go to the account.
+
+    Parameters
+    ----------
+    before
+        Rates at the start of the step.
+    allowed
+        (2 freedoms,) of increments and rates: what their errors may be. A state is moved further where steps are on a
+        grid, else what is farther is left to the steps that follow.
+    always
+        Whether what is only rounding is met, too: for the sake of its derivatives.
+    """
+    run = _Correction(on, motion, account, target, h, before, q, r, heats, allowed, on.scratch(3), on.counter(0))
+    account.moved, account.size = 0.0, 0.0
+    run.look()
+    on.when(run.known if always else on.negate(run.close), run.move)
+    account.rest = run.short
+    return run.status.value
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class _Correction:
+    """One correction; ``energies`` are what `held` writes."""
+
+    on: Evaluator
+    motion: "Mechanism"
+    account: Account
+    target: Real
+    h: Real
+    before: Vector
+    q: Vector
+    r: Vector
+    heats: Vector
+    allowed: Vector
+    energies: Vector
+    status: Variable[Integer]
+
+    def look(self) -> None:
+        """Evaluate the energy."""
+        self.status.value = held(self.on, self.motion, self.q, self.r, self.heats, self.energies)
+
+    @property
+    def short(self) -> Real:
+        """What is missing, in J."""
+        return self.target - (self.energies[0] + self.energies[1])
+
+    @property
+    def known(self) -> Truth:
+        """Whether it is a number: else nothing is to be met."""
+        return self.on.absolute(self.short) < 1e300
+
+    @property
+    def close(self) -> Truth:
+        """Whether it is no more than rounding, or not a number."""
+        terms = self.energies[0] + self.energies[2] + self.on.absolute(self.target)
+        return self.on.negate(self.on.absolute(self.short) > ROUNDING * terms)
+
+    def move(self) -> None:
+        """Move the rates along their free part; positions too where those are small."""
+        on, w, n = self.on, self.motion.work, self.r.size
+        self._free()
+        twice = on.variable(2.0 * self.energies[0])
+        on.when(self.motion.tables.own[0].driven > 0, lambda: self._weigh(w.direction, twice))
+        share = self._share(twice.value)
+        size = on.absolute(stretch(on, share)) * self._size(w.direction, n)
+
+        def far() -> None:
+            change = on.variable(0.0)
+
+            def changed(j: Integer) -> None:
+                w.descent[j] = self.r[j] - self.before[j]
+
+            on.loop(n, changed)
+            self._weigh(w.descent, change)
+            alone = self.motion.tables.own[0].attached > 0  # what is attached pushes at rest, too
+            small = on.negate(on.either(twice.value >= change.value, alone))
+            on.when(small, lambda: self._everything(twice.value), lambda: self._rates(twice.value, size))
+
+        within = on.both(size <= 1.0, share >= -FARTHEST)
+        on.when(within, lambda: self._rates(twice.value, size), far)
+
+    def _share(self, twice: Real) -> Real:
+        """What is missing relative to half of what stretches: beyond all numbers where that is nothing."""
+        on = self.on
+        return on.select(twice > 0.0, 2.0 * self.short / on.select(twice > 0.0, twice, 1.0), -1.0)
+
+    def _size(self, move: Vector, at: Integer) -> Real:
+        """Root mean square of a move relative to what is allowed."""
+        on, total = self.on, self.on.variable(0.0)
+
+        def one(j: Integer) -> None:
+            x = move[j] / self.allowed[at + j]
+            total.value = total.value + x * x
+
+        on.loop(move.size, one)
+        return on.sqrt(total.value / on.real(on.select(move.size > 1, move.size, 1)))
+
+    def _weigh(self, rates: Vector, out: Variable[Real]) -> None:
+        """Twice the kinetic energy that rates would have."""
+        on, motion, w, found = self.on, self.motion, self.motion.work, self.on.scratch(3)
+        on.reach(motion.tables.own[0].energy, *motion.swept, self.q, rates, w.momenta, w.spin, found)
+        out.value = 2.0 * found[0]
+
+    def _free(self) -> None:
+        """Write the free part of the rates: the rates, less the least ones that do as is prescribed."""
+        on, w = self.on, self.motion.work
+
+        def released() -> None:
+            calm = replace(self.motion, tables=replace(self.motion.tables, gravity=on.scratch(3)))
+            calm.outward(on, self.q, w.zero)
+            self.status.value = calm.fold(on, self.q, w.spin, w.momenta)
+            calm.unfold(on, self.q, w.direction)
+
+        on.when(self.motion.tables.own[0].driven > 0, released, lambda: copy(on, self.r, w.direction))
+
+    def _rates(self, twice: Real, size: Real) -> None:
+        """Move the rates, no further than chosen steps may."""
+        on, w, account = self.on, self.motion.work, self.account
+        share = self._share(twice)
+        share = on.select(on.absolute(share) <= FARTHEST, share, 0.0)
+        chosen = on.both(on.same(account.chosen, 1), size > MOST)
+        alpha = stretch(on, share) * on.select(chosen, MOST / on.select(chosen, size, 1.0), 1.0)
+
+        def one(j: Integer) -> None:
+            self.r[j] = self.r[j] + alpha * w.direction[j]
+
+        on.loop(self.r.size, one)
+        moved = twice * alpha * (1.0 + 0.5 * alpha)
+        account.moved, account.size = moved, size
+        self.energies[0] = self.energies[0] + moved
+
+    def _everything(self, twice: Real) -> None:
+        """Move rates and positions, until no more than rounding is missing."""
+        on, w = self.on, self.motion.work
+        self._descend()
+        slope, first = on.variable(0.0), on.variable(self.short)
+        self._weigh(w.descent, slope)
+        whole = twice + self.h * self.h * slope.value
+        rounds, gone = on.counter(0), on.variable(0.0)
+
+        def once() -> Truth:
+            part = self.short / whole
+            gone.value = gone.value + part
+            self._shift(part)
+            rounds.value = rounds.value + 1
+            unsound = on.negate(on.same(self.status.value, 0))
+            return on.either(on.either(unsound, self.close), rounds.value >= ROUNDS)
+
+        def go() -> None:
+            on.repeat(once)
+            n, far = self.r.size, on.absolute(gone.value)
+            here = far * self._size(w.direction, n)
+            there = far * self.h * self.h * self._size(w.descent, 0)
+            self.account.size = on.sqrt(0.5 * (here * here + there * there))
+            self.account.moved = first.value - self.short
+
+        within = on.both(whole > 0.0, on.absolute(self.short) <= FARTHEST * whole)
+        on.when(on.both(within, on.same(self.status.value, 0)), go)
+
+    def _descend(self) -> None:
+        """Write the accelerations from rest by weight and springs."""
+        on, tables, w = self.on, self.motion.tables, self.motion.work
+        alone = replace(tables, drive=w.still, body=Table(Body, tables.body.integers, tables.body.reals, 0))
+        ns, idle = tables.node.size, w.idle
+        s_rate, made = idle.part(0, ns), idle.part(ns + 2, idle.size - (ns + 2))
+        calm = replace(self.motion, tables=alone)
+        self.status.value = calm.accelerate(on, self.q, w.zero, w.descent, s_rate, made, idle.part(ns, 2))
+
+    def _shift(self, part: Real) -> None:
+        """Move rates and positions by a part of their directions, and look at the energy there."""
+        on, motion, w = self.on, self.motion, self.motion.work
+
+        def one(j: Integer) -> None:
+            w.alter[j] = -(part * self.h * self.h) * w.descent[j]
+            self.r[j] = self.r[j] + part * w.direction[j]
+
+        on.loop(self.r.size, one)
+        motion.displace(on, w.alter, self.q)
+        if motion.closes:
+            self.status.value = motion.shut(on, self.q, self.r)
+        on.when(on.same(self.status.value, 0), self.look)

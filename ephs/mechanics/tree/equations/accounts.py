@@ -1,0 +1,117 @@
+"""Steps that keep the balance of energy, one by one: the account of a run, and the correction of a step's end.
+
+The energy that is not heat is what it was at the start, and the work, less the heat, by sums over the run that lose
+nothing to rounding: see `ephs.solve.march.account`.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, final
+
+import numpy as np
+
+from ephs.semantics.bundle import Array
+from ephs.solve.march import Status
+
+if TYPE_CHECKING:
+    from ephs.mechanics.tree.equations.equations import Equations, ReducedState
+
+__all__ = ["Accounts"]
+
+OWN = 4
+"""Numbers of an account before what rounding left of sums."""
+
+
+@final
+class Accounts:
+    """The accounts of one mechanism's runs.
+
+    Attributes
+    ----------
+    kept
+        Whether steps are corrected.
+    largest, at, total
+        Of the states that were kept: the largest sum in J of what corrections put in, its time, the sum of sizes.
+    """
+
+    def __init__(self, equations: "Equations") -> None:
+        self._equations, self.kept = equations, False
+        self.largest = self.at = self.total = 0.0
+
+    def opened(self, state: "ReducedState") -> "ReducedState":
+        """The state with an account, which begins here unless it has one."""
+        if state.account.size:
+            return state
+        eq = self._equations
+        held = np.nan if eq.led.counting else float(eq.engine.energy(state.q, state.r, state.heats)[:2].sum())
+        account = np.zeros(OWN + eq.ns + state.books.size)
+        account[0] = held + state.books[0] - state.books[1]
+        return replace(state, account=account)
+
+    def booked(
+        self, start: "ReducedState", tableau: Mapping[str, Any], k: Array, h: float, y1: Array, *, part: bool = False
+    ) -> tuple[Array, Array]:
+        """The end y1 of a step with rates k with heats and books, and the account with what rounding left of them.
+
+        Parameters
+        ----------
+        part
+            Whether it is a part of a step: its sums lie between those in the engine's ``books``.
+
+        Raises
+        ------
+        SolveError
+            A component lost entropy in the step.
+        """
+        eq, start = self._equations, self.opened(start)
+        status, y, carry = eq.engine.sum(tableau, k, h, eq.vector(start), y1, start.account[OWN:], part=part)
+        eq.refuse(status, eq.engine.failed)
+        return y, np.concatenate([start.account[:OWN], carry])
+
+    def corrected(
+        self, start: "ReducedState", end: "ReducedState", h: float, allowed: Array, *, chosen: bool
+    ) -> tuple["ReducedState", float]:
+        """The end of a step of h seconds moved to the energy that is left to it, and the step's error by that.
+
+        Heats, books and sums of the end are taken, and its loops closed. Where constraints nearly repeat each other and
+        motions are prescribed, what is missing is left to the steps that follow.
+
+        Parameters
+        ----------
+        allowed
+            (counted,) what errors of increments and rates may be.
+        chosen
+            Whether steps are chosen: then it is moved by no more than `ephs.solve.march.account.MOST` of these.
+
+        Raises
+        ------
+        SolveError
+            A component cannot be evaluated there.
+        """
+        eq, start, self.kept = self._equations, self.opened(start), True
+        carry = (end if end.account.size else start).account[OWN:]
+        if eq.careful and eq.driven.size:
+            return replace(end, account=np.concatenate([start.account[:OWN], carry])), 0.0
+        given, alone = (start.account[:OWN], eq.vector(start), eq.vector(end), end.q), np.full(allowed.size, np.inf)
+        found = eq.engine.correct(*given, alone if eq.careful else allowed, h, chosen=chosen)
+        if found[0] == Status.DEPENDENT:  # rates alone
+            found = eq.engine.correct(*given, alone, h, chosen=chosen)
+        status, q, y, account, error = found
+        eq.refuse(status, eq.engine.failed)
+        end = replace(end, account=np.concatenate([account, carry]))
+        if account[2] == start.account[2]:
+            return end, error
+        return replace(end, q=q, r=y[eq.nv : eq.nv + eq.n]), error
+
+    def note(self, state: "ReducedState") -> None:
+        """Remember what corrections put in up to a state that is kept."""
+        if state.account.size:
+            put, self.total = abs(float(state.account[2])), float(state.account[3])
+            if put > self.largest:
+                self.largest, self.at = put, state.t
+
+    def stats(self) -> dict[str, Any]:
+        """Statistics of corrected steps: by how much the balance would be missed without corrections."""
+        if not self.kept or self._equations.led.counting:
+            return {}
+        return {"plain_defect": {"sum": self.total, "largest": self.largest, "at": self.at}}

@@ -1,0 +1,49 @@
+"""The energy of motion and of weight, in one outward sweep that keeps what the other sweeps know."""
+
+from ephs.mechanics.tree.sweeps.joints import force_outside, frame, rate_inside
+from ephs.mechanics.tree.sweeps.outward import momentum
+from ephs.mechanics.tree.sweeps.records import Joint, Link, Tree
+from ephs.semantics.spaces.se3 import twist_inward
+from ephs.semantics.spaces.vectors import add, apply_transposed, combine, dot, scale
+from ephs.semantics.stage import Evaluator, Integer, Matrix, Vector
+
+__all__ = ["energy"]
+
+
+def energy(on: Evaluator, tree: Tree, q: Vector, r: Vector, momenta: Matrix, spin: Vector, out: Vector) -> None:
+    """Write kinetic energy, potential energy and the sum of its terms' sizes in J to ``out``.
+
+    Heights count from the origin of the ground's frame. Momenta I u (links, 6), in the links' frames, go to
+    ``momenta``, those of rates that have inertia of their own to ``spin`` (freedoms,). Of the memory, twists change, to
+    those of r at q.
+    """
+    ground = tree.states[tree.size]
+    ground.twist, ground.down, ground.level = [0.0] * 6, tree.gravity, 0.0
+    out[0], out[1], out[2] = 0.0, 0.0, 0.0
+
+    def one(i: Integer) -> None:
+        def through(joint: Joint, link: Link) -> None:
+            state, parent = tree.states[i], tree.states[link.parent]
+            rotation, place = frame(on, joint, link, q)
+            rate = rate_inside(on, joint, link, q, [r[link.r_at + k] for k in range(joint.dim)])
+            twist = add(twist_inward(rotation, place, parent.twist), combine(joint.basis, rate))
+            down, level = parent.down, parent.level
+            level = level + dot(down, place)
+            down = apply_transposed(rotation, down)
+            state.twist, state.down, state.level = twist, down, level
+            carried = momentum(link, twist)
+            for k, x in enumerate(carried):
+                momenta[i, k] = x
+            weight = link.mass * level + dot(down, link.moment)
+            out[0] = out[0] + 0.5 * dot(twist, carried)
+            if joint.armature:
+                turning = scale(link.armature, rate)
+                out[0] = out[0] + 0.5 * dot(turning, rate)
+                for k, x in enumerate(force_outside(on, joint, link, q, turning)):
+                    spin[link.r_at + k] = x
+            out[1] = out[1] - weight
+            out[2] = out[2] + on.absolute(weight)
+
+        tree.visit(on, i, through)
+
+    tree.each(on, one)

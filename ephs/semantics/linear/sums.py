@@ -1,0 +1,16 @@
+"""Sums over many steps that lose nothing to rounding.
+
+Knuth, *The Art of Computer Programming* 2, 4.2.2, theorem B. Numbers are floats, arrays, or abstract ones.
+"""
+
+from typing import Any
+
+__all__ = ["grown"]
+
+
+def grown(total: Any, carry: Any, change: Any) -> tuple[Any, Any]:
+    """Return total + carry + change, rounded, and what rounding left of it, to carry on to the next sum."""
+    wanted = change + carry
+    found = total + wanted
+    taken = found - total
+    return found, (total - (found - taken)) + (wanted - taken)

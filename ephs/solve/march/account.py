@@ -1,0 +1,62 @@
+"""Both laws in a step: heat as energy by sums that lose nothing, and the energy that is left to the motion.
+
+With weights b_j of the stages, heats and books change by h Σ b_j of their rates. All other energy is then what it was,
+and the work, less the heat; by how much a step misses that, its plain defect, is of the order of its error. Moving the
+state by as little along the gradient of the energy keeps the order (Hairer, Lubich and Wanner, *Geometric Numerical
+Integration*, IV.4). The defect says how accurate the motion is, which a corrected balance does not: it is kept.
+"""
+
+from ephs.semantics.stage import Evaluator, Real, Record, integer, real
+
+__all__ = ["MOST", "ROUNDING", "WORTH", "Account", "stretch", "worth"]
+
+ROUNDING = 16.0 * 2.220446049250313e-16
+"""Part of the terms of an energy below which what is missing is rounding, and left."""
+MOST = 10.0
+"""Errors that a tolerance allows by which a correction moves a state at most where steps are chosen."""
+WORTH = 0.1
+"""Error of a step beside the correction that it needs: steps are refused whose correction is ten times what a tolerance
+allows."""
+
+
+class Account(Record):
+    """What a run has to account for.
+
+    Attributes
+    ----------
+    anchor
+        Energy in J of what is not heat where nothing has been booked; not a number where nothing is free to move.
+    left
+        Energy in J that the steps so far left missing.
+    put, total
+        Sum in J of the energies that corrections put in, and of their sizes.
+    moved, rest, size
+        Of the step that was tried last: energy put in, energy missing, errors that a tolerance allows by which the
+        correction moves the state.
+    chosen
+        1 where steps are chosen, not on a grid.
+    begins
+        1 where the anchor is that of the state that a march starts from.
+    """
+
+    anchor = real()
+    left = real()
+    put = real()
+    total = real()
+    moved = real()
+    rest = real()
+    size = real()
+    chosen = integer()
+    begins = integer()
+
+
+def stretch(on: Evaluator, share: Real) -> Real:
+    """Return α of (1 + α)² = 1 + share, exact to rounding where that is small."""
+    return share / (1.0 + on.sqrt(on.maximum(1.0 + share, 0.0)))
+
+
+def worth(on: Evaluator, account: Account) -> Real:
+    """Return the error of the step that was tried last by its correction, less what earlier ones left."""
+    short = account.moved + account.rest
+    own = on.absolute(short - account.left) / on.maximum(on.absolute(short), 1e-300)
+    return on.select(account.size > 0.0, WORTH * account.size * on.minimum(own, 1.0), 0.0)
