@@ -2,16 +2,16 @@
 
 from ephs.solve.march.account import Account as Account
 from ephs.solve.march.march import march as march
-from ephs.solve.march.records import BOOKS as BOOKS
-from ephs.solve.march.records import ERRORS as ERRORS
-from ephs.solve.march.records import MEMORY as MEMORY
+from ephs.solve.march.memory import BOOKS as BOOKS
+from ephs.solve.march.memory import ERRORS as ERRORS
+from ephs.solve.march.memory import MEMORY as MEMORY
+from ephs.solve.march.memory import Books as Books
+from ephs.solve.march.memory import Errors as Errors
+from ephs.solve.march.memory import Memory as Memory
 from ephs.solve.march.records import TABLEAU as TABLEAU
-from ephs.solve.march.records import Books as Books
 from ephs.solve.march.records import Control as Control
 from ephs.solve.march.records import Ending as Ending
-from ephs.solve.march.records import Errors as Errors
 from ephs.solve.march.records import Field as Field
-from ephs.solve.march.records import Memory as Memory
 from ephs.solve.march.records import Motion as Motion
 from ephs.solve.march.records import Status as Status
 from ephs.solve.march.records import Tableau as Tableau

@@ -6,6 +6,7 @@ state by as little along the gradient of the energy keeps the order (Hairer, Lub
 Integration*, IV.4). The defect says how accurate the motion is, which a corrected balance does not: it is kept.
 """
 
+from ephs.semantics.spaces.rank import TINY
 from ephs.semantics.stage import Evaluator, Real, Record, integer, real
 
 __all__ = ["MOST", "ROUNDING", "WORTH", "Account", "stretch", "worth"]
@@ -58,5 +59,5 @@ def stretch(on: Evaluator, share: Real) -> Real:
 def worth(on: Evaluator, account: Account) -> Real:
     """Return the error of the step that was tried last by its correction, less what earlier ones left."""
     short = account.moved + account.rest
-    own = on.absolute(short - account.left) / on.maximum(on.absolute(short), 1e-300)
+    own = on.absolute(short - account.left) / on.maximum(on.absolute(short), TINY)
     return on.select(account.size > 0.0, WORTH * account.size * on.minimum(own, 1.0), 0.0)

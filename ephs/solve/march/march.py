@@ -8,7 +8,8 @@ from ephs.semantics.linear.dense import copy
 from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Truth, Variable, Vector
 from ephs.solve.march.account import Account, worth
 from ephs.solve.march.control import PATIENCE, held_back, judge, length
-from ephs.solve.march.records import Books, Control, Ending, Memory, Motion, Status, Tableau
+from ephs.solve.march.memory import Books, Memory
+from ephs.solve.march.records import Control, Ending, Motion, Status, Tableau
 from ephs.solve.march.steps import allow, attempt, book, drift, error_of, first, stiffness_of
 
 __all__ = ["march"]

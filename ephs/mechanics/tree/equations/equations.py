@@ -5,7 +5,7 @@ spaces, v̇ = dexp⁻¹(v) r.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any, final
 
 import numpy as np
@@ -20,6 +20,7 @@ from ephs.mechanics.tree.equations.led import Led
 from ephs.mechanics.tree.equations.paper import PaperStates
 from ephs.mechanics.tree.equations.reading import JointStates
 from ephs.mechanics.tree.equations.stages import evaluated
+from ephs.mechanics.tree.equations.state import ReducedState
 from ephs.mechanics.tree.finding.layout import Layout
 from ephs.mechanics.tree.finding.mechanism import reduce_system
 from ephs.mechanics.tree.finding.naming import tolerances, within
@@ -40,34 +41,6 @@ PUSHED = 1e-9
 """Size of a push below which no freedom is left that it could move."""
 ASIDE = 0.1
 """Displacement, in rad or m, that finds the constraints which repeat others in every configuration."""
-
-
-@final
-@dataclass(frozen=True, slots=True, eq=False)
-class ReducedState:
-    """Where a mechanism is: joints' elements q, rates r of the tree, heats, and what was counted since the start.
-
-    Parameters
-    ----------
-    heats
-        Energies in J of what stores entropy, from s = 0; of the environment θ₀ s.
-    books
-        Heat and work in J, then the entropy that each component made in J/K.
-    memory
-        What a method takes along from step to step; none after a start.
-    account
-        (4 + heats + books,) energy in J where nothing is booked, what is missing of it, what corrections put in, and
-        the sum of their sizes, see `ephs.solve.march.account.Account`; then what rounding left of sums. Empty where a
-        run starts.
-    """
-
-    t: float
-    q: Array
-    r: Array
-    heats: Array
-    books: Array
-    memory: tuple[Array, ...] = ()
-    account: Array = field(default_factory=lambda: np.zeros(0))
 
 
 @final

@@ -1,0 +1,38 @@
+"""Where a mechanism in joint coordinates is, and what was counted since the start."""
+
+from dataclasses import dataclass, field
+from typing import final
+
+import numpy as np
+
+from ephs.semantics.bundle import Array
+
+__all__ = ["ReducedState"]
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class ReducedState:
+    """Where a mechanism is: joints' elements q, rates r of the tree, heats, and what was counted since the start.
+
+    Parameters
+    ----------
+    heats
+        Energies in J of what stores entropy, from s = 0; of the environment θ₀ s.
+    books
+        Heat and work in J, then the entropy that each component made in J/K.
+    memory
+        What a method takes along from step to step; none after a start.
+    account
+        (4 + heats + books,) energy in J where nothing is booked, what is missing of it, what corrections put in, and
+        the sum of their sizes, see `ephs.solve.march.account.Account`; then what rounding left of sums. Empty where a
+        run starts.
+    """
+
+    t: float
+    q: Array
+    r: Array
+    heats: Array
+    books: Array
+    memory: tuple[Array, ...] = ()
+    account: Array = field(default_factory=lambda: np.zeros(0))
