@@ -1,4 +1,4 @@
-"""The bar of a run: the time left, steps a second, the energy balance so far."""
+"""Progress bar of a run: time left, steps a second, energy defect so far."""
 
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -10,7 +10,7 @@ __all__ = ["progress_bar", "said_of"]
 
 @contextmanager
 def progress_bar(name: str) -> Iterator[Callable[[float, float, Mapping[str, Any]], None]]:
-    """Show a bar with the time left, and what is compiled before, on a terminal only."""
+    """Show a bar with the time left and the program being compiled, on a terminal only."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -43,7 +43,7 @@ def progress_bar(name: str) -> Iterator[Callable[[float, float, Mapping[str, Any
 
 
 def said_of(t: float, until: float, stats: Mapping[str, Any], spent: float) -> str:
-    """Where a run stands, in words: time, steps, steps a second, and by how much energy is not balanced so far."""
+    """Progress of a run in words: time, steps, steps a second, and the energy defect so far."""
     words = [f"t = {t:.3g} of {until:g} s"]
     if "steps" in stats:
         words.append(f"{stats['steps']} steps")

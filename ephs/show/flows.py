@@ -1,4 +1,4 @@
-"""Where exergy came from and where it went: a picture of a ledger from one instant to another."""
+"""Flow diagram of exergy between two instants."""
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 

@@ -92,7 +92,7 @@ def place(
 @final
 @dataclass(frozen=True, slots=True)
 class _Page:
-    """What is to be drawn: the graph, and which of its nodes are in which opened composite."""
+    """Graph to be drawn, and the opened composite of each node."""
 
     graph: Graph
     members: Mapping[str, frozenset[str]]
@@ -140,7 +140,7 @@ def _picture(page: _Page, points: Points, room: float = 1.0) -> Placement:
 @final
 @dataclass(frozen=True, slots=True)
 class _Field:
-    """Where nodes and opened composites are, before the picture has its rectangle."""
+    """Positions of nodes and opened composites, before the outer rectangle."""
 
     at: Mapping[str, Point]
     radii: Mapping[str, float]

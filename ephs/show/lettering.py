@@ -1,4 +1,4 @@
-"""Where names go: beside their dot or wire, on nothing else."""
+"""Placement of names beside dots and wires, without overlaps."""
 
 import itertools
 import math

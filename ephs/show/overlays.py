@@ -51,7 +51,7 @@ class Heat:
     high: float
 
     def share(self, node: str, frame: int) -> float:
-        """Where in the range a node is, from 0 to 1; 0 for what has no node."""
+        """Temperature of a node in the range, from 0 to 1; 0 without a node."""
         if node not in self.temperatures or not self.high > self.low:
             return 0.0
         return float((self.temperatures[node][frame] - self.low) / (self.high - self.low))

@@ -1,4 +1,4 @@
-"""Where boxes and junctions go: given points, else Graphviz' neato, else networkx; then small repairs."""
+"""Positions of boxes and junctions: given points, else Graphviz' neato, else networkx; then small repairs."""
 
 import ctypes
 import math

@@ -182,7 +182,7 @@ def _words(axes: "Axes", bodies: dict[str, Array], joints: dict[str, Array], siz
 
 
 def _shifts(wide: float, high: float) -> list[tuple[float, float]]:
-    """Where the middle of a name may be from what it names, in points; the first is the best."""
+    """Candidate offsets of a name's centre from its object, in points, best first."""
     aside, over = 0.5 * wide + 8.0, 0.5 * high + 8.0
     near = [(0.0, over), (aside, 0.0), (aside, over), (-aside, over), (-aside, 0.0), (0.0, -over), (aside, -over)]
     return [(0.0, 0.0), *near, (-aside, -over), (0.0, 2.2 * over), (0.0, -2.2 * over)]

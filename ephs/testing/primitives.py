@@ -17,7 +17,7 @@ from ephs.semantics.spaces import Pair
 __all__ = ["generators", "irreversibles", "reversibles", "storages"]
 
 CLEARED = 1e-12
-"""What rounding leaves of entries of order one."""
+"""Rounding error of entries of order one."""
 
 
 READING = st.sampled_from((False, True, True, True))

@@ -1,4 +1,4 @@
-"""Where links, joints and frames of an SDF model are. Source: the SDFormat specification, "Pose Frame Semantics"."""
+"""Poses of links, joints and frames of an SDF model. Source: the SDFormat specification, "Pose Frame Semantics"."""
 
 from collections.abc import Mapping
 from typing import final

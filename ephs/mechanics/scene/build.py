@@ -40,7 +40,7 @@ __all__ = [
 
 
 def component_path(kind: str, name: str) -> Path:
-    """Where a (dotted) body, joint, … lies: ``left.crank`` is the box ``parts.left.bodies.crank``."""
+    """Box of a (dotted) body, joint, …: ``left.crank`` is the box ``parts.left.bodies.crank``."""
     *parts, last = name.split(".")
     return Path([*(word for part in parts for word in ("parts", part)), kind, last])
 
@@ -124,7 +124,7 @@ def contact_points(scene: Scene, of: Contact) -> tuple[tuple[str, str], tuple[To
 
 
 def scene_inputs(scene: Scene) -> dict[Path, Input]:
-    """What the scene prescribes: drives as flows, motions as efforts, at the ports of `drive_ports`."""
+    """Prescribed drives as flows and motions as efforts, at the ports of `drive_ports`."""
     out: dict[Path, Input] = {}
     for _, j in scene.all_joints():
         if _is_driven(j):
@@ -168,7 +168,7 @@ def _needs_environment(scene: Scene) -> bool:
 @final
 @dataclass(frozen=True, slots=True)
 class _Demands:
-    """What the level above wants to reach, by names as seen from this level: bodies, thermal nodes, driven joints."""
+    """Bodies, thermal nodes and driven joints that the level above connects to, by names of this level."""
 
     bodies: frozenset[str]
     nodes: frozenset[str]
@@ -276,7 +276,7 @@ def _joined(b: _Builder, part: str, port: Path, of: Quantity) -> str:
 
 
 def _demands_on_parts(scene: Scene, demands: _Demands) -> _Demands:
-    """What the level above and this level's own joints, springs and conductions want of its parts."""
+    """Ports that the level above and this level's joints, springs and conductions need from its parts."""
     pairs = [*scene.joints.values(), *scene.springs.values()]
     bodies = {name for x in pairs for name in (x.body1, x.body2)} | _touching(scene)
     nodes = {x.heat for x in (*pairs, *scene.contacts.values())} | {

@@ -121,11 +121,11 @@ class Link:
         return rate, relative - basis @ rate
 
     def place_second(self, poses: Array, x: Array) -> Array:
-        """Where body 2 is when body 1 stands and the joint has this element."""
+        """Pose of body 2 from that of body 1 and the joint's element."""
         return self._place(self.first(poses), self.coupling.include(x), self.frame2)
 
     def place_first(self, poses: Array, x: Array) -> Array:
-        """Where body 1 is when body 2 stands and the joint has this element."""
+        """Pose of body 1 from that of body 2 and the joint's element."""
         return self._place(self.second(poses), SE3.inverse(self.coupling.include(x)), self.frame1)
 
     def move_second(self, twists: Array, x: Array, rate: Array) -> Array:

@@ -82,7 +82,7 @@ def names(model: Scene | System) -> list[str]:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class _Place:
-    """Where a path of a scene leads: the thing, its field, and the entry of it."""
+    """Target of a parameter path: object, field, and entry of the field."""
 
     path: str
     key: str

@@ -1,4 +1,4 @@
-"""Where a joint is: from `at` and `axis` in the world, or from a frame in each body."""
+"""Joint frames, from `at` and `axis` in the world or from a frame in each body."""
 
 from dataclasses import dataclass
 from typing import Any, final

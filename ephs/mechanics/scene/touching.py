@@ -89,7 +89,7 @@ def _stiffness(scene: Scene, joint: Joint) -> float:
 
 
 def overlaps(scene: Scene) -> list[Fault]:
-    """What overlaps at the start by more than a part of the scene's length."""
+    """Surfaces that overlap at the start by more than a part of the scene's length."""
     surfaces = dict(scene.all_surfaces())
     poses = {GROUND: IDENTITY_POSE} | {name: body.pose for name, body in scene.all_bodies()}
     length = Snapshot.of(scene).scale(scene.world.gravity).length if scene.contacts else 1.0

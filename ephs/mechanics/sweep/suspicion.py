@@ -28,7 +28,7 @@ ROUNDING = 1e-12
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Suspicion:
-    """What members of an ensemble are held against.
+    """Reference values of the audit of an ensemble's members.
 
     Parameters
     ----------

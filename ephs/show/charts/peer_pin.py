@@ -189,7 +189,7 @@ class PinModel:
             pin.initConstraintDynamics(self.model, self.data, self.constraints, self.workspace)
 
     def _lay(self, places: list[tuple[int, int, int]]) -> None:
-        """Where angles and quaternions are among the coordinates, and their rates among the velocities."""
+        """Indices of angles and quaternions among the coordinates, and of their rates among the velocities."""
         self._plain = all(size == 1 for *_, size in places)
         self._angles = np.array([a for a, _, size in places if size == 1], dtype=int)
         self._speeds = np.array([b for _, b, size in places if size == 1], dtype=int)

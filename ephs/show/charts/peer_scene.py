@@ -32,7 +32,7 @@ class PeerError(Exception):
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class PeerRun:
-    """Where a peer's run ended: (b, 3) positions, (b, 3, 3) rotations, the time of integration, and counts."""
+    """Final state of a peer's run: (b, 3) positions, (b, 3, 3) rotations, the time of integration, and counts."""
 
     position: Array
     rotation: Array

@@ -30,7 +30,7 @@ TRUSTED = 1e-4
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """Where the b bodies of a scene were at n times.
+    """Poses of the b bodies of a scene at n times.
 
     Parameters
     ----------

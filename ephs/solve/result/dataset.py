@@ -150,7 +150,7 @@ def _books(ledgers: Ledgers) -> Iterable[tuple[str, Array]]:
 
 
 def sampled_inputs(problem: Problem, t: Array, state: Callable[[int], State]) -> dict[Path, Variable]:
-    """What is prescribed at each outer port, at some instants; ``state(i)`` gives the states that inputs read."""
+    """Prescribed values at each outer port, at some instants; ``state(i)`` gives the states that inputs read."""
     out: dict[Path, Variable] = {}
     states = [state(i) for i in range(t.size)] if not problem.constant else [{}] * t.size
     for slot in problem.descriptor.outer:

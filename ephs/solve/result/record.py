@@ -146,12 +146,12 @@ class Recorder:
         return self.rows.whole(self._d)
 
     def snapshot(self) -> Snapshot:
-        """Where it stands, without the rows."""
+        """Position of the recorder, without the rows."""
         inside = self._inside.snapshot() if self._inside is not None else None
         return {"next": self._next, "last": list(self._last), "least": float(self._least), "inside": inside}
 
     def restore(self, snapshot: Snapshot, rows: Record | None) -> None:
-        """Where a recorder of the same run stood, and its rows."""
+        """Position and rows of a recorder of the same run."""
         self._next, self._last = snapshot["next"], tuple(snapshot["last"])
         self._least = snapshot["least"]
         if self._inside is not None:
