@@ -33,6 +33,7 @@ from benchmarks import (
     specialised,
     staged,
     start,
+    steps,
     traced,
     work,
 )
@@ -59,6 +60,7 @@ TABLES: dict[str, Callable[[Path | None], str | Report]] = {
     "ensemble": lambda _: ensemble.report(),
     "evaluation": lambda _: evaluation.report(),
     "specialised": lambda _: specialised.report(),
+    "steps": lambda _: steps.report(),
     "work": work.report,
     "growth": lambda _: growth.report(),
     "start": lambda _: start.report(),

@@ -4,7 +4,7 @@ import ctypes
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, final
+from typing import Any, cast, final
 
 import numpy as np
 
@@ -78,8 +78,12 @@ class Call:
         return self.bind(*arguments)()
 
 
-def _passed(part: Any) -> Any:
-    return part.__array_interface__["data"][0] if isinstance(part, np.ndarray) else part
+def _address(array: "np.ndarray[Any, Any]") -> int:
+    """Return where the numbers of an array lie."""
+    try:
+        return ctypes.addressof(ctypes.c_char.from_buffer(cast("Any", array)))
+    except (TypeError, ValueError):  # read-only, or empty
+        return int(array.__array_interface__["data"][0])
 
 
 def apart(entry: Entry, parts: list[Any]) -> tuple[Any, ...]:
@@ -90,13 +94,18 @@ def apart(entry: Entry, parts: list[Any]) -> tuple[Any, ...]:
     StageError
         Arrays share memory: programs are compiled as if none did.
     """
-    passed = tuple(map(_passed, parts))
+    passed: list[Any] = []
     spans: list[tuple[int, int, str]] = []
-    for (name, _), part, start in zip(entry.atoms, parts, passed, strict=True):
-        if isinstance(part, np.ndarray) and (size := part.nbytes):
-            spans.append((start, start + size, name))
+    for (name, _), part in zip(entry.atoms, parts, strict=True):
+        if isinstance(part, np.ndarray):
+            start = _address(cast("np.ndarray[Any, Any]", part))
+            passed.append(start)
+            if size := part.nbytes:
+                spans.append((start, start + size, name))
+        else:
+            passed.append(part)
     spans.sort()
     for (_, end, one), (start, _, other) in pairwise(spans):
         if start < end:
             raise StageError("overlap", where=entry.name, argument=one, other=other)
-    return passed
+    return tuple(passed)

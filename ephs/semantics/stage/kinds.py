@@ -58,15 +58,21 @@ class Kind:
     mapped: "Callable[[Callable[[Kind], Kind]], Kind] | None" = None
 
 
+_DTYPES: Final[dict[type[np.generic], np.dtype[Any]]] = {kind: np.dtype(kind) for kind in (np.float64, np.int64)}
+
+
 def _array(value: Any, dtype: type[np.generic], shape: Shape) -> bool:
     """Tell whether a value is a contiguous array of a type and a shape."""
     if not isinstance(value, np.ndarray):
         return False
     array = cast("np.ndarray[Any, np.dtype[Any]]", value)
-    fits = len(array.shape) == len(shape) and all(
-        want in (None, have) for want, have in zip(shape, array.shape, strict=True)
-    )
-    return fits and array.dtype == dtype and array.flags.c_contiguous and array.flags.aligned
+    if len(array.shape) != len(shape) or array.dtype != _DTYPES[dtype]:
+        return False
+    for want, have in zip(shape, array.shape, strict=True):
+        if want is not None and want != have:
+            return False
+    flags = array.flags
+    return flags.c_contiguous and flags.aligned
 
 
 def _is_integer(value: Any) -> bool:

@@ -1,0 +1,120 @@
+"""The programs of the natural methods: floats and machine code give the same bits, whatever a step meets."""
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import ephs
+from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.semantics.spaces import codes
+from ephs.semantics.spaces.differentials import DIMENSIONS, differentials
+from ephs.semantics.stage import Program
+from ephs.solve.methods.analysis import analyse
+from ephs.solve.methods.gauss import gauss_program
+from ephs.solve.methods.natural import Natural
+from ephs.solve.methods.natural4 import INSTANT, Natural4
+from ephs.solve.methods.newton import natural_program
+from ephs.solve.methods.records import DONE, parts_of
+from ephs.solve.methods.scheme import STAGES
+from ephs.solve.model import Model, compile_model
+
+ROOT = Path(__file__).resolve().parents[2]
+seeds = st.integers(0, 2**32 - 1)
+
+
+SCENES = ["heavy-top", "hot-brake"]
+"""A body on a spherical joint; a wheel, its brake and their heat."""
+
+
+@cache
+def model_of(name: str) -> tuple[Model, np.ndarray]:
+    problem = problem_of_scene(ephs.load(ROOT / f"scenes/{name}.toml"))
+    made = compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
+    return made, problem.descriptor.pack(problem.initial)
+
+
+def copied(value):
+    return {name: array.copy() for name, array in parts_of(value).items()}
+
+
+def same(program: Program, name: str, given) -> list:
+    """Run an entry function both ways on copies of its arguments; the arguments as both leave them, and the result."""
+    runs = []
+    for calls in (program.plain(), program.compiled()):
+        arguments = given()
+        result = calls[name](*arguments)
+        runs.append([*arguments, np.array(0 if result is None else result)])
+    for one, other in zip(*runs, strict=True):
+        pairs = [(one[key], other[key]) for key in one] if isinstance(one, dict) else [(one, other)]
+        assert all(np.array_equal(a, b, equal_nan=True) for a, b in pairs)
+    return runs[0]
+
+
+def step(model: Model, x, seed, stages):
+    """The arguments of one step from unknowns that are off by something."""
+    rng = np.random.default_rng(seed)
+    h = 10.0 ** rng.uniform(-4.0, -2.0)
+    shape = (stages, model.unknowns) if stages else model.unknowns
+    method = (Natural4 if stages else Natural)(model)
+    z = method.init(x).z + 1e-3 * rng.choice([0.0, 1.0]) * rng.standard_normal(shape)
+    rows = [np.zeros((1, width)) for width in (x.size, model.tables.kind.size, 5)]
+    ends = [np.zeros(4 + model.tables.kind.size), *rows, np.zeros(4, dtype=np.int64), 1]
+    return h, method, z, ends
+
+
+@pytest.mark.parametrize("name", SCENES)
+@settings(max_examples=2)
+@given(seed=seeds)
+def test_a_step_of_order_2(name, seed):
+    made, x = model_of(name)
+    h, method, z, ends = step(made, x, seed, 0)
+    order = analyse(made, x, method.init(x).z, h)
+    memory = made.memory(order.fill)
+
+    def given():
+        own = [array.copy() if isinstance(array, np.ndarray) else array for array in ends]
+        return [
+            parts_of(made.tables), parts_of(order.order), copied(memory), x.copy(), z.copy(), z.copy(), made.scal(h),
+            made.input_values(), *own,
+        ]  # fmt: skip
+
+    found = same(natural_program(), "advance", given)
+    assert found[-3][2] == (found[-3][0] == DONE)
+    assert np.array_equal(found[3], x) != (found[-3][0] == DONE)
+
+
+@pytest.mark.parametrize("name", SCENES)
+@settings(max_examples=1)
+@given(seed=seeds)
+def test_the_stages_of_order_4(name, seed):
+    made, x = model_of(name)
+    h, method, z, _ = step(made, x, seed, STAGES)
+    inputs = np.tile(made.input_values(), (STAGES, 1))
+
+    def given():
+        return [
+            parts_of(made.tables), parts_of(method._groups), np.zeros(made.unknowns, dtype=np.int64), x.copy(),
+            z.copy(), made.scal(h), made.scal(0.0), made.scal(INSTANT), inputs,
+            copied(made.memory()), copied(method._scratch), 1,
+        ]  # fmt: skip
+
+    found = same(gauss_program(), "linearise", given)
+    assert found[-1] == 0
+    assert found[-3]["slope"].any()
+
+
+@settings(max_examples=10)
+@given(seed=seeds, size=st.sampled_from([0.0, 1e-9, 0.1, 1.0, 3.0]))
+@pytest.mark.parametrize("code", DIMENSIONS)
+def test_differentials(code, seed, size):
+    v = size * np.random.default_rng(seed).standard_normal(DIMENSIONS[code])
+    for name in (f"dexp_left_{code}", f"dexp_left_inv_{code}"):
+        same(differentials(), name, lambda: [v, np.zeros((v.size, v.size))])
+
+
+def test_every_group_but_vectors_has_differentials():
+    assert set(DIMENSIONS) == {codes.SO3, codes.SE2, codes.SE3, codes.SO3xR3}
