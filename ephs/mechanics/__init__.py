@@ -15,9 +15,13 @@ if TYPE_CHECKING:
     from ephs.mechanics.elements.joints import mbs_pattern as mbs_pattern
     from ephs.mechanics.elements.joints import spring_damper as spring_damper
     from ephs.mechanics.elements.joints import universal_joint as universal_joint
+    from ephs.mechanics.elements.motor import armature as armature
+    from ephs.mechanics.elements.motor import motor as motor
     from ephs.mechanics.motion.inside import Inside as Inside
 
 _HOME = {
+    "armature": "ephs.mechanics.elements.motor",
+    "motor": "ephs.mechanics.elements.motor",
     "beam_element": "ephs.mechanics.elements.beam",
     "Inside": "ephs.mechanics.motion.inside",
     "joint": "ephs.mechanics.elements.joints",

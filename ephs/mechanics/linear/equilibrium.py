@@ -107,6 +107,9 @@ def equilibrium(
 def _of_scene(scene: Scene) -> Equilibrium:
     from ephs.mechanics.dynamics import Dynamics
 
+    if motors := [name for name, _ in scene.all_motors()]:
+        found = f"a scene with the motor {motors[0]}"
+        raise OptionError("model", found, "a scene without motors, or its system: their currents are states")
     moving = [name for name, joint in scene.all_joints() if joint.motion]
     if moving:
         raise _none(f"joints.{moving[0]}", "its motion is prescribed")

@@ -128,7 +128,10 @@ class _Linear:
         _, self.r, _ = _split(model, state)
         self.moving = bool(np.any(self.r))
         self.velocities = model.velocity_derivatives(self.state)
-        self.nodes = [i for i, path in enumerate(model.layout.entropies) if tuple(path)[-3:-2] == ("thermal",)]
+        self.motors = model.layout.attached
+        self.nodes = [
+            i for i, path in enumerate(model.layout.entropies) if i in self.motors or tuple(path)[-3:-2] == ("thermal",)
+        ]
         self.ad = self._ad()
         self.turned = self._turned()
         prescribed = {name for name, joint in model.scene.all_joints() if joint.motion is not None}
@@ -268,6 +271,8 @@ class _Linear:
         """The structure, or why there is none; and A, which with a structure is (J − R) Q to rounding."""
         if self.moving:
             return None, "the mechanism moves in this state", A
+        if self.motors:
+            return None, "motors give power in this state", A
         off = unbalanced(self.model, self.state, self.free, by.force_q)
         if off > BALANCED:
             return None, f"{off:.1e} of the forces is not balanced in this state", A

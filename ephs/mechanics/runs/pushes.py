@@ -1,6 +1,7 @@
 """Forces on a scene's joints, bodies and markers, as users give them."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any, final
 
 import numpy as np
@@ -33,33 +34,38 @@ def sum_of(one: Signal, other: Signal) -> Signal:
     return Signal(lambda t, state: one.at(t, state) + other.at(t, state), held=held)
 
 
-def scene_signals(scene: Scene, inputs: Mapping[Any, Any], view: View) -> tuple[dict[str, Signal], dict[str, Signal]]:
-    """Forces on joints and wrenches on bodies, by name: the loads, and what a user gives by joint, body and marker.
+def scene_signals(scene: Scene, inputs: Mapping[Any, Any], view: View) -> tuple[dict[str, Signal], ...]:
+    """Forces on joints, wrenches on bodies, voltages of motors, by name: the loads, and what a user gives.
 
     A key may be a tuple of names, whose input gives the numbers of all of them in a row.
 
     Raises
     ------
     AssemblyError
-        There is no such joint, body or marker.
+        There is no such joint, body, marker or motor.
     """
     forces: dict[str, Signal] = {}
     wrenches: dict[str, Signal] = {}
+    voltages: dict[str, Signal] = {}
     joints, bodies, markers = dict(scene.all_joints()), dict(scene.all_bodies()), dict(scene.all_markers())
     sizes = {f"joints.{name}": j.dim for name, j in joints.items()} | {f"bodies.{name}": 6 for name in bodies}
+    sizes |= {f"motors.{name}": 1 for name, _ in scene.all_motors()}
     sizes |= {f"markers.{name}": 3 for name, marker in markers.items() if marker.body in bodies}
     for _, load in scene.all_loads():
         push = _of_load(load)
         wrenches[load.body] = sum_of(wrenches[load.body], push) if load.body in wrenches else push
     for key, given in _single(inputs, sizes, view):
         kind, _, name = key.partition(".")
+        if kind == "motors":
+            voltages[name] = replace(given, effort=True)
+            continue
         if kind == "joints":
             forces[name] = sum_of(forces[name], given) if name in forces else given
             continue
         if kind == "markers":
             name, given = markers[name].body, _at_marker(markers[name], given)
         wrenches[name] = sum_of(wrenches[name], given) if name in wrenches else given
-    return forces, wrenches
+    return forces, wrenches, voltages
 
 
 def _single(inputs: Mapping[Any, Any], sizes: Mapping[str, int], view: View) -> Iterator[tuple[str, Signal]]:

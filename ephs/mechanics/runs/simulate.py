@@ -18,7 +18,15 @@ from ephs.mechanics.runs.pace import longest_step
 from ephs.mechanics.runs.pushes import part_of, scene_signals, sum_of
 from ephs.mechanics.runs.running import Course
 from ephs.mechanics.runs.signals import asked_of, jumps_of, signal, times_of
-from ephs.mechanics.scene.build import drive_ports, initial_state, scene_inputs, scene_names, scene_system, wrench_port
+from ephs.mechanics.scene.build import (
+    drive_ports,
+    initial_state,
+    motor_port,
+    scene_inputs,
+    scene_names,
+    scene_system,
+    wrench_port,
+)
 from ephs.mechanics.scene.document import scene_to_text
 from ephs.mechanics.scene.meant import is_shaky
 from ephs.mechanics.scene.model import Scene
@@ -322,7 +330,7 @@ def problem_of_scene(
 ) -> Problem:
     """The initial value problem of a scene."""
     view = Names(scene).view
-    forces, wrenches = scene_signals(scene, inputs or {}, view)
+    forces, wrenches, voltages = scene_signals(scene, inputs or {}, view)
     system = scene_system(scene, driven=frozenset(forces), wrenches=frozenset(wrenches))
     state = initial_state(scene)
     if initial:
@@ -337,6 +345,7 @@ def problem_of_scene(
                     "input", f"joints.{name}", found="a force", expected="none: its motion is prescribed"
                 )
             signals[port] = sum_of(signals[port], extra) if port in signals else extra
+    signals |= {motor_port(name): voltage for name, voltage in voltages.items()}
     signals |= {wrench_port(body): wrench for body, wrench in wrenches.items()}
     world = scene.world
     problem = Problem(

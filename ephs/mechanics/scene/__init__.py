@@ -6,14 +6,14 @@ and is imported where it is used.
 
 from ephs.mechanics.scene.adjustment import Adjustment as Adjustment
 from ephs.mechanics.scene.adjustment import Displacement as Displacement
+from ephs.mechanics.scene.attached import Conduction as Conduction
+from ephs.mechanics.scene.attached import ThermalNode as ThermalNode
 from ephs.mechanics.scene.errors import Fault as Fault
 from ephs.mechanics.scene.errors import ModelWarning as ModelWarning
 from ephs.mechanics.scene.errors import SceneError as SceneError
 from ephs.mechanics.scene.errors import SceneWarning as SceneWarning
 from ephs.mechanics.scene.model import Body as Body
-from ephs.mechanics.scene.model import Conduction as Conduction
 from ephs.mechanics.scene.model import Joint as Joint
 from ephs.mechanics.scene.model import Scene as Scene
 from ephs.mechanics.scene.model import Spring as Spring
-from ephs.mechanics.scene.model import ThermalNode as ThermalNode
 from ephs.mechanics.scene.model import World as World

@@ -201,6 +201,7 @@ def _joint(draft: JointDraft, link: Link, x: Array, rate: Array) -> Joint:
         rate=frozen(rate),
         middle=None if draft.place.middle is None else frozen(draft.place.middle),
         strain=draft.strain,
+        armature=draft.armature,
     )
 
 

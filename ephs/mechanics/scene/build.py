@@ -17,6 +17,8 @@ from ephs.mechanics.elements.beam import elastic
 from ephs.mechanics.elements.bodies import rigid_body
 from ephs.mechanics.elements.contact import contact
 from ephs.mechanics.elements.joints import between_frames, joint, spring_damper, universal_joint
+from ephs.mechanics.elements.motor import armature, motor
+from ephs.mechanics.scene.attached import Motor
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Body, Joint, Scene, Spring
 from ephs.mechanics.scene.surfaces import Contact, Surface
 from ephs.mechanics.shapes.pairs import Touch, touches
@@ -32,6 +34,7 @@ __all__ = [
     "contact_points",
     "drive_ports",
     "initial_state",
+    "motor_port",
     "scene_inputs",
     "scene_names",
     "scene_system",
@@ -56,6 +59,11 @@ def drive_ports(of: Joint) -> tuple[tuple[Path, slice], ...]:
     if of.middle is None:
         return ((at, slice(0, of.dim)),)
     return ((at / "first", slice(0, 1)), (at / "second", slice(1, 2)))
+
+
+def motor_port(name: str) -> Path:
+    """The outer port of a motor's voltage and current."""
+    return _at("voltages", name)
 
 
 def scene_system(scene: Scene, *, driven: Iterable[str] = (), wrenches: Iterable[str] = ()) -> System:
@@ -90,6 +98,17 @@ def initial_state(scene: Scene) -> dict[Path, Array]:
             out[place / "pe" / "q_r"] = value
             if j.heat == ENVIRONMENT:
                 out[place / "env" / "s"] = np.zeros(1)
+        if j.armature:
+            out[component_path("armatures", name) / "p"] = j.armature * j.rate
+    for name, m in scene.all_motors():
+        at = component_path("motors", name)
+        out[at / "field" / "b"] = np.array([m.constant])
+        if m.inductance:
+            out[at / "coil" / "b"] = np.zeros(1)
+        if m.inertia:
+            out[at / "rotor" / "p"] = m.inertia * m.gear * scene.joint(m.joint).rate
+        if m.heat == ENVIRONMENT:
+            out[at / "env" / "s"] = np.zeros(1)
     between = [
         (component_path("springs", name), (s.body1, s.body2), (_point(s.at1), _point(s.at2)), s.heat)
         for name, s in scene.all_springs()
@@ -124,8 +143,8 @@ def contact_points(scene: Scene, of: Contact) -> tuple[tuple[str, str], tuple[To
 
 
 def scene_inputs(scene: Scene) -> dict[Path, Input]:
-    """Prescribed drives as flows and motions as efforts, at the ports of `drive_ports`."""
-    out: dict[Path, Input] = {}
+    """Prescribed drives as flows, motions and voltages as efforts, at the ports of `drive_ports` and `motor_port`."""
+    out = {motor_port(name): Input(np.array([m.voltage]), True) for name, m in scene.all_motors()}
     for _, j in scene.all_joints():
         if _is_driven(j):
             for port, where in drive_ports(j):
@@ -189,6 +208,7 @@ class _Builder:
     """Collects the boxes of one level."""
 
     demands: _Demands
+    inner: _Demands
     junctions: dict[Path, Any] = field(default_factory=dict)
     boxes: dict[Path, dict[Any, str]] = field(default_factory=dict)
     fillings: dict[Path, Filling] = field(default_factory=dict)
@@ -205,9 +225,14 @@ class _Builder:
         self.junctions[path] = junction(quantity.entropy, exposed=node in self.demands.nodes)
         return str(path)
 
-    def drive(self, path: Path, of: Quantity) -> str:
-        """An exposed junction of a driven joint."""
-        self.junctions[path] = junction(of, exposed=True)
+    def drive(self, name: str, path: Path, of: Quantity) -> str:
+        """The junction of a driven joint, exposed where the level above wants it."""
+        self.junctions[path] = junction(of, exposed=name in self.demands.joints)
+        return str(path)
+
+    def supply(self, path: Path) -> str:
+        """An exposed junction of a motor's voltage."""
+        self.junctions[path] = junction(quantity.charge, exposed=True)
         return str(path)
 
     def add(self, path: Path, filling: Filling, ports: Mapping[Any, str]) -> None:
@@ -220,7 +245,7 @@ def _level(scene: Scene, demands: _Demands, *, top: bool) -> System:
     grounded = _uses_ground(scene)
     if grounded and not top:
         demands = _Demands(demands.bodies | {GROUND}, demands.nodes, demands.joints)
-    b = _Builder(demands)
+    b = _Builder(demands, inner)
     gravity = scene.world.gravity
     for name, body in scene.bodies.items():
         b.add(Path(["bodies", name]), _body(body, gravity), {"p": b.momentum(name)})
@@ -228,12 +253,16 @@ def _level(scene: Scene, demands: _Demands, *, top: bool) -> System:
         ports = {"p1": b.momentum(j.body1), "p2": b.momentum(j.body2)}
         if j.heat != ENVIRONMENT:
             ports["s"] = b.entropy(j.heat)
-        system = _joint(j, driven=name in demands.joints)
-        if name in demands.joints:
+        driven = name in inner.joints
+        system = _joint(j, driven=driven)
+        if driven:
             names = ("p_r",) if j.middle is None else ("p_r1", "p_r2")
             for port, (path, _) in zip(names, drive_ports(j), strict=True):
-                ports[port] = b.drive(path, system.interface[Path.of(port)].quantity)
+                ports[port] = b.drive(name, path, system.interface[Path.of(port)].quantity)
         b.add(Path(["joints", name]), system, ports)
+        if j.armature:
+            at = _at("drives", name)
+            b.add(Path(["armatures", name]), armature(b.junctions[at].quantity, j.armature), {"p": str(at)})
     for name, s in scene.springs.items():
         ports = {"p1": b.momentum(s.body1), "p2": b.momentum(s.body2)}
         if s.heat != ENVIRONMENT:
@@ -257,6 +286,12 @@ def _level(scene: Scene, demands: _Demands, *, top: bool) -> System:
         system = _level(part, inner.of_part(name), top=False)
         ports = {port: _joined(b, name, port, system.interface[port].quantity) for port in system.interface}
         b.add(Path(["parts", name]), system, ports)
+    for name, m in scene.motors.items():
+        at = _at("drives", m.joint)
+        ports = {"q": b.supply(motor_port(name)), "p_r": str(at)}
+        if m.heat != ENVIRONMENT:
+            ports["s"] = b.entropy(m.heat)
+        b.add(Path(["motors", name]), _motor(m, b.junctions[at].quantity), ports)
     if grounded and top:
         b.add(Path(["ground"]), components.ground(), {"p": b.momentum(GROUND)})
     return System.of(Pattern(junctions=b.junctions, boxes=b.boxes), b.fillings)
@@ -272,7 +307,10 @@ def _joined(b: _Builder, part: str, port: Path, of: Quantity) -> str:
         return b.momentum(name)
     if group == "entropies":
         return b.entropy(name)
-    return b.drive(Path(["drives", part, *rest]), of)
+    if group == "voltages":
+        return b.supply(_at("voltages", name))
+    joint_name = name if name in b.inner.joints else name.rpartition(".")[0]
+    return b.drive(joint_name, Path(["drives", part, *rest]), of)
 
 
 def _demands_on_parts(scene: Scene, demands: _Demands) -> _Demands:
@@ -282,7 +320,9 @@ def _demands_on_parts(scene: Scene, demands: _Demands) -> _Demands:
     nodes = {x.heat for x in (*pairs, *scene.contacts.values())} | {
         name for c in scene.conduction.values() for name in c.between
     }
-    return _Demands(demands.bodies | bodies, demands.nodes | nodes, demands.joints)
+    nodes |= {m.heat for m in scene.motors.values()}
+    turned = {m.joint for m in scene.motors.values()} | {name for name, j in scene.joints.items() if j.armature}
+    return _Demands(demands.bodies | bodies, demands.nodes | nodes, demands.joints | turned)
 
 
 def _uses_ground(scene: Scene) -> bool:
@@ -313,6 +353,13 @@ def _joint(j: Joint, *, driven: bool) -> System:
     return joint(
         j.kind, j.frame1, j.frame2, j.friction, j.stiffness, j.rest, pitch=j.pitch, heat=heat, driven=driven,
         limits=j.limits, stop=j.stop,
+    )  # fmt: skip
+
+
+def _motor(m: Motor, of: Quantity) -> System:
+    return motor(
+        of, constant=m.constant, resistance=m.resistance, gear=m.gear, inductance=m.inductance, inertia=m.inertia,
+        heat=m.heat != ENVIRONMENT,
     )  # fmt: skip
 
 

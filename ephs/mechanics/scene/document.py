@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from ephs.mechanics.scene.adjustment import Adjustment, Changed, Displacement
+from ephs.mechanics.scene.attached import Conduction, Motor, ThermalNode
 from ephs.mechanics.scene.flexible import Beam, Load, Strain
-from ephs.mechanics.scene.model import Body, Conduction, Joint, Marker, Scene, Spring, ThermalNode, World, frozen
+from ephs.mechanics.scene.model import Body, Joint, Marker, Scene, Spring, World, frozen
 from ephs.mechanics.scene.surfaces import Contact, Surface
 from ephs.mechanics.shapes.law import Law
 
@@ -36,6 +37,7 @@ _PARTS = {
     "contacts": Contact,
     "beams": Beam,
     "loads": Load,
+    "motors": Motor,
     "parts": Scene,
 }
 

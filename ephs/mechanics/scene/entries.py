@@ -34,6 +34,9 @@ _NEUTRAL: dict[str, Any] = {
     "body": "ground",
     "shape": SurfaceShapeEntry(),
     "surfaces": ["?", "?"],
+    "joint": "?",
+    "constant": 0.0,
+    "resistance": 1.0,
     "section": SectionEntry(),
 }
 

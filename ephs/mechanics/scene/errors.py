@@ -192,6 +192,9 @@ TEXTS: dict[str, tuple[str, str]] = {
         "a joint with one freedom",
         "motion prescribes a single rate; this joint has {d} freedoms",
     ),
+    "armature": ("inertia of a joint with one freedom whose motion is free", "give it to another joint"),
+    "motor joint": ("a joint with one freedom whose motion is free", "put the motor on another joint"),
+    "unknown joint": ("a joint of the scene", "{hint}"),
     "motion and drive": ("either motion or drive", "a prescribed rate leaves nothing for a drive to do"),
     "motion rate": ("{motion}, the prescribed rate", "take rate out, or make it equal to motion.rate"),
     "coordinate at": (

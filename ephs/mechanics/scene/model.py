@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ephs.mechanics.scene.adjustment import Adjustment
+from ephs.mechanics.scene.attached import Conduction, Motor, ThermalNode
 from ephs.mechanics.scene.flexible import FREE_END, Beam, Load, Strain
 from ephs.mechanics.scene.surfaces import Contact, Surface
 from ephs.mechanics.shapes.law import Law
@@ -117,6 +118,7 @@ class Joint:
     limits: Array | None = None
     stop: Law | None = None
     strain: Strain | None = None
+    armature: float = 0.0
 
     @property
     def dim(self) -> int:
@@ -142,26 +144,6 @@ class Spring:
     length: float
     damping: float
     heat: str = ENVIRONMENT
-
-
-@final
-@dataclass(frozen=True, slots=True)
-class ThermalNode:
-    """A body of uniform temperature: capacity in J/K, initial temperature in K."""
-
-    name: str
-    capacity: float
-    temperature: float
-
-
-@final
-@dataclass(frozen=True, slots=True)
-class Conduction:
-    """Heat conduction between two thermal nodes, or one and the environment; conductance in W/K."""
-
-    name: str
-    between: tuple[str, str]
-    conductance: float
 
 
 @final
@@ -204,6 +186,7 @@ class Scene:
     contacts: Mapping[str, Contact] = field(default_factory=dict)
     beams: Mapping[str, Beam] = field(default_factory=dict)
     loads: Mapping[str, Load] = field(default_factory=dict)
+    motors: Mapping[str, Motor] = field(default_factory=dict)
 
     def system(self) -> "System":
         """The scene as a hierarchical exergetic port-Hamiltonian system."""
@@ -307,6 +290,12 @@ class Scene:
         for path, scene in self._scenes():
             for load in scene.loads.values():
                 yield path + load.name, replace(load, name=path + load.name, body=_seen(path, load.body))
+
+    def all_motors(self) -> Iterator[tuple[str, Motor]]:
+        """Every motor with its dotted name; its joint and heat sink are dotted too."""
+        for path, scene in self._scenes():
+            for m in scene.motors.values():
+                yield path + m.name, replace(m, name=path + m.name, joint=path + m.joint, heat=_seen(path, m.heat))
 
     def all_thermal(self) -> Iterator[tuple[str, ThermalNode]]:
         """Every thermal node with its dotted name."""

@@ -11,7 +11,7 @@ from typing import Any, final
 
 import numpy as np
 
-from ephs.mechanics.scene.build import drive_ports, scene_system, wrench_port
+from ephs.mechanics.scene.build import drive_ports, motor_port, scene_system, wrench_port
 from ephs.mechanics.scene.geometry import coupling_of
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.rescaled import element_units, freedom_units, rescaled
@@ -19,7 +19,7 @@ from ephs.mechanics.scene.state import Snapshot
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.descriptor import Descriptor
-from ephs.semantics.spaces import Pair
+from ephs.semantics.spaces import Pair, pair
 from ephs.solve.events import Event
 from ephs.solve.instant import Mobility
 from ephs.solve.integrate import Progress
@@ -71,7 +71,8 @@ def in_own_units(problem: Problem) -> Problem:
     small = rescaled(scene, 1.0 / units.length, 1.0 / units.mass, 1.0 / units.time)
     ports = {port: where for _, j in scene.all_joints() for port, where in _ports(j, units)}
     bodies = {wrench_port(name): np.array([units.length] * 3 + [1.0] * 3) for name, _ in scene.all_bodies()}
-    forces = bodies | ports
+    current = np.array([units.time / (units.mass * units.length)])  # ampere in units of force a second
+    forces = bodies | ports | {motor_port(name): current for name, _ in scene.all_motors()}
     driven = frozenset(n for n, j in scene.all_joints() if any(port in problem.signals for port, _ in drive_ports(j)))
     pushed = frozenset(name for name, _ in scene.all_bodies() if wrench_port(name) in problem.signals)
     system = scene_system(small, driven=driven, wrenches=pushed)
@@ -147,13 +148,20 @@ def units_of_states(descriptor: Descriptor, units: Units, *, read: bool = False)
     for slot in descriptor.states:
         space, kind = slot.quantity.space, slot.quantity.kind
         if kind == "relative_pose":
-            pair = Pair.from_space(space)
-            unit = np.where(np.any(pair.basis[:3], axis=0), 1.0, units.length)
+            of = Pair.from_space(space)
+            unit = np.where(np.any(of.basis[:3], axis=0), 1.0, units.length)
             out[slot.path] = unit if read else element_units(space.size, unit, units.length)
         elif kind == "pose":
             out[slot.path] = np.array([1.0] * 4 + [units.length] * 3)
         elif kind == "entropy":
             out[slot.path] = np.array([units.energy])
+        elif kind == "flux_linkage":
+            out[slot.path] = np.array([units.energy * units.time])
+        elif kind == "momentum" and space.name.endswith("*") and space.dim == 1:  # of a joint's rate itself
+            turning = np.any(pair(space.name[:-1], **dict(space.parameters)).basis[:3])
+            out[slot.path] = np.array([momentum * (units.length if turning else 1.0)])
+        elif kind == "angular_momentum":
+            out[slot.path] = np.array([momentum * units.length])
         else:
             out[slot.path] = momentum * np.array([units.length] * 3 + [1.0] * 3)
     return out

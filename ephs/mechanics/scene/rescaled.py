@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ephs.mechanics.scene.attached import Motor
 from ephs.mechanics.scene.flexible import Load, Strain
 from ephs.mechanics.scene.geometry import Coupling, coupling_of
 from ephs.mechanics.scene.model import Array, Body, Joint, Scene, Spring, frozen
@@ -47,6 +48,7 @@ def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float =
             limits=None if j.limits is None else frozen(j.limits * unit[0]),
             stop=None if j.stop is None else j.stop.rescaled(float(unit[0]), energy * time**2 / unit[0] ** 2, time),
             strain=None if j.strain is None else strain(j.strain),
+            armature=j.armature * energy * time**2 / (unit[0] ** 2 if j.armature else 1.0),
         )
 
     def strain(s: Strain) -> Strain:
@@ -57,6 +59,15 @@ def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float =
             frozen(s.rest / length / turning),
             s.damping * time,
         )
+
+    def motor(x: Motor) -> Motor:  # amperes and coulombs a second stay what they are in these seconds
+        of = scene.joint(x.joint)
+        unit = float(freedom_units(coupling_of(of), of.coordinate, length)[0])
+        return replace(
+            x, constant=x.constant * energy * time, resistance=x.resistance * energy * time,
+            inductance=x.inductance * energy * time**2, gear=x.gear / unit, inertia=x.inertia * energy * time**2,
+            voltage=x.voltage * energy,
+        )  # fmt: skip
 
     def load(x: Load) -> Load:
         force = energy / length
@@ -85,6 +96,7 @@ def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float =
         conduction={
             name: replace(c, conductance=c.conductance * energy / time) for name, c in scene.conduction.items()
         },
+        motors={name: motor(x) for name, x in scene.motors.items()},
         loads={name: load(x) for name, x in scene.loads.items()},
         markers={name: replace(m, at=frozen(m.at * length)) for name, m in scene.markers.items()},
         surfaces={name: surface(s) for name, s in scene.surfaces.items()},

@@ -12,13 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ephs.mechanics.scene import values
+from ephs.mechanics.scene.attached import Conduction, Motor, ThermalNode
 from ephs.mechanics.scene.entries import Checked, Document, shown
 from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing
 from ephs.mechanics.scene.flexible import Load, Strain
 from ephs.mechanics.scene.geometry import Coupling, coupling, joint_types
 from ephs.mechanics.scene.homogeneous import mass_and_moments
 from ephs.mechanics.scene.inertia import mass_and_inertia
-from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Conduction, Marker, Spring, ThermalNode, World, frozen
+from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Marker, Scene, Spring, World, frozen
 from ephs.mechanics.scene.placing import Place, resolve_place
 from ephs.mechanics.scene.schema import BodyEntry, JointEntry, ShapeEntry, SpringEntry
 from ephs.mechanics.scene.text import MESHES
@@ -65,6 +66,7 @@ class JointDraft:
     coordinates: Array | None
     rate: Array | None
     strain: Strain | None = None
+    armature: float = 0.0
 
     def coupling(self) -> Coupling:
         """Motions that the joint allows."""
@@ -147,6 +149,8 @@ def resolve_joint(name: str, table: Checked[JointEntry], names: Names, faults: l
     _check_turning(allowed, stiffness, rest, entry, key, faults)
     drive = values.freedoms(entry.drive, d, f"{key}.drive", faults)
     _check_motion(entry, d, drive, key, faults)
+    if entry.armature and (d != 1 or entry.motion is not None):
+        faults.append(fault("armature", f"{key}.armature", shown(entry.armature)))
     coordinates = None
     if entry.coordinate is not None:
         coordinates = values.freedoms(entry.coordinate, d, f"{key}.coordinate", faults)
@@ -175,6 +179,7 @@ def resolve_joint(name: str, table: Checked[JointEntry], names: Names, faults: l
         motion=None if entry.motion is None else entry.motion.rate,
         coordinates=coordinates,
         rate=rate,
+        armature=entry.armature,
     )
 
 
@@ -223,6 +228,26 @@ def resolve_loads(document: Document, names: Names, faults: list[Fault]) -> dict
             if entry.body == GROUND:
                 faults.append(fault("load ground", key, shown(entry.body)))
         found[name] = Load(name, entry.body, frozen(entry.force), frozen(entry.moment), entry.follower, entry.ramp)
+    return found
+
+
+def resolve_motors(document: Document, scene: Scene, names: Names, faults: list[Fault]) -> dict[str, Motor]:
+    """The motors, their joints checked."""
+    found: dict[str, Motor] = {}
+    joints = dict(scene.all_joints())
+    for name, table in document.sections["motors"].items():
+        entry, key = table.entry, f"motors.{name}"
+        if table.sound("heat"):
+            names.check(entry.heat, f"{key}.heat", "thermal", faults)
+        if table.sound("joint"):
+            of = joints.get(entry.joint)
+            if of is None:
+                hint = did_you_mean(entry.joint, joints, f"there are: {listing(joints)}")
+                faults.append(fault("unknown joint", f"{key}.joint", f'"{entry.joint}"', hint=hint))
+            elif of.dim != 1 or of.motion is not None:
+                faults.append(fault("motor joint", f"{key}.joint", f"{of.name}, {of.kind}"))
+        numbers = entry.constant, entry.resistance, entry.inductance, entry.gear, entry.inertia, entry.voltage
+        found[name] = Motor(name, entry.joint, *numbers, entry.heat)
     return found
 
 

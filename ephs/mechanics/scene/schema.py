@@ -122,6 +122,9 @@ class JointEntry(Entry):
     stiffness: Numbers = Field(default=0.0, description="of the potential ½ k (coordinate − rest)²; N m/rad, N/m")
     rest: Numbers = Field(default=0.0, description="coordinates without force; rad, m")
     heat: Text = Field(default="environment", description="where the friction heat goes: a thermal name")
+    armature: NonNegative = Field(
+        default=0.0, description="inertia of the single rate itself, as of a rotor that it turns; kg m², kg"
+    )
     drive: Numbers = Field(default=0.0, description="constant generalised force on u_r; N m, N")
     motion: MotionEntry | None = Field(default=None, description="the freedom's rate is prescribed")
     limits: Limits | None = Field(
@@ -189,6 +192,19 @@ class ContactEntry(ContactLawEntry):
     surfaces: Pair = Field(description="names of two surfaces; the keys below replace theirs")
 
 
+class MotorEntry(Entry):
+    """``[motors.NAME]``"""
+
+    joint: Text = Field(description="a joint with one freedom, which it turns through its gear")
+    constant: Number = Field(description="torque of the rotor by the current, N m/A or V s/rad")
+    resistance: Positive = Field(description="of the winding, Ω")
+    inductance: NonNegative = Field(default=0.0, description="of the winding, H")
+    gear: Number = Field(default=1.0, description="rate of the rotor by the joint's, rad/rad or rad/m")
+    inertia: NonNegative = Field(default=0.0, description="of the rotor, kg m²")
+    voltage: Number = Field(default=0.0, description='V, where no input "motors.NAME" is given')
+    heat: Text = Field(default="environment", description="where the winding's heat goes: a thermal name")
+
+
 class ThermalEntry(Entry):
     """``[thermal.NAME]``"""
 
@@ -236,6 +252,7 @@ class SceneFile(Entry):
         default_factory=dict, description="rods that bend, twist and stretch"
     )
     loads: dict[str, LoadEntry] = Field(default_factory=dict, description="forces and moments on bodies")
+    motors: dict[str, MotorEntry] = Field(default_factory=dict, description="motors with circuit and gear on joints")
     thermal: dict[str, ThermalEntry] = Field(default_factory=dict, description="what heat warms")
     conduction: dict[str, ConductionEntry] = Field(default_factory=dict, description="how heat passes between them")
     markers: dict[str, MarkerEntry] = Field(default_factory=dict, description="points on bodies")
@@ -250,6 +267,7 @@ SECTIONS: dict[str, type[Entry]] = {
     "contacts": ContactEntry,
     "beams": BeamEntry,
     "loads": LoadEntry,
+    "motors": MotorEntry,
     "thermal": ThermalEntry,
     "conduction": ConductionEntry,
     "markers": MarkerEntry,

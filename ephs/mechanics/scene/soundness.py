@@ -19,6 +19,9 @@ from ephs.operad import Path as Name
 
 __all__ = ["check_scene", "meshes_within"]
 
+MOTOR = ("constant", "resistance", "inductance", "gear", "inertia", "voltage")
+"""Numbers of a motor."""
+
 
 def check_scene(scene: Scene) -> None:
     """Look at everything of a scene.
@@ -45,6 +48,8 @@ def check_scene(scene: Scene) -> None:
         ("body", bodies, [node for _, beam in scene.all_beams() for node in beam.nodes]),
         ("joint", dict(scene.all_joints()), [name for _, beam in scene.all_beams() for name in beam.joints]),
         ("thermal node", nodes, [each.heat for _, each in (*scene.all_joints(), *scene.all_springs())]),
+        ("joint", dict(scene.all_joints()), [motor.joint for _, motor in scene.all_motors()]),
+        ("thermal node", nodes, [motor.heat for _, motor in scene.all_motors()]),
         ("thermal node", nodes, [end for _, each in scene.all_conduction() for end in each.between]),
     ):
         for name in named:
@@ -113,6 +118,8 @@ def _shapes(scene: Scene) -> Iterator[tuple[str, dict[str, tuple[Any, tuple[int,
         yield name, {"frame": (surface.frame, (7,))} | ({kind: (sizes, SIZES[kind])} if kind != "plane" else {})
     for name, contact in scene.all_contacts():
         yield name, {key: (number, ()) for key, number in contact.law.numbers}
+    for name, motor in scene.all_motors():
+        yield name, {key: (getattr(motor, key), ()) for key in MOTOR}
     for name, load in scene.all_loads():
         yield name, {"force": (load.force, (3,)), "moment": (load.moment, (3,)), "ramp": (load.ramp, ())}
 
@@ -132,6 +139,7 @@ def _joint(j: Joint) -> dict[str, tuple[Any, tuple[int, ...]]]:
         "drive": (j.drive, (d,)),
         "rate": (j.rate, (d,)),
         "coordinate": (j.coordinate, (of.size,)),
+        "armature": (j.armature, ()),
         "motion": (0.0 if j.motion is None else j.motion, ()),
         **({} if j.middle is None else {"middle": (j.middle, (7,))}),
         **({} if j.stop is None else {f"stop.{key}": (number, ()) for key, number in j.stop.numbers}),
@@ -153,7 +161,7 @@ def _strain(j: Joint) -> dict[str, tuple[Any, tuple[int, ...]]]:
 
 def _check_names(scene: Scene) -> None:
     kinds = ("bodies", "joints", "springs", "thermal", "conduction", "markers", "surfaces", "contacts")
-    for things in (getattr(scene, kind) for kind in (*kinds, "beams", "loads")):
+    for things in (getattr(scene, kind) for kind in (*kinds, "beams", "loads", "motors")):
         for name, thing in things.items():
             if Name([name]) != (thing.name,):
                 raise ValueError(f"{legible(name)} is called {legible(str(thing.name))}")

@@ -13,6 +13,7 @@ from ephs.mechanics.tree.finding.tables import SPRING
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.solve.errors import OptionError
+from ephs.solve.heats import PLAIN
 from ephs.solve.sparse import Index
 
 __all__ = ["Layout"]
@@ -43,6 +44,8 @@ class Layout:
         State of the system that is a joint's element -> where that starts and ends in a state's array.
     elements_end
         How many numbers the elements take.
+    attached
+        Places among the entropies of what are states of attachments.
     """
 
     joints: tuple[str, ...]
@@ -54,6 +57,7 @@ class Layout:
     edges: Mapping[str, tuple[tuple[int, Edge], ...]]
     paths: Mapping[Path, slice]
     elements_end: int
+    attached: frozenset[int]
 
     @staticmethod
     def of(reduced: Reduced) -> "Layout":
@@ -88,6 +92,7 @@ class Layout:
                 }
             ),
             reduced.coordinates,
+            frozenset(np.flatnonzero(t.node == PLAIN).tolist()),
         )
 
     def vector(self, what: str, values: "Mapping[str, ArrayLike] | ArrayLike") -> Array:
