@@ -12,6 +12,8 @@ import ephs
 from ephs import library as lib
 from ephs.mechanics.methods.registry import METHODS
 from ephs.mechanics.scene.state import Snapshot
+from ephs.solve.auditing import audit as auditing
+from ephs.solve.auditing import rounding
 from ephs.solve.auditing.audit import CLOSED, COARSE, LAWFUL, LAWS, LEAST, PRODUCTION, Bounds, audit
 from ephs.solve.auditing.findings import Audit, Finding
 from ephs.solve.auditing.resolution import natural_trials
@@ -280,3 +282,37 @@ def test_entropies_of_radau_are_sums_of_what_is_made(rtol):
     rounding = 8.0 * len(sol) * np.finfo(float).eps * books.made[-1]
     assert np.abs(books.entropy - books.entropy[0] - books.made).max() <= rounding
     assert np.diff(books.entropy).min() >= -rounding
+
+
+RESTING = """
+format = 1
+[bodies.mass]
+mass = 1.0
+inertia = [0.1, 0.1, 0.1]
+position = [FAR, 0.0, 0.0]
+[joints.rail]
+type = "prismatic"
+bodies = ["ground", "mass"]
+at = [FAR, 0.0, 0.0]
+axis = [1.0, 0.0, 0.0]
+[springs.spring]
+bodies = ["ground", "mass"]
+at1 = [ORIGIN, 0.0, 0.0]
+at2 = [0.0, 0.0, 0.0]
+length = 1.0
+stiffness = 1e6
+"""
+
+
+@pytest.mark.parametrize("options", [{"step": 1e-3}, {}])
+@pytest.mark.parametrize("far", [2.0, 1000.0])
+def test_what_rests_is_not_held_to_the_energy_of_its_rounding(far, options, tmp_path, monkeypatch):
+    file = tmp_path / "resting.toml"
+    file.write_text(RESTING.replace("FAR", repr(far)).replace("ORIGIN", repr(far - 1.0)))
+    scene = ephs.load(file)
+    assert ephs.simulate(scene, 0.1, method="natural4", **options).audit.passed
+    for module in (rounding, auditing):
+        monkeypatch.setattr(module, "trembling", lambda _: 0.0)
+    run = ephs.simulate(scene, 0.1, method="natural4", audit="off", **options)
+    assert run.ledgers.scale < 1e-20, "the control: all that moves is rounding, of which the balance is no small part"
+    assert not run.audit.passed

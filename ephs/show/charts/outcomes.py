@@ -6,6 +6,7 @@ import numpy as np
 
 from ephs.show.charts.reference import Motion
 from ephs.show.charts.runs import Array, Setting
+from ephs.solve.auditing.audit import MANY_TIMES, MOTION
 
 __all__ = [
     "ACCURATE",
@@ -23,15 +24,18 @@ __all__ = [
 
 ACCURATE = 1e-2
 """Error at which digits of a motion end."""
-RIGHT = 0.1
+RIGHT = MOTION
 """Largest error of a right run at constant steps, what their audit allows: a part of the size of mechanism and motion,
 an entry of a rotation matrix, a part of the energies turned over."""
-TIMES, AMPLIFIED = 1000.0, 10.0
-"""Largest error of a right run at chosen steps, in tolerances, at most `RIGHT`: this many, or one a step, or so many
-times what a change of the data by the tolerance makes of the motion, whichever is most."""
-CONDITION = 1e2
+AMPLIFIED = 10.0
+"""How many times what a change of the data by the tolerance makes of a motion a right run may err by."""
+TIMES = MANY_TIMES * AMPLIFIED
+"""Largest error of a right run at chosen steps, in tolerances, where the motion amplifies nothing and steps are few:
+what the audit allows to the defect of energy, times a growth of errors that it does not see. Where there are more
+steps, one tolerance a step; where the motion amplifies, so much more; at most `RIGHT`."""
+CONDITION = RIGHT / 1e-3
 """A motion is judged up to the last time to which it changes by less than this many times a relative change of its
-data: later, digits depend on the rounding of any program."""
+data: to there, data of three digits make it right."""
 ENERGY = 1e-2
 """Largest defect of the energy balance that is no drift, relative to what was turned over."""
 KEPT = 0.5

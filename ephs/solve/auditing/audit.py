@@ -15,8 +15,9 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.rank import CLOSED
 from ephs.solve.auditing.findings import Audit, Finding
 from ephs.solve.auditing.growth import Again, GlobalError, global_error
-from ephs.solve.auditing.resolution import StepError, Trials
+from ephs.solve.auditing.resolution import STILL, StepError, Trials
 from ephs.solve.auditing.retaken import Missed
+from ephs.solve.auditing.rounding import rounded, trembling
 from ephs.solve.breakpoints import MOST_FOUND
 from ephs.solve.control import Control
 from ephs.solve.methods.driven import ComponentMethod
@@ -25,7 +26,7 @@ from ephs.solve.model import Model
 if TYPE_CHECKING:
     from ephs.solve.result.solution import Solution
 
-__all__ = ["LAWS", "LEAP", "Bounds", "Tests", "audit"]
+__all__ = ["LAWS", "LEAP", "MANY_TIMES", "MOTION", "Bounds", "Tests", "audit"]
 
 Tests = Trials | Missed
 """Steps that were tried again: of constant ones, or what is missed by chosen ones."""
@@ -44,9 +45,6 @@ INSTANTS = 125
 """Instants, evenly spread, at which the positions of joints are looked at."""
 ROUNDING = 8.0 * float(np.finfo(float).eps)
 """Part of what is stored that rounding leaves of a difference."""
-SOLVED = 100.0 * float(np.finfo(float).eps)
-"""The same of energies after the equations of a step were solved, times the root of the number of steps: 10 κ ε with a
-condition κ of 10."""
 
 
 @final
@@ -140,14 +138,7 @@ def _energy(solution: "Solution", _bounds: Bounds, _trials: Tests | None) -> Ite
     parts = {path: energy for path, energy in books.storages.items() if books.exergies[path].any()} | destroyed
     jump = 1 + int(np.argmax(np.abs(np.diff(solution.energy_error)))) if len(solution) > 1 else 0
     busiest = max(parts, key=lambda path: _step(parts[path], jump), default=None)
-    yield Breach(float(solution.energy_error[worst]), _rounded(solution) / books.scale, worst, busiest)
-
-
-def _rounded(solution: "Solution") -> float:
-    """Rounding of an energy balance, in J."""
-    books = solution.ledgers
-    stored = sum(float(np.abs(books.storages[path]).max()) for path, held in books.exergies.items() if held.any())
-    return SOLVED * float(solution.stats["steps"] or 1) ** 0.5 * stored
+    yield Breach(float(solution.energy_error[worst]), rounded(solution) / books.scale, worst, busiest)
 
 
 def _step(values: Array, instant: int) -> float:
@@ -159,7 +150,7 @@ def _accuracy(solution: "Solution", bounds: Bounds, trials: Tests | None) -> Ite
     plain = solution.stats.get("plain_defect")
     if plain is not None:
         instant = int(np.argmin(np.abs(solution.t - plain["at"])))
-        yield Breach(plain["largest"] / solution.ledgers.scale, _rounded(solution) / solution.ledgers.scale, instant)
+        yield Breach(plain["largest"] / solution.ledgers.scale, rounded(solution) / solution.ledgers.scale, instant)
     longest = abs(float(solution.stats.get("longest_step", bounds.step or 0.0)))
     for path, instant, size in solution.motion.leaps(longest) if solution.motion is not None else ():
         short = f"{0.9 * longest * LEAP / size:.2g} s: a contact was passed"
@@ -174,7 +165,7 @@ def _accuracy(solution: "Solution", bounds: Bounds, trials: Tests | None) -> Ite
     grown = _grown(solution, bounds, trials)
     if grown is not None:
         yield Breach(grown.size, slack, grown.instant, grown.path, _shorter(bounds, grown))
-    found = trials.error(bounds.step, steps, solution.ledgers.scale)
+    found = trials.error(bounds.step, steps, max(solution.ledgers.scale, trembling(solution) / STILL))
     if found is not None:
         hint, at = "", trials.times[found.trial]
         if found.size > bounds.accuracy:
@@ -272,7 +263,7 @@ def _exchanged(solution: "Solution", kind: str) -> tuple[float, float]:
     scale = float(np.max(np.sum(moved, axis=0))) if moved else 0.0
     rounding = ROUNDING * sum(float(np.abs(values).max()) for values in held.values())
     if kind == "entropy":  # of what stands still, heat is rounding
-        rounding += _rounded(solution) / books.temperature
+        rounding += rounded(solution) / books.temperature
     return scale, rounding / scale if scale else 0.0
 
 

@@ -1,0 +1,38 @@
+"""Rounding of a run's energies, in J: of what is stored, and of bodies that move by the rounding of their positions."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from ephs.solve.result.solution import Solution
+
+__all__ = ["rounded", "trembling"]
+
+SOLVED = 100.0 * float(np.finfo(float).eps)
+"""Part of what is solved for that rounding leaves, times the root of the number of steps: 10 κ ε with a condition κ of
+10."""
+
+
+def rounded(solution: "Solution") -> float:
+    """Rounding of an energy balance."""
+    books = solution.ledgers
+    stored = sum(float(np.abs(books.storages[path]).max()) for path, held in books.exergies.items() if held.any())
+    return _part(solution) * stored + trembling(solution)
+
+
+def trembling(solution: "Solution") -> float:
+    """Energy of bodies that move by the rounding of their positions in the longest step: what rests has no more."""
+    problem, stats = solution.problem, solution.stats
+    if problem is None or problem.scene is None:
+        return 0.0
+    h = abs(float(stats.get("longest_step", stats.get("step", 0.0)) or 0.0))
+    places = [values[:, 4:] for values in solution.states.values() if values.ndim == 2 and values.shape[1] == 7]
+    far = max((float(np.abs(place).max(initial=0.0)) for place in places), default=0.0)
+    mass = sum(float(body.mass) for _, body in problem.scene.all_bodies())
+    speed = _part(solution) * max(far, problem.length) / h if h else 0.0
+    return 0.5 * mass * speed**2
+
+
+def _part(solution: "Solution") -> float:
+    return SOLVED * float(solution.stats["steps"] or 1) ** 0.5
