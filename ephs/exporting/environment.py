@@ -1,0 +1,186 @@
+"""Environments of gymnasium: a scene as a task of control, one or many on threads."""
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, Final, final
+
+import gymnasium
+import numpy as np
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+
+from ephs.exporting.errors import ExportError
+from ephs.exporting.image import image_of
+from ephs.exporting.module import Exported, exported
+from ephs.exporting.running import Instances
+from ephs.mechanics.scene.model import Scene
+from ephs.semantics.bundle import Array
+from ephs.solve.control import RTOL
+
+__all__ = ["Environment", "Environments", "Task"]
+
+CHUNK: Final = 8
+"""Instances that a thread steps in turn: fewer cost more to hand over than to compute."""
+
+
+@final
+class Task:
+    """A scene, what acts on it, what is seen of it, and what is asked.
+
+    Parameters
+    ----------
+    inputs
+        Joints that are driven, as ``joints.hip``.
+    outputs
+        Names of what is observed, or beginnings of such, as ``joints``.
+    limits
+        Largest size of an action, in N or N m: one number, or one for each.
+    period
+        Time in s between actions.
+    reward
+        Called with the observation and the action.
+    done
+        Called with the observation: whether an episode ends there.
+    horizon
+        Actions of an episode.
+    parameters
+        Ranges of numbers of the model from which each episode draws, by path.
+    method, rtol, step
+        As of `ephs.export`.
+
+    Attributes
+    ----------
+    made
+        The mechanism as a program.
+    names
+        Of the observed numbers.
+
+    Raises
+    ------
+    ExportError
+        The scene, an input, an output or a parameter does not allow it.
+    """
+
+    def __init__(
+        self, scene: Scene, *, inputs: Sequence[str], reward: Callable[[Array, Array], float],
+        outputs: Sequence[str] = ("joints",), limits: float | Sequence[float] = 1.0, period: float = 0.02,
+        done: Callable[[Array], bool] = lambda _: False, horizon: int = 500,
+        parameters: Mapping[str, tuple[float, float]] | None = None, method: str = "rk54", rtol: float = RTOL,
+        step: float | None = None,
+    ) -> None:  # fmt: skip
+        self.reward, self.done, self.period, self.horizon = reward, done, period, horizon
+        self.ranges = np.array(list((parameters or {}).values()), dtype=float).reshape(-1, 2)
+        image = image_of(
+            scene, inputs=inputs, parameters=list(parameters or {}), method=method, rtol=rtol, step=step,
+            until=period * horizon,
+        )  # fmt: skip
+        self.made: Exported = exported(image, "task")
+        seen = [each for each in self.made.outputs if any(_within(each.name, name) for name in outputs)]
+        for name in outputs:
+            if not any(_within(each.name, name) for each in self.made.outputs):
+                raise ExportError("output", found=name, expected=", ".join(each.name for each in self.made.outputs))
+        self.names = tuple(each.name for each in seen)
+        self.places = np.array([each.place for each in seen], dtype=int)
+        size = np.broadcast_to(np.asarray(limits, dtype=float), (len(self.made.inputs),)).copy()
+        self.action_space = gymnasium.spaces.Box(-size, size, dtype=np.float64)
+        self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (len(seen),), dtype=np.float64)
+
+    def drawn(self, rng: np.random.Generator) -> Array | None:
+        """Parameters of an episode."""
+        return rng.uniform(self.ranges[:, 0], self.ranges[:, 1]) if len(self.ranges) else None
+
+
+def _within(name: str, beginning: str) -> bool:
+    return name == beginning or name.startswith(f"{beginning}.")
+
+
+@final
+class Environment(gymnasium.Env[Array, Array]):
+    """One environment: actions are forces on the inputs, held over a period, in addition to what the scene has.
+
+    An episode whose steps fail ends, and says why in ``info["status"]``.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - gymnasium's own
+
+    def __init__(self, task: Task) -> None:
+        self.task = task
+        self.action_space, self.observation_space = task.action_space, task.observation_space
+        self._run, self._count = Instances(task.made), 0
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
+        """Begin an episode."""
+        super().reset(seed=seed)
+        self._run.start(0, self.task.drawn(self.np_random))
+        self._count = 0
+        self._run.read()
+        return self._run.outputs[0, self.task.places], {}
+
+    def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
+        """Take a period under an action."""
+        task = self.task
+        self._run.inputs[0] = np.clip(action, task.action_space.low, task.action_space.high)
+        self._count += 1
+        status = self._run.advance(task.period * self._count)
+        seen = self._run.outputs[0, task.places]
+        ended = bool(status) or task.done(seen)
+        return seen, float(task.reward(seen, action)), ended, self._count >= task.horizon, {"status": status}
+
+
+@final
+class Environments(VectorEnv[Array, Array, Any]):
+    """So many environments of one task, stepped by threads. An episode that has ended begins anew at the next step."""
+
+    metadata: dict[str, Any] = {"autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012 - gymnasium's own
+
+    def __init__(self, task: Task, count: int, threads: int = 1) -> None:
+        self.task, self.num_envs = task, count
+        self.single_action_space, self.single_observation_space = task.action_space, task.observation_space
+        self.action_space = batch_space(task.action_space, count)
+        self.observation_space = batch_space(task.observation_space, count)
+        self._run, self._counts = Instances(task.made, count), np.zeros(count, dtype=int)
+        self._over = np.zeros(count, dtype=bool)
+        self._status = np.zeros(count, dtype=np.int64)
+        self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
+        self._random = np.random.default_rng()
+
+    def reset(
+        self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Array, dict[str, Any]]:
+        """Begin all episodes."""
+        self._random = np.random.default_rng([each or 0 for each in seed] if isinstance(seed, list) else seed)
+        for number in range(self.num_envs):
+            self._begin(number)
+        self._over[:] = False
+        return self._run.outputs[:, self.task.places], {}
+
+    def _begin(self, number: int) -> None:
+        self._run.start(number, self.task.drawn(self._random))
+        self._counts[number] = self._status[number] = 0
+        self._run.read(number)
+
+    def step(self, actions: Array) -> tuple[Array, Any, Any, Any, dict[str, Any]]:
+        """Take a period in all episodes under actions (count, ·)."""
+        task, going = self.task, ~self._over
+        for number in np.flatnonzero(self._over).tolist():
+            self._begin(number)
+        self._run.inputs[going] = np.clip(actions, task.action_space.low, task.action_space.high)[going]
+        self._counts[going] += 1
+        numbers = np.flatnonzero(going).tolist()
+        chunks = [numbers[k : k + CHUNK] for k in range(0, len(numbers), CHUNK)]
+        list(map(self._advance, chunks) if self._pool is None else self._pool.map(self._advance, chunks))
+        seen = self._run.outputs[:, task.places]
+        rewards = np.array([task.reward(x, u) for x, u in zip(seen, actions, strict=True)]) * going
+        ended = going & ((self._status != 0) | np.array([task.done(x) for x in seen]))
+        cut = going & (self._counts >= task.horizon)
+        self._over = ended | cut
+        return seen, rewards, ended, cut, {"status": self._status.copy()}
+
+    def _advance(self, numbers: Sequence[int]) -> None:
+        for number in numbers:
+            self._status[number] = self._run.advance(self.task.period * int(self._counts[number]), number)
+
+    def close_extras(self, **_: Any) -> None:
+        """End the threads."""
+        if self._pool is not None:
+            self._pool.shutdown()

@@ -1,0 +1,87 @@
+"""Environments: gymnasium's own checks, the motion of the package, many on threads like one alone."""
+
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+import ephs
+from ephs.exporting.environment import Environment, Environments, Task
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="module")
+def task() -> Task:
+    return Task(
+        ephs.load(ROOT / "scenes/slider-crank.toml"),
+        inputs=["joints.bearing"],
+        outputs=["joints.bearing", "joints.cylinder"],
+        reward=lambda seen, action: -float(action @ action) - (seen[1] - 20.0) ** 2,
+        limits=0.5,
+        horizon=10,
+        parameters={"bodies.rod.mass": (0.1, 0.2), "joints.bearing.friction": (1e-3, 3e-3)},
+    )
+
+
+def test_gymnasium_finds_nothing_wrong(task, recwarn):
+    check_env(Environment(task), skip_render_check=True)
+    assert all("infinity" in str(each.message) for each in recwarn)  # observations have no bounds
+
+
+def test_an_episode_is_a_run_of_the_package():
+    scene = ephs.load(ROOT / "scenes/slider-crank.toml")
+    made = Task(scene, inputs=["joints.bearing"], reward=lambda *_: 0.0, rtol=1e-9, horizon=10)
+    env = Environment(made)
+    env.reset(seed=1)
+    for _ in range(10):
+        seen, _, ended, cut, info = env.step(np.array([0.3]))
+    assert (ended, cut, info) == (False, True, {"status": 0})
+    run = ephs.simulate(scene, 0.2, method="rk54", rtol=1e-9, inputs={"joints.bearing": 0.3 - 0.06})
+    found = dict(zip(made.names, seen, strict=True))
+    assert found["joints.bearing.coordinate"] == pytest.approx(run.joint("bearing").coordinate[-1].item(), rel=1e-7)
+    assert found["joints.bearing.rate"] == pytest.approx(run.joint("bearing").rate[-1].item(), rel=1e-6)
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_many_are_like_one_alone(task, threads):
+    many, rng = Environments(task, 20, threads=threads), np.random.default_rng(3)
+    actions = rng.uniform(-0.5, 0.5, (23, 20, 1))
+    found, _ = many.reset(seed=5)
+    again = [found.copy()]
+    over = []
+    for action in actions:
+        seen, rewards, ended, cut, _ = many.step(action)
+        again.append(seen.copy())
+        over.append(ended | cut)
+        assert many.observation_space.contains(seen) and rewards.shape == (20,)
+    assert [bool(each.all()) for each in over] == [k in (9, 20) for k in range(23)]
+    np.testing.assert_array_equal(over[10], np.zeros(20, dtype=bool))
+    many.reset(seed=5)
+    for k, action in enumerate(actions):
+        np.testing.assert_array_equal(many.step(action)[0], again[k + 1])
+    many.close()
+
+
+def test_parameters_are_drawn_anew_for_each_episode(task):
+    env = Environment(task)
+    ends = []
+    for seed in (1, 1, 2):
+        env.reset(seed=seed)
+        for _ in range(5):
+            seen, *_ = env.step(np.array([0.2]))
+        ends.append(seen[0])
+    assert ends[0] == ends[1] != ends[2]
+
+
+def test_what_is_not_there_is_refused_by_name():
+    scene = ephs.load(ROOT / "scenes/slider-crank.toml")
+    with pytest.raises(ephs.ExportError, match=r"joints\.no"):
+        Task(scene, inputs=["joints.bearing"], outputs=["joints.no"], reward=lambda *_: 0.0)
+
+
+def test_it_is_an_environment_of_gymnasium(task):
+    assert isinstance(Environment(task), gymnasium.Env)
+    assert isinstance(Environments(task, 2), gymnasium.vector.VectorEnv)
