@@ -1,4 +1,4 @@
-"""Sums over many steps that lose nothing to rounding.
+"""Sums over many steps that lose no more than rounding of their terms.
 
 Knuth, *The Art of Computer Programming* 2, 4.2.2, theorem B. Numbers are floats, arrays, or abstract ones.
 """

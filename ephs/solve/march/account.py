@@ -1,4 +1,4 @@
-"""Both laws in a step: heat as energy by sums that lose nothing, and the energy that is left to the motion.
+"""Both laws in a step: heat as energy by compensated sums, and the energy that is left to the motion.
 
 With weights b_j of the stages, heats and books change by h Σ b_j of their rates. All other energy is then what it was,
 and the work, less the heat; by how much a step misses that, its plain defect, is of the order of its error. Moving the
@@ -12,7 +12,7 @@ from ephs.semantics.stage import Evaluator, Real, Record, integer, real
 __all__ = ["MOST", "ROUNDING", "WORTH", "Account", "stretch", "worth"]
 
 ROUNDING = 16.0 * 2.220446049250313e-16
-"""Part of the terms of an energy below which what is missing is rounding, and left."""
+"""Part of the terms of an energy, work and heat below which what is missing is rounding, and left."""
 MOST = 10.0
 """Errors that a tolerance allows by which a correction moves a state at most where steps are chosen."""
 WORTH = 0.1
@@ -34,6 +34,8 @@ class Account(Record):
     moved, rest, size
         Of the step that was tried last: energy put in, energy missing, errors that a tolerance allows by which the
         correction moves the state.
+    noise
+        Rounding of what is missing in J: so much is left.
     chosen
         1 where steps are chosen, not on a grid.
     begins
@@ -47,6 +49,7 @@ class Account(Record):
     moved = real()
     rest = real()
     size = real()
+    noise = real()
     chosen = integer()
     begins = integer()
 
@@ -59,5 +62,5 @@ def stretch(on: Evaluator, share: Real) -> Real:
 def worth(on: Evaluator, account: Account) -> Real:
     """Return the error of the step that was tried last by its correction, less what earlier ones left."""
     short = account.moved + account.rest
-    own = on.absolute(short - account.left) / on.maximum(on.absolute(short), TINY)
+    own = on.maximum(on.absolute(short - account.left) - account.noise, 0.0) / on.maximum(on.absolute(short), TINY)
     return on.select(account.size > 0.0, WORTH * account.size * on.minimum(own, 1.0), 0.0)

@@ -59,7 +59,8 @@ def correct(
     on: Evaluator,
     motion: "Mechanism",
     account: Account,
-    target: Real,
+    work: Real,
+    heat: Real,
     h: Real,
     before: Vector,
     q: Vector,
@@ -68,7 +69,7 @@ def correct(
     allowed: Vector,
     always: bool,
 ) -> Integer:
-    """Move the end (q, r) of a step of h seconds to an energy in J; return a status.
+    """Move the end (q, r) of a step of h seconds to the energy that work and heat in J leave to it; return a status.
 
     How much energy that takes, what it leaves and how far it goes, relative to what is allowed, go to the account.
 
@@ -82,9 +83,12 @@ def correct(
     always
         Whether what is only rounding is met, too: for the sake of its derivatives.
     """
+    target = account.anchor + (work - heat)
+    account.noise = ROUNDING * (on.absolute(account.anchor) + on.absolute(work) + on.absolute(heat))
     run = _Correction(on, motion, account, target, h, before, q, r, heats, allowed, on.scratch(3), on.counter(0))
     account.moved, account.size = 0.0, 0.0
     run.look()
+    account.noise = account.noise + ROUNDING * (run.energies[0] + run.energies[2])
     on.when(run.known if always else on.negate(run.close), run.move)
     account.rest = run.short
     return run.status.value
@@ -125,8 +129,7 @@ class _Correction:
     @property
     def close(self) -> Truth:
         """Whether it is no more than rounding, or not a number."""
-        terms = self.energies[0] + self.energies[2] + self.on.absolute(self.target)
-        return self.on.negate(self.on.absolute(self.short) > ROUNDING * terms)
+        return self.on.negate(self.on.absolute(self.short) > self.account.noise)
 
     def move(self) -> None:
         """Move the rates along their free part; positions too where those are small."""

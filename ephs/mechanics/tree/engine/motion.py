@@ -248,9 +248,10 @@ class Mechanism(Motion):
         always: bool = False,
     ) -> Integer:  # fmt: skip
         nv, n, at = self.increments, self.freedoms, self.summed + self.tables.node.size
-        target = account.anchor + (y[at + 1] - y[at])
         heats = y.part(self.summed, self.tables.node.size)
-        return correct(on, self, account, target, h, start.part(nv, n), q, y.part(nv, n), heats, allowed, always)
+        return correct(
+            on, self, account, y[at + 1], y[at], h, start.part(nv, n), q, y.part(nv, n), heats, allowed, always
+        )
 
     def open(self, on: Evaluator, account: Account, q: Vector, y: Vector) -> Integer:
         energies, at, ns = on.scratch(3), self.summed, self.tables.node.size

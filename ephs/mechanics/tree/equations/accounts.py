@@ -1,7 +1,7 @@
 """Steps that keep the balance of energy, one by one: the account of a run, and the correction of a step's end.
 
-The energy that is not heat is what it was at the start, and the work, less the heat, by sums over the run that lose
-nothing to rounding: see `ephs.solve.march.account`.
+The energy that is not heat is what it was at the start, and the work, less the heat, by compensated sums
+over the run: see `ephs.solve.march.account`.
 """
 
 from collections.abc import Mapping
