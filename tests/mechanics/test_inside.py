@@ -37,17 +37,16 @@ def test_it_reads_like_the_scene_alone(both):
     for name, _ in scene.all_joints():
         assert part.joint(name).coordinate == pytest.approx(alone.joint(name).coordinate, abs=1e-9)
         assert part.joint(name).rate == pytest.approx(alone.joint(name).rate, abs=1e-9)
+        known = alone.joint(name).wrench
+        assert part.joint(name).wrench == pytest.approx(known, abs=1e-9 * (1.0 + np.nanmax(np.abs(known))), nan_ok=True)
     for name, _ in scene.all_thermal():
         assert part.thermal(name).temperature == pytest.approx(alone.thermal(name).temperature, rel=1e-12)
     assert part.constraint_error.max() < 1e-12
 
 
-def test_it_moves_as_a_page_and_says_what_it_does_not_know(both):
+def test_it_moves_as_a_page(both):
     _, part = both
     assert "viser" in animate(part, fps=10.0).html.lower()
-    joint = next(name for name, _ in part.scene.all_joints())
-    with pytest.raises(TypeError, match=r"left\.engine .*joint wrenches"):
-        _ = part.joint(joint).wrench
 
 
 def test_a_scene_that_is_not_there_is_an_error(both):

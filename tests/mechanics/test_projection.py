@@ -1,4 +1,4 @@
-"""Velocities on the joints: sparse matrices find those of the dense pseudoinverse, and leave the joints closed."""
+"""Velocities and wrenches by the sweeps are those of the general form, which shares no table with them."""
 
 import numpy as np
 import pytest
@@ -6,42 +6,41 @@ from hypothesis import given, settings
 
 import ephs
 from benchmarks import families
-from ephs.mechanics.motion import motion
+from ephs.mechanics.motion.general import GeneralMotion
+from ephs.mechanics.motion.reduced import ReducedMotion
+from ephs.mechanics.tree.finding.frames import frames_of
 from ephs.testing import mechanisms
 
 # κ of the constraints of a few bodies, in the mass metric; see the rule for linear solves
 BOUND = 1e-9
 
 
-def twists_by(monkeypatch, solution, most):
-    """Twists and rates with sparse matrices for more than so many joints."""
-    monkeypatch.setattr(motion, "MANY", most)
-    problem = solution.problem
-    read = problem.motion(solution)
-    return read.twists, read.rates
-
-
 def same(one, other):
-    for name in one:
-        size = max(1.0, float(np.abs(one[name]).max(initial=0.0)))
-        np.testing.assert_allclose(one[name], other[name], rtol=0.0, atol=BOUND * size)
+    size = max(1.0, float(np.nanmax(np.abs(other), initial=0.0)))
+    np.testing.assert_allclose(one, other, rtol=0.0, atol=BOUND * size)
+
+
+def compare(solution):
+    swept = ReducedMotion.of(solution)
+    frames = frames_of(solution.problem.descriptor)
+    general = GeneralMotion(solution, frames)
+    assert swept is not None
+    for path, twist in general.twists.items():
+        same(swept.twists[path], twist)
+    for joint in frames.joints:
+        same(swept.rate(joint.path), general.rate(joint.path))
+        same(swept.wrench(joint.path), general.wrench(joint.path))
 
 
 @pytest.mark.parametrize("family", families.FAMILIES)
-def test_sparse_matrices_find_what_dense_ones_find(family, monkeypatch):
-    solution = ephs.simulate(families.scene(family, 4), 0.1, method="natural", step=0.02)
-    for one, other in zip(twists_by(monkeypatch, solution, 1000), twists_by(monkeypatch, solution, 0), strict=True):
-        same(one, other)
+def test_sweeps_find_what_the_general_form_finds(family):
+    compare(ephs.simulate(families.scene(family, 3), 0.02, method="natural", step=0.01))
 
 
-@settings(deadline=None, max_examples=15)
+@settings(deadline=None, max_examples=8)
 @given(mechanisms())
 def test_on_drawn_mechanisms_too(scene):
-    solution = ephs.simulate(scene, 0.02, method="natural", step=0.01)
-    with pytest.MonkeyPatch.context() as patch:
-        dense, sparse = twists_by(patch, solution, 1000), twists_by(patch, solution, 0)
-    for one, other in zip(dense, sparse, strict=True):
-        same(one, other)
+    compare(ephs.simulate(scene, 0.02, method="natural", step=0.01))
 
 
 def test_velocities_of_a_long_chain_keep_its_joints_closed():

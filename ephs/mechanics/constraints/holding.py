@@ -18,7 +18,7 @@ from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rank import CONSTRAINT, rank_of
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 
-__all__ = ["Hold", "Mechanism", "redundant"]
+__all__ = ["Hold", "Mechanism", "annihilator", "redundant"]
 
 
 @final
@@ -90,7 +90,7 @@ class Mechanism:
         basis = link.coupling.basis(x).copy()
         basis[3:] /= self.length
         # a single freedom moves: the wrench that does work on it alone is the freedom itself
-        local = basis / np.linalg.norm(basis) if moved else _annihilator(basis)
+        local = basis / np.linalg.norm(basis) if moved else annihilator(basis)
         rows = np.zeros((local.shape[1], poses.shape[0], 6))
         # body 1 feels the wrench where its own frame puts C2: the same place, as far as the joint is closed
         for body, sign, end in (
@@ -133,7 +133,7 @@ def redundant(holds: Sequence[Hold], tolerance: float = CONSTRAINT) -> list[Arra
     return out
 
 
-def _annihilator(basis: Array) -> Array:
+def annihilator(basis: Array) -> Array:
     """An orthonormal basis of the wrenches that do no work on the twists in the columns."""
     if not basis.shape[1]:
         return np.eye(6)

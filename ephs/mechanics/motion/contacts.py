@@ -1,4 +1,4 @@
-"""Contacts of a motion: gaps, forces, slip and heat at all instants, and the wrenches on bodies."""
+"""Contacts of a motion: gaps, forces, slip and heat at all instants, in closed form."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ import numpy as np
 
 from ephs.mechanics.elements.contact import lever, losses
 from ephs.mechanics.motion.batch import adjoint_inverse, compose, inverse, turned
-from ephs.mechanics.motion.loads import Read
+from ephs.mechanics.motion.moving import Moving
 from ephs.mechanics.scene.build import contact_points
 from ephs.mechanics.scene.model import GROUND, Scene
 from ephs.mechanics.scene.surfaces import Contact
@@ -16,7 +16,7 @@ from ephs.mechanics.shapes.gap import ramp
 from ephs.mechanics.shapes.pairs import Touch
 from ephs.semantics.bundle import Array
 
-__all__ = ["ContactMotion", "contact_motion", "contact_wrenches"]
+__all__ = ["ContactMotion", "contact_motion"]
 
 
 @final
@@ -54,7 +54,7 @@ class _Point:
     wrenches: tuple[Array, Array]
 
 
-def contact_motion(scene: Scene, of: Contact, read: Read) -> ContactMotion:
+def contact_motion(scene: Scene, of: Contact, read: Moving) -> ContactMotion:
     """Read a contact's motion."""
     points = [point for _, point in _points(scene, of, read)]
     return ContactMotion(
@@ -65,22 +65,13 @@ def contact_motion(scene: Scene, of: Contact, read: Read) -> ContactMotion:
     )
 
 
-def contact_wrenches(scene: Scene, read: Read) -> Iterator[tuple[str, Array]]:
-    """Wrenches (n, 6) of all contacts on bodies, in the bodies' frames."""
-    for _, contact in scene.all_contacts():
-        for bodies, point in _points(scene, contact, read):
-            for name, wrench in zip(bodies, point.wrenches, strict=True):
-                if name != GROUND:
-                    yield name, wrench
-
-
-def _points(scene: Scene, of: Contact, read: Read) -> Iterator[tuple[tuple[str, str], _Point]]:
+def _points(scene: Scene, of: Contact, read: Moving) -> Iterator[tuple[tuple[str, str], _Point]]:
     bodies, touches = contact_points(scene, of)
     for touch in touches:
         yield bodies, _point(bodies, touch, of, read)
 
 
-def _point(bodies: tuple[str, str], touch: Touch, of: Contact, read: Read) -> _Point:
+def _point(bodies: tuple[str, str], touch: Touch, of: Contact, read: Moving) -> _Point:
     frame1, frame2, gap = touch
     poses = [read.poses(name) for name in bodies]
     ends = [compose(pose, np.broadcast_to(o, pose.shape)) for pose, o in zip(poses, (frame1, frame2), strict=True)]

@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING, Any, cast, final
 import numpy as np
 
 from ephs.mechanics.motion.motion import BodyMotion, JointMotion, MarkerMotion, SceneMotion, ThermalMotion
+from ephs.mechanics.motion.moving import Part
+from ephs.mechanics.motion.reduced import motion_of
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 
@@ -21,7 +23,7 @@ __all__ = ["Inside"]
 class Inside:
     """The motion of a scene that is a box of a larger system; it reads like the solution of the scene alone.
 
-    `ephs.show.animate` takes it, too. Wrenches of joints are not known: others act on the mechanism through its ports.
+    `ephs.show.animate` takes it, too.
 
     Parameters
     ----------
@@ -42,7 +44,7 @@ class Inside:
         self._solution, self._path, self.scene = solution, Path.of(path), scene
         self.t, self.name = solution.t, f"{solution.name}.{path}"
         self.problem = None  # what acts on the mechanism is not a problem of its own
-        self._motion = SceneMotion(scene, cast(Any, self))
+        self._motion = SceneMotion(scene, cast(Any, self), lambda: Part(motion_of(solution), self._path))
         for name, _ in scene.all_bodies():
             self._motion.poses(name)
 
@@ -54,17 +56,6 @@ class Inside:
         return self._solution[self._path / path]
 
     @property
-    def inputs(self) -> Any:
-        """What acts at the ports, which nobody has written down.
-
-        Raises
-        ------
-        TypeError
-            Always.
-        """
-        raise TypeError(f"{self.name} is a part of a system: what acts at its ports is not known, nor joint wrenches")
-
-    @property
     def constraint_error(self) -> Array:
         """(n,) largest position residual of any joint, in m or rad."""
         return self._motion.constraint_error()
@@ -74,7 +65,7 @@ class Inside:
         return self._motion.body(name)
 
     def joint(self, name: str) -> JointMotion:
-        """The motion of a joint: coordinate, rate."""
+        """The motion of a joint: coordinate, rate, wrench."""
         return self._motion.joint(name)
 
     def thermal(self, name: str) -> ThermalMotion:

@@ -11,7 +11,7 @@ from typing import final
 import numpy as np
 
 from ephs.mechanics.motion.batch import compose, inverse
-from ephs.mechanics.motion.loads import Read
+from ephs.mechanics.motion.moving import Moving
 from ephs.mechanics.scene.build import contact_points
 from ephs.mechanics.scene.model import Scene
 from ephs.semantics.bundle import Array
@@ -41,7 +41,7 @@ class Leap:
     size: float
 
 
-def leaps(scene: Scene, read: Read, t: Array, h: float) -> Iterator[Leap]:
+def leaps(scene: Scene, read: Moving, t: Array, h: float) -> Iterator[Leap]:
     """The longest leap over each contact between instants t (n,) in s of a run whose steps are at most h s long.
 
     Where fewer instants are kept than steps, the way between two is divided among its steps.

@@ -3,7 +3,7 @@
 Velocities are those of the continuous relations: the stored momenta projected on the joints in the mass metric.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, final
@@ -15,11 +15,10 @@ from ephs.mechanics.motion.beams import BeamMotion, beam_motion
 from ephs.mechanics.motion.contacts import ContactMotion, contact_motion
 from ephs.mechanics.motion.gaps import open_by
 from ephs.mechanics.motion.leaps import leaps
-from ephs.mechanics.motion.moving import Moving
+from ephs.mechanics.motion.moving import ByPath, Moving
 from ephs.mechanics.motion.own_motion import OwnMotion, own_motion
-from ephs.mechanics.motion.projection import Held, project, project_dense
 from ephs.mechanics.motion.readout import summary, variables
-from ephs.mechanics.motion.wrenches import root_of, wrenches
+from ephs.mechanics.motion.reduced import motion_of
 from ephs.mechanics.scene.build import component_path
 from ephs.mechanics.scene.geometry import Coupling, coupling_of
 from ephs.mechanics.scene.model import GROUND, Joint, Scene
@@ -27,7 +26,6 @@ from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.solve.result.dataset import Variable
-from ephs.solve.threads import in_one_thread
 
 if TYPE_CHECKING:
     from ephs.solve.result.solution import Solution
@@ -128,10 +126,13 @@ class MarkerMotion:
 
 @final
 class SceneMotion:
-    """The motion of a scene, read from a solution."""
+    """The motion of a scene, read from a solution.
 
-    def __init__(self, scene: Scene, solution: "Solution") -> None:
-        self._scene, self._solution = scene, solution
+    Velocities and wrenches are those of the solution's problem, or of ``found``.
+    """
+
+    def __init__(self, scene: Scene, solution: "Solution", found: Callable[[], ByPath] | None = None) -> None:
+        self._scene, self._solution, self._given = scene, solution, found
         self._bodies = dict(scene.all_bodies())
         self._joints = dict(scene.all_joints())
         self._implicit = dict(scene.implicit_joints())
@@ -245,103 +246,39 @@ class SceneMotion:
     def _own(self) -> "OwnMotion | None":
         return own_motion(self._solution, SceneMotion)
 
+    @cached_property
+    def _found(self) -> ByPath:
+        return motion_of(self._solution) if self._given is None else self._given()
+
+    @cached_property
+    def _velocities(self) -> tuple[dict[str, Array], dict[str, Array]]:
+        if self._own is not None:
+            return self._own.velocities()
+        found = self._found.twists
+        twists = {name: found[component_path("bodies", name)] for name in self._bodies}
+        rates = {name: np.hstack([self._found.rate(box) for box in self._boxes(name)]) for name in self._joints}
+        return twists, rates | {name: twists[name] for name in self._implicit}
+
+    def _boxes(self, name: str) -> list[Path]:
+        """The boxes of a joint: a universal one is two."""
+        at = component_path("joints", name)
+        return [at] if self._joints[name].middle is None else [at / "first", at / "second"]
+
     @property
     def twists(self) -> dict[str, Array]:
         """(n, 6) by body."""
-        return self._projected[0]
+        return self._velocities[0]
 
     @property
     def rates(self) -> dict[str, Array]:
         """(n, d) by joint, implicit free joints included."""
-        return self._projected[1]
-
-    @cached_property
-    @in_one_thread
-    def _projected(self) -> tuple[dict[str, Array], dict[str, Array]]:
-        """Twists nearest to the stored momenta in the mass metric that satisfy the joints, and the joints' rates."""
-        if self._own is not None:
-            return self._own.velocities()
-        n = len(self._solution)
-        heavy = [name for name, body in self._bodies.items() if body.mass > 0.0]
-        light = [name for name, body in self._bodies.items() if not body.mass > 0.0]
-        twists = {name: np.zeros((n, 6)) for name in self._bodies}
-        rates = {name: np.zeros((n, c.dim)) for name, c in self._couplings.items()}
-        root: dict[str, Array] = {}
-        for name in heavy:
-            body = self._bodies[name]
-            p = self._solution[component_path("bodies", name) / "ke" / "p"]
-            twists[name][:] = np.column_stack([np.linalg.solve(body.inertia, p[:, :3].T).T, p[:, 3:] / body.mass])
-            root[name] = root_of(body)
-        if len(self._joints) > MANY and not light and all(j.middle is None for j in self._joints.values()):
-            return self._of_many(heavy, root, twists, rates)
-        columns = {name: 6 * i for i, name in enumerate(heavy)}
-        free: dict[str, int] = {}
-        width = 0
-        for name in [*light, *rates]:
-            free[name], width = width, width + (6 if name in light else self._couplings[name].dim)
-        for at in self.chunks():
-            size = at.stop - at.start
-            rows = 6 * len(self._joints) + sum(j.motion is not None for j in self._joints.values())
-            known, unknown = np.zeros((size, rows, 6 * len(heavy))), np.zeros((size, rows, width))
-            right = np.zeros((size, rows))
-            row = 0
-            for name, first, second, basis in self.joint_rows(at):
-                joint = self._joints[name]
-                for body, block in ((joint.body1, first), (joint.body2, second)):
-                    if body in columns:
-                        known[:, row : row + 6, columns[body] : columns[body] + 6] += block
-                    elif body != GROUND:
-                        unknown[:, row : row + 6, free[body] : free[body] + 6] += block
-                unknown[:, row : row + 6, free[name] : free[name] + self._couplings[name].dim] = basis
-                row += 6
-                if joint.motion is not None:
-                    unknown[:, row, free[name]] = 1.0
-                    right[:, row] = joint.motion
-                    row += 1
-            stacked = np.column_stack([twists[name][at] for name in heavy]) if heavy else np.zeros((size, 0))
-            u, rest = project_dense(known, unknown, right, stacked, [root[name] for name in heavy])
-            for name in heavy:
-                twists[name][at] = u[:, columns[name] : columns[name] + 6]
-            for name in light:
-                twists[name][at] = rest[:, free[name] : free[name] + 6]
-            for name in rates:
-                rates[name][at] = rest[:, free[name] : free[name] + self._couplings[name].dim]
-        for name in self._implicit:
-            rates[name] = twists[name]
-        return twists, rates
-
-    def _of_many(
-        self, names: list[str], root: dict[str, Array], twists: dict[str, Array], rates: dict[str, Array]
-    ) -> tuple[dict[str, Array], dict[str, Array]]:
-        """The same of a large mechanism without massless bodies and universal joints, by sparse matrices."""
-        number = {name: i for i, name in enumerate(names)}
-        roots = np.array([root[name] for name in names])
-        for at in self.chunks():
-            held: list[Held] = []
-            for name, first, second, basis in self.joint_rows(at):
-                joint = self._joints[name]
-                ends = ((joint.body1, first), (joint.body2, second))
-                rows = {number[body]: block for body, block in ends if body != GROUND}
-                held.append(Held(rows, basis[0], joint.motion))
-            given = np.stack([twists[name][at] for name in names], axis=1)
-            found, turned = project(held, roots, given)
-            for name, i in number.items():
-                twists[name][at] = found[:, i]
-            for name, rate in zip(self._joints, turned, strict=True):
-                rates[name][at] = rate
-        for name in self._implicit:
-            rates[name] = twists[name]
-        return twists, rates
+        return self._velocities[1]
 
     def wrench(self, name: str) -> Array:
         """(n, 6) of a joint; see `JointMotion`."""
-        return np.zeros((len(self._solution), 6)) if name in self._implicit else self._wrenches[name]
-
-    @cached_property
-    def _wrenches(self) -> dict[str, Array]:
-        if self._own is not None:
-            return self._own.wrenches()
-        return wrenches(self._scene, {path: given.values for path, given in self._solution.inputs.items()}, self)
+        if name in self._implicit:
+            return np.zeros((len(self._solution), 6))
+        return self._found.wrench(self._boxes(name)[-1]) if self._own is None else self._own.wrench(name)
 
     def variables(self, *, wrenches: bool) -> dict[str, Variable]:
         """Bodies, joints, thermal nodes and markers as labelled arrays."""

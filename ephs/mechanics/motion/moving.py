@@ -1,11 +1,13 @@
-"""What the motions of bodies and joints are read from: poses, twists, rates and wrenches by name."""
+"""What the motions of bodies and joints are read from: poses, twists, rates and wrenches, by name or by path."""
 
 from collections.abc import Mapping
-from typing import Protocol
+from dataclasses import dataclass
+from typing import Protocol, final
 
+from ephs.operad import Path
 from ephs.semantics.bundle import Array
 
-__all__ = ["Moving"]
+__all__ = ["ByPath", "Moving", "Part"]
 
 
 class Moving(Protocol):
@@ -28,3 +30,47 @@ class Moving(Protocol):
     def wrench(self, name: str) -> Array:
         """(n, 6) of a joint."""
         ...
+
+
+class ByPath(Protocol):
+    """The motion of links and joints by the paths of their boxes."""
+
+    @property
+    def twists(self) -> Mapping[Path, Array]:
+        """Path of a body -> (n, 6) in its frame; rad/s, m/s."""
+        ...
+
+    def rate(self, joint: Path) -> Array:
+        """(n, d) of a joint, in the axes of C2."""
+        ...
+
+    def wrench(self, joint: Path) -> Array:
+        """(n, 6) of a joint: λ on body 2 in C2, NaN in components that are indeterminate."""
+        ...
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Part:
+    """The motion of a box of a system, by the paths within it."""
+
+    whole: ByPath
+    box: Path
+
+    @property
+    def twists(self) -> Mapping[Path, Array]:
+        """Path of a body -> (n, 6) in its frame; rad/s, m/s."""
+        box = tuple(self.box)
+        return {
+            Path.of(tuple(path)[len(box) :]): twist
+            for path, twist in self.whole.twists.items()
+            if tuple(path)[: len(box)] == box
+        }
+
+    def rate(self, joint: Path) -> Array:
+        """(n, d) of a joint, in the axes of C2."""
+        return self.whole.rate(self.box / joint)
+
+    def wrench(self, joint: Path) -> Array:
+        """(n, 6) of a joint: λ on body 2 in C2, NaN in components that are indeterminate."""
+        return self.whole.wrench(self.box / joint)

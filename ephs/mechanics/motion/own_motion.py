@@ -44,10 +44,10 @@ class OwnMotion:
         }
         return {name: u * twist for name, u in self.motion.twists.items()}, rates
 
-    def wrenches(self) -> dict[str, Array]:
-        """(n, 6) by joint."""
+    def wrench(self, name: str) -> Array:
+        """(n, 6) of a joint."""
         units = np.array([self.units.energy] * 3 + [self.units.energy / self.units.length] * 3)
-        return {name: self.motion.wrench(name) * units for name, _ in self.scene.all_joints()}
+        return self.motion.wrench(name) * units
 
 
 def own_motion(solution: Solution, make: Callable[[Scene, Solution], Any]) -> OwnMotion | None:

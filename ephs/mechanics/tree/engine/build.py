@@ -37,6 +37,8 @@ def engine_of(
     supply: Array,
     acted: tuple[frozenset[int], frozenset[int]] = (frozenset(), frozenset()),
     kept: Sequence[Array] | None = None,
+    *,
+    apart: bool = False,
 ) -> Engine:
     """The engine of a reduced scene.
 
@@ -52,8 +54,10 @@ def engine_of(
         Edges and bodies on which given forces act.
     kept
         Of each cut joint, which of its rows are kept: those that others imply are left out. None: all.
+    apart
+        Whether each body is a link of its own, in space: `links_of`.
     """
-    found = links_of(reduced)
+    found = links_of(reduced, apart=apart)
     bodies, ground = found.bodies, found.ground
     cut, cut_frame, cut_basis, ends = _cut(reduced, bodies, ground, kept)
     charts = _chart(reduced, cut)
@@ -64,7 +68,7 @@ def engine_of(
     driven = any(part.joint.driven for part in found.parts)
     between = bool(np.any((forces.edge[:, 0] == ON_BODIES) & (forces.part[:, 0] >= 0)))
     records = found.packed(gravity)
-    program = sweeps(records.kind, general=bool(forced or driven or len(cut)))
+    program = sweeps(records.kind, general=bool(forced or driven or len(cut) or apart))
     eliminated = closing([part.parent for part in found.parts], ends)
     joints = kinds_of([*charts[:, [0, 3, 1]].tolist(), *cut[:, [2, 5, 3]].tolist()])
     reached = _reached(program.program, loop_program(joints))
@@ -128,7 +132,7 @@ def _work(
     rows, slots = len(closing.row), len(closing.slot)
     shapes: dict[str, tuple[int, ...]] = {
         "work": ((links + 1) * program.width,), "place": (links + 1, PLACE), "change": (links + 1, 6),
-        "pushed": (links, 6), "force": (freedoms,), "zero": (freedoms,), "attached": (joints,),
+        "pushed": (links, 6), "force": (freedoms,), "zero": (freedoms,), "attached": (joints,), "pulled": (joints,),
         "relative": (cuts, Relative.real_width),
         "value": (rows, 4), "entry": (closing.entries,), "covector": (slots, 6), "along": (slots, 12),
         "largest": (max(closing.blocks, 1),), "temperature": (max(entropies, 1),), "entropy": (entropies,),

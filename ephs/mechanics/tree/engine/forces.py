@@ -201,7 +201,11 @@ class _Acting:
 
             on.loop(edge.dim, one)
 
+        def keep() -> None:
+            copy(on, pull.part(0, edge.dim), w.pulled.part(edge.r_at, edge.dim))
+
         on.when(tree, in_joint, lambda: self._on_links(edge, motion, pull))
+        on.when(between_bodies, lambda: None, keep)
 
     def _cut(self, edge: Acting, motion: Relative) -> None:
         found = motion_of(self.work.relative, edge.cut)

@@ -61,11 +61,15 @@ class Found:
         return packed(self.parts, pull, planar=self.planar)
 
 
-def links_of(reduced: "Reduced") -> Found:
-    """The links of a reduced scene."""
+def links_of(reduced: "Reduced", *, apart: bool = False) -> Found:
+    """The links of a reduced scene.
+
+    With ``apart`` each body is a link, also of planar mechanisms and where bodies are fixed to each other: what joints
+    transmit is then known of all of them, in all six directions.
+    """
     t = reduced.tables
     joints = [i for i in range(len(reduced.edges)) if t.kind[i] != SPRING]
-    normal = _plane(reduced, joints)
+    normal = None if apart else _plane(reduced, joints)
     ground = SE3.identity() if normal is None else np.concatenate([matrix_to_quaternion(_onto(normal)), np.zeros(3)])
     bodies = Frames([], [])
     parts: list[Part] = []
@@ -75,7 +79,7 @@ def links_of(reduced: "Reduced") -> Found:
         forward = bool(t.forward[i])
         near, far = (t.offset1[i], t.offset2[i]) if forward else (t.offset2[i], t.offset1[i])
         edge = reduced.edges[i]
-        if edge.pair.dim == 0:
+        if edge.pair.dim == 0 and not apart:
             bodies.link.append(above)
             bodies.inside.append(SE3.compose(SE3.compose(inside, near), SE3.inverse(far)))
             if above >= 0:
@@ -88,7 +92,7 @@ def links_of(reduced: "Reduced") -> Found:
         joint = SE3.compose(joint, turn)
         bodies.link.append(len(parts))
         bodies.inside.append(SE3.compose(SE3.inverse(turn), SE3.inverse(far)))
-        sign, driven = 1 if forward else -1, bool(t.driven[t.r_at[i]])
+        sign, driven = 1 if forward else -1, edge.pair.dim > 0 and bool(t.driven[t.r_at[i]])
         if normal is not None:
             kind = replace(TURN if edge.pair.name == "revolute" else SLIDE, driven=driven)
             sign *= -1 if kind.revolute and quaternion_to_matrix(turn[:4])[2, 2] < 0.0 else 1
@@ -99,7 +103,7 @@ def links_of(reduced: "Reduced") -> Found:
         matrix = quaternion_to_matrix(joint[:4])
         numbers = np.concatenate([matrix.ravel(), joint[4:], np.zeros(10)])
         numbers += _inertia(t.inertia[i], bodies.inside[-1])
-        own = float(t.armature[t.r_at[i]])
+        own = float(t.armature[t.r_at[i]]) if edge.pair.dim else 0.0
         kind = replace(kind, armature=own > 0.0 and not driven)
         parts.append(Part(kind, above, int(t.q_at[i]), int(t.r_at[i]), sign, numbers, own))
     return Found(parts, bodies, ground, normal is not None)

@@ -47,7 +47,8 @@ ASIDE = 0.1
 class Equations:
     """The reduced form of one problem. It keeps scratch memory: use one for each thread.
 
-    With ``pushed`` forces may be put into ``drive`` at every joint, not only where the problem has an input.
+    With ``pushed`` forces may be put into ``drive`` at every joint, not only where the problem has an input. With
+    ``apart`` each body is a link of the engine.
 
     Attributes
     ----------
@@ -55,8 +56,8 @@ class Equations:
         Whether the loops were closed last at constraints that nearly repeat each other.
     """
 
-    def __init__(self, problem: Problem, t0: float, *, pushed: bool = False) -> None:
-        self.problem = problem
+    def __init__(self, problem: Problem, t0: float, *, pushed: bool = False, apart: bool = False) -> None:
+        self.problem, self._apart = problem, apart
         self.model = model = compile_model(
             problem.descriptor, problem.reference, problem.inputs(t0, problem.initial), matrix=False
         )
@@ -97,7 +98,8 @@ class Equations:
     def _build(self, kept: "list[Array] | None") -> None:
         """The engine, with all rows of the cut joints or those that are kept."""
         self.engine = engine_of(
-            self.reduced, self.gravity, self.drive, self.wrench, self.scal, self.given.supply, self._acted, kept
+            self.reduced, self.gravity, self.drive, self.wrench, self.scal, self.given.supply, self._acted, kept,
+            apart=self._apart,
         )  # fmt: skip
 
     # ---- the equations -----------------------------------------------------------------------------------------

@@ -1,6 +1,6 @@
 """External inputs: forces on joints and wrenches on bodies, in the arrays that the sweeps read."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import final
 
 import numpy as np
@@ -50,19 +50,22 @@ class Given:
 
     def place(self, t: float, state: Mapping[Path, Array] | None) -> None:
         """Put the inputs at a time and state into the arrays; without a state those that are constant."""
+        self.put(lambda port: self._value(port, t, state))
+
+    def put(self, value: Callable[[Path], Array | float]) -> None:
+        """Put the inputs into the arrays, each as ``value(port)``."""
         for port, where in self._drives:
-            self.drive[where] = self._value(port, t, state)
+            self.drive[where] = value(port)
         self.wrench[[link for _, link, _ in self._wrenches]] = 0.0
         for port, link, seen in self._wrenches:
-            value = self._value(port, t, state)
-            self.wrench[link] += value if seen is None else seen @ value
-
+            given = value(port)
+            self.wrench[link] += given if seen is None else seen @ given
         net = self._reduced.attaching.network
         for i, (port, k) in enumerate(net.inputs):
-            self.supply[i] = np.atleast_1d(self._value(port, t, state))[k]
+            self.supply[i] = np.atleast_1d(value(port))[k]
         self.supply[len(net.inputs) :] = 0.0
         for one in net.injections:
-            self.supply[len(net.inputs) :] += np.atleast_1d(self._value(one.port, t, state))[one.place] * one.row
+            self.supply[len(net.inputs) :] += np.atleast_1d(value(one.port))[one.place] * one.row
 
     def _value(self, port: Path, t: float, state: Mapping[Path, Array] | None) -> Array | float:
         signal = self._signals[port]

@@ -288,8 +288,8 @@ class Work:
         The sweeps' own; links in the world, and their accelerations beyond the bias; the ground's last.
     pushed, force, zero
         Wrenches (links, 6) on links, in their frames; forces on the tree's rates; zeros.
-    attached
-        Forces of what is attached on the freedoms of all joints.
+    attached, pulled
+        Forces on the freedoms of all joints: of what is attached, and all but the constraints'.
     relative
         (cut joints, width): see `ephs.mechanics.tree.sweeps.cuts.Relative`.
     value, entry, covector, along, largest
@@ -319,6 +319,7 @@ class Work:
     force: Vector
     zero: Vector
     attached: Vector
+    pulled: Vector
     relative: Matrix
     value: Matrix
     entry: Vector
@@ -350,9 +351,9 @@ class Work:
 
 WORK: Final[dict[str, Any]] = {
     "work": vector(), "place": matrix(PLACE), "change": matrix(6), "pushed": matrix(6), "force": vector(),
-    "zero": vector(), "attached": vector(), "relative": matrix(Relative.real_width), "value": matrix(4),
-    "entry": vector(), "covector": matrix(6), "along": matrix(12), "largest": vector(), "temperature": vector(),
-    "entropy": vector(), "x": vector(), "v": vector(), "e": vector(), "lam": vector(),
+    "zero": vector(), "attached": vector(), "pulled": vector(), "relative": matrix(Relative.real_width),
+    "value": matrix(4), "entry": vector(), "covector": matrix(6), "along": matrix(12), "largest": vector(),
+    "temperature": vector(), "entropy": vector(), "x": vector(), "v": vector(), "e": vector(), "lam": vector(),
     "f": vector(), "c": vector(), "jac": vector(), "scratch": vector(), "alter": vector(), "moved": vector(),
     "momenta": matrix(6), "spin": vector(), "direction": vector(), "descent": vector(), "still": vector(),
     "idle": vector(), "spare": vector(), "answer": vector(1), "fault": indices(1),

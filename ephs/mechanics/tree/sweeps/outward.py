@@ -52,7 +52,7 @@ def _step(on: Evaluator, tree: Tree, i: Integer, joint: Joint, link: Link, q: Ve
     state, parent = tree.states[i], tree.states[link.parent]
     rotation, place = frame(on, joint, link, q)
     rate = rate_inside(on, joint, link, q, [r[link.r_at + k] for k in range(joint.dim)])
-    along = combine(joint.basis, rate)
+    along = combine(joint.basis, rate) if joint.dim else [0.0] * 6
     state.rotation, state.place = rotation, place
     around = parent.turn
     state.turn, state.at = product(around, rotation), add(parent.at, apply(around, place))

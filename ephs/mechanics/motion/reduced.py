@@ -1,0 +1,158 @@
+"""Velocities and joint wrenches of a solution in joint coordinates, by the sweeps that the methods run.
+
+At each kept instant the tree's rates are those nearest to the stored momenta in the mass metric, put on the loops as
+the methods put them.
+"""
+
+from dataclasses import replace
+from functools import cached_property
+from typing import final
+
+import numpy as np
+
+from ephs.mechanics.motion.batch import adjoint_inverse
+from ephs.mechanics.motion.general import GeneralMotion
+from ephs.mechanics.motion.moving import ByPath
+from ephs.mechanics.motion.transmitted import Transmission
+from ephs.mechanics.tree.engine.links import links_of
+from ephs.mechanics.tree.equations.equations import Equations, ReducedState
+from ephs.mechanics.tree.equations.impulses import TWIST, Impulses
+from ephs.mechanics.tree.finding.frames import Unplaced, frames_of
+from ephs.mechanics.tree.finding.tables import SPRING, TREE
+from ephs.operad import Path
+from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.codes import VECTOR
+from ephs.solve.errors import OptionError, SolveError
+from ephs.solve.march import Status
+from ephs.solve.problem import Problem, Signal
+from ephs.solve.result.solution import Solution
+from ephs.solve.threads import in_one_thread
+
+__all__ = ["ReducedMotion", "motion_of"]
+
+
+@final
+class ReducedMotion:
+    """The motion of one solution, in joint coordinates.
+
+    Attributes
+    ----------
+    twists
+        Path of a body -> (n, 6) in its frame; rad/s, m/s.
+    """
+
+    def __init__(self, solution: Solution, equations: Equations) -> None:
+        self._solution, self._eq = solution, equations
+        reduced, t = equations.reduced, equations.reduced.tables
+        self._number = {edge.path: i for i, edge in enumerate(reduced.edges) if edge.path is not None}
+        inside = np.array(links_of(reduced, apart=True).bodies.inside).reshape(-1, 7)
+        into = adjoint_inverse(inside)
+        self._momenta = into.mT
+        self._transmission = Transmission(reduced, inside, into.mT @ t.inertia @ into)
+        self._impulses = Impulses(equations, self._transmission.inertia)
+        self._states = self._on_loops()
+        self._r = np.array([state.r for state in self._states])
+        twists = np.array([self._impulses.outward(s.q, s.r)[:, TWIST] for s in self._states])
+        own = np.einsum("lij,nlj->nli", into, twists)
+        self.twists = {link.path: own[:, i] for i, link in enumerate(reduced.places) if link.path is not None}
+
+    @staticmethod
+    @in_one_thread
+    def of(solution: Solution) -> "ReducedMotion | None":
+        """The motion of a solution; None where its problem has no form in joint coordinates, or it leaves that."""
+        if solution.problem is None or not len(solution):
+            return None
+        try:
+            return ReducedMotion(solution, Equations(_at_rest(solution.problem), 0.0, apart=True))
+        except (Unplaced, OptionError, SolveError):
+            return None
+
+    def rate(self, joint: Path) -> Array:
+        """(n, d) of the joint with this box, in the axes of C2."""
+        t, i = self._eq.reduced.tables, self._number[joint]
+        at, dim = int(t.r_at[i]), int(t.dim[i])
+        if t.kind[i] == TREE:
+            return self._r[:, at : at + dim]
+        places = (self._impulses.outward(state.q, state.r) for state in self._states)
+        return np.array([self._transmission.slip(i, one) for one in places]).reshape(-1, dim)
+
+    def wrench(self, joint: Path) -> Array:
+        """(n, 6) of the joint with this box: λ on body 2 in C2, NaN in components that are indeterminate."""
+        i = self._number[joint]
+        if self._eq.reduced.tables.kind[i] == SPRING:  # it carries neither link: the sweeps know of its force only
+            return self._general.wrench(joint)
+        return self._wrenches[:, i]
+
+    @cached_property
+    def _general(self) -> GeneralMotion:
+        return GeneralMotion(self._solution, frames_of(self._eq.problem.descriptor))
+
+    @cached_property
+    @in_one_thread
+    def _wrenches(self) -> Array:
+        """(n, edges, 6)."""
+        eq, out = self._eq, np.zeros((len(self._states), len(self._eq.reduced.edges), 6))
+        inputs = self._solution.inputs
+        work = eq.engine.work
+        for k, state in enumerate(self._states):
+            eq.given.put(lambda port, k=k: inputs[port].values[k])
+            y = eq.vector(state)
+            status, _, rates = eq.engine.rates(state.q, y)
+            if status == Status.DEPENDENT:
+                status, _ = eq.dense.rates(state.q, y, eq.given, eq.heats, rates)
+            eq.refuse(status, eq.engine.failed)
+            accelerations = rates[eq.nv : eq.nv + eq.n]
+            out[k] = self._transmission.wrenches(
+                work["place"][:-1], accelerations, work["pushed"], work["force"], work["pulled"]
+            )
+        return out
+
+    def _on_loops(self) -> list[ReducedState]:
+        """The states at the kept instants: rates by the momenta, loops closed."""
+        eq, solution, n = self._eq, self._solution, len(self._solution)
+        reduced, t = eq.reduced, eq.reduced.tables
+        prescribed = np.zeros(eq.n)
+        prescribed[t.driven == 1] = eq.prescribed
+        q, momenta = np.zeros((n, reduced.coordinates)), np.zeros((n, reduced.links, 6))
+        for i, edge in enumerate(reduced.edges):
+            if edge.state is not None and t.kind[i] != SPRING:
+                given = solution[edge.state].reshape(n, -1)
+                if edge.path is not None and t.code[i] != VECTOR:  # relative poses are kept as coordinates
+                    given = np.array([edge.pair.element(row) for row in given])
+                q[:, int(t.q_at[i]) : int(t.q_at[i] + t.q_size[i])] = given
+        for i, link in enumerate(reduced.places):
+            if link.momentum is not None:
+                momenta[:, i] = solution[link.momentum.path] @ self._momenta[i].T
+        s = [solution[path].reshape(n, -1) for path in reduced.entropies]
+        heats = eq.heats.energies(np.hstack([np.zeros((n, 0)), *s]))
+        books = np.zeros(2 + len(reduced.made))
+        return [
+            eq.closed(ReducedState(time, q[k], self._impulses.rates(q[k], prescribed, momenta[k]), heats[k], books))
+            for k, time in enumerate(solution.t.tolist())
+        ]
+
+
+def motion_of(solution: Solution) -> ByPath:
+    """The motion of a solution in joint coordinates, or by the general form where it has none.
+
+    Raises
+    ------
+    TypeError
+        The solution has lost its problem.
+    """
+    if solution.problem is None:
+        raise TypeError(f"{solution.name} has no problem any more, from which velocities and wrenches follow")
+    return ReducedMotion.of(solution) or GeneralMotion(solution, frames_of(solution.problem.descriptor))
+
+
+def _at_rest(problem: Problem) -> Problem:
+    """The problem with zeros for inputs that change: their values are known at the kept instants alone."""
+    return replace(
+        problem,
+        signals={
+            path: one
+            if one.constant
+            else Signal(np.zeros(problem.system.interface[path].quantity.space.dim), one.effort)
+            for path, one in problem.signals.items()
+        },
+    )

@@ -1,0 +1,196 @@
+"""What the joints of a mechanism transmit at an instant, from its accelerations.
+
+Each link with all that it carries needs a wrench W. A joint of the tree transmits it, less what the cut joints on these
+links do; along the joint's freedoms it is the force in the joint:
+
+    s_jᵀ (W_i − Σ_c σ_ic N_c μ_c) = f_j − a_j ṙ_j,
+
+with twists s of the freedoms, their forces f and armatures a, wrenches N that a cut joint can hold, and σ = ±1 where it
+acts on link i or what that carries as its second or first body. This is solved for all of N, not only for the rows by
+which methods close loops: what it leaves free is statically indeterminate.
+"""
+
+from collections.abc import Mapping
+from typing import final
+
+import numpy as np
+
+from ephs.mechanics.constraints.holding import annihilator
+from ephs.mechanics.tree.finding.mechanism import Reduced
+from ephs.mechanics.tree.finding.tables import CUT, SPRING
+from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.rank import CONSTRAINT, SPANNED, rank_of
+from ephs.semantics.spaces.rotations import quaternion_to_matrix
+
+__all__ = ["Transmission"]
+
+TURN, PLACE, TWIST, BIAS = slice(0, 9), slice(9, 12), slice(12, 18), slice(18, 24)
+"""Columns of a link's place: frame in the world, twist, acceleration where no rate changes, gravity in it."""
+
+
+@final
+class Transmission:
+    """The joints' wrenches of a mechanism whose links are its bodies.
+
+    Parameters
+    ----------
+    inside
+        (links, 7) poses of the bodies in their links' frames.
+    inertia
+        (links, 6, 6) in the links' frames.
+    """
+
+    def __init__(self, reduced: Reduced, inside: Array, inertia: Array) -> None:
+        t = reduced.tables
+        self._reduced, self.inertia = reduced, inertia
+        turn = np.array([quaternion_to_matrix(pose[:4]) for pose in inside]).reshape(-1, 3, 3)
+        self._ends = []  # of each joint: the link of body 2, and C2 in that link's frame
+        for i, edge in enumerate(reduced.edges):
+            link, own = int(t.second[i]), quaternion_to_matrix(edge.offset2[:4])
+            here = (own, edge.offset2[4:])
+            if link >= 0:
+                here = turn[link] @ own, turn[link] @ edge.offset2[4:] + inside[link, 4:]
+            self._ends.append((link, *here))
+        self._cut = [i for i in range(len(reduced.edges)) if t.kind[i] == CUT]
+        self._held = {i: annihilator(reduced.edges[i].pair.basis) for i in self._cut}
+        self._link = np.repeat(np.arange(reduced.links), t.dim[: reduced.links])
+        self._signs = np.zeros((reduced.links, len(self._cut)))
+        for k, i in enumerate(self._cut):
+            for end, sign in ((int(t.first[i]), -1.0), (int(t.second[i]), 1.0)):
+                while end >= 0:
+                    self._signs[end, k] += sign
+                    end = int(t.parent[end])
+
+    def slip(self, i: int, places: Array) -> Array:
+        """(d,) the rate of a cut joint by the links' places (links, 24)."""
+        t = self._reduced.tables
+        turn, at = self._second(i, places)
+        one, two = (_twist_outward(places[k]) if k >= 0 else np.zeros(6) for k in (int(t.first[i]), int(t.second[i])))
+        relative = two - one
+        own = np.concatenate([turn.T @ relative[:3], turn.T @ (relative[3:] - np.cross(at, relative[:3]))])
+        return t.left[i, : int(t.dim[i])] @ own
+
+    def wrenches(self, places: Array, accelerations: Array, pushed: Array, force: Array, pulled: Array) -> Array:
+        """(edges, 6) λ of the joints on their bodies 2 in C2, NaN in components that are indeterminate.
+
+        Parameters
+        ----------
+        places
+            (links, 24).
+        accelerations, force
+            (n,) of the tree's freedoms, and forces on them.
+        pushed
+            (links, 6) wrenches on the links in their frames, of all but the constraints.
+        pulled
+            Forces on the freedoms of all joints.
+        """
+        reduced, t = self._reduced, self._reduced.tables
+        frames = {i: self._second(i, places) for i in range(len(reduced.edges)) if t.kind[i] != SPRING}
+        freedoms = self._freedoms(frames)
+        needed = self._needed(places, accelerations, freedoms, pushed)
+        if not self._cut:
+            return self._on_second(frames, needed[:, :, None])[:, :, 0]
+        held = [_wrench_outward(*frames[i], self._held[i]) for i in self._cut]
+        columns = np.repeat(np.arange(len(self._cut)), [one.shape[1] for one in held])
+        whole, acting = np.hstack(held), self._signs[:, columns]
+        free = np.flatnonzero(t.driven == 0)
+        link = self._link[free]
+        right = np.einsum("fi,fi->f", freedoms[free], needed[link]) - force[free]
+        right += t.armature[free] * accelerations[free]
+        size = np.linalg.norm(freedoms[free], axis=1)
+        found, unknown = _solved(acting[link] * (freedoms[free] @ whole) / size[:, None], right / size)
+        multipliers = np.column_stack([found, unknown])
+        carried = -np.einsum("lm,im,mk->lik", acting, whole, multipliers)
+        carried[:, :, 0] += needed
+        out = self._on_second(frames, carried)
+        for k, i in enumerate(self._cut):
+            out[i] = self._held[i] @ multipliers[columns == k]
+            d, at = int(t.dim[i]), int(t.r_at[i])
+            out[i, :, 0] += t.left[i, :d].T @ pulled[at : at + d]
+        return _masked(out)
+
+    def _second(self, i: int, places: Array) -> tuple[Array, Array]:
+        """Frame C2 of a joint in the world."""
+        link, turn, at = self._ends[i]
+        if link < 0:
+            return turn, at
+        own = places[link, TURN].reshape(3, 3)
+        return own @ turn, places[link, PLACE] + own @ at
+
+    def _freedoms(self, frames: Mapping[int, tuple[Array, Array]]) -> Array:
+        """(n, 6) world twists that the tree's freedoms give the links that they carry."""
+        t = self._reduced.tables
+        out = np.zeros((self._reduced.freedoms, 6))
+        for i in range(self._reduced.links):
+            d, at = int(t.dim[i]), int(t.r_at[i])
+            turn, place = frames[i]
+            angular, linear = turn @ t.basis[i, :3, :d], turn @ t.basis[i, 3:, :d]
+            sign = 1.0 if t.forward[i] else -1.0
+            out[at : at + d, :3] = sign * angular.T
+            out[at : at + d, 3:] = sign * (linear.T + np.cross(place, angular.T))
+        return out
+
+    def _needed(self, places: Array, accelerations: Array, freedoms: Array, pushed: Array) -> Array:
+        """(links, 6) wrench about the world's origin that each link needs with all that it carries."""
+        t = self._reduced.tables
+        turn, at = places[:, TURN].reshape(-1, 3, 3), places[:, PLACE]
+        grown = np.zeros((self._reduced.links, 6))
+        np.add.at(grown, self._link, freedoms * accelerations[:, None])
+        for i in range(self._reduced.links):
+            if t.parent[i] >= 0:
+                grown[i] += grown[int(t.parent[i])]
+        changed = places[:, BIAS].copy()
+        changed[:, :3] += np.einsum("lji,lj->li", turn, grown[:, :3])
+        changed[:, 3:] += np.einsum("lji,lj->li", turn, grown[:, 3:] - np.cross(at, grown[:, :3]))
+        twist = places[:, TWIST]
+        momentum = np.einsum("lij,lj->li", self.inertia, twist)
+        own = np.einsum("lij,lj->li", self.inertia, changed) - pushed
+        own[:, :3] += np.cross(twist[:, :3], momentum[:, :3]) + np.cross(twist[:, 3:], momentum[:, 3:])
+        own[:, 3:] += np.cross(twist[:, :3], momentum[:, 3:])
+        out = np.zeros_like(own)
+        out[:, 3:] = np.einsum("lij,lj->li", turn, own[:, 3:])
+        out[:, :3] = np.einsum("lij,lj->li", turn, own[:, :3]) + np.cross(at, out[:, 3:])
+        for i in range(self._reduced.links - 1, -1, -1):
+            if t.parent[i] >= 0:
+                out[int(t.parent[i])] += out[i]
+        return out
+
+    def _on_second(self, frames: Mapping[int, tuple[Array, Array]], carried: Array) -> Array:
+        """(edges, 6, k) in C2 on body 2, of wrenches (links, 6, k) that the tree's joints transmit outwards."""
+        t = self._reduced.tables
+        out = np.zeros((len(self._reduced.edges), *carried.shape[1:]))
+        for i in range(self._reduced.links):
+            turn, at = frames[i]
+            wrench = carried[i] if t.forward[i] else -carried[i]
+            out[i, :3] = turn.T @ (wrench[:3] - np.cross(at, wrench[3:], axisb=0, axisc=0))
+            out[i, 3:] = turn.T @ wrench[3:]
+        return out
+
+
+def _twist_outward(place: Array) -> Array:
+    """(6,) the twist of a link about the world's origin."""
+    turn = place[TURN].reshape(3, 3)
+    angular = turn @ place[TWIST][:3]
+    return np.concatenate([angular, turn @ place[TWIST][3:] + np.cross(place[PLACE], angular)])
+
+
+def _wrench_outward(turn: Array, at: Array, wrenches: Array) -> Array:
+    """(6, k) wrenches in a frame, about the world's origin."""
+    force = turn @ wrenches[3:]
+    return np.vstack([turn @ wrenches[:3] + np.cross(at, force, axisb=0, axisc=0), force])
+
+
+def _solved(rows: Array, right: Array) -> tuple[Array, Array]:
+    """The least solution of equations, and what they leave free: (m,) and orthonormal columns (m, k)."""
+    left, sigma, columns = np.linalg.svd(rows)
+    rank = rank_of(sigma, CONSTRAINT, 1.0)
+    return columns[:rank].T @ ((left.T @ right)[:rank] / sigma[:rank]), columns[rank:].T
+
+
+def _masked(wrenches: Array) -> Array:
+    """(edges, 6) the first columns of (edges, 6, 1 + k), NaN in components that the others, orthonormalised, reach."""
+    out, others = wrenches[:, :, 0].copy(), wrenches[:, :, 1:].reshape(6 * len(wrenches), -1)
+    if others.shape[1]:
+        basis, _ = np.linalg.qr(others)
+        out[np.abs(basis).max(axis=1).reshape(-1, 6) > SPANNED] = np.nan
+    return out

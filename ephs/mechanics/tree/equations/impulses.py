@@ -1,0 +1,65 @@
+"""The tree's rates that are nearest to momenta of the links, in the mass metric."""
+
+from typing import TYPE_CHECKING, final
+
+import numpy as np
+
+from ephs.mechanics.tree.sweeps.programs import PLACE
+from ephs.semantics.bundle import Array
+from ephs.solve.errors import Outcome, SolveError
+
+if TYPE_CHECKING:
+    from ephs.mechanics.tree.equations.equations import Equations
+
+__all__ = ["TWIST", "Impulses"]
+
+TWIST = slice(12, 18)
+"""Where the twist of a link's row of `places` stands."""
+
+
+@final
+class Impulses:
+    """M⁻¹ Sᵀ p by the sweeps of an engine whose links are the bodies, loops left out; it keeps memory.
+
+    Parameters
+    ----------
+    inertia
+        (links, 6, 6) in the links' frames.
+    """
+
+    def __init__(self, equations: "Equations", inertia: Array) -> None:
+        engine, links, n = equations.engine, equations.reduced.links, equations.n
+        self._inertia, self._places = inertia, np.zeros((links + 1, PLACE))
+        program, _ = engine.reached["move"]
+        calls = program.compiled()
+        tree = links, engine.tables["integers"], engine.tables["reals"], np.zeros(engine.work["work"].size), np.zeros(3)
+        whole = np.zeros(0, dtype=np.int64)
+        numbers = np.zeros((0, 4)), np.zeros(0), np.zeros((0, 6)), np.zeros((0, 12))
+        rows = np.zeros(4 * (links + 1), dtype=np.int64), whole, whole, whole, *numbers
+        self._q, self._r, self._rate = np.zeros(equations.reduced.coordinates), np.zeros(n), np.zeros(n)
+        self._wrench = np.zeros((links, 6))
+        self._move = calls["move"].bind(*tree, self._q, self._r, self._places)
+        self._fold = calls["fold"].bind(*tree, *rows, self._q, np.zeros(n), self._wrench)
+        self._unfold = calls["unfold"].bind(*tree, *rows, self._q, self._rate, np.zeros((links, 6)))
+
+    def outward(self, q: Array, r: Array) -> Array:
+        """(links, 24) frames in the world, twists, and accelerations at ṙ = 0, at elements q and rates r."""
+        self._q[:], self._r[:] = q, r
+        self._move()
+        return self._places[:-1].copy()
+
+    def rates(self, q: Array, prescribed: Array, momenta: Array) -> Array:
+        """(n,) of momenta (links, 6) in the links' frames, with the rates of driven joints as prescribed (n,).
+
+        Raises
+        ------
+        SolveError
+            A joint moves no mass.
+        """
+        twists = self.outward(q, prescribed)[:, TWIST]
+        self._wrench[:] = momenta - np.einsum("lij,lj->li", self._inertia, twists)
+        self.outward(q, np.zeros_like(prescribed))
+        if self._fold():
+            raise SolveError(Outcome.UNDETERMINED, "", "the rate of a joint that moves no mass")
+        self._unfold()
+        return prescribed + self._rate
