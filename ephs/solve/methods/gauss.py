@@ -35,7 +35,7 @@ from ephs.solve.methods.records import (
     Scratch,
     row_of,
 )
-from ephs.solve.methods.residuals import FAULTS, account
+from ephs.solve.methods.residuals import FAULTS, account, evaluated
 from ephs.solve.methods.scales import FAR, measure
 from ephs.solve.methods.scheme import (
     AHEAD,
@@ -48,7 +48,7 @@ from ephs.solve.methods.scheme import (
     Place,
     StageScratch,
 )
-from ephs.solve.methods.stages import evaluated, linearise
+from ephs.solve.methods.stages import linearise
 
 __all__ = ["advance", "gauss_program"]
 

@@ -41,7 +41,7 @@ from ephs.solve.methods.records import (
     State,
     row_of,
 )
-from ephs.solve.methods.residuals import FAULTS, account, evaluate
+from ephs.solve.methods.residuals import FAULTS, account, evaluated
 from ephs.solve.methods.scales import FAR, measure, reach, weigh
 
 __all__ = [
@@ -228,7 +228,7 @@ def newton(
         on.when(on.same(outcome[0], RUNNING), step)
 
     def iterate() -> Truth:
-        fault = evaluate(on, t, x, z, scal, inputs, m)
+        fault = evaluated(on, t, x, z, scal, inputs, m)
 
         def fail() -> None:
             outcome[0], outcome[1] = fault % FAULTS, fault // FAULTS
@@ -309,7 +309,7 @@ def natural_program() -> Program:
             inputs=vector(), sums=vector(), states=matrix(), energies=matrix(), ledgers=matrix(5), outcome=indices(4),
             steps=integer(),
         ),
-        evaluate=Entry(evaluate, t=TABLES, **point, m=MEMORY),
+        evaluate=Entry(evaluated, t=TABLES, **point, m=MEMORY),
         measure=Entry(measure, t=TABLES, z=vector(), dropped=indices(), m=MEMORY),
         account=Entry(account, t=TABLES, z=vector(), h=real(), inputs=vector(), m=MEMORY, sums=vector()),
         reach=Entry(reach, t=TABLES, m=MEMORY),

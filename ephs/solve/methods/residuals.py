@@ -3,19 +3,20 @@
 from typing import Final
 
 from ephs.semantics.kernel_table import SIGNATURE
-from ephs.semantics.stage import Evaluator, Integer, Integers, Real, Vector
+from ephs.semantics.stage import Evaluator, Integer, Integers, Real, Vector, staged
 from ephs.semantics.stage.reaching import Reached
 from ephs.solve.methods.places import Part, add_to, copy, fill
 from ephs.solve.methods.records import COMPONENT, IRREVERSIBLE, STORING, Columns, Dims, Outer, Scratch, row_of
 from ephs.solve.methods.scales import FAR, reach, still, weigh
 
-__all__ = ["FAULTS", "account", "evaluate"]
+__all__ = ["FAULTS", "account", "evaluated"]
 
 FAULTS: Final = 64
 """A fault is a component's number times this, and a status; 0 is none."""
 
 
-def evaluate(on: Evaluator, t: Columns, x: Vector, z: Vector, scal: Vector, inputs: Vector, m: Scratch) -> Integer:
+@staged
+def evaluated(on: Evaluator, t: Columns, x: Vector, z: Vector, scal: Vector, inputs: Vector, m: Scratch) -> Integer:
     """Residual, its scale, and the matrix at z; 0, or COMPONENT + status + FAULTS · component."""
     h, fault = scal[0], on.counter(0)
     copy(on, t.template, m.data)

@@ -25,10 +25,10 @@ from ephs.solve.methods.corrections import bend, correct_joints, correct_storage
 from ephs.solve.methods.newton import retract, somewhere
 from ephs.solve.methods.places import copy
 from ephs.solve.methods.records import STORING, Columns, Dims, Scratch, State, row_of
-from ephs.solve.methods.residuals import evaluate
+from ephs.solve.methods.residuals import evaluated
 from ephs.solve.methods.scheme import SCHEME, STAGES, WEIGHTS, GroupColumns, Node, StageScratch, Velocity
 
-__all__ = ["evaluated", "exponents", "linearise"]
+__all__ = ["exponents", "linearise"]
 
 LAST = 2e-16
 """Change beside its size that is the last digit's."""
@@ -37,8 +37,6 @@ _A: Final[list[list[float]]] = SCHEME.tolist()
 _B: Final[list[float]] = WEIGHTS.tolist()
 _FIXED: Final = 30
 """Rounds of the iteration for the exponents on a group."""
-evaluated = staged(evaluate)
-"""The relations at one point, emitted once for all of them."""
 
 
 def _over_stages(entry: Callable[[int], Real]) -> Real:
@@ -102,7 +100,7 @@ def linearise(
     on: Evaluator, t: Columns, g: GroupColumns, dropped: Integers, x: Vector, z: Matrix, scal: Vector, still: Vector,
     unit: Vector, inputs: Matrix, m: Scratch, s: StageScratch, fresh: Integer,
 ) -> Integer:  # fmt: skip
-    """Residuals of the stages with their corrections, and where fresh their matrices; 0 or a fault as of `evaluate`."""
+    """Residuals of the stages with their corrections, and where fresh their matrices; 0 or a fault of `evaluated`."""
     n_rate, n, h = t.counts[0], z.columns, scal[0]
     fault, zero, mean_at = on.counter(0), on.counter(0).value, somewhere(on, s.mean)
 
@@ -192,7 +190,7 @@ def linearise(
 def _over_the_step(
     on: Evaluator, t: Columns, g: GroupColumns, h: Real, n: Integer, m: Scratch, s: StageScratch
 ) -> None:
-    """Energies, discrete gradients, temperatures at the end and gaps, as `evaluate` left them in m."""
+    """Energies, discrete gradients, temperatures at the end and gaps, as `evaluated` left them in m."""
     n_rate = t.counts[0]
 
     def component(i: Integer) -> None:
