@@ -6,10 +6,11 @@ source), so entropies change by what is made, to rounding, and friction never ma
 
 **Friction.** The heat H of a step is a quadrature of powers, which says nothing of a motion that decays in the step.
 There D = E⁰ + W − E¹ of all that is not heat is right, where Radau IIA finds a hundredth of it at hλ = 2000 and the
-trapezoidal rule thousands of times as much. So the heat Q of each friction goes from H towards D: no further than the
-estimated error of its quadrature, which is its difference to an embedded one, and not below zero. As |Q − H| ≤ |D − H|
-and D − H is of the order of the method's error, the order stays. What remains of D − H is an error of the motion, such
-as vibrations that the method damped: it stays in the balance, and the audit sees it.
+trapezoidal rule thousands of times as much. Methods whose quadrature finds no more than is lost, those that are
+algebraically stable, take what is lost beyond it, D − H > 0, for friction's heat, in proportion to what each made.
+Others have heat go from H towards D, no further than the estimated error of its quadrature, which is its difference to
+an embedded one, and not below zero. D − H is of the order of the method's error, so that the order stays. What remains
+of it is an error of the motion.
 """
 
 from collections.abc import Callable
@@ -150,13 +151,14 @@ class Heats:
         carried[drop == 0.0] = 0.0
         return carried
 
-    def booked(self, flows: Array, missed: Array, lost: float | None) -> Array:
+    def booked(self, flows: Array, missed: Array | None, lost: float | None) -> Array:
         """Flows of a step with friction's heat moved towards the energy that the motion lost.
 
         Parameters
         ----------
         flows, missed
-            (makers,) in J by a quadrature, and its differences to an embedded one.
+            (makers,) in J by a quadrature, and its differences to an embedded one; None where it finds no more heat
+            than is lost.
         lost
             E⁰ + W − E¹ in J; None where the work is what the energies say.
         """
@@ -165,14 +167,25 @@ class Heats:
         out, k = flows.copy(), self.frictions
         short = lost - float(flows[k].sum())
         made = np.maximum(0.0, flows[k])  # a component that destroys entropy is not covered up
+        if missed is None:
+            whole = float(made.sum())
+            out[k] += made * (short / whole if short > 0.0 and whole > 0.0 else 0.0)
+            return out
         room = np.abs(missed[k]) if short > 0.0 else np.minimum(np.abs(missed[k]), made)
         whole = float(room.sum())
         if whole > 0.0:
             out[k] = np.maximum(flows[k] - made, flows[k] + room * (np.sign(short) * min(1.0, abs(short) / whole)))
         return out
 
+    def most(self, heats: Array, flows: Array) -> Array:
+        """(components,) entropies in J/K that flows in J carry in and out of components, by their sizes."""
+        cold = 1.0 / self.temperatures(heats)
+        made = np.zeros(flows.size)
+        np.add.at(made, self._owners, np.abs(flows) * (self._sinks @ cold + self._sources @ cold + self._loose))
+        return made
+
     def taken(self, heats: Array, flows: Array) -> tuple[Array, Array]:
-        """Energies after the flows of a step in J, those of other states as they were; and the entropy that each
+        """What the flows of a step change energies by in J, those of other states not at all; and the entropy that each
         component made in J/K.
 
         Raises
@@ -191,4 +204,4 @@ class Heats:
         cold = 1.0 / (theta * ratio)
         made = np.zeros(flows.size)
         np.add.at(made, self._owners, flows * (self._sinks @ cold - self._sources @ cold + self._loose))
-        return heats + change, made
+        return change, made

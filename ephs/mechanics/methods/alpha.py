@@ -39,13 +39,19 @@ class Alpha(ReducedMethod):
     ----------
     rho
         ρ∞, what is left after a step of a mode that is far too fast for it: 1 nothing damped, 0 all.
+    keep
+        ``"damping"``, what it takes from fast modes is missing in the balance; or ``"energy"``, which a correction
+        gives back to the motion.
     """
 
     name = "alpha"
     exponent = 3.0
     share = 1.0
 
-    def __init__(self, equations: Equations, control: Control, rho: float = 0.8) -> None:
+    def __init__(self, equations: Equations, control: Control, rho: float = 0.8, keep: str = "damping") -> None:
+        if keep not in ("damping", "energy"):
+            raise OptionError("options['keep']", keep, "'damping' or 'energy'")
+        self._keep = keep
         if not 0.0 <= number_of("options['rho']", rho, "a number from 0 to 1") <= 1.0:
             raise OptionError("options['rho']", rho, "a number from 0 to 1")
         super().__init__(equations, control)
@@ -99,10 +105,16 @@ class Alpha(ReducedMethod):
             self.jacobian.at(state, renew=True)
             return self.step(state, h)
         flows, missed, work = self._passed(state, y0, y1, before, rates, h)
-        closed = eq.booking.step(state, eq.closed(eq.state(state, y1, state.t + h)), flows, missed, work)
+        closed, allowed = eq.closed(eq.state(state, y1, state.t + h)), self.atol + self.rtol * eq.sizes(y0, y1)
+        closed = eq.booking.step(state, closed, flows, work, missed=missed)
+        left = 0.0
+        if self._keep == "energy":
+            closed, left = eq.accounts.corrected(
+                state, closed, h, allowed, chosen=self.control.step is None, alone=True
+            )
         missed = h * h * (self._beta - 1.0 / 6.0) * (mean1 - mean)
         estimate = np.concatenate([missed, np.zeros(n), np.zeros(ns)])
-        error = float(np.max(np.abs(eq.along(estimate)) / (self.atol + self.rtol * eq.sizes(y0, y1)), initial=0.0))
+        error = max(left, float(np.max(np.abs(eq.along(estimate)) / allowed, initial=0.0)))
         return Attempt(state, replace(closed, memory=(rates, mean1)), h, error, eq.least(state, closed))
 
     def _passed(

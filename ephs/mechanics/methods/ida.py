@@ -1,7 +1,8 @@
 """IDA of SUNDIALS on the reduced form: an independent integrator, to check the others against.
 
 Its unknowns are the increments from a base that is moved, with the loops closed, where they have grown or a loop has
-opened by rounding; each move starts IDA anew, at order 1. Needs the package scikit-sundae.
+opened by rounding; each move starts IDA anew, at order 1. What it hands over at each of its steps keeps the balance of
+energy by a correction; it goes on from its own numbers. Needs the package scikit-sundae.
 """
 
 import os
@@ -13,6 +14,7 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.methods.method import ReducedMethod
+from ephs.mechanics.tree.equations.accounts import OWN
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.semantics.bundle import Array
 from ephs.solve.control import Control
@@ -56,6 +58,7 @@ class Ida(ReducedMethod):
 
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
         """One of IDA's steps, h seconds or less."""
+        state = self.equations.accounts.opened(state)
         if self._last is not state.q or self._base is None:
             self._restart(state)
         base, self._failure = self._base, None
@@ -83,12 +86,23 @@ class Ida(ReducedMethod):
         return state
 
     def _attempt(self, state: ReducedState, base: ReducedState, y: Array, t: float) -> Attempt[ReducedState]:
-        eq = self.equations
-        made = slice(eq.size - len(eq.reduced.made), eq.size)
-        passed, self._y = y[made] - self._y[made], y.copy()
-        y[made] = state.books[2:] + passed
-        free = eq.state(replace(state, q=base.q), y, t)
+        eq, plain = self.equations, self.equations.heats.plain
+        first = eq.size - len(eq.reduced.made)
+        passed, self._y = y - self._y, y.copy()
+        nv, n, ns = eq.nv, eq.n, eq.ns
+        v, r, heats = np.split(y[: nv + n + ns], [nv, nv + n])
+        heats = np.where(plain, heats, state.heats)
+        free = ReducedState(t, eq.advance(base.q, v), r, heats, state.books, account=state.account)
         closed = eq.closed(free)
+        # Its sums are its own: a sum that is off by rounding, of a component that makes nothing, refuses no step.
+        flows = passed[first:]
+        closed = eq.booking.step(state, closed, flows, float(passed[first - 1]), missed=0.0 * flows, refused=False)
+        # It goes on from where it was, so that what is put in is put into each state anew.
+        since = np.concatenate([base.account[:OWN], state.account[OWN:]])
+        allowed = self.atol + self.rtol * eq.sizes(eq.vector(state), eq.vector(closed))
+        closed, _ = eq.accounts.corrected(
+            replace(state, account=since), closed, t - state.t, allowed, chosen=True, alone=True
+        )
         moved = float(np.abs(eq.gaps(free.q, free.r)[0]).max(initial=0.0)) if closed is not free else 0.0
         self._last = closed.q
         if np.max(np.abs(y[eq.curved]), initial=0.0) <= FAR and moved <= OPEN * float(np.min(self.rtol)):
@@ -97,7 +111,7 @@ class Ida(ReducedMethod):
 
     def _restart(self, state: ReducedState) -> None:
         eq = self.equations
-        self._base = state
+        self._base = state = eq.accounts.opened(state)
         self.counts["restarts"] += 1
         y0 = self._y = eq.vector(state)
         rtol = PART * float(np.min(self.rtol, initial=1.0))

@@ -15,7 +15,7 @@ from ephs.mechanics.methods.stages import Stages
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.semantics.bundle import Array
 from ephs.solve.control import Control
-from ephs.solve.methods.radau import COEFFICIENTS, DEFECT, GAMMA, NODES
+from ephs.solve.methods.radau import COEFFICIENTS, NODES
 from ephs.solve.snapshot import Snapshot
 from ephs.solve.stepping import Attempt
 
@@ -50,11 +50,11 @@ class Implicit(ReducedMethod):
         y1[: stages.shape[1]] += stages[-1]
         end = eq.state(state, y1, state.t + h)
         closed, error = self._closed(state, end, y0, y1, first, stages, h)
-        missed = h * (GAMMA * first[eq.size - passed.shape[1] :] + DEFECT @ passed)
-        passed = h * (COEFFICIENTS[-1] @ passed)
-        closed = eq.booking.step(state, closed, passed[2:], missed[2:], float(passed[1]))
+        passed, allowed = h * (COEFFICIENTS[-1] @ passed), self._stages.allowed(y0, y1)
+        closed = eq.booking.step(state, closed, passed[2:], float(passed[1]))
+        closed, missed = eq.accounts.corrected(state, closed, h, allowed, chosen=self.control.step is None, alone=True)
         self._stages.keep(fast=fast)
-        return Attempt(state, closed, h, error, eq.least(state, closed))
+        return Attempt(state, closed, h, max(error, missed), eq.least(state, closed))
 
     def taken(self, state: ReducedState) -> Snapshot:
         """Where the matrix was made, and the step for which it was factorised."""

@@ -142,10 +142,10 @@ def _gauss(name: str) -> Callable[..., Any]:
     return make
 
 
-def _variational(equations: Any, control: Control) -> Any:
+def _variational(equations: Any, control: Control, **options: Any) -> Any:
     from ephs.mechanics.methods.variational import Variational
 
-    return Variational(equations, control)
+    return Variational(equations, control, **options)
 
 
 def _ida(equations: Any, control: Control) -> Any:
@@ -244,12 +244,15 @@ for _method in (
         True,
         False,
         True,
-        "symplectic, momentum maps exact",
+        "symplectic, momentum maps exact or energy",
         on_joints(_variational),
+        ("keep",),
         undamped=Natural,
     ),
     Method("radau", 5, True, True, True, True, "Radau IIA, stiff", _radau),
-    Method("alpha", 2, True, True, False, True, "generalised-α, damps what is fast", on_joints(_alpha), ("rho",)),
+    Method(
+        "alpha", 2, True, True, False, True, "generalised-α, damps what is fast", on_joints(_alpha), ("rho", "keep")
+    ),
     Method("rk54", 5, True, True, False, True, "Dormand and Prince, explicit", on_joints(_tableau("rk54"))),
     Method(
         "rk87", 8, True, True, False, True, "Dormand and Prince, explicit, many digits", on_joints(_tableau("rk87"))
@@ -264,7 +267,6 @@ for _method in (
             True,
             "Gauss, symmetric, implicit",
             on_joints(_gauss(f"gauss{order}")),
-            undamped=Natural,
         )
         for order in (4, 6, 8)
     ),

@@ -1,4 +1,4 @@
-"""The variational midpoint method on the reduced form: symplectic, momentum maps exact, order 2.
+"""The variational midpoint method on the reduced form: symplectic, momentum maps exact or energy, order 2.
 
 The discrete Lagrangian is L_d(q, ξ) = h L(q·exp(ξ/2), ξ/h) (Marsden and West, *Acta Numerica* 10 (2001), 357-514); in
 terms of momenta it is a map (q⁰, p⁰) → (q¹, p¹) with
@@ -23,7 +23,7 @@ from ephs.semantics.spaces.codes import VECTOR
 from ephs.semantics.spaces.differentials import dexp_left, dexp_left_inv
 from ephs.semantics.spaces.rank import CONSTRAINT, TINY
 from ephs.solve.control import Control
-from ephs.solve.errors import Outcome, SolveError
+from ephs.solve.errors import OptionError, Outcome, SolveError
 from ephs.solve.snapshot import Snapshot
 from ephs.solve.stepping import Attempt
 
@@ -42,13 +42,22 @@ ROUNDING = 1e-13
 
 @final
 class Variational(ReducedMethod):
-    """The method on one mechanism."""
+    """The method on one mechanism.
+
+    Parameters
+    ----------
+    keep
+        What every step keeps to rounding: ``"momentum"``, of what no force changes, or ``"energy"``, by a correction.
+    """
 
     name = "variational"
     exponent = 3.0
 
-    def __init__(self, equations: Equations, control: Control) -> None:
+    def __init__(self, equations: Equations, control: Control, keep: str = "momentum") -> None:
+        if keep not in ("momentum", "energy"):
+            raise OptionError("options['keep']", keep, "'momentum' or 'energy'")
         super().__init__(equations, control)
+        self._keep = keep
         t = equations.reduced.tables
         self._groups = [
             (int(t.code[i]), slice(int(t.r_at[i]), int(t.r_at[i] + t.dim[i])))
@@ -64,7 +73,7 @@ class Variational(ReducedMethod):
         self._rows = int(t.rows.sum() + t.driven.sum())
         self._matrix: Array | None = None
         self._guess: tuple[Array, Array] | None = None
-        self.counts: dict[str, Any] = {"iterations": 0, "jacobians": 0}
+        self.counts: dict[str, Any] = {"iterations": 0, "jacobians": 0, "keep": keep}
 
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
         """One step of h seconds."""
@@ -84,7 +93,7 @@ class Variational(ReducedMethod):
         mass = eq.mass(q, state.r)
         free = np.asarray(np.linalg.solve(mass, after), dtype=float)
         heats = np.where(eq.heats.plain, 2.0 * states - state.heats, state.heats)
-        closed = eq.closed(ReducedState(state.t + h, q, free, heats, state.books))
+        closed = eq.closed(ReducedState(state.t + h, q, free, heats, state.books, account=state.account))
         work = h * powers[1]
         if self._driven.size:  # the work of what is prescribed: its impulses at both ends of the step
             impulse = mass @ closed.r - after
@@ -92,7 +101,11 @@ class Variational(ReducedMethod):
             second = np.linalg.lstsq(rows.T, impulse, rcond=CONSTRAINT)[0][: self._driven.size]
             rates = closed.r[self._driven]
             work += float((push[: self._driven.size] + second) @ rates)
-        closed = eq.booking.step(state, closed, h * flows, np.zeros(flows.size), work)
+        closed = eq.booking.step(state, closed, h * flows, work, missed=np.zeros(flows.size))
+        if self._keep == "energy":
+            closed, _ = eq.accounts.corrected(
+                state, closed, h, np.full(eq.counted.size, np.inf), chosen=False, alone=True
+            )
         self._guess = closed.q, closed.r + (closed.r - state.r) * 0.5
         return Attempt(state, closed, h, 0.0, eq.least(state, closed))
 
@@ -155,7 +168,7 @@ class Variational(ReducedMethod):
             eq.load(state.t + 0.5 * h, q, r, heats)
             eq.refuse(*found.about(q, r, eq.heats.entropies(heats), eq.drive, eq.wrench))
             flows = eq.heats.flows(heats, found.laws.made)
-            before, heats = heats, eq.heats.taken(state.heats, 0.5 * h * flows)[0]
+            before, heats = heats, state.heats + eq.heats.taken(state.heats, 0.5 * h * flows)[0]
             if plain.any():
                 heats[plain] = found.follow(state.heats[plain], before[plain], h)
             moved = float(np.max(np.abs(heats - before)[plain] / np.maximum(np.abs(heats[plain]), TINY), initial=0.0))

@@ -38,6 +38,8 @@ class Account(Record):
         Rounding of what is missing in J: so much is left.
     chosen
         1 where steps are chosen, not on a grid.
+    alone
+        1 where rates alone are moved: positions where fast modes are not resolved would leave the energy's tangent.
     begins
         1 where the anchor is that of the state that a march starts from.
     """
@@ -51,6 +53,7 @@ class Account(Record):
     size = real()
     noise = real()
     chosen = integer()
+    alone = integer()
     begins = integer()
 
 

@@ -132,10 +132,11 @@ class Passages:
             others = float(heat.sum()) - float(heat[frictions].sum())
             lost = work - float((energies[1] - energies[0]) @ self._rest) - others
         flows = self._heats.booked(heat, missed, lost)
-        taken, made = self._heats.taken(self._heats.energies(x[self.states]), flows)
+        before = self._heats.energies(x[self.states])
+        change, made = self._heats.taken(before, flows)
         out = np.zeros(self._rest.size)
         np.add.at(out, self._makers, made - entropy)
-        return Booked(self._heats.entropies(taken), out, float((flows - heat)[frictions].sum()))
+        return Booked(self._heats.entropies(before + change), out, float((flows - heat)[frictions].sum()))
 
 
 def _stores(model: Model) -> list[_Store]:

@@ -99,7 +99,7 @@ def test_a_quadrature_alone_does_not(method, monkeypatch):
     assert "energy" in laws(sol)
 
 
-def test_vibrations_that_the_method_damps_are_no_heat():
+def test_vibrations_that_the_method_damps_are_heat_by_radau_and_missing_by_alpha():
     model = scene(
         """
         [bodies.disc]
@@ -116,10 +116,12 @@ def test_vibrations_that_the_method_damps_are_no_heat():
         """,
         "[world]\ngravity = [0.0, 0.0, 0.0]\n",
     )
-    for method in ("radau", "alpha"):
-        sol = run(model, 0.5, method, 0.01)
-        assert sol.ledgers.heat[-1] < 1e-2 * ENERGY
-        assert "energy" in laws(sol)
+    sol = run(model, 0.5, "alpha", 0.01)
+    assert sol.ledgers.heat[-1] < 1e-2 * ENERGY
+    assert "energy" in laws(sol)
+    sol = run(model, 0.5, "radau", 0.01)
+    assert sol.ledgers.heat[-1] == pytest.approx(ENERGY, rel=1e-12)
+    assert "energy" not in laws(sol)
 
 
 @pytest.mark.parametrize("method", sorted(CONSTANT))

@@ -133,7 +133,7 @@ class _Correction:
 
     def move(self) -> None:
         """Move the rates along their free part; positions too where those are small."""
-        on, w, n = self.on, self.motion.work, self.r.size
+        on, w, n, account = self.on, self.motion.work, self.r.size, self.account
         self._free()
         twice = on.variable(2.0 * self.energies[0])
         on.when(self.motion.tables.own[0].driven > 0, lambda: self._weigh(w.direction, twice))
@@ -148,7 +148,8 @@ class _Correction:
 
             on.loop(n, changed)
             self._weigh(w.descent, change)
-            alone = self.motion.tables.own[0].attached > 0  # what is attached pushes at rest, too
+            attached = self.motion.tables.own[0].attached > 0  # what is attached pushes at rest, too
+            alone = on.either(attached, on.same(account.alone, 1))
             small = on.negate(on.either(twice.value >= change.value, alone))
             on.when(small, lambda: self._everything(twice.value), lambda: self._rates(twice.value, size))
 

@@ -296,8 +296,9 @@ class Engine:
         return status, self._y.copy(), self.books["after"].copy()
 
     def correct(
-        self, account: Array, y0: Array, y: Array, q: Array, allowed: Array, h: float, *, chosen: bool
-    ) -> tuple[int, Array, Array, Array, float]:
+        self, account: Array, y0: Array, y: Array, q: Array, allowed: Array, h: float, *, chosen: bool,
+        alone: bool = False,
+    ) -> tuple[int, Array, Array, Array, float]:  # fmt: skip
         """Move the end (q, y) of a step from y0 to the energy that is left to it.
 
         Returns
@@ -308,7 +309,7 @@ class Engine:
         self._start[:], self._y[:], self._q[:], self._allowed[:] = y0, y, q, allowed[: self._allowed.size]
         a: Any = self._account[0]
         a.anchor, a.left, a.put, a.total = account.tolist()
-        a.chosen = int(chosen)
+        a.chosen, a.alone = int(chosen), int(alone)
         status = int(self._correct(h))
         after = np.array([a.anchor, a.rest, a.put + a.moved, a.total + abs(a.moved)])
         return status, self._q.copy(), self._y.copy(), after, float(a.size)

@@ -16,7 +16,7 @@ from ephs.solve.march import Status
 if TYPE_CHECKING:
     from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 
-__all__ = ["Accounts"]
+__all__ = ["OWN", "Accounts"]
 
 OWN = 4
 """Numbers of an account before what rounding left of sums."""
@@ -69,8 +69,9 @@ class Accounts:
         return y, np.concatenate([start.account[:OWN], carry])
 
     def corrected(
-        self, start: "ReducedState", end: "ReducedState", h: float, allowed: Array, *, chosen: bool
-    ) -> tuple["ReducedState", float]:
+        self, start: "ReducedState", end: "ReducedState", h: float, allowed: Array, *, chosen: bool,
+        alone: bool = False,
+    ) -> tuple["ReducedState", float]:  # fmt: skip
         """The end of a step of h seconds moved to the energy that is left to it, and the step's error by that.
 
         Heats, books and sums of the end are taken, and its loops closed. Where constraints nearly repeat each other and
@@ -82,6 +83,8 @@ class Accounts:
             (counted,) what errors of increments and rates may be.
         chosen
             Whether steps are chosen: then it is moved by no more than `ephs.solve.march.account.MOST` of these.
+        alone
+            Whether rates alone are moved, as of methods that do not resolve fast modes.
 
         Raises
         ------
@@ -92,10 +95,10 @@ class Accounts:
         carry = (end if end.account.size else start).account[OWN:]
         if eq.careful and eq.driven.size:
             return replace(end, account=np.concatenate([start.account[:OWN], carry])), 0.0
-        given, alone = (start.account[:OWN], eq.vector(start), eq.vector(end), end.q), np.full(allowed.size, np.inf)
-        found = eq.engine.correct(*given, alone if eq.careful else allowed, h, chosen=chosen)
+        given, every = (start.account[:OWN], eq.vector(start), eq.vector(end), end.q), np.full(allowed.size, np.inf)
+        found = eq.engine.correct(*given, every if eq.careful else allowed, h, chosen=chosen, alone=alone)
         if found[0] == Status.DEPENDENT:  # rates alone
-            found = eq.engine.correct(*given, alone, h, chosen=chosen)
+            found = eq.engine.correct(*given, every, h, chosen=chosen, alone=alone)
         status, q, y, account, error = found
         eq.refuse(status, eq.engine.failed)
         end = replace(end, account=np.concatenate([account, carry]))

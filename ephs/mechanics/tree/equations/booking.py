@@ -6,10 +6,14 @@ from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
+from ephs.mechanics.tree.engine.heats import ROUNDING
 from ephs.mechanics.tree.engine.states import STATES, Stored
 from ephs.mechanics.tree.engine.tables import table_of
+from ephs.mechanics.tree.equations.accounts import OWN
 from ephs.mechanics.tree.equations.paper import PaperStates
 from ephs.semantics.bundle import Array
+from ephs.semantics.linear.sums import grown
+from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.model import STORING
 
 if TYPE_CHECKING:
@@ -29,34 +33,65 @@ class Booking:
         places = np.stack([kept, t.parameter_at[kept], t.read_x_at[kept]], axis=1)
         self.storages = table_of(Stored, np.hstack([t.address[kept, None], t.dims[kept], places]))
         self._memory = m.x, m.v, m.e, m.lam, m.f, m.c, m.jac, m.work
-        self._last = np.zeros(0), np.zeros(0)
-        self._outer = equations.reduced.attaching.outer
 
     def step(
-        self, start: "ReducedState", end: "ReducedState", flows: Array, missed: Array, work: float
+        self,
+        start: "ReducedState",
+        end: "ReducedState",
+        flows: Array,
+        work: float,
+        *,
+        missed: Array | None = None,
+        refused: bool = True,
     ) -> "ReducedState":
-        """The end of a step with heats and books, see `Heats`.
+        """The end of a step with heats and books, see `Heats`, by sums that lose nothing to rounding.
 
         Parameters
         ----------
+        end
+            Its loops are closed.
         flows, missed
-            (makers,) in J over the step, and by how much their quadrature may be off.
+            (makers,) in J over the step, and by how much their quadrature may be off; None where it finds no more heat
+            than is lost.
         work
             By what drives, in J over the step.
+        refused
+            Whether a step is refused in which a component loses entropy.
+
+        Raises
+        ------
+        SolveError
+            The step is refused, or more heat was carried away than there is.
         """
-        eq = self._equations
-        heats, led, lost = eq.heats, eq.led, None
-        if heats.frictions.size and not led.counting:
-            before, after = self._energies(start), self._energies(end)
-            outside = self._outer @ (end.heats - start.heats)[heats.plain]
-            lost = work - float((after - before) @ led.mechanical + outside + flows @ heats.carried)
-            self._last = end.q, after
-        flows = heats.booked(flows, missed, lost)
-        taken, made = heats.taken(start.heats, flows)
+        eq, heats = self._equations, self._equations.heats
+        start = eq.accounts.opened(start)
+        flows = heats.booked(flows, missed, self._lost(start, end, flows, work))
+        change, made = heats.taken(start.heats, flows)
+        if refused:
+            self._refuse(made, flows, start, end)
         heat = float(flows[heats.frictions].sum() + flows @ heats.carried)
-        return replace(
-            end, heats=np.where(heats.plain, end.heats, taken), books=start.books + np.concatenate([[heat, work], made])
-        )
+        change = np.where(heats.plain, end.heats - start.heats, change)
+        sums, at = np.concatenate([start.heats, start.books]), start.heats.size
+        sums, carry = grown(sums, start.account[OWN:], np.concatenate([change, [heat, work], made]))
+        account = np.concatenate([start.account[:OWN], carry])
+        return replace(end, heats=sums[:at], books=sums[at:], account=account)
+
+    def _lost(self, start: "ReducedState", end: "ReducedState", flows: Array, work: float) -> float | None:
+        """Energy in J that is neither stored at the end, nor passed on by others than friction."""
+        eq = self._equations
+        if not eq.heats.frictions.size or np.isnan(start.account[0]):
+            return None
+        held = float(eq.engine.energy(end.q, end.r, end.heats)[:2].sum())
+        before = float(start.account[0] + start.books[1] - start.books[0])
+        return before + work - held - float(flows @ eq.heats.carried)
+
+    def _refuse(self, made: Array, flows: Array, start: "ReducedState", end: "ReducedState") -> None:
+        """Refuse a step in which a component lost entropy beyond rounding, in the direction of time."""
+        eq = self._equations
+        rounding = ROUNDING * eq.heats.most(start.heats, flows)
+        lost = np.flatnonzero(np.sign(end.t - start.t) * made < -rounding)
+        if lost.size:
+            raise SolveError(Outcome.ENTROPY, str(eq.reduced.made[int(lost[0])]), "in the step")
 
     def arrays(self) -> list[Any]:
         """All arrays of the tables that states are made from."""
@@ -74,7 +109,3 @@ class Booking:
         )
         eq.refuse(status, int(fault[0]))
         return x, energies
-
-    def _energies(self, state: "ReducedState") -> Array:
-        """(components,) stored energies in J."""
-        return self._last[1] if self._last[0] is state.q else self.energies([state])[1][0]
