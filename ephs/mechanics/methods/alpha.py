@@ -61,7 +61,7 @@ class Alpha(ReducedMethod):
         self._enough = 1e-4 if control.step is None else CONSTANT
         # what is good enough where it gets no better: tolerances near rounding cannot be met a hundred times over
         self._rough = max(1e-2, ROUNDING / max(float(np.min(self.rtol, initial=1.0)), ROUNDING))
-        self.counts = {"iterations": 0, "rho": rho}
+        self.counts = {"iterations": 0, "rho": rho, "keep": keep}
         self.jacobian = Jacobian(equations, self.counts)
 
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:

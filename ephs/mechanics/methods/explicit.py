@@ -219,7 +219,7 @@ class _March:
         self.steering, self._account = Steering.table(1), Account.table(1)
         a: Any = self._account[0]
         a.anchor, a.left, a.put, a.total = start.account[:4].tolist()
-        a.chosen, a.begins = int(span.policy is not None), int(not (eq.led.counting or start.books.any()))
+        a.chosen, a.begins = int(span.policy is not None), int(not (np.isnan(a.anchor) or start.books.any()))
         self.march = eq.engine.bind("march", tableau.arrays, self.memory, self.steering, self._account, 0)
         c, policy, control = self.control, span.policy, span.control
         c.end, c.span, c.origin = span.until - span.t0, abs(span.until - span.t0), span.t0
