@@ -252,7 +252,7 @@ class Net:
         return status.value
 
     def energies(self, on: Evaluator, s: Vector, out: Vector) -> Integer:
-        """Add the energies of storages in J to out[1], and their sizes to out[2]; return a status."""
+        """Add energies of storages and the environment in J to out[1], their sizes to out[2]; return a status."""
         status = on.counter(0)
 
         def one(it: Stores) -> None:
@@ -263,10 +263,13 @@ class Net:
 
             on.loop(n, read)
             self.failed(on, status, self._call(on, it, n * n, self.work), it.component)
-            energy = self.f[n * n]
+            count(self.f[n * n])
+
+        def count(energy: Real) -> None:
             out[1], out[2] = out[1] + energy, out[2] + on.absolute(energy)
 
         self.stores(on, one)
+        on.loop(self.outer.size, lambda k: count(self.outer[k] * s[self.head[5] + k]))
         return status.value
 
     def failed(self, on: Evaluator, status: Any, found: Integer, component: Integer) -> None:
