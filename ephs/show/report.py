@@ -14,6 +14,7 @@ from ephs.show.panels import constraint_panels, energy_panels, entropy_panels, e
 from ephs.show.player import player
 from ephs.show.signals import Group, packed
 from ephs.show.stage import stage_of
+from ephs.show.still import still_svg
 
 ZERO = 1e-12
 """SI number below which a report writes 0."""
@@ -64,6 +65,7 @@ def write_report(sol: Any, directory: str | FilePath) -> FilePath:
         balances(sol, summary),
         _summary(summary),
         _final(summary),
+        _schematic(sol),
         _pattern(sol),
     ]
     name = html.escape(str(sol.name))
@@ -159,6 +161,18 @@ def _final(summary: dict[str, Any]) -> str:
             f"<tbody>{rows}</tbody></table></div>"
         )
     return f"<h2>At the end</h2>{'<p></p>'.join(tables)}" if tables else ""
+
+
+def _schematic(sol: Any) -> str:
+    if sol.scene is None or not len(sol.t):
+        return ""
+    poses = {name: _pose(sol.body(name)) for name, _ in sol.scene.all_bodies()}
+    return f"<h2>Schematic</h2><figure>{still_svg(sol.scene, poses)}</figure>" if poses else ""
+
+
+def _pose(body: Any) -> Any:
+    """(7,) at the first instant."""
+    return np.concatenate([np.asarray(body.quaternion)[0], np.asarray(body.position)[0]])
 
 
 def _pattern(sol: Any) -> str:

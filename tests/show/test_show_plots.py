@@ -146,9 +146,17 @@ def test_the_report_says_what_there_is(pendulum, tmp_path):
         "housing",
     ):
         assert words in page
-    assert outside_frames(page).count("<svg") == 1
+    assert outside_frames(page).count("<svg") == 2
     headings = re.findall(r"<h2>(.*?)</h2>", outside_frames(page))
-    assert headings == ["Motion", "Signals", "Balances", "Summary", "At the end", "Interconnection pattern"]
+    assert headings == [
+        "Motion",
+        "Signals",
+        "Balances",
+        "Summary",
+        "At the end",
+        "Schematic",
+        "Interconnection pattern",
+    ]
     assert page.count('<div class="player"') == 1 and "<iframe" not in page
     for picture in re.findall(r"<svg.*?</svg>", outside_frames(page), flags=re.DOTALL):
         ElementTree.fromstring(picture)

@@ -1,0 +1,38 @@
+"""Schematics as SVG: every mark and every name, within the frame."""
+
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+import ephs
+from ephs.show.sketch import sketch
+from ephs.show.still import HIGHEST, WIDTH, still_svg
+
+SCENES = sorted((Path(__file__).resolve().parents[2] / "scenes").glob("*.toml"))
+
+
+@pytest.mark.parametrize("file", SCENES, ids=lambda file: file.stem)
+def test_an_svg_has_every_mark_and_every_name_within_its_frame(file):
+    scene = ephs.load(file)
+    poses = {name: np.asarray(body.pose) for name, body in scene.all_bodies()}
+    made, picture = sketch(scene, poses), ElementTree.fromstring(still_svg(scene, poses))
+    kinds = [element.tag.rpartition("}")[2] for element in picture]
+    assert kinds.count("polygon") == sum(mark.fill is not None for mark in made.marks)
+    assert kinds.count("polyline") == sum(mark.fill is None for mark in made.marks)
+    said = " ".join(element.text or "" for element in picture)
+    assert all(name in said for name in [*poses, *(name for name, _ in scene.all_joints())])
+    height = float(picture.attrib["viewBox"].split()[3])
+    assert height <= HIGHEST
+    points = [pair.split(",") for element in picture for pair in element.attrib.get("points", "").split()]
+    corners = np.array(points, dtype=float)
+    assert (corners >= 0.0).all() and (corners <= [WIDTH, height]).all()
+
+
+def test_names_cannot_break_the_picture(tmp_path):
+    file = tmp_path / "a.toml"
+    file.write_text("format = 1\n[bodies.'<b>&']\ndensity = 1.0\nshape = { sphere = 1.0 }\n")
+    scene = ephs.load(file)
+    picture = ElementTree.fromstring(still_svg(scene, {"<b>&": np.array([1.0, 0, 0, 0, 0, 0, 0])}))
+    assert "<b>&" in [element.text for element in picture]
