@@ -20,6 +20,8 @@ WIDTH, HIGHEST = 640.0, 420.0
 """Size of an SVG in pixels: its width, and its largest height."""
 POINT = 4.0 / 3.0
 """Pixels of a point."""
+THIN = 1e-12
+"""Least height or width of a drawing as a part of the other: marks on one line have no scale of their own across it."""
 MARGIN = 24.0
 """Pixels about the marks of an SVG, for names."""
 
@@ -66,7 +68,7 @@ def still_svg(scene: Any, poses: dict[str, Array], way: Array | None = None) -> 
     """The same as an SVG element; parameters as of `sketch`."""
     made = sketch(scene, poses, way)
     low, high = made.bounds()
-    span = np.maximum(high - low, 1e-12 * float(np.max(high - low)))
+    span = np.maximum(high - low, THIN * float(np.max(high - low)))
     scale = float(min((WIDTH - 2.0 * MARGIN) / span[0], (HIGHEST - 2.0 * MARGIN) / span[1]))
     height = float(scale * span[1]) + 2.0 * MARGIN
     across = 0.5 * (WIDTH - scale * float(span[0]))
