@@ -111,3 +111,33 @@ def test_wrenches_of_bodies_with_a_negative_principal_moment_are_those_of_the_de
     for name in ("pin", "elbow"):
         found, expected = sol.joint(name).wrench[-1], of_descriptor(sol, name, len(sol) - 1)
         assert np.abs(found - expected).max() < 1e-10 * np.abs(expected).max()
+
+
+def test_a_weld_transmits_what_the_body_behind_it_needs(tmp_path):
+    """Bodies that are fixed to each other are one link of the methods, and two where wrenches are read."""
+    text = """
+    format = 1
+    name = "welded"
+    [bodies.rod]
+    mass = 1.0
+    inertia = [0.1, 0.2, 0.2]
+    position = [0.5, 0.0, 0.0]
+    [bodies.bob]
+    mass = 0.7
+    inertia = [0.1, 0.2, 0.15]
+    position = [1.0, 0.0, 0.0]
+    [joints.pin]
+    type = "revolute"
+    bodies = ["ground", "rod"]
+    at = [0.0, 0.0, 0.0]
+    axis = [0.0, 1.0, 0.0]
+    [joints.weld]
+    type = "fixed"
+    bodies = ["rod", "bob"]
+    at = [0.8, 0.1, 0.0]
+    """
+    (tmp_path / "welded.toml").write_text(text)
+    sol = ephs.simulate(ephs.load(tmp_path / "welded.toml"), 0.1, method="rk87")
+    for name in ("pin", "weld"):
+        found, expected = sol.joint(name).wrench[-1], of_descriptor(sol, name, len(sol) - 1)
+        assert np.abs(found - expected).max() < 1e-10 * np.abs(expected).max()

@@ -26,7 +26,8 @@ def energy(on: Evaluator, tree: Tree, q: Vector, r: Vector, momenta: Matrix, spi
             state, parent = tree.states[i], tree.states[link.parent]
             rotation, place = frame(on, joint, link, q)
             rate = rate_inside(on, joint, link, q, [r[link.r_at + k] for k in range(joint.dim)])
-            twist = add(twist_inward(rotation, place, parent.twist), combine(joint.basis, rate))
+            along = combine(joint.basis, rate) if joint.dim else [0.0] * 6
+            twist = add(twist_inward(rotation, place, parent.twist), along)
             down, level = parent.down, parent.level
             level = level + dot(down, place)
             down = apply_transposed(rotation, down)
