@@ -176,6 +176,9 @@ def _stats(stats: Mapping[str, Any], units: Units, factors: Mapping[Path, Array]
         out["least_production"] *= units.energy
     if "work_apart" in out:
         out["work_apart"], out["work_apart_at"] = out["work_apart"] * units.energy, out["work_apart_at"] * units.time
+    if "plain_defect" in out:
+        factor = {"sum": units.energy, "largest": units.energy, "at": units.time}
+        out["plain_defect"] = {key: value * factor[key] for key, value in out["plain_defect"].items()}
     if "jumps" in out:
         found = [{**one, "t": one["t"] * units.time} for one in out["jumps"]["found"]]
         out["jumps"] = {**out["jumps"], "found": found}
