@@ -25,6 +25,7 @@ from benchmarks import (
     growth,
     honesty,
     implicit,
+    lawful,
     long,
     memory,
     order,
@@ -68,6 +69,7 @@ TABLES: dict[str, Callable[[Path | None], str | Report]] = {
     "start": lambda _: start.report(),
     "commands": lambda _: commands.report(),
     "gauss": lambda _: gauss.report(),
+    "lawful": lambda _: lawful.table(),
     "implicit": lambda _: implicit.report(),
 }
 

@@ -216,11 +216,11 @@ class _March:
             "q": np.array(q), "y": eq.vector(span.state), "atol": np.array(method.atol), "rtol": np.array(method.rtol),
             "times": self.times, "carry": start.account[4:].copy(),
         }  # fmt: skip
-        self.steering, self._account = Steering.table(1), Account.table(1)
-        a: Any = self._account[0]
+        self.steering, self.account = Steering.table(1), Account.table(1)
+        a: Any = self.account[0]
         a.anchor, a.left, a.put, a.total = start.account[:4].tolist()
         a.chosen, a.begins = int(span.policy is not None), int(not (np.isnan(a.anchor) or start.books.any()))
-        self.march = eq.engine.bind("march", tableau.arrays, self.memory, self.steering, self._account, 0)
+        self.march = eq.engine.bind("march", tableau.arrays, self.memory, self.steering, self.account, 0)
         c, policy, control = self.control, span.policy, span.control
         c.end, c.span, c.origin = span.until - span.t0, abs(span.until - span.t0), span.t0
         c.step, c.least_step, c.most_step = span.h, control.least, control.most
@@ -322,7 +322,7 @@ class _March:
             s["rows_q"][c.rows], s["rows_y"][c.rows] = found.q, eq.vector(found)[eq.nv :]
             c.rows += 1
         s["q"][:], s["y"][:] = attempt.end.q, eq.vector(attempt.end)
-        a: Any = self._account[0]
+        a: Any = self.account[0]
         (a.anchor, a.left, a.put, a.total), s["carry"][:] = attempt.end.account[:4].tolist(), attempt.end.account[4:]
         c.time, c.steps, c.fresh, c.rough = after, c.steps + 1, 0, int(eq.careful)
         c.shortest, c.longest = min(c.shortest, h), max(c.longest, h)
@@ -341,7 +341,7 @@ class _March:
     @property
     def state(self) -> ReducedState:
         """The state reached."""
-        a: Any = self._account[0]
+        a: Any = self.account[0]
         account = np.concatenate([[a.anchor, a.left, a.put, a.total], self.memory["carry"]])
         return self._state(self.time, self.memory["q"], self.memory["y"][self.method.equations.nv :], account)
 
@@ -359,7 +359,7 @@ class _March:
             t = self.span.until if passed == end else self.span.t0 + self._sign * passed
             if self.span.save_at is not None:
                 t = float(self.span.save_at[self.span.saved + self._handed + row])
-            account = np.concatenate([[self._account[0].anchor, 0.0, *put], np.zeros(self.memory["carry"].size)])
+            account = np.concatenate([[self.account[0].anchor, 0.0, *put], np.zeros(self.memory["carry"].size)])
             out.append((t, self._state(t, q, y, account), least))
         self._handed += len(out)
         self.control.rows = 0
@@ -377,7 +377,7 @@ class _March:
 
     def _taken(self) -> list[tuple[str, Any]]:
         (counts, control), s = self.steering.arrays, self.memory
-        parts = control, counts, s["q"], s["y"], s["k"][0], s["carry"], self._account.arrays[1]
+        parts = control, counts, s["q"], s["y"], s["k"][0], s["carry"], self.account.arrays[1]
         names = "control", "counts", "q", "y", "rates", "carry", "account"
         return list(zip(names, parts, strict=True))
 

@@ -22,6 +22,8 @@ __all__ = ["correct", "held"]
 
 ROUNDS = 8
 """Iterations that move positions."""
+BEYOND = 1e300
+"""Beyond all energies: what is not below is not a number, and says that nothing is to be met."""
 FARTHEST = 0.5
 """Part of its direction by which a state is moved at most."""
 
@@ -86,11 +88,15 @@ def correct(
     target = account.anchor + (work - heat)
     account.noise = ROUNDING * (on.absolute(account.anchor) + on.absolute(work) + on.absolute(heat))
     run = _Correction(on, motion, account, target, h, before, q, r, heats, allowed, on.scratch(3), on.counter(0))
-    account.moved, account.size = 0.0, 0.0
-    run.look()
-    account.noise = account.noise + ROUNDING * (run.energies[0] + run.energies[2])
-    on.when(run.known if always else on.negate(run.close), run.move)
-    account.rest = run.short
+    account.moved, account.size, account.rest = 0.0, 0.0, 0.0
+
+    def keep() -> None:
+        run.look()
+        account.noise = account.noise + ROUNDING * (run.energies[0] + run.energies[2])
+        on.when(run.known if always else on.negate(run.close), run.move)
+        account.rest = run.short
+
+    on.when(on.absolute(account.anchor) < BEYOND, keep)
     return run.status.value
 
 
@@ -124,7 +130,7 @@ class _Correction:
     @property
     def known(self) -> Truth:
         """Whether it is a number: else nothing is to be met."""
-        return self.on.absolute(self.short) < 1e300
+        return self.on.absolute(self.short) < BEYOND
 
     @property
     def close(self) -> Truth:
