@@ -17,6 +17,7 @@ HERE = {
     "jumps": ("natural4", "alpha", "rk87"),
     "bricard": ("radau", "rk54"),
     "nothing supplied": ("rk54", "radau"),
+    "size 3e-09 m": ("auto", "rk54", "rk87"),
 }
 """Cases and methods that are run here."""
 LIMIT = 5.0
