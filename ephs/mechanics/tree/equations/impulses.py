@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 
 from ephs.mechanics.tree.sweeps.programs import PLACE
+from ephs.mechanics.tree.sweeps.records import Link
 from ephs.semantics.bundle import Array
 from ephs.solve.errors import Outcome, SolveError
 
@@ -32,7 +33,9 @@ class Impulses:
         self._inertia, self._places = inertia, np.zeros((links + 1, PLACE))
         program, _ = engine.reached["move"]
         calls = program.compiled()
-        tree = links, engine.tables["integers"], engine.tables["reals"], np.zeros(engine.work["work"].size), np.zeros(3)
+        reals = engine.tables["reals"].copy()
+        reals.reshape(-1, Link.real_width)[:, Link.armature.offset] = 0.0  # momenta are those of bodies
+        tree = links, engine.tables["integers"], reals, np.zeros(engine.work["work"].size), np.zeros(3)
         whole = np.zeros(0, dtype=np.int64)
         numbers = np.zeros((0, 4)), np.zeros(0), np.zeros((0, 6)), np.zeros((0, 12))
         rows = np.zeros(4 * (links + 1), dtype=np.int64), whole, whole, whole, *numbers
