@@ -62,6 +62,9 @@ class Pendulum(Motion):
         q[0] = base[0] + y[0]
         return 0
 
+    def rounding(self, on, anchor, y):
+        return 0.0
+
     def book(self, on, y0, change, size, sign):
         return 0
 

@@ -5,6 +5,7 @@ from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Tru
 __all__ = [
     "backward",
     "cholesky",
+    "clear",
     "copy",
     "dot",
     "forward",
@@ -13,6 +14,15 @@ __all__ = [
     "norm",
     "subtract",
 ]
+
+
+def clear(on: Evaluator, x: Vector) -> None:
+    """Put zeros into a vector."""
+
+    def one(i: Integer) -> None:
+        x[i] = 0.0
+
+    on.loop(x.size, one)
 
 
 def copy(on: Evaluator, source: Vector, out: Vector) -> None:

@@ -9,10 +9,12 @@ Integration*, IV.4). The defect says how accurate the motion is, which a correct
 from ephs.semantics.spaces.rank import TINY
 from ephs.semantics.stage import Evaluator, Real, Record, integer, real
 
-__all__ = ["MOST", "ROUNDING", "WORTH", "Account", "stretch", "worth"]
+__all__ = ["BEYOND", "MOST", "ROUNDING", "WORTH", "Account", "rounding", "stretch", "worth"]
 
 ROUNDING = 16.0 * 2.220446049250313e-16
 """Part of the terms of an energy, work and heat below which what is missing is rounding, and left."""
+BEYOND = 1e300
+"""Beyond all energies: what is not below is not a number, and says that nothing is to be met."""
 MOST = 10.0
 """Errors that a tolerance allows by which a correction moves a state at most where steps are chosen."""
 WORTH = 0.1
@@ -55,6 +57,12 @@ class Account(Record):
     chosen = integer()
     alone = integer()
     begins = integer()
+
+
+def rounding(on: Evaluator, anchor: Real, work: Real, heat: Real) -> Real:
+    """Return the rounding in J of an energy that an anchor, work and heat make."""
+    known = on.select(on.absolute(anchor) < BEYOND, on.absolute(anchor), 0.0)
+    return ROUNDING * (known + on.absolute(work) + on.absolute(heat))
 
 
 def stretch(on: Evaluator, share: Real) -> Real:

@@ -159,7 +159,7 @@ class _Run:
         n, nv, error = motion.freedoms, motion.increments, on.variable(0.0)
 
         def keep_books() -> None:
-            self.status.value = book(on, motion, self.tableau, k, h, books, part)
+            self.status.value = book(on, motion, self.tableau, k, h, books, self.account.anchor, part)
 
         def settle() -> None:
             if motion.closes:

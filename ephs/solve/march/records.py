@@ -114,6 +114,10 @@ class Motion(ABC):
         """Take the end y of a step to a state: base·exp(v) to q, closed, rates in y; return a status."""
 
     @abstractmethod
+    def rounding(self, on: Evaluator, anchor: Real, y: Vector) -> Real:
+        """Return the rounding in J of the energy at y, where the anchor is that of an account."""
+
+    @abstractmethod
     def book(self, on: Evaluator, y0: Vector, change: Vector, size: Vector, sign: Real) -> Integer:
         """Make of a step's sums of rates, with sums of sizes, what changes from y0 on; return a status.
 
@@ -191,6 +195,9 @@ class Field(Motion):
 
     def settle(self, on: Evaluator, base: Vector, y: Vector, q: Vector) -> Integer:
         return 0
+
+    def rounding(self, on: Evaluator, anchor: Real, y: Vector) -> Real:
+        return 0.0
 
     def book(self, on: Evaluator, y0: Vector, change: Vector, size: Vector, sign: Real) -> Integer:
         return 0

@@ -92,28 +92,42 @@ def attempt(
     return status.value
 
 
-def book(on: Evaluator, motion: Motion, tableau: Tableau, k: Matrix, h: Real, books: Books, hold: Truth) -> Integer:
+def book(
+    on: Evaluator, motion: Motion, tableau: Tableau, k: Matrix, h: Real, books: Books, anchor: Real, hold: Truth
+) -> Integer:
     """Sum what a step of length h with rates k adds to heats and books; return a status.
 
     What the last row of a tableau weighs are h Σ b k. ``hold`` where the step is a part of one whose sums are known.
+    Flows that go both ways within a step, and back by less than the rounding of the energy, are zero.
     """
     at, count = motion.summed, tableau.a.columns
+    nothing = motion.rounding(on, anchor, books.start)
 
     def one(j: Integer) -> None:
-        total, size = on.variable(0.0), on.variable(0.0)
+        total, size, most = on.variable(0.0), on.variable(0.0), on.variable(0.0)
 
         def add(s: Integer) -> None:
-            term = tableau.a[count, s] * k[s, at + j]
+            rate = k[s, at + j]
+            term = tableau.a[count, s] * rate
             total.value, size.value = total.value + term, size.value + on.absolute(term)
+            most.value = on.maximum(most.value, h * rate)
 
         on.loop(count, add)
-        books.change[j], books.size[j] = h * total.value, on.absolute(h) * size.value
+        change = h * total.value
+        books.change[j], books.size[j] = change, on.absolute(h) * size.value
+        back = on.both(on.both(change < 0.0, most.value > 0.0), change >= -nothing)
+
+        def keep() -> None:
+            books.whole[j] = on.select(back, 0.0, change)
+
+        on.when(on.negate(hold), keep)
 
     def part() -> None:
         motion.hold(on, books.change, books.low, books.whole)
         copy(on, books.change, books.low)
 
     def entire() -> None:
+        motion.hold(on, books.change, books.whole, books.whole)
         copy(on, books.change, books.whole)
         on.loop(books.low.size, clear)
 

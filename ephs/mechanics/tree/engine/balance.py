@@ -13,7 +13,7 @@ from ephs.mechanics.tree.engine.heats import entropies
 from ephs.mechanics.tree.sweeps.acting import Body
 from ephs.semantics.linear.dense import copy
 from ephs.semantics.stage import Evaluator, Integer, Real, Table, Truth, Variable, Vector, staged
-from ephs.solve.march.account import MOST, ROUNDING, Account, stretch
+from ephs.solve.march.account import BEYOND, MOST, ROUNDING, Account, rounding, stretch
 
 if TYPE_CHECKING:
     from ephs.mechanics.tree.engine.motion import Mechanism
@@ -22,8 +22,6 @@ __all__ = ["correct", "held"]
 
 ROUNDS = 8
 """Iterations that move positions."""
-BEYOND = 1e300
-"""Beyond all energies: what is not below is not a number, and says that nothing is to be met."""
 FARTHEST = 0.5
 """Part of its direction by which a state is moved at most."""
 
@@ -86,7 +84,7 @@ def correct(
         Whether what is only rounding is met, too: for the sake of its derivatives.
     """
     target = account.anchor + (work - heat)
-    account.noise = ROUNDING * (on.absolute(account.anchor) + on.absolute(work) + on.absolute(heat))
+    account.noise = rounding(on, account.anchor, work, heat)
     run = _Correction(on, motion, account, target, h, before, q, r, heats, allowed, on.scratch(3), on.counter(0))
     account.moved, account.size, account.rest = 0.0, 0.0, 0.0
 

@@ -9,22 +9,16 @@ from ephs.mechanics.tree.engine.heats import count, entropies, heat_rates, hold,
 from ephs.mechanics.tree.sweeps.acting import Tables, Work
 from ephs.mechanics.tree.sweeps.closing import SIZE
 from ephs.mechanics.tree.sweeps.records import Link
+from ephs.semantics.linear.dense import clear
 from ephs.semantics.spaces.rank import CLOSED, GAP
 from ephs.semantics.stage import Argument, Evaluator, Integer, Matrix, Real, Truth, Vector, staged
-from ephs.solve.march.account import Account
+from ephs.solve.march.account import Account, rounding
 from ephs.solve.march.records import Motion, Status
 
 __all__ = ["Mechanism", "close"]
 
 ROUNDS = 20
 """Iterations that close loops."""
-
-
-def _clear(on: Evaluator, x: Vector) -> None:
-    def one(j: Integer) -> None:
-        x[j] = 0.0
-
-    on.loop(x.size, one)
 
 
 def _whole(x: Matrix) -> Vector:
@@ -89,11 +83,11 @@ class Mechanism(Motion):
         """The outward sweep: poses, twists, loads of all links, and the rows that close loops."""
         e, w, own = self.tables, self.work, self.tables.own[0]
         on.reach(own.move, *self.swept, q, r, w.place)
-        _clear(on, _whole(w.pushed))
+        clear(on, _whole(w.pushed))
         if not self.looped:
             return
-        _clear(on, w.entry)
-        _clear(on, _whole(w.covector))
+        clear(on, w.entry)
+        clear(on, _whole(w.covector))
 
         def forget(a: Integer) -> None:
             w.value[a, SIZE] = 0.0
@@ -147,7 +141,7 @@ class Mechanism(Motion):
 
         def general() -> None:
             self.outward(on, q, r)
-            _clear(on, w.force)
+            clear(on, w.force)
 
             def forced() -> None:
                 status.value = act(on, self.tables, w, q, r, s_rate, made, books)
@@ -183,7 +177,7 @@ class Mechanism(Motion):
     def rates(self, on: Evaluator, base: Vector, y: Vector, q: Vector, out: Vector) -> tuple[Integer, Integer]:
         e, w, nv, n, ns = self.tables, self.work, self.increments, self.freedoms, self.tables.node.size
         at, status = nv + n + ns, on.counter(0)
-        _clear(on, out.part(at, out.size - at))
+        clear(on, out.part(at, out.size - at))
         self.advance(on, base, y, q)
         r, made = y.part(nv, n), out.part(at + 2, out.size - (at + 2))
         s_rate = out.part(nv + n, ns)
@@ -215,6 +209,10 @@ class Mechanism(Motion):
     def shut(self, on: Evaluator, q: Vector, r: Vector) -> Integer:
         """Close the loops; return a status."""
         return close(on, self, q, r)
+
+    def rounding(self, on: Evaluator, anchor: Real, y: Vector) -> Real:
+        at = self.summed + self.tables.node.size
+        return rounding(on, anchor, y[at + 1], y[at])
 
     def book(self, on: Evaluator, y0: Vector, change: Vector, size: Vector, sign: Real) -> Integer:
         count(on, self.tables, self.work, y0.part(self.summed, change.size), change, size)

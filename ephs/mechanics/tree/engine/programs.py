@@ -83,9 +83,10 @@ def motion_program(*, looped: bool) -> Program:
         moving(tables, work).count(on, before, after)
 
     def summed(
-        on: Evaluator, tables: Tables, work: Work, tableau: Tableau, k: Matrix, books: Books, h: Real, part: Integer
-    ) -> Integer:
-        return book(on, moving(tables, work), tableau, k, h, books, on.same(part, 1))
+        on: Evaluator, tables: Tables, work: Work, tableau: Tableau, k: Matrix, books: Books, h: Real, anchor: Real,
+        part: Integer,
+    ) -> Integer:  # fmt: skip
+        return book(on, moving(tables, work), tableau, k, h, books, anchor, on.same(part, 1))
 
     def corrected(
         on: Evaluator, tables: Tables, work: Work, account: Table[Account], start: Vector, y: Vector, q: Vector,
@@ -128,7 +129,8 @@ def motion_program(*, looped: bool) -> Program:
         "velocities": Entry(velocities, **of, y=vector(), r=vector(), out=vector()),
         "counted": Entry(counted, **of, before=vector(), after=vector()),
         "summed": Entry(
-            summed, **of, tableau=tried["tableau"], k=matrix(), books=group(Books, **BOOKS), h=real(), part=integer()
+            summed, **of, tableau=tried["tableau"], k=matrix(), books=group(Books, **BOOKS), h=real(), anchor=real(),
+            part=integer(),
         ),
         "corrected": Entry(
             corrected, **of, account=table(Account), start=vector(), y=vector(), q=vector(), allowed=vector(), h=real()
@@ -282,9 +284,12 @@ class Engine:
         return self._y.copy()
 
     def sum(
-        self, tableau: Mapping[str, Any], k: Array, h: float, y0: Array, y1: Array, carry: Array, *, part: bool
-    ) -> tuple[int, Array, Array]:
+        self, tableau: Mapping[str, Any], k: Array, h: float, y0: Array, y1: Array, carry: Array, *, anchor: float,
+        part: bool,
+    ) -> tuple[int, Array, Array]:  # fmt: skip
         """Sum what a step with rates k adds to heats and books; a part of one is held by ``books``.
+
+        ``anchor`` is that of the account.
 
         Returns
         -------
@@ -292,7 +297,7 @@ class Engine:
             A status, the end, and what rounding left.
         """
         self._start[:], self._y[:], self.books["before"][:] = y0, y1, carry
-        status = int(self.bind("summed", tableau, k, self.books, h, int(part))())
+        status = int(self.bind("summed", tableau, k, self.books, h, anchor, int(part))())
         return status, self._y.copy(), self.books["after"].copy()
 
     def correct(

@@ -64,7 +64,8 @@ class Accounts:
             A component lost entropy in the step.
         """
         eq, start = self._equations, self.opened(start)
-        status, y, carry = eq.engine.sum(tableau, k, h, eq.vector(start), y1, start.account[OWN:], part=part)
+        carry, anchor = start.account[OWN:], float(start.account[0])
+        status, y, carry = eq.engine.sum(tableau, k, h, eq.vector(start), y1, carry, anchor=anchor, part=part)
         eq.refuse(status, eq.engine.failed)
         return y, np.concatenate([start.account[:OWN], carry])
 
