@@ -15,6 +15,7 @@ SHIPPED: Final = (
     "ephs.semantics.stage.functions:ELEMENTARY",
     "ephs.semantics.derive.linear:linear_program",
     "ephs.semantics.linear.rows:row_program",
+    "ephs.semantics.spaces.differentials:differentials",
     "ephs.semantics.linear.sparse:sparse_lu",
     "ephs.mechanics.tree.sweeps.programs:common_sweeps",
     "ephs.mechanics.tree.sweeps.loops:common_loops",

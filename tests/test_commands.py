@@ -172,7 +172,7 @@ def test_an_interrupted_run_is_readable_and_goes_on_to_the_undisturbed_numbers(t
     capsys.readouterr()
     for resumed in (["run", str(folder), "--resume"], [*words, str(folder), "--resume"]):
         assert main(resumed) == 0
-        assert "nothing is left to do" in capsys.readouterr().out
+        assert "has reached its end already" in capsys.readouterr().out
 
 
 def test_results_of_another_run_are_not_taken_for_this_one(tmp_path, capsys):
@@ -180,14 +180,14 @@ def test_results_of_another_run_are_not_taken_for_this_one(tmp_path, capsys):
     shutil.copy(ROOT / "scenes/heavy-top.toml", scene)
     words = ["run", str(scene), "--until", "0.01", "--out", str(tmp_path / "out"), "--resume"]
     assert main(words) == main(words) == 0
-    assert "nothing is left to do" in capsys.readouterr().out
+    assert "has reached its end already" in capsys.readouterr().out
     before = (tmp_path / "out/summary.json").read_bytes()
     for more, key in ((["--method", "radau"], "method"), (["--rtol", "1e-5"], "rtol"), (["--keep", "7"], "keep")):
         assert main([*words, *more]) == 2
-        assert f"another run's, whose {key} was" in capsys.readouterr().err
+        assert f"results of another run with {key} = " in capsys.readouterr().err
     scene.write_text(scene.read_text().replace("mass = ", "mass = 1"))
     assert main(words) == 2
-    assert "another run's, whose model was" in capsys.readouterr().err
+    assert "results of another run with model = " in capsys.readouterr().err
     assert (tmp_path / "out/summary.json").read_bytes() == before
     words[3] = "0.02"
     assert main(words) == 0  # a later end is another run

@@ -28,6 +28,9 @@ __all__ = ["PLAIN", "Heats", "exponential_law"]
 
 EXPONENTIAL = 1e-12
 """Part by which energies may be off an exponential law that they are taken for: rounding of the functions."""
+LITTLE = 0.1
+"""Part of a step's heat by which it may be less than a quadrature finds, where the motion gained that energy: moving
+rates instead would leave the slow motion of what friction holds."""
 LINEAR = 1e-8
 """Change of a temperature, relative, below which a series is taken: its square is below rounding."""
 PLAIN = -2
@@ -169,7 +172,7 @@ class Heats:
         made = np.maximum(0.0, flows[k])  # a component that destroys entropy is not covered up
         if missed is None:
             whole = float(made.sum())
-            out[k] += made * (short / whole if short > 0.0 and whole > 0.0 else 0.0)
+            out[k] += made * (short / whole if whole > 0.0 and short > -LITTLE * whole else 0.0)
             return out
         room = np.abs(missed[k]) if short > 0.0 else np.minimum(np.abs(missed[k]), made)
         whole = float(room.sum())

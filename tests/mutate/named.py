@@ -113,7 +113,7 @@ BREAKS = {
         "rows.extend([])",
     ),
     "functoriality, tolerance": Break(
-        "ephs/semantics/laws.py", "return min(1e-6, 1e-13 * max(", "return max(1e-2, 1e-13 * max("
+        "ephs/semantics/laws.py", "return min(APART, PROJECTOR * max(", "return max(1e-2, PROJECTOR * max("
     ),
     "isotropy of everything": Break(
         "ephs/semantics/laws.py",

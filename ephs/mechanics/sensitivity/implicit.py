@@ -23,7 +23,7 @@ from ephs.solve.errors import OptionError, SolveError
 from ephs.solve.methods.natural import Natural, NaturalState, stored_energies
 from ephs.solve.methods.newton import settle
 from ephs.solve.methods.records import MEMORY, TABLES, Columns, Scratch, parts_of
-from ephs.solve.methods.residuals import FAULTS, account, evaluate
+from ephs.solve.methods.residuals import FAULTS, account, evaluated
 from ephs.solve.model import Evaluation, Model, compile_model
 from ephs.solve.problem import Problem
 from ephs.solve.stepping import Row
@@ -68,7 +68,7 @@ def _program() -> Program:
     def whole(
         on: Evaluator, t: Columns, x: Vector, z: Vector, scal: Vector, inputs: Vector, m: Scratch, sums: Vector
     ) -> Integer:
-        fault = evaluate(on, t, x, z, scal, inputs, m)
+        fault = evaluated(on, t, x, z, scal, inputs, m)
         on.when(on.same(fault, 0), lambda: _counted(on, t, z, scal, inputs, m, sums))
         return fault
 

@@ -201,7 +201,7 @@ def test_momenta_and_their_forces_differentiate_as_differences_say(drawn):
         equations.refuse(*found.about(moved, rates, s, equations.drive, equations.wrench))
         return np.concatenate(found.momenta())
 
-    close(np.vstack(linear.action(q, r, s)), difference(action, 2 * n))
+    close(np.vstack(linear.action(q, r, s, 1.0)), difference(action, 2 * n))
 
 
 @settings(max_examples=20)

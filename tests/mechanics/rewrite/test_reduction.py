@@ -119,7 +119,9 @@ def check_rank(scene):
 
 @pytest.mark.parametrize("file", SCENES, ids=lambda file: file.stem)
 def test_loops_impose_all_that_they_did(file):
-    check_rank(ephs.load(file))
+    scene = ephs.load(file)
+    if not dict(scene.all_motors()):  # whose currents are motions that no joint has
+        check_rank(scene)
 
 
 @settings(max_examples=25)

@@ -85,7 +85,9 @@ def test_rates_along_directions_as_the_dense_equations_say(name):
     linear = Linearised(eq)
     linear.forward(state.q, state.r, eq.heats.entropies(state.heats))
     expected = linear.columns(solve=True, fit=True)[: eq.n]
-    tangent = StepTangent(eq.engine, partial(relation_of, eq.problem.descriptor), tableau("rk54").arrays)
+    tangent = StepTangent(
+        eq.engine, partial(relation_of, eq.problem.descriptor), tableau("rk54").arrays, corrected=True
+    )
     base, start = tangent.pairs["base"], tangent.pairs["start"]
     base[0][:], start[0][:] = state.q, eq.vector(state)
     for k in range(2 * eq.n):

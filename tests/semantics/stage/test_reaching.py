@@ -8,7 +8,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ephs.semantics.stage import (
-    Duals,
     Entry,
     Integers,
     Program,
@@ -142,10 +141,6 @@ def test_a_function_of_python_changes_memory_of_the_program(way, x):
 FAULTS = {
     "too few": (lambda on, address, x: on.reach(Reached(BARE, address), x), "takes 2 arguments, found 1"),
     "another kind": (lambda on, address, x: on.reach(Reached(BARE, address), x, x), "integers as argument 2, found"),
-    "a derivative": (
-        lambda on, address, x: Duals(on).reach(Reached(Signature((("integer",),)), address), 1),
-        "with a derivative; only machine code",
-    ),
 }
 
 

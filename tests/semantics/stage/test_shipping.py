@@ -50,7 +50,15 @@ def unconditional() -> set[str]:
     return found
 
 
-REACHING = {f"ephs.mechanics.tree.engine.programs:{name}" for name in ("motion_of_trees", "motion_of_loops")}
+REACHING = {
+    "ephs.exporting.outputs:outputs_program",
+    "ephs.mechanics.sensitivity.implicit:_program",
+    "ephs.mechanics.tree.engine.programs:motion_of_loops",
+    "ephs.mechanics.tree.engine.programs:motion_of_trees",
+    "ephs.mechanics.tree.sweeps.balances:network_program",
+    "ephs.solve.methods.gauss:gauss_program",
+    "ephs.solve.methods.newton:natural_program",
+}
 """Programs that call others by address: the emulator of arm64 has no others, so their bits there are not known."""
 
 

@@ -67,7 +67,7 @@ class State(Record):
         D⁻¹Uᵀ, D⁻¹ (upper triangle) and D⁻¹(τ − SᵀP) of the joint.
     change
         Acceleration beyond the bias.
-    down, level
+    down, level, reach
         Gravity, and its scalar product with the frame's origin.
     """
 
@@ -87,6 +87,7 @@ class State(Record):
     change = reals(6)
     down = reals(3)
     level = real()
+    reach = real()
 
 
 @final
