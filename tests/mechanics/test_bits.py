@@ -40,7 +40,7 @@ def equations(name):
 @cache
 def steps(name):
     eq = equations(name)[0]
-    return StepTangent(eq.engine, partial(relation_of, eq.problem.descriptor), tableau("rk54").arrays, corrected=True)
+    return StepTangent(eq.engine, partial(relation_of, eq.problem.descriptor), tableau("rk54").arrays, corrected=False)
 
 
 def copied(argument):
