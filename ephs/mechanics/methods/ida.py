@@ -48,6 +48,7 @@ class Ida(ReducedMethod):
         except ImportError as error:
             raise OptionError("method", "ida", "another, or ephs[ida] installed, which brings scikit-sundae") from error
         super().__init__(equations, control)
+        equations.accounts.followed = False
         self._make: Any = IDA
         self._failure: SolveError | None = None
         self._base: ReducedState | None = None

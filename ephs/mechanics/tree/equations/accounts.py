@@ -30,12 +30,14 @@ class Accounts:
     ----------
     kept
         Whether steps are corrected.
+    followed
+        Whether steps go on from what is corrected: else the balance is kept at single states only, to the tolerance.
     largest, at, total
         Of the states that were kept: the largest sum in J of what corrections put in, its time, the sum of sizes.
     """
 
     def __init__(self, equations: "Equations") -> None:
-        self._equations, self.kept = equations, False
+        self._equations, self.kept, self.followed = equations, False, True
         self.largest = self.at = self.total = 0.0
 
     def opened(self, state: "ReducedState") -> "ReducedState":
@@ -116,6 +118,6 @@ class Accounts:
 
     def stats(self) -> dict[str, Any]:
         """Statistics of corrected steps: by how much the balance would be missed without corrections."""
-        if not self.kept or self._equations.led.counting:
+        if not (self.kept and self.followed) or self._equations.led.counting:
             return {}
         return {"plain_defect": {"sum": self.total, "largest": self.largest, "at": self.at}}
