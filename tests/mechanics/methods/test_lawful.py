@@ -31,7 +31,7 @@ def test_every_step_keeps_the_balance_and_no_component_loses_entropy(name, metho
     sol = run(name, method, KEEPING.get(method, {}))
     assert sol.energy_error.max() <= ROUNDING
     assert np.diff(sol.ledgers.heat).min() >= 0.0
-    assert sol.stats["plain_defect"]["largest"] >= 0.0
+    assert ("plain_defect" in sol.stats) == (method != "ida"), "ida goes on from uncorrected states"
 
 
 @pytest.mark.parametrize("method", KEEPING)
