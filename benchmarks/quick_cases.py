@@ -33,9 +33,9 @@ RUNS = {
     "alpha": (0.01, 1.0),
     "rk54": (0.01, 20.0),
     "rk87": (0.02, 20.0),
-    "gauss4": (0.01, 10.0),
-    "gauss6": (0.02, 10.0),
-    "gauss8": (0.02, 10.0),
+    "gauss4": (0.0025, 0.5),
+    "gauss6": (0.0025, 0.5),
+    "gauss8": (0.0025, 0.5),
 }
 """Constant step and time in s of the methods on one window of four bars, so that steps cost more than setting up; those
 that are not here choose their steps."""

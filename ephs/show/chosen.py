@@ -34,7 +34,8 @@ def plot_signals(sol: Any, *names: str) -> "Figure":
     ----------
     names : str
         Outputs as `signal_names` lists them; the name of a joint, body, marker or thermal node alone stands for its
-        coordinate, position or temperature, and a further ``.x`` takes one component.
+        coordinate, position or temperature, and a further ``.x`` takes one component. Without names: coordinates of
+        all joints; positions of all bodies where there are no joints; else energies.
 
     Raises
     ------
@@ -43,7 +44,7 @@ def plot_signals(sol: Any, *names: str) -> "Figure":
     """
     known = signal_names(sol)
     lines: dict[str, list[tuple[str, Array]]] = {}
-    for name in names:
+    for name in names or _usual(known):
         output, component = _found(name, known)
         labels = known[output]
         values = Output(output, labels).read(sol).reshape(len(sol.t), -1)
@@ -59,6 +60,14 @@ def plot_signals(sol: Any, *names: str) -> "Figure":
         for title, found in lines.items()
     ]
     return panel_figure(sol, "signals", panels)
+
+
+def _usual(known: dict[str, Labels]) -> list[str]:
+    """The outputs that are drawn where none is chosen."""
+    for kind, quantity in _FIRST.items():
+        if found := [name for name in known if name.startswith(f"{kind}.") and name.endswith(f".{quantity}")]:
+            return found
+    return [name for name in known if name in BOOKS]
 
 
 def _found(name: str, known: dict[str, Labels]) -> tuple[str, str]:

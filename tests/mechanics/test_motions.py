@@ -87,8 +87,8 @@ def test_loops_and_all_pairs_and_heat_are_generated():
         find(mechanisms(), lambda s, kind=kind: any(j.kind == kind for j in s.joints.values()), settings=quick)
 
 
-STEPS = {2: (0.01, 0.005), 4: (0.04, 0.02), 5: (0.05, 0.025), 8: (0.1, 0.05)}
-BALANCED = ("natural", "natural4")
+STEPS = {2: (0.01, 0.005), 4: (0.04, 0.02), 5: (0.05, 0.025), 6: (0.1, 0.05), 8: (0.1, 0.05)}
+LAWLESS = ("alpha", "variational")  # unless they are asked to
 
 
 @pytest.mark.parametrize("method", [m.name for m in METHODS.values() if m.fixed and m.scenes])
@@ -107,7 +107,7 @@ def test_every_pair_with_every_method(kind, method):
     order, errors = METHODS[method].order, []
     for h in STEPS[order]:
         sol = ephs.simulate(scene, 0.2, method=method, step=h)
-        assert sol.energy_error.max() <= (1e-12 if method in BALANCED else 1e-3)
+        assert sol.energy_error.max() <= (1e-3 if method in LAWLESS else 1e-12)
         assert sol.constraint_error.max() <= 1e-12
         assert sol.velocity_error.max() <= 1e-11
         assert sol.stats["least_production"] >= 0.0

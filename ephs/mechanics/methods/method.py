@@ -113,13 +113,17 @@ class ReducedMethod(ABC):
     def snapshot(self, state: ReducedState) -> Snapshot | None:
         """Memory from step to step besides the state, with its counts; None where it is unknown."""
         own = self.taken(state)
-        return None if own is None else {"own": own, "counts": self.counts, "evaluations": self.equations.evaluations}
+        if own is None:
+            return None
+        equations = {"evaluations": self.equations.evaluations, "accounts": self.equations.accounts.snapshot()}
+        return {"own": own, "counts": self.counts, **equations}
 
     def restore(self, snapshot: Snapshot, state: ReducedState) -> None:
         """Go on from a snapshot."""
         self.take(snapshot["own"], state)
         self.counts.update(snapshot["counts"])
         self.equations.evaluations = snapshot["evaluations"]
+        self.equations.accounts.restore(snapshot["accounts"])
 
     def taken(self, state: ReducedState) -> Snapshot | None:
         """None: a method of one's own that can be resumed says what it takes along, be it nothing: an empty mapping."""

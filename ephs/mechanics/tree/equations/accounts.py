@@ -12,6 +12,7 @@ import numpy as np
 
 from ephs.semantics.bundle import Array
 from ephs.solve.march import Status
+from ephs.solve.snapshot import Snapshot
 
 if TYPE_CHECKING:
     from ephs.mechanics.tree.equations.equations import Equations, ReducedState
@@ -115,6 +116,15 @@ class Accounts:
             put, self.total = abs(float(state.account[2])), float(state.account[3])
             if put > self.largest:
                 self.largest, self.at = put, state.t
+
+    def snapshot(self) -> Snapshot:
+        """What has been noted of the run, for a journal."""
+        return {"kept": self.kept, "largest": self.largest, "at": self.at, "total": self.total}
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go on from a snapshot."""
+        self.kept, self.largest = snapshot["kept"], snapshot["largest"]
+        self.at, self.total = snapshot["at"], snapshot["total"]
 
     def stats(self) -> dict[str, Any]:
         """Statistics of corrected steps: by how much the balance would be missed without corrections."""
