@@ -16,6 +16,7 @@ from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.tree.equations.equations import Equations
 from ephs.mechanics.tree.sweeps.loops import ARGUMENTS as LOOPS
 from ephs.mechanics.tree.sweeps.programs import ARGUMENTS as SWEEPS
+from ephs.semantics.spaces.differentials import DIMENSIONS
 from ephs.semantics.stage import llvm
 from ephs.semantics.stage.calling import Call
 from ephs.semantics.stage.objects import FITTING, emitted, fitting
@@ -156,15 +157,26 @@ def swept(family: str, arguments: Mapping[str, Mapping[str, Any]]) -> Callable[.
                 names = list(arguments["accelerations"])[:5]
                 run[entry](*(values[name] for name in names), q, r, np.zeros(r.shape), 1)
             else:
-                run[entry](*(values[name] for name in arguments[entry]))
+                given = values | ({"out": np.zeros(3)} if entry == "energy" else {})
+                run[entry](*(given[name] for name in arguments[entry]))
 
     return use
 
 
+def differentials(run: Heard, seed: int, size: float) -> None:
+    """Those of every group and their inverses, at one drawn motion of each."""
+    rng = np.random.default_rng(seed)
+    for name in run.calls:
+        d = DIMENSIONS[int(name.rpartition("_")[2])]
+        run[name](size * rng.standard_normal(d), np.zeros((d, d)))
+
+
 NUMBERS = st.one_of(st.floats(-10.0, 10.0), st.sampled_from(EDGES), st.floats())
+SIZES = [0.0, 1e-9, 1e-3, 1.0, 9.0]
 MECHANISMS = st.tuples(st.integers(1, 2), st.integers(0, 2**32 - 1))
 USES: dict[str, tuple[Callable[..., None], st.SearchStrategy[Any]]] = {
     "ephs": (elementary, st.tuples(NUMBERS, NUMBERS)),
+    "differentials": (differentials, st.tuples(st.integers(0, 2**32 - 1), st.sampled_from(SIZES))),
     "constraint_rows": (constraint_rows, st.tuples(problems())),
     "linear": (linear, st.tuples(*[st.integers(1, 4), *[st.integers(0, 3)] * 2, st.integers(0, 2**32 - 1)])),
     "sparse_lu": (sparse, st.tuples(st.integers(1, 8), st.integers(0, 2**32 - 1), st.sampled_from([0.0, 0.1, 0.9]))),
@@ -183,7 +195,7 @@ USES: dict[str, tuple[Callable[..., None], st.SearchStrategy[Any]]] = {
 def test_all_ways_to_run_a_program_give_the_same_bits(name, run, data):
     use, strategy = USES[name]
     drawn = data.draw(strategy)
-    signed = not name.startswith(("sweeps", "loops"))
+    signed = not name.startswith(("sweeps", "loops", "differentials"))
     plain, found = Heard(calls(name, "plain"), [], signed), Heard(calls(name, run), [], signed)
     use(plain, *drawn)
     use(found, *drawn)
