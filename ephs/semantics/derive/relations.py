@@ -19,6 +19,7 @@ from ephs.semantics.derive.tape import Tape, evaluate
 from ephs.semantics.spaces.vectors import dot
 from ephs.semantics.stage.duals import Duals
 from ephs.semantics.stage.evaluator import Evaluator
+from ephs.semantics.stage.memory import Held, Vector
 from ephs.semantics.stage.numbers import Integer, Real, Truth
 from ephs.semantics.stage.programs import Call, Entry, Program
 
@@ -28,7 +29,7 @@ __all__ = [
     "Relation",
     "Reversible",
     "Storage",
-    "bare",
+    "at_rest",
     "compiled",
     "entry_of",
     "program",
@@ -112,11 +113,11 @@ class Storage:
         found = lifted(evaluate(Slopes(on), self.energy, states, given)[0])
         return [found.slopes.get(i, 0.0) for i in range(first)], found.end, [lifted(each).end for each in states]
 
-    def stage(self, on: Evaluator, a: Arguments) -> Integer:
-        """Write efforts, their derivatives by the step, and the energy."""
+    def stage(self, on: Evaluator, a: Arguments, *, rest: bool) -> Integer:
+        """Write efforts, their derivatives by the step, and the energy; no derivatives where nothing steps."""
         n, _, _, size = self.dimensions
         x, p = [a.x0[i] for i in range(size)], [a.p[i] for i in range(self.numbers)]
-        duals = Duals(on, n)
+        duals = Duals(on, 0 if rest else n)
         step = [duals.along(a.v[i], i) for i in range(n)]
         start, numbers = [duals.dual(each) for each in x], [duals.dual(each) for each in p[len(self.potentials) :]]
         efforts, energy, end = self.slopes(duals, start, step, numbers)
@@ -127,8 +128,8 @@ class Storage:
         for i, effort in enumerate(efforts):
             found = duals.dual(effort)
             value = found.value
-            for j in range(n):
-                a.f[i * n + j] = found.slopes[j]
+            for j, slope in enumerate(found.slopes):
+                a.f[i * n + j] = slope
             hot, wide = self.reference[i]
             if i in self.hot:
                 cold = on.either(cold, value <= 0.0)
@@ -183,10 +184,10 @@ class Reversible:
         """How many parameters there are."""
         return self.structure.parameters + (0 if self.maps is None else self.maps.numbers)
 
-    def stage(self, on: Evaluator, a: Arguments) -> Integer:
-        """Write flows, conditions and their derivatives by efforts, multipliers and increments."""
+    def stage(self, on: Evaluator, a: Arguments, *, rest: bool) -> Integer:
+        """Write flows, conditions and, unless at rest, their derivatives by efforts, multipliers and increments."""
         n, k = self.structure.shape[1], self.structure.shape[0] - self.structure.shape[1]
-        partials = Duals(on, sum(self.dimensions[:3]))
+        partials = Duals(on, 0 if rest else sum(self.dimensions[:3]))
         p, x, e, lam = _given(partials, self, a)
         own, through = self.structure.parameters, _Through(self.maps, p[self.structure.parameters :])
         e = through.inward(e)
@@ -249,9 +250,9 @@ class Irreversible:
     def _own(self) -> int:
         return len(self.potentials) + self.matrix.parameters
 
-    def stage(self, on: Evaluator, a: Arguments) -> Integer:
-        """Write flows and their derivatives by efforts and increments."""
-        n, partials = len(self.reference), Duals(on, sum(self.dimensions[:3]))
+    def stage(self, on: Evaluator, a: Arguments, *, rest: bool) -> Integer:
+        """Write flows and, unless at rest, their derivatives by efforts and increments."""
+        n, partials = len(self.reference), Duals(on, 0 if rest else sum(self.dimensions[:3]))
         p, x, e, _ = _given(partials, self, a)
         through = _Through(self.maps, p[self._own :])
         e = through.inward(e)
@@ -321,8 +322,8 @@ def _written(on: Duals, relation: Reversible | Irreversible, a: Arguments, value
             a.f[i] = found.value
         else:
             a.c[i - n] = found.value
-        for j in range(width):
-            a.jac[i * width + j] = found.slopes[j]
+        for j, slope in enumerate(found.slopes):
+            a.jac[i * width + j] = slope
     return _finite(on.base, [on.dual(entry).value for entry in values])
 
 
@@ -352,38 +353,39 @@ def sizes(relation: Relation) -> dict[str, int]:
 @cache
 def program(relation: Relation) -> Program:
     """The program of a relation; its entry `value` has the signature of `ephs.semantics.kernel_table`."""
-    return _program(relation, bare=False)
+    return _program(relation, rest=False)
 
 
 @cache
-def bare(relation: Relation) -> Program:
-    """The same without the derivatives that a relation writes, which its tangents do not need."""
-    return _program(relation, bare=True)
+def at_rest(relation: Relation) -> Program:
+    """The same over a step of no length: increments are zero, whatever is given, and derivatives are not written."""
+    return _program(relation, rest=True)
 
 
-def _program(relation: Relation, *, bare: bool) -> Program:
+def _program(relation: Relation, *, rest: bool) -> Program:
     size = sizes(relation)
 
     def value(on: Evaluator, dims: Any, scal: Any, p: Any, x0: Any, v: Any, e: Any, lam: Any, f: Any, c: Any,
               jac: Any, work: Any) -> Integer:  # fmt: skip
-        if bare:  # what is written to memory that nothing reads vanishes
-            f = on.scratch(size["f"]) if isinstance(relation, Storage) else f
-            jac = on.scratch(max(size["jac"], 1))
-        return relation.stage(on, Arguments(scal, p, x0, v, e, lam, f, c, jac, work))
+        if rest:
+            v = Vector(Held([0.0] * size["v"]), 0, size["v"])
+        if rest and isinstance(relation, Holonomic):  # what is written to memory that nothing reads vanishes
+            jac = on.scratch(size["jac"])
+        return relation.stage(on, Arguments(scal, p, x0, v, e, lam, f, c, jac, work), rest=rest)
 
     kinds = {name: pointer("reals", count) for name, count in size.items()}
-    return Program("bare" if bare else "element", value=Entry(value, dims=pointer("integers", 4), **kinds))
+    return Program("resting" if rest else "element", value=Entry(value, dims=pointer("integers", 4), **kinds))
 
 
-def entry_of(relation: Relation | Linear, *, derivatives: bool = True) -> tuple[Program, str]:
-    """The program of a relation, with the derivatives that it writes or without, and the name of its entry."""
+def entry_of(relation: Relation | Linear, *, rest: bool = False) -> tuple[Program, str]:
+    """The program of a relation, over a step or at rest, and the name of its entry."""
     if isinstance(relation, Linear):
         return relation.program, relation.name
-    return program(relation) if derivatives else bare(relation), "value"
+    return at_rest(relation) if rest else program(relation), "value"
 
 
 @cache
-def compiled(relation: Relation | Linear) -> Call:
+def compiled(relation: Relation | Linear, *, rest: bool = False) -> Call:
     """The relation in machine code; its `address` is good as long as the result lives, which is kept here."""
-    made, name = entry_of(relation)
+    made, name = entry_of(relation, rest=rest)
     return made.compiled()[name]

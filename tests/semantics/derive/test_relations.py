@@ -179,6 +179,22 @@ def test_floats_and_machine_code_give_the_same_bits(name, seed):
 
 @pytest.mark.parametrize("name", ALL)
 @given(seed=seeds)
+def test_at_rest_a_relation_is_that_of_a_step_of_no_length(name, seed):
+    primitive = ALL[name]
+    relation = primitive.kernel.relation
+    a, _ = arguments(relation, primitive, np.random.default_rng(seed), 0.0)
+    status, over = run(compiled(relation), relation, a)
+    stepped = a | {"v": a["v"] + 0.3}  # increments are not read
+    found, rest = run(compiled(relation, rest=True), relation, stepped)
+    assert found == status
+    values = ("e", "c") if primitive.kind == "storage" else ("f", "c")
+    for argument in values:
+        size = 8.0 * EPS * (1.0 + np.abs(over[argument]).max(initial=0.0))
+        assert over[argument] == pytest.approx(rest[argument], rel=0.0, abs=size), argument
+
+
+@pytest.mark.parametrize("name", ALL)
+@given(seed=seeds)
 def test_jacobians_are_derivatives(name, seed):
     primitive = ALL[name]
     relation = primitive.kernel.relation

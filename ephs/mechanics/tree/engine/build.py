@@ -10,7 +10,7 @@ from ephs.mechanics.tree.engine.closing import Closing, closing
 from ephs.mechanics.tree.engine.links import Frames, links_of
 from ephs.mechanics.tree.engine.programs import Engine
 from ephs.mechanics.tree.engine.tables import Forces, table_of
-from ephs.mechanics.tree.finding.tables import CUT, SPRING, TREE
+from ephs.mechanics.tree.finding.tables import CUT, SPRING, TREE, Mechanism
 from ephs.mechanics.tree.sweeps.acting import ON_BODIES, ON_CUT, ON_TREE, Component, Own
 from ephs.mechanics.tree.sweeps.balances import network_program
 from ephs.mechanics.tree.sweeps.cuts import Chart, Relative
@@ -237,9 +237,13 @@ def _forces(
         conduction=t.conduction,
         sink=t.sink,
         port=np.array([port[int(place)] for place in reduced.attaching.ports], dtype=np.int64).reshape(-1, 3),
-        component=table_of(
-            Component,
-            np.hstack([t.address[:, None], t.dims, t.parameter_at[: len(t.address), None], t.made_at[:, None]]),
-        ),
+        component=_components(t, t.address),
+        resting=_components(t, t.resting),
         parameters=t.parameters,
     )
+
+
+def _components(t: Mechanism, address: Index) -> Table[Component]:
+    """Components whose relations are at addresses."""
+    rows = np.hstack([address[:, None], t.dims, t.parameter_at[: len(address), None], t.made_at[:, None]])
+    return table_of(Component, rows)

@@ -26,7 +26,8 @@ class Forces(NamedTuple):
     conduction: Index  # (conductions, 3): component, entropy, entropy
     sink: Index  # (sinks, 3): place of what it makes, entropy that takes it or −1, first place of its component
     port: Index  # (rates, 3): place of the freedom, edge, freedom in it
-    component: Table[Component]
+    component: Table[Component]  # with their relations over a step
+    resting: Table[Component]  # with those at rest, without derivatives
     parameters: Array
 
     def tables(self) -> dict[str, Any]:
@@ -38,7 +39,7 @@ class Forces(NamedTuple):
             "conduction": table_of(Conduction, self.conduction),
             "sink": table_of(Sink, self.sink),
             "port": table_of(Port, self.port),
-            "component": self.component,
+            "component": self.resting,
             "parameters": self.parameters,
         }
 

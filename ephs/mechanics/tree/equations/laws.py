@@ -45,7 +45,7 @@ class Laws:
         self.made, self._heat = np.zeros(makers), np.zeros(1)
         tables, buffers = forces.tables(), [np.zeros(size) for size in BUFFERS.values()]
         self._call = laws_call().bind(
-            edge, self.law, tables["node"], tables["conduction"], tables["component"], tables["parameters"], scal,
+            edge, self.law, tables["node"], tables["conduction"], forces.component, tables["parameters"], scal,
             self._s, self.warming, self.flow, self.made, self._heat, *buffers,
         )  # fmt: skip
 

@@ -1,5 +1,6 @@
 """From a flat system to the tables of its reduced form: a spanning tree of joints, the rest cut."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, final
 
@@ -13,6 +14,8 @@ from ephs.mechanics.tree.finding.tables import CUT, SPRING, TREE, Mechanism
 from ephs.mechanics.tree.sweeps.acting import Node
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
+from ephs.semantics.derive.relations import compiled
+from ephs.semantics.descriptor import ComponentSlot
 from ephs.semantics.primitives import Storage
 from ephs.semantics.stage import Table
 from ephs.solve.errors import OptionError
@@ -230,11 +233,22 @@ def _tables(
         conduction=np.array(parts.conduction, dtype=np.int64).reshape(-1, 3),
         sink=np.array(sinks, dtype=np.int64).reshape(-1, 3),
         address=t.address,
+        resting=_resting(components, t.address, np.unique([spring, friction])),
         dims=t.dims,
         parameters=t.parameters,
         parameter_at=t.parameter_at,
         made_at=np.array([making.get(s.path, -1) for s in components], dtype=np.int64),
     )
+
+
+def _resting(components: Sequence[ComponentSlot], address: Index, edges: Index) -> Index:
+    """Addresses, of what acts in edges those of its relation at rest, where it is not called back in Python."""
+    found = address.copy()
+    for number in edges[edges >= 0].tolist():
+        kernel = components[number].primitive.kernel
+        if kernel is not None:
+            found[number] = compiled(kernel.relation, rest=True).address
+    return found
 
 
 def _length(edges: tuple[Edge, ...]) -> float:

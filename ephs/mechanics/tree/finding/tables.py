@@ -40,7 +40,8 @@ class Mechanism(NamedTuple):
     node: Index  # (entropies,): component of the storage, −1: the environment, −2: a state of an attachment
     conduction: Index  # (conductions, 3): component, entropy, entropy
     sink: Index  # (sinks, 3): place of what it makes, entropy that takes it or −1, first place of its component
-    address: Index  # (components,)
+    address: Index  # (components,): of its relation over a step
+    resting: Index  # (components,): at rest, of what acts in edges
     dims: Index  # (components, 4)
     parameters: Array
     parameter_at: Index
