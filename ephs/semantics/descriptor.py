@@ -15,6 +15,7 @@ from ephs.operad import ROOT, Path, Quantity
 from ephs.semantics.behaviour import Continuous, Natural, Relating, Storing
 from ephs.semantics.bundle import Array
 from ephs.semantics.errors import AssemblyError
+from ephs.semantics.kept import Kept
 from ephs.semantics.numbering import Index, Numbering, bearing_junctions, number_flat, starts
 from ephs.semantics.primitives import Point, Primitive, Reversible, Storage
 from ephs.semantics.spaces import manifold
@@ -101,6 +102,7 @@ class Descriptor:
 
     system: System
     numbering: Numbering
+    _kept: Kept = field(default_factory=Kept, init=False, repr=False)
     _states: tuple[StateSlot, ...] | None = field(default=None, init=False, repr=False)
     _junctions: tuple[JunctionSlot, ...] | None = field(default=None, init=False, repr=False)
     _components: tuple[ComponentSlot, ...] | None = field(default=None, init=False, repr=False)

@@ -4,7 +4,7 @@ A system carries its states: isolated composites have no ports, and equality of 
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeVar, final
 
 import numpy as np
@@ -13,6 +13,7 @@ from ephs.operad import ROOT, Algebra, Directory, Interface, Nesting, Path, Patt
 from ephs.operad.matching import interfaces_match
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.errors import AssemblyError, SemanticsError
+from ephs.semantics.kept import Kept, once
 from ephs.semantics.primitives import Irreversible, Primitive, Reversible, Storage
 from ephs.semantics.spaces import Pair, manifold
 
@@ -48,6 +49,7 @@ class System:
 
     pattern: Pattern
     fillings: Directory["Filling"]
+    _kept: Kept = field(default_factory=Kept, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         require_fillings(self.pattern, self.fillings)
@@ -165,7 +167,7 @@ class System:
         """
         from ephs.semantics.descriptor import descriptor_of
 
-        return descriptor_of(self)
+        return once(self, "descriptor", lambda: descriptor_of(self))
 
     def equations(self, form: Literal["relation", "descriptor", "reduced"] = "reduced") -> "Equations":
         """The equations of the system, with the names of its junctions; as text, LaTeX, or SymPy's expressions.

@@ -9,6 +9,7 @@ import numpy as np
 from ephs.operad import Path
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.descriptor import Descriptor, Input
+from ephs.semantics.kept import once
 from ephs.semantics.kernel_table import Callback
 from ephs.semantics.numbering import spans, starts, sums
 from ephs.semantics.primitives import Primitive
@@ -145,7 +146,7 @@ class Model:
 def compile_model(
     descriptor: Descriptor, reference: Reference, inputs: Mapping[Path, Input] | None, *, matrix: bool = True
 ) -> Model:
-    """Tabulate a descriptor form. Kernels are compiled where needed, and cached on disk.
+    """Tabulate a descriptor form, once: its tables are kept with it, and shared by all models without Python.
 
     Parameters
     ----------
@@ -158,8 +159,20 @@ def compile_model(
     AssemblyError
         An outer port without input, or an input without port.
     """
-    d, n = descriptor, descriptor.numbering
-    given = d.complete_inputs(inputs)
+    given = descriptor.complete_inputs(inputs)
+    sides = tuple((path, one.effort) for path, one in given.items())
+    key = "model", reference, sides, matrix
+
+    def made() -> Model:
+        return _compiled(descriptor, reference, given, matrix=matrix)
+
+    if any(primitive.kernel is None for primitive in descriptor.numbering.primitives):
+        return made()  # what Python raises in a component belongs to one run
+    return replace(once(descriptor, key, made), inputs=given)
+
+
+def _compiled(d: Descriptor, reference: Reference, given: Mapping[Path, Input], *, matrix: bool) -> Model:
+    n = d.numbering
     n_rate, n_effort, n_lam = d.rate_size, d.effort_size, d.multiplier_size
     size = d.unknowns(given)
     each = [entry_of(one, reference, reversible=matrix or _reads_numbers(one)) for one in n.primitives]

@@ -14,19 +14,25 @@ Made = TypeVar("Made")
 
 @final
 class _Limit:
-    """Number of calls that want one thread: the first sets it, the last restores the former number."""
+    """Number of calls that want one thread: the first sets it, the last restores the former number.
 
-    __slots__ = ("_before", "_calls", "_lock")
+    The libraries are looked for once, which takes a millisecond.
+    """
+
+    __slots__ = ("_before", "_calls", "_found", "_lock")
 
     def __init__(self) -> None:
         self._calls, self._lock = 0, Lock()
         self._before: Any = None
+        self._found: Any = None
 
     def __enter__(self) -> None:
         with self._lock:
             if self._calls == 0:
-                import_module("scipy.linalg")  # it brings a library of its own, which has to be there to be limited
-                self._before = import_module("threadpoolctl").threadpool_limits(1, "blas")
+                if self._found is None:
+                    import_module("scipy.linalg")  # it brings a library of its own, which has to be there to be limited
+                    self._found = import_module("threadpoolctl").ThreadpoolController()
+                self._before = self._found.limit(limits=1, user_api="blas")
             self._calls += 1
 
     def __exit__(self, *_failure: object) -> None:
@@ -40,10 +46,7 @@ _LIMIT = _Limit()
 
 
 def in_one_thread(function: Callable[Given, Made]) -> Callable[Given, Made]:
-    """A function during whose calls linear algebra takes one thread, so that its results can be repeated bit for bit.
-
-    For functions that take long: to find the libraries takes a few milliseconds.
-    """
+    """A function during whose calls linear algebra takes one thread, so that results can be repeated bit for bit."""
 
     @wraps(function)
     def limited(*arguments: Given.args, **keywords: Given.kwargs) -> Made:

@@ -37,6 +37,7 @@ from ephs.semantics import extents
 from ephs.semantics.bundle import Reference
 from ephs.semantics.checks import random_efforts
 from ephs.semantics.errors import AssemblyError
+from ephs.semantics.kept import once
 from ephs.semantics.primitives import Irreversible
 from ephs.semantics.system import System
 from ephs.solve.auditing.audit import Bounds
@@ -357,12 +358,12 @@ def problem_of_scene(
         Reference(world.temperature, world.pressure),
         motion=lambda solution: SceneMotion(scene, solution),
         scene=scene,
-        document=scene_to_text(scene),
+        document=once(scene, "text", lambda: scene_to_text(scene)),
         dependences=lambda: explain(scene),
         shaky=lambda: is_shaky(scene),
-        length=Snapshot.of(scene).scale(world.gravity).length,
+        length=once(scene, "length", lambda: Snapshot.of(scene).scale(world.gravity).length),
         view=view,
-        names=scene_names(scene),
+        names=once(scene, "names", lambda: scene_names(scene)),
     )
     if initial:
         _on_joints(problem)

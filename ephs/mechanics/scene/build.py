@@ -26,6 +26,7 @@ from ephs.operad import Path, Pattern, Quantity, junction, quantity
 from ephs.semantics import library
 from ephs.semantics.bundle import Array
 from ephs.semantics.descriptor import Input
+from ephs.semantics.kept import once
 from ephs.semantics.spaces import SE3
 from ephs.semantics.system import Filling, System
 
@@ -67,7 +68,7 @@ def motor_port(name: str) -> Path:
 
 
 def scene_system(scene: Scene, *, driven: Iterable[str] = (), wrenches: Iterable[str] = ()) -> System:
-    """The scene as a hierarchical system.
+    """The scene as a hierarchical system, made once and kept with the scene.
 
     Parameters
     ----------
@@ -76,8 +77,13 @@ def scene_system(scene: Scene, *, driven: Iterable[str] = (), wrenches: Iterable
     wrenches
         Bodies whose momentum is to be an outer port.
     """
-    own = {name for name, j in scene.all_joints() if _is_driven(j)}
-    return _level(scene, _Demands(frozenset(wrenches), frozenset(), own | set(driven)), top=True)
+    asked, pushed = frozenset(driven), frozenset(wrenches)
+
+    def made() -> System:
+        own = {name for name, j in scene.all_joints() if _is_driven(j)}
+        return _level(scene, _Demands(pushed, frozenset(), own | asked), top=True)
+
+    return once(scene, ("system", asked, pushed), made)
 
 
 def initial_state(scene: Scene) -> dict[Path, Array]:

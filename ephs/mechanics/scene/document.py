@@ -54,7 +54,7 @@ def scene_from_text(text: str) -> Scene:
 
 def _plain(value: Any) -> Any:
     if is_dataclass(value):
-        return {field.name: _plain(getattr(value, field.name)) for field in fields(value)}
+        return {field.name: _plain(getattr(value, field.name)) for field in fields(value) if field.init}
     if isinstance(value, np.ndarray):
         return {
             "shape": value.shape,

@@ -16,6 +16,7 @@ from ephs.mechanics.scene.attached import Conduction, Motor, ThermalNode
 from ephs.mechanics.scene.flexible import FREE_END, Beam, Load, Strain
 from ephs.mechanics.scene.surfaces import Contact, Surface
 from ephs.mechanics.shapes.law import Law
+from ephs.semantics.kept import Kept
 
 if TYPE_CHECKING:
     from ephs.semantics import System
@@ -187,6 +188,7 @@ class Scene:
     beams: Mapping[str, Beam] = field(default_factory=dict)
     loads: Mapping[str, Load] = field(default_factory=dict)
     motors: Mapping[str, Motor] = field(default_factory=dict)
+    _kept: Kept = field(default_factory=Kept, init=False, repr=False)
 
     def system(self) -> "System":
         """The scene as a hierarchical exergetic port-Hamiltonian system."""

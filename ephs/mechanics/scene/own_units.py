@@ -19,6 +19,7 @@ from ephs.mechanics.scene.state import Snapshot
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.descriptor import Descriptor
+from ephs.semantics.kept import once
 from ephs.semantics.spaces import Pair, pair
 from ephs.solve.events import Event
 from ephs.solve.instant import Mobility
@@ -66,9 +67,9 @@ def in_own_units(problem: Problem) -> Problem:
     That problem itself where its units are near, or where there is no scene.
     """
     scene: Scene | None = problem.scene
-    if scene is None or (units := Units.of(scene)) == SI:
+    if scene is None or (units := once(scene, "units", lambda: Units.of(scene))) == SI:
         return problem
-    small = rescaled(scene, 1.0 / units.length, 1.0 / units.mass, 1.0 / units.time)
+    small = once(scene, "own", lambda: rescaled(scene, 1.0 / units.length, 1.0 / units.mass, 1.0 / units.time))
     ports = {port: where for _, j in scene.all_joints() for port, where in _ports(j, units)}
     bodies = {wrench_port(name): np.array([units.length] * 3 + [1.0] * 3) for name, _ in scene.all_bodies()}
     current = np.array([units.time / (units.mass * units.length)])  # ampere in units of force a second

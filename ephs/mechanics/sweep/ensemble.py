@@ -63,7 +63,7 @@ class _Made:
     def of(scene: Scene, t0: float) -> "_Made":
         if Units.of(scene) != SI:
             raise Unlike(f"{scene.name} is solved in units of its own")
-        equations = Equations(problem_of_scene(scene), t0)
+        equations = Equations(problem_of_scene(replace(scene)), t0)  # nothing is shared: its tables are overwritten
         return _Made(equations, equations.start(t0))
 
     def arrays(self) -> list[Array]:

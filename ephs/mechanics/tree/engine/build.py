@@ -1,7 +1,8 @@
 """From the tables of a reduced scene to those of the engine: links at their joints, rigid groups merged."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from ephs.mechanics.tree.sweeps.cuts import Chart, Relative
 from ephs.mechanics.tree.sweeps.loops import kinds_of, loop_program
 from ephs.mechanics.tree.sweeps.programs import PLACE, Sweeps, sweeps
 from ephs.semantics.bundle import Array
+from ephs.semantics.kept import once
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.semantics.stage import Program, Table
@@ -57,6 +59,44 @@ def engine_of(
     apart
         Whether each body is a link of its own, in space: `links_of`.
     """
+    rows = None if kept is None else tuple(tuple(each.tolist()) for each in kept)
+    key = "engine", gravity.tobytes(), acted, rows, apart
+    plan = once(reduced, key, lambda: _plan(reduced, gravity, drive.size, acted, kept, apart=apart))
+    tables = {**plan.tables, "drive": drive, "wrench": wrench, "scal": scal, "supply": supply}
+    work: dict[str, Any] = {name: np.zeros(shape) for name, shape in plan.shapes.items()}
+    work["fault"] = np.zeros(1, dtype=np.int64)
+    return Engine(tables, work, plan.closing, plan.sizes, plan.reached, looped=plan.looped)
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class _Plan:
+    """Everything of an engine but what is given and its memory, which each has of its own.
+
+    Parameters
+    ----------
+    shapes
+        Of the arrays of its memory.
+    """
+
+    tables: Mapping[str, Any]
+    shapes: Mapping[str, tuple[int, ...]]
+    closing: Closing
+    sizes: tuple[int, int]
+    reached: Mapping[str, tuple[Program, str]]
+    looped: bool
+
+
+def _plan(
+    reduced: "Reduced",
+    gravity: Array,
+    rates: int,
+    acted: tuple[frozenset[int], frozenset[int]],
+    kept: Sequence[Array] | None,
+    *,
+    apart: bool,
+) -> _Plan:
+    """The plan of an engine, ``rates`` the number of all joints' rates."""
     found = links_of(reduced, apart=apart)
     bodies, ground = found.bodies, found.ground
     cut, cut_frame, cut_basis, ends = _cut(reduced, bodies, ground, kept)
@@ -84,18 +124,14 @@ def engine_of(
         "cut_numbers": np.hstack([cut_frame, cut_basis]).ravel(),
         **{name: getattr(eliminated, name).ravel() for name in ("at", "slot", "row", "flat", "end")},
         **forces.tables(),
-        "drive": drive,
-        "wrench": wrench,
-        "scal": scal,
         "net": net.integers,
         "numbers": net.reals,
-        "supply": supply,
     }
     freedoms, entropies = sum(part.joint.dim for part in found.parts), len(reduced.entropies)
-    sizes = reduced.coordinates, drive.size + freedoms + entropies + 2 + len(reduced.made)
+    sizes = reduced.coordinates, rates + freedoms + entropies + 2 + len(reduced.made)
     booked = entropies, entropies + 2 + len(reduced.made)
-    work = _work(program, len(found.parts), freedoms, drive.size, len(cut), booked, eliminated)
-    return Engine(tables, work, eliminated, sizes, reached, looped=len(cut) > 0)
+    shapes = _shapes(program, len(found.parts), freedoms, rates, len(cut), booked, eliminated)
+    return _Plan(tables, shapes, eliminated, sizes, reached, len(cut) > 0)
 
 
 def _reached(sweeps: Program, loops: Program) -> dict[str, tuple[Program, str]]:
@@ -124,13 +160,13 @@ def _own(
     return made
 
 
-def _work(
+def _shapes(
     program: Sweeps, links: int, freedoms: int, joints: int, cuts: int, booked: tuple[int, int], closing: Closing
-) -> dict[str, Any]:
-    """Memory for one thread; ``booked`` are the numbers of entropies, and of these and the books."""
+) -> dict[str, tuple[int, ...]]:
+    """Shapes of the memory of one thread; ``booked`` are the numbers of entropies, and of these and the books."""
     entropies, books = booked
     rows, slots = len(closing.row), len(closing.slot)
-    shapes: dict[str, tuple[int, ...]] = {
+    return {
         "work": ((links + 1) * program.width,), "place": (links + 1, PLACE), "change": (links + 1, 6),
         "pushed": (links, 6), "force": (freedoms,), "zero": (freedoms,), "attached": (joints,), "pulled": (joints,),
         "relative": (cuts, Relative.real_width),
@@ -141,7 +177,6 @@ def _work(
         "momenta": (links, 6), "spin": (freedoms,), "direction": (freedoms,), "descent": (freedoms,),
         "still": (joints,), "idle": (books,), "spare": (books,),
     }  # fmt: skip
-    return {name: np.zeros(shape) for name, shape in shapes.items()} | {"fault": np.zeros(1, dtype=np.int64)}
 
 
 def whole_tables(reduced: "Reduced", bodies: Frames, ground: Array) -> tuple[Index, Index, Array, Forces]:

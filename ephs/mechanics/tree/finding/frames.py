@@ -15,6 +15,7 @@ from ephs.mechanics.tree.finding.wiring import Wiring
 from ephs.operad import Path, quantity
 from ephs.semantics.bundle import Array
 from ephs.semantics.descriptor import Descriptor, StateSlot
+from ephs.semantics.kept import once
 from ephs.semantics.primitives import Primitive
 from ephs.semantics.spaces import SE3, Pair
 
@@ -133,7 +134,7 @@ class Frames:
 
 def frames_of(descriptor: Descriptor) -> Frames:
     """The links and joints of a flat system."""
-    return _Finder(Wiring.of(descriptor)).found()
+    return once(descriptor, "frames", lambda: _Finder(Wiring.of(descriptor)).found())
 
 
 @final

@@ -1,7 +1,7 @@
 """From a flat system to the tables of its reduced form: a spanning tree of joints, the rest cut."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, final
 
 import numpy as np
@@ -16,12 +16,13 @@ from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.derive.relations import compiled
 from ephs.semantics.descriptor import ComponentSlot
+from ephs.semantics.kept import Kept, once
 from ephs.semantics.primitives import Storage
 from ephs.semantics.stage import Table
 from ephs.solve.errors import OptionError
 from ephs.solve.heats import PLAIN, exponential_law
 from ephs.solve.model import Model
-from ephs.solve.problem import Problem
+from ephs.solve.problem import Problem, Signal
 from ephs.solve.sparse import Index
 
 __all__ = ["Reduced", "reduce_system"]
@@ -70,6 +71,7 @@ class Reduced:
     gravity: Array
     acting: tuple[Acting, ...]
     attaching: Attaching
+    _kept: Kept = field(default_factory=Kept, init=False, repr=False)
 
     @property
     def links(self) -> int:
@@ -89,7 +91,7 @@ class Reduced:
     @property
     def coordinates(self) -> int:
         """Number of reals that store the joints' elements."""
-        return sum(int(size) for size, kind in zip(self.tables.q_size, self.tables.kind, strict=True) if kind != SPRING)
+        return int(self.tables.q_size[self.tables.kind != SPRING].sum())
 
     @property
     def freedoms(self) -> int:
@@ -100,6 +102,8 @@ class Reduced:
 def reduce_system(problem: Problem, model: Model) -> Reduced:
     """The tables of a problem's reduced form; the kernels of its components are those of the compiled model.
 
+    They are made once for each initial configuration, names, and prescribed motions, and kept with the descriptor form.
+
     Raises
     ------
     Unplaced
@@ -107,6 +111,19 @@ def reduce_system(problem: Problem, model: Model) -> Reduced:
     OptionError
         A loop of prescribed joints.
     """
+    d = problem.descriptor
+    where = d.pack(problem.initial).tobytes()
+    motions = tuple((path, one.effort, _constant(one)) for path, one in problem.signals.items())
+    key = "reduced", model.reference, where, motions, tuple(problem.names.items())
+    return once(d, key, lambda: _reduced(problem, model))
+
+
+def _constant(signal: Signal) -> bytes | None:
+    """The value of a prescribed motion, None where it changes, or where a force is given."""
+    return np.asarray(signal.value, dtype=float).tobytes() if signal.effort and not callable(signal.value) else None
+
+
+def _reduced(problem: Problem, model: Model) -> Reduced:
     parts = parts_of(problem)
     inertial = [parts.attached[parts.network.rates[one.rate][0]] for one in parts.network.inertias]
     tree, cut = spanning_tree(parts.joints, [link.light for link in parts.links], inertial)

@@ -1,0 +1,47 @@
+"""Results kept with the frozen value that they were computed of, so that what depends on structure is found once."""
+
+from collections.abc import Callable, Hashable
+from threading import Lock
+from typing import Any, TypeVar, cast, final
+
+__all__ = ["MOST", "Kept", "once"]
+
+T = TypeVar("T")
+
+MOST = 8
+"""Number of results that one value keeps."""
+
+
+@final
+class Kept:
+    """A slot of a frozen value for what was computed of it; the oldest results make room for new ones.
+
+    Results are shared by all threads and never written to. They go with their owner: a value made from another one by
+    `dataclasses.replace`, a deep copy, and what comes out of a pickle start with an empty slot.
+    """
+
+    __slots__ = ("_found", "_lock")
+
+    def __init__(self) -> None:
+        self._found: dict[Hashable, Any] = {}
+        self._lock = Lock()
+
+    def of(self, key: Hashable, make: Callable[[], T]) -> T:
+        """Return the result of this key, made where it is not there; what raises is not kept."""
+        found = self._found.get(key)
+        if found is not None:
+            return cast("T", found)
+        made = make()
+        with self._lock:
+            kept = self._found.setdefault(key, made)
+            while len(self._found) > MOST:
+                del self._found[next(iter(self._found))]
+        return cast("T", kept)
+
+    def __reduce__(self) -> tuple[type["Kept"], tuple[()]]:
+        return (Kept, ())
+
+
+def once(owner: Any, key: Hashable, make: Callable[[], T]) -> T:
+    """Return what depends on a frozen value with a slot ``_kept``, and on the key, only: made once."""
+    return cast("Kept", owner._kept).of(key, make)

@@ -1,0 +1,96 @@
+"""Results kept with scenes and systems change no number of a run: the next one, one beside it, one after changes."""
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from hashlib import sha256
+from pathlib import Path as File
+
+import numpy as np
+import pytest
+
+import ephs
+from ephs.mechanics.methods.registry import METHODS
+from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.tree.equations.equations import Equations
+
+FOUR_BAR = File(ephs.__file__).parents[1] / "scenes" / "four-bar.toml"
+
+
+def ran(scene, method, **more):
+    step = {} if METHODS[method].adaptive and method != "alpha" else {"step": 2e-3}
+    sol = ephs.simulate(scene, 0.01, method=method, audit="off", **step, **more)
+    return sol.t, sol["bodies.crank.ke.p"], sol["bodies.coupler.pe.q"], sol.heat
+
+
+def same(one, other):
+    return all(np.array_equal(first, second) for first, second in zip(one, other, strict=True))
+
+
+def digest(equations):
+    """Of all tables that equations share with others of their scene."""
+    parameters = [equations.model.tables.parameters, equations.model.tables.dims]
+    arrays = [*equations.engine.arrays(), *equations.reduced.tables, *parameters]
+    own = {id(equations.drive), id(equations.wrench), id(equations.scal), id(equations.given.supply)}
+    return sha256(b"".join(np.ascontiguousarray(a).tobytes() for a in arrays if id(a) not in own)).hexdigest()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_next_run_has_the_digits_of_the_first(method):
+    scene = ephs.load(FOUR_BAR)
+    first, kept = ran(scene, method), Equations(problem_of_scene(scene), 0.0)
+    before = digest(kept)
+    assert same(ran(scene, method), first)
+    assert same(ran(ephs.load(FOUR_BAR), method), first)
+    assert digest(Equations(problem_of_scene(scene), 0.0)) == before
+    kept.reduced.tables.inertia[0] *= 1.5  # written where all read: seen in the digest and in the next run
+    assert digest(Equations(problem_of_scene(scene), 0.0)) != before
+
+
+def test_what_is_found_is_found_once():
+    scene = ephs.load(FOUR_BAR)
+    one, other = (Equations(problem_of_scene(scene), 0.0) for _ in range(2))
+    assert one.reduced is other.reduced
+    assert one.model.tables is other.model.tables
+    assert one.problem.system is other.problem.system
+    assert one.engine.work["force"] is not other.engine.work["force"]
+    assert Equations(problem_of_scene(ephs.load(FOUR_BAR)), 0.0).reduced is not one.reduced
+
+
+@pytest.mark.parametrize("method", ["rk87", "natural"])
+def test_a_changed_scene_is_another_one(method):
+    """Bodies, states, motions and inputs that differ from those of a run before it are those of the next run."""
+    scene = ephs.load(FOUR_BAR)
+    first = ran(scene, method)
+
+    def heavier(of):
+        crank = of.bodies["crank"]
+        return replace(of, bodies={**of.bodies, "crank": replace(crank, mass=2.0 * crank.mass)})
+
+    changes = {
+        "mass": heavier,
+        "gravity": lambda of: replace(of, world=replace(of.world, gravity=np.array([0.0, -1.6, 0.0]))),
+        "rate": lambda of: of.with_state(rates={"main": 2.0}, adjust=True),
+    }
+    for change in changes.values():
+        found = ran(change(scene), method)
+        assert same(found, ran(change(ephs.load(FOUR_BAR)), method))
+        assert not same(found, first)
+    for inputs in ({"joints.main": 3.0}, {"joints.main": 5.0}, {"bodies.coupler": np.arange(6.0)}):
+        found = ran(scene, method, inputs=inputs)
+        assert same(found, ran(ephs.load(FOUR_BAR), method, inputs=inputs))
+        assert not same(found, first)
+    assert same(ran(scene, method), first)
+
+
+def test_runs_side_by_side_share_what_is_kept():
+    scene, alone = ephs.load(FOUR_BAR), ran(ephs.load(FOUR_BAR), "rk87")
+    with ThreadPoolExecutor(4) as pool:
+        assert all(same(found, alone) for found in pool.map(lambda _: ran(scene, "rk87"), range(8)))
+
+
+def test_a_sweep_leaves_the_scene_as_it_is():
+    scene = ephs.load(FOUR_BAR)
+    before = ran(scene, "rk87"), digest(Equations(problem_of_scene(scene), 0.0))
+    ephs.sweep(scene, {"bodies.crank.mass": [1.0, 2.0, 5.0]}, 0.01, method="rk87")
+    assert same(ran(scene, "rk87"), before[0])
+    assert digest(Equations(problem_of_scene(scene), 0.0)) == before[1]
