@@ -44,7 +44,7 @@ def constraints_of(linear: Linearised, q: Array, r: Array, s: Array) -> Constrai
         for _ in range(int(t.driven[t.r_at[i] : t.r_at[i] + t.dim[i]].sum()))
     ]
     cut = [e.name for i, e in enumerate(edges) if t.kind[i] == CUT for _ in range(int(t.rows[i]))]
-    return Constraints(rows, target, gaps, (*driven, *cut), rank)
+    return Constraints(rows, target, gaps, (*driven, *cut, *map(str, eq.reduced.gears)), rank)
 
 
 def velocity_derivatives_of(linear: Linearised, links: Links, q: Array, r: Array) -> VelocityDerivatives:

@@ -70,7 +70,7 @@ class Variational(ReducedMethod):
         self._linear = Linearised(equations)
         # springs at cut joints are bent where these are, in the middle of the step too
         self._bent = bool(np.any((t.kind == CUT) & (t.spring >= 0)))
-        self._rows = int(t.rows.sum() + t.driven.sum())
+        self._rows = equations.dense.residual.m + int(t.driven.sum())
         self._matrix: Array | None = None
         self._guess: tuple[Array, Array] | None = None
         self.counts: dict[str, Any] = {"iterations": 0, "jacobians": 0, "keep": keep}

@@ -17,7 +17,7 @@ import numpy as np
 
 from ephs.mechanics.constraints.holding import annihilator
 from ephs.mechanics.tree.finding.mechanism import Reduced
-from ephs.mechanics.tree.finding.tables import CUT, SPRING
+from ephs.mechanics.tree.finding.tables import CUT, SPRING, TREE
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.rank import CONSTRAINT, SPANNED, rank_of
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
@@ -60,6 +60,11 @@ class Transmission:
                 while end >= 0:
                     self._signs[end, k] += sign
                     end = int(t.parent[end])
+        self._ratios = np.zeros((reduced.freedoms, len(reduced.attaching.ties)))
+        for number, gear in enumerate(reduced.attaching.ties):
+            for i, freedom, ratio in gear.terms:
+                if t.kind[i] == TREE:
+                    self._ratios[int(t.r_at[i]) + freedom, number] += ratio
 
     def slip(self, i: int, places: Array) -> Array:
         """(d,) the rate of a cut joint by the links' places (links, 24)."""
@@ -92,21 +97,36 @@ class Transmission:
             return self._on_second(frames, needed[:, :, None])[:, :, 0]
         held = [_wrench_outward(*frames[i], self._held[i]) for i in self._cut]
         columns = np.repeat(np.arange(len(self._cut)), [one.shape[1] for one in held])
-        whole, acting = np.hstack(held), self._signs[:, columns]
+        geared = [
+            (k, t.left[i, freedom] * ratio, number)
+            for number, gear in enumerate(reduced.attaching.ties)
+            for i, freedom, ratio in gear.terms
+            for k in range(len(self._cut))
+            if self._cut[k] == i
+        ]  # a gear's multiplier acts on a cut joint as a force along it does
+        gears = [_wrench_outward(*frames[self._cut[k]], row[:, None]) for k, row, _ in geared]
+        of = np.concatenate([np.arange(columns.size), [columns.size + n for *_, n in geared]]).astype(np.int64)
+        whole = np.hstack([*held, *gears])
+        acting = self._signs[:, [*columns, *(k for k, *_ in geared)]]
         free = np.flatnonzero(t.driven == 0)
         link = self._link[free]
         right = np.einsum("fi,fi->f", freedoms[free], needed[link]) - force[free]
         right += t.armature[free] * accelerations[free]
         size = np.linalg.norm(freedoms[free], axis=1)
-        found, unknown = _solved(acting[link] * (freedoms[free] @ whole) / size[:, None], right / size)
+        rows = np.zeros((free.size, columns.size + len(reduced.attaching.ties)))
+        np.add.at(rows.T, of, (acting[link] * (freedoms[free] @ whole)).T)
+        rows[:, columns.size :] += self._ratios[free]
+        found, unknown = _solved(rows / size[:, None], right / size)
         multipliers = np.column_stack([found, unknown])
-        carried = -np.einsum("lm,im,mk->lik", acting, whole, multipliers)
+        carried = -np.einsum("lm,im,mk->lik", acting, whole, multipliers[of])
         carried[:, :, 0] += needed
         out = self._on_second(frames, carried)
         for k, i in enumerate(self._cut):
-            out[i] = self._held[i] @ multipliers[columns == k]
+            out[i] = self._held[i] @ multipliers[: columns.size][columns == k]
             d, at = int(t.dim[i]), int(t.r_at[i])
             out[i, :, 0] += t.left[i, :d].T @ pulled[at : at + d]
+        for k, row, number in geared:
+            out[self._cut[k]] += np.outer(row, multipliers[columns.size + number])
         return _masked(out)
 
     def _second(self, i: int, places: Array) -> tuple[Array, Array]:

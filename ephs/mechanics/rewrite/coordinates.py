@@ -146,6 +146,8 @@ def cyclic(reduced: Reduced, part: Part) -> Subgroup:
     none = Subgroup(np.zeros((6, 0)))
     t = reduced.tables
     held = [i for i in part.edges if t.first[i] < 0 or t.second[i] < 0]
+    if any(i in part.edges for gear in reduced.attaching.ties for i, *_ in gear.terms):
+        return none
     if len(held) != 1 or t.kind[held[0]] != TREE:
         return none
     free = reduced.twists[held[0]]

@@ -16,6 +16,7 @@ from ephs.mechanics.sensitivity.family import Family, difference, relation_of, s
 from ephs.mechanics.tree.engine.tangents import DIRECTIONS, StepTangent
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.mechanics.tree.finding.tables import SPRING
+from ephs.mechanics.tree.sweeps.charts import TIE
 from ephs.mechanics.tree.sweeps.cuts import Cut
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
@@ -201,7 +202,10 @@ class ExplicitTangent:
             return numbers
         out, first = numbers.reshape(-1, Cut.real_width).copy(), self.equations.engine.tables[name]
         where = slice(Cut.normal.offset, Cut.normal.offset + 36)
-        for row, own in zip(out, first.reshape(-1, Cut.real_width), strict=True):
+        code = np.asarray(self.equations.engine.tables["cut"]).reshape(-1, Cut.integer_width)[:, Cut.code.offset]
+        for row, own, of in zip(out, first.reshape(-1, Cut.real_width), code, strict=True):
+            if of == TIE:  # its row is shared with others
+                continue
             rows = row[where].reshape(6, 6)
             row[where] = (own[where].reshape(6, 6) @ np.linalg.pinv(rows) @ rows).ravel()
         return out.ravel()

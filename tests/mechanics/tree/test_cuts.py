@@ -44,8 +44,8 @@ class Loop:
         numbers[1][:dim] = np.linalg.pinv(basis) if dim else np.zeros((0, 6))
         numbers[2][: len(self.normal)] = self.normal
         self.inner, self.outer = frame(rng), frame(rng)
-        real = np.concatenate([x.ravel() for x in (*self.inner, *self.outer, *numbers)])
-        whole = np.array([0, 1, code, dim, 0, size, 0, 0, len(self.normal)], dtype=np.int64)
+        real = np.concatenate([*(x.ravel() for x in (*self.inner, *self.outer, *numbers)), [0.0]])
+        whole = np.array([0, 1, code, dim, 0, size, 0, 0, len(self.normal), 0], dtype=np.int64)
         self.cut, self.numbers = whole, real
         self.chart = np.array([code, dim, 0, size, 0, 0, 0], dtype=np.int64)
         near = frame(rng)

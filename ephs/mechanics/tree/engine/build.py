@@ -14,7 +14,8 @@ from ephs.mechanics.tree.engine.tables import Forces, table_of
 from ephs.mechanics.tree.finding.tables import CUT, SPRING, TREE, Mechanism
 from ephs.mechanics.tree.sweeps.acting import ON_BODIES, ON_CUT, ON_TREE, Component, Own
 from ephs.mechanics.tree.sweeps.balances import network_program
-from ephs.mechanics.tree.sweeps.cuts import Chart, Relative
+from ephs.mechanics.tree.sweeps.charts import TIE, Chart
+from ephs.mechanics.tree.sweeps.cuts import Cut, Relative
 from ephs.mechanics.tree.sweeps.loops import kinds_of, loop_program
 from ephs.mechanics.tree.sweeps.programs import PLACE, Sweeps, sweeps
 from ephs.semantics.bundle import Array
@@ -55,7 +56,8 @@ def engine_of(
     acted
         Edges and bodies on which given forces act.
     kept
-        Of each cut joint, which of its rows are kept: those that others imply are left out. None: all.
+        Of each cut joint, then of each gear, which of its rows are kept: those that others imply are left out. None:
+        all.
     apart
         Whether each body is a link of its own, in space: `links_of`.
     """
@@ -103,7 +105,7 @@ def _plan(
     charts = _chart(reduced, cut)
     forces = _forces(reduced, bodies, ground, cut, acted)
     net = attachment_of(reduced)
-    attached = bool(reduced.attaching.network.attached) or bool(reduced.attaching.network.known)
+    attached = reduced.attaching.network.acts
     forced = bool(forces.edge.size or forces.conduction.size or np.any(forces.body != -1) or attached)
     driven = any(part.joint.driven for part in found.parts)
     between = bool(np.any((forces.edge[:, 0] == ON_BODIES) & (forces.part[:, 0] >= 0)))
@@ -205,30 +207,59 @@ def _ends(reduced: "Reduced", bodies: Frames, ground: Array, i: int) -> tuple[in
 
 def _cut(
     reduced: "Reduced", bodies: Frames, ground: Array, kept: Sequence[Array] | None
-) -> tuple[Index, Array, Array, list[tuple[int, int]]]:
+) -> tuple[Index, Array, Array, list[tuple[int, ...]]]:
     t = reduced.tables
     found = [i for i in range(len(reduced.edges)) if t.kind[i] == CUT]
-    cut, frames, numbers = np.zeros((len(found), 10), dtype=np.int64), np.zeros((len(found), 24)), []
-    ends: list[tuple[int, int]] = []
+    cut: list[tuple[int, ...]] = []
+    frames: list[Array] = []
+    numbers: list[Array] = []
+    ends: list[tuple[int, ...]] = []
     for k, i in enumerate(found):
-        one, two, frames[k] = _ends(reduced, bodies, ground, i)
+        one, two, frame = _ends(reduced, bodies, ground, i)
         chosen = np.arange(int(t.rows[i])) if kept is None else kept[k]
         if one == two:
             chosen = chosen[:0]
         covectors = np.zeros((6, 6))
         covectors[: chosen.size] = t.normal[i][chosen]
-        numbers.append(np.concatenate([t.basis[i].ravel(), t.left[i].ravel(), covectors.ravel()]))
-        cut[k] = (
-            one, two, t.code[i], t.dim[i], t.q_at[i], t.q_size[i], t.r_at[i], len(ends), chosen.size, i
-        )  # fmt: skip
+        numbers.append(np.concatenate([t.basis[i].ravel(), t.left[i].ravel(), covectors.ravel(), [0.0]]))
+        cut.append((
+            one, two, t.code[i], t.dim[i], t.q_at[i], t.q_size[i], t.r_at[i], len(ends), chosen.size, 2 * len(ends), i
+        ))  # fmt: skip
+        frames.append(frame)
         ends += [(one, two)] * chosen.size
-    return cut, frames, np.array(numbers).reshape(-1, 108), ends
+    size = 2 * len(ends)
+    for number, tie in enumerate(reduced.attaching.ties):
+        if kept is not None and not kept[len(found) + number].size:
+            continue
+        at = size
+        links: list[int] = []
+        for i, freedom, ratio in tie.terms:
+            one, two, frame = _ends(reduced, bodies, ground, i)
+            numbers.append(_geared(reduced, i, freedom, ratio))
+            cut.append((one, two, TIE, 0, t.q_at[i] + freedom, 1, t.r_at[i], len(ends), 1, size + len(links), -1))
+            frames.append(frame)
+            links += [one, two]
+        size = at + len(links)
+        ends.append(tuple(links))
+    return (
+        np.array(cut, dtype=np.int64).reshape(-1, Cut.integer_width + 1), np.array(frames).reshape(-1, 24),
+        np.array(numbers).reshape(-1, Cut.real_width - 24), ends,
+    )  # fmt: skip
+
+
+def _geared(reduced: "Reduced", edge: int, freedom: int, ratio: float) -> Array:
+    """B, its inverse, row and element of a joint that a gear ties to others; see `Cut`."""
+    t = reduced.tables
+    basis, left, normal = np.zeros((3, 6, 6))
+    basis[:, 0], left[0], normal[0] = t.basis[edge][:, freedom], t.left[edge][freedom], ratio * t.left[edge][freedom]
+    start = reduced.edges[edge].coordinate[freedom]
+    return np.concatenate([basis.ravel(), left.ravel(), normal.ravel(), [start]])
 
 
 def _chart(reduced: "Reduced", cut: Index) -> Index:
     t = reduced.tables
     joints = [i for i in range(len(reduced.edges)) if t.kind[i] != SPRING]
-    number = {int(i): k for k, i in enumerate(cut[:, 9])}
+    number = {int(i): k for k, i in enumerate(cut[:, -1])}
     found = [
         [t.code[i], t.dim[i], t.q_at[i], t.q_size[i], t.r_at[i], t.r_at[i], number.get(i, -1)]
         for i in joints
@@ -241,7 +272,7 @@ def _forces(
     reduced: "Reduced", bodies: Frames, ground: Array, cut: Index, acted: tuple[frozenset[int], frozenset[int]]
 ) -> Forces:
     t = reduced.tables
-    number = {int(i): k for k, i in enumerate(cut[:, 9])}
+    number = {int(i): k for k, i in enumerate(cut[:, -1])}
     edges: list[list[int]] = []
     parts: list[list[int]] = []
     frames: list[Array] = []

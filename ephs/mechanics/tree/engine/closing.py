@@ -1,6 +1,6 @@
 """Where loops are closed: in which order the constraints of loops are eliminated, and what each step of that touches.
 
-A constraint between two links is carried with the articulated inertias from both towards the ground, and eliminated at
+A constraint between links is carried with the articulated inertias from each towards the ground, and eliminated at
 the link where their paths meet. What is open at one link at the same time becomes coupled. For chains of loops few are
 open at a time, and the cost grows with their number, not with its cube. The order and the pattern depend on the tree
 only: they are found once. Sathya and Carpentier, *Constrained Articulated Body Dynamics Algorithms*, 2024, describe
@@ -22,15 +22,15 @@ class Closing(NamedTuple):
 
     at: Index  # (n + 1, 4): first slot, slots, of them eliminated here (they come first), first pair in `flat`
     slot: Index  # (slots, 2): row, slot at the parent or −1
-    end: Index  # (rows, 2): slots at the rows' two links
+    end: Index  # slots at the rows' links, row by row
     row: Index  # (rows, 4): first neighbour in `flat`, neighbours, first pair in `flat`, block
     flat: Index  # neighbours (row, slot, entry); pairs: entries
     entries: int  # of the matrix that couples rows: its diagonal by row, then what is off it
     blocks: int  # groups of rows that are coupled
 
 
-def closing(parents: Sequence[int], ends: Sequence[tuple[int, int]]) -> Closing:
-    """The program for links with these parents, −1 for the ground, and rows between these links.
+def closing(parents: Sequence[int], ends: Sequence[Sequence[int]]) -> Closing:
+    """The program for links with these parents, −1 for the ground, and rows among these links.
 
     A link's number is larger than its parent's.
     """
@@ -38,16 +38,15 @@ def closing(parents: Sequence[int], ends: Sequence[tuple[int, int]]) -> Closing:
     ground = n
     above = [p if p >= 0 else ground for p in parents]
     meet, paths = [], []
-    for one, two in ends:
-        a, b = (x if x >= 0 else ground for x in (one, two))
-        passed: set[int] = {a, b}
-        while a != b:  # the deeper one goes up; the ground is above all
-            if b == ground or (a != ground and a > b):
-                a = above[a]
-            else:
-                b = above[b]
-            passed |= {a, b}
-        meet.append(a)
+    for links in ends:
+        left = {x if x >= 0 else ground for x in links}
+        passed = set(left)
+        while len(left) > 1:  # the deepest one goes up; the ground is above all
+            deepest = max(left - {ground})
+            left.remove(deepest)
+            left.add(above[deepest])
+            passed.add(above[deepest])
+        meet.append(left.pop())
         paths.append(passed)
     open_at: list[list[int]] = [[] for _ in range(n + 1)]
     closed_at: list[list[int]] = [[] for _ in range(n + 1)]
@@ -113,11 +112,11 @@ def closing(parents: Sequence[int], ends: Sequence[tuple[int, int]]) -> Closing:
         flat += [place(a, b) for i, a in enumerate(others) for b in others[i:]]
     blocks: dict[int, int] = {}
     rows_at[:, 3] = [blocks.setdefault(find(row), len(blocks)) for row in range(m)]
-    pairs = [(number[a if a >= 0 else ground, r], number[b if b >= 0 else ground, r]) for r, (a, b) in enumerate(ends)]
+    places = [number[x if x >= 0 else ground, row] for row, links in enumerate(ends) for x in links]
     return Closing(
         at,
         np.array(slots, dtype=np.int64).reshape(-1, 2),
-        np.array(pairs, dtype=np.int64).reshape(-1, 2),
+        np.array(places, dtype=np.int64),
         rows_at,
         np.array(flat, dtype=np.int64),
         len(entry),

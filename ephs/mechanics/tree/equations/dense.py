@@ -11,6 +11,7 @@ from ephs.mechanics.tree.equations.given import Given
 from ephs.mechanics.tree.equations.residual import Residual
 from ephs.mechanics.tree.finding.mechanism import Reduced
 from ephs.mechanics.tree.finding.tables import CUT
+from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.kernel_table import TEMPERATURE
 from ephs.semantics.linear.rows import row_program
@@ -53,7 +54,9 @@ class Dense:
         t, found, arrays = reduced.tables, self.residual, self.residual.arrays
         self._driven = int(t.driven.sum())
         self._m, self._rank = found.m + self._driven, 0
-        self._cut = [i for i in range(len(reduced.edges)) if t.kind[i] == CUT]
+        closed = [e for e, kind in zip(reduced.edges, t.kind, strict=True) if kind == CUT]
+        self._closed = [(edge.path or Path(), f"the loop that {edge.name} closes") for edge in closed]
+        self._closed += [(path, f"the gear {path}") for path in reduced.gears]
         m, n, calls = self._m, found.n, row_program().compiled()
         self._scaled, self._triangle = np.zeros((m, n)), np.zeros((m, m))
         self._chosen, self._step = np.zeros(m, dtype=np.int64), np.zeros(max(n, m))
@@ -193,9 +196,8 @@ class Dense:
         """Loop that stays open, by the rows that `gaps` gives."""
         parts = np.split(residual[self._driven :], np.cumsum(self.residual.counts)[:-1])
         sizes = [float(np.abs(part).max(initial=0.0)) for part in parts]
-        edge = self.reduced.edges[self._cut[int(np.argmax(np.nan_to_num(sizes, nan=np.inf)))]]
-        found = f"the loop that {edge.name} closes stays open by {gap:.1e} m or rad"
-        return SolveError(Outcome.OPEN, str(edge.path or ""), found)
+        path, what = self._closed[int(np.argmax(np.nan_to_num(sizes, nan=np.inf)))]
+        return SolveError(Outcome.OPEN, str(path), f"{what} stays open by {gap:.1e} m or rad")
 
     def _contradicted(self, left: Array, driven: int) -> SolveError:
         """Prescribed rate or loop that contradicts the others."""
@@ -206,14 +208,16 @@ class Dense:
             edge = self.reduced.edges[link]
             return SolveError(Outcome.CONTRADICTION, str(edge.path or ""), f"the prescribed rate of {edge.name}")
         failed = self.opened(left, 0.0)
-        return SolveError(Outcome.CONTRADICTION, failed.path, "the velocities of the loop that it closes")
+        return SolveError(
+            Outcome.CONTRADICTION, failed.path, "the velocities of the loop that it closes, or of its gear"
+        )
 
     def back(self, change: Array) -> Array:
         """Correction of a change of the rates (n,) across the constraints, where loops were closed last."""
         return self._corrected(-self.residual.arrays["row"] @ change)
 
     def independent(self, q: Array, r: Array) -> list[Array]:
-        """Of each cut joint, which of its rows no others imply."""
+        """Of each cut joint, then of each gear, which of its rows no others imply."""
         self._reduce(q, r)
         chosen = {int(row) - self._driven for row in self._chosen[: self._rank]}
         first = np.cumsum([0, *self.residual.counts])

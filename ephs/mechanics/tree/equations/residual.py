@@ -12,6 +12,7 @@ from ephs.mechanics.tree.equations.laws import Laws
 from ephs.mechanics.tree.equations.slopes import Slopes
 from ephs.mechanics.tree.finding.mechanism import Reduced
 from ephs.mechanics.tree.finding.tables import CUT
+from ephs.mechanics.tree.sweeps.charts import TIE
 from ephs.mechanics.tree.sweeps.cuts import Cut, Relative
 from ephs.mechanics.tree.sweeps.loops import kinds_of, loop_program
 from ephs.mechanics.tree.sweeps.pack import STANDARD, packed
@@ -48,7 +49,7 @@ class Residual:
     laws
         The components about the point of the last evaluation.
     counts
-        Rows of each cut joint.
+        Rows of each cut joint, then of each gear.
     """
 
     def __init__(self, reduced: Reduced, gravity: Array, scal: Array, supply: Array) -> None:
@@ -71,7 +72,7 @@ class Residual:
         self.program = residuals(tree.kind, tuple(sorted({*kinds, *(ALL if usual else ())})))
         self.laws = Laws(forces, edge.ravel(), len(reduced.made), scal)
         self.attached = Attached(reduced, scal, supply)
-        self.counts: list[int] = cut[:, 8].tolist()
+        self.counts: list[int] = [*cut[cut[:, 2] != TIE, 8].tolist(), *[1] * len(reduced.attaching.ties)]
         self.n, self.m, self.ns = reduced.freedoms, sum(self.counts), t.node.size
         c = int(t.dim[t.kind == CUT].sum())
         self.nv, driven = self.n + c, int(t.driven.sum())
@@ -79,13 +80,13 @@ class Residual:
         self.cut_rates = slice(self.rows.stop, self.rows.stop + c)
         self.cut_changes = slice(self.cut_rates.stop, self.cut_rates.stop + c)
         self.entropy_rates = slice(self.cut_changes.stop, self.cut_changes.stop + self.ns)
-        n, m, bodies = self.n, self.m, found.bodies
+        n, m, ends, bodies = self.n, self.m, 2 * int(cut[:, 8].sum()), found.bodies
         self.arrays: dict[str, Any] = {
             "integers": tree.integers, "reals": tree.reals, "gravity": tree.gravity,
             "memory": np.zeros((tree.size + 1) * self.program.width), "cut": cut.ravel(),
             "cut_numbers": numbers.ravel(), "chart": chart.ravel(), "places": np.zeros((tree.size + 1, PLACE)),
-            "motions": np.zeros((len(cut), Relative.real_width)), "end": np.arange(2 * m),
-            "value": np.zeros((m, 4)), "covector": np.zeros((2 * m, 6)), "edge": edge.ravel(),
+            "motions": np.zeros((len(cut), Relative.real_width)), "end": np.arange(ends),
+            "value": np.zeros((m, 4)), "covector": np.zeros((ends, 6)), "edge": edge.ravel(),
             "edge_numbers": np.hstack([forces.frame, forces.left]).ravel(), "law": self.laws.law,
             "body": np.array(bodies.link, dtype=np.int64), "body_frame": _frames(bodies.inside),
             "warming": self.laws.warming, "passage": np.ascontiguousarray(t.conduction[:, 1:]).ravel(),

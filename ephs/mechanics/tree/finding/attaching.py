@@ -18,7 +18,16 @@ from ephs.semantics.primitives import Irreversible, Storage
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.solve.sparse import Index
 
-__all__ = ["Attaching", "attaching_of", "makers_of"]
+__all__ = ["Attaching", "Gear", "attaching_of", "makers_of"]
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Gear:
+    """A constant relation Σ ratio · rate = 0, by the component that has it: (edge, freedom, ratio) of its joints."""
+
+    path: Path
+    terms: tuple[tuple[int, int, float], ...]
 
 
 @final
@@ -40,6 +49,8 @@ class Attaching:
         First freedoms of the joints at which something is attached.
     outer
         (states,) energy of the environment by a state in it, as −π₀ of a volume; 0 of others.
+    ties
+        Constant relations of rates of joints.
     """
 
     network: Network
@@ -49,6 +60,7 @@ class Attaching:
     bent: Index
     edges: frozenset[int]
     outer: Array
+    ties: tuple[Gear, ...]
 
 
 def makers_of(components: Sequence[ComponentSlot], network: Network) -> tuple[tuple[Path, ...], tuple[Index, ...]]:
@@ -102,6 +114,14 @@ def attaching_of(
                 reason = f"reads {path}, which is neither attached nor the single coordinate of a joint"
                 raise Unplaced(components[one.component].path, reason)
         reads.append(np.array([known[path] for path in one.reads], dtype=np.int64))
+    number = {id(edge): i for i, edge in enumerate(edges)}
+    ties: list[Gear] = []
+    for tie in network.ties:
+        terms = [(*network.rates[place], ratio) for place, ratio in tie.terms]
+        path = components[tie.component].path
+        if any(parts.attached[junction].pair.code != VECTOR for junction, _, _ in terms):
+            raise Unplaced(path, "ties the rate of a joint whose freedoms do not commute")
+        ties.append(Gear(path, tuple((number[id(parts.attached[at])], k, ratio) for at, k, ratio in terms)))
     bent = sorted({-1 - int(read) for places in reads for read in places if read < 0})
     return Attaching(
         network,
@@ -111,6 +131,7 @@ def attaching_of(
         np.array([[place, freedom[place]] for place in bent], dtype=np.int64).reshape(-1, 2),
         frozenset(at[id(edge)] for edge in parts.attached.values()),
         _outer(components, network, reference),
+        tuple(ties),
     )
 
 

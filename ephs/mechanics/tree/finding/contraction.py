@@ -6,7 +6,7 @@ from typing import final
 import numpy as np
 
 from ephs.mechanics.tree.finding.frames import Unplaced
-from ephs.mechanics.tree.finding.network import Attached, Inertia, Injection, Network
+from ephs.mechanics.tree.finding.network import Attached, Inertia, Injection, Network, Tie
 from ephs.mechanics.tree.finding.wiring import Wiring
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
@@ -72,6 +72,7 @@ class _Contraction:
         self.sort: list[int] = []
         self.storage: dict[int, tuple[int, StateSlot]] = {}  # column -> storage there, its state
         self.stiff: list[Inertia] = []
+        self.tied: list[tuple[int, dict[int, float]]] = []  # component -> ratios of the rates that it ties
         for number in components:
             self._lay(number)
 
@@ -178,6 +179,9 @@ class _Contraction:
                 Inertia(one.component, one.state, rate[back[one.rate]], one.ratio, one.inertia) for one in self.stiff
             ),
             injections=tuple(self._injections(basis)),
+            ties=tuple(
+                Tie(number, tuple((rate[back[at]], by) for at, by in terms.items())) for number, terms in self.tied
+            ),
         )
 
     def _eliminated(self, rows: Array, owners: list[int]) -> dict[int, dict[int, float]]:
@@ -198,9 +202,7 @@ class _Contraction:
         ]
         _pivot(rows, inertial, pivots, left=[i for i in range(len(rows)) if i not in pivots])
         rows[np.abs(rows) <= NEGLIGIBLE] = 0.0
-        for i, row in enumerate(rows):
-            if i not in pivots and row.any():
-                raise self._overdetermined(row, owners[i])
+        self._tie(rows, owners, [i for i, row in enumerate(rows) if i not in pivots and row.any()])
         found: dict[int, dict[int, float]] = {}
         for i, at in pivots.items():
             found[at] = {int(other): -float(rows[i, other]) for other in np.flatnonzero(rows[i]) if other != at}
@@ -208,11 +210,33 @@ class _Contraction:
                 self._inertia(at, found[at])
         return found
 
+    def _tie(self, rows: Array, owners: list[int], left: list[int]) -> None:
+        """Take rows on rates of joints as ties, those that others imply left out.
+
+        Raises
+        ------
+        Unplaced
+            A row has more than rates, or the rows hold a joint still.
+        """
+        for i in left:
+            if any(self.sort[at] != RATE for at in np.flatnonzero(rows[i])):
+                raise self._overdetermined(rows[i], owners[i])
+        found: dict[int, int] = {}
+        apart = rows.copy()
+        _pivot(apart, [at for at, sort in enumerate(self.sort) if sort == RATE], found, left)
+        for i in sorted(found):
+            if np.count_nonzero(np.abs(apart[i]) > NEGLIGIBLE) == 1:
+                raise self._held(rows[i], owners[i])
+            self.tied.append((owners[i], {int(at): float(rows[i, at]) for at in np.flatnonzero(rows[i])}))
+
+    def _held(self, row: Array, owner: int) -> Unplaced:
+        if np.count_nonzero(row) == 1:
+            return self._fault(owner, "prescribes the motion of a joint")
+        return self._fault(owner, "contradicts the other gears of a loop: together they hold their joints still")
+
     def _overdetermined(self, row: Array, owner: int) -> Unplaced:
         sorts = {self.sort[at] for at in np.flatnonzero(row)}
         stored = [self.storage[at][0] for at in np.flatnonzero(row).tolist() if at in self.storage]
-        if sorts == {RATE} and np.count_nonzero(row) > 1:
-            return self._fault(owner, "ties the rates of joints to each other")
         if RATE in sorts and sorts <= {RATE, INPUT}:
             return self._fault(owner, "prescribes the motion of a joint")
         if stored:

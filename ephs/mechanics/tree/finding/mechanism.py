@@ -89,6 +89,11 @@ class Reduced:
         return tuple(e for e, kind in zip(self.edges, self.tables.kind, strict=True) if kind == CUT)
 
     @property
+    def gears(self) -> tuple[Path, ...]:
+        """Paths of the components that tie rates of joints to each other, one for each equation."""
+        return tuple(tie.path for tie in self.attaching.ties)
+
+    @property
     def coordinates(self) -> int:
         """Number of reals that store the joints' elements."""
         return int(self.tables.q_size[self.tables.kind != SPRING].sum())
@@ -147,12 +152,13 @@ def _reduced(problem: Problem, model: Model) -> Reduced:
     names = tuple(parts.names[body] for body in order)
     place = {body: i for i, body in enumerate(order)} | {GROUND: GROUND}
     acting = tuple(Acting(one.port, Frame(place[one.frame.link], one.frame.offset)) for one in parts.acting)
-    unknowns = 2 * int(mechanism.driven.size) + int(mechanism.rows.sum())
     stored = (*parts.entropies, *(state.path for state in parts.network.states))
+    attaching = attaching_of(slots, parts, edges, mechanism, stored, flows, model.reference)
+    unknowns = 2 * int(mechanism.driven.size) + int(mechanism.rows.sum()) + len(attaching.ties)
     return Reduced(
         mechanism, edges, names, tuple(links), stored, made, _nodes(model, parts), unknowns,
         tuple(twists), parts.gravity, acting,
-        attaching_of(slots, parts, edges, mechanism, stored, flows, model.reference),
+        attaching,
     )  # fmt: skip
 
 

@@ -7,7 +7,8 @@ heat that is booked as energy, prescribed efforts, efforts of storages, and effo
 of flows determines.
 
 A storage whose effort constant relations tie to the rate of one joint has no state of its own: E = ½ J (g r)² is
-inertia of the joint.
+inertia of the joint. What ties rates of joints to each other is a constraint of the mechanism, as the closing of a loop
+is.
 """
 
 from dataclasses import dataclass, field
@@ -19,7 +20,7 @@ from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.descriptor import StateSlot
 
-__all__ = ["Attached", "Inertia", "Injection", "Network"]
+__all__ = ["Attached", "Inertia", "Injection", "Network", "Tie"]
 
 
 @final
@@ -38,6 +39,21 @@ class Inertia:
     rate: int
     ratio: float
     inertia: float
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Tie:
+    """A constant relation among rates of joints, as of a gear: Σ ratio · rate = 0.
+
+    Parameters
+    ----------
+    terms
+        (place of the rate among those of the network, ratio).
+    """
+
+    component: int
+    terms: tuple[tuple[int, float], ...]
 
 
 @final
@@ -105,6 +121,7 @@ class Network:
     attached: tuple[Attached, ...] = ()
     inertias: tuple[Inertia, ...] = ()
     injections: tuple[Injection, ...] = ()
+    ties: tuple[Tie, ...] = ()
 
     @property
     def known(self) -> int:
@@ -115,6 +132,11 @@ class Network:
     def state_at(self) -> int:
         """Where the efforts of storages start in z."""
         return len(self.rates) + len(self.nodes) + len(self.inputs)
+
+    @property
+    def acts(self) -> bool:
+        """Whether something is left to evaluate: flows, efforts of storages, or what is given."""
+        return bool(self.attached or self.storages or self.inputs or self.injections or self.skew.any())
 
     def ports(self) -> set[Path]:
         """Outer ports on it."""

@@ -5,7 +5,8 @@ from typing import Any, Final, final
 
 from ephs.mechanics.tree.sweeps import loops, programs
 from ephs.mechanics.tree.sweeps.balances import ATTACH
-from ephs.mechanics.tree.sweeps.cuts import Chart, Relative
+from ephs.mechanics.tree.sweeps.charts import Chart
+from ephs.mechanics.tree.sweeps.cuts import Relative
 from ephs.mechanics.tree.sweeps.programs import PLACE
 from ephs.semantics.kernel_table import SIGNATURE
 from ephs.semantics.stage import (

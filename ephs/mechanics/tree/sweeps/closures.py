@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from typing import final
 
 from ephs.mechanics.tree.sweeps import cuts
-from ephs.mechanics.tree.sweeps.cuts import Chart, Cut, Kind, Place, Relative
+from ephs.mechanics.tree.sweeps.charts import Chart, Kind
+from ephs.mechanics.tree.sweeps.cuts import Cut, Place, Relative
 from ephs.mechanics.tree.sweeps.records import Tree
 from ephs.semantics.spaces.vectors import add, dot, scale
 from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Table, Vector
@@ -25,11 +26,11 @@ class Closures:
     motions
         (cuts, 31): see `cuts.Relative`.
     end
-        (2 rows,): 0, 1, 2, …: where the covectors of a row on its first and its second link are.
+        0, 1, 2, …: where the covectors of a row on its first and its second link are.
     value
         (rows, 4): minus the rows' accelerations, in the first column.
     covector
-        (2 rows, 6).
+        (ends, 6).
     """
 
     kinds: tuple[Kind, ...]
@@ -59,12 +60,12 @@ class Closures:
         cuts.rows(on, self.cuts, self.places, self.motions, self.end, self.value, self.covector)
         cuts.poses(on, self.cuts, self.motions)
 
-    def each_row(self, on: Evaluator, body: Callable[[Cut, Integer], None]) -> None:
-        """Call body(joint, row) for all rows."""
+    def each_row(self, on: Evaluator, body: Callable[[Cut, Integer, Integer], None]) -> None:
+        """Call body(joint, row, place of its first end) for all rows."""
 
         def of(i: Integer) -> None:
             cut = self.cuts[i]
-            on.loop(cut.rows, lambda j: body(cut, cut.row + j))
+            on.loop(cut.rows, lambda j: body(cut, cut.row + j, cut.end + 2 * j))
 
         on.loop(self.cuts.size, of)
 
@@ -75,8 +76,8 @@ class Closures:
     def push(self, on: Evaluator, tree: Tree, multiplier: Vector) -> None:
         """Take the wrenches of multipliers off the links' loads."""
 
-        def one(cut: Cut, row: Integer) -> None:
-            for link, e in ((cut.first, 2 * row), (cut.second, 2 * row + 1)):
+        def one(cut: Cut, row: Integer, end: Integer) -> None:
+            for link, e in ((cut.first, end), (cut.second, end + 1)):
                 on.when(link >= 0, lambda link=link, e=e: _load(tree, link, scale(-multiplier[row], self.at_end(e))))
 
         self.each_row(on, one)

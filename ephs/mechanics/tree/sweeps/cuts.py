@@ -1,13 +1,16 @@
-"""Joints at which loops are cut: their relative motion, the rows that close them, how far they are open.
+"""Joints at which loops are cut, and gears: their relative motion, the rows that close them, how far they are open.
 
 A cut joint lets twists B r pass in its second frame; a row n of the complement, n·B = 0, forbids one. With the twists
 u₁, u₂ of both links in that frame and the relative one u = u₂ − u₁, its acceleration is u̇₂ − u̇₁ + [u, u₁].
+
+A gear forbids Σ gᵢ rᵢ ≠ 0 of the rates of some joints. It is one row, to which each of its joints adds gᵢ (BᵢᵀBᵢ)⁻¹Bᵢᵀ
+in its own second frame: a cut joint without freedoms, whose element is that of the joint, and which is open where the
+element is not the one at which the gear meshes.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import final
 
+from ephs.mechanics.tree.sweeps.charts import TIE, Chart, Kind, of_joints, visit_kind
 from ephs.mechanics.tree.sweeps.needs import NO_INTEGERS
 from ephs.semantics.spaces import codes, se3, so3
 from ephs.semantics.spaces.staged_groups import STAGED
@@ -23,17 +26,15 @@ from ephs.semantics.stage import (
     Variable,
     Vector,
     integer,
+    real,
     reals,
 )
 
 __all__ = [
-    "Chart",
     "Cut",
-    "Kind",
     "Place",
     "Relative",
     "across",
-    "advance",
     "between",
     "fit",
     "gaps",
@@ -43,30 +44,7 @@ __all__ = [
     "relative_rates",
     "rows",
     "velocities",
-    "visit_kind",
 ]
-
-
-@final
-@dataclass(frozen=True, slots=True, order=True)
-class Kind:
-    """A group, and how many numbers an element and an increment have; known while staging."""
-
-    code: int
-    size: int
-    dim: int
-
-
-class Chart(Record):
-    """Where a joint's element, increment and rates lie; ``cut`` is its number among the cut joints, −1 on the tree."""
-
-    code = integer()
-    dim = integer()
-    q_at = integer()
-    size = integer()
-    v_at = integer()
-    r_at = integer()
-    cut = integer()
 
 
 class Cut(Record):
@@ -77,9 +55,11 @@ class Cut(Record):
     first, second
         Links of its bodies, −1 for the ground.
     code, dim, q_at, size, v_at
-        As in `Chart`.
+        As in `Chart`; a joint of a gear has the code `TIE`, no freedoms, and a size of 1.
     row, rows
-        Its first row, and how many.
+        Its first row, and how many; those of the joints of a gear are the same.
+    end
+        Where the places of its rows on its two links are.
     inner_turn, inner_at
         Its first frame in the first link's.
     outer_turn, outer_at
@@ -90,6 +70,8 @@ class Cut(Record):
         (BᵀB)⁻¹Bᵀ in its first ``dim`` rows.
     normal
         (6, 6): its rows.
+    start
+        The element at which a gear meshes.
     """
 
     first = integer()
@@ -101,6 +83,7 @@ class Cut(Record):
     v_at = integer()
     row = integer()
     rows = integer()
+    end = integer()
     inner_turn = reals(3, 3)
     inner_at = reals(3)
     outer_turn = reals(3, 3)
@@ -108,6 +91,7 @@ class Cut(Record):
     basis = reals(6, 6)
     left = reals(6, 6)
     normal = reals(6, 6)
+    start = real()
 
 
 class Place(Record):
@@ -150,31 +134,21 @@ def between(near: Place, far: Place, turn: list[list[Real]], at: list[Real]) -> 
     return product(back, product(far.turn, turn)), there
 
 
-def _each_row(on: Evaluator, cut: Cut, body: Callable[[Integer, list[Real]], None]) -> None:
-    """Call body(row, n) for the rows of a cut joint."""
+def _each_row(on: Evaluator, cut: Cut, body: Callable[[Integer, Integer, list[Real]], None]) -> None:
+    """Call body(row, place in ``end``, n) for the rows of a cut joint."""
 
     def one(j: Integer) -> None:
         normal = Vector(cut.reals, cut.real_start + Cut.normal.offset + 6 * j, 6)
-        body(cut.row + j, [normal[k] for k in range(6)])
+        body(cut.row + j, cut.end + 2 * j, [normal[k] for k in range(6)])
 
     on.loop(cut.rows, one)
 
 
-def visit_kind(
-    on: Evaluator, kinds: tuple[Kind, ...], code: Integer, dim: Integer, body: Callable[[Kind], None]
-) -> None:
-    """Call body(kind) with the kind of a joint, which is then known."""
+def _clear(on: Evaluator, value: Matrix) -> None:
+    def one(a: Integer) -> None:
+        value[a, 0] = 0.0
 
-    def among(first: int) -> None:
-        kind = kinds[first]
-        if first == len(kinds) - 1:
-            body(kind)
-        else:
-            same = on.both(on.same(code, kind.code), on.same(dim, kind.dim))
-            on.when(same, lambda: body(kind), lambda: among(first + 1))
-
-    if kinds:
-        among(0)
+    on.loop(value.rows, one)
 
 
 def _pose(on: Evaluator, kind: Kind, cut: Cut, q: Vector) -> list[Real]:
@@ -192,7 +166,10 @@ def _pose(on: Evaluator, kind: Kind, cut: Cut, q: Vector) -> list[Real]:
 
 
 def _gap(on: Evaluator, kind: Kind, cut: Cut, motion: Relative, q: Vector) -> list[Real]:
-    """log of the pose that is from the one that the joint's element stands for."""
+    """log of the pose that is from the one that the joint's element stands for; of a gear, how far a joint is from
+    where it meshes."""
+    if kind.code == TIE:
+        return scale(q[cut.q_at] - cut.start, transposed(cut.basis)[0])
     return se3.increment(on, _pose(on, kind, cut, q), motion.pose)
 
 
@@ -208,7 +185,7 @@ def rows(
     motions
         (cuts, 31): receives `Relative`, but for poses.
     end
-        (2 rows,): the slots of a row on its first and on its second link.
+        The slots of rows on links: see `Cut.end`.
     value, covector
         Targets go to the first column of ``value``; rows are added to ``covector``.
     """
@@ -230,13 +207,14 @@ def rows(
         total = add(se3.bracket(twist, first), bias)
         motion.change = total
 
-        def row(a: Integer, normal: list[Real]) -> None:
-            value[a, 0] = -dot(normal, total)
-            grow(end[2 * a + 1], se3.wrench_outward(outer_turn, outer_at, normal))
-            grow(end[2 * a], scale(-1.0, se3.wrench_outward(turn, at, normal)))
+        def row(a: Integer, e: Integer, normal: list[Real]) -> None:
+            value[a, 0] = value[a, 0] - dot(normal, total)
+            grow(end[e + 1], se3.wrench_outward(outer_turn, outer_at, normal))
+            grow(end[e], scale(-1.0, se3.wrench_outward(turn, at, normal)))
 
         _each_row(on, cut, row)
 
+    _clear(on, value)
     on.loop(cuts.size, one)
 
 
@@ -284,16 +262,16 @@ def gaps(on: Evaluator, kinds: tuple[Kind, ...], cuts: Table[Cut], motions: Matr
         def of(kind: Kind) -> None:
             log = _gap(on, kind, cut, motion, q)
 
-            def row(a: Integer, normal: list[Real]) -> None:
-                target = -dot(normal, log)
-                value[a, 0] = target
-                _widen(on, worst, target)
+            def row(a: Integer, e: Integer, normal: list[Real]) -> None:
+                value[a, 0] = value[a, 0] - dot(normal, log)
 
             _each_row(on, cut, row)
 
         visit_kind(on, kinds, cut.code, cut.dim, of)
 
+    _clear(on, value)
     on.loop(cuts.size, one)
+    on.loop(value.rows, lambda a: _widen(on, worst, value[a, 0]))
     return worst.value
 
 
@@ -309,11 +287,12 @@ def relative_rates(on: Evaluator, cuts: Table[Cut], motions: Matrix, value: Matr
     def one(i: Integer) -> None:
         twist = motion_of(motions, i).twist
 
-        def row(a: Integer, normal: list[Real]) -> None:
-            value[a, 0] = -dot(normal, twist)
+        def row(a: Integer, e: Integer, normal: list[Real]) -> None:
+            value[a, 0] = value[a, 0] - dot(normal, twist)
 
         _each_row(on, cuts[i], row)
 
+    _clear(on, value)
     on.loop(cuts.size, one)
 
 
@@ -329,29 +308,13 @@ def across(on: Evaluator, cuts: Table[Cut], motions: Matrix, change: Matrix, val
         near = se3.twist_inward(motion.turn, motion.at, of(cut.first))
         moved = sub(se3.twist_inward(cut.outer_turn, cut.outer_at, of(cut.second)), near)
 
-        def row(a: Integer, normal: list[Real]) -> None:
-            value[a, 0] = -dot(normal, moved)
+        def row(a: Integer, e: Integer, normal: list[Real]) -> None:
+            value[a, 0] = value[a, 0] - dot(normal, moved)
 
         _each_row(on, cut, row)
 
+    _clear(on, value)
     on.loop(cuts.size, one)
-
-
-def advance(on: Evaluator, kinds: tuple[Kind, ...], charts: Table[Chart], base: Vector, v: Vector, q: Vector) -> None:
-    """q = base·exp(v), joint by joint."""
-
-    def one(i: Integer) -> None:
-        chart = charts[i]
-
-        def of(kind: Kind) -> None:
-            element = [base[chart.q_at + k] for k in range(kind.size)]
-            change = [v[chart.v_at + j] for j in range(kind.dim)]
-            for k, x in enumerate(STAGED[kind.code].retract(on, element, change)):
-                q[chart.q_at + k] = x
-
-        visit_kind(on, kinds, chart.code, chart.dim, of)
-
-    on.loop(charts.size, one)
 
 
 def velocities(
@@ -383,6 +346,6 @@ def velocities(
             for j, x in enumerate(found):
                 out[chart.v_at + j] = x
 
-        visit_kind(on, kinds, chart.code, chart.dim, of)
+        visit_kind(on, of_joints(kinds), chart.code, chart.dim, of)
 
     on.loop(charts.size, one)

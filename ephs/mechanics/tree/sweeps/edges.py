@@ -9,7 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, final
 
-from ephs.mechanics.tree.sweeps.cuts import Kind, Place, visit_kind
+from ephs.mechanics.tree.sweeps.charts import Kind, visit_kind
+from ephs.mechanics.tree.sweeps.cuts import Place
 from ephs.mechanics.tree.sweeps.needs import NO_INTEGERS
 from ephs.mechanics.tree.sweeps.records import Tree
 from ephs.semantics.spaces import se3, so3

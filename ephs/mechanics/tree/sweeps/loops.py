@@ -6,8 +6,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from ephs.mechanics.tree.sweeps import cuts
-from ephs.mechanics.tree.sweeps.cuts import Chart, Cut, Kind
+from ephs.mechanics.tree.sweeps import charts, cuts
+from ephs.mechanics.tree.sweeps.charts import Chart, Kind
+from ephs.mechanics.tree.sweeps.cuts import Cut
 from ephs.semantics.spaces import codes
 from ephs.semantics.stage import (
     Entry,
@@ -85,10 +86,10 @@ def loop_program(kinds: tuple[Kind, ...]) -> Program:
         cuts.across(on, joints(cut, numbers), motions, change, value)
 
     def advance(on: Evaluator, chart: Integers, base: Vector, v: Vector, q: Vector) -> None:
-        cuts.advance(on, kinds, charted(chart), base, v, q)
+        charts.advance(on, kinds, charted(chart), base, v, q)
 
     def move(on: Evaluator, chart: Integers, v: Vector, q: Vector) -> None:
-        cuts.advance(on, kinds, charted(chart), q, v, q)
+        charts.advance(on, kinds, charted(chart), q, v, q)
 
     def velocities(
         on: Evaluator, chart: Integers, cut: Integers, numbers: Vector, motions: Matrix, v: Vector, r: Vector,

@@ -10,9 +10,10 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any, Final, final
 
-from ephs.mechanics.tree.sweeps import cuts
+from ephs.mechanics.tree.sweeps import charts
+from ephs.mechanics.tree.sweeps.charts import Chart, Kind
 from ephs.mechanics.tree.sweeps.closures import Closures
-from ephs.mechanics.tree.sweeps.cuts import Chart, Cut, Kind, Relative
+from ephs.mechanics.tree.sweeps.cuts import Cut, Relative
 from ephs.mechanics.tree.sweeps.edges import Edge, Edges, Law
 from ephs.mechanics.tree.sweeps.inverse import action, armatures, masses, needed_forces, row_of_covector, weigh
 from ephs.mechanics.tree.sweeps.loops import NO_REALS
@@ -119,7 +120,7 @@ class Residuals:
         def edges(edge: Integers, numbers: Vector, law: Vector, places: Matrix) -> Edges:
             count = edge.size // Edge.integer_width
             laws = Table(Law, edge.cells, law.cells, count)
-            return Edges(kinds, Table(Edge, edge.cells, numbers.cells, count), laws, places)
+            return Edges(charts.of_joints(kinds), Table(Edge, edge.cells, numbers.cells, count), laws, places)
 
         def place(
             on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector,
@@ -146,17 +147,21 @@ class Residuals:
             masses(on, tree, q, unit, mass)
             found = cholesky(on, mass, factor)
 
-            def one(joint: Cut, a: Integer) -> None:
-                into, m = row.row(driven + a), driven + a
+            def empty(a: Integer) -> None:
+                into = row.row(driven + a)
                 on.loop(unit.size, lambda k: _put(into, k))
-                terms[m] = 0.0
+                terms[driven + a] = 0.0
+
+            def one(joint: Cut, a: Integer, end: Integer) -> None:
+                into, m = row.row(driven + a), driven + a
 
                 def count(at: Integer, size: Real) -> None:
                     terms[m] = terms[m] + size / factor[at, at]
 
-                for link, e in ((joint.first, 2 * a), (joint.second, 2 * a + 1)):
+                for link, e in ((joint.first, end), (joint.second, end + 1)):
                     row_of_covector(on, tree, q, link, self._seen, closing.at_end(e), into, count)
 
+            on.loop(terms.size - driven, empty)
             closing.each_row(on, one)
             return found
 
@@ -236,7 +241,7 @@ class Residuals:
             closing = closures(cut, cut_numbers, chart, places, motions, end, value, covector)
             n, m, c = r.size, value.rows, v.size - r.size
             force, heat = out.part(0, n), out.part(n + m + 2 * c, s.size)
-            cuts.advance(on, kinds, closing.charts, base, v, q)
+            charts.advance(on, kinds, closing.charts, base, v, q)
             outward(on, tree, q, r)
             spread(on, tree, q, a)
             closing.place(on, tree)
@@ -268,7 +273,7 @@ class Residuals:
             n = r.size
             c = v.size - n
             momentum, force, heat = out.part(0, n), out.part(n, n), out.part(2 * n + 2 * c, s.size)
-            cuts.advance(on, kinds, closing.charts, base, v, q)
+            charts.advance(on, kinds, closing.charts, base, v, q)
             outward(on, tree, q, r)
             _at_rest(on, tree)
             closing.place(on, tree)

@@ -1,0 +1,74 @@
+"""Charts of joints: elements and increments of the groups that a mechanism has."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, final
+
+from ephs.semantics.spaces.staged_groups import STAGED
+from ephs.semantics.stage import Evaluator, Integer, Record, Table, Vector, integer
+
+__all__ = ["TIE", "Chart", "Kind", "advance", "of_joints", "visit_kind"]
+
+TIE: Final = 100
+"""Code of a joint that a gear ties to others."""
+
+
+@final
+@dataclass(frozen=True, slots=True, order=True)
+class Kind:
+    """A group, and how many numbers an element and an increment have; known while staging."""
+
+    code: int
+    size: int
+    dim: int
+
+
+class Chart(Record):
+    """Where a joint's element, increment and rates lie; ``cut`` is its number among the cut joints, −1 on the tree."""
+
+    code = integer()
+    dim = integer()
+    q_at = integer()
+    size = integer()
+    v_at = integer()
+    r_at = integer()
+    cut = integer()
+
+
+def visit_kind(
+    on: Evaluator, kinds: tuple[Kind, ...], code: Integer, dim: Integer, body: Callable[[Kind], None]
+) -> None:
+    """Call body(kind) with the kind of a joint, which is then known."""
+
+    def among(first: int) -> None:
+        kind = kinds[first]
+        if first == len(kinds) - 1:
+            body(kind)
+        else:
+            same = on.both(on.same(code, kind.code), on.same(dim, kind.dim))
+            on.when(same, lambda: body(kind), lambda: among(first + 1))
+
+    if kinds:
+        among(0)
+
+
+def of_joints(kinds: tuple[Kind, ...]) -> tuple[Kind, ...]:
+    """The kinds but for those of gears, which have no charts."""
+    return tuple(kind for kind in kinds if kind.code != TIE)
+
+
+def advance(on: Evaluator, kinds: tuple[Kind, ...], charts: Table[Chart], base: Vector, v: Vector, q: Vector) -> None:
+    """q = base·exp(v), joint by joint."""
+
+    def one(i: Integer) -> None:
+        chart = charts[i]
+
+        def of(kind: Kind) -> None:
+            element = [base[chart.q_at + k] for k in range(kind.size)]
+            change = [v[chart.v_at + j] for j in range(kind.dim)]
+            for k, x in enumerate(STAGED[kind.code].retract(on, element, change)):
+                q[chart.q_at + k] = x
+
+        visit_kind(on, of_joints(kinds), chart.code, chart.dim, of)
+
+    on.loop(charts.size, one)

@@ -1,0 +1,163 @@
+"""Gears: constant relations of the rates of joints, by every method and against the general form."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+import ephs
+from ephs import Pattern, junction
+from ephs import quantity as Q
+from ephs.mechanics import joint, rigid_body
+from ephs.mechanics.elements import components
+from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.equations.tangent import Linearised
+from ephs.mechanics.tree.finding.frames import Unplaced
+from ephs.operad import Path
+from tests.mechanics.methods.systems import problem_of
+from tests.mechanics.tree.general import held_to_the_general_form
+
+UNTIL = 0.5
+MASS, AWAY, GRAVITY, MESHED = 1.3, 0.4, 9.81, 0.7
+
+
+def train(bodies, gears):
+    """Wheels on hinges, each on the ground or on the wheel before; gears tie their rates.
+
+    Parameters
+    ----------
+    bodies
+        (whether it is on the one before, distance of its centre from its hinge).
+    gears
+        (of wheels, ratios): Σ ratio · rate = 0.
+    """
+    hinges = [
+        joint("revolute", [1, 0, 0, 0, 0.2 * k, 0, 0], [1, 0, 0, 0, -away, 0, 0], driven=True)
+        for k, (_, away) in enumerate(bodies)
+    ]
+    port = next(str(p) for p in hinges[0].interface if str(p) not in ("p1", "p2"))
+    of = hinges[0].interface[port].quantity
+    junctions = {"g": junction(Q.body_momentum)}
+    boxes, fillings = {"ground": {"p": "g"}}, {"ground": components.ground()}
+    for k, (carried, _) in enumerate(bodies):
+        junctions |= {f"b{k}": junction(Q.body_momentum), f"p{k}": junction(of)}
+        boxes |= {f"w{k}": {"p": f"b{k}"}, f"h{k}": {"p1": f"b{k - 1}" if carried and k else "g", "p2": f"b{k}"}}
+        boxes[f"h{k}"][port] = f"p{k}"
+        fillings |= {f"w{k}": rigid_body(MASS, [0.3, 0.4, 0.5], [0.0, -GRAVITY, 0.0]), f"h{k}": hinges[k]}
+    for number, (wheels, ratios) in enumerate(gears):
+        boxes[f"gear{number}"] = {f"x{i}": f"p{k}" for i, k in enumerate(wheels)}
+        ports = {f"x{i}": of for i in range(len(wheels))}
+        fillings[f"gear{number}"] = ephs.constraint(ports, [list(ratios)], name="gear")
+    system = Pattern(junctions=junctions, boxes=boxes)(**fillings)
+    poses, place = {}, np.zeros(3)
+    for k, (carried, away) in enumerate(bodies):
+        centre = place if carried and k else np.zeros(3)
+        place = centre + np.array([0.2 * k + away, 0.0, 0.0])
+        poses[f"w{k}.pe.q"] = np.array([1.0, 0.0, 0.0, 0.0, *place])
+    return system, poses
+
+
+@cache
+def pair():
+    """The second wheel meshes where it is, at an angle."""
+    system, start = train([(False, AWAY), (False, 0.0)], [((0, 1), (2.0, -1.0))])
+    turned = np.array([np.cos(0.5 * MESHED), 0.0, 0.0, np.sin(0.5 * MESHED), *start["w1.pe.q"][4:]])
+    return system, start | {"w1.pe.q": turned, "h1.pe.q_r": np.array([MESHED])}
+
+
+def pair_by_hand():
+    """(angle, rate) of the first wheel, whose gear turns the second one twice as fast."""
+    inertia = 0.5 + MASS * AWAY**2 + 4.0 * 0.5
+    run = solve_ivp(
+        lambda t, y: [y[1], -MASS * GRAVITY * AWAY * np.cos(y[0]) / inertia], (0.0, UNTIL), [0.0, 0.0],
+        method="DOP853", rtol=1e-12, atol=1e-13,
+    )  # fmt: skip
+    return run.y[:, -1]
+
+
+@pytest.mark.parametrize(
+    "method", ["rk54", "rk87", "radau", "gauss6", "ida", "auto", "natural", "alpha", "variational"]
+)
+def test_two_wheels_on_a_gear_turn_as_one_inertia_does(method):
+    system, start = pair()
+    second = method in ("natural", "alpha", "variational")
+    options = {"step": 1e-3} if second else {"rtol": 1e-11, "atol": 1e-12}
+    run = ephs.simulate(system, UNTIL, initial=start, method=method, save_at=[0.0, UNTIL], audit="off", **options)
+    angle, _ = pair_by_hand()
+    found, other = run["h0.pe.q_r"][-1, 0], run["h1.pe.q_r"][-1, 0]
+    assert np.isclose(found, angle, rtol=1e-6 if second else 1e-9)
+    assert abs(other - MESHED - 2.0 * found) <= 1e-13
+    assert run.energy_error.max() < (1e-5 if second else 1e-11)
+
+
+TREES = st.lists(st.tuples(st.booleans(), st.floats(0.05, 0.5)), min_size=2, max_size=5)
+
+
+@st.composite
+def trains(draw):
+    """Gears of two or three wheels each, each with a wheel that the others have not: no gear contradicts others."""
+    bodies = draw(TREES)
+    ratio = st.sampled_from([-2.0, -0.5, 0.75, 1.0, 3.0])
+    gears = []
+    for k in range(1, len(bodies)):
+        if draw(st.booleans()):
+            before = draw(st.lists(st.integers(0, k - 1), min_size=1, max_size=2, unique=True))
+            gears.append(((*before, k), tuple(draw(ratio) for _ in range(len(before) + 1))))
+    return bodies, gears
+
+
+@settings(max_examples=10, deadline=None)
+@given(trains(), st.integers(0, 10**6))
+def test_gears_accelerate_joints_as_the_general_form_says(made, seed):
+    system, start = train(*made)
+    _, gears = made
+    start = {Path.of(path): value for path, value in start.items()}
+    problem = problem_of(system, system.state() | start)
+    eq = Equations(problem, 0.0)
+    assert len(eq.reduced.attaching.ties) == len(gears)
+    state, rng = eq.start(0.0), np.random.default_rng(seed)
+    state = eq.closed(replace(state, r=rng.standard_normal(eq.n)))
+    by_joint = eq.layout.by_joint(state.r)
+    for wheels, ratios in gears:
+        assert abs(sum(g * by_joint[f"h{k}"][0] for k, g in zip(wheels, ratios, strict=True))) <= 1e-12
+    y = eq.vector(state)
+    fast, slow = eq.rates(0.0, state.q, y), np.zeros(eq.size)
+    assert eq.dense.rates(state.q, y, eq.given, eq.heats, slow) == (0, 0)
+    where = slice(eq.nv, eq.nv + eq.n)
+    assert np.allclose(fast[where], slow[where], rtol=1e-10, atol=1e-10)
+    held_to_the_general_form(eq, problem, state)
+
+
+def test_changes_of_geared_motion_are_those_of_the_equations():
+    system, start = train([(False, 0.3), (True, 0.2), (False, 0.1)], [((0, 1, 2), (1.0, -2.0, 0.5))])
+    start = {Path.of(path): value for path, value in start.items()}
+    eq = Equations(problem_of(system, system.state() | start), 0.0)
+    state, rng = eq.start(0.0), np.random.default_rng(3)
+    linear, r = Linearised(eq), rng.standard_normal(eq.n)
+    s = eq.heats.entropies(state.heats)
+
+    def rates(z):
+        linear.forward(eq.advance(state.q, z[: eq.nv]), z[eq.nv :], s)
+        return eq.dense.rate.copy()
+
+    linear.forward(state.q, r, s)
+    exact, middle = linear.columns(solve=True, fit=False)[: eq.n], np.concatenate([np.zeros(eq.nv), r])
+    for j in range(middle.size):
+        step = 1e-5 * np.eye(middle.size)[j]
+        near = (rates(middle + step) - rates(middle - step)) / 2e-5
+        assert np.allclose(exact[:, j], near, rtol=0.0, atol=1e-8 * max(1.0, np.abs(near).max()))
+
+
+def test_gears_of_a_loop_contradict_each_other_or_repeat():
+    def equations(ratio):
+        system, start = train([(False, 0.1)] * 3, [((0, 1), (1, -2)), ((1, 2), (1, -3)), ((0, 2), (1, -ratio))])
+        start = {Path.of(path): value for path, value in start.items()}
+        return Equations(problem_of(system, system.state() | start), 0.0)
+
+    assert len(equations(6).reduced.attaching.ties) == 2
+    with pytest.raises(Unplaced, match=r"gear\d.*contradicts the other gears"):
+        equations(5)
