@@ -41,7 +41,7 @@ class Alpha(ReducedMethod):
         ρ∞, what is left after a step of a mode that is far too fast for it: 1 nothing damped, 0 all.
     keep
         ``"damping"``, what it takes from fast modes is missing in the balance; or ``"energy"``, which a correction
-        gives back to the motion.
+        gives back to the motion; or ``"energy and momenta"``.
     """
 
     name = "alpha"
@@ -49,12 +49,11 @@ class Alpha(ReducedMethod):
     share = 1.0
 
     def __init__(self, equations: Equations, control: Control, rho: float = 0.8, keep: str = "damping") -> None:
-        if keep not in ("damping", "energy"):
-            raise OptionError("options['keep']", keep, "'damping' or 'energy'")
         self._keep = keep
         if not 0.0 <= number_of("options['rho']", rho, "a number from 0 to 1") <= 1.0:
             raise OptionError("options['rho']", rho, "a number from 0 to 1")
         super().__init__(equations, control)
+        equations.accounts.keep(keep, ("damping",))
         self._m, self._f = (2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0)
         self._gamma = 0.5 + self._f - self._m
         self._beta = 0.25 * (0.5 + self._gamma) ** 2
@@ -108,7 +107,7 @@ class Alpha(ReducedMethod):
         closed, allowed = eq.closed(eq.state(state, y1, state.t + h)), self.atol + self.rtol * eq.sizes(y0, y1)
         closed = eq.booking.step(state, closed, flows, work, missed=missed)
         left = 0.0
-        if self._keep == "energy":
+        if self._keep != "damping":
             closed, left = eq.accounts.corrected(
                 state, closed, h, allowed, chosen=self.control.step is None, alone=True
             )

@@ -12,6 +12,7 @@ import numpy as np
 
 from ephs.mechanics.methods import tableaux as t
 from ephs.mechanics.methods.method import ReducedMethod
+from ephs.mechanics.tree.equations.accounts import OWN
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.mechanics.tree.finding.naming import within
 from ephs.semantics.bundle import Array
@@ -199,7 +200,8 @@ class _March:
         left: Callable[[float, float, str], None] | None,
     ) -> None:
         eq, tableau, start = method.equations, method.method, method.equations.accounts.opened(span.state)
-        summed, eq.accounts.kept = start.account.size - 4, True
+        self.own, eq.accounts.kept = eq.accounts.own, True
+        summed = start.account.size - self.own
         self.method, self.span, self.left, self._leave = method, span, False, left
         self._handed = 0
         size, q, times = eq.size, span.state.q, span.save_at
@@ -214,11 +216,11 @@ class _March:
         }  # fmt: skip
         self.memory = {name: np.zeros(shape) for name, shape in shapes.items()} | {
             "q": np.array(q), "y": eq.vector(span.state), "atol": np.array(method.atol), "rtol": np.array(method.rtol),
-            "times": self.times, "carry": start.account[4:].copy(),
+            "times": self.times, "carry": start.account[self.own :].copy(),
         }  # fmt: skip
         self.steering, self.account = Steering.table(1), Account.table(1)
         a: Any = self.account[0]
-        a.anchor, a.left, a.put, a.total = start.account[:4].tolist()
+        (a.anchor, a.left, a.put, a.total), self.momenta[:] = np.split(start.account[: self.own], [OWN])
         a.chosen, a.begins = int(span.policy is not None), int(not (np.isnan(a.anchor) or start.books.any()))
         self.march = eq.engine.bind("march", tableau.arrays, self.memory, self.steering, self.account, 0)
         c, policy, control = self.control, span.policy, span.control
@@ -228,6 +230,11 @@ class _March:
         c.exponent, c.share, c.damping, c.strict = method.exponent, method.share, 0.4, Proportional.STRICT
         c.saved = -1 if times is None else span.saved
         c.limit, c.grid = limit, 0.0 if policy else float(control.step or 0.0)
+
+    @property
+    def momenta(self) -> Array:
+        """The momenta that steps keep, where these read them."""
+        return self.method.equations.engine.work["kept"][: self.own - OWN]
 
     @property
     def control(self) -> Any:
@@ -323,7 +330,7 @@ class _March:
             c.rows += 1
         s["q"][:], s["y"][:] = attempt.end.q, eq.vector(attempt.end)
         a: Any = self.account[0]
-        (a.anchor, a.left, a.put, a.total), s["carry"][:] = attempt.end.account[:4].tolist(), attempt.end.account[4:]
+        (a.anchor, a.left, a.put, a.total), _, s["carry"][:] = np.split(attempt.end.account, [OWN, self.own])
         c.time, c.steps, c.fresh, c.rough = after, c.steps + 1, 0, int(eq.careful)
         c.shortest, c.longest = min(c.shortest, h), max(c.longest, h)
         c.least = min(c.least, attempt.least)
@@ -342,7 +349,7 @@ class _March:
     def state(self) -> ReducedState:
         """The state reached."""
         a: Any = self.account[0]
-        account = np.concatenate([[a.anchor, a.left, a.put, a.total], self.memory["carry"]])
+        account = np.concatenate([[a.anchor, a.left, a.put, a.total], self.momenta, self.memory["carry"]])
         return self._state(self.time, self.memory["q"], self.memory["y"][self.method.equations.nv :], account)
 
     def _state(self, t: float, q: Array, rest: Array, account: Array) -> ReducedState:
@@ -359,7 +366,7 @@ class _March:
             t = self.span.until if passed == end else self.span.t0 + self._sign * passed
             if self.span.save_at is not None:
                 t = float(self.span.save_at[self.span.saved + self._handed + row])
-            account = np.concatenate([[self.account[0].anchor, 0.0, *put], np.zeros(self.memory["carry"].size)])
+            account = np.concatenate([[self.account[0].anchor, 0.0, *put], self.momenta, 0.0 * self.memory["carry"]])
             out.append((t, self._state(t, q, y, account), least))
         self._handed += len(out)
         self.control.rows = 0
@@ -377,8 +384,8 @@ class _March:
 
     def _taken(self) -> list[tuple[str, Any]]:
         (counts, control), s = self.steering.arrays, self.memory
-        parts = control, counts, s["q"], s["y"], s["k"][0], s["carry"], self.account.arrays[1]
-        names = "control", "counts", "q", "y", "rates", "carry", "account"
+        parts = control, counts, s["q"], s["y"], s["k"][0], s["carry"], self.account.arrays[1], self.momenta
+        names = "control", "counts", "q", "y", "rates", "carry", "account", "momenta"
         return list(zip(names, parts, strict=True))
 
     def restore(self, snapshot: Snapshot) -> None:

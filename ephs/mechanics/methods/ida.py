@@ -14,7 +14,6 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.methods.method import ReducedMethod
-from ephs.mechanics.tree.equations.accounts import OWN
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.semantics.bundle import Array
 from ephs.solve.control import Control
@@ -99,7 +98,7 @@ class Ida(ReducedMethod):
         flows = passed[first:]
         closed = eq.booking.step(state, closed, flows, float(passed[first - 1]), missed=0.0 * flows, refused=False)
         # It goes on from where it was, so that what is put in is put into each state anew.
-        since = np.concatenate([base.account[:OWN], state.account[OWN:]])
+        since = np.concatenate([base.account[: eq.accounts.own], state.account[eq.accounts.own :]])
         allowed = self.atol + self.rtol * eq.sizes(eq.vector(state), eq.vector(closed))
         closed, _ = eq.accounts.corrected(
             replace(state, account=since), closed, t - state.t, allowed, chosen=True, alone=True

@@ -112,6 +112,16 @@ def on_joints(make: Callable[..., Any]) -> Callable[[Setting], tuple[Stepper[Any
     return made
 
 
+def _corrected(make: Callable[[Any, Control], Any]) -> Callable[..., Any]:
+    """Constructor of a method whose steps are corrected, with the option what they keep."""
+
+    def made(equations: Any, control: Control, keep: str = "energy") -> Any:
+        equations.accounts.keep(keep)
+        return make(equations, control)
+
+    return made
+
+
 def _tableau(name: str) -> Callable[..., Any]:
     def make(equations: Any, control: Control) -> Any:
         from ephs.mechanics.methods.explicit import Explicit, tableau
@@ -182,7 +192,9 @@ def _of_order_4(model: Model) -> ComponentMethod:
 
 def _radau(setting: Setting) -> tuple[Stepper[Any], Policy | None]:
     if setting.problem.scene is not None or not _flat(setting.problem):
-        return on_joints(_implicit)(setting)
+        return on_joints(_corrected(_implicit))(setting)
+    if setting.options:
+        raise OptionError("options", ", ".join(setting.options), "none: a system without bodies has no momenta")
     from ephs.solve.methods.radau import Radau
 
     stepper = Radau(setting.problem, setting.t0, setting.control)
@@ -249,13 +261,23 @@ for _method in (
         ("keep",),
         undamped=Natural,
     ),
-    Method("radau", 5, True, True, True, True, "Radau IIA, stiff", _radau),
+    Method("radau", 5, True, True, True, True, "Radau IIA, stiff", _radau, ("keep",)),
     Method(
         "alpha", 2, True, True, False, True, "generalised-α, damps what is fast", on_joints(_alpha), ("rho", "keep")
     ),
-    Method("rk54", 5, True, True, False, True, "Dormand and Prince, explicit", on_joints(_tableau("rk54"))),
-    Method(
-        "rk87", 8, True, True, False, True, "Dormand and Prince, explicit, many digits", on_joints(_tableau("rk87"))
+    *(
+        Method(
+            name,
+            order,
+            True,
+            True,
+            False,
+            True,
+            f"Dormand and Prince, explicit{more}",
+            on_joints(_corrected(_tableau(name))),
+            ("keep",),
+        )
+        for name, order, more in (("rk54", 5, ""), ("rk87", 8, ", many digits"))
     ),
     *(
         Method(
@@ -266,7 +288,8 @@ for _method in (
             False,
             True,
             "Gauss, symmetric, implicit",
-            on_joints(_gauss(f"gauss{order}")),
+            on_joints(_corrected(_gauss(f"gauss{order}"))),
+            ("keep",),
         )
         for order in (4, 6, 8)
     ),
@@ -277,12 +300,14 @@ for _method in (
 
 def _for_scenes(setting: Setting) -> tuple[Stepper[Any], Policy | None]:
     try:
-        return on_joints(_auto)(setting)
+        return on_joints(_corrected(_auto))(setting)
     except OptionError:  # joints that the reduced form cannot have, such as loops of prescribed ones
+        if setting.options:
+            raise
         return METHODS["natural"].make(setting)
 
 
-AUTO = Method("auto", 8, True, False, False, True, "rk54 or rk87, radau where stiff", _for_scenes)
+AUTO = Method("auto", 8, True, False, False, True, "rk54 or rk87, radau where stiff", _for_scenes, ("keep",))
 """Method behind `auto` for mechanisms in joint coordinates."""
 
 

@@ -23,7 +23,7 @@ from ephs.semantics.spaces.codes import VECTOR
 from ephs.semantics.spaces.differentials import dexp_left, dexp_left_inv
 from ephs.semantics.spaces.rank import CONSTRAINT, TINY
 from ephs.solve.control import Control
-from ephs.solve.errors import OptionError, Outcome, SolveError
+from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.snapshot import Snapshot
 from ephs.solve.stepping import Attempt
 
@@ -47,16 +47,16 @@ class Variational(ReducedMethod):
     Parameters
     ----------
     keep
-        What every step keeps to rounding: ``"momentum"``, of what no force changes, or ``"energy"``, by a correction.
+        What every step keeps to rounding: ``"momentum"``, of what no force changes; or, by a correction, ``"energy"``,
+        or both, ``"energy and momenta"``.
     """
 
     name = "variational"
     exponent = 3.0
 
     def __init__(self, equations: Equations, control: Control, keep: str = "momentum") -> None:
-        if keep not in ("momentum", "energy"):
-            raise OptionError("options['keep']", keep, "'momentum' or 'energy'")
         super().__init__(equations, control)
+        equations.accounts.keep(keep, ("momentum",))
         self._keep = keep
         t = equations.reduced.tables
         self._groups = [
@@ -102,7 +102,7 @@ class Variational(ReducedMethod):
             rates = closed.r[self._driven]
             work += float((push[: self._driven.size] + second) @ rates)
         closed = eq.booking.step(state, closed, h * flows, work, missed=np.zeros(flows.size))
-        if self._keep == "energy":
+        if self._keep != "momentum":
             closed, _ = eq.accounts.corrected(
                 state, closed, h, np.full(eq.counted.size, np.inf), chosen=False, alone=True
             )

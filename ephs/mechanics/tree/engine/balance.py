@@ -3,6 +3,10 @@
 A state moves along the gradient n = G⁻¹∇E of the energy E with the mass matrix M as metric of the rates, within loops
 and with prescribed motions as they are: rates alone, r + α n with n their free part, which is r itself without
 prescribed motions; where they are no more than what the step changed them by, positions too, along −h² M⁻¹∇V.
+
+Where momenta are kept, too, islands are first moved rigidly to those that they had, see
+`ephs.mechanics.tree.sweeps.rigid`; n is then without the rigid motions, and positions are also moved along these, as
+the momenta turn them by themselves.
 """
 
 from dataclasses import dataclass, replace
@@ -11,17 +15,19 @@ from typing import TYPE_CHECKING, final
 from ephs.mechanics.tree.engine.forces import attached_energy, strain
 from ephs.mechanics.tree.engine.heats import entropies
 from ephs.mechanics.tree.sweeps.acting import Body
-from ephs.semantics.linear.dense import copy
+from ephs.semantics.linear.dense import clear, copy
 from ephs.semantics.stage import Evaluator, Integer, Real, Table, Truth, Variable, Vector, staged
 from ephs.solve.march.account import BEYOND, MOST, ROUNDING, Account, rounding, stretch
 
 if TYPE_CHECKING:
     from ephs.mechanics.tree.engine.motion import Mechanism
 
-__all__ = ["correct", "held"]
+__all__ = ["correct", "held", "measure"]
 
 ROUNDS = 8
 """Iterations that move positions."""
+RIGID = 1e-24
+"""Part of the kinetic energy below which what rigid motions leave of it is rounding."""
 FARTHEST = 0.5
 """Part of its direction by which a state is moved at most."""
 
@@ -52,6 +58,20 @@ def held(on: Evaluator, motion: "Mechanism", q: Vector, r: Vector, heats: Vector
 
     on.when(own.forced > 0, strained)
     return status.value
+
+
+def turn(on: Evaluator, motion: "Mechanism", q: Vector, r: Vector, target: Vector) -> None:
+    """Change the rates by rigid motions of islands, so that they have the momenta of ``target``."""
+    e, w = motion.tables, motion.work
+    on.reach(e.own[0].rigid, *motion.swept, q, r, e.island, e.bases, target, w.sums, w.found, w.torque)
+
+
+def measure(on: Evaluator, motion: "Mechanism", q: Vector, r: Vector) -> None:
+    """Write the momenta of islands to ``kept``."""
+    w = motion.work
+    copy(on, r, w.direction)
+    turn(on, motion, q, w.direction, w.released)
+    copy(on, w.found, w.kept)
 
 
 @staged
@@ -87,12 +107,20 @@ def correct(
     account.noise = rounding(on, account.anchor, work, heat)
     run = _Correction(on, motion, account, target, h, before, q, r, heats, allowed, on.scratch(3), on.counter(0))
     account.moved, account.size, account.rest = 0.0, 0.0, 0.0
+    turned = on.variable(0.0)
+
+    def settle() -> None:
+        short = run.short
+        turn(on, motion, q, r, motion.work.kept)
+        run.look()
+        turned.value = short - run.short
 
     def keep() -> None:
         run.look()
         account.noise = account.noise + ROUNDING * (run.energies[0] + run.energies[2])
+        on.when(on.both(run.known, run.floating), settle)
         on.when(run.known if always else on.negate(run.close), run.move)
-        account.rest = run.short
+        account.rest, account.moved = run.short, account.moved + turned.value
 
     on.when(on.absolute(account.anchor) < BEYOND, keep)
     return run.status.value
@@ -131,16 +159,22 @@ class _Correction:
         return self.on.absolute(self.short) < BEYOND
 
     @property
+    def floating(self) -> Truth:
+        """Whether there are momenta to be kept."""
+        return self.motion.tables.own[0].islands > 0
+
+    @property
     def close(self) -> Truth:
         """Whether it is no more than rounding, or not a number."""
         return self.on.negate(self.on.absolute(self.short) > self.account.noise)
 
     def move(self) -> None:
         """Move the rates along their free part; positions too where those are small."""
-        on, w, n, account = self.on, self.motion.work, self.r.size, self.account
+        on, w, n = self.on, self.motion.work, self.r.size
         self._free()
         twice = on.variable(2.0 * self.energies[0])
         on.when(self.motion.tables.own[0].driven > 0, lambda: self._weigh(w.direction, twice))
+        on.when(self.floating, lambda: self._weigh_inner(twice))
         share = self._share(twice.value)
         size = on.absolute(stretch(on, share)) * self._size(w.direction, n)
 
@@ -152,13 +186,23 @@ class _Correction:
 
             on.loop(n, changed)
             self._weigh(w.descent, change)
-            attached = self.motion.tables.own[0].attached > 0  # what is attached pushes at rest, too
-            alone = on.either(attached, on.same(account.alone, 1))
-            small = on.negate(on.either(twice.value >= change.value, alone))
+            still = on.both(self._alone, on.negate(self.floating))
+            small = on.negate(on.either(twice.value >= change.value, still))
             on.when(small, lambda: self._everything(twice.value), lambda: self._rates(twice.value, size))
 
         within = on.both(size <= 1.0, share >= -FARTHEST)
         on.when(within, lambda: self._rates(twice.value, size), far)
+
+    @property
+    def _alone(self) -> Truth:
+        """Whether no potential moves positions: what is attached pushes at rest, too."""
+        on = self.on
+        return on.either(self.motion.tables.own[0].attached > 0, on.same(self.account.alone, 1))
+
+    def _weigh_inner(self, out: Variable[Real]) -> None:
+        """Twice the kinetic energy of the direction; none where that is what rounding leaves of rigid motions."""
+        self._weigh(self.motion.work.direction, out)
+        out.value = self.on.select(out.value > RIGID * self.energies[0], out.value, 0.0)
 
     def _share(self, twice: Real) -> Real:
         """What is missing relative to half of what stretches: beyond all numbers where that is nothing."""
@@ -183,7 +227,7 @@ class _Correction:
         out.value = 2.0 * found[0]
 
     def _free(self) -> None:
-        """Write the free part of the rates: the rates, less the least ones that do as is prescribed."""
+        """Write the free part of the rates: less the least ones that do as is prescribed, and less rigid motions."""
         on, w = self.on, self.motion.work
 
         def released() -> None:
@@ -192,7 +236,12 @@ class _Correction:
             self.status.value = calm.fold(on, self.q, w.spin, w.momenta)
             calm.unfold(on, self.q, w.direction)
 
+        def loose() -> None:
+            for _ in range(2):  # once more, for what rounding left of momenta
+                turn(on, self.motion, self.q, w.direction, w.released)
+
         on.when(self.motion.tables.own[0].driven > 0, released, lambda: copy(on, self.r, w.direction))
+        on.when(self.floating, loose)
 
     def _rates(self, twice: Real, size: Real) -> None:
         """Move the rates, no further than chosen steps may."""
@@ -216,13 +265,22 @@ class _Correction:
         self._descend()
         slope, first = on.variable(0.0), on.variable(self.short)
         self._weigh(w.descent, slope)
-        whole = twice + self.h * self.h * slope.value
+        whole = on.variable(twice + self.h * self.h * slope.value)
         rounds, gone = on.counter(0), on.variable(0.0)
 
         def once() -> Truth:
-            part = self.short / whole
+            short, part = self.short, self.short / whole.value
             gone.value = gone.value + part
             self._shift(part)
+            # turning about rates that are not small bends the energy: by how much it grew says the slope
+            grown = short - self.short
+            likely = on.both(grown > 0.25 * short, grown < 4.0 * short)
+            likely = on.either(likely, on.both(grown < 0.25 * short, grown > 4.0 * short))
+
+            def learn() -> None:
+                whole.value = whole.value * (grown / short)
+
+            on.when(on.both(self.floating, likely), learn)
             rounds.value = rounds.value + 1
             unsound = on.negate(on.same(self.status.value, 0))
             return on.either(on.either(unsound, self.close), rounds.value >= ROUNDS)
@@ -235,17 +293,34 @@ class _Correction:
             self.account.size = on.sqrt(0.5 * (here * here + there * there))
             self.account.moved = first.value - self.short
 
-        within = on.both(whole > 0.0, on.absolute(self.short) <= FARTHEST * whole)
+        within = on.both(whole.value > 0.0, on.absolute(self.short) <= FARTHEST * whole.value)
         on.when(on.both(within, on.same(self.status.value, 0)), go)
 
     def _descend(self) -> None:
-        """Write the accelerations from rest by weight and springs."""
-        on, tables, w = self.on, self.motion.tables, self.motion.work
-        alone = replace(tables, drive=w.still, body=Table(Body, tables.body.integers, tables.body.reals, 0))
-        ns, idle = tables.node.size, w.idle
-        s_rate, made = idle.part(0, ns), idle.part(ns + 2, idle.size - (ns + 2))
-        calm = replace(self.motion, tables=alone)
-        self.status.value = calm.accelerate(on, self.q, w.zero, w.descent, s_rate, made, idle.part(ns, 2))
+        """Write the accelerations from rest by weight and springs, and those of islands that turn by themselves."""
+        on, motion, w = self.on, self.motion, self.motion.work
+
+        def fall() -> None:
+            alone = replace(
+                motion.tables, drive=w.still, body=Table(Body, motion.tables.body.integers, motion.tables.body.reals, 0)
+            )
+            ns, idle = motion.tables.node.size, w.idle
+            s_rate, made = idle.part(0, ns), idle.part(ns + 2, idle.size - (ns + 2))
+            calm = replace(motion, tables=alone)
+            self.status.value = calm.accelerate(on, self.q, w.zero, w.descent, s_rate, made, idle.part(ns, 2))
+
+        def spin() -> None:
+            turn(on, motion, self.q, self.r, w.kept)
+            clear(on, w.alter)
+            turn(on, motion, self.q, w.alter, w.torque)
+
+            def one(j: Integer) -> None:
+                w.descent[j] = w.descent[j] + w.alter[j]
+
+            on.loop(self.r.size, one)
+
+        on.when(self._alone, lambda: clear(on, w.descent), fall)
+        on.when(self.floating, spin)
 
     def _shift(self, part: Real) -> None:
         """Move rates and positions by a part of their directions, and look at the energy there."""
@@ -259,4 +334,5 @@ class _Correction:
         motion.displace(on, w.alter, self.q)
         if motion.closes:
             self.status.value = motion.shut(on, self.q, self.r)
+        on.when(self.floating, lambda: turn(on, motion, self.q, self.r, w.kept))
         on.when(on.same(self.status.value, 0), self.look)

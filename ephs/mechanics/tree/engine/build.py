@@ -8,6 +8,7 @@ import numpy as np
 
 from ephs.mechanics.tree.engine.attachment import attachment_of
 from ephs.mechanics.tree.engine.closing import Closing, closing
+from ephs.mechanics.tree.engine.islands import islands_of
 from ephs.mechanics.tree.engine.links import Frames, links_of
 from ephs.mechanics.tree.engine.programs import Engine
 from ephs.mechanics.tree.engine.tables import Forces, table_of
@@ -18,6 +19,7 @@ from ephs.mechanics.tree.sweeps.charts import TIE, Chart
 from ephs.mechanics.tree.sweeps.cuts import Cut, Relative
 from ephs.mechanics.tree.sweeps.loops import kinds_of, loop_program
 from ephs.mechanics.tree.sweeps.programs import PLACE, Sweeps, sweeps
+from ephs.mechanics.tree.sweeps.rigid import SUMS
 from ephs.semantics.bundle import Array
 from ephs.semantics.kept import once
 from ephs.semantics.spaces import SE3
@@ -42,6 +44,7 @@ def engine_of(
     kept: Sequence[Array] | None = None,
     *,
     apart: bool = False,
+    momenta: bool = False,
 ) -> Engine:
     """The engine of a reduced scene.
 
@@ -60,10 +63,12 @@ def engine_of(
         all.
     apart
         Whether each body is a link of its own, in space: `links_of`.
+    momenta
+        Whether steps keep the momenta of islands.
     """
     rows = None if kept is None else tuple(tuple(each.tolist()) for each in kept)
-    key = "engine", gravity.tobytes(), acted, rows, apart
-    plan = once(reduced, key, lambda: _plan(reduced, gravity, drive.size, acted, kept, apart=apart))
+    key = "engine", gravity.tobytes(), acted, rows, apart, momenta
+    plan = once(reduced, key, lambda: _plan(reduced, gravity, drive.size, acted, kept, apart=apart, momenta=momenta))
     tables = {**plan.tables, "drive": drive, "wrench": wrench, "scal": scal, "supply": supply}
     work: dict[str, Any] = {name: np.zeros(shape) for name, shape in plan.shapes.items()}
     work["fault"] = np.zeros(1, dtype=np.int64)
@@ -97,6 +102,7 @@ def _plan(
     kept: Sequence[Array] | None,
     *,
     apart: bool,
+    momenta: bool,
 ) -> _Plan:
     """The plan of an engine, ``rates`` the number of all joints' rates."""
     found = links_of(reduced, apart=apart)
@@ -109,6 +115,7 @@ def _plan(
     forced = bool(forces.edge.size or forces.conduction.size or np.any(forces.body != -1) or attached)
     driven = any(part.joint.driven for part in found.parts)
     between = bool(np.any((forces.edge[:, 0] == ON_BODIES) & (forces.part[:, 0] >= 0)))
+    island, bases = islands_of(reduced, found, acted)
     records = found.packed(gravity)
     program = sweeps(records.kind, general=bool(forced or driven or len(cut) or apart))
     eliminated = closing([part.parent for part in found.parts], ends)
@@ -117,7 +124,14 @@ def _plan(
     if attached:
         reached["attach"] = network_program(), "solve"
     tables: dict[str, Any] = {
-        "own": _own(len(found.parts), reached, forced=forced, driven=driven, attached=attached, between=between),
+        "own": _own(
+            (len(found.parts), len(bases) if momenta else 0),
+            reached,
+            forced=forced,
+            driven=driven,
+            attached=attached,
+            between=between,
+        ),
         "integers": records.integers,
         "reals": records.reals,
         "gravity": records.gravity,
@@ -126,26 +140,28 @@ def _plan(
         "cut_numbers": np.hstack([cut_frame, cut_basis]).ravel(),
         **{name: getattr(eliminated, name).ravel() for name in ("at", "slot", "row", "flat", "end")},
         **forces.tables(),
+        "island": island,
+        "bases": bases.ravel(),
         "net": net.integers,
         "numbers": net.reals,
     }
     freedoms, entropies = sum(part.joint.dim for part in found.parts), len(reduced.entropies)
     sizes = reduced.coordinates, rates + freedoms + entropies + 2 + len(reduced.made)
     booked = entropies, entropies + 2 + len(reduced.made)
-    shapes = _shapes(program, len(found.parts), freedoms, rates, len(cut), booked, eliminated)
+    shapes = _shapes(program, (len(found.parts), len(bases)), freedoms, rates, len(cut), booked, eliminated)
     return _Plan(tables, shapes, eliminated, sizes, reached, len(cut) > 0)
 
 
 def _reached(sweeps: Program, loops: Program) -> dict[str, tuple[Program, str]]:
     """Function of `Own` -> the program and the entry that it is; sweeps of a free tree have one of their own."""
-    own = ("accelerations", "move", "fold", "unfold", "resolve", "spread", "power", "dependent", "energy")
+    own = ("accelerations", "move", "fold", "unfold", "resolve", "spread", "power", "dependent", "energy", "rigid")
     cut = ("rows", "poses", "fit", "gaps", "relative_rates", "across", "advance", "velocities")
     found = {name: (sweeps, name) for name in own if name in sweeps.entries}
     return found | {name: (loops, name) for name in cut} | {"displace": (loops, "move")}
 
 
 def _own(
-    links: int,
+    groups: tuple[int, int],
     reached: Mapping[str, tuple[Program, str]],
     *,
     forced: bool,
@@ -155,7 +171,8 @@ def _own(
 ) -> Table[Own]:
     made = Own.table(1)
     own = made[0]
-    own.links, own.forced, own.driven, own.falls = links, int(forced), int(driven), int("accelerations" in reached)
+    own.links, own.islands = groups
+    own.forced, own.driven, own.falls = int(forced), int(driven), int("accelerations" in reached)
     own.attached, own.between = int(attached), int(between)
     for name, (program, entry) in reached.items():
         setattr(own, name, program.compiled()[entry].address)
@@ -163,10 +180,11 @@ def _own(
 
 
 def _shapes(
-    program: Sweeps, links: int, freedoms: int, joints: int, cuts: int, booked: tuple[int, int], closing: Closing
-) -> dict[str, tuple[int, ...]]:
-    """Shapes of the memory of one thread; ``booked`` are the numbers of entropies, and of these and the books."""
-    entropies, books = booked
+    program: Sweeps, groups: tuple[int, int], freedoms: int, joints: int, cuts: int, booked: tuple[int, int],
+    closing: Closing,
+) -> dict[str, tuple[int, ...]]:  # fmt: skip
+    """Shapes of the memory of one thread, by numbers of links and islands, of entropies, and of these and the books."""
+    (links, islands), (entropies, books) = groups, booked
     rows, slots = len(closing.row), len(closing.slot)
     return {
         "work": ((links + 1) * program.width,), "place": (links + 1, PLACE), "change": (links + 1, 6),
@@ -177,7 +195,8 @@ def _shapes(
         "x": (16,), "v": (64,), "e": (16,), "lam": (64,), "f": (256,), "c": (16,), "jac": (512,), "scratch": (2048,),
         "alter": (freedoms,), "moved": (joints,), "answer": (1,),
         "momenta": (links, 6), "spin": (freedoms,), "direction": (freedoms,), "descent": (freedoms,),
-        "still": (joints,), "idle": (books,), "spare": (books,),
+        "kept": (6 * islands,), "released": (6 * islands,), "found": (6 * islands,), "torque": (6 * islands,),
+        "sums": (islands, SUMS), "still": (joints,), "idle": (books,), "spare": (books,),
     }  # fmt: skip
 
 

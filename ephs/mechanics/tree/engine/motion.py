@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import final
 
-from ephs.mechanics.tree.engine.balance import correct, held
+from ephs.mechanics.tree.engine.balance import correct, held, measure
 from ephs.mechanics.tree.engine.forces import act
 from ephs.mechanics.tree.engine.heats import count, entropies, heat_rates, hold, lawless
 from ephs.mechanics.tree.sweeps.acting import Tables, Work
@@ -255,6 +255,8 @@ class Mechanism(Motion):
         energies, at, ns = on.scratch(3), self.summed, self.tables.node.size
         status = held(on, self, q, y.part(self.increments, self.freedoms), y.part(at, ns), energies)
         account.anchor = energies[0] + energies[1] + (y[at + ns] - y[at + (ns + 1)])
+        moving = y.part(self.increments, self.freedoms)
+        on.when(self.tables.own[0].islands > 0, lambda: measure(on, self, q, moving))
         return status
 
     def sizes(self, on: Evaluator, y0: Vector, y1: Vector, out: Vector) -> None:

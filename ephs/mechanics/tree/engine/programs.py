@@ -6,7 +6,7 @@ from typing import Any, cast, final
 
 import numpy as np
 
-from ephs.mechanics.tree.engine.balance import held
+from ephs.mechanics.tree.engine.balance import held, measure
 from ephs.mechanics.tree.engine.closing import Closing
 from ephs.mechanics.tree.engine.motion import Mechanism, close
 from ephs.mechanics.tree.sweeps.acting import TABLES, WORK, Tables, Work
@@ -96,6 +96,9 @@ def motion_program(*, looped: bool) -> Program:
         account[0].size = worth(on, account[0])
         return status
 
+    def measured(on: Evaluator, tables: Tables, work: Work, q: Vector, r: Vector) -> None:
+        measure(on, moving(tables, work), q, r)
+
     def energy(on: Evaluator, tables: Tables, work: Work, q: Vector, r: Vector, heats: Vector, out: Vector) -> Integer:
         return held(on, moving(tables, work), q, r, heats, out)
 
@@ -135,6 +138,7 @@ def motion_program(*, looped: bool) -> Program:
         "corrected": Entry(
             corrected, **of, account=table(Account), start=vector(), y=vector(), q=vector(), allowed=vector(), h=real()
         ),
+        "measured": Entry(measured, **of, q=vector(), r=vector()),
         "energy": Entry(energy, **of, q=vector(), r=vector(), heats=vector(), out=vector(3)),
         "evaluations": Entry(
             evaluations, **of, q=matrix(), r=matrix(), out=vector(), rates=matrix(), repeats=integer()
@@ -197,6 +201,7 @@ class Engine:
         self._heats = np.zeros(work["entropy"].size)
         self._energy = self.bind("energy", self._q, self._r, self._heats, self._held)
         self.books = {name: np.zeros(summed) for name in BOOKS} | {"start": self._start, "end": self._y}
+        self._measure = self.bind("measured", self._q, self._r)
         self._account, self._allowed = Account.table(1), np.zeros(2 * self._r.size)
         self._correct = self.bind("corrected", self._account, self._start, self._y, self._q, self._allowed, 0.0)
         self._counted = 2 * self._r.size + work["entropy"].size
@@ -309,14 +314,15 @@ class Engine:
         Returns
         -------
         tuple[int, Array, Array, Array, float]
-            A status, elements, y, the account (anchor, left, put, total) after it, and the step's error by that.
+            A status, elements, y, the account (anchor, left, put, total, momenta) after it, and the step's error by
+            that.
         """
         self._start[:], self._y[:], self._q[:], self._allowed[:] = y0, y, q, allowed[: self._allowed.size]
         a: Any = self._account[0]
-        a.anchor, a.left, a.put, a.total = account.tolist()
+        (a.anchor, a.left, a.put, a.total), self.work["kept"][: self.momenta] = account[:4].tolist(), account[4:]
         a.chosen, a.alone = int(chosen), int(alone)
         status = int(self._correct(h))
-        after = np.array([a.anchor, a.rest, a.put + a.moved, a.total + abs(a.moved)])
+        after = np.concatenate([[a.anchor, a.rest, a.put + a.moved, a.total + abs(a.moved)], account[4:]])
         return status, self._q.copy(), self._y.copy(), after, float(a.size)
 
     def energy(self, q: Array, r: Array, heats: Array) -> Array:
@@ -324,6 +330,20 @@ class Engine:
         self._q[:], self._r[:], self._heats[:] = q, r, heats
         self._energy()
         return self._held.copy()
+
+    @property
+    def momenta(self) -> int:
+        """How many momenta steps keep: six of each island, zeros among them."""
+        own: Any = self.tables["own"][0]
+        return 6 * int(own.islands)
+
+    def measure(self, q: Array, r: Array) -> Array:
+        """Return the momenta of islands that steps keep."""
+        if not self.momenta:
+            return np.zeros(0)
+        self._q[:], self._r[:] = q, r
+        self._measure()
+        return self.work["kept"].copy()
 
     def close(self, q: Array, r: Array) -> tuple[int, float, Array, Array]:
         """Return a status, how far constraints are open, elements with loops closed, and rates on them."""

@@ -11,16 +11,19 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 
 from ephs.semantics.bundle import Array
+from ephs.solve.errors import OptionError
 from ephs.solve.march import Status
 from ephs.solve.snapshot import Snapshot
 
 if TYPE_CHECKING:
     from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 
-__all__ = ["OWN", "Accounts"]
+__all__ = ["KEEP", "OWN", "Accounts"]
 
 OWN = 4
-"""Numbers of an account before what rounding left of sums."""
+"""Numbers of an account before the momenta that steps keep."""
+KEEP = ("energy", "energy and momenta")
+"""What every step keeps to rounding."""
 
 
 @final
@@ -41,14 +44,33 @@ class Accounts:
         self._equations, self.kept, self.followed = equations, False, True
         self.largest = self.at = self.total = 0.0
 
+    def keep(self, what: str, also: tuple[str, ...] = ()) -> None:
+        """Keep what is asked for: one of `KEEP`, or of what the method keeps by itself.
+
+        Raises
+        ------
+        OptionError
+            It is none of these.
+        """
+        if what not in (*also, *KEEP):
+            raise OptionError("options['keep']", what, " or ".join(map(repr, (*also, *KEEP))))
+        if what == KEEP[1]:
+            self._equations.keep_momenta()
+
+    @property
+    def own(self) -> int:
+        """Numbers of an account before what rounding left of sums."""
+        return OWN + self._equations.engine.momenta
+
     def opened(self, state: "ReducedState") -> "ReducedState":
         """The state with an account, which begins here unless it has one."""
         if state.account.size:
             return state
         eq = self._equations
         held = np.nan if eq.led.counting else float(eq.engine.energy(state.q, state.r, state.heats)[:2].sum())
-        account = np.zeros(OWN + eq.ns + state.books.size)
+        account = np.zeros(self.own + eq.ns + state.books.size)
         account[0] = held + state.books[0] - state.books[1]
+        account[OWN : self.own] = eq.engine.measure(state.q, state.r)
         return replace(state, account=account)
 
     def booked(
@@ -67,10 +89,10 @@ class Accounts:
             A component lost entropy in the step.
         """
         eq, start = self._equations, self.opened(start)
-        carry, anchor = start.account[OWN:], float(start.account[0])
+        carry, anchor = start.account[self.own :], float(start.account[0])
         status, y, carry = eq.engine.sum(tableau, k, h, eq.vector(start), y1, carry, anchor=anchor, part=part)
         eq.refuse(status, eq.engine.failed)
-        return y, np.concatenate([start.account[:OWN], carry])
+        return y, np.concatenate([start.account[: self.own], carry])
 
     def corrected(
         self, start: "ReducedState", end: "ReducedState", h: float, allowed: Array, *, chosen: bool,
@@ -96,17 +118,18 @@ class Accounts:
             A component cannot be evaluated there.
         """
         eq, start, self.kept = self._equations, self.opened(start), True
-        carry = (end if end.account.size else start).account[OWN:]
+        carry = (end if end.account.size else start).account[self.own :]
         if eq.careful and eq.driven.size:
-            return replace(end, account=np.concatenate([start.account[:OWN], carry])), 0.0
-        given, every = (start.account[:OWN], eq.vector(start), eq.vector(end), end.q), np.full(allowed.size, np.inf)
+            return replace(end, account=np.concatenate([start.account[: self.own], carry])), 0.0
+        own, every = start.account[: self.own], np.full(allowed.size, np.inf)
+        given = own, eq.vector(start), eq.vector(end), end.q
         found = eq.engine.correct(*given, every if eq.careful else allowed, h, chosen=chosen, alone=alone)
         if found[0] == Status.DEPENDENT:  # rates alone
             found = eq.engine.correct(*given, every, h, chosen=chosen, alone=alone)
         status, q, y, account, error = found
         eq.refuse(status, eq.engine.failed)
         end = replace(end, account=np.concatenate([account, carry]))
-        if account[2] == start.account[2]:
+        if account[2] == start.account[2] and self.own == OWN:
             return end, error
         return replace(end, q=q, r=y[eq.nv : eq.nv + eq.n]), error
 
@@ -130,4 +153,6 @@ class Accounts:
         """Statistics of corrected steps: by how much the balance would be missed without corrections."""
         if not (self.kept and self.followed) or self._equations.led.counting:
             return {}
-        return {"plain_defect": {"sum": self.total, "largest": self.largest, "at": self.at}}
+        momenta = int(np.any(self._equations.engine.tables["bases"].reshape(-1, 6, 6), axis=1).sum())
+        kept = {"momenta": momenta} if self.own > OWN else {}
+        return {"plain_defect": {"sum": self.total, "largest": self.largest, "at": self.at}} | kept

@@ -9,7 +9,6 @@ import numpy as np
 from ephs.mechanics.tree.engine.heats import ROUNDING
 from ephs.mechanics.tree.engine.states import STATES, Stored
 from ephs.mechanics.tree.engine.tables import table_of
-from ephs.mechanics.tree.equations.accounts import OWN
 from ephs.mechanics.tree.equations.paper import PaperStates
 from ephs.semantics.bundle import Array
 from ephs.semantics.linear.sums import grown
@@ -72,8 +71,8 @@ class Booking:
         heat = float(flows[heats.frictions].sum() + flows @ heats.carried)
         change = np.where(heats.plain, end.heats - start.heats, change)
         sums, at = np.concatenate([start.heats, start.books]), start.heats.size
-        sums, carry = grown(sums, start.account[OWN:], np.concatenate([change, [heat, work], made]))
-        account = np.concatenate([start.account[:OWN], carry])
+        sums, carry = grown(sums, start.account[eq.accounts.own :], np.concatenate([change, [heat, work], made]))
+        account = np.concatenate([start.account[: eq.accounts.own], carry])
         return replace(end, heats=sums[:at], books=sums[at:], account=account)
 
     def _lost(self, start: "ReducedState", end: "ReducedState", flows: Array, work: float) -> float | None:

@@ -92,6 +92,7 @@ class Equations:
         self.accounts = Accounts(self)
         self.gravity = reduced.gravity
         self.driven = np.flatnonzero(t.driven)
+        self._momenta = False
         self._acted = self.given.acted(set(self._moving) if pushed else set())
         self._build(None)
 
@@ -99,8 +100,13 @@ class Equations:
         """The engine, with all rows of the cut joints or those that are kept."""
         self.engine = engine_of(
             self.reduced, self.gravity, self.drive, self.wrench, self.scal, self.given.supply, self._acted, kept,
-            apart=self._apart,
+            apart=self._apart, momenta=self._momenta,
         )  # fmt: skip
+
+    def keep_momenta(self) -> None:
+        """Make steps keep momenta where nothing holds the mechanism."""
+        self._momenta = True
+        self._build(None)
 
     # ---- the equations -----------------------------------------------------------------------------------------
 

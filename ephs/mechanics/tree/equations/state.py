@@ -24,9 +24,9 @@ class ReducedState:
     memory
         What a method takes along from step to step; none after a start.
     account
-        (4 + heats + books,) energy in J where nothing is booked, what is missing of it, what corrections put in, and
-        the sum of their sizes, see `ephs.solve.march.account.Account`; then what rounding left of sums. Empty where a
-        run starts.
+        (4 + momenta + heats + books,) energy in J where nothing is booked, what is missing of it, what corrections put
+        in, and the sum of their sizes, see `ephs.solve.march.account.Account`; momenta that steps keep; then what
+        rounding left of sums. Empty where a run starts.
     """
 
     t: float

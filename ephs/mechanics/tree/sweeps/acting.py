@@ -8,6 +8,7 @@ from ephs.mechanics.tree.sweeps.balances import ATTACH
 from ephs.mechanics.tree.sweeps.charts import Chart
 from ephs.mechanics.tree.sweeps.cuts import Relative
 from ephs.mechanics.tree.sweeps.programs import PLACE
+from ephs.mechanics.tree.sweeps.rigid import SUMS
 from ephs.semantics.kernel_table import SIGNATURE
 from ephs.semantics.stage import (
     Integer,
@@ -72,6 +73,8 @@ class Own(Record):
         1 where there is a network, which `attach` evaluates.
     between
         1 where springs act between bodies.
+    islands
+        How many groups of links keep momenta in every step; 0 where that is not asked for.
     falls
         1 where `accelerations` is all there is to do; else it has no address, or else the other sweeps have none.
     """
@@ -81,6 +84,7 @@ class Own(Record):
     driven = integer()
     attached = integer()
     between = integer()
+    islands = integer()
     falls = integer()
     accelerations = _sweep("accelerations")
     move = _sweep("move")
@@ -91,6 +95,7 @@ class Own(Record):
     power = _sweep("power")
     dependent = _sweep("dependent")
     energy = _sweep("energy")
+    rigid = _sweep("rigid")
     rows = _loop("rows")
     poses = _loop("poses")
     fit = _loop("fit")
@@ -223,6 +228,8 @@ class Tables:
         Joints, and those at which loops are cut, see `ephs.mechanics.tree.sweeps.cuts`.
     at, slot, row, flat, end
         The elimination of loops, see `ephs.mechanics.tree.engine.closing.Closing`.
+    island, bases
+        Group of each link that may move as a whole, and how: see `ephs.mechanics.tree.sweeps.rigid`.
     port, net, numbers
         What is attached, and where: see `ephs.mechanics.tree.sweeps.network.Net`.
     drive, wrench, scal, supply
@@ -249,6 +256,8 @@ class Tables:
     sink: Table[Sink]
     component: Table[Component]
     parameters: Vector
+    island: Integers
+    bases: Vector
     port: Table[Port]
     net: Integers
     numbers: Vector
@@ -273,8 +282,8 @@ TABLES: Final[dict[str, Any]] = {
     "cut": indices(), "cut_numbers": vector(), "at": indices(), "slot": indices(), "row": indices(), "flat": indices(),
     "end": indices(), "acting": table(Acting), "body": table(Body), "node": table(Node),
     "conduction": table(Conduction), "sink": table(Sink), "component": table(Component), "parameters": vector(),
-    "port": table(Port), "net": indices(), "numbers": vector(), "drive": vector(), "wrench": matrix(6),
-    "scal": vector(3), "supply": vector(),
+    "island": indices(), "bases": vector(), "port": table(Port), "net": indices(), "numbers": vector(),
+    "drive": vector(), "wrench": matrix(6), "scal": vector(3), "supply": vector(),
 }  # fmt: skip
 
 
@@ -305,6 +314,8 @@ class Work:
         Of links (links, 6), in their frames; of rates that have inertia of their own.
     direction, descent
         Free part of the rates; accelerations at rest by weight and springs.
+    kept, released, found, torque, sums
+        Of islands: momenta that steps keep, zeros, what `ephs.mechanics.tree.sweeps.rigid` writes, and its memory.
     still, idle, spare
         Zeros for given forces on all joints; memory for (heats, heat, work, flows).
     books
@@ -343,6 +354,11 @@ class Work:
     spin: Vector
     direction: Vector
     descent: Vector
+    kept: Vector
+    released: Vector
+    found: Vector
+    torque: Vector
+    sums: Matrix
     still: Vector
     idle: Vector
     spare: Vector
@@ -356,6 +372,7 @@ WORK: Final[dict[str, Any]] = {
     "value": matrix(4), "entry": vector(), "covector": matrix(6), "along": matrix(12), "largest": vector(),
     "temperature": vector(), "entropy": vector(), "x": vector(), "v": vector(), "e": vector(), "lam": vector(),
     "f": vector(), "c": vector(), "jac": vector(), "scratch": vector(), "alter": vector(), "moved": vector(),
-    "momenta": matrix(6), "spin": vector(), "direction": vector(), "descent": vector(), "still": vector(),
+    "momenta": matrix(6), "spin": vector(), "direction": vector(), "descent": vector(), "kept": vector(),
+    "released": vector(), "found": vector(), "torque": vector(), "sums": matrix(SUMS), "still": vector(),
     "idle": vector(), "spare": vector(), "answer": vector(1), "fault": indices(1),
 }  # fmt: skip

@@ -15,6 +15,7 @@ from ephs.mechanics.tree.sweeps.needs import NO_INTEGERS, Compact, LaidOut, Layo
 from ephs.mechanics.tree.sweeps.outward import outward
 from ephs.mechanics.tree.sweeps.pack import SLIDE, TURN, Class
 from ephs.mechanics.tree.sweeps.records import Link, State, States, Tree
+from ephs.mechanics.tree.sweeps.rigid import SUMS, rigid
 from ephs.mechanics.tree.sweeps.spreading import driven_power, spread
 from ephs.semantics.spaces.rank import SPARSE
 from ephs.semantics.stage import (
@@ -38,9 +39,9 @@ __all__ = [
 
 PLACE: Final = 24
 """Numbers of a link that rows and forces read: R and p in the world, twist, bias."""
-FREE: Final = ("accelerations", "evaluations", "energy")
+FREE: Final = ("accelerations", "evaluations", "energy", "rigid")
 """Entry functions for trees on which nothing but gravity and forces on the rates act."""
-GENERAL: Final = ("move", "fold", "unfold", "resolve", "spread", "power", "dependent", "energy")
+GENERAL: Final = ("move", "fold", "unfold", "resolve", "spread", "power", "dependent", "energy", "rigid")
 """Entry functions for mechanisms with loops, wrenches on links or prescribed motions."""
 ENTRIES: Final = (*FREE, *GENERAL)
 
@@ -90,6 +91,17 @@ ARGUMENTS: Final[dict[str, dict[str, Any]]] = {
     "power": {**MECHANISM, **ROWS, "q": vector(), "r": vector(), "force": vector(), "out": vector()},
     "dependent": {**ROWS, "largest": vector()},
     "energy": {**MECHANISM, "q": vector(), "r": vector(), "momenta": matrix(6), "spin": vector(), "out": vector(3)},
+    "rigid": {
+        **MECHANISM,
+        "q": vector(),
+        "r": vector(),
+        "island": indices(),
+        "bases": vector(),
+        "target": vector(),
+        "sums": matrix(SUMS),
+        "found": vector(),
+        "torque": vector(),
+    },
 }
 """What the entry functions take; `accelerations`, `fold` and `dependent` return an integer."""
 
@@ -185,17 +197,27 @@ class Sweeps:
         return {
             "accelerations": Entry(accelerate, **ARGUMENTS["accelerations"]),
             "evaluations": Entry(evaluations, **MECHANISM, q=matrix(), r=matrix(), rates=matrix(), repeats=integer()),
-            "energy": self._energy(),
+            **self._kept(),
         }
 
-    def _energy(self) -> Entry:
+    def _kept(self) -> dict[str, Entry]:
+        """What corrections of a step read and move."""
+        along = [k for k in range(6) if k not in self._zeros]
+
         def held(
             on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector, q: Vector,
             r: Vector, momenta: Matrix, spin: Vector, out: Vector,
         ) -> None:  # fmt: skip
             energy(on, self.tree(size, integers, reals, memory, gravity), q, r, momenta, spin, out)
 
-        return Entry(held, **ARGUMENTS["energy"])
+        def moved(
+            on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector, q: Vector,
+            r: Vector, island: Integers, bases: Vector, target: Vector, sums: Matrix, found: Vector, torque: Vector,
+        ) -> None:  # fmt: skip
+            tree = self.tree(size, integers, reals, memory, gravity)
+            rigid(on, tree, q, r, island, bases, target, sums, found, torque, along)
+
+        return {"energy": Entry(held, **ARGUMENTS["energy"]), "rigid": Entry(moved, **ARGUMENTS["rigid"])}
 
     # ---- mechanisms with loops, wrenches on links, prescribed motions --------------------------------------------
 
@@ -307,7 +329,7 @@ class Sweeps:
             "dependent": dependent,
         }  # fmt: skip
         entries = {name: Entry(function, **ARGUMENTS[name]) for name, function in functions.items()}
-        return entries | {"energy": self._energy()}
+        return entries | self._kept()
 
 
 def _show_changes(on: Evaluator, tree: Tree, change: Matrix) -> None:

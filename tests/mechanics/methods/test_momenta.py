@@ -1,0 +1,150 @@
+"""Linear and angular momentum in every step: of mechanisms that nothing holds, with the balance of energy."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import ephs
+from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.tree.equations.equations import Equations
+from tests.mechanics.momenta import floating, momenta
+
+SCENES = Path(__file__).parents[3] / "scenes"
+METHODS = {
+    **{name: {"rtol": 1e-4, "atol": 1e-4} for name in ("rk54", "rk87", "radau", "auto")},
+    **{name: {"step": 0.04} for name in ("gauss4", "alpha", "variational")},
+}
+BOTH = {"keep": "energy and momenta"}
+ROUNDING = 4e-14
+"""Of sums of some twenty terms, relative to these: 8 n ε."""
+LIMITS = settings(max_examples=4)
+
+
+def run(scene, method, options, until=0.4):
+    return ephs.simulate(scene, until, method=method, options=options, audit="off", **METHODS[method])
+
+
+def drift(scene, sol, columns=slice(None)):
+    """The largest change of momenta, relative to the largest of the bodies' momenta."""
+    found, size = momenta(scene, sol), 1e-3
+    for name, body in scene.all_bodies():
+        motion = sol.body(name)
+        far = 1.0 + np.linalg.norm(motion.position, axis=1).max()
+        size += body.mass * far * (np.abs(motion.velocity).max() + np.abs(motion.angular_velocity).max())
+    return float(np.abs(found - found[0])[:, columns].max() / size)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@LIMITS
+@given(data=st.data())
+def test_steps_keep_momenta_and_the_balance_where_nothing_holds_a_mechanism(method, data):
+    """Trees and closed loops with springs and friction, in free flight.
+
+    Loops start at rest relative to their base: long steps that move rates alone leave energy to those that follow.
+    """
+    scene = data.draw(floating(kinds=("revolute", "spherical")))
+    sol = run(scene, method, BOTH)
+    first = len(sol) // 2 if method in ("alpha", "variational") else 0
+    assert drift(scene, sol) <= ROUNDING and sol.energy_error[first:].max() <= ROUNDING
+    assert sol.stats["momenta"] == 6
+
+
+@given(scene=floating(springs=False, friction=False, kinds=("revolute", "spherical")))
+@LIMITS
+def test_under_gravity_what_lies_across_is_kept(scene):
+    scene = replace(scene, world=replace(scene.world, gravity=np.array([0.0, 0.0, -9.81])))
+    sol = run(scene, "rk54", BOTH)
+    assert sol.stats["momenta"] == 3
+    assert drift(scene, sol, [0, 1, 5]) <= ROUNDING and sol.energy_error.max() <= ROUNDING
+    assert drift(scene, sol, [2]) > 1e3 * ROUNDING
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_without_the_option_momenta_drift(method):
+    """The control; steps of the variational method keep them by themselves, not with its energies corrected."""
+    scene = ephs.load(SCENES / "mbs.toml")
+    assert drift(scene, run(scene, method, {"keep": "energy"})) > 1e2 * ROUNDING
+    assert drift(scene, run(scene, method, BOTH)) <= ROUNDING
+
+
+@pytest.mark.parametrize("method", ["rk87", "gauss4", "radau"])
+def test_instants_within_steps_keep_them_too(method):
+    scene = ephs.load(SCENES / "mbs.toml")
+    times = np.linspace(0.0, 0.4, 32)
+    sol = ephs.simulate(scene, 0.4, method=method, options=BOTH, audit="off", save_at=times, **METHODS[method])
+    assert sol.stats["steps"] < len(times) and drift(scene, sol) <= ROUNDING
+
+
+def test_variational_steps_keep_momenta_by_themselves():
+    scene = ephs.load(SCENES / "mbs.toml")
+    sol = run(scene, "variational", {"keep": "momentum"})
+    assert drift(scene, sol) <= ROUNDING and sol.energy_error.max() > 1e2 * ROUNDING
+
+
+@pytest.mark.parametrize(("name", "kept"), [("heavy-top", 1), ("four-bar", 0), ("slider-crank", 0), ("mbs", 6)])
+def test_what_is_held_keeps_fewer(name, kept):
+    """A top keeps what turns it about the vertical; a crank keeps nothing."""
+    eq = Equations(problem_of_scene(ephs.load(SCENES / f"{name}.toml")), 0.0)
+    eq.accounts.keep("energy and momenta")
+    assert int(np.any(eq.engine.tables["bases"].reshape(-1, 6, 6), axis=1).sum()) == kept
+
+
+@pytest.mark.parametrize(("method", "order"), [("rk54", 5), ("gauss4", 4), ("alpha", 2)])
+def test_keeping_momenta_leaves_the_order_as_it_is(method, order):
+    scene, ends = ephs.load(SCENES / "mbs.toml"), []
+    exact = ephs.simulate(scene, 0.8, method="rk87", rtol=1e-13, atol=1e-13)
+    for step in (0.1, 0.05):
+        sol = ephs.simulate(scene, 0.8, method=method, step=step, options=BOTH, audit="off")
+        ends.append(
+            max(np.abs(sol.body(b).position[-1] - exact.body(b).position[-1]).max() for b, _ in scene.all_bodies())
+        )
+    assert np.log2(ends[0] / ends[1]) > order - 0.6
+
+
+def test_an_option_that_there_is_not_is_refused():
+    scene = ephs.load(SCENES / "mbs.toml")
+    for method in ("rk87", "auto", "radau"):
+        with pytest.raises(ephs.OptionError, match="'energy and momenta'"):
+            run(scene, method, {"keep": "momenta"})
+
+
+CART = """format = 1
+[world]
+gravity = [0.0, 0.0, -9.81]
+[bodies.cart]
+mass = 2.0
+inertia = [0.1, 0.1, 0.1]
+position = [0.3, 0.0, 0.0]
+[bodies.bob]
+mass = 1.0
+inertia = [0.01, 0.01, 0.01]
+position = [1.3, 0.0, 0.0]
+velocity = [0.4, 0.0, 0.0]
+[joints.rail]
+type = "prismatic"
+bodies = ["ground", "cart"]
+at = [0.3, 0.0, 0.0]
+axis = [1.0, 0.0, 0.0]
+rate = 0.4
+[joints.pin]
+type = "revolute"
+bodies = ["cart", "bob"]
+at = [0.3, 0.0, 0.0]
+axis = [0.0, 1.0, 0.0]
+"""
+
+
+def test_a_cart_on_a_level_rail_keeps_its_momentum_along_it(tmp_path):
+    """A mechanism in a plane, held but for one direction."""
+    file = tmp_path / "cart.toml"
+    file.write_text(CART, encoding="utf-8")
+    scene = ephs.load(file)
+    for method in ("rk54", "gauss4"):
+        sol = run(scene, method, BOTH)
+        assert sol.stats["momenta"] == 1
+        assert drift(scene, sol, [0]) <= ROUNDING < drift(scene, sol, [2])
+        assert drift(scene, run(scene, method, {"keep": "energy"}), [0]) > ROUNDING
