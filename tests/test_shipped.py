@@ -36,7 +36,7 @@ def calls(name: str, run: str) -> Mapping[str, Callable[..., Any]]:
     program, (target, *_) = PROGRAMS[name], run.split()
     if target not in FITTING:
         return program.plain() if run == "plain" else program.compiled()
-    _, results = _staged(program, 1, ())
+    *_, results = _staged(program, 1, ())
     code = emitted(program.text(), target)
     if target == run:
         library = llvm.load(code)

@@ -99,7 +99,7 @@ class _Writer:
         """Return the name of an entry function in the module, its program written once."""
         if program not in self.programs:
             self.programs[program] = number = len(self.programs)
-            text = program.text()
+            text = program.text(blocks=False)
             for line in _DECLARED.findall(text):
                 self.declared[line.strip()] = None
             text = _DECLARED.sub("", text)

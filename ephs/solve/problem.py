@@ -2,7 +2,8 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Protocol, final
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Final, Protocol, final
 
 import numpy as np
 
@@ -17,9 +18,11 @@ if TYPE_CHECKING:
     from ephs.solve.result.record import Record
     from ephs.solve.result.solution import Solution
 
-__all__ = ["Motion", "Problem", "Signal", "State", "States"]
+__all__ = ["NO_STATE", "Motion", "Problem", "Signal", "State", "States"]
 
 State = Mapping[Path, Array]
+NO_STATE: Final[State] = MappingProxyType({})
+"""What inputs are given that do not read the state."""
 
 
 @final
@@ -56,6 +59,8 @@ class Signal:
         How many numbers a function has to give; not checked where None.
     held
         Whether the value changes where steps end, and nowhere else: of a sampled input.
+    timed
+        Whether a function reads the time alone.
     """
 
     value: Array | Callable[[float, State], Array]
@@ -63,6 +68,7 @@ class Signal:
     name: str = ""
     size: int | None = None
     held: bool = False
+    timed: bool = False
 
     @property
     def constant(self) -> bool:
@@ -247,3 +253,8 @@ class Problem:
     def held(self) -> bool:
         """Whether no input changes within a step."""
         return all(signal.constant or signal.held for signal in self.signals.values())
+
+    @property
+    def timed(self) -> bool:
+        """Whether inputs depend on the time alone."""
+        return all(signal.constant or signal.timed for signal in self.signals.values())

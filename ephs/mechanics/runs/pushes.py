@@ -23,7 +23,7 @@ def part_of(whole: Signal, where: slice) -> Signal:
     """Some of a signal's numbers."""
     if whole.constant:
         return Signal(whole.at(0.0, {})[where])
-    return Signal(lambda t, state: whole.at(t, state)[where], held=whole.held)
+    return Signal(lambda t, state: whole.at(t, state)[where], held=whole.held, timed=whole.timed)
 
 
 def sum_of(one: Signal, other: Signal) -> Signal:
@@ -31,7 +31,8 @@ def sum_of(one: Signal, other: Signal) -> Signal:
     if one.constant and other.constant:
         return Signal(one.at(0.0, {}) + other.at(0.0, {}))
     held = all(signal.constant or signal.held for signal in (one, other))
-    return Signal(lambda t, state: one.at(t, state) + other.at(t, state), held=held)
+    timed = all(signal.constant or signal.timed for signal in (one, other))
+    return Signal(lambda t, state: one.at(t, state) + other.at(t, state), held=held, timed=timed)
 
 
 def scene_signals(scene: Scene, inputs: Mapping[Any, Any], view: View) -> tuple[dict[str, Signal], ...]:
@@ -80,7 +81,7 @@ def _single(inputs: Mapping[Any, Any], sizes: Mapping[str, int], view: View) -> 
         if len(keys) == 1:
             yield keys[0], whole
             continue
-        shared = whole if whole.constant else Signal(_Latest(whole).at, held=whole.held)
+        shared = whole if whole.constant else Signal(_Latest(whole).at, held=whole.held, timed=whole.timed)
         for one, first, last in zip(keys, ends[:-1], ends[1:], strict=True):
             yield one, part_of(shared, slice(int(first), int(last)))
 
@@ -123,4 +124,4 @@ def _of_load(load: Load) -> Signal:
         turn = quaternion_to_matrix(state[pose][:4]).T
         return share * np.concatenate([turn @ load.moment, turn @ load.force])
 
-    return Signal(full) if load.follower and not load.ramp else Signal(wrench)
+    return Signal(full) if load.follower and not load.ramp else Signal(wrench, timed=load.follower)

@@ -38,7 +38,7 @@ def signal(value: Any, *, effort: bool, name: str, size: int | None, view: View 
     function: Any = value
     if takes_state(function):
         return Signal(lambda t, state: function(t, view(state)), effort, name, size)
-    return Signal(lambda t, _state: function(t), effort, name, size, held=isinstance(function, Held))
+    return Signal(lambda t, _state: function(t), effort, name, size, held=isinstance(function, Held), timed=True)
 
 
 def numbers_of(value: Any) -> Array | None:

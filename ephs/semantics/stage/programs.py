@@ -9,7 +9,7 @@ from typing import Any, Final, cast, final
 import numpy as np
 
 from ephs.semantics.stage.arrays import ARRAYS, Batch, BatchCells
-from ephs.semantics.stage.calling import Call, apart
+from ephs.semantics.stage.calling import Call, apart, packed
 from ephs.semantics.stage.emission import IntegerPointer, RealPointer, Symbol, TruthSymbol, WholeSymbol, Writer
 from ephs.semantics.stage.entries import Entry
 from ephs.semantics.stage.errors import StageError
@@ -47,9 +47,10 @@ class Program:
         """Return the program of all entry functions' tangents, see `Entry.tangent`: what tangents reach."""
         return _tangent(self, directions)
 
-    def text(self, members: int = 1, shared: tuple[str, ...] = ()) -> str:
-        """Return the program as assembly text of LLVM."""
-        return _staged(self, members, shared)[0]
+    def text(self, members: int = 1, shared: tuple[str, ...] = (), *, blocks: bool = True) -> str:
+        """Return the program as assembly text of LLVM, with or without the functions on blocks of memory."""
+        text, packed, _ = _staged(self, members, shared)
+        return text + packed if blocks else text
 
     def header(self) -> str:
         """Return declarations in C of the entry functions in object code.
@@ -59,7 +60,7 @@ class Program:
         The object code keeps no state, so calls from several threads are independent, and needs no library but C's
         ``memset``, ``memcpy`` and ``memmove``.
         """
-        _, results = _staged(self, 1, ())
+        *_, results = _staged(self, 1, ())
         lines = [f"{_C[results[name]]} {self.name}_{name}({_c(entry)});" for name, entry in self.entries.items()]
         return _HEADER.format(guard=f"{self.name.upper()}_H", lines="\n".join(lines))
 
@@ -174,10 +175,11 @@ def _tangent(program: Program, directions: int) -> Program:
 
 
 @cache
-def _staged(program: Program, members: int, shared: tuple[str, ...]) -> tuple[str, dict[str, str]]:
-    """Return the text of a program, and the type of each entry's result."""
+def _staged(program: Program, members: int, shared: tuple[str, ...]) -> tuple[str, str, dict[str, str]]:
+    """Return the text of a program, that of its functions on blocks of memory, and the type of each entry's result."""
     on = Machine(members)
     results: dict[str, str] = {}
+    blocks: list[str] = []
     for name, entry in program.entries.items():
         parameters: list[tuple[str, Atom, bool]] = [
             (_parameter(atom, members > 1 and argument not in shared), atom, argument not in shared)
@@ -191,13 +193,14 @@ def _staged(program: Program, members: int, shared: tuple[str, ...]) -> tuple[st
         texts = [f"{kind} %a{k}" for k, (kind, _, _) in enumerate(parameters)]
         with np.errstate(all="ignore"):
             results[name], _ = on.define(f"{program.name}_{name}", texts, body)
-    return on.text, results
+        blocks.append(packed(f"{program.name}_{name}", results[name], [kind for kind, _, _ in parameters]))
+    return on.text, "\n\n".join(blocks) + "\n", results
 
 
 @cache
 def _compiled(program: Program, members: int, shared: tuple[str, ...]) -> Mapping[str, Call]:
-    text, results = _staged(program, members, shared)
-    library = compiled(text, program.name)
+    text, blocks, results = _staged(program, members, shared)
+    library = compiled(text + blocks, program.name)
 
     def trail(name: str) -> tuple[int | None, ...]:
         return () if members == 1 or name in shared else (members,)

@@ -100,7 +100,7 @@ def test_object_code_needs_nothing_but_memory_functions_of_c(folder, name, targe
     text = {at: names[at : names.index(0, at)].decode() for at, *_ in entries}
     assert {text[at] for at, _, _, section, *_ in entries if at and section == 0} <= LIBRARY
     public = {text[at] for at, info, _, section, *_ in entries if section and info >> 4 == 1}
-    assert public == {f"{name}_{entry}" for entry in PROGRAMS[name].entries}
+    assert public == {f"{name}_{entry}{form}" for entry in PROGRAMS[name].entries for form in ("", "_packed")}
 
 
 @pytest.mark.parametrize(

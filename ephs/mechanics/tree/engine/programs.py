@@ -206,6 +206,7 @@ class Engine:
         self._correct = self.bind("corrected", self._account, self._start, self._y, self._q, self._allowed, 0.0)
         self._counted = 2 * self._r.size + work["entropy"].size
         self._stages: dict[int, tuple[Table[Control], Array, dict[str, Array], Array, Bound]] = {}
+        self._sums: dict[int, tuple[Mapping[str, Any], Array, Bound]] = {}
         self._close = self.bind("close", self._q, self._r) if looped else None
         self._project = self.bind("project", self._q, self._change) if looped else None
 
@@ -301,8 +302,14 @@ class Engine:
         tuple[int, Array, Array]
             A status, the end, and what rounding left.
         """
-        self._start[:], self._y[:], self.books["before"][:] = y0, y1, carry
-        status = int(self.bind("summed", tableau, k, self.books, h, anchor, int(part))())
+        known = self._sums.get(id(tableau))
+        if known is None or known[0] is not tableau:
+            rows = np.zeros(k.shape)
+            known = tableau, rows, self.bind("summed", tableau, rows, self.books, h, anchor, int(part))
+            self._sums[id(tableau)] = known
+        _, rows, summed = known
+        self._start[:], self._y[:], self.books["before"][:], rows[:] = y0, y1, carry, k
+        status = int(summed(h, anchor, int(part)))
         return status, self._y.copy(), self.books["after"].copy()
 
     def correct(

@@ -32,7 +32,7 @@ from ephs.solve.control import Tolerance
 from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.march import Status
 from ephs.solve.model import compile_model
-from ephs.solve.problem import Problem
+from ephs.solve.problem import NO_STATE, Problem
 from ephs.solve.stepping import Row
 
 __all__ = ["Equations", "ReducedState"]
@@ -85,7 +85,7 @@ class Equations:
         self.given = Given(problem, reduced, self.nv)
         self.drive, self.wrench = self.given.drive, self.given.wrench
         self.constant, self.held = problem.constant, problem.held and not problem.constant
-        self.steady = self.constant or self.held
+        self.steady, self.timed = self.constant or self.held, problem.timed
         self._paper, self.layout = PaperStates(reduced, problem), Layout.of(reduced)
         self.booking = Booking(self, self._paper)
         self.evaluations = 0
@@ -125,8 +125,8 @@ class Equations:
         nv, n, ns = self.nv, self.n, self.ns
         self.evaluations += 1
         self._factored = False
-        if self.held:
-            self.given.place(t, {})
+        if self.timed and not self.constant:
+            self.given.place(t, NO_STATE)
         elif not self.constant:
             v, r, heats, books = np.split(y, [nv, nv + n, nv + n + ns])
             self.given.place(t, self.states(ReducedState(t, self.advance(base, v), r, heats, books)))
@@ -147,7 +147,7 @@ class Equations:
         Returns y at the last stage. See `Engine.stages`.
         """
         if self.held:
-            self.given.place(state.t, {})
+            self.given.place(state.t, NO_STATE)
         if self.steady:
             status, evaluations, before = self.engine.stages(scheme, state.q, y0, h, k, y1, tolerances, chosen=chosen)
             self.evaluations += evaluations
@@ -263,7 +263,9 @@ class Equations:
 
     def load(self, t: float, q: Array, r: Array, heats: Array) -> None:
         """Put what drives at a time and state into ``drive`` and ``wrench``."""
-        if not self.constant:
+        if self.timed and not self.constant:
+            self.given.place(t, NO_STATE)
+        elif not self.constant:
             books = np.zeros(2 + len(self.reduced.made))
             self.given.place(t, self.states(ReducedState(t, q, r, heats, books)))
 

@@ -46,17 +46,22 @@ class Given:
         for i, edge in enumerate(reduced.edges):
             if edge.port is not None and not self._signals[edge.port].effort:
                 self._drives.append((edge.port, slice(int(t.r_at[i]), int(t.r_at[i] + t.dim[i]))))
+        ports = [port for port, _ in self._drives] + [port for port, _, _ in self._wrenches]
+        ports += [port for port, _ in net.inputs] + [one.port for one in net.injections]
+        self._fixed = {port: self._signals[port].at(0.0, {}) for port in ports if self._signals[port].constant}
         self.place(0.0, None)
 
     def place(self, t: float, state: Mapping[Path, Array] | None) -> None:
         """Put the inputs at a time and state into the arrays; without a state those that are constant."""
-        self.put(lambda port: self._value(port, t, state))
+        fixed, signals = self._fixed, self._signals
+        self.put(lambda port: fixed[port] if port in fixed else 0.0 if state is None else signals[port].at(t, state))
 
     def put(self, value: Callable[[Path], Array | float]) -> None:
         """Put the inputs into the arrays, each as ``value(port)``."""
         for port, where in self._drives:
             self.drive[where] = value(port)
-        self.wrench[[link for _, link, _ in self._wrenches]] = 0.0
+        for _, link, _ in self._wrenches:
+            self.wrench[link] = 0.0
         for port, link, seen in self._wrenches:
             given = value(port)
             self.wrench[link] += given if seen is None else seen @ given
@@ -66,10 +71,6 @@ class Given:
         self.supply[len(net.inputs) :] = 0.0
         for one in net.injections:
             self.supply[len(net.inputs) :] += np.atleast_1d(value(one.port))[one.place] * one.row
-
-    def _value(self, port: Path, t: float, state: Mapping[Path, Array] | None) -> Array | float:
-        signal = self._signals[port]
-        return signal.at(t, {} if state is None else state) if state is not None or signal.constant else 0.0
 
     def acted(self, edges: set[int]) -> tuple[frozenset[int], frozenset[int]]:
         """Edges, beside those given, and links on which they act."""
