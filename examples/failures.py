@@ -172,6 +172,10 @@ CASES = (
         r"-\d.* J/K in the step to t = 0\.\d+ s", step=1e-4, within=(0.0, 0.01), options=fixed(initial={"ke.p": 7.75}),
     ),
     Case(
+        Outcome.LAWLESS, "explicit steps that are too long for a brake", lambda: slide("friction = 25.0", 1.0),
+        ("rk54",), r"joints\.rail.*", step=0.1,
+    ),
+    Case(
         Outcome.DOMAIN, "a spring that has no length to begin with", lambda: slide(CORD), ALL, r"springs\.cord.*",
         options=fixed(initial={"joints.rail.pe.q_r": -0.5, "bodies.block.pe.q": HERE, "springs.cord.pe.q_r": HERE}),
     ),

@@ -34,6 +34,7 @@ class Outcome(StrEnum):
     TURN = "a rotation of π or more in one step"
     TEMPERATURE = "an absolute temperature that is not positive"
     ENTROPY = "a component that destroys entropy"
+    LAWLESS = "a step in which a component loses entropy"
     EXTENT = "a length or a volume that is not positive"
     DOMAIN = "an energy or a flow that is not a finite number"
     RANGE = "a state beyond the range of numbers"
@@ -66,6 +67,7 @@ _ADVICE = {
     Outcome.TURN: "take a smaller step: h·|ω| must stay below π",
     Outcome.TEMPERATURE: "check initial temperatures and heat capacities, or take a smaller step",
     Outcome.ENTROPY: "mend the component's function there; if it is right, take a smaller step",
+    Outcome.LAWLESS: "take a smaller step, or natural; mend the component where that is refused, too",
     Outcome.EXTENT: "check initial values, or take a smaller step",
     Outcome.DOMAIN: "check initial values and the component's function there, or take a smaller step",
     Outcome.RANGE: "check initial values and inputs, or take a smaller step",

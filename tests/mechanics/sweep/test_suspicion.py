@@ -35,13 +35,13 @@ def test_members_that_break_a_law_are_run_on_their_own_and_say_so(alone):
     """The limit of stability at this step is at a friction of about 10 N m s."""
     found = status(BRAKE, {"joints.pin.friction": FRICTIONS}, 2.0, method="rk54", step=0.1)
     assert found[0] == "done"
-    assert all("energy: " in text or Outcome.ENTROPY in text for text in found[3:])
+    assert all("energy: " in text or Outcome.LAWLESS in text for text in found[3:])
     for friction, text in zip(FRICTIONS, found, strict=True):
         scene = pendulum(6.0, f"friction = {friction}")
         try:
             passed = ephs.simulate(scene, 2.0, method="rk54", step=0.1, audit="off").audit.passed
         except ephs.SimulationError as error:
-            passed = error.outcome is not Outcome.ENTROPY
+            passed = error.outcome is not Outcome.LAWLESS
         assert (text == "done") == passed
     assert {values[0] for values in alone} >= set(FRICTIONS[3:])
     assert len(alone) < len(FRICTIONS)
@@ -50,7 +50,7 @@ def test_members_that_break_a_law_are_run_on_their_own_and_say_so(alone):
 def test_without_a_look_they_are_silent(alone, monkeypatch):
     monkeypatch.setattr(Suspicion, "of", lambda *_: False)
     found = status(BRAKE, {"joints.pin.friction": FRICTIONS}, 2.0, method="rk54", step=0.1)
-    assert all(text == "done" or Outcome.ENTROPY in text for text in found)
+    assert all(text == "done" or Outcome.LAWLESS in text for text in found)
     refused = [friction for friction, text in zip(FRICTIONS, found, strict=True) if text != "done"]
     assert [friction for group in alone for friction in group] == refused, (
         "what ends early is run once more, to say why"

@@ -90,7 +90,7 @@ class Booking:
         rounding = ROUNDING * eq.heats.most(start.heats, flows)
         lost = np.flatnonzero(np.sign(end.t - start.t) * made < -rounding)
         if lost.size:
-            raise SolveError(Outcome.ENTROPY, str(eq.reduced.made[int(lost[0])]), "in the step")
+            raise SolveError(Outcome.LAWLESS, str(eq.reduced.made[int(lost[0])]), "")
 
     def arrays(self) -> list[Any]:
         """All arrays of the tables that states are made from."""

@@ -181,7 +181,7 @@ class Equations:
         if status == Status.STILL:
             raise unmoved(self.reduced, int(component))
         if status == Status.LAWLESS:
-            raise SolveError(Outcome.ENTROPY, str(self.model.path_of(int(component))), "in the step")
+            raise SolveError(Outcome.LAWLESS, str(self.model.path_of(int(component))), "")
         if status:
             raise SolveError.of_component(int(status), self.model, int(component))
 
