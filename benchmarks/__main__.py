@@ -27,6 +27,7 @@ from benchmarks import (
     honesty,
     implicit,
     lawful,
+    laws,
     long,
     memory,
     order,
@@ -72,6 +73,7 @@ TABLES: dict[str, Callable[[Path | None], str | Report]] = {
     "commands": lambda _: commands.report(),
     "gauss": lambda _: gauss.report(),
     "lawful": lambda _: lawful.table(),
+    "laws": lambda _: laws.report(),
     "implicit": lambda _: implicit.report(),
 }
 

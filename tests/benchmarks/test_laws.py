@@ -1,0 +1,28 @@
+"""The table of both laws by methods: the kinds of systems that other tests of the laws leave out, and a control."""
+
+import pytest
+
+from benchmarks import laws
+from ephs.mechanics.methods.registry import METHODS
+
+CELLS = {cell.words: cell for cell in laws.CELLS}
+ROUNDING = 1e-13
+"""Of sums of energies relative to the gross ones: ten times the rounding of a hundred steps."""
+
+
+@pytest.mark.parametrize("name", [name for name in laws.METHODS if name not in ("alpha", "variational", "ida")])
+def test_circuits_at_a_mechanism_keep_both_laws(name):
+    row = laws.measure(CELLS["circuit"], laws.METHODS[name])
+    assert not row["failed"]
+    assert row["defect"] <= ROUNDING and row["least"] >= 0.0
+
+
+def test_what_a_method_does_not_keep_is_seen():
+    row = laws.measure(CELLS["drive"], laws.METHODS["alpha"])
+    assert row["defect"] > 1e6 * ROUNDING
+    text = laws.report([CELLS["tree"]], ["natural", "alpha"]).text
+    assert text.count("\n") == 3 and "| natural | " in text
+
+
+def test_every_method_is_in_the_table():
+    assert {asked.method for asked in laws.METHODS.values()} == {"auto", *METHODS}
