@@ -234,15 +234,22 @@ def _pose(matrix: Array) -> Array:
     return np.concatenate((so3.matrix_to_quaternion(matrix[:3, :3]), matrix[:3, 3]))
 
 
+_DEXP = tuple(
+    so3.terms(each)
+    for each in (
+        lambda k: (-1) ** k * (1 - k) / factorial(2 * k + 2),
+        lambda k: (-1) ** k * (1 - k) / factorial(2 * k + 3),
+        lambda k: (-1) ** k * (1 + k) / factorial(2 * k + 4),
+        lambda k: (-1) ** k * (1 + k) / factorial(2 * k + 5),
+    )
+)
+
+
 def _dexp_coefficients(t: float) -> tuple[float, float, float, float]:
     if t < so3.SMALL_ANGLE:
         x = t * t
-        return (
-            so3.series(lambda k: (-1) ** k * (1 - k) / factorial(2 * k + 2), x),
-            so3.series(lambda k: (-1) ** k * (1 - k) / factorial(2 * k + 3), x),
-            so3.series(lambda k: (-1) ** k * (1 + k) / factorial(2 * k + 4), x),
-            so3.series(lambda k: (-1) ** k * (1 + k) / factorial(2 * k + 5), x),
-        )
+        a1, a2, a3, a4 = (so3.series(each, x) for each in _DEXP)
+        return a1, a2, a3, a4
     s, c = sin(t), cos(t)
     return (
         (4.0 - t * s - 4.0 * c) / (2.0 * t**2),
@@ -252,13 +259,20 @@ def _dexp_coefficients(t: float) -> tuple[float, float, float, float]:
     )
 
 
+_DEXP_INV = tuple(
+    so3.terms(each)
+    for each in (
+        lambda k: (-1) ** k * (1 - k) * so3.bernoulli_ratio(k + 1),
+        lambda k: (-1) ** k * (1 + k) * so3.bernoulli_ratio(k + 2),
+    )
+)
+
+
 def _dexp_inv_coefficients(t: float) -> tuple[float, float]:
     if t < so3.SMALL_ANGLE:
         x = t * t
-        return (
-            so3.series(lambda k: (-1) ** k * (1 - k) * so3.bernoulli_ratio(k + 1), x),
-            so3.series(lambda k: (-1) ** k * (1 + k) * so3.bernoulli_ratio(k + 2), x),
-        )
+        b2, b4 = (so3.series(each, x) for each in _DEXP_INV)
+        return b2, b4
     # 1 − cos θ in a form that does not cancel.
     s, versine = sin(t), 2.0 * sin(0.5 * t) ** 2
     return (

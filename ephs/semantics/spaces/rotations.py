@@ -25,37 +25,40 @@ def vee(m: Array) -> Array:
     return np.array([m[2, 1], m[0, 2], m[1, 0]])
 
 
-def series(coefficient: Callable[[int], float], x: float) -> float:
-    """The power series Σ coefficient(k) xᵏ, cut after as many terms as double precision needs for |x| ≤ ¼."""
-    return sum(coefficient(k) * x**k for k in range(_TERMS))
+def terms(coefficient: Callable[[int], float]) -> tuple[float, ...]:
+    """As many coefficients of a power series as double precision needs for |x| ≤ ¼."""
+    return tuple(coefficient(k) for k in range(_TERMS))
+
+
+def series(coefficients: tuple[float, ...], x: float) -> float:
+    """The power series Σ coefficients[k] xᵏ."""
+    return sum(coefficient * x**k for k, coefficient in enumerate(coefficients))
+
+
+_ALPHA = terms(lambda k: (-1) ** k / factorial(2 * k + 1))
+_BETA = terms(lambda k: (-1) ** k / factorial(2 * k + 2))
+_GAMMA = terms(lambda k: (-1) ** k / factorial(2 * k + 3))
 
 
 def alpha(angle: float) -> float:
     """sin θ / θ."""
     if abs(angle) < SMALL_ANGLE:
-        return series(lambda k: (-1) ** k / factorial(2 * k + 1), angle**2)
+        return series(_ALPHA, angle**2)
     return sin(angle) / angle
 
 
 def beta(angle: float) -> float:
     """(1 − cos θ) / θ²."""
     if abs(angle) < SMALL_ANGLE:
-        return series(lambda k: (-1) ** k / factorial(2 * k + 2), angle**2)
+        return series(_BETA, angle**2)
     return 2.0 * (sin(0.5 * angle) / angle) ** 2
 
 
 def gamma(angle: float) -> float:
     """(θ − sin θ) / θ³."""
     if abs(angle) < SMALL_ANGLE:
-        return series(lambda k: (-1) ** k / factorial(2 * k + 3), angle**2)
+        return series(_GAMMA, angle**2)
     return (angle - sin(angle)) / angle**3
-
-
-def cotangent(angle: float) -> float:
-    """(1 − (θ/2) cot(θ/2)) / θ²."""
-    if abs(angle) < SMALL_ANGLE:
-        return series(lambda k: (-1) ** k * bernoulli_ratio(k + 1), angle**2)
-    return (1.0 - 0.5 * angle / tan(0.5 * angle)) / angle**2
 
 
 _NUMERATORS = (1, -1, 1, -1, 5, -691, 7, -3617, 43867, -174611, 854513, -236364091, 8553103)
@@ -65,6 +68,16 @@ _DENOMINATORS = (6, 30, 42, 30, 66, 2730, 6, 510, 798, 330, 138, 2730, 6)
 def bernoulli_ratio(k: int) -> float:
     """B₂ₖ / (2k)! with the Bernoulli numbers, for k = 1 … 13."""
     return _NUMERATORS[k - 1] / (_DENOMINATORS[k - 1] * factorial(2 * k))
+
+
+_COTANGENT = terms(lambda k: (-1) ** k * bernoulli_ratio(k + 1))
+
+
+def cotangent(angle: float) -> float:
+    """(1 − (θ/2) cot(θ/2)) / θ²."""
+    if abs(angle) < SMALL_ANGLE:
+        return series(_COTANGENT, angle**2)
+    return (1.0 - 0.5 * angle / tan(0.5 * angle)) / angle**2
 
 
 def rotation_exp(w: Array) -> Array:

@@ -1,5 +1,6 @@
 """Methods that discretise component by component, and one step of theirs with inputs that change."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Protocol
 
@@ -9,7 +10,7 @@ from ephs.semantics.bundle import Array
 from ephs.solve.errors import LARGEST, Outcome, SolveError
 from ephs.solve.methods.natural import Chunk, NaturalState
 from ephs.solve.model import Model, evaluate_at
-from ephs.solve.problem import Problem
+from ephs.solve.problem import NO_STATE, Problem, State
 from ephs.solve.snapshot import Snapshot
 
 __all__ = ["ComponentMethod", "advance_driven", "advance_whole", "started"]
@@ -150,20 +151,22 @@ def advance_driven(
         return advance_whole(method, state, h, 1)
     d = problem.descriptor
 
-    def given(points: list[Array]) -> Array:
+    def given(states: Sequence[State]) -> Array:
         rows: list[Array] = []
-        for node, x in zip(method.nodes, points, strict=True):
-            inputs = problem.inputs(t + node * h, d.unpack(x))
+        for node, found in zip(method.nodes, states, strict=True):
+            inputs = problem.inputs(t + node * h, found)
             rows.append(np.concatenate([*(inputs[slot.path].value for slot in d.outer), np.zeros(1)]))
         return np.array(rows)
 
-    inputs = given(method.points(state, h, state.x))
+    if problem.timed:
+        return advance_whole(method, state, h, 1, given([NO_STATE] * len(method.nodes)))
+    inputs = given([d.unpack(x) for x in method.points(state, h, state.x)])
     first, last = advance_whole(method, state, h, 1, inputs), np.inf
     found = first
     for _ in range(ROUNDS):
         if found[1].failure is not None:
             return found
-        again = given(method.stage_points(found[0], h, state.x))
+        again = given([d.unpack(x) for x in method.stage_points(found[0], h, state.x)])
         change = float(np.max(np.abs(again - inputs), initial=0.0))
         if change <= ROUNDED_INPUTS * float(np.max(np.abs(again), initial=0.0)):
             return found
