@@ -60,12 +60,16 @@ def _pair_spring(ports: Interface, numbers: Numbers) -> Primitive:
 
 
 def _beam_damper(_ports: Interface, n: Numbers) -> Primitive:
-    return beam.beam_damper(n["length"], n["stiffness"], n["rest"], n["damping"])
+    return beam.beam_damper(n["length"], n["stiffness"], n["rest"], n["damping"], n.get("order", 2))
+
+
+def _beam_spring(_ports: Interface, n: Numbers) -> Primitive:
+    return beam.beam_spring(n["length"], n["stiffness"], n["rest"], n.get("order", 2))
 
 
 PARTS: tuple[Part, ...] = (
     Part("beam_damper", "beam_damper", _beam_damper),
-    Part("beam_spring", "beam_spring", lambda _, n: beam.beam_spring(n["length"], n["stiffness"], n["rest"])),
+    Part("beam_spring", "beam_spring", _beam_spring),
     Part("frame_change", "frame_change", _frame_change),
     Part("gravity", "gravity", lambda ports, numbers: components.gravity(numbers["weight"], _group(ports))),
     Part("ground", "ground", lambda ports, _: components.ground(next(iter(ports.values())).quantity)),

@@ -6,7 +6,7 @@ from typing import final
 
 import numpy as np
 
-from ephs.mechanics.elements.beam import displacement
+from ephs.mechanics.elements.strain import displacement, mean_stress
 from ephs.mechanics.scene.flexible import Beam
 from ephs.mechanics.scene.model import Scene
 from ephs.semantics.bundle import Array
@@ -52,7 +52,9 @@ def beam_motion(
         rows = displacement(relative(name).T, of.length, of.rest)
         strain = np.column_stack([np.broadcast_to(d, len(position)) for d in rows]) / of.length
         strains.append(strain)
-        stresses.append(strain * of.stiffness)
-        energies.append(0.5 * of.length * np.sum(strain * strain * of.stiffness, axis=1))
+        rows = mean_stress(relative(name).T, of.length, of.stiffness, of.rest, of.order)
+        stress = np.column_stack([np.broadcast_to(n, len(position)) for n in rows])
+        stresses.append(stress)
+        energies.append(0.5 * of.length * np.sum(strain * stress, axis=1))
     stress = np.stack(stresses, axis=1)
     return BeamMotion(position, np.stack(strains, axis=1), stress[..., 3:], stress[..., :3], np.stack(energies, axis=1))

@@ -354,7 +354,7 @@ def _joint(j: Joint, *, driven: bool) -> System:
         return universal_joint(j.frame1, j.middle, j.frame2, j.friction, j.stiffness, j.rest, heat=heat, driven=driven)
     if j.strain is not None:
         of = j.strain
-        parts = elastic(of.length, of.stiffness, of.rest, of.damping)
+        parts = elastic(of.length, of.stiffness, of.rest, of.damping, of.order)
         return between_frames(j.frame1, j.frame2, *parts, heat=heat)
     return joint(
         j.kind, j.frame1, j.frame2, j.friction, j.stiffness, j.rest, pitch=j.pitch, heat=heat, driven=driven,

@@ -16,7 +16,7 @@ FREE_END = "free"
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Strain:
-    """Elasticity of a beam element: the energy L/2 (ξ − ξ₀)ᵀ K (ξ − ξ₀) of the strain ξ = log(exp(L ξ₀) q_r)/L.
+    """Elasticity of a beam element: the energy of the mean strain ξ = log(exp(L ξ₀) q_r)/L.
 
     Its joint's frame C1 is where C2 would be without force, so that q_r is 1 there.
 
@@ -26,12 +26,14 @@ class Strain:
     stiffness : (6,) diagonal of K: GJ, EI2, EI3 in N m², EA, GA2, GA3 in N
     rest : (6,) ξ₀: torsion and curvatures in 1/m, stretch (1: none) and shears
     damping : Kelvin–Voigt time in s: τ K resists the rate of ξ
+    order : 2, the strain is the same all along, or 4, the stress is in balance; see `elements.strain`
     """
 
     length: float
     stiffness: Array
     rest: Array
     damping: float = 0.0
+    order: int = 2
 
 
 @final

@@ -58,6 +58,7 @@ def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float =
             frozen(s.stiffness * energy * length * turning**2),
             frozen(s.rest / length / turning),
             s.damping * time,
+            s.order,
         )
 
     def motor(x: Motor) -> Motor:  # amperes and coulombs a second stay what they are in these seconds

@@ -1,6 +1,6 @@
 """Tables of beams and loads in scene files."""
 
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import Field, create_model
 
@@ -52,6 +52,10 @@ _BEAM: dict[str, Any] = {
     "elements": (
         _Count,
         Field(default=None, description="how many, the same number between any two points; 1 there unless given"),
+    ),
+    "order": (
+        Literal[2, 4],
+        Field(default=2, description="by which rest converges with shorter elements, and motion of thin beams"),
     ),
     "section": (SectionEntry, Field(description="stiffness and inertia per length")),
     "strain": (

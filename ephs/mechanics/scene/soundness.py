@@ -151,6 +151,8 @@ def _strain(j: Joint) -> dict[str, tuple[Any, tuple[int, ...]]]:
     s = j.strain
     if s is None or j.kind != "free":
         raise ValueError(f"joint {legible(j.name)} has a strain, which free joints have only")
+    if s.order not in (2, 4):
+        raise ValueError(f"{legible(j.name)}.strain.order is {legible(str(s.order))}; expected 2 or 4")
     return {
         "strain.length": (s.length, ()),
         "strain.stiffness": (s.stiffness, (6,)),
