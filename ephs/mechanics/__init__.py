@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from ephs.mechanics.elements.beam import beam_element as beam_element
     from ephs.mechanics.elements.bodies import body_pattern as body_pattern
     from ephs.mechanics.elements.bodies import rigid_body as rigid_body
+    from ephs.mechanics.elements.gear import gear as gear
     from ephs.mechanics.elements.joints import joint as joint
     from ephs.mechanics.elements.joints import joint_pattern as joint_pattern
     from ephs.mechanics.elements.joints import mbs_pattern as mbs_pattern
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 _HOME = {
     "armature": "ephs.mechanics.elements.motor",
+    "gear": "ephs.mechanics.elements.gear",
     "motor": "ephs.mechanics.elements.motor",
     "beam_element": "ephs.mechanics.elements.beam",
     "Inside": "ephs.mechanics.motion.inside",

@@ -97,8 +97,13 @@ class Dynamics:
         return tuple(edge.name for edge in self._equations.reduced.cut)
 
     @property
+    def gears(self) -> tuple[str, ...]:
+        """What ties rates of joints to each other: equations of `constraints` beside those of loops."""
+        return tuple(map(str, self._equations.reduced.gears))
+
+    @property
     def free(self) -> bool:
-        """Whether every freedom of the tree moves by itself: there are no loops and no prescribed motions."""
+        """Whether every freedom of the tree moves by itself: there are no loops, gears and prescribed motions."""
         return self.placing.free
 
     @property
@@ -111,7 +116,7 @@ class Dynamics:
     # ---- states ------------------------------------------------------------------------------------------------
 
     def state(self, coordinates: ByJoint | None = None, rates: ByJoint | None = None, *, adjust: bool = False) -> State:
-        """The initial state with some joints elsewhere, as `Scene.with_state` has it.
+        """The initial state with some joints elsewhere, as `Scene.with_state` has it; `closed` turns geared joints.
 
         Of a tree all joints' may be given as arrays (n,).
 

@@ -25,12 +25,13 @@ class Placing:
     Attributes
     ----------
     free
-        Whether coordinates and rates may be any: nothing is prescribed, and no loop has to close.
+        Whether coordinates and rates may be any: nothing is prescribed, no loop has to close, no gear ties them.
     """
 
     def __init__(self, equations: Equations) -> None:
         self.layout: Layout = equations.layout
-        self.free = self.layout.total == self.layout.n and not equations.prescribed.size
+        tied = equations.prescribed.size or equations.reduced.attaching.ties
+        self.free = self.layout.total == self.layout.n and not tied
         t = equations.reduced.tables
         self._parts = {
             name: [(e.pair, slice(int(t.q_at[i]), int(t.q_at[i] + e.pair.size)), e.pair.dim) for i, e in parts]

@@ -1,9 +1,12 @@
-"""What a scene puts on its mechanism: motors, stores of heat, conduction."""
+"""What a scene puts on its mechanism: motors, gears, stores of heat, conduction."""
 
 from dataclasses import dataclass
 from typing import final
 
-__all__ = ["Conduction", "Motor", "ThermalNode"]
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Conduction", "Gear", "Motor", "ThermalNode"]
 
 
 @final
@@ -34,6 +37,35 @@ class Motor:
     inertia: float
     voltage: float
     heat: str
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Gear:
+    """What ties the rates of joints: that of the first is Σ ratio · rate of the others.
+
+    Attributes
+    ----------
+    ratio
+        A number for each joint but the first.
+    stiffness, damping
+        Of a belt that stretches, N m/rad and N m s/rad, or N/m and N s/m, of the first joint; a rigid gear has none.
+    friction
+        On the first joint's rate.
+    """
+
+    name: str
+    joints: tuple[str, ...]
+    ratio: NDArray[np.float64]
+    stiffness: float
+    damping: float
+    friction: float
+    heat: str
+
+    @property
+    def warms(self) -> bool:
+        """Whether it makes heat."""
+        return bool(self.friction or (self.stiffness and self.damping))
 
 
 @final

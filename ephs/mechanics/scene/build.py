@@ -16,6 +16,7 @@ from ephs.mechanics.elements import components
 from ephs.mechanics.elements.beam import elastic
 from ephs.mechanics.elements.bodies import rigid_body
 from ephs.mechanics.elements.contact import contact
+from ephs.mechanics.elements.gear import gear
 from ephs.mechanics.elements.joints import between_frames, joint, spring_damper, universal_joint
 from ephs.mechanics.elements.motor import armature, motor
 from ephs.mechanics.scene.attached import Motor
@@ -114,6 +115,12 @@ def initial_state(scene: Scene) -> dict[Path, Array]:
         if m.inertia:
             out[at / "rotor" / "p"] = m.inertia * m.gear * scene.joint(m.joint).rate
         if m.heat == ENVIRONMENT:
+            out[at / "env" / "s"] = np.zeros(1)
+    for name, g in scene.all_gears():
+        at = component_path("gears", name)
+        if g.stiffness:
+            out[at / "spring" / "q"] = np.zeros(1)
+        if g.warms and g.heat == ENVIRONMENT:
             out[at / "env" / "s"] = np.zeros(1)
     between = [
         (component_path("springs", name), (s.body1, s.body2), (_point(s.at1), _point(s.at2)), s.heat)
@@ -298,6 +305,16 @@ def _level(scene: Scene, demands: _Demands, *, top: bool) -> System:
         if m.heat != ENVIRONMENT:
             ports["s"] = b.entropy(m.heat)
         b.add(Path(["motors", name]), _motor(m, b.junctions[at].quantity), ports)
+    for name, g in scene.gears.items():
+        at = [_at("drives", each) for each in g.joints]
+        ports = {f"p{k}": str(each) for k, each in enumerate(at)}
+        if g.warms and g.heat != ENVIRONMENT:
+            ports["s"] = b.entropy(g.heat)
+        filling = gear(
+            [b.junctions[each].quantity for each in at], g.ratio.tolist(),
+            stiffness=g.stiffness, damping=g.damping, friction=g.friction, heat=g.heat != ENVIRONMENT,
+        )  # fmt: skip
+        b.add(Path(["gears", name]), filling, ports)
     if grounded and top:
         b.add(Path(["ground"]), components.ground(), {"p": b.momentum(GROUND)})
     return System.of(Pattern(junctions=b.junctions, boxes=b.boxes), b.fillings)
@@ -326,8 +343,9 @@ def _demands_on_parts(scene: Scene, demands: _Demands) -> _Demands:
     nodes = {x.heat for x in (*pairs, *scene.contacts.values())} | {
         name for c in scene.conduction.values() for name in c.between
     }
-    nodes |= {m.heat for m in scene.motors.values()}
+    nodes |= {m.heat for m in scene.motors.values()} | {g.heat for g in scene.gears.values() if g.warms}
     turned = {m.joint for m in scene.motors.values()} | {name for name, j in scene.joints.items() if j.armature}
+    turned |= {name for g in scene.gears.values() for name in g.joints}
     return _Demands(demands.bodies | bodies, demands.nodes | nodes, demands.joints | turned)
 
 

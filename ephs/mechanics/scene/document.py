@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ephs.mechanics.scene.adjustment import Adjustment, Changed, Displacement
-from ephs.mechanics.scene.attached import Conduction, Motor, ThermalNode
+from ephs.mechanics.scene.attached import Conduction, Gear, Motor, ThermalNode
 from ephs.mechanics.scene.flexible import Beam, Load, Strain
 from ephs.mechanics.scene.model import Body, Joint, Marker, Scene, Spring, World, frozen
 from ephs.mechanics.scene.surfaces import Contact, Surface
@@ -25,6 +25,7 @@ _ARRAYS = {
     Surface: {"frame"},
     Strain: {"stiffness", "rest"},
     Load: {"force", "moment"},
+    Gear: {"ratio"},
 }
 _PARTS = {
     "bodies": Body,
@@ -38,6 +39,7 @@ _PARTS = {
     "beams": Beam,
     "loads": Load,
     "motors": Motor,
+    "gears": Gear,
     "parts": Scene,
 }
 

@@ -284,6 +284,20 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
         "at1": _attribute("springs", "at1"),
         "at2": _attribute("springs", "at2"),
     },
+    "motors": {
+        "constant": _attribute("motors", "constant"),
+        "resistance": _attribute("motors", "resistance", POSITIVE),
+        "inductance": _attribute("motors", "inductance", NON_NEGATIVE),
+        "gear": _attribute("motors", "gear"),
+        "inertia": _attribute("motors", "inertia", NON_NEGATIVE),
+        "voltage": _attribute("motors", "voltage"),
+    },
+    "gears": {
+        "ratio": _attribute("gears", "ratio"),
+        "stiffness": _attribute("gears", "stiffness", NON_NEGATIVE),
+        "damping": _attribute("gears", "damping", NON_NEGATIVE),
+        "friction": _attribute("gears", "friction", NON_NEGATIVE),
+    },
     "thermal": {
         "capacity": _attribute("thermal", "capacity", POSITIVE),
         "temperature": _attribute("thermal", "temperature", POSITIVE),

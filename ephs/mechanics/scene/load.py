@@ -155,7 +155,8 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
         beams={name: rod.beam for name, rod in rods.items()},
         loads=loads,
     )
-    scene = replace(scene, motors=resolve.resolve_motors(document, scene, names, faults))
+    motors = resolve.resolve_motors(document, scene, names, faults)
+    scene = replace(scene, motors=motors, gears=resolve.resolve_gears(document, scene, names, faults))
     contacts, laws = resolve_contacts(document, scene, r.laws, names, faults)
     if faults:
         return None
@@ -305,9 +306,9 @@ def _check_names(document: Document, faults: list[Fault]) -> None:
                 faults.append(fault("name", f'{section}."{name}"', shown(name)))
             elif name in (GROUND, ENVIRONMENT):
                 faults.append(fault("reserved", key, shown(name), reserved=f'"{GROUND}" and "{ENVIRONMENT}"'))
-            elif section not in ("parts", "loads", "motors") and name in document.sections["parts"]:
+            elif section not in ("parts", "loads", "motors", "gears") and name in document.sections["parts"]:
                 faults.append(fault("collision", key, shown(name), other="a part"))
-            elif section not in ("beams", "loads", "motors") and name in document.sections["beams"]:
+            elif section not in ("beams", "loads", "motors", "gears") and name in document.sections["beams"]:
                 faults.append(fault("collision", key, shown(name), other="a beam"))
             elif section == "joints" and name in document.sections["bodies"] and name not in held:
                 faults.append(fault("collision", key, shown(name), other="the free joint of the body of this name"))

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ephs.mechanics.scene.adjustment import Adjustment
-from ephs.mechanics.scene.attached import Conduction, Motor, ThermalNode
+from ephs.mechanics.scene.attached import Conduction, Gear, Motor, ThermalNode
 from ephs.mechanics.scene.flexible import FREE_END, Beam, Load, Strain
 from ephs.mechanics.scene.surfaces import Contact, Surface
 from ephs.mechanics.shapes.law import Law
@@ -188,6 +188,7 @@ class Scene:
     beams: Mapping[str, Beam] = field(default_factory=dict)
     loads: Mapping[str, Load] = field(default_factory=dict)
     motors: Mapping[str, Motor] = field(default_factory=dict)
+    gears: Mapping[str, Gear] = field(default_factory=dict)
     _kept: Kept = field(default_factory=Kept, init=False, repr=False)
 
     def system(self) -> "System":
@@ -298,6 +299,13 @@ class Scene:
         for path, scene in self._scenes():
             for m in scene.motors.values():
                 yield path + m.name, replace(m, name=path + m.name, joint=path + m.joint, heat=_seen(path, m.heat))
+
+    def all_gears(self) -> Iterator[tuple[str, Gear]]:
+        """Every gear with its dotted name; its joints and heat sink are dotted too."""
+        for path, scene in self._scenes():
+            for g in scene.gears.values():
+                joints = tuple(path + name for name in g.joints)
+                yield path + g.name, replace(g, name=path + g.name, joints=joints, heat=_seen(path, g.heat))
 
     def all_thermal(self) -> Iterator[tuple[str, ThermalNode]]:
         """Every thermal node with its dotted name."""

@@ -178,6 +178,8 @@ def _things(scene: Scene, kind: str) -> Mapping[str, Any]:
         "bodies": scene.all_bodies,
         "joints": scene.all_joints,
         "springs": scene.all_springs,
+        "motors": scene.all_motors,
+        "gears": scene.all_gears,
         "thermal": scene.all_thermal,
         "conduction": scene.all_conduction,
         "markers": scene.all_markers,

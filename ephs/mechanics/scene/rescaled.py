@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ephs.mechanics.scene.attached import Motor
+from ephs.mechanics.scene.attached import Gear, Motor
 from ephs.mechanics.scene.flexible import Load, Strain
 from ephs.mechanics.scene.geometry import Coupling, coupling_of
 from ephs.mechanics.scene.model import Array, Body, Joint, Scene, Spring, frozen
@@ -70,6 +70,16 @@ def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float =
             voltage=x.voltage * energy,
         )  # fmt: skip
 
+    def gear(x: Gear) -> Gear:
+        first, *others = (
+            float(freedom_units(coupling_of(of), of.coordinate, length)[0]) for of in map(scene.joint, x.joints)
+        )
+        return replace(
+            x, ratio=frozen(x.ratio * first / np.array(others)),
+            stiffness=x.stiffness * energy / first**2, damping=x.damping * energy * time / first**2,
+            friction=x.friction * energy * time / first**2,
+        )  # fmt: skip
+
     def load(x: Load) -> Load:
         force = energy / length
         return replace(x, force=frozen(x.force * force), moment=frozen(x.moment * energy), ramp=x.ramp * time)
@@ -98,6 +108,7 @@ def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float =
             name: replace(c, conductance=c.conductance * energy / time) for name, c in scene.conduction.items()
         },
         motors={name: motor(x) for name, x in scene.motors.items()},
+        gears={name: gear(x) for name, x in scene.gears.items()},
         loads={name: load(x) for name, x in scene.loads.items()},
         markers={name: replace(m, at=frozen(m.at * length)) for name, m in scene.markers.items()},
         surfaces={name: surface(s) for name, s in scene.surfaces.items()},

@@ -16,6 +16,7 @@ from ephs.mechanics.scene.schema_numbers import (
     Inertia,
     Limits,
     Matrix,
+    Names,
     NonNegative,
     Number,
     Numbers,
@@ -205,6 +206,17 @@ class MotorEntry(Entry):
     heat: Text = Field(default="environment", description="where the winding's heat goes: a thermal name")
 
 
+class GearEntry(Entry):
+    """``[gears.NAME]``"""
+
+    joints: Names = Field(description="two or more joints with one freedom; a gear, a belt, a differential, a mimic")
+    ratio: Numbers = Field(default=1.0, description="rate of the first joint = Σ ratio · rate of the others")
+    stiffness: NonNegative = Field(default=0.0, description="of a belt, N m/rad or N/m of the first; 0: rigid")
+    damping: NonNegative = Field(default=0.0, description="of a belt's stretching, N m s/rad or N s/m")
+    friction: NonNegative = Field(default=0.0, description="on the first joint's rate, N m s/rad or N s/m")
+    heat: Text = Field(default="environment", description="where the heat of damping and friction goes: a thermal name")
+
+
 class ThermalEntry(Entry):
     """``[thermal.NAME]``"""
 
@@ -253,6 +265,7 @@ class SceneFile(Entry):
     )
     loads: dict[str, LoadEntry] = Field(default_factory=dict, description="forces and moments on bodies")
     motors: dict[str, MotorEntry] = Field(default_factory=dict, description="motors with circuit and gear on joints")
+    gears: dict[str, GearEntry] = Field(default_factory=dict, description="ties between the rates of joints")
     thermal: dict[str, ThermalEntry] = Field(default_factory=dict, description="what heat warms")
     conduction: dict[str, ConductionEntry] = Field(default_factory=dict, description="how heat passes between them")
     markers: dict[str, MarkerEntry] = Field(default_factory=dict, description="points on bodies")
@@ -268,6 +281,7 @@ SECTIONS: dict[str, type[Entry]] = {
     "beams": BeamEntry,
     "loads": LoadEntry,
     "motors": MotorEntry,
+    "gears": GearEntry,
     "thermal": ThermalEntry,
     "conduction": ConductionEntry,
     "markers": MarkerEntry,

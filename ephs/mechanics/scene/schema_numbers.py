@@ -38,6 +38,7 @@ Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Quaternion = Annotated[list[Number], Field(min_length=4, max_length=4)]
 Text = Annotated[str, Field(strict=True, min_length=1)]
 Flag = Annotated[bool, Field(strict=True)]
+Names = Annotated[list[Text], Field(min_length=2)]
 Pair = Annotated[list[Text], Field(min_length=2, max_length=2)]
 Sizes = Annotated[list[Positive], Field(min_length=2, max_length=2)]
 

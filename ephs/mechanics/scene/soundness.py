@@ -50,6 +50,8 @@ def check_scene(scene: Scene) -> None:
         ("thermal node", nodes, [each.heat for _, each in (*scene.all_joints(), *scene.all_springs())]),
         ("joint", dict(scene.all_joints()), [motor.joint for _, motor in scene.all_motors()]),
         ("thermal node", nodes, [motor.heat for _, motor in scene.all_motors()]),
+        ("joint", dict(scene.all_joints()), [name for _, gear in scene.all_gears() for name in gear.joints]),
+        ("thermal node", nodes, [gear.heat for _, gear in scene.all_gears()]),
         ("thermal node", nodes, [end for _, each in scene.all_conduction() for end in each.between]),
     ):
         for name in named:
@@ -120,6 +122,9 @@ def _shapes(scene: Scene) -> Iterator[tuple[str, dict[str, tuple[Any, tuple[int,
         yield name, {key: (number, ()) for key, number in contact.law.numbers}
     for name, motor in scene.all_motors():
         yield name, {key: (getattr(motor, key), ()) for key in MOTOR}
+    for name, gear in scene.all_gears():
+        numbers = {key: (getattr(gear, key), ()) for key in ("stiffness", "damping", "friction")}
+        yield name, {"ratio": (gear.ratio, (len(gear.joints) - 1,))} | numbers
     for name, load in scene.all_loads():
         yield name, {"force": (load.force, (3,)), "moment": (load.moment, (3,)), "ramp": (load.ramp, ())}
 
@@ -163,7 +168,7 @@ def _strain(j: Joint) -> dict[str, tuple[Any, tuple[int, ...]]]:
 
 def _check_names(scene: Scene) -> None:
     kinds = ("bodies", "joints", "springs", "thermal", "conduction", "markers", "surfaces", "contacts")
-    for things in (getattr(scene, kind) for kind in (*kinds, "beams", "loads", "motors")):
+    for things in (getattr(scene, kind) for kind in (*kinds, "beams", "loads", "motors", "gears")):
         for name, thing in things.items():
             if Name([name]) != (thing.name,):
                 raise ValueError(f"{legible(name)} is called {legible(str(thing.name))}")

@@ -1,0 +1,71 @@
+"""Gears, belts and mimics: what ties the rates of joints to each other, rigidly or by a spring."""
+
+from collections.abc import Sequence
+
+from ephs.operad import Path, Pattern, Quantity, junction, quantity
+from ephs.semantics import library
+from ephs.semantics.constructors import constraint, transformer
+from ephs.semantics.system import Filling, System
+
+__all__ = ["gear"]
+
+
+def gear(
+    of: Sequence[Quantity],
+    ratio: Sequence[float],
+    *,
+    stiffness: float = 0.0,
+    damping: float = 0.0,
+    friction: float = 0.0,
+    heat: bool = False,
+) -> System:
+    """A gear, a belt or a differential; ports p0, p1, … of joints: the rate of the first is Σ ratio · rate of others.
+
+    Without stiffness the rates are tied: a constraint. With it what the first joint is ahead by stretches a spring, the
+    box ``spring``, in rad or m of the first joint.
+
+    Parameters
+    ----------
+    of
+        Momenta of the joints, each of one freedom.
+    ratio
+        One number for each joint but the first.
+    stiffness, damping
+        Of a belt, in N m/rad and N m s/rad or N/m and N s/m.
+    friction
+        On the first joint's rate, in N m s/rad or N s/m: what the gear loses.
+    heat
+        The heat leaves through the port s, in place of the box env.
+    """
+    shafts = [f"p{k}" for k in range(len(of))]
+    ports = dict(zip(shafts, of, strict=True))
+    row = [1.0, *(-float(x) for x in ratio)]
+    junctions = {name: junction(each, exposed=True) for name, each in ports.items()}
+    boxes: dict[str, dict[str, str]] = {"mesh": {name: name for name in shafts}}
+    fillings: dict[str, Filling] = {}
+    if stiffness:
+        junctions |= {"p": junction(quantity.momentum), "q": junction(quantity.displacement)}
+        boxes["mesh"]["p"] = "p"
+        boxes |= {"pkc": {"q": "q", "p": "p"}, "spring": {"q": "q"}}
+        fillings = {
+            "mesh": constraint({**ports, "p": quantity.momentum}, [[*row, -1.0]], name="mesh"),
+            "pkc": library.pkc(),
+            "spring": library.spring(k=stiffness),
+        }
+    else:
+        fillings = {"mesh": constraint(ports, [row], name="mesh")}
+    losses = {"damper": (damping if stiffness else 0.0, "p"), "loss": (friction, "first")}
+    for name, (size, at) in losses.items():
+        if size:
+            boxes[name], fillings[name] = {"p": at, "s": "s"}, library.friction(d=size)
+    if friction:
+        junctions["first"] = junction(quantity.momentum)
+        boxes["shaft"] = {"p0": "p0", "p": "first"}
+        fillings["shaft"] = transformer({"p0": of[0], "p": quantity.momentum}, [[1.0]], name="shaft")
+    if any(size for size, _ in losses.values()):
+        junctions["s"] = junction(quantity.entropy, exposed=heat)
+        if not heat:
+            boxes["env"], fillings["env"] = {"s": "s"}, library.environment()
+    return System.of(
+        Pattern(junctions=junctions, boxes=boxes), {Path.of(name): filling for name, filling in fillings.items()}
+    )

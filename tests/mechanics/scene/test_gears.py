@@ -1,0 +1,142 @@
+"""Gears, belts and differentials of scene files."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import ephs
+from ephs.mechanics.scene.document import scene_from_text, scene_to_text
+from ephs.mechanics.scene.parameters import varied
+from ephs.mechanics.scene.rescaled import rescaled
+
+MASS, TURNING, RATIO, LOSS, GRAVITY = 5.0, 0.02, 10.0, 0.05, 9.81
+HOIST = f"""
+format = 1
+name = "hoist"
+[bodies.drum]
+mass = 2.0
+inertia = [0.01, 0.01, {TURNING}]
+[bodies.load]
+mass = {MASS}
+inertia = [0.01, 0.01, 0.01]
+position = [0.1, 0.0, -1.0]
+[joints.shaft]
+type = "revolute"
+bodies = ["ground", "drum"]
+at = [0.0, 0.0, 0.0]
+axis = [0.0, 1.0, 0.0]
+[joints.rail]
+type = "prismatic"
+bodies = ["ground", "load"]
+at = [0.1, 0.0, -1.0]
+axis = [0.0, 0.0, 1.0]
+[gears.rope]
+joints = ["shaft", "rail"]
+ratio = {RATIO}
+friction = {LOSS}
+heat = "bearing"
+[thermal.bearing]
+capacity = 10.0
+temperature = 300.0
+"""
+
+
+@pytest.fixture
+def hoist(tmp_path):
+    (tmp_path / "hoist.toml").write_text(HOIST)
+    return ephs.load(tmp_path / "hoist.toml")
+
+
+def falling(t):
+    """The load's rate: m r̈ = −m g − g² (J r̈ + d ṙ), g the ratio."""
+    inertia, loss = MASS + RATIO**2 * 0.01, RATIO**2 * LOSS
+    return -MASS * GRAVITY / loss * (1.0 - np.exp(-loss / inertia * t))
+
+
+@pytest.mark.parametrize("method", ["rk87", "radau", "ida"])
+def test_a_rope_on_a_drum_lets_a_load_down(hoist, method):
+    sol = ephs.simulate(hoist, 0.4, method=method, rtol=1e-11, atol=1e-12)
+    assert sol.stats["form"] == "reduced"
+    assert np.isclose(sol.joint("rail").rate[-1, 0], falling(0.4), rtol=1e-9)
+    assert np.allclose(sol.joint("shaft").rate, RATIO * sol.joint("rail").rate, rtol=0.0, atol=1e-12)
+    assert np.isclose(sol["thermal.bearing.s"][-1], 10.0 * np.log1p(sol.heat[-1] / 3000.0), rtol=1e-9)
+    assert sol.energy_error.max() < 1e-11
+
+
+def test_its_force_is_in_the_wrench_of_the_joint(hoist):
+    sol = ephs.simulate(hoist, 0.4, method="rk87", rtol=1e-11, atol=1e-12)
+    rate = sol.joint("rail").rate[:, 0]
+    slowing = (-MASS * GRAVITY - RATIO**2 * LOSS * rate) / (MASS + RATIO**2 * 0.01)
+    assert np.allclose(sol.joint("rail").wrench[:, 5], MASS * (slowing + GRAVITY), rtol=1e-8)
+
+
+def test_a_stiff_belt_moves_as_a_gear_does(hoist):
+    ends = []
+    for stiffness in (0.0, 1e4, 1e6):
+        belt = replace(hoist.gears["rope"], stiffness=stiffness, damping=0.1)
+        sol = ephs.simulate(replace(hoist, gears={"rope": belt}), 0.4, method="radau", rtol=1e-9)
+        assert sol.energy_error.max() < 1e-11
+        ends.append(sol.joint("rail").rate[-1, 0])
+    assert 10.0 < abs(ends[1] - ends[0]) / abs(ends[2] - ends[0]) < 1000.0
+
+
+def test_units_text_and_parameters_of_gears(hoist):
+    other = scene_from_text(scene_to_text(hoist))
+    sol, same = (ephs.simulate(one, 0.2, method="rk87") for one in (hoist, other))
+    assert np.array_equal(sol.joint("rail").rate, same.joint("rail").rate)
+    units = 2.0**4, 2.0**-3, 2.0**5
+    found = ephs.simulate(rescaled(hoist, *units), 0.2 * units[2], method="rk87", rtol=1e-11, atol=1e-13)
+    exact = ephs.simulate(hoist, 0.2, method="rk87", rtol=1e-11, atol=1e-13)
+    assert np.isclose(found.joint("rail").rate[-1, 0] / units[0] * units[2], exact.joint("rail").rate[-1, 0], rtol=1e-9)
+    paths = ["gears.rope.ratio", "gears.rope.friction"]
+    near = []
+    for path, value in zip(paths, (RATIO, LOSS), strict=True):
+        step = 1e-4 * value
+        ends = [
+            ephs.simulate(varied(hoist, {path: value + by}), 0.2, method="rk87", rtol=1e-12, atol=1e-13)
+            for by in (-step, step)
+        ]
+        near.append((ends[1].joint("rail").rate[-1, 0] - ends[0].joint("rail").rate[-1, 0]) / (2.0 * step))
+    run = ephs.sensitivity(hoist, paths, 0.2, method="rk87", rtol=1e-11, atol=1e-13)
+    assert np.allclose(run["joints.rail.rate"][-1, 0], near, rtol=1e-6)
+
+
+def test_a_differential_divides_its_rate(tmp_path):
+    text = HOIST.replace(
+        'joints = ["shaft", "rail"]\nratio = 10.0', 'joints = ["shaft", "rail", "other"]\nratio = [5.0, 5.0]'
+    )
+    text += """
+[bodies.mass]
+mass = 5.0
+inertia = [0.01, 0.01, 0.01]
+position = [0.2, 0.0, -1.0]
+[joints.other]
+type = "prismatic"
+bodies = ["ground", "mass"]
+at = [0.2, 0.0, -1.0]
+axis = [0.0, 0.0, 1.0]
+"""
+    (tmp_path / "two.toml").write_text(text)
+    sol = ephs.simulate(ephs.load(tmp_path / "two.toml"), 0.2, method="rk87")
+    one, two, drum = (sol.joint(name).rate[:, 0] for name in ("rail", "other", "shaft"))
+    assert np.allclose(drum, 5.0 * (one + two), rtol=0.0, atol=1e-12)
+    assert np.allclose(one, two, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('["shaft", "rail"]', '["shaft", "rial"]', r'gears.rope.joints\[1\].*did you mean "rail"'),
+        ('["shaft", "rail"]', '["shaft", "shaft"]', "different joints"),
+        ("ratio = 10.0", "ratio = [1.0, 2.0]", "gears.rope.ratio.*1 numbers"),
+        ('type = "prismatic"', 'type = "cylindrical"', "gears.rope.joints.*one freedom"),
+        ('heat = "bearing"', 'heat = "baring"', "gears.rope.heat"),
+        ("axis = [0.0, 1.0, 0.0]", "axis = [0.0, 1.0, 0.0]\nrate = 1.0", "gears.rope.*the first rate, of shaft, at 0"),
+    ],
+)
+def test_what_does_not_fit_is_told_by_its_key(tmp_path, old, new, words):
+    assert old in HOIST
+    (tmp_path / "hoist.toml").write_text(HOIST.replace(old, new))
+    with pytest.raises(ephs.SceneError, match=words):
+        ephs.load(tmp_path / "hoist.toml")
