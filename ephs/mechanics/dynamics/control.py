@@ -59,7 +59,7 @@ def tree_only(model: "Dynamics", what: str) -> None:
         It has loops or prescribed motions; a ValueError.
     """
     if not model.free:
-        found = ", ".join([*model.cut, *model.gears]) or "prescribed motions"
+        found = ", ".join([*model.cut, *model.placing.gears]) or "prescribed motions"
         expected = (
             f"a tree, without loops, gears (here {found}) and prescribed motions: take inverse_dynamics and constraints"
         )

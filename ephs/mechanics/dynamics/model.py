@@ -97,11 +97,6 @@ class Dynamics:
         return tuple(edge.name for edge in self._equations.reduced.cut)
 
     @property
-    def gears(self) -> tuple[str, ...]:
-        """What ties rates of joints to each other: equations of `constraints` beside those of loops."""
-        return tuple(map(str, self._equations.reduced.gears))
-
-    @property
     def free(self) -> bool:
         """Whether every freedom of the tree moves by itself: there are no loops, gears and prescribed motions."""
         return self.placing.free

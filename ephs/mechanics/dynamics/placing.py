@@ -26,12 +26,14 @@ class Placing:
     ----------
     free
         Whether coordinates and rates may be any: nothing is prescribed, no loop has to close, no gear ties them.
+    gears
+        What ties rates of joints to each other.
     """
 
     def __init__(self, equations: Equations) -> None:
         self.layout: Layout = equations.layout
-        tied = equations.prescribed.size or equations.reduced.attaching.ties
-        self.free = self.layout.total == self.layout.n and not tied
+        self.gears = tuple(map(str, equations.reduced.gears))
+        self.free = self.layout.total == self.layout.n and not equations.prescribed.size and not self.gears
         t = equations.reduced.tables
         self._parts = {
             name: [(e.pair, slice(int(t.q_at[i]), int(t.q_at[i] + e.pair.size)), e.pair.dim) for i, e in parts]
