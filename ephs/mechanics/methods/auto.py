@@ -1,4 +1,4 @@
-"""The method that chooses by what it meets: explicit until steps are held back by stability, then implicit.
+"""The method that chooses by what it meets: one without damping until steps are held back by stability, then radau.
 
 Stiffness is what Hairer and Wanner test in DOPRI5 and DOP853: the last two stages of a step show how fast its fastest
 mode is, and a step that this holds at the limit of stability again and again serves stability, not accuracy.
@@ -17,26 +17,37 @@ from ephs.solve.snapshot import Snapshot
 from ephs.solve.stepping import Attempt, Leg, Span
 
 if TYPE_CHECKING:
+    from ephs.mechanics.methods.gauss import Gauss
     from ephs.mechanics.methods.radau import Implicit
 
 __all__ = ["Auto"]
 
 LIMITS = {"rk54": 3.25, "rk87": 6.1}
 """h·|λ| at the limit of stability."""
+SLOW = 0.5
+"""Contraction of a Gauss method's sweeps beyond which these hold its steps back, not accuracy."""
 DIGITS = 1e-5
 """Tolerances below this are for order 8."""
 
 
 @final
 class Auto(ReducedMethod):
-    """rk54 or rk87 by the tolerance, and radau from where the problem shows itself stiff."""
+    """rk54 or rk87 by the tolerance, or a Gauss method, and radau from where the problem shows itself stiff.
+
+    Parameters
+    ----------
+    gauss
+        The Gauss method that goes first.
+    """
 
     name = "auto"
 
-    def __init__(self, equations: Equations, control: Control) -> None:
+    def __init__(self, equations: Equations, control: Control, gauss: "Gauss | None" = None) -> None:
         super().__init__(equations, control)
         name = "rk87" if control.rtol.value < DIGITS else "rk54"
-        self._explicit = Explicit(equations, control, tableau(name))
+        first = gauss or Explicit(equations, control, tableau(name))
+        name, self._limit = first.name, SLOW * gauss.limit if gauss else LIMITS[name]
+        self._explicit = first
         self._implicit: Implicit | None = None
         self._held = self._free = self._failures = 0
         self.name, self.exponent, self.share = name, self._explicit.exponent, self._explicit.share
@@ -57,7 +68,7 @@ class Auto(ReducedMethod):
             raise
         if found.error <= 1.0:
             self._failures = 0
-            if self._explicit.stiffness > LIMITS[self._explicit.name]:
+            if self._explicit.stiffness > self._limit:
                 self._held, self._free = self._held + 1, 0
                 if self._held == PATIENCE:
                     self._switch(found.end.t, h, f"h·|λ| = {self._explicit.stiffness:.1f} holds its steps")
@@ -69,7 +80,7 @@ class Auto(ReducedMethod):
 
     def many(self, span: Span[ReducedState]) -> Leg[ReducedState] | None:
         """Explicit steps, many in one compiled call, until the problem shows itself stiff."""
-        return self._explicit.many(span, LIMITS[self._explicit.name], self._switch)
+        return self._explicit.many(span, self._limit, self._switch)
 
     def _switch(self, t: float, h: float, reason: str) -> None:
         self._go_implicit()

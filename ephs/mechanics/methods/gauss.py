@@ -1,10 +1,11 @@
 """Gauss methods of orders 4, 6 and 8 on the reduced form: symmetric, not damping, both laws kept by the correction.
 
 Hairer, Lubich and Wanner, *Geometric Numerical Integration*, II.1 and VIII.6. Stages are iterated in machine code, many
-steps a call, while that contracts; from where it does not, by Newton's method with exact derivatives.
+steps a call, while that contracts; from where it does not, constant steps are solved by Newton's method with exact
+derivatives, and chosen ones are left to radau, since nothing here damps what is too fast.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any, final
 
@@ -84,7 +85,7 @@ class Gauss(ReducedMethod):
             for method in (self, self._steps):
                 method.rtol, method.atol = np.full_like(self.rtol, ROUNDING), np.full_like(self.atol, ROUNDING)
         # h·|λ| beyond which sweeps over the stages do not contract
-        self._limit = 1.0 / float(np.abs(np.linalg.eigvals(self.tableau.arrays["a"][1:-1, 1:])).max())
+        self.limit = 1.0 / float(np.abs(np.linalg.eigvals(self.tableau.arrays["a"][1:-1, 1:])).max())
         self._stages: Stages | None = None
         self._sweeps = True
         self.counts: dict[str, Any] = {"switches": []}
@@ -93,9 +94,19 @@ class Gauss(ReducedMethod):
         """One step of h seconds."""
         return self._steps.step(state, h)
 
-    def many(self, span: Span[ReducedState]) -> Leg[ReducedState] | None:
-        """Steps by sweeps over the stages, many in one compiled call, until these do not contract."""
-        return self._steps.many(span, self._limit, self._switch) if self._sweeps else None
+    @property
+    def stiffness(self) -> float:
+        """h·|λ| of the fastest mode, as the last step showed it."""
+        return self._steps.stiffness
+
+    def many(
+        self, span: Span[ReducedState], limit: float = 0.0, left: Callable[[float, float, str], None] | None = None
+    ) -> Leg[ReducedState] | None:
+        """Steps by sweeps over the stages, many in one compiled call, until these do not contract.
+
+        From there they are ``left``, or solved by Newton's method.
+        """
+        return self._steps.many(span, limit or self.limit, left or self._switch) if self._sweeps else None
 
     def inside(self, attempt: Attempt[ReducedState], t: float) -> ReducedState:
         """The state at a time within a step, by a shorter one."""

@@ -145,9 +145,11 @@ def _implicit(equations: Any, control: Control) -> Any:
 
 def _gauss(name: str) -> Callable[..., Any]:
     def make(equations: Any, control: Control) -> Any:
+        from ephs.mechanics.methods.auto import Auto
         from ephs.mechanics.methods.gauss import Gauss
 
-        return Gauss(equations, control, name)
+        first = Gauss(equations, control, name)
+        return first if control.step is not None else Auto(equations, control, first)
 
     return make
 

@@ -138,6 +138,17 @@ def test_a_spring_too_stiff_for_sweeps_is_left_to_newtons_method(tmp_path):
         assert np.ravel(sol.joint("axle").coordinate)[i] + 0.3 == pytest.approx(y[0], abs=1e-9)
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_chosen_steps_are_left_to_radau_where_a_brake_is_stiff(name, tmp_path):
+    """A brake that stops within a microsecond: Gauss steps of the motion's length would let its rate ring on."""
+    file = tmp_path / "brake.toml"
+    file.write_text(torsion(0.5, 3.0, -1.1, rest=-0.3, friction=1e5), encoding="utf-8")
+    sol = ephs.simulate(ephs.load(file), 1.0, method=name, rtol=1e-6, atol=1e-6)
+    assert [switch["to"] for switch in sol.stats["switches"]] == ["radau"] and sol.stats["steps"] < 500
+    assert abs(sol.joint("axle").rate[-1]) <= 1e-5 and sol.energy_error.max() <= 1e-12
+    assert not ephs.simulate(ephs.load(file), 1e-6, method=name, rtol=1e-6, atol=1e-6).stats["switches"]
+
+
 def test_sweeps_that_do_not_contract_end_a_step(tmp_path):
     file = tmp_path / "stiff.toml"
     file.write_text(torsion(0.5, 2e4, -1.1, rest=-0.3), encoding="utf-8")
