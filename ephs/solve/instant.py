@@ -13,6 +13,7 @@ import numpy as np
 from ephs.operad import Path
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.descriptor import ComponentSlot, Descriptor, Input
+from ephs.semantics.extents import room
 from ephs.semantics.primitives import Irreversible, Reversible, Storage
 from ephs.semantics.spaces.rank import CONSTRAINT, ELIMINATION, IMPLICIT, SPANNED, TINY, rank_of
 
@@ -207,7 +208,7 @@ def _flows(d: Descriptor, reference: Reference, x: Array, efforts: Array) -> Arr
 
 
 def _compliance(slot: ComponentSlot, d: Descriptor, x: Array, reference: Reference) -> Array:
-    """∂(effort)/∂(state) of a storage, left-trivialised, by differences of fourth order."""
+    """∂(effort)/∂(state) of a storage, left-trivialised, by differences of fourth order within the states' domain."""
     storage = slot.primitive
     assert isinstance(storage, Storage)
     n = storage.bundle.size
@@ -215,12 +216,16 @@ def _compliance(slot: ComponentSlot, d: Descriptor, x: Array, reference: Referen
         return np.array(storage.kernel.parameters).reshape(n, n)
     point = d.point(slot, x)
     out = np.zeros((n, n))
-    for i, unit in enumerate(np.eye(n)):
+    for port, where, quantity in storage.bundle.items():
+        h = 1e-3 * min(1.0, room(quantity, point[port]))
+        for i in range(where.start, where.stop):
+            along = np.zeros(n)
+            along[i] = h
 
-        def effort(step: float, along: Array = unit) -> Array:
-            return storage.effort(storage.retract(point, step * along), reference)
+            def effort(steps: float, along: Array = along) -> Array:
+                return storage.effort(storage.retract(point, steps * along), reference)
 
-        out[:, i] = (8.0 * (effort(1e-3) - effort(-1e-3)) - (effort(2e-3) - effort(-2e-3))) / 12e-3
+            out[:, i] = (8.0 * (effort(1.0) - effort(-1.0)) - (effort(2.0) - effort(-2.0))) / (12.0 * h)
     return out
 
 

@@ -133,7 +133,8 @@ def seen_from(problem: Problem, events: tuple[Event, ...], progress: Progress | 
 def mobility_of(problem: Problem) -> Mobility:
     """Mobility and redundant constraints of a problem in its initial state."""
     own = in_own_units(problem)
-    return mobility(own.descriptor, own.descriptor.pack(own.initial), own.prescribed)
+    d, x = own.descriptor, own.descriptor.pack(own.initial)
+    return once(d, ("mobility", x.tobytes(), own.prescribed), lambda: mobility(d, x, own.prescribed))
 
 
 def _ports(j: Any, units: Units) -> list[tuple[Path, Array]]:

@@ -10,12 +10,19 @@ from ephs.operad import Path, junction
 from ephs.semantics.bundle import Reference
 from ephs.semantics.system import System
 from ephs.solve.problem import Problem, Signal
+from tests.oracle import Oracle
 
 
 def problem_of(system, initial=None, signals=None, reference=None):
     return Problem(
         "system", system, system.descriptor(), initial or system.state(), signals or {}, reference or Reference()
     )
+
+
+def oracle_of(problem):
+    """The plain evaluation of a problem whose inputs are constant."""
+    inputs = {port: (np.atleast_1d(np.array(of.value, dtype=float)), of.effort) for port, of in problem.signals.items()}
+    return Oracle(problem.system, inputs, problem.reference)
 
 
 def renamed(scene, word, seed):

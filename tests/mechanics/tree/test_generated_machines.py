@@ -84,7 +84,7 @@ class Bench:
             self.motor(shaft)
 
     def motor(self, shaft):
-        """A mesh with a coil that a magnet couples to the shaft; the oracle takes efforts of storages only."""
+        """A mesh with a coil that a magnet couples to the shaft."""
         b, magnet = self.junction(Q.flux_linkage), self.junction(Q.flux_linkage)
         self.start[f"{self.add(lib.inductor(l=1.0), {'b': magnet})}.b"] = self.number()
         self.add(lib.mkc(), {"b": b, "p": shaft, "bs": f"~{magnet}"})
