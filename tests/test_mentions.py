@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parents[1]
 TEXTS = [ROOT / f"{name}.md" for name in ("README", "CONTRIBUTING", "STYLE")] + sorted((ROOT / "docs").glob("*.md"))
 MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
 TARGETS = set(re.findall(r"^([a-z-]+):", MAKEFILE, re.MULTILINE))
-HOUSE = "ephs|docs|tests|tests_real|benchmarks|examples|scenes"
+HOUSE = "ephs|docs|tests|tests_real|tests_learning|benchmarks|examples|scenes"
 TOP = r"[A-Z]+\.md|Makefile|CITATION\.cff|pyproject\.toml"
 MADE = ("docs/_build",)
 """What is not in the tree, but made by a command that the text names."""

@@ -17,6 +17,8 @@ TEXTS: Final = {
     "structure": "parameters {found}: they change what the mechanism is made of, expected numbers only",
     "polynomial": "parameter {found}: the program's numbers are no polynomials of degree 2 in it, expected one such as "
     "a mass, a stiffness, a friction or a force",
+    "values": "numbers of shape {found}: expected {expected}, one for each parameter",
+    "double": "{where}: numbers of {found}; expected float64",
     "name": "name {found!r}: expected a name of C, of letters, digits and _",
 }
 
