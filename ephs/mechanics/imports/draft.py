@@ -44,6 +44,7 @@ class Draft:
         self._joints: dict[str, dict[str, Any]] = {}
         self._names: dict[str, str] = {WORLD: GROUND}
         self._joint_names: dict[str, str] = {}
+        self._gears: dict[str, dict[str, Any]] = {}
         self._centres: dict[str, Array] = {WORLD: np.zeros(3)}
         self._left: dict[str, dict[str, None]] = {}
         self._renamed: list[str] = []
@@ -124,7 +125,19 @@ class Draft:
 
     def hold(self, name: str) -> None:
         """Keep a joint of one freedom where it is."""
-        self._joints[self._joint_names[name]]["motion"] = {"rate": 0.0}
+        entries = self._joints[self._joint_names[name]]
+        entries.pop("armature", None)
+        entries["motion"] = {"rate": 0.0}
+
+    def gear(self, name: str, first: str, second: str, ratio: float, offset: float = 0.0) -> None:
+        """Tie the coordinate of a joint of one freedom to that of another, which is 0: ratio · coordinate + offset."""
+        joints = [self._joint_names[first], self._joint_names[second]]
+        if offset:
+            self._joints[joints[0]]["coordinate"] = offset
+        if ratio:
+            self._gears[self._own(name, self._gears)] = {"joints": joints, "ratio": float(ratio)}
+        else:
+            self.hold(first)
 
     def shape(self, link: str, kind: str, value: Any, place: Array, **more: Any) -> None:
         """Something to draw on a link."""
@@ -170,6 +183,7 @@ class Draft:
             "assembly": {"inertia": mode},
             "bodies": self._bodies,
             "joints": self._joints,
+            **({"gears": self._gears} if self._gears else {}),
             **({"surfaces": self._surfaces, "contacts": self._contacts} if self._contacts else {}),
         }
 

@@ -152,7 +152,9 @@ def _joints(model: Any, b: int, names: Names, threads: Mapping[int, Thread], dra
         entries = _passive(model, j, kind)
         if thread is not None:
             kind, entries["pitch"] = "screw", thread.pitch
-            entries["friction"] += thread.pitch**2 * _passive(model, thread.slide, "prismatic")["friction"]
+            slide = _passive(model, thread.slide, "prismatic")
+            for key in ("friction", "armature"):
+                entries[key] += thread.pitch**2 * slide[key]
         draft.joint(names.joints[j], kind, before, after, SE3.compose(at, frame), frame, entries)
         if kind in ("revolute", "prismatic") and _limited(model, j):
             draft.limit(names.joints[j], *(model.jnt_range[j] - model.qpos0[int(model.jnt_qposadr[j])]))
@@ -167,10 +169,12 @@ def _limited(model: Any, j: int) -> bool:
 
 
 def _passive(model: Any, j: int, kind: str) -> dict[str, Any]:
-    """Damping, stiffness and rest; coordinates count from the reference configuration."""
+    """Damping, stiffness, rest and armature; coordinates count from the reference configuration."""
     mujoco: Any = import_module("mujoco")
     off, flags = mujoco.mjtDisableBit, model.opt.disableflags
     entries: dict[str, Any] = {"friction": 0.0}
+    if kind in ("revolute", "prismatic"):
+        entries["armature"] = float(model.dof_armature[model.jnt_dofadr[j]])
     if not flags & off.mjDSBL_DAMPER:
         entries["friction"] = float(model.dof_damping[model.jnt_dofadr[j]])
     if not flags & off.mjDSBL_SPRING:

@@ -1,4 +1,4 @@
-"""Equality constraints of a compiled MJCF: those that are lower pairs close loops or hold joints."""
+"""Equality constraints of a compiled MJCF: those that are lower pairs close loops, others hold joints or tie two."""
 
 from collections.abc import Set
 from dataclasses import dataclass
@@ -52,7 +52,8 @@ def screws(model: Any, names: Names) -> dict[int, Thread]:
 
 
 def loops(model: Any, names: Names, screwed: Set[int], draft: Draft) -> None:
-    """A spherical joint for a ``connect``, a fixed one for a ``weld``; a joint that is held at a value gets the rate 0.
+    """A spherical joint for a ``connect``, a fixed one for a ``weld``; a joint that is held at a value gets the rate 0,
+    one that follows another in a constant ratio a gear.
 
     Others but those of screws are noted. They are rigid here, soft in MuJoCo.
     """
@@ -82,5 +83,13 @@ def loops(model: Any, names: Names, screwed: Set[int], draft: Draft) -> None:
         elif kind == kinds.mjEQ_JOINT and second < 0 and not data[0]:
             draft.hold(names.joints[first])
             draft.leave("softness of equality constraints", name)
+        elif kind == kinds.mjEQ_JOINT and second >= 0 and _in_ratio(names, (first, second), data):
+            draft.gear(name, names.joints[first], names.joints[second], data[1])
+            draft.leave("softness of equality constraints", name)
         else:
-            draft.leave("equality constraints that are no lower pairs", name)
+            draft.leave("equality constraints that are neither lower pairs nor constant ratios", name)
+
+
+def _in_ratio(names: Names, joints: tuple[int, int], data: Any) -> bool:
+    """Whether the coordinates of two joints with one freedom are in a constant ratio."""
+    return not np.any(data[[0, 2, 3, 4]]) and all(names.kinds[j] in ("revolute", "prismatic") for j in joints)

@@ -129,7 +129,7 @@ class Source:
         for section in list(root):
             if section.tag in _SECTIONS:
                 for number, entry in enumerate(section):
-                    self._draft.leave(_SECTIONS[section.tag], entry.get("name") or f"{entry.tag} {number + 1}")
+                    self._draft.leave(_SECTIONS[section.tag], _called(entry, number))
             if section.tag in _SECTIONS or section.tag in _SILENT:
                 root.remove(section)
         for element in list(root.iter()):
@@ -138,7 +138,7 @@ class Source:
                     element.remove(child)
                 elif element.tag == "equality" and child.tag not in _PAIRS:
                     name = child.get("name") or f"one of {child.tag}"
-                    self._draft.leave("equality constraints that are no lower pairs", name)
+                    self._draft.leave("equality constraints that are neither lower pairs nor constant ratios", name)
                     element.remove(child)
                 elif element.tag == "body" and child.tag == "plugin":
                     self._draft.leave("plugins", child.get("plugin") or "plugin")
@@ -193,6 +193,14 @@ class Source:
             if not small:
                 key = f"mesh {mesh.get('name', '')}.params"
                 self._draft.faults.append(fault("large", key, word, most=_MOST_PARAMETER))
+
+
+def _called(entry: Element, number: int) -> str:
+    """Name of an entry; of an actuator on a joint with that joint, whose force is an input here, and the gear."""
+    name, joint, gear = entry.get("name") or f"{entry.tag} {number + 1}", entry.get("joint"), entry.get("gear", "")
+    if joint is None:
+        return name
+    return f"{name} (gear {gear.split()[0]} on {joint})" if gear.split() else f"{name} (on {joint})"
 
 
 def _geoms(root: Element) -> Iterator[tuple[Element, Element]]:

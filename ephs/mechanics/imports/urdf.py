@@ -8,7 +8,7 @@ import numpy as np
 from ephs.mechanics.imports.draft import WORLD, Draft, along, pose, turned_tensor
 from ephs.mechanics.imports.elements import check_kind, check_link, check_mass, named, tensor
 from ephs.mechanics.imports.xml import numbers, vector
-from ephs.mechanics.scene.errors import fault
+from ephs.mechanics.scene.errors import did_you_mean, fault, listing
 from ephs.mechanics.scene.geometry import coupling
 from ephs.semantics.spaces import SE3
 
@@ -48,6 +48,8 @@ def read_urdf(root: Element, draft: Draft, base: str) -> None:
     for link in order[1:]:
         name = of_child[link]
         _joint(name, joints[name], *ends[name], draft)
+    for name, joint in joints.items():
+        _mimic(name, joint, joints, draft)
     for element in root:
         if element.tag in _PASSED_BY:
             draft.leave(_PASSED_BY[element.tag], element.get("name") or element.get("reference") or element.tag)
@@ -165,9 +167,26 @@ def _joint(name: str, joint: Element, parent: str, child: str, draft: Draft) -> 
         draft.limit(name, lower, upper)
     elif d and limit is not None:
         draft.leave("limits of", name)
+
+
+def _mimic(name: str, joint: Element, joints: Mapping[str, Element], draft: Draft) -> None:
+    """Tie a joint to the one that it mimics, where both have one freedom and the other one starts at 0."""
     mimic = joint.find("mimic")
-    if mimic is not None:
-        draft.leave("mimicry of", f"{name} (of {mimic.get('joint')})")
+    if mimic is None:
+        return
+    key, other = f"joints.{name}.mimic", mimic.get("joint") or ""
+    ratio, offset = (
+        _attribute(mimic, word, key, draft, default) for word, default in (("multiplier", 1.0), ("offset", 0.0))
+    )
+    followed = joints.get(other)
+    moves = [KINDS.get(str(each.get("type"))) for each in (joint, followed) if each is not None]
+    if followed is None:
+        hint = did_you_mean(other, joints, f"there are: {listing(joints)}")
+        draft.faults.append(fault("unknown joint", f"{key}.joint", f'"{other}"', hint=hint))
+    elif other == name or set(moves) - {"revolute", "prismatic"} or (followed.find("mimic") is not None and offset):
+        draft.leave("mimicry of", f"{name} (of {other})")
+    else:
+        draft.gear(name, name, other, ratio, offset)
 
 
 def _origin(element: Element, key: str, draft: Draft) -> np.ndarray:

@@ -15,7 +15,8 @@ def stripped(model):
     disabled = mujoco.mjtDisableBit
     for bit in ("CONTACT", "LIMIT", "EQUALITY", "ACTUATION", "FRICTIONLOSS"):
         model.opt.disableflags |= int(getattr(disabled, f"mjDSBL_{bit}"))
-    model.dof_armature[:] = 0.0
+    many = np.isin(model.jnt_type, (mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtJoint.mjJNT_BALL))
+    model.dof_armature[many[model.dof_jntid]] = 0.0
     model.opt.viscosity = model.opt.density = 0.0
     mujoco.mj_setConst(model, mujoco.MjData(model))  # inertias that it keeps ready have the armature in them
     return model

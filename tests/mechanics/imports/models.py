@@ -37,7 +37,7 @@ URDF = """<?xml version="1.0"?>
   <joint name="elbow.pitch" type="continuous"><parent link="turn"/><child link="spin"/>
     <origin xyz="0 0 0.6"/><axis xyz="0 1 0"/></joint>
   <joint name="rail" type="prismatic"><parent link="spin"/><child link="slide"/>
-    <origin xyz="0.4 0 0" rpy="0 0.4 0"/><axis xyz="1 0 2"/><mimic joint="shoulder" multiplier="2"/>
+    <origin xyz="0.4 0 0" rpy="0 0.4 0"/><axis xyz="1 0 2"/>
     <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
   <joint name="table" type="planar"><parent link="base"/><child link="plate"/>
     <origin xyz="0 1 0" rpy="0.7 0.2 0.1"/><axis xyz="0 0 1"/></joint>

@@ -102,7 +102,7 @@ WELDED = """<mujoco><worldbody>
   <body name="b" pos="1 0 1.5" euler="0 30 0"><freejoint/><geom size="0.1"/></body>
 </worldbody><equality>
   <weld name="glue" body1="a" body2="b" anchor="0.2 0.1 0.3"/><joint name="stop" joint1="lock"/>
-  <joint name="couple" joint1="lock" joint2="slow"/>
+  <joint name="couple" joint1="lock" joint2="slow" polycoef="0 1 0.5 0 0"/>
   <connect name="idle" body1="a" body2="b" anchor="0 0 0" active="false"/>
 </equality></mujoco>"""
 
@@ -111,7 +111,7 @@ def test_equalities_that_are_lower_pairs_hold(write):
     with pytest.warns(ephs.ModelWarning) as caught:
         scene = ephs.load(write(WELDED, "xml"))
     text = str(caught[0].message)
-    assert "equality constraints that are no lower pairs: couple" in text
+    assert "equality constraints that are neither lower pairs nor constant ratios: couple" in text
     assert "inactive equality constraints: idle" in text
     assert "softness of equality constraints: glue, stop" in text
     assert scene.joints["glue"].kind == "fixed"
@@ -168,3 +168,23 @@ def test_a_hinge_and_a_slide_in_a_ratio_are_a_screw(order, first, second, ratio,
     dynamics = ephs.dynamics(scene)
     expected = -sign * 2.0 * 9.81 * 0.05 / (0.2 + 2.0 * 0.3**2 + 2.0 * 0.05**2)
     assert abs(dynamics.acceleration(dynamics.state0)["turn"][0] - expected) < 1e-12
+
+
+RATIO = """<mujoco><worldbody>
+  <body name="a"><joint name="one" axis="0 1 0" armature="0.3"/><geom size="0.1" pos="0.2 0 0"/></body>
+  <body name="b" pos="0 1 0"><joint name="two" axis="0 1 0" armature="0.1"/><geom size="0.1" pos="0.1 0 0"/></body>
+</worldbody><actuator><motor name="servo" joint="two" gear="50"/></actuator>
+<equality><joint name="couple" joint1="one" joint2="two" polycoef="0 -2 0 0 0"/></equality></mujoco>"""
+
+
+def test_joints_in_a_ratio_are_geared_and_armatures_are_kept(write):
+    with pytest.warns(ephs.ModelWarning, match=r"actuators: servo \(gear 50 on two\)"):
+        scene = ephs.load(write(RATIO, "xml"))
+    assert [scene.joints[name].armature for name in ("one", "two")] == [0.3, 0.1]
+    sol = ephs.simulate(scene, 0.3, method="rk87")
+    one, two = sol.joint("one"), sol.joint("two")
+    assert np.allclose(one.coordinate, -2.0 * two.coordinate, rtol=0.0, atol=1e-12)
+    mass, moment = scene.bodies["a"].mass, scene.bodies["a"].inertia[1, 1]
+    inertia = 4.0 * (0.3 + moment + 0.04 * mass) + 0.1 + moment + 0.01 * mass
+    start = (sol.joint("two").rate[1, 0] - sol.joint("two").rate[0, 0]) / (sol.t[1] - sol.t[0])
+    assert np.isclose(start, 9.81 * mass * (0.1 - 0.4) / inertia, rtol=1e-3)

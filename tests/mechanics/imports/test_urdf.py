@@ -84,12 +84,42 @@ def test_the_warning_comes_once_and_names_everything(write):
     for words in (
         "contacts of: base",
         "limits of: shoulder, rail",
-        "mimicry of: rail (of shoulder)",
         "dry friction of: shoulder",
         "transmissions: motor",
         "hand.tip → hand_tip, elbow.pitch → elbow_pitch",
     ):
         assert words in text
+
+
+MIMIC = URDF.replace('<axis xyz="1 0 2"/>', '<axis xyz="1 0 2"/><mimic joint="shoulder" multiplier="2" offset="0.1"/>')
+
+
+def test_a_joint_that_mimics_another_follows_it(write, quiet):
+    scene = quiet(write(MIMIC))
+    moving = scene.with_state(rates={"shoulder": 0.5, "rail": 1.0, "elbow_pitch": 0.2})
+    sol = ephs.simulate(moving, 0.3, method="rk87")
+    shoulder, rail = sol.joint("shoulder"), sol.joint("rail")
+    assert sol.stats["form"] == "reduced"
+    assert np.allclose(rail.rate, 2.0 * shoulder.rate, rtol=0.0, atol=1e-11)
+    assert np.allclose(rail.coordinate, 2.0 * shoulder.coordinate + 0.1, rtol=0.0, atol=1e-11)
+    assert np.abs(shoulder.rate - 0.5).max() > 0.1
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('mimic joint="shoulder"', 'mimic joint="shuolder"', 'joints.rail.mimic.joint.*did you mean "shoulder"'),
+        ('multiplier="2"', 'multiplier="two"', "joints.rail.mimic.multiplier"),
+    ],
+)
+def test_mimicry_that_does_not_fit_is_told_by_its_key(write, old, new, words):
+    with pytest.raises(ephs.SceneError, match=words):
+        ephs.load(write(MIMIC.replace(old, new)))
+
+
+def test_a_joint_that_mimics_one_of_many_freedoms_is_named(write):
+    with pytest.warns(ephs.ModelWarning, match=r"mimicry of: rail \(of table\)"):
+        ephs.load(write(MIMIC.replace('mimic joint="shoulder"', 'mimic joint="table"')))
 
 
 NAMES = st.text(
