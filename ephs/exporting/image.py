@@ -148,7 +148,7 @@ def _started(
     control = control_of(problem, tableau(method).order, rtol, atol, step, None, None, None)
     state = equations.start(0.0)
     explicit = Explicit(equations, control, tableau(method))
-    policy = None if step is not None else Proportional(lambda: explicit.exponent, explicit.share)
+    policy = None if step is not None else Proportional(lambda: explicit.exponent, lambda: explicit.share)
     span = Span(state, 0.0, until, first_step(control, until), control, policy, np.zeros(0), 0)
     leg = explicit.many(span)
     if leg is None:

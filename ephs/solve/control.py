@@ -205,8 +205,8 @@ class Proportional:
     exponent
         Says with which power of the step the estimate falls, which may change from step to step.
     share
-        A step of h in a run of T aims at (h/T)^share of the tolerance: with 0 errors add up over the steps, with 1
-        they make the tolerance together.
+        Says, as it may change too, how a step's part of the tolerance depends on its length: a step of h in a run of T
+        aims at (h/T)^share of it. With 0 errors add up over the steps, with 1 they make the tolerance together.
     damping
         How much the last error counts, 0 for none.
     """
@@ -214,7 +214,9 @@ class Proportional:
     STRICT = 30.0
     finest = 0.0
 
-    def __init__(self, exponent: Callable[[], float], share: float = 0.0, damping: float = 0.4) -> None:
+    def __init__(
+        self, exponent: Callable[[], float], share: Callable[[], float] = lambda: 0.0, damping: float = 0.4
+    ) -> None:
         self._exponent, self._share, self._damping, self._before = exponent, share, damping, 1e-4
         self._failed = False
 
@@ -223,8 +225,8 @@ class Proportional:
 
         What is accepted knows the share up to a limit only: where rates jump, no step would be short enough.
         """
-        part = (span / h) ** self._share
-        exponent = self._exponent() - self._share
+        share = self._share()
+        part, exponent = (span / h) ** share, self._exponent() - share
         strict = error * min(part, self.STRICT)
         error *= part
         if not strict <= 1.0:
@@ -239,8 +241,9 @@ class Proportional:
 
     def wanted(self, h: float, error: float, span: float) -> float:
         """Length of the step, however short, whose error would be the tolerance."""
-        part = min((span / h) ** self._share, self.STRICT)
-        return h * (error * part) ** (-1.0 / (self._exponent() - self._share))
+        share = self._share()
+        part = min((span / h) ** share, self.STRICT)
+        return h * (error * part) ** (-1.0 / (self._exponent() - share))
 
     def snapshot(self) -> Snapshot:
         """Memory of earlier steps."""

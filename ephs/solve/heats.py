@@ -24,7 +24,7 @@ from ephs.semantics.numbering import Index
 from ephs.semantics.primitives import Primitive, Storage
 from ephs.solve.errors import Outcome, SolveError
 
-__all__ = ["PLAIN", "Heats", "exponential_law"]
+__all__ = ["LITTLE", "PLAIN", "Heats", "exponential_law"]
 
 EXPONENTIAL = 1e-12
 """Part by which energies may be off an exponential law that they are taken for: rounding of the functions."""

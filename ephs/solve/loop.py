@@ -16,14 +16,14 @@ from ephs.solve.auditing.resolution import Samples, trials_of
 from ephs.solve.breakpoints import Breakpoints
 from ephs.solve.control import SLIVER, Control, Policy, first_step
 from ephs.solve.errors import OptionError, Outcome, SolveError, solve_error_of
-from ephs.solve.events import Crossing, Event, Watch
+from ephs.solve.events import Event, Watch
 from ephs.solve.integrate import Grid, Progress, audited, failures_of, repeatable
 from ephs.solve.journal import Written
 from ephs.solve.problem import Problem, States
 from ephs.solve.result.record import Record, Rows, record_of
 from ephs.solve.result.solution import Solution
 from ephs.solve.snapshot import Snapshot, like, parts
-from ephs.solve.stepping import Attempt, Leg, Row, Span, Stepper, too_fast
+from ephs.solve.stepping import Attempt, Counts, Leg, Row, Span, Stepper, too_fast
 from ephs.solve.watching import Balance
 
 __all__ = ["integrate_stepwise"]
@@ -153,18 +153,20 @@ class _Run(Generic[S]):
 
         ``stood`` is where the compiled part of an earlier run did, None where it was left.
         """
-        # nothing has to be looked at in each step
-        alone = self.watch is None and not self.production.active and not self.breakpoints.active
-        if alone and (self.journal is None or self.journal.snapshot is None or stood is not None):
-            span = Span(self.state, self.t0, self.until, self.h, self.control, self.policy, self.save_at, self.saved)
-            self.leg = self.stepper.many(span)
-            if self.leg is not None:
-                if stood is not None:
-                    self.leg.restore(stood)
-                self._follow(self.leg)
-                self.leg = None
-        if not self.ended:
-            self._advance_stepwise()
+        alone = not (self.watch or self.production.active or self.breakpoints.active)  # no step has to be looked at
+        compiled = alone and (self.journal is None or self.journal.snapshot is None or stood is not None)
+        while compiled and not self.ended and self.t != self.until:  # leg after leg, while the method has one
+            counts = Counts(self.steps, self.rejected, self.shortest, self.longest, self.least, self.h)
+            here = self.state, self.t0, self.until, self.h, self.control, self.policy, self.save_at, self.saved
+            self.leg = self.stepper.many(Span(*here, counts))
+            if self.leg is None:
+                break
+            if stood is not None:
+                self.leg.restore(stood)
+            stood = None
+            self._follow(self.leg)
+            self.leg = None
+        self._advance_stepwise()
 
     def _follow(self, leg: Leg[S]) -> None:
         """Compiled steps until the end, or where they leave off."""
@@ -292,8 +294,6 @@ class _Run(Generic[S]):
 
     def stats(self) -> dict[str, Any]:
         """Statistics of the run so far."""
-        least = float(self.least) if np.isfinite(self.least) else 0.0
-        crossings: list[Crossing] = self.watch.crossings if self.watch else []
         return {
             "method": self.stepper.name,
             "steps": self.steps,
@@ -308,8 +308,8 @@ class _Run(Generic[S]):
             **self.forecast.stats(),
             "setup_s": self.setup,
             "integrate_s": time.perf_counter() - self.begin - self.setup,
-            "least_production": least,
-            **({"events": [crossing.record() for crossing in crossings]} if self.watch else {}),
+            "least_production": float(self.least) if np.isfinite(self.least) else 0.0,
+            **({"events": [crossing.record() for crossing in self.watch.crossings]} if self.watch else {}),
         }
 
     def solution(self) -> Solution:

@@ -1,7 +1,7 @@
 """Contract between the time loop and a method: steps one a call, or many; steps and records."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Generic, Protocol, TypeVar, final
 
 import numpy as np
@@ -69,10 +69,10 @@ class Attempt(Generic[S]):
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Span(Generic[S]):
-    """Remainder of a run: from a state to a time, by steps of which the next one is h seconds long.
+    """Remainder of a run: from a state to its end, by steps of which the next one is h seconds long.
 
-    ``save_at`` are the times to keep, of which ``saved`` are kept already; None: every step. Without a ``policy`` steps
-    are constant.
+    The run began at ``t0``; ``counts`` are those of its steps so far. ``save_at`` are the times to keep, of which
+    ``saved`` are kept already; None: every step. Without a ``policy`` steps are constant.
     """
 
     state: S
@@ -83,6 +83,7 @@ class Span(Generic[S]):
     policy: Policy | None
     save_at: Array | None
     saved: int
+    counts: "Counts" = field(default_factory=lambda: Counts())
 
 
 @final
@@ -90,12 +91,12 @@ class Span(Generic[S]):
 class Counts:
     """Steps that were taken, tries that were rejected, lengths in s, the least entropy production, the next step."""
 
-    steps: int
-    rejected: int
-    shortest: float
-    longest: float
-    least: float
-    h: float
+    steps: int = 0
+    rejected: int = 0
+    shortest: float = float("inf")
+    longest: float = 0.0
+    least: float = float("inf")
+    h: float = 0.0
 
 
 def too_fast(method: str, worst: str, asked: float) -> SolveError:

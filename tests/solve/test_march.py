@@ -71,6 +71,12 @@ class Pendulum(Motion):
     def hold(self, on, change, low, high):
         pass
 
+    def absorb(self, on, anchor, y0, q, y1, change):
+        pass
+
+    def warm(self, on, y0, y):
+        pass
+
     def open(self, on, account, q, y):
         return 0
 
@@ -221,7 +227,7 @@ def test_backward_in_time_leads_back():
     share=st.sampled_from([0.0, 0.5]), exponent=st.sampled_from([5.0, 8.0]),
 )  # fmt: skip
 def test_steps_are_judged_as_by_the_proportional_control(h, error, before, failed, share, exponent):
-    oracle = Proportional(lambda: exponent, share)
+    oracle = Proportional(lambda: exponent, lambda: share)
     oracle.restore({"before": before, "failed": failed})
     accepted, following = oracle.judge(h, error, 1.0)
     control = Control.table(1)

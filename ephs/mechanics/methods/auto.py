@@ -56,9 +56,7 @@ class Auto(ReducedMethod):
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
         """One step of h seconds."""
         if self._implicit is not None:
-            found = self._implicit.step(state, h)
-            self.counts |= self._implicit.counts
-            return found
+            return self._implicit.step(state, h)
         try:
             found = self._explicit.step(state, h)
         except SolveError as error:
@@ -79,7 +77,9 @@ class Auto(ReducedMethod):
         return found
 
     def many(self, span: Span[ReducedState]) -> Leg[ReducedState] | None:
-        """Explicit steps, many in one compiled call, until the problem shows itself stiff."""
+        """Explicit steps, many in one compiled call, until the problem shows itself stiff; then implicit ones."""
+        if self._implicit is not None:
+            return self._implicit.many(span)
         return self._explicit.many(span, self._limit, self._switch)
 
     def _switch(self, t: float, h: float, reason: str) -> None:
@@ -89,8 +89,8 @@ class Auto(ReducedMethod):
     def _go_implicit(self) -> "Implicit":
         from ephs.mechanics.methods.radau import Implicit  # with its derivatives, which explicit runs do not need
 
-        self._implicit = Implicit(self.equations, self.control)
-        self.exponent = self._implicit.exponent
+        self._implicit = Implicit(self.equations, self.control, self.counts)
+        self.exponent, self.share = self._implicit.exponent, self._implicit.share
         self.name = f"{self._explicit.name}, radau"
         return self._implicit
 

@@ -5,35 +5,46 @@ y = (v, r, heats), so that the same collocation serves joints on every group; wo
 heats follow that and the energies, see `Heats`.
 """
 
-from typing import final
+from collections.abc import Mapping
+from typing import Any, Final, final
 
 import numpy as np
 from scipy.linalg import lu_solve
 
+from ephs.mechanics.methods.marching import March
 from ephs.mechanics.methods.method import ReducedMethod
-from ephs.mechanics.methods.stages import Stages
+from ephs.mechanics.methods.stages import Kept, Stages
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.semantics.bundle import Array
 from ephs.solve.control import Control
 from ephs.solve.methods.radau import COEFFICIENTS, NODES
 from ephs.solve.snapshot import Snapshot
-from ephs.solve.stepping import Attempt
+from ephs.solve.stepping import Attempt, Leg, Span
 
 __all__ = ["Implicit"]
 
 _S6 = 6.0**0.5
 _EMBEDDED = np.array([-13.0 - 7.0 * _S6, -13.0 + 7.0 * _S6, -1.0]) / 3.0
+ARRAYS: Final[Mapping[str, Any]] = {
+    "a": np.pad(np.vstack([np.zeros(3), COEFFICIENTS, COEFFICIENTS[-1]]), ((0, 0), (1, 0))),
+    "guess": np.zeros((4, 4)),
+    "error": np.array([1.0, *(_EMBEDDED @ COEFFICIENTS), 0.0]),
+    "coarse": np.zeros(5),
+    "eighth": np.zeros(1, dtype=np.int64),
+}
+"""The method as `ephs.solve.march.Tableau`: after the start, the stages; the last leads to the end."""
 
 
 @final
 class Implicit(ReducedMethod):
-    """The method on one mechanism."""
+    """The method on one mechanism; with ``counts`` its own are counted there."""
 
     name = "radau"
     exponent = 4.0
 
-    def __init__(self, equations: Equations, control: Control) -> None:
+    def __init__(self, equations: Equations, control: Control, counts: dict[str, Any] | None = None) -> None:
         super().__init__(equations, control)
+        self.counts = self.counts if counts is None else counts
         self._known: tuple[Array, Array] | None = None
         self._stages = Stages(equations, control, NODES, COEFFICIENTS, self.counts)
         self.rtol, self.atol = self._stages.rtol, self._stages.atol
@@ -55,6 +66,14 @@ class Implicit(ReducedMethod):
         closed, missed = eq.accounts.corrected(state, closed, h, allowed, chosen=self.control.step is None, alone=True)
         self._stages.keep(fast=fast)
         return Attempt(state, closed, h, max(error, missed), eq.least(state, closed))
+
+    def many(self, span: Span[ReducedState]) -> Leg[ReducedState] | None:
+        """Steps of trees, many in one compiled call, where nothing has to be asked of Python at each."""
+        eq = self.equations
+        looped, attached = eq.engine.looped or eq.driven.size > 0, bool(eq.reduced.attaching.network.attached)
+        if looped or attached or not eq.constant:
+            return None
+        return March(self, ARRAYS, span, kept=Kept(self._stages, COEFFICIENTS))
 
     def taken(self, state: ReducedState) -> Snapshot:
         """Where the matrix was made, and the step for which it was factorised."""

@@ -106,7 +106,7 @@ def on_joints(make: Callable[..., Any]) -> Callable[[Setting], tuple[Stepper[Any
             raise OptionError("method", setting.method, f"{serving}: {error}") from None
         stepper = make(equations, setting.control, **setting.options)
         return stepper, None if setting.control.step is not None else Proportional(
-            lambda: stepper.exponent, stepper.share
+            lambda: stepper.exponent, lambda: stepper.share
         )
 
     return made

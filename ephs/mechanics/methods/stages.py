@@ -15,18 +15,19 @@ from ephs.mechanics.tree.finding.naming import counted
 from ephs.semantics.bundle import Array
 from ephs.solve.control import Control
 from ephs.solve.errors import Outcome, SolveError
+from ephs.solve.march import Newton
+from ephs.solve.march.newton import ITERATIONS
 from ephs.solve.methods.factors import factors
 from ephs.solve.snapshot import Snapshot
 
-__all__ = ["Stages"]
+__all__ = ["Kept", "Stages"]
 
 SOLVED = 1e-13
 """Part of the states to which the equations of a step can be solved: rounding, times a condition of some hundreds."""
 REAL = 1e-12
 """Imaginary part of an eigenvalue, beside its size, that is rounding."""
-
-ITERATIONS = 10
 ROUNDING = 1e-14
+"""Tolerances to which stages are solved at constant steps."""
 FAST = 2e-3
 """A rate of convergence that a new matrix would not better: an exact one costs about as much as an iteration."""
 
@@ -48,6 +49,9 @@ class Stages:
         Of what counts in an error; near rounding where steps are constant.
     inverse
         Of the coefficients.
+    enough, rough
+        Change of an iteration, relative to what is allowed, after which stages are solved; that is good enough where
+        the iteration gets no further.
     """
 
     def __init__(
@@ -58,10 +62,10 @@ class Stages:
         if control.step is None:
             # As far as Newton's method is taken, relative to the tolerance: less than the method's own error.
             least = float(np.min(self.rtol, initial=1.0))
-            self._enough, self._rough = max(SOLVED / max(least, SOLVED), min(0.03, least**0.5)), 1e-2
+            self.enough, self.rough = max(SOLVED / max(least, SOLVED), min(0.03, least**0.5)), 1e-2
         else:  # to rounding, and near changes of rank as far as it goes
             self.rtol, self.atol = np.full_like(self.rtol, ROUNDING), np.full_like(self.atol, ROUNDING)
-            self._enough, self._rough = 1.0, 1e5
+            self.enough, self.rough = 1.0, 1e5
         values, vectors = np.linalg.eig(self.inverse)
         sizes, turns = np.abs(values), np.imag(values)
         kept = np.flatnonzero(turns >= -REAL * sizes)
@@ -72,7 +76,7 @@ class Stages:
         self._solvers: tuple[float, list[Any]] | None = None
         # Off the constraints the exact matrix grows as one over this: an old one is wrong there by as much.
         self._separation, self._stale = equations.separation(), False
-        self._counts = counts
+        self.counts = counts
         counts |= {"iterations": 0, "factorisations": 0}
         self.jacobian = Jacobian(equations, counts)
         self.heat = slice(equations.nv + equations.n, self.jacobian.size)
@@ -105,7 +109,7 @@ class Stages:
             matrix, unit = self.jacobian.at(state), np.eye(self.jacobian.size)
             numbers = [mu if twice > 1.0 else mu.real for mu, twice in zip(self._values, self._twice, strict=True)]
             self._solvers = h, [factors(mu / h * unit - matrix) for mu in numbers]
-            self._counts["factorisations"] += 1
+            self.counts["factorisations"] += 1
         return self._solvers[1]
 
     def allowed(self, y0: Array, y1: Array) -> Array:
@@ -163,7 +167,7 @@ class Stages:
                 y[:size] += stages[i]
                 y[self.heat] = np.maximum(y[self.heat], coldest)
                 rates[i] = eq.rates(state.t + node * h, state.q, y)
-            self._counts["iterations"] += 1
+            self.counts["iterations"] += 1
             change = self._change(state, h, rates[:, :size] - self.inverse @ stages / h)
             reached = np.abs(y0)  # what starts from nothing, as heat does, is measured by what it becomes
             reached[:size] += np.abs(stages + change).max(axis=0)
@@ -175,14 +179,75 @@ class Stages:
             if iteration > 1:
                 rate = moved / before
                 # heats are quadratic in rates: their first change says nothing of convergence
-                if rate >= 1.0 and iteration > 2 and moved > max(10.0 * self._enough, self._rough):
+                if rate >= 1.0 and iteration > 2 and moved > max(10.0 * self.enough, self.rough):
                     break
-            if moved <= self._enough or (iteration > 1 and moved * rate <= self._enough * (1.0 - min(rate, 0.9))):
+            if moved <= self.enough or (iteration > 1 and moved * rate <= self.enough * (1.0 - min(rate, 0.9))):
                 return stages, rates[:, books], iteration <= 2 or rate < FAST
-            if iteration > 2 and rate > 0.5 and moved <= self._rough:  # rounding is all that is left
+            if iteration > 2 and rate > 0.5 and moved <= self.rough:  # rounding is all that is left
                 return stages, rates[:, books], False
             before = moved
-        if moved <= self._rough:  # near a change of rank the matrix is no good, and the iteration slow
+        if moved <= self.rough:  # near a change of rank the matrix is no good, and the iteration slow
             return stages, rates[:, books], False
         path, what = counted(eq.reduced, int(np.argmax(np.nan_to_num(worst, nan=np.inf))))
         raise SolveError(Outcome.DIVERGED, path, f"{what} at the stages")
+
+
+@final
+class Kept:
+    """The Jacobian of compiled implicit steps, and their memory: `ephs.solve.march.Stiff`.
+
+    Parameters
+    ----------
+    stages
+        The same method step by step, whose Jacobian and counts it shares.
+    coefficients
+        (3, 3), with one real eigenvalue.
+    """
+
+    def __init__(self, stages: Stages, coefficients: Array) -> None:
+        eq, m = stages.equations, stages.jacobian.size
+        self._stages, self._counted = stages, [0, 0]
+        inverse = np.linalg.inv(coefficients)
+        values, vectors = np.linalg.eig(inverse)
+        real, imaginary = np.real(values), np.imag(values)
+        one, pair = int(np.argmin(np.abs(imaginary))), int(np.argmax(imaginary))
+        out = np.column_stack([np.real(vectors[:, one]), np.real(vectors[:, pair]), np.imag(vectors[:, pair])])
+        self.newton = Newton.table(1)
+        n: Any = self.newton[0]
+        n.enough, n.rough, n.stale = stages.enough, stages.rough, 1
+        # In these coordinates the inverse is (growth, −turning; turning, growth) on the pair.
+        n.decay, n.growth, n.turning = float(real[one]), float(real[pair]), -float(imaginary[pair])
+        shapes: dict[str, tuple[int, ...]] = {
+            "matrix": (m, m), "single": (m, m), "pair": (2 * m, 2 * m), "stages": (3, m), "change": (3, m),
+            "part": (m,), "parts": (2 * m,), "y": (eq.size,), "rate": (eq.size,), "q": (eq.reduced.coordinates,),
+        }  # fmt: skip
+        self.memory: dict[str, Any] = {name: np.zeros(shape) for name, shape in shapes.items()} | {
+            "newton": self.newton, "inverse": inverse, "into": np.linalg.inv(out), "out": out,
+            "swap": np.zeros(m, dtype=np.int64), "swaps": np.zeros(2 * m, dtype=np.int64),
+        }  # fmt: skip
+
+    def renew(self, state: ReducedState) -> None:
+        """Make the matrix that of a state.
+
+        Raises
+        ------
+        SolveError
+            A component cannot be evaluated there, or the mass matrix is singular.
+        """
+        self.memory["matrix"][:] = self._stages.jacobian.at(state, renew=True)
+        n: Any = self.newton[0]
+        n.stale, n.young, n.factored = 0, 1, 0.0
+
+    def count(self) -> None:
+        """Add what steps took since the last time to the method's counts."""
+        n: Any = self.newton[0]
+        found = [int(n.iterations), int(n.factorisations)]
+        for name, now, before in zip(("iterations", "factorisations"), found, self._counted, strict=True):
+            self._stages.counts[name] += now - before
+        self._counted = found
+
+    def parts(self) -> list[tuple[str, Any]]:
+        """All that the next step depends on, by name."""
+        integers, reals = self.newton.arrays
+        names = "matrix", "single", "pair", "swap", "swaps"
+        return [("newton", integers), ("newton_reals", reals), *((name, self.memory[name]) for name in names)]

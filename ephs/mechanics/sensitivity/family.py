@@ -185,7 +185,7 @@ def relation_of(descriptor: Descriptor, number: int) -> tuple[Program, str]:
     slot = descriptor.components[number]
     if slot.primitive.kernel is None:
         raise OptionError("model", str(slot.path), "relations that can be recorded: this one is called back in Python")
-    return entry_of(slot.primitive.kernel.relation, rest=True)
+    return entry_of(slot.primitive.kernel.relation, derivatives=False)
 
 
 def _entry(path: str) -> tuple[str, int]:

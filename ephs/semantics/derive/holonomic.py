@@ -76,8 +76,8 @@ class Holonomic:
         """How many parameters there are."""
         return 0 if self.maps is None else self.maps.numbers
 
-    def stage(self, on: Evaluator, a: Arguments, *, rest: bool) -> Integer:
-        """Write flows, conditions and their derivatives by efforts, multipliers and increments, at rest too."""
+    def stage(self, on: Evaluator, a: Arguments, *, bare: bool) -> Integer:
+        """Write flows, conditions and their derivatives by efforts, multipliers and increments, bare too."""
         n, _, d, size = self.dimensions
         maps = self.maps or Maps((Block(6, 6, "same"), Block(6, 6, "same"), *[Block(d, d, "same")] * (d > 0)))
         through = maps.rows([a.p[i] for i in range(self.numbers)])

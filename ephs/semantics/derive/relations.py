@@ -30,6 +30,7 @@ __all__ = [
     "Reversible",
     "Storage",
     "at_rest",
+    "bare",
     "compiled",
     "entry_of",
     "program",
@@ -113,11 +114,11 @@ class Storage:
         found = lifted(evaluate(Slopes(on), self.energy, states, given)[0])
         return [found.slopes.get(i, 0.0) for i in range(first)], found.end, [lifted(each).end for each in states]
 
-    def stage(self, on: Evaluator, a: Arguments, *, rest: bool) -> Integer:
-        """Write efforts, their derivatives by the step, and the energy; no derivatives where nothing steps."""
+    def stage(self, on: Evaluator, a: Arguments, *, bare: bool) -> Integer:
+        """Write efforts, their derivatives by the step, and the energy; no derivatives where it is bare."""
         n, _, _, size = self.dimensions
         x, p = [a.x0[i] for i in range(size)], [a.p[i] for i in range(self.numbers)]
-        duals = Duals(on, 0 if rest else n)
+        duals = Duals(on, 0 if bare else n)
         step = [duals.along(a.v[i], i) for i in range(n)]
         start, numbers = [duals.dual(each) for each in x], [duals.dual(each) for each in p[len(self.potentials) :]]
         efforts, energy, end = self.slopes(duals, start, step, numbers)
@@ -184,10 +185,10 @@ class Reversible:
         """How many parameters there are."""
         return self.structure.parameters + (0 if self.maps is None else self.maps.numbers)
 
-    def stage(self, on: Evaluator, a: Arguments, *, rest: bool) -> Integer:
-        """Write flows, conditions and, unless at rest, their derivatives by efforts, multipliers and increments."""
+    def stage(self, on: Evaluator, a: Arguments, *, bare: bool) -> Integer:
+        """Write flows, conditions and, unless bare, their derivatives by efforts, multipliers and increments."""
         n, k = self.structure.shape[1], self.structure.shape[0] - self.structure.shape[1]
-        partials = Duals(on, 0 if rest else sum(self.dimensions[:3]))
+        partials = Duals(on, 0 if bare else sum(self.dimensions[:3]))
         p, x, e, lam = _given(partials, self, a)
         own, through = self.structure.parameters, _Through(self.maps, p[self.structure.parameters :])
         e = through.inward(e)
@@ -250,9 +251,9 @@ class Irreversible:
     def _own(self) -> int:
         return len(self.potentials) + self.matrix.parameters
 
-    def stage(self, on: Evaluator, a: Arguments, *, rest: bool) -> Integer:
-        """Write flows and, unless at rest, their derivatives by efforts and increments."""
-        n, partials = len(self.reference), Duals(on, 0 if rest else sum(self.dimensions[:3]))
+    def stage(self, on: Evaluator, a: Arguments, *, bare: bool) -> Integer:
+        """Write flows and, unless bare, their derivatives by efforts and increments."""
+        n, partials = len(self.reference), Duals(on, 0 if bare else sum(self.dimensions[:3]))
         p, x, e, _ = _given(partials, self, a)
         through = _Through(self.maps, p[self._own :])
         e = through.inward(e)
@@ -353,35 +354,42 @@ def sizes(relation: Relation) -> dict[str, int]:
 @cache
 def program(relation: Relation) -> Program:
     """The program of a relation; its entry `value` has the signature of `ephs.semantics.kernel_table`."""
-    return _program(relation, rest=False)
+    return _program(relation)
+
+
+@cache
+def bare(relation: Relation) -> Program:
+    """The same without the derivatives that a relation writes, which its tangents do not need."""
+    return _program(relation, bare=True)
 
 
 @cache
 def at_rest(relation: Relation) -> Program:
-    """The same over a step of no length: increments are zero, whatever is given, and derivatives are not written."""
-    return _program(relation, rest=True)
+    """The bare relation over a step of no length: increments are zero, whatever is given."""
+    return _program(relation, bare=True, rest=True)
 
 
-def _program(relation: Relation, *, rest: bool) -> Program:
+def _program(relation: Relation, *, bare: bool = False, rest: bool = False) -> Program:
     size = sizes(relation)
 
     def value(on: Evaluator, dims: Any, scal: Any, p: Any, x0: Any, v: Any, e: Any, lam: Any, f: Any, c: Any,
               jac: Any, work: Any) -> Integer:  # fmt: skip
         if rest:
             v = Vector(Held([0.0] * size["v"]), 0, size["v"])
-        if rest and isinstance(relation, Holonomic):  # what is written to memory that nothing reads vanishes
+        if bare and isinstance(relation, Holonomic):  # what is written to memory that nothing reads vanishes
             jac = on.scratch(size["jac"])
-        return relation.stage(on, Arguments(scal, p, x0, v, e, lam, f, c, jac, work), rest=rest)
+        return relation.stage(on, Arguments(scal, p, x0, v, e, lam, f, c, jac, work), bare=bare)
 
     kinds = {name: pointer("reals", count) for name, count in size.items()}
-    return Program("resting" if rest else "element", value=Entry(value, dims=pointer("integers", 4), **kinds))
+    name = "resting" if rest else "bare" if bare else "element"
+    return Program(name, value=Entry(value, dims=pointer("integers", 4), **kinds))
 
 
-def entry_of(relation: Relation | Linear, *, rest: bool = False) -> tuple[Program, str]:
-    """The program of a relation, over a step or at rest, and the name of its entry."""
+def entry_of(relation: Relation | Linear, *, derivatives: bool = True, rest: bool = False) -> tuple[Program, str]:
+    """The program of a relation over a step, with the derivatives that it writes or without, or at rest; its entry."""
     if isinstance(relation, Linear):
         return relation.program, relation.name
-    return at_rest(relation) if rest else program(relation), "value"
+    return (at_rest if rest else program if derivatives else bare)(relation), "value"
 
 
 @cache

@@ -9,6 +9,7 @@ from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Truth, Variab
 from ephs.solve.march.account import Account, worth
 from ephs.solve.march.control import PATIENCE, held_back, judge, length
 from ephs.solve.march.memory import Books, Memory
+from ephs.solve.march.newton import Stiff, filtered
 from ephs.solve.march.records import Control, Ending, Motion, Status, Tableau
 from ephs.solve.march.steps import allow, attempt, book, drift, error_of, first, stiffness_of
 
@@ -21,9 +22,12 @@ ROUNDING = 16.0 * 2.220446049250313e-16
 
 
 def march(
-    on: Evaluator, motion: Motion, tableau: Tableau, memory: Memory, control: Control, account: Account, steps: Integer
-) -> Integer:
+    on: Evaluator, motion: Motion, tableau: Tableau, memory: Memory, control: Control, account: Account, steps: Integer,
+    stiff: Stiff | None = None,
+) -> Integer:  # fmt: skip
     """Take steps from the state in (memory.q, memory.y) until the end, or ``steps`` of them.
+
+    With memory for that, steps are implicit, their stages by Newton's method.
 
     Instants in memory.times are kept where control.saved is not negative, else every step is.
 
@@ -32,7 +36,7 @@ def march(
     Integer
         An `Ending`.
     """
-    run = _Run(on, motion, tableau, memory, control, account, on.counter(GOING), on.counter(0), on.counter(0))
+    run = _Run(on, motion, tableau, memory, control, account, stiff, on.counter(GOING), on.counter(0), on.counter(0))
     tries = on.counter(0)
 
     def one() -> Truth:
@@ -43,6 +47,11 @@ def march(
     on.when(steps > 0, lambda: on.repeat(one))
     reached = on.select(control.time >= on.absolute(control.end), int(Ending.DONE), int(Ending.PAUSED))
     return on.select(run.ended, run.ending.value, reached)
+
+
+def _set(on: Evaluator, flag: Integer) -> Truth:
+    """Tell whether a flag is 1."""
+    return on.same(flag, 1)
 
 
 @final
@@ -56,6 +65,7 @@ class _Run:
     memory: Memory
     control: Control
     account: Account
+    stiff: Stiff | None
     ending: Variable[Integer]
     status: Variable[Integer]
     accepted: Variable[Integer]
@@ -87,6 +97,7 @@ class _Run:
         def go() -> None:
             h = c.tried = length(on, c, rest)
             on.when(on.same(c.fresh, 0), self._begin)
+            self.unless_ended(self._refresh)
             self.unless_ended(lambda: self._try(h, rest))
 
         def look() -> None:
@@ -114,12 +125,19 @@ class _Run:
 
         on.when(self.sound, known, refused)
 
+    def _refresh(self) -> None:
+        """Ask for the matrix of the state where the one at hand served badly."""
+        if self.stiff is not None:
+            known = self.stiff.newton[0]
+            stale = self.on.both(_set(self.on, known.stale), self.on.negate(_set(self.on, known.young)))
+            self.on.when(stale, lambda: self.end(Ending.STALE))
+
     def _try(self, h: Real, rest: Real) -> None:
         """Take a step of length h, measure its error, and accept it or not."""
         on, motion, m, c = self.on, self.motion, self.memory, self.control
         self.accepted.value = 0
         self.status.value = attempt(
-            on, motion, self.tableau, c, m.q, m.y, self.sign * h, m.k, m.errors, m.last, m.y1, m.q1
+            on, motion, self.tableau, c, m.q, m.y, self.sign * h, m.k, m.errors, m.last, m.y1, m.q1, self.stiff
         )
 
         def look() -> None:
@@ -148,6 +166,15 @@ class _Run:
 
             dependent = on.same(self.status.value, int(Status.DEPENDENT))
             on.when(dependent, lambda: self.end(Ending.CAREFUL), other)
+            if self.stiff is not None:  # first by the matrix of the state
+                known = self.stiff.newton[0]
+                unsettled = on.same(self.status.value, int(Status.UNSETTLED))
+
+                def renew() -> None:
+                    known.stale, c.step = 1, h
+                    self.end(Ending.STALE)
+
+                on.when(on.both(unsettled, on.negate(_set(on, known.young))), renew)
 
         on.when(self.sound, weigh, refused)
         taken = on.same(self.accepted.value, 1)
@@ -157,9 +184,10 @@ class _Run:
         """Take the end of a step, or a part of one, to a state that obeys the laws, and return its error."""
         on, motion, m, c, y = self.on, self.motion, self.memory, self.control, books.end
         n, nv, error = motion.freedoms, motion.increments, on.variable(0.0)
+        damped = None if self.stiff is None else q
 
         def keep_books() -> None:
-            self.status.value = book(on, motion, self.tableau, k, h, books, self.account.anchor, part)
+            self.status.value = book(on, motion, self.tableau, k, h, books, self.account.anchor, part, damped)
 
         def settle() -> None:
             if motion.closes:
@@ -167,7 +195,10 @@ class _Run:
             self.status.value = motion.settle(on, m.q, y, q)
 
         def measure() -> None:
-            error.value = error_of(on, motion, self.tableau, m, k, h, q)
+            if self.stiff is None:
+                error.value = error_of(on, motion, self.tableau, m, k, h, q)
+            else:
+                error.value = filtered(on, motion, self.tableau, c, m.q, books.start, k, m.errors, self.stiff)
 
             def reveal() -> None:
                 error.value = on.maximum(error.value, drift(on, m.open, y.part(nv, n), m.allowed))
@@ -240,7 +271,9 @@ class _Run:
         def inside(wanted: Real) -> None:
             copy(on, m.k.row(0), m.k2.row(0))
             part = self.sign * (wanted - c.time)
-            self.status.value = attempt(on, motion, self.tableau, c, m.q, m.y, part, m.k2, m.errors, m.last, m.y2, m.q2)
+            self.status.value = attempt(
+                on, motion, self.tableau, c, m.q, m.y, part, m.k2, m.errors, m.last, m.y2, m.q2, self.stiff
+            )
 
             # Near a change of rank a part may be wrong though the whole is right: closing takes out what is across.
             on.when(self.sound, lambda: allow(on, motion, m.errors, m.y, m.y2))
@@ -293,6 +326,8 @@ class _Run:
             copy(on, m.k.row(self.tableau.a.columns), m.k.row(0))
             copy(on, m.y.part(nv, nv), m.k.row(0).part(0, nv))
         c.refusals = 0
+        if self.stiff is not None:
+            self.stiff.newton[0].young = 0
 
         def watch() -> None:
             on.when(held_back(on, c), lambda: self.end(Ending.STIFF))

@@ -51,7 +51,9 @@ class Ending(IntEnum):
     """Where no more rows fit."""
     STIFF = 5
     """Where stability, or failed evaluations, hold the steps back."""
-    REFUSED = 6
+    STALE = 6
+    """Where implicit steps need the matrix of the state."""
+    REFUSED = 7
 
 
 class Status(IntEnum):
@@ -123,6 +125,17 @@ class Motion(ABC):
 
         Sums of rates are h Σ b k of what is summed; ``sign`` is that of h.
         """
+
+    @abstractmethod
+    def absorb(self, on: Evaluator, anchor: Real, y0: Vector, q: Vector, y1: Vector, change: Vector) -> None:
+        """Make heat of the energy that a step's sums miss where its method damps: the motion lost it.
+
+        The step leads from y0 to (q, y1); the anchor is that of an account.
+        """
+
+    @abstractmethod
+    def warm(self, on: Evaluator, y0: Vector, y: Vector) -> None:
+        """Lift what an iterate y of a step from y0 may not be below."""
 
     @abstractmethod
     def hold(self, on: Evaluator, change: Vector, low: Vector, high: Vector) -> None:
@@ -201,6 +214,12 @@ class Field(Motion):
 
     def book(self, on: Evaluator, y0: Vector, change: Vector, size: Vector, sign: Real) -> Integer:
         return 0
+
+    def absorb(self, on: Evaluator, anchor: Real, y0: Vector, q: Vector, y1: Vector, change: Vector) -> None:
+        """There is no heat."""
+
+    def warm(self, on: Evaluator, y0: Vector, y: Vector) -> None:
+        """There is no heat."""
 
     def hold(self, on: Evaluator, change: Vector, low: Vector, high: Vector) -> None:
         """There are no sums."""

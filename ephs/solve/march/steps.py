@@ -25,6 +25,7 @@ from ephs.semantics.stage import (
 from ephs.solve.march.collocation import combine, evaluate, iterate, place
 from ephs.solve.march.control import judge
 from ephs.solve.march.memory import Books, Errors, Memory
+from ephs.solve.march.newton import Stiff, newton
 from ephs.solve.march.records import Control, Motion, Status, Tableau
 
 __all__ = ["DRIFT", "STEPS", "allow", "attempt", "book", "drift", "error_of", "first", "measure", "stiffness_of"]
@@ -58,10 +59,11 @@ def attempt(
     last: Vector,
     y: Vector,
     q: Vector,
+    stiff: Stiff | None = None,
 ) -> Integer:
     """Evaluate the stages of a step of length h from (base, start), k[0] known; by iteration where they need it.
 
-    Without errors for iterations to end at, the method is an explicit one.
+    Without errors for iterations to end at, the method is an explicit one; with memory for that, it is Newton's.
     The step's end goes to y and q, the rates there to the last row of k, y at the last stage to ``last``.
 
     Returns
@@ -82,7 +84,10 @@ def attempt(
 
     def collocated(errors: Errors) -> None:
         allow(on, motion, errors, start, start)
-        status.value = iterate(on, motion, tableau, control, base, start, h, k, errors.allowed, y, q)
+        if stiff is None:
+            status.value = iterate(on, motion, tableau, control, base, start, h, k, errors.allowed, y, q)
+        else:
+            status.value = newton(on, motion, tableau, control, base, start, h, k, errors, stiff, y, q)
         copy(on, y, last)
         stage.value = count
 
@@ -93,11 +98,13 @@ def attempt(
 
 
 def book(
-    on: Evaluator, motion: Motion, tableau: Tableau, k: Matrix, h: Real, books: Books, anchor: Real, hold: Truth
-) -> Integer:
+    on: Evaluator, motion: Motion, tableau: Tableau, k: Matrix, h: Real, books: Books, anchor: Real, hold: Truth,
+    q: Vector | None = None,
+) -> Integer:  # fmt: skip
     """Sum what a step of length h with rates k adds to heats and books; return a status.
 
     What the last row of a tableau weighs are h Σ b k. ``hold`` where the step is a part of one whose sums are known.
+    With the elements q at the end of a step whose method damps, heat is made of the energy that this takes out.
     Flows that go both ways within a step, and back by less than the rounding of the energy, are zero.
     """
     at, count = motion.summed, tableau.a.columns
@@ -122,12 +129,18 @@ def book(
 
         on.when(on.negate(hold), keep)
 
+    def absorb() -> None:
+        if q is not None:
+            motion.absorb(on, anchor, books.start, q, books.end, books.change)
+
     def part() -> None:
+        absorb()
         motion.hold(on, books.change, books.low, books.whole)
         copy(on, books.change, books.low)
 
     def entire() -> None:
         motion.hold(on, books.change, books.whole, books.whole)
+        absorb()
         copy(on, books.change, books.whole)
         on.loop(books.low.size, clear)
 

@@ -3,9 +3,9 @@
 from ephs.mechanics.tree.sweeps.acting import Tables, Work
 from ephs.semantics.kernel_table import TEMPERATURE
 from ephs.semantics.stage import Evaluator, Integer, Real, Vector
-from ephs.solve.heats import PLAIN
+from ephs.solve.heats import LITTLE, PLAIN
 
-__all__ = ["count", "entropies", "heat_rates", "hold", "lawless"]
+__all__ = ["absorb", "count", "entropies", "heat_rates", "hold", "lawless", "warm"]
 
 ROUNDING = 100.0 * 2.220446049250313e-16
 """Part of what a sum of flows adds up by which it may be off: 10 κ ε with a condition κ of 10."""
@@ -155,6 +155,42 @@ def lawless(on: Evaluator, tables: Tables, change: Vector, rounding: Vector, sig
 
     on.loop(change.size, one, start=first)
     return found.value
+
+
+def absorb(on: Evaluator, tables: Tables, lost: Real, change: Vector) -> None:
+    """Make the heat of friction in a step's changes what the motion lost in J, see `ephs.solve.heats.Heats.booked`."""
+    nodes, total, whole = tables.node.size, on.variable(0.0), on.variable(0.0)
+
+    def weigh(i: Integer) -> None:
+        flow = change[nodes + 2 + tables.sink[i].maker]
+        total.value, whole.value = total.value + flow, whole.value + on.maximum(flow, 0.0)
+
+    on.loop(tables.sink.size, weigh)
+    short, made = lost - total.value, whole.value
+    share = on.select(on.both(made > 0.0, short > -LITTLE * made), short / on.select(made > 0.0, made, 1.0), 0.0)
+
+    def grow(i: Integer) -> None:
+        sink = tables.sink[i]
+        at = nodes + 2 + sink.maker
+        more = share * on.maximum(change[at], 0.0)
+        for place in (at, sink.entropy, nodes):
+            change[place] = change[place] + more
+
+    on.loop(tables.sink.size, grow)
+
+
+def warm(on: Evaluator, tables: Tables, before: Vector, heats: Vector) -> None:
+    """Lift energies in J to what they are at a hundredth of the temperatures before."""
+
+    def one(k: Integer) -> None:
+        c1 = tables.node[k].c1
+
+        def lift() -> None:
+            heats[k] = on.maximum(heats[k], 0.01 * (c1 + before[k]) - c1)
+
+        on.when(tables.node[k].component >= 0, lift)
+
+    on.loop(tables.node.size, one)
 
 
 def hold(on: Evaluator, tables: Tables, change: Vector, low: Vector, high: Vector) -> None:

@@ -5,20 +5,18 @@ from typing import final
 
 from ephs.mechanics.tree.engine.balance import correct, held, measure
 from ephs.mechanics.tree.engine.forces import act
-from ephs.mechanics.tree.engine.heats import count, entropies, heat_rates, hold, lawless
+from ephs.mechanics.tree.engine.heats import absorb, count, entropies, heat_rates, hold, lawless, warm
+from ephs.mechanics.tree.engine.shutting import close
 from ephs.mechanics.tree.sweeps.acting import Tables, Work
 from ephs.mechanics.tree.sweeps.closing import SIZE
 from ephs.mechanics.tree.sweeps.records import Link
 from ephs.semantics.linear.dense import clear
-from ephs.semantics.spaces.rank import CLOSED, GAP
-from ephs.semantics.stage import Argument, Evaluator, Integer, Matrix, Real, Truth, Vector, staged
-from ephs.solve.march.account import Account, rounding
+from ephs.semantics.spaces.rank import GAP
+from ephs.semantics.stage import Argument, Evaluator, Integer, Matrix, Real, Truth, Vector
+from ephs.solve.march.account import BEYOND, Account, rounding
 from ephs.solve.march.records import Motion, Status
 
-__all__ = ["Mechanism", "close"]
-
-ROUNDS = 20
-"""Iterations that close loops."""
+__all__ = ["Mechanism"]
 
 
 def _whole(x: Matrix) -> Vector:
@@ -238,6 +236,21 @@ class Mechanism(Motion):
         count(on, self.tables, self.work, start.part(at, change.size), change, size)
         on.loop(change.size, put)
 
+    def absorb(self, on: Evaluator, anchor: Real, y0: Vector, q: Vector, y1: Vector, change: Vector) -> None:
+        nv, n, at, nodes = self.increments, self.freedoms, self.summed, self.tables.node.size
+        energies, before = on.scratch(3), y0.part(at + nodes, 2)
+
+        def known() -> None:
+            held(on, self, q, y1.part(nv, n), y1.part(at, nodes), energies)
+            lost = anchor + (before[1] - before[0]) + change[nodes + 1] - (energies[0] + energies[1])
+            absorb(on, self.tables, lost, change)
+
+        on.when(on.both(self.tables.sink.size > 0, on.absolute(anchor) < BEYOND), known)
+
+    def warm(self, on: Evaluator, y0: Vector, y: Vector) -> None:
+        ns = self.tables.node.size
+        warm(on, self.tables, y0.part(self.summed, ns), y.part(self.summed, ns))
+
     def hold(self, on: Evaluator, change: Vector, low: Vector, high: Vector) -> None:
         hold(on, self.tables, change, low, high)
 
@@ -375,25 +388,3 @@ class Mechanism(Motion):
             r[j] = r[j] + alter[j]
 
         on.loop(r.size, add)
-
-
-@staged
-def close(on: Evaluator, motion: Mechanism, q: Vector, r: Vector) -> Integer:
-    """Close the loops and put the rates on them, by the least change in the mass metric; return a status.
-
-    The gap that is left, in m or rad, is the answer in the memory. Prescribed rates are as they should be.
-    """
-    before, status, rounds = on.variable(1e300), on.counter(0), on.counter(0)
-
-    def once() -> Truth:
-        status.value, gap, done = motion.newton(on, q, r, before.value)
-        before.value = gap
-        rounds.value = rounds.value + 1
-        return on.either(done, rounds.value >= ROUNDS)
-
-    on.repeat(once)
-    opened = on.negate(before.value <= CLOSED)
-    status.value = on.select(on.both(on.same(status.value, 0), opened), int(Status.OPEN), status.value)
-    on.when(on.same(status.value, 0), lambda: motion.straighten(on, q, r))
-    motion.work.answer[0] = before.value
-    return status.value

@@ -8,7 +8,8 @@ import numpy as np
 
 from ephs.mechanics.tree.engine.balance import held, measure
 from ephs.mechanics.tree.engine.closing import Closing
-from ephs.mechanics.tree.engine.motion import Mechanism, close
+from ephs.mechanics.tree.engine.motion import Mechanism
+from ephs.mechanics.tree.engine.shutting import close
 from ephs.mechanics.tree.sweeps.acting import TABLES, WORK, Tables, Work
 from ephs.semantics.bundle import Array
 from ephs.semantics.stage import (
@@ -33,12 +34,14 @@ from ephs.solve.march import (
     BOOKS,
     ERRORS,
     MEMORY,
+    STIFF,
     TABLEAU,
     Account,
     Books,
     Control,
     Errors,
     Memory,
+    Stiff,
     Tableau,
     march,
 )
@@ -150,6 +153,26 @@ def motion_program(*, looped: bool) -> Program:
     return Program("motion_of_loops" if looped else "motion_of_trees", **entries)
 
 
+@cache
+def stiff_program() -> Program:
+    """Return the program of implicit steps of trees, many in one call."""
+
+    def marched(
+        on: Evaluator, tables: Tables, work: Work, tableau: Tableau, memory: Memory, control: Table[Control],
+        account: Table[Account], stiff: Stiff, steps: Integer,
+    ) -> Integer:  # fmt: skip
+        return march(on, Mechanism(tables, work, False), tableau, memory, control[0], account[0], steps, stiff)
+
+    return Program(
+        "stiff_steps_of_trees",
+        march=Entry(
+            marched, tables=group(Tables, **TABLES), work=group(Work, **WORK), tableau=group(Tableau, **TABLEAU),
+            memory=group(Memory, **MEMORY), control=table(Control), account=table(Account),
+            stiff=group(Stiff, **STIFF), steps=integer(),
+        ),
+    )  # fmt: skip
+
+
 def motion_of_trees() -> Program:
     """Return the program without loops."""
     return motion_program(looped=False)
@@ -213,6 +236,10 @@ class Engine:
     def bind(self, name: str, *arguments: Any) -> Bound:
         """Return an entry function of the program, bound to this mechanism and to further arguments."""
         return self._calls[name].bind(self.tables, self.work, *arguments)
+
+    def implicit(self, *arguments: Any) -> Bound:
+        """Return implicit steps, bound to this tree and to further arguments."""
+        return stiff_program().compiled()["march"].bind(self.tables, self.work, *arguments)
 
     def array(self, name: str) -> Array:
         """Return an array of the memory."""

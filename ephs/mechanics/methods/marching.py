@@ -1,0 +1,267 @@
+"""Many steps of a mechanism in one compiled call, where nothing has to be asked of Python at each."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, final
+
+import numpy as np
+
+from ephs.mechanics.methods.method import ReducedMethod
+from ephs.mechanics.methods.stages import Kept
+from ephs.mechanics.tree.equations.accounts import OWN
+from ephs.mechanics.tree.equations.equations import ReducedState
+from ephs.mechanics.tree.finding.naming import within
+from ephs.semantics.bundle import Array
+from ephs.solve.control import Proportional
+from ephs.solve.errors import LARGEST, Outcome, SolveError
+from ephs.solve.march import STEPS, Account, Ending, Status
+from ephs.solve.march import Control as Steering
+from ephs.solve.march.control import PATIENCE
+from ephs.solve.snapshot import Snapshot
+from ephs.solve.stepping import Counts, Span
+
+__all__ = ["March"]
+
+ROWS = 1024
+"""Rows that are kept before they are handed over."""
+Leave = Callable[[float, float, str], None]
+"""Called with the time, the next step in s, and why steps are held back."""
+
+
+@final
+class March:
+    """One run in compiled steps. Times in it are counted from the start and grow.
+
+    Parameters
+    ----------
+    arrays
+        Coefficients, by the names of `ephs.solve.march.Tableau`.
+    limit, left
+        Where stability, whose limit is h·|λ|, holds steps back, it calls ``left`` and ends; 0: it does not look.
+    kept
+        The matrix of implicit steps, and memory for these; None: steps are explicit or iterated.
+
+    Attributes
+    ----------
+    march
+        The compiled function, bound to all that it reads and writes.
+    memory, steering
+        Its state and memory, and what chooses its steps.
+    """
+
+    def __init__(
+        self,
+        method: ReducedMethod,
+        arrays: Mapping[str, Any],
+        span: Span[ReducedState],
+        limit: float = 0.0,
+        left: Leave | None = None,
+        kept: Kept | None = None,
+    ) -> None:
+        eq, start = method.equations, method.equations.accounts.opened(span.state)
+        self.own, eq.accounts.kept = eq.accounts.own, True
+        summed = start.account.size - self.own
+        self.method, self.span, self.left, self._leave = method, span, False, left
+        self._handed, self._kept = 0, kept
+        size, q, times = eq.size, span.state.q, span.save_at
+        rows = ROWS if times is None else max(times.size, 1)
+        self.times = np.zeros(0) if times is None else np.abs(times - span.t0)
+        stages, counted = arrays["a"].shape[0], method.atol.size
+        shapes: dict[str, tuple[int, ...]] = {
+            "k": (stages, size), "q1": (q.size,), "y1": (size,), "q2": (q.size,), "y2": (size,), "k2": (stages, size),
+            "last": (size,), "allowed": (counted,), "open": (eq.n,), "fine": (counted,), "coarse": (counted,),
+            "rows_t": (rows, 4), "rows_q": (rows, q.size), "rows_y": (rows, size - eq.nv),
+            **dict.fromkeys(("carry1", "carry2", "change", "size", "whole", "low"), (summed,)),
+        }  # fmt: skip
+        self.memory = {name: np.zeros(shape) for name, shape in shapes.items()} | {
+            "q": np.array(q), "y": eq.vector(span.state), "atol": np.array(method.atol), "rtol": np.array(method.rtol),
+            "times": self.times, "carry": start.account[self.own :].copy(),
+        }  # fmt: skip
+        self.steering, self.account = Steering.table(1), Account.table(1)
+        a: Any = self.account[0]
+        (a.anchor, a.left, a.put, a.total), self.momenta[:] = np.split(start.account[: self.own], [OWN])
+        a.chosen, a.begins = int(span.policy is not None), int(not (np.isnan(a.anchor) or start.books.any()))
+        given = arrays, self.memory, self.steering, self.account
+        self.march = eq.engine.bind("march", *given, 0) if kept is None else eq.engine.implicit(*given, kept.memory, 0)
+        c, policy, control = self.control, span.policy, span.control
+        c.end, c.span, c.origin = span.until - span.t0, abs(span.until - span.t0), span.t0
+        c.step, c.least_step, c.most_step = span.h, control.least, control.most
+        c.time, c.before, known = abs(span.state.t - span.t0), 1e-4, span.counts
+        c.steps, c.rejected = known.steps, known.rejected
+        c.shortest, c.longest, c.least = known.shortest, known.longest, known.least
+        c.exponent, c.share, c.damping, c.strict = method.exponent, method.share, 0.4, Proportional.STRICT
+        c.saved = -1 if times is None else span.saved
+        c.limit, c.grid = limit, 0.0 if policy else float(control.step or 0.0)
+
+    @property
+    def momenta(self) -> Array:
+        """The momenta that steps keep, where these read them."""
+        return self.method.equations.engine.work["kept"][: self.own - OWN]
+
+    @property
+    def control(self) -> Any:
+        """Where the march stands, a record of `Steering`; its numbers are known here."""
+        return self.steering[0]
+
+    def advance(self, steps: int) -> bool:
+        """Up to so many steps; whether the end is reached.
+
+        Raises
+        ------
+        SolveError
+            The steps get too short, or a state cannot be evaluated.
+        """
+        eq, c = self.method.equations, self.control
+        before, sound = c.evaluations, float(c.time)
+        found = int(self.march(steps))
+        while found == Ending.STALE and self._kept is not None:
+            self._kept.renew(self.state)
+            found = int(self.march(steps))
+        eq.evaluations += c.evaluations - before
+        if self._kept is not None:
+            self._kept.count()
+        self._hold(sound)
+        self.method.stiffness = float(c.stiff)
+        if found == Ending.CAREFUL or (self._kept is not None and found >= Ending.REFUSED):
+            self._step()
+        elif self._leave is not None and found in (Ending.STIFF, Ending.REFUSED + Status.UNSETTLED):
+            failing = found != Ending.STIFF or c.refusals > PATIENCE
+            reason = "its steps fail" if failing else f"h·|λ| = {c.stiff:.1f} holds its steps"
+            self._leave(self.time, float(c.step), reason)
+            self.left = True
+        elif found == Ending.SHORT:
+            raise SolveError(Outcome.TINY, "", f"{c.step:.3g} s")
+        elif found >= Ending.REFUSED:
+            self._refused(found - Ending.REFUSED)
+        return found == Ending.DONE
+
+    def _hold(self, sound: float) -> None:
+        """Give up the rows that left the range of numbers; ``sound``: the time before.
+
+        Raises
+        ------
+        SolveError
+            It names the joint.
+        """
+        eq, c, q, y = self.method.equations, self.control, self.memory["q"], self.memory["y"]
+        sizes = (np.abs(q), np.abs(y[eq.nv : eq.nv + eq.n + eq.ns]))
+        if all(size.max(initial=0.0) < LARGEST for size in sizes) and np.isfinite(y[eq.nv :]).all():
+            return
+        beyond = self.state
+        times, q, y = self.kept()
+        good = np.isfinite(y).all(axis=1)
+        good &= np.abs(np.hstack([q, y[:, : eq.n + eq.ns]])).max(axis=1, initial=0.0) < LARGEST
+        rows = int(np.argmin(good)) if not good.all() else good.size
+        c.rows, c.time = rows, times[rows - 1, 0] if rows else sound
+        within(eq.reduced, beyond.q, beyond.r, beyond.heats)
+        raise SolveError(Outcome.RANGE, "", "heat, work or entropy made")
+
+    def _refused(self, status: int) -> None:
+        eq = self.method.equations
+        if status == Status.OPEN:
+            residual = eq.dense.gaps(self.memory["q"], self.memory["y"][eq.nv : eq.nv + eq.n])[0]
+            raise eq.dense.opened(residual, float(np.abs(residual).max(initial=0.0)))
+        eq.refuse(status, eq.engine.failed)
+
+    def _step(self) -> None:
+        """One step with the careful elimination, where constraints nearly repeat each other."""
+        c, s, h = self.control, self.memory, float(self.control.tried)
+        state, eq, grid = self.state, self.method.equations, float(c.grid)
+        sign, latest = self._sign, max(abs(state.t), abs(self.span.until))
+        self.method.rough = (state.q,) if c.rough else ()
+        try:
+            attempt = self.method.step(state, sign * h)
+        except SolveError as error:
+            if grid:
+                raise
+            c.step, c.rejected = 0.25 * h, c.rejected + 1
+            self.span.control.allowed(float(c.step), latest, error)
+            return
+        if not (grid or STEPS.compiled()["judge"](self.steering, h, attempt.error)):
+            c.rejected += 1
+            self.span.control.allowed(float(c.step), latest, None)
+            return
+        now, whole = float(c.time), float(abs(c.end))
+        after = whole if h >= whole - now else now + h
+        wanted = [(after, attempt.end)]
+        if c.saved >= 0:
+            last = int(np.searchsorted(self.times, after, side="right"))
+            wanted = [
+                (when, attempt.end if when == after else self.method.inside(attempt, state.t + sign * (when - now)))
+                for when in self.times[c.saved : last].tolist()
+            ]
+            c.saved = last
+        for when, found in wanted:
+            s["rows_t"][c.rows] = when, attempt.least, *found.account[2:4]
+            s["rows_q"][c.rows], s["rows_y"][c.rows] = found.q, eq.vector(found)[eq.nv :]
+            c.rows += 1
+        s["q"][:], s["y"][:] = attempt.end.q, eq.vector(attempt.end)
+        a: Any = self.account[0]
+        (a.anchor, a.left, a.put, a.total), _, s["carry"][:] = np.split(attempt.end.account, [OWN, self.own])
+        c.time, c.steps, c.fresh, c.rough = after, c.steps + 1, 0, int(eq.careful)
+        c.shortest, c.longest = min(c.shortest, h), max(c.longest, h)
+        c.least = min(c.least, attempt.least)
+
+    @property
+    def _sign(self) -> float:
+        return 1.0 if self.control.end >= 0.0 else -1.0
+
+    @property
+    def time(self) -> float:
+        """The time reached."""
+        done = self.control.time >= abs(self.control.end)
+        return self.span.until if done else self.span.t0 + self._sign * float(self.control.time)
+
+    @property
+    def state(self) -> ReducedState:
+        """The state reached."""
+        a: Any = self.account[0]
+        account = np.concatenate([[a.anchor, a.left, a.put, a.total], self.momenta, self.memory["carry"]])
+        return self._state(self.time, self.memory["q"], self.memory["y"][self.method.equations.nv :], account)
+
+    def _state(self, t: float, q: Array, rest: Array, account: Array) -> ReducedState:
+        n, ns = self.method.equations.n, self.method.equations.ns
+        heats, books = rest[n : n + ns].copy(), rest[n + ns :].copy()
+        return ReducedState(t, q.copy(), rest[:n].copy(), heats, books, account=account)
+
+    def rows(self) -> list[tuple[float, ReducedState, float]]:
+        """Records since the last call: time, state, the step's least production."""
+        end = abs(float(self.control.end))
+        out: list[tuple[float, ReducedState, float]] = []
+        for row, (times, q, y) in enumerate(zip(*self.kept(), strict=True)):
+            passed, least, *put = times.tolist()
+            t = self.span.until if passed == end else self.span.t0 + self._sign * passed
+            if self.span.save_at is not None:
+                t = float(self.span.save_at[self.span.saved + self._handed + row])
+            account = np.concatenate([[self.account[0].anchor, 0.0, *put], self.momenta, 0.0 * self.memory["carry"]])
+            out.append((t, self._state(t, q, y, account), least))
+        self._handed += len(out)
+        self.control.rows = 0
+        return out
+
+    def kept(self) -> tuple[Array, Array, Array]:
+        """The rows that `rows` would hand over, views of the memory: (n, 4) time from the start, least production, what
+        corrections put in and its sizes; (n, ·) elements; (n, ·) rates, heats and books."""
+        count, memory = int(self.control.rows), self.memory
+        return memory["rows_t"][:count], memory["rows_q"][:count], memory["rows_y"][:count]
+
+    def snapshot(self) -> Snapshot:
+        """Where it stands: the state, the rates there, and what chooses the steps."""
+        return dict(self._taken())
+
+    def _taken(self) -> list[tuple[str, Any]]:
+        (counts, control), s = self.steering.arrays, self.memory
+        parts = control, counts, s["q"], s["y"], s["k"][0], s["carry"], self.account.arrays[1], self.momenta
+        names = "control", "counts", "q", "y", "rates", "carry", "account", "momenta"
+        own = [] if self._kept is None else self._kept.parts()
+        return [*zip(names, parts, strict=True), *own]
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go on from a snapshot."""
+        for name, array in self._taken():
+            array[:] = snapshot[name]
+
+    @property
+    def counts(self) -> Counts:
+        """Statistics so far."""
+        c = self.control
+        return Counts(c.steps, c.rejected, float(c.shortest), float(c.longest), float(c.least), float(c.step))

@@ -1,0 +1,108 @@
+"""Steps of radau in compiled calls: those taken one by one, lawful, and no more of them than its errors ask for."""
+
+import numpy as np
+import pytest
+
+import ephs
+from ephs.mechanics.methods.radau import Implicit
+
+SCENE = """
+format = 1
+name = "stick"
+[thermal.housing]
+capacity = 2.0
+temperature = 300.0
+[bodies.arm]
+mass = 1.0
+inertia = [0.02, 0.02, 0.01]
+position = [0.3, 0.0, 0.6]
+[bodies.fist]
+mass = 0.5
+inertia = [1e-3, 1e-3, 1e-3]
+position = [0.6, 0.0, 0.6]
+[joints.shoulder]
+type = "revolute"
+bodies = ["ground", "arm"]
+at = [0.0, 0.0, 0.6]
+axis = [0.0, 1.0, 0.0]
+friction = 0.05
+heat = "housing"
+[joints.wrist]
+type = "revolute"
+bodies = ["arm", "fist"]
+at = [0.6, 0.0, 0.6]
+axis = [0.0, 1.0, 0.0]
+stiffness = 500.0
+friction = 0.5
+heat = "housing"
+limits = [-0.02, nan]
+limit_stiffness = 1e3
+limit_loss = 0.1
+[surfaces.fist]
+body = "fist"
+shape = { sphere = 0.1 }
+stiffness = 1e5
+loss = 0.3
+friction = 0.5
+slip = 1e-3
+heat = "housing"
+[surfaces.floor]
+body = "ground"
+shape = { plane = {} }
+"""
+ASKED = {"method": "radau", "audit": "off"}
+TIMES = np.linspace(0.0, 0.6, 13)
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory):
+    file = tmp_path_factory.mktemp("stick") / "stick.toml"
+    file.write_text(SCENE, encoding="utf-8")
+    return ephs.load(file)
+
+
+def stepwise(monkeypatch):
+    monkeypatch.setattr(Implicit, "many", lambda *_: None)
+
+
+def motion(sol):
+    return np.concatenate([sol.body("fist").position, sol.body("fist").velocity, sol.heat[:, None]], axis=1)
+
+
+@pytest.mark.parametrize(
+    ("until", "options", "error"),
+    [(0.6, {"rtol": 1e-5}, 1e-4), (0.25, {"step": 1e-3}, 1e-10)],
+    ids=["chosen", "constant"],
+)
+def test_compiled_steps_are_those_taken_one_by_one(until, options, error, scene, monkeypatch):
+    times = np.linspace(0.0, until, 13)
+    found = ephs.simulate(scene, until, save_at=times, **options, **ASKED)
+    stepwise(monkeypatch)
+    oracle = ephs.simulate(scene, until, save_at=times, **options, **ASKED)
+    assert abs(found.stats["steps"] - oracle.stats["steps"]) <= 0.1 * oracle.stats["steps"]
+    assert motion(found) == pytest.approx(motion(oracle), rel=0.0, abs=error)
+
+
+@pytest.mark.parametrize("rtol", [0.1, 1e-2, 1e-3, 1e-5])
+def test_both_laws_hold_at_any_tolerance(rtol, scene):
+    sol = ephs.simulate(scene, 0.6, rtol=rtol, **ASKED)
+    assert sol.contact("fist_floor").gap.min() < 0.0
+    assert np.abs(sol.energy_error).max() <= 1e-12
+    assert sol.stats["least_production"] >= 0.0
+    assert np.all(np.diff(sol.heat) >= 0.0)
+
+
+def test_a_matrix_serves_many_steps(scene):
+    stats = ephs.simulate(scene, 0.6, rtol=1e-4, **ASKED).stats
+    assert 0 < stats["jacobians"] < 0.5 * stats["steps"]
+    assert stats["iterations"] < 5 * (stats["steps"] + stats["rejected"])
+
+
+def test_after_it_chose_radau_auto_takes_its_steps(scene):
+    """Compiled leg after compiled leg, and as few steps: what is asked of an explicit step is stricter."""
+    options = {"rtol": 1e-4, "audit": "off", "save_at": TIMES}
+    auto, radau = (ephs.simulate(scene, 0.6, method=name, **options) for name in ("auto", "radau"))
+    assert auto.stats["switches"][0]["to"] == "radau"
+    assert auto.stats["steps"] < 3 * radau.stats["steps"]
+    assert np.array_equal(auto.t, TIMES)
+    assert motion(auto) == pytest.approx(motion(radau), abs=1e-2)
