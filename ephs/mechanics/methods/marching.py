@@ -1,14 +1,13 @@
 """Many steps of a mechanism in one compiled call, where nothing has to be asked of Python at each."""
 
 from collections.abc import Callable, Mapping
-from typing import Any, final
+from typing import Any, Protocol, final
 
 import numpy as np
 
-from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.methods.stages import Kept
 from ephs.mechanics.tree.equations.accounts import OWN
-from ephs.mechanics.tree.equations.equations import ReducedState
+from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.mechanics.tree.finding.naming import within
 from ephs.semantics.bundle import Array
 from ephs.solve.control import Proportional
@@ -17,7 +16,7 @@ from ephs.solve.march import STEPS, Account, Ending, Status
 from ephs.solve.march import Control as Steering
 from ephs.solve.march.control import PATIENCE
 from ephs.solve.snapshot import Snapshot
-from ephs.solve.stepping import Counts, Span
+from ephs.solve.stepping import Attempt, Counts, Span
 
 __all__ = ["March"]
 
@@ -25,6 +24,39 @@ ROWS = 1024
 """Rows that are kept before they are handed over."""
 Leave = Callable[[float, float, str], None]
 """Called with the time, the next step in s, and why steps are held back."""
+
+
+class Marching(Protocol):
+    """What a march asks of its method.
+
+    Attributes
+    ----------
+    atol, rtol
+        (counted,) of what counts in an error.
+    exponent, share
+        See `ephs.mechanics.methods.method.ReducedMethod`.
+    stiffness
+        h·|λ| of the fastest mode, as the last step showed it; 0 of methods that do not look.
+    rough
+        Elements of the last step's start and end, each where constraints nearly repeat each other: rates there carry
+        rounding over the least singular value, so that drift says nothing.
+    """
+
+    equations: Equations
+    atol: Array
+    rtol: Array
+    exponent: float
+    share: float
+    stiffness: float
+    rough: tuple[Array, ...]
+
+    def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
+        """One step of h seconds."""
+        ...
+
+    def inside(self, attempt: Attempt[ReducedState], t: float) -> ReducedState:
+        """The state at a time within a step."""
+        ...
 
 
 @final
@@ -50,7 +82,7 @@ class March:
 
     def __init__(
         self,
-        method: ReducedMethod,
+        method: Marching,
         arrays: Mapping[str, Any],
         span: Span[ReducedState],
         limit: float = 0.0,

@@ -6,7 +6,6 @@ from dataclasses import replace
 from typing import Any
 
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
-from ephs.semantics.bundle import Array
 from ephs.solve.control import Control
 from ephs.solve.errors import SolveError
 from ephs.solve.snapshot import Snapshot
@@ -38,18 +37,11 @@ class ReducedMethod(ABC):
         How a step's part of the tolerance depends on its length, see `Proportional`.
     counts
         Its own counts, for the solution's statistics.
-    stiffness
-        h·|λ| of the fastest mode, as the last step showed it; 0 of methods that do not look.
-    rough
-        Elements of the last step's start and end, each where constraints nearly repeat each other: rates there carry
-        rounding over the least singular value, so that drift says nothing.
     """
 
     name: str
     exponent: float
     share: float = 0.0
-    stiffness: float = 0.0
-    rough: tuple[Array, ...] = ()
 
     def __init__(self, equations: Equations, control: Control) -> None:
         self.equations, self.control = equations, control

@@ -46,6 +46,7 @@ class Implicit(ReducedMethod):
         super().__init__(equations, control)
         self.counts = self.counts if counts is None else counts
         self._known: tuple[Array, Array] | None = None
+        self.stiffness, self.rough = 0.0, tuple[Array, ...]()
         self._stages = Stages(equations, control, NODES, COEFFICIENTS, self.counts)
         self.rtol, self.atol = self._stages.rtol, self._stages.atol
 
