@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import linalg
+from scipy.sparse import csr_array
 
 import ephs
-from ephs.solve.methods.analysis import exchanged
+from ephs.solve.methods.analysis import entangled, exchanged
 
 ROOT = Path(__file__).parents[2]
 BRICARD = ROOT / "scenes/bricard.toml"
@@ -77,3 +78,26 @@ def test_the_control_leaves_out_whatever_the_pivots_say():
     triangle, pivots = linalg.qr(rows.T, mode="r", pivoting=True)
     assert list(pivots[2:]) == [1]
     assert list(exchanged(triangle, pivots, 2, np.array([1.0, 1e-3, 1e-3]))) == [0]
+
+
+@settings(max_examples=50, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), loops=st.integers(0, 3))
+def test_rows_with_an_effort_of_their_own_take_part_in_no_dependence(seed, loops):
+    """A chain whose rows have two neighbours' efforts and one of their own, in any order, beside dependent rows."""
+    rng = np.random.default_rng(seed)
+    count = 12
+    chain = np.zeros((count, 2 * count + 1 + 3))
+    for i in range(count):
+        chain[i, [i, i + 1, count + 1 + i]] = rng.uniform(0.5, 1.0, 3)
+    repeated = np.zeros((2 * loops, chain.shape[1]))
+    repeated[:, -3:] = rng.uniform(0.5, 1.0, 3)
+    rows = np.concatenate([chain, repeated])
+    order = rng.permutation(len(rows))
+    left = entangled(csr_array(rows[order]))
+    assert set(order[left]) == set(range(count, len(rows)))
+    assert np.linalg.matrix_rank(rows) == count + np.linalg.matrix_rank(rows[order[left]])
+
+
+def test_an_effort_too_small_beside_its_row_makes_no_row_independent():
+    rows = np.array([[1.0, 1.0, 1e-6], [1.0, 1.0, 0.0]])
+    assert list(entangled(csr_array(rows))) == [0, 1]

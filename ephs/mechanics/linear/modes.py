@@ -16,7 +16,8 @@ SHOWN = 1e-6
 
 Complex = NDArray[np.complex128]
 STILL = 1e-7
-"""Eigenvalues below this part of the largest count as zero: a double one is good to the root of rounding only."""
+"""Eigenvalues below this part of the largest count as zero, imaginary parts below this part of their eigenvalue too:
+a double one is good to the root of rounding only."""
 ROUNDING = 1e-12
 """Real parts below this part of the largest eigenvalue count as zero: what does not decay is not to seem to grow."""
 
@@ -72,6 +73,7 @@ def modes_of(A: Array, shapes: Mapping[str, Array]) -> tuple[Mode, ...]:
     values, vectors = found[0].astype(np.complex128), found[1].astype(np.complex128)
     top = float(np.abs(values).max(initial=0.0))
     values[np.abs(values) < STILL * top] = 0.0
+    values.imag[np.abs(values.imag) < STILL * np.abs(values)] = 0.0
     values.real[np.abs(values.real) < ROUNDING * top] = 0.0
     kept = [i for i in range(values.size) if values[i].imag >= 0.0]
     out: list[Mode] = []

@@ -24,7 +24,7 @@ from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces import rotations as so3
 from ephs.semantics.spaces.rank import TINY
 
-__all__ = ["BeamDraft", "check_beam", "curve_frames", "resolve_beam"]
+__all__ = ["BeamDraft", "check_beam", "curve", "resolve_beam"]
 
 ALONG = 1.0 - 1e-9
 """Cosine above which a direction that was given lies along the beam: its sine is 4e-5, well above rounding."""
@@ -64,12 +64,11 @@ def resolve_beam(name: str, table: Checked[Any], world: World, faults: list[Faul
     entry, key = table.entry, f"beams.{name}"
     ends = [*entry.ends, *[FREE_END] * (2 - len(entry.ends))]
     section = resolve_section(entry.section, f"{key}.section", faults) if table.sound("section") else None
-    frames = _frames(table, key, faults)
-    if section is None or frames is None:
+    placed = _placed(table, key, faults)
+    if section is None or placed is None:
         return None
+    frames, shapes = placed
     n = len(frames) - 1
-    between = [SE3.compose(SE3.inverse(one), two) for one, two in pairwise(frames)]
-    shapes = [SE3.log(pose) for pose in between]
     lengths = np.array([float(np.linalg.norm(shape[3:])) for shape in shapes])
     initial = np.array(entry.strain or np.zeros(6))
     joints: list[JointDraft] = []
@@ -144,8 +143,8 @@ def _settled(strain: Array) -> Array:
     return np.where(np.abs(strain) <= NOISE * np.abs(strain).max(), 0.0, strain)
 
 
-def _frames(table: Checked[Any], key: str, faults: list[Fault]) -> list[Array] | None:
-    """The poses of the nodes, axis 1 along the tangent; None, with a fault, where they cannot be told."""
+def _placed(table: Checked[Any], key: str, faults: list[Fault]) -> tuple[list[Array], list[Array]] | None:
+    """What `curve` gives of a table; None, with a fault, where they cannot be told."""
     entry = table.entry
     if not table.sound("from", "to", "points", "up", "elements"):
         return None
@@ -166,14 +165,16 @@ def _frames(table: Checked[Any], key: str, faults: list[Fault]) -> list[Array] |
     if elements % segments or elements > MOST_ELEMENTS:
         faults.append(fault("beam elements", f"{key}.elements", elements, segments=segments, most=MOST_ELEMENTS))
         return None
-    frames = curve_frames(points, None if entry.up is None else np.array(entry.up), elements)
-    if frames is None:
+    found = curve(points, None if entry.up is None else np.array(entry.up), elements)
+    if found is None:
         faults.append(fault("up", f"{key}.up", "nothing" if entry.up is None else shown(entry.up)))
-    return frames
+    return found
 
 
-def curve_frames(points: Array, up: Array | None, elements: int) -> list[Array] | None:
-    """Poses (7,) of the nodes on a curve through points (k, 3): axis 1 along it, axis 2 as near ``up`` as can be.
+def curve(points: Array, up: Array | None, elements: int) -> tuple[list[Array], list[Array]] | None:
+    """Nodes on a curve through points (k, 3), axis 1 along it, axis 2 as near ``up`` as can be.
+
+    Gives the poses (7,) of the nodes and the logarithms (6,) of the elements between them, the same for equal ones.
 
     Between two points the curve is a helix, cut into equal elements. Where ``up`` is None it is the first of the
     world's axes z, y, x that is along no tangent; None where ``up`` is along one.
@@ -187,12 +188,13 @@ def curve_frames(points: Array, up: Array | None, elements: int) -> list[Array] 
         return None
     corners = [_frame(point, tangent, chosen) for point, tangent in zip(points, tangents, strict=True)]
     cut = elements // (len(points) - 1)
-    frames = [corners[0]]
+    frames, shapes = [corners[0]], list[Array]()
     for one, two in pairwise(corners):
         along = SE3.log(SE3.compose(SE3.inverse(one), two))
         frames += [SE3.normalise(SE3.compose(one, SE3.exp(along * (i / cut)))) for i in range(1, cut)]
         frames.append(two)
-    return frames
+        shapes += [along / cut] * cut
+    return frames, shapes
 
 
 def _tangents(points: Array) -> Array:

@@ -19,7 +19,7 @@ from ephs.solve.methods.records import STORING, Order, OrderOf
 from ephs.solve.model import Model, evaluate_at
 from ephs.solve.sparse import Index, order
 
-__all__ = ["Analysis", "analyse", "dependent_rows", "exchanged"]
+__all__ = ["Analysis", "analyse", "dependent_rows", "entangled", "exchanged"]
 
 SHRUNK = 1e-6
 DEFECT = 1e-11
@@ -27,6 +27,10 @@ DEFECT = 1e-11
 OTHERWISE = 1e-3
 """Weight of equations that are not preferred where some are left out: others take part that much more."""
 
+LARGE = 256
+"""Rows above which those with an effort of their own are taken out before the rank is decided densely."""
+OWN = 1e-3
+"""Part of a row above which an effort that is in no other row makes it independent of the others."""
 ALIKE = 1e-6
 """Unknowns that null vectors move by the same but for this share are moved alike."""
 
@@ -134,6 +138,8 @@ def dependent_rows(
     matrix = csr_array(entries, shape=(rows.size, n_effort)) @ _compliance(model, values)
     count, part = connected_components(block_array([[None, matrix], [matrix.T, None]]), directed=False)
     for members in _groups(part[: rows.size], count):
+        if members.size > LARGE:
+            members = members[entangled(matrix[members])]
         local = matrix[members]
         dense = local[:, np.unique(local.indices)].toarray()
         if not dense.size:  # equations without efforts hold of themselves, or contradict
@@ -154,6 +160,26 @@ def dependent_rows(
             left = exchanged(triangle, pivots, rank, np.where(rather[rows[members]], 1.0, OTHERWISE))
         out[rows[members[left]]] = 1
     return out
+
+
+def entangled(matrix: Any) -> Index:
+    """Rows that may depend on each other: what is left when those with an effort of their own are taken out in turn.
+
+    Such a row takes part in no dependence. Its effort has to be more than `OWN` of it, so that the rest is as well
+    conditioned as the whole.
+    """
+    kept = np.arange(matrix.shape[0])
+    while kept.size:
+        local = abs(matrix[kept]).tocsc()
+        local.eliminate_zeros()
+        columns = np.flatnonzero(np.diff(local.indptr) == 1)
+        at = local.indptr[columns]
+        norms = np.sqrt(np.asarray(local.multiply(local).sum(axis=1)).ravel())
+        own = local.indices[at][local.data[at] > OWN * norms[local.indices[at]]]
+        if not own.size:
+            break
+        kept = np.delete(kept, own)
+    return kept
 
 
 def exchanged(triangle: Array, pivots: Index, rank: int, weights: Array) -> Index:

@@ -7,6 +7,7 @@ from hypothesis import given, settings
 import ephs
 from ephs import Pattern
 from ephs import library as lib
+from ephs.mechanics.linear.modes import modes_of
 from ephs.mechanics.linear.pencil import Pencil, system_problem
 from ephs.testing import systems
 from examples import physics
@@ -147,3 +148,12 @@ def test_what_only_falls_has_no_equilibrium():
 def test_what_cannot_be_is_named(keys, what):
     with pytest.raises(ephs.OptionError, match=what):
         ephs.linearize(MASS, **keys)
+
+
+def test_double_real_eigenvalues_are_not_oscillations():
+    """Rounding splits them into pairs whose imaginary parts are roots of it."""
+    turn = np.array([[0.6, -0.8], [0.8, 0.6]])
+    found = modes_of(turn @ np.array([[-1.0, 1.0], [0.0, -1.0]]) @ turn.T, {})
+    assert [mode.frequency for mode in found] == [0.0, 0.0]
+    swinging = modes_of(np.array([[-1.0, 1e-3], [-1e-3, -1.0]]), {})
+    assert [mode.frequency > 0.0 for mode in swinging] == [True]
