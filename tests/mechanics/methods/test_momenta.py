@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 import ephs
 from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.tree.equations.equations import Equations
+from ephs.solve import integrate, loop
 from tests.mechanics.momenta import floating, momenta
 
 SCENES = Path(__file__).parents[3] / "scenes"
@@ -148,3 +149,24 @@ def test_a_cart_on_a_level_rail_keeps_its_momentum_along_it(tmp_path):
         assert sol.stats["momenta"] == 1
         assert drift(scene, sol, [0]) <= ROUNDING < drift(scene, sol, [2])
         assert drift(scene, run(scene, method, {"keep": "energy"}), [0]) > ROUNDING
+
+
+@pytest.mark.parametrize(("method", "step"), [("rk54", 4e-5), ("radau", 2.5e-2)])
+def test_a_run_that_was_stopped_goes_on_with_the_momenta_that_it_had(method, step, tmp_path):
+    def stop(t, *_):
+        if t > 0.3:
+            raise RuntimeError
+
+    def going(**more):
+        times = np.linspace(0.0, 1.0, 21)
+        return ephs.simulate(scene, 1.0, method=method, step=step, options=BOTH, audit="off", save_at=times, **more)
+
+    scene, journal = ephs.load(SCENES / "mbs.toml"), tmp_path / "run.journal"
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (integrate, loop):  # progress is told at every step
+            patch.setattr(module, "RESPONSE", -1.0)
+        with pytest.raises(ephs.SimulationError) as stopped:
+            going(journal=journal, progress=stop)
+    assert 0.0 < stopped.value.time < 1.0
+    whole, again = going(), going(journal=journal)
+    assert all(np.array_equal(whole[str(path)], again[str(path)]) for path in whole.states)
