@@ -57,6 +57,9 @@ if TYPE_CHECKING:
     from ephs.solve.errors import OptionError as OptionError
     from ephs.solve.errors import SimulationError as SimulationError
     from ephs.solve.events import Event as Event
+    from ephs.solve.exchange.coupling import Bond as Bond
+    from ephs.solve.exchange.errors import ExchangeError as ExchangeError
+    from ephs.solve.exchange.exchange import Exchange as Exchange
     from ephs.solve.result.solution import Solution as Solution
     from ephs.solve.sampled import Sampled as Sampled
 
@@ -94,6 +97,9 @@ _HOMES = {
     "ephs.mechanics.sensitivity": ("fit", "sensitivity"),
     "ephs.solve.errors": ("Interrupted", "OptionError", "Outcome", "SimulationError"),
     "ephs.solve.events": ("Event",),
+    "ephs.solve.exchange.coupling": ("Bond",),
+    "ephs.solve.exchange.errors": ("ExchangeError",),
+    "ephs.solve.exchange.exchange": ("Exchange",),
     "ephs.solve.sampled": ("Sampled",),
     "ephs.solve.auditing.findings": ("AuditError", "AuditWarning", "CostWarning"),
     "ephs.solve.result.solution": ("Solution",),

@@ -133,9 +133,10 @@ def _description(made: Exported, shown: Sequence[Variable], token: str, experime
     for each in shown:
         told = {"unit": each.unit} if each.unit else {}
         add(each.name, first + each.place, causality="output", variability="continuous", **told)
-    for kind in ("Output", "InitialUnknown"):
-        for each in shown:
-            ElementTree.SubElement(structure, kind, valueReference=str(first + each.place))
+    for each in shown:  # of the state alone, never of the inputs at the same instant
+        ElementTree.SubElement(structure, "Output", valueReference=str(first + each.place), dependencies="")
+    for each in shown:
+        ElementTree.SubElement(structure, "InitialUnknown", valueReference=str(first + each.place))
     return ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
 
 

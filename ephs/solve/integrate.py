@@ -124,6 +124,7 @@ def integrate(
         run.full_steps(max_steps)
         if grid.last and run.t != grid.until:
             run.to(grid.until, grid.last)
+            run.look()
     return run.solution()
 
 
@@ -257,8 +258,7 @@ class _Run:
         self.problem, self.grid, self.stepper, self.recorder = problem, grid, stepper, recorder
         self.begin, self.progress, self.journal, self.bounds = begin, progress, journal, bounds
         self.t, self.setup, self.steps, self.iterations, self.cut = grid.t0, 0.0, 0, 0, 0
-        self.looked = begin
-        self.production = Production(problem)
+        self.looked, self.production = begin, Production(problem)
 
     def full_steps(self, max_steps: int | None) -> None:
         """All steps of full length, in chunks that adapt to the time that they take."""
@@ -269,16 +269,17 @@ class _Run:
         size = 16 if alone else 1
         while self.done < whole:
             count = min(size, whole - self.done)
-            before = time.perf_counter()
-            done = self.done + count
+            before, done = time.perf_counter(), self.done + count
             end = self.grid.until if done == whole and not self.grid.last else None
             if alone:
                 self.take(self.grid.h, count, end)
             else:
                 self.to(self.grid.time(done) if end is None else end, self.grid.h)
-            spent = time.perf_counter() - before
+            self.look()
             if alone:
-                size = int(np.clip(size / np.clip(spent / RESPONSE, 0.25, 2.0), 1, LARGEST_CHUNK))
+                size = int(
+                    np.clip(size / np.clip((time.perf_counter() - before) / RESPONSE, 0.25, 2.0), 1, LARGEST_CHUNK)
+                )
 
     @property
     def done(self) -> int:
@@ -289,12 +290,11 @@ class _Run:
         """One step of the grid of h seconds, in parts where inputs jump within it."""
         grid, first = self.grid, self.done
         while self.done == first:
-            at = self.t
-            end = self.breakpoints.end(at, target - at, self._states)
+            end = self.breakpoints.end(self.t, target - self.t, self._states)
             whole = end - target >= -SLIVER * grid.h  # a jump at the grid's time, to rounding, divides no step
             jump = end != grid.until and end - target <= SLIVER * grid.h
-            regular = abs(target - at - h) <= SLIVER * grid.h and whole
-            self.take(h if regular else min(end, target) - at, 1, end if jump else target)
+            regular = abs(target - self.t - h) <= SLIVER * grid.h and whole
+            self.take(h if regular else min(end, target) - self.t, 1, end if jump else target)
             if jump:
                 self.state = started(self.stepper, self.state.x, self.state.sums)
                 self.breakpoints.enter(end, self._states, split=not whole)
@@ -317,10 +317,12 @@ class _Run:
         self._record(times[: chunk.steps], chunk)
         if chunk.failure is not None:
             raise chunk.failure
+
+    def look(self) -> None:
+        """Tell the progress and write the journal, from time to time."""
         due = self.t == self.grid.until or time.perf_counter() - self.looked > 0.5 * RESPONSE
         if self.progress is not None and due:
-            error = self.balance.error(*self.recorder.latest)
-            self.looked = time.perf_counter()
+            self.looked, error = time.perf_counter(), self.balance.error(*self.recorder.latest)
             self.progress(self.t, self.grid.until, {**self.stats(), "energy_error": error})
         if self.journal is not None and (self.t == self.grid.until or self.journal.due):
             self.journal.write(self.recorder.rows.fresh(), self.snapshot(), self.stats())

@@ -230,6 +230,7 @@ class _Run(Generic[S]):
             if self.t == end != self.until and not self.ended:
                 self.state = self.stepper.anew(self.state)
                 self.breakpoints.enter(end, self._here, split=not whole)
+            self._look()
 
     def _shrink(self, h: float, cause: SolveError | None) -> None:
         self.rejected += 1
@@ -270,7 +271,6 @@ class _Run(Generic[S]):
         self.steps += 1
         if self.policy is not None:
             self.forecast.look(self.steps, t, self.stepper.stats)
-        self._look()
         return stopped is not None
 
     def _look(self) -> None:

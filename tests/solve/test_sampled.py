@@ -8,6 +8,7 @@ from scipy.linalg import expm
 
 import ephs
 from ephs.mechanics.methods.registry import METHODS
+from ephs.solve import journal
 from ephs.solve.errors import OptionError
 
 MASS, STIFFNESS, START = 2.0, 8.0, 0.3
@@ -195,6 +196,37 @@ def test_a_run_goes_on_from_its_journal_with_what_was_held(cart, tmp_path):
     stop[0] = np.inf
     sol = ephs.simulate(cart, UNTIL, **options)
     assert np.array_equal(sol.t, whole.t)
+    assert all(np.array_equal(sol.states[path], whole.states[path]) for path in whole.states)
+
+
+@pytest.mark.parametrize("method", ["rk87", "natural4"])
+def test_a_run_that_stops_on_a_sample_takes_it_once(cart, tmp_path, monkeypatch, method):
+    monkeypatch.setattr(journal, "EVERY", -1.0)
+    taken, stop = [], [np.inf]
+
+    def function(t, state, before):
+        taken.append(t)
+        return control(t, state) - before, 0.1 * float(state.joints.rail.coordinate[0])
+
+    def progress(t, until, stats):
+        if t > stop[0]:
+            raise KeyboardInterrupt
+
+    def go(**more):
+        taken.clear()
+        inputs = {"joints.rail": ephs.Sampled(PERIOD, function, memory=0.0)}
+        return ephs.simulate(cart, UNTIL, method=method, step=PERIOD, inputs=inputs, progress=progress, **more)
+
+    whole, times = go(), taken[1:]
+    stop[0] = 0.12
+    for module in ("loop", "integrate"):
+        monkeypatch.setattr(f"ephs.solve.{module}.RESPONSE", -1.0)  # every step is told
+    file = tmp_path / "run.journal"
+    with pytest.raises(ephs.Interrupted):
+        go(journal=file)
+    before, stop[0] = taken[1:], np.inf
+    sol = go(journal=file)
+    assert sorted({*before, *taken[1:]}) == times
     assert all(np.array_equal(sol.states[path], whole.states[path]) for path in whole.states)
 
 

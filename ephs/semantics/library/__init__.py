@@ -28,6 +28,7 @@ from ephs.semantics.library.magnetics import (
     saturating_reluctance,
     winding,
 )
+from ephs.semantics.library.units import fmu as fmu
 from ephs.semantics.primitives import Formula, Irreversible, Kernel, Reversible, Storage, power_ports
 from ephs.semantics.structures import constant_structure, dissipation, exponential, quadratic
 from ephs.semantics.verdict import Condition, proved

@@ -1,0 +1,52 @@
+"""The one exception of this room and the texts that it carries."""
+
+from typing import Final, final
+
+__all__ = ["ExchangeError"]
+
+TEXTS: Final = {
+    "package": "a unit is loaded by FMPy, which is not installed: pip install ephs[fmi]",
+    "file": "{file}: no unit of FMI 2.0 or 3.0: {found}",
+    "version": "{file}: a unit of FMI {found}, expected 2.0 or 3.0",
+    "kind": "{file}: a unit for {found}, expected one for co-simulation",
+    "machine": "{file}: no library for {found}; it has {expected}",
+    "variable": "{where}: no variable {found!r}, expected one of {expected}{near}",
+    "type": "{where}: variable {found!r} is {kind}, expected one real number",
+    "causality": "{where}: variable {found!r} is {kind}, expected {expected}",
+    "causal": "{where}: both {first!r} and {second!r} are of the unit's {kind}s, expected an input and an output",
+    "power": "{where}: {first} times {second} is no power: expected units whose product is the watt",
+    "integral": "{where}: {first} is no integral of {second} over time: expected a unit of {second} times second",
+    "unit": "unit {found!r}: expected one of {expected}{near}",
+    "port": "unit {where!r} has no power port {found!r}, expected one of {expected}{near}",
+    "name": "unit name {found!r}: expected one without dots, which end it in wires",
+    "source": "wire to {where}: found {found!r}, expected 'unit.output', a number, or a function f(t, state)",
+    "units": "wire to {where}, in {second}: {source} is in {first}",
+    "taken": "{where}: an input of a power port, which a wire sets too",
+    "loop": "algebraic loop between units: {found}; give one of these outputs a value at the start: initial={{...}}",
+    "period": "period {found!r}: expected {expected}",
+    "end": "until {found!r}: expected whole periods after {start!r}",
+    "target": "{where}: {found!r} is neither a power port nor an output of a unit; expected one of {expected}{near}",
+    "twice": "power port {found!r} is coupled twice",
+    "outer": "{where}: a power port at an outer port is coupled by a `Bond`, which says what is measured there",
+    "joint": "{where}: found {found} coordinates, expected a joint with one",
+    "value": "{where}: found {found!r}, expected one finite number",
+    "call": "unit {where} at t = {time:.9g} s: {found}",
+    "state": "unit {where}: its state cannot be kept, so that the run cannot go on from a journal",
+}
+
+
+@final
+class ExchangeError(ValueError):
+    """A unit, or an exchange between units and a system, that cannot be as asked.
+
+    Parameters
+    ----------
+    fault
+        The key of the text.
+    **details
+        What the text names.
+    """
+
+    def __init__(self, fault: str, /, **details: object) -> None:
+        super().__init__(TEXTS[fault].format(**details))
+        self.fault: str = fault
