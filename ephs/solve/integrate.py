@@ -277,9 +277,8 @@ class _Run:
                 self.to(self.grid.time(done) if end is None else end, self.grid.h)
             self.look()
             if alone:
-                size = int(
-                    np.clip(size / np.clip((time.perf_counter() - before) / RESPONSE, 0.25, 2.0), 1, LARGEST_CHUNK)
-                )
+                slow = (time.perf_counter() - before) / RESPONSE
+                size = int(np.clip(size / np.clip(slow, 0.25, 2.0), 1, LARGEST_CHUNK))
 
     @property
     def done(self) -> int:
@@ -320,8 +319,9 @@ class _Run:
 
     def look(self) -> None:
         """Tell the progress and write the journal, from time to time."""
-        due = self.t == self.grid.until or time.perf_counter() - self.looked > 0.5 * RESPONSE
-        if self.progress is not None and due:
+        if self.progress is not None and (
+            self.t == self.grid.until or time.perf_counter() - self.looked > 0.5 * RESPONSE
+        ):
             self.looked, error = time.perf_counter(), self.balance.error(*self.recorder.latest)
             self.progress(self.t, self.grid.until, {**self.stats(), "energy_error": error})
         if self.journal is not None and (self.t == self.grid.until or self.journal.due):
