@@ -254,11 +254,10 @@ class _Run:
         bounds: Bounds | None,
         breakpoints: Breakpoints,
     ) -> None:
-        self.breakpoints = breakpoints
+        self.breakpoints, self.production, self.looked = breakpoints, Production(problem), begin
         self.problem, self.grid, self.stepper, self.recorder = problem, grid, stepper, recorder
         self.begin, self.progress, self.journal, self.bounds = begin, progress, journal, bounds
         self.t, self.setup, self.steps, self.iterations, self.cut = grid.t0, 0.0, 0, 0, 0
-        self.looked, self.production = begin, Production(problem)
 
     def full_steps(self, max_steps: int | None) -> None:
         """All steps of full length, in chunks that adapt to the time that they take."""
@@ -319,12 +318,11 @@ class _Run:
 
     def look(self) -> None:
         """Tell the progress and write the journal, from time to time."""
-        if self.progress is not None and (
-            self.t == self.grid.until or time.perf_counter() - self.looked > 0.5 * RESPONSE
-        ):
-            self.looked, error = time.perf_counter(), self.balance.error(*self.recorder.latest)
+        at_end, now = self.t == self.grid.until, time.perf_counter()
+        if self.progress is not None and (at_end or now - self.looked > 0.5 * RESPONSE):
+            self.looked, error = now, self.balance.error(*self.recorder.latest)
             self.progress(self.t, self.grid.until, {**self.stats(), "energy_error": error})
-        if self.journal is not None and (self.t == self.grid.until or self.journal.due):
+        if self.journal is not None and (at_end or self.journal.due):
             self.journal.write(self.recorder.rows.fresh(), self.snapshot(), self.stats())
 
     def snapshot(self) -> Snapshot:
