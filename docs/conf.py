@@ -1,7 +1,10 @@
 """Configuration of the documentation: pages are executed, and load nothing from a network."""
 
+import sys
 from importlib.metadata import version as installed_version
 from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
 
 project = "ephs"
 author = "The ephs developers"
@@ -40,3 +43,10 @@ nb_execution_timeout = 300
 nb_merge_streams = True
 nb_ipywidgets_js = {}  # its default comes from a network
 nb_render_markdown_format = "myst"  # CommonMark has no tables
+
+
+def setup(app):
+    """Write the pages that simulate beside the built pages."""
+    from live_pages import write
+
+    app.connect("build-finished", lambda app, failure: failure or write(Path(app.outdir, "live")))

@@ -7,6 +7,7 @@ from importlib import import_module
 from typing import Any
 
 from gallery_pictures import View, moving_scene, sliding
+from live_pages import file_of
 
 from ephs.mechanics.motion.inside import Inside
 from examples.gallery import UNTIL, entries
@@ -68,6 +69,9 @@ def shown(name: str) -> None:
     system = model if isinstance(model, System) else model.system()
     sol = entry.run(UNTIL)
     display(SVG(picture(name, sol)))
+    page = file_of(name)
+    if page is not None:
+        display(HTML(f'<p><a href="live/{page}">Simulate it in the browser</a>, with sliders for its numbers.</p>'))
     display(SVG(draw(system, opened=len(system.fillings) <= FEW).svg))
     equations = system.equations()
     if len(equations) <= SHORT:

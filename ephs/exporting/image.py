@@ -162,11 +162,12 @@ def _image(problem: Problem, eq: Equations, leg: Any, inputs: Sequence[str]) -> 
     out = np.zeros(reduced.coordinates + eq.n + 7 * reduced.links + 1)
     state = leg.state
     eq.rows_of([state])  # which of a pose's two quaternions is meant
-    model = eq.model.tables
+    model, (turning, momentum) = eq.model.tables, eq.booking.paper.inertias()
     parts = {
         "tables": eq.engine.tables, "work": eq.engine.work, **eq.booking.paper.parts(),
         "storages": eq.booking.storages, "reads": model.read_x, "parameters": np.array(model.parameters),
-        "s": np.zeros((1, eq.ns)), "x": np.array(eq.booking.paper.rest[None]),
+        "turning": turning, "momentum": momentum, "s": np.zeros((1, eq.ns + turning.size)),
+        "x": np.array(eq.booking.paper.rest[None]),
         "stored": np.zeros((1, len(problem.descriptor.components))), "q": memory["q"], "y": memory["y"], "out": out,
     }  # fmt: skip
     read = outputs_program().compiled()["read"].bind(*parts.values())

@@ -32,8 +32,8 @@ def _row(x: Vector) -> Matrix:
 
 def _read(
     on: Evaluator, tables: Tables, work: Work, bodies: Table[Walked], springs: Table[Ends], plan: Table[Source],
-    poses: Matrix, twists: Matrix, storages: Table[Stored], reads: Integers, parameters: Vector, s: Matrix, x: Matrix,
-    stored: Matrix, q: Vector, y: Vector, out: Vector,
+    poses: Matrix, twists: Matrix, storages: Table[Stored], reads: Integers, parameters: Vector, turning: Integers,
+    momentum: Vector, s: Matrix, x: Matrix, stored: Matrix, q: Vector, y: Vector, out: Vector,
 ) -> Integer:  # fmt: skip
     """Write (q, r, poses of bodies, energy in J) at a state to ``out``; return a status."""
     increments, freedoms, nodes = tables.drive.size, work.force.size, tables.node.size
@@ -41,6 +41,11 @@ def _read(
     status = on.counter(0)
     status.value = entropies(on, tables, work, y.part(increments + freedoms, nodes))
     copy(on, work.entropy.part(0, nodes), s.row(0))
+
+    def turn(k: Integer) -> None:
+        s[0, nodes + k] = r[turning[k]] * momentum[k]
+
+    on.loop(turning.size, turn)
     rows(on, bodies, springs, plan, _row(q), _row(r), s, poses, twists, x)
 
     def store() -> None:
@@ -74,7 +79,8 @@ def outputs_program() -> Program:
     of: dict[str, Any] = {
         "tables": group(Tables, **TABLES), "work": group(Work, **WORK), "bodies": table(Walked),
         "springs": table(Ends), "plan": table(Source), "poses": matrix(7), "twists": matrix(6),
-        "storages": table(Stored), "reads": indices(), "parameters": vector(), "s": matrix(), "x": matrix(),
+        "storages": table(Stored), "reads": indices(), "parameters": vector(),
+        "turning": indices(), "momentum": vector(), "s": matrix(), "x": matrix(),
         "stored": matrix(), "q": vector(), "y": vector(), "out": vector(),
     }  # fmt: skip
     return Program("outputs", read=Entry(_read, **of))

@@ -14,6 +14,7 @@ from ephs.exporting.image import Variable, image_of
 from ephs.exporting.linking import webassembly
 from ephs.exporting.module import exported
 from ephs.mechanics.runs.simulate import simulate
+from ephs.mechanics.scene.build import component_path
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.parameters import names, read
 from ephs.show.page import Page
@@ -76,11 +77,11 @@ def live_page(
         "bytes": made.bytes,
         "outputs": len(made.outputs),
         "times": stage.frames.times.tolist(),
-        "poses": [places[f"bodies.{name}.quaternion.w"] for name in stage.bodies],
+        "poses": [places[f"{component_path('bodies', name)}.quaternion.w"] for name in stage.bodies],
         "curves": [*curves, energy],
         "panels": list(dict.fromkeys(str(curve["panel"]) for curve in (*curves, energy))),
         "parameters": [_slider(each, _span(each)) for each in made.parameters],
-        "inputs": [_slider(each, max(4.0 * abs(each.start), weight * stage.size())) for each in made.inputs],
+        "inputs": [_slider(each, 4.0 * abs(each.start) or weight * stage.size()) for each in made.inputs],
     }
     data = json.dumps(told, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")
     title = html.escape(scene.name)
@@ -108,7 +109,7 @@ def _candidates(scene: Scene) -> list[str]:
         if len(kept) == MOST:
             break
         try:
-            image_of(scene, parameters=[path])
+            image_of(scene, parameters=[*kept, path])
         except ExportError:
             continue
         kept.append(path)

@@ -42,7 +42,7 @@ def wanted(solution, name):
     return getattr(solution.body(of), what)[-1][("wxyz" if what == "quaternion" else "xyz").index(part[0])]
 
 
-@pytest.mark.parametrize("scene", ["slider-crank", "heavy-top", "four-bar", "chain", "mbs"])
+@pytest.mark.parametrize("scene", ["slider-crank", "heavy-top", "four-bar", "chain", "mbs", "motor-four-bar"])
 def test_the_steps_are_those_of_the_package(scene):
     model = ephs.load(ROOT / f"scenes/{scene}.toml")
     run = Run(exported(image_of(model, until=0.3), "made"))
@@ -54,6 +54,19 @@ def test_the_steps_are_those_of_the_package(scene):
             assert value == wanted(solution, name), name
         elif ".position." in name:
             np.testing.assert_allclose(value, wanted(solution, name), rtol=1e-13, atol=1e-13)
+
+
+def test_the_energy_is_that_of_all_storages_but_the_environment():
+    model = ephs.load(ROOT / "scenes/motor-four-bar.toml")
+    run = Run(exported(image_of(model, until=0.3), "made"))
+    assert run.call("advance", ctypes.c_int64, 0.3) == 0
+    solution = ephs.simulate(model, 0.3, method="rk87", save_at=[0.0, 0.3], audit="off")
+    around = sum(
+        293.15 * solution[str(path)][-1].item()
+        for path in solution.states
+        if str(path).endswith(("env.s", "environment.s"))
+    )
+    assert run.outputs()["energy"] == pytest.approx(solution.energy[-1] - around, rel=1e-12)
 
 
 def test_forces_from_outside_are_inputs():

@@ -25,7 +25,27 @@ def ends(tab):
     return dict(zip((curve["name"] for curve in json.loads(names)), told, strict=True))
 
 
-@pytest.mark.parametrize("name", ["slider-crank", "four-bar"])
+def test_the_page_of_the_documentation_simulates_the_torque_of_its_slider(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(ROOT / "docs"))
+    import live_pages
+
+    page, torque = live_pages.four_bar().save(tmp_path / "live.html"), 6.5
+    runs = []
+    with opened(page) as tab:
+        tab.until(READY)
+        runs.append(tab.evaluate("document.body.dataset.end"))
+        tab.evaluate(MOVE % (json.dumps(live_pages.DRIVEN), torque))
+        tab.until(f"document.body.dataset.end !== {json.dumps(runs[0])}")
+        found = ends(tab)
+        assert tab.complaints == []
+        assert [url for url in tab.requests if not url.startswith(("file:", "data:"))] == []
+    changed = varied(live_pages.linkage(), {f"{live_pages.DRIVEN}.drive": torque})
+    run = ephs.simulate(changed, live_pages.UNTIL, method="rk87", rtol=1e-10)
+    angle = run.joint("main").coordinate[-1].item()
+    assert found["joints.main.coordinate"] == pytest.approx(angle, abs=1e-4 * abs(angle))
+
+
+@pytest.mark.parametrize("name", ["slider-crank", "four-bar", "biped"])
 def test_a_slider_gives_the_motion_of_a_run_here(tmp_path, name):
     scene = ephs.load(ROOT / f"scenes/{name}.toml")
     body = list(dict(scene.all_bodies()))[1]
@@ -45,4 +65,5 @@ def test_a_slider_gives_the_motion_of_a_run_here(tmp_path, name):
         run = ephs.simulate(model, SECONDS, method="rk87", rtol=1e-9)
         for curve, value in found.items():
             if curve.endswith("coordinate"):
-                assert value == pytest.approx(run.joint(curve.split(".")[1]).coordinate[-1].item(), abs=1e-5)
+                joint = ".".join(word for word in curve.split(".")[:-1] if word not in ("parts", "joints"))
+                assert value == pytest.approx(run.joint(joint).coordinate[-1].item(), abs=1e-5)

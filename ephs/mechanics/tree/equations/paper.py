@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from typing import Any, final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ephs.mechanics.tree.engine.states import ELEMENT, ENTROPY, MOMENTUM, POSE, RELATIVE, STATES, Ends, Source, Walked
 from ephs.mechanics.tree.engine.tables import table_of
@@ -82,6 +83,10 @@ class PaperStates:
             "bodies": bodies, "springs": springs, "plan": table_of(Source, self._plan), "poses": poses,
             "twists": twists,
         }  # fmt: skip
+
+    def inertias(self) -> tuple[NDArray[np.int64], Array]:
+        """Places in r of the rates that storages follow as inertia of joints, and momentum by rate, (k,) each."""
+        return np.array(self._turning, dtype=np.int64), self._momentum
 
     def rows(self, q: Array, r: Array, s: Array) -> Array:
         """(rows, point_size) all states, of rows of joints' elements, rates and entropies."""
