@@ -234,14 +234,11 @@ def _pose(matrix: Array) -> Array:
     return np.concatenate((so3.matrix_to_quaternion(matrix[:3, :3]), matrix[:3, 3]))
 
 
-_DEXP = tuple(
-    so3.terms(each)
-    for each in (
-        lambda k: (-1) ** k * (1 - k) / factorial(2 * k + 2),
-        lambda k: (-1) ** k * (1 - k) / factorial(2 * k + 3),
-        lambda k: (-1) ** k * (1 + k) / factorial(2 * k + 4),
-        lambda k: (-1) ** k * (1 + k) / factorial(2 * k + 5),
-    )
+_DEXP = (
+    so3.terms(lambda k: (-1) ** k * (1 - k) / factorial(2 * k + 2)),
+    so3.terms(lambda k: (-1) ** k * (1 - k) / factorial(2 * k + 3)),
+    so3.terms(lambda k: (-1) ** k * (1 + k) / factorial(2 * k + 4)),
+    so3.terms(lambda k: (-1) ** k * (1 + k) / factorial(2 * k + 5)),
 )
 
 
@@ -259,12 +256,9 @@ def _dexp_coefficients(t: float) -> tuple[float, float, float, float]:
     )
 
 
-_DEXP_INV = tuple(
-    so3.terms(each)
-    for each in (
-        lambda k: (-1) ** k * (1 - k) * so3.bernoulli_ratio(k + 1),
-        lambda k: (-1) ** k * (1 + k) * so3.bernoulli_ratio(k + 2),
-    )
+_DEXP_INV = (
+    so3.terms(lambda k: (-1) ** k * (1 - k) * so3.bernoulli_ratio(k + 1)),
+    so3.terms(lambda k: (-1) ** k * (1 + k) * so3.bernoulli_ratio(k + 2)),
 )
 
 
