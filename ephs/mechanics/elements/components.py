@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ephs.mechanics.elements import notation
+from ephs.mechanics.shapes.dry import Dry
 from ephs.operad import Directory, Path, PortType, Quantity, quantity
 from ephs.semantics import formulas, structures
 from ephs.semantics.bundle import Array
@@ -288,6 +289,33 @@ def joint_friction(
         Directory(ports),
         lambda x, u, theta: np.asarray(resistance(of.coordinates(x[q_r]), u, theta)).reshape(of.dim, of.dim),
         parameters=(("mu", getattr(mu, "__name__", "function")),),
+    )
+    return replace(made, notation=notation.friction)
+
+
+def dry_friction(of: Pair, mu: float, dry: Dry) -> Irreversible:
+    """Friction μ of a joint with one freedom, in N m s or N s/m, and dry friction; ports p_r, s.
+
+    Raises
+    ------
+    StructureError
+        The joint has not one freedom.
+    """
+    if of.dim != 1:
+        found = f"dry friction of a joint with {of.dim} freedoms"
+        raise StructureError("parameter", of.name, key="dry", found=found, expected="a joint with one freedom")
+    ports = Directory({"p_r": PortType(joint_momentum(of), True), "s": PortType(quantity.entropy, True)})
+
+    def resistance(_x: Any, u: Any, _theta: Any) -> Any:
+        return [[mu + dry.resistance(u[0])]]
+
+    made = structures.dissipation(
+        "dry_friction",
+        ports,
+        resistance,
+        parameters=(("viscous", mu), *dry.numbers),
+        shown=lambda: structures.dissipation_proof(ports, None),
+        trusted=True,
     )
     return replace(made, notation=notation.friction)
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from ephs.mechanics.elements import components, springs
 from ephs.mechanics.elements.limit import limited_friction, limited_spring, stops
+from ephs.mechanics.shapes.dry import Dry
 from ephs.mechanics.shapes.law import Law
 from ephs.operad import Pattern, junction, quantity
 from ephs.semantics import library
@@ -92,6 +93,7 @@ def joint(
     driven: bool = False,
     limits: "ArrayLike | None" = None,
     stop: Law | None = None,
+    dry: Dry | None = None,
 ) -> System:
     """A joint between two bodies; its ports p1, p2 carry the bodies' momenta.
 
@@ -116,6 +118,8 @@ def joint(
         The momentum of u_r is a port p_r: its flow is a generalised force.
     limits, stop
         Least and largest coordinate of a joint with one freedom in rad or m, nan for none, and the law of its stops.
+    dry
+        Dry friction of a joint with one freedom, beside μ as a number.
 
     Raises
     ------
@@ -137,14 +141,19 @@ def joint(
     if spring is None:
         spring = components.no_potential(components.relative(of), "q_r")
     mu = friction if callable(friction) else _matrix(of, friction)
-    if limits is None:
+    if dry is not None and callable(mu):
+        found = "dry friction and a function"
+        raise StructureError("parameter", "joint", key="dry", found=found, expected="dry friction, and a number")
+    if limits is None and dry is not None:
+        loss = components.dry_friction(of, float(np.asarray(mu).ravel()[0]), dry)
+    elif limits is None:
         loss = components.joint_friction(of, mu)
     elif stop is None or potential is not None or callable(mu):
         found = "limits without the law of their stops" if stop is None else "limits and a function"
         raise StructureError("parameter", "joint", key="limits", found=found, expected="limits, their law, and numbers")
     else:
         held = stops(of, limits)
-        spring, loss = limited_spring(of, k, zero, held, stop), limited_friction(of, mu, held, stop)
+        spring, loss = limited_spring(of, k, zero, held, stop), limited_friction(of, mu, held, stop, dry)
     return _joint(of, _frame(frame1), _frame(frame2), spring, loss, heat, driven)
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from ephs.mechanics.elements import notation
 from ephs.mechanics.elements.components import coordinate_energy, joint_momentum, relative
+from ephs.mechanics.shapes.dry import Dry
 from ephs.mechanics.shapes.gap import ramp
 from ephs.mechanics.shapes.law import Law
 from ephs.operad import Directory, PortType, quantity
@@ -79,8 +80,8 @@ def limited_spring(of: Pair, stiffness: Array, rest: Array, stops: Stops, law: L
     )
 
 
-def limited_friction(of: Pair, mu: Array, stops: Stops, law: Law) -> Irreversible:
-    """Friction μ of a joint with one freedom and the loss of its stops; ports p_r, s, q_r."""
+def limited_friction(of: Pair, mu: Array, stops: Stops, law: Law, dry: Dry | None = None) -> Irreversible:
+    """Friction μ of a joint with one freedom, dry friction, and the loss of its stops; ports p_r, s, q_r."""
     ports = {
         "p_r": PortType(joint_momentum(of), True),
         "s": PortType(quantity.entropy, True),
@@ -91,13 +92,18 @@ def limited_friction(of: Pair, mu: Array, stops: Stops, law: Law) -> Irreversibl
     def resistance(x: Any, u: Any, _theta: Any) -> Any:
         rate, at = u[0], x[q_r][0]
         lost = [law.normal(ramp(side * (bound - at)), side * rate)[1] for side, bound in stops]
-        return [[sum(lost, float(mu[0, 0]))]]
+        return [[sum(lost, float(mu[0, 0])) + (0.0 if dry is None else dry.resistance(rate))]]
 
     made = structures.dissipation(
         "limited_friction",
         Directory(ports),
         resistance,
-        parameters=(("viscous", float(mu[0, 0])), *((f"bound{i}", b) for i, (_, b) in enumerate(stops)), *law.numbers),
+        parameters=(
+            ("viscous", float(mu[0, 0])),
+            *((f"bound{i}", b) for i, (_, b) in enumerate(stops)),
+            *law.numbers,
+            *(() if dry is None else dry.numbers),
+        ),
         shown=lambda: structures.dissipation_proof(Directory(ports), None),
         trusted=True,
         one_sided=True,

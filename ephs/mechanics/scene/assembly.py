@@ -192,6 +192,7 @@ def _joint(draft: JointDraft, link: Link, x: Array, rate: Array) -> Joint:
         frame2=frozen(link.frame2),
         pitch=draft.pitch,
         friction=frozen(draft.friction),
+        dry=draft.dry,
         stiffness=frozen(draft.stiffness),
         rest=frozen(draft.rest),
         heat=draft.heat,

@@ -376,7 +376,7 @@ def _joint(j: Joint, *, driven: bool) -> System:
         return between_frames(j.frame1, j.frame2, *parts, heat=heat)
     return joint(
         j.kind, j.frame1, j.frame2, j.friction, j.stiffness, j.rest, pitch=j.pitch, heat=heat, driven=driven,
-        limits=j.limits, stop=j.stop,
+        limits=j.limits, stop=j.stop, dry=j.dry,
     )  # fmt: skip
 
 

@@ -12,6 +12,7 @@ from ephs.mechanics.scene.attached import Conduction, Gear, Motor, ThermalNode
 from ephs.mechanics.scene.flexible import Beam, Load, Strain
 from ephs.mechanics.scene.model import Body, Joint, Marker, Scene, Spring, World, frozen
 from ephs.mechanics.scene.surfaces import Contact, Surface
+from ephs.mechanics.shapes.dry import Dry
 from ephs.mechanics.shapes.law import Law
 
 __all__ = ["scene_from_text", "scene_to_text"]
@@ -89,6 +90,7 @@ def _scene(data: dict[str, Any]) -> Scene:
         if cls is Joint:
             entries = {
                 name: entry
+                | ({"dry": Dry(**entry["dry"])} if entry.get("dry") else {})
                 | ({"stop": Law(**entry["stop"])} if entry.get("stop") else {})
                 | ({"strain": _value(Strain, entry["strain"])} if entry.get("strain") else {})
                 for name, entry in entries.items()

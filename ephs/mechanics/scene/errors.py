@@ -133,6 +133,8 @@ TEXTS: dict[str, tuple[str, str]] = {
         "less than {most:.3g} m at the start",
         "the energy of this overlap is in the balance from the start; move one of the bodies",
     ),
+    "dry joint": ("a joint with one freedom that is free to move", "take dry out"),
+    "dry static": ("a number ≥ coulomb = {coulomb:g}", "friction at rest is no less than while sliding"),
     "limited joint": ("a joint with one freedom that is free to move", "take limits out"),
     "no scale": ("a stiffness, as nothing in the scene moves or falls", "add this key"),
     "unknown surface": ("a surface", "{hint}"),

@@ -233,6 +233,23 @@ def _put_motion(scene: Scene, name: str, values: Array) -> Scene:
     return _edited(scene, "joints", name, lambda j: replace(j, motion=float(values[0]), rate=frozen(values)))
 
 
+def _dry(key: str) -> Field:
+    """A number of dry friction; without that there is none."""
+
+    def get(scene: Scene, name: str) -> Array:
+        dry = scene.joint(name).dry
+        return np.zeros(0) if dry is None else np.array([dict(dry.numbers)[key]])
+
+    def put(scene: Scene, name: str, values: Array) -> Scene:
+        def edit(joint: Joint) -> Joint:
+            assert joint.dry is not None
+            return replace(joint, dry=replace(joint.dry, **{key: float(values[0])}))
+
+        return _edited(scene, "joints", name, edit)
+
+    return Field(get, put)
+
+
 def _stiffness_faults(scene: Scene, name: str, _before: Scene) -> list[Fault]:
     """A rotation vector has one stiffness, and rest 0."""
     joint: Joint = scene.joint(name)
@@ -267,6 +284,7 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
     "joints": {
         "pitch": _attribute("joints", "pitch", moves="frame"),
         "friction": _attribute("joints", "friction", spread=True, faults=_friction_faults),
+        **{f"dry.{key}": _dry(key) for key in ("coulomb", "static", "stribeck", "slip")},
         "stiffness": _attribute("joints", "stiffness", spread=True, faults=_stiffness_faults),
         "rest": _attribute("joints", "rest", faults=_stiffness_faults),
         "drive": _attribute("joints", "drive"),

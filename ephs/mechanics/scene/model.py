@@ -15,6 +15,7 @@ from ephs.mechanics.scene.adjustment import Adjustment
 from ephs.mechanics.scene.attached import Conduction, Gear, Motor, ThermalNode
 from ephs.mechanics.scene.flexible import FREE_END, Beam, Load, Strain
 from ephs.mechanics.scene.surfaces import Contact, Surface
+from ephs.mechanics.shapes.dry import Dry
 from ephs.mechanics.shapes.law import Law
 from ephs.semantics.kept import Kept
 
@@ -95,6 +96,7 @@ class Joint:
         universal joint)
     limits, stop : (2,) least and largest coordinate of a joint with one freedom, nan for none, and the law of its
         elastic stops; None both where there are no limits
+    dry : dry friction of a joint with one freedom, None without
     middle : (7,) universal only: constant pose from the frame that follows the first revolute (C1 turned by
         angle 1) to the frame before the second, whose z axis is the second axis; None otherwise
     strain : of a beam element, which is a free joint; then friction and stiffness are 0
@@ -118,6 +120,7 @@ class Joint:
     middle: Array | None = None
     limits: Array | None = None
     stop: Law | None = None
+    dry: Dry | None = None
     strain: Strain | None = None
     armature: float = 0.0
 

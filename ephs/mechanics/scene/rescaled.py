@@ -47,6 +47,7 @@ def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float =
             rate=frozen(j.rate * unit / time),
             limits=None if j.limits is None else frozen(j.limits * unit[0]),
             stop=None if j.stop is None else j.stop.rescaled(float(unit[0]), energy * time**2 / unit[0] ** 2, time),
+            dry=None if j.dry is None else j.dry.rescaled(float(force[0]), float(unit[0] / time)),
             strain=None if j.strain is None else strain(j.strain),
             armature=j.armature * energy * time**2 / (unit[0] ** 2 if j.armature else 1.0),
         )

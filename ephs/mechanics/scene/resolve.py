@@ -23,6 +23,7 @@ from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Marker, Scene, Sprin
 from ephs.mechanics.scene.placing import Place, resolve_place
 from ephs.mechanics.scene.schema import BodyEntry, JointEntry, ShapeEntry, SpringEntry
 from ephs.mechanics.scene.text import MESHES
+from ephs.mechanics.shapes.dry import Dry
 
 Array = NDArray[np.float64]
 ROUNDED = 1e-12
@@ -68,6 +69,7 @@ class JointDraft:
     coordinates: Array | None
     rate: Array | None
     strain: Strain | None = None
+    dry: Dry | None = None
     armature: float = 0.0
 
     def coupling(self) -> Coupling:
@@ -181,8 +183,23 @@ def resolve_joint(name: str, table: Checked[JointEntry], names: Names, faults: l
         motion=None if entry.motion is None else entry.motion.rate,
         coordinates=coordinates,
         rate=rate,
+        dry=_dry(entry, d, key, faults),
         armature=entry.armature,
     )
+
+
+def _dry(entry: JointEntry, d: int, key: str, faults: list[Fault]) -> Dry | None:
+    found = entry.dry
+    if found is None:
+        return None
+    if d != 1 or entry.motion is not None:
+        what = "a joint with a prescribed motion" if entry.motion is not None else f"a {entry.type} joint"
+        faults.append(fault("dry joint", f"{key}.dry", what))
+        return None
+    if found.static is not None and found.static < found.coulomb:
+        faults.append(fault("dry static", f"{key}.dry.static", shown(found.static), coulomb=found.coulomb))
+        return None
+    return Dry(found.coulomb, found.static, found.stribeck, found.slip)
 
 
 def resolve_spring(name: str, table: Checked[SpringEntry], names: Names, faults: list[Fault]) -> Spring:

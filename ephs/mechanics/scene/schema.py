@@ -101,6 +101,15 @@ class MotionEntry(Entry):
     rate: Number = Field(description="of the single freedom, rad/s or m/s")
 
 
+class DryEntry(Entry):
+    """Dry friction of a joint with one freedom."""
+
+    coulomb: NonNegative = Field(description="force while it slides, N m or N")
+    static: NonNegative | None = Field(default=None, description="force at which it begins to; default: coulomb")
+    stribeck: Positive = Field(default=0.01, description="rate over which the force falls to coulomb, rad/s or m/s")
+    slip: Positive = Field(default=1e-3, description="rate below which it is viscous, rad/s or m/s")
+
+
 class JointEntry(Entry):
     """``[joints.NAME]``"""
 
@@ -120,6 +129,7 @@ class JointEntry(Entry):
     friction: Matrix = Field(
         default=0.0, description="on the joint twist: a number, one a freedom, or a matrix; N m s, N s/m"
     )
+    dry: DryEntry | None = Field(default=None, description="dry friction of a joint with one freedom")
     stiffness: Numbers = Field(default=0.0, description="of the potential ½ k (coordinate − rest)²; N m/rad, N/m")
     rest: Numbers = Field(default=0.0, description="coordinates without force; rad, m")
     heat: Text = Field(default="environment", description="where the friction heat goes: a thermal name")

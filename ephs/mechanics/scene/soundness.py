@@ -148,6 +148,7 @@ def _joint(j: Joint) -> dict[str, tuple[Any, tuple[int, ...]]]:
         "motion": (0.0 if j.motion is None else j.motion, ()),
         **({} if j.middle is None else {"middle": (j.middle, (7,))}),
         **({} if j.stop is None else {f"stop.{key}": (number, ()) for key, number in j.stop.numbers}),
+        **({} if j.dry is None else {f"dry.{key}": (number, ()) for key, number in j.dry.numbers}),
         **({} if j.strain is None else _strain(j)),
     }
 
