@@ -15,6 +15,7 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
     "sphinx.ext.mathjax",
+    "sphinx_design",
     "sphinxcontrib.bibtex",
 ]
 exclude_patterns = ["_build", ".jupyter_cache", "jupyter_execute"]
@@ -33,7 +34,7 @@ if not Path(__file__).parent.joinpath("../.build/static", mathjax_path).is_file(
     raise FileNotFoundError("MathJax is missing, build the pages with `make docs`")
 
 bibtex_bibfiles = ["../ephs/mechanics/references.bib"]  # the file that ephs.cite reads
-myst_enable_extensions = ["dollarmath", "deflist"]
+myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 
 nb_execution_mode = "cache"
