@@ -1,7 +1,8 @@
 """Ordering and fill of a sparse LU factorisation, decided once; the numbers follow in compiled code.
 
-SuperLU chooses the pivots at sample values (columns by minimum degree, rows by size). The fill of exactly this order
-is then known, and each later factorisation only computes numbers in fixed places, watching its pivots.
+SuperLU chooses the pivots at sample values (columns by minimum degree, rows by size), once as they come, once with rows
+and columns paired by large entries. The fill of exactly this order is then known, and each later factorisation only
+computes numbers in fixed places, watching its pivots.
 """
 
 from dataclasses import dataclass
@@ -12,8 +13,12 @@ from numpy.typing import NDArray
 
 from ephs.semantics.bundle import Array
 from ephs.semantics.linear.sparse import sparse_lu
+from ephs.semantics.spaces.rank import TINY
 
 Index = NDArray[np.int64]
+
+FAINT = 1e-12
+"""Entries below this part of the largest count alike where diagonals are chosen."""
 
 
 @final
@@ -57,11 +62,13 @@ def order(n: int, row: Index, column: Index, value: Array) -> Elimination:
 
     scale_r, scale_c = equilibrate(n, row, column, value)
     scaled = value * scale_r[row] * scale_c[column]
-    pattern = sparse.csc_matrix((scaled, (row, column)), shape=(n, n))
+    matrix = sparse.csc_matrix((scaled, (row, column)), shape=(n, n))
+    by_size = paired(n, row, column, scaled)
     plans: list[_Plan] = []
-    for choice in ("COLAMD", "MMD_AT_PLUS_A"):
-        factor = splu(pattern, permc_spec=choice, diag_pivot_thresh=0.1, options={"SymmetricMode": choice != "COLAMD"})
-        rows, columns = np.argsort(factor.perm_r).astype(np.int64), np.argsort(factor.perm_c).astype(np.int64)
+    for choice, given in (("COLAMD", np.arange(n)), ("MMD_AT_PLUS_A", by_size)):
+        symmetric = {"SymmetricMode": choice != "COLAMD"}
+        factor = splu(matrix[given], permc_spec=choice, diag_pivot_thresh=0.1, options=symmetric)
+        rows, columns = given[np.argsort(factor.perm_r)], np.argsort(factor.perm_c).astype(np.int64)
         plans.append(_Plan.of(n, row, column, rows, columns))
     room = 4 * row.size + n
     while True:  # of two orders that fit into some room the better one; the other may fill a hundred times as much
@@ -69,6 +76,33 @@ def order(n: int, row: Index, column: Index, value: Array) -> Elimination:
         if found:
             return min(found, key=lambda made: made.fill)
         room *= 2
+
+
+def paired(n: int, row: Index, column: Index, value: Array) -> Index:
+    """(n,) rows by columns, so that the product of the diagonal is large: orders of the sum with the transpose need it.
+
+    Of small entries on the diagonal the pivots are taken elsewhere, against the order: fill grows with the square.
+
+    Raises
+    ------
+    RuntimeError
+        No such rows exist: the matrix is singular by its pattern.
+    """
+    from scipy import sparse
+    from scipy.sparse.csgraph import min_weight_full_bipartite_matching
+
+    weight = np.abs(value)
+    seen = np.flatnonzero(weight > 0.0)
+    weight = 1.0 - np.log(np.maximum(weight[seen] / weight.max(initial=TINY), FAINT))
+    try:
+        rows, columns = min_weight_full_bipartite_matching(
+            sparse.csr_matrix((weight, (row[seen], column[seen])), shape=(n, n))
+        )
+    except ValueError as error:
+        raise RuntimeError("singular by its pattern") from error
+    out = np.empty(n, dtype=np.int64)
+    out[columns] = rows
+    return out
 
 
 def equilibrate(n: int, row: Index, column: Index, value: Array) -> tuple[Array, Array]:
@@ -110,7 +144,7 @@ class _Plan:
         to_row[rows], to_column[columns] = np.arange(n), np.arange(n)
         given, own = to_row[row] * n + to_column[column], np.arange(n) * n + np.arange(n)
         places = np.sort(np.concatenate([given, own]))  # 100 times as fast as NumPy's unique, which hashes
-        return _Plan(rows, columns, places[np.append(True, np.diff(places) > 0)], own, given)
+        return _Plan(rows, columns, places[np.diff(places, prepend=-1) > 0], own, given)
 
     def filled(self, room: int) -> Elimination | None:
         """The elimination, None where its factors do not fit into so many entries."""

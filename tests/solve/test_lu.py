@@ -1,12 +1,14 @@
 """The fixed-order factorisation solves what a dense solver solves, and watches its pivots."""
 
+from itertools import permutations
+
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from ephs.semantics.linear.sparse import sparse_lu
-from ephs.solve.sparse import order
+from ephs.solve.sparse import order, paired
 
 RUNS = {"compiled": sparse_lu().compiled(), "plain": sparse_lu().plain()}
 factorise, solve = RUNS["compiled"]["factorise"], RUNS["compiled"]["solve"]
@@ -42,6 +44,21 @@ def test_solves_as_a_dense_solver(dense, seed):
     assert good
     scale = np.abs(dense) @ np.abs(x) + np.abs(right)
     assert np.all(np.abs(dense @ x - right) <= 1e-11 * scale.max())
+
+
+@given(matrices())
+def test_rows_are_paired_with_columns_by_the_largest_product(dense):
+    n = min(5, dense.shape[0])
+    part = dense[:n, :n] + np.diag(np.full(n, 1e-3))
+    row, column = np.nonzero(part)
+    found = np.abs(part[paired(n, row, column, part[row, column]), np.arange(n)]).prod()
+    best = max(np.abs(part[list(rows), np.arange(n)]).prod() for rows in permutations(range(n)))
+    assert found >= (1.0 - 1e-12) * best > 0.0
+
+
+def test_a_matrix_that_no_values_make_regular_is_refused():
+    with pytest.raises(RuntimeError, match="singular by its pattern"):
+        paired(3, np.array([0, 1, 2, 2]), np.array([0, 0, 1, 2]), np.ones(4))
 
 
 @given(matrices(), st.floats(0.5, 2.0))
