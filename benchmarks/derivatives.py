@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import ephs
+from ephs.mechanics.scene.parameters import names
 
 __all__ = ["table"]
 
@@ -32,7 +33,44 @@ CASES: dict[str, tuple[list[str], float, float]] = {
 REPEATS = 3
 
 
+COUNTS = (1, 10, 100)
+"""Numbers of parameters of a gradient."""
+LONG = 200
+"""Steps of the run that a gradient is taken of."""
+
+
 def table() -> str:
+    """Tables of derivatives by four parameters, and of gradients."""
+    return f"{_tangents()}\n\n{_gradients()}"
+
+
+def _gradients() -> str:
+    """Milliseconds of a run, and of the gradient of its end; tangents forward beside it."""
+    lines = [
+        "| scene | parameters | run [ms] | gradient [ms] | ratio | sensitivity [ms] | ratio |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    scene = ephs.load(ROOT / "scenes" / "chain.toml")
+    paths = [path for path in names(scene) if path.startswith("bodies.")]
+    run: dict[str, Any] = {"method": "rk87", "step": 0.002}
+    end = LONG * run["step"]
+    weights = {"joints.j0.coordinate": [1.0]}
+    for count in COUNTS:
+        chosen = (paths * (1 + count // len(paths)))[:count]
+        ways: list[Callable[[], object]] = [
+            lambda: ephs.simulate(scene, end, audit="off", **run),
+            lambda chosen=chosen: ephs.gradient(scene, chosen, [end], weights, **run),
+            lambda chosen=chosen: ephs.sensitivity(scene, chosen, end, **run),
+        ]
+        plain, back, along = _least(ways)
+        lines.append(
+            f"| chain | {count} | {1e3 * plain:.0f} | {1e3 * back:.0f} | {back / plain:.1f} "
+            f"| {1e3 * along:.0f} | {along / plain:.1f} |"
+        )
+    return "\n".join(lines)
+
+
+def _tangents() -> str:
     """Milliseconds of a run and of its derivatives by four parameters, and of a linearisation."""
     lines = [
         "| scene | method | run [ms] | with derivatives [ms] | ratio | linearise [ms] |",

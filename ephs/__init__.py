@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from ephs.mechanics.scene import SceneWarning as SceneWarning
     from ephs.mechanics.scene.load import load as load
     from ephs.mechanics.sensitivity import fit as fit
+    from ephs.mechanics.sensitivity import gradient as gradient
     from ephs.mechanics.sensitivity import sensitivity as sensitivity
     from ephs.mechanics.sweep.sweep import SweepInterrupted as SweepInterrupted
     from ephs.mechanics.sweep.sweep import sweep as sweep
@@ -94,7 +95,7 @@ _HOMES = {
     "ephs.mechanics.runs.reduce": ("reduce",),
     "ephs.mechanics.runs.reading": ("load_solution",),
     "ephs.mechanics.runs.simulate": ("simulate",),
-    "ephs.mechanics.sensitivity": ("fit", "sensitivity"),
+    "ephs.mechanics.sensitivity": ("fit", "gradient", "sensitivity"),
     "ephs.solve.errors": ("Interrupted", "OptionError", "Outcome", "SimulationError"),
     "ephs.solve.events": ("Event",),
     "ephs.solve.exchange.coupling": ("Bond",),

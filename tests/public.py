@@ -25,6 +25,7 @@ CLASSES = (
     "ephs.mechanics.motion.motion.BodyMotion",
     "ephs.mechanics.motion.motion.JointMotion",
     "ephs.mechanics.sensitivity.Fit",
+    "ephs.mechanics.sensitivity.Gradient",
     "ephs.mechanics.sensitivity.Sensitivity",
     "ephs.mechanics.motion.views.StateView",
     "ephs.operad.Algebra",

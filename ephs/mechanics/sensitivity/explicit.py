@@ -67,13 +67,19 @@ class _Read(Exception):
 
 @final
 class ExplicitTangent:
-    """Steps of a method with their tangents, for one family."""
+    """Steps of a method with their tangents, for one family.
+
+    Attributes
+    ----------
+    tangents
+        Numbers of parameters, and steps with derivatives by these, after a start.
+    """
 
     def __init__(self, family: Family, t0: float, method: str) -> None:
         self.family, self.t0, self.method = family, t0, tableau(method)
         self.equations = Equations(family.problem, t0)
         self._others: dict[tuple[int, float], tuple[Problem, Equations, ReducedState]] = {}
-        self._tangents: list[tuple[slice, StepTangent]] = []
+        self.tangents: list[tuple[slice, StepTangent]] = []
 
     # ---- steps -------------------------------------------------------------------------------------------------
 
@@ -93,7 +99,7 @@ class ExplicitTangent:
             for name in made.slopes:
                 for k, j in enumerate(range(which.start, which.stop)):
                     made.slopes[name][..., k] = self._by(j, lambda of, _, name=name: self._numbers(of, name))
-            self._tangents.append((which, made))
+            self.tangents.append((which, made))
         return self._closed(point)
 
     def step(self, point: Point, h: float) -> Point:
@@ -102,7 +108,7 @@ class ExplicitTangent:
         if eq.held:
             eq.given.place(base.t, {})
         out = Point(base, np.empty_like(point.q), np.empty_like(point.y))
-        for which, tangent in self._tangents:
+        for which, tangent in self.tangents:
             self._put(tangent, point, which, "base", "start")
             status = tangent.step(h) if eq.constant or eq.held else self._staged(tangent, base.t, h)
             self._refuse(status)
@@ -112,7 +118,7 @@ class ExplicitTangent:
 
     def _closed(self, point: Point) -> Point:
         out = Point(point.state, np.empty_like(point.q), np.empty_like(point.y))
-        for which, tangent in self._tangents:
+        for which, tangent in self.tangents:
             self._put(tangent, point, which, "q", "y")
             self._refuse(tangent.close())
             self._taken(tangent, out, which, point.t)

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, Final, final
 
-from ephs.semantics.derive.arguments import pointer
 from ephs.semantics.stage.evaluator import Evaluator
+from ephs.semantics.stage.kinds import pointer
 from ephs.semantics.stage.memory import Integers, Vector
 from ephs.semantics.stage.numbers import Integer, Real
 from ephs.semantics.stage.programs import Entry, Program

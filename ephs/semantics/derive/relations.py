@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, Final, TypeAlias, final
 
-from ephs.semantics.derive.arguments import Arguments, pointer
+from ephs.semantics.derive.arguments import Arguments
 from ephs.semantics.derive.charts import moved, over
 from ephs.semantics.derive.holonomic import Holonomic
 from ephs.semantics.derive.linear import Linear
@@ -19,6 +19,7 @@ from ephs.semantics.derive.tape import Tape, evaluate
 from ephs.semantics.spaces.vectors import dot
 from ephs.semantics.stage.duals import Duals
 from ephs.semantics.stage.evaluator import Evaluator
+from ephs.semantics.stage.kinds import pointer
 from ephs.semantics.stage.memory import Held, Vector
 from ephs.semantics.stage.numbers import Integer, Real, Truth
 from ephs.semantics.stage.programs import Call, Entry, Program

@@ -10,7 +10,7 @@ from ephs.semantics.stage.memory import Cells, IntegerCells, RealCells
 from ephs.semantics.stage.numbers import Condition, Integer, Number, Operation, Order, Real, Truth
 from ephs.semantics.stage.reaching import Atom, Part, Reached, Signature
 
-__all__ = ["Dual", "DualCells", "Duals"]
+__all__ = ["RULES", "Dual", "DualCells", "Duals"]
 
 Ruled: TypeAlias = tuple[Real, tuple[Real, ...]]
 """The value of a function, and its derivative by each argument."""
@@ -177,7 +177,7 @@ class Duals(Evaluator):
 
     def _function(self, name: Function, *arguments: Real) -> Real:
         numbers = [self.dual(number) for number in arguments]
-        value, factors = _RULES[name](self.base, [number.value for number in numbers])
+        value, factors = RULES[name](self.base, [number.value for number in numbers])
         slopes: tuple[Real, ...] = (0.0,) * self.directions
         for factor, number in zip(factors, numbers, strict=True):
             slopes = tuple(_plus(s, _times(n, factor)) for s, n in zip(slopes, number.slopes, strict=True))
@@ -275,7 +275,7 @@ def _copysign(on: Evaluator, x: Sequence[Real]) -> Ruled:
     return on.copysign(x[0], x[1]), (on.copysign(1.0, x[0]) * on.copysign(1.0, x[1]), 0.0)
 
 
-_RULES: Final[dict[Function, Callable[[Evaluator, Sequence[Real]], Ruled]]] = {
+RULES: Final[dict[Function, Callable[[Evaluator, Sequence[Real]], Ruled]]] = {
     "sqrt": _sqrt,
     "absolute": lambda on, x: (on.absolute(x[0]), (on.copysign(1.0, x[0]),)),
     "floor": lambda on, x: (on.floor(x[0]), (0.0,)),
@@ -286,3 +286,4 @@ _RULES: Final[dict[Function, Callable[[Evaluator, Sequence[Real]], Ruled]]] = {
     "atan2": _atan2,
     "copysign": _copysign,
 }
+"""Value of each function, and its derivatives by the arguments."""

@@ -2,16 +2,18 @@
 
 import inspect
 from collections.abc import Callable, Iterator
+from dataclasses import fields, is_dataclass
 from functools import wraps
 from inspect import Parameter
-from typing import Any, final
+from typing import Any, Final, cast, final
 
 from ephs.semantics.stage.duals import Duals
 from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.evaluator import Evaluator
-from ephs.semantics.stage.kinds import Kind, described, dual, of_field, signature_of
+from ephs.semantics.stage.kinds import Kind, described, dual, of_field, pointer, signature_of, taped
 from ephs.semantics.stage.reaching import Atom, Signature
 from ephs.semantics.stage.records import IntegerField, RealField
+from ephs.semantics.stage.taped import Tape, Taped
 from ephs.semantics.stage.unrolled import Unrolled
 
 __all__ = ["Entry"]
@@ -101,6 +103,26 @@ class Entry:
 
         return Entry(run, **{name: dual(kind, directions, name in chosen) for name, kind in self.kinds.items()})
 
+    def taped(self) -> "Entry":
+        """Return this function writing a tape from which a gradient is read, see `ephs.semantics.stage.gradients`.
+
+        Arguments with real numbers are pairs: the argument, and an array of int64 of its shape, the row of each number
+        on the tape, 0 for constants. Three more follow: the tape's counters, places and slopes. What it calls by
+        address is to be taped, too.
+        """
+
+        def run(on: Evaluator, *arguments: Any) -> Any:
+            *own, counters, places, slopes = arguments
+            taping = Taped(on, Tape(counters.cells, places.cells, slopes.cells))
+            return self.function(taping, *[_resolved(argument, taping) for argument in own])
+
+        kinds = {name: taped(kind) for name, kind in self.kinds.items()} | TAPE
+        run.__qualname__ = self.name
+        run.__signature__ = inspect.Signature(
+            [Parameter(name, Parameter.POSITIONAL_OR_KEYWORD) for name in ("on", *kinds)]
+        )
+        return Entry(run, **kinds)
+
     def given(self, **values: Any) -> "Entry":
         """Return this function for some arguments given while staging, unrolled over what they say.
 
@@ -146,3 +168,17 @@ class Entry:
     def _known(self, names: tuple[str, ...]) -> None:
         if unknown := [name for name in names if name not in self.kinds]:
             raise StageError("unknown", where=self.name, found=", ".join(unknown), expected=", ".join(self.kinds))
+
+
+def _resolved(argument: Any, on: Taped) -> Any:
+    """An argument of a taped function; groups part by part."""
+    if is_dataclass(argument) and not isinstance(argument, type) and not callable(argument):
+        made = cast("Callable[..., Any]", type(argument))
+        return made(**{field.name: _resolved(getattr(argument, field.name), on) for field in fields(argument)})
+    return cast("Callable[[Taped], Any]", argument)(on)
+
+
+TAPE: Final[dict[str, Kind]] = {
+    "counters": pointer("integers"), "tape_places": pointer("integers"), "tape_slopes": pointer("reals"),
+}  # fmt: skip
+"""A tape, as taped functions take it behind their own arguments."""

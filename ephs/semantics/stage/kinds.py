@@ -11,6 +11,7 @@ from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.memory import ArrayIntegers, ArrayReals, Integers, Matrix, RealCells, Vector
 from ephs.semantics.stage.reaching import Atom, Signature
 from ephs.semantics.stage.records import IntegerField, RealField, Record, Table
+from ephs.semantics.stage.taped import Taped, TapedCells
 
 __all__ = [
     "INTEGER",
@@ -22,11 +23,15 @@ __all__ = [
     "indices",
     "matrix",
     "of_field",
+    "pointer",
     "signature_of",
     "table",
+    "taped",
     "vector",
 ]
 
+ANY: Final = 2**40
+"""A size beyond all: that of memory whose size the program is not told."""
 Shape: TypeAlias = tuple[int | None, ...]
 """A shape, None where any size will do."""
 
@@ -101,6 +106,19 @@ def vector(size: int | None = None) -> Kind:
         lambda value, trail: (value, len(value)) if _array(value, np.float64, (size, *trail)) else None,
         lambda parts: Vector(parts[0], 0, parts[1] if size is None else size),
     )
+
+
+def pointer(atom: Atom, size: int | None = None) -> Kind:
+    """Describe an argument that is the address of so many numbers, or of any number of them."""
+
+    def join(parts: list[Any]) -> Vector | Integers:
+        kind = Vector if atom == "reals" else Integers
+        return kind(parts[0], 0, ANY if size is None else size)
+
+    def split(value: Any, _trail: object) -> tuple[Any, ...] | None:
+        return (value,) if size is None or len(value) == size else None
+
+    return Kind(f"an array of {'any number of' if size is None else size} numbers", (atom,), split, join)
 
 
 def indices(size: int | None = None) -> Kind:
@@ -222,6 +240,39 @@ def dual(kind: Kind, directions: int, active: bool) -> Kind:
         return Kind(kind.expected, kind.atoms, kind.split, join)
     shape = "of its shape" if directions == 1 else f"of its shape and {directions} directions after it"
     return Kind(f"a pair: {kind.expected}, and its slopes, float64 {shape}", (*kind.atoms, "reals"), split, join)
+
+
+def taped(kind: Kind) -> Kind:
+    """Return the kind of an argument of a function that writes a tape: a pair of real numbers and their rows, int64.
+
+    What it makes of the parts is called with the evaluation to have the argument.
+    """
+    if kind.mapped is not None:
+        return kind.mapped(taped)
+    atoms = tuple(atom for atom in kind.atoms if atom in ("reals", "real"))
+
+    def split(value: Any, trail: Shape) -> tuple[Any, ...] | None:
+        match value:
+            case (values, places) if (parts := kind.split(values, trail)) is not None:
+                sizes = [np.size(part) for part, atom in zip(parts, kind.atoms, strict=True) if atom == "reals"]
+                rows = cast("np.ndarray[Any, np.dtype[Any]]", places)
+                return (*parts, rows) if _array(rows, np.int64, np.shape(rows)) and rows.size == sum(sizes) else None
+            case _:
+                return None
+
+    def join(parts: list[Any]) -> Callable[[Taped], Any]:
+        def made(on: Taped) -> Any:
+            own = [
+                TapedCells(on, part, parts[-1]) if atom == "reals" else on.constant(part) if atom == "real" else part
+                for part, atom in zip(parts, kind.atoms, strict=False)
+            ]
+            return kind.join(own)
+
+        return made
+
+    if not atoms or atoms == ("real",):
+        return Kind(kind.expected, kind.atoms, kind.split, join)
+    return Kind(f"a pair: {kind.expected}, and its rows, int64 of its shape", (*kind.atoms, "integers"), split, join)
 
 
 def signature_of(*, returns: bool = True, **kinds: "Kind | RealField | IntegerField") -> Signature:

@@ -47,6 +47,10 @@ class Program:
         """Return the program of all entry functions' tangents, see `Entry.tangent`: what tangents reach."""
         return _tangent(self, directions)
 
+    def taped(self) -> "Program":
+        """Return the program of all entry functions writing a tape, see `Entry.taped`: what taped functions reach."""
+        return _taped(self)
+
     def text(self, members: int = 1, shared: tuple[str, ...] = (), *, blocks: bool = True) -> str:
         """Return the program as assembly text of LLVM, with or without the functions on blocks of memory."""
         text, packed, _ = _staged(self, members, shared)
@@ -172,6 +176,11 @@ def _made(atom: Atom, part: Any, wide: bool) -> Any:
 def _tangent(program: Program, directions: int) -> Program:
     made = {name: entry.tangent(directions=directions) for name, entry in program.entries.items()}
     return Program(f"{program.name}_along_{directions}", **made)
+
+
+@cache
+def _taped(program: Program) -> Program:
+    return Program(f"{program.name}_taped", **{name: entry.taped() for name, entry in program.entries.items()})
 
 
 @cache

@@ -37,7 +37,7 @@ from ephs.solve.heats import PLAIN
 from ephs.solve.march import TABLEAU, Account, Control, Tableau
 from ephs.solve.march.steps import attempt
 
-__all__ = ["DIRECTIONS", "StepTangent", "evaluated", "step_program", "step_tangents"]
+__all__ = ["DIRECTIONS", "StepTangent", "evaluated", "reaching", "step_program", "step_tangents"]
 
 BEYOND: Final = 1e100
 """Errors that are allowed of a step where its length is given."""
@@ -166,7 +166,7 @@ class StepTangent:
         coordinates, size = engine.sizes
         stages = tableau["a"].shape[0]
         self.slopes: dict[str, Array] = {}
-        tables = {**engine.tables, **_of_tangents(engine, relation)}
+        tables = {**engine.tables, **reaching(engine, relation, lambda program: program.tangent(DIRECTIONS))}
         arguments: dict[str, Any] = {"tables": {}, "work": {}, "tableau": {}}
         self.arguments = arguments
         for key, values in (("tables", tables), ("work", engine.work), ("tableau", tableau)):
@@ -238,18 +238,22 @@ def _paired(value: Any, kept: dict[str, Array], name: str) -> Any:
     return value, kept[name]
 
 
-def _of_tangents(engine: Engine, relation: Callable[[int], tuple[Program, str]]) -> dict[str, Any]:
-    """The tables that hold addresses, with those of tangents."""
+def reaching(
+    engine: Engine, relation: Callable[[int], tuple[Program, str]], variant: Callable[[Program], Program]
+) -> dict[str, Any]:
+    """Return the tables that hold addresses, with those of a variant of each program: of its tangents, or taped."""
+
+    def address(program: Program, entry: str) -> int:
+        return variant(program).compiled()[entry].address
+
     own, component = _copied(engine.tables["own"]), _copied(engine.tables["component"])
     for name, (program, entry) in engine.reached.items():
-        setattr(own[0], name, program.tangent(DIRECTIONS).compiled()[entry].address)
+        setattr(own[0], name, address(program, entry))
     for number in evaluated(engine.tables):
-        program, entry = relation(number)
-        component[number].law = program.tangent(DIRECTIONS).compiled()[entry].address
+        component[number].law = address(*relation(number))
     net = engine.tables["net"].copy()
     for place, number in laws_in(net):
-        program, entry = relation(number)
-        net[place] = program.tangent(DIRECTIONS).compiled()[entry].address
+        net[place] = address(*relation(number))
     return {"own": own, "component": component, "net": net}
 
 

@@ -1,0 +1,144 @@
+"""`gradient`: derivatives of a sum of readings by many parameters at once, by reverse accumulation."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any, final
+
+import numpy as np
+
+from ephs.mechanics.runs.simulate import simulate
+from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.sensitivity.explicit import ExplicitTangent
+from ephs.mechanics.sensitivity.family import Family, relation_of
+from ephs.mechanics.sensitivity.sensitivity import ATOL, RTOL
+from ephs.mechanics.tree.engine.adjoints import StepAdjoint
+from ephs.mechanics.tree.equations.equations import Equations
+from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.codes import VECTOR
+from ephs.solve.errors import OptionError
+from ephs.solve.sparse import Index
+from ephs.solve.threads import in_one_thread
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+__all__ = ["Gradient", "gradient"]
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Gradient:
+    """A weighted sum of readings of a motion, and its derivatives.
+
+    Parameters
+    ----------
+    value
+        The sum.
+    derivatives
+        Path of a parameter -> derivative by it.
+    tables
+        Table of the mechanism's equations -> derivative by each of its numbers.
+    """
+
+    value: float
+    derivatives: Mapping[str, float]
+    tables: Mapping[str, Array]
+
+
+@in_one_thread
+def gradient(
+    scene: Scene,
+    parameters: Sequence[str],
+    times: "ArrayLike",
+    weights: "Mapping[str, ArrayLike]",
+    *,
+    t0: float = 0.0,
+    initial: "Mapping[str, ArrayLike] | None" = None,
+    method: str = "rk87",
+    rtol: float = RTOL,
+    atol: float = ATOL,
+    step: float | None = None,
+    inputs: Mapping[str, Any] | None = None,
+) -> Gradient:
+    """Σ weights · readings of a motion, by all parameters at once: reverse accumulation through its steps.
+
+    Steps are chosen by a run of `simulate`, end at the times besides, and are held; the state before each is kept, and
+    the step is run again on a tape when it is taken back. All of a step is differentiated, with the closing of loops
+    and the correction that keeps the balance of energy. Its time does not depend on the number of parameters, but for
+    each the model's tables are made anew. For few parameters and many readings take `sensitivity`. The gradient of a
+    sum of squares of residuals has twice the residuals as weights.
+
+    Parameters
+    ----------
+    parameters
+        Paths, as for `ephs.sensitivity`.
+    times
+        (n,) ascending, in s, after the start.
+    weights
+        ``joints.pin.coordinate`` or ``joints.pin.rate`` -> (n,) or (n, d), for the freedoms of a joint of the tree
+        whose elements are its coordinates.
+    method
+        ``"rk54"`` or ``"rk87"``.
+
+    Raises
+    ------
+    OptionError
+        A reading or a method has no such gradient, or inputs are functions.
+    SimulationError
+        The run failed.
+    """
+    if method not in ("rk54", "rk87"):
+        raise OptionError("method", method, "rk54 or rk87")
+    if not parameters:
+        raise OptionError("parameters", parameters, "at least one path")
+    family = Family(scene, parameters, initial, inputs, None, joints=True)
+    if not family.problem.constant:
+        raise OptionError("inputs", "a function", "constants; ephs.sensitivity takes functions of time")
+    wanted = np.atleast_1d(np.asarray(times, dtype=float))
+    if not (wanted.size and np.all(np.diff(wanted) > 0.0) and wanted[0] > t0):
+        raise OptionError("times", times, f"ascending times after {t0:g} s")
+    control: dict[str, Any] = {"step": step} if step is not None else {"rtol": rtol, "atol": atol}
+    run: dict[str, Any] = {"t0": t0, "initial": initial, "method": method, "inputs": inputs}
+    grid = np.union1d(simulate(scene, float(wanted[-1]), **run, **control).t, wanted)
+    forward = ExplicitTangent(family, t0, method)
+    point, eq = forward.start(), forward.equations
+    seeds = [_seed(eq, name, np.asarray(given, dtype=float), wanted.size) for name, given in weights.items()]
+    steps = StepAdjoint(eq.engine, partial(relation_of, family.problem.descriptor), forward.tangents[0][1])
+    q, y = point.state.q, eq.vector(point.state)
+    states, value = list[tuple[Array, Array]](), 0.0
+    for before, after in zip(grid[:-1].tolist(), grid[1:].tolist(), strict=True):
+        states.append((q, y))
+        status, q, y = steps.step(q, y, after - before)
+        eq.refuse(status, eq.engine.failed)
+        y[: eq.nv] = 0.0
+        for place in np.flatnonzero(wanted == after):
+            value += sum(float(w[place] @ (q if of_q else y)[where]) for where, of_q, w in seeds)
+    by_q, by_y = np.zeros(q.size), np.zeros(y.size)
+    for k in range(len(states) - 1, -1, -1):
+        for place in np.flatnonzero(wanted == grid[k + 1]):
+            for where, of_q, w in seeds:
+                (by_q if of_q else by_y)[where] += w[place]
+        by_q, by_y = steps.back(*states[k], float(grid[k + 1] - grid[k]), by_q, by_y)
+        by_y[: eq.nv] = 0.0
+    found = point.q @ by_q + point.y @ by_y[eq.nv :]
+    for which, tangent in forward.tangents:
+        for name, slopes in tangent.slopes.items():
+            count = which.stop - which.start
+            found[which] += steps.tables[name].ravel() @ slopes.reshape(-1, slopes.shape[-1])[:, :count]
+    names = [parameter.path for parameter in family.parameters]
+    return Gradient(value, dict(zip(names, found.tolist(), strict=True)), steps.tables)
+
+
+def _seed(eq: Equations, name: str, weights: Array, count: int) -> tuple[Index, bool, Array]:
+    """Where a reading is in q or y, which of both, and its weights (n, d)."""
+    joint, _, key = name.removeprefix("joints.").rpartition(".")
+    freedoms = eq.layout.freedoms.get(joint)
+    parts = eq.layout.edges.get(joint, ())
+    flat = freedoms is not None and all(edge.pair.code == VECTOR for _, edge in parts) and freedoms.max() < eq.n
+    if freedoms is None or not flat or key not in ("coordinate", "rate"):
+        raise OptionError("weights", name, "joints.….coordinate or joints.….rate of a joint of the tree, not a ball's")
+    if weights.size != count * freedoms.size:
+        raise OptionError(f"weights[{name!r}]", weights.shape, f"({count}, {freedoms.size})")
+    where = eq.layout.elements[joint] if key == "coordinate" else eq.nv + freedoms
+    return where, key == "coordinate", weights.reshape(count, freedoms.size)

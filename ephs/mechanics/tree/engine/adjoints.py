@@ -1,0 +1,65 @@
+"""Explicit steps of a mechanism backwards: what a function of a step's end is by all numbers that the step reads."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, final
+
+from ephs.mechanics.tree.engine.programs import Engine
+from ephs.mechanics.tree.engine.tangents import StepTangent, reaching, step_program
+from ephs.semantics.bundle import Array
+from ephs.semantics.stage import Program
+from ephs.semantics.stage.gradients import Gradients, Shares
+
+__all__ = ["StepAdjoint"]
+
+
+@final
+class StepAdjoint:
+    """Steps of one mechanism, and the same backwards.
+
+    Parameters
+    ----------
+    engine, relation
+        As of `StepTangent`.
+    tangent
+        Steps forward, whose arrays are taken.
+    """
+
+    def __init__(self, engine: Engine, relation: Callable[[int], tuple[Program, str]], tangent: StepTangent) -> None:
+        program = step_program(looped=engine.looped)
+        given = {name: _values(tangent.arguments[name]) for name in program.entries["step"].kinds}
+        self._arrays = {name: given[name] for name in ("base", "start", "q", "y")}
+        given["tables"] = {**given["tables"], **{n: engine.tables[n] for n in ("own", "component", "net")}}
+        self._forward = program.compiled()["step"].bind(*given.values())
+        taped = {**given, "tables": {**given["tables"], **reaching(engine, relation, Program.taped)}}
+        self._back = Gradients(program.entries["step"], **taped)
+        self._sum: Shares | None = None
+
+    @property
+    def tables(self) -> Mapping[str, Array]:
+        """The function's derivative by each real number of each table, by its name: the sum over steps taken back."""
+        found = self._sum or {}
+        return {name.removeprefix("tables."): found[name] for name in found if name.startswith("tables.")}
+
+    def step(self, q: Array, y: Array, h: float) -> tuple[int, Array, Array]:
+        """Take a step of h seconds: a status, and elements and y at its end."""
+        self._arrays["base"][:], self._arrays["start"][:] = q, y
+        status = int(self._forward(h))
+        return status, self._arrays["q"].copy(), self._arrays["y"].copy()
+
+    def back(self, q: Array, y: Array, h: float, by_q: Array, by_y: Array) -> tuple[Array, Array]:
+        """Take a function's derivatives by the end of the step from (q, y) back to its start, and to the tables."""
+        self._arrays["base"][:], self._arrays["start"][:] = q, y
+        self._back.run(h=h)
+        found = self._back.pull({"q": by_q, "y": by_y})
+        if self._sum is None:
+            self._sum = found
+        else:
+            self._sum.flat[:] += found.flat
+        return found["base"], found["start"]
+
+
+def _values(argument: Any) -> Any:
+    """An argument without its slopes."""
+    if isinstance(argument, Mapping):
+        return {name: _values(part) for name, part in argument.items()}
+    return argument[0] if isinstance(argument, tuple) else argument

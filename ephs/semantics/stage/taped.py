@@ -1,0 +1,285 @@
+"""Reverse accumulation over any evaluator: a function writes a tape as it runs, and the tape is read backwards.
+
+A number knows its value and, where it is active, a linear combination of earlier rows of the tape: a row is written
+where the combination gets long or the number is kept in memory. The gradient of one result by all arguments takes one
+run and one reading, however many there are. Griewank and Walther, *Evaluating Derivatives*, 2008, chapter 6.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final, TypeAlias, final
+
+from ephs.semantics.stage.duals import RULES
+from ephs.semantics.stage.errors import StageError
+from ephs.semantics.stage.evaluator import Evaluator, Function
+from ephs.semantics.stage.memory import Cells, IntegerCells, Integers, RealCells, Vector
+from ephs.semantics.stage.numbers import Condition, Integer, Number, Operation, Order, Real, Truth
+from ephs.semantics.stage.reaching import Atom, Part, Reached, Signature
+
+__all__ = ["CAPACITY", "COUNT", "POSITION", "ROWS", "Tape", "Taped", "TapedCells", "back"]
+
+POSITION, ROWS, CAPACITY, COUNT = range(4)
+"""Counters of a tape: where the next entry goes, the number of the next row, room for entries; how many counters."""
+LONG: Final = 8
+"""Terms of a sum beyond which a row is written."""
+PRODUCT: Final = 2
+"""The same of what is multiplied: its terms would be computed for each product."""
+Terms: TypeAlias = tuple[tuple[Integer, Real], ...]
+"""Rows of the tape and what the number changes with each; row 0 is none."""
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Tape:
+    """Rows of entries: each a row of before and a slope; after the entries of a row stands how many they are."""
+
+    counters: IntegerCells
+    places: IntegerCells
+    slopes: RealCells
+
+    def write(self, on: Evaluator, terms: Terms) -> Integer:
+        """Write a row and return its number. Where there is no room the first entries are spoiled: the count shows."""
+        size = len(terms) + 1
+        position, row = self.counters.load(POSITION), self.counters.load(ROWS)
+        at = on.select(position + size <= self.counters.load(CAPACITY), position, 0)
+        for k, (place, slope) in enumerate(terms):
+            self.places.store(at + k, place)
+            self.slopes.store(at + k, slope)
+        self.places.store(at + (size - 1), size - 1)
+        self.counters.store(POSITION, position + size)
+        self.counters.store(ROWS, row + 1)
+        return row
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Traced(Number):
+    """A value, and how it changes with rows of a tape."""
+
+    on: "Taped"
+    value: Real
+    terms: Terms
+
+    def _apply(self, operation: Operation, left: Real, right: Real) -> Real:
+        on, (a, one), (b, other) = self.on, _split(left), _split(right)
+        match operation:
+            case "+":
+                return on.traced(a + b, (*one, *other))
+            case "-":
+                return on.traced(a - b, (*one, *_scaled(other, -1.0)))
+            case "*":
+                one, other = on.short(one), on.short(other)
+                return on.traced(a * b, (*_scaled(one, b), *_scaled(other, a)))
+            case "/":
+                quotient = a / b
+                one, other = on.short(one), on.short(other)
+                under = 1.0 / b
+                return on.traced(quotient, (*_scaled(one, under), *_scaled(other, -(quotient * under))))
+
+    def _order(self, order: Order, left: Real, right: Real) -> Truth:
+        a, b = _split(left)[0], _split(right)[0]
+        match order:
+            case "<":
+                return a < b
+            case "<=":
+                return a <= b
+            case ">":
+                return a > b
+            case ">=":
+                return a >= b
+
+    def _negative(self) -> Real:
+        return Traced(self.on, -self.value, _scaled(self.terms, -1.0))
+
+
+def _split(number: Real) -> tuple[Real, Terms]:
+    return (number.value, number.terms) if isinstance(number, Traced) else (number, ())
+
+
+def _scaled(terms: Terms, by: Real) -> Terms:
+    return tuple((place, slope * by) for place, slope in terms)
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class TapedCells(Cells[Real]):
+    """Cells of traced numbers: values, and the row of each; none where it is a constant."""
+
+    on: "Taped"
+    values: RealCells
+    places: IntegerCells
+
+    def load(self, index: Integer) -> Real:
+        """Return the number at an index."""
+        return Traced(self.on, self.values.load(index), ((self.places.load(index), 1.0),))
+
+    def store(self, index: Integer, value: Real) -> None:
+        """Keep a number at an index."""
+        number, terms = _split(value)
+        self.values.store(index, number)
+        self.places.store(index, self.on.place(terms))
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Taped(Evaluator):
+    """Evaluation that writes a tape, with another evaluator's numbers."""
+
+    base: Evaluator
+    tape: Tape
+
+    def constant(self, value: Real) -> Real:
+        """Return a number of the base as one that nothing changes."""
+        return Traced(self, value, ())
+
+    def traced(self, value: Real, terms: Terms) -> Real:
+        """Return a number; a row is written where its terms are many, and a constant is one of the base."""
+        merged: dict[int, tuple[Integer, Real]] = {}
+        for place, slope in terms:
+            known = merged.get(id(place))
+            merged[id(place)] = (place, slope if known is None else known[1] + slope)
+        found = tuple(merged.values())
+        if len(found) > LONG:
+            found = ((self.tape.write(self.base, found), 1.0),)
+        return Traced(self, value, found)
+
+    def short(self, terms: Terms) -> Terms:
+        """Return terms that are few, by a row of the tape."""
+        return terms if len(terms) <= PRODUCT else ((self.tape.write(self.base, terms), 1.0),)
+
+    def place(self, terms: Terms) -> Integer:
+        """Return the row that a number is."""
+        if not terms:
+            return 0
+        place, slope = terms[0]
+        if len(terms) == 1 and type(slope) is float and slope == 1.0:
+            return place
+        return self.tape.write(self.base, terms)
+
+    def _function(self, name: Function, *arguments: Real) -> Real:
+        parts = [_split(argument) for argument in arguments]
+        value, factors = RULES[name](self.base, [value for value, _ in parts])
+        terms = [_scaled(self.short(terms), factor) for (_, terms), factor in zip(parts, factors, strict=True)]
+        return self.traced(value, tuple(term for part in terms for term in part))
+
+    def scale(self, real: Real, power: Integer) -> Real:
+        value, terms = _split(real)
+        scaled = tuple((place, self.base.scale(slope, power)) for place, slope in terms)
+        return self.traced(self.base.scale(value, power), scaled)
+
+    def _choose(self, truth: Condition, one: Any, other: Any) -> Any:
+        if not isinstance(one, float | Number) and not isinstance(other, float | Number):
+            return self.base.select(truth, one, other)
+        (a, left), (b, right) = _split(one), _split(other)
+        place = self.base.select(truth, self.place(left), self.place(right))
+        return Traced(self, self.base.select(truth, a, b), ((place, 1.0),))
+
+    def _both(self, one: Truth, other: Truth) -> Truth:
+        return self.base.both(one, other)
+
+    def _negate(self, truth: Condition) -> Truth:
+        return self.base.negate(truth)
+
+    def _same(self, one: Integer, other: Integer) -> Truth:
+        return self.base.same(one, other)
+
+    def real(self, integer: Integer) -> Real:
+        return self.constant(self.base.real(integer))
+
+    def integer(self, real: Real) -> Integer:
+        return self.base.integer(_split(real)[0])
+
+    def loop(self, count: Integer, body: Callable[[Integer], None], start: Integer = 0, down: bool = False) -> None:
+        self.base.loop(count, body, start, down)
+
+    def when(self, truth: Truth, yes: Callable[[], None], no: Callable[[], None] | None = None) -> None:
+        self.base.when(truth, yes, no)
+
+    def repeat(self, body: Callable[[], Truth]) -> None:
+        self.base.repeat(body)
+
+    def _reals(self, size: int) -> RealCells:
+        return TapedCells(self, self.base._reals(size), self.base._wholes(size))
+
+    def _wholes(self, size: int) -> IntegerCells:
+        return self.base._wholes(size)
+
+    def _constants(self, values: list[Any], whole: bool) -> Cells[Any]:
+        constants = self.base._constants(values, whole)
+        return constants if whole else TapedCells(self, constants, _Nothing())
+
+    def _rehearse(self, body: Callable[[], None]) -> None:
+        self.base._rehearse(body)
+
+    def _reach(self, function: Reached, parts: list[Part]) -> Integer:
+        """Call a function that writes the same tape: its address is what a table holds where programs are taped."""
+        rest, passed = iter(parts), list[Part]()
+        arguments: list[tuple[Atom, ...]] = []
+        for atoms in function.signature.arguments:
+            rows: list[Part] = []
+            for atom, value in (next(rest) for _ in atoms):
+                if atom == "real":
+                    raise StageError("unreached", what="the derivative of a number that is handed over by itself")
+                if atom != "reals":
+                    passed.append((atom, value))
+                    continue
+                cells, start = value
+                if not isinstance(cells, TapedCells):
+                    raise StageError("passive")
+                passed.append((atom, (cells.values, start)))
+                rows.append(("integers", (cells.places, start)))
+            passed += rows
+            arguments.append((*atoms, *(atom for atom, _ in rows)))
+        tape = self.tape
+        own: list[Part] = [
+            ("integers", (tape.counters, 0)),
+            ("integers", (tape.places, 0)),
+            ("reals", (tape.slopes, 0)),
+        ]
+        passed += own
+        signature = Signature((*arguments, ("integers",), ("integers",), ("reals",)), function.signature.returns)
+        return self.base._reach(Reached(signature, function.address), passed)
+
+    def _call(self, on: Evaluator, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+        return function(on, *arguments)  # the tape is memory of the function that is emitted
+
+
+@final
+class _Nothing(Cells[Integer]):
+    """Rows of constants."""
+
+    __slots__ = ()
+
+    def load(self, index: Integer) -> Integer:
+        """Return no row."""
+        return 0
+
+    def store(self, index: Integer, value: Integer) -> None:
+        """Refuse: constants are read only."""
+        raise StageError("passive")
+
+
+def back(on: Evaluator, counters: Integers, places: Integers, slopes: Vector, bars: Vector) -> None:
+    """Read a tape backwards: add to each row's share in the result what later rows have of it, and clear those.
+
+    Parameters
+    ----------
+    bars
+        By row: the share of each in the result; before, that of the rows that are results.
+    """
+    position, row = on.counter(counters[POSITION]), on.counter(counters[ROWS] - 1)
+
+    def one() -> Truth:
+        count = places[position.value - 1]
+        first, share = position.value - 1 - count, bars[row.value]
+
+        def entry(j: Integer) -> None:
+            place = places[first + j]
+            bars[place] = bars[place] + slopes[first + j] * share
+
+        bars[row.value] = 0.0
+        on.loop(count, entry)
+        position.value, row.value = first, row.value - 1
+        return first <= 0
+
+    on.when(position.value > 0, lambda: on.repeat(one))
