@@ -5,11 +5,12 @@ Ways are interleaved and the least processor time counts; all is compiled before
 
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import ephs
-from ephs.mechanics.scene.parameters import names
+from ephs.mechanics.scene.parameters import names, read
 
 __all__ = ["table"]
 
@@ -33,9 +34,9 @@ CASES: dict[str, tuple[list[str], float, float]] = {
 REPEATS = 3
 
 
-COUNTS = (1, 10, 100)
+COUNTS = (1, 8, 32)
 """Numbers of parameters of a gradient."""
-LONG = 200
+LONG = 2000
 """Steps of the run that a gradient is taken of."""
 
 
@@ -45,27 +46,33 @@ def table() -> str:
 
 
 def _gradients() -> str:
-    """Milliseconds of a run, and of the gradient of its end; tangents forward beside it."""
+    """Milliseconds of a run, of the gradient of its end and of derivatives along the run; less the model's tables.
+
+    How the tables change with the parameters takes as long for one step as for many.
+    """
     lines = [
-        "| scene | parameters | run [ms] | gradient [ms] | ratio | sensitivity [ms] | ratio |",
-        "| --- | --- | --- | --- | --- | --- | --- |",
+        "| scene | parameters | run [ms] | gradient [ms] | ratio | sensitivity [ms] | ratio | tables besides [ms] |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     scene = ephs.load(ROOT / "scenes" / "chain.toml")
-    paths = [path for path in names(scene) if path.startswith("bodies.")]
+    given = [path for path in names(scene) if path.startswith("bodies.") and "velocity" not in path]
+    given += [path for path in names(scene) if path.startswith("joints.") and path.endswith(("coordinate", "rate"))]
+    paths = [path for path in given if not path.startswith("bodies.") or read(scene, path)]
     run: dict[str, Any] = {"method": "rk87", "step": 0.002}
-    end = LONG * run["step"]
+    one, end = run["step"], LONG * run["step"]
     weights = {"joints.j0.coordinate": [1.0]}
     for count in COUNTS:
-        chosen = (paths * (1 + count // len(paths)))[:count]
+        chosen = paths[:count]
         ways: list[Callable[[], object]] = [
             lambda: ephs.simulate(scene, end, audit="off", **run),
-            lambda chosen=chosen: ephs.gradient(scene, chosen, [end], weights, **run),
-            lambda chosen=chosen: ephs.sensitivity(scene, chosen, end, **run),
+            *(partial(ephs.gradient, scene, chosen, [until], weights, **run) for until in (one, end)),
+            *(partial(ephs.sensitivity, scene, chosen, until, **run) for until in (one, end)),
         ]
-        plain, back, along = _least(ways)
+        plain, tables, back, start, along = _least(ways)
+        back, along = back - tables, along - start
         lines.append(
-            f"| chain | {count} | {1e3 * plain:.0f} | {1e3 * back:.0f} | {back / plain:.1f} "
-            f"| {1e3 * along:.0f} | {along / plain:.1f} |"
+            f"| chain | {len(chosen)} | {1e3 * plain:.0f} | {1e3 * back:.0f} | {back / plain:.1f} "
+            f"| {1e3 * along:.0f} | {along / plain:.1f} | {1e3 * tables:.0f} |"
         )
     return "\n".join(lines)
 

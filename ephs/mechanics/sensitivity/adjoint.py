@@ -48,7 +48,7 @@ class Gradient:
 
 @in_one_thread
 def gradient(
-    scene: Scene,
+    model: Scene,
     parameters: Sequence[str],
     times: "ArrayLike",
     weights: "Mapping[str, ArrayLike]",
@@ -71,6 +71,8 @@ def gradient(
 
     Parameters
     ----------
+    model
+        A scene.
     parameters
         Paths, as for `ephs.sensitivity`.
     times
@@ -84,15 +86,17 @@ def gradient(
     Raises
     ------
     OptionError
-        A reading or a method has no such gradient, or inputs are functions.
+        A model, a reading or a method has no such gradient, or inputs are functions.
     SimulationError
         The run failed.
     """
     if method not in ("rk54", "rk87"):
         raise OptionError("method", method, "rk54 or rk87")
+    if not isinstance(model, Scene):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise OptionError("model", type(model).__name__, "a scene: of systems ephs.sensitivity takes natural")
     if not parameters:
         raise OptionError("parameters", parameters, "at least one path")
-    family = Family(scene, parameters, initial, inputs, None, joints=True)
+    family = Family(model, parameters, initial, inputs, None, joints=True)
     if not family.problem.constant:
         raise OptionError("inputs", "a function", "constants; ephs.sensitivity takes functions of time")
     wanted = np.atleast_1d(np.asarray(times, dtype=float))
@@ -100,7 +104,7 @@ def gradient(
         raise OptionError("times", times, f"ascending times after {t0:g} s")
     control: dict[str, Any] = {"step": step} if step is not None else {"rtol": rtol, "atol": atol}
     run: dict[str, Any] = {"t0": t0, "initial": initial, "method": method, "inputs": inputs}
-    grid = np.union1d(simulate(scene, float(wanted[-1]), **run, **control).t, wanted)
+    grid = np.union1d(simulate(model, float(wanted[-1]), **run, **control).t, wanted)
     forward = ExplicitTangent(family, t0, method)
     point, eq = forward.start(), forward.equations
     seeds = [_seed(eq, name, np.asarray(given, dtype=float), wanted.size) for name, given in weights.items()]

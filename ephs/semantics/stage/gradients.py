@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from ephs.semantics.stage.entries import Entry
 from ephs.semantics.stage.kinds import indices, vector
-from ephs.semantics.stage.memory import ArrayReals
 from ephs.semantics.stage.programs import Program
 from ephs.semantics.stage.records import Record, Table
 from ephs.semantics.stage.taped import CAPACITY, COUNT, POSITION, ROWS, back
@@ -54,7 +53,7 @@ class Gradients:
             group = cast("Mapping[str, Any]", value) if isinstance(value, Mapping) else None
             parts |= {name: value} if group is None else {f"{name}.{key}": part for key, part in group.items()}
         self._numbers = {name: numbers for name, value in parts.items() if (numbers := _numbers(value)) is not None}
-        self._before = {name: numbers.copy() for name, numbers in self._numbers.items()}
+        self._memory = [(array, array.copy()) for value in parts.values() for array in _arrays(value)]
         self._loose: dict[str, float] = {n: value for n, value in arguments.items() if isinstance(value, int | float)}
         self._flat = np.zeros(sum(numbers.size for numbers in self._numbers.values()), dtype=np.int64)
         self._first = np.arange(1, self._flat.size + 1)
@@ -96,8 +95,8 @@ class Gradients:
     def run(self, **numbers: float) -> Any:
         """Run the function and return its result; numbers among the arguments may be new ones."""
         self._loose |= numbers
-        for name, kept in self._before.items():
-            kept[...] = self._numbers[name]
+        for array, kept in self._memory:
+            kept[...] = array
         while True:
             self._flat[:] = self._first
             self._counters[:] = 0
@@ -106,8 +105,8 @@ class Gradients:
             if self._counters[POSITION] <= self._tape.size:
                 return result
             self._bind(2 * int(self._counters[POSITION]))
-            for name, kept in self._before.items():
-                self._numbers[name][...] = kept
+            for array, kept in self._memory:
+                array[...] = kept
 
     def _paired(self, name: str, value: Any) -> Any:
         """An argument with the rows of its numbers."""
@@ -157,12 +156,13 @@ class Shares(Mapping[str, NDArray[np.float64]]):
         return len(self._which)
 
 
+def _arrays(value: Any) -> list[NDArray[Any]]:
+    """The memory of an argument."""
+    if isinstance(value, Table):
+        return list(cast("Table[Record]", value).arrays)
+    return [cast("NDArray[Any]", value)] if isinstance(value, np.ndarray) else []
+
+
 def _numbers(value: Any) -> NDArray[np.float64] | None:
     """The real numbers of an argument."""
-    if isinstance(value, Table):
-        cells = cast("Table[Record]", value).reals
-        return cells.array if isinstance(cells, ArrayReals) else None
-    if not isinstance(value, np.ndarray):
-        return None
-    array = cast("NDArray[Any]", value)
-    return array if array.dtype == np.float64 else None
+    return next((array for array in _arrays(value) if array.dtype == np.float64), None)

@@ -278,7 +278,8 @@ def back(on: Evaluator, counters: Integers, places: Integers, slopes: Vector, ba
             bars[place] = bars[place] + slopes[first + j] * share
 
         bars[row.value] = 0.0
-        on.loop(count, entry)
+        # What nothing came of is left out: there may be infinite slopes in a choice that was not taken.
+        on.when(on.absolute(share) > 0.0, lambda: on.loop(count, entry))
         position.value, row.value = first, row.value - 1
         return first <= 0
 

@@ -5,11 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ephs.semantics.stage import Entry, Program, Record, function, integer, real, signature_of, table, vector
+from ephs.semantics.stage import Entry, Program, Record, function, indices, integer, real, signature_of, table, vector
 from ephs.semantics.stage.gradients import Gradients
 from ephs.semantics.stage.taped import COUNT
 
 NEAR = 1e-13
+"""Part of the largest derivative: some hundred terms of either way round."""
 
 
 class Spring(Record):
@@ -98,6 +99,33 @@ def test_a_tape_that_is_too_short_grows():
     )
     made.run()
     assert made.pull({"x": [1.0]})["a"][0] == pytest.approx(20_000 * 1.0001**19_999, rel=1e-10)
+
+
+def test_what_a_choice_leaves_out_is_left_out():
+    """The root's slope at zero is infinite, and it is not taken: |x| near zero, as a smoothed friction has it."""
+
+    def chosen(on, x, out):
+        out[0] = on.select(x[0] > 0.0, on.sqrt(x[0]), 3.0 * x[0])
+
+    made = Gradients(Entry(chosen, x=vector(1), out=vector(1)), x=np.zeros(1), out=np.zeros(1))
+    made.run()
+    assert made.pull({"out": [1.0]})["x"][0] == 3.0
+
+
+def test_a_second_run_starts_with_what_the_first_found():
+    """Integers, too: the tape of the first run is too short."""
+
+    def counted(on, x, count, rounds):
+        def one(_):
+            count[0] = count[0] + 1
+            x[0] = x[0] * x[0]
+
+        on.loop(rounds, one)
+
+    count = np.array([5])
+    entry = Entry(counted, x=vector(1), count=indices(1), rounds=integer())
+    Gradients(entry, x=np.ones(1), count=count, rounds=10_000).run()
+    assert count[0] == 10_005
 
 
 class Reaching(Record):
