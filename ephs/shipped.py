@@ -13,6 +13,7 @@ __all__ = ["SHIPPED", "programs", "write_objects"]
 
 SHIPPED: Final = (
     "ephs.semantics.stage.functions:ELEMENTARY",
+    "ephs.semantics.stage.gradients:reading_program",
     "ephs.semantics.derive.linear:linear_program",
     "ephs.semantics.linear.rows:row_program",
     "ephs.semantics.spaces.differentials:differentials",

@@ -14,14 +14,15 @@ from ephs.semantics.stage.programs import Program
 from ephs.semantics.stage.records import Record, Table
 from ephs.semantics.stage.taped import CAPACITY, COUNT, POSITION, ROWS, back
 
-__all__ = ["Gradients", "Shares"]
+__all__ = ["Gradients", "Shares", "reading_program"]
 
 FIRST = 1 << 12
 """Room of a tape at first, in entries; it doubles until a run fits."""
 
 
 @cache
-def _reading() -> Program:
+def reading_program() -> Program:
+    """Return the program that reads a tape backwards."""
     kinds = {"counters": indices(COUNT), "places": indices(), "slopes": vector(), "bars": vector()}
     return Program("reading", back=Entry(back, **kinds))
 
@@ -79,13 +80,13 @@ class Gradients:
         names = list(self._arguments)
         if self._compiled:
             bound = _taped(self._entry).compiled()["run"].bind(*given, *tape)
-            self._back: Callable[[], Any] = _reading().compiled()["back"].bind(*tape, self._bars)
+            self._back: Callable[[], Any] = reading_program().compiled()["back"].bind(*tape, self._bars)
 
             def run(numbers: dict[str, float]) -> Any:
                 return bound(*numbers.values())
         else:
             plain = _taped(self._entry).plain()["run"]
-            self._back = partial(_reading().plain()["back"], *tape, self._bars)
+            self._back = partial(reading_program().plain()["back"], *tape, self._bars)
 
             def run(numbers: dict[str, float]) -> Any:
                 return plain(*(numbers.get(name, value) for name, value in zip(names, given, strict=True)), *tape)

@@ -55,6 +55,7 @@ REACHING = {
     "ephs.mechanics.sensitivity.implicit:_program",
     "ephs.mechanics.tree.engine.programs:motion_of_loops",
     "ephs.mechanics.tree.engine.programs:motion_of_trees",
+    "ephs.mechanics.tree.engine.programs:stiff_program",
     "ephs.mechanics.tree.sweeps.balances:network_program",
     "ephs.solve.methods.gauss:gauss_program",
     "ephs.solve.methods.newton:natural_program",
