@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from ephs.mechanics.sensitivity import sensitivity as sensitivity
     from ephs.mechanics.sweep.sweep import SweepInterrupted as SweepInterrupted
     from ephs.mechanics.sweep.sweep import sweep as sweep
+    from ephs.modelica.errors import ModelicaError as ModelicaError
+    from ephs.modelica.library import ModelicaLibrary as ModelicaLibrary
     from ephs.operad import Directory as Directory
     from ephs.operad import Path as Path
     from ephs.operad import Pattern as Pattern
@@ -102,6 +104,8 @@ _HOMES = {
     "ephs.solve.exchange.errors": ("ExchangeError",),
     "ephs.solve.exchange.exchange": ("Exchange",),
     "ephs.solve.sampled": ("Sampled",),
+    "ephs.modelica.errors": ("ModelicaError",),
+    "ephs.modelica.library": ("ModelicaLibrary",),
     "ephs.solve.auditing.findings": ("AuditError", "AuditWarning", "CostWarning"),
     "ephs.solve.result.solution": ("Solution",),
     "ephs.mechanics.sweep.sweep": ("SweepInterrupted", "sweep"),

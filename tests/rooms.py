@@ -21,7 +21,7 @@ STOREYS: tuple[tuple[frozenset[str], ...], ...] = tuple(
         ([".semantics.derive"],),
         ([".semantics", ".semantics.library", ".semantics.algebra", ".semantics.relations", ".semantics.symbols"],),
         ([".solve", ".solve.march", ".solve.methods", ".solve.result", ".solve.auditing", ".solve.exchange"],),
-        ([".mechanics.shapes"],),
+        ([".mechanics.shapes"], [".modelica"]),
         ([".mechanics.elements"],),
         ([".mechanics.scene", ".mechanics.imports"], [".mechanics.tree", ".mechanics.tree.sweeps"]),
         ([".mechanics.constraints"],),

@@ -1,0 +1,1 @@
+"""Components of Modelica as systems: flat equations, their relation at power ports, its structure."""

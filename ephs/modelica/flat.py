@@ -1,0 +1,248 @@
+"""A component of Modelica as flat equations: what Pymoca flattens, in SymPy's expressions."""
+
+import logging
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, final
+
+from ephs.modelica.errors import ModelicaError
+from ephs.modelica.expressions import Expr, Reader, Symbol, said, sp
+from ephs.operad import Quantity, quantity
+from ephs.solve.errors import nearest_of
+
+__all__ = ["DOMAINS", "Domain", "Equation", "Flat", "Port", "flattened", "tree_of"]
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Domain:
+    """A kind of connector: units of its potential and its flow variable.
+
+    Parameters
+    ----------
+    quantity
+        Of the power port that it is.
+    position
+        Whether the effort is the potential's derivative, not the potential.
+    """
+
+    potential: str
+    flow: str
+    quantity: Quantity
+    position: bool = False
+
+
+DOMAINS = (
+    Domain("V", "A", quantity.charge),
+    Domain("rad", "N.m", quantity.angular_momentum, position=True),
+    Domain("m", "N", quantity.momentum, position=True),
+    Domain("K", "W", quantity.entropy),
+)
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Port:
+    """A connector: symbols of its potential and of its flow, which is positive into the component."""
+
+    name: str
+    domain: Domain
+    potential: Symbol
+    flow: Symbol
+
+    @property
+    def heat(self) -> bool:
+        """Whether the flow is a power by itself."""
+        return self.domain.flow == "W"
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Equation:
+    """0 = residual, and the equation's text."""
+
+    residual: Expr
+    text: str
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Flat:
+    """A component: its ports, its equations, and of each variable the unit and the start value.
+
+    Variables without a unit entry are signals, which Pymoca leaves undeclared.
+    """
+
+    name: str
+    ports: tuple[Port, ...]
+    equations: tuple[Equation, ...]
+    units: Mapping[Symbol, str]
+    starts: Mapping[Symbol, float]
+
+
+def tree_of(paths: tuple[Path, ...]) -> Any:
+    """The syntax tree of files and of folders with libraries.
+
+    Raises
+    ------
+    ModelicaError
+        No such file, or none of Modelica.
+    """
+    try:
+        from pymoca import parser
+    except ImportError as error:
+        raise ModelicaError("package") from error
+    logging.getLogger("pymoca").setLevel(logging.CRITICAL)
+    tree = parser.modelicapath_to_tree([path for path in paths if path.is_dir()])
+    for path in paths:
+        if path.is_dir():
+            continue
+        if not path.is_file():
+            raise ModelicaError("file", where=path)
+        try:
+            tree.extend(parser.parse_file(path))
+        except (parser.ModelicaSyntaxError, UnicodeDecodeError, AttributeError, KeyError) as error:
+            raise ModelicaError("text", where=path, found=_first(error)) from error
+    return tree
+
+
+def flattened(tree: Any, name: str, given: Mapping[str, float]) -> Flat:
+    """The equations of one class of the tree, with parameters of those values.
+
+    Raises
+    ------
+    ModelicaError
+        What is not read: see `errors`.
+    """
+    from pymoca import ast
+    from pymoca.tree import flatten
+
+    try:
+        found = flatten(tree, name).classes[name]
+    except Exception as error:  # as many kinds as there are ways to fail
+        raise ModelicaError("flat", where=name, found=_first(error)) from error
+    if found.statements:
+        raise ModelicaError("algorithm", where=name)
+    symbols: dict[str, Any] = dict(found.symbols)
+    fixed = {key for key, symbol in symbols.items() if {"parameter", "constant"} & set(symbol.prefixes)}
+    parameters = _parameters(name, {key: symbols[key] for key in symbols if key in fixed}, given, ast.Primary)
+    free = {key: symbol for key, symbol in symbols.items() if key not in fixed}
+    for key, symbol in free.items():
+        if "input" in symbol.prefixes:
+            raise ModelicaError("signal", where=name, found=key)
+        if any(str(getattr(extent, "value", extent)) != "None" for extents in symbol.dimensions for extent in extents):
+            raise ModelicaError("array", where=name, found=key)
+    real = {key: sp.Symbol(key, real=True) for key, symbol in free.items() if str(symbol.type.name) == "Real"}
+    kinds = {key: str(symbol.type.name) for key, symbol in free.items() if key not in real}
+    reader = Reader(name, real, parameters, lambda parts, scope: _constant(tree, parts, scope), kinds)
+    units = {real[key]: str(free[key].unit.value or "") for key in real}
+    ports = _ports(name, real, free, units)
+    try:
+        equations = tuple(_equations(reader, found.equations, {port.flow.name for port in ports}))
+    except RecursionError:
+        raise ModelicaError("expression", where=name, found="parameters that need each other") from None
+    return Flat(
+        name,
+        ports,
+        equations,
+        units,
+        {real[key]: float(free[key].start.value or 0.0) for key in real if _is_number(free[key].start)},
+    )
+
+
+def _first(error: Exception) -> str:
+    """The first line of what an error says."""
+    return next(iter(str(error).splitlines()), type(error).__name__)
+
+
+def _is_number(node: Any) -> bool:
+    return isinstance(getattr(node, "value", "none"), float | int | None)
+
+
+def _parameters(
+    where: str, symbols: Mapping[str, Any], given: Mapping[str, float], literal: type[Any]
+) -> dict[str, Any]:
+    """The nodes of their values: what is given, else the value, else the start value, as Modelica has it."""
+    for key in given:
+        if key not in symbols:
+            known = [each for each in symbols if "." not in each]
+            raise ModelicaError(
+                "parameter", where=where, found=key, expected=", ".join(known) or "none", near=nearest_of(key, known)
+            )
+    out: dict[str, Any] = {}
+    for key, symbol in symbols.items():
+        nodes = (literal(value=given[key]) if key in given else None, symbol.value, symbol.start)
+        found = (node for node in nodes if node is not None and getattr(node, "value", 0) is not None)
+        out[key] = next((node for node in found if str(node) != key), None)  # Pymoca takes R = R for its own
+        if key in ("useHeatPort", "useSupport"):  # Pymoca keeps connectors whatever their condition says
+            out[key] = literal(value=True)
+    return out
+
+
+def _constant(tree: Any, parts: tuple[str, ...], scope: Any) -> tuple[Any, Any]:
+    """The value's node of a constant of a package, and the package; None where there is none."""
+    for start in (scope, tree):
+        inside = start
+        for part in parts[:-1]:
+            inside = None if inside is None else inside.classes.get(part)
+        if inside is not None and parts[-1] in inside.symbols:
+            symbol = inside.symbols[parts[-1]]
+            changed = symbol.class_modification.arguments if symbol.class_modification is not None else ()
+            given = [node for each in changed for node in getattr(each.value, "modifications", ())]
+            value = symbol.value if getattr(symbol.value, "value", 0) is not None else (given or [None])[-1]
+            return value, inside
+    return None, None
+
+
+def _ports(
+    where: str, real: Mapping[str, Symbol], free: Mapping[str, Any], units: Mapping[Symbol, str]
+) -> tuple[Port, ...]:
+    """Connectors of the component itself: a flow variable and a potential under one name."""
+    out: list[Port] = []
+    for key, symbol in free.items():
+        if "flow" not in symbol.prefixes or key.count(".") != 1:
+            continue
+        name = key.split(".")[0]
+        beside = [each for each in free if each.startswith(f"{name}.") and each != key]
+        found = (*(units.get(real.get(each, sp.Symbol(each)), "?") for each in beside), units[real[key]])
+        domain = next((each for each in DOMAINS if (each.potential, each.flow) == found), None)
+        if domain is None:
+            expected = "; ".join(f"{each.potential}, {each.flow}" for each in DOMAINS)
+            raise ModelicaError("connector", where=where, port=name, found=", ".join(found), expected=expected)
+        out.append(Port(name, domain, real[beside[0]], real[key]))
+    if not out:
+        raise ModelicaError("ports", where=where)
+    return tuple(out)
+
+
+def _equations(reader: Reader, nodes: Any, own: set[str]) -> list[Equation]:
+    """Equations of the branches that hold, without those that leave the component's own connectors open."""
+    out: list[Equation] = []
+    for node in nodes:
+        kind = type(node).__name__
+        if kind == "Function" or (kind == "Expression" and str(node.operator) in ("assert", "terminate")):
+            continue
+        if kind == "IfEquation":
+            taken = next(
+                (
+                    block
+                    for place, block in enumerate(node.blocks)
+                    if place >= len(node.conditions) or reader.truth(node.conditions[place])
+                ),
+                (),
+            )
+            out += _equations(reader, taken, own)
+        elif kind == "WhenEquation":
+            raise ModelicaError("branch", where=reader.where, found=f"when {said(node.conditions[0])}")
+        elif kind == "ConnectClause":  # connectors of power are equations already
+            raise ModelicaError("signal", where=reader.where, found=f"{node.left} as {node.right}")
+        elif kind != "Equation":
+            raise ModelicaError("expression", where=reader.where, found=f"{kind} {said(node)}")
+        elif type(node.left).__name__ in ("Symbol", "InstanceSymbol"):  # of an open connector
+            if node.left.name not in own:
+                out.append(Equation(reader.variables[node.left.name], f"{node.left.name} = 0"))
+        else:
+            left, right = reader.value(node.left), reader.value(node.right)
+            out.append(Equation(sp.expand(left - right), said(node)))
+    return out
