@@ -1,6 +1,7 @@
 """A placed picture as SVG."""
 
 from ephs.show.geometry import Placement, Point, Text
+from ephs.show.legend import title
 from ephs.show.palette import FILLS, GREY, INK, PAPER, RIMS
 
 _FONT = "Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans', sans-serif"
@@ -50,9 +51,10 @@ def to_svg(placement: Placement) -> str:
             line.args["stroke-dasharray"] = "1.5 3" if wire.role == "link" else "4 3"
         line.append_title(wire.title)
         drawing.append(line)
-    for box in placement.boxes:
-        group = svg.Group(class_=f"box {box.kind}")
-        group.append_title(f"{box.path} ({box.kind})" if box.kind != "unknown" else box.path)
+    for box in (*placement.boxes, *(box for box, _ in placement.legend)):
+        group = svg.Group(class_=f"box {box.kind}" if box.path else f"legend {box.kind}")
+        if box.path:
+            group.append_title(title(box.path, box.kind))
         x, y = _rounded(box.at)
         rim = RIMS[box.kind]
         group.append(svg.Circle(x, y, round(box.radius, 2), fill=FILLS[box.kind], stroke=rim, stroke_width=1.3))
@@ -70,6 +72,8 @@ def to_svg(placement: Placement) -> str:
     for wire in placement.wires:
         if wire.label is not None:
             drawing.append(_text(wire.label, GREY, halo=PAPER))
+    for _, word in placement.legend:
+        drawing.append(_text(word, GREY))
     text = drawing.as_svg()
     if text is None:  # as_svg() returns text unless it is given a file to write to
         return ""

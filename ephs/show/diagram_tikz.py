@@ -55,9 +55,10 @@ def to_tikz(placement: Placement) -> str:
     for wire in placement.wires:
         dash = "" if wire.power else "[dotted]" if wire.role == "link" else "[dashed]"
         body.append(rf"\draw{dash} {' -- '.join(_at(point) for point in wire.points)}; % {_comment(wire.title)}")
-    for box in placement.boxes:
+    for box in (*placement.boxes, *(box for box, _ in placement.legend)):
         style = f"fill=ephs{box.kind},draw=ephs{box.kind}rim"
-        body.append(rf"\filldraw[{style}] {_at(box.at)} circle[radius={box.radius:.2f}bp]; % {_comment(box.path)}")
+        what = box.path or f"legend: {box.kind}"
+        body.append(rf"\filldraw[{style}] {_at(box.at)} circle[radius={box.radius:.2f}bp]; % {_comment(what)}")
         body += [rf"\draw[ephs{box.kind}rim,line width=.4bp] {_at(a)} -- {_at(b)};" for a, b in box.hatching]
         back = f"fill=ephs{box.kind},inner sep=.5bp," if box.hatching else ""
         body += [_node(text, back) for text in box.lines]
@@ -65,6 +66,7 @@ def to_tikz(placement: Placement) -> str:
         body.append(rf"\fill {_at(junction.at)} circle[radius={junction.radius:.2f}bp]; % {_comment(junction.path)}")
         body.append(_node(junction.label, ""))
     body += [_node(wire.label, "text=gray,") for wire in placement.wires if wire.label is not None]
+    body += [_node(word, "text=gray,") for _, word in placement.legend]
     body.append(r"\end{tikzpicture}")
     lines = [*head, r"\begin{document}", r"\hbox{%", *body, "}", r"\end{document}"]
     return "\n".join(lines) + "\n"

@@ -85,7 +85,9 @@ def draw(
     Round boxes coloured by kind (storage blue, environment blue and hatched, reversible green, irreversible red,
     composite yellow, unknown white), black dots for junctions, dashed lines for state ports, dotted lines between
     junctions that share their state, and a rounded rectangle for the outer box, to which the outer ports run. A port is
-    named at its junction; where its name differs from the junction's, at its box too.
+    named at its junction; where its name differs from the junction's, at its box too. Boxes of one kind have one size;
+    a legend below names the kinds. In SVG the full path of each box, and what a name of the literature stands for, is
+    shown on hover.
 
     Parameters
     ----------

@@ -119,7 +119,10 @@ class Wire:
 @final
 @dataclass(frozen=True, slots=True)
 class Placement:
-    """A pattern, placed in the plane; `rectangle` is left, top, width, height of the outer box."""
+    """A pattern, placed in the plane.
+
+    `rectangle` is left, top, width, height of the outer box; `legend` has a disc and a word for each kind, below it.
+    """
 
     boxes: tuple[PlacedBox, ...]
     junctions: tuple[PlacedJunction, ...]
@@ -127,12 +130,15 @@ class Placement:
     rectangle: tuple[float, float, float, float]
     corner: float
     regions: tuple[PlacedRegion, ...] = ()
+    legend: tuple[tuple[PlacedBox, Text], ...] = ()
 
     @property
     def size(self) -> tuple[float, float]:
-        """Width and height of the whole picture, margins included."""
+        """Width and height of the whole picture, margins and legend included."""
         left, top, width, height = self.rectangle
-        return (width + 2 * left, height + 2 * top)
+        right = max([left + width, *(word.bounds[2] for _, word in self.legend)])
+        bottom = max([top + height, *(box.at[1] + box.radius for box, _ in self.legend)])
+        return (right + left, bottom + top)
 
     def nodes(self) -> dict[str, tuple[Point, float]]:
         """Centre and radius of every box and junction, by path."""

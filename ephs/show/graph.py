@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, final
 
 from ephs.operad import Nesting, Pattern
@@ -135,10 +135,17 @@ def read(
         for first, second in itertools.pairwise(group):
             edges.append(Edge(f"{first} and {second} share their state", (first, second), "link", False, ""))
     return Graph(
-        tuple(_disc(path, name, found.get(path, "unknown")) for path, name in boxes.items()),
+        _alike(_disc(path, name, found.get(path, "unknown")) for path, name in boxes.items()),
         tuple((path, subscripted(name)) for path, name in dots.items()),
         tuple(edges),
     )
+
+
+def _alike(discs: Iterable[Disc]) -> tuple[Disc, ...]:
+    """The discs, those of one kind as large as the largest of them."""
+    each = tuple(discs)
+    largest = {kind: max(disc.radius for disc in each if disc.kind == kind) for kind in {d.kind for d in each}}
+    return tuple(replace(disc, radius=largest[disc.kind]) for disc in each)
 
 
 def _joined(box: str, port: str) -> str:

@@ -31,6 +31,7 @@ from ephs.show.geometry import (
     hatching,
 )
 from ephs.show.graph import DOT, TYPE, Disc, Edge, Graph, read, width_of
+from ephs.show.legend import legend
 from ephs.show.lettering import Sheet, around, beside
 from ephs.show.routing import bulged, route, straight, trimmed
 
@@ -134,7 +135,16 @@ def _picture(page: _Page, points: Points, room: float = 1.0) -> Placement:
         (MARGIN, MARGIN, rectangle[2] - rectangle[0], rectangle[3] - rectangle[1]),
         14.0,
         tuple(replace(r, at=_moved(r.at, shift), label=_shifted(r.label, shift)) for r in regions),
+        legend(
+            _kinds(graph, regions),
+            (MARGIN, 2 * MARGIN - 4.0 + rectangle[3] - rectangle[1]),
+            rectangle[2] - rectangle[0],
+        ),
     )
+
+
+def _kinds(graph: Graph, regions: tuple[PlacedRegion, ...]) -> set[str]:
+    return {disc.kind for disc in graph.discs} | {"composite" for _ in regions}
 
 
 @final

@@ -14,6 +14,7 @@ from ephs.operad import Pattern, junction, quantity
 from ephs.show import Drawing, ShowError, draw, place
 from ephs.show.geometry import Placement, Wire, crossings, faults, gap, overlaps, trespasses
 from ephs.show.graph import short_names, subscripted
+from ephs.show.legend import legend, title
 from ephs.show.palette import FILLS
 from ephs.show.positions import _networkx, _spread
 from ephs.testing import nestings, patterns
@@ -175,6 +176,31 @@ def test_kinds_are_coloured():
     )
 
 
+def test_boxes_of_a_kind_are_of_one_size_and_in_the_legend(drawn):
+    _, drawing = drawn
+    picture = drawing.placement
+    sizes = {(box.kind, box.radius) for box in picture.boxes}
+    assert len(sizes) == len({kind for kind, _ in sizes})
+    explained = [box.kind for box, _ in picture.legend]
+    assert sorted(explained) == sorted({kind for kind, _ in sizes} - {"unknown"})
+    left, top, _, height = picture.rectangle
+    wide, high = picture.size
+    for box, word in picture.legend:
+        assert top + height < box.at[1] - box.radius and word.bounds[3] < high
+        assert left <= box.at[0] - box.radius and word.bounds[2] < wide
+
+
+def test_a_wide_legend_takes_rows():
+    kinds = ("storage", "environment", "reversible", "irreversible", "composite")
+    entries = legend(kinds, (0.0, 0.0), 100.0)
+    assert len({box.at[1] for box, _ in entries}) > 1 and max(word.bounds[2] for _, word in entries) <= 100.0
+
+
+def test_names_of_the_literature_are_explained():
+    assert title("b1.pkc", "reversible") == "b1.pkc (reversible): coupling of potential and kinetic energy"
+    assert title("j.o_1", "reversible").endswith("the joint") and title("crank", "unknown") == "crank"
+
+
 def test_only_state_ports_and_links_are_dashed():
     pattern = PICTURES["awkward"]()
     root = Xml.fromstring(draw(pattern).svg)
@@ -187,7 +213,7 @@ def test_only_state_ports_and_links_are_dashed():
 def test_full_names_stand_in_the_titles():
     pattern = flat()
     svg = draw(pattern).svg
-    assert all(f"<title>{box}</title>" in svg for box in pattern.boxes)
+    assert all(f"<title>{title(str(box), 'unknown')}</title>" in svg for box in pattern.boxes)
 
 
 def test_a_port_is_named_at_its_box_only_if_its_junction_does_not_say_it():
@@ -263,7 +289,7 @@ def test_tikz_names_all_and_escapes_what_tex_would_read(drawn):
     pattern, drawing = drawn
     text = drawing.tikz
     assert text.count("\\begin{") == text.count("\\end{") and r"\documentclass{article}" in text
-    assert text.count(r"\filldraw") == len(pattern.boxes)
+    assert text.count(r"\filldraw") == len(pattern.boxes) + len(drawing.placement.legend)
     body = re.sub(r"%.*", "", text.partition(r"\begin{tikzpicture}")[2])
     assert not re.search(r"(?<!\\)[_&#$]", body)
     whole = re.sub(r"(?<!\\)%.*", "", text)
