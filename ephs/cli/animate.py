@@ -31,7 +31,7 @@ def animate(
     output
         Page to write, FILE.html.
     wrenches
-        Draw joint forces and moments as arrows.
+        Draw joint forces and moments, and contact forces, as arrows.
     heat
         Colour bodies by the temperature of their thermal nodes.
     fps

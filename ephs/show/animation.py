@@ -4,7 +4,7 @@ import contextlib
 import html
 import io
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path as FilePath
@@ -15,7 +15,7 @@ import numpy as np
 from ephs.show.errors import ShowError
 from ephs.show.geometry import POINT
 from ephs.show.motion import Array, best_side, between, frame_all, point_of
-from ephs.show.overlays import ARROWS, GROUND, Heat, tint
+from ephs.show.overlays import GROUND, Arrows, Heat, tint
 from ephs.show.page import Page
 from ephs.show.player import player
 from ephs.show.solids import held_at
@@ -55,7 +55,8 @@ def animate(
     path : str or Path, optional
         Where to write the page.
     wrenches : bool
-        Whether joint forces and moments on body 2 are drawn as arrows; none where a joint leaves them indeterminate.
+        Whether joint forces and moments on body 2, and contact forces on the second body, are drawn as arrows; none
+        where a joint leaves them indeterminate.
     heat : bool
         Whether joints and springs glow by the temperature of the thermal node that takes their heat, and bodies by the
         node of their name.
@@ -113,8 +114,9 @@ class _Drawn:
         across = float(np.linalg.norm(np.ptp(points.reshape(-1, 3), axis=0)))
         some = points if across < FAR * size else points[:1]  # of long ways the start is framed
         places, reaches = some.reshape(-1, 3), np.tile(radii, len(some))
-        tips = [self._tips(kind, frame, size) for kind in self._kinds() for frame in range(len(some))]
-        seen = np.concatenate([places, *(tip[:, 1] for tip in tips)])
+        shown = () if self.stage.loads is None else self.stage.loads.arrows
+        tips = [each.tips(LONGEST * size)[: len(some)].reshape(-1, 3) for each in shown]
+        seen = np.concatenate([places, *tips])
         side = best_side(points.reshape(-1, 3))
         _set(server, seen, np.concatenate([reaches, np.zeros(len(seen) - len(places))]), size, side)
         nodes: dict[str, Any] = {}
@@ -138,7 +140,7 @@ class _Drawn:
             for name, coil in coils.items()
             if self.stage.heat
         ]
-        arrows = self._arrows(server, size)
+        arrows = self._arrows(server, size, shown)
         recording = server.get_scene_serializer()
         for frame in range(len(self.stage.frames.times)):
             for name, node in nodes.items():
@@ -148,8 +150,8 @@ class _Drawn:
                 start, end = self._spring_ends(self.stage.springs[name], frame)
                 turn, length = between(start, end)
                 coil.wxyz, coil.position, coil.scale = turn, start, (1.0, 1.0, max(length, POINT))
-            for kind, node in arrows.items():
-                node.points = self._tips(kind, frame, size)
+            for node, points in arrows:
+                node.points = points[frame]
             for each in warm:
                 if self.stage.heat is not None:
                     each.glow(self.stage.heat, frame)
@@ -161,12 +163,10 @@ class _Drawn:
         """Legend of arrows and colours, and missing meshes, in a corner of the page."""
         rows: list[str] = []
         if self.stage.loads is not None:
-            for kind, unit in (("force", "N"), ("moment", "N m")):
-                if self.stage.loads.largest[kind] > 0.0:
-                    colour = "rgb({},{},{})".format(*ARROWS[kind])
-                    most = f"{self.stage.loads.largest[kind]:.3g} {unit}"
-                    arrow = f'<b style="color:{colour};font-size:1.4em;line-height:1">→</b>'
-                    rows.append(f"{arrow} {kind} on body 2, the longest {most}")
+            for each in self.stage.loads.arrows:
+                colour = "rgb({},{},{})".format(*each.colour)
+                arrow = f'<b style="color:{colour};font-size:1.4em;line-height:1">→</b>'
+                rows.append(f"{arrow} {each.label}")
             if self.stage.loads.loose:
                 rows.append(f"indeterminate, so in part not drawn: {html.escape(', '.join(self.stage.loads.loose))}")
         if self.stage.heat is not None and self.stage.heat.high > self.stage.heat.low:
@@ -184,32 +184,24 @@ class _Drawn:
         )
         return f'<div id="legend" style="{style}">{"<br>".join(rows)}</div>'
 
-    def _arrows(self, server: Any, size: float) -> dict[str, Any]:
-        return {
-            kind: server.scene.add_arrows(
-                f"/{kind}s",
-                points=self._tips(kind, 0, size),
-                colors=ARROWS[kind],
+    @staticmethod
+    def _arrows(server: Any, size: float, shown: Sequence[Arrows]) -> list[tuple[Any, Any]]:
+        """Nodes of each kind, and (m, n, 2, 3) where their arrows begin and end at each frame."""
+        ends: list[Any] = [
+            np.stack([each.places, each.tips(LONGEST * size)], axis=2).astype(np.float32) for each in shown
+        ]
+        nodes = [
+            server.scene.add_arrows(
+                f"/{each.kind}s",
+                points=points[0],
+                colors=each.colour,
                 shaft_radius=0.006 * size,
                 head_radius=0.015 * size,
                 head_length=0.035 * size,
             )
-            for kind in self._kinds()
-        }
-
-    def _kinds(self) -> list[str]:
-        """The kinds of arrows that there are."""
-        return (
-            [] if self.stage.loads is None else [kind for kind, most in self.stage.loads.largest.items() if most > 0.0]
-        )
-
-    def _tips(self, kind: str, frame: int, size: float) -> Any:
-        """(n, 2, 3) start and end of each joint's arrow of this kind."""
-        loads = self.stage.loads
-        assert loads is not None
-        vectors = (loads.force if kind == "force" else loads.moment)[frame]
-        start = loads.places[frame]
-        return np.stack([start, start + LONGEST * size / loads.largest[kind] * vectors], axis=1).astype(np.float32)
+            for each, points in zip(shown, ends, strict=True)
+        ]
+        return list(zip(nodes, ends, strict=True))
 
     def _spring_ends(self, spring: Any, frame: int) -> tuple[Array, Array]:
         start = point_of(self.stage.pose_of(spring.body1)[frame], np.asarray(spring.at1, dtype=float))

@@ -1,16 +1,19 @@
-"""Overlays of an animation: forces and moments of joints as arrows, warmth as glow."""
+"""Overlays of an animation: forces and moments of joints and forces of contacts as arrows, warmth as glow."""
 
 from dataclasses import dataclass
 from typing import Any, final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ephs.show.motion import Array, Film, between_instants, nearest, point_of, rotate
 from ephs.show.symbols import METAL, Colour
 
-__all__ = ["ARROWS", "Heat", "Loads", "heat_of", "loads_of", "tint"]
+__all__ = ["ARROWS", "Arrows", "Heat", "Loads", "heat_of", "loads_of", "tint"]
 
-ARROWS: dict[str, Colour] = {"force": (214, 51, 108), "moment": (112, 72, 232)}
+ARROWS: dict[str, Colour] = {
+    "force": (214, 51, 108), "moment": (112, 72, 232), "contact": (9, 146, 104), "slip": (245, 159, 0),
+}  # fmt: skip
 _WARM = np.array([METAL, (148, 46, 36), (226, 92, 28), (255, 172, 48), (255, 236, 170)], dtype=float)
 GROUND = "ground"
 NOISE = 1e-9
@@ -19,25 +22,53 @@ NOISE = 1e-9
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Loads:
-    """Wrenches of joints at the frames of a film.
+class Arrows:
+    """Arrows of one kind at the frames of a film.
 
     Attributes
     ----------
+    kind : str
+        A key of `ARROWS`.
     places : (m, n, 3)
-        Origins of the frames C2 of n joints in the world, m.
-    force, moment : (m, n, 3)
-        On body 2, in world axes, N and N m; zero where they are indeterminate.
-    largest : dict of str to float
-        Largest size of each, zero where that is rounding.
+        Where n arrows begin in the world, m.
+    vectors : (m, n, 3)
+        In world axes, N or N m; zero where there is none.
+    largest : float
+        Size of the vector whose arrow is the longest.
+    label : str
+        Of the legend.
+    """
+
+    kind: str
+    places: Array
+    vectors: Array
+    largest: float
+    label: str
+
+    @property
+    def colour(self) -> Colour:
+        """Red, green and blue."""
+        return ARROWS[self.kind]
+
+    def tips(self, longest: float) -> Array:
+        """(m, n, 3) where they end, the longest of a length in m."""
+        return self.places + longest / self.largest * self.vectors
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Loads:
+    """Wrenches of joints on their body 2, and forces of contacts on their second body.
+
+    Attributes
+    ----------
+    arrows : tuple of Arrows
+        Those that are there, beyond rounding.
     loose : tuple of str
         Joints that have indeterminate components; where there are some, no arrow is drawn.
     """
 
-    places: Array
-    force: Array
-    moment: Array
-    largest: dict[str, float]
+    arrows: tuple[Arrows, ...]
     loose: tuple[str, ...]
 
 
@@ -58,7 +89,7 @@ class Heat:
 
 
 def loads_of(sol: Any, frames: Film, joints: dict[str, Any]) -> Loads:
-    """Wrenches at the kept instants nearest to the frames."""
+    """Wrenches of joints, and forces of contacts, at the kept instants nearest to the frames."""
     instants = nearest(np.asarray(sol.t, dtype=float), frames.times)
     shape = (len(frames.times), len(joints), 3)
     places, force, moment = np.zeros(shape), np.zeros(shape), np.zeros(shape)
@@ -75,10 +106,30 @@ def loads_of(sol: Any, frames: Film, joints: dict[str, Any]) -> Loads:
             out[:, i] = rotate(pose[:, :4], rotate(np.broadcast_to(frame[:4], (shape[0], 4)), known))
     largest = {"force": _largest(force), "moment": _largest(moment)}
     arm = max([float(np.linalg.norm(np.asarray(j.frame2)[4:])) for j in joints.values()], default=0.0) or 1.0
-    for kind, other in (("force", largest["moment"] / arm), ("moment", largest["force"] * arm)):
-        if largest[kind] < NOISE * max(1e-3, other):
-            largest[kind] = 0.0
-    return Loads(places, force, moment, largest, tuple(loose))
+    beyond = {"force": NOISE * max(1e-3, largest["moment"] / arm), "moment": NOISE * max(1e-3, largest["force"] * arm)}
+    found = [
+        Arrows(kind, places, vectors, largest[kind], f"{kind} on body 2, the longest {largest[kind]:.3g} {unit}")
+        for kind, vectors, unit in (("force", force, "N"), ("moment", moment, "N m"))
+        if largest[kind] >= beyond[kind]
+    ]
+    return Loads((*found, *_contacts(sol, instants)), tuple(loose))
+
+
+def _contacts(sol: Any, instants: NDArray[np.int64]) -> list[Arrows]:
+    """Forces of contacts, those that slip apart from those that stick, on one scale."""
+    laws = dict(sol.scene.all_contacts())
+    if not laws:
+        return []
+    motions = [sol.contact(name) for name in laws]
+    places, force = (np.stack([getattr(m, key)[instants] for m in motions], axis=1) for key in ("place", "force"))
+    slips = np.stack([m.slip[instants] > of.law.slip for m, of in zip(motions, laws.values(), strict=True)], axis=1)
+    most, says = _largest(force), {"contact": "contact force", "slip": "contact force where it slips"}
+    parts = {kind: np.where((slips == (kind == "slip"))[:, :, None], force, 0.0) for kind in says}
+    return [
+        Arrows(kind, places, part, most, f"{says[kind]}, the longest {_largest(part):.3g} N")
+        for kind, part in parts.items()
+        if part.any()
+    ]
 
 
 def heat_of(sol: Any, frames: Film, nodes: list[str]) -> Heat:

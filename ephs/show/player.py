@@ -10,7 +10,7 @@ import numpy as np
 
 from ephs.mechanics.scene.model import Joint
 from ephs.show.motion import Array, best_side, rotate
-from ephs.show.overlays import ARROWS, GROUND, tint
+from ephs.show.overlays import GROUND, tint
 from ephs.show.solids import Solid, box, cylinder, held_at, sphere
 from ephs.show.stage import Stage
 from ephs.show.symbols import METAL, MUTED, ink
@@ -143,18 +143,11 @@ def _spring(spring: Any, names: list[str]) -> dict[str, Any]:
 
 
 def _arrows(stage: Stage, size: float) -> list[dict[str, Any]]:
-    """Forces and moments at joints, the longest of each of the same length."""
-    loads = stage.loads
-    if loads is None:
-        return []
-    found = []
-    for kind, vectors, unit in (("force", loads.force, "N"), ("moment", loads.moment, "N m")):
-        most = loads.largest[kind]
-        if most > 0.0:
-            tips = loads.places + LONGEST * size / most * vectors
-            says = f"{kind} on body 2, longest {most:.3g} {unit}"
-            found.append({"from": _text(loads.places), "to": _text(tips), "colour": list(ARROWS[kind]), "label": says})
-    return found
+    """Forces and moments, the longest of each of the same length."""
+    return [
+        {"from": _text(a.places), "to": _text(a.tips(LONGEST * size)), "colour": list(a.colour), "label": a.label}
+        for a in (() if stage.loads is None else stage.loads.arrows)
+    ]
 
 
 def _heat(stage: Stage) -> dict[str, Any] | None:

@@ -54,9 +54,46 @@ def test_the_hook_holds_the_lamp_up(tmp_path):
     sol = lamp(tmp_path)
     frames = film(sol, ["lamp"], 30.0, None)
     loads = loads_of(sol, frames, dict(sol.scene.all_joints()))
-    assert np.allclose(loads.force, [0.0, 0.0, 2.0 * 9.81], atol=1e-9)
-    assert np.allclose(loads.places, 0.0, atol=1e-9) and np.abs(loads.moment).max() < 1e-9
-    assert loads.largest == {"force": pytest.approx(19.62), "moment": 0.0} and loads.loose == ()
+    (force,) = loads.arrows
+    assert np.allclose(force.vectors, [0.0, 0.0, 2.0 * 9.81], atol=1e-9)
+    assert np.allclose(force.places, 0.0, atol=1e-9) and force.kind == "force"
+    assert force.largest == pytest.approx(19.62) and loads.loose == ()
+
+
+SLED = """
+format = 1
+name = "sled"
+[bodies.sled]
+mass = 2.0
+inertia = [0.1, 0.1, 0.1]
+position = [0.0, 0.0, 0.0999]
+velocity = [0.5, 0.0, 0.0]
+[surfaces.sled]
+body = "sled"
+shape = { box = [0.4, 0.2, 0.2] }
+stiffness = 5e4
+loss = 1.0
+friction = 0.5
+[surfaces.floor]
+body = "ground"
+shape = { plane = {} }
+"""
+
+
+def test_contacts_push_where_they_touch_and_show_that_they_slip(tmp_path):
+    """A sled slides, then stands: its weight is held under its middle, in one colour and then in another."""
+    (tmp_path / "sled.toml").write_text(SLED)
+    sol = ephs.simulate(ephs.load(tmp_path / "sled.toml"), 1.0, rtol=1e-6)
+    frames = film(sol, ["sled"], 30.0, None)
+    arrows = {each.kind: each for each in loads_of(sol, frames, {}).arrows}
+    assert arrows.keys() == {"contact", "slip"} and arrows["contact"].largest == arrows["slip"].largest
+    sliding, still = arrows["slip"].vectors[1, 0], arrows["contact"].vectors[-1, 0]
+    assert sliding[0] == pytest.approx(-0.5 * sliding[2], rel=1e-3)
+    assert np.allclose(still, [0.0, 0.0, 2.0 * 9.81], atol=1e-2)
+    assert not arrows["contact"].vectors[1].any() and not arrows["slip"].vectors[-1].any()
+    place, middle = arrows["contact"].places[-1, 0], frames.poses["sled"][-1, 4:]
+    assert np.allclose(place[:2], middle[:2], atol=1e-3) and place[2] == pytest.approx(0.0, abs=1e-3)
+    assert "contact force where it slips" in legend(animate(sol, wrenches=True))
 
 
 @given(st.tuples(*[st.floats(-2.0, 2.0)] * 3).map(np.array))
@@ -80,7 +117,7 @@ def test_what_is_indeterminate_has_no_arrow():
     joints = dict(sol.scene.all_joints())
     loads = loads_of(sol, film(sol, list(sol.scene.bodies), 30.0, None), joints)
     assert set(loads.loose) == set(joints)
-    assert np.all(loads.force == 0.0) and np.isfinite(loads.moment).all()
+    assert all(each.kind == "moment" and np.isfinite(each.vectors).all() for each in loads.arrows)
     assert "indeterminate" in legend(animate(sol, wrenches=True))
 
 

@@ -30,6 +30,8 @@ class ContactMotion:
         (n,) least gap of its points in m, negative where the surfaces overlap.
     force
         (n, 3) on the second body, in N and world axes.
+    place
+        (n, 3) where it acts in the world, in m: the mean of the points by their forces; the nearest where none touches.
     slip
         (n,) largest velocity of a touching point along the surfaces in m/s; 0 where none touches.
     heat
@@ -38,6 +40,7 @@ class ContactMotion:
 
     gap: Array
     force: Array
+    place: Array
     slip: Array
     heat: Array
 
@@ -49,6 +52,7 @@ class _Point:
 
     gap: Array
     force: Array
+    place: Array
     slip: Array
     heat: Array
     wrenches: tuple[Array, Array]
@@ -57,9 +61,15 @@ class _Point:
 def contact_motion(scene: Scene, of: Contact, read: Moving) -> ContactMotion:
     """Read a contact's motion."""
     points = [point for _, point in _points(scene, of, read)]
+    gaps, forces = np.array([point.gap for point in points]), np.array([point.force for point in points])
+    weights = np.linalg.norm(forces, axis=2)
+    touching = weights.any(axis=0)
+    weights = np.where(touching, weights, gaps == gaps.min(axis=0))
+    places = np.array([point.place for point in points])
     return ContactMotion(
-        np.min([point.gap for point in points], axis=0),
-        np.sum([point.force for point in points], axis=0),
+        gaps.min(axis=0),
+        forces.sum(axis=0),
+        (weights[:, :, None] * places).sum(axis=0) / weights.sum(axis=0)[:, None],
         np.max([point.slip for point in points], axis=0),
         np.sum([point.heat for point in points], axis=0),
     )
@@ -91,8 +101,9 @@ def _point(bodies: tuple[str, str], touch: Touch, of: Contact, read: Moving) -> 
         heat += factor * rate**2
     velocity = twist[:, 3:] + np.cross(twist[:, :3], _rows(point, len(relative)))
     slip = np.linalg.norm(np.cross(_rows(normal, len(relative)), velocity), axis=1)
+    place = ends[1][:, 4:] + turned(ends[1], _rows(point, len(relative)))
     one, two = (_carried(o, wrench) for o in (offset1, np.broadcast_to(frame2, relative.shape)))
-    return _Point(distance, turned(poses[1], two[:, 3:]), np.where(distance < 0.0, slip, 0.0), heat, (-one, two))
+    return _Point(distance, turned(poses[1], two[:, 3:]), place, np.where(distance < 0.0, slip, 0.0), heat, (-one, two))
 
 
 def _rows(components: Sequence[Any], count: int) -> Array:
