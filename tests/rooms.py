@@ -47,6 +47,9 @@ DOORS = {
     ("ephs.semantics.system", "ephs.show"): "so does a system",
     ("ephs.mechanics.scene.words", "ephs.show"): "so does a scene",
     ("ephs.solve.result.solution", "ephs.show"): "a solution plots and moves itself",
+    ("ephs.mechanics.dynamics.model", "ephs.show"): "dynamics show their mechanism in notebooks",
+    ("ephs.mechanics.linear.equilibrium", "ephs.show"): "so does an equilibrium",
+    ("ephs.mechanics.linear.statespace", "ephs.show"): "a linear system shows its eigenvalues",
 }
 """Module, room above it: why it may know that. What is above is loaded when it is asked for."""
 PLACE = {room: (level, flat) for level, storey in enumerate(STOREYS) for flat in storey for room in flat}

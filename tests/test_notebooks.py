@@ -7,6 +7,8 @@ import pytest
 
 import ephs
 from ephs.show import draw
+from ephs.show.notebook import MANY
+from ephs.show.palette import RED
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -66,3 +68,45 @@ def test_an_empty_solution_shows_itself_too():
     scene = ephs.load(ROOT / "scenes/mbs.toml")
     empty = ephs.simulate(scene, 0.1, step=0.1, save_at=[])
     assert "empty" in words_of(empty._repr_html_())
+
+
+def test_solutions_dynamics_and_equilibria_show_their_mechanism(scene, solution):
+    values = {
+        "Solution of slider-crank": solution,
+        "Dynamics of slider-crank": ephs.dynamics(scene),
+        "Equilibrium of four-bar": ephs.equilibrium(ephs.load(ROOT / "scenes/four-bar.toml")),
+    }
+    for title, value in values.items():
+        said = value._repr_html_()
+        drawing = ET.fromstring(said[said.index("<svg") : said.index("</svg>") + len("</svg>")])
+        assert len(list(drawing.iter("{http://www.w3.org/2000/svg}polygon"))) >= 3 and title in words_of(said)
+
+
+def test_a_mechanism_of_many_bodies_shows_no_schematic():
+    said = ephs.dynamics(ephs.load(ROOT / "scenes/chain.toml"))._repr_html_()
+    bodies = len(ephs.load(ROOT / "scenes/chain.toml").bodies)
+    assert ("<svg" in said) == (bodies <= MANY)
+
+
+def test_a_linear_system_shows_each_eigenvalue():
+    linear = ephs.linearize(ephs.load(ROOT / "scenes/four-bar.toml"))
+    said = linear._repr_html_()
+    assert said.count("<circle") == len(linear.eigenvalues) and said.count(RED) == int(
+        (linear.eigenvalues.real > 0).sum()
+    )
+    assert "not stable" in words_of(said)
+
+
+def test_a_check_report_shows_each_check():
+    pattern = ephs.Pattern.from_text("q: displacement; p: momentum; a(q=q); b(p=p); c(q=q, p=p)")
+    parts = {"a": ephs.library.spring(k=1.0), "b": ephs.library.point_mass(m=1.0), "c": ephs.library.pkc()}
+    report = pattern(parts).check()
+    said = words_of(report._repr_html_())
+    assert "Check: all hold" in said and all(item.name in said and item.detail in said for item in report.items)
+
+
+def test_motions_show_their_ranges(solution):
+    for value, words in ((solution.joint("bearing"), "Motion of joint bearing"), (solution.body("crank"), "velocity")):
+        assert words in words_of(value._repr_html_())
+    last = solution.joint("bearing").coordinate[-1, 0]
+    assert f"{last:.5g}" in words_of(solution.joint("bearing")._repr_html_())

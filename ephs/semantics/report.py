@@ -9,6 +9,7 @@ from ephs.semantics.bundle import Reference
 from ephs.semantics.errors import SemanticsError
 from ephs.semantics.forms import obstacle
 from ephs.semantics.laws import SYSTEM_LAWS, Probe, SystemLaw, random_probe
+from ephs.semantics.markup import table
 from ephs.semantics.search import search
 from ephs.semantics.system import System
 
@@ -38,6 +39,10 @@ class CheckReport:
     def ok(self) -> bool:
         """Whether all hold."""
         return all(item.ok for item in self.items)
+
+    def _repr_html_(self) -> str:  # pyright: ignore[reportUnusedFunction] - notebooks call it
+        rows = ((name, "holds" if ok else "FAILS", detail) for name, ok, detail in self.items)
+        return table("Check: all hold" if self.ok else "Check: some fail", (), rows)
 
     def __str__(self) -> str:
         return "\n".join(f"{'holds' if ok else 'FAILS'}  {name}: {detail}" for name, ok, detail in self.items)

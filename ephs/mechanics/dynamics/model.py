@@ -84,7 +84,10 @@ class Dynamics:
         cut = f", {', '.join(self.cut)} cut" if self.cut else ""
         return f"Dynamics({self.scene.name!r}: {self.layout.n} freedoms of {len(self.joints)} joints{cut})"
 
-    # ---- what there is -----------------------------------------------------------------------------------------
+    def _repr_html_(self) -> str:  # pyright: ignore[reportUnusedFunction] - notebooks call it
+        from ephs.show.notebook import dynamics_html
+
+        return dynamics_html(self)
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -107,8 +110,6 @@ class Dynamics:
         n = self.layout.n
         kept = {name: where[where < n] for name, where in self.layout.freedoms.items()}
         return {name: where for name, where in kept.items() if where.size or name not in self.cut}
-
-    # ---- states ------------------------------------------------------------------------------------------------
 
     def state(self, coordinates: ByJoint | None = None, rates: ByJoint | None = None, *, adjust: bool = False) -> State:
         """The initial state with some joints elsewhere, as `Scene.with_state` has it; `closed` turns geared joints.
@@ -336,8 +337,6 @@ class Dynamics:
     def velocity_derivatives(self, state: State) -> VelocityDerivatives:
         """Exact derivatives, by the configuration, of what the rates make: constraints' rows, cut joints, bodies."""
         return differentiating.velocity_derivatives_of(self._linear, self._links, state.q, state.r)
-
-    # ---- steps -------------------------------------------------------------------------------------------------
 
     def step(self, state: State, h: float, method: "str | Method" = "rk54", *, forces: ByJoint | None = None) -> State:
         """The state h seconds later, by one step of a method that takes constant steps.

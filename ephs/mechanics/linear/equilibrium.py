@@ -63,6 +63,11 @@ class Equilibrium:
     shares: Array = field(default_factory=lambda: np.ones(1))
     critical: tuple[float, ...] = ()
 
+    def _repr_html_(self) -> str:  # pyright: ignore[reportUnusedFunction] - notebooks call it
+        from ephs.show.notebook import equilibrium_html
+
+        return equilibrium_html(self)
+
 
 @in_one_thread
 def equilibrium(

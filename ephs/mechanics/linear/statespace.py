@@ -56,6 +56,11 @@ class StateSpace:
     about: Mapping[str, Array]
     play: Any
 
+    def _repr_html_(self) -> str:  # pyright: ignore[reportUnusedFunction] - notebooks call it
+        from ephs.show.notebook import state_space_html
+
+        return state_space_html(self)
+
     @property
     def J(self) -> Array | None:
         """(n, n) skew, of the structure."""

@@ -3,7 +3,7 @@
 Velocities are those of the continuous relations: the stored momenta projected on the joints in the mass metric.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, final
@@ -24,6 +24,7 @@ from ephs.mechanics.scene.geometry import Coupling, coupling_of
 from ephs.mechanics.scene.model import GROUND, Joint, Scene
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
+from ephs.semantics.markup import table
 from ephs.semantics.spaces import SE3
 from ephs.solve.result.dataset import Variable
 
@@ -45,6 +46,16 @@ class ThermalMotion:
 
     temperature: Array
     entropy: Array
+
+
+def _ranges(title: str, values: Mapping[str, Array]) -> str:
+    """A table of the first, last, least and largest values, a row for each component."""
+    rows: list[tuple[str, ...]] = []
+    for name, of in values.items():
+        for k, each in enumerate(of.T if len(of) else ()):
+            label = name if of.shape[1] == 1 else f"{name} {k + 1}"
+            rows.append((label, *(f"{x:.5g}" for x in (each[0], each[-1], each.min(), each.max()))))
+    return table(title, ("", "first", "last", "least", "largest"), rows)
 
 
 @final
@@ -78,6 +89,13 @@ class BodyMotion:
         """(n, 6) angular and linear velocity in the body frame."""
         return self._motion.twists[self._name]
 
+    def _repr_html_(self) -> str:  # pyright: ignore[reportUnusedFunction] - notebooks call it
+        values = {
+            "position [m]": self.position, "velocity [m/s]": self.velocity,
+            "angular velocity [rad/s]": self.angular_velocity,
+        }  # fmt: skip
+        return _ranges(f"Motion of body {self._name}", values)
+
     @property
     def velocity(self) -> Array:
         """(n, 3) of the centre of mass in the world basis, in m/s."""
@@ -103,6 +121,10 @@ class JointMotion:
 
     def __init__(self, motion: Moving, name: str, coordinate: Array) -> None:
         self._motion, self._name, self.coordinate = motion, name, coordinate
+
+    def _repr_html_(self) -> str:  # pyright: ignore[reportUnusedFunction] - notebooks call it
+        values = {"coordinates [rad, m]": self.coordinate, "rate [rad/s, m/s]": self.rate}
+        return _ranges(f"Motion of joint {self._name}", values | {"moment, force [N m, N]": self.wrench})
 
     @property
     def rate(self) -> Array:

@@ -115,9 +115,9 @@ class Solution:
         return f"Solution of {self.name}: {span}, {len(self.states)} states"
 
     def _repr_html_(self) -> str:  # pyright: ignore[reportUnusedFunction] - notebooks call it
-        from ephs.solve.result.tables import solution_table
+        from ephs.show.notebook import solution_html
 
-        return solution_table(self)
+        return solution_html(self)
 
     @property
     def events(self) -> tuple[Crossing, ...]:

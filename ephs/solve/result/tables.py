@@ -1,27 +1,14 @@
-"""Small HTML tables, as notebooks show solutions and ledgers."""
+"""Solutions and ledgers as small HTML tables for notebooks."""
 
-from collections.abc import Iterable, Sequence
-from html import escape
 from typing import TYPE_CHECKING
+
+from ephs.semantics.markup import table
 
 if TYPE_CHECKING:
     from ephs.solve.result.books import Entry
     from ephs.solve.result.solution import Solution
 
-__all__ = ["ledger_table", "solution_table", "table"]
-
-
-def table(title: str, head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """An HTML table; the first cell of a row is its name."""
-    top = f"<thead><tr>{''.join(f'<th>{escape(word)}</th>' for word in head)}</tr></thead>" if head else ""
-    body = "".join(
-        f'<tr><th style="text-align:left">{escape(name)}</th>'
-        + "".join(f'<td style="text-align:right">{escape(cell)}</td>' for cell in cells)
-        + "</tr>"
-        for name, *cells in rows
-    )
-    caption = f'<caption style="text-align:left">{escape(title)}</caption>'
-    return f"<table>{caption}{top}<tbody>{body}</tbody></table>"
+__all__ = ["ledger_table", "solution_table"]
 
 
 def solution_table(solution: "Solution") -> str:
