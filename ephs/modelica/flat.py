@@ -1,7 +1,7 @@
 """A component of Modelica as flat equations: what Pymoca flattens, in SymPy's expressions."""
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, final
@@ -71,7 +71,7 @@ class Equation:
 class Flat:
     """A component: its ports, its equations, and of each variable the unit and the start value.
 
-    Variables without a unit entry are signals, which Pymoca leaves undeclared.
+    Variables without a unit entry are signals that are read: Pymoca leaves connectors of signals undeclared.
     """
 
     name: str
@@ -116,10 +116,11 @@ def flattened(tree: Any, name: str, given: Mapping[str, float]) -> Flat:
         What is not read: see `errors`.
     """
     from pymoca import ast
-    from pymoca.tree import flatten
+    from pymoca.tree import flatten, instantiate
 
     try:
         found = flatten(tree, name).classes[name]
+        readings = set(_readings(instantiate(tree, name))) - found.symbols.keys()
     except Exception as error:  # as many kinds as there are ways to fail
         raise ModelicaError("flat", where=name, found=_first(error)) from error
     if found.statements:
@@ -134,9 +135,10 @@ def flattened(tree: Any, name: str, given: Mapping[str, float]) -> Flat:
         if any(str(getattr(extent, "value", extent)) != "None" for extents in symbol.dimensions for extent in extents):
             raise ModelicaError("array", where=name, found=key)
     real = {key: sp.Symbol(key, real=True) for key, symbol in free.items() if str(symbol.type.name) == "Real"}
+    real |= {key: sp.Symbol(key, real=True) for key in sorted(readings)}
     kinds = {key: str(symbol.type.name) for key, symbol in free.items() if key not in real}
     reader = Reader(name, real, parameters, lambda parts, scope: _constant(tree, parts, scope), kinds)
-    units = {real[key]: str(free[key].unit.value or "") for key in real}
+    units = {real[key]: str(free[key].unit.value or "") if key in free else "" for key in real}
     ports = _ports(name, real, free, units)
     try:
         equations = tuple(_equations(reader, found.equations, {port.flow.name for port in ports}))
@@ -147,8 +149,18 @@ def flattened(tree: Any, name: str, given: Mapping[str, float]) -> Flat:
         ports,
         equations,
         units,
-        {real[key]: float(free[key].start.value or 0.0) for key in real if _is_number(free[key].start)},
+        {real[key]: float(free[key].start.value or 0.0) for key in real if key in free and _is_number(free[key].start)},
     )
+
+
+def _readings(instance: Any) -> Iterator[str]:
+    """Names of the signals that a class gives, by the names of their types in Modelica's standard library."""
+    for key, symbol in instance.symbols.items():
+        if str(getattr(symbol.type, "name", "")).endswith("Output"):
+            yield key
+    for base in instance.extends:
+        if type(base).__name__ == "InstanceClass":
+            yield from _readings(base)
 
 
 def _first(error: Exception) -> str:

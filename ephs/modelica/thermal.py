@@ -45,7 +45,7 @@ def require_heat(flat: Flat, relation: Relation, form: Matrix) -> None:
     solved = sp.solve(residuals, unknown, dict=True) if residuals else []
     flows = [solved[0].get(port.flow, port.flow) if solved else port.flow for port in ports]
     taken = sp.cancel(sum(flows, sp.Integer(0)))
-    if len(ports) > 1 or (ports and sp.cancel(taken + lost) != 0):
+    if len(ports) > 1 or (residuals and not solved) or (ports and sp.cancel(taken + lost) != 0):
         texts = ", ".join(each.text for each in relation.powers)
         raise ModelicaError("heat", where=flat.name, equation=texts or "there are none of powers")
 

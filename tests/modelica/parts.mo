@@ -16,6 +16,10 @@ package Parts "Components by their textbook equations, in the units and connecto
     flow Real Q_flow(unit = "W");
   end Heat;
 
+  partial model Pins
+    Pin p;
+    Pin n;
+  end Pins;
   partial model Branch
     Pin p;
     Pin n;
@@ -174,6 +178,15 @@ package Parts "Components by their textbook equations, in the units and connecto
     i = 0;
     reading = v;
   end Voltmeter;
+  connector RealOutput = output Real;
+  model Ammeter
+    extends Pins;
+    RealOutput i;
+  equation
+    p.v = n.v;
+    p.i = i;
+    n.i = -i;
+  end Ammeter;
   model Capacity
     Heat port;
     parameter Real C = 20;

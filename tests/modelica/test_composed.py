@@ -1,5 +1,8 @@
 """Components in larger systems, against closed forms."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -46,3 +49,13 @@ def test_a_magnet_couples_a_coil_to_a_wheel(parts):
     swing = inertia * np.cos(k / np.sqrt(inertia * coil) * sol.t)
     assert np.abs(np.asarray(sol["wheel.stored.w"]) - swing).max() <= 1e-4  # of second order
     assert np.allclose(sol["m.field.b"], 1.0, rtol=1e-14)
+
+
+def test_the_page_of_the_documentation_runs():
+    page = (Path(__file__).parents[2] / "docs/modelica.md").read_text()
+    *cells, refused = re.findall(r"```\{code-cell\} python\n(.*?)```", page, flags=re.DOTALL)
+    names: dict[str, object] = {}
+    for cell in cells:
+        exec(cell, names)
+    with pytest.raises(ephs.ModelicaError, match="makes energy"):
+        exec(refused.removeprefix(":tags: [raises-exception]\n"), names)

@@ -23,6 +23,7 @@ TAKEN = {
     "Rack": {},
     "Differential": {},
     "Voltmeter": {},
+    "Ammeter": {},
     "Delayed": {},
     "Capacity": {},
     "Conductor": {},
