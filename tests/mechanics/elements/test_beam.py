@@ -315,6 +315,15 @@ def test_a_flying_rod_keeps_what_its_method_keeps(name, tmp_path):
     assert lost <= (1e-11 if name.startswith("natural") else 1e-2 if name in CONSTANT else 1e-5)
 
 
+@pytest.mark.parametrize("name", ["natural", "variational"])
+def test_a_flying_rod_keeps_its_energy_or_its_momenta_for_five_seconds(name, tmp_path):
+    """After 5 s in which it bends, twists and tumbles: energy by `natural`, both momenta by `variational`."""
+    sol = ephs.simulate(rod(tmp_path, STRUCK), 5.0, method=name, step=2.0**-5, audit="off")
+    kept = sol.energy[:, None] if name == "natural" else momenta(sol)
+    assert np.abs(kept - kept[0]).max() <= 1e-11 * np.abs(kept).max()
+    assert np.ptp(sol.beam("rod").energy.sum(axis=1)) > 1e-3 * sol.energy[0]
+
+
 @pytest.mark.parametrize("order", [2, 4])
 def test_damping_turns_into_heat_what_the_motion_loses(order, tmp_path):
     heat = 'damping = 0.02\nheat = "core"\n[thermal.core]\ncapacity = 10.0\ntemperature = 300.0\n'
