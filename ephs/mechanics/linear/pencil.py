@@ -17,7 +17,7 @@ from ephs.semantics.spaces.rank import CONSTRAINT, ELIMINATION, REGULAR, TINY, r
 from ephs.semantics.system import System
 from ephs.solve.errors import OptionError, Outcome, SolveError
 from ephs.solve.methods.continuous import Continuous
-from ephs.solve.methods.natural import guessed_efforts
+from ephs.solve.methods.stored import guessed_efforts
 from ephs.solve.model import Model, compile_model
 from ephs.solve.problem import Problem
 from ephs.solve.sparse import Index

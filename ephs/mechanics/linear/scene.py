@@ -24,7 +24,7 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.rank import ELIMINATION
 from ephs.semantics.spaces.rotations import hat
 from ephs.solve.errors import OptionError
-from ephs.solve.methods.natural import stored_energies
+from ephs.solve.methods.stored import Stored
 from ephs.solve.model import compile_model
 from ephs.solve.result.replay import replay
 from ephs.solve.result.solution import Solution
@@ -345,11 +345,11 @@ def _play(linear: _Linear, t: Array, moved: Array) -> Solution:
     """The mechanism along some displacements (frames, states) of the state."""
     problem = problem_of_scene(linear.model.scene)
     model = compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
-    rows: list[Row] = []
+    stored, rows = Stored(model), list[Row]()
     for row in moved:
         at = linear.model.moved(linear.state, linear.free.Z @ row[: linear.k])
         q, _, s = _split(linear.model, at)
         at = linear.model.unpack(np.concatenate([q, linear.free.Z @ row[linear.k : 2 * linear.k], s]))
         x = problem.descriptor.pack(linear.model.states(linear.model.closed(at)))
-        rows.append(Row(x, stored_energies(model, x), np.zeros(4)))
+        rows.append(Row(x, stored.energies(x), np.zeros(4)))
     return replay(problem, t, rows, "mode")

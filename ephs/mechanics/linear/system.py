@@ -21,7 +21,7 @@ from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.rank import ELIMINATION, IMPLICIT, NEIGHBOUR, SPANNED, TINY, rank_of
 from ephs.semantics.system import System
 from ephs.solve.errors import OptionError, failing_at
-from ephs.solve.methods.natural import stored_energies
+from ephs.solve.methods.stored import Stored
 from ephs.solve.model import Model
 from ephs.solve.problem import Problem
 from ephs.solve.result.replay import replay
@@ -219,5 +219,6 @@ def _numbered(name: str, count: int) -> list[str]:
 def _play(problem: Problem, model: Model, x: Array, X: Array, t: Array, moved: Array) -> Solution:
     """The system along some displacements (frames, states) of the state."""
     xs = [problem.descriptor.advance(x, X @ row) for row in moved]
-    rows = [Row(point, stored_energies(model, point), np.zeros(4)) for point in xs]
+    stored = Stored(model)
+    rows = [Row(point, stored.energies(point), np.zeros(4)) for point in xs]
     return replay(problem, t, rows, "mode")

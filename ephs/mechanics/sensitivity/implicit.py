@@ -20,10 +20,11 @@ from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.rank import IMPLICIT, TINY
 from ephs.semantics.stage import Entry, Evaluator, Integer, Program, Vector, vector
 from ephs.solve.errors import OptionError, SolveError
-from ephs.solve.methods.natural import Natural, NaturalState, stored_energies
+from ephs.solve.methods.natural import Natural, NaturalState
 from ephs.solve.methods.newton import settle
 from ephs.solve.methods.records import MEMORY, TABLES, Columns, Scratch, parts_of
 from ephs.solve.methods.residuals import FAULTS, account, evaluated
+from ephs.solve.methods.stored import stored_energies
 from ephs.solve.model import Evaluation, Model, compile_model
 from ephs.solve.problem import Problem
 from ephs.solve.stepping import Row

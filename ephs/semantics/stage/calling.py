@@ -2,6 +2,7 @@
 
 import ctypes
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, cast, final
 
@@ -9,12 +10,45 @@ import numpy as np
 
 from ephs.semantics.stage.entries import Entry
 from ephs.semantics.stage.errors import StageError
+from ephs.semantics.stage.kinds import Atom, Kind
 from ephs.semantics.stage.llvm import Library
 
-__all__ = ["Bound", "Call", "apart", "packed"]
+__all__ = ["Bound", "Call", "First", "apart", "packed"]
 
 RESULTS = {"void": None, "double": ctypes.c_double, "i64": ctypes.c_int64}
 NUMBERS = ("real", "integer")
+
+
+Span = tuple[int, int, str]
+"""Where an array begins and ends in memory, and the name of its argument."""
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class First:
+    """The first arguments of several calls, checked once.
+
+    Attributes
+    ----------
+    kinds
+        Of these arguments, those of the calls.
+    parts
+        The arguments as machine code takes them.
+    block
+        The same as numbers of eight bytes.
+    spans
+        Where their arrays lie.
+    """
+
+    kinds: tuple[Kind, ...]
+    parts: tuple[Any, ...]
+    block: "np.ndarray[Any, np.dtype[np.int64]]"
+    spans: list[Span]
+
+    def begins(self, entry: Entry) -> bool:
+        """Tell whether an entry function has these arguments first."""
+        own = tuple(entry.kinds.values())[: len(self.kinds)]
+        return len(own) == len(self.kinds) and all(one is other for one, other in zip(own, self.kinds, strict=True))
 
 
 @final
@@ -28,17 +62,25 @@ class Bound:
     call
         The function.
     parts
-        Its arguments, arrays and numbers, as machine code takes them.
+        Its arguments, arrays and numbers, as machine code takes them; those after the first where these are given.
+    first
+        Its first arguments.
     """
 
     __slots__ = ("_block", "_function", "_integers", "_reals", "call", "parts")
 
-    def __init__(self, call: "Call", parts: tuple[Any, ...]) -> None:
-        self.call, self.parts, self._function = call, parts, call.function
-        self._integers = np.zeros(len(parts), dtype=np.int64)
+    def __init__(self, call: "Call", parts: tuple[Any, ...], first: First | None = None) -> None:
+        self.call, self._function = call, call.function
+        known = 0 if first is None else len(first.parts)
+        self._integers = np.zeros(known + len(parts), dtype=np.int64)
         self._reals = self._integers.view(np.float64)
-        for place, (part, number) in enumerate(zip(apart(call.entry, parts), call.scalars, strict=True)):
+        passed, spans = _addresses(call.entry.atoms[known:], parts)
+        if first is not None:
+            self._integers[:known], spans = first.block, [*first.spans, *spans]
+        _distinct(call.entry, spans)
+        for place, (part, number) in enumerate(zip(passed, call.scalars[known:], strict=True), known):
             self._into(number)[place] = part
+        self.parts = parts if first is None else (*first.parts, *parts)
         self._block = int(self._integers.ctypes.data)
 
     def _into(self, number: str) -> "np.ndarray[Any, Any]":
@@ -82,9 +124,32 @@ class Call:
         names = [name for name, _ in entry.atoms]
         self.numbers = [k for k, atom in enumerate(self.scalars) if atom in NUMBERS and names.count(names[k]) == 1]
 
-    def bind(self, *arguments: Any) -> Bound:
-        """Check arguments once; what comes back may be called again and again."""
-        return Bound(self, tuple(self.entry.split(arguments, self.trail)))
+    def bind(self, *arguments: Any, first: First | None = None) -> Bound:
+        """Check arguments once; what comes back may be called again and again.
+
+        Parameters
+        ----------
+        *arguments
+            All of them, or those that follow the first ones.
+        first
+            The first ones, as `first` of a call with the same kinds made them.
+        """
+        if first is not None and not first.begins(self.entry):
+            expected = "first arguments of the same kinds"
+            raise StageError("parameters", where=self.entry.name, expected=expected, found="others")
+        known = 0 if first is None else len(first.kinds)
+        return Bound(self, tuple(self.entry.split(arguments, self.trail, known)), first)
+
+    def first(self, *arguments: Any) -> First:
+        """Check the first arguments, which several calls share."""
+        count = len(arguments)
+        parts = tuple(self.entry.split(arguments, self.trail, 0, count))
+        passed, spans = _addresses(self.entry.atoms[: len(parts)], parts)
+        block = np.zeros(len(parts), dtype=np.int64)
+        reals = block.view(np.float64)
+        for place, (part, number) in enumerate(zip(passed, self.scalars[: len(parts)], strict=True)):
+            (reals if number == "real" else block)[place] = part
+        return First(tuple(self.entry.kinds.values())[:count], parts, block, spans)
 
     def __call__(self, *arguments: Any) -> Any:
         return self.bind(*arguments)()
@@ -119,17 +184,11 @@ def _address(array: "np.ndarray[Any, Any]") -> int:
         return int(array.__array_interface__["data"][0])
 
 
-def apart(entry: Entry, parts: Sequence[Any]) -> tuple[Any, ...]:
-    """Return the addresses of arrays, and numbers as they are.
-
-    Raises
-    ------
-    StageError
-        Arrays share memory: programs are compiled as if none did.
-    """
+def _addresses(atoms: Sequence[tuple[str, Atom]], parts: Sequence[Any]) -> tuple[list[Any], list[Span]]:
+    """Return the addresses of arrays, numbers as they are, and where arrays lie."""
     passed: list[Any] = []
-    spans: list[tuple[int, int, str]] = []
-    for (name, _), part in zip(entry.atoms, parts, strict=True):
+    spans: list[Span] = []
+    for (name, _), part in zip(atoms, parts, strict=True):
         if isinstance(part, np.ndarray):
             start = _address(cast("np.ndarray[Any, Any]", part))
             passed.append(start)
@@ -137,8 +196,23 @@ def apart(entry: Entry, parts: Sequence[Any]) -> tuple[Any, ...]:
                 spans.append((start, start + size, name))
         else:
             passed.append(part)
+    return passed, spans
+
+
+def _distinct(entry: Entry, spans: list[Span]) -> None:
+    """Refuse arrays that share memory: programs are compiled as if none did."""
     spans.sort()
     for (_, end, one), (start, _, other) in pairwise(spans):
         if start < end:
             raise StageError("overlap", where=entry.name, argument=one, other=other)
-    return tuple(passed)
+
+
+def apart(entry: Entry, parts: Sequence[Any]) -> None:
+    """Refuse arguments whose arrays share memory.
+
+    Raises
+    ------
+    StageError
+        It names two of them.
+    """
+    _distinct(entry, _addresses(entry.atoms, parts)[1])

@@ -52,13 +52,25 @@ class Entry:
         """Return how this function is called by its address; `returns`: it returns an integer or a condition."""
         return signature_of(returns=returns, **self.kinds)
 
-    def split(self, arguments: tuple[Any, ...], trail: Callable[[str], tuple[int | None, ...]]) -> list[Any]:
-        """Return the atoms of arguments, checked; `trail` says what shape follows that of an argument's numbers."""
-        if len(arguments) != len(self.kinds):
-            expected = f"{len(self.kinds)} arguments ({', '.join(self.kinds)})"
+    def split(
+        self, arguments: tuple[Any, ...], trail: Callable[[str], tuple[int | None, ...]], after: int = 0,
+        count: int | None = None,
+    ) -> list[Any]:  # fmt: skip
+        """Return the atoms of arguments, checked.
+
+        Parameters
+        ----------
+        arguments
+            So many (default: all) after the first so many.
+        trail
+            Says what shape follows that of an argument's numbers.
+        """
+        kinds = list(self.kinds.items())[after : None if count is None else after + count]
+        if len(arguments) != len(kinds):
+            expected = f"{len(kinds)} arguments ({', '.join(name for name, _ in kinds)})"
             raise StageError("parameters", where=self.name, expected=expected, found=len(arguments))
         parts: list[Any] = []
-        for (name, kind), value in zip(self.kinds.items(), arguments, strict=True):
+        for (name, kind), value in zip(kinds, arguments, strict=True):
             found = kind.split(value, trail(name))
             if found is None:
                 members = f", and {trail(name)} members after it" if trail(name) else ""

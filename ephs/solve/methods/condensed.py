@@ -16,7 +16,7 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.numbering import Index, starts
 from ephs.semantics.spaces.rank import IMPLICIT
 from ephs.solve.errors import Outcome, SolveError
-from ephs.solve.methods.natural import guessed_efforts
+from ephs.solve.methods.stored import guessed_efforts
 from ephs.solve.model import Evaluation, Model
 from ephs.solve.sparse import equilibrate
 

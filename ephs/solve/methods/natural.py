@@ -4,7 +4,6 @@ The state of the method is a value; advancing it is compiled, and gives one row 
 """
 
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import final
 
@@ -12,13 +11,13 @@ import numpy as np
 
 from ephs.semantics.bundle import Array
 from ephs.semantics.kernel_table import RAISED
-from ephs.semantics.numbering import spans
 from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.methods.analysis import Analysis, analyse
 from ephs.solve.methods.blame import Blame
 from ephs.solve.methods.newton import natural_program
 from ephs.solve.methods.records import COMPONENT, DIVERGED, DONE, INCONSISTENT, PIVOT, Memory, Order, parts_of
-from ephs.solve.model import Model, evaluate_at
+from ephs.solve.methods.stored import Stored
+from ephs.solve.model import Model
 from ephs.solve.snapshot import Snapshot, parts
 from ephs.solve.sparse import Index
 
@@ -27,10 +26,8 @@ __all__ = [
     "Decided",
     "Natural",
     "NaturalState",
-    "guessed_efforts",
     "has_choice",
     "of_status",
-    "stored_energies",
 ]
 
 SETTLING = 16
@@ -169,15 +166,16 @@ class Natural:
         self._dropped: Index | None = None
         self._decided: Decided | None = None
         self._bound: _Loop | None = None
+        self._stored = Stored(model)
 
     def init(self, x: Array) -> NaturalState:
         """The state of the method at the states x; unknowns are guessed from the efforts there."""
-        z = guessed_efforts(self.model, x)
+        z = self._stored.efforts(x)
         return NaturalState(x.copy(), z, z.copy(), np.zeros(4 + len(self.model.descriptor.components)))
 
     def energies(self, x: Array) -> Array:
         """(components,): energy of each storage at the states x, zero elsewhere."""
-        return stored_energies(self.model, x)
+        return self._stored.energies(x)
 
     def prepare(self, state: NaturalState, h: float) -> None:
         """Decide the order of elimination and compile what is not in the cache, before time counts."""
@@ -298,31 +296,6 @@ class Natural:
             self._unsettled = max(0, self._unsettled - taken)
             if not self._unsettled:
                 self.analysis = None
-
-
-def guessed_efforts(model: Model, x: Array) -> Array:
-    """Unknowns at the states x: the efforts of storages, zero where one has none; all else zero."""
-    d, n_rate = model.descriptor, int(model.tables.counts[0])
-    z, storages = np.zeros(model.unknowns), model.storages()
-    status, _, memory = evaluate_at(storages, x, z, 0.0)
-    if not status:
-        t = storages.tables
-        rates = t.read_w[spans(t.read_w_at, t.dims[:, 2])]
-        z[n_rate + t.e_index[spans(t.e_at, t.dims[:, 0])]] = -memory.residual[rates]
-        return z
-    for slot in d.components:  # one after the other, as one of them has no effort there
-        if slot.primitive.kind == "storage":
-            with suppress(Exception):
-                z[[n_rate + i for i in slot.efforts]] = slot.primitive.effort(d.point(slot, x), model.reference)
-    return z
-
-
-def stored_energies(model: Model, x: Array) -> Array:
-    """(components,): energy of each storage at the states x, zero elsewhere."""
-    status, component, memory = evaluate_at(model, x, guessed_efforts(model, x), 0.0)
-    if status:
-        raise SolveError.of_component(status, model, component)
-    return memory.energy
 
 
 def has_choice(dropped: Index, status: int) -> bool:

@@ -27,10 +27,8 @@ from ephs.solve.methods.natural import (
     Chunk,
     Decided,
     NaturalState,
-    guessed_efforts,
     has_choice,
     of_status,
-    stored_energies,
 )
 from ephs.solve.methods.records import (
     COMPONENT,
@@ -54,6 +52,7 @@ from ephs.solve.methods.scheme import (
     Stages,
     StagesOf,
 )
+from ephs.solve.methods.stored import Stored
 from ephs.solve.model import Model, evaluate_at
 from ephs.solve.snapshot import Snapshot, parts
 from ephs.solve.sparse import Index, order
@@ -148,15 +147,16 @@ class Natural4:
         self._dropped: Index | None = None
         self._decided: Decided | None = None
         self._inputs, self._tried = np.zeros(0), AS_BEFORE
+        self._stored = Stored(model)
 
     def init(self, x: Array) -> NaturalState:
         """The state of the method at the states x; unknowns are guessed from the efforts there."""
-        z = np.tile(guessed_efforts(self.model, x), (STAGES, 1))
+        z = np.tile(self._stored.efforts(x), (STAGES, 1))
         return NaturalState(x.copy(), z, z.copy(), np.zeros(4 + len(self.model.descriptor.components)))
 
     def energies(self, x: Array) -> Array:
         """(components,): energy of each storage at the states x, zero elsewhere."""
-        return stored_energies(self.model, x)
+        return self._stored.energies(x)
 
     def prepare(self, state: NaturalState, h: float) -> None:
         """Decide the order of elimination and compile what is not in the cache, before time counts."""

@@ -18,9 +18,9 @@ from ephs.solve.control import Control
 from ephs.solve.errors import LARGEST, Outcome, SolveError
 from ephs.solve.methods.collocation import moments, values
 from ephs.solve.methods.continuous import Continuous, Matrices
-from ephs.solve.methods.natural import guessed_efforts
 from ephs.solve.methods.passages import Passages
 from ephs.solve.methods.records import IRREVERSIBLE
+from ephs.solve.methods.stored import guessed_efforts
 from ephs.solve.model import compile_model
 from ephs.solve.problem import Problem
 from ephs.solve.snapshot import Snapshot, like, parts

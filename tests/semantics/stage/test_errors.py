@@ -136,5 +136,25 @@ def test_a_bound_call_keeps_its_arrays_and_refuses_other_numbers():
     assert gone() is None
 
 
+def test_calls_share_first_arguments_that_are_checked_once():
+    kinds = {"x": vector(), "y": vector(), "k": real()}
+    entries = {
+        "once": Entry(lambda on, x, y, k: x[0] * y[0] * k, **kinds),
+        "twice": Entry(lambda on, x, y, k: 2.0 * x[0] * y[0] * k, **kinds),
+    }
+    calls = Program("shares_first", **entries, other=Entry(lambda on, x: x[0], x=vector())).compiled()
+    x, y = np.full(2, 3.0), np.full(2, 5.0)
+    first = calls["once"].first(x)
+    for name in ("once", "twice"):
+        bound, whole = calls[name].bind(y, 7.0, first=first), calls[name].bind(x, y, 7.0)
+        assert bound() == whole() and bound(2.0) == whole(2.0) == (1 + (name == "twice")) * 30.0
+    with pytest.raises(StageError, match="first arguments of the same kinds"):
+        calls["other"].bind(first=first)
+    with pytest.raises(StageError, match="memory"):
+        calls["once"].bind(x, 7.0, first=first)
+    with pytest.raises(StageError, match=r"2 arguments \(y, k\)"):
+        calls["once"].bind(y, first=first)
+
+
 def test_every_text_is_one_line_with_a_place():
     assert all("{where}" in text and "\n" not in text for text in TEXTS.values())

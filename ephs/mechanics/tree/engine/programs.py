@@ -30,6 +30,7 @@ from ephs.semantics.stage import (
     vector,
 )
 from ephs.semantics.stage.calling import Bound
+from ephs.semantics.stage.kinds import Kind
 from ephs.solve.march import (
     BOOKS,
     ERRORS,
@@ -49,6 +50,12 @@ from ephs.solve.march.account import worth
 from ephs.solve.march.steps import attempt, book
 
 __all__ = ["Engine", "motion_of_loops", "motion_of_trees", "motion_program"]
+
+
+@cache
+def _of() -> dict[str, Kind]:
+    """Return the kinds of a mechanism's arguments, which all entry functions have first."""
+    return {"tables": group(Tables, **TABLES), "work": group(Work, **WORK)}
 
 
 @cache
@@ -118,8 +125,7 @@ def motion_program(*, looped: bool) -> Program:
 
         on.loop(repeats, lambda _: on.loop(q.rows, one))
 
-    of: dict[str, Any] = {"tables": group(Tables, **TABLES), "work": group(Work, **WORK)}
-    tried: dict[str, Any] = {"tableau": group(Tableau, **TABLEAU)}
+    of, tried = _of(), {"tableau": group(Tableau, **TABLEAU)}
     entries = {
         "march": Entry(
             marched, **of, **tried, memory=group(Memory, **MEMORY), control=table(Control), account=table(Account),
@@ -166,9 +172,8 @@ def stiff_program() -> Program:
     return Program(
         "stiff_steps_of_trees",
         march=Entry(
-            marched, tables=group(Tables, **TABLES), work=group(Work, **WORK), tableau=group(Tableau, **TABLEAU),
-            memory=group(Memory, **MEMORY), control=table(Control), account=table(Account),
-            stiff=group(Stiff, **STIFF), steps=integer(),
+            marched, **_of(), tableau=group(Tableau, **TABLEAU), memory=group(Memory, **MEMORY), control=table(Control),
+            account=table(Account), stiff=group(Stiff, **STIFF), steps=integer(),
         ),
     )  # fmt: skip
 
@@ -212,34 +217,44 @@ class Engine:
         self.sizes, self.reached = sizes, reached
         coordinates, size = sizes
         self._calls = motion_program(looped=looped).compiled()
+        self._first = self._calls["rates"].first(tables, work)
         self._base, self._q = np.zeros(coordinates), np.zeros(coordinates)
         self._start, self._y, self._out = np.zeros(size), np.zeros(size), np.zeros(size)
         self._r, self._change = np.zeros(work["force"].size), np.zeros(work["force"].size)
-        self._rates = self.bind("rates", self._base, self._y, self._q, self._out)
-        self._advance = self.bind("advance", self._base, self._y, self._q)
-        self._velocities = self.bind("velocities", self._y, self._r, self._out)
         summed = size - self._r.size - work["still"].size
-        self._count = self.bind("counted", self._start, self._y)
-        self._held = np.zeros(3)
-        self._heats = np.zeros(work["entropy"].size)
-        self._energy = self.bind("energy", self._q, self._r, self._heats, self._held)
+        self._held, self._heats = np.zeros(3), np.zeros(work["entropy"].size)
         self.books = {name: np.zeros(summed) for name in BOOKS} | {"start": self._start, "end": self._y}
-        self._measure = self.bind("measured", self._q, self._r)
         self._account, self._allowed = Account.table(1), np.zeros(2 * self._r.size)
-        self._correct = self.bind("corrected", self._account, self._start, self._y, self._q, self._allowed, 0.0)
         self._counted = 2 * self._r.size + work["entropy"].size
         self._stages: dict[int, tuple[Table[Control], Array, dict[str, Array], Array, Bound]] = {}
         self._sums: dict[int, tuple[Mapping[str, Any], Array, Bound]] = {}
-        self._close = self.bind("close", self._q, self._r) if looped else None
-        self._project = self.bind("project", self._q, self._change) if looped else None
+        self._arguments: dict[str, tuple[Any, ...]] = {
+            "rates": (self._base, self._y, self._q, self._out),
+            "advance": (self._base, self._y, self._q),
+            "velocities": (self._y, self._r, self._out),
+            "counted": (self._start, self._y),
+            "energy": (self._q, self._r, self._heats, self._held),
+            "measured": (self._q, self._r),
+            "corrected": (self._account, self._start, self._y, self._q, self._allowed, 0.0),
+            "close": (self._q, self._r),
+            "project": (self._q, self._change),
+        }
+        self._bound: dict[str, Bound] = {}
+
+    def _run(self, name: str, *numbers: float) -> int:
+        """Call an entry function on the engine's own arrays, bound when it is first asked for; return its status."""
+        bound = self._bound.get(name)
+        if bound is None:
+            bound = self._bound[name] = self.bind(name, *self._arguments[name])
+        return bound(*numbers)
 
     def bind(self, name: str, *arguments: Any) -> Bound:
         """Return an entry function of the program, bound to this mechanism and to further arguments."""
-        return self._calls[name].bind(self.tables, self.work, *arguments)
+        return self._calls[name].bind(*arguments, first=self._first)
 
     def implicit(self, *arguments: Any) -> Bound:
         """Return implicit steps, bound to this tree and to further arguments."""
-        return stiff_program().compiled()["march"].bind(self.tables, self.work, *arguments)
+        return stiff_program().compiled()["march"].bind(*arguments, first=self._first)
 
     def array(self, name: str) -> Array:
         """Return an array of the memory."""
@@ -260,13 +275,13 @@ class Engine:
     def advance(self, base: Array, v: Array) -> Array:
         """Return base·exp(v), joint by joint; v may stand at the head of y."""
         self._base[:], self._y[: v.size] = base, v
-        self._advance()
+        self._run("advance")
         return self._q.copy()
 
     def rates(self, base: Array, y: Array) -> tuple[int, Array, Array]:
         """Return a status, the elements base·exp(v), and ẏ of y = (v, r, heats, heat, work, flows)."""
         self._base[:], self._y[:] = base, y
-        status = int(self._rates())
+        status = self._run("rates")
         return status, self._q.copy(), self._out.copy()
 
     def stages(
@@ -307,13 +322,13 @@ class Engine:
     def velocities(self, y: Array, r: Array, out: Array) -> None:
         """Write v̇ of all joints to ``out``, where an outward sweep has been."""
         self._y[:], self._r[:], self._out[:] = y, r, out
-        self._velocities()
+        self._run("velocities")
         out[:] = self._out
 
     def book(self, y0: Array, y1: Array) -> Array:
         """Return the end y1 of a step from y0 with what components made in place of what they passed on."""
         self._start[:], self._y[:] = y0, y1
-        self._count()
+        self._run("counted")
         return self._y.copy()
 
     def sum(
@@ -355,14 +370,14 @@ class Engine:
         a: Any = self._account[0]
         (a.anchor, a.left, a.put, a.total), self.work["kept"][: self.momenta] = account[:4].tolist(), account[4:]
         a.chosen, a.alone = int(chosen), int(alone)
-        status = int(self._correct(h))
+        status = self._run("corrected", h)
         after = np.concatenate([[a.anchor, a.rest, a.put + a.moved, a.total + abs(a.moved)], account[4:]])
         return status, self._q.copy(), self._y.copy(), after, float(a.size)
 
     def energy(self, q: Array, r: Array, heats: Array) -> Array:
         """Return (3,) kinetic energy, all other energy that is not heat, and the sum of its terms' sizes in J."""
         self._q[:], self._r[:], self._heats[:] = q, r, heats
-        self._energy()
+        self._run("energy")
         return self._held.copy()
 
     @property
@@ -376,19 +391,17 @@ class Engine:
         if not self.momenta:
             return np.zeros(0)
         self._q[:], self._r[:] = q, r
-        self._measure()
+        self._run("measured")
         return self.work["kept"].copy()
 
     def close(self, q: Array, r: Array) -> tuple[int, float, Array, Array]:
         """Return a status, how far constraints are open, elements with loops closed, and rates on them."""
-        assert self._close is not None
         self._q[:], self._r[:] = q, r
-        status = int(self._close())
+        status = self._run("close")
         return status, float(self.work["answer"][0]), self._q.copy(), self._r.copy()
 
     def along(self, q: Array, change: Array) -> Array:
         """Return a change of the rates without its part across the constraints, where loops were closed last, at q."""
-        assert self._project is not None
         self._q[:], self._change[:] = q, change
-        self._project()
+        self._run("project")
         return self._change.copy()

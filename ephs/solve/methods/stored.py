@@ -1,0 +1,65 @@
+"""Energies of a model's storages, and their efforts, from which methods guess unknowns."""
+
+from contextlib import suppress
+from typing import final
+
+import numpy as np
+
+from ephs.semantics.bundle import Array
+from ephs.semantics.numbering import spans
+from ephs.solve.errors import SolveError
+from ephs.solve.model import Evaluation, Model
+
+__all__ = ["Stored", "guessed_efforts", "stored_energies"]
+
+
+@final
+class Stored:
+    """What the storages of a model say of its states. It keeps memory: use one for each thread."""
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        self._storages: Evaluation | None = None
+        self._whole: Evaluation | None = None
+
+    def efforts(self, x: Array) -> Array:
+        """(unknowns,) at the states x: the efforts of storages, zero where one has none; all else zero."""
+        model = self.model
+        d, n_rate = model.descriptor, int(model.tables.counts[0])
+        z = np.zeros(model.unknowns)
+        found = self._storages = self._storages or Evaluation(model.storages())
+        status, _ = found.at(x, z, 0.0)
+        if not status:
+            t = found.model.tables
+            rates = t.read_w[spans(t.read_w_at, t.dims[:, 2])]
+            z[n_rate + t.e_index[spans(t.e_at, t.dims[:, 0])]] = -found.memory.residual[rates]
+            return z
+        for slot in d.components:  # one after the other, as one of them has no effort there
+            if slot.primitive.kind == "storage":
+                with suppress(Exception):
+                    z[[n_rate + i for i in slot.efforts]] = slot.primitive.effort(d.point(slot, x), model.reference)
+        return z
+
+    def energies(self, x: Array) -> Array:
+        """(components,) energy of each storage at the states x, zero elsewhere.
+
+        Raises
+        ------
+        SolveError
+            A component cannot be evaluated there.
+        """
+        found = self._whole = self._whole or Evaluation(self.model)
+        status, component = found.at(x, self.efforts(x), 0.0)
+        if status:
+            raise SolveError.of_component(status, self.model, component)
+        return found.memory.energy.copy()
+
+
+def guessed_efforts(model: Model, x: Array) -> Array:
+    """`Stored.efforts` of a model at one place."""
+    return Stored(model).efforts(x)
+
+
+def stored_energies(model: Model, x: Array) -> Array:
+    """`Stored.energies` of a model at one place."""
+    return Stored(model).energies(x)
