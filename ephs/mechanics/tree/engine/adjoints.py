@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import Any, final
 
-from ephs.mechanics.tree.engine.programs import Engine
+from ephs.mechanics.tree.engine.engine import Engine
 from ephs.mechanics.tree.engine.tangents import StepTangent, reaching, step_program
 from ephs.semantics.bundle import Array
 from ephs.semantics.stage import Program

@@ -8,9 +8,9 @@ import numpy as np
 
 from ephs.mechanics.tree.engine.attachment import attachment_of
 from ephs.mechanics.tree.engine.closing import Closing, closing
+from ephs.mechanics.tree.engine.engine import Engine
 from ephs.mechanics.tree.engine.islands import islands_of
 from ephs.mechanics.tree.engine.links import Frames, links_of
-from ephs.mechanics.tree.engine.programs import Engine
 from ephs.mechanics.tree.engine.tables import Forces, table_of
 from ephs.mechanics.tree.finding.tables import CUT, SPRING, TREE, Mechanism
 from ephs.mechanics.tree.sweeps.acting import ON_BODIES, ON_CUT, ON_TREE, Component, Own

@@ -11,8 +11,8 @@ from typing import Any, Final, cast, final
 import numpy as np
 
 from ephs.mechanics.tree.engine.attachment import laws_in
+from ephs.mechanics.tree.engine.engine import Engine
 from ephs.mechanics.tree.engine.motion import Mechanism
-from ephs.mechanics.tree.engine.programs import Engine
 from ephs.mechanics.tree.engine.shutting import close
 from ephs.mechanics.tree.sweeps.acting import TABLES, WORK, Tables, Work
 from ephs.semantics.bundle import Array
