@@ -180,3 +180,8 @@ def test_what_is_said_first_loads_nothing_heavy(words):
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, env=environment)
     assert done.stderr.splitlines()[-1] == ""
+
+
+def test_a_name_that_is_no_model_is_answered_with_the_models_of_the_file(capsys):
+    assert cli.main(["check", f"{ROOT / 'examples/oscillator.py'}:damped"]) == 2
+    assert "damped is a Pattern" in (said := capsys.readouterr().err) and "free_oscillator, damped_oscillator" in said

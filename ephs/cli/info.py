@@ -45,7 +45,7 @@ def _of_scene(scene: "Scene") -> list[str]:
         f"redundant constraints {found.redundant}",
         *_table(("body", "mass [kg]", "position [m]"), ((n, f"{b.mass:g}", _row(b.pose[4:])) for n, b in bodies)),
         *_table(
-            ("joint", "type", "between", "freedoms"),
+            ("joint", "type", "between", "degrees of freedom"),
             ((n, j.kind, f"{j.body1} – {j.body2}", ", ".join(_coordinates(freedoms[n]))) for n, j in joints),
         ),
     ]

@@ -47,7 +47,7 @@ TEXTS = {
     "no-name": "{file}: found no System or Scene {name} in it, expected one of {found}",
     "nameless": "{file}: found no NAME after the file; it holds {found}; give one as {file}:{example}",
     "no-model": "{file}: found no System and no Scene in it; bind one to a name at the top level of the file",
-    "not-a-model": "{file}: {name} is a {found}, expected a System or a Scene",
+    "not-a-model": "{file}: {name} is a {found}, expected a System or a Scene; {others}",
     "user-code": "{file}: line {line}: {found}; correct the file, then run again",
     "extra": "{file}: the module {found} is not installed; python -m pip install 'ephs[{extra}]'",
     "no-report": "report.html was not written: the module {found} is not installed; the solution is saved; "
@@ -199,7 +199,10 @@ def _from_python(file: Path, name: str) -> "Scene | System":
         sys.path.remove(str(file.parent.resolve()))
     models = [key for key, value in names.items() if isinstance(value, (ephs.System, ephs.Scene))]
     if name in names and name not in models:
-        raise BadInput(TEXTS["not-a-model"].format(file=file, name=name, found=type(names[name]).__name__))
+        others = f"the file holds {', '.join(models)}" if models else "the file holds none"
+        raise BadInput(
+            TEXTS["not-a-model"].format(file=file, name=name, found=type(names[name]).__name__, others=others)
+        )
     if not models:
         raise BadInput(TEXTS["no-model"].format(file=file))
     if name not in names:
