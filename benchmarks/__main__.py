@@ -35,6 +35,7 @@ from benchmarks import (
     parts,
     size,
     specialised,
+    stabilised,
     staged,
     start,
     steps,
@@ -75,6 +76,7 @@ TABLES: dict[str, Callable[[Path | None], str | Report]] = {
     "lawful": lambda _: lawful.table(),
     "laws": lambda _: laws.report(),
     "implicit": lambda _: implicit.report(),
+    "stabilised": lambda _: stabilised.report(),
 }
 
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from ephs.mechanics.elements.motor import armature as armature
     from ephs.mechanics.elements.motor import motor as motor
     from ephs.mechanics.motion.inside import Inside as Inside
+    from ephs.mechanics.rewrite.stabilised import stabilised as stabilised
 
 _HOME = {
     "armature": "ephs.mechanics.elements.motor",
@@ -32,6 +33,7 @@ _HOME = {
     "joint_pattern": "ephs.mechanics.elements.joints",
     "mbs_pattern": "ephs.mechanics.elements.joints",
     "spring_damper": "ephs.mechanics.elements.joints",
+    "stabilised": "ephs.mechanics.rewrite.stabilised",
     "universal_joint": "ephs.mechanics.elements.joints",
 }
 

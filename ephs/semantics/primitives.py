@@ -232,6 +232,9 @@ class Reversible:
     discrete
         (C_h (k, n), F (k,)) from (h, x⁰, increments of the read states, e): the discrete constraint, with
         C_h e = F, used in place of C at the midpoint.
+    working
+        Whether its discrete relation does work, C_h e ≠ F: over a step it is no Dirac structure. The work is booked as
+        supplied, and component by component.
     domain, proof, trusted
         As of a `Storage`; of an irreversible process a domain may bound energy efforts, too.
     """
@@ -249,6 +252,7 @@ class Reversible:
     domain: Domain = ()
     proof: Proof | None = field(default=None, compare=False, repr=False)
     trusted: bool = field(default=False, compare=False, repr=False)
+    working: bool = False
     _verdict: StructureVerdict | None = field(default=None, init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:

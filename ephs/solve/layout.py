@@ -16,7 +16,7 @@ from ephs.semantics.checks import random_efforts, random_point
 from ephs.semantics.kernel_table import Callback, address_of, prototype
 from ephs.semantics.numbering import Index, spans, starts
 from ephs.semantics.primitives import Primitive, Reversible, Storage
-from ephs.solve.methods.records import IRREVERSIBLE, REVERSIBLE, STORING, Tables
+from ephs.solve.methods.records import IRREVERSIBLE, REVERSIBLE, STORING, WORKING, Tables
 
 __all__ = ["Entry", "entry_of", "laid_out"]
 
@@ -48,8 +48,10 @@ def entry_of(primitive: Primitive, reference: Reference, *, reversible: bool = T
         address, numbers, callback = address_of(primitive, reference)
     else:
         address, numbers, callback = 0, (), None
-    kind = REVERSIBLE if isinstance(primitive, Reversible) else IRREVERSIBLE
-    multipliers = primitive.multipliers if isinstance(primitive, Reversible) else 0
+    if isinstance(primitive, Reversible):
+        kind, multipliers = WORKING if primitive.working else REVERSIBLE, primitive.multipliers
+    else:
+        kind, multipliers = IRREVERSIBLE, 0
     bundle = primitive.bundle
     counts = (
         STORING if isinstance(primitive, Storage) else kind,

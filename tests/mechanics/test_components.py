@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 import ephs
 from ephs.mechanics.elements import components, springs
+from ephs.mechanics.elements.closing import closing
 from ephs.operad import Quantity, Space
 from ephs.operad import quantity as Q
 from ephs.semantics import Reference, Storage, StructureError, library
@@ -25,6 +26,14 @@ REFERENCE = Reference()
 PLANE = Quantity("plane", Space("real", 2, 2), 1)
 SIZES = [0.0, 1e-10, 1e-7, 1e-4, 0.02, 0.3]
 seeds = st.integers(0, 2**20)
+END, OTHER = (
+    (SE3.exp(np.array(offset)), np.diag(masses))
+    for offset, masses in (
+        ([0.3, -0.2, 0.5, 1.0, 2.0, -1.0], [1.0, 2.0, 2.5, 3.0, 3.0, 3.0]),
+        ([-0.1, 0.4, 0.2, 0.3, -0.5, 0.7], [0.2, 0.3, 0.4, 0.7, 0.7, 0.7]),
+    )
+)
+"""Offsets and inertias of two bodies at a joint."""
 POINTER = ctypes.POINTER(ctypes.c_double)
 
 
@@ -48,6 +57,8 @@ def primitives():
         factor = np.arange(1.0, of.dim**2 + 1.0).reshape(of.dim, of.dim) / 10.0
         out[f"pair_spring {name}"] = components.pair_spring(of, stiffness, rest)
         out[f"holonomic {name}"] = components.holonomic(of)
+        out[f"velocity_relation {name}"] = components.holonomic(of, on_group=False)
+        out[f"closing {name}"] = closing(of, END, None if name == "planar" else OTHER)
         out[f"joint_friction {name}"] = components.joint_friction(of, factor @ factor.T)
     out["pkc"] = components.kinematic_coupling(Q.pose, Q.body_momentum, "q", "p")
     out["no_potential"] = components.no_potential(Q.pose, "q")

@@ -53,8 +53,8 @@ BREAKS = {
     ),
     "hc": Break(
         "ephs/mechanics/elements/components.py",
-        "np.hstack([SE3.adjoint(SE3.inverse(pose)), -np.eye(6), of.basis])",
-        "np.hstack([SE3.adjoint(SE3.inverse(pose)), np.eye(6), of.basis])",
+        "np.hstack([SE3.adjoint(SE3.inverse(of.include(x))), -np.eye(6), of.basis])",
+        "np.hstack([SE3.adjoint(SE3.inverse(of.include(x))), np.eye(6), of.basis])",
     ),
     "hc, compiled": Break(
         "ephs/semantics/derive/holonomic.py",

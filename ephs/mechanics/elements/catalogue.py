@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from ephs.mechanics.elements import beam, components, springs
+from ephs.mechanics.elements.closing import Q1, Q2, closing
 from ephs.operad import Interface, Path, Quantity
 from ephs.semantics.catalogue import Part
 from ephs.semantics.primitives import Primitive
@@ -59,6 +60,16 @@ def _pair_spring(ports: Interface, numbers: Numbers) -> Primitive:
     return components.pair_spring(_pair(ports, "q_r"), numbers["stiffness"], numbers["rest"])
 
 
+def _closing(ports: Interface, numbers: Numbers) -> Primitive:
+    ends = [
+        (np.array(numbers[f"offset {port}"]), np.array(numbers[f"inertia {port}"]).reshape(6, 6))
+        if port in ports
+        else None
+        for port in (Q1, Q2)
+    ]
+    return closing(_pair(ports, "q_r"), ends[0], ends[1])
+
+
 def _beam_damper(_ports: Interface, n: Numbers) -> Primitive:
     return beam.beam_damper(n["length"], n["stiffness"], n["rest"], n["damping"], n.get("order", 2))
 
@@ -70,6 +81,7 @@ def _beam_spring(_ports: Interface, n: Numbers) -> Primitive:
 PARTS: tuple[Part, ...] = (
     Part("beam_damper", "beam_damper", _beam_damper),
     Part("beam_spring", "beam_spring", _beam_spring),
+    Part("closing", "closing", _closing),
     Part("frame_change", "frame_change", _frame_change),
     Part("gravity", "gravity", lambda ports, numbers: components.gravity(numbers["weight"], _group(ports))),
     Part("ground", "ground", lambda ports, _: components.ground(next(iter(ports.values())).quantity)),
@@ -82,5 +94,10 @@ PARTS: tuple[Part, ...] = (
     Part("pair_spring", "pair_spring", _pair_spring),
     Part("point_damper", "point_damper", lambda _, numbers: springs.point_damper(numbers["damping"])),
     Part("point_spring", "point_spring", lambda _, n: springs.point_spring(n["stiffness"], n["length"])),
+    Part(
+        "velocity_relation",
+        "velocity_relation",
+        lambda ports, _: components.holonomic(_pair(ports, "q_r"), on_group=False),
+    ),
     Part("thermal_node", "thermal_node", lambda _, n: components.thermal_node(n["capacity"], n["temperature"])),
 )

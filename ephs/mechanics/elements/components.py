@@ -28,11 +28,14 @@ from ephs.semantics.special import squared_turn
 from ephs.semantics.verdict import proved
 
 __all__ = [
+    "columns_of",
     "frame_change",
+    "gap_over",
     "gravity",
     "ground",
     "holonomic",
     "joint_friction",
+    "joint_matrix",
     "joint_momentum",
     "kinematic_coupling",
     "kinetic",
@@ -206,14 +209,19 @@ def frame_change(offset: Array, inner: str, outer: str) -> Reversible:
 
 
 @cache
-def holonomic(of: Pair) -> Reversible:
+def holonomic(of: Pair, *, on_group: bool = True) -> Reversible:
     """The joint's relation: f = C*λ, 0 = C e, C = [Ad_{I(q_r)⁻¹}, −1, B]; ports p_j1, p_j2, p_r, state port q_r.
 
-    λ is the wrench of body 1 on body 2 in the frame C2, p_r.e the twist of C2 relative to C1 in the axes of C2. Over a
-    step it holds on the group: q_1 o_1 I(q_r) = q_2 o_2 stays true exactly.
+    λ is the wrench of body 1 on body 2 in the frame C2, p_r.e the twist of C2 relative to C1 in the axes of C2.
+
+    Parameters
+    ----------
+    on_group
+        Over a step it holds on the group: q_1 o_1 I(q_r) = q_2 o_2 stays true exactly. Else C e = 0 in its middle,
+        from which positions drift.
     """
     q_r = Path.of("q_r")
-    n, d = 12 + of.dim, of.dim
+    n = 12 + of.dim
     interface = Directory(
         {
             "p_j1": PortType(quantity.body_momentum, True),
@@ -223,38 +231,29 @@ def holonomic(of: Pair) -> Reversible:
         }
     )
 
-    def constraint(pose: Array) -> Array:
-        return np.hstack([SE3.adjoint(SE3.inverse(pose)), -np.eye(6), of.basis])
-
     def structure(x: Point) -> tuple[Array, Array]:
-        return np.zeros((n, n)), constraint(of.include(x[q_r]))
+        return np.zeros((n, n)), joint_matrix(of, x[q_r])
 
     def discrete(h: float, x0: Point, v: Point, e: Array) -> tuple[Array, Array]:
-        middle = constraint(of.include(of.manifold.retract(x0[q_r], 0.5 * v[q_r])))
-        along = [-0.5 * h * e[6:12], 0.5 * h * of.basis @ e[12:], h * middle[:, :6] @ e[:6]]
-        if any(w[:3] @ w[:3] >= np.pi**2 for w in along):
-            raise StructureError("rotation", of.name)
-        side, half, inner = (SE3.exp(w) for w in along)
-        around = side
-        for factor in (half, inner, half, side):
-            around = SE3.compose(around, factor)
-        residual = SE3.log(around) / h
+        middle = joint_matrix(of, of.manifold.retract(x0[q_r], 0.5 * v[q_r]))
+        residual = gap_over(of, h, middle, e)
         square = float(e @ e)
         if square <= TINY:  # only to keep the quotient from overflowing
             return middle, residual
         return middle + np.outer(residual - middle @ e, e) / square, residual
 
-    basis = tuple(tuple(column) for column in of.basis.reshape(6, d).T.tolist())
+    basis = columns_of(of)
     parameters = (("pair", of.name), *of.parameters)
+    name = "holonomic" if on_group else "velocity_relation"
     return Reversible(
-        "holonomic",
+        name,
         interface,
         structure,
         (q_r,),
-        discrete,
+        discrete if on_group else None,
         parameters,
         6,
-        Kernel("holonomic", Holonomic(of.code, of.size, basis)),
+        Kernel("holonomic", Holonomic(of.code, of.size, basis, on_group=on_group)),
         notation=notation.holonomic,
         proof=lambda: proved(
             "L = 0, all efforts are odd, q_r is even, and C is made of Ad of a pose, which is even in its quaternion",
@@ -262,6 +261,41 @@ def holonomic(of: Pair) -> Reversible:
         ),
         trusted=True,
     )
+
+
+def columns_of(of: Pair) -> tuple[tuple[float, ...], ...]:
+    """B of a pair, column by column."""
+    return tuple(tuple(column) for column in of.basis.reshape(6, of.dim).T.tolist())
+
+
+def joint_matrix(of: Pair, x: Array) -> Array:
+    """C (6, 12 + d) of a joint at an element x of its group."""
+    return np.hstack([SE3.adjoint(SE3.inverse(of.include(x))), -np.eye(6), of.basis])
+
+
+def gap_over(of: Pair, h: float, middle: Array, e: Array) -> Array:
+    """F = log[exp(−½ h u₂) exp(½ h b) exp(h a) exp(½ h b) exp(−½ h u₂)] / h, (6,): how far a joint opens in a step.
+
+    Parameters
+    ----------
+    middle
+        C in the middle of the step.
+    e
+        (12 + d,) velocities u₁, u₂ of the joint's frames and u_r: a = C₁ u₁, b = B u_r.
+
+    Raises
+    ------
+    StructureError
+        One of the factors turns by half a turn or more.
+    """
+    along = [-0.5 * h * e[6:12], 0.5 * h * of.basis @ e[12:], h * middle[:, :6] @ e[:6]]
+    if any(w[:3] @ w[:3] >= np.pi**2 for w in along):
+        raise StructureError("rotation", of.name)
+    side, half, inner = (SE3.exp(w) for w in along)
+    around = side
+    for factor in (half, inner, half, side):
+        around = SE3.compose(around, factor)
+    return SE3.log(around) / h
 
 
 def joint_friction(

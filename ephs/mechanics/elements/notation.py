@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:  # SymPy is loaded when equations are asked for
     from ephs.semantics.symbols.voices import Voice
 
-__all__ = ["frame_change", "friction", "holonomic", "kinetic", "lie_poisson", "nothing"]
+__all__ = ["frame_change", "friction", "holonomic", "idle", "kinetic", "lie_poisson", "nothing"]
 
 Relations = tuple[dict[str, Any], tuple[Any, ...]]
 
@@ -22,6 +22,11 @@ def kinetic(w: "Voice") -> dict[str, Any]:
 def nothing(w: "Voice") -> dict[str, Any]:
     """No energy: every effort is zero."""
     return dict.fromkeys(w.x, 0)
+
+
+def idle(w: "Voice") -> Relations:
+    """No flow and no condition."""
+    return dict.fromkeys(w.e, 0), ()
 
 
 def lie_poisson(w: "Voice") -> Relations:

@@ -188,7 +188,10 @@ def _component_wise(
 
 def _of_order_4(model: Model) -> ComponentMethod:
     from ephs.solve.methods.natural4 import Natural4
+    from ephs.solve.methods.records import WORKING
 
+    if (model.tables.kind == WORKING).any():
+        raise OptionError("method", "natural4", "natural: at stages of a step stabilised joints close nothing")
     return Natural4(model)
 
 

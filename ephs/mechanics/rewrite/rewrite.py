@@ -109,6 +109,11 @@ class Draft:
         for port, where in self.wires[box].items():
             self._at.setdefault(where.junction, {})[box, port] = where.power
 
+    def add(self, box: Path, filling: Primitive, ports: Mapping[Path, Path]) -> None:
+        """Add a box with its ports on junctions."""
+        self.wires[box] = {}
+        self.replace(box, filling, ports)
+
     def remove(self, boxes: Iterable[Path], junctions: Iterable[Path] = ()) -> None:
         """Take boxes out, and junctions that nothing lies on then."""
         for box in boxes:

@@ -1,4 +1,4 @@
-"""The relation of a joint over a step, as it holds on the group of its pair: the one of primitives named "holonomic".
+"""The relation of a joint over a step: on the group of its pair, or between velocities in the middle of the step.
 
 The derivatives are written out: those of the product of five exponentials by their logarithms are carried to its left
 end. Matrices of SE(3) that are Ad, ad and differentials have the form [[D, 0], [B, D]], and are kept as (D, B).
@@ -31,7 +31,7 @@ from ephs.semantics.spaces.vectors import (
 from ephs.semantics.stage.evaluator import Evaluator
 from ephs.semantics.stage.numbers import Integer, Real, Truth
 
-__all__ = ["Holonomic", "half_turn"]
+__all__ = ["Holonomic", "Passage", "half_turn"]
 
 OK: Final = 0
 TURN: Final = 1
@@ -58,12 +58,15 @@ class Holonomic:
         B, column by column.
     maps
         Of the efforts: the relation is that of T e and Tᵀ f.
+    on_group
+        Whether the joint stays closed over the step; else C e = 0 in its middle, and it drifts.
     """
 
     code: int
     size: int
     basis: tuple[tuple[float, ...], ...]
     maps: Maps | None = None
+    on_group: bool = True
 
     @property
     def dimensions(self) -> tuple[int, int, int, int]:
@@ -81,43 +84,12 @@ class Holonomic:
         n, _, d, size = self.dimensions
         maps = self.maps or Maps((Block(6, 6, "same"), Block(6, 6, "same"), *[Block(d, d, "same")] * (d > 0)))
         through = maps.rows([a.p[i] for i in range(self.numbers)])
-        columns: Rows = [list(column) for column in self.basis]
         x, step, outer = [a.x0[i] for i in range(size)], [a.v[i] for i in range(d)], [a.e[i] for i in range(n)]
         h, force = a.scal[0], [a.lam[i] for i in range(6)]
         effort = maps.inward(through, outer)
-        one, two, along = effort[:6], effort[6:12], effort[12:]
-
-        # The frame in the middle of the step, and C e there.
-        half = scale(0.5, step)
-        middle = included(on, self.code, self.basis, moved(on, self.code, x, half))
-        carried = _inverse_adjoint(*middle)
-        seen, turning = _applied(carried, one), combine(columns, along) if d else [0.0] * 6
-        rate = add(sub(seen, two), turning)
-
-        # F = log[exp(side) exp(mid) exp(inner) exp(mid) exp(side)] / h
-        side, mid, inner = scale(-0.5 * h, two), scale(0.5 * h, turning), scale(h, seen)
-        exp_side, exp_mid = se3.exp(on, side), se3.exp(on, mid)
-        g2 = se3.compose(on, exp_side, exp_mid)
-        g3 = se3.compose(on, g2, se3.exp(on, inner))
-        g4 = se3.compose(on, g3, exp_mid)
-        total = se3.log(on, se3.compose(on, g4, exp_side))
-        still = on.both(h <= 0.0, h >= 0.0)  # at an instant F is C e
-        residual = on.select(still, rate, scale(1.0 / on.select(still, 1.0, h), total))
-
-        # ∂F: right-trivialised variations of the factors, carried to the left end.
-        back = _halved(se3.dexp_inv(on, total))
-        turn = _times(back, _times(_adjoint(g2), _halved(se3.dexp(on, inner))))
-        by_side = _halved(se3.dexp(on, side))
-        outward = _sum(by_side, _times(_adjoint(g4), by_side))
-        by_mid, around = _halved(se3.dexp(on, mid)), _sum(_adjoint(exp_side), _adjoint(g3))
-        by_rate = [scale(0.5, _applied(back, _applied(around, _applied(by_mid, column)))) for column in columns]
-        slopes = _beside(_times(turn, carried), _scaled(-0.5, _times(back, outward)), by_rate)
-        whole = _beside(carried, ([[-1.0 * (i == j) for j in range(3)] for i in range(3)], _ZEROS), columns)
-        # Through the middle frame: δa = ad_a B δη, with δη = dexp_left(v/2) δv/2.
-        differential = STAGED[self.code].dexp(on, scale(-1.0, half))
-        moving = [scale(0.5, combine(columns, column)) for column in transposed(differential)]
-        turned = [se3.bracket(seen, column) for column in moving]
-        reads = [_applied(turn, column) for column in turned]
+        over = Passage.of(on, self.code, self.basis, x, step, h, effort[:6], effort[6:12], effort[12:])
+        rate, whole, turned = over.rate, over.whole, over.turned
+        residual, slopes, reads = (over.residual, over.slopes, over.reads) if self.on_group else (rate, whole, turned)
 
         # C_h = C + (F − C e) eᵀ/⟨e|e⟩, seen from outside.
         missed = sub(residual, rate)
@@ -142,8 +114,7 @@ class Holonomic:
                 a.jac[(n + k) * width + j] = entry
         metric = [maps.outward(through, column) for column in transposed(_matrix(maps, through))]
         # ∂(Cᵀλ)/∂v: −Ad_{I⁻¹}ᵀ ad_ζᵀ λ, and the share of F − C e.
-        turns = [scale(-1.0, _transposed(carried, se3.cobracket(column, force))) for column in moving]
-        turns = [maps.outward(through, [*column, *[0.0] * (6 + d)]) for column in turns]
+        turns = [maps.outward(through, [*column, *[0.0] * (6 + d)]) for column in over.pulled(force)[1]]
 
         def steered() -> None:
             for i in range(n):
@@ -162,8 +133,82 @@ class Holonomic:
                     a.jac[i * width + n + 6 + j] = turns[j][i]
 
         on.when(steering, steered, slow)
+        return on.select(over.far, TURN, OK)
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Passage:
+    """A joint over a step at given velocities of its frames, (6,) each, and along its freedoms.
+
+    Parameters
+    ----------
+    carried, rate, whole
+        Ad_{I⁻¹} of the frame in the middle of the step; C e there, and C (6, 12 + d).
+    residual, slopes
+        F = log[exp(side) exp(mid) exp(inner) exp(mid) exp(side)] / h, and ∂F/∂e (6, 12 + d).
+    moving, turned, reads
+        By increments of q_r, column by column: the middle frame's motion, that of C e, that of F.
+    far
+        Whether an exponent is half a turn or more.
+    """
+
+    carried: Halves
+    rate: Entries
+    whole: Rows
+    residual: Entries
+    slopes: Rows
+    moving: Rows
+    turned: Rows
+    reads: Rows
+    far: Truth
+
+    @staticmethod
+    def of(
+        on: Evaluator, code: int, basis: tuple[tuple[float, ...], ...], x: Entries, step: Entries, h: Real,
+        one: Entries, two: Entries, along: Entries,
+    ) -> "Passage":  # fmt: skip
+        """The joint of a pair's group over a step of h from x."""
+        d = len(basis)
+        columns: Rows = [list(column) for column in basis]
+        # The frame in the middle of the step, and C e there.
+        half = scale(0.5, step)
+        middle = included(on, code, basis, moved(on, code, x, half))
+        carried = _inverse_adjoint(*middle)
+        seen, turning = _applied(carried, one), combine(columns, along) if d else [0.0] * 6
+        rate = add(sub(seen, two), turning)
+
+        side, mid, inner = scale(-0.5 * h, two), scale(0.5 * h, turning), scale(h, seen)
+        exp_side, exp_mid = se3.exp(on, side), se3.exp(on, mid)
+        g2 = se3.compose(on, exp_side, exp_mid)
+        g3 = se3.compose(on, g2, se3.exp(on, inner))
+        g4 = se3.compose(on, g3, exp_mid)
+        total = se3.log(on, se3.compose(on, g4, exp_side))
+        still = on.both(h <= 0.0, h >= 0.0)  # at an instant F is C e
+        residual = on.select(still, rate, scale(1.0 / on.select(still, 1.0, h), total))
+
+        # ∂F: right-trivialised variations of the factors, carried to the left end.
+        back = _halved(se3.dexp_inv(on, total))
+        turn = _times(back, _times(_adjoint(g2), _halved(se3.dexp(on, inner))))
+        by_side = _halved(se3.dexp(on, side))
+        outward = _sum(by_side, _times(_adjoint(g4), by_side))
+        by_mid, around = _halved(se3.dexp(on, mid)), _sum(_adjoint(exp_side), _adjoint(g3))
+        by_rate = [scale(0.5, _applied(back, _applied(around, _applied(by_mid, column)))) for column in columns]
+        slopes = _beside(_times(turn, carried), _scaled(-0.5, _times(back, outward)), by_rate)
+        whole = _beside(carried, ([[-1.0 * (i == j) for j in range(3)] for i in range(3)], _ZEROS), columns)
+        # Through the middle frame: δa = ad_a B δη, with δη = dexp_left(v/2) δv/2.
+        differential = STAGED[code].dexp(on, scale(-1.0, half))
+        moving = [scale(0.5, combine(columns, column)) for column in transposed(differential)]
+        turned = [se3.bracket(seen, column) for column in moving]
+        reads = [_applied(turn, column) for column in turned]
         far = on.either(half_turn(inner), on.either(half_turn(side), half_turn(mid)))
-        return on.select(far, TURN, OK)
+        return Passage(carried, rate, whole, residual, slopes, moving, turned, reads, far)
+
+    def pulled(self, force: Entries) -> tuple[list[Real], Rows]:
+        """Ad_{I⁻¹}ᵀ of a wrench on frame 1, and its derivatives by increments of q_r, column by column."""
+        return _transposed(self.carried, force), [
+            scale(-1.0, _transposed(self.carried, se3.cobracket(column, force))) for column in self.moving
+        ]
 
 
 def half_turn(v: Entries) -> Truth:

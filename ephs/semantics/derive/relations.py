@@ -11,6 +11,7 @@ from typing import Any, Final, TypeAlias, final
 
 from ephs.semantics.derive.arguments import Arguments
 from ephs.semantics.derive.charts import moved, over
+from ephs.semantics.derive.closing import Closing
 from ephs.semantics.derive.holonomic import Holonomic
 from ephs.semantics.derive.linear import Linear
 from ephs.semantics.derive.maps import Maps
@@ -278,7 +279,7 @@ class Irreversible:
         return on.select(cold, TEMPERATURE, on.select(good, OK, DOMAIN))
 
 
-Relation: TypeAlias = Storage | Reversible | Irreversible | Holonomic
+Relation: TypeAlias = Storage | Reversible | Irreversible | Holonomic | Closing
 
 
 @final
@@ -377,7 +378,7 @@ def _program(relation: Relation, *, bare: bool = False, rest: bool = False) -> P
               jac: Any, work: Any) -> Integer:  # fmt: skip
         if rest:
             v = Vector(Held([0.0] * size["v"]), 0, size["v"])
-        if bare and isinstance(relation, Holonomic):  # what is written to memory that nothing reads vanishes
+        if bare and isinstance(relation, Holonomic | Closing):  # what is written to memory that nothing reads vanishes
             jac = on.scratch(size["jac"])
         return relation.stage(on, Arguments(scal, p, x0, v, e, lam, f, c, jac, work), bare=bare)
 

@@ -122,7 +122,7 @@ def dependent_rows(
         (rows,) those to be marked where there is a choice.
     """
     from scipy import linalg
-    from scipy.sparse import block_array, csr_array
+    from scipy.sparse import block_array, csr_array, hstack
     from scipy.sparse.csgraph import connected_components
 
     t = model.tables
@@ -133,9 +133,16 @@ def dependent_rows(
         return out
     of = np.full(size, -1)
     of[rows] = np.arange(rows.size)
-    inside = (of[t.row] >= 0) & (t.column >= n_rate) & (t.column < n_rate + n_effort)
+    constrained = of[t.row] >= 0
+    inside = constrained & (t.column >= n_rate) & (t.column < n_rate + n_effort)
     entries = (values[inside], (of[t.row[inside]], t.column[inside] - n_rate))
     matrix = csr_array(entries, shape=(rows.size, n_effort)) @ _compliance(model, values)
+    inside &= values != 0.0
+    still = np.bincount(of[t.row[inside]], minlength=rows.size) == 0
+    moving = constrained & (t.column < n_rate) & still[of[t.row]]
+    if moving.any():  # conditions on rates alone, of the poses of stabilised joints
+        rates = csr_array((values[moving], (of[t.row[moving]], t.column[moving])), shape=(rows.size, n_rate))
+        matrix = csr_array(hstack([matrix, rates]))
     count, part = connected_components(block_array([[None, matrix], [matrix.T, None]]), directed=False)
     for members in _groups(part[: rows.size], count):
         if members.size > LARGE:

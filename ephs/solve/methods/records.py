@@ -14,15 +14,15 @@ from ephs.semantics.stage.memory import Held
 
 __all__ = [
     "COMPONENT", "DIVERGED", "DONE", "INCONSISTENT", "IRREVERSIBLE", "MEMORY", "ORDER", "PIVOT", "REVERSIBLE",
-    "STORING", "TABLES", "Columns", "Dims", "Elimination", "Memory", "Order", "Outer", "Scratch", "State", "Tables",
-    "flat", "kind_of", "parts_of", "row_of",
+    "STORING", "TABLES", "WORKING", "Columns", "Dims", "Elimination", "Memory", "Order", "Outer", "Scratch", "State",
+    "Tables", "flat", "kind_of", "parts_of", "row_of",
 ]  # fmt: skip
 
 DONE, DIVERGED, PIVOT, INCONSISTENT, COMPONENT = 0, 1, 2, 3, 10
 """How a step ends: COMPONENT + what a component's kernel returned (see `ephs.semantics.kernel_table`)."""
 
-STORING, REVERSIBLE, IRREVERSIBLE = 0, 1, 2
-"""Kinds of components."""
+STORING, REVERSIBLE, IRREVERSIBLE, WORKING = 0, 1, 2, 3
+"""Kinds of components; a working one is reversible at an instant and does work over a step."""
 
 Whole = TypeVar("Whole")
 Numbers = TypeVar("Numbers")

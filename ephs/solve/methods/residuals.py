@@ -6,7 +6,7 @@ from ephs.semantics.kernel_table import SIGNATURE
 from ephs.semantics.stage import Evaluator, Integer, Integers, Real, Vector, staged
 from ephs.semantics.stage.reaching import Reached
 from ephs.solve.methods.places import Part, add_to, copy, fill
-from ephs.solve.methods.records import COMPONENT, IRREVERSIBLE, STORING, Columns, Dims, Outer, Scratch, row_of
+from ephs.solve.methods.records import COMPONENT, IRREVERSIBLE, STORING, WORKING, Columns, Dims, Outer, Scratch, row_of
 from ephs.solve.methods.scales import FAR, reach, still, weigh
 
 __all__ = ["FAULTS", "account", "evaluated"]
@@ -191,7 +191,8 @@ def _prescribe(on: Evaluator, t: Columns, z: Vector, inputs: Vector, m: Scratch)
 def account(on: Evaluator, t: Columns, z: Vector, h: Real, inputs: Vector, m: Scratch, sums: Vector) -> Real:
     """Add the ledgers of a step of h to sums; return the least entropy production of a component in it.
 
-    sums = heat, supplied energy, supplied exergy, entropy made, and the entropy made by each component.
+    sums = heat, supplied energy, supplied exergy, entropy made, and the entropy made by each component, or of a working
+    one the energy that it supplied.
     """
     n_rate, least = t.counts[0], on.variable(FAR)
 
@@ -217,7 +218,20 @@ def account(on: Evaluator, t: Columns, z: Vector, h: Real, inputs: Vector, m: Sc
             m.energy[i] = sums[4 + i]
             least.value = on.minimum(least.value, h * made.value)
 
+        def worked() -> None:
+            part, work = Part.of(t, i), on.variable(0.0)
+
+            def one(j: Integer) -> None:
+                work.value = work.value - z[n_rate + part.effort(j)] * m.flows[part.e_at + j]
+
+            on.loop(part.n, one)
+            for place in (1, 2):
+                add_to(sums, place, h * work.value)
+            add_to(sums, 4 + i, h * work.value)
+            m.energy[i] = sums[4 + i]
+
         on.when(on.same(t.kind[i], IRREVERSIBLE), produced)
+        on.when(on.same(t.kind[i], WORKING), worked)
 
     def port(i: Integer) -> None:
         outer, first = row_of(Outer, t.outer, i), t.input_at[i]

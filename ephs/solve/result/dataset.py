@@ -35,6 +35,7 @@ _LEDGERS = {
     "least": ("J/K", "least entropy production of a component in the step before"),
     "storages": ("J", "energy"),
     "makers": ("J/K", "entropy made since the start"),
+    "workers": ("J", "energy supplied over steps since the start"),
     "entropies": ("J/K", "entropy"),
     "volumes": ("m³", "volume"),
     "momenta": ("N s", "momentum"),

@@ -9,7 +9,7 @@ import numpy as np
 from ephs.operad import Path
 from ephs.operad.charges import ENTROPY, VOLUME
 from ephs.semantics.bundle import Array
-from ephs.semantics.primitives import Irreversible, Storage
+from ephs.semantics.primitives import Irreversible, Reversible, Storage
 from ephs.solve.problem import Problem
 from ephs.solve.result.record import Record
 
@@ -38,8 +38,9 @@ class Ledgers:
         What friction turned into heat; energy and exergy supplied through outer ports: J since the start.
     made, least
         Entropy made since the start; least production of a component in the step before: J/K.
-    storages, makers
-        Energy of each storage in J, entropy made by each irreversible component in J/K, by path.
+    storages, makers, workers
+        Energy of each storage in J, entropy made by each irreversible component in J/K, energy that each component
+        which does work over a step has supplied in J, by path.
     entropies, volumes, momenta
         Entropy in J/K, volume in m³ and momentum in N s of each storage that has one, by path.
     exergies
@@ -61,6 +62,7 @@ class Ledgers:
     least: Array
     storages: Mapping[Path, Array]
     makers: Mapping[Path, Array]
+    workers: Mapping[Path, Array]
     entropies: Mapping[Path, Array]
     volumes: Mapping[Path, Array]
     momenta: Mapping[Path, Array]
@@ -110,6 +112,7 @@ def ledgers(problem: Problem, record: Record) -> Ledgers:
     kinetic, potential, thermal, environment, exergy, entropy = (np.zeros(n) for _ in range(6))
     storages: dict[Path, Array] = {}
     makers: dict[Path, Array] = {}
+    workers: dict[Path, Array] = {}
     entropies: dict[Path, Array] = {}
     amounts: dict[str, dict[Path, Array]] = {"entropy": entropies, "volume": {}, "momentum": {}}
     exergies: dict[Path, Array] = {}
@@ -117,6 +120,8 @@ def ledgers(problem: Problem, record: Record) -> Ledgers:
         primitive = slot.primitive
         if isinstance(primitive, Irreversible):
             makers[slot.path] = record.energies[:, number]
+        if isinstance(primitive, Reversible) and primitive.working:
+            workers[slot.path] = record.energies[:, number]
         if not isinstance(primitive, Storage):
             continue
         exchanged: Array | None = None  # most storages have no part in it: nothing is made for them
@@ -147,5 +152,5 @@ def ledgers(problem: Problem, record: Record) -> Ledgers:
     heat, work, supplied, made, least = record.ledgers.T
     return Ledgers(
         kinetic, potential, thermal, environment, exergy, entropy, heat, work, supplied, made, least,
-        storages, makers, entropies, amounts["volume"], amounts["momentum"], exergies, reference.temperature,
+        storages, makers, workers, entropies, amounts["volume"], amounts["momentum"], exergies, reference.temperature,
     )  # fmt: skip
