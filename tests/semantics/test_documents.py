@@ -13,7 +13,7 @@ from referencing import Registry, Resource
 import ephs
 from ephs import Pattern, PatternError, SemanticsError, System, junction, library
 from ephs import quantity as Q
-from ephs.mechanics import beam_element, joint, rigid_body, spring_damper
+from ephs.mechanics import beam_element, joint, mbs_pattern, rigid_body, spring_damper, stabilised
 from ephs.mechanics.elements.catalogue import PARTS
 from ephs.operad import Path
 from ephs.operad.documents import SCHEMA_FILE as PATTERN_SCHEMA
@@ -159,6 +159,7 @@ def test_every_library_part_is_written_by_name(name):
 
 
 KINDS = ("revolute", "prismatic", "cylindrical", "planar", "spherical", "fixed", "free", "screw")
+ROUND = rigid_body(2.0, [0.1, 0.2, 0.25])
 MECHANICS = [
     *(joint(kind, stiffness=2.0, pitch=0.3) for kind in KINDS),
     joint("revolute", friction=0.1, heat=True),
@@ -168,6 +169,7 @@ MECHANICS = [
     beam_element(
         length=2.0, stiffness=[5.0, 4.0, 6.0, 1e2, 8e1, 9e1], rest=[0.1, 0.0, 0.2, 1.0, 0.0, 0.1], damping=0.1
     ),
+    stabilised(mbs_pattern()(body1=ROUND, body2=ROUND, joint=joint("revolute"))),
     alone(ephs.mechanics.elements.components.ground()),
     alone(ephs.mechanics.elements.components.thermal_node(3.0, 300.0)),
 ]

@@ -37,22 +37,23 @@ def closing(of: Pair, first: tuple[Array, Array] | None, second: tuple[Array, Ar
         which has no port.
     """
     ends = [(Q1, first), (Q2, second)]
-    seen: list[tuple[Path, Array, Array]] = []
+    carried: dict[Path, Array] = {}
+    weights: dict[Path, Array] = {}
     numbers: list[float] = []
     entries: list[tuple[str, tuple[float, ...]]] = []
     mobility = np.zeros((6, 6))
     for port, end in ends:
         if end is not None:
-            carried = SE3.adjoint(SE3.inverse(end[0]))
-            weight: Array = np.asarray(np.linalg.solve(end[1], carried.T), dtype=float)
-            seen.append((port, carried, weight))
+            seen = SE3.adjoint(SE3.inverse(end[0]))
+            weight: Array = np.asarray(np.linalg.solve(end[1], seen.T), dtype=float)
+            carried[port], weights[port] = seen, weight
             entries += [(f"offset {port}", tuple(end[0].tolist())), (f"inertia {port}", tuple(end[1].ravel().tolist()))]
-            numbers += [*carried.ravel().tolist(), *weight.ravel().tolist()]
-            mobility += carried @ weight
+            numbers += [*seen.ravel().tolist(), *weight.ravel().tolist()]
+            mobility += seen @ weight
     own = of.basis.T @ mobility @ of.basis
     own = 0.5 * (own + own.T)
-    ports = {str(port): PortType(quantity.pose, True) for port, *_ in seen} | {"q_r": PortType(relative(of), True)}
-    reads, n = (*(port for port, *_ in seen), Q_R), MULTIPLIERS * len(seen) + of.dim
+    ports = {str(port): PortType(quantity.pose, True) for port in carried} | {"q_r": PortType(relative(of), True)}
+    reads, n = (*carried, Q_R), MULTIPLIERS * len(carried) + of.dim
 
     def structure(_x: Point) -> tuple[Array, Array]:
         return np.zeros((n, n)), np.zeros((MULTIPLIERS, n))
@@ -60,8 +61,8 @@ def closing(of: Pair, first: tuple[Array, Array] | None, second: tuple[Array, Ar
     def discrete(h: float, x0: Point, v: Point, _e: Array) -> tuple[Array, Array]:
         middle = joint_matrix(of, of.manifold.retract(x0[Q_R], 0.5 * v[Q_R]))
         part = {Q1: middle[:, :6], Q2: middle[:, 6:12]}
-        velocity = {Q1: np.zeros(6), Q2: np.zeros(6)} | {port: carried @ v[port] / h for port, carried, _ in seen}
-        moved = [-(weight @ part[port].T).T for port, _, weight in seen]
+        velocity = {Q1: np.zeros(6), Q2: np.zeros(6)} | {port: seen @ v[port] / h for port, seen in carried.items()}
+        moved = [-part[port] @ weight.T for port, weight in weights.items()]
         rates = np.concatenate([velocity[Q1], velocity[Q2], v[Q_R] / h])
         return np.hstack([*moved, -middle[:, 12:] @ own]), gap_over(of, h, middle, rates)
 
