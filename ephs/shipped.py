@@ -20,6 +20,14 @@ SHIPPED: Final = (
     "ephs.semantics.linear.sparse:sparse_lu",
     "ephs.mechanics.tree.sweeps.programs:common_sweeps",
     "ephs.mechanics.tree.sweeps.loops:common_loops",
+    "ephs.mechanics.tree.engine.programs:motion_of_loops",
+    "ephs.mechanics.tree.engine.programs:motion_of_trees",
+    "ephs.mechanics.tree.engine.programs:stiff_program",
+    "ephs.mechanics.tree.sweeps.balances:network_program",
+    "ephs.mechanics.sensitivity.implicit:tangent_program",
+    "ephs.solve.methods.newton:natural_program",
+    "ephs.solve.methods.gauss:gauss_program",
+    "ephs.exporting.outputs:outputs_program",
 )
 """Module and name of each program, or of a function that returns one or several. To ship a program, list it here."""
 

@@ -63,7 +63,7 @@ class _Side:
 
 
 @cache
-def _program() -> Program:
+def tangent_program() -> Program:
     """The program of a step's equations and ledgers, and of its end, over dual numbers."""
 
     def whole(
@@ -113,7 +113,7 @@ class _Along:
         self.sums = _pair(np.zeros(4 + model.tables.kind.size))
         self.memory = {name: _pair(value) for name, value in memory.items()}
         self._scal = pairs["scal"][0]
-        calls, t = _program().compiled(), {**tables, **{name: pairs[name] for name in tables if name in pairs}}
+        calls, t = tangent_program().compiled(), {**tables, **{name: pairs[name] for name in tables if name in pairs}}
         point = t, self.x, self.z, pairs["scal"]
         self._whole = calls["whole"].bind(*point, pairs["inputs"], self.memory, self.sums)
         self._end = calls["end"].bind(*point, self.memory)
