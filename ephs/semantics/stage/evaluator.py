@@ -164,7 +164,7 @@ class Evaluator(ABC):
 
     @final
     def copysign(self, x: Real, sign: Real) -> Real:
-        """Return |x| with the sign of `sign`."""
+        """Return the absolute value of `x` with the sign of `sign`."""
         return self._function("copysign", x, sign)
 
     @final
