@@ -59,7 +59,7 @@ def _ours(folder: Path, name: str) -> list[dict[str, Any]]:
     exact = _places(scene, ephs.simulate(scene, UNTIL, rtol=REFINED, atol=1e-2 * REFINED, audit="off"))
     for rtol in TOLERANCES:
         options: dict[str, Any] = {"rtol": rtol, "atol": 1e-2 * rtol, "audit": "off"}
-        ephs.simulate(scene, 0.01, **options)  # compiles
+        ephs.simulate(scene, UNTIL, **options)  # compiles
         start = time.process_time()
         sol = ephs.simulate(scene, UNTIL, **options)
         seconds = time.process_time() - start

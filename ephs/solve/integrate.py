@@ -394,7 +394,5 @@ def coordinates(quantity: Quantity, x: Array) -> Array:
     """States (n, size) as users read them: scalars (n,), relative poses as the pair's coordinates (n, d)."""
     if quantity.kind == "relative_pose":
         pair = Pair.from_space(quantity.space)
-        if pair.manifold.code == VECTOR:
-            return x
-        return np.array([pair.coordinates(row) for row in x]).reshape(x.shape[0], pair.dim)
+        return x if pair.manifold.code == VECTOR else pair.coordinates(x)
     return x[:, 0] if x.shape[1] == 1 else x

@@ -171,9 +171,7 @@ class SceneMotion:
         """The motion of a joint, or of a body's implicit free joint."""
         joint = self._scene.joint(name)
         if name in self._implicit:
-            pair = coupling_of(joint).pair
-            coordinate = np.array([pair.coordinates(row) for row in self.poses(name)]).reshape(-1, pair.dim)
-            return JointMotion(self, name, coordinate)
+            return JointMotion(self, name, coupling_of(joint).pair.coordinates(self.poses(name)))
         return JointMotion(self, name, self.coordinates(name))
 
     def thermal(self, name: str) -> ThermalMotion:

@@ -379,5 +379,5 @@ def _reading(equations: Equations, output: Output) -> Any:
         pair: Pair = edge.pair
         if size == edge.pair.dim:
             return lambda q, y: q[:, at : at + size]
-        return lambda q, y: np.array([pair.coordinates(row) for row in q[:, at : at + size]])
+        return lambda q, y: pair.coordinates(q[:, at : at + size])
     raise Unlike

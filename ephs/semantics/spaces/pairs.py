@@ -92,7 +92,7 @@ class Pair:
                 return groups.SE3.exp(self.basis @ x)
 
     def coordinates(self, x: Array) -> Array:
-        """The joint coordinates, shape (dim,), of an element: angles in radians, distances in metres.
+        """The joint coordinates, shape (..., dim), of elements (..., size): angles in radians, distances in metres.
 
         Rotation vectors are principal values of length ≤ π; single angles are not wrapped.
         """
@@ -100,7 +100,7 @@ class Pair:
             case codes.SO3:
                 return so3.rotation_log(x)
             case codes.SE3:
-                return np.concatenate((so3.rotation_log(x[:4]), x[4:]))
+                return np.concatenate((so3.rotation_log(x[..., :4]), x[..., 4:]), axis=-1)
             case _:
                 return np.array(x)
 

@@ -133,17 +133,18 @@ def normalised(q: Array) -> Array:
 
 
 def rotation_log(q: Array) -> Array:
-    """Principal rotation vector of a unit quaternion, of length ≤ π; well conditioned everywhere.
+    """Principal rotation vectors (..., 3) of unit quaternions (..., 4), of length ≤ π; well conditioned everywhere.
 
     At exactly π the sign of the axis is arbitrary.
     """
-    q = q if q[0] >= 0.0 else -q
-    v = q[1:]
-    length = float(np.linalg.norm(v))
-    if length < 1e-4:
-        x = (length / q[0]) ** 2
-        return v * (2.0 / q[0]) * (1.0 - x / 3.0 + x * x / 5.0)
-    return v * (2.0 * np.arctan2(length, q[0]) / length)
+    q = np.where(q[..., :1] >= 0.0, q, -q)
+    w, v = q[..., :1], q[..., 1:]
+    length = np.sqrt((v * v).sum(axis=-1, keepdims=True))
+    near = length < 1e-4
+    upper = np.where(near, w, 1.0)  # only a half turn has w = 0, and that is not near
+    x = (length / upper) ** 2
+    series = 2.0 / upper * (1.0 - x / 3.0 + x * x / 5.0)
+    return v * np.where(near, series, 2.0 * np.arctan2(length, w) / np.where(near, 1.0, length))
 
 
 def random_quaternion(rng: np.random.Generator) -> Array:
