@@ -95,6 +95,12 @@ class Explicit(ReducedMethod):
         self.stiffness = 0.0
         self.rough: tuple[Array, ...] = ()
         self._low: tuple[ReducedState, float, Array] | None = None
+        compiled = STEPS.compiled()
+        self._fine, self._coarse, self._allowed = np.zeros((3, self.atol.size))
+        self._open, self._shut = np.zeros((2, equations.n))
+        self._measure = compiled["measure"].bind(self._fine, self._coarse, self._allowed, method.arrays["eighth"])
+        self._drift = compiled["drift"].bind(self._open, self._shut, self._allowed)
+        self._stiffness = compiled["stiffness"].bind(self._fine, self._coarse, self._allowed, 0.0)
 
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
         """One step of h seconds."""
@@ -124,22 +130,24 @@ class Explicit(ReducedMethod):
         k[0] = self._known[1]
         tolerances, chosen = (self.atol, self.rtol), self.control.step is None
         before = self.solve(state, scheme, self.method.c, h, y0, k, y1, tolerances, chosen=chosen)
-        allowed, steps = self.atol + self.rtol * eq.sizes(y0, y1), STEPS.compiled()
+        allowed = self._allowed[:] = self.atol + self.rtol * eq.sizes(y0, y1)
         y1, account = eq.accounts.booked(state, scheme, k, h, y1, part=part)
         sums = np.array(eq.engine.books["low" if part else "whole"])
         end = replace(eq.ended(state, y1, state.t + h), account=account)
         closed = eq.closed(end)
         estimates = [eq.along(h * (weights @ k)[eq.counted]) for weights in self.method.estimates]
-        error = float(steps["measure"](estimates[0], np.array(estimates[-1]), allowed, scheme["eighth"]))
+        self._fine[:], self._coarse[:] = estimates[0], estimates[-1]
+        error = float(self._measure())
         rough = any(q is state.q for q in self.rough)
         if eq.engine.looped and not (rough or eq.careful):
-            error = max(error, float(steps["drift"](end.r, closed.r, allowed)))
+            self._open[:], self._shut[:] = end.r, closed.r
+            error = max(error, float(self._drift()))
         if not error > 1.0 or self.control.step is not None:
             closed, missed = eq.accounts.corrected(state, closed, h, allowed, chosen=self.control.step is None)
             error = max(error, missed)
         self.rough = (*((state.q,) if rough else ()), *((closed.q,) if eq.careful else ()))
-        rise, run = (k[-1] - k[-2])[eq.counted], (y1 - before)[eq.counted]
-        self.stiffness = float(steps["stiffness"](rise, run, allowed, h))
+        self._fine[:], self._coarse[:] = (k[-1] - k[-2])[eq.counted], (y1 - before)[eq.counted]
+        self.stiffness = float(self._stiffness(h))
         if not (eq.engine.looped or eq.careful):  # nothing was projected: the last rates are the next first ones
             first = k[-1].copy()
             first[: eq.nv] = closed.r
