@@ -19,6 +19,8 @@ Index = NDArray[np.int64]
 
 FAINT = 1e-12
 """Entries below this part of the largest count alike where diagonals are chosen."""
+FINE = 2.0**20
+"""Logarithms of entries are whole numbers of this part of one."""
 
 
 @final
@@ -93,7 +95,8 @@ def paired(n: int, row: Index, column: Index, value: Array) -> Index:
 
     weight = np.abs(value)
     seen = np.flatnonzero(weight > 0.0)
-    weight = 1.0 - np.log(np.maximum(weight[seen] / weight.max(initial=TINY), FAINT))
+    # Whole numbers: with others, sums that differ by rounding can keep SciPy's search from ever ending.
+    weight = np.round(1.0 - FINE * np.log(np.maximum(weight[seen] / weight.max(initial=TINY), FAINT)))
     try:
         rows, columns = min_weight_full_bipartite_matching(
             sparse.csr_matrix((weight, (row[seen], column[seen])), shape=(n, n))
