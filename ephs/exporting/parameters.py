@@ -1,4 +1,4 @@
-"""How the numbers of an exported mechanism depend on parameters of its model: by polynomials of degree two, checked."""
+"""Numbers of an exported mechanism as functions of parameters of its model: polynomials of degree two, checked."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

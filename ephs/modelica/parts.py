@@ -47,7 +47,7 @@ class ModelicaComponent:
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """What it is made of: ``"storage"``, ``"reversible"``, ``"irreversible"``."""
+        """Kinds of its primitives: ``"storage"``, ``"reversible"``, ``"irreversible"``."""
         boxes = (each for path, each in self.system.fillings.items() if str(path) != "field")
         return tuple(sorted({each.kind for each in boxes}, key=("storage", "reversible", "irreversible").index))
 

@@ -218,7 +218,7 @@ def _rest(
     states: tuple[Symbol, ...],
     shown: list[Symbol],
 ) -> dict[Symbol, Expr]:
-    """Where the states rest: values for which all else vanishes.
+    """States at rest: values for which all else vanishes.
 
     Raises
     ------

@@ -79,7 +79,7 @@ class Bundle:
         return _bundle(tuple(interface.items()))  # equal interfaces may differ in order, and the order counts here
 
     def slice(self, port: Path) -> Span:
-        """Where the port's flow and effort lie in the fibre vectors."""
+        """Slice of the port's flow and effort in the fibre vectors."""
         i = self.ports.index(port)
         return Span(self.offsets[i], self.offsets[i] + self.quantity(port).space.dim)
 

@@ -27,7 +27,7 @@ __all__ = ["Descriptor", "Input", "assemble", "descriptor_of"]
 @final
 @dataclass(frozen=True, slots=True)
 class StateSlot:
-    """Where the state of one storage port lies: x[at:at+size], its rate w[rate:rate+dim]."""
+    """Position of the state of one storage port: x[at:at+size], its rate w[rate:rate+dim]."""
 
     path: Path
     quantity: Quantity

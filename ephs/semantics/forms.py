@@ -29,7 +29,7 @@ __all__ = [
 ]
 
 LARGEST = 32
-"""How many numbers states and efforts may have together: a relation is written out, every derivative for itself."""
+"""Largest number of state and effort coordinates together: a relation is written out, every derivative for itself."""
 WITHOUT_SLOPE = ("sign", "sinhc", "choose")
 """Functions that jump, or have no rule for their slope between two arguments."""
 Carried = dict[int, tuple[tuple[str, float], ...]]
@@ -315,7 +315,7 @@ def _numbers(interface: Interface, ports: Sequence[Path], domain: Domain) -> tup
 
 
 def _reference(bundle: Bundle) -> tuple[tuple[float, float], ...]:
-    """How much θ₀, and how much π₀, there is in each effort of the environment."""
+    """Shares of θ₀ and of π₀ in each effort of the environment."""
     hot, wide = bundle.indicator(ENTROPY), bundle.indicator(VOLUME)
     return tuple((float(a), 0.0 - float(b)) for a, b in zip(hot, wide, strict=True))
 

@@ -36,7 +36,7 @@ __all__ = [
 ]
 
 OK, TURN, TEMPERATURE, RAISED, EXTENT, DOMAIN = 0, 1, 2, 3, 4, 5
-"""What a kernel returns: done; half a turn in a step; θ ≤ 0; a Python function raised; a length or volume ≤ 0; a value
+"""Results of kernels: done; half a turn in a step; θ ≤ 0; a Python function raised; a length or volume ≤ 0; a value
 that is not a finite number."""
 
 _REALS: Final[tuple[Atom, ...]] = ("reals",)

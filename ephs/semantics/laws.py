@@ -162,7 +162,7 @@ def _renaming(probe: Probe) -> Verdict:
 
 
 def _places(relation: LinearRelation) -> dict[Path, range]:
-    """Where the rates lie."""
+    """Slice of the rates."""
     out: dict[Path, range] = {}
     at = 0
     for path, dim in relation.rates:

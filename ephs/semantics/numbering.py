@@ -112,7 +112,7 @@ class Interned(Generic[T]):
 
 
 def starts(length: Index) -> Index:
-    """Where each of some rows begins when they lie one after the other."""
+    """Start of each of some rows that lie one after the other."""
     return np.cumsum(length) - length
 
 

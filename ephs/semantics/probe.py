@@ -1,4 +1,4 @@
-"""Where laws of systems are measured, and what a measurement says."""
+"""Points at which laws of systems are measured, and results of measurements."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -19,7 +19,7 @@ __all__ = ["Probe", "SystemLaw", "Verdict", "random_probe"]
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Probe:
-    """Where laws are measured: a system at a state, over a step of h seconds.
+    """Point at which laws are measured: a system at a state, over a step of h seconds.
 
     Parameters
     ----------

@@ -55,7 +55,7 @@ def exponential_law(primitive: Primitive) -> tuple[float, float] | None:
 
 @final
 class Heats:
-    """What stores heat in one system, and what its components pass on to it.
+    """Stores of heat of one system, and the heat that its components pass on to them.
 
     Energies are in J and count from s = 0. Flows, in W or J, are what components pass: the heat of friction; of
     conduction what goes from one end to the other.
@@ -188,7 +188,7 @@ class Heats:
         return made
 
     def taken(self, heats: Array, flows: Array) -> tuple[Array, Array]:
-        """What the flows of a step change energies by in J, those of other states not at all; and the entropy that each
+        """Changes of energies in J by the flows of a step, those of other states not at all; and the entropy that each
         component made in J/K.
 
         Raises

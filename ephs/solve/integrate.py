@@ -326,7 +326,7 @@ class _Run:
             self.journal.write(self.recorder.rows.fresh(), self.snapshot(), self.stats())
 
     def snapshot(self) -> Snapshot:
-        """Where the run stands."""
+        """Present state of the run."""
         return {
             "t": self.t,
             "counts": [self.steps, self.iterations, self.cut],

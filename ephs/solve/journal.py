@@ -64,7 +64,7 @@ class Contents:
 @final
 @dataclass(frozen=True, slots=True)
 class Journal:
-    """Where a run is to be written down.
+    """Place at which a run is written down.
 
     Parameters
     ----------

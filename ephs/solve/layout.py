@@ -114,7 +114,7 @@ def _constant_entries(t: Tables, size: int) -> tuple[Index, Array]:
 
 
 def _places(t: Tables, primitive: Index, patterns: list[Array]) -> tuple[Index, Index]:
-    """Where each local Jacobian entry goes in the matrix, row · size + column, −1 where it is structurally zero; and
+    """Positions of local Jacobian entries in the matrix, row · size + column, −1 where it is structurally zero; and
     where those of each component begin. Components of one pattern are placed at once."""
     n_rate, n_effort, size = t.counts[0], t.counts[1], t.counts[3]
     same = {id(pattern): pattern for pattern in patterns}

@@ -352,7 +352,7 @@ class _Run(Generic[S]):
             self.journal.write(self.kept.fresh(), self.snapshot(), self.stats())
 
     def snapshot(self) -> Snapshot | None:
-        """Where the run stands; None where its method cannot say."""
+        """Present state of the run; None where its method has none to give."""
         method = self.stepper.snapshot(self.state)
         if method is None:
             return None

@@ -22,7 +22,7 @@ __all__ = ["NO_STATE", "Motion", "Problem", "Signal", "State", "States"]
 
 State = Mapping[Path, Array]
 NO_STATE: Final[State] = MappingProxyType({})
-"""What inputs are given that do not read the state."""
+"""States for inputs that do not read them."""
 
 
 @final

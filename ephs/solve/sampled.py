@@ -109,7 +109,7 @@ class Held:
         return np.unique(np.concatenate([whole, whole + self.sampled.delay])) if self.sampled.delay else whole
 
     def __call__(self, t: float) -> Any:
-        """What is held at a time; where one value takes over from another, the new one."""
+        """Held value at a time; where one value takes over from another, the new one."""
         k = bisect_right(self._times, t) - 1
         if k >= 0:
             return self._values[k]
@@ -149,7 +149,7 @@ class Held:
         self.count += 1
 
     def _noise(self, view: Any) -> dict[str, Array]:
-        """What is added to each measured value in this sample."""
+        """Noise of each measured value in this sample."""
         rng = np.random.default_rng([self.sampled.seed, self.count])
         out: dict[str, Array] = {}
         for name, size in self.sampled.noise.items():
@@ -218,7 +218,7 @@ class Sampling:
 
 
 def _read(view: Any, name: str) -> Any:
-    """What a view reads under a name: ``joints.left.waist.rate``, or the path of a state."""
+    """Reading of a view under a name: ``joints.left.waist.rate``, or the path of a state."""
     kind, _, rest = name.partition(".")
     of, _, what = rest.rpartition(".")
     try:

@@ -1,4 +1,4 @@
-"""Where a run stands, as plain data: what a journal writes down, and from which a run goes on."""
+"""Present state of a run as plain data: entries of a journal, from which a run goes on."""
 
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass

@@ -141,7 +141,7 @@ class Leg(Protocol[S]):
         ...
 
     def snapshot(self) -> Snapshot:
-        """Where it stands, for `restore` of a leg of the same run."""
+        """Present state, for `restore` of a leg of the same run."""
         ...
 
     def restore(self, snapshot: Snapshot) -> None:

@@ -17,7 +17,7 @@ from ephs.semantics.bundle import Array
 __all__ = ["Axes", "Direction", "Place", "describe", "enumerated", "name_directions"]
 
 ALIGNED = 1e-6
-"""How far, relative to its length, a direction may be from one that is named."""
+"""Largest distance, relative to its length, of a direction from one that is named."""
 
 
 @final
@@ -62,7 +62,7 @@ class Direction:
 
     @property
     def kind(self) -> str:
-        """What is held, up to the direction."""
+        """The held direction up to its sense."""
         if not np.any(self.force):
             return "rotation about"
         return "translation along" if not np.any(self.moment) else "coupled"
@@ -153,7 +153,7 @@ def _units_within(space: Array) -> list[int]:
 
 
 def _pure(space: Array) -> int:
-    """How many independent pure forces a space contains; pure moments are the same about all places."""
+    """Number of independent pure forces in a space; pure moments are the same about all places."""
     return _null(space[:3]).shape[1]
 
 

@@ -176,7 +176,7 @@ def _needed(before: Sequence[Hold], target: Array, lengths: Sequence[float]) -> 
 
 
 def _shares(holds: Sequence[Hold], target: Array) -> list[float] | None:
-    """How much of each hold the target is made of; None where it is not in the span."""
+    """Coefficients of the target in the holds; None where it is not in their span."""
     matrix = np.vstack([hold.rows for hold in holds]).T
     weights = np.asarray(np.linalg.lstsq(matrix, target, rcond=CONSTRAINT)[0])
     if np.abs(matrix @ weights - target).max(initial=0.0) > SPANNED:

@@ -16,7 +16,7 @@ __all__ = ["State"]
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class State:
-    """Where a mechanism is and how it moves. All arrays are read-only.
+    """State of a mechanism. All arrays are read-only.
 
     Parameters
     ----------

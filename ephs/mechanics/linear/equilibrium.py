@@ -30,7 +30,7 @@ SHORTEST, LEAST, SETTLED = 1e-12, 1e-9, 1e-12
 ENOUGH = 1e-12
 """Part of the forces that act which may stay unbalanced."""
 STRIDE = 0.3
-"""How far a mechanism goes in one step, in rad or m."""
+"""Largest change of a mechanism in one step, in rad or m."""
 STEPS = 200
 
 

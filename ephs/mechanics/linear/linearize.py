@@ -96,7 +96,7 @@ def linearize(
 
 
 def _driven(scene: Scene) -> dict[str, Any]:
-    """What a scene prescribes at the outer ports of its system."""
+    """Values that a scene prescribes at the outer ports of its system."""
     from ephs.mechanics.scene.build import scene_inputs
 
     return {

@@ -78,7 +78,7 @@ def freedoms_of(model: Dynamics, state: State) -> Freedoms:
 
 
 def unbalanced(model: Dynamics, state: State, free: Freedoms, stiffness: Array) -> float:
-    """What of the forces is not balanced at rest in a state, relative to all that act; 0 where nothing acts.
+    """Unbalanced part of the forces at rest in a state, relative to all that act; 0 where nothing acts.
 
     Weights act at their arms, and all else counts with what ``stiffness`` (n, n) makes of it over 1 rad or m: forces
     that balance each other may vanish one by one.
@@ -323,7 +323,7 @@ class _Linear:
         )
 
     def _shapes(self) -> Mapping[str, Array]:
-        """What the states do to the places of joints and bodies."""
+        """Derivatives of the places of joints and bodies by the states."""
         rest = np.zeros((self.n, self.k + len(self.nodes)))
         whole = np.hstack([self.free.Z, rest])
         model = self.model

@@ -136,7 +136,7 @@ class Alpha(ReducedMethod):
         return flows, 2.0 * (flows - half), work
 
     def taken(self, state: ReducedState) -> Snapshot:
-        """Where the matrix was made."""
+        """State at which the matrix was made."""
         return {"jacobian": self.jacobian.snapshot(state)}
 
     def take(self, own: Snapshot, state: ReducedState) -> None:

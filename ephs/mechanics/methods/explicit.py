@@ -24,7 +24,7 @@ from ephs.solve.stepping import Attempt, Leg, Span
 __all__ = ["Explicit", "Tableau", "tableau"]
 
 Solve = Callable[..., Array]
-"""What solves the stages of a step, with the arguments of `Equations.stages`."""
+"""Solver of the stages of a step, with the arguments of `Equations.stages`."""
 
 
 @final

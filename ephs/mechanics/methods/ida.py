@@ -25,7 +25,7 @@ __all__ = ["Ida"]
 LEAST_RTOL, LEAST_ATOL = 1e-14, 1e-15
 """Least tolerances that IDA is given: smaller ones are rounding, by which it ends."""
 LOG = "SUNLOGGER_ERROR_FILENAME"
-"""Where SUNDIALS writes errors to, if not to stderr: an environment variable, read when a solver is made."""
+"""Environment variable that names the file of SUNDIALS' errors, if not stderr; read when a solver is made."""
 FAR = 1.5
 """Increments beyond this on a group ask for another base, in rad or m."""
 OPEN = 10.0

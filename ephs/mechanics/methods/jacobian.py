@@ -74,7 +74,7 @@ class Jacobian:
         return value
 
     def snapshot(self, state: ReducedState) -> Snapshot:
-        """Where the matrix was made, and whether that is at ``state``."""
+        """State at which the matrix was made, and whether that is ``state``."""
         return {"made": parts(self._at), "fresh": self.fresh(state)}
 
     def restore(self, snapshot: Snapshot, state: ReducedState) -> None:

@@ -27,7 +27,7 @@ Leave = Callable[[float, float, str], None]
 
 
 class Marching(Protocol):
-    """What a march asks of its method.
+    """Interface that a march asks of its method.
 
     Attributes
     ----------
@@ -131,7 +131,7 @@ class March:
 
     @property
     def control(self) -> Any:
-        """Where the march stands, a record of `Steering`; its numbers are known here."""
+        """Present state of the march, a record of `Steering`; its numbers are known here."""
         return self.steering[0]
 
     def advance(self, steps: int) -> bool:
@@ -277,7 +277,7 @@ class March:
         return memory["rows_t"][:count], memory["rows_q"][:count], memory["rows_y"][:count]
 
     def snapshot(self) -> Snapshot:
-        """Where it stands: the state, the rates there, and what chooses the steps."""
+        """Present state, the rates there, and the choice of steps."""
         return dict(self._taken())
 
     def _taken(self) -> list[tuple[str, Any]]:

@@ -77,7 +77,7 @@ class Implicit(ReducedMethod):
         return March(self, ARRAYS, span, kept=Kept(self._stages, COEFFICIENTS))
 
     def taken(self, state: ReducedState) -> Snapshot:
-        """Where the matrix was made, and the step for which it was factorised."""
+        """State at which the matrix was made, and the step for which it was factorised."""
         return self._stages.snapshot(state)
 
     def take(self, own: Snapshot, state: ReducedState) -> None:

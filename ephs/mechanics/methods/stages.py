@@ -113,11 +113,11 @@ class Stages:
         return self._solvers[1]
 
     def allowed(self, y0: Array, y1: Array) -> Array:
-        """What errors of a step may be, of what is counted."""
+        """Allowed errors of a step, for what is counted."""
         return self.atol + self.rtol * self.equations.sizes(y0, y1)
 
     def snapshot(self, state: ReducedState) -> Snapshot:
-        """Where the matrix was made, and the step for which it was factorised."""
+        """State at which the matrix was made, and the step for which it was factorised."""
         return {
             "jacobian": self.jacobian.snapshot(state),
             "separation": self._separation,

@@ -1,4 +1,4 @@
-"""How a solution reads as mechanics: poses, velocities and joints of a scene, for all instants at once.
+"""A solution as mechanics: poses, velocities and joints of a scene, for all instants at once.
 
 Velocities are those of the continuous relations: the stored momenta projected on the joints in the mass metric.
 """

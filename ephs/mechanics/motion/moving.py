@@ -1,4 +1,4 @@
-"""What the motions of bodies and joints are read from: poses, twists, rates and wrenches, by name or by path."""
+"""Sources of the motions of bodies and joints: poses, twists, rates and wrenches, by name or by path."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ __all__ = ["ByPath", "Moving", "Part"]
 
 
 class Moving(Protocol):
-    """Where bodies and joints read their motion."""
+    """Source of the motion of bodies and joints."""
 
     @property
     def twists(self) -> Mapping[str, Array]:

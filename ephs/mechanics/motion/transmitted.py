@@ -1,4 +1,4 @@
-"""What the joints of a mechanism transmit at an instant, from its accelerations.
+"""Wrenches in the joints of a mechanism at an instant, from its accelerations.
 
 Each link with all that it carries needs a wrench W. A joint of the tree transmits it, less what the cut joints on these
 links do; along the joint's freedoms it is the force in the joint:

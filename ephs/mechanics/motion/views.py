@@ -34,7 +34,7 @@ AXIAL = frozenset({"revolute", "prismatic", "cylindrical", "screw"})
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyState:
-    """Where a body is and how it moves.
+    """Motion of a body.
 
     Parameters
     ----------

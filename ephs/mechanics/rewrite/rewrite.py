@@ -225,7 +225,7 @@ class Rule:
 
 
 def sites_of(system: System, rule: Rule) -> tuple[Site, ...]:
-    """Where a rule applies or is refused, anywhere in a hierarchical system; paths are those of its flat form."""
+    """Matches of a rule, and its refusals, anywhere in a hierarchical system; paths are those of its flat form."""
     draft = Draft(system)
     found = (rule.at(draft, place) for place in rule.places(draft))
     return tuple(site for site in found if site is not None)

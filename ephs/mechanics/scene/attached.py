@@ -1,4 +1,4 @@
-"""What a scene puts on its mechanism: motors, gears, stores of heat, conduction."""
+"""Attachments of a scene's mechanism: motors, gears, stores of heat, conduction."""
 
 from dataclasses import dataclass
 from typing import final
@@ -42,7 +42,7 @@ class Motor:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Gear:
-    """What ties the rates of joints: that of the first is Σ ratio · rate of the others.
+    """A relation of the rates of joints: that of the first is Σ ratio · rate of the others.
 
     Attributes
     ----------

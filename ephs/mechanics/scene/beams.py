@@ -144,7 +144,7 @@ def _settled(strain: Array) -> Array:
 
 
 def _placed(table: Checked[Any], key: str, faults: list[Fault]) -> tuple[list[Array], list[Array]] | None:
-    """What `curve` gives of a table; None, with a fault, where they cannot be told."""
+    """Result of `curve` of a table; None, with a fault, where they cannot be told."""
     entry = table.entry
     if not table.sound("from", "to", "points", "up", "elements"):
         return None

@@ -135,7 +135,7 @@ def gradient(
 
 
 def _seed(eq: Equations, name: str, weights: Array, count: int) -> tuple[Index, bool, Array]:
-    """Where a reading is in q or y, which of both, and its weights (n, d)."""
+    """Places of a reading in q or y, which of both, and its weights (n, d)."""
     joint, _, key = name.removeprefix("joints.").rpartition(".")
     freedoms = eq.layout.freedoms.get(joint)
     parts = eq.layout.edges.get(joint, ())

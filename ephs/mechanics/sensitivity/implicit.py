@@ -56,7 +56,7 @@ class _Side:
         return _Side(problem, compile_model(problem.descriptor, problem.reference, problem.inputs(t0, problem.initial)))
 
     def numbers(self, name: str) -> Array:
-        """What the equations are evaluated from."""
+        """Point at which the equations are evaluated."""
         if name == "scal":
             return self.model.scal(0.0)
         return self.model.input_values() if name == "inputs" else getattr(self.model.tables, name)

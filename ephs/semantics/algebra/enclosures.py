@@ -22,7 +22,7 @@ Node: TypeAlias = tuple[Path, int]
 Interval: TypeAlias = tuple[Fraction, Fraction]
 Edges: TypeAlias = dict[tuple[Node, Node], Interval]
 GROUND: Node = (ROOT, 0)
-"""Where the effort is zero."""
+"""State of zero effort."""
 
 
 @final

@@ -34,13 +34,13 @@ class Closing:
 
     @property
     def dimensions(self) -> tuple[int, int, int, int]:
-        """How many efforts, conditions, increments and numbers of states there are."""
+        """Numbers of efforts, conditions, increments and state coordinates."""
         posed, d = sum(self.ends), len(self.basis)
         return 6 * posed + d, 6, 6 * posed + d, 7 * posed + self.size
 
     @property
     def numbers(self) -> int:
-        """How many parameters there are."""
+        """Number of parameters."""
         return 72 * sum(self.ends) + len(self.basis) ** 2
 
     def stage(self, on: Evaluator, a: Arguments, *, bare: bool) -> Integer:

@@ -70,13 +70,13 @@ class Holonomic:
 
     @property
     def dimensions(self) -> tuple[int, int, int, int]:
-        """How many efforts, conditions, increments and numbers of states there are."""
+        """Numbers of efforts, conditions, increments and state coordinates."""
         d = len(self.basis)
         return 12 + d if self.maps is None else self.maps.outside, 6, d, self.size
 
     @property
     def numbers(self) -> int:
-        """How many parameters there are."""
+        """Number of parameters."""
         return 0 if self.maps is None else self.maps.numbers
 
     def stage(self, on: Evaluator, a: Arguments, *, bare: bool) -> Integer:

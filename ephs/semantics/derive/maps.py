@@ -44,7 +44,7 @@ class Block:
 
     @property
     def numbers(self) -> int:
-        """How many numbers say what the map is."""
+        """Number of parameters of the map."""
         return {"same": 0, "frame": 18, "any": self.inside * self.outside}[self.sort]
 
     def rows(self, numbers: Sequence[Real]) -> Rows:
@@ -78,17 +78,17 @@ class Maps:
 
     @property
     def inside(self) -> int:
-        """How many efforts the relation sees."""
+        """Number of efforts that the relation sees."""
         return sum(block.inside for block in self.blocks)
 
     @property
     def outside(self) -> int:
-        """How many efforts there are."""
+        """Number of efforts."""
         return sum(block.outside for block in self.blocks)
 
     @property
     def numbers(self) -> int:
-        """How many numbers say what the maps are."""
+        """Number of parameters of the maps."""
         return sum(block.numbers for block in self.blocks)
 
     def rows(self, numbers: Sequence[Real]) -> list[Rows]:

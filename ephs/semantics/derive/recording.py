@@ -105,7 +105,7 @@ _NUMPY: Final = str(Path(np.__file__).parent)
 
 
 def _place(value: Any, recorder: Recorder) -> int:
-    """Where a value is on the tape; a number becomes a parameter, but 0 and ±1."""
+    """Position of a value on the tape; a number becomes a parameter, but 0 and ±1."""
     if isinstance(value, Recorded):
         if value.recorder is not recorder:
             raise Untraceable("a recorded value is used in another function")
@@ -234,7 +234,7 @@ def _mathematics() -> dict[str, Any]:
 _BY_IDENTITY = {id(getattr(math, name)): replacement for name, replacement in _mathematics().items()}
 _MODULE = types.SimpleNamespace(**{**vars(math), **_mathematics()})
 DEPTH = 8
-"""How many functions deep `math` is looked for."""
+"""Depth of functions to which `math` is looked for."""
 
 
 def _recordable(function: Callable[..., Any], depth: int = 0) -> Callable[..., Any]:

@@ -87,13 +87,13 @@ class Storage:
 
     @property
     def dimensions(self) -> tuple[int, int, int, int]:
-        """How many efforts, conditions, increments and numbers of states there are."""
+        """Numbers of efforts, conditions, increments and state coordinates."""
         n = sum(port.dim for port in self.ports)
         return n, 0, n, sum(port.size for port in self.ports)
 
     @property
     def numbers(self) -> int:
-        """How many parameters there are."""
+        """Number of parameters."""
         return len(self.potentials) + self.energy.parameters
 
     def slopes(self, on: Evaluator, x: Numbers, v: Numbers, parameters: Numbers) -> tuple[list[Real], Real, list[Real]]:
@@ -168,14 +168,14 @@ class Reversible:
 
     @property
     def dimensions(self) -> tuple[int, int, int, int]:
-        """How many efforts, conditions, increments and numbers of states there are."""
+        """Numbers of efforts, conditions, increments and state coordinates."""
         rows, n = self.structure.shape
         outside = n if self.maps is None else self.maps.outside
         return outside, rows - n, sum(port.dim for port in self.ports), sum(port.size for port in self.ports)
 
     @property
     def numbers(self) -> int:
-        """How many parameters there are."""
+        """Number of parameters."""
         return self.structure.parameters + (0 if self.maps is None else self.maps.numbers)
 
     def stage(self, on: Evaluator, a: Arguments, *, bare: bool) -> Integer:
@@ -231,13 +231,13 @@ class Irreversible:
 
     @property
     def dimensions(self) -> tuple[int, int, int, int]:
-        """How many efforts, conditions, increments and numbers of states there are."""
+        """Numbers of efforts, conditions, increments and state coordinates."""
         n = len(self.reference) if self.maps is None else self.maps.outside
         return n, 0, sum(port.dim for port in self.ports), sum(port.size for port in self.ports)
 
     @property
     def numbers(self) -> int:
-        """How many parameters there are."""
+        """Number of parameters."""
         return self._own + (0 if self.maps is None else self.maps.numbers)
 
     @property
@@ -336,7 +336,7 @@ def _inside(on: Evaluator, bounds: Bounds, values: Numbers) -> Truth:
 
 
 def sizes(relation: Relation) -> dict[str, int]:
-    """How many numbers each argument after the first has."""
+    """Number of coordinates of each argument after the first."""
     n, k, m, size = relation.dimensions
     stores = isinstance(relation, Storage)
     f, c, jac = (n * n, 1, 0) if stores else (n, k, (n + k) * (n + k + m))

@@ -29,7 +29,7 @@ one, of ``"constant"`` its value, of ``"power"`` the exponent, a multiple of 1/4
 @final
 @dataclass(frozen=True, slots=True)
 class Tape:
-    """What a function does.
+    """Operations of a function.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def _operations() -> Mapping[str, Callable[..., Real]]:
 
 
 OPERATIONS: Final = _operations()
-"""What each operation is with the numbers of an evaluator."""
+"""Operations on the numbers of an evaluator."""
 
 
 def quarter(value: object) -> float | None:
@@ -175,7 +175,7 @@ class Recorder:
         self._places: dict[Operation, int] = {}
 
     def place(self, name: str, arguments: tuple[int, ...] = (), number: float = 0.0) -> int:
-        """Where an operation is on the tape."""
+        """Position of an operation on the tape."""
         operation = name, arguments, number
         found = self._places.get(operation)
         if found is None:

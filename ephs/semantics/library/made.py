@@ -1,4 +1,4 @@
-"""What parameters of the library's parts are held to."""
+"""Ranges of the parameters of the library's parts."""
 
 import math
 

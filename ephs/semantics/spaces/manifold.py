@@ -1,4 +1,4 @@
-"""What every space of states offers, and the registry from names to manifolds.
+"""Interface of every space of states, and the registry from names to manifolds.
 
 The states of every quantity form a Lie group: coordinates add, poses multiply. All tangent and cotangent
 vectors are *left-trivialised*: a twist u at x stands for the tangent vector x·u. So a vector space and SE(3)

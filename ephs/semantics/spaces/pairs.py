@@ -64,7 +64,7 @@ class Pair:
 
     @property
     def dim(self) -> int:
-        """How many freedoms the pair has."""
+        """Number of freedoms of the pair."""
         return self.manifold.dim
 
     @property
@@ -151,7 +151,7 @@ def left_inverse(of: Pair) -> Array:
 @final
 @dataclass(frozen=True, slots=True)
 class PairEntry:
-    """What it takes to know a pair.
+    """Data that determine a pair.
 
     Attributes
     ----------

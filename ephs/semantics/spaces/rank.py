@@ -96,5 +96,5 @@ DIFFERENCE = 1e-6
 
 
 def rank_of(sizes: NDArray[Any], part: float, usual: float = 0.0) -> int:
-    """How many of these sizes, singular values or pivots (k,), exceed a part of the largest and of a usual size."""
+    """Number of these sizes, singular values or pivots (k,), that exceed a part of the largest and of a usual size."""
     return int(np.sum(sizes > part * max(sizes.max(), usual))) if sizes.size and sizes.max() > 0.0 else 0

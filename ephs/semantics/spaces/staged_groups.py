@@ -18,7 +18,7 @@ Differential: TypeAlias = Callable[[Evaluator, Entries], Rows]
 @final
 @dataclass(frozen=True, slots=True)
 class StagedGroup:
-    """What steps and charts need of a group.
+    """Operations of a group that steps and charts use.
 
     Attributes
     ----------

@@ -20,7 +20,7 @@ NUMBERS = ("real", "integer")
 
 
 Span = tuple[int, int, str]
-"""Where an array begins and ends in memory, and the name of its argument."""
+"""Begin and end of an array in memory, and the name of its argument."""
 
 
 @final

@@ -30,7 +30,7 @@ Parameters = ParamSpec("Parameters")
 
 
 class Evaluator(ABC):
-    """What a staged function is run with: its first argument, named `on`."""
+    """The evaluator of a staged function: its first argument, named `on`."""
 
     @abstractmethod
     def _function(self, name: Function, *arguments: Real) -> Real:

@@ -33,7 +33,7 @@ Value = TypeVar("Value")
 
 
 class Cells(ABC, Generic[Value]):
-    """Where numbers live."""
+    """Memory of numbers."""
 
     __slots__ = ()
 

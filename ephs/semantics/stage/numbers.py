@@ -41,7 +41,7 @@ class Condition:
 
 
 class _Unknown:
-    """What cannot become a number of Python."""
+    """A value that cannot become a number of Python."""
 
     __slots__ = ()
 

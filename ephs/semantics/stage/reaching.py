@@ -18,9 +18,9 @@ from ephs.semantics.stage.numbers import Integer, Number, Real
 __all__ = ["Argument", "Atom", "Part", "Reached", "Signature", "called", "parts_of"]
 
 Atom: TypeAlias = Literal["reals", "integers", "real", "integer"]
-"""What an argument is made of: an array of floats or of integers, a float, an integer."""
+"""Parts of an argument: an array of floats or of integers, a float, an integer."""
 Argument: TypeAlias = Vector | Integers | Matrix | Real | Integer
-"""What is handed over to a function that is called by its address."""
+"""Arguments of a function that is called by its address."""
 Part: TypeAlias = tuple[Atom, Any]
 """An atom and its value: a number, or cells and the place of the first."""
 
@@ -28,7 +28,7 @@ Part: TypeAlias = tuple[Atom, Any]
 @final
 @dataclass(frozen=True, slots=True)
 class Signature:
-    """How a function is called.
+    """Calling convention of a function.
 
     Attributes
     ----------

@@ -14,7 +14,7 @@ from typing import Any, Final, cast
 __all__ = ["FOLDER", "INDEX", "ship", "shipped"]
 
 FOLDER: Final = Path(__file__).resolve().parents[2] / "objects"
-"""Where object code comes with the package; it is made when a wheel is built, and need not exist."""
+"""Folder of the object code that comes with the package; it is made when a wheel is built, and need not exist."""
 INDEX: Final = "index.json"
 
 

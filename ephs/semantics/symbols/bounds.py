@@ -20,7 +20,7 @@ WHOLE: Interval = (-math.inf, math.inf)
 PIECES = 600
 """Boxes into which a domain is cut, at most."""
 FAR = 1e6
-"""Where an unbounded side is no longer cut by doubling."""
+"""Bound beyond which an unbounded side is no longer cut by doubling."""
 
 
 def at_least(expression: Expr, bounds: Bounds, *, strict: bool) -> bool:

@@ -1,4 +1,4 @@
-"""What a plain Python function says of symbols: its tape, run with expressions of SymPy.
+"""A plain Python function of symbols: its tape, run with expressions of SymPy.
 
 Numbers that meet a symbol become parameters of the formula, so that functions which differ in numbers only share it.
 """
@@ -24,7 +24,7 @@ DIGITS = 10**30
 @final
 @dataclass(frozen=True, slots=True)
 class Trace:
-    """What a function says of symbols.
+    """Result of a function of symbols.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class Trace:
 
 
 def trace(function: Callable[..., Any], arguments: Mapping[str, Any]) -> Trace:
-    """What a function says of symbols.
+    """Result of a function of symbols.
 
     Parameters
     ----------
@@ -140,4 +140,4 @@ def _table() -> Mapping[str, Callable[..., Expr]]:
 
 
 _TABLE: Final = _table()
-"""What each operation of a tape is with expressions."""
+"""Operations of a tape on expressions."""

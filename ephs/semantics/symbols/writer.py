@@ -51,7 +51,7 @@ class Writer:
         return self.flat.leaves()
 
     def junction(self, box: Path, port: Path) -> Path:
-        """Where a port is connected."""
+        """The junction of a port."""
         return self.flat.pattern.boxes[box].ports[port].junction
 
     def state(self, box: Path, port: Path) -> tuple[Path, Quantity]:

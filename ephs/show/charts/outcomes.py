@@ -28,7 +28,7 @@ RIGHT = MOTION
 """Largest error of a right run at constant steps, what their audit allows: a part of the size of mechanism and motion,
 an entry of a rotation matrix, a part of the energies turned over."""
 AMPLIFIED = 10.0
-"""How many times what a change of the data by the tolerance makes of a motion a right run may err by."""
+"""Allowed error of a right run: a multiple of the effect that a change of the data by the tolerance has on it."""
 TIMES = MANY_TIMES * AMPLIFIED
 """Largest error of a right run at chosen steps, in tolerances, where the motion amplifies nothing and steps are few:
 what the audit allows to the defect of energy, times a growth of errors that it does not see. Where there are more

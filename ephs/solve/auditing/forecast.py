@@ -92,7 +92,7 @@ class Forecast:
 
 
 def _steps(rest: float, before: float, last: float, steps: int) -> float:
-    """How many steps a rest of a run takes, whose last steps covered ``last`` s and as many before them ``before`` s.
+    """Number of steps of the rest of a run, whose last steps covered ``last`` s and as many before them ``before`` s.
 
     After a transient steps grow, and are taken to go on to do so.
     """

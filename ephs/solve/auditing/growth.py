@@ -119,7 +119,7 @@ def global_error(
 
 
 def _distance(one: "Solution", run: Callable[[], "Solution"]) -> tuple[float, int, Path | None] | None:
-    """How far a solution and that of a run are apart at the times that both have: how much, when, which body.
+    """Distance of a solution from that of a run at their common times: size, time, body.
 
     None where the run fails.
     """

@@ -46,7 +46,7 @@ EACH, LEAST, MOST = 600, 4, 6
 STILL = 1e-6
 """Part of the gross energies below which a run of such steps moves nothing."""
 SHORTER = 16
-"""How often a step is divided by four to find one that would do."""
+"""Number of times that a step is divided by four to find one that would do."""
 ROUNDED = 1e4 * float(np.finfo(float).eps)
 """Part of the energies that differences of solved steps have lost to rounding."""
 

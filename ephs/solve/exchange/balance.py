@@ -52,7 +52,7 @@ class Balance:
         self.u, self.g = self._taken * a, self._given * y
 
     def moved(self, h: float, a: float, X: float | None) -> tuple[float, float]:
-        """What the unit takes over the period of h seconds that the system went through, and X."""
+        """Energy that the unit takes over the period of h seconds that the system went through, and X."""
         if X is None:
             X = 0.5 * h * (self.a + a)
         self.u = self._taken * (X / h if self._kept else self.a)
@@ -60,7 +60,7 @@ class Balance:
         return self.u, X
 
     def returned(self, h: float, y: float, Y: float | None, X: float) -> float:
-        """What was made in the period, in J, after the unit too went through it; g is that of the next."""
+        """Energy made in the period, in J, after the unit too went through it; g is that of the next."""
         if Y is None:
             Y = 0.5 * h * (self.y + y)
         made = self.g * X + self.u * Y

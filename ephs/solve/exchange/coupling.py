@@ -88,7 +88,7 @@ class _Joined:
 
 @final
 class _Memory(Mapping[str, Any]):
-    """What a coupling remembers after a sample; written down only where a journal asks, which is before the next."""
+    """Memory of a coupling after a sample; written down only where a journal asks, which is before the next."""
 
     __slots__ = ("_count", "_of")
 
@@ -136,7 +136,7 @@ class Coupling:
 
     @property
     def traffic(self) -> Traffic:
-        """What the last run made."""
+        """Record of the last run."""
         return Traffic(np.array(self._times), {name: np.array(made) for name, made in self._made.items()})
 
     def _sampling(self, name: str) -> Callable[[float, Any, Snapshot], tuple[float, Snapshot]]:

@@ -23,7 +23,7 @@ SLIVER = 1e-9
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Exchanged:
-    """What units gave: ``t`` (n,) in s, ``values`` (n,) of each output by ``unit.output``."""
+    """Outputs of units: ``t`` (n,) in s, ``values`` (n,) of each output by ``unit.output``."""
 
     t: Array
     values: Mapping[str, Array]

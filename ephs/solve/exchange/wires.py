@@ -44,7 +44,7 @@ def place_of(text: str, units: Mapping[str, Unit]) -> Place:
 
 
 def sources_of(units: Mapping[str, Unit], wires: Mapping[str, Any]) -> dict[Place, Place | Source]:
-    """What each wired input reads.
+    """Source of each wired input.
 
     Raises
     ------

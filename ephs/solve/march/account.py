@@ -23,7 +23,7 @@ allows."""
 
 
 class Account(Record):
-    """What a run has to account for.
+    """Energy account of a run.
 
     Attributes
     ----------

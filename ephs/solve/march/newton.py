@@ -37,11 +37,11 @@ ITERATIONS = 10
 FAST = 0.3
 """A rate of convergence from which on a new matrix is made: one costs as much as a dozen iterations."""
 BEYOND = 1e300
-"""What is not below is not a number."""
+"""Bound of numbers: nan is not below it."""
 
 
 class Newton(Record):
-    """What is known of the iteration.
+    """State of the iteration.
 
     Attributes
     ----------

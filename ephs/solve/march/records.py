@@ -1,4 +1,4 @@
-"""What a march works on: equations of motion, a tableau, its control, its memory."""
+"""Data of a march: equations of motion, a tableau, its control, its memory."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -34,7 +34,7 @@ __all__ = [
 
 
 class Ending(IntEnum):
-    """How a march ends.
+    """Outcome of a march.
 
     Beyond REFUSED: by the status of an evaluation, REFUSED + status.
     """
@@ -44,20 +44,20 @@ class Ending(IntEnum):
     PAUSED = 1
     """After as many steps as asked."""
     CAREFUL = 2
-    """Where constraints nearly repeat each other: the next step needs a careful elimination."""
+    """Constraints nearly repeat each other: the next step needs a careful elimination."""
     SHORT = 3
-    """Where the step gets too short."""
+    """The step gets too short."""
     FULL = 4
-    """Where no more rows fit."""
+    """No more rows fit."""
     STIFF = 5
-    """Where stability, or failed evaluations, hold the steps back."""
+    """Stability, or failed evaluations, hold the steps back."""
     STALE = 6
-    """Where implicit steps need the matrix of the state."""
+    """Implicit steps need the matrix of the state."""
     REFUSED = 7
 
 
 class Status(IntEnum):
-    """What an evaluation of a motion says; other numbers are those of its components."""
+    """Outcome of an evaluation of a motion; other numbers are those of its components."""
 
     SOUND = 0
     STILL = 20
@@ -95,12 +95,12 @@ class Motion(ABC):
     @property
     @abstractmethod
     def summed(self) -> Integer:
-        """Where in y the sums over the run start; its size where there are none."""
+        """Start of the sums over the run in y; its size where there are none."""
 
     @property
     @abstractmethod
     def counted(self) -> Integer:
-        """How many numbers an error counts."""
+        """Number of coordinates that an error counts."""
 
     @property
     @abstractmethod
@@ -281,7 +281,7 @@ TABLEAU: Final[dict[str, Any]] = {
 
 
 class Control(Record):
-    """Where a march stands, and what chooses its steps. Times are counted from the start and grow.
+    """Present state of a march, and the choice of its steps. Times are counted from the start and grow.
 
     Attributes
     ----------

@@ -271,4 +271,4 @@ STEPS: Final = Program(
     stiffness=Entry(stiffness, rise=vector(), run=vector(), allowed=vector(), h=real()),
     judge=Entry(_judge, control=table(Control), h=real(), error=real()),
 )
-"""What drivers that take one step a call share with the march."""
+"""Entry functions for drivers that take one step a call."""

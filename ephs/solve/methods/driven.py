@@ -19,7 +19,7 @@ ROUNDED_INPUTS = 1e-13
 """Part of inputs that read the state by which they may change once more: rounding, times a condition of hundreds."""
 ROUNDS = 12
 CUTS = 6
-"""How often a step without solution is halved."""
+"""Number of times that a step without solution is halved."""
 _CURABLE = (Outcome.DIVERGED, Outcome.SINGULAR, Outcome.CONTRADICTION)
 _DOMAINS = (Outcome.TURN, Outcome.TEMPERATURE, Outcome.EXTENT, Outcome.DOMAIN)
 

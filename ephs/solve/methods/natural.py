@@ -38,7 +38,7 @@ _OUTCOMES = {DIVERGED: Outcome.DIVERGED, PIVOT: Outcome.SINGULAR, INCONSISTENT: 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class NaturalState:
-    """Where the method stands.
+    """Present state of the method.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ class NaturalState:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Decided:
-    """Where an order of elimination was decided: states, unknowns, the step in s, the equations left out before."""
+    """Origin of an order of elimination: states, unknowns, the step in s, the equations left out before."""
 
     x: Array
     z: Array
@@ -250,7 +250,7 @@ class Natural:
         return self.analysis.redundant if self.analysis is not None else ()
 
     def snapshot(self) -> Snapshot:
-        """Where the present order of elimination was decided, and the equations left out before."""
+        """Origin of the present order of elimination, and the equations left out before."""
         return {
             "decided": parts(self._decided) if self.analysis is not None else None,
             "dropped": self._dropped,

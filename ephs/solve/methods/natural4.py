@@ -62,7 +62,7 @@ __all__ = ["Natural4"]
 INSTANT = 1e-7
 """The step, in s, over which derivatives by increments are taken at a stage: so short that it is an instant."""
 AS_BEFORE, AT_START, WITHIN = 0, 1, 2
-"""Where the order of elimination of a step was decided: for a step before it, at its start, by its unknowns."""
+"""Origin of a step's order of elimination: a step before it, at its start, by its unknowns."""
 
 
 @final
@@ -221,7 +221,7 @@ class Natural4:
         return after, Chunk(rows[:done], energies[:done], ledgers[:done], int(iterations), failure)
 
     def snapshot(self) -> Snapshot:
-        """Where the present order of elimination was decided, and the equations left out before."""
+        """Origin of the present order of elimination, and the equations left out before."""
         return {
             "decided": parts(self._decided) if self._order is not None else None,
             "inputs": self._inputs,

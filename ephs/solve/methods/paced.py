@@ -24,7 +24,7 @@ __all__ = ["Paced", "PacedState"]
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class PacedState:
-    """Where the method stands: its own state, the time, and what is kept there."""
+    """Present state of the method: its own state, the time, and what is kept there."""
 
     t: float
     inner: NaturalState

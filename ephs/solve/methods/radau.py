@@ -58,7 +58,7 @@ DEFECT = np.linalg.solve(np.vander(NODES, increasing=True).T, _ORDER_3) - COEFFI
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class RadauState:
-    """Where the method stands.
+    """Present state of the method.
 
     Parameters
     ----------
@@ -204,7 +204,7 @@ class Radau:
         }
 
     def snapshot(self, state: RadauState) -> Snapshot:
-        """Where the matrices were made, and for which step they were factorised."""
+        """State at which the matrices were made, and the step for which they were factorised."""
         made = self._current if self._matrices is not None else None
         return {
             "made": parts(made),
@@ -236,7 +236,7 @@ class Radau:
         return stages, state.x + h * COEFFICIENTS[-1] @ stages[:, : self._rates], iterations
 
     def _books(self, state: RadauState, h: float, stages: Array) -> Books:
-        """What the ledgers get at the stages, and the heat that is passed there and at the start."""
+        """Entries of the ledgers at the stages, and the heat that is passed there and at the start."""
         xs = state.x + h * COEFFICIENTS @ stages[:, : self._rates]
         powers, passed = list[Array](), list[Array]()
         for x, z, c in zip(xs, stages, NODES, strict=True):

@@ -19,7 +19,7 @@ __all__ = [
 ]  # fmt: skip
 
 DONE, DIVERGED, PIVOT, INCONSISTENT, COMPONENT = 0, 1, 2, 3, 10
-"""How a step ends: COMPONENT + what a component's kernel returned (see `ephs.semantics.kernel_table`)."""
+"""Outcome of a step: COMPONENT + the value that a component's kernel returned (see `ephs.semantics.kernel_table`)."""
 
 STORING, REVERSIBLE, IRREVERSIBLE, WORKING = 0, 1, 2, 3
 """Kinds of components; a working one is reversible at an instant and does work over a step."""
@@ -30,7 +30,7 @@ Numbers = TypeVar("Numbers")
 
 @final
 class Dims(Record):
-    """How many efforts and multipliers a component has, and how many increments and numbers of states it reads."""
+    """Numbers of efforts and multipliers of a component, and of increments and state coordinates that it reads."""
 
     efforts = integer()
     multipliers = integer()

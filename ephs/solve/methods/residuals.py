@@ -163,7 +163,7 @@ def _relate(on: Evaluator, part: Part, z: Vector, h: Real, m: Scratch) -> None:
 
 
 def _prescribe(on: Evaluator, t: Columns, z: Vector, inputs: Vector, m: Scratch) -> None:
-    """What outer ports are given: flows, or efforts whose flows are unknown."""
+    """Given quantities of outer ports: flows, or efforts whose flows are unknown."""
 
     def port(i: Integer) -> None:
         outer = row_of(Outer, t.outer, i)

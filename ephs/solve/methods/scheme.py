@@ -64,7 +64,7 @@ class Place(Record):
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class GroupsOf(Generic[Whole, Numbers]):
-    """What the corrections need of the model.
+    """Data of the model that the corrections use.
 
     Attributes
     ----------

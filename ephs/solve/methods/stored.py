@@ -15,7 +15,7 @@ __all__ = ["Stored", "guessed_efforts", "stored_energies"]
 
 @final
 class Stored:
-    """What the storages of a model say of its states. It keeps memory: use one for each thread."""
+    """Energies and efforts of a model's storages. It keeps memory: use one for each thread."""
 
     def __init__(self, model: Model) -> None:
         self.model = model

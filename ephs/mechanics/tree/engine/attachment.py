@@ -1,4 +1,4 @@
-"""What is attached to a mechanism, as the arrays of `ephs.mechanics.tree.sweeps.network.Net`."""
+"""The network attached to a mechanism, as the arrays of `ephs.mechanics.tree.sweeps.network.Net`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -101,7 +101,7 @@ def _sparse(row: Array) -> tuple[Index, Array]:
 
 
 def laws_in(integers: Index) -> list[tuple[int, int]]:
-    """Where a network's integers hold the address of a component's relation, and that component."""
+    """Positions of addresses of components' relations in a network's integers, and the components."""
     found: list[tuple[int, int]] = []
     for name, record in (("store", Stores), ("called", Called)):
         at, size = integers[2 * INTEGERS.index(name) :][:2].tolist()

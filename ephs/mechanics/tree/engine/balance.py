@@ -150,7 +150,7 @@ class _Correction:
 
     @property
     def short(self) -> Real:
-        """What is missing, in J."""
+        """Missing energy in J."""
         return self.target - (self.energies[0] + self.energies[1])
 
     @property
@@ -205,7 +205,7 @@ class _Correction:
         out.value = self.on.select(out.value > RIGID * self.energies[0], out.value, 0.0)
 
     def _share(self, twice: Real) -> Real:
-        """What is missing relative to half of what stretches: beyond all numbers where that is nothing."""
+        """Missing energy relative to half of that which is stretched: beyond all numbers where that is nothing."""
         on = self.on
         return on.select(twice > 0.0, 2.0 * self.short / on.select(twice > 0.0, twice, 1.0), -1.0)
 

@@ -1,4 +1,4 @@
-"""Where loops are closed: in which order the constraints of loops are eliminated, and what each step of that touches.
+"""Order of elimination of the constraints of loops, and the rows that each of its steps touches.
 
 A constraint between links is carried with the articulated inertias from each towards the ground, and eliminated at
 the link where their paths meet. What is open at one link at the same time becomes coupled. For chains of loops few are

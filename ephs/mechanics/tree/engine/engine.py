@@ -209,7 +209,7 @@ class Engine:
 
     @property
     def momenta(self) -> int:
-        """How many momenta steps keep: six of each island, zeros among them."""
+        """Number of momenta that steps keep: six of each island, zeros among them."""
         own: Any = self.tables["own"][0]
         return 6 * int(own.islands)
 

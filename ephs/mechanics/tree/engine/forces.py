@@ -1,4 +1,4 @@
-"""What acts on a mechanism besides inertia and gravity: springs, friction and its heat, conduction, given wrenches."""
+"""Forces on a mechanism besides inertia and gravity: springs, friction and its heat, conduction, given wrenches."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -64,7 +64,7 @@ class Mechanism(Motion):
 
     @property
     def swept(self) -> tuple[Argument, ...]:
-        """What all sweeps take first."""
+        """First arguments of all sweeps."""
         e = self.tables
         return e.own[0].links, e.integers, e.reals, self.work.work, e.gravity
 

@@ -46,7 +46,7 @@ __all__ = [
 ]  # fmt: skip
 
 POSE, MOMENTUM, ELEMENT, RELATIVE, ENTROPY = range(5)
-"""Where a state comes from: a link's pose or momentum, a joint's element, a spring's relative pose, an entropy."""
+"""Source of a state: a link's pose or momentum, a joint's element, a spring's relative pose, an entropy."""
 
 
 class Walked(Record):
@@ -90,7 +90,7 @@ class Ends(Record):
 
 
 class Source(Record):
-    """Where a state comes from, of which link, edge or entropy, its place and its size.
+    """Source of a state: kind, link, edge or entropy, place and size.
 
     Attributes
     ----------
@@ -293,4 +293,4 @@ STATES: Final = Program(
         **dict.fromkeys(("x0", "v", "e", "lam", "f", "c", "jac", "work"), vector()), out=matrix(), fault=indices(1),
     ),
 )  # fmt: skip
-"""What is kept of a run is made of its states by this program, for all systems."""
+"""Program that makes the records of a run from its states, for all systems."""

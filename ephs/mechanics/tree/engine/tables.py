@@ -1,4 +1,4 @@
-"""What acts on a mechanism, as arrays: from the tables of a reduced scene to the records of the engine."""
+"""Forces on a mechanism as arrays: from the tables of a reduced scene to the records of the engine."""
 
 from typing import Any, NamedTuple
 
@@ -14,7 +14,7 @@ __all__ = ["Forces", "table_of"]
 
 
 class Forces(NamedTuple):
-    """What acts besides inertia and gravity: components of joints and springs, entropies, wrenches on bodies."""
+    """Forces besides inertia and gravity: components of joints and springs, entropies, wrenches on bodies."""
 
     edge: Index  # (edges, 8): kind, link of body 1, of body 2, freedoms, place of q, its size, place of r, cut joint
     part: Index  # (edges, 3): component of the potential, of friction, entropy that takes its heat; −1: none

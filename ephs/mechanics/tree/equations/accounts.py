@@ -23,7 +23,7 @@ __all__ = ["KEEP", "OWN", "Accounts"]
 OWN = 4
 """Numbers of an account before the momenta that steps keep."""
 KEEP = ("energy", "energy and momenta")
-"""What every step keeps to rounding."""
+"""Quantities that every step keeps to rounding."""
 
 
 @final
@@ -141,7 +141,7 @@ class Accounts:
                 self.largest, self.at = put, state.t
 
     def snapshot(self) -> Snapshot:
-        """What has been noted of the run, for a journal."""
+        """Notes of the run, for a journal."""
         return {"kept": self.kept, "largest": self.largest, "at": self.at, "total": self.total}
 
     def restore(self, snapshot: Snapshot) -> None:

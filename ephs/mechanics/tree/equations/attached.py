@@ -1,4 +1,4 @@
-"""What is attached to a mechanism about a point: flows and their derivatives by what they depend on."""
+"""The attached network about a point: flows and their derivatives by what they depend on."""
 
 from typing import final
 

@@ -325,7 +325,7 @@ class Equations:
         return self.rows_of([state])[0]
 
     def rows_of(self, states: Sequence[ReducedState]) -> list[Row]:
-        """What is kept of many states."""
+        """Records of many states."""
         if not states:
             return []
         x, energies = self.booking.energies(states)

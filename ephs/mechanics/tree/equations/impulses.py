@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 __all__ = ["TWIST", "Impulses"]
 
 TWIST = slice(12, 18)
-"""Where the twist of a link's row of `places` stands."""
+"""Position of the twist in a link's row of `places`."""
 
 
 @final

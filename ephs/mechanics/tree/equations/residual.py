@@ -220,7 +220,7 @@ class Residual:
 
     @property
     def out(self) -> Array:
-        """What `at` found last."""
+        """Last result of `at`."""
         return self.outs["residual"]
 
     def slopes(self) -> Slopes:

@@ -1,4 +1,4 @@
-"""Where a mechanism in joint coordinates is, and what was counted since the start."""
+"""State of a mechanism in joint coordinates, and sums since the start."""
 
 from dataclasses import dataclass, field
 from typing import final
@@ -13,7 +13,7 @@ __all__ = ["ReducedState"]
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class ReducedState:
-    """Where a mechanism is: joints' elements q, rates r of the tree, heats, and what was counted since the start.
+    """State of a mechanism: joints' elements q, rates r of the tree, heats, and sums since the start.
 
     Parameters
     ----------

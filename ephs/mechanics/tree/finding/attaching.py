@@ -1,4 +1,4 @@
-"""Where the network of what is attached meets a mechanism: freedoms, states that components read, entropies made."""
+"""Interface of the attached network and a mechanism: freedoms, states that components read, entropies made."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Where each joint of a mechanism stands in its vectors."""
+"""Positions of the joints of a mechanism in its vectors."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ __all__ = ["Layout"]
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Layout:
-    """Where each joint stands in the vectors of a mechanism.
+    """Positions of the joints in the vectors of a mechanism.
 
     Parameters
     ----------

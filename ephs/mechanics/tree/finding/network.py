@@ -125,12 +125,12 @@ class Network:
 
     @property
     def known(self) -> int:
-        """How many entries of z are given."""
+        """Number of given entries of z."""
         return self.skew.shape[0] - self.unknown
 
     @property
     def state_at(self) -> int:
-        """Where the efforts of storages start in z."""
+        """Start of the efforts of storages in z."""
         return len(self.rates) + len(self.nodes) + len(self.inputs)
 
     @property

@@ -39,7 +39,7 @@ class Acting:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Parts:
-    """What a flat system is made of.
+    """Parts of a flat system.
 
     Parameters
     ----------

@@ -43,7 +43,7 @@ class Role(Enum):
     ENVIRONMENT = auto()
     """Takes up heat at the temperature of the reference."""
     OTHER = auto()
-    """What may be attached."""
+    """Components that may be attached."""
 
 
 @final

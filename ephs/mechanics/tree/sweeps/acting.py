@@ -1,4 +1,4 @@
-"""What a mechanism's equations of motion read: tables of records, addresses of its sweeps, memory of one evaluation."""
+"""Data of a mechanism's equations of motion: tables of records, addresses of its sweeps, memory of one evaluation."""
 
 from dataclasses import dataclass
 from typing import Any, Final, final
@@ -61,7 +61,7 @@ def _loop(name: str) -> Any:
 
 
 class Own(Record):
-    """What one mechanism has of its own: the functions of its class, and what there is to do.
+    """Data of one mechanism: the functions of its class, and flags of what there is to do.
 
     Attributes
     ----------
@@ -179,7 +179,7 @@ class Body(Record):
 
 
 class Node(Record):
-    """What stores entropy: E = c1 (exp(s/c2) − 1), or the environment's θ₀ s where there is no component, −1.
+    """A store of entropy: E = c1 (exp(s/c2) − 1), or the environment's θ₀ s where there is no component, −1.
 
     Or, −2, a state of what is attached, which is advanced as it is.
     """
@@ -268,7 +268,7 @@ class Tables:
 
     @property
     def links(self) -> Integer:
-        """How many links."""
+        """Number of links."""
         return self.own[0].links
 
     @property
@@ -290,7 +290,7 @@ TABLES: Final[dict[str, Any]] = {
 @final
 @dataclass(frozen=True, slots=True)
 class Work:
-    """What one evaluation writes.
+    """Memory of one evaluation.
 
     Attributes
     ----------

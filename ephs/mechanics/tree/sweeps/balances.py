@@ -37,7 +37,7 @@ _PLACE: Final[dict[str, Any]] = {
 }  # fmt: skip
 _ABOUT: Final[dict[str, Any]] = {"q": vector(), "s": vector(), "warmth": vector(), "made": vector()}
 ATTACH: Final = signature_of(**_PLACE, **_ABOUT)
-"""How the network of a mechanism is called by its address."""
+"""Signature of the network of a mechanism, which is called by its address."""
 
 
 def solve_network(on: Evaluator, net: Net, q: Vector, s: Vector, warmth: Vector, made: Vector) -> Integer:

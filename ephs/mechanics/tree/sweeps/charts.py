@@ -24,7 +24,7 @@ class Kind:
 
 
 class Chart(Record):
-    """Where a joint's element, increment and rates lie; ``cut`` is its number among the cut joints, −1 on the tree."""
+    """Places of a joint's element, increment, rates; ``cut`` is its number among the cut joints, −1 on the tree."""
 
     code = integer()
     dim = integer()

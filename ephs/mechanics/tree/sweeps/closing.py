@@ -183,7 +183,7 @@ def carry(on: Evaluator, tree: Tree, rows: Rows, i: Integer) -> None:
 
 
 def carry_load(on: Evaluator, tree: Tree, rows: Rows, i: Integer) -> None:
-    """What the targets of the open rows lose to the joint of link i."""
+    """Change of the targets of the open rows by the joint of link i."""
 
     def through(joint: Joint, link: Link) -> None:
         if not joint.dim or joint.driven:

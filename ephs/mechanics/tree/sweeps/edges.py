@@ -88,7 +88,7 @@ class Edge(Record):
 
 
 class Law(Record):
-    """What acts in an edge, about a point.
+    """Forces in an edge about a point.
 
     Attributes
     ----------

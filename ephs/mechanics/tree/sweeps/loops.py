@@ -49,7 +49,7 @@ ARGUMENTS: Final[dict[str, dict[str, Any]]] = {
     "move": {"chart": indices(), "v": vector(), "q": vector()},
     "velocities": {"chart": indices(), **JOINT, "v": vector(), "r": vector(), "out": vector()},
 }  # fmt: skip
-"""What the entry functions take; none returns anything."""
+"""Arguments of the entry functions; none returns anything."""
 
 
 @cache

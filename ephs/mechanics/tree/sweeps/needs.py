@@ -27,7 +27,7 @@ Row = TypeVar("Row", bound=Record)
 @final
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """Where the fields of a record live.
+    """Positions of the fields of a record.
 
     Attributes
     ----------
@@ -145,7 +145,7 @@ def _bits(*values: object) -> int:
 
 
 class _Entries:
-    """What is known of the entries of memory and of variables: constants assumed, values written, dependences."""
+    """Knowledge of the entries of memory and of variables: constants assumed, values written, dependences."""
 
     def __init__(self) -> None:
         self.assumed: dict[int, float | None] = {}

@@ -170,12 +170,12 @@ class Net:
 
     @property
     def known(self) -> Integer:
-        """How many entries of z are known; the unknown ones follow."""
+        """Number of known entries of z; the unknown ones follow."""
         return self.effort.size - self.head[4]
 
     @property
     def first_state(self) -> Integer:
-        """Where efforts of storages start in z."""
+        """Start of the efforts of storages in z."""
         return self.head[0] + self.head[1] + self.head[2]
 
     # ---- sums --------------------------------------------------------------------------------------------------

@@ -81,7 +81,7 @@ class Class:
     planar: bool
 
     def constants(self, kind: int) -> dict[int, float]:
-        """What all links with a kind of joints have in common: offset in `Link` and the value, 0 or 1."""
+        """Constants of all links with a kind of joints: offset in `Link` and the value, 0 or 1."""
         turn, moment, inertia = Link.rotation.offset, Link.moment.offset, Link.inertia.offset
         own = {} if self.joints[kind].armature else {Link.armature.offset: 0.0}
         if not self.planar:
@@ -105,7 +105,7 @@ class Packed:
 
     @property
     def size(self) -> int:
-        """How many links."""
+        """Number of links."""
         return int(self.integers.size // Link.integer_width)
 
     @property

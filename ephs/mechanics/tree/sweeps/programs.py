@@ -103,7 +103,7 @@ ARGUMENTS: Final[dict[str, dict[str, Any]]] = {
         "torque": vector(),
     },
 }
-"""What the entry functions take; `accelerations`, `fold` and `dependent` return an integer."""
+"""Arguments of the entry functions; `accelerations`, `fold` and `dependent` return an integer."""
 
 
 @final
@@ -201,7 +201,7 @@ class Sweeps:
         }
 
     def _kept(self) -> dict[str, Entry]:
-        """What corrections of a step read and move."""
+        """Quantities that corrections of a step read and move."""
         along = [k for k in range(6) if k not in self._zeros]
 
         def held(

@@ -49,7 +49,7 @@ class Link(Record):
 
 
 class State(Record):
-    """What the sweeps keep of a link, in its frame.
+    """Quantities of a link that the sweeps keep, in its frame.
 
     Attributes
     ----------
@@ -118,7 +118,7 @@ class Joint:
 
     @property
     def dim(self) -> int:
-        """How many freedoms it has."""
+        """Number of its freedoms."""
         return len(self.basis)
 
     @property

@@ -52,14 +52,14 @@ ACTING: Final[dict[str, Any]] = {
     "edge": indices(), "edge_numbers": vector(), "law": vector(), "body": indices(), "body_frame": matrix(12),
     "warming": matrix(3), "passage": indices(), "flow": matrix(8), "tie": indices(), "tied": matrix(),
 }  # fmt: skip
-"""What acts: see `Edges`; links and frames of bodies, on which wrenches are given; of each entropy the temperature over
+"""Forces: see `Edges`; links and frames of bodies, on which wrenches are given; of each entropy the temperature over
 the environment's, its derivative, and the entropy there; of conductions two entropies each, what these lose, its
 derivatives by their temperatures, and the temperatures; of what is attached see `_attach`."""
 POINT: Final[dict[str, Any]] = {
     "base": vector(), "v": vector(), "q": vector(), "r": vector(), "s": vector(), "drive": vector(),
     "wrench": matrix(6), "warmth": vector(), "beyond": vector(), "pulls": vector(),
 }  # fmt: skip
-"""Where functions are evaluated: q is written; forces on all joints, wrenches on bodies; memory (entropies,), (ties,),
+"""Point of evaluation: q is written; forces on all joints, wrenches on bodies; memory (entropies,), (ties,),
 (joints' freedoms,)."""
 ACTIVE: Final = (
     "memory", "places", "motions", "value", "covector", "v", "q", "r", "s", "drive", "wrench", "warmth", "beyond",
