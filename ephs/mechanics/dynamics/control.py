@@ -63,7 +63,7 @@ def tree_only(model: "Dynamics", what: str) -> None:
         expected = (
             f"a tree, without loops, gears (here {found}) and prescribed motions: take inverse_dynamics and constraints"
         )
-        raise OptionError(what, model.scene.name, expected)
+        raise OptionError(what, model.name, expected)
 
 
 def computed_torque(

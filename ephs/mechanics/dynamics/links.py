@@ -5,7 +5,6 @@ from typing import final
 import numpy as np
 
 from ephs.mechanics.motion.views import BodyState
-from ephs.mechanics.scene.build import component_path
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.tree.equations.equations import Equations
 from ephs.semantics.bundle import Array
@@ -20,12 +19,13 @@ __all__ = ["Links"]
 class Links:
     """The links of one mechanism where `place` put them. It shares the equations' scratch memory."""
 
-    def __init__(self, scene: Scene, equations: Equations) -> None:
+    def __init__(self, equations: Equations) -> None:
         self.equations = equations
-        self._bodies = dict(scene.all_bodies())
         self._residual = equations.dense.residual
         self._q, self._r = np.zeros(equations.reduced.coordinates), np.zeros(equations.n)
-        self._number = {name: i for i, name in enumerate(equations.reduced.bodies) if name is not None}
+        found = {name: i for i, name in enumerate(equations.reduced.bodies) if name is not None}
+        scene: Scene | None = equations.problem.scene
+        self._number = found if scene is None else {name: found[name] for name, _ in scene.all_bodies()}
 
     def place(self, q: Array, r: Array) -> None:
         """Poses and twists of all links, into the scratch memory."""
@@ -33,14 +33,14 @@ class Links:
         self._q, self._r = q, r
 
     def bodies(self) -> dict[str, BodyState]:
-        """Body -> pose and twist, in the scene's order."""
+        """Body -> pose and twist, in the order of the scene, or outwards."""
         found = self._residual
-        return {name: BodyState(found.pose(i), found.twist(i)) for name, i in self._ordered()}
+        return {name: BodyState(found.pose(i), found.twist(i)) for name, i in self._number.items()}
 
     def jacobian(self, body: str, point: Array | None) -> Array:
         """(6, n) to a body's twist, or (3, n) to the velocity of a point in the world."""
         if body not in self._number:
-            raise OptionError("body", body, f"one of {', '.join(self._bodies)}")
+            raise OptionError("body", body, f"one of {', '.join(self._number)}")
         i = self._number[body]
         out = self._residual.twists(i)
         if point is None:
@@ -53,7 +53,7 @@ class Links:
     def inside(self, twists: Array) -> dict[str, Array]:
         """Body -> (6, k) twists in its frame, from (links + 1, 6, k) of the links and the ground."""
         found = self._residual
-        return {name: found.inside(i, twists[found.link(i)].T).T for name, i in self._ordered()}
+        return {name: found.inside(i, twists[found.link(i)].T).T for name, i in self._number.items()}
 
     def bias(self) -> Array:
         """(n,) C r: inertia forces at ṙ = 0."""
@@ -62,15 +62,11 @@ class Links:
     def momenta(self, states: States) -> Array:
         """(n,) what the bodies' momenta are on the tree's freedoms: M r, where they are on the joints."""
         out = np.zeros(self.equations.n)
-        for name, i in self._number.items():
-            path = component_path("bodies", name) / "ke" / "p"
-            if path in states:
-                out += self._residual.twists(i).T @ states[path]
+        for i, link in enumerate(self.equations.reduced.places):
+            if link.momentum is not None:
+                out += self._residual.twists(i).T @ states[link.momentum.path]
         return out
 
     def gravity(self) -> Array:
         """(n,) the derivative of gravity's potential."""
         return self._residual.rigid(self._q, np.zeros_like(self._r), gravity=True)
-
-    def _ordered(self) -> list[tuple[str, int]]:
-        return [(name, self._number[name]) for name in self._bodies]

@@ -25,11 +25,12 @@ class Loading:
         Part of the loads that acts: 1 after their ramps.
     """
 
-    def __init__(self, scene: Scene, equations: Equations, links: Links) -> None:
+    def __init__(self, equations: Equations, links: Links) -> None:
         self.share = 1.0
         self._equations, self._links = equations, links
         numbers = {name: i for i, name in enumerate(equations.reduced.bodies) if name is not None}
-        self._loads = [(numbers[load.body], load) for _, load in scene.all_loads()]
+        scene: Scene | None = equations.problem.scene
+        self._loads = [(numbers[load.body], load) for _, load in (() if scene is None else scene.all_loads())]
 
     def __bool__(self) -> bool:
         return bool(self._loads)

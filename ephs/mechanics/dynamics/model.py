@@ -1,9 +1,9 @@
-"""`dynamics`: a scene compiled to functions of its state."""
+"""A mechanism in joint coordinates as functions of its state."""
 
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import TYPE_CHECKING, final, overload
+from typing import TYPE_CHECKING, Any, final, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,45 +16,27 @@ from ephs.mechanics.dynamics.placing import ByJoint, Placing
 from ephs.mechanics.dynamics.results import Constraints, Derivatives, Energies, VelocityDerivatives
 from ephs.mechanics.dynamics.state import State
 from ephs.mechanics.dynamics.stepping import Steps
-from ephs.mechanics.motion.views import BodyState, Names, StateView
+from ephs.mechanics.motion.views import BodyState
 from ephs.mechanics.runs.simulate import problem_of_scene
-from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.mechanics.tree.equations.paper import PaperStates
 from ephs.mechanics.tree.equations.tangent import Linearised
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.solve.errors import OptionError, failing_at
+from ephs.solve.problem import Problem
 from ephs.solve.problem import State as States
 from ephs.solve.sparse import Index
 
 if TYPE_CHECKING:
     from ephs.mechanics.methods.registry import Method
 
-__all__ = ["Dynamics", "dynamics"]
-
-
-def dynamics(scene: Scene) -> "Dynamics":
-    """A scene compiled to functions of its state.
-
-    Parameters
-    ----------
-    scene
-        With its drives, springs, friction and prescribed motions; its initial state is ``state0``.
-
-    Raises
-    ------
-    OptionError
-        The reduced form cannot have the scene: a loop of prescribed joints.
-    SimulationError
-        The initial state contradicts the joints.
-    """
-    return Dynamics(scene)
+__all__ = ["Dynamics"]
 
 
 @final
 class Dynamics:
-    """A scene as functions of its state. No call changes a state, or what a later call gives.
+    """A mechanism as functions of its state. No call changes a state, or what a later call gives.
 
     Vectors and matrices count the n freedoms of the spanning tree's joints, as ``freedoms`` says; at a joint that
     closes a loop (``cut``) the loop is closed by constraints. It keeps scratch memory: use one for each thread.
@@ -62,19 +44,20 @@ class Dynamics:
     Attributes
     ----------
     state0
-        The scene's initial state, its loops closed.
+        The initial state, its loops closed.
     loading
-        Its loads, which act in full unless ``loading.share`` is less.
+        Loads of a scene, which act in full unless ``loading.share`` is less.
     """
 
-    def __init__(self, scene: Scene) -> None:
-        self.scene = scene
-        self._problem = problem_of_scene(scene)
+    def __init__(self, problem: Problem) -> None:
+        self.scene: Any = problem.scene
+        self.name = problem.name
+        self._problem = problem
         self._equations = Equations(self._problem, 0.0, pushed=True)
         self._linear = Linearised(self._equations)
         self.layout = self._equations.layout
-        self._links, self._names = Links(scene, self._equations), Names(scene)
-        self.loading = Loading(scene, self._equations, self._links)
+        self._links = Links(self._equations)
+        self.loading = Loading(self._equations, self._links)
         self.placing, self._steps = Placing(self._equations), Steps(self._problem, self._equations)
         with failing_at(0.0):
             start = self._equations.start(0.0)
@@ -82,7 +65,7 @@ class Dynamics:
 
     def __repr__(self) -> str:
         cut = f", {', '.join(self.cut)} cut" if self.cut else ""
-        return f"Dynamics({self.scene.name!r}: {self.layout.n} freedoms of {len(self.joints)} joints{cut})"
+        return f"Dynamics({self.name!r}: {self.layout.n} freedoms of {len(self.joints)} joints{cut})"
 
     def _repr_html_(self) -> str:  # pyright: ignore[reportUnusedFunction] - notebooks call it
         from ephs.show.notebook import dynamics_html
@@ -114,7 +97,7 @@ class Dynamics:
     def state(self, coordinates: ByJoint | None = None, rates: ByJoint | None = None, *, adjust: bool = False) -> State:
         """The initial state with some joints elsewhere, as `Scene.with_state` has it; `closed` turns geared joints.
 
-        Of a tree all joints' may be given as arrays (n,).
+        Of a tree all joints' may be given as arrays (n,). Of a system the nearest state whose loops are closed.
 
         Raises
         ------
@@ -125,6 +108,8 @@ class Dynamics:
         if made is not None:
             return made
         by_name = [self.layout.named("state", given) for given in (coordinates, rates)]
+        if self.scene is None:
+            return self.closed(self.placing.moved(self.state0, *by_name))
         scene = self.scene.with_state(*by_name, adjust=adjust)
         return self._of_states(problem_of_scene(scene).initial)
 
@@ -169,9 +154,9 @@ class Dynamics:
         self._at(state)
         return self._links.bodies()
 
-    def view(self, state: State) -> StateView:
+    def view(self, state: State) -> Any:
         """The state by names, as functions of inputs read it: ``view.joints.pin.rate``."""
-        return self._names.view(self._equations.states(self._reduced(state)))
+        return self._problem.view(self._equations.states(self._reduced(state)))
 
     def states(self, state: State) -> dict[Path, Array]:
         """All states of the scene's system by path, as `simulate` takes them for ``initial``."""

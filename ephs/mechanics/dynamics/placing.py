@@ -11,6 +11,7 @@ from ephs.mechanics.tree.equations.equations import Equations
 from ephs.mechanics.tree.finding.layout import Layout
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.codes import VECTOR
+from ephs.solve.errors import OptionError
 
 __all__ = ["ByJoint", "Placing"]
 
@@ -55,6 +56,20 @@ class Placing:
         r = self.rates(first.r, {} if rates is None else rates)
         if q is None or r is None:
             return None
+        return State(np.concatenate([q, r, first.entropies]), self.layout, first.cut_rates)
+
+    def moved(self, first: State, coordinates: Mapping[str, ArrayLike], rates: Mapping[str, ArrayLike]) -> State:
+        """A state with some joints elsewhere, whose loops may be open.
+
+        Raises
+        ------
+        OptionError
+            What is given does not fit a joint.
+        """
+        q, r = self.elements(first.q, coordinates), self.rates(first.r, rates)
+        if q is None or r is None:
+            expected = ", ".join(f"{name} {where.size}" for name, where in self.layout.freedoms.items())
+            raise OptionError("state", {**coordinates, **rates}, f"finite numbers, as many as freedoms: {expected}")
         return State(np.concatenate([q, r, first.entropies]), self.layout, first.cut_rates)
 
     def elements(self, q: Array, given: ByJoint) -> Array | None:

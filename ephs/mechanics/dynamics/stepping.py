@@ -5,11 +5,13 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ephs.mechanics.dynamics.placing import ByJoint
 from ephs.mechanics.methods.explicit import tableau
 from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.methods.registry import Setting, chosen
+from ephs.mechanics.runs.pushes import sum_of
 from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
@@ -17,7 +19,7 @@ from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.solve.control import Control, Tolerance
 from ephs.solve.errors import OptionError
-from ephs.solve.problem import Problem
+from ephs.solve.problem import Problem, Signal
 
 if TYPE_CHECKING:
     from ephs.mechanics.methods.registry import Method
@@ -63,14 +65,32 @@ class Steps:
         if isinstance(stepper, ReducedMethod):
             return stepper.step(state, h).end
         if forces is not None:
-            by_name = self._equations.layout.named("forces", forces)
-            scene: Scene = self._problem.scene
-            implicit = dict(scene.implicit_joints())
-            inputs = {f"{'bodies' if name in implicit else 'joints'}.{name}": force for name, force in by_name.items()}
-            driven = replace(problem_of_scene(scene, None, inputs), initial=states)
+            driven = replace(self._driven(self._equations.layout.named("forces", forces)), initial=states)
             stepper, _ = of.make(replace(setting, problem=driven, equations=None))
         start = stepper.start(0.0, h)
         return self._problem.descriptor.unpack(stepper.row(stepper.step(start, h).end).x)
+
+    def _driven(self, forces: Mapping[str, ArrayLike]) -> Problem:
+        """The problem under further forces on joints.
+
+        Raises
+        ------
+        OptionError
+            A joint of a system has no outer port where a force could be given.
+        """
+        scene: Scene | None = self._problem.scene
+        if scene is not None:
+            implicit = dict(scene.implicit_joints())
+            inputs = {f"{'bodies' if name in implicit else 'joints'}.{name}": force for name, force in forces.items()}
+            return problem_of_scene(scene, None, inputs)
+        signals = dict(self._problem.signals)
+        for name, force in forces.items():
+            values = np.atleast_1d(np.asarray(force, dtype=float))
+            for _, edge in self._equations.layout.edges[name]:
+                if edge.port is None or signals[edge.port].effort:
+                    raise OptionError("forces", name, "joints with an outer port where a force is given")
+                signals[edge.port] = sum_of(signals[edge.port], Signal(values[edge.freedoms]))
+        return replace(self._problem, signals=signals)
 
     def _explicit(self, state: ReducedState, h: float, method: str) -> ReducedState:
         """A step without its error."""

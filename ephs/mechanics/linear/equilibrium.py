@@ -110,7 +110,7 @@ def equilibrium(
 
 
 def _of_scene(scene: Scene) -> Equilibrium:
-    from ephs.mechanics.dynamics import Dynamics
+    from ephs.mechanics.dynamics import dynamics
 
     if motors := [name for name, _ in scene.all_motors()]:
         found = f"a scene with the motor {motors[0]}"
@@ -118,7 +118,7 @@ def _of_scene(scene: Scene) -> Equilibrium:
     moving = [name for name, joint in scene.all_joints() if joint.motion]
     if moving:
         raise _none(f"joints.{moving[0]}", "its motion is prescribed")
-    model = Dynamics(_resting(scene))
+    model = dynamics(_resting(scene))
     if model.loading:
         return _loaded(model)
     state, left, steps = _settled(model)

@@ -73,7 +73,7 @@ def linearize(
         raise OptionError("reference", reference, "none: a scene's [world] has its own")
     if isinstance(inputs, Mapping):
         raise OptionError("inputs", inputs, "names of joints, bodies and markers")
-    from ephs.mechanics.dynamics import Dynamics, State
+    from ephs.mechanics.dynamics import State, dynamics
     from ephs.mechanics.linear.scene import linear_scene
 
     if isinstance(state, Equilibrium):
@@ -85,13 +85,13 @@ def linearize(
         )
     if form == "reduced":
         return linear_scene(model, state, inputs, outputs)
-    dynamics = Dynamics(model)
-    at = dynamics.state0 if state is None else state
+    mechanism = dynamics(model)
+    at = mechanism.state0 if state is None else state
     assert isinstance(at, State)
     from ephs.mechanics.runs.simulate import problem_of_scene
 
     return linear_system(
-        problem_of_scene(model).system, dynamics.states(at), _driven(model), outputs, _reference(model), model.name
+        problem_of_scene(model).system, mechanism.states(at), _driven(model), outputs, _reference(model), model.name
     )
 
 

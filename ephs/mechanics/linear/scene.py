@@ -14,7 +14,7 @@ from typing import Any, final
 
 import numpy as np
 
-from ephs.mechanics.dynamics import Derivatives, Dynamics, State
+from ephs.mechanics.dynamics import Derivatives, Dynamics, State, dynamics
 from ephs.mechanics.linear.statespace import StateSpace
 from ephs.mechanics.linear.structure import PortHamiltonian
 from ephs.mechanics.runs.simulate import problem_of_scene
@@ -98,7 +98,7 @@ def linear_scene(
     scene: Scene, state: State | None, inputs: Sequence[str] | None, outputs: Sequence[str] | None
 ) -> StateSpace:
     """See `ephs.linearize`."""
-    model = Dynamics(scene)
+    model = dynamics(scene)
     at = model.state0 if state is None else model.closed(state)
     return _Linear(model, at, inputs, outputs).whole()
 

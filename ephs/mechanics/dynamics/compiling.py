@@ -1,0 +1,48 @@
+"""`dynamics`: a scene or a system compiled to functions of its state."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+from ephs.mechanics.dynamics.model import Dynamics
+from ephs.mechanics.runs.simulate import problem_of_scene, problem_of_system
+from ephs.mechanics.scene.model import Scene
+from ephs.semantics.bundle import Reference
+from ephs.semantics.system import System
+from ephs.solve.errors import OptionError
+
+__all__ = ["dynamics"]
+
+
+def dynamics(
+    scene: Scene | System,
+    *,
+    initial: Mapping[str, ArrayLike] | None = None,
+    inputs: Mapping[str, Any] | None = None,
+    reference: Reference | None = None,
+) -> Dynamics:
+    """A scene, or a system with bodies in it, compiled to functions of its state.
+
+    Parameters
+    ----------
+    scene
+        With its drives, springs, friction and prescribed motions; its initial state is ``state0``. Bodies and joints of
+        a system have the paths of their boxes for names.
+    initial, inputs, reference
+        Of a system, as `simulate` takes them.
+
+    Raises
+    ------
+    OptionError
+        The reduced form cannot have the model: a loop of prescribed joints; or what a scene says itself is given.
+    Unplaced
+        A component of a system has no place in joint coordinates.
+    SimulationError
+        The initial state contradicts the joints.
+    """
+    if not isinstance(scene, Scene):
+        return Dynamics(problem_of_system(scene, initial, inputs, reference))
+    if given := [name for name, of in (("initial", initial), ("inputs", inputs), ("reference", reference)) if of]:
+        raise OptionError(given[0], "a value", "none: a scene has its own")
+    return Dynamics(problem_of_scene(scene))
