@@ -36,8 +36,8 @@ class Attachment:
         return self.integers[at : at + size]
 
 
-def attachment_of(reduced: "Reduced") -> Attachment:
-    """The arrays of a mechanism's network."""
+def attachment_of(reduced: "Reduced", address: Index) -> Attachment:
+    """The arrays of a mechanism's network, its components' relations at addresses (components,)."""
     t, there = reduced.tables, reduced.attaching
     net = there.network
     size, nodes = net.skew.shape[0], len(reduced.entropies) - len(net.states)
@@ -47,10 +47,10 @@ def attachment_of(reduced: "Reduced") -> Attachment:
     stores: list[list[int]] = []
     for component, first in net.storages:
         n = int(t.dims[component, 0])
-        stores.append([*_head(reduced, component), first, net.state_at + first, kept])
+        stores.append([*_head(reduced, address, component), first, net.state_at + first, kept])
         kept += n * n
     for one, read, flows in zip(net.attached, there.reads, there.flows, strict=True):
-        called.append([*_head(reduced, one.component), len(rows), len(reads), kept])
+        called.append([*_head(reduced, address, one.component), len(rows), len(reads), kept])
         reads += read.tolist()
         n, k, nv, _ = t.dims[one.component].tolist()
         kept += (n + k) * (n + k + nv)
@@ -90,9 +90,9 @@ def _places(parts: Sequence[Array | Index], first: int) -> Index:
     return np.column_stack([first + starts(size), size]).ravel()
 
 
-def _head(reduced: "Reduced", component: int) -> list[int]:
+def _head(reduced: "Reduced", address: Index, component: int) -> list[int]:
     t = reduced.tables
-    return [int(t.address[component]), *t.dims[component].tolist(), int(t.parameter_at[component]), component]
+    return [int(address[component]), *t.dims[component].tolist(), int(t.parameter_at[component]), component]
 
 
 def _sparse(row: Array) -> tuple[Index, Array]:

@@ -110,7 +110,7 @@ def _plan(
     cut, cut_frame, cut_basis, ends = _cut(reduced, bodies, ground, kept)
     charts = _chart(reduced, cut)
     forces = _forces(reduced, bodies, ground, cut, acted)
-    net = attachment_of(reduced)
+    net = attachment_of(reduced, reduced.tables.resting)
     attached = reduced.attaching.network.acts
     forced = bool(forces.edge.size or forces.conduction.size or np.any(forces.body != -1) or attached)
     driven = any(part.joint.driven for part in found.parts)

@@ -39,7 +39,11 @@ class Attached:
         self.there = bool(net.skew.size)
         self.tie = np.array(places, dtype=np.int64).ravel()
         self.tied = np.zeros((len(places), 2 + len(places)))
-        self._count, self._net, self._theta = (net.known, len(there.bent)), attachment_of(reduced), float(scal[1])
+        self._count, self._net, self._theta = (
+            (net.known, len(there.bent)),
+            attachment_of(reduced, reduced.tables.address),
+            float(scal[1]),
+        )
         self._ports, self._nodes, self._states, self._bent = there.ports, list(net.nodes), nodes, there.bent[:, 0]
         self._slopes = np.zeros((net.known, len(places)))
         self._first = net.state_at

@@ -8,6 +8,7 @@ import numpy as np
 
 from ephs.mechanics.tree.finding.attaching import Attaching, attaching_of, makers_of
 from ephs.mechanics.tree.finding.frames import GROUND, Frame, Link, Unplaced
+from ephs.mechanics.tree.finding.network import Network
 from ephs.mechanics.tree.finding.parts import Acting, Parts, parts_of
 from ephs.mechanics.tree.finding.spanning import Edge, frames_of_joints, loop_algebra, spanning_tree, twists_of
 from ephs.mechanics.tree.finding.tables import CUT, SPRING, TREE, Mechanism
@@ -256,7 +257,7 @@ def _tables(
         conduction=np.array(parts.conduction, dtype=np.int64).reshape(-1, 3),
         sink=np.array(sinks, dtype=np.int64).reshape(-1, 3),
         address=t.address,
-        resting=_resting(components, t.address, np.unique([spring, friction])),
+        resting=_resting(components, t.address, np.unique([*spring, *friction, *_called(parts.network)])),
         dims=t.dims,
         parameters=t.parameters,
         parameter_at=t.parameter_at,
@@ -264,10 +265,16 @@ def _tables(
     )
 
 
-def _resting(components: Sequence[ComponentSlot], address: Index, edges: Index) -> Index:
-    """Addresses, of what acts in edges those of its relation at rest, where it is not called back in Python."""
+def _called(network: Network) -> list[int]:
+    """Components whose derivatives the network's flows do not need."""
+    every = [number for number, _ in network.storages] + [one.component for one in network.attached]
+    return [] if network.unknown else every
+
+
+def _resting(components: Sequence[ComponentSlot], address: Index, acting: Index) -> Index:
+    """Addresses, of what acts those of its relation at rest, where it is not called back in Python."""
     found = address.copy()
-    for number in edges[edges >= 0].tolist():
+    for number in acting[acting >= 0].tolist():
         kernel = components[number].primitive.kernel
         if kernel is not None:
             found[number] = compiled(kernel.relation, rest=True).address

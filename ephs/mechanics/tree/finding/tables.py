@@ -41,7 +41,7 @@ class Mechanism(NamedTuple):
     conduction: Index  # (conductions, 3): component, entropy, entropy
     sink: Index  # (sinks, 3): place of what it makes, entropy that takes it or −1, first place of its component
     address: Index  # (components,): of its relation over a step
-    resting: Index  # (components,): at rest, of what acts in edges
+    resting: Index  # (components,): at rest, of what acts
     dims: Index  # (components, 4)
     parameters: Array
     parameter_at: Index
