@@ -67,6 +67,21 @@ def threads() -> set[int]:
     return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
 
 
+def test_libraries_that_come_later_take_one_thread_too():
+    """SUNDIALS brings a library of its own when it is first imported."""
+    text = """
+from threadpoolctl import threadpool_info, threadpool_limits
+from ephs.solve.threads import in_one_thread
+seen = in_one_thread(lambda: {each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"})
+for module in ("numpy", "sksundae.ida"):
+    __import__(module)
+    with threadpool_limits(2, "blas"):
+        print(module, seen())
+"""
+    said = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, cwd=ROOT, check=True).stdout
+    assert said == "numpy {1}\nsksundae.ida {1}\n"
+
+
 def test_linear_algebra_takes_one_thread_until_the_last_call_is_done():
     seen = []
 

@@ -361,7 +361,7 @@ def test_messages_steer_no_terminal(tmp_path):
         ephs.load(path)
     assert all(line.isprintable() for line in str(caught.value).splitlines())
     model = tmp_path / "model.urdf"
-    model.write_text(URDF.replace('name="j"', 'name="&#x9b;2J"'))
+    model.write_text(URDF.replace('name="j"', 'name="&#x9b;2J"').replace('<mimic joint="j"/>', ""))
     with pytest.warns(ephs.ModelWarning) as told:
         ephs.load(model)
     assert all(line.isprintable() for each in told for line in str(each.message).splitlines())

@@ -1,8 +1,8 @@
 """Ordering and fill of a sparse LU factorisation, decided once; the numbers follow in compiled code.
 
-SuperLU chooses the pivots at sample values (columns by minimum degree, rows by size), once as they come, once with rows
-and columns paired by large entries. The fill of exactly this order is then known, and each later factorisation only
-computes numbers in fixed places, watching its pivots.
+SuperLU chooses the pivots at sample values (columns by minimum degree, rows by size), once as they come, once, of
+large matrices, with rows and columns paired by large entries. The fill of exactly this order is then known, and each
+later factorisation only computes numbers in fixed places, watching its pivots.
 """
 
 from dataclasses import dataclass
@@ -19,6 +19,8 @@ Index = NDArray[np.int64]
 
 FAINT = 1e-12
 """Entries below this part of the largest count alike where diagonals are chosen."""
+MANY = 1000
+"""Unknowns from which on rows and columns are paired: of fewer fill does not matter, and small pivots tell of ranks."""
 FINE = 2.0**20
 """Logarithms of entries are whole numbers of this part of one."""
 
@@ -65,7 +67,7 @@ def order(n: int, row: Index, column: Index, value: Array) -> Elimination:
     scale_r, scale_c = equilibrate(n, row, column, value)
     scaled = value * scale_r[row] * scale_c[column]
     matrix = sparse.csc_matrix((scaled, (row, column)), shape=(n, n))
-    by_size = paired(n, row, column, scaled)
+    by_size = paired(n, row, column, scaled) if n > MANY else np.arange(n)
     plans: list[_Plan] = []
     for choice, given in (("COLAMD", np.arange(n)), ("MMD_AT_PLUS_A", by_size)):
         symmetric = {"SymmetricMode": choice != "COLAMD"}

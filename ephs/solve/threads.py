@@ -1,5 +1,6 @@
 """Linear algebra in one thread. With several, a library takes sums in another order, and the last digits are others."""
 
+import sys
 from collections.abc import Callable
 from functools import wraps
 from importlib import import_module
@@ -16,22 +17,24 @@ Made = TypeVar("Made")
 class _Limit:
     """Number of calls that want one thread: the first sets it, the last restores the former number.
 
-    The libraries are looked for once, which takes a millisecond.
+    Libraries are looked for again where modules were imported since, which may bring others; it takes a millisecond.
     """
 
-    __slots__ = ("_before", "_calls", "_found", "_lock")
+    __slots__ = ("_before", "_calls", "_found", "_lock", "_modules")
 
     def __init__(self) -> None:
         self._calls, self._lock = 0, Lock()
         self._before: Any = None
         self._found: Any = None
+        self._modules = 0
 
     def __enter__(self) -> None:
         with self._lock:
             if self._calls == 0:
-                if self._found is None:
-                    import_module("scipy.linalg")  # it brings a library of its own, which has to be there to be limited
-                    self._found = import_module("threadpoolctl").ThreadpoolController()
+                import_module("scipy.linalg")  # it brings a library of its own, which has to be there to be limited
+                controller = import_module("threadpoolctl").ThreadpoolController
+                if len(sys.modules) != self._modules:
+                    self._found, self._modules = controller(), len(sys.modules)
                 self._before = self._found.limit(limits=1, user_api="blas")
             self._calls += 1
 

@@ -112,6 +112,7 @@ class March:
         a: Any = self.account[0]
         (a.anchor, a.left, a.put, a.total), self.momenta[:] = np.split(start.account[: self.own], [OWN])
         a.chosen, a.begins = int(span.policy is not None), int(not (np.isnan(a.anchor) or start.books.any()))
+        a.alone = int(kept is not None and span.policy is None)  # constant implicit steps may not resolve fast modes
         given = arrays, self.memory, self.steering, self.account
         self.march = eq.engine.bind("march", *given, 0) if kept is None else eq.engine.implicit(*given, kept.memory, 0)
         c, policy, control = self.control, span.policy, span.control

@@ -28,6 +28,8 @@ REAL = 1e-12
 """Imaginary part of an eigenvalue, beside its size, that is rounding."""
 ROUNDING = 1e-14
 """Tolerances to which stages are solved at constant steps."""
+KEPT = 0.3
+"""As `Stages.enough`, at constant steps: with a kept matrix errors fall by a rate, and not as squares."""
 FAST = 2e-3
 """A rate of convergence that a new matrix would not better: an exact one costs about as much as an iteration."""
 
@@ -49,9 +51,9 @@ class Stages:
         Of what counts in an error; near rounding where steps are constant.
     inverse
         Of the coefficients.
-    enough, rough
-        Change of an iteration, relative to what is allowed, after which stages are solved; that is good enough where
-        the iteration gets no further.
+    enough, enough_kept, rough
+        Change of an iteration, relative to what is allowed, after which stages are solved; where the matrix is kept;
+        that is good enough where the iteration gets no further.
     """
 
     def __init__(
@@ -63,9 +65,10 @@ class Stages:
             # As far as Newton's method is taken, relative to the tolerance: less than the method's own error.
             least = float(np.min(self.rtol, initial=1.0))
             self.enough, self.rough = max(SOLVED / max(least, SOLVED), min(0.03, least**0.5)), 1e-2
+            self.enough_kept = self.enough
         else:  # to rounding, and near changes of rank as far as it goes
             self.rtol, self.atol = np.full_like(self.rtol, ROUNDING), np.full_like(self.atol, ROUNDING)
-            self.enough, self.rough = 1.0, 1e5
+            self.enough, self.rough, self.enough_kept = 1.0, 1e5, KEPT
         values, vectors = np.linalg.eig(self.inverse)
         sizes, turns = np.abs(values), np.imag(values)
         kept = np.flatnonzero(turns >= -REAL * sizes)
@@ -214,7 +217,7 @@ class Kept:
         out = np.column_stack([np.real(vectors[:, one]), np.real(vectors[:, pair]), np.imag(vectors[:, pair])])
         self.newton = Newton.table(1)
         n: Any = self.newton[0]
-        n.enough, n.rough, n.stale = stages.enough, stages.rough, 1
+        n.enough, n.rough, n.stale = stages.enough_kept, stages.rough, 1
         # In these coordinates the inverse is (growth, −turning; turning, growth) on the pair.
         n.decay, n.growth, n.turning = float(real[one]), float(real[pair]), -float(imaginary[pair])
         shapes: dict[str, tuple[int, ...]] = {

@@ -165,6 +165,7 @@ def test_a_run_that_was_stopped_goes_on_with_the_momenta_that_it_had(method, ste
     with pytest.MonkeyPatch.context() as patch:
         for module in (integrate, loop):  # progress is told at every step
             patch.setattr(module, "RESPONSE", -1.0)
+        patch.setattr(loop, "BURST", 8)  # of compiled ones after so many
         with pytest.raises(ephs.SimulationError) as stopped:
             going(journal=journal, progress=stop)
     assert 0.0 < stopped.value.time < 1.0

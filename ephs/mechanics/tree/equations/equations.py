@@ -358,7 +358,7 @@ class Equations:
     @property
     def unknowns(self) -> int:
         """Places and rates of the tree's freedoms, and a multiplier for each equation of a loop that is kept."""
-        return 2 * self.n + len(self.engine.closing.end)
+        return 2 * self.n + len(self.engine.closing.row)
 
     def states(self, state: ReducedState) -> JointStates:
         """All states of the system."""
