@@ -1,8 +1,8 @@
 """A rod that falls from level, clamped at one end: error over processor time, here, by PyElastica and by Exudyn.
 
 All have the same section in numbers. The error is the largest distance of the tip from a refined run at the same
-instants, relative to the length. Set-up is not counted, nor is compiling. How the set-up and a step grow with the
-number of elements is in a second table. Programs that are not installed are left out.
+instants, relative to the length. Reading the model and compiling are not counted; the set-up of a run is. How the
+set-up and a step grow with the number of elements is in a second table. Programs that are not installed are left out.
 """
 
 import sys
