@@ -103,6 +103,12 @@ class Draft:
             **{key: value for key, value in entries.items() if np.any(value)},
         }
 
+    def dry(self, name: str, force: float, freedoms: int) -> dict[str, Any]:
+        """Entries of dry friction; a note of it where the joint has several freedoms."""
+        if force and freedoms != 1:
+            self.leave("dry friction of joints with several freedoms", name)
+        return {"dry": {"coulomb": float(force)}} if force and freedoms == 1 else {}
+
     def limit(self, name: str, lower: float, upper: float) -> None:
         """Put stops to a joint of one freedom, or note that it has limits."""
         sides = [float(value) if abs(value) < UNLIMITED else np.nan for value in (lower, upper)]
@@ -126,7 +132,8 @@ class Draft:
     def hold(self, name: str) -> None:
         """Keep a joint of one freedom where it is."""
         entries = self._joints[self._joint_names[name]]
-        entries.pop("armature", None)
+        for key in ("armature", "dry"):
+            entries.pop(key, None)
         entries["motion"] = {"rate": 0.0}
 
     def gear(self, name: str, first: str, second: str, ratio: float, offset: float = 0.0) -> None:

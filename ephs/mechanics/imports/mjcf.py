@@ -23,9 +23,20 @@ from ephs.semantics.spaces import SE3
 __all__ = ["read_mjcf"]
 
 Inertias = dict[int, tuple[float, Any]]
+DIMENSIONS = {"free": 6, "spherical": 3, "prismatic": 1, "revolute": 1}
 READ = (
     *("body_mass", "body_inertia", "body_pos", "body_quat", "body_ipos", "body_iquat", "qpos0", "qpos_spring"),
-    *("jnt_pos", "jnt_axis", "jnt_range", "jnt_stiffness", "dof_damping", "eq_data", "site_pos", "site_quat"),
+    *(
+        "jnt_pos",
+        "jnt_axis",
+        "jnt_range",
+        "jnt_stiffness",
+        "dof_damping",
+        "dof_frictionloss",
+        "eq_data",
+        "site_pos",
+        "site_quat",
+    ),
     *("geom_pos", "geom_quat", "geom_size", "mesh_pos", "mesh_quat", "mesh_scale"),
 )
 
@@ -149,18 +160,23 @@ def _joints(model: Any, b: int, names: Names, threads: Mapping[int, Thread], dra
             assert turned is not None  # MuJoCo makes axes unit vectors
             frame = turned
         after = body if last else draft.frame_without_mass(names.between(b, j))
-        entries = _passive(model, j, kind)
+        entries = _passive(model, j, kind) | draft.dry(names.joints[j], _dry(model, j), DIMENSIONS[kind])
         if thread is not None:
             kind, entries["pitch"] = "screw", thread.pitch
             slide = _passive(model, thread.slide, "prismatic")
             for key in ("friction", "armature"):
                 entries[key] += thread.pitch**2 * slide[key]
+            entries |= draft.dry(names.joints[j], _dry(model, j) + abs(thread.pitch) * _dry(model, thread.slide), 1)
         draft.joint(names.joints[j], kind, before, after, SE3.compose(at, frame), frame, entries)
         if kind in ("revolute", "prismatic") and _limited(model, j):
             draft.limit(names.joints[j], *(model.jnt_range[j] - model.qpos0[int(model.jnt_qposadr[j])]))
         elif model.jnt_limited[j]:
             draft.leave("limits of", names.joints[j])
         before, at = after, pose()
+
+
+def _dry(model: Any, j: int) -> float:
+    return float(model.dof_frictionloss[model.jnt_dofadr[j]])
 
 
 def _limited(model: Any, j: int) -> bool:

@@ -49,7 +49,6 @@ def noted(model: Any, names: Names, draft: Draft) -> None:
         "rotor inertia (armature) of joints with several freedoms": [
             name for name in dofs(model.dof_armature) if names.kinds[names.joints.index(name)] in ("free", "spherical")
         ],
-        "dry friction of": dofs(model.dof_frictionloss),
         "damping that is not linear of": dofs(model.dof_dampingpoly),
         "stiffness that is not linear of": joints(model.jnt_stiffnesspoly),
         "compensation of gravity on": bodies(model.body_gravcomp),

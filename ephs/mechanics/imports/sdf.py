@@ -256,8 +256,8 @@ def _direction(
 
 def _dynamics(name: str, joint: Element, kind: str, count: int, draft: Draft) -> dict[str, Any]:
     """Friction, stiffness and rest, a number an axis; damping of a ball joint is about all axes."""
-    rows: dict[str, list[float]] = {"friction": [], "stiffness": [], "rest": []}
-    words = {"friction": "damping", "stiffness": "spring_stiffness", "rest": "spring_reference"}
+    words = {"friction": "damping", "dry": "friction", "stiffness": "spring_stiffness", "rest": "spring_reference"}
+    rows: dict[str, list[float]] = {entry: [] for entry in words}
     for tag in ("axis", "axis2")[: max(count, 1)]:
         axis, key = joint.find(tag), f"joints.{name}.{tag}"
         dynamics = None if axis is None else axis.find("dynamics")
@@ -268,18 +268,16 @@ def _dynamics(name: str, joint: Element, kind: str, count: int, draft: Draft) ->
                 what = "a number not below 0"
                 draft.faults.append(fault("range", f"{key}.dynamics.{word}", f"{value:g}", what=what))
             rows[entry].append(value)
-        dry = None if dynamics is None else dynamics.findtext("friction")
-        if numbers(dry, 1, f"{key}.dynamics.friction", draft.faults, (0.0,))[0]:
-            draft.leave("dry friction of", name)
         if axis is not None and axis.find("limit") is not None and kind != "fixed":
             draft.leave("limits of", name)
         if axis is not None and axis.find("mimic") is not None:
             draft.leave("mimicry of", name)
     if kind == "fixed":
         return {}
+    dry = draft.dry(name, max(rows.pop("dry")), 3 if kind == "spherical" else count)
     if kind == "spherical":
         return {"friction": rows["friction"][0]}
-    return dict(rows) if count > 1 else {entry: values[0] for entry, values in rows.items()}
+    return dict(rows) if count > 1 else {entry: values[0] for entry, values in rows.items()} | dry
 
 
 def _pitch(joint: Element, key: str, draft: Draft) -> float:

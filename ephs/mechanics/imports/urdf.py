@@ -8,7 +8,7 @@ import numpy as np
 from ephs.mechanics.imports.draft import WORLD, Draft, along, pose, turned_tensor
 from ephs.mechanics.imports.elements import check_kind, check_link, check_mass, named, tensor
 from ephs.mechanics.imports.xml import numbers, vector
-from ephs.mechanics.scene.errors import did_you_mean, fault, listing
+from ephs.mechanics.scene.errors import fault
 from ephs.mechanics.scene.geometry import coupling
 from ephs.semantics.spaces import SE3
 
@@ -151,13 +151,13 @@ def _joint(name: str, joint: Element, parent: str, child: str, draft: Draft) -> 
     dynamics, d = joint.find("dynamics"), coupling(kind).dim
     entries: dict[str, object] = {}
     if dynamics is not None:
-        damping = _attribute(dynamics, "damping", f"{key}.dynamics", draft, 0.0)
-        if damping < 0.0:
-            draft.faults.append(fault("range", f"{key}.dynamics.damping", f"{damping:g}", what="a number not below 0"))
-        elif d:
-            entries["friction"] = damping
-        if _attribute(dynamics, "friction", f"{key}.dynamics", draft, 0.0):
-            draft.leave("dry friction of", name)
+        losses = {word: _attribute(dynamics, word, f"{key}.dynamics", draft, 0.0) for word in ("damping", "friction")}
+        for word, value in losses.items():
+            if value < 0.0:
+                draft.faults.append(fault("range", f"{key}.dynamics.{word}", f"{value:g}", what="a number not below 0"))
+        if d:
+            entries["friction"] = losses["damping"]
+            entries |= draft.dry(name, losses["friction"], d)
         for other in set(dynamics.attrib) - {"damping", "friction"}:
             draft.leave("joint dynamics", f"{other} of {name}")
     draft.joint(name, kind, parent, child, SE3.compose(origin, turned), turned, entries)
@@ -181,8 +181,7 @@ def _mimic(name: str, joint: Element, joints: Mapping[str, Element], draft: Draf
     followed = joints.get(other)
     moves = [KINDS.get(str(each.get("type"))) for each in (joint, followed) if each is not None]
     if followed is None:
-        hint = did_you_mean(other, joints, f"there are: {listing(joints)}")
-        draft.faults.append(fault("unknown joint", f"{key}.joint", f'"{other}"', hint=hint))
+        draft.leave("mimicry of", f"{name} (of {other}, which is not there)")
     elif other == name or set(moves) - {"revolute", "prismatic"} or (followed.find("mimic") is not None and offset):
         draft.leave("mimicry of", f"{name} (of {other})")
     else:

@@ -6,6 +6,7 @@ coordinate; a body without a velocity likewise, at its rate. What then remains o
 unless the scene is adjusted.
 """
 
+import math
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TypeAlias
@@ -207,10 +208,9 @@ def _joint(draft: JointDraft, link: Link, x: Array, rate: Array) -> Joint:
 
 
 def gyration(bodies: Iterable[tuple[float, Array]]) -> float:
-    """The largest radius of gyration in m of bodies with these masses and inertias (3, 3)."""
-    return max(
-        (float(np.sqrt(np.trace(inertia) / (2.0 * mass))) for mass, inertia in bodies if mass > 0.0), default=0.0
-    )
+    """The largest radius of gyration in m of bodies with masses and inertias (3, 3); some models have negative ones."""
+    squares = (float(np.trace(inertia)) / (2.0 * mass) for mass, inertia in bodies if mass > 0.0)
+    return math.sqrt(max((0.0, *squares)))
 
 
 def _size(vector: Array) -> float:

@@ -65,7 +65,7 @@ SDF = """<?xml version="1.0"?>
     <collision name="c"><geometry><sphere><radius>0.1</radius></sphere></geometry></collision></link>
   <joint name="motor" type="revolute"><parent>world</parent><child>crank</child><pose>0 0 -0.15 0 0 0</pose>
     <axis><xyz expressed_in="__model__">0 1 0</xyz><limit><lower>-1</lower><upper>1</upper></limit>
-      <dynamics><damping>0.02</damping></dynamics></axis></joint>
+      <dynamics><damping>0.02</damping><friction>0.01</friction></dynamics></axis></joint>
   <joint name="knee" type="continuous"><parent>crank</parent><child>coupler</child><pose relative_to="top"/>
     <axis><xyz>0 1 0</xyz></axis></joint>
   <joint name="foot" type="revolute"><parent>world</parent><child>rocker</child><pose>0.15 0 0 0 0 0</pose>
@@ -81,7 +81,7 @@ MJCF = """
   <option gravity="0 0.5 -9"/>
   <worldbody>
     <body name="crank" pos="0 0 1">
-      <joint name="motor" axis="0 1 0" damping="0.02" range="-1 1"/>
+      <joint name="motor" axis="0 1 0" damping="0.02" frictionloss="0.01" range="-1 1"/>
       <inertial pos="0 0 0.15" quat="0.995004165278 0 0 0.0998334166468" mass="0.2" diaginertia="2e-3 3e-3 1.5e-3"/>
       <body name="coupler" pos="0 0 0.3">
         <joint name="knee" axis="0 1 0"/>

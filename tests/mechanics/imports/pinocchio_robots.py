@@ -12,9 +12,11 @@ ORDER = {6: [3, 4, 5, 0, 1, 2], 3: [2, 0, 1]}
 
 
 def frictionless(scene):
-    """The scene without friction, which Pinocchio leaves out."""
-    joints = {name: replace(j, friction=np.zeros_like(j.friction)) for name, j in scene.joints.items()}
-    return replace(scene, joints=joints)
+    """The scene without friction and mimicry, which Pinocchio leaves out."""
+    joints = {
+        name: replace(j, friction=np.zeros_like(j.friction), dry=None, motion=None) for name, j in scene.joints.items()
+    }
+    return replace(scene, joints=joints, gears={})
 
 
 def robot(path, base):

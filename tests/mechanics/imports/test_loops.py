@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import ephs
+from ephs.mechanics.shapes.dry import Dry
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from tests.mechanics.imports.models import MJCF, SDF
 
@@ -11,6 +12,7 @@ from tests.mechanics.imports.models import MJCF, SDF
 def test_two_formats_describe_one_mechanism(write, quiet):
     scenes = [quiet(write(SDF, "sdf")), quiet(write(MJCF, "xml"))]
     assert [scene.name for scene in scenes] == ["four-bar"] * 2
+    assert [scene.joint("motor").dry for scene in scenes] == [Dry(0.01)] * 2
     runs = [ephs.simulate(scene, 1.0, rtol=1e-10, atol=1e-12, save_at=np.linspace(0.0, 1.0, 5)) for scene in scenes]
     for body in ("crank", "coupler", "rocker"):
         assert np.abs(runs[0].body(body).position - runs[1].body(body).position).max() < 1e-8

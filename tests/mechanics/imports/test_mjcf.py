@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import ephs
+from ephs.mechanics.shapes.dry import Dry
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from tests.mechanics.imports.models import MODELS, URDF
 
@@ -84,6 +85,26 @@ def test_flags_are_kept(write):
     assert load('damper="disable"').joint("j").friction.tolist() == [[0.0]]
     kept = load('contact="disable"').joint("j")
     assert (kept.stiffness.tolist(), kept.friction.tolist()) == ([2.0], [[1.0]])
+
+
+@pytest.mark.parametrize("rate", [-2.0, 3.0])
+def test_dry_friction_of_a_sliding_joint_is_mujocos(write, rate):
+    bodies = "".join(
+        f"""<body name="{name}"><joint name="{name}" {kind} damping="0.1" frictionloss="{loss}"/>
+        <geom size="0.1" pos="0.3 0 0.2"/>"""
+        for name, kind, loss in (("turn", 'axis="0 1 0"', 0.7), ("slide", 'type="slide" axis="1 0 1"', 4.0))
+    )
+    path = write(f"<mujoco><worldbody>{bodies}</body></body></worldbody></mujoco>", "xml")
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    data.qvel[:] = rate, -rate
+    mujoco.mj_forward(model, data)
+    scene = ephs.load(path)
+    assert (scene.joint("turn").dry, scene.joint("slide").dry) == (Dry(0.7), Dry(4.0))
+    dynamics = ephs.dynamics(scene)
+    found = dynamics.acceleration(dynamics.state(rates={"turn": rate, "slide": -rate}))
+    # a regularised law: sqrt(rate² + slip²) = rate (1 + 1e-7)
+    assert np.allclose([found["turn"][0], found["slide"][0]], data.qacc, rtol=1e-6, atol=0.0)
 
 
 @pytest.mark.parametrize("ending", [".urdf", ".xml", ".sdf"])
