@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import ephs
 from ephs.mechanics.elements import components, springs
 from ephs.mechanics.elements.closing import closing
-from ephs.operad import Quantity, Space
+from ephs.operad import Path, Quantity, Space
 from ephs.operad import quantity as Q
 from ephs.semantics import Reference, Storage, StructureError, library
 from ephs.semantics.behaviour import Natural
@@ -19,10 +19,11 @@ from ephs.semantics.checks import dirac, random_efforts, random_point
 from ephs.semantics.kernel_table import DOMAIN, OK, TEMPERATURE, TURN, address_of, prototype
 from ephs.semantics.laws import isotropy
 from ephs.semantics.search import search
-from ephs.semantics.spaces import PAIRS, SE3, pair
-from ephs.testing import mechanisms
+from ephs.semantics.spaces import PAIRS, SE3, SO3, pair
+from ephs.testing import check_primitive, mechanisms
 
 REFERENCE = Reference()
+EPS = float(np.finfo(float).eps)
 PLANE = Quantity("plane", Space("real", 2, 2), 1)
 SIZES = [0.0, 1e-10, 1e-7, 1e-4, 0.02, 0.3]
 seeds = st.integers(0, 2**20)
@@ -335,13 +336,30 @@ def test_a_spring_without_length_has_no_direction():
     assert np.isnan(draw.primitive.energy_gradient(draw.x)).any()
 
 
-@pytest.mark.parametrize(
-    ("stiffness", "rest", "key"),
-    [([1.0, 2.0, 1.0], np.zeros(3), "stiffness"), (np.ones(3), [0.1, 0.0, 0.0], "rest")],
-)
-def test_springs_on_rotation_vectors_are_isotropic_about_zero(stiffness, rest, key):
-    with pytest.raises(StructureError, match=key):
-        components.pair_spring(pair("spherical"), np.array(stiffness), np.array(rest))
+def test_springs_on_rotation_vectors_rest_at_zero():
+    with pytest.raises(StructureError, match="rest"):
+        components.pair_spring(pair("spherical"), np.ones(3), np.array([0.1, 0.0, 0.0]))
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(1e-9, 3.0))
+def test_springs_on_rotation_vectors_may_be_stiffer_about_one_axis(seed, size):
+    """½ Σ k_i θ_i² with θ = log q, and what its effort does on a small turn is the change of that."""
+    rng, k = np.random.default_rng(seed), np.array([5.0, 1.0, 2.0])
+    spring, at = components.pair_spring(pair("spherical"), k, np.zeros(3)), Path.of("q_r")
+    theta = rng.standard_normal(3)
+    theta *= size / np.linalg.norm(theta)
+    energy = 0.5 * float(k @ theta**2)
+    q = SO3.exp(theta)
+    assert abs(spring.energy({at: q}) - energy) <= 64 * EPS * energy
+    assert abs(spring.energy({at: -q}) - energy) <= 64 * EPS * energy
+    v = 0.1 * rng.standard_normal(3)
+    after = spring.energy({at: SO3.retract(q, v)})
+    work = float(spring.discrete_gradient({at: q}, v) @ v)
+    assert abs(work - (after - energy)) <= 256 * EPS * (energy + after)
+
+
+def test_springs_stiffer_about_one_axis_pass_their_checks():
+    check_primitive(components.pair_spring(pair("spherical"), np.array([5.0, 1.0, 2.0]), np.zeros(3)), max_examples=20)
 
 
 @settings(deadline=None, max_examples=30)

@@ -24,7 +24,7 @@ from ephs.semantics.forms import coupled, stored
 from ephs.semantics.primitives import Formula, Irreversible, Kernel, Point, Reversible, Storage, power_ports
 from ephs.semantics.spaces import SE3, Pair, codes, manifold
 from ephs.semantics.spaces.rank import TINY
-from ephs.semantics.special import squared_turn
+from ephs.semantics.special import squared_turn, turn_ratio
 from ephs.semantics.verdict import proved
 
 __all__ = [
@@ -126,16 +126,11 @@ def pair_spring(of: Pair, stiffness: Array, rest: Array) -> Storage:
     Raises
     ------
     StructureError
-        A rotation vector whose stiffness is not isotropic, or whose rest is not zero.
+        A rotation vector whose rest is not zero.
     """
     k, zero = np.array(stiffness, dtype=float), np.array(rest, dtype=float)
-    if of.code in (codes.SO3, codes.SE3):
-        if np.ptp(k[:3]):
-            raise StructureError(
-                "parameter", of.name, key="stiffness", found=k.tolist(), expected="equal for rotations"
-            )
-        if np.any(zero[:3]):
-            raise StructureError("parameter", of.name, key="rest", found=zero.tolist(), expected="0 for rotations")
+    if of.code in (codes.SO3, codes.SE3) and np.any(zero[:3]):
+        raise StructureError("parameter", of.name, key="rest", found=zero.tolist(), expected="0 for rotations")
 
     return stored(
         "pair_spring",
@@ -153,9 +148,14 @@ def pair_spring(of: Pair, stiffness: Array, rest: Array) -> Storage:
 
 
 def coordinate_energy(of: Pair, q: Any, stiffness: Array, rest: Array) -> Any:
-    """½ k (coordinate − rest)² of an element of a joint's group; of a rotation vector ½ k θ²."""
+    """½ k (coordinate − rest)² of an element of a joint's group; of a rotation vector ½ k θ², or ½ Σ k_i θ_i²."""
     turns = of.code in (codes.SO3, codes.SE3)
-    rotation = 0.5 * stiffness[0] * squared_turn(q[:4]) if turns else 0.0
+    rotation: Any = 0.0
+    if turns and np.ptp(stiffness[:3]):
+        ratio = turn_ratio(squared_turn(q[:4]))  # θ_i = ±2 ratio q_i: the sign is squared away
+        rotation = 2.0 * ratio * ratio * sum((stiffness[i] * q[1 + i] * q[1 + i] for i in range(3)), 0.0)
+    elif turns:
+        rotation = 0.5 * stiffness[0] * squared_turn(q[:4])
     first, numbers = (3, q[4:]) if turns else (0, np.atleast_1d(q))
     off = numbers - rest[first:]
     return rotation + 0.5 * sum((k * each * each for k, each in zip(stiffness[first:], off, strict=True)), 0.0)

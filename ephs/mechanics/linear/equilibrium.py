@@ -32,6 +32,8 @@ ENOUGH = 1e-12
 STRIDE = 0.3
 """Largest change of a mechanism in one step, in rad or m."""
 STEPS = 200
+HALVINGS = 8
+"""Of a step after which loops do not close."""
 
 
 @final
@@ -182,8 +184,18 @@ def _settled(model: "Dynamics") -> "tuple[State, float, int]":
         stretch = push / np.where(flat, max(float(size.max(initial=0.0)), TINY), size + shift * size.max(initial=0.0))
         change = Z @ (ways @ stretch)
         change /= max(1.0, float(np.abs(change).max(initial=0.0)) / STRIDE)
-        state = _without_rates(model, model.closed(model.moved(state, change)))
+        state = _nearest(model, state, change)
     raise _none(*_culprit(model, state))
+
+
+def _nearest(model: "Dynamics", state: "State", change: Array) -> "State":
+    """The state without rates after a change, or the largest half, quarter, … of it after which loops close."""
+    for halvings in range(HALVINGS):
+        try:
+            return _without_rates(model, model.closed(model.moved(state, 0.5**halvings * change)))
+        except SimulationError:
+            continue
+    return _without_rates(model, model.closed(model.moved(state, 0.5**HALVINGS * change)))
 
 
 def _still(model: "Dynamics", state: "State") -> Array:

@@ -195,7 +195,7 @@ class SceneMotion:
         beams = dict(self._scene.all_beams())
         if name not in beams:
             raise KeyError(f"{name}: no such beam; the beams are {', '.join(beams) or 'none'}")
-        return beam_motion(self._scene, beams[name], self.poses, self.inclusion)
+        return beam_motion(self._scene, beams[name], self.poses, self.inclusion, self.wrench)
 
     def marker(self, name: str) -> MarkerMotion:
         """The motion of a marker."""

@@ -3,9 +3,13 @@
 The nodes of the beam ``rod`` are the bodies ``rod.0`` … ``rod.n`` of a part; its elements are the joints ``rod-1`` …
 ``rod-n``, its welds ``rod-start`` and ``rod-end``. The reference curve is a helix on each segment between two points,
 so a beam through points of a circle is that circle, whatever the number of its elements.
+
+A rod that neither stretches nor shears (Kirchhoff's) has rigid pieces for its nodes, which meet in the middle of its
+elements by spherical joints: their energy is ½ θᵀ (K/L) θ of the rotation vector θ. A string has no such energy, and
+pivots where its ends are held.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, final
 
@@ -63,8 +67,11 @@ def resolve_beam(name: str, table: Checked[Any], world: World, faults: list[Faul
     """A beam's bodies and joints; None where its place or section cannot be told."""
     entry, key = table.entry, f"beams.{name}"
     ends = [*entry.ends, *[FREE_END] * (2 - len(entry.ends))]
-    section = resolve_section(entry.section, f"{key}.section", faults) if table.sound("section") else None
+    section = (
+        resolve_section(entry.section, f"{key}.section", faults, entry.rod) if table.sound("section", "rod") else None
+    )
     placed = _placed(table, key, faults)
+    _check_kind(table, key, faults)
     if section is None or placed is None:
         return None
     frames, shapes = placed
@@ -73,21 +80,68 @@ def resolve_beam(name: str, table: Checked[Any], world: World, faults: list[Faul
     initial = np.array(entry.strain or np.zeros(6))
     joints: list[JointDraft] = []
     for i, (shape, length) in enumerate(zip(shapes, lengths.tolist(), strict=True)):
-        rest = _settled(shape / length) - initial
-        start = Place(SE3.exp(length * rest), IDENTITY_POSE, in_bodies=True)
-        strain = Strain(length, frozen(section.stiffness), frozen(rest), entry.damping, entry.order)
-        joints.append(_joint(f"{name}-{i + 1}", "free", (f"{name}.{i}", f"{name}.{i + 1}"), start, entry.heat, strain))
+        between = f"{name}.{i}", f"{name}.{i + 1}"
+        make = _element if entry.rod == "reissner" else _hinge
+        joints.append(make(f"{name}-{i + 1}", between, _settled(shape / length), length, initial, section, entry))
+    held = "spherical" if entry.rod == "string" else "fixed"
     for end, node, side in ((ends[0], 0, "start"), (ends[1], n, "end")):
         if end != FREE_END:
             at = frames[node]
-            joints.append(_joint(f"{name}-{side}", "fixed", (end, f"{name}.{node}"), Place(at, at, False)))
-    beam = Beam(name, n, (ends[0], ends[1]), section.outline)
+            joints.append(_joint(f"{name}-{side}", held, (end, f"{name}.{node}"), Place(at, at, False)))
+    beam = Beam(
+        name, n, (ends[0], ends[1]), section.outline, tuple(lengths.tolist()) if entry.rod != "reissner" else ()
+    )
     return BeamDraft(beam, _nodes(name, entry, section, frames, lengths, world), tuple(joints))
 
 
+def _check_kind(table: Checked[Any], key: str, faults: list[Fault]) -> None:
+    """Rigid pieces can be strained by torsion and bending, those of strings by nothing, and are of order 2."""
+    entry = table.entry
+    if not table.sound("rod", "order", "strain", "damping") or entry.rod == "reissner":
+        return
+    strain = np.array(entry.strain or np.zeros(6))
+    if entry.order != 2:
+        faults.append(fault("rod order", f"{key}.order", entry.order, rod=entry.rod))
+    if np.any(strain[3 if entry.rod == "kirchhoff" else 0 :]):
+        faults.append(fault("rod strain", f"{key}.strain", shown(entry.strain), rod=entry.rod))
+    if entry.rod == "string" and entry.damping:
+        faults.append(fault("string damping", f"{key}.damping", shown(entry.damping)))
+
+
+def _element(
+    name: str, bodies: tuple[str, str], shape: Array, length: float, initial: Array, section: Section, entry: Any
+) -> JointDraft:
+    """A geometrically exact element; ``shape`` (6,) is the strain of its reference curve, stretch 1."""
+    rest = shape - initial
+    place = Place(SE3.exp(length * rest), IDENTITY_POSE, in_bodies=True)
+    strain = Strain(length, frozen(section.stiffness), frozen(rest), entry.damping, entry.order)
+    return _joint(name, "free", bodies, place, entry.heat, strain)
+
+
+def _hinge(
+    name: str, bodies: tuple[str, str], shape: Array, length: float, initial: Array, section: Section, entry: Any
+) -> JointDraft:
+    """A spherical joint in the middle of an element, its frames one another's half a rotation away from rest."""
+    half = SE3.exp(0.5 * length * shape)
+    turn = SE3.exp(np.append(0.5 * length * initial[:3], np.zeros(3)))
+    place = Place(SE3.compose(half, SE3.inverse(turn)), SE3.compose(SE3.inverse(half), turn), in_bodies=True)
+    joint = _joint(name, "spherical", bodies, place, entry.heat)
+    if entry.rod == "string":
+        return joint
+    stiffness = section.stiffness[:3] / length
+    return replace(joint, stiffness=stiffness, friction=np.diag(entry.damping * stiffness))
+
+
 def _nodes(name: str, entry: Any, section: Section, frames: list[Array], lengths: Array, world: World) -> Scene:
-    """The part with the nodes: their shares of the length are the weights of a quadrature of the elements' order."""
+    """The part with the nodes: their shares of the length are the weights of a quadrature of the elements' order.
+
+    Rigid pieces turn as rods, about their nodes, where the mass is; others have the inertia of their section. Nothing
+    tells how pieces of a string spin about themselves: their inertia against it is a tenth of that across.
+    """
     share = _shares(lengths, entry.order)
+    sides = np.append(lengths, 0.0), np.insert(lengths, 0, 0.0)
+    swing = section.mass / 24.0 * (sides[0] ** 3 + sides[1] ** 3)
+    way = {"reissner": np.zeros(3), "kirchhoff": np.array([0.0, 1.0, 1.0]), "string": np.array([0.1, 1.0, 1.0])}
     speed, spin = np.array(entry.velocity or np.zeros(3)), np.array(entry.angular_velocity or np.zeros(3))
     bodies: dict[str, Body] = {}
     for i, (pose, length) in enumerate(zip(frames, share, strict=True)):
@@ -95,7 +149,8 @@ def _nodes(name: str, entry: Any, section: Section, frames: list[Array], lengths
         twist = body_twist(pose, velocity, so3.quaternion_to_matrix(pose[:4]).T @ spin)
         back = 0.5 * lengths[i - 1] if i else 0.0
         bodies[str(i)] = Body(
-            str(i), section.mass * length, frozen(np.diag(section.inertia * length)), frozen(pose), frozen(twist),
+            str(i), section.mass * length, frozen(np.diag(section.inertia * length + swing[i] * way[entry.rod])),
+            frozen(pose), frozen(twist),
             _shape(section.outline, float(length), float(0.5 * length - back)),
         )  # fmt: skip
     return Scene(name, world, bodies)
@@ -131,7 +186,7 @@ def _shape(outline: tuple[float, ...], length: float, shift: float) -> dict[str,
 def _joint(
     name: str, kind: str, bodies: tuple[str, str], place: Place, heat: str = ENVIRONMENT, strain: Strain | None = None
 ) -> JointDraft:
-    d = 6 if kind == "free" else 0
+    d = {"free": 6, "spherical": 3, "fixed": 0}[kind]
     none = np.zeros(d)
     return JointDraft(
         name, kind, *bodies, place, 0.0, np.zeros((d, d)), none, none, heat, none, None, None, None, strain

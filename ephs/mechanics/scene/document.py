@@ -101,8 +101,10 @@ def _scene(data: dict[str, Any]) -> Scene:
                 for name, entry in entries.items()
             }
         if cls is Beam:
-            pairs = ("ends", "outline")
-            entries = {name: entry | {key: tuple(entry[key]) for key in pairs} for name, entry in entries.items()}
+            several = ("ends", "outline", "lengths")
+            entries = {
+                name: entry | {key: tuple(entry.get(key, ())) for key in several} for name, entry in entries.items()
+            }
         make = _scene if cls is Scene else lambda entry, cls=cls: _value(cls, entry)
         given[key] = {name: make(entry) for name, entry in entries.items()}
     given["world"] = _value(World, given["world"])

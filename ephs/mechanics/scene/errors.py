@@ -188,7 +188,6 @@ TEXTS: dict[str, tuple[str, str]] = {
     "friction shape": ("a number, {d} numbers, or a symmetric {d} by {d} matrix", "correct the value"),
     "friction sign": ("a symmetric, positive semidefinite matrix", "friction may not produce energy"),
     "friction asymmetric": ("a symmetric matrix", "make entry [i][j] equal to entry [j][i]"),
-    "isotropic": ("the same stiffness about every axis of a rotation vector", "give equal numbers"),
     "rest rotation": ("rest 0 on a rotation vector", "turn frame1 or frame2 instead"),
     "motion freedoms": (
         "a joint with one freedom",
@@ -216,6 +215,9 @@ TEXTS: dict[str, tuple[str, str]] = {
     "beam place": ("either from and to, or points", "give one of the two"),
     "beam points": ("a point away from the one before", "take it out, or move it"),
     "beam elements": ("a multiple of the {segments} segments, at most {most}", "there is a node at every point"),
+    "rod order": ("2 for {rod}", "elements of order 4 stretch and shear"),
+    "rod strain": ("0 where {rod} takes no strain", "kirchhoff takes torsion and bending, a string takes none"),
+    "string damping": ("0 for a string, which does not resist bending", "take kirchhoff"),
     "up": ("a direction along no tangent of the beam", "give another up"),
     "load ground": ("a body", "loads on the ground do nothing"),
     "same ends": ("two different points or nodes", "correct one of the two"),

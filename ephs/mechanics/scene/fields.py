@@ -251,12 +251,11 @@ def _dry(key: str) -> Field:
 
 
 def _stiffness_faults(scene: Scene, name: str, _before: Scene) -> list[Fault]:
-    """A rotation vector has one stiffness, and rest 0."""
+    """A rotation vector rests at 0."""
     joint: Joint = scene.joint(name)
-    turning, key = coupling_of(joint).turning, f"joints.{name}"
-    about, rest = joint.stiffness[list(turning)], joint.rest[list(turning)]
-    faults = [fault("isotropic", f"{key}.stiffness", about.tolist())] if np.any(about != about[:1]) else []
-    return faults + ([fault("rest rotation", f"{key}.rest", rest.tolist())] if np.any(about) and np.any(rest) else [])
+    turning = list(coupling_of(joint).turning)
+    about, rest = joint.stiffness[turning], joint.rest[turning]
+    return [fault("rest rotation", f"joints.{name}.rest", rest.tolist())] if np.any(about) and np.any(rest) else []
 
 
 def _friction_faults(scene: Scene, name: str, _before: Scene) -> list[Fault]:

@@ -45,12 +45,14 @@ class Beam:
     ----------
     ends : what the first and the last node are welded to, ``"free"`` where to nothing
     outline : radius of a round section, or extents along axes 2 and 3 in m; for pictures
+    lengths : of the elements in m, where these are spherical joints between rigid pieces
     """
 
     name: str
     elements: int
     ends: tuple[str, str]
     outline: tuple[float, ...]
+    lengths: tuple[float, ...] = ()
 
     @property
     def nodes(self) -> list[str]:

@@ -150,7 +150,8 @@ def resolve_joint(name: str, table: Checked[JointEntry], names: Names, faults: l
     d = allowed.dim
     stiffness = values.freedoms(entry.stiffness, d, f"{key}.stiffness", faults, spread=True)
     rest = values.freedoms(entry.rest, d, f"{key}.rest", faults, spread=True)
-    _check_turning(allowed, stiffness, rest, entry, key, faults)
+    if rest[list(allowed.turning)].any():
+        faults.append(fault("rest rotation", f"{key}.rest", shown(entry.rest)))
     drive = values.freedoms(entry.drive, d, f"{key}.drive", faults)
     _check_motion(entry, d, drive, key, faults)
     if entry.armature and (d != 1 or entry.motion is not None):
@@ -328,17 +329,6 @@ def _check_ends(table: Checked[Any], key: str, names: Names, faults: list[Fault]
 def _check_pitch(entry: JointEntry, key: str, faults: list[Fault]) -> None:
     if entry.pitch and entry.type != "screw":
         faults.append(fault("only screw", f"{key}.pitch", shown(entry.pitch), kind=entry.type))
-
-
-def _check_turning(
-    allowed: Coupling, stiffness: Array, rest: Array, entry: JointEntry, key: str, faults: list[Fault]
-) -> None:
-    """A rotation vector's potential must not depend on the choice of axes."""
-    turning = list(allowed.turning)
-    if turning and np.ptp(stiffness[turning]) > values.TOLERANCE * np.abs(stiffness[turning]).max():
-        faults.append(fault("isotropic", f"{key}.stiffness", shown(entry.stiffness)))
-    if rest[turning].any():
-        faults.append(fault("rest rotation", f"{key}.rest", shown(entry.rest)))
 
 
 def _check_motion(entry: JointEntry, d: int, drive: Array, key: str, faults: list[Fault]) -> None:

@@ -57,6 +57,12 @@ _BEAM: dict[str, Any] = {
         Literal[2, 4],
         Field(default=2, description="by which rest converges with shorter elements, and motion of thin beams"),
     ),
+    "rod": (
+        Literal["reissner", "kirchhoff", "string"],
+        Field(
+            default="reissner", description="kirchhoff: no stretch and no shear; string: no bending and torsion either"
+        ),
+    ),
     "section": (SectionEntry, Field(description="stiffness and inertia per length")),
     "strain": (
         _Strain,

@@ -19,6 +19,10 @@ __all__ = ["Section", "circle", "rectangle", "resolve_section", "tube"]
 
 Array = NDArray[np.float64]
 NUMBERS = ("EA", "GA", "GJ", "EI", "rhoA", "rhoI")
+NEEDED = {"reissner": NUMBERS, "kirchhoff": ("GJ", "EI", "rhoA", "rhoI"), "string": ("rhoA",)}
+"""Numbers that a kind of rod needs; those of the others may be there."""
+IRON = 7870.0
+"""Density in kg/m³."""
 SHAPES = ("circle", "tube", "rectangle")
 MATERIAL = ("E", "nu", "rho")
 
@@ -75,28 +79,29 @@ def _of(
     return Section(np.array(bending + axial), float(rho * area), inertia, outline)
 
 
-def resolve_section(entry: SectionEntry, key: str, faults: list[Fault]) -> Section | None:
-    """The section of a table; None, with a fault, where it says too little or too much."""
+def resolve_section(entry: SectionEntry, key: str, faults: list[Fault], rod: str) -> Section | None:
+    """The section of a table for a kind of rod; None, with a fault, where it says too little or too much."""
     given: Mapping[str, Any] = {name: value for name, value in entry.model_dump().items() if value is not None}
     shapes = [name for name in given if name in SHAPES]
     if len(shapes) > 1 or (shapes and any(name in NUMBERS for name in given)):
         names = [name for name in given if name in (*SHAPES, *NUMBERS)]
         faults.append(fault("section", key, f"{', '.join(names[:-1])} and {names[-1]}"))
         return None
-    needed = MATERIAL if shapes else NUMBERS
+    needed = MATERIAL if shapes else NEEDED[rod]
     missing = [name for name in needed if name not in given]
     if missing:
         found = "an empty table" if not given else f"a table without {', '.join(missing)}"
         faults.append(fault("section", key, found))
         return None
-    spare = [name for name in given if name not in (*needed, *shapes)]
+    spare = [name for name in given if name not in ((*MATERIAL, *shapes) if shapes else NUMBERS)]
     if spare:
         faults.append(fault("section", f"{key}.{spare[0]}", shown(given[spare[0]])))
         return None
     if not shapes:
-        stiffness = np.array([given["GJ"], *given["EI"], given["EA"], *given["GA"]])
-        radius = 2.0 * float(np.sqrt(max(given["EI"]) / given["EA"]))
-        return Section(stiffness, given["rhoA"], np.array(given["rhoI"]), (radius,))
+        full = {"GJ": 0.0, "EI": [0.0, 0.0], "EA": 0.0, "GA": [0.0, 0.0], "rhoI": [0.0, 0.0, 0.0]} | given
+        stiffness = np.array([full["GJ"], *full["EI"], full["EA"], *full["GA"]])
+        outline = (_radius(full, rod),)
+        return Section(stiffness, full["rhoA"], np.array(full["rhoI"]), outline)
     material = {name: given[name] for name in MATERIAL}
     if shapes == ["circle"]:
         return circle(given["circle"], **material)
@@ -107,3 +112,12 @@ def resolve_section(entry: SectionEntry, key: str, faults: list[Fault]) -> Secti
             return None
         return tube(*sizes, **material)
     return rectangle(*sizes, **material)
+
+
+def _radius(given: Mapping[str, Any], rod: str) -> float:
+    """Radius in m of a circle with these numbers, for pictures: of iron, where only the mass is known."""
+    if rod == "reissner":
+        return 2.0 * float(np.sqrt(max(given["EI"]) / given["EA"]))
+    if any(given["rhoI"]):
+        return 2.0 * float(np.sqrt(max(given["rhoI"][1:]) / given["rhoA"]))
+    return float(np.sqrt(given["rhoA"] / (np.pi * IRON)))

@@ -184,16 +184,6 @@ FAULTS: dict[str, tuple[str, str, tuple[str, ...]]] = {
     ),
     "drive number": (BODY + joint("drive = 1.0", kind="planar"), "joints.j.drive", ("a list of 3 numbers",)),
     "drive of fixed": (BODY + joint("drive = 1.0", kind="fixed"), "joints.j.drive", ("no number",)),
-    "anisotropic": (
-        BODY + joint("stiffness = [1.0, 2.0, 1.0]", kind="spherical"),
-        "joints.j.stiffness",
-        ("same stiffness",),
-    ),
-    "anisotropic free": (
-        BODY + joint("stiffness = [1.0, 2.0, 1.0, 1.0, 2.0, 3.0]", kind="free"),
-        "joints.j.stiffness",
-        ("same stiffness",),
-    ),
     "rest turned": (
         BODY + joint("rest = [0.1, 0.0, 0.0]", kind="spherical"),
         "joints.j.rest",
