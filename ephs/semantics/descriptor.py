@@ -186,8 +186,11 @@ class Descriptor:
         multipliers = starts(n.multipliers).tolist()
         reads: list[int] = n.reads.tolist()
         wire = read = 0
+        counts: dict[int, tuple[int, int]] = {}  # equal elements share their primitives
         for (path, primitive), multiplier in zip(self.system.leaves(), multipliers, strict=True):
-            wires, width = len(primitive.bundle.ports), len(primitive.reads)
+            if id(primitive) not in counts:
+                counts[id(primitive)] = len(primitive.bundle.ports), len(primitive.reads)
+            wires, width = counts[id(primitive)]
             index = tuple(i for first, last in at[wire : wire + wires] for i in range(first, last))
             slots = tuple(states[i] for i in reads[read : read + width])
             yield ComponentSlot(path, primitive, index, slots, multiplier)

@@ -13,14 +13,11 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.elements import components
-from ephs.mechanics.elements.beam import elastic
-from ephs.mechanics.elements.bodies import rigid_body
 from ephs.mechanics.elements.contact import contact
 from ephs.mechanics.elements.gear import gear
-from ephs.mechanics.elements.joints import between_frames, joint, spring_damper, universal_joint
-from ephs.mechanics.elements.motor import armature, motor
-from ephs.mechanics.scene.attached import Motor
-from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Body, Joint, Scene, Spring
+from ephs.mechanics.elements.motor import armature
+from ephs.mechanics.scene.made import Made, motor_system, spring_system
+from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Joint, Scene
 from ephs.mechanics.scene.surfaces import Contact, Surface
 from ephs.mechanics.shapes.pairs import Touch, touches
 from ephs.operad import Path, Pattern, Quantity, junction, quantity
@@ -225,6 +222,7 @@ class _Builder:
     junctions: dict[Path, Any] = field(default_factory=dict)
     boxes: dict[Path, dict[Any, str]] = field(default_factory=dict)
     fillings: dict[Path, Filling] = field(default_factory=dict)
+    made: Made = field(default_factory=Made)
 
     def momentum(self, body: str) -> str:
         """The junction of a body's momentum."""
@@ -261,13 +259,13 @@ def _level(scene: Scene, demands: _Demands, *, top: bool) -> System:
     b = _Builder(demands, inner)
     gravity = scene.world.gravity
     for name, body in scene.bodies.items():
-        b.add(Path(["bodies", name]), _body(body, gravity), {"p": b.momentum(name)})
+        b.add(Path(["bodies", name]), b.made.body(body, gravity), {"p": b.momentum(name)})
     for name, j in scene.joints.items():
         ports = {"p1": b.momentum(j.body1), "p2": b.momentum(j.body2)}
         if j.heat != ENVIRONMENT:
             ports["s"] = b.entropy(j.heat)
         driven = name in inner.joints
-        system = _joint(j, driven=driven)
+        system = b.made.joint(j, driven=driven)
         if driven:
             names = ("p_r",) if j.middle is None else ("p_r1", "p_r2")
             for port, (path, _) in zip(names, drive_ports(j), strict=True):
@@ -280,7 +278,7 @@ def _level(scene: Scene, demands: _Demands, *, top: bool) -> System:
         ports = {"p1": b.momentum(s.body1), "p2": b.momentum(s.body2)}
         if s.heat != ENVIRONMENT:
             ports["s"] = b.entropy(s.heat)
-        b.add(Path(["springs", name]), _spring(s), ports)
+        b.add(Path(["springs", name]), spring_system(s), ports)
     for name, c in scene.contacts.items():
         ends, points = contact_points(scene, c)
         ports = {"p1": b.momentum(ends[0]), "p2": b.momentum(ends[1])}
@@ -304,7 +302,7 @@ def _level(scene: Scene, demands: _Demands, *, top: bool) -> System:
         ports = {"q": b.supply(motor_port(name)), "p_r": str(at)}
         if m.heat != ENVIRONMENT:
             ports["s"] = b.entropy(m.heat)
-        b.add(Path(["motors", name]), _motor(m, b.junctions[at].quantity), ports)
+        b.add(Path(["motors", name]), motor_system(m, b.junctions[at].quantity), ports)
     for name, g in scene.gears.items():
         at = [_at("drives", each) for each in g.joints]
         ports = {f"p{k}": str(each) for k, each in enumerate(at)}
@@ -360,32 +358,3 @@ def _touching(scene: Scene) -> set[str]:
     """The bodies of this level's own contacts, as seen from it."""
     surfaces = dict(scene.all_surfaces())
     return {surfaces[name].body for c in scene.contacts.values() for name in c.surfaces}
-
-
-def _body(body: Body, gravity: Array) -> System:
-    return rigid_body(body.mass, body.inertia, gravity, strict=False)  # the scene's reader has seen to it
-
-
-def _joint(j: Joint, *, driven: bool) -> System:
-    heat = j.heat != ENVIRONMENT
-    if j.middle is not None:
-        return universal_joint(j.frame1, j.middle, j.frame2, j.friction, j.stiffness, j.rest, heat=heat, driven=driven)
-    if j.strain is not None:
-        of = j.strain
-        parts = elastic(of.length, of.stiffness, of.rest, of.damping, of.order)
-        return between_frames(j.frame1, j.frame2, *parts, heat=heat)
-    return joint(
-        j.kind, j.frame1, j.frame2, j.friction, j.stiffness, j.rest, pitch=j.pitch, heat=heat, driven=driven,
-        limits=j.limits, stop=j.stop, dry=j.dry,
-    )  # fmt: skip
-
-
-def _motor(m: Motor, of: Quantity) -> System:
-    return motor(
-        of, constant=m.constant, resistance=m.resistance, gear=m.gear, inductance=m.inductance, inertia=m.inertia,
-        heat=m.heat != ENVIRONMENT,
-    )  # fmt: skip
-
-
-def _spring(s: Spring) -> System:
-    return spring_damper(s.at1, s.at2, s.stiffness, s.length, s.damping, heat=s.heat != ENVIRONMENT)

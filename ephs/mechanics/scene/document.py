@@ -3,6 +3,7 @@
 import json
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -55,14 +56,21 @@ def scene_from_text(text: str) -> Scene:
     return _scene(json.loads(text))
 
 
+@cache
+def _kept(of: type[Any]) -> tuple[str, ...]:
+    return tuple(field.name for field in fields(of) if field.init)
+
+
 def _plain(value: Any) -> Any:
-    if is_dataclass(value):
-        return {field.name: _plain(getattr(value, field.name)) for field in fields(value) if field.init}
+    if value is None or isinstance(value, str | float | int):
+        return value
     if isinstance(value, np.ndarray):
         return {
             "shape": value.shape,
             "values": value.ravel().tolist(),
         }  # (0, 0) would be lost in nested lists
+    if is_dataclass(value):
+        return {name: _plain(getattr(value, name)) for name in _kept(type(value))}
     if isinstance(value, Mapping):
         return {key: _plain(entry) for key, entry in value.items()}
     if isinstance(value, list | tuple):

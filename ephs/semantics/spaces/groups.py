@@ -175,11 +175,32 @@ class RigidMotions(Manifold):
         return np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
 
     def compose(self, a: Array, b: Array) -> Array:
-        return _pose(_matrix(a) @ _matrix(b))
+        # numbers, not arrays: setting up a mechanism composes some twenty poses a body
+        w, x, y, z, *at = a.tolist()
+        s, i, j, k, *to = b.tolist()
+        q = np.array([
+            w * s - x * i - y * j - z * k,
+            w * i + x * s + y * k - z * j,
+            w * j - x * k + y * s + z * i,
+            w * k + x * j - y * i + z * s,
+        ])  # fmt: skip
+        e, f, g = y * to[2] - z * to[1], z * to[0] - x * to[2], x * to[1] - y * to[0]
+        moved = [
+            at[0] + to[0] + 2.0 * (w * e + y * g - z * f),
+            at[1] + to[1] + 2.0 * (w * f + z * e - x * g),
+            at[2] + to[2] + 2.0 * (w * g + x * f - y * e),
+        ]
+        return np.concatenate((so3.normalised(q if q[0] >= 0.0 else -q), moved))
 
     def inverse(self, a: Array) -> Array:
-        rotation = so3.quaternion_to_matrix(a[:4])
-        return np.concatenate((a[:4] * np.array([1.0, -1.0, -1.0, -1.0]), -rotation.T @ a[4:]))
+        w, x, y, z, *at = a.tolist()
+        e, f, g = y * at[2] - z * at[1], z * at[0] - x * at[2], x * at[1] - y * at[0]
+        return np.array([
+            w, -x, -y, -z,
+            2.0 * (w * e - y * g + z * f) - at[0],
+            2.0 * (w * f - z * e + x * g) - at[1],
+            2.0 * (w * g - x * f + y * e) - at[2],
+        ])  # fmt: skip
 
     def exp(self, v: Array) -> Array:
         return np.concatenate((so3.matrix_to_quaternion(so3.rotation_exp(v[:3])), so3.rotation_dexp(v[:3]) @ v[3:]))
@@ -221,17 +242,6 @@ def _lower(diagonal: Array, below: Array) -> Array:
     out[:3, :3] = out[3:, 3:] = diagonal
     out[3:, :3] = below
     return out
-
-
-def _matrix(pose: Array) -> Array:
-    out = np.eye(4)
-    out[:3, :3] = so3.quaternion_to_matrix(pose[:4])
-    out[:3, 3] = pose[4:]
-    return out
-
-
-def _pose(matrix: Array) -> Array:
-    return np.concatenate((so3.matrix_to_quaternion(matrix[:3, :3]), matrix[:3, 3]))
 
 
 _DEXP = (

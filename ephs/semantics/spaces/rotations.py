@@ -100,7 +100,7 @@ def rotation_dexp_inv(w: Array) -> Array:
 
 def quaternion_to_matrix(q: Array) -> Array:
     """Rotation matrix of a unit quaternion: 1 + 2 w v̂ + 2 v̂²."""
-    w, x, y, z = q
+    w, x, y, z = q.tolist()
     return np.array(
         [
             [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],

@@ -61,12 +61,19 @@ def islands_of(reduced: "Reduced", found: Found, acted: tuple[frozenset[int], fr
 
 def _joined(links: int, ends: Sequence[Sequence[int]]) -> list[int]:
     """For each link the least number among those that hang together with it, the ground left out."""
-    of = list(range(links))
+    of = list(range(links))  # each link -> one that is no greater in the same group
+
+    def least(link: int) -> int:
+        while of[link] != link:
+            of[link] = of[of[link]]
+            link = of[link]
+        return link
+
     for one, two in ends:
-        if one >= 0 and two >= 0 and of[one] != of[two]:
-            low, high = sorted((of[one], of[two]))
-            of = [low if group == high else group for group in of]
-    return of
+        if one >= 0 and two >= 0:
+            low, high = sorted((least(one), least(two)))
+            of[high] = low
+    return [least(link) for link in range(links)]
 
 
 def _of_gravity(reduced: "Reduced") -> Array:

@@ -131,8 +131,10 @@ def _inertia(own: Array, inside: Array) -> Array:
     """(22,): the inertia of a body at a pose in its link; zeros where the pose stands."""
     turn, at, m = quaternion_to_matrix(inside[:4]), inside[4:], float(own[3, 3])
     about = turn @ own[:3, :3] @ turn.T + m * (float(at @ at) * np.eye(3) - np.outer(at, at))
-    upper = about[np.triu_indices(3)]
-    return np.concatenate([np.zeros(12), [m], m * at, upper])
+    out = np.zeros(22)
+    out[12], out[13:16] = m, m * at
+    out[16:19], out[19:21], out[21] = about[0], about[1, 1:], about[2, 2]
+    return out
 
 
 def _plane(reduced: "Reduced", joints: list[int]) -> Array | None:
