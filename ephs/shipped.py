@@ -23,6 +23,7 @@ SHIPPED: Final = (
     "ephs.mechanics.tree.engine.programs:motion_of_loops",
     "ephs.mechanics.tree.engine.programs:motion_of_trees",
     "ephs.mechanics.tree.engine.programs:stiff_program",
+    "ephs.mechanics.tree.engine.slopes:rate_slopes",
     "ephs.mechanics.tree.sweeps.balances:network_program",
     "ephs.mechanics.sensitivity.implicit:tangent_program",
     "ephs.solve.methods.newton:natural_program",

@@ -28,6 +28,8 @@ Point = Mapping[Path, Array]
 """States of the ports that a primitive reads: port -> (size,)."""
 Domain = tuple[tuple[Path, float, float], ...]
 """Ports with the least and the largest number that their states may have."""
+Support = tuple[tuple[int, ...], float]
+"""Places among coordinates, and the largest value of theirs, or norm, at which anything happens."""
 Proof = Callable[[], tuple[Condition, ...]]
 
 
@@ -115,6 +117,9 @@ class Storage:
     trusted
         Give a verdict when it is asked for, and not when made: what makes it accepts only parameters for which the
         conditions hold. Tests ask for the verdicts.
+    support
+        Places among the states' coordinates, and a number: where the coordinate (of several places, their norm) is
+        larger, energy and effort are 0. Of an irreversible process among those that it reads, and its flow is 0.
     """
 
     name: str
@@ -130,6 +135,7 @@ class Storage:
     domain: Domain = ()
     proof: Proof | None = field(default=None, compare=False, repr=False)
     trusted: bool = field(default=False, compare=False, repr=False)
+    support: Support | None = field(default=None, compare=False, repr=False)
     _verdict: StructureVerdict | None = field(default=None, init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -235,7 +241,7 @@ class Reversible:
     working
         Whether its discrete relation does work, C_h e ≠ F: over a step it is no Dirac structure. The work is booked as
         supplied, and component by component.
-    domain, proof, trusted
+    domain, proof, trusted, support
         As of a `Storage`; of an irreversible process a domain may bound energy efforts, too.
     """
 
@@ -310,6 +316,7 @@ class Irreversible:
     proof: Proof | None = field(default=None, compare=False, repr=False)
     trusted: bool = field(default=False, compare=False, repr=False)
     one_sided: bool = field(default=False, compare=False, repr=False)
+    support: Support | None = field(default=None, compare=False, repr=False)
     _verdict: StructureVerdict | None = field(default=None, init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:

@@ -98,6 +98,7 @@ def contact_energy(gap: Gap, law: Law) -> Storage:
             *STATEMENTS["storage"],
         ),
         trusted=True,
+        support=gap.support,
     )
 
 
@@ -117,7 +118,7 @@ def contact_loss(gap: Gap, law: Law) -> Irreversible:
         trusted=True,
         one_sided=True,
     )
-    return replace(made, notation=notation.friction)
+    return replace(made, notation=notation.friction, support=gap.support)
 
 
 def _squares(terms: Any) -> Any:

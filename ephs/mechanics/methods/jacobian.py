@@ -5,11 +5,15 @@ from typing import Any, final
 
 import numpy as np
 
+from ephs.mechanics.tree.engine.slopes import RateSlopes
+from ephs.mechanics.tree.engine.tangents import evaluated
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.mechanics.tree.equations.tangent import Linearised
 from ephs.mechanics.tree.finding.tables import SPRING
 from ephs.semantics.bundle import Array
+from ephs.semantics.derive.relations import entry_of
 from ephs.semantics.spaces.codes import VECTOR
+from ephs.semantics.stage import Program
 from ephs.solve.snapshot import Snapshot, like, parts
 
 __all__ = ["Jacobian"]
@@ -30,7 +34,10 @@ class Jacobian:
         self.size = equations.nv + equations.n + equations.ns
         self._counts = {} if counts is None else counts
         self._counts["jacobians"] = 0
-        self._linear = Linearised(equations)
+        tree = equations.constant and not equations.engine.looped
+        self._compiled = tree and _recorded(equations)
+        self._linear: Linearised | None = None
+        self._slopes: RateSlopes | None = None
         self._at: ReducedState | None = None
         self._value = np.zeros((self.size, self.size))
 
@@ -48,7 +55,27 @@ class Jacobian:
         """
         if self._at is not None and not renew:
             return self._value
-        eq, linear = self.equations, self._linear
+        value = self._of_rates(state) if self._compiled else self._dense(state)
+        self._value, self._at = value, state
+        self._counts["jacobians"] += 1
+        return value
+
+    def _of_rates(self, state: ReducedState) -> Array:
+        """By tangents of the compiled rates of a tree."""
+        eq = self.equations
+        if self._slopes is None:
+            warm = eq.nv + eq.n + np.flatnonzero(eq.reduced.tables.node != -1)  # the environment is as warm as it is
+            wanted = np.concatenate([np.arange(eq.nv + eq.n), warm])
+            self._slopes = RateSlopes(eq.engine, lambda number: _at_rest(eq, number), wanted, self.size)
+        eq.load(state.t, state.q, state.r, state.heats)
+        status, value = self._slopes.at(state.q, eq.vector(state))
+        eq.refuse(status, eq.engine.failed)
+        return value
+
+    def _dense(self, state: ReducedState) -> Array:
+        """By tangents of the residual, with components' own derivatives."""
+        eq, linear = self.equations, self._linear or Linearised(self.equations)
+        self._linear = linear
         n, nv = eq.n, eq.nv
         s, warmth = eq.heats.entropies(state.heats), eq.heats.temperatures(state.heats)
         eq.load(state.t, state.q, state.r, state.heats)
@@ -63,14 +90,12 @@ class Jacobian:
         value[heat] *= warmth[:, None]
         value[heat, heat] += np.diag(linear.entropy_rates * eq.heats.slopes())
         if not eq.problem.constant:
-            value[nv : nv + n] += self._inputs(state)
+            value[nv : nv + n] += self._inputs(linear, state)
         t = eq.reduced.tables
         for i, edge in enumerate(eq.reduced.edges):
             if t.kind[i] != SPRING and t.code[i] != VECTOR:  # v̇ = dexp⁻¹(v) r turns with v: r + ½ [v, r] + …
                 where = slice(int(t.r_at[i]), int(t.r_at[i] + t.dim[i]))
                 value[where, where] -= 0.5 * edge.pair.manifold.ad(rates[where])
-        self._value, self._at = value, state
-        self._counts["jacobians"] += 1
         return value
 
     def snapshot(self, state: ReducedState) -> Snapshot:
@@ -84,7 +109,7 @@ class Jacobian:
             made = like(state, found)
             self.at(replace(made, q=state.q) if snapshot["fresh"] else made)
 
-    def _inputs(self, state: ReducedState) -> Array:
+    def _inputs(self, linear: Linearised, state: ReducedState) -> Array:
         """(n, size) what the inputs' dependence on the state adds to ∂ṙ/∂y."""
         eq = self.equations
         y = eq.vector(state)[: self.size]
@@ -98,6 +123,23 @@ class Jacobian:
             by = moved[j] - y[j]
             changes.append(((eq.drive - middle[0]) / by, (eq.wrench - middle[1]) / by))
         eq.drive[:], eq.wrench[:] = middle
-        self._linear.forward(state.q, state.r, eq.heats.entropies(state.heats))
+        linear.forward(state.q, state.r, eq.heats.entropies(state.heats))
         drive, wrench = (np.moveaxis(np.array(parts), 0, -1) for parts in zip(*changes, strict=True))
-        return self._linear.pushed(drive, wrench)
+        return linear.pushed(drive, wrench)
+
+
+def _recorded(equations: Equations) -> bool:
+    """Whether all components that act have relations in machine code, and not Python's."""
+    slots, net = equations.problem.descriptor.components, equations.reduced.attaching.network
+    return (
+        not net.attached
+        and not net.storages
+        and all(slots[number].primitive.kernel is not None for number in evaluated(equations.engine.tables))
+    )
+
+
+def _at_rest(equations: Equations, number: int) -> tuple[Program, str]:
+    """Program and entry of a component's relation at rest."""
+    kernel = equations.problem.descriptor.components[number].primitive.kernel
+    assert kernel is not None
+    return entry_of(kernel.relation, derivatives=False, rest=True)

@@ -30,6 +30,8 @@ ROUNDING = 1e-14
 """Tolerances to which stages are solved at constant steps."""
 KEPT = 0.3
 """As `Stages.enough`, at constant steps: with a kept matrix errors fall by a rate, and not as squares."""
+NOTHING = 1e-14
+"""Size beside the largest entry of a matrix at which derivatives by heats are rounding."""
 FAST = 2e-3
 """A rate of convergence that a new matrix would not better: an exact one costs about as much as an iteration."""
 
@@ -221,8 +223,9 @@ class Kept:
         # In these coordinates the inverse is (growth, −turning; turning, growth) on the pair.
         n.decay, n.growth, n.turning = float(real[one]), float(real[pair]), -float(imaginary[pair])
         shapes: dict[str, tuple[int, ...]] = {
-            "matrix": (m, m), "single": (m, m), "pair": (2 * m, 2 * m), "stages": (3, m), "change": (3, m),
-            "part": (m,), "parts": (2 * m,), "y": (eq.size,), "rate": (eq.size,), "q": (eq.reduced.coordinates,),
+            "matrix": (m, m), "damping": (eq.n, eq.n), "spring": (eq.n, eq.n), "single": (m, m), "pair": (2 * m, 2 * m),
+            "stages": (3, m), "change": (3, m), "part": (m,), "parts": (2 * m,), "right": (2 * eq.n,), "y": (eq.size,),
+            "rate": (eq.size,), "q": (eq.reduced.coordinates,),
         }  # fmt: skip
         self.memory: dict[str, Any] = {name: np.zeros(shape) for name, shape in shapes.items()} | {
             "newton": self.newton, "inverse": inverse, "into": np.linalg.inv(out), "out": out,
@@ -237,9 +240,14 @@ class Kept:
         SolveError
             A component cannot be evaluated there, or the mass matrix is singular.
         """
-        self.memory["matrix"][:] = self._stages.jacobian.at(state, renew=True)
+        found, f = self._stages.jacobian.at(state, renew=True), self._stages.equations.n
+        by_rates, by_places, by_heats = found[f : 2 * f, f : 2 * f], found[:f, :f], found[f:, 2 * f :]
+        self.memory["matrix"][:] = found
+        self.memory["damping"][:] = by_rates + by_places
+        self.memory["spring"][:] = by_rates @ by_places - found[f : 2 * f, :f]
         n: Any = self.newton[0]
         n.stale, n.young, n.factored = 0, 1, 0.0
+        n.split = int(np.abs(by_heats).max(initial=0.0) <= NOTHING * np.abs(found).max(initial=0.0))
 
     def count(self) -> None:
         """Add what steps took since the last time to the method's counts."""
@@ -252,5 +260,5 @@ class Kept:
     def parts(self) -> list[tuple[str, Any]]:
         """All that the next step depends on, by name."""
         integers, reals = self.newton.arrays
-        names = "matrix", "single", "pair", "swap", "swaps"
+        names = "matrix", "damping", "spring", "single", "pair", "swap", "swaps"
         return [("newton", integers), ("newton_reals", reals), *((name, self.memory[name]) for name in names)]

@@ -14,10 +14,24 @@ import numpy as np
 from ephs.semantics.derive.functions import TINY
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 
-__all__ = ["Gap", "Vector", "cross", "dot", "plane_rim", "plane_sphere", "ramp", "rounded_box_sphere"]
+__all__ = [
+    "HEIGHT",
+    "PLACE",
+    "Gap",
+    "Vector",
+    "cross",
+    "dot",
+    "plane_rim",
+    "plane_sphere",
+    "ramp",
+    "rounded_box_sphere",
+]
 
 UPRIGHT: Final = 1e-3
 """Inclination in rad below which a circle counts as flat: its gap is smaller by this part of the radius at the most."""
+HEIGHT: Final = (6,)
+PLACE: Final = (4, 5, 6)
+"""Places of z, and of x, y, z, in a pose."""
 Vector = tuple[Any, Any, Any]
 """Components of a vector."""
 
@@ -40,6 +54,9 @@ class Gap:
         Radius of curvature of the second surface at the contact in m; 0 of a corner.
     numbers
         Sizes of both surfaces by name, m.
+    support
+        Places in the relative pose, and the value of that coordinate, or the norm of several, beyond which the gap is
+        positive.
     thickness
         Least length of a straight way of C2 through the overlap, from side to side, in m; infinite behind a plane.
     """
@@ -49,6 +66,7 @@ class Gap:
     contact: Callable[[Any], tuple[Vector, Vector]]
     radius: float
     numbers: tuple[tuple[str, float], ...]
+    support: tuple[tuple[int, ...], float]
     thickness: float = np.inf
 
 
@@ -84,7 +102,8 @@ def plane_sphere(radius: float) -> Gap:
         normal = _upwards(pose)
         return normal, _times(-radius, normal)
 
-    return Gap("plane_sphere", lambda pose: pose[6] - radius, contact, radius, (("radius", radius),))
+    numbers = (("radius", radius),)
+    return Gap("plane_sphere", lambda pose: pose[6] - radius, contact, radius, numbers, (HEIGHT, radius))
 
 
 def plane_rim(radius: float) -> Gap:
@@ -102,7 +121,10 @@ def plane_rim(radius: float) -> Gap:
         out = -radius / length
         return normal, (out * normal[0], out * normal[1], 0.0)
 
-    return Gap("plane_rim", lambda pose: pose[6] - radius * inclined(pose)[1], contact, radius, (("radius", radius),))
+    def distance(pose: Any) -> Any:
+        return pose[6] - radius * inclined(pose)[1]
+
+    return Gap("plane_rim", distance, contact, radius, (("radius", radius),), (HEIGHT, radius * (1.0 + UPRIGHT)))
 
 
 def rounded_box_sphere(half: Vector, rounding: float, radius: float) -> Gap:
@@ -129,5 +151,6 @@ def rounded_box_sphere(half: Vector, rounding: float, radius: float) -> Gap:
         contact,
         radius,
         (*sizes, ("rounding", rounding), ("radius", radius)),
+        (PLACE, sum(half) + rounding + radius),
         2.0 * (min(half) + rounding + radius),
     )

@@ -13,6 +13,7 @@ from ephs.mechanics.runs import pace
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.mechanics.shapes.gap import plane_rim, plane_sphere, rounded_box_sphere
 from ephs.mechanics.shapes.law import Law
+from ephs.mechanics.tree.finding import mechanism
 from ephs.operad import Path
 from ephs.semantics.spaces import SE3
 from ephs.testing import check_primitive
@@ -48,6 +49,45 @@ USUAL = {
     "gravity": 0.0, "height": 0.15, "along": 0.0, "speed": 0.0, "stiffness": 1e5, "exponent": 1.0, "loss": 0.0,
     "friction": 0.0, "slip": 1e-3,
 }  # fmt: skip
+
+
+POSES = st.tuples(
+    st.lists(st.floats(-1.0, 1.0), min_size=4, max_size=4).filter(lambda x: np.linalg.norm(x) > 0.1),
+    st.lists(st.floats(-2.0, 2.0), min_size=3, max_size=3),
+).map(lambda x: np.concatenate([np.array(x[0]) / np.linalg.norm(x[0]), x[1]]))
+
+
+@pytest.mark.parametrize("gap", GAPS, ids=[gap.name for gap in GAPS])
+@given(pose=POSES, out=st.floats(0.0, 1.0))
+def test_beyond_its_support_a_gap_is_open(gap, pose, out):
+    places, reach = gap.support
+    at = pose[list(places)] if len(places) > 1 else np.ones(1)
+    if np.linalg.norm(at) > 1e-3:
+        pose[list(places)] = at / np.linalg.norm(at) * (reach * (1.0 + 1e-12) + out)
+        assert gap.distance(pose) >= 0.0
+
+
+@pytest.mark.parametrize(("gap", "turn"), [(plane_sphere(0.3), [1.0, 0.0, 0.0, 0.0]), (plane_rim(0.2), [1, 1, 0, 0])])
+def test_below_its_support_a_gap_above_a_plane_may_be_closed(gap, turn):
+    """So that the law above fails for a smaller one."""
+    pose = np.array([*(np.array(turn) / np.linalg.norm(turn)), 0.0, 0.0, 0.99 * gap.support[1]])
+    assert gap.distance(pose) < 0.0
+
+
+def test_what_is_out_of_reach_is_left_out_to_the_last_bit(tmp_path, monkeypatch):
+    options = {"height": 0.15, "along": 1.0, "gravity": -9.81, "loss": 0.3, "friction": 0.4}
+    found = run(scene_of(tmp_path, BALL, **options), 0.5)
+    called = []
+
+    def everywhere(*_):
+        called.append(True)
+        return 0, 0.0
+
+    monkeypatch.setattr(mechanism, "_support", everywhere)
+    oracle = run(scene_of(tmp_path, BALL, **options), 0.5)
+    assert called and found.contact("ball_floor").gap.min() < 0.0 < found.contact("ball_floor").gap.max()
+    assert np.array_equal(found.body("ball").position, oracle.body("ball").position)
+    assert np.array_equal(found.heat, oracle.heat)
 
 
 def scene_of(tmp_path, text, **numbers):

@@ -4,7 +4,18 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import final
 
-from ephs.mechanics.tree.sweeps.acting import ON_BODIES, ON_TREE, Acting, Component, Conduction, Port, Tables, Work
+from ephs.mechanics.tree.sweeps.acting import (
+    ABOVE,
+    BEYOND,
+    ON_BODIES,
+    ON_TREE,
+    Acting,
+    Component,
+    Conduction,
+    Port,
+    Tables,
+    Work,
+)
 from ephs.mechanics.tree.sweeps.cuts import Relative, between, motion_of, place_of
 from ephs.mechanics.tree.sweeps.needs import NO_INTEGERS
 from ephs.mechanics.tree.sweeps.network import Net
@@ -34,7 +45,7 @@ def act(
     on.loop(tables.node.size, acting.warm)
     on.loop(tables.body.size, acting.push)
     on.when(tables.own[0].attached > 0, lambda: acting.unless_refused(acting.attach))
-    on.loop(tables.acting.size, lambda i: acting.unless_refused(lambda: acting.edge(tables.acting[i])))
+    on.loop(tables.acting.size, lambda i: acting.unless_refused(lambda: acting.if_near(tables.acting[i], acting.edge)))
     on.loop(tables.conduction.size, lambda i: acting.unless_refused(lambda: acting.conduct(tables.conduction[i])))
     return acting.status.value
 
@@ -48,8 +59,11 @@ def strain(on: Evaluator, tables: Tables, work: Work, q: Vector, out: Vector) ->
     acting = _Acting(on, tables, work, q, q, work.idle, work.idle, work.idle, on.counter(0))
 
     def one(i: Integer) -> None:
+        def store(edge: Acting) -> None:
+            acting.store(edge, out)
+
         edge = tables.acting[i]
-        on.when(edge.spring >= 0, lambda: acting.unless_refused(lambda: acting.store(edge, out)))
+        on.when(edge.spring >= 0, lambda: acting.unless_refused(lambda: acting.if_near(edge, store)))
 
     on.loop(tables.acting.size, one)
     return acting.status.value
@@ -175,6 +189,22 @@ class _Acting:
 
         on.when(on.same(edge.kind, ON_TREE), in_tree, aside)
         return rate.value
+
+    def if_near(self, edge: Acting, body: Callable[[Acting], None]) -> None:
+        """Call body(edge) unless its frames are so far apart that nothing acts."""
+        on, near = self.on, self.on.counter(1)
+
+        def look() -> None:
+            one, other = place_of(on, self.work.place, edge.first), place_of(on, self.work.place, edge.second)
+            _, there = between(one, other, edge.outer_turn, edge.outer_at)
+            x, y, z = apply_transposed(edge.inner_turn, sub(there, edge.inner_at))
+            square = edge.reach * edge.reach
+            above = on.both(on.same(edge.support, ABOVE), z > edge.reach)
+            beyond = on.both(on.same(edge.support, BEYOND), x * x + y * y + z * z > square)
+            near.value = on.select(on.either(above, beyond), 0, 1)
+
+        on.when(edge.support > 0, look)
+        on.when(on.same(near.value, 1), lambda: body(edge))
 
     def edge(self, edge: Acting) -> None:
         """Add what acts in an edge to the forces on joints, or to the wrenches on links."""

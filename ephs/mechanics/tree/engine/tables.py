@@ -17,9 +17,10 @@ class Forces(NamedTuple):
     """Forces besides inertia and gravity: components of joints and springs, entropies, wrenches on bodies."""
 
     edge: Index  # (edges, 8): kind, link of body 1, of body 2, freedoms, place of q, its size, place of r, cut joint
-    part: Index  # (edges, 3): component of the potential, of friction, entropy that takes its heat; −1: none
+    part: Index  # (edges, 4): component of the potential, of friction, entropy that takes its heat, −1: none; support
     frame: Array  # (edges, 24): rows of R and p of both joint frames in their links' frames
     left: Array  # (edges, 36): (BᵀB)⁻¹Bᵀ, row by row
+    reach: Array  # (edges, 1): from where on nothing acts
     body: Index  # (bodies,): link on which the wrench acts, −1: none does
     body_frame: Array  # (bodies, 12): R and p of the body in its link's frame
     node: Table[Node]
@@ -33,7 +34,9 @@ class Forces(NamedTuple):
     def tables(self) -> dict[str, Any]:
         """Return the records of the engine, by name."""
         return {
-            "acting": table_of(Acting, np.hstack([self.edge, self.part]), np.hstack([self.frame, self.left])),
+            "acting": table_of(
+                Acting, np.hstack([self.edge, self.part]), np.hstack([self.frame, self.left, self.reach])
+            ),
             "body": table_of(Body, self.body[:, None], self.body_frame),
             "node": self.node,
             "conduction": table_of(Conduction, self.conduction),

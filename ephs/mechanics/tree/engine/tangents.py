@@ -37,7 +37,7 @@ from ephs.solve.heats import PLAIN
 from ephs.solve.march import TABLEAU, Account, Control, Tableau
 from ephs.solve.march.steps import attempt
 
-__all__ = ["DIRECTIONS", "StepTangent", "evaluated", "reaching", "step_program", "step_tangents"]
+__all__ = ["DIRECTIONS", "StepTangent", "evaluated", "paired_tables", "reaching", "step_program", "step_tangents"]
 
 BEYOND: Final = 1e100
 """Errors that are allowed of a step where its length is given."""
@@ -165,14 +165,10 @@ class StepTangent:
     ) -> None:  # fmt: skip
         coordinates, size = engine.sizes
         stages = tableau["a"].shape[0]
-        self.slopes: dict[str, Array] = {}
-        tables = {**engine.tables, **reaching(engine, relation, lambda program: program.tangent(DIRECTIONS))}
-        arguments: dict[str, Any] = {"tables": {}, "work": {}, "tableau": {}}
-        self.arguments = arguments
-        for key, values in (("tables", tables), ("work", engine.work), ("tableau", tableau)):
-            for name, value in values.items():
-                kept = self.slopes if key == "tables" else {}
-                arguments[key][name] = _paired(value, kept, name)
+        tables, work, self.slopes = paired_tables(engine, relation)
+        coefficients = {name: _paired(value, {}, name) for name, value in tableau.items()}
+        self.arguments: dict[str, Any] = {"tables": tables, "work": work, "tableau": coefficients}
+        arguments = self.arguments
         shapes: dict[str, tuple[int, ...]] = {
             "base": (coordinates,), "start": (size,), "k": (stages, size), "last": (size,), "y": (size,),
             "q": (coordinates,),
@@ -220,6 +216,16 @@ def step_tangents(looped: bool) -> Program:
             for name, entry in program.entries.items()
         },
     )
+
+
+def paired_tables(
+    engine: Engine, relation: Callable[[int], tuple[Program, str]]
+) -> tuple[dict[str, Any], dict[str, Any], dict[str, Array]]:
+    """Return an engine's tables and memory with slopes, which call tangents, and the slopes of the tables by name."""
+    slopes: dict[str, Array] = {}
+    tables = {**engine.tables, **reaching(engine, relation, lambda program: program.tangent(DIRECTIONS))}
+    paired = {name: _paired(value, slopes, name) for name, value in tables.items()}
+    return paired, {name: _paired(value, {}, name) for name, value in engine.work.items()}, slopes
 
 
 def _pair(array: Array) -> tuple[Array, Array]:

@@ -6,19 +6,20 @@ from typing import Any, final
 
 import numpy as np
 
+from ephs.mechanics.shapes.gap import HEIGHT, PLACE
 from ephs.mechanics.tree.finding.attaching import Attaching, attaching_of, makers_of
 from ephs.mechanics.tree.finding.frames import GROUND, Frame, Link, Unplaced
 from ephs.mechanics.tree.finding.network import Network
 from ephs.mechanics.tree.finding.parts import Acting, Parts, parts_of
 from ephs.mechanics.tree.finding.spanning import Edge, frames_of_joints, loop_algebra, spanning_tree, twists_of
 from ephs.mechanics.tree.finding.tables import CUT, SPRING, TREE, Mechanism
-from ephs.mechanics.tree.sweeps.acting import Node
+from ephs.mechanics.tree.sweeps.acting import ABOVE, BEYOND, Node
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.derive.relations import compiled
 from ephs.semantics.descriptor import ComponentSlot
 from ephs.semantics.kept import Kept, once
-from ephs.semantics.primitives import Storage
+from ephs.semantics.primitives import Irreversible, Storage
 from ephs.semantics.stage import Table
 from ephs.solve.errors import OptionError
 from ephs.solve.heats import PLAIN, exponential_law
@@ -196,6 +197,7 @@ def _tables(
     at_q = at_r = 0
     driven: list[int] = []
     spring, friction, heat = (np.full(count, -1) for _ in range(3))
+    support, reach = np.zeros(count, dtype=np.int64), np.zeros(count)
     for i, (edge, kind) in enumerate(zip(edges, kinds, strict=True)):
         b, d = edge.pair.basis, edge.pair.dim
         basis[i, :, :d], left[i, :d] = b, np.linalg.pinv(b)
@@ -211,6 +213,8 @@ def _tables(
         heat[i] = edge.heat
         spring[i] = -1 if edge.spring < 0 or _stores_nothing(model, edge.spring) else edge.spring
         friction[i] = -1 if edge.friction < 0 or _idle(model, edge.friction) else edge.friction
+        if kind == SPRING:
+            support[i], reach[i] = _support(model, [c for c in (spring[i], friction[i]) if c >= 0])
     t, components = model.tables, model.descriptor.components
     armature = np.zeros(len(driven))
     for one in parts.network.inertias:
@@ -247,6 +251,8 @@ def _tables(
         spring=spring,
         friction=friction,
         heat=heat,
+        support=support,
+        reach=reach,
         driven=np.array(driven, dtype=np.int64),
         armature=armature,
         node=np.array(
@@ -279,6 +285,17 @@ def _resting(components: Sequence[ComponentSlot], address: Index, acting: Index)
         if kernel is not None:
             found[number] = compiled(kernel.relation, rest=True).address
     return found
+
+
+def _support(model: Model, parts: list[int]) -> tuple[int, float]:
+    """Where what acts in a spring vanishes, and from which height or distance on; 0 where that is not said."""
+    primitives = [model.descriptor.components[part].primitive for part in parts]
+    said = [p.support for p in primitives if isinstance(p, Storage | Irreversible)]
+    found = {places for places, _ in (one for one in said if one is not None)}
+    if None in said or len(said) < len(parts) or len(found) != 1:
+        return 0, 0.0
+    kind = {HEIGHT: ABOVE, PLACE: BEYOND}.get(found.pop(), 0)
+    return kind, max(limit for _, limit in (one for one in said if one is not None))
 
 
 def _length(edges: tuple[Edge, ...]) -> float:

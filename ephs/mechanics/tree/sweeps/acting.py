@@ -30,6 +30,8 @@ from ephs.semantics.stage import (
 )
 
 __all__ = [
+    "ABOVE",
+    "BEYOND",
     "ON_BODIES",
     "ON_CUT",
     "ON_TREE",
@@ -47,6 +49,8 @@ __all__ = [
     "Work",
 ]  # fmt: skip
 
+ABOVE, BEYOND = 1, 2
+"""Where what acts in a spring vanishes: above a plane z = reach of its first frame, beyond a distance from it."""
 ON_TREE, ON_CUT, ON_BODIES = range(3)
 """Kinds of edges in which something acts: a joint of the tree, a cut one, a spring between bodies."""
 
@@ -146,6 +150,8 @@ class Acting(Record):
         Components of the potential and of friction, −1: none.
     heat
         The entropy that takes its heat.
+    support, reach
+        `ABOVE` or `BEYOND`: where the second frame's place in the first is higher or farther, nothing acts; else 0.
     inner_turn, inner_at, outer_turn, outer_at
         Its first frame in the first link's, its second in the second's.
     left
@@ -163,11 +169,13 @@ class Acting(Record):
     spring = integer()
     friction = integer()
     heat = integer()
+    support = integer()
     inner_turn = reals(3, 3)
     inner_at = reals(3)
     outer_turn = reals(3, 3)
     outer_at = reals(3)
     left = reals(6, 6)
+    reach = real()
 
 
 class Body(Record):

@@ -1,0 +1,74 @@
+"""Derivatives of a mechanism's rates by its state: the rates over dual numbers, several directions a call."""
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any, final
+
+import numpy as np
+
+from ephs.mechanics.tree.engine.engine import Engine
+from ephs.mechanics.tree.engine.motion import Mechanism
+from ephs.mechanics.tree.engine.tangents import DIRECTIONS, paired_tables
+from ephs.mechanics.tree.sweeps.acting import TABLES, WORK, Tables, Work
+from ephs.semantics.bundle import Array
+from ephs.semantics.stage import Entry, Evaluator, Integer, Program, Vector, group, vector
+from ephs.solve.sparse import Index
+
+__all__ = ["RateSlopes", "rate_slopes"]
+
+
+@cache
+def rate_slopes() -> Program:
+    """Return the program of the rates of trees over dual numbers."""
+
+    def rates(on: Evaluator, tables: Tables, work: Work, base: Vector, y: Vector, q: Vector, out: Vector) -> Integer:
+        return Mechanism(tables, work, False).rates(on, base, y, q, out)[0]
+
+    of: dict[str, Any] = {"tables": group(Tables, **TABLES), "work": group(Work, **WORK)}
+    entry = Entry(rates, **of, base=vector(), y=vector(), q=vector(), out=vector())
+    return Program(f"rates_of_trees_along_{DIRECTIONS}", rates=entry.tangent(directions=DIRECTIONS))
+
+
+@final
+class RateSlopes:
+    """Derivatives of the rates of one tree.
+
+    Parameters
+    ----------
+    engine
+        Its equations, whose tables are read where they are.
+    relation
+        Called with the number of a component; returns the program and the entry that it is in machine code.
+    wanted
+        Numbers of y by which derivatives are asked for; those by others are 0.
+    size
+        How many numbers of y have rates of interest: the first ones.
+    """
+
+    def __init__(
+        self, engine: Engine, relation: Callable[[int], tuple[Program, str]], wanted: Index, size: int
+    ) -> None:
+        coordinates, whole = engine.sizes
+        self._q, self._y, self._out = (np.zeros(count) for count in (coordinates, whole, whole))
+        self._seed, self._slope = np.zeros((2, whole, DIRECTIONS))
+        self._wanted, self._size = wanted, size
+        still, moved = np.zeros((coordinates, DIRECTIONS)), np.zeros((coordinates, DIRECTIONS))
+        tables, work, _ = paired_tables(engine, relation)
+        self._run = rate_slopes().compiled()["rates"].bind(
+            tables, work, (self._q, still), (self._y, self._seed), (np.zeros(coordinates), moved),
+            (self._out, self._slope),
+        )  # fmt: skip
+
+    def at(self, q: Array, y: Array) -> tuple[int, Array]:
+        """A status, and ∂ẏ/∂y (size, size) where joints' elements are q·exp(v)."""
+        self._q[:], self._y[:] = q, y
+        found = np.zeros((self._size, self._size))
+        for first in range(0, self._wanted.size, DIRECTIONS):
+            here = self._wanted[first : first + DIRECTIONS]
+            self._seed[here, range(here.size)] = 1.0
+            status = int(self._run())
+            self._seed[here] = 0.0
+            if status:
+                return status, found
+            found[:, here] = self._slope[: self._size, : here.size]
+        return 0, found
