@@ -8,9 +8,6 @@ from ephs.solve.march.memory import MEMORY as MEMORY
 from ephs.solve.march.memory import Books as Books
 from ephs.solve.march.memory import Errors as Errors
 from ephs.solve.march.memory import Memory as Memory
-from ephs.solve.march.newton import STIFF as STIFF
-from ephs.solve.march.newton import Newton as Newton
-from ephs.solve.march.newton import Stiff as Stiff
 from ephs.solve.march.records import TABLEAU as TABLEAU
 from ephs.solve.march.records import Control as Control
 from ephs.solve.march.records import Ending as Ending
@@ -19,3 +16,6 @@ from ephs.solve.march.records import Motion as Motion
 from ephs.solve.march.records import Status as Status
 from ephs.solve.march.records import Tableau as Tableau
 from ephs.solve.march.steps import STEPS as STEPS
+from ephs.solve.march.stiff import STIFF as STIFF
+from ephs.solve.march.stiff import Newton as Newton
+from ephs.solve.march.stiff import Stiff as Stiff

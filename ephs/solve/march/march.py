@@ -9,9 +9,10 @@ from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Truth, Variab
 from ephs.solve.march.account import Account, worth
 from ephs.solve.march.control import PATIENCE, held_back, judge, length
 from ephs.solve.march.memory import Books, Memory
-from ephs.solve.march.newton import Stiff, filtered
+from ephs.solve.march.newton import filtered
 from ephs.solve.march.records import Control, Ending, Motion, Status, Tableau
 from ephs.solve.march.steps import allow, attempt, book, drift, error_of, first, stiffness_of
+from ephs.solve.march.stiff import Stiff
 
 __all__ = ["march"]
 

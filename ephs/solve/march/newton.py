@@ -1,39 +1,19 @@
 """Stages that depend on each other by Newton's method, with a matrix that is kept while it serves.
 
-Hairer and Wanner, *Solving Ordinary Differential Equations II*, IV.8. The system of three stages falls apart by the
-eigenvalues of the method's coefficients, into a real system of the motion's size and one of twice that for the pair.
-Where rates of freedoms depend on increments and rates alone, and sums on nothing but these, each falls to one of the
-size of the freedoms: with γ = μ/h, (γ² − γ (J_rr + J_vv) + J_rr J_vv − J_rv) δv = f_r + (γ − J_rr) f_v.
+Hairer and Wanner, *Solving Ordinary Differential Equations II*, IV.8.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Final, final
+from typing import final
 
-from ephs.semantics.linear.dense import clear, copy, dot, lu, lu_solve
-from ephs.semantics.stage import (
-    Evaluator,
-    Integer,
-    Integers,
-    Matrix,
-    Real,
-    Record,
-    Table,
-    Truth,
-    Vector,
-    indices,
-    integer,
-    matrix,
-    real,
-    staged,
-    table,
-    vector,
-)
+from ephs.semantics.linear.dense import clear, copy
+from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Truth, Vector, staged
 from ephs.solve.march.collocation import evaluate, place
 from ephs.solve.march.memory import Errors
 from ephs.solve.march.records import Control, Motion, Status, Tableau
+from ephs.solve.march.stiff import Solver, Stiff, whole
 
-__all__ = ["ITERATIONS", "STIFF", "Newton", "Stiff", "filtered", "newton"]
+__all__ = ["ITERATIONS", "filtered", "newton"]
 
 ITERATIONS = 10
 """Iterations after which a step is given up."""
@@ -41,97 +21,6 @@ FAST = 0.3
 """A rate of convergence from which on a new matrix is made: one costs as much as a dozen iterations."""
 BEYOND = 1e300
 """Bound of numbers: nan is not below it."""
-
-
-class Newton(Record):
-    """State of the iteration.
-
-    Attributes
-    ----------
-    enough, rough
-        Change of an iteration, relative to what is allowed, after which stages are solved; that is good enough where
-        the iteration gets no further.
-    factored
-        Step in s for which the matrices are factorised; 0: none.
-    decay, growth, turning
-        The eigenvalues of the coefficients' inverse: the real one, and the pair.
-    stale
-        1 where the matrix served badly.
-    young
-        1 where it is that of the state.
-    split
-        1 where no rate of the matrix depends on the numbers after increments and rates.
-    iterations, factorisations
-        Counts.
-    """
-
-    enough = real()
-    rough = real()
-    factored = real()
-    decay = real()
-    growth = real()
-    turning = real()
-    stale = integer()
-    young = integer()
-    split = integer()
-    iterations = integer()
-    factorisations = integer()
-
-
-@final
-@dataclass(frozen=True, slots=True)
-class Stiff:
-    """Memory of implicit steps of a motion whose state has m numbers besides the sums that no rate reads.
-
-    Attributes
-    ----------
-    newton
-        One row.
-    matrix
-        (m, m): ∂ẏ/∂y.
-    damping, spring
-        (n, n): J_rr + J_vv and J_rr J_vv − J_rv, of increments v and rates r.
-    single, pair
-        (m, m) and (2 m, 2 m): factors, with `swap` and `swaps`.
-    inverse, into, out
-        (3, 3): the coefficients' inverse, and to and from the parts that it falls into.
-    stages, change
-        (3, m): increments of the stages, and what an iteration adds to them.
-    part, parts
-        (m,) and (2 m,).
-    right
-        (2 n,).
-    y, rate, q
-        A state and its rates.
-    """
-
-    newton: Table[Newton]
-    matrix: Matrix
-    damping: Matrix
-    spring: Matrix
-    single: Matrix
-    pair: Matrix
-    swap: Integers
-    swaps: Integers
-    inverse: Matrix
-    into: Matrix
-    out: Matrix
-    stages: Matrix
-    change: Matrix
-    part: Vector
-    parts: Vector
-    right: Vector
-    y: Vector
-    rate: Vector
-    q: Vector
-
-
-STIFF: Final[dict[str, Any]] = {
-    "newton": table(Newton), "matrix": matrix(), "damping": matrix(), "spring": matrix(), "single": matrix(),
-    "pair": matrix(), "swap": indices(), "swaps": indices(), "inverse": matrix(3), "into": matrix(3), "out": matrix(3),
-    "stages": matrix(), "change": matrix(), "part": vector(), "parts": vector(), "right": vector(), "y": vector(),
-    "rate": vector(), "q": vector(),
-}  # fmt: skip
 
 
 @staged
@@ -150,8 +39,8 @@ def newton(
     n = stiff.newton[0]
     status, tries, done = on.counter(0), on.counter(0), on.counter(0)
     before, rate = on.variable(BEYOND), on.variable(BEYOND)
-    on.when(on.negate(on.absolute(n.factored - h) <= 0.0), _Solver(on, stiff, h).factorise)
-    clear(on, _whole(stiff.stages))
+    on.when(on.negate(on.absolute(n.factored - h) <= 0.0), Solver(on, stiff, h).factorise)
+    clear(on, whole(stiff.stages))
 
     def stage(i: Integer) -> None:
         def look() -> None:
@@ -204,7 +93,7 @@ def filtered(
     it leads, as of stiff parts the first estimate is.
     """
     m, n = stiff.part, stiff.newton[0]
-    worst, solver = on.variable(0.0), _Solver(on, stiff, n.factored)
+    worst, solver = on.variable(0.0), Solver(on, stiff, n.factored)
 
     def estimate(first: Vector) -> None:
         def one(j: Integer) -> None:
@@ -233,147 +122,8 @@ def filtered(
     return worst.value
 
 
-def _whole(x: Matrix) -> Vector:
-    return Vector(x.cells, x.start, x.rows * x.columns)
-
-
-def _set(on: Evaluator, flag: Integer) -> Truth:
-    """Tell whether a flag is 1."""
-    return on.same(flag, 1)
-
-
 def _add(x: Vector, j: Integer, by: Real) -> None:
     x[j] = x[j] + by
-
-
-@final
-@dataclass(frozen=True, slots=True)
-class _Solver:
-    """The matrices μ/h − J for the real eigenvalue μ and for the pair: a complex one, its parts as two real ones."""
-
-    on: Evaluator
-    stiff: Stiff
-    h: Real
-
-    @property
-    def _real(self) -> list[Real]:
-        return [self.stiff.newton[0].decay / self.h]
-
-    @property
-    def _complex(self) -> list[Real]:
-        n = self.stiff.newton[0]
-        return [n.growth / self.h, n.turning / self.h]
-
-    def factorise(self) -> None:
-        """Factorise both."""
-        n = self.stiff.newton[0]
-        self.on.when(_set(self.on, n.split), self._of_freedoms, self._whole)
-        n.factored, n.factorisations = self.h, n.factorisations + 1
-
-    def one(self) -> None:
-        """Solve for `part` by the real one."""
-        s = self.stiff
-        self._either([s.part], self._real, lambda: lu_solve(self.on, s.single, s.swap, s.part))
-
-    def two(self) -> None:
-        """Solve for `parts` by that of the pair."""
-        s, size = self.stiff, self.stiff.matrix.rows
-        parts = [s.parts.part(0, size), s.parts.part(size, size)]
-        self._either(parts, self._complex, lambda: lu_solve(self.on, s.pair, s.swaps, s.parts))
-
-    def _either(self, parts: list[Vector], by: list[Real], whole: Callable[[], None]) -> None:
-        self.on.when(_set(self.on, self.stiff.newton[0].split), lambda: self._by_freedoms(parts, by), whole)
-
-    def _whole(self) -> None:
-        """Write and factorise the matrices of all numbers."""
-        on, s = self.on, self.stiff
-        size, (decay,), (growth, turning) = s.matrix.rows, self._real, self._complex
-        clear(on, _whole(s.pair))
-
-        def row(i: Integer) -> None:
-            def entry(j: Integer) -> None:
-                x = -s.matrix[i, j]
-                s.single[i, j], s.pair[i, j], s.pair[size + i, size + j] = x, x, x
-
-            on.loop(size, entry)
-            s.single[i, i] = s.single[i, i] + decay
-            s.pair[i, i] = s.pair[i, i] + growth
-            s.pair[size + i, size + i] = s.pair[size + i, size + i] + growth
-            s.pair[i, size + i], s.pair[size + i, i] = -turning, turning
-
-        on.loop(size, row)
-        lu(on, s.single, s.swap)
-        lu(on, s.pair, s.swaps)
-
-    def _factors(self, size: int) -> Matrix:
-        """The factors of the freedoms' matrix: of one, or of a pair."""
-        n, held = self.stiff.damping.rows, self.stiff.single if size == 1 else self.stiff.pair
-        return Matrix(held.cells, held.start, size * n, size * n)
-
-    def _of_freedoms(self) -> None:
-        """Write and factorise the matrices of the freedoms."""
-        on, s, n, (decay,), (growth, turning) = self.on, self.stiff, self.stiff.damping.rows, self._real, self._complex
-        single, pair = self._factors(1), self._factors(2)
-
-        def row(i: Integer) -> None:
-            def entry(j: Integer) -> None:
-                single[i, j] = s.spring[i, j] - decay * s.damping[i, j]
-                real, imaginary = s.spring[i, j] - growth * s.damping[i, j], -turning * s.damping[i, j]
-                pair[i, j], pair[n + i, n + j], pair[i, n + j], pair[n + i, j] = real, real, -imaginary, imaginary
-
-            on.loop(n, entry)
-            single[i, i] = single[i, i] + decay * decay
-            real, imaginary = growth * growth - turning * turning, 2.0 * growth * turning
-            pair[i, i], pair[n + i, n + i] = pair[i, i] + real, pair[n + i, n + i] + real
-            pair[i, n + i], pair[n + i, i] = pair[i, n + i] - imaginary, pair[n + i, i] + imaginary
-
-        on.loop(n, row)
-        lu(on, single, s.swap)
-        lu(on, pair, s.swaps)
-
-    def _by_freedoms(self, parts: list[Vector], by: list[Real]) -> None:
-        """Solve for (δv, δr, δs) in place of (f_v, f_r, f_s): a real right side, or both parts of a complex one."""
-        on, s, n, count = self.on, self.stiff, self.stiff.damping.rows, len(parts)
-        right = [s.right.part(k * n, n) for k in range(count)]
-
-        def project(i: Integer) -> None:
-            turned = _times(by, [x[i] for x in parts])
-            for x, out, first in zip(parts, right, turned, strict=True):
-                out[i] = x[n + i] + first - self._row(n + i, n, n, x.part(0, n))
-
-        def lift(i: Integer) -> None:
-            turned = _times(by, [x[i] for x in right])
-            for x, found, first in zip(parts, right, turned, strict=True):
-                x[n + i] = first - self._row(i, 0, n, found) - x[i]
-
-        def sums(i: Integer) -> None:
-            whole = [x[i] + self._row(i, 0, 2 * n, x) for x in parts]
-            for x, value in zip(parts, _over(by, whole), strict=True):
-                x[i] = value
-
-        on.loop(n, project)
-        lu_solve(on, self._factors(count), s.swap if count == 1 else s.swaps, s.right.part(0, count * n))
-        on.loop(n, lift)
-        for x, found in zip(parts, right, strict=True):
-            copy(on, found, x.part(0, n))
-        on.loop(s.matrix.rows, sums, start=2 * n)
-
-    def _row(self, i: Integer, first: Integer, count: Integer, x: Vector) -> Real:
-        """Part of a row of the matrix times a vector."""
-        return dot(self.on, self.stiff.matrix.row(i).part(first, count), x.part(0, count))
-
-
-def _times(by: list[Real], x: list[Real]) -> list[Real]:
-    """A real or a complex product, by parts."""
-    return [by[0] * x[0]] if len(by) == 1 else [by[0] * x[0] - by[1] * x[1], by[0] * x[1] + by[1] * x[0]]
-
-
-def _over(by: list[Real], x: list[Real]) -> list[Real]:
-    """A real or a complex quotient, by parts."""
-    if len(by) == 1:
-        return [x[0] / by[0]]
-    size = by[0] * by[0] + by[1] * by[1]
-    return [(by[0] * x[0] + by[1] * x[1]) / size, (by[0] * x[1] - by[1] * x[0]) / size]
 
 
 @final
@@ -410,7 +160,7 @@ class _Newton:
                 s.change[i, j] = x
 
         on.loop(size, defect)
-        solver = _Solver(on, s, self.h)
+        solver = Solver(on, s, self.h)
         solver.one()
         solver.two()
         on.loop(size, back)
@@ -447,7 +197,7 @@ class _Newton:
     def move(self) -> None:
         """Add the change to the stages."""
         s = self.stiff
-        stages, change = _whole(s.stages), _whole(s.change)
+        stages, change = whole(s.stages), whole(s.change)
         self.on.loop(stages.size, lambda j: _add(stages, j, change[j]))
 
     def rates(self) -> None:

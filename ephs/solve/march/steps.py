@@ -25,8 +25,9 @@ from ephs.semantics.stage import (
 from ephs.solve.march.collocation import combine, evaluate, iterate, place
 from ephs.solve.march.control import judge
 from ephs.solve.march.memory import Books, Errors, Memory
-from ephs.solve.march.newton import Stiff, newton
+from ephs.solve.march.newton import newton
 from ephs.solve.march.records import Control, Motion, Status, Tableau
+from ephs.solve.march.stiff import Stiff
 
 __all__ = ["DRIFT", "STEPS", "allow", "attempt", "book", "drift", "error_of", "first", "measure", "stiffness_of"]
 
