@@ -28,7 +28,7 @@ STOREYS: tuple[tuple[frozenset[str], ...], ...] = tuple(
         ([".mechanics.tree.finding"],),
         ([".mechanics.tree.engine"], [".mechanics.rewrite"]),
         ([".mechanics.tree.equations"],),
-        ([".mechanics.methods"],),
+        ([".mechanics.methods", ".mechanics.impacts"],),
         ([".mechanics.motion"],),
         ([".mechanics", ".mechanics.runs"],),
         ([".mechanics.dynamics"], [".mechanics.sweep"]),

@@ -302,6 +302,8 @@ class Irreversible:
     one_sided
         Whether M depends on the direction of the flow, as of valves, diodes and contacts, which push only: then its
         parity under time reversal is not asked for.
+    impulse
+        Law of its impulses, of a process that acts at instants and has no rate, as a hard contact; None of others.
     """
 
     name: str
@@ -317,6 +319,7 @@ class Irreversible:
     trusted: bool = field(default=False, compare=False, repr=False)
     one_sided: bool = field(default=False, compare=False, repr=False)
     support: Support | None = field(default=None, compare=False, repr=False)
+    impulse: object = field(default=None, compare=False, repr=False)
     _verdict: StructureVerdict | None = field(default=None, init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:

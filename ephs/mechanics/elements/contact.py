@@ -13,8 +13,10 @@ from typing import Any, Final
 import numpy as np
 
 from ephs.mechanics.elements import notation
+from ephs.mechanics.elements.components import no_potential
 from ephs.mechanics.elements.joints import between_frames
 from ephs.mechanics.shapes.gap import Gap, Vector, cross, dot, ramp
+from ephs.mechanics.shapes.impact import Impact, Meeting
 from ephs.mechanics.shapes.law import Law
 from ephs.mechanics.shapes.pairs import Touch
 from ephs.operad import Directory, Path, Pattern, PortType, junction, quantity
@@ -25,14 +27,14 @@ from ephs.semantics.primitives import Irreversible, Storage, power_ports
 from ephs.semantics.system import System
 from ephs.semantics.verdict import proved
 
-__all__ = ["contact", "contact_energy", "contact_loss", "lever", "losses"]
+__all__ = ["contact", "contact_energy", "contact_loss", "impact", "lever", "losses"]
 
 RELATIVE = quantity.relative_pose("free")
 Q_R = Path.of("q_r")
 UNITS: Final = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
-def contact(touches: Sequence[Touch], law: Law, *, heat: bool = False) -> System:
+def contact(touches: Sequence[Touch], law: Law | Impact, *, heat: bool = False) -> System:
     """Contact of two surfaces, at each of their points that can touch; ports p1, p2 carry the bodies' momenta.
 
     Parameters
@@ -49,10 +51,16 @@ def contact(touches: Sequence[Touch], law: Law, *, heat: bool = False) -> System
         junctions["s"] = junction(quantity.entropy, exposed=True)
         wires["s"] = "s"
     points = {
-        f"point{i}": between_frames(one, two, contact_energy(gap, law), contact_loss(gap, law), heat=heat)
+        f"point{i}": between_frames(one, two, *_parts(gap, law), heat=heat)
         for i, (one, two, gap) in enumerate(touches)
     }
     return System.of(Pattern(junctions=junctions, boxes=dict.fromkeys(points, wires)), points)
+
+
+def _parts(gap: Gap, law: Law | Impact) -> tuple[Storage, Irreversible]:
+    if isinstance(law, Impact):
+        return replace(no_potential(RELATIVE, "q_r"), name="wall"), impact(gap, law)
+    return contact_energy(gap, law), contact_loss(gap, law)
 
 
 def lever(direction: Vector, point: Vector) -> tuple[Any, ...]:
@@ -119,6 +127,26 @@ def contact_loss(gap: Gap, law: Law) -> Irreversible:
         one_sided=True,
     )
     return replace(made, notation=notation.friction, support=gap.support)
+
+
+def impact(gap: Gap, law: Impact) -> Irreversible:
+    """Impulses of a hard contact at a closed gap, which steps make; it has no rate. Ports p_r, s, q_r."""
+    ports = {
+        "p_r": PortType(quantity.joint_momentum("free"), True),
+        "s": PortType(quantity.entropy, True),
+        "q_r": PortType(RELATIVE, False),
+    }
+    nothing = np.zeros((6, 6))
+    made = structures.dissipation(
+        gap.name + "_impact",
+        Directory(ports),
+        lambda _x, _u, _theta: nothing,
+        parameters=(*gap.numbers, *law.numbers),
+        shown=lambda: structures.dissipation_proof(Directory(ports), None),
+        trusted=True,
+        one_sided=True,
+    )
+    return replace(made, notation=notation.friction, impulse=Meeting(gap, law))
 
 
 def _squares(terms: Any) -> Any:

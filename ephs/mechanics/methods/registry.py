@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any, final
 
 from ephs.mechanics.tree.finding.frames import Unplaced
+from ephs.mechanics.tree.finding.roles import strikes
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.solve.control import Control, Policy, Proportional, Symmetric
@@ -73,6 +74,8 @@ class Method:
     undamped
         Of a method that damps nothing at infinity: makes, for a compiled model, what estimates the error of its
         constant steps; None of others.
+    impacts
+        Whether it takes hard contacts: its steps may begin and end anywhere.
     """
 
     name: str
@@ -88,6 +91,7 @@ class Method:
     forms: tuple[str, ...] = ()
     lawful: bool = False
     undamped: Callable[[Model], ComponentMethod] | None = None
+    impacts: bool = False
 
 
 def on_joints(make: Callable[..., Any]) -> Callable[[Setting], tuple[Stepper[Any], Policy | None]]:
@@ -99,12 +103,17 @@ def on_joints(make: Callable[..., Any]) -> Callable[[Setting], tuple[Stepper[Any
     def made(setting: Setting) -> tuple[Stepper[Any], Policy | None]:
         from ephs.mechanics.tree.equations.equations import Equations  # its kernels take a quarter of a second to load
 
+        hard = strikes(setting.problem.descriptor.components)
         try:
-            equations = setting.equations or Equations(setting.problem, setting.t0)
+            equations = setting.equations or Equations(setting.problem, setting.t0, pushed=hard is not None)
         except Unplaced as error:
             serving = ", ".join(m.name for m in METHODS.values() if m.systems and m.name != setting.method)
             raise OptionError("method", setting.method, f"{serving}: {error}") from None
         stepper = make(equations, setting.control, **setting.options)
+        if hard is not None:
+            from ephs.mechanics.impacts.stepping import Impacts
+
+            stepper = Impacts(stepper)
         return stepper, None if setting.control.step is not None else Proportional(
             lambda: stepper.exponent, lambda: stepper.share
         )
@@ -266,7 +275,7 @@ for _method in (
         ("keep",),
         undamped=Natural,
     ),
-    Method("radau", 5, True, True, True, True, "Radau IIA, stiff", _radau, ("keep",)),
+    Method("radau", 5, True, True, True, True, "Radau IIA, stiff", _radau, ("keep",), impacts=True),
     Method(
         "alpha", 2, True, True, False, True, "generalised-α, damps what is fast", on_joints(_alpha), ("rho", "keep")
     ),
@@ -281,6 +290,7 @@ for _method in (
             f"Dormand and Prince, explicit{more}",
             on_joints(_corrected(_tableau(name))),
             ("keep",),
+            impacts=True,
         )
         for name, order, more in (("rk54", 5, ""), ("rk87", 8, ", many digits"))
     ),
@@ -295,6 +305,7 @@ for _method in (
             "Gauss, symmetric, implicit",
             on_joints(_corrected(_gauss(f"gauss{order}"))),
             ("keep",),
+            impacts=True,
         )
         for order in (4, 6, 8)
     ),
@@ -312,7 +323,7 @@ def _for_scenes(setting: Setting) -> tuple[Stepper[Any], Policy | None]:
         return METHODS["natural"].make(setting)
 
 
-AUTO = Method("auto", 8, True, False, False, True, "rk54 or rk87, radau where stiff", _for_scenes, ("keep",))
+AUTO = Method("auto", 8, True, False, False, True, "rk54 or rk87, radau where stiff", _for_scenes, ("keep",), impacts=True)
 """Method behind `auto` for mechanisms in joint coordinates."""
 
 
@@ -324,7 +335,10 @@ def chosen(name: str | Method, problem: Problem, *, step: float | None) -> tuple
     OptionError
         There is no such method, or it does not serve this problem.
     """
+    hard = strikes(problem.descriptor.components)
     if name == "auto":
+        if hard is not None:
+            return (AUTO, "a mechanism with hard contacts") if step is None else (METHODS["rk54"], "hard contacts")
         return _for_all(problem, step)
     if not isinstance(name, Method) and name not in METHODS:
         known = ("auto", *METHODS)
@@ -333,6 +347,9 @@ def chosen(name: str | Method, problem: Problem, *, step: float | None) -> tuple
     name = method.name
     if problem.scene is not None and not method.scenes:
         raise OptionError("method", name, f"{', '.join(m.name for m in METHODS.values() if m.scenes)} for a scene")
+    if hard is not None and not method.impacts:
+        known = ", ".join(m.name for m in (*METHODS.values(), AUTO) if m.impacts)
+        raise OptionError("method", name, f"{known}: {hard} is a hard contact")
     if step is not None and not method.fixed:
         raise OptionError("step", step, f"none: {name} chooses its steps")
     if step is None and not method.adaptive:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, final
+from typing import Any, Protocol, final
 
 import numpy as np
 
@@ -12,7 +12,9 @@ from ephs.mechanics.motion.moving import Moving
 from ephs.mechanics.scene.build import contact_points
 from ephs.mechanics.scene.model import GROUND, Scene
 from ephs.mechanics.scene.surfaces import Contact
-from ephs.mechanics.shapes.gap import ramp
+from ephs.mechanics.shapes.gap import Gap, ramp
+from ephs.mechanics.shapes.impact import Impact
+from ephs.mechanics.shapes.law import Law
 from ephs.mechanics.shapes.pairs import Touch
 from ephs.semantics.bundle import Array
 
@@ -45,6 +47,14 @@ class ContactMotion:
     heat: Array
 
 
+class Pressed(Moving, Protocol):
+    """Source of the motion of bodies with hard contacts."""
+
+    def pressed(self, contact: str, point: int) -> Array:
+        """(n, 3) force of a point of a hard contact on the second body, in world axes."""
+        ...
+
+
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class _Point:
@@ -58,7 +68,7 @@ class _Point:
     wrenches: tuple[Array, Array]
 
 
-def contact_motion(scene: Scene, of: Contact, read: Moving) -> ContactMotion:
+def contact_motion(scene: Scene, of: Contact, read: Pressed) -> ContactMotion:
     """Read a contact's motion."""
     points = [point for _, point in _points(scene, of, read)]
     gaps, forces = np.array([point.gap for point in points]), np.array([point.force for point in points])
@@ -75,13 +85,13 @@ def contact_motion(scene: Scene, of: Contact, read: Moving) -> ContactMotion:
     )
 
 
-def _points(scene: Scene, of: Contact, read: Moving) -> Iterator[tuple[tuple[str, str], _Point]]:
+def _points(scene: Scene, of: Contact, read: Pressed) -> Iterator[tuple[tuple[str, str], _Point]]:
     bodies, touches = contact_points(scene, of)
-    for touch in touches:
-        yield bodies, _point(bodies, touch, of, read)
+    for i, touch in enumerate(touches):
+        yield bodies, _point(bodies, touch, of, read, i)
 
 
-def _point(bodies: tuple[str, str], touch: Touch, of: Contact, read: Moving) -> _Point:
+def _point(bodies: tuple[str, str], touch: Touch, of: Contact, read: Pressed, number: int) -> _Point:
     frame1, frame2, gap = touch
     poses = [read.poses(name) for name in bodies]
     ends = [compose(pose, np.broadcast_to(o, pose.shape)) for pose, o in zip(poses, (frame1, frame2), strict=True)]
@@ -92,18 +102,38 @@ def _point(bodies: tuple[str, str], touch: Touch, of: Contact, read: Moving) -> 
     twist -= np.einsum("nij,nj->ni", adjoint_inverse(offset1), twist1)
     normal, point = gap.contact(relative.T)
     distance = np.asarray(gap.distance(relative.T))
-    wrench = _rows(lever(normal, point), len(relative)) * of.law.force(ramp(-distance))[:, None]
+    velocity = twist[:, 3:] + np.cross(twist[:, :3], _rows(point, len(relative)))
+    if isinstance(of.law, Impact):
+        pressed = _turned_back(ends[1], read.pressed(of.name, number))
+        wrench = np.column_stack([np.cross(_rows(point, len(relative)), pressed), pressed])
+        heat = np.maximum(-np.einsum("ni,ni->n", wrench, twist), 0.0)
+        touching = np.any(pressed, axis=1)
+    else:
+        wrench, heat = _elastic(gap, of.law, relative, twist, lever(normal, point), distance)
+        touching = distance < 0.0
+    slip = np.linalg.norm(np.cross(_rows(normal, len(relative)), velocity), axis=1)
+    place = ends[1][:, 4:] + turned(ends[1], _rows(point, len(relative)))
+    one, two = (_carried(o, wrench) for o in (offset1, np.broadcast_to(frame2, relative.shape)))
+    return _Point(distance, turned(poses[1], two[:, 3:]), place, np.where(touching, slip, 0.0), heat, (-one, two))
+
+
+def _elastic(
+    gap: Gap, law: Law, relative: Array, twist: Array, normal: tuple[Any, ...], distance: Array
+) -> tuple[Array, Array]:
+    """(n, 6) wrenches of an elastic contact on the second body, in the axes of C2, and the power (n,) that it heats."""
+    wrench = _rows(normal, len(relative)) * law.force(ramp(-distance))[:, None]
     heat = np.zeros(len(relative))
-    for factor, w in losses(gap, of.law, relative.T, twist.T):
+    for factor, w in losses(gap, law, relative.T, twist.T):
         direction = _rows(w, len(relative))
         rate = np.einsum("ni,ni->n", direction, twist)
         wrench -= direction * (factor * rate)[:, None]
         heat += factor * rate**2
-    velocity = twist[:, 3:] + np.cross(twist[:, :3], _rows(point, len(relative)))
-    slip = np.linalg.norm(np.cross(_rows(normal, len(relative)), velocity), axis=1)
-    place = ends[1][:, 4:] + turned(ends[1], _rows(point, len(relative)))
-    one, two = (_carried(o, wrench) for o in (offset1, np.broadcast_to(frame2, relative.shape)))
-    return _Point(distance, turned(poses[1], two[:, 3:]), place, np.where(distance < 0.0, slip, 0.0), heat, (-one, two))
+    return wrench, heat
+
+
+def _turned_back(poses: Array, vectors: Array) -> Array:
+    """(n, 3) vectors of the world in the axes of poses (n, 7)."""
+    return turned(np.column_stack([poses[:, :1], -poses[:, 1:4], poses[:, 4:]]), vectors)
 
 
 def _rows(components: Sequence[Any], count: int) -> Array:

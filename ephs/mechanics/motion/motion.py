@@ -183,6 +183,10 @@ class SceneMotion:
         s = self._solution[component_path("thermal", name) / "s"]
         return ThermalMotion(node.temperature * np.exp(s / node.capacity), s)
 
+    def pressed(self, contact: str, point: int) -> Array:
+        """(n, 3) force of a point of a hard contact on the second body in N and world axes."""
+        return self._found.pressed(component_path("contacts", contact) / f"point{point}")
+
     def contact(self, name: str) -> ContactMotion:
         """Gap, force, slip and heat of a contact."""
         contacts = dict(self._scene.all_contacts())

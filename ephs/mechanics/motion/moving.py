@@ -48,6 +48,10 @@ class ByPath(Protocol):
         """(n, 6) of a joint: λ on body 2 in C2, NaN in components that are indeterminate."""
         ...
 
+    def pressed(self, point: Path) -> Array:
+        """(n, 3) force of the point of a hard contact with this box on the second body, in world axes."""
+        ...
+
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,3 +78,7 @@ class Part:
     def wrench(self, joint: Path) -> Array:
         """(n, 6) of a joint: λ on body 2 in C2, NaN in components that are indeterminate."""
         return self.whole.wrench(self.box / joint)
+
+    def pressed(self, point: Path) -> Array:
+        """(n, 3) force of the point of a hard contact with this box on the second body, in world axes."""
+        return self.whole.pressed(self.box / point)

@@ -10,6 +10,8 @@ from typing import final
 
 import numpy as np
 
+from ephs.mechanics.impacts.reading import forces_at
+from ephs.mechanics.impacts.touching import Touching
 from ephs.mechanics.motion.batch import adjoint_inverse
 from ephs.mechanics.motion.general import GeneralMotion
 from ephs.mechanics.motion.moving import ByPath
@@ -83,6 +85,18 @@ class ReducedMotion:
             return self._general.wrench(joint)
         return self._wrenches[:, i]
 
+    def pressed(self, point: Path) -> Array:
+        """(n, 3) force of the point of a hard contact with this box on the second body, in world axes."""
+        return self._pressed[point]
+
+    @cached_property
+    @in_one_thread
+    def _pressed(self) -> dict[Path, Array]:
+        """Box of a point of hard contact -> (n, 3)."""
+        touching = Touching(self._eq)
+        found = np.array([forces_at(self._eq, touching, s, self._rates(k)) for k, s in enumerate(self._states)])
+        return {Path.of(tuple(path)[:-1]): found[:, i] for i, path in enumerate(touching.paths)}
+
     @cached_property
     def _general(self) -> GeneralMotion:
         return GeneralMotion(self._solution, frames_of(self._eq.problem.descriptor))
@@ -91,21 +105,25 @@ class ReducedMotion:
     @in_one_thread
     def _wrenches(self) -> Array:
         """(n, edges, 6)."""
-        eq, out = self._eq, np.zeros((len(self._states), len(self._eq.reduced.edges), 6))
-        inputs = self._solution.inputs
-        work = eq.engine.work
-        for k, state in enumerate(self._states):
-            eq.given.put(lambda port, k=k: inputs[port].values[k])
-            y = eq.vector(state)
-            status, _, rates = eq.engine.rates(state.q, y)
-            if status == Status.DEPENDENT:
-                status, _ = eq.dense.rates(state.q, y, eq.given, eq.heats, rates)
-            eq.refuse(status, eq.engine.failed)
-            accelerations = rates[eq.nv : eq.nv + eq.n]
+        out = np.zeros((len(self._states), len(self._eq.reduced.edges), 6))
+        work = self._eq.engine.work
+        for k in range(len(self._states)):
+            accelerations = self._rates(k)
             out[k] = self._transmission.wrenches(
                 work["place"][:-1], accelerations, work["pushed"], work["force"], work["pulled"]
             )
         return out
+
+    def _rates(self, k: int) -> Array:
+        """(n,) accelerations of the tree at the k-th instant."""
+        eq, state, inputs = self._eq, self._states[k], self._solution.inputs
+        eq.given.put(lambda port: inputs[port].values[k])
+        y = eq.vector(state)
+        status, _, rates = eq.engine.rates(state.q, y)
+        if status == Status.DEPENDENT:
+            status, _ = eq.dense.rates(state.q, y, eq.given, eq.heats, rates)
+        eq.refuse(status, eq.engine.failed)
+        return rates[eq.nv : eq.nv + eq.n]
 
     def _on_loops(self) -> list[ReducedState]:
         """The states at the kept instants: rates by the momenta, loops closed."""

@@ -14,6 +14,7 @@ from ephs.mechanics.scene.flexible import Beam, Load, Strain
 from ephs.mechanics.scene.model import Body, Joint, Marker, Scene, Spring, World, frozen
 from ephs.mechanics.scene.surfaces import Contact, Surface
 from ephs.mechanics.shapes.dry import Dry
+from ephs.mechanics.shapes.impact import Impact
 from ephs.mechanics.shapes.law import Law
 
 __all__ = ["scene_from_text", "scene_to_text"]
@@ -87,6 +88,10 @@ def _value(cls: Any, data: dict[str, Any]) -> Any:
     return cls(**{key: _array(value) if key in arrays else value for key, value in data.items()})
 
 
+def _law(given: dict[str, Any]) -> Law | Impact:
+    return Law(**given) if "stiffness" in given else Impact(**given)
+
+
 def _scene(data: dict[str, Any]) -> Scene:
     given = dict(data)
     for key, cls in _PARTS.items():
@@ -105,7 +110,7 @@ def _scene(data: dict[str, Any]) -> Scene:
             }
         if cls is Contact:
             entries = {
-                name: entry | {"surfaces": tuple(entry["surfaces"]), "law": Law(**entry["law"])}
+                name: entry | {"surfaces": tuple(entry["surfaces"]), "law": _law(entry["law"])}
                 for name, entry in entries.items()
             }
         if cls is Beam:

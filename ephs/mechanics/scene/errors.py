@@ -141,7 +141,15 @@ TEXTS: dict[str, tuple[str, str]] = {
     "surface shape": ("one of sphere, capsule, cylinder, box, plane = {{}}", "a surface has exactly one shape"),
     "surface pair": ("a pair of shapes that can touch: {pairs}", "list the contacts that are meant, or take others"),
     "two exponents": ("one exponent", "give both surfaces the same, or the contact its own"),
-    "no stiffness": ("the stiffness of one surface, or of the contact", "add this key"),
+    "no stiffness": (
+        "the stiffness of one surface or of the contact, or the restitution of hard ones",
+        "add one of these keys",
+    ),
+    "hard and soft": ("stiffness or restitution", "hard surfaces have no {soft}: take one of both out"),
+    "hard overlap": (
+        "hard surfaces that do not overlap at the start",
+        "move one of the bodies, or give one of the surfaces a stiffness",
+    ),
     "mesh": ("a file in the scene's folder or below", "move it there, and give its path from the scene file"),
     "mesh kind": ("a mesh that ends in one of {known}", "convert it to one of these"),
     "both shapes": ("either shape or shapes", "take one of the two out"),

@@ -163,7 +163,9 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
     scene = with_stops(document, replace(scene, contacts=contacts), faults)
     if faults:
         return None
-    r.odd.extend(overlaps(scene))
+    r.odd.extend(overlaps(scene, faults))
+    if faults:
+        return None
     r.laws.clear()
     r.laws[""] = laws
     if r.adjust:

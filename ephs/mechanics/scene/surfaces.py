@@ -7,6 +7,7 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+from ephs.mechanics.shapes.impact import Impact
 from ephs.mechanics.shapes.law import Law
 
 __all__ = ["Contact", "Surface"]
@@ -40,10 +41,11 @@ class Contact:
     Attributes
     ----------
     surfaces : names of both
+    law : of an elastic contact, or of a hard one
     heat : where the heat goes, ``"environment"`` or the name of a thermal node
     """
 
     name: str
     surfaces: tuple[str, str]
-    law: Law
+    law: Law | Impact
     heat: str

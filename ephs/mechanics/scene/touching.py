@@ -19,6 +19,7 @@ from ephs.mechanics.scene.resolve import Names
 from ephs.mechanics.scene.schema import ContactEntry, ContactLawEntry, SurfaceEntry
 from ephs.mechanics.scene.state import Snapshot
 from ephs.mechanics.scene.surfaces import Contact, Surface
+from ephs.mechanics.shapes.impact import Impact
 from ephs.mechanics.shapes.law import Law
 from ephs.mechanics.shapes.pairs import PAIRS, touches
 from ephs.semantics.spaces import SE3
@@ -29,8 +30,12 @@ Laws = Mapping[str, ContactLawEntry]
 STIFF = 1e4
 """Stiffness of stops by default, in M (L ω)² of the scene's mass, length and rate: what falls by its length presses a
 stop by 1/70 rad, or of its length."""
+SOFT = ("stiffness", "exponent", "loss", "slip", "rolling", "spinning")
+"""Keys of elastic surfaces that hard ones do not have."""
 DEEP = 1e-2
 """Part of the mechanism's length from which on an overlap at the start is told."""
+OVERLAP = 1e-9
+"""Likewise of hard surfaces, for which it is refused."""
 
 
 def resolve_surfaces(document: Document, names: Names, faults: list[Fault]) -> dict[str, Surface]:
@@ -88,8 +93,8 @@ def _stiffness(scene: Scene, joint: Joint) -> float:
     return float(STIFF * mass * scale.rate**2 * (scale.length**2 if turning else 1.0))
 
 
-def overlaps(scene: Scene) -> list[Fault]:
-    """Surfaces that overlap at the start by more than a part of the scene's length."""
+def overlaps(scene: Scene, faults: list[Fault]) -> list[Fault]:
+    """Surfaces that overlap at the start by more than a part of the scene's length; hard ones are faults."""
     surfaces = dict(scene.all_surfaces())
     poses = {GROUND: IDENTITY_POSE} | {name: body.pose for name, body in scene.all_bodies()}
     length = Snapshot.of(scene).scale(scene.world.gravity).length if scene.contacts else 1.0
@@ -102,10 +107,13 @@ def overlaps(scene: Scene) -> list[Fault]:
         for frame1, frame2, gap in touching:
             first, second = SE3.compose(poses[bodies[0]], frame1), SE3.compose(poses[bodies[1]], frame2)
             depth = max(depth, -float(gap.distance(SE3.compose(SE3.inverse(first), second))))
-        if depth > DEEP * length:
+        hard = isinstance(contact.law, Impact)
+        if depth > (OVERLAP if hard else DEEP) * length:
             pair = " and ".join(contact.surfaces)
-            found.append(
-                fault("overlap", f"contacts.{name}", f"{pair} {depth:.3g} m deep in each other", most=DEEP * length)
+            told = f"{pair} {depth:.3g} m deep in each other"
+            key = f"contacts.{name}"
+            (faults if hard else found).append(
+                fault("hard overlap", key, told) if hard else fault("overlap", key, told, most=DEEP * length)
             )
     return found
 
@@ -172,10 +180,16 @@ def _add(
         found[name] = Contact(name, (one.name, other.name), law, sinks[0] if sinks else ENVIRONMENT)
 
 
-def _law(laws: tuple[ContactLawEntry, ...], key: str, faults: list[Fault]) -> Law | None:
+def _law(laws: tuple[ContactLawEntry, ...], key: str, faults: list[Fault]) -> Law | Impact | None:
     """The law of a pair: what the contact says, else of two elastic surfaces in series, the lesser friction, else the
-    larger number of both."""
+    larger number of both. Surfaces with a restitution are hard beside others without stiffness."""
     *own, first, second = laws
+    for each in laws:
+        if each.restitution is not None and (soft := [name for name in SOFT if getattr(each, name) is not None]):
+            faults.append(fault("hard and soft", key, f"restitution and {soft[0]}", soft=soft[0]))
+            return None
+    if (hard := _hard(laws)) is not None:
+        return hard
     both = first, second
 
     def given(name: str) -> list[float]:
@@ -193,6 +207,21 @@ def _law(laws: tuple[ContactLawEntry, ...], key: str, faults: list[Fault]) -> La
     more = {name: max(given(name)) for name in ("loss", "slip", "rolling", "spinning") if given(name)}
     stiffness = sum(k ** (-1.0 / n) for k in soft) ** -n if len(soft) > 1 else soft[0]
     return Law(stiffness=float(stiffness), exponent=n, friction=min(frictions, default=0.0), **more)
+
+
+def _hard(laws: tuple[ContactLawEntry, ...]) -> Impact | None:
+    """The law of a hard pair: what the contact says, else the lesser number of both; None of an elastic one."""
+    *own, first, second = laws
+
+    def given(name: str) -> list[float]:
+        said = [value for each in own if (value := getattr(each, name)) is not None]
+        return said or [value for each in (first, second) if (value := getattr(each, name)) is not None]
+
+    said = [each for each in own if each.restitution is not None or each.stiffness is not None] or [first, second]
+    if any(each.stiffness is not None for each in said) or all(each.restitution is None for each in said):
+        return None
+    tangential = min(given("tangential"), default=None)
+    return Impact(min(given("restitution")), min(given("friction"), default=0.0), tangential)
 
 
 def _meeting(scene: Scene, surfaces: Mapping[str, Surface]) -> Iterator[tuple[Surface, Surface]]:

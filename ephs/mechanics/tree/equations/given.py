@@ -33,6 +33,7 @@ class Given:
     def __init__(self, problem: Problem, reduced: Reduced, freedoms: int) -> None:
         self._signals, self._reduced = problem.signals, reduced
         self.drive, self.wrench = np.zeros(freedoms), np.zeros((reduced.links, 6))
+        self._contact: Callable[[float], Array] | None = None
         self._drives: list[tuple[Path, slice]] = []
         self._wrenches: list[tuple[Path, int, Array | None]] = []
         for port, frame in ((one.port, one.frame) for one in reduced.acting):
@@ -48,6 +49,9 @@ class Given:
                 self._drives.append((edge.port, slice(int(t.r_at[i]), int(t.r_at[i] + t.dim[i]))))
         ports = [port for port, _ in self._drives] + [port for port, _, _ in self._wrenches]
         ports += [port for port, _ in net.inputs] + [one.port for one in net.injections]
+        self._own = np.zeros(freedoms)
+        for _, where in self._drives:
+            self._own[where] = 1.0
         self._fixed = {port: self._signals[port].at(0.0, {}) for port in ports if self._signals[port].constant}
         self.place(0.0, None)
 
@@ -55,6 +59,14 @@ class Given:
         """Put the inputs at a time and state into the arrays; without a state those that are constant."""
         fixed, signals = self._fixed, self._signals
         self.put(lambda port: fixed[port] if port in fixed else 0.0 if state is None else signals[port].at(t, state))
+        if self._contact is not None:
+            self.drive[:] = self._own * self.drive + self._contact(t)
+
+    def push(self, contact: Callable[[float], Array] | None) -> None:
+        """Let closed contacts act besides, by forces (joints' freedoms,) on the rates that are functions of time."""
+        self._contact = contact
+        if contact is None:
+            self.drive *= self._own
 
     def put(self, value: Callable[[Path], Array | float]) -> None:
         """Put the inputs into the arrays, each as ``value(port)``."""

@@ -212,7 +212,8 @@ def _tables(
             driven += [int(edge.motion is not None)] * d
         heat[i] = edge.heat
         spring[i] = -1 if edge.spring < 0 or _stores_nothing(model, edge.spring) else edge.spring
-        friction[i] = -1 if edge.friction < 0 or _idle(model, edge.friction) else edge.friction
+        idle = edge.friction < 0 or _idle(model, edge.friction) or _strikes(model, edge.friction)
+        friction[i] = -1 if idle else edge.friction
         if kind == SPRING:
             support[i], reach[i] = _support(model, [c for c in (spring[i], friction[i]) if c >= 0])
     t, components = model.tables, model.descriptor.components
@@ -222,9 +223,9 @@ def _tables(
         armature[r_at[next(i for i, other in enumerate(edges) if other is edge)]] += one.inertia * one.ratio**2
     making = {path: i for i, path in reversed(list(enumerate(made)))}
     sinks = [
-        [making[components[c].path], taking, making[components[c].path]]
-        for c, taking in zip(friction.tolist(), heat.tolist(), strict=True)
-        if c >= 0
+        [making[components[e.friction].path], e.heat, making[components[e.friction].path]]
+        for e, c in zip(edges, friction.tolist(), strict=True)
+        if c >= 0 or _strikes(model, e.friction)
     ]
     for called, mine in zip(parts.network.attached, flows, strict=True):
         sinks += [[int(flow), taken, int(mine[0])] for flow, (_, taken) in zip(mine, called.heated, strict=True)]
@@ -319,6 +320,12 @@ def _idle(model: Model, component: int) -> bool:
     entries: dict[str, Any] = dict(model.descriptor.components[component].primitive.parameters)
     given = entries.get("mu", entries.get("damping"))
     return given is not None and not isinstance(given, str) and not np.any(given)
+
+
+def _strikes(model: Model, component: int) -> bool:
+    """Whether a process has impulses instead of a rate."""
+    primitive = None if component < 0 else model.descriptor.components[component].primitive
+    return isinstance(primitive, Irreversible) and primitive.impulse is not None
 
 
 def _stores_nothing(model: Model, component: int) -> bool:

@@ -1,16 +1,18 @@
 """The part that a primitive can play in a mechanism, read from its structure."""
 
+from collections.abc import Iterable
 from enum import Enum, auto
 from typing import final
 
 import numpy as np
 
-from ephs.operad import quantity
+from ephs.operad import Path, quantity
+from ephs.semantics.descriptor import ComponentSlot
 from ephs.semantics.primitives import Irreversible, Primitive, Reversible, Storage
 from ephs.semantics.pullback import pulled_ports
 from ephs.solve.heats import exponential_law
 
-__all__ = ["Role", "Roles", "offset_of"]
+__all__ = ["Role", "Roles", "offset_of", "strikes"]
 
 
 class Role(Enum):
@@ -44,6 +46,14 @@ class Role(Enum):
     """Takes up heat at the temperature of the reference."""
     OTHER = auto()
     """Components that may be attached."""
+
+
+def strikes(components: Iterable[ComponentSlot]) -> Path | None:
+    """The first component that has impulses instead of a rate; None where none has."""
+    for slot in components:
+        if isinstance(slot.primitive, Irreversible) and slot.primitive.impulse is not None:
+            return slot.path
+    return None
 
 
 @final

@@ -1,0 +1,21 @@
+"""Response of a mechanism to impulses, its loops closed and its prescribed motions kept."""
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from ephs.mechanics.tree.equations.equations import Equations, ReducedState
+from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.rank import CONSTRAINT
+
+__all__ = ["answer"]
+
+
+def answer(equations: Equations, state: ReducedState, rows: Array) -> Array:
+    """(n, k) changes of the tree's rates by unit impulses along rows (k, n)."""
+    factor = cho_factor(equations.mass(state.q, state.r))
+    free = cho_solve(factor, rows.T)
+    held = equations.rows()
+    if not len(held):
+        return free
+    back = cho_solve(factor, held.T)
+    return free - back @ np.linalg.lstsq(held @ back, held @ free, rcond=CONSTRAINT)[0]

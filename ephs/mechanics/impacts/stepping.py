@@ -1,0 +1,297 @@
+"""Steps with hard contact: flights and persistent contact by any method in joint coordinates, impacts between them.
+
+A step is divided where a gap closes, which is located, and where a contact would take energy from its friction. At a
+closed gap an impact takes place at once, by its island (`ephs.mechanics.impacts.islands`). Contacts that stay closed act
+by constant forces over a part of a step, P/h with impulses P in the friction cones, which are complementary to the
+velocities at its end. Their heat is −Pᵀ(γ⁰ + γ¹)/2, so that it has a place, joule by joule; the energy of the end is
+moved to what is left, as that of all corrected steps is.
+"""
+
+from dataclasses import replace
+from typing import Any, final
+
+import numpy as np
+
+from ephs.mechanics.impacts.cone import impulses
+from ephs.mechanics.impacts.islands import Unlawful, islands_of, shared, struck
+from ephs.mechanics.impacts.mobility import answer
+from ephs.mechanics.impacts.touching import Touching
+from ephs.mechanics.methods.method import ReducedMethod
+from ephs.mechanics.tree.equations.equations import ReducedState
+from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.rank import CONSTRAINT
+from ephs.solve.errors import Outcome, SolveError
+from ephs.solve.snapshot import Snapshot
+from ephs.solve.sparse import Index
+from ephs.solve.stepping import Attempt, Leg, Span
+
+__all__ = ["Impacts"]
+
+CLOSED = 1e-9
+"""Gap, in the mechanism's length, below which a contact is closed."""
+LOCATED = 1e-3
+"""Part of that to which gaps are located."""
+DRIFTED = 1e-5
+"""Part of that by which gaps of persistent contacts change in a part of a step at most."""
+PARTING = 1e-9
+"""Speed, in the mechanism's own, above which closed contacts part."""
+QUIET = 1e-6
+"""Speed, likewise, below which contacts do not bounce: a bouncing ball's rest of the time, and its square of energy."""
+PARTS = 10_000
+"""Parts of a step at most."""
+SLIVER = 1e-12
+"""Part of a step that is none."""
+DIVISIONS = 60
+ROUNDS = 20
+FLAT = 1e-9
+"""Imaginary part beside 1 of a root that is real."""
+SETTLED = 1e-7
+"""Change of impulses beside their size that leaves the rest to a correction of velocities."""
+TOO_LONG = 8.0
+"""Error of a part of a step whose halves meet with what the whole does not."""
+
+
+@final
+class Impacts(ReducedMethod):
+    """A method on a mechanism with hard contacts.
+
+    Parameters
+    ----------
+    inner
+        Takes the steps between impacts.
+    """
+
+    def __init__(self, inner: ReducedMethod) -> None:
+        self._inner, self.equations, self.control = inner, inner.equations, inner.control
+        self.rtol, self.atol = inner.rtol, inner.atol
+        self.name, self.exponent, self.share = inner.name, inner.exponent, inner.share
+        self._touching = Touching(self.equations)
+        eq = self.equations
+        self._inputs = eq.constant, eq.held, eq.steady
+        self._alone = eq.problem.constant and not (eq.drive.any() or eq.wrench.any() or eq.given.supply.any())
+        self._alone = self._alone and not eq.driven.size
+        length = eq.problem.length
+        self._closed = CLOSED * length
+        self._speed = float(np.sqrt(np.linalg.norm(eq.gravity) * length))
+        self.counts: dict[str, Any] = inner.counts
+        self.counts |= {"impacts": 0, "parts": 0}
+
+    def start(self, t: float, h: float) -> ReducedState:
+        """The initial state; speeds count by the mechanism's own, a fall's or that of the start."""
+        state = self.equations.accounts.opened(self._inner.start(t, h))
+        gaps, rates = self._touching.motion(state.q, state.r)
+        self._speed = max(self._speed, float(np.abs(rates).max(initial=0.0)))
+        deep = int(np.argmin(gaps))
+        if gaps[deep] < -self._closed:
+            path = str(self._touching.paths[deep])
+            raise SolveError(Outcome.INCONSISTENT, path, f"hard surfaces overlap by {-gaps[deep]:.3g} m")
+        return state
+
+    def many(self, span: Span[ReducedState]) -> Leg[ReducedState] | None:
+        """None: impacts are looked for at each step."""
+        return None
+
+    def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
+        """One step of h seconds, in as many parts as it takes."""
+        here, left, error = self.equations.accounts.opened(state), h, 0.0
+        self.name, self.exponent, self.share = self._inner.name, self._inner.exponent, self._inner.share
+        for _ in range(PARTS):
+            here = self._struck(here)
+            end, share, worst = self._taken(here, left)
+            here, error = end, max(error, worst)
+            left *= 1.0 - share
+            self.counts["parts"] += 1
+            if abs(left) <= SLIVER * abs(h):
+                end = self._struck(replace(here, t=state.t + h))
+                return Attempt(state, end, h, error, self.equations.least(state, end))
+        path = self._touching.paths[int(np.argmin(self._touching.gaps(here.q, here.r)))]
+        raise SolveError(Outcome.TINY, str(path), f"a step of more than {PARTS} impacts")
+
+    # ---- impacts -----------------------------------------------------------------------------------------------
+
+    def _struck(self, state: ReducedState) -> ReducedState:
+        """The state after the impact of its closed gaps, if these close."""
+        gaps, rates = self._touching.motion(state.q, state.r)
+        closed = np.flatnonzero(gaps <= self._closed)
+        if not closed.size or not np.any(rates[closed] < -PARTING * self._speed):
+            return state
+        eq = self.equations
+        rows, _ = self._touching.rows(state.q, state.r, closed)
+        by = answer(eq, state, rows)
+        before = rows @ state.r
+        laws = [self._touching.laws[i] for i in closed]
+        try:
+            blow = struck(rows @ by, before, laws, PARTING * self._speed, QUIET * self._speed)
+        except Unlawful as failed:
+            path = str(self._touching.paths[closed[failed.contact]])
+            raise SolveError(Outcome.LAWLESS, path, failed.reason) from None
+        change = by @ blow.impulse
+        mass = eq.mass(state.q, state.r)
+        gained = float(change @ (mass @ (state.r + 0.5 * change)))
+        self.counts["impacts"] += 1
+        end = replace(state, q=state.q.copy(), r=state.r + change, memory=())
+        return self._booked(state, end, closed, blow.heat, gained + float(blow.heat.sum()) if eq.driven.size else 0.0)
+
+    def _booked(self, start: ReducedState, end: ReducedState, which: Index, heat: Array, work: float) -> ReducedState:
+        """The end with the heat of contacts and work in its books."""
+        flows = np.zeros(len(self.equations.reduced.made))
+        np.add.at(flows, self._touching.makers[which], heat)
+        return self.equations.booking.step(start, end, flows, work, missed=np.zeros(flows.size))
+
+    # ---- between impacts ---------------------------------------------------------------------------------------
+
+    def _taken(self, state: ReducedState, h: float) -> tuple[ReducedState, float, float]:
+        """As much of h seconds as goes without an impact: its end, the part of h, and its error."""
+        gaps, rates = self._touching.motion(state.q, state.r)
+        held = np.flatnonzero((gaps <= self._closed) & (rates <= PARTING * self._speed))
+        share = 1.0
+        for _ in range(DIVISIONS):
+            end, error, divided = self._smooth(state, share * h, held, gaps)
+            if divided == 1.0:
+                divided = self._closing(gaps, rates, end, share * h, held)
+            if divided == 1.0:
+                if held.size and self.control.step is None:
+                    end, error = self._halved(state, share * h, held, gaps, end, error)
+                return end, share, error
+            share *= divided
+        raise SolveError(Outcome.DIVERGED, str(self._touching.paths[0]), "the instant at which a gap closes")
+
+    def _halved(
+        self, state: ReducedState, h: float, held: Index, gaps: Array, whole: ReducedState, error: float
+    ) -> tuple[ReducedState, float]:
+        """The end by two halves, and its error by their difference to the whole, which is of order 2."""
+        middle, _, divided = self._smooth(state, 0.5 * h, held, gaps)
+        if divided < 1.0:
+            return whole, TOO_LONG
+        end, _, divided = self._smooth(middle, 0.5 * h, held, gaps)
+        if divided < 1.0:
+            return whole, TOO_LONG
+        self.exponent = 3.0
+        eq = self.equations
+        y0, y1 = eq.vector(state), eq.vector(end)
+        allowed = self.atol + self.rtol * eq.sizes(y0, y1)
+        far = max(float(np.abs(end.q - whole.q).max()) / float(allowed[: eq.n].min()), 0.0)
+        rates = np.abs(end.r - whole.r) / allowed[eq.n : 2 * eq.n]
+        return end, max(error, far / 3.0, float(rates.max()) / 3.0)
+
+    def _closing(self, gaps: Array, rates: Array, end: ReducedState, h: float, held: Index) -> float:
+        """Part of a flight of h s at whose end a gap closes first, by cubics; 1 where none closes before its end."""
+        after, speed = self._touching.motion(end.q, end.r)
+        near = np.minimum(after, gaps) <= abs(h) * np.maximum(np.abs(rates), np.abs(speed))
+        near[held] = False
+        near[(np.abs(after) <= LOCATED * self._closed) & (speed <= 0.0)] = False  # closes at the end
+        first = 1.0
+        for i in np.flatnonzero(near):
+            first = min(first, _closes(gaps[i], h * rates[i], after[i], h * speed[i], LOCATED * self._closed))
+        return first
+
+    def _smooth(self, state: ReducedState, h: float, held: Index, gaps: Array) -> tuple[ReducedState, float, float]:
+        """The end of h seconds with some contacts closed, its error, and the part of it after which to divide it."""
+        eq, touching = self.equations, self._touching
+        if not held.size:
+            self._flying()
+            flight = self._inner.step(self._inner.anew(state), h)
+            return replace(flight.end, memory=()), flight.error, 1.0
+        rows0, axes = touching.rows(state.q, state.r, held)
+        laws = [touching.laws[i].friction for i in held]
+        start = rows0 @ state.r
+        slipping = np.repeat(np.hypot(start[1::3], start[2::3]) > PARTING * self._speed, 3)
+        slipping[::3] = False
+        before = np.where(slipping, start, 0.0)
+        rows1, impulse, found, change = rows0, np.zeros(3 * held.size), np.zeros(3 * held.size), np.zeros((0, 0))
+        for count in range(ROUNDS):
+            self._push(state.t, h, rows0.T @ impulse / h, rows1.T @ impulse / h)
+            attempt = self._inner.step(self._inner.anew(state), h)
+            end = attempt.end
+            rows1, _ = touching.rows(end.q, end.r, held, axes)
+            if not count:
+                change = answer(eq, end, rows1)
+            mobility = rows1 @ change
+            free = rows1 @ end.r - mobility @ impulse
+            solved = impulses(mobility, free + before, laws, impulse)
+            if solved is None:
+                raise SolveError(Outcome.DIVERGED, str(touching.paths[held[0]]), "the forces of its contacts")
+            found = solved
+            most = float(np.abs(mobility @ found).max())
+            if float(np.abs(mobility @ (found - impulse)).max()) <= SETTLED * most:
+                break
+            impulse = found
+        else:
+            raise SolveError(Outcome.DIVERGED, str(touching.paths[held[0]]), "the forces of its contacts")
+        pressed = found[::3] > 0.0
+        moved = self._put(end, held[pressed], gaps[held[pressed]], change[:, ::3][:, pressed])
+        rows1, _ = touching.rows(moved.q, moved.r, held, axes)
+        moved = replace(moved, r=moved.r + change @ (found - impulse))
+        stop = rows1 @ moved.r
+        if (divided := _turning(before, stop, found, laws, PARTING * self._speed)) < 1.0:
+            return end, 0.0, divided
+        taken = -0.5 * (found * (start + stop)).reshape(-1, 3)[:, 1:].sum(axis=1)
+        heat = np.zeros(held.size)
+        for island in islands_of(rows1 @ change):
+            heat[island] = shared(taken[island])
+        put = float(end.books[1] - state.books[1])
+        if not self._alone:
+            put = 0.5 * float((rows0.T @ impulse) @ state.r + (rows1.T @ impulse) @ end.r)
+        booked = self._booked(end, moved, held, heat, -put)
+        booked, _ = eq.accounts.corrected(state, booked, h, np.full(self.atol.size, np.inf), chosen=False, alone=True)
+        return replace(booked, memory=()), attempt.error, 1.0
+
+    def _push(self, t: float, h: float, first: Array, last: Array) -> None:
+        """Let closed contacts act on the tree's rates from t on, by forces (n,) that go from ``first`` to ``last``."""
+        eq, forces = self.equations, np.zeros((2, self.equations.nv))
+        forces[:, : eq.n] = first, last - first
+        eq.given.push(lambda now: forces[0] + (now - t) / h * forces[1])
+        eq.constant = eq.held = eq.steady = False
+
+    def _flying(self) -> None:
+        """Let nothing act but what is given."""
+        eq = self.equations
+        eq.given.push(None)
+        eq.constant, eq.held, eq.steady = self._inputs
+
+    def _put(self, state: ReducedState, pressed: Index, before: Array, answer: Array) -> ReducedState:
+        """The state moved to where pressed contacts have the gaps before, by changes (n, k) of unit impulses."""
+        eq, q = self.equations, state.q
+        for _ in range(ROUNDS if pressed.size else 0):
+            gaps = self._touching.gaps(q, state.r)[pressed] - before
+            if float(np.abs(gaps).max()) <= DRIFTED * self._closed:
+                break
+            rows, _ = self._touching.rows(q, state.r, pressed)
+            q = eq.moved(q, answer @ np.linalg.lstsq(rows[::3] @ answer, -gaps, rcond=CONSTRAINT)[0])
+        return state if q is state.q else eq.closed(replace(state, q=q))
+
+    def taken(self, state: ReducedState) -> Snapshot | None:
+        """Memory of the method between impacts."""
+        return self._inner.taken(state)
+
+    def take(self, own: Snapshot, state: ReducedState) -> None:
+        """Take along what `taken` said."""
+        self._inner.take(own, state)
+
+
+def _closes(start: float, slope: float, end: float, slope1: float, closed: float) -> float:
+    """First part of a way at which a gap with these values and slopes at both ends closes; 1 where it does not."""
+    cubic = np.array([2.0 * (start - end) + slope + slope1, 3.0 * (end - start) - 2.0 * slope - slope1, slope, start])
+    turns = np.roots(np.polyder(cubic))
+    inside = [float(x) for x in turns.real[np.abs(turns.imag) < FLAT] if 0.0 < x < 1.0]
+    if min([end, *(float(np.polyval(cubic, x)) for x in inside)]) >= -closed:
+        return 1.0
+    found = np.roots(cubic)
+    for x in np.sort(found.real[np.abs(found.imag) < FLAT]).tolist():
+        if 0.0 < x < 1.0 and np.polyval(np.polyder(cubic), x) <= 0.0:
+            return x
+    return 0.5
+
+
+def _turning(before: Array, stop: Array, impulse: Array, friction: list[float], still: float) -> float:
+    """Part of a step after which the first contact that slips before has come to a stop; 1 where none turns back."""
+    first, last, force = (v.reshape(-1, 3)[:, 1:] for v in (before, stop, impulse))
+    share = 1.0
+    for i, coefficient in enumerate(friction):
+        speed, back = float(first[i] @ first[i]), float(first[i] @ last[i])
+        if back >= -still * np.sqrt(speed) or not speed:
+            continue
+        most = coefficient * float(impulse[3 * i])
+        held = float(np.hypot(*force[i])) / most if most > 0.0 else 1.0
+        share = min(share, 0.5 * held if held < 1.0 - FLAT else speed / (speed - back))
+    return share

@@ -1,0 +1,155 @@
+"""Points of hard contact in joint coordinates: gaps, and velocities at closed ones as rows on the tree's rates."""
+
+from dataclasses import dataclass
+from typing import Any, Final, final
+
+import numpy as np
+
+from ephs.mechanics.elements.contact import lever
+from ephs.mechanics.shapes.impact import Impact, Meeting
+from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.finding.frames import GROUND
+from ephs.operad import Path
+from ephs.semantics.bundle import Array
+from ephs.semantics.primitives import Irreversible
+from ephs.semantics.spaces import SE3, se3
+from ephs.semantics.spaces.rotations import quaternion_to_matrix
+from ephs.solve.sparse import Index
+
+__all__ = ["Touching"]
+
+POSES: Final[Any] = se3
+"""Formulas of poses, for arrays of many."""
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class _Point:
+    """Bodies of both frames, the offsets of these, the gap, and the process that takes the heat."""
+
+    bodies: tuple[int, int]
+    offsets: tuple[Array, Array]
+    meeting: Meeting
+    path: Path
+
+
+@final
+class Touching:
+    """The points of hard contact of one mechanism. It shares the equations' scratch memory.
+
+    Attributes
+    ----------
+    laws, paths
+        (points,).
+    makers
+        (points,) places of their processes among those that make entropy.
+    """
+
+    def __init__(self, equations: Equations) -> None:
+        self._eq = equations
+        reduced, t = equations.reduced, equations.reduced.tables
+        components = equations.model.descriptor.components
+        self._points: list[_Point] = []
+        for i, edge in enumerate(reduced.edges):
+            if edge.friction < 0:
+                continue
+            slot = components[edge.friction]
+            if isinstance(slot.primitive, Irreversible) and isinstance(slot.primitive.impulse, Meeting):
+                ends = int(t.first[i]), int(t.second[i])
+                self._points.append(_Point(ends, (edge.offset1, edge.offset2), slot.primitive.impulse, slot.path))
+        self.laws: list[Impact] = [point.meeting.law for point in self._points]
+        self.paths = [point.path for point in self._points]
+        self.makers = np.array([reduced.made.index(path) for path in self.paths], dtype=np.int64)
+        groups: dict[Any, list[int]] = {}
+        for i, point in enumerate(self._points):
+            groups.setdefault((point.meeting.gap.name, point.meeting.gap.numbers), []).append(i)
+        self._groups = [(self._points[group[0]].meeting.gap, group) for group in groups.values()]
+        self._ends = [
+            (
+                np.array([point.bodies[side] for point in self._points], dtype=np.int64),
+                np.array([point.offsets[side] for point in self._points]).reshape(-1, 7).T,
+            )
+            for side in (0, 1)
+        ]
+
+    def __len__(self) -> int:
+        return len(self._points)
+
+    def gaps(self, q: Array, r: Array) -> Array:
+        """(points,) in m."""
+        relative = self._relative(q, r)
+        out = np.zeros(len(self._points))
+        for gap, group in self._groups:
+            out[group] = gap.distance(relative[:, group])
+        return out
+
+    def motion(self, q: Array, r: Array) -> tuple[Array, Array]:
+        """(points,) gaps in m and their rates in m/s."""
+        relative, residual = self._relative(q, r), self._eq.dense.residual
+        twists = np.array([residual.twist(i) for i in range(self._eq.reduced.links)] + [np.zeros(6)]).T
+        (first, near), (second, far) = self._ends
+        ahead = POSES.compose(np, list(near), list(relative))
+        one = POSES.adjoint(POSES.inverse(ahead), list(twists[:, first]))
+        two = POSES.adjoint(POSES.inverse(list(far)), list(twists[:, second]))
+        twist = np.array(two) - np.array(one)
+        gaps, rates = np.zeros((2, len(self._points)))
+        for gap, group in self._groups:
+            pose, moving = relative[:, group], twist[:, group]
+            gaps[group] = gap.distance(pose)
+            wrench = lever(*gap.contact(pose))
+            rates[group] = sum(w * u for w, u in zip(wrench, moving, strict=True))
+        return gaps, rates
+
+    def rows(self, q: Array, r: Array, which: Index, axes: Index | None = None) -> tuple[Array, Index]:
+        """(3k, n) of some points: the normal velocity, positive where they part, and two along the surfaces.
+
+        These are orthogonal to an axis (k,) of the world, which is chosen where none is given.
+        """
+        eq, residual = self._eq, self._eq.dense.residual
+        relative = self._relative(q, r)
+        out, chosen = np.zeros((3 * which.size, eq.n)), np.zeros(which.size, dtype=np.int64)
+        for k, i in enumerate(which.tolist()):
+            point, pose = self._points[i], relative[:, i]
+            normal, at = point.meeting.gap.contact(pose)
+            second = SE3.identity() if point.bodies[1] == GROUND else residual.pose(point.bodies[1])
+            turn = quaternion_to_matrix(SE3.compose(second, point.offsets[1])[:4])
+            chosen[k] = np.argmin(np.abs(turn @ normal)) if axes is None else axes[k]
+            ways = _ways(np.array(normal), turn[chosen[k]])
+            wrenches = np.hstack([np.cross(np.array(at), ways), ways])
+            for sign, body, offset in (
+                (1.0, point.bodies[1], point.offsets[1]),
+                (-1.0, point.bodies[0], SE3.compose(point.offsets[0], pose)),
+            ):
+                if body != GROUND:
+                    seen = SE3.adjoint(SE3.inverse(offset))
+                    out[3 * k : 3 * k + 3] += sign * wrenches @ seen @ residual.twists(body)
+        return out, chosen
+
+    def ways(self, i: int, axis: int) -> Array:
+        """(3, 3) world directions of the rows of a point, where the links were placed last."""
+        point, residual = self._points[i], self._eq.dense.residual
+        one, two = (
+            SE3.compose(SE3.identity() if body == GROUND else residual.pose(body), offset)
+            for body, offset in zip(point.bodies, point.offsets, strict=True)
+        )
+        normal, _ = point.meeting.gap.contact(SE3.compose(SE3.inverse(one), two))
+        turn = quaternion_to_matrix(two[:4])
+        ways = _ways(np.array(normal), turn[axis])
+        return ways @ turn.T
+
+    def _relative(self, q: Array, r: Array) -> Array:
+        """(7, points) poses of second frames in first ones; the links are placed at q and r."""
+        residual = self._eq.dense.residual
+        residual.place(q, r)
+        poses = np.array([residual.pose(i) for i in range(self._eq.reduced.links)] + [SE3.identity()]).T
+        one, two = (
+            POSES.compose(np, list(poses[:, bodies]), list(offsets)) for bodies, offsets in self._ends
+        )
+        return np.array(POSES.between(np, one, two))
+
+
+def _ways(normal: Array, axis: Array) -> Array:
+    """(3, 3) a unit normal and two directions across, the first of which is orthogonal to an axis."""
+    one = np.cross(normal, axis)
+    one /= np.linalg.norm(one)
+    return np.array([normal, one, np.cross(normal, one)])
