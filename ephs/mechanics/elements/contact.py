@@ -51,8 +51,7 @@ def contact(touches: Sequence[Touch], law: Law | Impact, *, heat: bool = False) 
         junctions["s"] = junction(quantity.entropy, exposed=True)
         wires["s"] = "s"
     points = {
-        f"point{i}": between_frames(one, two, *_parts(gap, law), heat=heat)
-        for i, (one, two, gap) in enumerate(touches)
+        f"point{i}": between_frames(one, two, *_parts(gap, law), heat=heat) for i, (one, two, gap) in enumerate(touches)
     }
     return System.of(Pattern(junctions=junctions, boxes=dict.fromkeys(points, wires)), points)
 

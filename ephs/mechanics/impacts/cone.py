@@ -13,6 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.rank import CONSTRAINT
 
 __all__ = ["impulses"]
 
@@ -46,7 +47,7 @@ def impulses(whole: Array, free: Array, friction: Sequence[float], start: Array 
     if not m or np.all(free[::3] >= 0.0):
         return np.zeros(3 * m)
     found = np.zeros(3 * m) if start is None else start
-    allowed = EXACT * max(float(np.abs(rho * free).max()), 1e-300)
+    allowed = EXACT * float(np.abs(rho * free).max())
     for _ in range(TRIALS):
         found, size = _newton(whole, free, mu, rho, found, allowed)
         if size <= allowed:
@@ -65,9 +66,7 @@ def _inside(found: Array, mu: Array) -> Array:
     return out.ravel()
 
 
-def _newton(
-    whole: Array, free: Array, mu: Array, rho: Array, start: Array, allowed: float
-) -> tuple[Array, float]:
+def _newton(whole: Array, free: Array, mu: Array, rho: Array, start: Array, allowed: float) -> tuple[Array, float]:
     """The impulses that Newton's method comes to, and what is left."""
     found = start
     left, slope = _residual(whole, free, mu, rho, found)
@@ -75,7 +74,7 @@ def _newton(
     for _ in range(ITERATIONS):
         if size <= allowed:
             break
-        step = np.linalg.lstsq(slope, -left, rcond=1e-13)[0]
+        step = np.linalg.lstsq(slope, -left, rcond=CONSTRAINT)[0]
         share = 1.0
         for _ in range(HALVINGS):
             tried = found + share * step

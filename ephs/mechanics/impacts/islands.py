@@ -1,9 +1,9 @@
 """Impacts: contacts that touch at the same instant, and act on each other, are an island with one coefficient.
 
-Moreau's law: with velocities γ before and γ + G P after, ξ = γ⁺ + e γ and P are complementary in the friction cones. With
-one coefficient the energy ½ Pᵀ(γ + γ⁺) that the impulses give is at most −½ (1 − e)/(1 + e) PᵀGP, so never positive, for
-any number of contacts (Moreau, in *Nonsmooth Mechanics and Applications*, CISM 302 (1988), 1-82). Single contacts of an
-island may give what others take: its heat is shared by those that lose energy, in proportion to what they lose.
+Moreau's law: with velocities γ before and γ⁺ = γ + G P after, ξ = γ⁺ + e γ and P are complementary in the friction
+cones. With one coefficient the energy ½ Pᵀ(γ + γ⁺) that the impulses give is at most −½ (1 − e)/(1 + e) PᵀGP, so never
+positive, for any number of contacts (Moreau, in *Nonsmooth Mechanics and Applications*, CISM 302 (1988), 1-82). Single
+contacts of an island may give what others take: its heat is shared by those that lose energy, as they lose it.
 """
 
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,7 @@
 """Forces of hard contacts at an instant: complementary to what the velocities become.
 
-Between impacts a state says its forces: with accelerations a without them, contacts whose gaps are closed and do not part
-press where a would close them, stick where they can, and slip where they do.
+Between impacts a state says its forces: contacts whose gaps are closed and do not part press where the accelerations
+without them would close them, stick where they can, and slip where they do.
 """
 
 import numpy as np
@@ -15,7 +15,7 @@ from ephs.semantics.bundle import Array
 __all__ = ["forces_at"]
 
 CLOSED = 1e-7
-"""Gap in the mechanism's length, and speed in its own, below which a contact is closed: momenta are kept to rounding."""
+"""Gap in the mechanism's length, and speed in its own, below which a contact is closed."""
 INSTANT = 1e-6
 """Time, in the mechanism's own, over which forces act."""
 

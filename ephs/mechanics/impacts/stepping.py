@@ -1,10 +1,10 @@
 """Steps with hard contact: flights and persistent contact by any method in joint coordinates, impacts between them.
 
-A step is divided where a gap closes, which is located, and where a contact would take energy from its friction. At a
-closed gap an impact takes place at once, by its island (`ephs.mechanics.impacts.islands`). Contacts that stay closed act
-by constant forces over a part of a step, P/h with impulses P in the friction cones, which are complementary to the
-velocities at its end. Their heat is −Pᵀ(γ⁰ + γ¹)/2, so that it has a place, joule by joule; the energy of the end is
-moved to what is left, as that of all corrected steps is.
+A step is divided where a gap closes, which is located, and where a slip comes to rest. At a closed gap an impact takes
+place at once, by its island (`ephs.mechanics.impacts.islands`). Contacts that stay closed act by forces Jᵀ P/h over a
+part h of a step, with impulses P in the friction cones, complementary to the velocities at its end; those that slip
+before are held against the mean of their slips, v̄. So their heat −P_tᵀ v̄ is never negative, and every joule of it has
+a place; the energy of the end is moved to what is left, as that of all corrected steps is.
 """
 
 from dataclasses import replace

@@ -142,9 +142,7 @@ class Touching:
         residual = self._eq.dense.residual
         residual.place(q, r)
         poses = np.array([residual.pose(i) for i in range(self._eq.reduced.links)] + [SE3.identity()]).T
-        one, two = (
-            POSES.compose(np, list(poses[:, bodies]), list(offsets)) for bodies, offsets in self._ends
-        )
+        one, two = (POSES.compose(np, list(poses[:, bodies]), list(offsets)) for bodies, offsets in self._ends)
         return np.array(POSES.between(np, one, two))
 
 

@@ -323,7 +323,9 @@ def _for_scenes(setting: Setting) -> tuple[Stepper[Any], Policy | None]:
         return METHODS["natural"].make(setting)
 
 
-AUTO = Method("auto", 8, True, False, False, True, "rk54 or rk87, radau where stiff", _for_scenes, ("keep",), impacts=True)
+AUTO = Method(
+    "auto", 8, True, False, False, True, "rk54 or rk87, radau where stiff", _for_scenes, ("keep",), impacts=True
+)
 """Method behind `auto` for mechanisms in joint coordinates."""
 
 

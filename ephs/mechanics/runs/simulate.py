@@ -284,7 +284,7 @@ def _reversible(problem: Problem, until: float) -> None:
     for slot in d.components:
         if isinstance(slot.primitive, Irreversible):
             e = random_efforts(slot.primitive.bundle, rng)
-            if np.any(slot.primitive.flow(d.point(slot, x), e, problem.reference)):
+            if slot.primitive.impulse or np.any(slot.primitive.flow(d.point(slot, x), e, problem.reference)):
                 expected = f"a time after t0: {slot.path} produces entropy, which does not run backward"
                 raise OptionError("until", until, expected)
 

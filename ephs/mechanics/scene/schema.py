@@ -186,7 +186,9 @@ class ContactLawEntry(Entry):
     rolling: NonNegative | None = Field(default=None, description="arm of the moment against rolling, m (default 0)")
     spinning: NonNegative | None = Field(default=None, description="arm of that against spinning, m (default 0)")
     restitution: NonNegative | None = Field(
-        default=None, le=1.0, description="coefficient of restitution: the surface is hard, where the other one has no stiffness"
+        default=None,
+        le=1.0,
+        description="coefficient of restitution: the surface is hard, where the other one has no stiffness",
     )
     tangential: NonNegative | None = Field(
         default=None, le=1.0, description="that of the slip of hard surfaces (default restitution)"

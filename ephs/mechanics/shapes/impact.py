@@ -11,6 +11,10 @@ from ephs.semantics.errors import StructureError
 __all__ = ["Impact", "Meeting"]
 
 
+STUCK = 1e-9
+"""Slip velocity in m/s of contacts that stick, to rounding."""
+
+
 @final
 @dataclass(frozen=True, slots=True)
 class Impact:
@@ -45,8 +49,8 @@ class Impact:
 
     @property
     def slip(self) -> float:
-        """Slip velocity in m/s below which it sticks, to rounding."""
-        return 1e-9
+        """Slip velocity in m/s below which it sticks."""
+        return STUCK
 
     @property
     def numbers(self) -> tuple[tuple[str, float], ...]:
@@ -54,7 +58,7 @@ class Impact:
         given = {each.name: getattr(self, each.name) for each in fields(self)} | {"tangential": self.slip_restitution}
         return tuple((name, float(value)) for name, value in given.items())
 
-    def rescaled(self, length: float, mass: float, time: float) -> "Impact":  # noqa: ARG002 - it has no units
+    def rescaled(self, length: float, mass: float, time: float) -> "Impact":
         """The same law in other units."""
         return self
 

@@ -7,7 +7,7 @@ import ephs
 from ephs.mechanics.methods.registry import METHODS
 
 HARD = [name for name, method in METHODS.items() if method.impacts]
-RUNS = [*((name, 2.0**-6) for name in HARD), ("rk87", None), ("auto", None)]
+RUNS = [*((name, 2.0**-5) for name in HARD), ("rk87", None)]
 G = 9.81
 BODY = """
 [bodies.{name}]
@@ -76,7 +76,9 @@ def test_a_ball_bounces_until_it_rests(method, step, tmp_path):
 
 @pytest.mark.parametrize("e", [0.0, 0.4, 1.0])
 def test_a_bounce_gives_back_the_square_of_its_coefficient(e, tmp_path):
-    scene = scene_of(tmp_path, body("ball", position=[0.0, 0.0, 0.15], velocity=[0.0, 0.0, -1.0], restitution=e), gravity=0.0)
+    scene = scene_of(
+        tmp_path, body("ball", position=[0.0, 0.0, 0.15], velocity=[0.0, 0.0, -1.0], restitution=e), gravity=0.0
+    )
     sol = run(scene, 0.1)
     assert sol.body("ball").velocity[-1, 2] == pytest.approx(e, abs=1e-14)
     assert sol.heat[-1] == pytest.approx(1.0 - e * e, abs=1e-14)
@@ -139,15 +141,17 @@ def test_a_rocking_block_loses_by_its_slenderness(tmp_path):
     radius, alpha, tilt = np.hypot(b, h), np.arctan2(b, h), 0.02
     turn = [float(np.cos(tilt / 2.0)), 0.0, float(np.sin(tilt / 2.0)), 0.0]
     centre = [float(-radius * np.sin(alpha - tilt)), 0.0, float(radius * np.cos(alpha - tilt))]
-    inertia = [m / 3.0 * (h * h + thick * thick / 4.0), m / 3.0 * (b * b + h * h), m / 3.0 * (b * b + thick * thick / 4.0)]
+    inertia = [
+        m / 3.0 * (h * h + thick * thick / 4.0),
+        m / 3.0 * (b * b + h * h),
+        m / 3.0 * (b * b + thick * thick / 4.0),
+    ]
     block = body(
         "block", mass=m, position=centre, rotation=turn, inertia=inertia, shape=f"box = [{2 * b}, {thick}, {2 * h}]",
         friction=5.0,
     )  # fmt: skip
-    p = np.sqrt(3.0 * G / (4.0 * radius))
-    sol = run(scene_of(tmp_path, block), 0.6, "rk54", 2.0**-8)
-    spin = sol.body("block").angular_velocity[:, 1]
-    hit = int(np.argmax(np.abs(np.diff(spin))))
-    energy = spin[hit + 1] ** 2 / spin[hit] ** 2
-    assert energy == pytest.approx((1.0 - 1.5 * np.sin(alpha) ** 2) ** 2, rel=0.03)
-    assert sol.t[hit] == pytest.approx(np.arccosh(1.0 / (1.0 - tilt / alpha)) / p, abs=2.0**-7)
+    quarter = np.arccosh(1.0 / (1.0 - tilt / alpha)) / np.sqrt(3.0 * G / (4.0 * radius))
+    sol = run(scene_of(tmp_path, block), 1.5 * quarter, "rk54", 2.0**-8, save_at=[0.98 * quarter, 1.02 * quarter])
+    energy = m * G * radius * (np.cos(alpha - tilt) - np.cos(alpha))
+    assert sol.heat[0] == pytest.approx(0.0, abs=1e-4 * energy)
+    assert sol.heat[1] / energy == pytest.approx(1.0 - (1.0 - 1.5 * np.sin(alpha) ** 2) ** 2, rel=1e-3)
