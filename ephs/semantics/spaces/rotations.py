@@ -99,8 +99,8 @@ def rotation_dexp_inv(w: Array) -> Array:
 
 
 def quaternion_to_matrix(q: Array) -> Array:
-    """Rotation matrix of a unit quaternion: 1 + 2 w v̂ + 2 v̂²."""
-    w, x, y, z = q.tolist()
+    """Rotation matrix (3, 3) of a unit quaternion, or (3, 3, n) of many (4, n): 1 + 2 w v̂ + 2 v̂²."""
+    w, x, y, z = q.tolist() if q.ndim == 1 else q
     return np.array(
         [
             [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
