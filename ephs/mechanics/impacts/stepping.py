@@ -47,6 +47,8 @@ FLAT = 1e-9
 """Imaginary part beside 1 of a root that is real."""
 SETTLED = 1e-7
 """Change of impulses beside their size that leaves the rest to a correction of velocities."""
+ROUNDED = 1e-13
+"""Part of velocities, and of the mechanism's speed, that is rounding."""
 TOO_LONG = 8.0
 """Error of a part of a step whose halves meet with what the whole does not."""
 
@@ -212,8 +214,8 @@ class Impacts(ReducedMethod):
             if solved is None:
                 raise SolveError(Outcome.DIVERGED, str(touching.paths[held[0]]), "the forces of its contacts")
             found = solved
-            most = float(np.abs(mobility @ found).max())
-            if float(np.abs(mobility @ (found - impulse)).max()) <= SETTLED * most:
+            most, fast = float(np.abs(mobility @ found).max()), float((np.abs(rows1) @ np.abs(end.r)).max())
+            if float(np.abs(mobility @ (found - impulse)).max()) <= SETTLED * most + ROUNDED * (fast + self._speed):
                 break
             impulse = found
         else:
