@@ -16,7 +16,7 @@ from ephs.semantics.derive.holonomic import Holonomic
 from ephs.semantics.derive.linear import Linear
 from ephs.semantics.derive.maps import Maps
 from ephs.semantics.derive.slopes import Slopes, lifted
-from ephs.semantics.derive.tape import Tape, evaluate
+from ephs.semantics.derive.tape import Tape, evaluate, over_step
 from ephs.semantics.spaces.vectors import dot
 from ephs.semantics.stage.duals import Duals
 from ephs.semantics.stage.evaluator import Evaluator
@@ -104,7 +104,7 @@ class Storage:
             states += over(on, port.code, x[at : at + port.size], v[first : first + port.dim], first)
             at, first = at + port.size, first + port.dim
         given = [lifted(each) for each in parameters]
-        found = lifted(evaluate(Slopes(on), self.energy, states, given)[0])
+        found = over_step(Slopes(on), self.energy, states, given)
         return [found.slopes.get(i, 0.0) for i in range(first)], found.end, [lifted(each).end for each in states]
 
     def stage(self, on: Evaluator, a: Arguments, *, bare: bool) -> Integer:

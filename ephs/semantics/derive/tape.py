@@ -14,11 +14,11 @@ from typing import Final, TypeVar, final
 import numpy as np
 
 from ephs.semantics.derive.functions import COMPOSED, FUNCTIONS, turn
-from ephs.semantics.derive.slopes import Slope, Slopes, lifted
+from ephs.semantics.derive.slopes import Entries, Slope, Slopes, lifted
 from ephs.semantics.stage.evaluator import Evaluator
 from ephs.semantics.stage.numbers import Real
 
-__all__ = ["OPERATIONS", "Operation", "Tape", "evaluate"]
+__all__ = ["OPERATIONS", "Operation", "Tape", "evaluate", "over_step"]
 
 T = TypeVar("T")
 Operation = tuple[str, tuple[int, ...], float]
@@ -84,6 +84,41 @@ def evaluate(on: Evaluator, tape: Tape, inputs: Sequence[Real], parameters: Sequ
 
     table = {name: bound(OPERATIONS[name]) for name in {each[0] for each in tape.operations} if name in OPERATIONS}
     return tape.run(table, lambda number: number, inputs, parameters)
+
+
+def over_step(on: Slopes, tape: Tape, inputs: Sequence[Real], parameters: Sequence[Real]) -> Slope:
+    """The result of a tape with one over a step, its slopes accumulated from the end.
+
+    Every operation says how its own arguments change it; the result's slope along each number is then the sum over
+    those that it goes into: two products an operation, whatever the number of increments.
+    """
+    values: list[Slope] = []
+    parts: list[Entries] = []
+    given: dict[str, Callable[[float], Real]] = {
+        "input": lambda number: inputs[int(number)],
+        "parameter": lambda number: parameters[int(number)],
+        "constant": lambda number: number,
+    }
+    for place, (name, places, number) in enumerate(tape.operations):
+        arguments = [values[i] for i in places]
+        if name in given:
+            found = lifted(given[name](number))
+        elif name == "power":
+            found = lifted(OPERATIONS[name](on, *arguments, number))
+        else:
+            found = lifted(OPERATIONS[name](on, *arguments))
+        parts.append(found.slopes)
+        values.append(Slope(found.start, found.end, {place: 1.0} if found.slopes else {}))
+    (last,) = tape.outputs
+    weights: dict[int, Real] = {last: 1.0}
+    entries: dict[int, Real] = {}
+    for place in range(last, -1, -1):
+        if place in weights:
+            into = entries if tape.operations[place][0] == "input" else weights
+            for i, part in parts[place].items():
+                more = part * weights[place]
+                into[i] = into[i] + more if i in into else more
+    return Slope(values[last].start, values[last].end, entries)
 
 
 def _function(name: str) -> Callable[[Evaluator, Real], Real]:
