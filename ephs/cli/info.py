@@ -59,9 +59,10 @@ def _of_scene(scene: "Scene") -> list[str]:
     lines += [f"{kind}: {', '.join(_few(names))}" for kind, given in rest.items() if (names := list(given))]
     markers = [f"markers.{name}" for name, _ in scene.all_markers()]
     inputs = [f"joints.{name}" for name, j in joints if j.dim and j.motion is None]
+    inputs += [f"{section}.{name}" for section, name, each in scene.all_attachments() if each.commanded]
     return [
         *lines,
-        f"inputs (forces): {', '.join(_few([*inputs, *markers]))}, bodies.NAME",
+        f"inputs: {', '.join(_few([*inputs, *markers]))}, bodies.NAME",
         "outputs: joints.NAME.{coordinate, rate, wrench}, bodies.NAME.{position, velocity, …}, "
         + ("thermal.NAME.temperature, " if any(True for _ in scene.all_thermal()) else "")
         + "energy, heat, work, …; ephs plot RUN lists all",

@@ -10,6 +10,8 @@ if TYPE_CHECKING:
     from ephs.mechanics.elements.beam import beam_element as beam_element
     from ephs.mechanics.elements.bodies import body_pattern as body_pattern
     from ephs.mechanics.elements.bodies import rigid_body as rigid_body
+    from ephs.mechanics.elements.cylinder import gas_spring as gas_spring
+    from ephs.mechanics.elements.cylinder import hydraulic_cylinder as hydraulic_cylinder
     from ephs.mechanics.elements.gear import gear as gear
     from ephs.mechanics.elements.joints import joint as joint
     from ephs.mechanics.elements.joints import joint_pattern as joint_pattern
@@ -23,6 +25,8 @@ if TYPE_CHECKING:
 
 _HOME = {
     "armature": "ephs.mechanics.elements.motor",
+    "gas_spring": "ephs.mechanics.elements.cylinder",
+    "hydraulic_cylinder": "ephs.mechanics.elements.cylinder",
     "gear": "ephs.mechanics.elements.gear",
     "motor": "ephs.mechanics.elements.motor",
     "beam_element": "ephs.mechanics.elements.beam",

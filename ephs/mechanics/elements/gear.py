@@ -1,13 +1,18 @@
-"""Gears, belts and mimics: what ties the rates of joints to each other, rigidly or by a spring."""
+"""Gears, belts, mimics and tendons: what ties the rates of joints to each other, rigidly or by a spring."""
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from ephs.operad import Path, Pattern, Quantity, junction, quantity
 from ephs.semantics import library
-from ephs.semantics.constructors import constraint, transformer
+from ephs.semantics.constructors import constraint, gyrator, transformer
+from ephs.semantics.primitives import power_ports
+from ephs.semantics.spaces import pair
+from ephs.semantics.structures import quadratic
 from ephs.semantics.system import Filling, System
 
-__all__ = ["gear"]
+__all__ = ["gear", "turns"]
 
 
 def gear(
@@ -31,7 +36,7 @@ def gear(
     ratio
         One number for each joint but the first.
     stiffness, damping
-        Of a belt, in N m/rad and N m s/rad or N/m and N s/m.
+        Of a belt or a tendon, in N m/rad and N m s/rad or N/m and N s/m.
     friction
         On the first joint's rate, in N m s/rad or N s/m: what the gear loses.
     heat
@@ -40,28 +45,34 @@ def gear(
     shafts = [f"p{k}" for k in range(len(of))]
     ports = dict(zip(shafts, of, strict=True))
     row = [1.0, *(-float(x) for x in ratio)]
+    momentum, place = (
+        (quantity.angular_momentum, quantity.angle) if turns(of[0]) else (quantity.momentum, quantity.displacement)
+    )
     junctions = {name: junction(each, exposed=True) for name, each in ports.items()}
     boxes: dict[str, dict[str, str]] = {"mesh": {name: name for name in shafts}}
     fillings: dict[str, Filling] = {}
     if stiffness:
-        junctions |= {"p": junction(quantity.momentum), "q": junction(quantity.displacement)}
+        junctions |= {"p": junction(momentum), "q": junction(place)}
         boxes["mesh"]["p"] = "p"
         boxes |= {"pkc": {"q": "q", "p": "p"}, "spring": {"q": "q"}}
         fillings = {
-            "mesh": constraint({**ports, "p": quantity.momentum}, [[*row, -1.0]], name="mesh"),
-            "pkc": library.pkc(),
-            "spring": library.spring(k=stiffness),
+            "mesh": constraint({**ports, "p": momentum}, [[*row, -1.0]], name="mesh"),
+            "pkc": gyrator({"q": place, "p": momentum}, [[0.0, -1.0], [1.0, 0.0]], name="pkc"),
+            "spring": quadratic(
+                "spring", power_ports(q=place), np.array([[stiffness]]), (("k", stiffness),), trusted=True
+            ),
         }
     else:
         fillings = {"mesh": constraint(ports, [row], name="mesh")}
     losses = {"damper": (damping if stiffness else 0.0, "p"), "loss": (friction, "first")}
     for name, (size, at) in losses.items():
         if size:
-            boxes[name], fillings[name] = {"p": at, "s": "s"}, library.friction(d=size)
+            boxes[name] = {"p": at, "s": "s"}
+            fillings[name] = library.rotational_friction(d=size) if turns(of[0]) else library.friction(d=size)
     if friction:
-        junctions["first"] = junction(quantity.momentum)
+        junctions["first"] = junction(momentum)
         boxes["shaft"] = {"p0": "p0", "p": "first"}
-        fillings["shaft"] = transformer({"p0": of[0], "p": quantity.momentum}, [[1.0]], name="shaft")
+        fillings["shaft"] = transformer({"p0": of[0], "p": momentum}, [[1.0]], name="shaft")
     if any(size for size, _ in losses.values()):
         junctions["s"] = junction(quantity.entropy, exposed=heat)
         if not heat:
@@ -69,3 +80,9 @@ def gear(
     return System.of(
         Pattern(junctions=junctions, boxes=boxes), {Path.of(name): filling for name, filling in fillings.items()}
     )
+
+
+def turns(of: Quantity) -> bool:
+    """Whether the rate that belongs to a joint's momentum is an angular one."""
+    space = of.space
+    return bool(np.any(pair(space.name.removesuffix("*"), **dict(space.parameters)).basis[:3]))

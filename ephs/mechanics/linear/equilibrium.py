@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
+from ephs.mechanics.scene.attached import Attachment, Cylinder, GasSpring, Gear, Motor
 from ephs.mechanics.scene.model import Scene
 from ephs.operad import Path
 from ephs.semantics.bundle import Array, Reference
@@ -111,12 +112,17 @@ def equilibrium(
 # ---- scenes ------------------------------------------------------------------------------------------------------
 
 
+def _keeps(of: Attachment) -> bool:
+    """Whether an attachment has states beside those of its joints."""
+    return isinstance(of, Motor | Cylinder | GasSpring) or (isinstance(of, Gear) and bool(of.stiffness))
+
+
 def _of_scene(scene: Scene) -> Equilibrium:
     from ephs.mechanics.dynamics import dynamics
 
-    if motors := [name for name, _ in scene.all_motors()]:
-        found = f"a scene with the motor {motors[0]}"
-        raise OptionError("model", found, "a scene without motors, or its system: their currents are states")
+    if own := [f"{section}.{name}" for section, name, each in scene.all_attachments() if _keeps(each)]:
+        found = f"a scene with {own[0]}"
+        raise OptionError("model", found, "a scene without attachments with states, or its system")
     moving = [name for name, joint in scene.all_joints() if joint.motion]
     if moving:
         raise _none(f"joints.{moving[0]}", "its motion is prescribed")

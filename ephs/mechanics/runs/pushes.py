@@ -7,6 +7,8 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.runs.signals import View, signal
+from ephs.mechanics.scene.attached import Actuator
+from ephs.mechanics.scene.attaching import supplies_of
 from ephs.mechanics.scene.build import component_path
 from ephs.mechanics.scene.flexible import Load
 from ephs.mechanics.scene.model import Marker, Scene
@@ -35,38 +37,47 @@ def sum_of(one: Signal, other: Signal) -> Signal:
     return Signal(lambda t, state: one.at(t, state) + other.at(t, state), held=held, timed=timed)
 
 
-def scene_signals(scene: Scene, inputs: Mapping[Any, Any], view: View) -> tuple[dict[str, Signal], ...]:
-    """Forces on joints, wrenches on bodies, voltages of motors, by name: the loads, and what a user gives.
+def scene_signals(
+    scene: Scene, inputs: Mapping[Any, Any], view: View
+) -> tuple[dict[str, Signal], dict[str, Signal], dict[Path, Signal]]:
+    """Forces on joints, wrenches on bodies, efforts of supplies, by name: the loads, and what a user gives.
 
     A key may be a tuple of names, whose input gives the numbers of all of them in a row.
 
     Raises
     ------
     AssemblyError
-        There is no such joint, body, marker or motor.
+        There is no such joint, body, marker or attachment.
     """
     forces: dict[str, Signal] = {}
     wrenches: dict[str, Signal] = {}
-    voltages: dict[str, Signal] = {}
+    efforts: dict[Path, Signal] = {}
     joints, bodies, markers = dict(scene.all_joints()), dict(scene.all_bodies()), dict(scene.all_markers())
     sizes = {f"joints.{name}": j.dim for name, j in joints.items()} | {f"bodies.{name}": 6 for name in bodies}
-    sizes |= {f"motors.{name}": 1 for name, _ in scene.all_motors()}
+    attached = {f"{section}.{name}": each for section, name, each in scene.all_attachments()}
+    supplied = {key: supplies_of(each) for key, each in attached.items()}
+    sizes |= {key: len(given) for key, given in supplied.items() if given}
+    sizes |= {key: 1 for key, each in attached.items() if isinstance(each, Actuator)}
     sizes |= {f"markers.{name}": 3 for name, marker in markers.items() if marker.body in bodies}
     for _, load in scene.all_loads():
         push = _of_load(load)
         wrenches[load.body] = sum_of(wrenches[load.body], push) if load.body in wrenches else push
     for key, given in _single(inputs, sizes, view):
         kind, _, name = key.partition(".")
-        if kind == "motors":
-            voltages[name] = replace(given, effort=True)
+        if supplied.get(key):
+            parts = (part_of(given, slice(k, k + 1)) for k in range(len(supplied[key])))
+            efforts |= {s.outer: replace(part, effort=True) for s, part in zip(supplied[key], parts, strict=True)}
             continue
-        if kind == "joints":
-            forces[name] = sum_of(forces[name], given) if name in forces else given
+        if kind in ("joints", "actuators"):
+            of = attached.get(key)
+            shares = _shares(of, given) if isinstance(of, Actuator) else {name: given}
+            for joint, share in shares.items():
+                forces[joint] = sum_of(forces[joint], share) if joint in forces else share
             continue
         if kind == "markers":
             name, given = markers[name].body, _at_marker(markers[name], given)
         wrenches[name] = sum_of(wrenches[name], given) if name in wrenches else given
-    return forces, wrenches, voltages
+    return forces, wrenches, efforts
 
 
 def _single(inputs: Mapping[Any, Any], sizes: Mapping[str, int], view: View) -> Iterator[tuple[str, Signal]]:
@@ -84,6 +95,18 @@ def _single(inputs: Mapping[Any, Any], sizes: Mapping[str, int], view: View) -> 
         shared = whole if whole.constant else Signal(_Latest(whole).at, held=whole.held, timed=whole.timed)
         for one, first, last in zip(keys, ends[:-1], ends[1:], strict=True):
             yield one, part_of(shared, slice(int(first), int(last)))
+
+
+def _shares(of: Actuator, control: Signal) -> dict[str, Signal]:
+    """Force on each joint of an actuator, of its control within its limits."""
+    low, high = (-np.inf, np.inf) if of.limits is None else of.limits.tolist()
+
+    def share(ratio: float) -> Signal:
+        if control.constant:
+            return Signal(ratio * np.clip(control.at(0.0, {}), low, high))
+        return replace(control, value=lambda t, state: ratio * np.clip(control.at(t, state), low, high))
+
+    return {joint: share(ratio) for joint, ratio in zip(of.joints, of.ratio.tolist(), strict=True)}
 
 
 @final

@@ -21,7 +21,6 @@ from ephs.mechanics.runs.signals import asked_of, jumps_of, signal, times_of
 from ephs.mechanics.scene.build import (
     drive_ports,
     initial_state,
-    motor_port,
     scene_inputs,
     scene_names,
     scene_system,
@@ -331,7 +330,7 @@ def problem_of_scene(
 ) -> Problem:
     """The initial value problem of a scene."""
     view = Names(scene).view
-    forces, wrenches, voltages = scene_signals(scene, inputs or {}, view)
+    forces, wrenches, efforts = scene_signals(scene, inputs or {}, view)
     system = scene_system(scene, driven=frozenset(forces), wrenches=frozenset(wrenches))
     state = initial_state(scene)
     if initial:
@@ -346,7 +345,7 @@ def problem_of_scene(
                     "input", f"joints.{name}", found="a force", expected="none: its motion is prescribed"
                 )
             signals[port] = sum_of(signals[port], extra) if port in signals else extra
-    signals |= {motor_port(name): voltage for name, voltage in voltages.items()}
+    signals |= efforts
     signals |= {wrench_port(body): wrench for body, wrench in wrenches.items()}
     world = scene.world
     problem = Problem(

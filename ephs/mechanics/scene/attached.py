@@ -1,17 +1,118 @@
-"""Attachments of a scene's mechanism: motors, gears, stores of heat, conduction."""
+"""Attachments of a scene's mechanism: motors, gears, cylinders, gas springs, actuators; stores of heat, conduction."""
 
-from dataclasses import dataclass
-from typing import final
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Conduction", "Gear", "Motor", "ThermalNode"]
+__all__ = [
+    "ATTACHED",
+    "Actuator",
+    "Attachment",
+    "Conduction",
+    "Cylinder",
+    "GasSpring",
+    "Gear",
+    "Motor",
+    "Number",
+    "ThermalNode",
+]
+
+Array = NDArray[np.float64]
+POSITIVE, NON_NEGATIVE = (0.0, True), (0.0, False)
+"""A bound from below, and whether it is excluded."""
 
 
 @final
 @dataclass(frozen=True, slots=True)
-class Motor:
+class Number:
+    """Dimension, count and range of a number of an attachment.
+
+    Parameters
+    ----------
+    energy, time, length
+        Exponents of its dimension.
+    first, others
+        Exponents of the units of coordinates: of the first joint; of its own joint, where there is a number for each.
+    count
+        Of a row of numbers; 0 for one number.
+    each
+        There is a number for each joint from this one on; −1 for none.
+    least
+        Bound from below, and whether it is excluded.
+    """
+
+    energy: int = 0
+    time: int = 0
+    length: int = 0
+    first: int = 0
+    others: int = 0
+    count: int = 0
+    each: int = -1
+    least: tuple[float, bool] | None = None
+
+    def shape(self, joints: int) -> tuple[int, ...]:
+        """Shape of its array at an attachment of so many joints."""
+        return (joints - self.each,) if self.each >= 0 else (self.count,) if self.count else ()
+
+    def unit(self, length: float, mass: float, time: float, joints: Sequence[float]) -> Any:
+        """Its unit, of those of length, mass and time, and of the coordinates of joints."""
+        energy = mass * length**2 / time**2
+        whole = energy**self.energy * time**self.time * length**self.length * joints[0] ** self.first
+        return whole * np.array(joints[self.each :]) ** self.others if self.each >= 0 else whole
+
+
+class Attachment(ABC):
+    """What acts on the rates of joints with one freedom each."""
+
+    __slots__ = ()
+    numbers: ClassVar[Mapping[str, Number]]
+    name: str
+    heat: str
+
+    @property
+    @abstractmethod
+    def tied(self) -> tuple[str, ...]:
+        """Its joints."""
+
+    @property
+    @abstractmethod
+    def warms(self) -> bool:
+        """Whether it makes heat."""
+
+    @property
+    def commanded(self) -> bool:
+        """Whether it is an input of runs."""
+        return isinstance(self, Motor | Cylinder | Actuator)
+
+    @abstractmethod
+    def seen(self, path: str, heat: str) -> Self:
+        """Itself with names as seen from outside of the part at a path."""
+
+    @abstractmethod
+    def __str__(self) -> str:
+        """In a few words."""
+
+    def values(self) -> dict[str, tuple[Any, tuple[int, ...]]]:
+        """Its numbers, with the shapes that they ought to have; none for those that are left out."""
+        given = {key: (getattr(self, key), number.shape(len(self.tied))) for key, number in self.numbers.items()}
+        return {key: pair for key, pair in given.items() if pair[0] is not None}
+
+    def rescaled(self, length: float, mass: float, time: float, joints: Sequence[float]) -> Self:
+        """Itself in other units; ``joints`` are those of its joints' coordinates."""
+        changed: dict[str, Any] = {}
+        for key, (value, _) in self.values().items():
+            found = value * self.numbers[key].unit(length, mass, time, joints)
+            changed[key] = _frozen(found) if isinstance(value, np.ndarray) else float(found)
+        return replace(self, **changed)  # pyright: ignore[reportArgumentType] - all attachments are dataclasses
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Motor(Attachment):
     """A direct-current motor on a joint with one freedom.
 
     Attributes
@@ -28,6 +129,15 @@ class Motor:
         V, where no input is given.
     """
 
+    # Amperes and coulombs a second stay what they are in other seconds.
+    numbers: ClassVar[Mapping[str, Number]] = {
+        "constant": Number(energy=1, time=1),
+        "resistance": Number(energy=1, time=1, least=POSITIVE),
+        "inductance": Number(energy=1, time=2, least=NON_NEGATIVE),
+        "gear": Number(first=-1),
+        "inertia": Number(energy=1, time=2, least=NON_NEGATIVE),
+        "voltage": Number(energy=1),
+    }
     name: str
     joint: str
     constant: float
@@ -38,10 +148,24 @@ class Motor:
     voltage: float
     heat: str
 
+    @property
+    def tied(self) -> tuple[str, ...]:
+        return (self.joint,)
+
+    @property
+    def warms(self) -> bool:
+        return True
+
+    def seen(self, path: str, heat: str) -> Self:
+        return replace(self, name=path + self.name, joint=path + self.joint, heat=heat)
+
+    def __str__(self) -> str:
+        return f"on {self.joint}, {self.resistance:g} Ω, gear {self.gear:g}"
+
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Gear:
+class Gear(Attachment):
     """A relation of the rates of joints: that of the first is Σ ratio · rate of the others.
 
     Attributes
@@ -49,23 +173,193 @@ class Gear:
     ratio
         A number for each joint but the first.
     stiffness, damping
-        Of a belt that stretches, N m/rad and N m s/rad, or N/m and N s/m, of the first joint; a rigid gear has none.
+        Of a belt or a tendon that stretches, N m/rad and N m s/rad, or N/m and N s/m, of the first joint; a rigid gear
+        has none.
     friction
         On the first joint's rate.
+    stretch
+        Of the belt at the start, rad or m of the first joint.
     """
 
+    numbers: ClassVar[Mapping[str, Number]] = {
+        "ratio": Number(first=1, others=-1, each=1),
+        "stiffness": Number(energy=1, first=-2, least=NON_NEGATIVE),
+        "damping": Number(energy=1, time=1, first=-2, least=NON_NEGATIVE),
+        "friction": Number(energy=1, time=1, first=-2, least=NON_NEGATIVE),
+        "stretch": Number(first=1),
+    }
     name: str
     joints: tuple[str, ...]
-    ratio: NDArray[np.float64]
+    ratio: Array
     stiffness: float
     damping: float
     friction: float
     heat: str
+    stretch: float = 0.0
+
+    @property
+    def tied(self) -> tuple[str, ...]:
+        return self.joints
 
     @property
     def warms(self) -> bool:
-        """Whether it makes heat."""
         return bool(self.friction or (self.stiffness and self.damping))
+
+    def seen(self, path: str, heat: str) -> Self:
+        return replace(self, name=path + self.name, joints=tuple(path + each for each in self.joints), heat=heat)
+
+    def __str__(self) -> str:
+        return f"{' – '.join(self.joints)}, {', '.join(f'{x:g}' for x in self.ratio)}"
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Cylinder(Attachment):
+    """A hydraulic cylinder on a joint that slides, or a hydraulic motor on one that turns.
+
+    Attributes
+    ----------
+    area
+        (2,) volume of chambers a and b by the coordinate, m³/m or m³/rad; a pushes towards larger coordinates.
+    volume
+        (2,) oil in each, m³.
+    bulk
+        Its bulk modulus, Pa.
+    conductance, leak
+        Of the line to each chamber, and across the piston, m³/(s Pa).
+    pressure
+        (2,) of the supplies of a and b above the environment's, Pa, where no input is given; the chambers start there.
+    """
+
+    numbers: ClassVar[Mapping[str, Number]] = {
+        "area": Number(length=3, first=-1, count=2),
+        "volume": Number(length=3, count=2, least=POSITIVE),
+        "bulk": Number(energy=1, length=-3, least=POSITIVE),
+        "conductance": Number(energy=-1, time=-1, length=6, least=POSITIVE),
+        "leak": Number(energy=-1, time=-1, length=6, least=NON_NEGATIVE),
+        "pressure": Number(energy=1, length=-3, count=2),
+    }
+    name: str
+    joint: str
+    area: Array
+    volume: Array
+    bulk: float
+    conductance: float
+    leak: float
+    pressure: Array
+    heat: str
+
+    @property
+    def tied(self) -> tuple[str, ...]:
+        return (self.joint,)
+
+    @property
+    def warms(self) -> bool:
+        return True
+
+    def seen(self, path: str, heat: str) -> Self:
+        return replace(self, name=path + self.name, joint=path + self.joint, heat=heat)
+
+    def __str__(self) -> str:
+        return f"on {self.joint}, {' and '.join(f'{x:g}' for x in self.area)} m²"
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class GasSpring(Attachment):
+    """An ideal gas behind a piston on a joint, the environment's pressure before it.
+
+    Attributes
+    ----------
+    area
+        Volume of the gas by the coordinate, m³/m or m³/rad; negative where it shrinks towards larger coordinates.
+    volume, pressure, temperature
+        Of the gas at the start: m³, Pa (absolute), K.
+    gamma
+        Its ratio of specific heats.
+    conductance
+        From the gas to ``heat``, W/K.
+    """
+
+    numbers: ClassVar[Mapping[str, Number]] = {
+        "area": Number(length=3, first=-1),
+        "volume": Number(length=3, least=POSITIVE),
+        "pressure": Number(energy=1, length=-3, least=POSITIVE),
+        "temperature": Number(least=POSITIVE),
+        "gamma": Number(least=(1.0, True)),
+        "conductance": Number(energy=1, time=-1, least=NON_NEGATIVE),
+    }
+    name: str
+    joint: str
+    area: float
+    volume: float
+    pressure: float
+    temperature: float
+    gamma: float
+    conductance: float
+    heat: str
+
+    @property
+    def tied(self) -> tuple[str, ...]:
+        return (self.joint,)
+
+    @property
+    def warms(self) -> bool:
+        return bool(self.conductance)
+
+    def seen(self, path: str, heat: str) -> Self:
+        return replace(self, name=path + self.name, joint=path + self.joint, heat=heat)
+
+    def __str__(self) -> str:
+        return f"on {self.joint}, {self.volume:g} m³ at {self.pressure:g} Pa"
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Actuator(Attachment):
+    """A control that is forces on joints: an input by name, of any motor that is no more than its force.
+
+    Attributes
+    ----------
+    ratio
+        Force on each joint by the control, N m or N.
+    limits
+        (2,) least and largest control; None for none.
+    """
+
+    numbers: ClassVar[Mapping[str, Number]] = {
+        "ratio": Number(energy=1, others=-1, each=0),
+        "limits": Number(count=2),
+    }
+    name: str
+    joints: tuple[str, ...]
+    ratio: Array
+    limits: Array | None
+    heat: str = "environment"
+
+    @property
+    def tied(self) -> tuple[str, ...]:
+        return self.joints
+
+    @property
+    def warms(self) -> bool:
+        return False
+
+    def seen(self, path: str, heat: str) -> Self:
+        return replace(self, name=path + self.name, joints=tuple(path + each for each in self.joints))
+
+    def __str__(self) -> str:
+        return f"{' – '.join(self.joints)}, {', '.join(f'{x:g}' for x in self.ratio)}"
+
+
+ATTACHED: Mapping[str, type[Attachment]] = {
+    "motors": Motor,
+    "gears": Gear,
+    "cylinders": Cylinder,
+    "gas_springs": GasSpring,
+    "actuators": Actuator,
+}
+"""Kinds of attachments, by their sections of scene files."""
 
 
 @final
@@ -86,3 +380,9 @@ class Conduction:
     name: str
     between: tuple[str, str]
     conductance: float
+
+
+def _frozen(values: Array) -> Array:
+    array = np.array(values, dtype=np.float64)
+    array.setflags(write=False)
+    return array

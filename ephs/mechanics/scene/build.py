@@ -14,9 +14,10 @@ import numpy as np
 
 from ephs.mechanics.elements import components
 from ephs.mechanics.elements.contact import contact
-from ephs.mechanics.elements.gear import gear
 from ephs.mechanics.elements.motor import armature
-from ephs.mechanics.scene.made import Made, motor_system, spring_system
+from ephs.mechanics.scene.attached import Actuator
+from ephs.mechanics.scene.attaching import SUPPLIED, starts_of, supplies, supplies_of, system_of
+from ephs.mechanics.scene.made import Made, spring_system
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Joint, Scene
 from ephs.mechanics.scene.surfaces import Contact, Surface
 from ephs.mechanics.shapes.pairs import Touch, touches
@@ -33,7 +34,6 @@ __all__ = [
     "contact_points",
     "drive_ports",
     "initial_state",
-    "motor_port",
     "scene_inputs",
     "scene_names",
     "scene_system",
@@ -58,11 +58,6 @@ def drive_ports(of: Joint) -> tuple[tuple[Path, slice], ...]:
     if of.middle is None:
         return ((at, slice(0, of.dim)),)
     return ((at / "first", slice(0, 1)), (at / "second", slice(1, 2)))
-
-
-def motor_port(name: str) -> Path:
-    """The outer port of a motor's voltage and current."""
-    return _at("voltages", name)
 
 
 def scene_system(scene: Scene, *, driven: Iterable[str] = (), wrenches: Iterable[str] = ()) -> System:
@@ -104,21 +99,10 @@ def initial_state(scene: Scene) -> dict[Path, Array]:
                 out[place / "env" / "s"] = np.zeros(1)
         if j.armature:
             out[component_path("armatures", name) / "p"] = j.armature * j.rate
-    for name, m in scene.all_motors():
-        at = component_path("motors", name)
-        out[at / "field" / "b"] = np.array([m.constant])
-        if m.inductance:
-            out[at / "coil" / "b"] = np.zeros(1)
-        if m.inertia:
-            out[at / "rotor" / "p"] = m.inertia * m.gear * scene.joint(m.joint).rate
-        if m.heat == ENVIRONMENT:
-            out[at / "env" / "s"] = np.zeros(1)
-    for name, g in scene.all_gears():
-        at = component_path("gears", name)
-        if g.stiffness:
-            out[at / "spring" / "q"] = np.zeros(1)
-        if g.warms and g.heat == ENVIRONMENT:
-            out[at / "env" / "s"] = np.zeros(1)
+    for section, name, each in scene.all_attachments():
+        at = component_path(section, name)
+        found = starts_of(each, [scene.joint(tied) for tied in each.tied])
+        out |= {Path([*at, *path.split(".")]): value.copy() for path, value in found.items()}
     between = [
         (component_path("springs", name), (s.body1, s.body2), (_point(s.at1), _point(s.at2)), s.heat)
         for name, s in scene.all_springs()
@@ -153,8 +137,8 @@ def contact_points(scene: Scene, of: Contact) -> tuple[tuple[str, str], tuple[To
 
 
 def scene_inputs(scene: Scene) -> dict[Path, Input]:
-    """Prescribed drives as flows, motions and voltages as efforts, at the ports of `drive_ports` and `motor_port`."""
-    out = {motor_port(name): Input(np.array([m.voltage]), True) for name, m in scene.all_motors()}
+    """Prescribed drives as flows, motions and supplies as efforts, at the ports of `drive_ports` and `supplies`."""
+    out = {supply.outer: Input(supply.value, True) for supply in supplies(scene)}
     for _, j in scene.all_joints():
         if _is_driven(j):
             for port, where in drive_ports(j):
@@ -242,8 +226,8 @@ class _Builder:
         return str(path)
 
     def supply(self, path: Path) -> str:
-        """An exposed junction of a motor's voltage."""
-        self.junctions[path] = junction(quantity.charge, exposed=True)
+        """An exposed junction of an attachment's supply."""
+        self.junctions[path] = junction(SUPPLIED[path[0]], exposed=True)
         return str(path)
 
     def add(self, path: Path, filling: Filling, ports: Mapping[Any, str]) -> None:
@@ -297,22 +281,16 @@ def _level(scene: Scene, demands: _Demands, *, top: bool) -> System:
         system = _level(part, inner.of_part(name), top=False)
         ports = {port: _joined(b, name, port, system.interface[port].quantity) for port in system.interface}
         b.add(Path(["parts", name]), system, ports)
-    for name, m in scene.motors.items():
-        at = _at("drives", m.joint)
-        ports = {"q": b.supply(motor_port(name)), "p_r": str(at)}
-        if m.heat != ENVIRONMENT:
-            ports["s"] = b.entropy(m.heat)
-        b.add(Path(["motors", name]), motor_system(m, b.junctions[at].quantity), ports)
-    for name, g in scene.gears.items():
-        at = [_at("drives", each) for each in g.joints]
-        ports = {f"p{k}": str(each) for k, each in enumerate(at)}
-        if g.warms and g.heat != ENVIRONMENT:
-            ports["s"] = b.entropy(g.heat)
-        filling = gear(
-            [b.junctions[each].quantity for each in at], g.ratio.tolist(),
-            stiffness=g.stiffness, damping=g.damping, friction=g.friction, heat=g.heat != ENVIRONMENT,
-        )  # fmt: skip
-        b.add(Path(["gears", name]), filling, ports)
+    for section, name, each in scene.attachments():
+        at = [_at("drives", tied) for tied in each.tied]
+        made = system_of(each, [b.junctions[path].quantity for path in at])
+        if made is None:
+            continue
+        ports = dict(zip(made[1], map(str, at), strict=True))
+        ports |= {supply.port: b.supply(supply.outer) for supply in supplies_of(each)}
+        if each.warms and each.heat != ENVIRONMENT:
+            ports["s"] = b.entropy(each.heat)
+        b.add(Path([section, name]), made[0], ports)
     if grounded and top:
         b.add(Path(["ground"]), components.ground(), {"p": b.momentum(GROUND)})
     return System.of(Pattern(junctions=b.junctions, boxes=b.boxes), b.fillings)
@@ -328,8 +306,8 @@ def _joined(b: _Builder, part: str, port: Path, of: Quantity) -> str:
         return b.momentum(name)
     if group == "entropies":
         return b.entropy(name)
-    if group == "voltages":
-        return b.supply(_at("voltages", name))
+    if group in SUPPLIED:
+        return b.supply(_at(group, name))
     joint_name = name if name in b.inner.joints else name.rpartition(".")[0]
     return b.drive(joint_name, Path(["drives", part, *rest]), of)
 
@@ -341,9 +319,10 @@ def _demands_on_parts(scene: Scene, demands: _Demands) -> _Demands:
     nodes = {x.heat for x in (*pairs, *scene.contacts.values())} | {
         name for c in scene.conduction.values() for name in c.between
     }
-    nodes |= {m.heat for m in scene.motors.values()} | {g.heat for g in scene.gears.values() if g.warms}
-    turned = {m.joint for m in scene.motors.values()} | {name for name, j in scene.joints.items() if j.armature}
-    turned |= {name for g in scene.gears.values() for name in g.joints}
+    attached = [each for _, _, each in scene.attachments()]
+    nodes |= {each.heat for each in attached if each.warms}
+    turned = {name for name, j in scene.joints.items() if j.armature}
+    turned |= {name for each in attached for name in each.tied if not isinstance(each, Actuator)}
     return _Demands(demands.bodies | bodies, demands.nodes | nodes, demands.joints | turned)
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ephs.mechanics.scene.adjustment import Adjustment, Changed, Displacement
-from ephs.mechanics.scene.attached import Conduction, Gear, Motor, ThermalNode
+from ephs.mechanics.scene.attached import ATTACHED, Conduction, ThermalNode
 from ephs.mechanics.scene.flexible import Beam, Load, Strain
 from ephs.mechanics.scene.model import Body, Joint, Marker, Scene, Spring, World, frozen
 from ephs.mechanics.scene.surfaces import Contact, Surface
@@ -28,7 +28,7 @@ _ARRAYS = {
     Surface: {"frame"},
     Strain: {"stiffness", "rest"},
     Load: {"force", "moment"},
-    Gear: {"ratio"},
+    **{kind: {key for key, of in kind.numbers.items() if of.shape(2)} for kind in ATTACHED.values()},
 }
 _PARTS = {
     "bodies": Body,
@@ -41,8 +41,7 @@ _PARTS = {
     "contacts": Contact,
     "beams": Beam,
     "loads": Load,
-    "motors": Motor,
-    "gears": Gear,
+    **ATTACHED,
     "parts": Scene,
 }
 
@@ -100,6 +99,11 @@ def _scene(data: dict[str, Any]) -> Scene:
             entries = {name: entry | {"shapes": tuple(entry.get("shapes", ()))} for name, entry in entries.items()}
         if cls is Conduction:
             entries = {name: entry | {"between": tuple(entry["between"])} for name, entry in entries.items()}
+        if cls in ATTACHED.values():
+            entries = {
+                name: {key: tuple(value) if key == "joints" else value for key, value in entry.items()}
+                for name, entry in entries.items()
+            }
         if cls is Joint:
             entries = {
                 name: entry

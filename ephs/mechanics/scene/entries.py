@@ -13,7 +13,7 @@ from pydantic import ValidationError, WrapValidator
 
 from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing
 from ephs.mechanics.scene.rotations import FORMS
-from ephs.mechanics.scene.schema import SECTIONS, AssemblyEntry, SceneFile, SurfaceShapeEntry, WorldEntry
+from ephs.mechanics.scene.schema import SECTIONS, AssemblyEntry, CylinderEntry, SceneFile, SurfaceShapeEntry, WorldEntry
 from ephs.mechanics.scene.schema_flexible import SectionEntry
 from ephs.mechanics.scene.schema_numbers import LARGEST, Entry
 
@@ -29,16 +29,22 @@ _NEUTRAL: dict[str, Any] = {
     "capacity": 1.0,
     "temperature": 1.0,
     "between": ["environment", "environment"],
-    "conductance": 0.0,
+    "conductance": 1.0,
     "use": "?",
     "body": "ground",
     "shape": SurfaceShapeEntry(),
     "surfaces": ["?", "?"],
     "joint": "?",
+    "joints": ["?", "!"],
     "constant": 0.0,
     "resistance": 1.0,
     "section": SectionEntry(),
+    "area": 1.0,
+    "volume": 1.0,
+    "pressure": 1.0,
 }
+_NEUTRAL_PAIRS = {key: [1.0, 1.0] for key in ("area", "volume")}
+"""The same of cylinders."""
 
 _EXPECTED: dict[str, Callable[[Mapping[str, Any]], tuple[str, str]]] = {
     "float_type": lambda ctx: ("type", "a number"),
@@ -119,7 +125,8 @@ def validate(model: type[E], raw: Any, key: str, faults: list[Fault]) -> Checked
                 spoiled.add(str(item["loc"][0]))
     sound = {k: v for k, v in raw.items() if k not in spoiled}
     required = {k for k, field in model.model_fields.items() if field.is_required()}
-    neutral = {k: _NEUTRAL[k] for k in spoiled & required}
+    known = _NEUTRAL | (_NEUTRAL_PAIRS if model is CylinderEntry else {})
+    neutral = {k: known[k] for k in spoiled & required}
     return Checked(model.model_validate({**sound, **neutral}), frozenset(spoiled))
 
 

@@ -7,6 +7,7 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+from ephs.mechanics.scene.attached import ATTACHED
 from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.geometry import body_twist, coupling_of
 from ephs.mechanics.scene.model import GROUND, IDENTITY_POSE, Joint, Scene, frozen
@@ -301,19 +302,9 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
         "at1": _attribute("springs", "at1"),
         "at2": _attribute("springs", "at2"),
     },
-    "motors": {
-        "constant": _attribute("motors", "constant"),
-        "resistance": _attribute("motors", "resistance", POSITIVE),
-        "inductance": _attribute("motors", "inductance", NON_NEGATIVE),
-        "gear": _attribute("motors", "gear"),
-        "inertia": _attribute("motors", "inertia", NON_NEGATIVE),
-        "voltage": _attribute("motors", "voltage"),
-    },
-    "gears": {
-        "ratio": _attribute("gears", "ratio"),
-        "stiffness": _attribute("gears", "stiffness", NON_NEGATIVE),
-        "damping": _attribute("gears", "damping", NON_NEGATIVE),
-        "friction": _attribute("gears", "friction", NON_NEGATIVE),
+    **{
+        section: {key: _attribute(section, key, number.least) for key, number in kind.numbers.items()}
+        for section, kind in ATTACHED.items()
     },
     "thermal": {
         "capacity": _attribute("thermal", "capacity", POSITIVE),

@@ -14,12 +14,14 @@ import numpy as np
 
 from ephs.mechanics.scene import resolve, values
 from ephs.mechanics.scene.assembly import assemble
+from ephs.mechanics.scene.attached import ATTACHED
 from ephs.mechanics.scene.beams import BeamDraft, check_beam, resolve_beam
 from ephs.mechanics.scene.entries import Document, read_document, shown
 from ephs.mechanics.scene.errors import Fault, ModelWarning, SceneError, SceneWarning, fault, legible
 from ephs.mechanics.scene.meant import as_meant
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Scene, World
 from ephs.mechanics.scene.moving import moved, spring_length
+from ephs.mechanics.scene.resolve_attached import resolve_attached
 from ephs.mechanics.scene.state import Asked, adjusted
 from ephs.mechanics.scene.text import file_text
 from ephs.mechanics.scene.touching import Laws, overlaps, resolve_contacts, resolve_surfaces, with_stops
@@ -155,8 +157,7 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
         beams={name: rod.beam for name, rod in rods.items()},
         loads=loads,
     )
-    motors = resolve.resolve_motors(document, scene, names, faults)
-    scene = replace(scene, motors=motors, gears=resolve.resolve_gears(document, scene, names, faults))
+    scene = replace(scene, **resolve_attached(document, scene, names, faults))
     contacts, laws = resolve_contacts(document, scene, r.laws, names, faults)
     if faults:
         return None
@@ -308,9 +309,9 @@ def _check_names(document: Document, faults: list[Fault]) -> None:
                 faults.append(fault("name", f'{section}."{name}"', shown(name)))
             elif name in (GROUND, ENVIRONMENT):
                 faults.append(fault("reserved", key, shown(name), reserved=f'"{GROUND}" and "{ENVIRONMENT}"'))
-            elif section not in ("parts", "loads", "motors", "gears") and name in document.sections["parts"]:
+            elif section not in ("parts", "loads", *ATTACHED) and name in document.sections["parts"]:
                 faults.append(fault("collision", key, shown(name), other="a part"))
-            elif section not in ("beams", "loads", "motors", "gears") and name in document.sections["beams"]:
+            elif section not in ("beams", "loads", *ATTACHED) and name in document.sections["beams"]:
                 faults.append(fault("collision", key, shown(name), other="a beam"))
             elif section == "joints" and name in document.sections["bodies"] and name not in held:
                 faults.append(fault("collision", key, shown(name), other="the free joint of the body of this name"))

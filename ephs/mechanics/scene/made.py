@@ -1,4 +1,4 @@
-"""Systems of a scene's bodies, joints, springs and motors; equal bodies and joints are made once.
+"""Systems of a scene's bodies, joints and springs; equal bodies and joints are made once.
 
 A rod has a thousand of them that differ by their names only.
 """
@@ -12,15 +12,12 @@ import numpy as np
 from ephs.mechanics.elements.beam import elastic
 from ephs.mechanics.elements.bodies import rigid_body
 from ephs.mechanics.elements.joints import between_frames, joint, spring_damper, universal_joint
-from ephs.mechanics.elements.motor import motor
-from ephs.mechanics.scene.attached import Motor
 from ephs.mechanics.scene.flexible import Strain
 from ephs.mechanics.scene.model import ENVIRONMENT, Body, Joint, Spring
-from ephs.operad import Quantity
 from ephs.semantics.bundle import Array
 from ephs.semantics.system import System
 
-__all__ = ["Made", "motor_system", "spring_system"]
+__all__ = ["Made", "spring_system"]
 
 NOT_OF_SYSTEM = frozenset(
     {"name", "body1", "body2", "heat", "drive", "motion", "coordinate", "rate", "armature"}
@@ -69,14 +66,6 @@ def _joint(j: Joint, *, driven: bool) -> System:
     return joint(
         j.kind, j.frame1, j.frame2, j.friction, j.stiffness, j.rest, pitch=j.pitch, heat=heat, driven=driven,
         limits=j.limits, stop=j.stop, dry=j.dry,
-    )  # fmt: skip
-
-
-def motor_system(m: Motor, of: Quantity) -> System:
-    """A motor on a joint with this quantity."""
-    return motor(
-        of, constant=m.constant, resistance=m.resistance, gear=m.gear, inductance=m.inductance, inertia=m.inertia,
-        heat=m.heat != ENVIRONMENT,
     )  # fmt: skip
 
 

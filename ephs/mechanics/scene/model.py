@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, TypeVar, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ephs.mechanics.scene import attached
 from ephs.mechanics.scene.adjustment import Adjustment
-from ephs.mechanics.scene.attached import Conduction, Gear, Motor, ThermalNode
 from ephs.mechanics.scene.flexible import FREE_END, Beam, Load, Strain
 from ephs.mechanics.scene.surfaces import Contact, Surface
 from ephs.mechanics.shapes.dry import Dry
@@ -180,8 +180,8 @@ class Scene:
     bodies: Mapping[str, Body]
     joints: Mapping[str, Joint] = field(default_factory=dict)
     springs: Mapping[str, Spring] = field(default_factory=dict)
-    thermal: Mapping[str, ThermalNode] = field(default_factory=dict)
-    conduction: Mapping[str, Conduction] = field(default_factory=dict)
+    thermal: Mapping[str, attached.ThermalNode] = field(default_factory=dict)
+    conduction: Mapping[str, attached.Conduction] = field(default_factory=dict)
     parts: Mapping[str, "Scene"] = field(default_factory=dict)
     source: str | None = None
     adjusted: Adjustment | None = None
@@ -190,8 +190,11 @@ class Scene:
     contacts: Mapping[str, Contact] = field(default_factory=dict)
     beams: Mapping[str, Beam] = field(default_factory=dict)
     loads: Mapping[str, Load] = field(default_factory=dict)
-    motors: Mapping[str, Motor] = field(default_factory=dict)
-    gears: Mapping[str, Gear] = field(default_factory=dict)
+    motors: Mapping[str, attached.Motor] = field(default_factory=dict)
+    gears: Mapping[str, attached.Gear] = field(default_factory=dict)
+    cylinders: Mapping[str, attached.Cylinder] = field(default_factory=dict)
+    gas_springs: Mapping[str, attached.GasSpring] = field(default_factory=dict)
+    actuators: Mapping[str, attached.Actuator] = field(default_factory=dict)
     _kept: Kept = field(default_factory=Kept, init=False, repr=False)
 
     def system(self) -> "System":
@@ -297,26 +300,26 @@ class Scene:
             for load in scene.loads.values():
                 yield path + load.name, replace(load, name=path + load.name, body=_seen(path, load.body))
 
-    def all_motors(self) -> Iterator[tuple[str, Motor]]:
-        """Every motor with its dotted name; its joint and heat sink are dotted too."""
-        for path, scene in self._scenes():
-            for m in scene.motors.values():
-                yield path + m.name, replace(m, name=path + m.name, joint=path + m.joint, heat=_seen(path, m.heat))
+    def attachments(self) -> Iterator[tuple[str, str, attached.Attachment]]:
+        """Section, name and value of every attachment of this level: motors, gears, cylinders, actuators, …"""
+        for section in attached.ATTACHED:
+            own: Mapping[str, attached.Attachment] = getattr(self, section)
+            for name, each in own.items():
+                yield section, name, each
 
-    def all_gears(self) -> Iterator[tuple[str, Gear]]:
-        """Every gear with its dotted name; its joints and heat sink are dotted too."""
+    def all_attachments(self) -> Iterator[tuple[str, str, attached.Attachment]]:
+        """Section, dotted name and value of every attachment; its joints and heat sink are dotted too."""
         for path, scene in self._scenes():
-            for g in scene.gears.values():
-                joints = tuple(path + name for name in g.joints)
-                yield path + g.name, replace(g, name=path + g.name, joints=joints, heat=_seen(path, g.heat))
+            for section, name, each in scene.attachments():
+                yield section, path + name, each.seen(path, _seen(path, each.heat))
 
-    def all_thermal(self) -> Iterator[tuple[str, ThermalNode]]:
+    def all_thermal(self) -> Iterator[tuple[str, attached.ThermalNode]]:
         """Every thermal node with its dotted name."""
         for path, scene in self._scenes():
             for node in scene.thermal.values():
                 yield path + node.name, replace(node, name=path + node.name)
 
-    def all_conduction(self) -> Iterator[tuple[str, Conduction]]:
+    def all_conduction(self) -> Iterator[tuple[str, attached.Conduction]]:
         """Every conduction with its dotted name, as `all_joints`."""
         for path, scene in self._scenes():
             for c in scene.conduction.values():

@@ -11,7 +11,8 @@ from typing import Any, final
 
 import numpy as np
 
-from ephs.mechanics.scene.build import drive_ports, motor_port, scene_system, wrench_port
+from ephs.mechanics.scene.attaching import supplies
+from ephs.mechanics.scene.build import drive_ports, scene_system, wrench_port
 from ephs.mechanics.scene.geometry import coupling_of
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.rescaled import element_units, freedom_units, rescaled
@@ -72,8 +73,10 @@ def in_own_units(problem: Problem) -> Problem:
     small = once(scene, "own", lambda: rescaled(scene, 1.0 / units.length, 1.0 / units.mass, 1.0 / units.time))
     ports = {port: where for _, j in scene.all_joints() for port, where in _ports(j, units)}
     bodies = {wrench_port(name): np.array([units.length] * 3 + [1.0] * 3) for name, _ in scene.all_bodies()}
-    current = np.array([units.time / (units.mass * units.length)])  # ampere in units of force a second
-    forces = bodies | ports | {motor_port(name): current for name, _ in scene.all_motors()}
+    force = units.mass * units.length / units.time**2
+    sizes = units.length, units.mass, units.time, (1.0,)
+    flows = {supply.outer: np.array([supply.flow.unit(*sizes) / force]) for supply in supplies(scene)}
+    forces = bodies | ports | flows
     driven = frozenset(n for n, j in scene.all_joints() if any(port in problem.signals for port, _ in drive_ports(j)))
     pushed = frozenset(name for name, _ in scene.all_bodies() if wrench_port(name) in problem.signals)
     system = scene_system(small, driven=driven, wrenches=pushed)
@@ -162,6 +165,10 @@ def units_of_states(descriptor: Descriptor, units: Units, *, read: bool = False)
         elif kind == "momentum" and space.name.endswith("*") and space.dim == 1:  # of a joint's rate itself
             turning = np.any(pair(space.name[:-1], **dict(space.parameters)).basis[:3])
             out[slot.path] = np.array([momentum * (units.length if turning else 1.0)])
+        elif kind in ("displacement", "angle"):
+            out[slot.path] = np.array([units.length if kind == "displacement" else 1.0])
+        elif kind in ("volume", "liquid"):
+            out[slot.path] = np.array([units.length**3])
         elif kind == "angular_momentum":
             out[slot.path] = np.array([momentum * units.length])
         else:

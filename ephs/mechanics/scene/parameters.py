@@ -18,6 +18,7 @@ from typing import Any, TypeVar, final
 import numpy as np
 from numpy.typing import NDArray
 
+from ephs.mechanics.scene.attached import ATTACHED
 from ephs.mechanics.scene.errors import Fault, SceneError, did_you_mean, fault, listing
 from ephs.mechanics.scene.fields import FIELDS, Field, placed
 from ephs.mechanics.scene.model import Scene
@@ -178,12 +179,12 @@ def _things(scene: Scene, kind: str) -> Mapping[str, Any]:
         "bodies": scene.all_bodies,
         "joints": scene.all_joints,
         "springs": scene.all_springs,
-        "motors": scene.all_motors,
-        "gears": scene.all_gears,
         "thermal": scene.all_thermal,
         "conduction": scene.all_conduction,
         "markers": scene.all_markers,
     }
+    if kind in ATTACHED:
+        return {name: each for section, name, each in scene.all_attachments() if section == kind}
     return dict(every[kind]())
 
 

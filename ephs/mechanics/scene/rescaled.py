@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ephs.mechanics.scene.attached import Gear, Motor
+from ephs.mechanics.scene.attached import ATTACHED, Attachment
 from ephs.mechanics.scene.flexible import Load, Strain
 from ephs.mechanics.scene.geometry import Coupling, coupling_of
 from ephs.mechanics.scene.model import Array, Body, Joint, Scene, Spring, frozen
@@ -62,24 +62,11 @@ def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float =
             s.order,
         )
 
-    def motor(x: Motor) -> Motor:  # amperes and coulombs a second stay what they are in these seconds
-        of = scene.joint(x.joint)
-        unit = float(freedom_units(coupling_of(of), of.coordinate, length)[0])
-        return replace(
-            x, constant=x.constant * energy * time, resistance=x.resistance * energy * time,
-            inductance=x.inductance * energy * time**2, gear=x.gear / unit, inertia=x.inertia * energy * time**2,
-            voltage=x.voltage * energy,
-        )  # fmt: skip
-
-    def gear(x: Gear) -> Gear:
-        first, *others = (
-            float(freedom_units(coupling_of(of), of.coordinate, length)[0]) for of in map(scene.joint, x.joints)
+    def attached(x: Attachment) -> Attachment:
+        of = map(scene.joint, x.tied)
+        return x.rescaled(
+            length, mass, time, [float(freedom_units(coupling_of(j), j.coordinate, length)[0]) for j in of]
         )
-        return replace(
-            x, ratio=frozen(x.ratio * first / np.array(others)),
-            stiffness=x.stiffness * energy / first**2, damping=x.damping * energy * time / first**2,
-            friction=x.friction * energy * time / first**2,
-        )  # fmt: skip
 
     def load(x: Load) -> Load:
         force = energy / length
@@ -108,8 +95,7 @@ def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float =
         conduction={
             name: replace(c, conductance=c.conductance * energy / time) for name, c in scene.conduction.items()
         },
-        motors={name: motor(x) for name, x in scene.motors.items()},
-        gears={name: gear(x) for name, x in scene.gears.items()},
+        **{kind: {name: attached(x) for name, x in getattr(scene, kind).items()} for kind in ATTACHED},
         loads={name: load(x) for name, x in scene.loads.items()},
         markers={name: replace(m, at=frozen(m.at * length)) for name, m in scene.markers.items()},
         surfaces={name: surface(s) for name, s in scene.surfaces.items()},

@@ -12,22 +12,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ephs.mechanics.scene import values
-from ephs.mechanics.scene.attached import Conduction, Gear, Motor, ThermalNode
+from ephs.mechanics.scene.attached import Conduction, ThermalNode
 from ephs.mechanics.scene.entries import Checked, Document, shown
 from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing
 from ephs.mechanics.scene.flexible import Load, Strain
 from ephs.mechanics.scene.geometry import Coupling, coupling, joint_types
 from ephs.mechanics.scene.homogeneous import mass_and_moments
 from ephs.mechanics.scene.inertia import mass_and_inertia
-from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Marker, Scene, Spring, World, frozen
+from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Marker, Spring, World, frozen
 from ephs.mechanics.scene.placing import Place, resolve_place
 from ephs.mechanics.scene.schema import BodyEntry, JointEntry, ShapeEntry, SpringEntry
 from ephs.mechanics.scene.text import MESHES
 from ephs.mechanics.shapes.dry import Dry
 
 Array = NDArray[np.float64]
-ROUNDED = 1e-12
-"""Difference of initial rates that gears may leave, relative to what is added: theirs are written in decimals."""
 
 
 @final
@@ -248,57 +246,6 @@ def resolve_loads(document: Document, names: Names, faults: list[Fault]) -> dict
             if entry.body == GROUND:
                 faults.append(fault("load ground", key, shown(entry.body)))
         found[name] = Load(name, entry.body, frozen(entry.force), frozen(entry.moment), entry.follower, entry.ramp)
-    return found
-
-
-def resolve_motors(document: Document, scene: Scene, names: Names, faults: list[Fault]) -> dict[str, Motor]:
-    """The motors, their joints checked."""
-    found: dict[str, Motor] = {}
-    joints = dict(scene.all_joints())
-    for name, table in document.sections["motors"].items():
-        entry, key = table.entry, f"motors.{name}"
-        if table.sound("heat"):
-            names.check(entry.heat, f"{key}.heat", "thermal", faults)
-        if table.sound("joint"):
-            of = joints.get(entry.joint)
-            if of is None:
-                hint = did_you_mean(entry.joint, joints, f"there are: {listing(joints)}")
-                faults.append(fault("unknown joint", f"{key}.joint", f'"{entry.joint}"', hint=hint))
-            elif of.dim != 1 or of.motion is not None:
-                faults.append(fault("motor joint", f"{key}.joint", f"{of.name}, {of.kind}"))
-        numbers = entry.constant, entry.resistance, entry.inductance, entry.gear, entry.inertia, entry.voltage
-        found[name] = Motor(name, entry.joint, *numbers, entry.heat)
-    return found
-
-
-def resolve_gears(document: Document, scene: Scene, names: Names, faults: list[Fault]) -> dict[str, Gear]:
-    """The gears, their joints, ratios and initial rates checked."""
-    found: dict[str, Gear] = {}
-    joints = dict(scene.all_joints())
-    for name, table in document.sections["gears"].items():
-        entry, key = table.entry, f"gears.{name}"
-        ratio = frozen(np.atleast_1d(np.asarray(entry.ratio, dtype=float)))
-        if table.sound("heat"):
-            names.check(entry.heat, f"{key}.heat", "thermal", faults)
-        if not table.sound("joints") or not table.sound("ratio"):
-            continue
-        if len(set(entry.joints)) < len(entry.joints):
-            faults.append(fault("gear joints", f"{key}.joints", shown(entry.joints)))
-        if ratio.size != len(entry.joints) - 1:
-            faults.append(fault("gear ratio", f"{key}.ratio", shown(entry.ratio), count=len(entry.joints) - 1))
-        of = [joints.get(each) for each in entry.joints]
-        for i, (each, known) in enumerate(zip(entry.joints, of, strict=True)):
-            if known is None:
-                hint = did_you_mean(each, joints, f"there are: {listing(joints)}")
-                faults.append(fault("unknown joint", f"{key}.joints[{i}]", f'"{each}"', hint=hint))
-            elif known.dim != 1:
-                faults.append(fault("gear freedoms", f"{key}.joints[{i}]", f"{known.name}, {known.kind}"))
-        rates = [float(each.rate[0]) for each in of if each is not None and each.dim == 1]
-        if len(rates) == ratio.size + 1 and not entry.stiffness:
-            rest = [by * rate for by, rate in zip(ratio, rates[1:], strict=True)]
-            if abs(rates[0] - sum(rest)) > ROUNDED * sum(map(abs, (rates[0], *rest))):
-                faults.append(fault("gear rates", key, listing(map(str, rates)), first=entry.joints[0], rate=sum(rest)))
-        found[name] = Gear(name, tuple(entry.joints), ratio, entry.stiffness, entry.damping, entry.friction, entry.heat)
     return found
 
 

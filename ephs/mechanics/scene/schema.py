@@ -22,6 +22,7 @@ from ephs.mechanics.scene.schema_numbers import (
     Numbers,
     Pair,
     Positive,
+    Range,
     Sizes,
     Text,
     Vector,
@@ -231,8 +232,50 @@ class GearEntry(Entry):
     ratio: Numbers = Field(default=1.0, description="rate of the first joint = Σ ratio · rate of the others")
     stiffness: NonNegative = Field(default=0.0, description="of a belt, N m/rad or N/m of the first; 0: rigid")
     damping: NonNegative = Field(default=0.0, description="of a belt's stretching, N m s/rad or N s/m")
+    stretch: Number = Field(default=0.0, description="of a belt at the start, rad or m of the first")
     friction: NonNegative = Field(default=0.0, description="on the first joint's rate, N m s/rad or N s/m")
     heat: Text = Field(default="environment", description="where the heat of damping and friction goes: a thermal name")
+
+
+class CylinderEntry(Entry):
+    """``[cylinders.NAME]``"""
+
+    joint: Text = Field(description="a joint with one freedom, which chamber a pushes to larger coordinates")
+    area: Annotated[list[Number], Field(min_length=2, max_length=2)] = Field(
+        description="volume of chambers a and b by the coordinate, m³/m or m³/rad"
+    )
+    volume: Annotated[list[Positive], Field(min_length=2, max_length=2)] = Field(description="oil in each, m³")
+    bulk: Positive = Field(default=1.5e9, description="bulk modulus of the oil, Pa")
+    conductance: Positive = Field(description="of the line to each chamber, m³/(s Pa)")
+    leak: NonNegative = Field(default=0.0, description="across the piston, m³/(s Pa)")
+    pressure: Annotated[list[Number], Field(min_length=2, max_length=2)] = Field(
+        default=[0.0, 0.0],
+        description='of the supplies above the environment\'s, Pa, where no input "cylinders.NAME" is given',
+    )
+    heat: Text = Field(default="environment", description="where the heat of lines and leak goes: a thermal name")
+
+
+class GasSpringEntry(Entry):
+    """``[gas_springs.NAME]``"""
+
+    joint: Text = Field(description="a joint with one freedom")
+    area: Number = Field(description="volume of the gas by the coordinate, m³/m or m³/rad; may be negative")
+    volume: Positive = Field(description="at the start, m³")
+    pressure: Positive = Field(description="of the gas at the start, absolute, Pa; before the piston is world.pressure")
+    temperature: Positive = Field(default=293.15, description="at the start, K")
+    gamma: Annotated[float, Field(gt=1.0, allow_inf_nan=False)] = Field(
+        default=1.4, description="ratio of specific heats"
+    )
+    conductance: NonNegative = Field(default=0.0, description="from the gas to heat, W/K; 0: adiabatic")
+    heat: Text = Field(default="environment", description="what the gas warms: a thermal name")
+
+
+class ActuatorEntry(Entry):
+    """``[actuators.NAME]``"""
+
+    joints: Annotated[list[Text], Field(min_length=1)] = Field(description="joints with one freedom")
+    ratio: Numbers = Field(default=1.0, description='force on each by the control, the input "actuators.NAME"; N m, N')
+    limits: Range | None = Field(default=None, description="least and largest control")
 
 
 class ThermalEntry(Entry):
@@ -284,6 +327,9 @@ class SceneFile(Entry):
     loads: dict[str, LoadEntry] = Field(default_factory=dict, description="forces and moments on bodies")
     motors: dict[str, MotorEntry] = Field(default_factory=dict, description="motors with circuit and gear on joints")
     gears: dict[str, GearEntry] = Field(default_factory=dict, description="ties between the rates of joints")
+    cylinders: dict[str, CylinderEntry] = Field(default_factory=dict, description="hydraulic cylinders on joints")
+    gas_springs: dict[str, GasSpringEntry] = Field(default_factory=dict, description="gas behind pistons on joints")
+    actuators: dict[str, ActuatorEntry] = Field(default_factory=dict, description="controls that are forces on joints")
     thermal: dict[str, ThermalEntry] = Field(default_factory=dict, description="what heat warms")
     conduction: dict[str, ConductionEntry] = Field(default_factory=dict, description="how heat passes between them")
     markers: dict[str, MarkerEntry] = Field(default_factory=dict, description="points on bodies")
@@ -300,6 +346,9 @@ SECTIONS: dict[str, type[Entry]] = {
     "loads": LoadEntry,
     "motors": MotorEntry,
     "gears": GearEntry,
+    "cylinders": CylinderEntry,
+    "gas_springs": GasSpringEntry,
+    "actuators": ActuatorEntry,
     "thermal": ThermalEntry,
     "conduction": ConductionEntry,
     "markers": MarkerEntry,

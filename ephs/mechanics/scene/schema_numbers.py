@@ -94,7 +94,16 @@ def _inertia(value: Any, handler: Any) -> Any:
     return handler(value)
 
 
+def _range(value: Any, handler: Any) -> list[float]:
+    """Two ascending numbers."""
+    found = _limits(value, handler)
+    if any(map(math.isnan, found)):
+        raise PydanticCustomError("limits", "two numbers")
+    return found
+
+
 Limits = Annotated[list[float], WrapValidator(_limits), WithJsonSchema(_LIST_SCHEMA | {"minItems": 2, "maxItems": 2})]
+Range = Annotated[list[float], WrapValidator(_range), WithJsonSchema(_LIST_SCHEMA | {"minItems": 2, "maxItems": 2})]
 _ROWS_SCHEMA: dict[str, Any] = {"type": "array", "items": _LIST_SCHEMA}
 
 Numbers = Annotated[

@@ -11,6 +11,7 @@ from warnings import warn
 
 import numpy as np
 
+from ephs.mechanics.scene.attached import ATTACHED
 from ephs.mechanics.scene.errors import ModelWarning, legible
 from ephs.mechanics.scene.geometry import UNIVERSAL, coupling, joint_types
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Joint, Scene
@@ -18,9 +19,6 @@ from ephs.mechanics.shapes.pairs import SIZES
 from ephs.operad import Path as Name
 
 __all__ = ["check_scene", "meshes_within"]
-
-MOTOR = ("constant", "resistance", "inductance", "gear", "inertia", "voltage")
-"""Numbers of a motor."""
 
 
 def check_scene(scene: Scene) -> None:
@@ -48,10 +46,8 @@ def check_scene(scene: Scene) -> None:
         ("body", bodies, [node for _, beam in scene.all_beams() for node in beam.nodes]),
         ("joint", dict(scene.all_joints()), [name for _, beam in scene.all_beams() for name in beam.joints]),
         ("thermal node", nodes, [each.heat for _, each in (*scene.all_joints(), *scene.all_springs())]),
-        ("joint", dict(scene.all_joints()), [motor.joint for _, motor in scene.all_motors()]),
-        ("thermal node", nodes, [motor.heat for _, motor in scene.all_motors()]),
-        ("joint", dict(scene.all_joints()), [name for _, gear in scene.all_gears() for name in gear.joints]),
-        ("thermal node", nodes, [gear.heat for _, gear in scene.all_gears()]),
+        ("joint", dict(scene.all_joints()), [name for _, _, each in scene.all_attachments() for name in each.tied]),
+        ("thermal node", nodes, [each.heat for _, _, each in scene.all_attachments()]),
         ("thermal node", nodes, [end for _, each in scene.all_conduction() for end in each.between]),
     ):
         for name in named:
@@ -120,11 +116,8 @@ def _shapes(scene: Scene) -> Iterator[tuple[str, dict[str, tuple[Any, tuple[int,
         yield name, {"frame": (surface.frame, (7,))} | ({kind: (sizes, SIZES[kind])} if kind != "plane" else {})
     for name, contact in scene.all_contacts():
         yield name, {key: (number, ()) for key, number in contact.law.numbers}
-    for name, motor in scene.all_motors():
-        yield name, {key: (getattr(motor, key), ()) for key in MOTOR}
-    for name, gear in scene.all_gears():
-        numbers = {key: (getattr(gear, key), ()) for key in ("stiffness", "damping", "friction")}
-        yield name, {"ratio": (gear.ratio, (len(gear.joints) - 1,))} | numbers
+    for _, name, each in scene.all_attachments():
+        yield name, each.values()
     for name, load in scene.all_loads():
         yield name, {"force": (load.force, (3,)), "moment": (load.moment, (3,)), "ramp": (load.ramp, ())}
 
@@ -169,7 +162,7 @@ def _strain(j: Joint) -> dict[str, tuple[Any, tuple[int, ...]]]:
 
 def _check_names(scene: Scene) -> None:
     kinds = ("bodies", "joints", "springs", "thermal", "conduction", "markers", "surfaces", "contacts")
-    for things in (getattr(scene, kind) for kind in (*kinds, "beams", "loads", "motors", "gears")):
+    for things in (getattr(scene, kind) for kind in (*kinds, "beams", "loads", *ATTACHED)):
         for name, thing in things.items():
             if Name([name]) != (thing.name,):
                 raise ValueError(f"{legible(name)} is called {legible(str(thing.name))}")

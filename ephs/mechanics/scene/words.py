@@ -44,11 +44,7 @@ def _things(scene: "Scene") -> list[tuple[str, str, str]]:
         *(("contact", name, " – ".join(c.surfaces)) for name, c in scene.all_contacts()),
         *(("beam", name, f"{beam.elements} elements, {' – '.join(beam.ends)}") for name, beam in scene.all_beams()),
         *(("load", name, f"on {load.body}") for name, load in scene.all_loads()),
-        *(("motor", name, f"on {m.joint}, {m.resistance:g} Ω, gear {m.gear:g}") for name, m in scene.all_motors()),
-        *(
-            ("gear", name, f"{' – '.join(g.joints)}, {', '.join(f'{x:g}' for x in g.ratio)}")
-            for name, g in scene.all_gears()
-        ),
+        *((section.removesuffix("s").replace("_", " "), name, str(x)) for section, name, x in scene.all_attachments()),
         *(("thermal", name, f"{n.capacity:g} J/K at {n.temperature:g} K") for name, n in scene.all_thermal()),
         *(("conduction", n, f"{' – '.join(c.between)}, {c.conductance:g} W/K") for n, c in scene.all_conduction()),
     ]

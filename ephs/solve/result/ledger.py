@@ -91,12 +91,15 @@ class Ledgers:
         return max(still, float(np.max(np.sum(exchanged, axis=0), initial=0.0))) or 1.0
 
     def defect(self, mechanical: bool) -> Array:
-        """Relative defect of the energy balance since the first row, (n,); ``mechanical``: of K + V + heat − work."""
+        """Relative defect of the energy balance since the first row, (n,); ``mechanical``: of K + V + heat − work, too.
+
+        That holds where no gas makes work of heat.
+        """
         if not self.heat.size:
             return np.zeros(0)
         work, heat = self.work - self.work[0], self.heat - self.heat[0]
         defects = [self._change(self.kinetic, self.potential, self.thermal, self.environment) - work]
-        if mechanical:
+        if mechanical and not self.volumes:
             defects.append(self._change(self.kinetic, self.potential) + heat - work)
         return np.max(np.abs(defects), axis=0) / self.scale
 

@@ -1,0 +1,99 @@
+"""Tables of motors, gears, cylinders, gas springs and actuators, checked and resolved."""
+
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+
+from ephs.mechanics.scene.attached import ATTACHED, Actuator, Attachment, Gear
+from ephs.mechanics.scene.entries import Checked, Document, shown
+from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing
+from ephs.mechanics.scene.model import Joint, Scene, frozen
+from ephs.mechanics.scene.resolve import Names
+
+__all__ = ["resolve_attached"]
+
+ROUNDED = 1e-12
+"""Difference of initial rates that gears may leave, relative to what is added: theirs are written in decimals."""
+
+
+def resolve_attached(
+    document: Document, scene: Scene, names: Names, faults: list[Fault]
+) -> dict[str, dict[str, Attachment]]:
+    """The attachments by section, their joints and numbers checked; ``scene`` has the joints."""
+    joints = dict(scene.all_joints())
+    return {
+        section: {
+            name: found
+            for name, table in document.sections[section].items()
+            if (found := _resolved(section, name, table, joints, names, faults)) is not None
+        }
+        for section in ATTACHED
+    }
+
+
+def _resolved(
+    section: str, name: str, table: Checked[Any], joints: Mapping[str, Joint], names: Names, faults: list[Fault]
+) -> Attachment | None:
+    kind: Any = ATTACHED[section]
+    entry, key = table.entry, f"{section}.{name}"
+    if table.sound("heat") and kind is not Actuator:
+        names.check(entry.heat, f"{key}.heat", "thermal", faults)
+    several = kind in (Gear, Actuator)
+    if not table.sound("joints", "joint"):
+        return None
+    tied = entry.joints if several else [entry.joint]
+    of = _joints(kind, key, tied, joints, several=several, faults=faults)
+    if table.spoiled:
+        return None
+    given: dict[str, Any] = {}
+    for each in fields(kind):
+        if each.name not in ("name", *(("heat",) if kind is Actuator else ())):
+            value: Any = getattr(entry, each.name)
+            number = kind.numbers.get(each.name)
+            if number is not None and number.shape(len(tied)) and value is not None:
+                value = frozen(np.atleast_1d(np.asarray(value, dtype=float)))
+            given[each.name] = tuple(tied) if each.name == "joints" else value
+    if several:
+        count = len(tied) - (kind is Gear)
+        if kind is Actuator and given["ratio"].size == 1:
+            given["ratio"] = frozen(np.full(count, given["ratio"][0]))
+        if given["ratio"].size != count:
+            faults.append(fault("gear ratio", f"{key}.ratio", shown(entry.ratio), count=count))
+        elif kind is Gear and not entry.stiffness:
+            _check_rates(key, given["ratio"].tolist(), of, faults)
+    return kind(name=name, **given)
+
+
+def _joints(
+    kind: type[Attachment], key: str, tied: list[str], joints: Mapping[str, Joint], *, several: bool,
+    faults: list[Fault],
+) -> list[Joint]:  # fmt: skip
+    """The joints that a table names; faults of those that do not fit."""
+    if len(set(tied)) < len(tied):
+        faults.append(fault("gear joints", f"{key}.joints", shown(tied)))
+    found: list[Joint] = []
+    for i, each in enumerate(tied):
+        here, known = f"{key}.joints[{i}]" if several else f"{key}.joint", joints.get(each)
+        if known is None:
+            hint = did_you_mean(each, joints, f"there are: {listing(joints)}")
+            faults.append(fault("unknown joint", here, f'"{each}"', hint=hint))
+        elif known.dim != 1 or (kind is not Gear and known.motion is not None):
+            faults.append(
+                fault("gear freedoms" if kind is Gear else "motor joint", here, f"{known.name}, {known.kind}")
+            )
+        else:
+            found.append(known)
+    return found
+
+
+def _check_rates(key: str, ratio: list[float], of: list[Joint], faults: list[Fault]) -> None:
+    """A fault where initial rates contradict a rigid gear."""
+    if len(of) != len(ratio) + 1:
+        return
+    first, *others = (float(each.rate[0]) for each in of)
+    rest = [by * rate for by, rate in zip(ratio, others, strict=True)]
+    if abs(first - sum(rest)) > ROUNDED * sum(map(abs, (first, *rest))):
+        found = listing(str(float(each.rate[0])) for each in of)
+        faults.append(fault("gear rates", key, found, first=of[0].name, rate=sum(rest)))
