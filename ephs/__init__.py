@@ -63,6 +63,9 @@ if TYPE_CHECKING:
     from ephs.solve.exchange.coupling import Bond as Bond
     from ephs.solve.exchange.errors import ExchangeError as ExchangeError
     from ephs.solve.exchange.exchange import Exchange as Exchange
+    from ephs.solve.motion_law import HarmonicMotion as HarmonicMotion
+    from ephs.solve.motion_law import PolynomialMotion as PolynomialMotion
+    from ephs.solve.motion_law import TabulatedMotion as TabulatedMotion
     from ephs.solve.result.solution import Solution as Solution
     from ephs.solve.sampled import Sampled as Sampled
 
@@ -103,6 +106,7 @@ _HOMES = {
     "ephs.solve.exchange.coupling": ("Bond",),
     "ephs.solve.exchange.errors": ("ExchangeError",),
     "ephs.solve.exchange.exchange": ("Exchange",),
+    "ephs.solve.motion_law": ("HarmonicMotion", "PolynomialMotion", "TabulatedMotion"),
     "ephs.solve.sampled": ("Sampled",),
     "ephs.modelica.errors": ("ModelicaError",),
     "ephs.modelica.library": ("ModelicaLibrary",),

@@ -12,6 +12,7 @@ from typing import Any, final
 import numpy as np
 
 from ephs.semantics.bundle import Array
+from ephs.solve.motion_law import MotionLaw
 from ephs.solve.probe import Asked, Change, Probe
 from ephs.solve.problem import Problem, Signal, State
 from ephs.solve.sampled import Sampling
@@ -77,7 +78,7 @@ class Breakpoints:
 
     def _sided(self, signal: Signal) -> Signal:
         value = signal.value
-        if not callable(value):
+        if not callable(value) or isinstance(value, MotionLaw):
             return signal
         return replace(signal, value=lambda t, state: value(self.within(t), state))
 

@@ -12,6 +12,7 @@ from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.descriptor import Descriptor, Input
 from ephs.semantics.system import System
 from ephs.solve.errors import Outcome, SolveError
+from ephs.solve.motion_law import MotionLaw
 
 if TYPE_CHECKING:
     from ephs.solve.result.dataset import Variable
@@ -69,6 +70,11 @@ class Signal:
     size: int | None = None
     held: bool = False
     timed: bool = False
+
+    @staticmethod
+    def of_motion(law: MotionLaw, name: str = "") -> "Signal":
+        """The effort at a port whose motion is prescribed."""
+        return Signal(law(0.0) if law.constant else law, True, name, 1, timed=True)
 
     @property
     def constant(self) -> bool:

@@ -34,7 +34,7 @@ class Placing:
     def __init__(self, equations: Equations) -> None:
         self.layout: Layout = equations.layout
         self.gears = tuple(map(str, equations.reduced.gears))
-        self.free = self.layout.total == self.layout.n and not equations.prescribed.size and not self.gears
+        self.free = self.layout.total == self.layout.n and not equations.driven.size and not self.gears
         t = equations.reduced.tables
         self._parts = {
             name: [(e.pair, slice(int(t.q_at[i]), int(t.q_at[i] + e.pair.size)), e.pair.dim) for i, e in parts]

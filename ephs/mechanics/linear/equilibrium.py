@@ -123,7 +123,7 @@ def _of_scene(scene: Scene) -> Equilibrium:
     if own := [f"{section}.{name}" for section, name, each in scene.all_attachments() if _keeps(each)]:
         found = f"a scene with {own[0]}"
         raise OptionError("model", found, "a scene without attachments with states, or its system")
-    moving = [name for name, joint in scene.all_joints() if joint.motion]
+    moving = [name for name, joint in scene.all_joints() if joint.motion is not None and joint.motion.fastest(0.0, 1.0)]
     if moving:
         raise _none(f"joints.{moving[0]}", "its motion is prescribed")
     model = dynamics(_resting(scene))

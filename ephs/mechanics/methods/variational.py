@@ -99,8 +99,8 @@ class Variational(ReducedMethod):
             impulse = mass @ closed.r - after
             rows = eq.rows()
             second = np.linalg.lstsq(rows.T, impulse, rcond=CONSTRAINT)[0][: self._driven.size]
-            rates = closed.r[self._driven]
-            work += float((push[: self._driven.size] + second) @ rates)
+            first = push[: self._driven.size]
+            work += float(first @ state.r[self._driven] + second @ closed.r[self._driven])
         closed = eq.booking.step(state, closed, h * flows, work, missed=np.zeros(flows.size))
         if self._keep != "momentum":
             closed, _ = eq.accounts.corrected(
@@ -184,7 +184,7 @@ class Variational(ReducedMethod):
         if not self._rows:
             return np.zeros(0), np.zeros((0, eq.n))
         residual, rows = eq.gaps(eq.moved(state.q, xi), state.r)
-        residual[: self._driven.size] = xi[self._driven] - h * eq.prescribed
+        residual[: self._driven.size] = xi[self._driven] - eq.displaced(state.t, state.t + h)
         return residual, rows
 
     def _slope(self, state: ReducedState, h: float, xi: Array, middle: Any) -> Array:

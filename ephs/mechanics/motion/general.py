@@ -16,6 +16,7 @@ from ephs.semantics.descriptor import Input
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rank import CONSTRAINT
 from ephs.solve.instant import instant
+from ephs.solve.motion_law import MotionLaw
 from ephs.solve.result.solution import Solution
 from ephs.solve.threads import in_one_thread
 
@@ -107,13 +108,15 @@ class GeneralMotion:
         after = np.broadcast_to(SE3.adjoint(SE3.inverse(joint.second.offset)), (n, 6, 6))
         return adjoint_inverse(before), -after
 
-    def _prescribed(self, joint: LinkJoint) -> float | None:
-        """The constant rate at a joint's port, None where none is prescribed."""
+    def _prescribed(self, joint: LinkJoint) -> Array | None:
+        """(n,) the rates at a joint's port that are prescribed; None where none is, or by a function."""
         problem, port = self._solution.problem, self._frames.wiring.outer.get(joint.rate)
         if problem is None or port is None or joint.pair.dim != 1:
             return None
         signal = problem.signals[port]
-        return float(signal.at(0.0, {})[0]) if signal.effort and signal.constant else None
+        if not signal.effort or not (signal.constant or isinstance(signal.value, MotionLaw)):
+            return None
+        return np.array([float(signal.at(float(t), {})[0]) for t in self._solution.t])
 
     def _velocities(self, link: Link) -> Array:
         """(n, 6) twists of the stored momenta of a link."""

@@ -26,6 +26,7 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.solve.errors import OptionError, SolveError
 from ephs.solve.march import Status
+from ephs.solve.motion_law import MotionLaw
 from ephs.solve.problem import Problem, Signal
 from ephs.solve.result.solution import Solution
 from ephs.solve.threads import in_one_thread
@@ -108,7 +109,7 @@ class ReducedMotion:
         out = np.zeros((len(self._states), len(self._eq.reduced.edges), 6))
         work = self._eq.engine.work
         for k in range(len(self._states)):
-            accelerations = self._rates(k)
+            accelerations = self._rates(k) - self._eq.given.lead  # which frames have for a bias
             out[k] = self._transmission.wrenches(
                 work["place"][:-1], accelerations, work["pushed"], work["force"], work["pulled"]
             )
@@ -118,6 +119,7 @@ class ReducedMotion:
         """(n,) accelerations of the tree at the k-th instant."""
         eq, state, inputs = self._eq, self._states[k], self._solution.inputs
         eq.given.put(lambda port: inputs[port].values[k])
+        eq.given.follow(state.t)
         y = eq.vector(state)
         status, _, rates = eq.engine.rates(state.q, y)
         if status == Status.DEPENDENT:
@@ -129,8 +131,8 @@ class ReducedMotion:
         """The states at the kept instants: rates by the momenta, loops closed."""
         eq, solution, n = self._eq, self._solution, len(self._solution)
         reduced, t = eq.reduced, eq.reduced.tables
-        prescribed = np.zeros(eq.n)
-        prescribed[t.driven == 1] = eq.prescribed
+        prescribed = np.zeros((n, eq.n))
+        prescribed[:, eq.driven] = [eq.prescribed(time) for time in solution.t]
         q, momenta = np.zeros((n, reduced.coordinates)), np.zeros((n, reduced.links, 6))
         for i, edge in enumerate(reduced.edges):
             if edge.state is not None and t.kind[i] != SPRING:
@@ -145,7 +147,7 @@ class ReducedMotion:
         heats = eq.heats.energies(np.hstack([np.zeros((n, 0)), *s]))
         books = np.zeros(2 + len(reduced.made))
         return [
-            eq.closed(ReducedState(time, q[k], self._impulses.rates(q[k], prescribed, momenta[k]), heats[k], books))
+            eq.closed(ReducedState(time, q[k], self._impulses.rates(q[k], prescribed[k], momenta[k]), heats[k], books))
             for k, time in enumerate(solution.t.tolist())
         ]
 
@@ -164,12 +166,12 @@ def motion_of(solution: Solution) -> ByPath:
 
 
 def _at_rest(problem: Problem) -> Problem:
-    """The problem with zeros for inputs that change: their values are known at the kept instants alone."""
+    """The problem with zeros for other inputs that change: their values are known at the kept instants alone."""
     return replace(
         problem,
         signals={
             path: one
-            if one.constant
+            if one.constant or isinstance(one.value, MotionLaw)
             else Signal(np.zeros(problem.system.interface[path].quantity.space.dim), one.effort)
             for path, one in problem.signals.items()
         },

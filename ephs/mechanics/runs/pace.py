@@ -20,9 +20,12 @@ TIMES = 100.0
 """Largest error of a step of a method of order p, which is the p-th power of that angle, in tolerances."""
 
 
-def longest_step(scene: "Scene", order: int, rtol: float) -> float:
-    """The longest step in s that is chosen for a scene; infinite without prescribed motion and thin surfaces."""
-    return min(_driven_step(scene, order, rtol), _contact_step(scene))
+def longest_step(scene: "Scene", order: int, rtol: float, span: tuple[float, float]) -> float:
+    """The longest step in s that is chosen for a scene; infinite without prescribed motion and thin surfaces.
+
+    ``span`` is the run's, in s; see `_driven_step`.
+    """
+    return min(_driven_step(scene, order, rtol, span), _contact_step(scene))
 
 
 def _contact_step(scene: "Scene") -> float:
@@ -54,7 +57,7 @@ def _extent(scene: "Scene") -> float:
     return float(np.linalg.norm(np.ptp(places, axis=0)))
 
 
-def _driven_step(scene: "Scene", order: int, rtol: float) -> float:
+def _driven_step(scene: "Scene", order: int, rtol: float, span: tuple[float, float]) -> float:
     """The longest step in s where motions are prescribed.
 
     What is prescribed makes no error, and what follows from it alone makes none that is seen: without a limit, steps
@@ -65,14 +68,15 @@ def _driven_step(scene: "Scene", order: int, rtol: float) -> float:
     order, rtol
         Of the method; the least of the tolerances that steer it.
     """
-    moved = [joint for _, joint in scene.all_joints() if joint.motion]
+    moved = [(joint, joint.motion) for _, joint in scene.all_joints() if joint.motion is not None]
     if not moved:
         return np.inf
     extent = _extent(scene)
     turn = min(TURN, (TIMES * rtol) ** (1.0 / order)) if rtol else TURN
     limits: list[float] = []
-    for joint in moved:
+    for joint, motion in moved:
         turning = bool(np.any(coupling(joint.kind, joint.pitch).pair.basis[:3]))
         allowed = turn if turning or not extent else turn * extent
-        limits.append(allowed / abs(float(joint.motion or 1.0)))
+        fastest = motion.fastest(*span)
+        limits.append(allowed / fastest if fastest else np.inf)
     return min(limits)

@@ -20,6 +20,7 @@ from ephs.semantics.system import System
 from ephs.solve.errors import OptionError
 from ephs.solve.integrate import solution_of
 from ephs.solve.journal import MAGIC, read_journal
+from ephs.solve.motion_law import MotionLaw
 from ephs.solve.problem import Problem, Signal
 from ephs.solve.result.guard import check_file
 from ephs.solve.result.record import Rows
@@ -139,7 +140,12 @@ def _problem_again(text: str, t: Array, inputs: Mapping[Path, Array], homes: tup
     driven = {f"joints.{name}" for name, j in scene.all_joints() if any(p in own for p, _ in drive_ports(j))}
     zeros = {key: np.zeros(scene.joint(key.partition(".")[2]).dim) for key in forced if key not in driven}
     problem = problem_of_scene(scene, None, {**zeros, **{key: np.zeros(6) for key in pushed}})
-    signals = {path: _kept(t, values, problem.signals[path].effort) for path, values in inputs.items() if t.size}
+    changing = {path for path, given in own.items() if isinstance(given.value, MotionLaw)}  # known between instants
+    signals = {
+        path: _kept(t, values, problem.signals[path].effort)
+        for path, values in inputs.items()
+        if t.size and path not in changing
+    }
     return replace(problem, signals={**problem.signals, **signals})
 
 

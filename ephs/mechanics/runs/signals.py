@@ -9,6 +9,7 @@ from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.errors import AssemblyError
 from ephs.solve.errors import OptionError, nearest_of
+from ephs.solve.motion_law import MotionLaw
 from ephs.solve.probe import Asked
 from ephs.solve.problem import Problem, Signal, State, States
 from ephs.solve.sampled import Held
@@ -29,6 +30,10 @@ def signal(value: Any, *, effort: bool, name: str, size: int | None, view: View 
     AssemblyError
         A constant is something else.
     """
+    if isinstance(value, MotionLaw):
+        if not effort:
+            raise AssemblyError("input", name, found=value, expected="an effort: a motion law prescribes a rate")
+        return Signal.of_motion(value, name)
     if not callable(value):
         found = numbers_of(value)
         expected = f"{size or ''} finite number{'' if size == 1 else 's'}".strip()
@@ -104,7 +109,9 @@ def asked_of(problem: Problem, inputs: Mapping[str, Any]) -> list[Asked]:
     for name, given in inputs.items():
         values = given.values() if isinstance(given, Mapping) else [given]
         found += [
-            _asked(problem, str(name), value) for value in values if callable(value) and not isinstance(value, Held)
+            _asked(problem, str(name), value)
+            for value in values
+            if callable(value) and not isinstance(value, Held | MotionLaw)
         ]
     return found
 

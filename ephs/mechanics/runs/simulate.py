@@ -176,7 +176,7 @@ def simulate(
     if end < start:
         _reversible(problem, end)
     order, unit = chosen_method.order, problem.seconds
-    control = control_of(problem, order, rtol, atol, step, min_step, max_step, max_steps)
+    control = control_of(problem, order, rtol, atol, step, min_step, max_step, max_steps, (start / unit, end / unit))
     told_apart(start / unit, end / unit, control.step)
     if options is not None and not isinstance(options, Mapping):
         raise OptionError("options", options, "a mapping from names to values")
@@ -242,8 +242,9 @@ def control_of(
     min_step: float | None,
     max_step: float | None,
     max_steps: int | None,
+    span: tuple[float, float] = (0.0, 0.0),
 ) -> Control:
-    """Control of the steps of a problem, by a method of an order.
+    """Control of the steps of a problem, by a method of an order, over a span in the problem's own unit of time.
 
     Raises
     ------
@@ -259,7 +260,7 @@ def control_of(
     most = np.inf if max_step is None else number_of("max_step", max_step) / unit
     if problem.scene is not None and step is None:
         tightest = min(relative.value, *relative.special.values(), np.inf)
-        most = min(most, max(longest_step(problem.scene, order, tightest), least))
+        most = min(most, max(longest_step(problem.scene, order, tightest, span), least))
     return Control(
         relative,
         absolute,
@@ -336,7 +337,7 @@ def problem_of_scene(
     if initial:
         changed = system.state(initial)
         state |= {Path.of(path): changed[Path.of(path)] for path in initial}
-    signals = {path: Signal(given.value, given.effort) for path, given in scene_inputs(scene).items()}
+    signals = dict(scene_inputs(scene))
     for name, force in forces.items():
         for port, where in drive_ports(scene.joint(name)):
             extra = part_of(force, where)

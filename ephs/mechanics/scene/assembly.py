@@ -180,7 +180,7 @@ def _link(draft: JointDraft, index: Mapping[str, int], poses: Array) -> Link:
     # Where `at` and `axis` are given, the coordinates are 0 by definition.
     coupling = draft.coupling()
     coordinates = draft.coordinates if place.in_bodies else np.zeros(coupling.dim)
-    return Link(draft.name, body1, body2, frame1, frame2, coupling, coordinates, draft.rate, draft.motion)
+    return Link(draft.name, body1, body2, frame1, frame2, coupling, coordinates, draft.rate, draft.first_rate)
 
 
 def _joint(draft: JointDraft, link: Link, x: Array, rate: Array) -> Joint:

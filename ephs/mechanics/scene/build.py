@@ -24,10 +24,10 @@ from ephs.mechanics.shapes.pairs import Touch, touches
 from ephs.operad import Path, Pattern, Quantity, junction, quantity
 from ephs.semantics import library
 from ephs.semantics.bundle import Array
-from ephs.semantics.descriptor import Input
 from ephs.semantics.kept import once
 from ephs.semantics.spaces import SE3
 from ephs.semantics.system import Filling, System
+from ephs.solve.problem import Signal
 
 __all__ = [
     "component_path",
@@ -136,14 +136,13 @@ def contact_points(scene: Scene, of: Contact) -> tuple[tuple[str, str], tuple[To
     return ((other.body, one.body) if swapped else (one.body, other.body)), points
 
 
-def scene_inputs(scene: Scene) -> dict[Path, Input]:
+def scene_inputs(scene: Scene) -> dict[Path, Signal]:
     """Prescribed drives as flows, motions and supplies as efforts, at the ports of `drive_ports` and `supplies`."""
-    out = {supply.outer: Input(supply.value, True) for supply in supplies(scene)}
+    out = {supply.outer: Signal(supply.value, effort=True) for supply in supplies(scene)}
     for _, j in scene.all_joints():
         if _is_driven(j):
             for port, where in drive_ports(j):
-                value = j.drive[where] if j.motion is None else np.array([j.motion])
-                out[port] = Input(np.array(value), j.motion is not None)
+                out[port] = Signal(np.array(j.drive[where])) if j.motion is None else Signal.of_motion(j.motion)
     return out
 
 

@@ -12,6 +12,7 @@ from ephs.mechanics.scene.adjustment import Adjustment, Changed, Displacement
 from ephs.mechanics.scene.attached import ATTACHED, Conduction, ThermalNode
 from ephs.mechanics.scene.flexible import Beam, Load, Strain
 from ephs.mechanics.scene.model import Body, Joint, Marker, Scene, Spring, World, frozen
+from ephs.mechanics.scene.motions import law_from
 from ephs.mechanics.scene.surfaces import Contact, Surface
 from ephs.mechanics.shapes.dry import Dry
 from ephs.mechanics.shapes.impact import Impact
@@ -107,6 +108,7 @@ def _scene(data: dict[str, Any]) -> Scene:
         if cls is Joint:
             entries = {
                 name: entry
+                | ({"motion": law_from(entry["motion"])} if entry.get("motion") is not None else {})
                 | ({"dry": Dry(**entry["dry"])} if entry.get("dry") else {})
                 | ({"stop": Law(**entry["stop"])} if entry.get("stop") else {})
                 | ({"strain": _value(Strain, entry["strain"])} if entry.get("strain") else {})

@@ -209,7 +209,12 @@ TEXTS: dict[str, tuple[str, str]] = {
     "gear rates": ("the first rate, of {first}, at {rate:.6g}", "give rates that the gear ties together"),
     "unknown joint": ("a joint of the scene", "{hint}"),
     "motion and drive": ("either motion or drive", "a prescribed rate leaves nothing for a drive to do"),
-    "motion rate": ("{motion}, the prescribed rate", "take rate out, or make it equal to motion.rate"),
+    "motion form": (
+        "rate, or polynomial, or amplitude and frequency (and phase), or times and displacements",
+        "give the keys of one form",
+    ),
+    "motion number": ("{expected}", "correct the value"),
+    "motion rate": ("{motion}, the prescribed rate", "take rate out, or make it equal to the motion's at the start"),
     "coordinate at": (
         "0 where at and axis are given",
         "give frame1 and frame2 to start at another coordinate",

@@ -11,6 +11,7 @@ from ephs.mechanics.scene.attached import ATTACHED
 from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.geometry import body_twist, coupling_of
 from ephs.mechanics.scene.model import GROUND, IDENTITY_POSE, Joint, Scene, frozen
+from ephs.mechanics.scene.motions import changed, number_of_law
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces import rotations as so3
 from ephs.semantics.spaces.rank import INERTIA
@@ -225,13 +226,21 @@ def _put_coordinate(scene: Scene, name: str, values: Array) -> Scene:
     return _edited(scene, "joints", name, lambda j: replace(j, coordinate=element))
 
 
-def _motion(scene: Scene, name: str) -> Array:
-    rate = scene.joint(name).motion
-    return np.zeros(0) if rate is None else np.array([rate])
+def _motion(key: str) -> Field:
+    """A number of a prescribed motion; without that there is none."""
 
+    def get(scene: Scene, name: str) -> Array:
+        number = number_of_law(scene.joint(name).motion, key)
+        return np.zeros(0) if number is None else np.array([number])
 
-def _put_motion(scene: Scene, name: str, values: Array) -> Scene:
-    return _edited(scene, "joints", name, lambda j: replace(j, motion=float(values[0]), rate=frozen(values)))
+    def put(scene: Scene, name: str, values: Array) -> Scene:
+        def edit(joint: Joint) -> Joint:
+            law = changed(joint.motion, key, float(values[0]))
+            return replace(joint, motion=law, rate=frozen(np.array([law.rate(0.0)])))
+
+        return _edited(scene, "joints", name, edit)
+
+    return Field(get, put, moves="state")
 
 
 def _dry(key: str) -> Field:
@@ -289,7 +298,7 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
         "rest": _attribute("joints", "rest", faults=_stiffness_faults),
         "drive": _attribute("joints", "drive"),
         "coordinate": Field(_coordinate, _put_coordinate, moves="state"),
-        "motion.rate": Field(_motion, _put_motion, moves="state"),
+        **{f"motion.{key}": _motion(key) for key in ("rate", "amplitude", "frequency", "phase")},
         "rate": _attribute("joints", "rate", moves="state"),
         "at": Field(_at, _put_at, moves="frame"),
         "frame1.position": _frame("frame1"),

@@ -18,6 +18,7 @@ from ephs.mechanics.scene.surfaces import Contact, Surface
 from ephs.mechanics.shapes.dry import Dry
 from ephs.mechanics.shapes.law import Law
 from ephs.semantics.kept import Kept
+from ephs.solve.motion_law import MotionLaw
 
 if TYPE_CHECKING:
     from ephs.semantics import System
@@ -90,7 +91,7 @@ class Joint:
     stiffness, rest : (d,) of the potential ``½ k (coordinate − rest)²``
     heat : where the friction heat goes, ``"environment"`` or the name of a thermal node
     drive : (d,) constant generalised force on u_r
-    motion : the prescribed rate of a single freedom, or None
+    motion : the prescribed motion law of a single freedom, or None
     coordinate : (size,) initial element of the pair's group; the two angles of a universal joint
     rate : (d,) initial u_r, the twist of C2 relative to C1 in the axes of C2 (the two angle rates of a
         universal joint)
@@ -114,7 +115,7 @@ class Joint:
     rest: Array
     heat: str
     drive: Array
-    motion: float | None
+    motion: MotionLaw | None
     coordinate: Array
     rate: Array
     middle: Array | None = None
@@ -128,6 +129,11 @@ class Joint:
     def dim(self) -> int:
         """The number of freedoms d."""
         return int(self.rate.shape[0])
+
+    @property
+    def first_rate(self) -> float | None:
+        """The rate of a prescribed motion at the start; None without."""
+        return None if self.motion is None else self.motion.rate(0.0)
 
 
 @final

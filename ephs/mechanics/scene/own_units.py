@@ -26,6 +26,7 @@ from ephs.solve.events import Event
 from ephs.solve.instant import Mobility
 from ephs.solve.integrate import Progress
 from ephs.solve.mobility import mobility
+from ephs.solve.motion_law import MotionLaw
 from ephs.solve.problem import Problem, Signal, State
 from ephs.solve.result.record import Record
 
@@ -91,6 +92,8 @@ def in_own_units(problem: Problem) -> Problem:
         unit = units.energy / units.time / force if signal.effort else force
         if not callable(signal.value):
             return replace(signal, value=np.asarray(signal.value) / unit)
+        if isinstance(signal.value, MotionLaw):
+            return replace(signal, value=signal.value.rescaled(1.0 / float(unit[0] * units.time), 1.0 / units.time))
         return replace(signal, value=lambda t, state: signal.at(t * units.time, given(state)) / unit)
 
     whole = np.concatenate([factors[slot.path] for slot in descriptor.states])

@@ -42,7 +42,7 @@ def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float =
             stiffness=frozen(j.stiffness * force / unit),
             rest=frozen(j.rest * unit),
             drive=frozen(j.drive * force),
-            motion=None if j.motion is None else float(j.motion * unit[0] / time),
+            motion=None if j.motion is None else j.motion.rescaled(float(unit[0]), time),
             coordinate=frozen(j.coordinate * element_units(j.coordinate.size, unit, length)),
             rate=frozen(j.rate * unit / time),
             limits=None if j.limits is None else frozen(j.limits * unit[0]),

@@ -20,10 +20,12 @@ from ephs.mechanics.scene.geometry import Coupling, coupling, joint_types
 from ephs.mechanics.scene.homogeneous import mass_and_moments
 from ephs.mechanics.scene.inertia import mass_and_inertia
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Marker, Spring, World, frozen
+from ephs.mechanics.scene.motions import law_of
 from ephs.mechanics.scene.placing import Place, resolve_place
 from ephs.mechanics.scene.schema import BodyEntry, JointEntry, ShapeEntry, SpringEntry
 from ephs.mechanics.scene.text import MESHES
 from ephs.mechanics.shapes.dry import Dry
+from ephs.solve.motion_law import MotionLaw
 
 Array = NDArray[np.float64]
 
@@ -63,12 +65,17 @@ class JointDraft:
     rest: Array
     heat: str
     drive: Array
-    motion: float | None
+    motion: MotionLaw | None
     coordinates: Array | None
     rate: Array | None
     strain: Strain | None = None
     dry: Dry | None = None
     armature: float = 0.0
+
+    @property
+    def first_rate(self) -> float | None:
+        """The rate of a prescribed motion at the start."""
+        return None if self.motion is None else self.motion.rate(0.0)
 
     def coupling(self) -> Coupling:
         """Motions that the joint allows."""
@@ -151,7 +158,7 @@ def resolve_joint(name: str, table: Checked[JointEntry], names: Names, faults: l
     if rest[list(allowed.turning)].any():
         faults.append(fault("rest rotation", f"{key}.rest", shown(entry.rest)))
     drive = values.freedoms(entry.drive, d, f"{key}.drive", faults)
-    _check_motion(entry, d, drive, key, faults)
+    motion = _motion(entry, d, drive, key, faults)
     if entry.armature and (d != 1 or entry.motion is not None):
         faults.append(fault("armature", f"{key}.armature", shown(entry.armature)))
     coordinates = None
@@ -160,8 +167,8 @@ def resolve_joint(name: str, table: Checked[JointEntry], names: Names, faults: l
         if (entry.at or entry.axis) and coordinates.any():
             faults.append(fault("coordinate at", f"{key}.coordinate", shown(entry.coordinate)))
     rate = None
-    if entry.motion is not None:
-        rate = np.full(d, entry.motion.rate)
+    if motion is not None:
+        rate = np.full(d, motion.rate(0.0))
     elif entry.rate is not None:
         rate = values.freedoms(entry.rate, d, f"{key}.rate", faults)
     friction = values.friction(entry.friction, d, f"{key}.friction", faults)
@@ -179,7 +186,7 @@ def resolve_joint(name: str, table: Checked[JointEntry], names: Names, faults: l
         rest=rest,
         heat=entry.heat,
         drive=drive,
-        motion=None if entry.motion is None else entry.motion.rate,
+        motion=motion,
         coordinates=coordinates,
         rate=rate,
         dry=_dry(entry, d, key, faults),
@@ -278,16 +285,19 @@ def _check_pitch(entry: JointEntry, key: str, faults: list[Fault]) -> None:
         faults.append(fault("only screw", f"{key}.pitch", shown(entry.pitch), kind=entry.type))
 
 
-def _check_motion(entry: JointEntry, d: int, drive: Array, key: str, faults: list[Fault]) -> None:
+def _motion(entry: JointEntry, d: int, drive: Array, key: str, faults: list[Fault]) -> MotionLaw | None:
+    """The motion law that a joint is prescribed; None without."""
     if entry.motion is None:
-        return
-    rate = entry.motion.rate
+        return None
+    found = law_of(entry.motion, f"{key}.motion", faults)
+    rate = found.rate(0.0)
     if d != 1:
         faults.append(fault("motion freedoms", f"{key}.motion", f"a motion of a {entry.type} joint", d=d))
     elif entry.rate is not None and np.asarray(entry.rate).ravel().tolist() not in ([rate], [0.0]):
         faults.append(fault("motion rate", f"{key}.rate", shown(entry.rate), motion=shown(rate)))
     if drive.any():
         faults.append(fault("motion and drive", key, "motion and drive"))
+    return found
 
 
 def _mesh(name: str, folder: Path) -> Path | None:

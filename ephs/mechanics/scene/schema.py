@@ -23,6 +23,7 @@ from ephs.mechanics.scene.schema_numbers import (
     Pair,
     Positive,
     Range,
+    Series,
     Sizes,
     Text,
     Vector,
@@ -97,9 +98,19 @@ class FrameEntry(Entry):
 
 
 class MotionEntry(Entry):
-    """A prescribed motion."""
+    """A prescribed motion: one of four forms, by which the coordinate departs from where it starts."""
 
-    rate: Number = Field(description="of the single freedom, rad/s or m/s")
+    rate: Number | None = Field(default=None, description="constant rate of the single freedom, rad/s or m/s")
+    polynomial: Series | None = Field(
+        default=None, description="c₁, c₂, … of c₁ t + c₂ t² + …; rad/s, rad/s², … or m/s, m/s², …"
+    )
+    amplitude: Number | None = Field(default=None, description="A of the harmonic A sin(2π f t + φ), rad or m")
+    frequency: Number | None = Field(default=None, description="its f, Hz")
+    phase: Number | None = Field(default=None, description="its φ, rad; default: 0")
+    times: Series | None = Field(
+        default=None, description="of a table: ascending, s; a spline of fifth order, at rest before and after"
+    )
+    displacements: Series | None = Field(default=None, description="there, rad or m")
 
 
 class DryEntry(Entry):
@@ -138,7 +149,7 @@ class JointEntry(Entry):
         default=0.0, description="inertia of the single rate itself, as of a rotor that it turns; kg m², kg"
     )
     drive: Numbers = Field(default=0.0, description="constant generalised force on u_r; N m, N")
-    motion: MotionEntry | None = Field(default=None, description="the freedom's rate is prescribed")
+    motion: MotionEntry | None = Field(default=None, description="the motion of the single freedom is prescribed")
     limits: Limits | None = Field(
         default=None, description="least and largest coordinate of a joint with one freedom, nan for none; rad or m"
     )

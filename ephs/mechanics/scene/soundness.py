@@ -138,7 +138,7 @@ def _joint(j: Joint) -> dict[str, tuple[Any, tuple[int, ...]]]:
         "rate": (j.rate, (d,)),
         "coordinate": (j.coordinate, (of.size,)),
         "armature": (j.armature, ()),
-        "motion": (0.0 if j.motion is None else j.motion, ()),
+        **({} if j.motion is None else {f"motion.{key}": (number, ()) for key, number in j.motion.numbers}),
         **({} if j.middle is None else {"middle": (j.middle, (7,))}),
         **({} if j.stop is None else {f"stop.{key}": (number, ()) for key, number in j.stop.numbers}),
         **({} if j.dry is None else {f"dry.{key}": (number, ()) for key, number in j.dry.numbers}),

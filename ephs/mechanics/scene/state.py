@@ -63,7 +63,7 @@ class Snapshot:
                     coupling_of(j),
                     None,
                     None,
-                    j.motion,
+                    j.first_rate,
                     np.array(j.coordinate),
                 )
                 for j in joints

@@ -87,6 +87,8 @@ class ExplicitTangent:
         """The initial state."""
         eq, count = self.equations, len(self.family.parameters)
         state = eq.start(self.t0)
+        if eq.changing:
+            raise OptionError("motion", "one that changes with time", "constant rates; ephs.sweep takes others")
         if not (eq.constant or eq.held):
             self._of_time(self.t0)
         found = [self._by(j, lambda of, at: np.concatenate([at.q, of.vector(at)[eq.nv :]])) for j in range(count)]

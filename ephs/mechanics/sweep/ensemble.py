@@ -333,7 +333,8 @@ class Ensemble:
         given = self._options
         method, _ = chosen(given.get("method", "auto"), equations.problem, step=given.get("step"))
         if method.many is not None or (
-            given.get("step") is None and longest_step(equations.problem.scene, 1, 0.0) < np.inf
+            given.get("step") is None
+            and longest_step(equations.problem.scene, 1, 0.0, (self._t0, self._until)) < np.inf
         ):
             return None  # each member has its own limit
         if equations.led.holds:  # its work is no sum of rows

@@ -212,7 +212,7 @@ def test_forward_columns_are_inverse_columns_solved(drawn):
     equations = Equations(problem_of_scene(scene), 0.0)
     linear, (q, r, s) = Linearised(equations), model.layout.split(state.array)
     n = equations.n
-    assume(n and not model.cut and not equations.prescribed.size)
+    assume(n and not model.cut and not equations.driven.size)
     a = linear.forward(q, r, s)
     forward = linear.columns(solve=True, fit=True)
     linear.inverse(q, r, s, a)

@@ -200,7 +200,7 @@ FAULTS: dict[str, tuple[str, str, tuple[str, ...]]] = {
         ("either motion or drive",),
     ),
     "motion and rate": (BODY + joint("motion = { rate = 1.0 }", "rate = 2.0"), "joints.j.rate", ("1.0",)),
-    "motion empty": (BODY + joint("motion = {}"), "joints.j.motion.rate", ("nothing",)),
+    "motion empty": (BODY + joint("motion = {}"), "joints.j.motion", ("empty", "one form")),
     "motion against velocity": (
         body("angular_velocity = [0.0, 0.0, 2.0]") + joint("motion = { rate = 1.0 }"),
         "joints.j.motion",

@@ -45,7 +45,7 @@ def held(on: Evaluator, motion: "Mechanism", q: Vector, r: Vector, heats: Vector
     on.reach(own.energy, *motion.swept, q, r, w.momenta, w.spin, out)
 
     def place() -> None:
-        on.reach(own.move, *motion.swept, q, r, w.place)
+        on.reach(own.move, *motion.swept, q, r, w.zero, w.place)
 
     def strained() -> None:
         on.when(own.between > 0, place)
@@ -232,7 +232,7 @@ class _Correction:
 
         def released() -> None:
             calm = replace(self.motion, tables=replace(self.motion.tables, gravity=on.scratch(3)))
-            calm.outward(on, self.q, w.zero)
+            calm.outward(on, self.q, w.zero, w.zero)
             self.status.value = calm.fold(on, self.q, w.spin, w.momenta)
             calm.unfold(on, self.q, w.direction)
 
@@ -301,9 +301,8 @@ class _Correction:
         on, motion, w = self.on, self.motion, self.motion.work
 
         def fall() -> None:
-            alone = replace(
-                motion.tables, drive=w.still, body=Table(Body, motion.tables.body.integers, motion.tables.body.reals, 0)
-            )
+            bodies = Table(Body, motion.tables.body.integers, motion.tables.body.reals, 0)
+            alone = replace(motion.tables, drive=w.still, body=bodies, lead=w.zero)
             ns, idle = motion.tables.node.size, w.idle
             s_rate, made = idle.part(0, ns), idle.part(ns + 2, idle.size - (ns + 2))
             calm = replace(motion, tables=alone)

@@ -40,6 +40,7 @@ def engine_of(
     wrench: Array,
     scal: Array,
     supply: Array,
+    lead: Array,
     acted: tuple[frozenset[int], frozenset[int]] = (frozenset(), frozenset()),
     kept: Sequence[Array] | None = None,
     *,
@@ -54,8 +55,8 @@ def engine_of(
         (3,) in world axes.
     drive, wrench, scal
         Given forces (joints' freedoms,), given wrenches (bodies, 6), and (h, θ₀, π₀), which are read where they are.
-    supply
-        What is given to what is attached, which is read there, too.
+    supply, lead
+        What is given to what is attached, and accelerations (freedoms,) of prescribed motions, read there, too.
     acted
         Edges and bodies on which given forces act.
     kept
@@ -69,7 +70,7 @@ def engine_of(
     rows = None if kept is None else tuple(tuple(each.tolist()) for each in kept)
     key = "engine", gravity.tobytes(), acted, rows, apart, momenta
     plan = once(reduced, key, lambda: _plan(reduced, gravity, drive.size, acted, kept, apart=apart, momenta=momenta))
-    tables = {**plan.tables, "drive": drive, "wrench": wrench, "scal": scal, "supply": supply}
+    tables = {**plan.tables, "drive": drive, "wrench": wrench, "scal": scal, "supply": supply, "lead": lead}
     work: dict[str, Any] = {name: np.zeros(shape) for name, shape in plan.shapes.items()}
     work["fault"] = np.zeros(1, dtype=np.int64)
     return Engine(tables, work, plan.closing, plan.sizes, plan.reached, looped=plan.looped)

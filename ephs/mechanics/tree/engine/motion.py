@@ -77,10 +77,13 @@ class Mechanism(Motion):
     def _cuts(self) -> tuple[Argument, ...]:
         return self.tables.cut, self.tables.cut_numbers, self.work.relative
 
-    def outward(self, on: Evaluator, q: Vector, r: Vector) -> None:
-        """The outward sweep: poses, twists, loads of all links, and the rows that close loops."""
+    def outward(self, on: Evaluator, q: Vector, r: Vector, lead: Vector) -> None:
+        """The outward sweep: poses, twists, loads of all links, and the rows that close loops.
+
+        ``lead`` are the accelerations of joints with prescribed motions.
+        """
         e, w, own = self.tables, self.work, self.tables.own[0]
-        on.reach(own.move, *self.swept, q, r, w.place)
+        on.reach(own.move, *self.swept, q, r, lead, w.place)
         clear(on, _whole(w.pushed))
         if not self.looped:
             return
@@ -138,7 +141,7 @@ class Mechanism(Motion):
             status.value = self._still(on, still)
 
         def general() -> None:
-            self.outward(on, q, r)
+            self.outward(on, q, r, self.tables.lead)
             clear(on, w.force)
 
             def forced() -> None:
@@ -155,8 +158,12 @@ class Mechanism(Motion):
                 on.when(own.driven > 0, drive)
 
             def drive() -> None:
+                on.loop(rate.size, follow)
                 on.reach(own.power, *self.swept, *self._rows, q, r, w.force, w.answer)
                 books[1] = books[1] + w.answer[0]
+
+            def follow(j: Integer) -> None:
+                rate[j] = rate[j] + self.tables.lead[j]
 
             on.when(own.forced > 0, forced)
             on.when(on.same(status.value, 0), inward)
@@ -339,7 +346,7 @@ class Mechanism(Motion):
         With ``always`` it is moved in any case: the tangent of closing is that of a round that was taken.
         """
         own, w, status = self.tables.own[0], self.work, on.counter(0)
-        self.outward(on, q, r)
+        self.outward(on, q, r, w.zero)
         on.reach(own.poses, *self._cuts)
         on.reach(own.fit, *self._cuts, q)
         gap = self.gaps(on, q)

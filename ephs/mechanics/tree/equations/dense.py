@@ -27,6 +27,9 @@ SLIP = 1e-2
 """Part of the rates by which constraints may be missed that are left out as repeating others: where they only nearly
 repeat them, a rate is missed by as much as the rank decision drops."""
 
+STOPPED = 1e-10
+"""Part of the rates before that rounding leaves of constraints where a mechanism is brought to rest."""
+
 
 def unmoved(reduced: Reduced, freedom: int) -> SolveError:
     """A freedom whose motion no inertia determines."""
@@ -49,10 +52,10 @@ class Dense:
         (n,) and (m,) the accelerations and multipliers that `forward` found last: of prescribed rates, then of loops.
     """
 
-    def __init__(self, reduced: Reduced, gravity: Array, scal: Array, supply: Array) -> None:
+    def __init__(self, reduced: Reduced, gravity: Array, scal: Array, supply: Array, lead: Array) -> None:
         self.reduced, self.residual = reduced, Residual(reduced, gravity, scal, supply)
         t, found, arrays = reduced.tables, self.residual, self.residual.arrays
-        self._driven = int(t.driven.sum())
+        self._driven, self._lead, self._led = int(t.driven.sum()), lead, np.flatnonzero(t.driven)
         self._m, self._rank = found.m + self._driven, 0
         closed = [e for e, kind in zip(reduced.edges, t.kind, strict=True) if kind == CUT]
         self._closed = [(edge.path or Path(), f"the loop that {edge.name} closes") for edge in closed]
@@ -102,7 +105,7 @@ class Dense:
             return int(Status.STILL), still - 1
         bare = found.at(np.zeros(found.n), np.zeros(found.m))
         self._orthonormalised()
-        rows = np.concatenate([np.zeros(self._driven), bare[found.rows]])
+        rows = np.concatenate([-self._lead[self._led], bare[found.rows]])
         self.rate[:] = self.solved(-bare[found.forces][:, None], rows[:, None])[:, 0]
         self._target[:] = -rows - found.arrays["row"] @ self._free[:, 0]
         self._corrected(self._target)
@@ -133,7 +136,7 @@ class Dense:
         """(m,) the accelerations on the rows that `forward` asked for, −(d rows/dt)·r; and the rows' rank."""
         found = self.residual
         bare = found.at(np.zeros(found.n), np.zeros(found.m))[found.rows]
-        return -np.concatenate([np.zeros(self._driven), bare]), self._rank
+        return np.concatenate([self._lead[self._led], -bare]), self._rank
 
     def settle(self) -> Array:
         """The residual at the accelerations and multipliers that `forward` found."""
@@ -186,9 +189,8 @@ class Dense:
         target[: motions.size] += motions
         change = self._corrected(target)
         left = np.abs(row @ change - target)
-        if not left.max(initial=0.0) <= SLIP * max(
-            np.abs(r + change).max(initial=0.0), np.abs(motions).max(initial=0.0)
-        ):
+        rates = max(np.abs(r + change).max(initial=0.0), np.abs(motions).max(initial=0.0))
+        if not left.max(initial=0.0) <= SLIP * rates + STOPPED * np.abs(r).max(initial=0.0):
             raise self._contradicted(left, motions.size)
         return q, r + change
 

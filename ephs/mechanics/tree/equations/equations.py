@@ -54,6 +54,8 @@ class Equations:
     ----------
     careful
         Whether the loops were closed last at constraints that nearly repeat each other.
+    changing
+        Whether rates of prescribed motions change with time.
     """
 
     def __init__(self, problem: Problem, t0: float, *, pushed: bool = False, apart: bool = False) -> None:
@@ -71,7 +73,9 @@ class Equations:
         self.nv, self.n, self.ns = int(t.dim[self._moving].sum()), reduced.freedoms, len(reduced.entropies)
         self.size = self.nv + self.n + self.ns + 2 + len(reduced.made)
         driven = [i for i in range(reduced.links) if t.driven[t.r_at[i] : t.r_at[i] + t.dim[i]].any()]
-        self.prescribed = np.array([float(reduced.edges[i].motion or 0.0) for i in driven])
+        self._laws = [law for i in driven if (law := reduced.edges[i].motion) is not None]
+        self._led_q = np.array([int(t.q_at[i]) for i in driven], dtype=int)
+        self.changing = not all(law.constant for law in self._laws)
         groups = [i for i in self._moving if t.code[i] != VECTOR]
         self.curved = np.array([int(t.r_at[i]) + j for i in groups for j in range(int(t.dim[i]))], dtype=int)
         self.counted = np.r_[np.arange(self.n), self.nv : self.nv + self.n + self.ns]
@@ -99,8 +103,8 @@ class Equations:
     def _build(self, kept: "list[Array] | None") -> None:
         """The engine, with all rows of the cut joints or those that are kept."""
         self.engine = engine_of(
-            self.reduced, self.gravity, self.drive, self.wrench, self.scal, self.given.supply, self._acted, kept,
-            apart=self._apart, momenta=self._momenta,
+            self.reduced, self.gravity, self.drive, self.wrench, self.scal, self.given.supply, self.given.lead,
+            self._acted, kept, apart=self._apart, momenta=self._momenta,
         )  # fmt: skip
 
     def keep_momenta(self) -> None:
@@ -202,7 +206,7 @@ class Equations:
             The loops do not close near by, or the state has left the range of numbers.
         """
         within(self.reduced, state.q, state.r, state.heats)
-        if np.any(state.r[self.driven] != self.prescribed):  # all rates give way, in the mass metric
+        if np.any(state.r[self.driven] != self.prescribed(state.t)):  # all rates give way, in the mass metric
             return self._closed_carefully(state)
         self.careful = False
         if not self.engine.looped:
@@ -216,6 +220,14 @@ class Equations:
         self._closed_at, self._factored = (q, r), True
         return replace(state, q=q, r=r, memory=())
 
+    def prescribed(self, t: float) -> Array:
+        """Rates of the joints ``driven`` at a time in s."""
+        return np.array([law.rate(t) for law in self._laws])
+
+    def displaced(self, start: float, end: float) -> Array:
+        """Changes of the coordinates of the joints ``driven`` between two times in s."""
+        return np.array([law.displacement(end) - law.displacement(start) for law in self._laws])
+
     def separation(self) -> Array:
         """Squared part of each loop constraint off those before it, relative to the largest constraint, (m,).
 
@@ -228,8 +240,9 @@ class Equations:
     def _closed_carefully(self, state: ReducedState) -> ReducedState:
         """`closed`, for constraints that nearly repeat each other."""
         self.careful = True
-        q, r = self.dense.closed(state.q, state.r, self.prescribed, self.moved)
-        r[self.driven] = self.prescribed
+        wanted = self.prescribed(state.t)
+        q, r = self.dense.closed(state.q, state.r, wanted, self.moved)
+        r[self.driven] = wanted
         return replace(state, q=q, r=r, memory=())
 
     # ---- the same over dense matrices --------------------------------------------------------------------------
@@ -238,7 +251,7 @@ class Equations:
     def dense(self) -> Dense:
         """Sweeps over dense matrices, made when they are first asked for."""
         if self._dense is None:
-            self._dense = Dense(self.reduced, self.gravity, self.scal, self.given.supply)
+            self._dense = Dense(self.reduced, self.gravity, self.scal, self.given.supply, self.given.lead)
         return self._dense
 
     def refilled(self) -> None:
@@ -282,7 +295,15 @@ class Equations:
     def ended(self, base: ReducedState, y: Array, t: float) -> ReducedState:
         """The same of a vector whose books are made up already."""
         v, r, heats, books = np.split(y, np.cumsum([self.nv, self.n, self.ns]))
-        return ReducedState(t, self.advance(base.q, v), r, heats, books, account=base.account)
+        end = ReducedState(t, self.advance(base.q, v), r, heats, books, account=base.account)
+        return self.followed(base, end) if self.changing else end
+
+    def followed(self, base: ReducedState, end: ReducedState) -> ReducedState:
+        """The end of a step from ``base`` with coordinates and rates of prescribed motions as these are."""
+        q, r = end.q.copy(), end.r.copy()
+        q[self._led_q] = base.q[self._led_q] + self.displaced(base.t, end.t)
+        r[self.driven] = self.prescribed(end.t)
+        return replace(end, q=q, r=r)
 
     def settled(self, y0: Array, y1: Array) -> Array:
         """The end y1 of a step from y0 with what components made in place of what they passed on."""

@@ -28,6 +28,8 @@ class Given:
         (links, 6) in body frames.
     supply
         Efforts that are prescribed to what is attached, then flows by the efforts of its network.
+    lead
+        (tree's freedoms,) accelerations of joints whose motion is prescribed, at the time that was placed last.
     """
 
     def __init__(self, problem: Problem, reduced: Reduced, freedoms: int) -> None:
@@ -44,6 +46,9 @@ class Given:
         net = reduced.attaching.network
         self.supply = np.zeros(len(net.inputs) + net.skew.shape[0])
         t = reduced.tables
+        self.lead = np.zeros(reduced.freedoms)
+        motions = [(int(t.r_at[i]), edge.motion) for i, edge in enumerate(reduced.edges) if edge.motion is not None]
+        self._laws = [(at, law) for at, law in motions if not law.constant]
         for i, edge in enumerate(reduced.edges):
             if edge.port is not None and not self._signals[edge.port].effort:
                 self._drives.append((edge.port, slice(int(t.r_at[i]), int(t.r_at[i] + t.dim[i]))))
@@ -59,6 +64,7 @@ class Given:
         """Put the inputs at a time and state into the arrays; without a state those that are constant."""
         fixed, signals = self._fixed, self._signals
         self.put(lambda port: fixed[port] if port in fixed else 0.0 if state is None else signals[port].at(t, state))
+        self.follow(t)
         if self._contact is not None:
             self.drive[:] = self._own * self.drive + self._contact(t)
 
@@ -67,6 +73,11 @@ class Given:
         self._contact = contact
         if contact is None:
             self.drive *= self._own
+
+    def follow(self, t: float) -> None:
+        """Put the accelerations of prescribed motions at a time into ``lead``."""
+        for at, law in self._laws:
+            self.lead[at] = law.acceleration(t)
 
     def put(self, value: Callable[[Path], Array | float]) -> None:
         """Put the inputs into the arrays, each as ``value(port)``."""

@@ -41,7 +41,7 @@ class Impulses:
         rows = np.zeros(4 * (links + 1), dtype=np.int64), whole, whole, whole, *numbers
         self._q, self._r, self._rate = np.zeros(equations.reduced.coordinates), np.zeros(n), np.zeros(n)
         self._wrench = np.zeros((links, 6))
-        self._move = calls["move"].bind(*tree, self._q, self._r, self._places)
+        self._move = calls["move"].bind(*tree, self._q, self._r, np.zeros(n), self._places)
         self._fold = calls["fold"].bind(*tree, *rows, self._q, np.zeros(n), self._wrench)
         self._unfold = calls["unfold"].bind(*tree, *rows, self._q, self._rate, np.zeros((links, 6)))
 

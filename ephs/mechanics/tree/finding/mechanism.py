@@ -24,6 +24,7 @@ from ephs.semantics.stage import Table
 from ephs.solve.errors import OptionError
 from ephs.solve.heats import PLAIN, exponential_law
 from ephs.solve.model import Model
+from ephs.solve.motion_law import MotionLaw
 from ephs.solve.problem import Problem, Signal
 from ephs.solve.sparse import Index
 
@@ -120,14 +121,16 @@ def reduce_system(problem: Problem, model: Model) -> Reduced:
     """
     d = problem.descriptor
     where = d.pack(problem.initial).tobytes()
-    motions = tuple((path, one.effort, _constant(one)) for path, one in problem.signals.items())
+    motions = tuple((path, one.effort, _prescribed(one)) for path, one in problem.signals.items())
     key = "reduced", model.reference, where, motions, tuple(problem.names.items())
     return once(d, key, lambda: _reduced(problem, model))
 
 
-def _constant(signal: Signal) -> bytes | None:
-    """The value of a prescribed motion, None where it changes, or where a force is given."""
-    return np.asarray(signal.value, dtype=float).tobytes() if signal.effort and not callable(signal.value) else None
+def _prescribed(signal: Signal) -> MotionLaw | bytes | None:
+    """A prescribed motion; None where it is a function, or where a force is given."""
+    if not signal.effort or isinstance(signal.value, MotionLaw):
+        return signal.value if isinstance(signal.value, MotionLaw) else None
+    return None if callable(signal.value) else np.asarray(signal.value, dtype=float).tobytes()
 
 
 def _reduced(problem: Problem, model: Model) -> Reduced:

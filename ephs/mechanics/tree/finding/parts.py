@@ -18,6 +18,7 @@ from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.primitives import Irreversible, Primitive, Storage
 from ephs.semantics.spaces import SE3, pair
+from ephs.solve.motion_law import MotionLaw, PolynomialMotion
 from ephs.solve.problem import Problem
 
 __all__ = ["Acting", "Parts", "parts_of"]
@@ -194,15 +195,19 @@ class _Reader:
             slice(start, start + d), joint.state.path, port, joint.potential, friction, heat,
         )  # fmt: skip
 
-    def _motion(self, port: Path, freedoms: int) -> float | None:
-        """The rate that is prescribed at a joint's port; None where a force is."""
+    def _motion(self, port: Path, freedoms: int) -> MotionLaw | None:
+        """What is prescribed at a joint's port; None where a force is."""
         self.ports.add(port)
         signal = self.problem.signals[port]
         if not signal.effort:
             return None
-        if freedoms != 1 or callable(signal.value):
-            raise Unplaced(port, "prescribes rates of several freedoms, or one that changes")
-        return float(np.atleast_1d(signal.value)[0])
+        if freedoms != 1:
+            raise Unplaced(port, "prescribes rates of several freedoms")
+        if isinstance(signal.value, MotionLaw):
+            return signal.value
+        if callable(signal.value):
+            raise Unplaced(port, "prescribes a rate by a function without derivative; a motion law has one")
+        return PolynomialMotion((float(np.atleast_1d(signal.value)[0]),))
 
     def _is_force(self, joint: LinkJoint) -> bool:
         """Whether a joint is a force between two frames, which carries neither."""

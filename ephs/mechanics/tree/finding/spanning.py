@@ -11,6 +11,7 @@ from ephs.mechanics.constraints.subgroup import generated
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3, Pair
+from ephs.solve.motion_law import MotionLaw
 
 __all__ = ["Edge", "frames_of_joints", "islands", "loop_algebra", "spanning_tree", "twists_of"]
 
@@ -29,7 +30,7 @@ class Edge:
     body1, body2
         Numbers of the links, −1 for the ground.
     motion
-        The prescribed rate of a single freedom, or None.
+        The motion law of a single freedom, or None.
     coordinate
         Initial element of the pair's group.
     freedoms
@@ -49,7 +50,7 @@ class Edge:
     offset1: Array
     offset2: Array
     pair: Pair
-    motion: float | None
+    motion: MotionLaw | None
     coordinate: Array
     freedoms: slice
     state: Path | None

@@ -240,9 +240,9 @@ class Tables:
         Group of each link that may move as a whole, and how: see `ephs.mechanics.tree.sweeps.rigid`.
     port, net, numbers
         What is attached, and where: see `ephs.mechanics.tree.sweeps.network.Net`.
-    drive, wrench, scal, supply
-        Given forces on the freedoms of all joints, given wrenches (bodies, 6) in body frames, (h, θ₀, π₀), and what is
-        given to what is attached.
+    drive, wrench, scal, supply, lead
+        Given forces on the freedoms of all joints, given wrenches (bodies, 6) in body frames, (h, θ₀, π₀), what is
+        given to what is attached, and the accelerations (freedoms,) of joints with prescribed motions.
     """
 
     own: Table[Own]
@@ -273,6 +273,7 @@ class Tables:
     wrench: Matrix
     scal: Vector
     supply: Vector
+    lead: Vector
 
     @property
     def links(self) -> Integer:
@@ -292,6 +293,7 @@ TABLES: Final[dict[str, Any]] = {
     "conduction": table(Conduction), "sink": table(Sink), "component": table(Component), "parameters": vector(),
     "island": indices(), "bases": vector(), "port": table(Port), "net": indices(), "numbers": vector(),
     "drive": vector(), "wrench": matrix(6), "scal": vector(3), "supply": vector(),
+    "lead": vector(),
 }  # fmt: skip
 
 

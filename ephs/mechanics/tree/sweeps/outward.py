@@ -27,16 +27,16 @@ def momentum(link: Link, u: Entries) -> list[Real]:
     return [*angular, *add(scale(link.mass, moving), cross(turning, link.moment))]
 
 
-def outward(on: Evaluator, tree: Tree, q: Vector, r: Vector) -> None:
+def outward(on: Evaluator, tree: Tree, q: Vector, r: Vector, lead: Vector | None = None) -> None:
     """Fill the states of all links at the elements q and rates r; inertias are set to the links' own.
 
-    The load of a link is I b − ad*_u(I u), with its twist u and the acceleration b that it has at ṙ = 0. Gravity is an
-    acceleration of the ground.
+    The load of a link is I b − ad*_u(I u), with its twist u and the acceleration b that it has at ṙ = 0, or, of joints
+    with prescribed motions, at the rates' derivatives ``lead``. Gravity is an acceleration of the ground.
     """
     _ground(tree)
 
     def one(i: Integer) -> None:
-        tree.visit(on, i, lambda joint, link: _step(on, tree, i, joint, link, q, r))
+        tree.visit(on, i, lambda joint, link: _step(on, tree, i, joint, link, q, r, lead))
 
     tree.each(on, one)
 
@@ -48,7 +48,9 @@ def _ground(tree: Tree) -> None:
     ground.bias = [0.0, 0.0, 0.0, *scale(-1.0, tree.gravity)]
 
 
-def _step(on: Evaluator, tree: Tree, i: Integer, joint: Joint, link: Link, q: Vector, r: Vector) -> None:
+def _step(
+    on: Evaluator, tree: Tree, i: Integer, joint: Joint, link: Link, q: Vector, r: Vector, lead: Vector | None
+) -> None:  # fmt: skip
     state, parent = tree.states[i], tree.states[link.parent]
     rotation, place = frame(on, joint, link, q)
     rate = rate_inside(on, joint, link, q, [r[link.r_at + k] for k in range(joint.dim)])
@@ -58,6 +60,9 @@ def _step(on: Evaluator, tree: Tree, i: Integer, joint: Joint, link: Link, q: Ve
     state.turn, state.at = product(around, rotation), add(parent.at, apply(around, place))
     twist = add(twist_inward(rotation, place, parent.twist), along)
     bias = add(twist_inward(rotation, place, parent.bias), bracket(twist, along))
+    if joint.driven and lead is not None:
+        led = rate_inside(on, joint, link, q, [lead[link.r_at + k] for k in range(joint.dim)])
+        bias = add(bias, combine(joint.basis, led))
     state.twist, state.bias = twist, bias
     state.load = sub(momentum(link, bias), cobracket(twist, momentum(link, twist)))
     _own_inertia(state, link)

@@ -83,7 +83,7 @@ ROWS: Final[dict[str, Any]] = {
 """The rows of its loops: see `ephs.mechanics.tree.sweeps.closing.Rows`."""
 ARGUMENTS: Final[dict[str, dict[str, Any]]] = {
     "accelerations": {**MECHANISM, "q": vector(), "r": vector(), "force": vector(), "rate": vector()},
-    "move": {**MECHANISM, "q": vector(), "r": vector(), "places": matrix(PLACE)},
+    "move": {**MECHANISM, "q": vector(), "r": vector(), "lead": vector(), "places": matrix(PLACE)},
     "fold": {**MECHANISM, **ROWS, "q": vector(), "force": vector(), "wrench": matrix(6)},
     "unfold": {**MECHANISM, **ROWS, "q": vector(), "rate": vector(), "change": matrix(6)},
     "resolve": {**MECHANISM, **ROWS, "q": vector(), "rate": vector(), "change": matrix(6)},
@@ -224,10 +224,10 @@ class Sweeps:
     def _general(self) -> dict[str, Entry]:
         def move(
             on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector, q: Vector,
-            r: Vector, places: Matrix,
+            r: Vector, lead: Vector, places: Matrix,
         ) -> None:  # fmt: skip
             tree = self.tree(size, integers, reals, memory, gravity)
-            outward(on, tree, q, r)
+            outward(on, tree, q, r, lead)
 
             def show(i: Integer) -> None:
                 state = tree.states[i]

@@ -58,7 +58,7 @@ class State(Record):
     turn, at
         The link's frame in the world.
     twist, bias
-        Twist (ω, υ), and the acceleration at ṙ = 0, in which gravity is.
+        Twist (ω, υ), and the acceleration at ṙ = 0, in which gravity and prescribed accelerations are.
     load
         Wrench that the link and what it carries need beyond inertia · change.
     angular, mixed, linear

@@ -1,0 +1,272 @@
+"""Motions that are prescribed as functions of time: laws, closed forms by every method, loops, what is refused."""
+
+import tempfile
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+import ephs
+from ephs.mechanics.methods.registry import METHODS
+from ephs.mechanics.scene.document import scene_from_text, scene_to_text
+
+GRAVITY, DAMPING = 9.81, 0.05
+CART = """
+format = 1
+[assembly]
+adjust = true
+[bodies.cart]
+mass = 1.0
+inertia = [0.1, 0.1, 0.1]
+[bodies.bob]
+mass = 1.0
+inertia = [1e-9, 1e-9, 1e-9]
+position = [0.0, 0.0, -1.0]
+[joints.rail]
+type = "prismatic"
+bodies = ["ground", "cart"]
+at = [0.0, 0.0, 0.0]
+axis = [1.0, 0.0, 0.0]
+motion = {motion}
+[joints.pivot]
+type = "revolute"
+bodies = ["cart", "bob"]
+at = [0.0, 0.0, 0.0]
+axis = [0.0, 1.0, 0.0]
+friction = 0.05
+"""
+HARMONIC = ephs.HarmonicMotion(0.1, 0.8, 0.3)
+FORMS = {
+    "{ rate = 0.3 }": ephs.PolynomialMotion((0.3,)),
+    "{ polynomial = [0.2, -0.3, 0.5] }": ephs.PolynomialMotion((0.2, -0.3, 0.5)),
+    "{ amplitude = 0.1, frequency = 0.8, phase = 0.3 }": HARMONIC,
+    "{ times = [0.0, 0.4, 1.0], displacements = [0.0, 0.3, 0.1] }": ephs.TabulatedMotion(
+        (0.0, 0.4, 1.0), (0.0, 0.3, 0.1)
+    ),
+}
+
+
+def loaded(text):
+    """The scene of a text."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "led.toml"
+        file.write_text(text)
+        return ephs.load(file)
+
+
+number = st.floats(-3.0, 3.0)
+times = st.lists(st.floats(-2.0, 2.0), min_size=2, max_size=5, unique=True).map(sorted)
+
+
+@st.composite
+def laws(draw):
+    """Motion laws of each form."""
+    kind = draw(st.sampled_from(["polynomial", "harmonic", "table"]))
+    if kind == "polynomial":
+        return ephs.PolynomialMotion(tuple(draw(st.lists(number, min_size=1, max_size=5))))
+    if kind == "harmonic":
+        return ephs.HarmonicMotion(draw(number), draw(st.floats(0.0, 2.0)), draw(number))
+    at = tuple(draw(times))
+    assume(min(np.diff(at)) > 0.05)
+    return ephs.TabulatedMotion(at, tuple(draw(st.lists(number, min_size=len(at), max_size=len(at)))))
+
+
+def integral(function, law, start, end):
+    """Gauss's quadrature, exact in each piece of a spline."""
+    knots = np.clip([start, *getattr(law, "times", ()), end], start, end)
+    nodes, weights = np.polynomial.legendre.leggauss(40)  # for four turns of a harmonic
+    pieces = pairwise(knots)
+    return sum(0.5 * (b - a) * w * function(0.5 * (a + b) + 0.5 * (b - a) * x) for a, b in pieces
+               for x, w in zip(nodes, weights, strict=True))  # fmt: skip
+
+
+def size(function, start, end):
+    return 1.0 + max(abs(function(t)) for t in np.linspace(start, end, 60))
+
+
+class Slow:
+    """A law whose rate is none of its displacement."""
+
+    displacement = staticmethod(lambda t: t + 2.0 * t**2)
+    rate = staticmethod(lambda t: 0.9 + 3.6 * t)
+    acceleration = staticmethod(lambda t: 3.6)
+
+
+def off(law, start, end):
+    """How far displacement, rate and acceleration are from being integrals of each other, relative to their size."""
+    found = []
+    for whole, part in ((law.displacement, law.rate), (law.rate, law.acceleration)):
+        wanted = whole(end) - whole(start)
+        found.append(abs(integral(part, law, start, end) - wanted) / (size(whole, start, end) + size(part, start, end)))
+    return max(found)
+
+
+@given(laws(), st.floats(-2.0, 0.0), st.floats(0.1, 2.0))
+def test_rates_and_accelerations_integrate(law, start, length):
+    assert off(law, start, start + length) < 1e-11
+
+
+@given(laws(), st.floats(0.1, 10.0), st.floats(0.1, 10.0), st.floats(-2.0, 2.0))
+def test_other_units_are_the_same_law(law, length, time, t):
+    other = law.rescaled(length, time)
+    for k, name in enumerate(("displacement", "rate", "acceleration")):
+        wanted = getattr(law, name)(t) * length / time**k
+        scale = size(getattr(law, name), -2.0, 2.0) * length / time**k
+        assert getattr(other, name)(t * time) == pytest.approx(wanted, abs=1e-9 * scale)
+
+
+def cart(law, end):
+    """Angle and rate of a pendulum whose pivot moves along a law, by SciPy."""
+    start = [0.0, law.rate(0.0)]  # the bob is at rest
+
+    def slopes(t, y):
+        return [y[1], law.acceleration(t) * np.cos(y[0]) - GRAVITY * np.sin(y[0]) - DAMPING * y[1]]
+
+    jumps = [t for t in getattr(law, "times", ()) if 0.0 < t < end]
+    state = start
+    for a, b in zip([0.0, *jumps], [*jumps, end], strict=True):
+        state = solve_ivp(slopes, (a, b), state, method="DOP853", rtol=1e-12, atol=1e-12).y[:, -1]
+    return state
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("method", [name for name in METHODS if name != "gauss6"])
+def test_pendulum_on_a_led_cart_by_every_method(method, form):
+    scene, law, end = loaded(CART.replace("{motion}", form)), FORMS[form], 1.2
+    own = METHODS[method]
+    fixed = {"natural": 2e-3, "natural4": 1e-2, "variational": 2e-3, "alpha": 1e-3}
+    options = {"step": fixed[method]} if method in fixed else {"rtol": 1e-8, "atol": 1e-10}
+    sol = ephs.simulate(scene, end, method=method, **options)
+    angle, rate = cart(law, end)
+    allowed = 2e-5 if own.order == 2 else 1e-6
+    assert sol.joint("pivot").coordinate[-1, 0] == pytest.approx(angle, abs=allowed)
+    assert sol.joint("pivot").rate[-1, 0] == pytest.approx(rate, abs=10.0 * allowed)
+    rail, moved = sol.joint("rail"), [law.displacement(t) - law.displacement(0.0) for t in sol.t]
+    exact = allowed if method in ("natural", "natural4") else 1e-14  # theirs takes rates at nodes
+    np.testing.assert_allclose(rail.coordinate[:, 0], moved, atol=exact)
+    np.testing.assert_allclose(rail.rate[:, 0], [law.rate(t) for t in sol.t], atol=1e-10)
+
+
+def test_force_of_a_led_body_is_its_mass_times_acceleration():
+    scene = loaded(CART.replace("{motion}", "{ amplitude = 0.1, frequency = 0.8, phase = 0.3 }"))
+    alone = ephs.simulate(scene, 1.0, method="rk87", rtol=1e-9)
+    joint, pendulum = alone.joint("rail"), alone.joint("pivot")
+    angle, spin = pendulum.coordinate[:, 0], pendulum.rate[:, 0]
+    pushed = np.array([HARMONIC.acceleration(t) for t in alone.t])
+    turned = pushed * np.cos(angle) - GRAVITY * np.sin(angle) - DAMPING * spin
+    bob = pushed - turned * np.cos(angle) + spin**2 * np.sin(angle)
+    force = joint.wrench[:, 5]
+    np.testing.assert_allclose(force, pushed + bob, atol=1e-7)
+
+
+@pytest.fixture(scope="module")
+def crank():
+    """A slider-crank that is turned from rest to rest."""
+    text = (Path(__file__).parents[2] / "scenes" / "slider-crank.toml").read_text()
+    lines = [line for line in text.splitlines() if not line.startswith("drive")]
+    text = "\n".join("velocity = [0.0, 0.0, 0.0]" if line.startswith("velocity") else line for line in lines)
+    text = "\n".join(
+        "angular_velocity = [0.0, 0.0, 0.0]" if line.startswith("angular_velocity") else line
+        for line in text.splitlines()
+    )
+    motion = "motion = { times = [0.0, 0.2, 0.5], displacements = [0.0, 1.0, 4.0] }"
+    return loaded(text.replace("[joints.bearing]", "[joints.bearing]\n" + motion))
+
+
+def test_loop_from_rest_to_rest(crank):
+    """Work is what the energies gain, and heat; it is so by methods that share no code."""
+    first = ephs.simulate(crank, 0.6, method="rk87", rtol=1e-10)
+    other = ephs.simulate(crank, 0.6, method="natural", step=2.5e-4)
+    assert first.joint("bearing").coordinate[-1, 0] == 4.0
+    assert first.joint("bearing").rate[-1, 0] == 0.0
+    np.testing.assert_allclose(first.body("slider").position[-1], other.body("slider").position[-1], atol=1e-6)
+    assert first.work[-1] == pytest.approx(other.work[-1], rel=1e-5)
+    assert first.energy_error.max() < 1e-12
+
+
+def test_small_mechanism_moves_likewise():
+    """Its equations are solved in units of its own: a millimetre, a milligram."""
+    small = CART.replace("mass = 1.0", "mass = 1e-9").replace("[0.1, 0.1, 0.1]", "[1e-16, 1e-16, 1e-16]")
+    small = small.replace("1e-9, 1e-9, 1e-9]", "1e-24, 1e-24, 1e-24]").replace("-1.0]", "-1e-3]")
+    small = small.replace("friction = 0.05\n", "")
+    text = "{ amplitude = 1e-4, frequency = 25.0, phase = 0.3 }"
+    sol = ephs.simulate(loaded(small.replace("{motion}", text)), 0.03, method="rk87", rtol=1e-9)
+    law = ephs.HarmonicMotion(0.1, 25.0 / 1000.0**0.5, 0.3)
+    slopes = lambda t, y: [y[1], law.acceleration(t) * np.cos(y[0]) - GRAVITY * np.sin(y[0])]  # noqa: E731
+    end = 0.03 * 1000.0**0.5
+    wanted = solve_ivp(slopes, (0.0, end), [0.0, law.rate(0.0)], method="DOP853", rtol=1e-12, atol=1e-12).y[0, -1]
+    assert sol.joint("pivot").coordinate[-1, 0] == pytest.approx(wanted, abs=1e-6)
+
+
+def test_system_by_hand_takes_a_law():
+    """An effort at a joint's port; a function without derivative is left to the natural methods."""
+    scene = loaded(CART.replace("{motion}", "{ amplitude = 0.1, frequency = 0.8, phase = 0.3 }"))
+    whole = ephs.simulate(scene, 0.5, method="rk87", rtol=1e-9)
+    problem = whole.problem
+    (port,) = (path for path, signal in problem.signals.items() if signal.effort)
+    own = {str(path): value for path, value in problem.initial.items()}
+    given_law = ephs.simulate(
+        problem.system, 0.5, method="rk87", rtol=1e-9, initial=own, inputs={str(port): {"effort": HARMONIC}}
+    )
+    last = {str(path): values[-1] for path, values in whole.states.items()}
+    for path, values in given_law.states.items():
+        np.testing.assert_allclose(values[-1], last[str(path)], atol=1e-9)
+    with pytest.raises(ephs.OptionError, match="without derivative"):
+        ephs.simulate(problem.system, 0.5, method="rk87", initial=own, inputs={str(port): {"effort": HARMONIC.rate}})
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_text_keeps_the_law(form):
+    scene = loaded(CART.replace("{motion}", form))
+    again = scene_from_text(scene_to_text(scene))
+    assert again.joint("rail").motion == scene.joint("rail").motion == FORMS[form]
+
+
+def test_numbers_of_a_law_are_varied():
+    form = "{ amplitude = 0.1, frequency = 0.8, phase = 1.5707963267948966 }"  # it begins at rest
+    scene, other = (loaded(CART.replace("{motion}", form.replace("0.1", of))) for of in ("0.1", "0.2"))
+    table = ephs.sweep(scene, {"joints.rail.motion.amplitude": [0.1, 0.2]}, 0.3, outputs=["joints.pivot.coordinate"])
+    wanted = ephs.simulate(other, 0.3).joint("pivot").coordinate[-1, 0]
+    assert table["joints.pivot.coordinate"].values.ravel()[-1] == pytest.approx(wanted, abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("motion", "key", "parts"),
+    [
+        ("{}", "motion", ("an empty table", "give the keys of one form")),
+        ("{ rate = 1.0, amplitude = 2.0 }", "motion", ("amplitude, rate", "one form")),
+        ("{ amplitude = 2.0 }", "motion", ("amplitude", "amplitude and frequency")),
+        ("{ times = [0.0, 1.0], displacements = [0.0] }", "motion.displacements", ("2 numbers",)),
+        ("{ times = [1.0, 0.0], displacements = [0.0, 1.0] }", "motion.times", ("ascending times",)),
+        ("{ times = [1.0], displacements = [0.0] }", "motion.times", ("2 or more",)),
+        ("{ polynomial = [] }", "motion.polynomial", ()),
+    ],
+)
+def test_bad_motions_name_the_key(motion, key, parts):
+    with pytest.raises(ephs.SceneError) as caught:
+        loaded(CART.replace("{motion}", motion))
+    assert f"joints.rail.{key}" in str(caught.value)
+    assert all(part in str(caught.value) for part in parts)
+
+
+@pytest.mark.parametrize(
+    "use",
+    [
+        ephs.dynamics,
+        ephs.linearize,
+        ephs.equilibrium,
+        lambda scene: ephs.sensitivity(scene, ["bodies.bob.mass"], 0.1),
+    ],
+)
+def test_functions_of_a_state_refuse_it(use):
+    scene = loaded(CART.replace("{motion}", "{ amplitude = 0.1, frequency = 0.8 }"))
+    with pytest.raises((ephs.OptionError, ephs.SimulationError), match=r"motion|prescribed"):
+        use(scene)
+
+
+def test_law_with_another_rate_is_seen():
+    assert off(Slow(), 0.0, 1.0) > 1e-2
