@@ -143,7 +143,9 @@ def test_a_prescribed_motion_goes_at_its_rate_and_takes_away_a_freedom():
     scene = ephs.load(ROOT / "benchmarks" / "scenes" / "four-bar-windows-1.toml")
     name = "j0"
     rate = float(scene.joints[name].rate[0])
-    driven = replace(scene, joints={**scene.joints, name: replace(scene.joints[name], motion=rate)})
+    driven = replace(
+        scene, joints={**scene.joints, name: replace(scene.joints[name], motion=ephs.PolynomialMotion((rate,)))}
+    )
     sol = ephs.simulate(driven, 1.0, step=0.005)
     assert np.allclose(sol.joint(name).coordinate[:, 0], rate * sol.t, rtol=0.0, atol=1e-12)
     assert np.allclose(sol.joint(name).rate, rate, rtol=0.0, atol=1e-12)

@@ -262,7 +262,7 @@ def test_contradictory_motions_are_refused():
     case = next(c for c in CASES if c.name == "four-bar-windows-1")
     scene = case.scene()
     rates = {"j0": -1.0, "j1": -1.5}
-    told = {name: replace(scene.joints[name], motion=rate) for name, rate in rates.items()}
+    told = {name: replace(scene.joints[name], motion=ephs.PolynomialMotion((rate,))) for name, rate in rates.items()}
     with pytest.raises(ephs.SimulationError) as caught:
         ephs.simulate(replace(scene, joints={**scene.joints, **told}), 1.0, step=0.01)
     assert "check prescribed motions" in str(caught.value) or "no solution" in str(caught.value)

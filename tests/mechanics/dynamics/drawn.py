@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 import ephs
 from benchmarks import families
+from ephs import PolynomialMotion
 from ephs.mechanics.scene.geometry import coupling_of
 from ephs.mechanics.scene.model import frozen
 from ephs.testing import mechanisms
@@ -48,7 +49,7 @@ def moving(draw, **options):
         if choice == "driven":
             joint = replace(joint, drive=frozen(rng.standard_normal(joint.dim)))
         if choice == "prescribed" and tree and joint.dim == 1:
-            joint = replace(joint, motion=float(joint.rate[0]))
+            joint = replace(joint, motion=PolynomialMotion((float(joint.rate[0]),)))
         joints[name] = joint
     scene = replace(scene, joints=joints)
     model = ephs.dynamics(scene)

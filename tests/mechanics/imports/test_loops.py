@@ -117,7 +117,7 @@ def test_equalities_that_are_lower_pairs_hold(write):
     assert "inactive equality constraints: idle" in text
     assert "softness of equality constraints: glue, stop" in text
     assert scene.joints["glue"].kind == "fixed"
-    assert scene.joints["lock"].motion == 0.0
+    assert scene.joints["lock"].motion == ephs.PolynomialMotion((0.0,))
     assert scene.joints["b_joint"].kind == "free"
     assert list(scene.bodies) == ["a", "held", "held_after_lock", "b"]
     sol = ephs.simulate(scene.with_state(rates={"slow": 1.0}), 0.3)

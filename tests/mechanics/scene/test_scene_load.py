@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ephs import PolynomialMotion
 from ephs.mechanics.scene import SceneError
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.mechanics.scene.load import load
@@ -111,7 +112,7 @@ def test_the_whole_joint_table(scene):
     )
     j = loaded.joint("pin")
     assert (j.friction.tolist(), j.stiffness.tolist(), j.rest.tolist()) == ([[0.5]], [2.0], [0.25])
-    assert (j.heat, j.motion, j.drive.tolist(), j.dim) == ("housing", 1.0, [0.0], 1)
+    assert (j.heat, j.motion, j.drive.tolist(), j.dim) == ("housing", PolynomialMotion((1.0,)), [0.0], 1)
     frame = quaternion_to_matrix(j.frame1[:4])
     np.testing.assert_allclose(frame, [[0, 0, 1], [1, 0, 0], [0, 1, 0]], atol=1e-15)
     assert j.frame1[4:].tolist() == [0.0, 0.1, 0.12]
