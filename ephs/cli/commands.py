@@ -35,6 +35,7 @@ from ephs.cli.next import known_command, welcome, with_examples
 from ephs.cli.plot import plot
 from ephs.cli.run import run
 from ephs.cli.sweep import sweeps
+from ephs.cli.view import view
 
 __all__ = ["main"]
 
@@ -62,6 +63,7 @@ app.command(run)
 app.command(info)
 app.command(plot)
 app.command(animate)
+app.command(view)
 app.command(charts)
 app.command(sweeps)
 app.command(linearizing)

@@ -44,6 +44,7 @@ TEXTS = {
     "suffix": "{found}: expected one of {expected}; choose the file name's ending accordingly",
     "no-file": "{found}: no such file; expected a scene file (.toml), a model (.urdf, .xml, .sdf) or FILE.py:NAME",
     "no-result": "{found}: found no solution.nc in it, expected a result folder of ephs run",
+    "no-scene": "{found}: found a System, expected a scene or a model, whose bodies have shapes to show",
     "no-name": "{file}: found no System or Scene {name} in it, expected one of {found}",
     "nameless": "{file}: found no NAME after the file; it holds {found}; give one as {file}:{example}",
     "no-model": "{file}: found no System and no Scene in it; bind one to a name at the top level of the file",

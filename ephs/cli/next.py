@@ -26,6 +26,7 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
     "reduce": ("ephs reduce scenes/four-bar.toml",),
     "info": ("ephs info scenes/slider-crank.toml",),
     "plot": ("ephs plot out/slider-crank joints.bearing.rate energy", "ephs plot out/slider-crank"),
+    "view": ("ephs view scenes/four-bar.toml", "ephs view robot.urdf"),
     "animate": ("ephs animate out/slider-crank -o slider-crank.html",),
     "sweep": ("ephs sweep scenes/heavy-top.toml --vary bodies.top.mass=5:25:9 --until 1 -o out/sweep",),
     "equilibrium": ("ephs equilibrium scenes/four-bar.toml --out out/rest",),
