@@ -30,13 +30,17 @@ def view(
     """
     import ephs
 
-    model = load_model(scene, loading)
-    if not isinstance(model, ephs.Scene):
-        raise BadInput(TEXTS["no-scene"].format(found=scene))
+    def loaded(file: str) -> ephs.Scene:
+        model = load_model(file, loading)
+        if not isinstance(model, ephs.Scene):
+            raise BadInput(TEXTS["no-scene"].format(found=file))
+        return model
+
+    model = loaded(scene)
     with addressed(scene):
         from ephs.show.viewer import Posed, served
 
-        server = served(Posed(model, lambda file: load_model(str(file), loading)), port=port)
+        server = served(Posed(model, lambda file: loaded(str(file))), port=port)
     address = f"http://127.0.0.1:{server.server_address[1]}/"
     say(f"{address} (stop with Ctrl+C)")
     if browser:

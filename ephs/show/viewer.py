@@ -5,7 +5,6 @@ import json
 import tempfile
 import warnings
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib.resources import files
@@ -36,7 +35,6 @@ Load = Callable[[FilePath], Scene]
 
 
 @final
-@dataclass(slots=True)
 class Posed:
     """A scene in a configuration that sliders move; loops stay closed.
 
@@ -46,14 +44,16 @@ class Posed:
         As it stands.
     load
         Reads a model's file.
+
+    Attributes
+    ----------
     notes
         What reading the last one said.
     """
 
-    scene: Scene
-    load: Load
-    notes: str = ""
-    _lock: Lock = field(default_factory=Lock, repr=False)
+    def __init__(self, scene: Scene, load: Load) -> None:
+        self.scene, self.load, self.notes = scene, load, ""
+        self._lock = Lock()
 
     def page(self) -> Page:
         """Return the page, which asks this server for poses."""

@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from functools import cached_property
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
@@ -160,7 +160,7 @@ class HarmonicMotion(MotionLaw):
 
 
 @final
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class TabulatedMotion(MotionLaw):
     """A spline of fifth order through points: at rest before the first one and after the last.
 
@@ -190,22 +190,14 @@ class TabulatedMotion(MotionLaw):
         if len(self.displacements) != len(self.times):
             raise OptionError("displacements", list(self.displacements), f"{len(self.times)} numbers, one a time")
 
-    @cached_property
-    def _splines(self) -> "tuple[BSpline, BSpline, BSpline]":
-        from scipy.interpolate import make_interp_spline
-
-        rest: Any = ([(1, 0.0), (2, 0.0)],) * 2
-        spline = make_interp_spline(self.times, self.displacements, k=5, bc_type=rest)
-        return spline, spline.derivative(), spline.derivative(2)
-
     def displacement(self, t: float) -> float:
-        return float(self._splines[0](min(max(t, self.times[0]), self.times[-1])))
+        return float(_splines(self.times, self.displacements)[0](min(max(t, self.times[0]), self.times[-1])))
 
     def rate(self, t: float) -> float:
-        return float(self._splines[1](t)) if self.times[0] < t < self.times[-1] else 0.0
+        return float(_splines(self.times, self.displacements)[1](t)) if self.times[0] < t < self.times[-1] else 0.0
 
     def acceleration(self, t: float) -> float:
-        return float(self._splines[2](t)) if self.times[0] < t < self.times[-1] else 0.0
+        return float(_splines(self.times, self.displacements)[2](t)) if self.times[0] < t < self.times[-1] else 0.0
 
     @property
     def numbers(self) -> tuple[tuple[str, float], ...]:
@@ -213,6 +205,16 @@ class TabulatedMotion(MotionLaw):
 
     def rescaled(self, length: float, time: float) -> "TabulatedMotion":
         return TabulatedMotion(tuple(t * time for t in self.times), tuple(s * length for s in self.displacements))
+
+
+@lru_cache(maxsize=64)
+def _splines(times: tuple[float, ...], values: tuple[float, ...]) -> "tuple[BSpline, BSpline, BSpline]":
+    """The spline of a table, and its first two derivatives."""
+    from scipy.interpolate import make_interp_spline
+
+    rest: Any = ([(1, 0.0), (2, 0.0)],) * 2
+    spline = make_interp_spline(times, values, k=5, bc_type=rest)
+    return spline, spline.derivative(), spline.derivative(2)
 
 
 def _horner(coefficients: Any, t: float) -> float:

@@ -54,7 +54,7 @@ class Dynamics:
         self.name = problem.name
         self._problem = problem
         self._equations = Equations(self._problem, 0.0, pushed=True)
-        if self._equations.changing:
+        if self._equations.prescribed.changing:
             raise OptionError("motion", "one that changes with time", "constant rates: dynamics have no time")
         self._linear = Linearised(self._equations)
         self.layout = self._equations.layout

@@ -92,7 +92,9 @@ class Ida(ReducedMethod):
         nv, n, ns = eq.nv, eq.n, eq.ns
         v, r, heats = np.split(y[: nv + n + ns], [nv, nv + n])
         heats = np.where(plain, heats, state.heats)
-        free = eq.followed(base, ReducedState(t, eq.advance(base.q, v), r, heats, state.books, account=state.account))
+        free = eq.prescribed.followed(
+            base, ReducedState(t, eq.advance(base.q, v), r, heats, state.books, account=state.account)
+        )
         closed = eq.closed(free)
         # Its sums are its own: a sum that is off by rounding, of a component that makes nothing, refuses no step.
         flows = passed[first:]

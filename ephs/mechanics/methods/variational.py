@@ -184,7 +184,7 @@ class Variational(ReducedMethod):
         if not self._rows:
             return np.zeros(0), np.zeros((0, eq.n))
         residual, rows = eq.gaps(eq.moved(state.q, xi), state.r)
-        residual[: self._driven.size] = xi[self._driven] - eq.displaced(state.t, state.t + h)
+        residual[: self._driven.size] = xi[self._driven] - eq.prescribed.displaced(state.t, state.t + h)
         return residual, rows
 
     def _slope(self, state: ReducedState, h: float, xi: Array, middle: Any) -> Array:

@@ -109,7 +109,7 @@ class ReducedMotion:
         out = np.zeros((len(self._states), len(self._eq.reduced.edges), 6))
         work = self._eq.engine.work
         for k in range(len(self._states)):
-            accelerations = self._rates(k) - self._eq.given.lead  # which frames have for a bias
+            accelerations = self._rates(k) - self._eq.prescribed.lead  # which frames have for a bias
             out[k] = self._transmission.wrenches(
                 work["place"][:-1], accelerations, work["pushed"], work["force"], work["pulled"]
             )
@@ -119,7 +119,7 @@ class ReducedMotion:
         """(n,) accelerations of the tree at the k-th instant."""
         eq, state, inputs = self._eq, self._states[k], self._solution.inputs
         eq.given.put(lambda port: inputs[port].values[k])
-        eq.given.follow(state.t)
+        eq.prescribed.place(state.t)
         y = eq.vector(state)
         status, _, rates = eq.engine.rates(state.q, y)
         if status == Status.DEPENDENT:
@@ -132,7 +132,7 @@ class ReducedMotion:
         eq, solution, n = self._eq, self._solution, len(self._solution)
         reduced, t = eq.reduced, eq.reduced.tables
         prescribed = np.zeros((n, eq.n))
-        prescribed[:, eq.driven] = [eq.prescribed(time) for time in solution.t]
+        prescribed[:, eq.driven] = [eq.prescribed.rates(time) for time in solution.t]
         q, momenta = np.zeros((n, reduced.coordinates)), np.zeros((n, reduced.links, 6))
         for i, edge in enumerate(reduced.edges):
             if edge.state is not None and t.kind[i] != SPRING:

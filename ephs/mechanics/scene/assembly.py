@@ -18,6 +18,7 @@ from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.geometry import body_twist
 from ephs.mechanics.scene.kinematics import Link, Scale, at
 from ephs.mechanics.scene.model import GROUND, IDENTITY_POSE, Body, Joint, Scene, frozen
+from ephs.mechanics.scene.motions import first_rate
 from ephs.mechanics.scene.resolve import BodyDraft, JointDraft
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rank import ASSEMBLY
@@ -180,7 +181,7 @@ def _link(draft: JointDraft, index: Mapping[str, int], poses: Array) -> Link:
     # Where `at` and `axis` are given, the coordinates are 0 by definition.
     coupling = draft.coupling()
     coordinates = draft.coordinates if place.in_bodies else np.zeros(coupling.dim)
-    return Link(draft.name, body1, body2, frame1, frame2, coupling, coordinates, draft.rate, draft.first_rate)
+    return Link(draft.name, body1, body2, frame1, frame2, coupling, coordinates, draft.rate, first_rate(draft.motion))
 
 
 def _joint(draft: JointDraft, link: Link, x: Array, rate: Array) -> Joint:

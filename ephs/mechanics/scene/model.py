@@ -93,8 +93,7 @@ class Joint:
     drive : (d,) constant generalised force on u_r
     motion : the prescribed motion law of a single freedom, or None
     coordinate : (size,) initial element of the pair's group; the two angles of a universal joint
-    rate : (d,) initial u_r, the twist of C2 relative to C1 in the axes of C2 (the two angle rates of a
-        universal joint)
+    rate : (d,) initial u_r, the twist of C2 relative to C1 in C2; of a universal joint the two angles' rates
     limits, stop : (2,) least and largest coordinate of a joint with one freedom, nan for none, and the law of its
         elastic stops; None both where there are no limits
     dry : dry friction of a joint with one freedom, None without
@@ -129,11 +128,6 @@ class Joint:
     def dim(self) -> int:
         """The number of freedoms d."""
         return int(self.rate.shape[0])
-
-    @property
-    def first_rate(self) -> float | None:
-        """The rate of a prescribed motion at the start; None without."""
-        return None if self.motion is None else self.motion.rate(0.0)
 
 
 @final

@@ -9,7 +9,7 @@ from ephs.mechanics.scene.schema import MotionEntry
 from ephs.solve.errors import OptionError
 from ephs.solve.motion_law import HarmonicMotion, MotionLaw, PolynomialMotion, TabulatedMotion
 
-__all__ = ["changed", "law_from", "law_of", "number_of_law"]
+__all__ = ["changed", "first_rate", "law_from", "law_of", "number_of_law"]
 
 STILL: Final = PolynomialMotion((0.0,))
 _KEYS: Final[Mapping[str, tuple[str, ...]]] = {
@@ -52,6 +52,11 @@ def law_from(data: Any) -> MotionLaw | None:
     return (
         HarmonicMotion(**of) if "amplitude" in of else TabulatedMotion(tuple(of["times"]), tuple(of["displacements"]))
     )
+
+
+def first_rate(law: MotionLaw | None) -> float | None:
+    """The rate of a motion law at the start; None without."""
+    return None if law is None else law.rate(0.0)
 
 
 def number_of_law(of: MotionLaw | None, key: str) -> float | None:

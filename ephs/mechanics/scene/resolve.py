@@ -72,11 +72,6 @@ class JointDraft:
     dry: Dry | None = None
     armature: float = 0.0
 
-    @property
-    def first_rate(self) -> float | None:
-        """The rate of a prescribed motion at the start."""
-        return None if self.motion is None else self.motion.rate(0.0)
-
     def coupling(self) -> Coupling:
         """Motions that the joint allows."""
         return coupling(self.kind, self.pitch, self.place.middle)

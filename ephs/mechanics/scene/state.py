@@ -14,6 +14,7 @@ from ephs.mechanics.scene.errors import Fault, SceneError, fault, unknown_name
 from ephs.mechanics.scene.geometry import body_twist, coupling_of
 from ephs.mechanics.scene.kinematics import Link, Scale, elements, largest_gap, largest_slip
 from ephs.mechanics.scene.model import GROUND, Body, Joint, Scene, frozen
+from ephs.mechanics.scene.motions import first_rate
 from ephs.mechanics.scene.tree import spanning_hops
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces import rotations as so3
@@ -63,7 +64,7 @@ class Snapshot:
                     coupling_of(j),
                     None,
                     None,
-                    j.first_rate,
+                    first_rate(j.motion),
                     np.array(j.coordinate),
                 )
                 for j in joints

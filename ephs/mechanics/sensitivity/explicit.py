@@ -87,7 +87,7 @@ class ExplicitTangent:
         """The initial state."""
         eq, count = self.equations, len(self.family.parameters)
         state = eq.start(self.t0)
-        if eq.changing:
+        if eq.prescribed.changing:
             raise OptionError("motion", "one that changes with time", "constant rates; ephs.sweep takes others")
         if not (eq.constant or eq.held):
             self._of_time(self.t0)

@@ -18,6 +18,7 @@ from ephs.mechanics.tree.equations.given import Given
 from ephs.mechanics.tree.equations.heat import heats_of
 from ephs.mechanics.tree.equations.led import Led
 from ephs.mechanics.tree.equations.paper import PaperStates
+from ephs.mechanics.tree.equations.prescribed import Prescribed
 from ephs.mechanics.tree.equations.reading import JointStates
 from ephs.mechanics.tree.equations.stages import evaluated
 from ephs.mechanics.tree.equations.state import ReducedState
@@ -54,8 +55,6 @@ class Equations:
     ----------
     careful
         Whether the loops were closed last at constraints that nearly repeat each other.
-    changing
-        Whether rates of prescribed motions change with time.
     """
 
     def __init__(self, problem: Problem, t0: float, *, pushed: bool = False, apart: bool = False) -> None:
@@ -72,21 +71,20 @@ class Equations:
         self._q = np.zeros(reduced.coordinates)
         self.nv, self.n, self.ns = int(t.dim[self._moving].sum()), reduced.freedoms, len(reduced.entropies)
         self.size = self.nv + self.n + self.ns + 2 + len(reduced.made)
-        driven = [i for i in range(reduced.links) if t.driven[t.r_at[i] : t.r_at[i] + t.dim[i]].any()]
-        self._laws = [law for i in driven if (law := reduced.edges[i].motion) is not None]
-        self._led_q = np.array([int(t.q_at[i]) for i in driven], dtype=int)
-        self.changing = not all(law.constant for law in self._laws)
+        self.prescribed = Prescribed(reduced)
         groups = [i for i in self._moving if t.code[i] != VECTOR]
         self.curved = np.array([int(t.r_at[i]) + j for i in groups for j in range(int(t.dim[i]))], dtype=int)
         self.counted = np.r_[np.arange(self.n), self.nv : self.nv + self.n + self.ns]
         number = {slot.path: i for i, slot in enumerate(problem.descriptor.components)}
         self.heats = heats_of(reduced, model.reference.temperature)
         self.led = Led(
-            problem, frozenset(reduced.entropies[: self.ns - len(reduced.attaching.network.states)]), moved=bool(driven)
+            problem,
+            frozenset(reduced.entropies[: self.ns - len(reduced.attaching.network.states)]),
+            moved=self.prescribed.freedoms.size > 0,
         )
         self._makers = np.array([number[path] for path in reduced.made], dtype=int)
         self.scal = model.scal(0.0)
-        self.given = Given(problem, reduced, self.nv)
+        self.given = Given(problem, reduced, self.nv, self.prescribed)
         self.drive, self.wrench = self.given.drive, self.given.wrench
         self.constant, self.held = problem.constant, problem.held and not problem.constant
         self.steady, self.timed = self.constant or self.held, problem.timed
@@ -95,7 +93,7 @@ class Equations:
         self.evaluations = 0
         self.accounts = Accounts(self)
         self.gravity = reduced.gravity
-        self.driven = np.flatnonzero(t.driven)
+        self.driven = self.prescribed.freedoms
         self._momenta = False
         self._acted = self.given.acted(set(self._moving) if pushed else set())
         self._build(None)
@@ -103,7 +101,7 @@ class Equations:
     def _build(self, kept: "list[Array] | None") -> None:
         """The engine, with all rows of the cut joints or those that are kept."""
         self.engine = engine_of(
-            self.reduced, self.gravity, self.drive, self.wrench, self.scal, self.given.supply, self.given.lead,
+            self.reduced, self.gravity, self.drive, self.wrench, self.scal, self.given.supply, self.prescribed.lead,
             self._acted, kept, apart=self._apart, momenta=self._momenta,
         )  # fmt: skip
 
@@ -206,7 +204,7 @@ class Equations:
             The loops do not close near by, or the state has left the range of numbers.
         """
         within(self.reduced, state.q, state.r, state.heats)
-        if np.any(state.r[self.driven] != self.prescribed(state.t)):  # all rates give way, in the mass metric
+        if np.any(state.r[self.driven] != self.prescribed.rates(state.t)):  # all rates give way, in the mass metric
             return self._closed_carefully(state)
         self.careful = False
         if not self.engine.looped:
@@ -220,14 +218,6 @@ class Equations:
         self._closed_at, self._factored = (q, r), True
         return replace(state, q=q, r=r, memory=())
 
-    def prescribed(self, t: float) -> Array:
-        """Rates of the joints ``driven`` at a time in s."""
-        return np.array([law.rate(t) for law in self._laws])
-
-    def displaced(self, start: float, end: float) -> Array:
-        """Changes of the coordinates of the joints ``driven`` between two times in s."""
-        return np.array([law.displacement(end) - law.displacement(start) for law in self._laws])
-
     def separation(self) -> Array:
         """Squared part of each loop constraint off those before it, relative to the largest constraint, (m,).
 
@@ -240,7 +230,7 @@ class Equations:
     def _closed_carefully(self, state: ReducedState) -> ReducedState:
         """`closed`, for constraints that nearly repeat each other."""
         self.careful = True
-        wanted = self.prescribed(state.t)
+        wanted = self.prescribed.rates(state.t)
         q, r = self.dense.closed(state.q, state.r, wanted, self.moved)
         r[self.driven] = wanted
         return replace(state, q=q, r=r, memory=())
@@ -251,7 +241,7 @@ class Equations:
     def dense(self) -> Dense:
         """Sweeps over dense matrices, made when they are first asked for."""
         if self._dense is None:
-            self._dense = Dense(self.reduced, self.gravity, self.scal, self.given.supply, self.given.lead)
+            self._dense = Dense(self.reduced, self.gravity, self.scal, self.given.supply, self.prescribed.lead)
         return self._dense
 
     def refilled(self) -> None:
@@ -296,14 +286,7 @@ class Equations:
         """The same of a vector whose books are made up already."""
         v, r, heats, books = np.split(y, np.cumsum([self.nv, self.n, self.ns]))
         end = ReducedState(t, self.advance(base.q, v), r, heats, books, account=base.account)
-        return self.followed(base, end) if self.changing else end
-
-    def followed(self, base: ReducedState, end: ReducedState) -> ReducedState:
-        """The end of a step from ``base`` with coordinates and rates of prescribed motions as these are."""
-        q, r = end.q.copy(), end.r.copy()
-        q[self._led_q] = base.q[self._led_q] + self.displaced(base.t, end.t)
-        r[self.driven] = self.prescribed(end.t)
-        return replace(end, q=q, r=r)
+        return self.prescribed.followed(base, end)
 
     def settled(self, y0: Array, y1: Array) -> Array:
         """The end y1 of a step from y0 with what components made in place of what they passed on."""

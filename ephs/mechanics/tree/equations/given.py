@@ -5,6 +5,7 @@ from typing import final
 
 import numpy as np
 
+from ephs.mechanics.tree.equations.prescribed import Prescribed
 from ephs.mechanics.tree.finding.frames import GROUND
 from ephs.mechanics.tree.finding.mechanism import Reduced
 from ephs.mechanics.tree.finding.tables import SPRING
@@ -28,11 +29,9 @@ class Given:
         (links, 6) in body frames.
     supply
         Efforts that are prescribed to what is attached, then flows by the efforts of its network.
-    lead
-        (tree's freedoms,) accelerations of joints whose motion is prescribed, at the time that was placed last.
     """
 
-    def __init__(self, problem: Problem, reduced: Reduced, freedoms: int) -> None:
+    def __init__(self, problem: Problem, reduced: Reduced, freedoms: int, prescribed: Prescribed) -> None:
         self._signals, self._reduced = problem.signals, reduced
         self.drive, self.wrench = np.zeros(freedoms), np.zeros((reduced.links, 6))
         self._contact: Callable[[float], Array] | None = None
@@ -46,9 +45,7 @@ class Given:
         net = reduced.attaching.network
         self.supply = np.zeros(len(net.inputs) + net.skew.shape[0])
         t = reduced.tables
-        self.lead = np.zeros(reduced.freedoms)
-        motions = [(int(t.r_at[i]), edge.motion) for i, edge in enumerate(reduced.edges) if edge.motion is not None]
-        self._laws = [(at, law) for at, law in motions if not law.constant]
+        self._prescribed = prescribed
         for i, edge in enumerate(reduced.edges):
             if edge.port is not None and not self._signals[edge.port].effort:
                 self._drives.append((edge.port, slice(int(t.r_at[i]), int(t.r_at[i] + t.dim[i]))))
@@ -64,7 +61,7 @@ class Given:
         """Put the inputs at a time and state into the arrays; without a state those that are constant."""
         fixed, signals = self._fixed, self._signals
         self.put(lambda port: fixed[port] if port in fixed else 0.0 if state is None else signals[port].at(t, state))
-        self.follow(t)
+        self._prescribed.place(t)
         if self._contact is not None:
             self.drive[:] = self._own * self.drive + self._contact(t)
 
@@ -73,11 +70,6 @@ class Given:
         self._contact = contact
         if contact is None:
             self.drive *= self._own
-
-    def follow(self, t: float) -> None:
-        """Put the accelerations of prescribed motions at a time into ``lead``."""
-        for at, law in self._laws:
-            self.lead[at] = law.acceleration(t)
 
     def put(self, value: Callable[[Path], Array | float]) -> None:
         """Put the inputs into the arrays, each as ``value(port)``."""
