@@ -48,6 +48,11 @@ class Entry:
         """The function's name, for errors."""
         return getattr(self.function, "__qualname__", repr(self.function))
 
+    @property
+    def made_of(self) -> object:
+        """Function and kinds, which are all that an entry is."""
+        return self.function, self.kinds
+
     def signature(self, *, returns: bool = True) -> Signature:
         """Return how this function is called by its address; `returns`: it returns an integer or a condition."""
         return signature_of(returns=returns, **self.kinds)

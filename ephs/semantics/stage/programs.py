@@ -13,6 +13,7 @@ from ephs.semantics.stage.calling import Call, apart, packed
 from ephs.semantics.stage.emission import IntegerPointer, RealPointer, Symbol, TruthSymbol, WholeSymbol, Writer
 from ephs.semantics.stage.entries import Entry
 from ephs.semantics.stage.errors import StageError
+from ephs.semantics.stage.known import known
 from ephs.semantics.stage.machine import Machine
 from ephs.semantics.stage.memory import ArrayIntegers, ArrayReals
 from ephs.semantics.stage.objects import compiled
@@ -186,6 +187,12 @@ def _taped(program: Program) -> Program:
 @cache
 def _staged(program: Program, members: int, shared: tuple[str, ...]) -> tuple[str, str, dict[str, str]]:
     """Return the text of a program, that of its functions on blocks of memory, and the type of each entry's result."""
+    of = (program.name, [(name, entry) for name, entry in program.entries.items()], members, shared)
+    text, blocks, results = known(of, lambda: _emitted(program, members, shared))
+    return text, blocks, results
+
+
+def _emitted(program: Program, members: int, shared: tuple[str, ...]) -> tuple[str, str, dict[str, str]]:
     on = Machine(members)
     results: dict[str, str] = {}
     blocks: list[str] = []

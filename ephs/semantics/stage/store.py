@@ -1,4 +1,4 @@
-"""Object code on disk: one file for each module of machine code, which is whole or counts as absent.
+"""Object code and results of staging on disk: one file for each, which is whole or counts as absent.
 
 A file begins with the digest of its content and gets its name in one move. So a file that is cut short or spoilt is
 compiled anew and replaced, and processes that compile the same module at once replace a file by its like.

@@ -45,6 +45,11 @@ class Layout:
         """Columns of the matrix."""
         return len(self.columns)
 
+    @property
+    def pairs(self) -> tuple[list[tuple[int, float]], list[tuple[int, int]]]:
+        """The items of both mappings."""
+        return list(self.constants.items()), list(self.columns.items())
+
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)

@@ -31,6 +31,7 @@ from ephs.semantics.stage import (
     matrix,
     vector,
 )
+from ephs.semantics.stage.known import known
 from ephs.semantics.stage.memory import IntegerCells, RealCells
 
 __all__ = [
@@ -121,6 +122,8 @@ class Sweeps:
 
     Attributes
     ----------
+    made_of
+        The arguments.
     width
         Numbers of memory that a link takes; the ground takes as many.
     program
@@ -130,15 +133,19 @@ class Sweeps:
     def __init__(
         self, kind: Class, *, general: bool = True, others: "Callable[[Sweeps], dict[str, Entry]] | None" = None
     ) -> None:
-        self._class = kind
+        self._class, self.made_of = kind, (kind, general, others)
         self._zeros = (0, 1, 5) if kind.planar else ()
         self._constants = tuple(
             Layout(known, {k: k for k in range(Link.real_width) if k not in known})
             for known in (kind.constants(number) for number in range(len(kind.joints)))
         )
+        self._states: States | None = None
         entries = others(self) if others is not None else self._general() if general else self._free()
         self._layout: Layout | None = None
-        self._layout = layout_of(State.real_width, lambda survey: self._survey(survey, entries))
+        constants, columns = known(
+            ("layout", self), lambda: layout_of(State.real_width, lambda survey: self._survey(survey, entries)).pairs
+        )
+        self._layout = Layout(dict(constants), dict(columns))
         self.width = self._layout.width
         self.program = Program(_name(kind, general=general), **entries)
 
@@ -153,7 +160,7 @@ class Sweeps:
         )
 
     def _survey(self, survey: Survey, entries: dict[str, Entry]) -> None:
-        self._states: States | None = _Whole(survey.memory())
+        self._states = _Whole(survey.memory())
         for entry in entries.values():
             survey.returned(entry.function(survey, *(survey.argument(kind) for kind in entry.kinds.values())))
         self._states = None

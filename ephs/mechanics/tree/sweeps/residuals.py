@@ -83,6 +83,8 @@ class Residuals:
     ----------
     kinds
         As given.
+    made_of
+        The arguments.
     width
         Numbers of memory that a link takes; the ground takes as many.
     program
@@ -92,7 +94,8 @@ class Residuals:
     """
 
     def __init__(self, kind: Class, kinds: tuple[Kind, ...]) -> None:
-        self.kinds, self._seen = kinds, [k for k in range(6) if not kind.planar or k not in (0, 1, 5)]
+        self.kinds, self.made_of = kinds, (kind, kinds)
+        self._seen = [k for k in range(6) if not kind.planar or k not in (0, 1, 5)]
         self._sweeps = Sweeps(kind, others=self._entries)
         self._tangents: dict[tuple[str, int], Program] = {}
         self.width, self.program = self._sweeps.width, self._sweeps.program
