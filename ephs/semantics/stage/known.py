@@ -110,8 +110,10 @@ class _Teller:
 
     def _compound(self, value: object) -> str:
         match value:
-            case tuple() | list():
-                return f"{type(value).__name__}({self._all(cast('tuple[object, ...]', value))})"
+            case tuple():
+                return f"tuple({self._all(cast('tuple[object, ...]', value))})"
+            case list():
+                return f"list({self._all(cast('list[object]', value))})"
             case Mapping():
                 pairs = cast("Mapping[object, object]", value).items()
                 return f"{{{self._all([part for pair in pairs for part in pair])}}}"
