@@ -166,7 +166,19 @@ GROUPS = {
             "ephs/mechanics/tree/engine/motion.py",
             "ephs/solve/march/*.py",
         ),
-        (f"{MECHANICS}/tree", f"{MECHANICS}/tree/engine", "tests/solve/test_march.py"),
+        (
+            f"{MECHANICS}/tree",
+            f"{MECHANICS}/tree/engine",
+            "tests/solve/test_march.py",
+            *(
+                f"{MECHANICS}/methods/test_{name}.py"
+                for name in ("compiled_radau", "explicit", "heat", "momenta", "parts")
+            ),
+            f"{MECHANICS}/elements/test_contact.py",
+            f"{MECHANICS}/test_work.py",
+            f"{MECHANICS}/test_stability_functions.py",
+        ),
+        pace=Pace(each=6.0, file=40.0, budget=20.0),
     ),
     "derivatives": Group(
         DERIVATIVES,

@@ -64,9 +64,11 @@ class Changed(importlib.abc.MetaPathFinder):
             def get_code(self, fullname: str) -> types.CodeType:
                 return compile(text, self.path, "exec", dont_inherit=True)
 
-        return importlib.machinery.ModuleSpec(
+        found = importlib.machinery.ModuleSpec(
             fullname, Loader(fullname, file), origin=file, is_package=file.endswith("__init__.py")
         )
+        found.has_location = True  # modules that look for files beside them know where they are
+        return found
 
 
 def forked(work: Callable[[Callable[[Any], None]], int], seconds: float) -> tuple[int | None, list[Any]]:

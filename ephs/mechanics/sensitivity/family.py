@@ -39,7 +39,9 @@ RELATIVE = 2.0**-8
 """A neighbour's distance, relative to the parameter, or absolute where that is zero."""
 WIDE = 2.0**-4
 """The same for numbers in which equations in joint coordinates are linear: the farther, the less rounding."""
-LINEAR = ("mass", "inertia", "friction", "stiffness", "damping", "conductance", "drive", "rest", "gravity")
+LINEAR = (
+    "mass", "inertia", "friction", "stiffness", "damping", "conductance", "drive", "rest", "gravity", "rate", "velocity",
+)  # fmt: skip
 SIGNED = ("position", "at", "at1", "at2", "coordinate", "rate", "rest", "drive", "gravity", "velocity")
 RESISTING = ("friction", "stiffness", "damping", "conductance")
 NEXT_TO_NOTHING = 1e-200

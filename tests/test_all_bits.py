@@ -1,0 +1,78 @@
+"""Float runs and machine code give the same bits: of every entry function that runs call, by each method and element.
+
+The registry is what runs call themselves, from Python and by addresses; programs that must be among it are named.
+"""
+
+import numpy as np
+import pytest
+
+import ephs
+from ephs.semantics.stage.elementary import COMPOSED
+from tests.watch import watching
+
+HEAD = 'format = 1\nname = "few"\n[world]\ngravity = [0.0, 0.0, -9.81]\n'
+BALL = """
+[bodies.ball]
+mass = 2.0
+inertia = [8e-3, 8e-3, 8e-3]
+position = [0.0, 0.0, 0.0999]
+velocity = [0.1, 0.0, -0.1]
+[surfaces.ball]
+body = "ball"
+shape = { sphere = 0.1 }
+[surfaces.floor]
+body = "ground"
+shape = { plane = {} }
+"""
+SOFT = BALL.replace("sphere = 0.1 }", "sphere = 0.1 }\nstiffness = 1e5\nloss = 0.3\nfriction = 0.4\nslip = 1e-3")
+HARD = BALL.replace("sphere = 0.1 }", "sphere = 0.1 }\nrestitution = 0.5\nfriction = 0.4")
+HARD = HARD.replace("plane = {} }", "plane = {} }\nrestitution = 0.5\nfriction = 0.4").replace("0.0999", "0.1001")
+BEAM = """
+[beams.rod]
+from = [0.0, 0.0, 0.0]
+to = [1.0, 0.0, 0.0]
+up = [0.0, 0.0, 1.0]
+elements = 1
+order = 4
+section = { circle = 0.01, E = 2e9, nu = 0.3, rho = 7850.0 }
+[joints.clamp]
+type = "fixed"
+bodies = ["ground", "rod.0"]
+at = [0.0, 0.0, 0.0]
+"""
+CASES = {
+    "loops": ("scenes/slider-crank.toml", {"method": "rk87", "until": 0.002}, {"motion_of_loops", "element", "states"}),
+    "network": ("scenes/motor-four-bar.toml", {"method": "rk54", "until": 0.002}, {"network", "resting"}),
+    "natural": ("scenes/four-bar.toml", {"method": "natural", "until": 0.01, "step": 0.01}, {"natural"}),
+    "natural4": ("scenes/body.toml", {"method": "natural4", "until": 0.01, "step": 0.01}, {"gauss"}),
+    "gauss": ("scenes/heavy-top.toml", {"method": "gauss4", "until": 0.002, "step": 0.002}, {"motion_of_trees"}),
+    "radau": ("scenes/chain.toml", {"method": "radau", "until": 0.002}, {"stiff_steps_of_trees"}),
+    "alpha": ("scenes/heavy-top.toml", {"method": "alpha", "until": 0.002, "step": 0.002}, {"motion_of_trees"}),
+    "contact": (SOFT, {"method": "rk87", "until": 1e-4}, {"motion_of_trees", "resting"}),
+    "stiff contact": (SOFT, {"method": "radau", "until": 1e-4}, {"stiff_steps_of_trees"}),
+    "hard contact": (HARD, {"method": "rk87", "until": 2e-3}, {"motion_of_trees"}),
+    "beam": (BEAM, {"method": "natural", "until": 1e-4, "step": 1e-4}, {"natural", "element"}),
+}
+
+
+def watched(case, tmp_path):
+    text, run, _ = CASES[case]
+    file = tmp_path / "few.toml"
+    file.write_text(HEAD + text)
+    scene = ephs.load(text if text.endswith(".toml") else file)
+    with watching() as watch:
+        ephs.simulate(scene, **run, audit="off")
+    return watch
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_every_call_of_a_run_has_the_bits_of_the_float_run(case, tmp_path):
+    watch = watched(case, tmp_path)
+    assert not watch.differing
+    assert CASES[case][2] <= {program for program, _ in watch.seen}
+
+
+def test_another_last_bit_is_noticed(tmp_path, monkeypatch):
+    exact = COMPOSED["sin"]
+    monkeypatch.setitem(COMPOSED, "sin", lambda on, x: np.nextafter(exact(on, x), 2.0))
+    assert watched("natural", tmp_path).differing
