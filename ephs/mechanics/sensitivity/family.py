@@ -40,7 +40,8 @@ RELATIVE = 2.0**-8
 WIDE = 2.0**-4
 """The same for numbers in which equations in joint coordinates are linear: the farther, the less rounding."""
 LINEAR = (
-    "mass", "inertia", "friction", "stiffness", "damping", "conductance", "drive", "rest", "gravity", "rate", "velocity",
+    "mass", "inertia", "friction", "stiffness", "damping", "conductance", "drive", "rest", "gravity", "rate",
+    "velocity",
 )  # fmt: skip
 SIGNED = ("position", "at", "at1", "at2", "coordinate", "rate", "rest", "drive", "gravity", "velocity")
 RESISTING = ("friction", "stiffness", "damping", "conductance")
