@@ -45,6 +45,7 @@ class Draft:
         self._names: dict[str, str] = {WORLD: GROUND}
         self._joint_names: dict[str, str] = {}
         self._gears: dict[str, dict[str, Any]] = {}
+        self._actuators: dict[str, dict[str, Any]] = {}
         self._centres: dict[str, Array] = {WORLD: np.zeros(3)}
         self._left: dict[str, dict[str, None]] = {}
         self._renamed: list[str] = []
@@ -146,6 +147,35 @@ class Draft:
         else:
             self.hold(first)
 
+    def knows(self, name: str) -> bool:
+        """Whether there is a joint of this name that moves freely."""
+        return name in self._joint_names and "motion" not in self._joints[self._joint_names[name]]
+
+    def pull(self, name: str, stiffness: float, rest: float, damping: float) -> None:
+        """Add a spring and friction to a joint of one freedom."""
+        entries = self._joints[self._joint_names[name]]
+        before, whole = entries.get("stiffness", 0.0), entries.get("stiffness", 0.0) + stiffness
+        if stiffness:
+            entries["rest"] = (before * entries.get("rest", 0.0) + stiffness * rest) / whole
+            entries["stiffness"] = whole
+        if damping:
+            entries["friction"] = entries.get("friction", 0.0) + damping
+
+    def belt(
+        self, name: str, joints: Sequence[str], ratio: Sequence[float], stiffness: float, damping: float, stretch: float
+    ) -> None:
+        """A spring and a damper along a sum of coordinates of joints with one freedom; numbers of the first."""
+        self._gears[self._own(name, self._gears)] = {
+            "joints": [self._joint_names[each] for each in joints], "ratio": list(map(float, ratio)),
+            "stiffness": stiffness, "damping": damping, "stretch": stretch,
+        }  # fmt: skip
+
+    def actuate(self, name: str, ratio: Mapping[str, float], limits: Sequence[float] | None) -> None:
+        """A control that is forces on joints of one freedom."""
+        found = {"joints": [self._joint_names[each] for each in ratio], "ratio": list(map(float, ratio.values()))}
+        more = {} if limits is None or limits[0] >= limits[1] else {"limits": list(map(float, limits))}
+        self._actuators[self._own(name, self._actuators)] = found | more
+
     def shape(self, link: str, kind: str, value: Any, place: Array, **more: Any) -> None:
         """Something to draw on a link."""
         if kind != "mesh" and not np.all(np.asarray(value, dtype=float) > 0.0):
@@ -191,6 +221,7 @@ class Draft:
             "bodies": self._bodies,
             "joints": self._joints,
             **({"gears": self._gears} if self._gears else {}),
+            **({"actuators": self._actuators} if self._actuators else {}),
             **({"surfaces": self._surfaces, "contacts": self._contacts} if self._contacts else {}),
         }
 

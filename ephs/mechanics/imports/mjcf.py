@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ephs.mechanics.imports.draft import Draft, along, pose, turned_tensor
+from ephs.mechanics.imports.mjcf_actuators import actuators, tendons
 from ephs.mechanics.imports.mjcf_contacts import contacts
 from ephs.mechanics.imports.mjcf_links import Thread, loops, screws
 from ephs.mechanics.imports.mjcf_names import Names, noted
@@ -87,6 +88,8 @@ def read_mjcf(root: Any, draft: Draft) -> None:
         _joints(model, b, names, threads, draft)
         shapes(model, b, names.bodies[b], source, draft)
     contacts(model, names, draft)
+    tendons(model, names, draft)
+    actuators(model, names, draft)
     loops(model, names, {thread.equality for thread in threads.values()}, draft)
     noted(model, names, draft)
 

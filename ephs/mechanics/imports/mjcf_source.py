@@ -16,13 +16,14 @@ __all__ = ["Source"]
 
 # Sections that a scene does not have, and how what is in them is called.
 _SECTIONS = {
-    "actuator": "actuators",
     "sensor": "sensors",
-    "tendon": "tendons",
     "deformable": "deformables",
     "contact": "contact pairs and exclusions",
     "extension": "plugins",
 }
+# Actuators and tendons that may have a counterpart, and what an actuator then acts on.
+_DRIVES = ("general", "motor", "position", "velocity", "cylinder", "damper")
+_TARGETS = ("joint", "jointinparent", "tendon")
 _SILENT = ("visual", "statistic", "custom", "keyframe", "size", "compiler-plugin")
 _ASSETS = ("texture", "material", "hfield", "skin", "model")
 _UNSUPPORTED = {
@@ -35,7 +36,22 @@ _REFERENCES = ("material", "hfield", "texture")
 # Attributes that hold names: a body may be called nan.
 _NAMES = {
     *("name", "class", "childclass", "model", "file", "content_type", "material", "mesh", "hfield", "prefix", "target"),
-    *("body", "body1", "body2", "joint", "joint1", "joint2", "site", "site1", "site2", "geom", "geom1", "geom2"),
+    *(
+        "body",
+        "body1",
+        "body2",
+        "tendon",
+        "jointinparent",
+        "joint",
+        "joint1",
+        "joint2",
+        "site",
+        "site1",
+        "site2",
+        "geom",
+        "geom1",
+        "geom2",
+    ),
 }
 _MOST_INCLUDES = 100
 _MOST_COPIES = 10_000
@@ -132,6 +148,19 @@ class Source:
                     self._draft.leave(_SECTIONS[section.tag], _called(entry, number))
             if section.tag in _SECTIONS or section.tag in _SILENT:
                 root.remove(section)
+        lost: set[str] = set()
+        for section in root.findall("tendon"):
+            for number, tendon in enumerate(list(section)):
+                if tendon.tag != "fixed":
+                    self._draft.leave("tendons", _called(tendon, number))
+                    lost.add(tendon.get("name") or "")
+                    section.remove(tendon)
+        for section in root.findall("actuator"):
+            for number, drive in enumerate(list(section)):
+                targets = [drive.get(word) for word in _TARGETS if drive.get(word)]
+                if drive.tag not in _DRIVES or not targets or drive.get("tendon") in lost:
+                    self._draft.leave("actuators", _called(drive, number))
+                    section.remove(drive)
         for element in list(root.iter()):
             for child in list(element):
                 if element.tag == "asset" and child.tag in _ASSETS:
@@ -196,11 +225,8 @@ class Source:
 
 
 def _called(entry: Element, number: int) -> str:
-    """Name of an entry; of an actuator on a joint with that joint, whose force is an input here, and the gear."""
-    name, joint, gear = entry.get("name") or f"{entry.tag} {number + 1}", entry.get("joint"), entry.get("gear", "")
-    if joint is None:
-        return name
-    return f"{name} (gear {gear.split()[0]} on {joint})" if gear.split() else f"{name} (on {joint})"
+    """Name of an entry, or one that is made up."""
+    return entry.get("name") or f"{entry.tag} {number + 1}"
 
 
 def _geoms(root: Element) -> Iterator[tuple[Element, Element]]:

@@ -25,7 +25,7 @@ KINDS = {
 }
 AXIAL = ("revolute", "prismatic", "planar")
 ROOT = "root_joint"
-_PASSED_BY = {"transmission": "transmissions", "gazebo": "simulator tags", "sensor": "sensors"}
+_PASSED_BY = {"gazebo": "simulator tags", "sensor": "sensors"}
 
 
 def read_urdf(root: Element, draft: Draft, base: str) -> None:
@@ -50,6 +50,8 @@ def read_urdf(root: Element, draft: Draft, base: str) -> None:
         _joint(name, joints[name], *ends[name], draft)
     for name, joint in joints.items():
         _mimic(name, joint, joints, draft)
+    for number, element in enumerate(root.findall("transmission")):
+        _transmission(element, element.get("name") or f"transmission_{number + 1}", joints, draft)
     for element in root:
         if element.tag in _PASSED_BY:
             draft.leave(_PASSED_BY[element.tag], element.get("name") or element.get("reference") or element.tag)
@@ -186,6 +188,21 @@ def _mimic(name: str, joint: Element, joints: Mapping[str, Element], draft: Draf
         draft.leave("mimicry of", f"{name} (of {other})")
     else:
         draft.gear(name, name, other, ratio, offset)
+
+
+def _transmission(element: Element, name: str, joints: Mapping[str, Element], draft: Draft) -> None:
+    """An actuator of a transmission between one actuator and one joint; its control is the actuator's effort."""
+    tied, motors = element.findall("joint"), element.findall("actuator")
+    joint = "" if len(tied) != 1 or len(motors) != 1 else tied[0].get("name", "")
+    kind = KINDS.get(str(joints[joint].get("type"))) if joint in joints else None
+    text = next((each.text for each in element.iter("mechanicalReduction")), None)
+    ratio = numbers(text, 1, f"transmissions.{name}.mechanicalReduction", draft.faults, (1.0,))[0]
+    if kind not in ("revolute", "prismatic") or not draft.knows(joint) or not ratio:
+        draft.leave("transmissions", name)
+        return
+    limit = joints[joint].find("limit")
+    effort = 0.0 if limit is None else _attribute(limit, "effort", f"joints.{joint}.limit", draft, 0.0)
+    draft.actuate(motors[0].get("name") or name, {joint: ratio}, [-effort / abs(ratio), effort / abs(ratio)])
 
 
 def _origin(element: Element, key: str, draft: Draft) -> np.ndarray:

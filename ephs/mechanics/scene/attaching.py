@@ -65,8 +65,8 @@ def supplies(scene: Scene) -> Iterator[Supply]:
         yield from supplies_of(of)
 
 
-def system_of(of: Attachment, joints: Sequence[Quantity]) -> tuple[System, tuple[str, ...]] | None:
-    """An attachment's system, and its ports of the joints' momenta; None of what is an input only."""
+def system_of(of: Attachment, joints: Sequence[Quantity]) -> tuple[System, tuple[str, ...]]:
+    """An attachment's system, and its ports of the joints' momenta."""
     heat = of.warms and of.heat != ENVIRONMENT
     match of:
         case Motor():
@@ -90,7 +90,7 @@ def system_of(of: Attachment, joints: Sequence[Quantity]) -> tuple[System, tuple
             )
             return made, tuple(f"p{k}" for k in range(len(joints)))
         case _:
-            return None
+            raise TypeError(of.name)
     return made, ("p_r",)
 
 

@@ -281,10 +281,10 @@ def _level(scene: Scene, demands: _Demands, *, top: bool) -> System:
         ports = {port: _joined(b, name, port, system.interface[port].quantity) for port in system.interface}
         b.add(Path(["parts", name]), system, ports)
     for section, name, each in scene.attachments():
+        if isinstance(each, Actuator):
+            continue  # forces on joints, as the runs have them
         at = [_at("drives", tied) for tied in each.tied]
         made = system_of(each, [b.junctions[path].quantity for path in at])
-        if made is None:
-            continue
         ports = dict(zip(made[1], map(str, at), strict=True))
         ports |= {supply.port: b.supply(supply.outer) for supply in supplies_of(each)}
         if each.warms and each.heat != ENVIRONMENT:

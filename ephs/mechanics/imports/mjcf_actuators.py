@@ -1,0 +1,115 @@
+"""Actuators and fixed tendons of a compiled MJCF.
+
+An actuator's force on its length l is gain · control + b₀ + b₁ l + b₂ dl/dt. The first term is an actuator of the
+scene; the others are a spring, friction, and a constant force on its joints.
+"""
+
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any, final
+
+import numpy as np
+
+from ephs.mechanics.imports.draft import Draft
+from ephs.mechanics.imports.mjcf_names import Names
+
+__all__ = ["actuators", "tendons"]
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A length Σ coefficient · coordinate: the numbers of the joints, and its value at the reference configuration."""
+
+    joints: tuple[int, ...]
+    coefficients: tuple[float, ...]
+    length: float
+
+
+def tendons(model: Any, names: Names, draft: Draft) -> None:
+    """Springs and dampers of fixed tendons."""
+    for t in range(model.ntendon):
+        name, line = str(model.tendon(t).name) or f"tendon_{t + 1}", _of_tendon(model, t)
+        stiffness, damping = float(model.tendon_stiffness[t].flat[0]), float(model.tendon_damping[t].flat[0])
+        low, high = model.tendon_lengthspring[t].tolist()
+        if not _pull(name, line, stiffness if low == high else 0.0, low, damping, names, draft):
+            draft.leave("tendons", name)
+        if stiffness and low != high:
+            draft.leave("slack of", name)
+        if model.tendon_limited[t]:
+            draft.leave("limits of", name)
+        if model.tendon_frictionloss[t]:
+            draft.leave("dry friction of", name)
+
+
+def actuators(model: Any, names: Names, draft: Draft) -> None:
+    """Actuators on joints with one freedom and on fixed tendons."""
+    mujoco: Any = import_module("mujoco")
+    through, gains, biases, dynamics = mujoco.mjtTrn, mujoco.mjtGain, mujoco.mjtBias, mujoco.mjtDyn
+    for a in range(model.nu):
+        name = str(model.actuator(a).name) or f"actuator_{a + 1}"
+        kind, target, gear = int(model.actuator_trntype[a]), int(model.actuator_trnid[a, 0]), model.actuator_gear[a]
+        lawful = (
+            int(model.actuator_gaintype[a]) == gains.mjGAIN_FIXED
+            and int(model.actuator_biastype[a]) in (biases.mjBIAS_NONE, biases.mjBIAS_AFFINE)
+            and int(model.actuator_dyntype[a])
+            in (dynamics.mjDYN_NONE, dynamics.mjDYN_FILTER, dynamics.mjDYN_FILTEREXACT)
+        )
+        line: Line | None = None
+        if kind in (through.mjTRN_JOINT, through.mjTRN_JOINTINPARENT) and not np.any(gear[1:]):
+            if names.kinds[target] in ("revolute", "prismatic"):
+                line = Line((target,), (1.0,), float(model.qpos0[model.jnt_qposadr[target]]))
+        elif kind == through.mjTRN_TENDON:
+            line = _of_tendon(model, target)
+        if not lawful or line is None or not all(draft.knows(names.joints[j]) for j in line.joints):
+            draft.leave("actuators", name)
+            continue
+        line = Line(line.joints, tuple(float(gear[0]) * x for x in line.coefficients), float(gear[0]) * line.length)
+        affine = int(model.actuator_biastype[a]) == biases.mjBIAS_AFFINE
+        constant, by_length, by_rate = (float(x) if affine else 0.0 for x in model.actuator_biasprm[a, :3])
+        rest = -constant / by_length if by_length else 0.0
+        if not _pull(name, line, -by_length, rest, -by_rate, names, draft) or (constant and not by_length):
+            draft.leave("bias of", name)
+        gain = float(model.actuator_gainprm[a, 0])
+        limits = model.actuator_ctrlrange[a].tolist() if model.actuator_ctrllimited[a] else None
+        ratio = {names.joints[j]: gain * x for j, x in zip(line.joints, line.coefficients, strict=True)}
+        draft.actuate(name, ratio, limits)
+        if model.actuator_forcelimited[a]:
+            draft.leave("limits of the force of", name)
+        if int(model.actuator_dyntype[a]) != dynamics.mjDYN_NONE:
+            draft.leave("activation of", name)
+
+
+def _of_tendon(model: Any, t: int) -> Line | None:
+    """The length of a fixed tendon over joints with one freedom; None of others."""
+    mujoco: Any = import_module("mujoco")
+    first, count = int(model.tendon_adr[t]), int(model.tendon_num[t])
+    every = range(first, first + count)
+    if any(int(model.wrap_type[w]) != mujoco.mjtWrap.mjWRAP_JOINT for w in every):
+        return None
+    joints = tuple(int(model.wrap_objid[w]) for w in every)
+    coefficients = tuple(float(model.wrap_prm[w]) for w in every)
+    at = (float(model.qpos0[int(model.jnt_qposadr[j])]) for j in joints)
+    return Line(joints, coefficients, sum(c * q for c, q in zip(coefficients, at, strict=True)))
+
+
+def _pull(
+    name: str, line: Line | None, stiffness: float, rest: float, damping: float, names: Names, draft: Draft
+) -> bool:
+    """A spring and a damper along a length; whether the scene has them."""
+    if line is None or not all(draft.knows(names.joints[j]) for j in line.joints):
+        return False
+    if not (stiffness or damping):
+        return True
+    if stiffness < 0.0 or damping < 0.0 or not line.coefficients[0]:
+        return False
+    first, *others = line.coefficients
+    scale, stretch = first * first, (line.length - rest) / first
+    joints = [names.joints[j] for j in line.joints]
+    if not others:
+        draft.pull(joints[0], scale * stiffness, -stretch, scale * damping)
+        return True
+    if not stiffness:
+        return False
+    draft.belt(name, joints, [-x / first for x in others], scale * stiffness, scale * damping, stretch)
+    return True

@@ -1,0 +1,81 @@
+"""Actuators and tendons of MJCF, transmissions of URDF: the forces are MuJoCo's."""
+
+import mujoco
+import numpy as np
+import pytest
+
+import ephs
+from tests.mechanics.imports.models import URDF
+
+BODIES = "".join(
+    f'<body name="{name}" pos="0 {k} 0"><joint name="{name}" type="{kind}" axis="0 1 0" ref="{0.1 * k}" '
+    f'stiffness="{k}" springref="0.3" damping="0.2"/><geom size="0.1" pos="0.2 0 0.1"/></body>'
+    for k, (name, kind) in enumerate((("a", "hinge"), ("b", "hinge"), ("c", "slide"), ("d", "hinge")))
+)
+DRIVEN = f"""<mujoco><compiler angle="radian" autolimits="true"/><worldbody>{BODIES}
+  <body name="e"><freejoint name="e"/><geom size="0.1"/></body></worldbody>
+<tendon>
+  <fixed name="rope" stiffness="7" damping="0.4" springlength="0.2">
+    <joint joint="a" coef="0.5"/><joint joint="b" coef="-2"/></fixed>
+  <fixed name="one" stiffness="3" springlength="-0.1"><joint joint="d" coef="1.5"/></fixed>
+  <spatial name="cable"><site site="tip"/><site site="top"/></spatial>
+</tendon>
+<actuator>
+  <motor name="motor" joint="a" gear="3" ctrlrange="-1 0.5"/>
+  <position name="servo" joint="b" kp="20" kv="2" gear="2"/>
+  <velocity name="speed" joint="c" kv="4"/>
+  <general name="affine" joint="d" gainprm="5" biastype="affine" biasprm="1 -6 -0.5"/>
+  <cylinder name="piston" joint="c" area="0.3" bias="0 -2 0" timeconst="0.1"/>
+  <motor name="pull" tendon="rope" gear="4"/>
+  <damper name="brake" joint="a" kv="2" ctrlrange="0 1"/>
+  <muscle name="muscle" joint="a" lengthrange="0.1 1"/>
+  <motor name="thrust" joint="e" gear="0 0 1 0 0 0"/>
+  <motor name="winch" tendon="cable"/>
+</actuator></mujoco>"""
+CONTROLS = {"motor": 0.9, "servo": 0.4, "speed": -1.3, "affine": 0.7, "piston": 0.0, "pull": 1.1}
+
+
+def test_forces_of_actuators_and_tendons_are_mujocos(write):
+    text = DRIVEN.replace('<body name="e">', '<site name="top"/><body name="e"><site name="tip"/>')
+    path = write(text, "xml")
+    with pytest.warns(ephs.ModelWarning) as said:
+        scene = ephs.load(path)
+    words = str(said[0].message)
+    assert "actuators: muscle, winch, brake, thrust" in words
+    assert "tendons: cable" in words
+    assert "activation of: piston" in words
+    assert set(scene.actuators) == set(CONTROLS)
+
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    rng = np.random.default_rng(3)
+    data.qvel[:4] = rates = rng.standard_normal(4)
+    for name, control in CONTROLS.items():
+        data.ctrl[model.actuator(name).id] = control
+    mujoco.mj_forward(model, data)
+
+    model_rates = dict(zip("abcd", rates.tolist(), strict=True))
+    found = ephs.simulate(
+        scene.with_state(rates=model_rates), 1e-6, inputs={f"actuators.{name}": u for name, u in CONTROLS.items()},
+        method="rk87", rtol=1e-12, atol=1e-14, save_at=[0.0, 1e-6],
+    )  # fmt: skip
+    for name, exact in zip("abcd", data.qacc[:4], strict=True):
+        change = np.diff(found.joint(name).rate[:, 0])[0] / 1e-6
+        assert change == pytest.approx(exact, rel=1e-4, abs=1e-3)
+
+
+def test_a_transmission_is_an_actuator(write):
+    motor = "<joint name='shoulder'/><actuator name='drive'><mechanicalReduction>50</mechanicalReduction></actuator>"
+    with pytest.warns(ephs.ModelWarning) as said:
+        scene = ephs.load(
+            write(URDF.replace('<transmission name="motor"/>', f"<transmission name='t'>{motor}</transmission>"))
+        )
+    assert "transmissions" not in str(said[0].message)
+    drive = scene.actuators["drive"]
+    assert (drive.joints, drive.ratio.tolist(), drive.limits.tolist()) == (("shoulder",), [50.0], [-0.02, 0.02])
+    inputs = {"actuators.drive": 0.01}
+    sol, same = (ephs.simulate(scene, 0.1, inputs=given, method="rk87") for given in (inputs, {"joints.shoulder": 0.5}))
+    assert np.array_equal(sol.joint("shoulder").rate, same.joint("shoulder").rate)
+    assert not np.allclose(
+        sol.joint("shoulder").rate, ephs.simulate(scene, 0.1, method="rk87").joint("shoulder").rate[-1]
+    )
