@@ -91,6 +91,7 @@ class Heats:
     ) -> None:
         self._paths, self._components, self._present, self._theta = paths, components, laws, theta
         self._nodes, self.plain = components >= 0, components == PLAIN
+        self._booked, self._units = bool(np.any(self._nodes)), np.where(self.plain, 1.0, theta)
         self._incidence, self.frictions, self._owners = np.where(self.plain[:, None], 0.0, incidence), frictions, owners
         self._sources, self._sinks = np.maximum(-incidence, 0.0).T, np.maximum(incidence, 0.0).T
         self._loose = 1.0 - np.abs(incidence).max(axis=0, initial=0.0)
@@ -125,16 +126,18 @@ class Heats:
 
     def entropies(self, heats: Array) -> Array:
         """(..., entropies) in J/K, of energies."""
-        out = heats / np.where(self.plain, 1.0, self._theta)
-        k, (c1, c2) = self._nodes, self._laws
-        out[..., k] = c2 * np.log1p(heats[..., k] / c1)
+        out = heats / self._units
+        if self._booked:
+            k, (c1, c2) = self._nodes, self._laws
+            out[..., k] = c2 * np.log1p(heats[..., k] / c1)
         return out
 
     def energies(self, s: Array) -> Array:
         """(..., entropies) in J, of entropies."""
-        out = s * np.where(self.plain, 1.0, self._theta)
-        k, (c1, c2) = self._nodes, self._laws
-        out[..., k] = c1 * np.expm1(s[..., k] / c2)
+        out = s * self._units
+        if self._booked:
+            k, (c1, c2) = self._nodes, self._laws
+            out[..., k] = c1 * np.expm1(s[..., k] / c2)
         return out
 
     def slopes(self) -> Array:

@@ -91,7 +91,7 @@ def computed_torque(
         + np.asarray(stiffness) * off
         + np.asarray(damping) * (wanted.r - state.r)
     )
-    return model.inverse_dynamics(state, np.broadcast_to(a, off.shape))
+    return model.inverse_dynamics(state, a)
 
 
 def task_of(
