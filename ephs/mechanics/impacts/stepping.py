@@ -273,6 +273,7 @@ class Impacts(ReducedMethod):
 
 def _closes(start: float, slope: float, end: float, slope1: float, closed: float) -> float:
     """First part of a way at which a gap with these values and slopes at both ends closes; 1 where it does not."""
+    closed = max(closed, -2.0 * start)  # what is open by less than rounding is so at its start
     cubic = np.array([2.0 * (start - end) + slope + slope1, 3.0 * (end - start) - 2.0 * slope - slope1, slope, start])
     turns = np.roots(np.polyder(cubic))
     inside = [float(x) for x in turns.real[np.abs(turns.imag) < FLAT] if 0.0 < x < 1.0]

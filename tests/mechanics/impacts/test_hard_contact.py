@@ -155,3 +155,42 @@ def test_a_rocking_block_loses_by_its_slenderness(tmp_path):
     energy = m * G * radius * (np.cos(alpha - tilt) - np.cos(alpha))
     assert sol.heat[0] == pytest.approx(0.0, abs=1e-4 * energy)
     assert sol.heat[1] / energy == pytest.approx(1.0 - (1.0 - 1.5 * np.sin(alpha) ** 2) ** 2, rel=1e-3)
+
+
+BALL = {"position": [0.0, 0.0, 0.3], "restitution": 0.5}
+
+
+@pytest.mark.parametrize("name", [name for name, method in METHODS.items() if method.scenes and not method.impacts])
+def test_methods_without_impacts_say_which_have_them(name, tmp_path):
+    step = 0.01 if METHODS[name].fixed else None
+    with pytest.raises(ephs.OptionError, match=r"rk54, rk87.*contacts\.ball_floor.* is a hard contact"):
+        ephs.simulate(scene_of(tmp_path, body("ball", **BALL)), 0.1, method=name, step=step)
+
+
+def test_impacts_do_not_run_backward(tmp_path):
+    with pytest.raises(ephs.OptionError, match="does not run backward"):
+        ephs.simulate(scene_of(tmp_path, body("ball", **BALL)), -0.1)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "fault"),
+    [
+        ("0.0, 0.0, 0.3", "0.0, 0.0, 0.07", r"contacts\.ball_floor: found ball and floor 0\.03 m deep"),
+        ("restitution = 0.5", "restitution = 1.5", "not above 1"),
+        ("restitution = 0.5", "restitution = -0.5", "restitution"),
+        ("restitution = 0.5", "restitution = 0.5\nstiffness = 1e5", "restitution and stiffness"),
+        ("restitution = 0.5", "restitution = 0.5\nslip = 1e-3", "restitution and slip"),
+        ("restitution = 0.5", "restitution = 0.5\ntangential = 2.0", "tangential"),
+    ],
+)
+def test_what_is_wrong_of_hard_surfaces_is_named(old, new, fault, tmp_path):
+    text = body("ball", **BALL)
+    assert old in text
+    with pytest.raises(ephs.SceneError, match=fault):
+        scene_of(tmp_path, text.replace(old, new))
+
+
+def test_a_hard_surface_meets_an_elastic_one_elastically(tmp_path):
+    soft = body("ball", **BALL).replace("restitution = 0.5", "stiffness = 1e5")
+    scene = scene_of(tmp_path, soft)
+    assert scene.contacts["ball_floor"].law.stiffness == 1e5
