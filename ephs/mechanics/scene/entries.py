@@ -62,6 +62,7 @@ _EXPECTED: dict[str, Callable[[Mapping[str, Any]], tuple[str, str]]] = {
     "too_long": lambda ctx: ("length", f"{ctx['max_length']} entries"),
     "greater_than": lambda ctx: ("range", f"a number above {ctx['gt']:g}"),
     "greater_than_equal": lambda ctx: ("range", f"a number not below {ctx['ge']:g}"),
+    "less_than_equal": lambda ctx: ("range", f"a number not above {ctx['le']:g}"),
     "literal_error": lambda ctx: ("range", str(ctx["expected"])),
 }
 
@@ -175,7 +176,7 @@ def _translate(model: type[Entry], key: str, item: Any) -> Fault:
     found = shown(value)
     if code == "finite_number" or (isinstance(value, float) and not math.isfinite(value)):
         return fault("finite", path, found)
-    if code in ("large", "less_than_equal") or context.get("ge") == -LARGEST:
+    if code == "large" or context.get("ge") == -LARGEST or context.get("le") == LARGEST:
         return fault("large", path, found, most=LARGEST)
     if code in ("model_type", "dict_type", "model_attributes_type"):
         return fault("table", path, found)
