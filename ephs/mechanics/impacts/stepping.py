@@ -156,7 +156,8 @@ class Impacts(ReducedMethod):
                     end, error = self._halved(state, share * h, held, gaps, end, error)
                 return end, share, error
             share *= divided
-        raise SolveError(Outcome.DIVERGED, str(self._touching.paths[0]), "the instant at which a gap closes")
+        path = self._touching.paths[int(held[0]) if held.size else int(np.argmin(gaps))]
+        raise SolveError(Outcome.DIVERGED, str(path), "an impact, or forces of closed contacts")
 
     def _halved(
         self, state: ReducedState, h: float, held: Index, gaps: Array, whole: ReducedState, error: float
@@ -218,13 +219,16 @@ class Impacts(ReducedMethod):
             if float(np.abs(mobility @ (found - impulse)).max()) <= SETTLED * most + ROUNDED * (fast + self._speed):
                 break
             impulse = found
-        else:
-            raise SolveError(Outcome.DIVERGED, str(touching.paths[held[0]]), "the forces of its contacts")
+        else:  # the part is too long for them
+            return state, 0.0, 0.5
         pressed = found[::3] > 0.0
         moved = self._put(end, held[pressed], gaps[held[pressed]], change[:, ::3][:, pressed])
         rows1, _ = touching.rows(moved.q, moved.r, held, axes)
         moved = replace(moved, r=moved.r + change @ (found - impulse))
         stop = rows1 @ moved.r
+        loose = held[found[::3] <= 0.0]
+        if loose.size and touching.gaps(moved.q, moved.r)[loose].min() < -self._closed:  # it leaves and comes back
+            return end, 0.0, 0.5
         if (divided := _turning(before, stop, found, laws, PARTING * self._speed)) < 1.0:
             return end, 0.0, divided
         taken = -0.5 * (found * (start + stop)).reshape(-1, 3)[:, 1:].sum(axis=1)
