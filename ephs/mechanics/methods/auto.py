@@ -2,6 +2,7 @@
 
 Stiffness is what Hairer and Wanner test in DOPRI5 and DOP853: the last two stages of a step show how fast its fastest
 mode is, and a step that this holds at the limit of stability again and again serves stability, not accuracy.
+Contacts of trees are stiff from the start: their steps are radau's.
 """
 
 from typing import TYPE_CHECKING, Any, final
@@ -26,6 +27,8 @@ LIMITS = {"rk54": 3.25, "rk87": 6.1}
 """h·|λ| at the limit of stability."""
 SLOW = 0.5
 """Contraction of a Gauss method's sweeps beyond which these hold its steps back, not accuracy."""
+FREEDOMS = 64
+"""Freedoms up to which factorising their matrix costs less than an explicit method's shorter steps."""
 DIGITS = 1e-5
 """Tolerances below this are for order 8."""
 
@@ -52,6 +55,9 @@ class Auto(ReducedMethod):
         self._held = self._free = self._failures = 0
         self.name, self.exponent, self.share = name, self._explicit.exponent, self._explicit.share
         self.counts: dict[str, Any] = {"chosen": name, "switches": []}
+        if name == "rk54" and _touches(equations):
+            self._go_implicit()
+            self.name = self.counts["chosen"] = "radau"
 
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
         """One step of h seconds."""
@@ -108,3 +114,9 @@ class Auto(ReducedMethod):
         if own["implicit"] is not None:
             self._go_implicit().restore(own["implicit"], state)
         self._held, self._free, self._failures = own["nearness"]
+
+
+def _touches(equations: Equations) -> bool:
+    """Whether surfaces of a tree may touch, and implicit steps are taken many in one compiled call."""
+    compiled = equations.constant and not (equations.engine.looped or equations.reduced.attaching.network.attached)
+    return compiled and equations.n <= FREEDOMS and bool(equations.reduced.tables.support.any())
