@@ -12,6 +12,7 @@ from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.geometry import body_twist, coupling_of
 from ephs.mechanics.scene.model import GROUND, IDENTITY_POSE, Joint, Scene, frozen
 from ephs.mechanics.scene.motions import changed, number_of_law
+from ephs.mechanics.scene.surfaces import Contact
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces import rotations as so3
 from ephs.semantics.spaces.rank import INERTIA
@@ -94,6 +95,22 @@ def _attribute(kind: str, key: str, least: Least | None = None, **more: Any) -> 
         return _edited(scene, kind, name, lambda thing: replace(thing, **{key: value}))
 
     return Field(get, put, least, **more)
+
+
+def _law(key: str, least: Least | None = None) -> Field:
+    """A number of the law of contacts that have it: hard ones have no stiffness, soft ones no restitution."""
+
+    def get(scene: Scene, name: str) -> Array:
+        value = getattr(_thing(scene, "contacts", name).law, key, None)
+        return np.zeros(0) if value is None else np.asarray(value, dtype=float)
+
+    def put(scene: Scene, name: str, values: Array) -> Scene:
+        def edited(contact: Contact) -> Contact:
+            return replace(contact, law=replace(contact.law, **{key: float(values)}))
+
+        return _edited(scene, "contacts", name, edited)
+
+    return Field(get, put, least)
 
 
 def _world(key: str, least: Least | None = None) -> Field:
@@ -320,6 +337,14 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
         "temperature": _attribute("thermal", "temperature", POSITIVE),
     },
     "conduction": {"conductance": _attribute("conduction", "conductance", NON_NEGATIVE)},
+    "contacts": {
+        "stiffness": _law("stiffness", POSITIVE),
+        "loss": _law("loss", NON_NEGATIVE),
+        "friction": _law("friction", NON_NEGATIVE),
+        "slip": _law("slip", POSITIVE),
+        "rolling": _law("rolling", NON_NEGATIVE),
+        "spinning": _law("spinning", NON_NEGATIVE),
+    },
     "markers": {"at": _attribute("markers", "at")},
 }
 """Kind of thing -> key of the scene file -> its numbers."""

@@ -1,8 +1,8 @@
 """Numbers of a model by path: read one, or make the model with other ones.
 
 Paths of a scene are keys of its file, names in parts dotted: ``bodies.crank.mass``, ``bodies.left.crank.inertia[0]``,
-``joints.pin.friction``, ``joints.pin.frame1.position[2]``, ``springs.s.length``, ``world.gravity[2]``. Those of a
-system are its components' parameters: ``osc.pe.k``.
+``joints.pin.friction``, ``joints.pin.frame1.position[2]``, ``springs.s.length``, ``contacts.foot_floor.friction``,
+``world.gravity[2]``. Those of a system are its components' parameters: ``osc.pe.k``.
 
 Positions mean what they mean in a file whose joints are given by ``at`` and ``axis``: a body's ``position`` moves its
 centre of mass (with its axes, springs and markers) while its joints stay where they are in the world, a joint's ``at``
@@ -181,6 +181,7 @@ def _things(scene: Scene, kind: str) -> Mapping[str, Any]:
         "springs": scene.all_springs,
         "thermal": scene.all_thermal,
         "conduction": scene.all_conduction,
+        "contacts": scene.all_contacts,
         "markers": scene.all_markers,
     }
     if kind in ATTACHED:

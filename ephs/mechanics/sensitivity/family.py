@@ -15,6 +15,7 @@ from ephs.mechanics.runs.simulate import problem_of_scene, problem_of_system
 from ephs.mechanics.scene.errors import SceneError
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.parameters import read, varied
+from ephs.mechanics.tree.finding.roles import strikes
 from ephs.operad import Path
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.derive.relations import entry_of
@@ -117,6 +118,8 @@ class Family:
                 self._inputs[f"joints.{joint}"] = np.zeros(model.joint(joint).dim)
         self._neighbours: dict[tuple[str, float], Problem] = {}
         self.problem = self._made({})
+        if (path := strikes(self.problem.descriptor.components)) is not None:
+            raise OptionError("model", str(path), "a contact with a stiffness: impulses have no derivative")
         self._states = {str(slot.path): slot for slot in self.problem.descriptor.states}
         idle = {path: NEXT_TO_NOTHING for path in paths if path.rpartition(".")[2].partition("[")[0] in RESISTING}
         idle = {path: value for path, value in idle.items() if not self._read(path)}

@@ -182,8 +182,8 @@ class Solver:
             s.pair[i, size + i], s.pair[size + i, i] = -turning, turning
 
         on.loop(size, row)
-        lu(on, s.single, s.swap)
-        lu(on, s.pair, s.swaps)
+        lu(on, s.single, s.swap, skipping=True)
+        lu(on, s.pair, s.swaps, skipping=True)
 
     def _factors(self, size: int) -> Matrix:
         """The factors of the freedoms' matrix: of one, or of a pair."""
@@ -208,8 +208,8 @@ class Solver:
             pair[i, n + i], pair[n + i, i] = pair[i, n + i] - imaginary, pair[n + i, i] + imaginary
 
         on.loop(n, row)
-        lu(on, single, s.swap)
-        lu(on, pair, s.swaps)
+        lu(on, single, s.swap, skipping=True)
+        lu(on, pair, s.swaps, skipping=True)
 
     def _by_freedoms(self, parts: list[Vector], by: list[Real]) -> None:
         """Solve for (δv, δr, δs) in place of (f_v, f_r, f_s): a real right side, or both parts of a complex one."""
