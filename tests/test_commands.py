@@ -128,7 +128,7 @@ def test_animate_makes_a_page_of_a_result_folder(tmp_path, capsys):
     [
         ("nowhere", "film.html", "no solution.nc in it"),
         ("broken", "film.html", "not a netCDF file"),
-        ("circuit", "film.html", "found no scene"),
+        ("circuit", "film.html", "found no bodies"),
         ("circuit", "film.pdf", "expected one of .html"),
     ],
 )

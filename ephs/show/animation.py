@@ -51,7 +51,7 @@ def animate(
     Parameters
     ----------
     sol : Solution
-        Of a scene.
+        Of a scene, or of a system with bodies.
     path : str or Path, optional
         Where to write the page.
     wrenches : bool
@@ -75,7 +75,7 @@ def animate(
     Raises
     ------
     ShowError
-        If the solution has no scene, or no instants, viser is not installed, or `fps` or `duration` is not positive.
+        If the solution has no bodies, or no instants, viser is not installed, or `fps` or `duration` is not positive.
     """
     stage = stage_of(sol, wrenches=wrenches, heat=heat, fps=fps, duration=duration)
     if find_spec("viser") is None:

@@ -40,9 +40,9 @@ def plot_mechanism(sol: Any, at: float | None = None, *, opened: bool = False) -
     """
     from matplotlib import rc_context
 
-    scene = sol if callable(getattr(sol, "all_bodies", None)) else sol.scene
+    scene = sol if callable(getattr(sol, "all_bodies", None)) else sol.outline
     if scene is None:
-        raise ShowError("nothing", path=str(sol.name), found="mechanism", expected="a scene's solution")
+        raise ShowError("nothing", path=str(sol.name), found="mechanism", expected="a solution with bodies")
     if sol is scene:
         poses = {name: np.asarray(body.pose, dtype=float) for name, body in scene.all_bodies()}
         way, system = None, scene.system()
@@ -74,7 +74,7 @@ def _poses(sol: Any, at: float | None) -> tuple[dict[str, Any], Any]:
     if not min(t[0], t[-1]) <= time <= max(t[0], t[-1]):
         span = f"one from {t[0]:g} to {t[-1]:g} s"
         raise ShowError("nothing", path=str(sol.name), found=f"time {time:g} s", expected=span)
-    names = [name for name, _ in sol.scene.all_bodies()]
+    names = [name for name, _ in sol.outline.all_bodies()]
     frames = film(sol, names, 30.0, None, most=60)
     places = [np.asarray(sol.body(name).position, dtype=float) for name in names]
     still: dict[str, Any] = {}

@@ -16,10 +16,7 @@ _TEXTS = {
         "positions: {path} and {found} are at the same point; expected different points for all boxes and junctions; "
         "move one of them"
     ),
-    "scene": (
-        "solution {path}: found no scene, expected bodies to animate; "
-        "only solutions of a Scene can be animated, plot() draws the states of any other"
-    ),
+    "scene": ("solution {path}: found no bodies, expected some to animate; plot() draws the states"),
     "viser": (
         "animation: the package viser is not installed; expected it for moving pictures; "
         "install it with: pip install 'ephs[viz]'"

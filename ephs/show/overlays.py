@@ -117,7 +117,7 @@ def loads_of(sol: Any, frames: Film, joints: dict[str, Any]) -> Loads:
 
 def _contacts(sol: Any, instants: NDArray[np.int64]) -> list[Arrows]:
     """Forces of contacts, those that slip apart from those that stick, on one scale."""
-    laws = dict(sol.scene.all_contacts())
+    laws = dict(sol.outline.all_contacts())
     if not laws:
         return []
     motions = [sol.contact(name) for name in laws]

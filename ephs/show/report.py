@@ -164,10 +164,10 @@ def _final(summary: dict[str, Any]) -> str:
 
 
 def _schematic(sol: Any) -> str:
-    if sol.scene is None or not len(sol.t):
+    if sol.outline is None or not len(sol.t):
         return ""
-    poses = {name: _pose(sol.body(name)) for name, _ in sol.scene.all_bodies()}
-    return f"<h2>Schematic</h2><figure>{still_svg(sol.scene, poses)}</figure>" if poses else ""
+    poses = {name: _pose(sol.body(name)) for name, _ in sol.outline.all_bodies()}
+    return f"<h2>Schematic</h2><figure>{still_svg(sol.outline, poses)}</figure>" if poses else ""
 
 
 def _pose(body: Any) -> Any:
@@ -183,9 +183,9 @@ def _pattern(sol: Any) -> str:
 
 
 def _animation(sol: Any) -> str:
-    if sol.scene is None:
+    if sol.outline is None:
         return ""
-    warm = any(True for _ in sol.scene.all_thermal())
+    warm = any(True for _ in sol.outline.all_thermal())
     stage = stage_of(sol, wrenches=False, heat=warm, fps=30.0, duration=None)
     return f"<h2>Motion</h2>{player(stage, str(sol.name))}"
 

@@ -74,23 +74,24 @@ def stage_of(sol: Any, *, wrenches: bool, heat: bool, fps: float, duration: floa
     Raises
     ------
     ShowError
-        If the solution has no scene, or no instants, or `fps` or `duration` is not positive.
+        If the solution has no bodies, or no instants, or `fps` or `duration` is not positive.
     """
-    if sol.scene is None:
+    scene = sol.outline
+    if scene is None:
         raise ShowError("scene", path=str(sol.name))
     if not len(sol.t):
         raise ShowError("nothing", path=str(sol.name), found="instants", expected="some to show")
     for name, value in (("fps", fps), ("duration", duration)):
         if value is not None and not value > 0:
             raise ShowError("span", path=name, found=str(value), expected="something above 0")
-    bodies, joints = dict(sol.scene.all_bodies()), dict(sol.scene.all_joints())
+    bodies, joints = dict(scene.all_bodies()), dict(scene.all_joints())
     frames = film(sol, list(bodies), fps, duration)
     return Stage(
         joints,
-        dict(sol.scene.all_springs()),
+        dict(scene.all_springs()),
         bodies,
-        solids_of(sol.scene),
+        solids_of(scene),
         frames,
         loads_of(sol, frames, joints) if wrenches else None,
-        heat_of(sol, frames, [name for name, _ in sol.scene.all_thermal()]) if heat else None,
+        heat_of(sol, frames, [name for name, _ in scene.all_thermal()]) if heat else None,
     )

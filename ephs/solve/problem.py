@@ -119,6 +119,14 @@ class Linked(Protocol):
         ...
 
 
+class Outlined(Linked, Protocol):
+    """The same of a system."""
+
+    def outline(self) -> Any:
+        """Bodies and joints as a scene, to be drawn."""
+        ...
+
+
 class Motion(Protocol):
     """A motion in the terms of its field: the solver itself knows states, efforts and flows only."""
 
@@ -233,7 +241,7 @@ class Problem:
     shaky: Callable[[], bool] | None = None
     shown: "Callable[[Record, Mapping[str, Any]], tuple[Problem, Record, Mapping[str, Any]]] | None" = None
     gaps: Callable[["Solution"], Array] | None = None
-    linked: Callable[["Solution"], "Linked"] | None = None
+    linked: Callable[["Solution"], Outlined] | None = None
     given: Callable[[State], State] | None = None
     view: Callable[[State], Mapping[Path, Array]] = States
     seconds: float = 1.0

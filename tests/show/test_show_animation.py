@@ -124,7 +124,7 @@ def test_impossible_films_are_refused(pendulum, asked, words):
 
 
 def test_a_system_without_scene_cannot_be_animated(circuit):
-    with pytest.raises(ShowError, match="damped oscillator: found no scene"):
+    with pytest.raises(ShowError, match="damped oscillator: found no bodies"):
         animate(circuit)
 
 

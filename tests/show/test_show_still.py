@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 import ephs
+from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.show.sketch import sketch
+from ephs.show.stage import stage_of
 from ephs.show.still import HIGHEST, WIDTH, still_svg
 
 SCENES = sorted((Path(__file__).resolve().parents[2] / "scenes").glob("*.toml"))
@@ -36,3 +38,24 @@ def test_names_cannot_break_the_picture(tmp_path):
     scene = ephs.load(file)
     picture = ElementTree.fromstring(still_svg(scene, {"<b>&": np.array([1.0, 0, 0, 0, 0, 0, 0])}))
     assert "<b>&" in [element.text for element in picture]
+
+
+def test_the_outline_of_a_system_is_where_the_scene_is():
+    """A system has no shapes and no names: bodies, joints and their frames are those of the scene it was built from."""
+    scene = ephs.load(next(file for file in SCENES if file.stem == "four-bar"))
+    problem = problem_of_scene(scene)
+    initial = {str(path): value for path, value in problem.initial.items()}
+    inputs = {str(path): {"flow": signal.value} for path, signal in problem.signals.items()}
+    sol = ephs.simulate(problem.system, 0.2, initial=initial, inputs=inputs, save_at=[0.0, 0.1, 0.2])
+    known = ephs.simulate(scene, 0.2, save_at=[0.0, 0.1, 0.2])
+    for name, joint in scene.all_joints():
+        found = sol.outline.joint(f"joints.{name}")
+        assert (found.kind, found.body1.rpartition(".")[2], found.body2.rpartition(".")[2]) == (
+            joint.kind, joint.body1, joint.body2,
+        )  # fmt: skip
+        np.testing.assert_allclose(found.frame1, joint.frame1, atol=1e-12)
+        np.testing.assert_allclose(found.frame2, joint.frame2, atol=1e-12)
+    own = stage_of(sol, wrenches=True, heat=False, fps=10.0, duration=None)
+    for name, _ in scene.all_bodies():
+        np.testing.assert_allclose(own.frames.poses[f"bodies.{name}"][-1, 4:], known.body(name).position[-1], atol=1e-6)
+    assert own.loads is not None and own.size() > 1.0

@@ -230,6 +230,13 @@ class Solution:
             return self.motion
         return None if self.problem is None or self.problem.linked is None else self.problem.linked(self)
 
+    @cached_property
+    def outline(self) -> Any:
+        """Bodies and joints to be drawn: the scene, or those of a system as one; None where there are none."""
+        if self.scene is not None or self.problem is None or self.problem.linked is None:
+            return self.scene
+        return self.problem.linked(self).outline()
+
     def thermal(self, name: str) -> Any:
         """The temperature of a thermal node."""
         return self._moving("thermal nodes").thermal(name)
