@@ -46,17 +46,21 @@ def ladder(cells: int) -> System:
 
 
 def grid(cells: int) -> System:
-    """A square of heat capacities, each conducting to its right and to its lower neighbour; a corner is hot."""
-    side = math.isqrt(cells)
+    """A square of heat capacities."""
+    return conducting(math.isqrt(cells), math.isqrt(cells))
+
+
+def conducting(rows: int, columns: int) -> System:
+    """Heat capacities in rows, each conducting to its right and to its lower neighbour."""
     node = lib.thermal_capacity(c1=293.15 * 10.0, c2=10.0)
-    junctions = {f"s{i}_{j}": junction(Q.entropy) for i in range(side) for j in range(side)}
-    boxes: dict[str, dict[str, str]] = {f"n{i}_{j}": {"s": f"s{i}_{j}"} for i in range(side) for j in range(side)}
+    junctions = {f"s{i}_{j}": junction(Q.entropy) for i in range(rows) for j in range(columns)}
+    boxes: dict[str, dict[str, str]] = {f"n{i}_{j}": {"s": f"s{i}_{j}"} for i in range(rows) for j in range(columns)}
     fillings: dict[str, Any] = dict.fromkeys(boxes, node)
     link = lib.heat_transfer(h=1.0)
-    for i in range(side):
-        for j in range(side):
+    for i in range(rows):
+        for j in range(columns):
             for name, k, m in (("right", i, j + 1), ("down", i + 1, j)):
-                if k < side and m < side:
+                if k < rows and m < columns:
                     boxes[f"{name}{i}_{j}"] = {"s1": f"s{i}_{j}", "s2": f"s{k}_{m}"}
                     fillings[f"{name}{i}_{j}"] = link
     return Pattern(junctions, boxes)(fillings)

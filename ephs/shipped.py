@@ -27,6 +27,7 @@ SHIPPED: Final = (
     "ephs.mechanics.tree.sweeps.balances:network_program",
     "ephs.mechanics.sensitivity.implicit:tangent_program",
     "ephs.solve.methods.newton:natural_program",
+    "ephs.solve.methods.integral:integral_program",
     "ephs.solve.methods.gauss:gauss_program",
     "ephs.exporting.outputs:outputs_program",
 )

@@ -209,16 +209,20 @@ class Proportional:
         aims at (h/T)^share of it. With 0 errors add up over the steps, with 1 they make the tolerance together.
     damping
         How much the last error counts, 0 for none.
+    hold
+        A step that may grow by less than this factor stays as it is, since its matrices are factorised; else its own
+        error alone counts. With 1 both do.
     """
 
-    STRICT = 30.0
+    STRICT, NEAR = 30.0, 0.93
     finest = 0.0
 
     def __init__(
-        self, exponent: Callable[[], float], share: Callable[[], float] = lambda: 0.0, damping: float = 0.4
-    ) -> None:
+        self, exponent: Callable[[], float], share: Callable[[], float] = lambda: 0.0, damping: float = 0.4,
+        hold: float = 1.0,
+    ) -> None:  # fmt: skip
         self._exponent, self._share, self._damping, self._before = exponent, share, damping, 1e-4
-        self._failed = False
+        self._failed, self._hold = False, hold
 
     def judge(self, h: float, error: float, span: float) -> tuple[bool, float]:
         """Accept what is at most 1; a step after a failure does not grow.
@@ -235,6 +239,9 @@ class Proportional:
         main = (1.0 - 0.75 * self._damping) / exponent
         factor = 0.9 * max(error, UNFELT) ** -main * self._before ** (self._damping / exponent)
         self._before = max(error, 1e-4)
+        if self._hold > 1.0:
+            alone = 0.9 * max(error, UNFELT) ** (-1.0 / exponent)
+            factor = 1.0 if self.NEAR <= alone < self._hold else alone
         most = 1.0 if self._failed else 6.0
         self._failed = False
         return True, h * min(most, max(0.3, factor))

@@ -93,11 +93,15 @@ class Model:
 
     def storages(self) -> "Model":
         """The model without what is no storage."""
-        t, stored = self.tables, np.flatnonzero(self.tables.kind == STORING)
+        return self.only(np.flatnonzero(self.tables.kind == STORING))
+
+    def only(self, chosen: Index) -> "Model":
+        """The model with these components alone, in this order, at the same places."""
+        t = self.tables
         keys = (
             "kind", "address", "dims", "parameter_at", "e_at", "multiplier_at", "read_x_at", "read_w_at", "jacobian_at"
         )  # fmt: skip
-        return replace(self, tables=replace(t, **{key: getattr(t, key)[stored] for key in keys}))
+        return replace(self, tables=replace(t, **{key: getattr(t, key)[chosen] for key in keys}))
 
     def path_of(self, component: int) -> Path:
         """The path of a component by its number."""

@@ -116,6 +116,7 @@ GROUPS = {
             "ephs/solve/methods/natural4.py",
             "ephs/solve/methods/radau.py",
             "ephs/solve/methods/collocation.py",
+            "ephs/solve/methods/integral.py",
             "ephs/mechanics/methods/explicit.py",
             "ephs/mechanics/methods/tableaux.py",
             "ephs/mechanics/methods/alpha.py",
@@ -124,6 +125,7 @@ GROUPS = {
         ),
         (
             *RUNS,
+            "tests/solve/test_integral.py",
             "tests/solve/test_books.py",
             "tests/solve/test_journal.py",
             f"{MECHANICS}/rewrite/test_folding.py",

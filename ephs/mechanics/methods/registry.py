@@ -212,7 +212,9 @@ def _radau(setting: Setting) -> tuple[Stepper[Any], Policy | None]:
     from ephs.solve.methods.radau import Radau
 
     stepper = Radau(setting.problem, setting.t0, setting.control)
-    return stepper, None if setting.control.step is not None else Proportional(lambda: stepper.exponent)
+    return stepper, None if setting.control.step is not None else Proportional(
+        lambda: stepper.exponent, hold=Radau.hold
+    )
 
 
 METHODS: dict[str, Method] = {}

@@ -53,13 +53,16 @@ _SIGNS = {
     Outcome.UNKNOWN: "?",
 }
 _DPI = 150
+_DEFECTS = (1e-16, 1e-2)
+"""Defects of energy from the lightest colour to the darkest."""
+_UNKNOWN = "#d1d5db"
 
 
 def draw_work_precision(points: Sequence[Point], title: str, folder: Path, name: str) -> list[Path]:
-    """Error against wall time, evaluations, and the tolerance asked for; PNG, SVG, CSV and JSON of this name.
+    """Error against time, evaluations, and the tolerance asked for; and against time, coloured by the defect of energy.
 
-    Methods over tolerances have filled marks and full lines, over steps hollow marks and dashed lines. What failed is
-    marked at the right edge.
+    Written as PNG, SVG, CSV and JSON of this name. Methods over tolerances have filled marks and full lines, over steps
+    hollow marks and dashed lines. What failed is marked at the right edge.
     """
     from matplotlib import rc_context
 
@@ -68,10 +71,10 @@ def draw_work_precision(points: Sequence[Point], title: str, folder: Path, name:
     for point in points:
         series.setdefault((point.method, point.setting.kind), []).append(point)
     with rc_context(style):
-        figure = new_figure(12.0, 5.6)
-        left, middle, right = figure.subplots(1, 3, sharey=True)
+        figure = new_figure(12.0, 9.6)
+        (left, middle), (right, lawful) = figure.subplots(2, 2, sharey=True)
         panels = (
-            (left, "seconds", "wall time [s]"),
+            (left, "seconds", "time [s]"),
             (middle, "evaluations", "evaluations, iterations"),
             (right, "tolerance", "tolerance asked for"),
         )
@@ -85,8 +88,10 @@ def draw_work_precision(points: Sequence[Point], title: str, folder: Path, name:
         if asked:
             right.plot([min(asked), max(asked)], [min(asked), max(asked)], color=GREY, linewidth=0.8, zorder=0.5)
             right.invert_xaxis()
+        _defects(lawful, series)
         left.set_ylabel("error at the end [m, 1]")
-        left.set_title(plain(title), loc="left")
+        right.set_ylabel("error at the end [m, 1]")
+        left.set_title(plain(title, 90), loc="left")
         _failures(right, series)
         handles, labels = left.get_legend_handles_labels()
         extra, said = middle.get_legend_handles_labels()
@@ -98,7 +103,7 @@ def draw_work_precision(points: Sequence[Point], title: str, folder: Path, name:
             handles.append(Line2D([], [], color=INK, marker="x", markersize=4.0, linestyle="none"))
             labels.append("near the reference's own error")
         if handles:
-            figure.legend(handles, labels, loc="outside lower center", ncols=5, frameon=False, fontsize=8.0)
+            figure.legend(handles, labels, loc="outside lower center", ncols=6, frameon=False, fontsize=8.0)
     return [*_save(figure, folder, name), *_write_data([_flat(point) for point in points], folder, name)]
 
 
@@ -217,7 +222,7 @@ def _look(method: str) -> tuple[str, str]:
     """One colour and one marker a method, the same in every figure."""
     if method in METHODS:
         at = list(METHODS).index(method)
-        return _COLOURS[at % len(_COLOURS)], _MARKERS[at % len(_MARKERS)]
+        return _COLOURS[at % len(_COLOURS)], _MARKERS[(at + at // len(_COLOURS)) % len(_MARKERS)]
     at = list(PEERS).index(method) if method in PEERS else 0
     return _PEER_COLOURS[at % len(_PEER_COLOURS)], _PEER_MARKERS[at % len(_PEER_MARKERS)]
 
@@ -243,6 +248,25 @@ def _curve(axes: "Axes", method: str, kind: str, points: Sequence[Point], key: s
     floor = [p for p in done if p.floor]
     if floor:
         axes.plot([getattr(p, key) for p in floor], [p.error for p in floor], "x", color=INK, markersize=4.0)
+
+
+def _defects(axes: "Axes", series: Mapping[tuple[str, str], Sequence[Point]]) -> None:
+    """Error against time, marks filled by the defect of the balance of energy, grey where it is not known."""
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import LogNorm
+
+    shade: Any = ScalarMappable(LogNorm(*_DEFECTS, clip=True), "viridis_r")
+    for (method, _), found in series.items():
+        done = [p for p in found if p.outcome is Ending.DONE and p.error > 0.0]
+        fills = [shade.to_rgba(max(p.defect, _DEFECTS[0])) if math.isfinite(p.defect) else _UNKNOWN for p in done]
+        x, y = [p.seconds for p in done], [p.error for p in done]
+        axes.plot(x, y, color=GREY, linewidth=0.5, zorder=1.0)
+        axes.scatter(x, y, c=fills, marker=_look(method)[1], s=26.0, edgecolors=INK, linewidths=0.3, zorder=2.0)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set_xlabel("time [s]")
+    bar = axes.figure.colorbar(shade, ax=axes, pad=0.02)
+    bar.set_label("defect of energy, relative to what is turned over")
 
 
 def _both(method: str) -> bool:

@@ -40,6 +40,8 @@ class Point:
         Of the accelerations, or iterations where the method solves equations; 0 where it does not tell.
     outcome, message
         How the run ended, and what it told its user.
+    defect
+        Of the balance of energy at the end, relative to what was turned over; NaN where it is not known.
     floor
         Whether the error is too near that of the reference to be known.
     """
@@ -52,6 +54,7 @@ class Point:
     steps: int
     outcome: Ending
     message: str = ""
+    defect: float = np.nan
     floor: bool = False
 
     @property
@@ -125,22 +128,27 @@ def _settings(name: str, until: float, tolerances: Sequence[float], steps: Seque
 def _own(
     scene: Scene, until: float, name: str, settings: list[Setting], truth: Reference, repeats: int, limit: float
 ) -> Iterator[Point]:
+    both = np.array([0.0, until])
     for setting in settings:
-        first = attempt(scene, until, name, setting, limit=limit)
+        first = attempt(scene, until, name, setting, limit=limit, save_at=both)
         if first.solution is None:
             yield Point(name, setting, np.nan, np.nan, 0, 0, first.ending, first.message)
             if first.ending is not Ending.FAILED:  # a finer setting changes nothing, or takes longer still
                 return
             continue
         if setting is settings[0] and first.wall > limit / 4.0:  # kernels may have been compiled
-            first = attempt(scene, until, name, setting, limit=limit)
+            first = attempt(scene, until, name, setting, limit=limit, save_at=both)
             if first.solution is None:
                 return
-        rest = [attempt(scene, until, name, setting, limit=limit) for _ in range(_more(repeats, first.wall, limit))]
+        rest = [
+            attempt(scene, until, name, setting, limit=limit, save_at=both)
+            for _ in range(_more(repeats, first.wall, limit))
+        ]
         runs = [run.solution.stats["integrate_s"] for run in [*rest, first] if run.solution is not None]
         stats, error = first.solution.stats, float(Motion.of(first.solution).off(truth.motion)[-1])
         count = int(stats.get("evaluations", stats.get("iterations", 0)))
-        yield _point(name, setting, error, float(np.median(runs)), count, int(stats["steps"]), truth)
+        defect = float(first.solution.energy_error[-1])
+        yield _point(name, setting, error, float(np.median(runs)), count, int(stats["steps"]), defect, truth)
         if first.wall > limit / 4.0:
             return
 
@@ -175,7 +183,7 @@ def _foreign(
         still: Array = np.zeros(1)
         end = Motion(truth.motion.t[-1:], first.position[None], first.rotation[None], still, np.zeros((1, 2)), 0.0)
         error = float(end.off(_end(truth.motion))[0])
-        yield _point(name, setting, error, seconds, first.evaluations, first.steps, truth)
+        yield _point(name, setting, error, seconds, first.evaluations, first.steps, first.defect, truth)
         if first.seconds > limit / 4.0:
             return
 
@@ -194,9 +202,16 @@ def _more(repeats: int, wall: float, limit: float) -> int:
 
 
 def _point(
-    name: str, setting: Setting, error: float, seconds: float, evaluations: int, steps: int, truth: Reference
+    name: str,
+    setting: Setting,
+    error: float,
+    seconds: float,
+    evaluations: int,
+    steps: int,
+    defect: float,
+    truth: Reference,
 ) -> Point:
     floor = error < FLOOR * truth.cross_check
     if not np.isfinite(error):
         return Point(name, setting, np.nan, seconds, evaluations, steps, Ending.FAILED, "the result is not finite")
-    return Point(name, setting, error, seconds, evaluations, steps, Ending.DONE, floor=floor)
+    return Point(name, setting, error, seconds, evaluations, steps, Ending.DONE, defect=defect, floor=floor)

@@ -10,7 +10,7 @@ import numpy as np
 from ephs.mechanics.scene.model import GROUND, Scene
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import matrix_to_quaternion, quaternion_to_matrix
-from ephs.show.charts.peer_scene import Branch, Go, PeerError, PeerRun, PeerScene, peer_scene, start
+from ephs.show.charts.peer_scene import Branch, Energies, Go, PeerError, PeerRun, PeerScene, peer_scene, start
 from ephs.show.charts.runs import Array, Ending, Setting
 
 __all__ = ["integrator", "mjcf", "mujoco_model", "silent"]
@@ -39,6 +39,7 @@ def integrator(method: str) -> Callable[[Scene, float], Go]:
 
         def run(setting: Setting, limit: float) -> PeerRun:
             model, data = mujoco_model(given, method, setting.value)
+            before = _energies(mujoco, model, data)
             steps, begin = round(until / setting.value), time.perf_counter()
             for done in range(0, steps, 1000):
                 mujoco.mj_step(model, data, min(1000, steps - done))
@@ -47,10 +48,10 @@ def integrator(method: str) -> Callable[[Scene, float], Go]:
             seconds = time.perf_counter() - begin
             if data.time < until * (1.0 - REACHED):  # it starts again from zero where its state is not finite
                 raise PeerError("the state was not finite", Ending.FAILED)
-            mujoco.mj_kinematics(model, data)
+            after = _energies(mujoco, model, data)
             numbers = [model.body(name).id for name in names]
             position, rotation = data.xpos[numbers].copy(), data.xmat[numbers].reshape(-1, 3, 3).copy()
-            return PeerRun(position, rotation, seconds, stages * steps, steps)
+            return PeerRun(position, rotation, seconds, stages * steps, steps, given.defect(before, after))
 
         return go
 
@@ -78,6 +79,14 @@ def mujoco_model(given: PeerScene, method: str, step: float) -> tuple[Any, Any]:
             if branch.drive:
                 data.qfrc_applied[at] = branch.drive
     return model, data
+
+
+def _energies(mujoco: Any, model: Any, data: Any) -> Energies:
+    """Potential and kinetic energy in J, at the state's own places, which are left in the data."""
+    mujoco.mj_forward(model, data)
+    mujoco.mj_energyPos(model, data)
+    mujoco.mj_energyVel(model, data)
+    return float(data.energy[1]), float(data.energy[0])
 
 
 def silent(_text: str) -> None:

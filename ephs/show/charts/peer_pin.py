@@ -10,7 +10,7 @@ import numpy as np
 from ephs.mechanics.scene.model import GROUND, Scene
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
-from ephs.show.charts.peer_scene import Go, PeerError, PeerRun, PeerScene, peer_scene, start
+from ephs.show.charts.peer_scene import Energies, Go, PeerError, PeerRun, PeerScene, peer_scene, start
 from ephs.show.charts.runs import Array, Ending, Setting
 
 __all__ = ["SOFT", "TIGHT", "PinModel", "integrator"]
@@ -52,8 +52,9 @@ def integrator(method: str, *, proximal: float = TIGHT) -> Callable[[Scene, floa
             seconds = time.perf_counter() - begin
             if done.status != 0:
                 raise PeerError(str(done.message), Ending.FAILED)
-            position, rotation = model.bodies(done.y[:, -1])
-            return PeerRun(position, rotation, seconds, int(done.nfev), len(done.t) - 1)
+            end = done.y[:, -1]
+            defect = given.defect(model.energies(model.start), model.energies(end))
+            return PeerRun(*model.bodies(end), seconds, int(done.nfev), len(done.t) - 1, defect)
 
         return go
 
@@ -156,17 +157,27 @@ class PinModel:
         out[self.nq :] = self.accelerations(q, v)
         return out
 
+    def energies(self, y: Array) -> Energies:
+        """Kinetic and potential energy in J."""
+        q = self._unit(y)
+        kinetic = self.pin.computeKineticEnergy(self.model, self.data, q, y[self.nq :])
+        return float(kinetic), float(self.pin.computePotentialEnergy(self.model, self.data, q))
+
     def bodies(self, y: Array) -> tuple[Array, Array]:
         """(b, 3) and (b, 3, 3) of the centre-of-mass frames, in the scene's order."""
-        q = y[: self.nq].copy()
-        for k in self._quaternions:
-            q[k] /= np.linalg.norm(q[k])
+        q = self._unit(y)
         self.pin.forwardKinematics(self.model, self.data, q)
         found = [
             self.data.oMi[number] * self._se3(SE3.inverse(own))
             for number, own in (self.at[name] for name in self.names)
         ]
         return np.array([pose.translation for pose in found]), np.array([pose.rotation for pose in found])
+
+    def _unit(self, y: Array) -> Array:
+        q = y[: self.nq].copy()
+        for k in self._quaternions:
+            q[k] /= np.linalg.norm(q[k])
+        return q
 
     def _close(self, given: PeerScene, proximal: float) -> None:
         pin = self.pin

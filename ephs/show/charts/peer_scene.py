@@ -32,16 +32,22 @@ class PeerError(Exception):
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class PeerRun:
-    """Final state of a peer's run: (b, 3) positions, (b, 3, 3) rotations, the time of integration, and counts."""
+    """Final state of a peer's run: (b, 3) positions, (b, 3, 3) rotations, the time of integration, and counts.
+
+    ``defect`` is that of the balance of energy at the end, relative to what was turned over.
+    """
 
     position: Array
     rotation: Array
     seconds: float
     evaluations: int
     steps: int
+    defect: float
 
 
 Go = Callable[[Setting, float], PeerRun]
+Energies = tuple[float, float]
+"""Kinetic and potential, in J."""
 
 
 @final
@@ -82,6 +88,14 @@ class PeerScene:
     branches: tuple[Branch, ...]
     closures: tuple[tuple[str, str, Array, Array], ...]
     springs: tuple[Spring, ...]
+
+    def defect(self, before: Energies, after: Energies) -> float:
+        """What a run gained or lost of K + V, relative to the larger of both ends' K + |V − V₀|; NaN with drives or
+        damping, whose work and heat other programs do not add up."""
+        if any(branch.drive for branch in self.branches) or any(spring.damping for spring in self.springs):
+            return float("nan")
+        lifted = after[1] - before[1]
+        return abs(after[0] - before[0] + lifted) / max(before[0], after[0] + abs(lifted))
 
 
 def peer_scene(scene: Scene) -> PeerScene:

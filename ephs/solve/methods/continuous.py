@@ -4,8 +4,10 @@ They are the kernels of the natural discretisation at increments of length zero,
 continuous one, and half of the derivative by the increment is the derivative by the state.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import final
+from types import MappingProxyType
+from typing import Any, final
 
 import numpy as np
 from scipy.sparse import csc_array
@@ -13,9 +15,10 @@ from scipy.sparse import csc_array
 from ephs.semantics.bundle import Array
 from ephs.solve.errors import SolveError
 from ephs.solve.methods.records import STORING
+from ephs.solve.methods.stored import guessed_efforts
 from ephs.solve.model import Evaluation, Model
 
-__all__ = ["Continuous", "Matrices"]
+__all__ = ["Continuous", "Instant", "Matrices"]
 
 
 @final
@@ -36,13 +39,54 @@ class Matrices:
 
 
 @final
+@dataclass(frozen=True, slots=True, eq=False)
+class Instant:
+    """What is booked at one instant.
+
+    Parameters
+    ----------
+    sums
+        (4 + components,) rates of the ledgers, per second: heat, energy, exergy supplied, entropy made, and the entropy
+        made by each component.
+    flows
+        Into the ports of irreversible components, at least.
+    unknowns
+        Rates, efforts, multipliers, outer flows.
+    energies
+        (components,) of each storage, zero elsewhere.
+    """
+
+    sums: Array
+    flows: Array
+    unknowns: Array
+    energies: Array
+
+
+@final
 class Continuous:
-    """The equations of one model. It keeps scratch memory: use one for each thread."""
+    """The equations of one model. It keeps scratch memory: use one for each thread.
+
+    Attributes
+    ----------
+    pivots
+        How SuperLU is to choose pivots of their matrices, options of `scipy.sparse.linalg.splu`.
+    """
+
+    pivots: Mapping[str, Any] = MappingProxyType({})
 
     def __init__(self, model: Model) -> None:
         self.model = model
         self._evaluation = Evaluation(model)
         self._memory = self._evaluation.memory
+
+    @property
+    def unknowns(self) -> int:
+        """Number of unknowns z."""
+        return self.model.unknowns
+
+    def guess(self, x: Array) -> Array:
+        """Unknowns from which to begin: the storages' efforts."""
+        return guessed_efforts(self.model, x)
 
     def residual(self, x: Array, z: Array, inputs: Array) -> Array:
         """g(x, z), (n,).
@@ -54,6 +98,10 @@ class Continuous:
         """
         self._evaluate(x, z, 0.0, inputs)
         return self._memory.residual.copy()
+
+    def residuals(self, xs: Array, zs: Array, inputs: Array) -> Array:
+        """g(x, z) row by row, (stages, n)."""
+        return np.array([self.residual(x, z, given) for x, z, given in zip(xs, zs, inputs, strict=True)])
 
     def matrices(self, x: Array, z: Array, inputs: Array) -> Matrices:
         """The derivatives of g at (x, z)."""
@@ -72,16 +120,12 @@ class Continuous:
         states = 2.0 * (self._memory.data - unknowns)
         return Matrices(whole(unknowns), whole(states))
 
-    def powers(self, x: Array, z: Array, inputs: Array) -> tuple[Array, Array]:
-        """Rates of the ledgers, per second, (4 + components,): heat, energy, exergy supplied, entropy made, and
-        the entropy made by each component; and the flows into the ports of all components but storages."""
+    def instant(self, x: Array, z: Array, inputs: Array) -> Instant:
+        """Powers and energies at (x, z)."""
         self._evaluate(x, z, 0.0, inputs)
-        return self._evaluation.ledgers(1.0), self._memory.flows.copy()
-
-    def energies(self, x: Array, z: Array, inputs: Array) -> Array:
-        """(components,): energy of each storage at the states x, zero elsewhere."""
-        self._evaluate(x, z, 0.0, inputs)
-        return np.where(self.model.tables.kind == STORING, self._memory.energy, 0.0)
+        m = self._memory
+        energies = np.where(self.model.tables.kind == STORING, m.energy, 0.0)  # ledgers write to what is none
+        return Instant(self._evaluation.ledgers(1.0), m.flows.copy(), z, energies)
 
     def _evaluate(self, x: Array, z: Array, h: float, inputs: Array) -> None:
         status, component = self._evaluation.at(x, z, h, inputs)

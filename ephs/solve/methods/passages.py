@@ -162,9 +162,11 @@ def _stores(model: Model) -> list[_Store]:
 
 def _ports(model: Model, stores: Mapping[int, int]) -> list[_Port]:
     t, found = model.tables, list[_Port]()
-    for number, slot in enumerate(model.descriptor.components):
+    components = model.descriptor.components
+    for number in np.flatnonzero(t.kind == IRREVERSIBLE).tolist():
+        slot = components[number]
         warm = [k for k, effort in enumerate(slot.efforts) if t.entropy[effort] == 1.0]
-        for k in warm if t.kind[number] == IRREVERSIBLE else ():
+        for k in warm:
             if slot.efforts[k] in stores:
                 friction = len(warm) == 1 and len(slot.efforts) > 1
                 found.append(_Port(number, int(t.e_at[number]) + k, stores[slot.efforts[k]], friction))

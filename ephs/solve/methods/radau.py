@@ -5,7 +5,7 @@ equations g(x, ẋ, e, λ) = 0: the unknowns of a stage are its rates, efforts a
 nor a choice of causality is needed, and what is algebraic in them is met at the end of the step, which is a stage.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, final
 
@@ -18,11 +18,11 @@ from ephs.solve.control import Control
 from ephs.solve.errors import LARGEST, Outcome, SolveError
 from ephs.solve.methods.collocation import moments, values
 from ephs.solve.methods.continuous import Continuous, Matrices
+from ephs.solve.methods.integral import Integral
 from ephs.solve.methods.passages import Passages
 from ephs.solve.methods.records import IRREVERSIBLE
-from ephs.solve.methods.stored import guessed_efforts
 from ephs.solve.model import compile_model
-from ephs.solve.problem import Problem
+from ephs.solve.problem import NO_STATE, Problem
 from ephs.solve.snapshot import Snapshot, like, parts
 from ephs.solve.stepping import Attempt, Row, Span
 
@@ -36,6 +36,8 @@ NODES = np.array([(4.0 - _S6) / 10.0, (4.0 + _S6) / 10.0, 1.0])
 DENSE = 48
 """Unknowns up to which factorising without regard to zeros is faster."""
 ITERATIONS = 10
+FARTHEST = 2.0
+"""Lengths of the step before, beyond which its polynomial guesses worse than what was last."""
 
 
 COEFFICIENTS = np.array([moments(NODES, node) for node in NODES])
@@ -64,6 +66,8 @@ class RadauState:
     ----------
     x, z
         The states, and the unknowns there: rates, efforts, multipliers, outer flows.
+    stages, h
+        The unknowns at the stages of the step before, and its length in s: 0 where there is none.
     sums
         (4 + components,): heat, energy supplied, exergy supplied, entropy made; entropy made by each component.
     """
@@ -72,6 +76,14 @@ class RadauState:
     x: Array
     z: Array
     sums: Array
+    stages: Array
+    h: float
+
+    def guess(self, h: float) -> Array:
+        """Unknowns at the stages of a step of h seconds, by the polynomial of the step before."""
+        if self.h == 0.0 or abs(h) > FARTHEST * abs(self.h):
+            return np.tile(self.z, (NODES.size, 1))
+        return np.array([values(NODES, 1.0 + c * h / self.h) @ self.stages for c in NODES])
 
 
 @final
@@ -98,11 +110,13 @@ class Radau:
     name = "radau"
     order = 5
     exponent = 4.0
+    hold = 1.2
 
     def __init__(self, problem: Problem, t0: float, control: Control) -> None:
         self.problem = problem
         self.model = compile_model(problem.descriptor, problem.reference, problem.inputs(t0, problem.initial))
-        self.equations = Continuous(self.model)
+        self.equations: Continuous | Integral = Integral.of(self.model) or Continuous(self.model)
+        self._given = self.model.input_values()
         self._passages = Passages(self.model)
         self.rtol, self.atol = control.rtol.rates(problem.descriptor), control.atol.rates(problem.descriptor)
         self.evaluations = self.factorisations = self.iterations = 0
@@ -115,7 +129,10 @@ class Radau:
 
     def inputs(self, t: float, x: Array) -> Array:
         """Values at the outer ports, one after the other."""
-        given = self.problem.inputs(t, self.problem.descriptor.unpack(x))
+        p = self.problem
+        if p.constant:
+            return self._given
+        given = p.inputs(t, NO_STATE if p.timed else p.descriptor.unpack(x))
         return np.concatenate([*(given[slot.path].value for slot in self.problem.descriptor.outer), np.zeros(1)])
 
     def start(self, t: float, h: float) -> RadauState:
@@ -128,8 +145,8 @@ class Radau:
         """
         d = self.model.descriptor
         x = d.pack(self.problem.initial)
-        z = guessed_efforts(self.model, x)
-        start = RadauState(t, x.copy(), z, np.zeros(4 + len(d.components)))
+        z = self.equations.guess(x)
+        start = RadauState(t, x.copy(), z, np.zeros(4 + len(d.components)), np.zeros((NODES.size, z.size)), 0.0)
         first, second = (self._solved(start, PROBE * h * part)[1] for part in (1.0, 0.5))
         jumps = [self._size(end - x, x) for end in (first, second)]
         if jumps[1] > 0.75 * jumps[0] and jumps[1] > 1.0:
@@ -158,7 +175,7 @@ class Radau:
             raise SolveError(Outcome.RANGE, self._path(int(np.argmin(np.abs(x) < LARGEST))), "")
         books = self._books(state, h, stages)
         error = self._error(state, h, stages, x)
-        end = self._end(state, h, 1.0, x, stages[-1].copy(), books)
+        end = replace(self._end(state, h, 1.0, x, stages[-1].copy(), books), stages=stages, h=h)
         made = (end.sums - state.sums)[4:][self._makers]
         self.iterations += iterations
         if iterations > 4:
@@ -181,8 +198,8 @@ class Radau:
         return replace(state, t=t)
 
     def anew(self, state: RadauState) -> RadauState:
-        """The same state as one to start from; what it holds of the step before is a first guess only."""
-        return replace(state)
+        """The same state as one to start from, whose rates may be others than before."""
+        return replace(state, h=0.0)
 
     def rows(self, states: Sequence[RadauState]) -> list[Row]:
         """Records of many states."""
@@ -190,8 +207,7 @@ class Radau:
 
     def row(self, state: RadauState) -> Row:
         """Record of a state."""
-        energies = self.equations.energies(state.x, state.z, self.inputs(state.t, state.x))
-        return Row(state.x, np.where(self._makers, state.sums[4:], energies), state.sums[:4])
+        return Row(state.x, np.where(self._makers, state.sums[4:], self._known(state)[0]), state.sums[:4])
 
     def stats(self) -> dict[str, Any]:
         """Counts, for the solution's statistics."""
@@ -200,7 +216,7 @@ class Radau:
             "iterations": self.iterations,
             "evaluations": self.evaluations,
             "factorisations": self.factorisations,
-            "unknowns": self.model.unknowns,
+            "unknowns": self.equations.unknowns,
         }
 
     def snapshot(self, state: RadauState) -> Snapshot:
@@ -240,18 +256,16 @@ class Radau:
         xs = state.x + h * COEFFICIENTS @ stages[:, : self._rates]
         powers, passed = list[Array](), list[Array]()
         for x, z, c in zip(xs, stages, NODES, strict=True):
-            sums, flows = self.equations.powers(x, z, self.inputs(state.t + c * h, x))
-            powers.append(sums)
-            passed.append(self._passages.powers(flows, z))
-        first = self._passages.powers(self._known(state)[1], state.z)
-        return Books(np.array(powers), np.array([first, *passed]))
+            found = self.equations.instant(x, z, self.inputs(state.t + c * h, x))
+            powers.append(found.sums)
+            passed.append(self._passages.powers(found.flows, found.unknowns))
+        return Books(np.array(powers), np.array([self._known(state)[1], *passed]))
 
     def _known(self, state: RadauState) -> tuple[Array, Array]:
-        """(components,) stored energies, and the flows into all components."""
+        """(components,) stored energies, and what is passed as heat and entropy."""
         if self._last is None or self._last[0] is not state:
-            given = self.model.input_values()  # neither depends on them
-            energies = self.equations.energies(state.x, state.z, given)
-            self._last = state, energies, self.equations.powers(state.x, state.z, given)[1]
+            found = self.equations.instant(state.x, state.z, self.inputs(state.t, state.x))
+            self._last = state, found.energies, self._passages.powers(found.flows, found.unknowns)
         return self._last[1:]
 
     def _end(self, state: RadauState, h: float, theta: float, x: Array, z: Array, books: Books) -> RadauState:
@@ -260,7 +274,7 @@ class Radau:
         sums = state.sums + weights @ books.powers
         if passages.states.size:
             x[passages.states] = state.x[passages.states]
-            energies = [self._known(state)[0], self.equations.energies(x, z, self.model.input_values())]
+            energies = [self._known(state)[0], self.equations.instant(x, z, self.inputs(t, x)).energies]
             missed = theta * h * (GAMMA * books.passed[0, 0] + DEFECT @ books.passed[1:, 0])
             booked = passages.booked(
                 state.x, np.tensordot(weights, books.passed[1:], 1), missed, np.array(energies), sums[1] - state.sums[1]
@@ -269,7 +283,7 @@ class Radau:
             sums[0] += booked.heat
             sums[3] += booked.made.sum()
             sums[4:] += booked.made
-        return RadauState(t, x, z, sums)
+        return RadauState(t, x, z, sums, state.stages, 0.0)
 
     def _refresh(self, state: RadauState) -> None:
         self._matrices = self.equations.matrices(state.x, state.z, self.inputs(state.t, state.x))
@@ -281,25 +295,22 @@ class Radau:
         if self._solvers is None or self._solvers[0] != h:
             m = self._matrices
             assert m is not None
-            real = _solver(m.unknowns + (h * GAMMA) * m.states, self.model.unknown_name)
-            rest = _solver(m.unknowns + (h * complex(VALUES[1])) * m.states, self.model.unknown_name)
+            shifts = h * GAMMA, h * complex(VALUES[1])
+            name, pivots = self.model.unknown_name, self.equations.pivots
+            real, rest = (_solver(m.unknowns + shift * m.states, name, pivots) for shift in shifts)
             self._solvers = h, real, rest
             self.factorisations += 1
         return self._solvers[1], self._solvers[2]
 
     def _stages(self, state: RadauState, h: float) -> tuple[Array, int]:
         real, rest = self._solve(h)
-        stages = np.tile(state.z, (3, 1))
+        stages = state.guess(h)
         rates = self._rates
         parts, before = np.zeros((1, rates)), np.inf
         for iteration in range(1, ITERATIONS + 1):
             xs = state.x + h * COEFFICIENTS @ stages[:, :rates]
-            found = np.array(
-                [
-                    self.equations.residual(x, z, self.inputs(state.t + c * h, x))
-                    for x, z, c in zip(xs, stages, NODES, strict=True)
-                ]
-            )
+            inputs = np.array([self.inputs(state.t + c * h, x) for x, c in zip(xs, NODES, strict=True)])
+            found = self.equations.residuals(xs, stages, inputs)
             self.evaluations += 3
             turned = T_INVERSE @ found
             pair = rest(turned[1])
@@ -340,7 +351,7 @@ class Radau:
         return float(np.max(np.abs(difference) / (self.atol + self.rtol * np.abs(x)), initial=0.0))
 
 
-def _solver(matrix: Any, name: Callable[[int], str]) -> Callable[[Array], Array]:
+def _solver(matrix: Any, name: Callable[[int], str], pivots: Mapping[str, Any]) -> Callable[[Array], Array]:
     if matrix.shape[0] <= DENSE:
         whole = matrix.toarray()
         factorise, solve = get_lapack_funcs(("getrf", "getrs"), (whole,))
@@ -349,6 +360,6 @@ def _solver(matrix: Any, name: Callable[[int], str]) -> Callable[[Array], Array]
             raise SolveError(Outcome.SINGULAR, "", name(info - 1) if info > 0 else "")
         return lambda right: solve(factors, pivots, right)[0]
     try:
-        return splu(matrix.tocsc()).solve
+        return splu(matrix.tocsc(), **pivots).solve
     except RuntimeError as error:  # what SuperLU says of a singular matrix
         raise SolveError(Outcome.SINGULAR, "", "") from error

@@ -9,7 +9,7 @@ from ephs.solve.methods.places import Part, add_to, copy, fill
 from ephs.solve.methods.records import COMPONENT, IRREVERSIBLE, STORING, WORKING, Columns, Dims, Outer, Scratch, row_of
 from ephs.solve.methods.scales import FAR, reach, still, weigh
 
-__all__ = ["FAULTS", "account", "evaluated"]
+__all__ = ["FAULTS", "account", "called", "evaluated"]
 
 FAULTS: Final = 64
 """A fault is a component's number times this, and a status; 0 is none."""
@@ -26,7 +26,7 @@ def evaluated(on: Evaluator, t: Columns, x: Vector, z: Vector, scal: Vector, inp
     def component(i: Integer) -> None:
         def sound() -> None:
             part = Part.of(t, i)
-            status = _called(on, part, x, z, scal, m)
+            status = called(on, part, x, z, scal, m)
 
             def fail() -> None:
                 fault.value = COMPONENT + status + FAULTS * i
@@ -52,7 +52,7 @@ def evaluated(on: Evaluator, t: Columns, x: Vector, z: Vector, scal: Vector, inp
     return fault.value
 
 
-def _called(on: Evaluator, part: Part, x: Vector, z: Vector, scal: Vector, m: Scratch) -> Integer:
+def called(on: Evaluator, part: Part, x: Vector, z: Vector, scal: Vector, m: Scratch) -> Integer:
     """The status of a component's kernel, called at the unknowns."""
     t, i = part.t, part.i
     numbers, x_at, at = row_of(Dims, t.dims, i).numbers, t.read_x_at[i], t.parameter_at[i]
