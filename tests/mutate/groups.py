@@ -169,16 +169,11 @@ GROUPS = {
             "ephs/solve/march/*.py",
         ),
         (
-            f"{MECHANICS}/tree",
             f"{MECHANICS}/tree/engine",
+            *(f"{MECHANICS}/tree/test_{name}.py" for name in ("attached", "gears", "oracle", "sweeps")),
             "tests/solve/test_march.py",
-            *(
-                f"{MECHANICS}/methods/test_{name}.py"
-                for name in ("compiled_radau", "explicit", "heat", "momenta", "parts")
-            ),
+            f"{MECHANICS}/methods/test_heat.py",
             f"{MECHANICS}/elements/test_contact.py",
-            f"{MECHANICS}/test_work.py",
-            f"{MECHANICS}/test_stability_functions.py",
         ),
         pace=Pace(each=6.0, file=40.0, budget=20.0),
     ),

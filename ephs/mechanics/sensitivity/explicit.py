@@ -7,12 +7,13 @@ rates, books; masses, lengths, stiffnesses, …) comes with its derivatives by t
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, Never, final
+from typing import Any, Final, Never, final
 
 import numpy as np
 
 from ephs.mechanics.methods.explicit import tableau
 from ephs.mechanics.sensitivity.family import Family, difference, relation_of, same_shape
+from ephs.mechanics.tree.engine.links import links_of
 from ephs.mechanics.tree.engine.tangents import DIRECTIONS, StepTangent
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.mechanics.tree.finding.tables import SPRING
@@ -27,6 +28,12 @@ from ephs.solve.problem import Problem
 from ephs.solve.stepping import Row
 
 __all__ = ["ExplicitTangent"]
+
+WEIGHTS: Final = {
+    "mass": np.diag([0.0, 0.0, 0.0, 1.0, 1.0, 1.0]),
+    **{f"inertia[{k}]": np.diag([float(k == i) for i in range(6)]) for k in range(3)},
+}
+"""Numbers of a body -> its spatial inertia where the number is one and the others are none."""
 
 
 @final
@@ -61,6 +68,11 @@ class _Unread(Mapping[Path, Array]):
         raise _Read
 
 
+def _whole(of: Equations, at: ReducedState) -> Array:
+    """All numbers of a state but the increments of a step."""
+    return np.concatenate([at.q, of.vector(at)[of.nv :]])
+
+
 class _Read(Exception):
     """A function of time has read a state."""
 
@@ -91,15 +103,24 @@ class ExplicitTangent:
             raise OptionError("motion", "one that changes with time", "constant rates; ephs.sweep takes others")
         if not (eq.constant or eq.held):
             self._of_time(self.t0)
-        found = [self._by(j, lambda of, at: np.concatenate([at.q, of.vector(at)[eq.nv :]])) for j in range(count)]
-        slopes = np.array(found)
+        size = state.q.size + eq.vector(state).size - eq.nv
+        weights = [self._weighed(j) for j in range(count)]
+        slopes = np.array(
+            [
+                np.zeros(size) if weight is not None else self._by(j, lambda of, at: _whole(of, at))
+                for j, weight in enumerate(weights)
+            ]
+        )
         point = Point(state, slopes[:, : state.q.size], slopes[:, state.q.size :])
         for first in range(0, count, DIRECTIONS):
             which = slice(first, min(first + DIRECTIONS, count))
             relation = partial(relation_of, self.family.problem.descriptor)
             made = StepTangent(eq.engine, relation, self.method.arrays, corrected=not eq.led.counting)
-            for name in made.slopes:
-                for k, j in enumerate(range(which.start, which.stop)):
+            for k, j in enumerate(range(which.start, which.stop)):
+                if (weight := weights[j]) is not None:
+                    made.slopes["reals"][..., k] = weight
+                    continue
+                for name in made.slopes:
                     made.slopes[name][..., k] = self._by(j, lambda of, _, name=name: self._numbers(of, name))
             self.tangents.append((which, made))
         return self._closed(point)
@@ -182,6 +203,25 @@ class ExplicitTangent:
         if status == Status.DEPENDENT:
             raise OptionError("method", self.method.name, "a motion whose constraints do not nearly repeat each other")
         self.equations.refuse(status, self.equations.engine.failed)
+
+    # ---- inertia -----------------------------------------------------------------------------------------------
+
+    def _weighed(self, number: int) -> Array | None:
+        """The derivative of the links' numbers by a mass or a moment of inertia, which change nothing else that steps
+        of a tree read; None for other parameters, and where loops close."""
+        eq, parameter = self.equations, self.family.parameters[number]
+        body, _, entry = parameter.path.rpartition(".")
+        own = [i for i, name in enumerate(eq.reduced.bodies) if name is not None and f"bodies.{name}" == body]
+        if entry not in WEIGHTS or len(own) != 1 or eq.engine.looped or not parameter.value > 0.0:
+            return None
+        tables, unit = eq.reduced.tables, WEIGHTS[entry]
+        if not np.all(tables.inertia[own[0]][unit > 0.0] == parameter.value):
+            return None
+        changed = tables.inertia.copy()
+        changed[own[0]] += parameter.value * unit
+        more = links_of(replace(eq.reduced, tables=tables._replace(inertia=changed))).packed(np.zeros(3)).reals
+        base = links_of(eq.reduced).packed(np.zeros(3)).reals
+        return (more - base) / parameter.value if np.array_equal(base, eq.engine.tables["reals"]) else None
 
     # ---- neighbours --------------------------------------------------------------------------------------------
 

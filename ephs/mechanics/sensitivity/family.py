@@ -142,6 +142,8 @@ class Family:
         signed = isinstance(self.model, Scene) and path.partition("[")[0].endswith(SIGNED)
         linear = self._joints and path.partition("[")[0].endswith(LINEAR)
         step = (WIDE if linear else RELATIVE) * max(abs(value) or 1.0, LEAST if signed else 0.0)
+        if self._joints and value > 0.0 and path.partition("[")[0].endswith(("mass", "inertia")):
+            return Parameter(path, value, step, CENTRAL, STRAIGHT)  # neighbours are models, too
         for stencil in (CENTRAL, FORWARD):
             try:
                 tables = STRAIGHT if linear and stencil is CENTRAL else stencil
