@@ -74,6 +74,10 @@ class FakeSolution:
     thermal_records: dict[str, Any] = field(default_factory=dict)
 
     @property
+    def outline(self) -> Any:
+        return self.scene
+
+    @property
     def labels(self) -> dict[str, Any]:
         quantities = {"pe.q": quantity.displacement, "ke.p": quantity.momentum, "env.s": quantity.entropy}
         return {path: labels_of(quantities.get(path, quantity.body_momentum)) for path in self.states}
