@@ -10,8 +10,13 @@ import pytest
 
 import ephs
 from ephs.mechanics.methods.registry import METHODS
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.simulate import problem_of_scene, problem_of_system
 from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.finding.mechanism import reduce_system
+from ephs.operad import Path, Pattern, junction
+from ephs.operad import quantity as Q
+from ephs.solve.model import compile_model
+from tests.mechanics.tree import machines
 
 FOUR_BAR = File(ephs.__file__).parents[1] / "scenes" / "four-bar.toml"
 
@@ -94,3 +99,24 @@ def test_a_sweep_leaves_the_scene_as_it_is():
     ephs.sweep(scene, {"bodies.crank.mass": [1.0, 2.0, 5.0]}, 0.01, method="rk87")
     assert same(ran(scene, "rk87"), before[0])
     assert digest(Equations(problem_of_scene(scene), 0.0)) == before[1]
+
+
+def test_tables_call_the_functions_of_their_own_run():
+    """An energy that cannot be recorded is called at an address, which goes with the model of its run."""
+    linkage, _ = machines.four_bar()
+    turning = linkage.interface[Path.of("drives.main")].quantity
+    sprung = Pattern(
+        junctions={"p": junction(turning), "q": junction(Q.angle)},
+        boxes={"linkage": {"drives.main": "p"}, "pkc": {"q": "q", "p": "p"}, "spring": {"q": "q"}},
+    )(
+        linkage=linkage,
+        pkc=ephs.gyrator({"q": Q.angle, "p": turning}, [[0.0, -1.0], [1.0, 0.0]]),
+        spring=ephs.storage({"q": Q.angle}, lambda q: 2.0 * float(q) ** 2),
+    )
+    problem = problem_of_system(sprung)
+    models = [compile_model(problem.descriptor, problem.reference, {}, matrix=False) for _ in range(2)]
+    found = [reduce_system(problem, model).tables.address for model in models]
+    called = sorted(models[0].callbacks)
+    assert called and set(found[0][called]).isdisjoint(found[1][called])
+    for address, model in zip(found, models, strict=True):
+        assert [model.callbacks[i].address for i in called] == address[called].tolist()

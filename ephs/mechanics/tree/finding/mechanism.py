@@ -123,6 +123,8 @@ def reduce_system(problem: Problem, model: Model) -> Reduced:
     where = d.pack(problem.initial).tobytes()
     motions = tuple((path, one.effort, _prescribed(one)) for path, one in problem.signals.items())
     key = "reduced", model.reference, where, motions, tuple(problem.names.items())
+    if model.callbacks:
+        return _reduced(problem, model)  # tables hold addresses of functions that go with their model
     return once(d, key, lambda: _reduced(problem, model))
 
 
