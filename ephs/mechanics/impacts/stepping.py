@@ -175,7 +175,8 @@ class Impacts(ReducedMethod):
         allowed = self.atol + self.rtol * eq.sizes(y0, y1)
         far = max(float(np.abs(end.q - whole.q).max()) / float(allowed[: eq.n].min()), 0.0)
         rates = np.abs(end.r - whole.r) / allowed[eq.n : 2 * eq.n]
-        return end, max(error, far / 3.0, float(rates.max()) / 3.0)
+        inside = float(self._touching.gaps(end.q, end.r).min()) < -self._closed  # where the whole ends at an impact
+        return whole if inside else end, max(error, far / 3.0, float(rates.max()) / 3.0)
 
     def _closing(self, gaps: Array, rates: Array, end: ReducedState, h: float, held: Index) -> float:
         """Part of a flight of h s at whose end a gap closes first, by cubics; 1 where none closes before its end."""
@@ -277,7 +278,7 @@ class Impacts(ReducedMethod):
 
 def _closes(start: float, slope: float, end: float, slope1: float, closed: float) -> float:
     """First part of a way at which a gap with these values and slopes at both ends closes; 1 where it does not."""
-    closed = max(closed, -2.0 * start)  # what is open by less than rounding is so at its start
+    closed += max(-start, 0.0)  # what is open by less than rounding at its start may stay so
     cubic = np.array([2.0 * (start - end) + slope + slope1, 3.0 * (end - start) - 2.0 * slope - slope1, slope, start])
     turns = np.roots(np.polyder(cubic))
     inside = [float(x) for x in turns.real[np.abs(turns.imag) < FLAT] if 0.0 < x < 1.0]
@@ -287,7 +288,8 @@ def _closes(start: float, slope: float, end: float, slope1: float, closed: float
     for x in np.sort(found.real[np.abs(found.imag) < FLAT]).tolist():
         if 0.0 < x < 1.0 and np.polyval(np.polyder(cubic), x) <= 0.0:
             return x
-    return 0.5
+    back = [x for x in inside if np.polyval(np.polyder(cubic, 2), x) < 0.0] if start < 0.0 else []
+    return min(back, default=0.5)  # it turns back before it was open
 
 
 def _turning(before: Array, stop: Array, impulse: Array, friction: list[float], still: float) -> float:
