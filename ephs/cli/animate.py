@@ -19,6 +19,7 @@ def animate(
     output: Annotated[Path, Parameter(name=["--output", "-o"])],
     wrenches: Flag = False,
     heat: Flag = False,
+    strain: Flag = False,
     fps: float = 30.0,
     duration: float | None = None,
 ) -> int:
@@ -34,6 +35,8 @@ def animate(
         Draw joint forces and moments, and contact forces, as arrows.
     heat
         Colour bodies by the temperature of their thermal nodes.
+    strain
+        Colour beams by their strain energy per length, where heat is not asked for.
     fps
         Frames a second.
     duration
@@ -47,6 +50,6 @@ def animate(
         raise BadInput(TEXTS["suffix"].format(found=output, expected=".html"))
     sol = solution_of(folder)
     with addressed(str(folder), output):
-        animated(sol, output, wrenches=wrenches, heat=heat, fps=fps, duration=duration)
+        animated(sol, output, wrenches=wrenches, heat=heat, strain=strain, fps=fps, duration=duration)
     Console().print(str(output), highlight=False, markup=False, soft_wrap=True)
     return 0

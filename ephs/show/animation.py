@@ -38,6 +38,7 @@ def animate(
     *,
     wrenches: bool = False,
     heat: bool = False,
+    strain: bool = False,
     fps: float = 30.0,
     duration: float | None = None,
     host: str = "127.0.0.1",
@@ -60,6 +61,8 @@ def animate(
     heat : bool
         Whether joints and springs glow by the temperature of the thermal node that takes their heat, and bodies by the
         node of their name.
+    strain : bool
+        Whether beams are coloured by their strain energy per length, where `heat` is not asked for.
     fps : float
         Frames a second of playing time.
     duration : float, optional
@@ -77,7 +80,7 @@ def animate(
     ShowError
         If the solution has no bodies, or no instants, viser is not installed, or `fps` or `duration` is not positive.
     """
-    stage = stage_of(sol, wrenches=wrenches, heat=heat, fps=fps, duration=duration)
+    stage = stage_of(sol, wrenches=wrenches, heat=heat, strain=strain, fps=fps, duration=duration)
     if find_spec("viser") is None:
         raise ShowError("viser")
     drawn = _Drawn(stage)
@@ -172,9 +175,10 @@ class _Drawn:
         if self.stage.heat is not None and self.stage.heat.high > self.stage.heat.low:
             stops = ",".join("rgb({},{},{})".format(*tint(k / 8)) for k in range(9))
             bar = f"display:inline-block;width:7em;height:.7em;background:linear-gradient(90deg,{stops})"
-            rows.append(f'{self.stage.heat.low:.2f} K <span style="{bar}"></span> {self.stage.heat.high:.2f} K')
+            low, high = self.stage.heat.ends
+            rows.append(f'{low} <span style="{bar}"></span> {high}')
         elif self.stage.heat is not None:
-            rows.append(f"everything at {self.stage.heat.low:.2f} K")
+            rows.append(f"everything at {self.stage.heat.ends[0]}")
         rows += [html.escape(solid.note) for solid in self.stage.solids.values() if solid.note]
         if not rows:
             return ""

@@ -75,11 +75,21 @@ class Loads:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Heat:
-    """Temperatures of thermal nodes at the frames of a film: (m,) in K by node, and their whole range."""
+    """What is shown as a colour at the frames of a film: (m,) by thermal node or body, and their whole range.
+
+    Temperatures in K; or strain energy per length, in J/m, of beams.
+    """
 
     temperatures: dict[str, Array]
     low: float
     high: float
+    unit: str = "K"
+
+    @property
+    def ends(self) -> tuple[str, str]:
+        """Both ends of the range in words."""
+        form = ".2f" if self.unit == "K" else ".3g"
+        return f"{self.low:{form}} {self.unit}", f"{self.high:{form}} {self.unit}"
 
     def share(self, node: str, frame: int) -> float:
         """Temperature of a node in the range, from 0 to 1; 0 without a node."""
@@ -137,10 +147,34 @@ def heat_of(sol: Any, frames: Film, nodes: list[str]) -> Heat:
     t = np.asarray(sol.t, dtype=float)
     values = {name: np.asarray(sol.thermal(name).temperature, dtype=float) for name in nodes}
     found = {name: between_instants(t, frames.times, value) for name, value in values.items()}
-    around = float(sol.scene.world.temperature)
+    for _, beam in sol.outline.all_beams():
+        if all(joint in found for joint in beam.joints):
+            found |= _at_nodes(beam, found)
+    around = float(sol.outline.world.temperature)
     low = min([around, *(float(v.min()) for v in found.values())])
     high = max([around, *(float(v.max()) for v in found.values())])
     return Heat(found, low, high)
+
+
+def strain_of(sol: Any, frames: Film) -> Heat:
+    """Strain energy per length at the frames: of the elements' joints, and of nodes the mean of those beside them."""
+    t, found = np.asarray(sol.t, dtype=float), dict[str, Array]()
+    for name, beam in sol.outline.all_beams():
+        motion = sol.beam(name)
+        lengths = [each.length for each in (sol.outline.joint(joint).strain for joint in beam.joints) if each]
+        along = motion.energy / np.array(beam.lengths or lengths)
+        found |= {
+            joint: between_instants(t, frames.times, row) for joint, row in zip(beam.joints, along.T, strict=True)
+        }
+        found |= _at_nodes(beam, found)
+    return Heat(found, 0.0, max((float(v.max(initial=0.0)) for v in found.values()), default=0.0), "J/m")
+
+
+def _at_nodes(beam: Any, of_elements: dict[str, Array]) -> dict[str, Array]:
+    """Values at a beam's nodes: the means of the elements beside them."""
+    beside = [None, *beam.joints, None]
+    pairs = zip(beam.nodes, beside[:-1], beside[1:], strict=True)
+    return {node: np.mean([of_elements[each] for each in two if each], axis=0) for node, *two in pairs}
 
 
 def tint(share: float) -> Colour:

@@ -156,7 +156,7 @@ def _heat(stage: Stage) -> dict[str, Any] | None:
         return None
     shares = {name: _text((values - heat.low) / (heat.high - heat.low)) for name, values in heat.temperatures.items()}
     scale = [list(tint(k / 16)) for k in range(17)]
-    return {"shares": shares, "scale": scale, "low": heat.low, "high": heat.high}
+    return {"shares": shares, "scale": scale, "ends": heat.ends}
 
 
 def _text(values: Any) -> str:

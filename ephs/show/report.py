@@ -186,7 +186,8 @@ def _animation(sol: Any) -> str:
     if sol.outline is None:
         return ""
     warm = any(True for _ in sol.outline.all_thermal())
-    stage = stage_of(sol, wrenches=False, heat=warm, fps=30.0, duration=None)
+    bent = any(True for _ in sol.outline.all_beams())
+    stage = stage_of(sol, wrenches=False, heat=warm, strain=bent, fps=30.0, duration=None)
     return f"<h2>Motion</h2>{player(stage, str(sol.name))}"
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from ephs.show.errors import ShowError
 from ephs.show.motion import Array, Film, film, point_of
-from ephs.show.overlays import GROUND, Heat, Loads, heat_of, loads_of
+from ephs.show.overlays import GROUND, Heat, Loads, heat_of, loads_of, strain_of
 from ephs.show.solids import Solid, solids_of
 
 __all__ = ["Stage", "stage_of"]
@@ -68,7 +68,9 @@ class Stage:
         return float(np.clip(0.16 * small, 0.014 * size, 0.05 * size))
 
 
-def stage_of(sol: Any, *, wrenches: bool, heat: bool, fps: float, duration: float | None) -> Stage:
+def stage_of(
+    sol: Any, *, wrenches: bool, heat: bool, fps: float, duration: float | None, strain: bool = False
+) -> Stage:
     """The stage of a solution.
 
     Raises
@@ -93,5 +95,7 @@ def stage_of(sol: Any, *, wrenches: bool, heat: bool, fps: float, duration: floa
         solids_of(scene),
         frames,
         loads_of(sol, frames, joints) if wrenches else None,
-        heat_of(sol, frames, [name for name, _ in scene.all_thermal()]) if heat else None,
+        heat_of(sol, frames, [name for name, _ in scene.all_thermal()])
+        if heat
+        else (strain_of(sol, frames) if strain else None),
     )

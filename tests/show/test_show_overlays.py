@@ -13,6 +13,19 @@ from ephs.show import Page, animate
 from ephs.show.motion import between_instants, film, nearest
 from ephs.show.overlays import heat_of, loads_of, tint
 from ephs.show.solids import Solid, box, cylinder, solid_of, sphere
+from ephs.show.stage import stage_of
+
+BENT = """
+format = 1
+[beams.rod]
+from = [0.0, 0.0, 0.0]
+to = [0.6, 0.0, 0.0]
+up = [0.0, 0.0, 1.0]
+elements = 6
+section = { rectangle = [0.02, 0.004], E = 2e9, nu = 0.3, rho = 2000.0 }
+damping = 5e-3
+ends = ["ground", "free"]
+"""
 
 PARTS = st.floats(0.05, 3.0)
 HANGING = """
@@ -201,3 +214,17 @@ def test_a_run_backward_plays_backward(tmp_path):
     frames = film(sol, [name], 30.0, None)
     assert frames.times[0] == 0.0 and frames.times[-1] == -0.2 and frames.pause > 0.0
     assert np.allclose(frames.poses[name][-1, 4:], sol.body(name).position[-1])
+
+
+def test_strain_energy_is_a_colour(tmp_path):
+    """Of elements, and of nodes the mean of those beside them; the report's player says what the colour is."""
+    file = tmp_path / "bent.toml"
+    file.write_text(BENT, encoding="utf-8")
+    sol = ephs.simulate(ephs.load(file), 0.1, method="radau", rtol=1e-4)
+    shown = stage_of(sol, wrenches=False, heat=False, strain=True, fps=20.0, duration=None).heat
+    wanted = sol.beam("rod").energy[-1] / 0.1
+    np.testing.assert_allclose([shown.temperatures[f"rod-{i + 1}"][-1] for i in range(6)], wanted, rtol=1e-12)
+    assert shown.temperatures["rod.1"][-1] == pytest.approx(0.5 * (wanted[0] + wanted[1]))
+    assert shown.ends == ("0 J/m", f"{shown.high:.3g} J/m")
+    assert f"{shown.high:.3g} J/m" in sol.animate(strain=True).html
+    assert stage_of(sol, wrenches=False, heat=False, fps=20.0, duration=None).heat is None

@@ -31,7 +31,7 @@ for (const host of document.querySelectorAll(".player:not([data-ready])")) {
   bar.append(play, slider, clock, speed, ...Object.values(switches).map((s) => s.label), home);
   const key = make("div", { className: "key" });
   key.innerHTML = data.arrows.map((a) => `<b style="color:rgb(${a.colour})">→</b> ${a.label}`)
-    .concat(data.heat ? [`${data.heat.low.toFixed(2)} K <span style="display:inline-block;width:7em;height:.7em;background:linear-gradient(90deg,${data.heat.scale.map((c) => `rgb(${c})`)})"></span> ${data.heat.high.toFixed(2)} K`] : []).join("<br>");
+    .concat(data.heat ? [`${data.heat.ends[0]} <span style="display:inline-block;width:7em;height:.7em;background:linear-gradient(90deg,${data.heat.scale.map((c) => `rgb(${c})`)})"></span> ${data.heat.ends[1]}`] : []).join("<br>");
   host.append(canvas, key, bar);
   const context = canvas.getContext("2d");
   const is = (name) => switches[name]?.box.checked;
