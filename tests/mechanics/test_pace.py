@@ -37,9 +37,9 @@ def test_a_joint_moves_by_a_tenth_of_a_turn_or_of_the_extent_at_most(tmp_path):
     for rate, expected in (("-2.0", TURN * 5.0 / 2.0), ("0.0", np.inf)):
         file = tmp_path / "slide.toml"
         file.write_text(SLIDE.replace("RATE", rate))
-        assert longest_step(ephs.load(file), 8, 1e-6) == expected
-    assert longest_step(four_bar(2.5), 2, 0.0) == TURN
-    assert longest_step(four_bar(2.5), 2, 1e-6) == pytest.approx(0.01)
+        assert longest_step(ephs.load(file), 8, 1e-6, (0.0, 1.0)) == expected
+    assert longest_step(four_bar(2.5), 2, 0.0, (0.0, 1.0)) == TURN
+    assert longest_step(four_bar(2.5), 2, 1e-6, (0.0, 1.0)) == pytest.approx(0.01)
 
 
 @pytest.mark.parametrize("rtol", [1e-5, 1e-6])

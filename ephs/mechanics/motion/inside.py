@@ -56,6 +56,11 @@ class Inside:
         return self._solution[self._path / path]
 
     @property
+    def outline(self) -> "Scene":
+        """What is drawn: the scene."""
+        return self.scene
+
+    @property
     def constraint_error(self) -> Array:
         """(n,) largest position residual of any joint, in m or rad."""
         return self._motion.constraint_error()

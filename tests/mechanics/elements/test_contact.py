@@ -328,5 +328,5 @@ def test_no_step_leaps_over_a_thin_plate(name, tmp_path, monkeypatch):
 def test_the_limit_is_half_the_way_through(tmp_path):
     file = tmp_path / "plate.toml"
     file.write_text(HEAD.format(gravity=0.0) + PLATE, encoding="utf-8")
-    longest = pace.longest_step(ephs.load(file), 5, 1e-3)
+    longest = pace.longest_step(ephs.load(file), 5, 1e-3, (0.0, 1.0))
     assert longest == pytest.approx(0.5 * 0.021 / 40.0, rel=0.1)

@@ -64,7 +64,9 @@ def test_meshes_are_where_mujoco_has_them(rich):
     body = ephs.load(rich).body("arm")
     (shape,) = body.shapes
     assert shape["mesh"] == str(rich.parent / "parts/wedge.obj")
-    inside = np.array(shape["position"]) + (CORNERS * shape["scale"]) @ quaternion_to_matrix(shape["rotation"]).T
+    inside = (
+        np.array(shape["position"]) + (CORNERS * shape["scale"]) @ quaternion_to_matrix(np.array(shape["rotation"])).T
+    )
     found = body.pose[4:] + inside @ quaternion_to_matrix(body.pose[:4]).T
     (geom,) = np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_MESH)
     expected = data.geom_xpos[geom] + model.mesh_vert @ data.geom_xmat[geom].reshape(3, 3).T
