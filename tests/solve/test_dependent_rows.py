@@ -39,7 +39,8 @@ def test_long_steps_of_order_4_carry_a_linkage_of_special_geometry(exact):
         sol, found = run("natural4", step=step)
         assert sol.stats["cut_steps"] == 0
         assert sol.energy_error.max() <= 10.0 * np.sqrt(5.0 / step) * 10.0 * np.finfo(float).eps
-        assert sol.constraint_error.max() <= 1e-12
+        # ten roundings a step, times the condition of constraints that nearly repeat each other
+        assert sol.constraint_error.max() <= 10.0 * 100.0 * np.sqrt(5.0 / step) * np.finfo(float).eps
         errors.append(np.abs(found - exact).max())
     assert errors[0] <= 1e-5
     assert np.all(np.array(errors[:-1]) >= 40.0 * np.array(errors[1:])), errors

@@ -194,21 +194,24 @@ def test_what_is_kept_does_not_change_the_steps(method):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_pendulum_takes_the_steps_of_a_mechanism(method):
-    """The same control in another evaluation: a scene's steps differ by the rounding of its sweeps only."""
-    sol = ephs.simulate(families.scene("revolute-chain", 1), 2.0, method=method, rtol=1e-8, atol=1e-8)
+    """The same control in another evaluation: a scene's steps differ by the rounding of its sweeps only.
+
+    Estimates of the first, short steps are rounding. Tolerances are such that these grow by as much as steps may.
+    """
+    allowed = 1e-8 if method == "rk54" else 1e-4
+    sol = ephs.simulate(families.scene("revolute-chain", 1), 2.0, method=method, rtol=allowed, atol=allowed)
     inertia = families.MASS * families.LENGTH**2 / 4.0 + families.THICK[1]
     stiffness = families.MASS * 9.81 * 0.5 * families.LENGTH / inertia
     angle = sol.joint("j0").coordinate[:, 0]
     first = sol.t[1] - sol.t[0]
     for call in PENDULUM.values():
         run = start(
-            call, method, [0.0, 0.0, 0.0], 2.0, parameters=(stiffness,), rtol=1e-8, atol=1e-8, step=first, q=[1.0],
+            call, method, [0.0, 0.0, 0.0], 2.0, parameters=(stiffness,), rtol=allowed, atol=allowed, step=first, q=[1.0],
             increments=1,
         )  # fmt: skip
         assert run.advance(10_000) is Ending.DONE
         assert (run.c.steps, run.c.rejected) == (sol.stats["steps"], sol.stats["rejected"])
         times, _ = run.rows()
-        # The first steps are so short that their estimates are rounding, as are the digits of steps after them.
         assert times == pytest.approx(sol.t[1:], rel=1e-4)
         moved = run.arrays["rows_q"][: len(times), 0] - 1.0
         assert np.abs(moved - (angle[1:] - angle[0])).max() <= 1e-4 * 2.0 * np.sqrt(stiffness)
