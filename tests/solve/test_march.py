@@ -206,8 +206,8 @@ def test_a_pendulum_takes_the_steps_of_a_mechanism(method):
     first = sol.t[1] - sol.t[0]
     for call in PENDULUM.values():
         run = start(
-            call, method, [0.0, 0.0, 0.0], 2.0, parameters=(stiffness,), rtol=allowed, atol=allowed, step=first, q=[1.0],
-            increments=1,
+            call, method, [0.0, 0.0, 0.0], 2.0, parameters=(stiffness,), rtol=allowed, atol=allowed, step=first,
+            q=[1.0], increments=1,
         )  # fmt: skip
         assert run.advance(10_000) is Ending.DONE
         assert (run.c.steps, run.c.rejected) == (sol.stats["steps"], sol.stats["rejected"])
