@@ -5,6 +5,7 @@ large matrices, with rows and columns paired by large entries. The fill of exact
 later factorisation only computes numbers in fixed places, watching its pivots.
 """
 
+from collections import deque
 from dataclasses import dataclass
 from typing import final
 
@@ -17,12 +18,12 @@ from ephs.semantics.spaces.rank import TINY
 
 Index = NDArray[np.int64]
 
-FAINT = 1e-12
-"""Entries below this part of the largest count alike where diagonals are chosen."""
+FAINT = 1e-4
+"""Part of the largest entry below which the diagonal takes none for its size alone."""
+PARTS = (1e-2, 1e-4, 1e-8, 0.0)
+"""Parts of the largest entry below which entries have no place on the diagonal, unless it has none left."""
 MANY = 1000
 """Unknowns from which on rows and columns are paired: of fewer fill does not matter, and small pivots tell of ranks."""
-FINE = 2.0**20
-"""Logarithms of entries are whole numbers of this part of one."""
 
 
 @final
@@ -83,7 +84,7 @@ def order(n: int, row: Index, column: Index, value: Array) -> Elimination:
 
 
 def paired(n: int, row: Index, column: Index, value: Array) -> Index:
-    """(n,) rows by columns, so that the product of the diagonal is large: orders of the sum with the transpose need it.
+    """(n,) rows by columns, so that no entry of the diagonal is small: orders of the sum with the transpose need it.
 
     Of small entries on the diagonal the pivots are taken elsewhere, against the order: fill grows with the square.
 
@@ -92,22 +93,41 @@ def paired(n: int, row: Index, column: Index, value: Array) -> Index:
     RuntimeError
         No such rows exist: the matrix is singular by its pattern.
     """
-    from scipy import sparse
-    from scipy.sparse.csgraph import min_weight_full_bipartite_matching
+    size = np.abs(value)
+    largest = size.max(initial=TINY)
+    row_of, column_of = np.full(n, -1), np.full(n, -1)
+    for k in np.argsort(-size, kind="stable").tolist():  # the largest entries that do not share rows or columns
+        if size[k] > FAINT * largest and row_of[column[k]] < 0 and column_of[row[k]] < 0:
+            row_of[column[k]], column_of[row[k]] = row[k], column[k]
+    for part in PARTS:
+        seen = np.flatnonzero(size > part * largest)
+        seen = seen[np.lexsort((-size[seen], column[seen]))]
+        rows, first = row[seen].tolist(), np.searchsorted(column[seen], np.arange(n + 1)).tolist()
+        for free in np.flatnonzero(row_of < 0).tolist():
+            _augment(free, rows, first, row_of, column_of)
+        if np.all(row_of >= 0):
+            return row_of
+    raise RuntimeError("singular by its pattern")
 
-    weight = np.abs(value)
-    seen = np.flatnonzero(weight > 0.0)
-    # Whole numbers: with others, sums that differ by rounding can keep SciPy's search from ever ending.
-    weight = np.round(1.0 - FINE * np.log(np.maximum(weight[seen] / weight.max(initial=TINY), FAINT)))
-    try:
-        rows, columns = min_weight_full_bipartite_matching(
-            sparse.csr_matrix((weight, (row[seen], column[seen])), shape=(n, n))
-        )
-    except ValueError as error:
-        raise RuntimeError("singular by its pattern") from error
-    out = np.empty(n, dtype=np.int64)
-    out[columns] = rows
-    return out
+
+def _augment(free: int, rows: list[int], first: list[int], row_of: Index, column_of: Index) -> None:
+    """Pair a free column by a shortest path that gives others other rows, ``rows[first[j]:first[j + 1]]`` of each."""
+    came, seen, waiting = {free: (-1, -1)}, set[int](), deque([free])
+    while waiting:
+        j = waiting.popleft()
+        for i in rows[first[j] : first[j + 1]]:
+            if i in seen:
+                continue
+            seen.add(i)
+            other = int(column_of[i])
+            if other >= 0:
+                came[other] = i, j
+                waiting.append(other)
+                continue
+            while j >= 0:  # the way back
+                row_of[j], column_of[i] = i, j
+                i, j = came[j]
+            return
 
 
 def equilibrate(n: int, row: Index, column: Index, value: Array) -> tuple[Array, Array]:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy import sparse
 
 from ephs.semantics.linear.sparse import sparse_lu
-from ephs.solve.sparse import order, paired
+from ephs.solve.sparse import FAINT, PARTS, order, paired
 
 RUNS = {"compiled": sparse_lu().compiled(), "plain": sparse_lu().plain()}
 factorise, solve = RUNS["compiled"]["factorise"], RUNS["compiled"]["solve"]
@@ -47,14 +47,19 @@ def test_solves_as_a_dense_solver(dense, seed):
     assert np.all(np.abs(dense @ x - right) <= 1e-11 * scale.max())
 
 
-@given(matrices())
-def test_rows_are_paired_with_columns_by_the_largest_product(dense):
+@given(matrices(), st.integers(0, 2**32 - 1))
+def test_rows_are_paired_with_columns_so_that_no_entry_of_the_diagonal_is_small(dense, seed):
+    """As large as the largest part allows that any pairing does, or that is taken for its size alone."""
     n = min(5, dense.shape[0])
     part = dense[:n, :n] + np.diag(np.full(n, 1e-3))
+    part *= 10.0 ** np.random.default_rng(seed).uniform(-10.0, 0.0, part.shape)
     row, column = np.nonzero(part)
-    found = np.abs(part[paired(n, row, column, part[row, column]), np.arange(n)]).prod()
-    best = max(np.abs(part[list(rows), np.arange(n)]).prod() for rows in permutations(range(n)))
-    assert found >= (1.0 - n * 2.0**-20) * best > 0.0  # logarithms are rounded to so much
+    rows = paired(n, row, column, part[row, column])
+    assert sorted(rows) == list(range(n))
+    size = np.abs(part)
+    best = max(size[list(order), np.arange(n)].min() for order in permutations(range(n)))
+    allowed = max(level for level in PARTS if level * size.max() < best)
+    assert size[rows, np.arange(n)].min() > min(allowed, FAINT) * size.max()
 
 
 def test_a_matrix_that_no_values_make_regular_is_refused():
