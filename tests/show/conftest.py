@@ -45,6 +45,9 @@ class FakeScene:
     def all_thermal(self) -> list[tuple[str, Any]]:
         return [("housing", None)]
 
+    def all_beams(self) -> list[tuple[str, Any]]:
+        return []
+
     @property
     def world(self) -> Record:
         return Record({"temperature": 293.15})
