@@ -12,13 +12,14 @@ from typing import Any, Final, Never, final
 import numpy as np
 
 from ephs.mechanics.methods.explicit import tableau
-from ephs.mechanics.sensitivity.family import Family, difference, relation_of, same_shape
+from ephs.mechanics.sensitivity.family import CENTRAL, OUTER, Family, Stencil, difference, relation_of, same_shape
 from ephs.mechanics.tree.engine.links import links_of
 from ephs.mechanics.tree.engine.tangents import DIRECTIONS, StepTangent
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.mechanics.tree.finding.tables import SPRING
 from ephs.mechanics.tree.sweeps.charts import TIE
 from ephs.mechanics.tree.sweeps.cuts import Cut
+from ephs.mechanics.tree.sweeps.records import Link
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.stage import Table
@@ -34,6 +35,14 @@ WEIGHTS: Final = {
     **{f"inertia[{k}]": np.diag([float(k == i) for i in range(6)]) for k in range(3)},
 }
 """Numbers of a body -> its spatial inertia where the number is one and the others are none."""
+
+ROUNDING: Final = 8.0 * np.finfo(float).eps
+"""Of the difference of two sums of two numbers, relative to all of them."""
+TURNED: Final = {
+    "reals": (Link.real_width, slice(Link.rotation.offset, Link.rotation.offset + 9)),
+    "body": (12, slice(9)),
+}
+"""Table -> width of its rows, and where these hold rotations: of joints in links, of bodies in links."""
 
 
 @final
@@ -91,6 +100,7 @@ class ExplicitTangent:
         self.family, self.t0, self.method = family, t0, tableau(method)
         self.equations = Equations(family.problem, t0)
         self._others: dict[tuple[int, float], tuple[Problem, Equations, ReducedState]] = {}
+        self._stencils: dict[int, Stencil] = {}
         self.tangents: list[tuple[slice, StepTangent]] = []
 
     # ---- steps -------------------------------------------------------------------------------------------------
@@ -227,8 +237,35 @@ class ExplicitTangent:
 
     def _by(self, number: int, function: Any) -> Array:
         """The derivative of a function of (equations, initial state) by a parameter."""
-        step, stencil = self.family.parameters[number].step, self.family.parameters[number].tables
-        return difference(lambda k: function(*self._other(number, k * step)[1:]), stencil, step)
+        step = self.family.parameters[number].step
+        return difference(lambda k: function(*self._other(number, k * step)[1:]), self._stencil(number), step)
+
+    def _stencil(self, number: int) -> Stencil:
+        """The neighbours that derivatives of tables take: the two outer ones where these show that it
+        is a coordinate of a tree, or shifts what is in its links, whose inertia is of degree two in that."""
+        if number not in self._stencils:
+            parameter = self.family.parameters[number]
+            outer = not self.equations.engine.looped and parameter.tables is CENTRAL and self._shifts(number)
+            self._stencils[number] = OUTER if outer else parameter.tables
+        return self._stencils[number]
+
+    def _shifts(self, number: int) -> bool:
+        """Whether a parameter is a coordinate itself, or changes places and inertia in links only, no rotations."""
+        step, eq = self.family.parameters[number].step, self.equations
+        (_, low, before), (_, high, after) = (self._other(number, k * step) for k, _ in OUTER)
+        (first, last), apart = (_whole(low, before), _whole(high, after)), (OUTER[1][0] - OUTER[0][0]) * step
+        rounding = ROUNDING * (np.abs(first).max(initial=apart) + abs(self.family.parameters[number].value))
+        if np.any(np.minimum(np.abs(last - first), np.abs(last - first - apart)) > rounding):
+            return False
+        for name, value in eq.engine.tables.items():
+            if isinstance(value, Table | np.ndarray):
+                own, *others = (self._numbers(of, name) for of in (eq, low, high))
+                if name in TURNED:
+                    width, turned = TURNED[name]
+                    own, *others = (each.reshape(-1, width)[:, turned] for each in (own, *others))
+                if not all(np.array_equal(own, other) for other in others):
+                    return False
+        return True
 
     def _other(self, number: int, offset: float) -> tuple[Problem, Equations, ReducedState]:
         if (number, offset) not in self._others:

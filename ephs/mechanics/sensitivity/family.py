@@ -29,11 +29,12 @@ from ephs.solve.problem import Problem
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-__all__ = ["CENTRAL", "Family", "Parameter", "Stencil", "difference", "relation_of", "same_shape"]
+__all__ = ["CENTRAL", "OUTER", "Family", "Parameter", "Stencil", "difference", "relation_of", "same_shape"]
 
 Stencil = tuple[tuple[int, float], ...]
 """Multiples of a step, and their weights in a first derivative."""
 CENTRAL: Stencil = ((-3, -1 / 60), (-2, 0.15), (-1, -0.75), (1, 0.75), (2, -0.15), (3, 1 / 60))
+OUTER: Stencil = ((-3, -1 / 6), (3, 1 / 6))
 STRAIGHT: Stencil = ((-1, -0.5), (1, 0.5))
 FORWARD: Stencil = ((0, -2.45), (1, 6.0), (2, -7.5), (3, 20 / 3), (4, -3.75), (5, 1.2), (6, -1 / 6))
 RELATIVE = 2.0**-8
