@@ -303,7 +303,7 @@ class Irreversible:
         Whether M depends on the direction of the flow, as of valves, diodes and contacts, which push only: then its
         parity under time reversal is not asked for.
     impulse
-        Law of its impulses, of a process that acts at instants and has no rate, as a hard contact; None of others.
+        Law of its impulses, of a process that acts at instants, as a hard contact or a hard stop; None of others.
     """
 
     name: str

@@ -9,6 +9,7 @@ import numpy as np
 from ephs.mechanics.elements import components, springs
 from ephs.mechanics.elements.limit import limited_friction, limited_spring, stops
 from ephs.mechanics.shapes.dry import Dry
+from ephs.mechanics.shapes.impact import Impact
 from ephs.mechanics.shapes.law import Law
 from ephs.operad import Pattern, junction, quantity
 from ephs.semantics import library
@@ -92,7 +93,7 @@ def joint(
     heat: bool = False,
     driven: bool = False,
     limits: "ArrayLike | None" = None,
-    stop: Law | None = None,
+    stop: Law | Impact | None = None,
     dry: Dry | None = None,
 ) -> System:
     """A joint between two bodies; its ports p1, p2 carry the bodies' momenta.
@@ -117,7 +118,8 @@ def joint(
     driven
         The momentum of u_r is a port p_r: its flow is a generalised force.
     limits, stop
-        Least and largest coordinate of a joint with one freedom in rad or m, nan for none, and the law of its stops.
+        Least and largest coordinate of a joint with one freedom in rad or m, nan for none, and the law of its stops,
+        elastic or hard.
     dry
         Dry friction of a joint with one freedom, beside μ as a number.
 
@@ -153,7 +155,8 @@ def joint(
         raise StructureError("parameter", "joint", key="limits", found=found, expected="limits, their law, and numbers")
     else:
         held = stops(of, limits)
-        spring, loss = limited_spring(of, k, zero, held, stop), limited_friction(of, mu, held, stop, dry)
+        spring = limited_spring(of, k, zero, held, stop) if isinstance(stop, Law) else spring
+        loss = limited_friction(of, mu, held, stop, dry)
     return _joint(of, _frame(frame1), _frame(frame2), spring, loss, heat, driven)
 
 

@@ -1,4 +1,4 @@
-"""Limits of a joint's coordinate: elastic stops with loss, beside the joint's own spring and friction."""
+"""Limits of a joint's coordinate: elastic stops with loss, or hard ones, beside the joint's own spring and friction."""
 
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -9,6 +9,7 @@ from ephs.mechanics.elements import notation
 from ephs.mechanics.elements.components import coordinate_energy, joint_momentum, relative
 from ephs.mechanics.shapes.dry import Dry
 from ephs.mechanics.shapes.gap import ramp
+from ephs.mechanics.shapes.impact import Halt, Impact
 from ephs.mechanics.shapes.law import Law
 from ephs.operad import Directory, PortType, quantity
 from ephs.semantics import structures
@@ -23,7 +24,7 @@ from ephs.semantics.verdict import proved
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-__all__ = ["Stops", "limited_friction", "limited_spring", "stop_force", "stops"]
+__all__ = ["Stops", "limited_friction", "limited_spring", "stops"]
 
 Stops = tuple[tuple[float, float], ...]
 """(side, bound): +1 at the least coordinate, −1 at the largest; the gap is side·(coordinate − bound)."""
@@ -43,21 +44,7 @@ def stops(of: Pair, limits: "ArrayLike") -> Stops:
         raise StructureError("parameter", of.name, key="limits", found=found, expected="a joint with one freedom")
     if lower >= upper or lower == np.inf or upper == -np.inf:
         raise StructureError("parameter", of.name, key="limits", found=[lower, upper], expected="lower < upper")
-    return sides(limits)
-
-
-def sides(limits: "ArrayLike") -> Stops:
-    """Stops at sound limits."""
-    lower, upper = np.asarray(limits, dtype=float).tolist()
     return tuple((side, bound) for side, bound in ((1.0, lower), (-1.0, upper)) if np.isfinite(bound))
-
-
-def stop_force(limits: "ArrayLike", law: Law, coordinate: Array, rate: Array) -> Array:
-    """Force of the stops at coordinates and rates of any shape, in N m or N."""
-    out = np.zeros_like(coordinate)
-    for side, bound in sides(limits):
-        out += side * law.normal(ramp(side * (bound - coordinate)), side * rate)[0]
-    return out
 
 
 def limited_spring(of: Pair, stiffness: Array, rest: Array, stops: Stops, law: Law) -> Storage:
@@ -80,8 +67,9 @@ def limited_spring(of: Pair, stiffness: Array, rest: Array, stops: Stops, law: L
     )
 
 
-def limited_friction(of: Pair, mu: Array, stops: Stops, law: Law, dry: Dry | None = None) -> Irreversible:
-    """Friction μ of a joint with one freedom, dry friction, and the loss of its stops; ports p_r, s, q_r."""
+def limited_friction(of: Pair, mu: Array, stops: Stops, law: Law | Impact, dry: Dry | None = None) -> Irreversible:
+    """Friction μ of a joint with one freedom, dry friction, and the loss of its stops or their impulses; ports p_r, s,
+    q_r."""
     ports = {
         "p_r": PortType(joint_momentum(of), True),
         "s": PortType(quantity.entropy, True),
@@ -91,7 +79,9 @@ def limited_friction(of: Pair, mu: Array, stops: Stops, law: Law, dry: Dry | Non
 
     def resistance(x: Any, u: Any, _theta: Any) -> Any:
         rate, at = u[0], x[q_r][0]
-        lost = [law.normal(ramp(side * (bound - at)), side * rate)[1] for side, bound in stops]
+        lost: list[Any] = []
+        if isinstance(law, Law):
+            lost = [law.normal(ramp(side * (bound - at)), side * rate)[1] for side, bound in stops]
         return [[sum(lost, float(mu[0, 0])) + (0.0 if dry is None else dry.resistance(rate))]]
 
     made = structures.dissipation(
@@ -108,4 +98,5 @@ def limited_friction(of: Pair, mu: Array, stops: Stops, law: Law, dry: Dry | Non
         trusted=True,
         one_sided=True,
     )
-    return replace(made, notation=notation.friction)
+    halt = Halt(stops, law) if isinstance(law, Impact) else None
+    return replace(made, notation=notation.friction, impulse=halt)

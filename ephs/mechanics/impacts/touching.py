@@ -1,4 +1,5 @@
-"""Points of hard contact in joint coordinates: gaps, and velocities at closed ones as rows on the tree's rates."""
+"""Points of hard contact and hard stops in joint coordinates: gaps, and velocities at closed ones as rows on the tree's
+rates. Stops come after the points; of their three rows two are zero."""
 
 from dataclasses import dataclass
 from typing import Any, Final, final
@@ -6,9 +7,11 @@ from typing import Any, Final, final
 import numpy as np
 
 from ephs.mechanics.elements.contact import lever
-from ephs.mechanics.shapes.impact import Impact, Meeting
+from ephs.mechanics.shapes.gap import Gap
+from ephs.mechanics.shapes.impact import Halt, Impact, Meeting
 from ephs.mechanics.tree.equations.equations import Equations
 from ephs.mechanics.tree.finding.frames import GROUND
+from ephs.mechanics.tree.finding.tables import CUT
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.primitives import Irreversible
@@ -29,20 +32,36 @@ class _Point:
 
     bodies: tuple[int, int]
     offsets: tuple[Array, Array]
-    meeting: Meeting
+    gap: Gap
+    law: Impact
+    path: Path
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class _Stop:
+    """The same of a stop: the coordinate's place, and the wrench of a unit force on body 2 away from it, in C2."""
+
+    bodies: tuple[int, int]
+    offsets: tuple[Array, Array]
+    place: int
+    side: float
+    bound: float
+    wrench: Array
+    law: Impact
     path: Path
 
 
 @final
 class Touching:
-    """The points of hard contact of one mechanism. It shares the equations' scratch memory.
+    """The points of hard contact and the hard stops of one mechanism. It shares the equations' scratch memory.
 
     Attributes
     ----------
     laws, paths
-        (points,).
+        (points + stops,).
     makers
-        (points,) places of their processes among those that make entropy.
+        (points + stops,) places of their processes among those that make entropy.
     """
 
     def __init__(self, equations: Equations) -> None:
@@ -50,41 +69,54 @@ class Touching:
         reduced, t = equations.reduced, equations.reduced.tables
         components = equations.model.descriptor.components
         self._points: list[_Point] = []
+        self._stops: list[_Stop] = []
+        self._cut = False
         for i, edge in enumerate(reduced.edges):
             if edge.friction < 0:
                 continue
             slot = components[edge.friction]
-            if isinstance(slot.primitive, Irreversible) and isinstance(slot.primitive.impulse, Meeting):
-                ends = int(t.first[i]), int(t.second[i])
-                self._points.append(_Point(ends, (edge.offset1, edge.offset2), slot.primitive.impulse, slot.path))
-        self.laws: list[Impact] = [point.meeting.law for point in self._points]
-        self.paths = [point.path for point in self._points]
+            law = slot.primitive.impulse if isinstance(slot.primitive, Irreversible) else None
+            ends, offsets = (int(t.first[i]), int(t.second[i])), (edge.offset1, edge.offset2)
+            if isinstance(law, Meeting):
+                self._points.append(_Point(ends, offsets, law.gap, law.law, slot.path))
+            elif isinstance(law, Halt):
+                self._cut = self._cut or t.kind[i] == CUT
+                place, along = int(t.q_at[i]), t.left[i, 0]
+                for side, bound in law.stops:
+                    self._stops.append(_Stop(ends, offsets, place, side, bound, side * along, law.law, slot.path))
+        self._spots = [*self._points, *self._stops]
+        self.laws: list[Impact] = [spot.law for spot in self._spots]
+        self.paths = [spot.path for spot in self._spots]
+        self._places = np.array([stop.place for stop in self._stops], dtype=np.int64)
+        self._sides, self._bounds = np.array([[stop.side, stop.bound] for stop in self._stops]).reshape(-1, 2).T
+        self._along = np.array([stop.wrench for stop in self._stops]).reshape(-1, 6)
         self.makers = np.array([reduced.made.index(path) for path in self.paths], dtype=np.int64)
         groups: dict[Any, list[int]] = {}
         for i, point in enumerate(self._points):
-            groups.setdefault((point.meeting.gap.name, point.meeting.gap.numbers), []).append(i)
-        self._groups = [(self._points[group[0]].meeting.gap, group) for group in groups.values()]
+            groups.setdefault((point.gap.name, point.gap.numbers), []).append(i)
+        self._groups = [(self._points[group[0]].gap, group) for group in groups.values()]
         self._ends = [
             (
-                np.array([point.bodies[side] for point in self._points], dtype=np.int64),
-                np.array([point.offsets[side] for point in self._points]).reshape(-1, 7).T,
+                np.array([spot.bodies[side] for spot in self._spots], dtype=np.int64),
+                np.array([spot.offsets[side] for spot in self._spots]).reshape(-1, 7).T,
             )
             for side in (0, 1)
         ]
 
     def __len__(self) -> int:
-        return len(self._points)
+        return len(self._spots)
 
     def gaps(self, q: Array, r: Array) -> Array:
-        """(points,) in m."""
+        """(points + stops,) in m, or in rad."""
         relative = self._relative(q, r)
-        out = np.zeros(len(self._points))
+        out = np.zeros(len(self))
         for gap, group in self._groups:
             out[group] = gap.distance(relative[:, group])
+        out[len(self._points) :] = self._left(q, r)
         return out
 
     def motion(self, q: Array, r: Array) -> tuple[Array, Array]:
-        """(points,) gaps in m and their rates in m/s."""
+        """(points + stops,) gaps in m and their rates in m/s, or in rad and rad/s."""
         relative, residual = self._relative(q, r), self._eq.dense.residual
         twists = np.array([residual.twist(i) for i in range(self._eq.reduced.links)] + [np.zeros(6)]).T
         (first, near), (second, far) = self._ends
@@ -92,7 +124,10 @@ class Touching:
         one = POSES.adjoint(POSES.inverse(ahead), list(twists[:, first]))
         two = POSES.adjoint(POSES.inverse(list(far)), list(twists[:, second]))
         twist = np.array(two) - np.array(one)
-        gaps, rates = np.zeros((2, len(self._points)))
+        gaps, rates = np.zeros((2, len(self)))
+        first_stop = len(self._points)
+        gaps[first_stop:] = self._left(q, r)
+        rates[first_stop:] = np.einsum("ij,ji->i", self._along, twist[:, first_stop:])
         for gap, group in self._groups:
             pose, moving = relative[:, group], twist[:, group]
             gaps[group] = gap.distance(pose)
@@ -101,7 +136,7 @@ class Touching:
         return gaps, rates
 
     def rows(self, q: Array, r: Array, which: Index, axes: Index | None = None) -> tuple[Array, Index]:
-        """(3k, n) of some points: the normal velocity, positive where they part, and two along the surfaces.
+        """(3k, n) of some points and stops: the velocity with which they part, and two along the surfaces.
 
         These are orthogonal to an axis (k,) of the world, which is chosen where none is given.
         """
@@ -109,13 +144,17 @@ class Touching:
         relative = self._relative(q, r)
         out, chosen = np.zeros((3 * which.size, eq.n)), np.zeros(which.size, dtype=np.int64)
         for k, i in enumerate(which.tolist()):
-            point, pose = self._points[i], relative[:, i]
-            normal, at = point.meeting.gap.contact(pose)
-            second = SE3.identity() if point.bodies[1] == GROUND else residual.pose(point.bodies[1])
-            turn = quaternion_to_matrix(SE3.compose(second, point.offsets[1])[:4])
-            chosen[k] = np.argmin(np.abs(turn @ normal)) if axes is None else axes[k]
-            ways = _ways(np.array(normal), turn[chosen[k]])
-            wrenches = np.hstack([np.cross(np.array(at), ways), ways])
+            point, pose = self._spots[i], relative[:, i]
+            wrenches = np.zeros((3, 6))
+            if isinstance(point, _Stop):
+                wrenches[0] = point.wrench
+            else:
+                normal, at = point.gap.contact(pose)
+                second = SE3.identity() if point.bodies[1] == GROUND else residual.pose(point.bodies[1])
+                turn = quaternion_to_matrix(SE3.compose(second, point.offsets[1])[:4])
+                chosen[k] = np.argmin(np.abs(turn @ normal)) if axes is None else axes[k]
+                ways = _ways(np.array(normal), turn[chosen[k]])
+                wrenches = np.hstack([np.cross(np.array(at), ways), ways])
             for sign, body, offset in (
                 (1.0, point.bodies[1], point.offsets[1]),
                 (-1.0, point.bodies[0], SE3.compose(point.offsets[0], pose)),
@@ -126,19 +165,26 @@ class Touching:
         return out, chosen
 
     def ways(self, i: int, axis: int) -> Array:
-        """(3, 3) world directions of the rows of a point, where the links were placed last."""
-        point, residual = self._points[i], self._eq.dense.residual
+        """(3, 3) world directions of the rows of a point, where the links were placed last; zeros of a stop."""
+        point, residual = self._spots[i], self._eq.dense.residual
+        if isinstance(point, _Stop):
+            return np.zeros((3, 3))
         one, two = (
             SE3.compose(SE3.identity() if body == GROUND else residual.pose(body), offset)
             for body, offset in zip(point.bodies, point.offsets, strict=True)
         )
-        normal, _ = point.meeting.gap.contact(SE3.compose(SE3.inverse(one), two))
+        normal, _ = point.gap.contact(SE3.compose(SE3.inverse(one), two))
         turn = quaternion_to_matrix(two[:4])
         ways = _ways(np.array(normal), turn[axis])
         return ways @ turn.T
 
+    def _left(self, q: Array, r: Array) -> Array:
+        """(stops,) gaps, where the links were placed; cut joints are where their bodies put them."""
+        coordinates = self._eq.fitted(q, r) if self._cut else q
+        return self._sides * (coordinates[self._places] - self._bounds)
+
     def _relative(self, q: Array, r: Array) -> Array:
-        """(7, points) poses of second frames in first ones; the links are placed at q and r."""
+        """(7, points + stops) poses of second frames in first ones; the links are placed at q and r."""
         residual = self._eq.dense.residual
         residual.place(q, r)
         poses = np.array([residual.pose(i) for i in range(self._eq.reduced.links)] + [SE3.identity()]).T

@@ -353,7 +353,7 @@ def chosen(name: str | Method, problem: Problem, *, step: float | None) -> tuple
         raise OptionError("method", name, f"{', '.join(m.name for m in METHODS.values() if m.scenes)} for a scene")
     if hard is not None and not method.impacts:
         known = ", ".join(m.name for m in (*METHODS.values(), AUTO) if m.impacts)
-        raise OptionError("method", name, f"{known}: {hard} is a hard contact")
+        raise OptionError("method", name, f"{known}: {hard} acts by impulses")
     if step is not None and not method.fixed:
         raise OptionError("step", step, f"none: {name} chooses its steps")
     if step is None and not method.adaptive:

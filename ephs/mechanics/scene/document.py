@@ -110,7 +110,7 @@ def _scene(data: dict[str, Any]) -> Scene:
                 name: entry
                 | ({"motion": law_from(entry["motion"])} if entry.get("motion") is not None else {})
                 | ({"dry": Dry(**entry["dry"])} if entry.get("dry") else {})
-                | ({"stop": Law(**entry["stop"])} if entry.get("stop") else {})
+                | ({"stop": _law(entry["stop"])} if entry.get("stop") else {})
                 | ({"strain": _value(Strain, entry["strain"])} if entry.get("strain") else {})
                 for name, entry in entries.items()
             }

@@ -136,6 +136,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     "dry joint": ("a joint with one freedom that is free to move", "take dry out"),
     "dry static": ("a number ≥ coulomb = {coulomb:g}", "friction at rest is no less than while sliding"),
     "limited joint": ("a joint with one freedom that is free to move", "take limits out"),
+    "beyond stop": ("a start between hard stops", "move the joint, or take limit_restitution out"),
     "no scale": ("a stiffness, as nothing in the scene moves or falls", "add this key"),
     "unknown surface": ("a surface", "{hint}"),
     "surface shape": ("one of sphere, capsule, cylinder, box, plane = {{}}", "a surface has exactly one shape"),
@@ -145,7 +146,7 @@ TEXTS: dict[str, tuple[str, str]] = {
         "the stiffness of one surface or of the contact, or the restitution of hard ones",
         "add one of these keys",
     ),
-    "hard and soft": ("stiffness or restitution", "hard surfaces have no {soft}: take one of both out"),
+    "hard and soft": ("stiffness or restitution", "what is hard has no {soft}: take one of both out"),
     "hard overlap": (
         "hard surfaces that do not overlap at the start",
         "move one of the bodies, or give one of the surfaces a stiffness",

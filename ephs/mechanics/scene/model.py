@@ -16,6 +16,7 @@ from ephs.mechanics.scene.adjustment import Adjustment
 from ephs.mechanics.scene.flexible import FREE_END, Beam, Load, Strain
 from ephs.mechanics.scene.surfaces import Contact, Surface
 from ephs.mechanics.shapes.dry import Dry
+from ephs.mechanics.shapes.impact import Impact
 from ephs.mechanics.shapes.law import Law
 from ephs.semantics.kept import Kept
 from ephs.solve.motion_law import MotionLaw
@@ -94,8 +95,7 @@ class Joint:
     motion : the prescribed motion law of a single freedom, or None
     coordinate : (size,) initial element of the pair's group; the two angles of a universal joint
     rate : (d,) initial u_r, the twist of C2 relative to C1 in C2; of a universal joint the two angles' rates
-    limits, stop : (2,) least and largest coordinate of a joint with one freedom, nan for none, and the law of its
-        elastic stops; None both where there are no limits
+    limits, stop : (2,) least and largest coordinate of one freedom, nan for none, and its stops' law; or None both
     dry : dry friction of a joint with one freedom, None without
     middle : (7,) universal only: constant pose from the frame that follows the first revolute (C1 turned by
         angle 1) to the frame before the second, whose z axis is the second axis; None otherwise
@@ -119,7 +119,7 @@ class Joint:
     rate: Array
     middle: Array | None = None
     limits: Array | None = None
-    stop: Law | None = None
+    stop: Law | Impact | None = None
     dry: Dry | None = None
     strain: Strain | None = None
     armature: float = 0.0

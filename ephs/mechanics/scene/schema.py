@@ -156,7 +156,12 @@ class JointEntry(Entry):
     limit_stiffness: Positive | None = Field(
         default=None, description="of the elastic stops, N m/rad or N/m; default from the mechanism's scale"
     )
-    limit_loss: NonNegative = Field(default=0.1, description="α of Hunt and Crossley at the stops, s/rad or s/m")
+    limit_loss: NonNegative | None = Field(
+        default=None, description="α of Hunt and Crossley at the elastic stops, s/rad or s/m (default 0.1)"
+    )
+    limit_restitution: NonNegative | None = Field(
+        default=None, le=1.0, description="coefficient of restitution of hard stops, in place of elastic ones"
+    )
 
 
 class SpringEntry(Entry):

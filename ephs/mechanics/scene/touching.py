@@ -16,7 +16,7 @@ from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing
 from ephs.mechanics.scene.geometry import coupling_of
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, IDENTITY_POSE, Joint, Scene, frozen
 from ephs.mechanics.scene.resolve import Names
-from ephs.mechanics.scene.schema import ContactEntry, ContactLawEntry, SurfaceEntry
+from ephs.mechanics.scene.schema import ContactEntry, ContactLawEntry, JointEntry, SurfaceEntry
 from ephs.mechanics.scene.state import Snapshot
 from ephs.mechanics.scene.surfaces import Contact, Surface
 from ephs.mechanics.shapes.impact import Impact
@@ -30,6 +30,8 @@ Laws = Mapping[str, ContactLawEntry]
 STIFF = 1e4
 """Stiffness of stops by default, in M (L ω)² of the scene's mass, length and rate: what falls by its length presses a
 stop by 1/70 rad, or of its length."""
+LOSS = 0.1
+"""Loss of stops by default, s/rad or s/m."""
 SOFT = ("stiffness", "exponent", "loss", "slip", "rolling", "spinning")
 """Keys of elastic surfaces that hard ones do not have."""
 DEEP = 1e-2
@@ -69,20 +71,32 @@ def with_stops(document: Document, scene: Scene, faults: list[Fault]) -> Scene:
     found = dict(scene.joints)
     for name, table in document.sections["joints"].items():
         entry, key = table.entry, f"joints.{name}"
-        if entry.limits is None or not table.sound("limits", "limit_stiffness", "limit_loss") or name not in found:
+        sound = table.sound("limits", "limit_stiffness", "limit_loss", "limit_restitution")
+        if entry.limits is None or not sound or name not in found:
             continue
         joint = found[name]
         if joint.dim != 1 or joint.motion is not None:
             what = "a joint with a prescribed motion" if joint.motion is not None else f"a {joint.kind} joint"
             faults.append(fault("limited joint", f"{key}.limits", what))
             continue
-        stiffness = entry.limit_stiffness or _stiffness(scene, joint)
-        if not stiffness:
-            faults.append(fault("no scale", f"{key}.limit_stiffness", "nothing"))
-            continue
-        law = Law(stiffness=stiffness, loss=entry.limit_loss)
-        found[name] = replace(joint, limits=frozen(entry.limits), stop=law)
+        if (law := _stop(scene, joint, entry, key, faults)) is not None:
+            found[name] = replace(joint, limits=frozen(entry.limits), stop=law)
     return replace(scene, joints=found)
+
+
+def _stop(scene: Scene, joint: Joint, entry: JointEntry, key: str, faults: list[Fault]) -> Law | Impact | None:
+    """The law of a joint's stops, or None and a fault."""
+    if entry.limit_restitution is not None:
+        soft = [name for name in ("limit_stiffness", "limit_loss") if getattr(entry, name) is not None]
+        if soft:
+            faults.append(fault("hard and soft", key, f"limit_restitution and {soft[0]}", soft=soft[0]))
+            return None
+        return Impact(entry.limit_restitution)
+    stiffness = entry.limit_stiffness or _stiffness(scene, joint)
+    if not stiffness:
+        faults.append(fault("no scale", f"{key}.limit_stiffness", "nothing"))
+        return None
+    return Law(stiffness=stiffness, loss=LOSS if entry.limit_loss is None else entry.limit_loss)
 
 
 def _stiffness(scene: Scene, joint: Joint) -> float:
@@ -94,7 +108,14 @@ def _stiffness(scene: Scene, joint: Joint) -> float:
 
 
 def overlaps(scene: Scene, faults: list[Fault]) -> list[Fault]:
-    """Surfaces that overlap at the start by more than a part of the scene's length; hard ones are faults."""
+    """Surfaces that overlap at the start by more than a part of the scene's length; hard ones, and joints beyond hard
+    stops, are faults."""
+    for name, joint in scene.all_joints():
+        if isinstance(joint.stop, Impact) and joint.limits is not None:
+            at, (lower, upper) = float(joint.coordinate[0]), joint.limits.tolist()
+            beyond = float(np.nanmax([lower - at, at - upper]))
+            if beyond > OVERLAP:
+                faults.append(fault("beyond stop", f"joints.{name}.limits", f"a start {beyond:.3g} beyond them"))
     surfaces = dict(scene.all_surfaces())
     poses = {GROUND: IDENTITY_POSE} | {name: body.pose for name, body in scene.all_bodies()}
     length = Snapshot.of(scene).scale(scene.world.gravity).length if scene.contacts else 1.0

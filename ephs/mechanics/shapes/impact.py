@@ -1,4 +1,4 @@
-"""Law of hard contact: impenetrable surfaces, restitution by Moreau, friction by Coulomb."""
+"""Law of hard contact: impenetrable surfaces and stops, restitution by Moreau, friction by Coulomb."""
 
 from dataclasses import dataclass, fields
 from typing import final
@@ -8,7 +8,7 @@ import numpy as np
 from ephs.mechanics.shapes.gap import Gap
 from ephs.semantics.errors import StructureError
 
-__all__ = ["Impact", "Meeting"]
+__all__ = ["Halt", "Impact", "Meeting"]
 
 
 STUCK = 1e-9
@@ -75,4 +75,19 @@ class Meeting:
     """
 
     gap: Gap
+    law: Impact
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Halt:
+    """Hard stops of a joint with one freedom: steps give them impulses, beside the friction of the joint.
+
+    Parameters
+    ----------
+    stops
+        (side, bound) of each: the gap is side·(coordinate − bound).
+    """
+
+    stops: tuple[tuple[float, float], ...]
     law: Impact

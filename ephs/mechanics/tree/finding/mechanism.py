@@ -7,6 +7,7 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.shapes.gap import HEIGHT, PLACE
+from ephs.mechanics.shapes.impact import Meeting
 from ephs.mechanics.tree.finding.attaching import Attaching, attaching_of, makers_of
 from ephs.mechanics.tree.finding.frames import GROUND, Frame, Link, Unplaced
 from ephs.mechanics.tree.finding.network import Network
@@ -217,7 +218,7 @@ def _tables(
             driven += [int(edge.motion is not None)] * d
         heat[i] = edge.heat
         spring[i] = -1 if edge.spring < 0 or _stores_nothing(model, edge.spring) else edge.spring
-        idle = edge.friction < 0 or _idle(model, edge.friction) or _strikes(model, edge.friction)
+        idle = edge.friction < 0 or _idle(model, edge.friction)
         friction[i] = -1 if idle else edge.friction
         if kind == SPRING:
             support[i], reach[i] = _support(model, [c for c in (spring[i], friction[i]) if c >= 0])
@@ -321,14 +322,17 @@ def _complement(basis: Array, group: Array, length: float) -> Array:
 
 
 def _idle(model: Model, component: int) -> bool:
-    """Whether a joint's friction or a damper resists nothing."""
-    entries: dict[str, Any] = dict(model.descriptor.components[component].primitive.parameters)
+    """Whether a joint's friction or a damper resists nothing, as a hard contact between its impulses."""
+    primitive = model.descriptor.components[component].primitive
+    if isinstance(primitive, Irreversible) and isinstance(primitive.impulse, Meeting):
+        return True
+    entries: dict[str, Any] = dict(primitive.parameters)
     given = entries.get("mu", entries.get("damping"))
     return given is not None and not isinstance(given, str) and not np.any(given)
 
 
 def _strikes(model: Model, component: int) -> bool:
-    """Whether a process has impulses instead of a rate."""
+    """Whether a process has impulses."""
     primitive = None if component < 0 else model.descriptor.components[component].primitive
     return isinstance(primitive, Irreversible) and primitive.impulse is not None
 

@@ -49,7 +49,7 @@ class Role(Enum):
 
 
 def strikes(components: Iterable[ComponentSlot]) -> Path | None:
-    """The first component that has impulses instead of a rate; None where none has."""
+    """The first component that has impulses; None where none has."""
     for slot in components:
         if isinstance(slot.primitive, Irreversible) and slot.primitive.impulse is not None:
             return slot.path

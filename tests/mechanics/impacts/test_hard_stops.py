@@ -1,0 +1,163 @@
+"""Hard stops of joints: bounces in closed form, beside friction, in loops, in islands with contacts."""
+
+import numpy as np
+import pytest
+
+import ephs
+from ephs.mechanics.elements.joints import joint
+from ephs.mechanics.methods.registry import METHODS
+from ephs.mechanics.shapes.impact import Impact
+from ephs.semantics.errors import StructureError
+
+HARD = [name for name, method in METHODS.items() if method.impacts]
+G = 9.81
+HEAD = 'format = 1\nname = "stops"\n[world]\ngravity = [0.0, 0.0, {gravity}]\n'
+BODY = """
+[bodies.{name}]
+mass = 2.0
+inertia = [8e-3, 8e-3, 8e-3]
+position = {position}
+"""
+SLIDE = """
+[joints.slide]
+type = "prismatic"
+bodies = ["ground", "block"]
+frame1 = {{}}
+frame2 = {{}}
+coordinate = {coordinate}
+rate = {rate}
+{keys}
+"""
+HINGE = """
+[joints.{name}]
+type = "revolute"
+bodies = {bodies}
+at = {at}
+axis = [0.0, 1.0, 0.0]
+{keys}
+"""
+
+
+def scene_of(tmp_path, *parts, gravity=0.0):
+    file = tmp_path / "stops.toml"
+    file.write_text(HEAD.format(gravity=-gravity) + "".join(parts), encoding="utf-8")
+    return ephs.load(file)
+
+
+def sliding(tmp_path, keys, *, coordinate=0.0, rate=0.0, gravity=0.0):
+    block = BODY.format(name="block", position=[0.0, 0.0, coordinate])
+    return scene_of(tmp_path, block, SLIDE.format(coordinate=coordinate, rate=rate, keys=keys), gravity=gravity)
+
+
+def run(scene, until, method="rk87", step=None, **options):
+    sol = ephs.simulate(scene, until, method=method, step=step, **options)
+    assert np.abs(sol.energy_error).max() <= 1e-11
+    assert sol.stats["least_production"] >= 0.0
+    return sol
+
+
+@pytest.mark.parametrize(("method", "step"), [*((name, 2.0**-5) for name in HARD), ("rk87", None)])
+def test_what_falls_on_a_stop_rests_after_the_last_bounce(method, step, tmp_path):
+    """Infinitely many bounces end at √(2H/g)(1 + e)/(1 − e), and all of the energy is heat."""
+    fall, e = 0.2, 0.5
+    scene = sliding(tmp_path, f"limits = [{-fall}, nan]\nlimit_restitution = {e}", gravity=G)
+    last = np.sqrt(2.0 * fall / G) * (1.0 + e) / (1.0 - e)
+    sol = run(scene, 1.2 * last, method, step, save_at=[0.9 * last, last, 1.2 * last])
+    assert sol.heat[0] < 2.0 * G * fall * (1.0 - 1e-5)
+    assert sol.heat[1:] == pytest.approx(2.0 * G * fall, abs=1e-9)
+    assert sol.joint("slide").coordinate[1:, 0] == pytest.approx(-fall, abs=1e-9)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("e", [0.0, 0.4, 1.0])
+def test_a_bounce_off_a_stop_beside_viscous_friction(e, side, tmp_path):
+    """A block that slides loses v = c x/m of its speed on a way x, and 1 − e of what is left at the stop."""
+    way, damping, speed = 0.1, 3.0, 1.0
+    limits = f"limits = [{-way}, {way}]\nlimit_restitution = {e}\nfriction = {damping}"
+    sol = run(sliding(tmp_path, limits, rate=side * speed), 0.2, rtol=1e-10, atol=1e-13)
+    before = speed - damping * way / 2.0
+    rest = 0.2 + 2.0 / damping * np.log(1.0 - damping * way / (2.0 * speed))
+    assert sol.joint("slide").rate[-1, 0] == pytest.approx(-side * e * before * np.exp(-damping * rest / 2.0), abs=1e-9)
+    assert sol.heat[-1] == pytest.approx(1.0 - sol.joint("slide").rate[-1, 0] ** 2, abs=1e-9)
+
+
+def test_a_block_goes_to_and_fro_between_two_stops(tmp_path):
+    """With e = 1 for ever: after 4 ways and a quarter it is where a quarter of a way takes it."""
+    scene = sliding(tmp_path, "limits = [-0.1, 0.1]\nlimit_restitution = 1.0", rate=2.0)
+    sol = run(scene, 0.425, "rk54", 2.0**-6)
+    assert sol.joint("slide").coordinate[-1, 0] == pytest.approx(0.05, abs=1e-9)
+    assert sol.stats["impacts"] == 4
+    assert abs(sol.heat[-1]) <= 1e-12
+
+
+def parallelogram(tmp_path, stopped):
+    """Two cranks that hang from the ground and a coupler between them: all four joints turn by one angle."""
+    keys = "limits = [-0.2, nan]\nlimit_restitution = 0.6\n"
+    signs = {"first": "", "second": "", "third": "", "fourth": ""} | {stopped: keys}
+    parts = [
+        BODY.format(name=name, position=at)
+        for name, at in (("left", [0.0, 0.0, -0.5]), ("right", [2.0, 0.0, -0.5]), ("coupler", [1.0, 0.0, -1.0]))
+    ]
+    joints = [
+        ("first", ["ground", "left"], [0.0, 0.0, 0.0]), ("second", ["ground", "right"], [2.0, 0.0, 0.0]),
+        ("third", ["coupler", "left"], [0.0, 0.0, -1.0]), ("fourth", ["coupler", "right"], [2.0, 0.0, -1.0]),
+    ]  # fmt: skip
+    hinges = [
+        HINGE.format(name=name, bodies=str(on).replace("'", '"'), at=at, keys=signs[name]) for name, on, at in joints
+    ]
+    scene = scene_of(tmp_path, *parts, *hinges, gravity=G)
+    return scene.with_state({"first": 0.5}, {"first": 0.0}, adjust=True)
+
+
+def test_a_stop_acts_in_whichever_joint_of_a_loop_it_is(tmp_path):
+    ends = [
+        run(parallelogram(tmp_path, stopped), 1.0, rtol=1e-9, atol=1e-11).joint("first").coordinate[-1, 0]
+        for stopped in ("first", "second", "third", "fourth")
+    ]
+    assert ends == pytest.approx([ends[0]] * 4, abs=1e-7)
+    assert ends[0] >= -0.2
+
+
+def test_a_stop_and_a_contact_are_one_island(tmp_path):
+    """A ball that strikes a block at rest on its stop with e = 1 comes back as from a wall; with e = 0 all is heat."""
+    surface = '[surfaces.{name}]\nbody = "{name}"\nshape = {{ {shape} }}\nrestitution = {e}\n'
+    for e in (1.0, 0.0):
+        parts = [
+            BODY.format(name="block", position=[0.0, 0.0, 0.0]),
+            BODY.format(name="ball", position=[0.0, 0.0, 0.3]) + "velocity = [0.0, 0.0, -1.0]\n",
+            SLIDE.format(coordinate=0.0, rate=0.0, keys=f"limits = [0.0, nan]\nlimit_restitution = {e}"),
+            surface.format(name="block", shape="sphere = 0.1", e=e), surface.format(name="ball", shape="sphere = 0.1", e=e),
+        ]  # fmt: skip
+        sol = run(scene_of(tmp_path, *parts), 0.2, "rk54", 2.0**-5)
+        assert sol.body("ball").velocity[-1, 2] == pytest.approx(e, abs=1e-12)
+        assert sol.body("block").velocity[-1, 2] == pytest.approx(0.0, abs=1e-12)
+        assert sol.heat[-1] == pytest.approx(1.0 - e, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("limits", "keys", "fault"),
+    [
+        ([-0.1, 0.1], "limit_restitution = 1.5", "not above 1"),
+        ([-0.1, 0.1], "limit_restitution = 0.5\nlimit_loss = 0.2", "limit_restitution and limit_loss"),
+        ([-0.1, 0.1], "limit_restitution = 0.5\nlimit_stiffness = 1e4", "limit_restitution and limit_stiffness"),
+        ([0.25, 0.5], "limit_restitution = 0.5", r"joints\.slide\.limits: found a start 0\.25 beyond them"),
+    ],
+)
+def test_what_is_wrong_of_hard_stops_is_named(limits, keys, fault, tmp_path):
+    with pytest.raises(ephs.SceneError, match=fault):
+        sliding(tmp_path, f"limits = {limits}\n{keys}")
+
+
+def test_a_scene_with_hard_stops_is_read_as_it_was_written(tmp_path):
+    scene = sliding(tmp_path, "limits = [-0.1, 0.1]\nlimit_restitution = 0.5", rate=1.0)
+    sol = run(scene, 0.1)
+    sol.save(tmp_path / "kept")
+    again = ephs.load_solution(tmp_path / "kept").scene
+    assert again.joint("slide").stop == scene.joint("slide").stop == Impact(0.5)
+
+
+def test_a_joint_in_python_takes_hard_stops():
+    made = joint("revolute", limits=[-1.0, 1.0], stop=Impact(0.5))
+    assert made != joint("revolute", limits=[-1.0, 1.0], stop=Impact(0.6))
+    with pytest.raises(StructureError, match="limits of a joint with 3 freedoms"):
+        joint("spherical", limits=[-1.0, 1.0], stop=Impact(0.5))
