@@ -126,8 +126,8 @@ def test_a_stop_and_a_contact_are_one_island(tmp_path):
             BODY.format(name="block", position=[0.0, 0.0, 0.0]),
             BODY.format(name="ball", position=[0.0, 0.0, 0.3]) + "velocity = [0.0, 0.0, -1.0]\n",
             SLIDE.format(coordinate=0.0, rate=0.0, keys=f"limits = [0.0, nan]\nlimit_restitution = {e}"),
-            surface.format(name="block", shape="sphere = 0.1", e=e), surface.format(name="ball", shape="sphere = 0.1", e=e),
-        ]  # fmt: skip
+            *(surface.format(name=name, shape="sphere = 0.1", e=e) for name in ("block", "ball")),
+        ]
         sol = run(scene_of(tmp_path, *parts), 0.2, "rk54", 2.0**-5)
         assert sol.body("ball").velocity[-1, 2] == pytest.approx(e, abs=1e-12)
         assert sol.body("block").velocity[-1, 2] == pytest.approx(0.0, abs=1e-12)
