@@ -75,3 +75,22 @@ def test_suggestions_for_a_joint_are_joints(folder, capsys):
 def test_a_python_file_without_a_name_tells_its_models(capsys, name):
     assert main(["info", f"{ROOT / 'examples/oscillator.py'}{name}"]) == 2
     assert "free_oscillator, damped_oscillator" in capsys.readouterr().err
+
+
+def test_info_says_none_of_fixed_joints_and_zero_of_rounding(capsys):
+    assert main(["info", str(ROOT / "examples/arm.urdf")]) == 0
+    said = capsys.readouterr().out
+    (fixed,) = (line for line in said.splitlines() if " fixed " in line)
+    assert fixed.endswith("none")
+    assert "e-" not in said
+
+
+def test_plot_takes_a_saved_solution(folder, tmp_path, capsys):
+    assert main(["plot", str(folder)]) == 0
+    listed = capsys.readouterr().out
+    saved = tmp_path / "crank.nc"
+    saved.write_bytes((folder / "solution.nc").read_bytes())
+    assert main(["plot", str(saved)]) == 0
+    assert capsys.readouterr().out == listed
+    assert main(["plot", str(saved), "energy"]) == 0
+    assert (tmp_path / "signals.svg").is_file()

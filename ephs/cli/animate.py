@@ -28,7 +28,7 @@ def animate(
     Parameters
     ----------
     folder
-        Result folder of ephs run.
+        Result folder of ephs run, or a saved solution (.nc).
     output
         Page to write, FILE.html.
     wrenches

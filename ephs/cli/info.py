@@ -13,6 +13,9 @@ __all__ = ["info"]
 MOST = 12
 """Rows of a table; a line counts the others."""
 
+DIGITS = 12
+"""Decimals of positions in m."""
+
 
 def info(scene: str, /, *, loading: Loading = AS_GIVEN) -> int:
     """List bodies, joints, degrees of freedom, inputs and outputs of a model.
@@ -46,7 +49,7 @@ def _of_scene(scene: "Scene") -> list[str]:
         *_table(("body", "mass [kg]", "position [m]"), ((n, f"{b.mass:g}", _row(b.pose[4:])) for n, b in bodies)),
         *_table(
             ("joint", "type", "between", "degrees of freedom"),
-            ((n, j.kind, f"{j.body1} – {j.body2}", ", ".join(_coordinates(freedoms[n]))) for n, j in joints),
+            ((n, j.kind, f"{j.body1} – {j.body2}", _coordinates(freedoms[n]) if j.dim else "none") for n, j in joints),
         ),
     ]
     rest: dict[str, Iterable[str]] = {
@@ -86,12 +89,14 @@ def _of_system(system: "System", name: str) -> list[str]:
     ]
 
 
-def _coordinates(labels: Any) -> list[str]:
-    return [f"{name or 'coordinate'} [{unit}]" for name, unit in zip(labels.names or ("",), labels.units, strict=True)]
+def _coordinates(labels: Any) -> str:
+    return ", ".join(
+        f"{name or 'coordinate'} [{unit}]" for name, unit in zip(labels.names or ("",), labels.units, strict=True)
+    )
 
 
 def _row(values: Any) -> str:
-    return ", ".join(f"{value:.4g}" for value in values)
+    return ", ".join(f"{round(value, DIGITS) + 0.0:.4g}" for value in values)
 
 
 def _few(names: list[str]) -> list[str]:

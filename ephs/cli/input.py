@@ -43,7 +43,7 @@ TEXTS = {
     "jumps": "--jumps {found}: expected TIME,TIME,... in seconds, as in 0.1,0.25",
     "suffix": "{found}: expected one of {expected}; choose the file name's ending accordingly",
     "no-file": "{found}: no such file; expected a scene file (.toml), a model (.urdf, .xml, .sdf) or FILE.py:NAME",
-    "no-result": "{found}: found no solution.nc in it, expected a result folder of ephs run",
+    "no-result": "{found}: found no solution.nc in it, expected a result folder of ephs run or a saved solution (.nc)",
     "no-scene": "{found}: found a System, expected a scene or a model, whose bodies have shapes to show",
     "no-name": "{file}: found no System or Scene {name} in it, expected one of {found}",
     "nameless": "{file}: found no NAME after the file; it holds {found}; give one as {file}:{example}",
@@ -214,7 +214,7 @@ def _from_python(file: Path, name: str) -> "Scene | System":
 
 
 def solution_of(folder: Path) -> "Solution":
-    """Solution in a result folder.
+    """Solution in a result folder, or in the file of `Solution.save`.
 
     Raises
     ------
@@ -223,7 +223,7 @@ def solution_of(folder: Path) -> "Solution":
     """
     import ephs
 
-    file = folder / "solution.nc"
+    file = folder if folder.suffix == ".nc" else folder / "solution.nc"
     if not file.is_file():
         raise BadInput(TEXTS["no-result"].format(found=folder))
     try:

@@ -24,15 +24,15 @@ def plot(
     Parameters
     ----------
     folder
-        Result folder of ephs run.
+        Result folder of ephs run, or a saved solution (.nc).
     signals
         Names such as joints.bearing.rate, bodies.rod.position.x or energy.
     output
-        Figure to write, .svg, .png or .pdf. Default: signals.svg in the result folder.
+        Figure to write, .svg, .png or .pdf. Default: signals.svg in the result folder or beside the file.
     """
     from ephs.show.chosen import plot_signals, signal_names
 
-    target = output or folder / "signals.svg"
+    target = output or (folder.parent if folder.suffix == ".nc" else folder) / "signals.svg"
     if target.suffix not in _FIGURES:
         raise BadInput(TEXTS["suffix"].format(found=target, expected=", ".join(_FIGURES)))
     sol = solution_of(folder)

@@ -60,7 +60,7 @@ def run(
     stepping: Stepping = AS_CHOSEN,
     keep: Annotated[int | None, Parameter(validator=lambda _, n: _counted(n))] = None,
     initial: list[str] | None = None,
-    out: Path | None = None,
+    out: Annotated[Path | None, Parameter(name=["--out", "-o"])] = None,
     report: bool = True,
     live: bool = False,
     resume: bool = False,
