@@ -175,7 +175,7 @@ GROUPS = {
             f"{MECHANICS}/methods/test_heat.py",
             f"{MECHANICS}/elements/test_contact.py",
         ),
-        pace=Pace(each=6.0, file=40.0, budget=20.0),
+        pace=Pace(each=30.0, file=300.0, budget=60.0),
     ),
     "derivatives": Group(
         DERIVATIVES,
