@@ -23,8 +23,9 @@ from ephs.semantics.stage.reaching import Atom
 __all__ = ["Program", "located"]
 
 _COMPILING: Final = RLock()
-_PLACES: Final["dict[int, tuple[Program, str]]"] = {}
-"""Program and entry of each address of machine code that was made; such code lives as long as the process."""
+_PLACES: Final["dict[int, tuple[Program, str, Call]]"] = {}
+"""Program, entry and call of each address of machine code that was made: tables hold addresses alone, so that code has
+to live as long as the process."""
 
 
 @final
@@ -98,7 +99,7 @@ class Program:
 
 def located(address: int) -> tuple[Program, str] | None:
     """Return the program and the name of the entry function that lies at an address, None where none does."""
-    return _PLACES.get(address)
+    return found[:2] if (found := _PLACES.get(address)) is not None else None
 
 
 _HEADER = """\
@@ -226,7 +227,7 @@ def _compiled(program: Program, members: int, shared: tuple[str, ...]) -> Mappin
         for name, entry in program.entries.items()
     }
     if members == 1:
-        _PLACES.update({call.address: (program, name) for name, call in calls.items()})
+        _PLACES.update({call.address: (program, name, call) for name, call in calls.items()})
     return MappingProxyType(calls)
 
 
