@@ -159,8 +159,6 @@ def _method(model: System | Scene, method: str, step: float | None) -> str:
         found = "natural" if step is not None or isinstance(model, System) else "rk87"
     if found not in METHODS:
         raise OptionError("method", method, f"one of auto, {', '.join(METHODS)}, which have tangents")
-    if found != "natural" and isinstance(model, System):
-        raise OptionError("method", method, f"natural: {found} is for scenes")
     if found == "natural" and step is None:
         raise OptionError("step", step, "a number of seconds: the tangent of natural is that of constant steps")
     return found

@@ -107,8 +107,6 @@ class _Reader:
         links = self.found.links
         if self.found.faults:
             raise self.found.faults[0]
-        if not links:
-            raise Unplaced(Path(), "has no body")
         names = tuple(None if link.path is None else self._name(link.path) for link in links)
         joints: list[Edge] = []
         forces: list[Edge] = []
