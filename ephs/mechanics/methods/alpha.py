@@ -103,7 +103,7 @@ class Alpha(ReducedMethod):
                 raise SolveError(Outcome.DIVERGED, path, f"{what} at the end of the step")
             self.jacobian.at(state, renew=True)
             return self.step(state, h)
-        flows, missed, work = self._passed(state, y0, y1, before, rates, h)
+        flows, missed, work, fallen = self._passed(state, y0, y1, before, rates, h)
         closed, allowed = eq.closed(eq.state(state, y1, state.t + h)), self.atol + self.rtol * eq.sizes(y0, y1)
         closed = eq.booking.step(state, closed, flows, work, missed=missed)
         left = 0.0
@@ -112,28 +112,30 @@ class Alpha(ReducedMethod):
                 state, closed, h, allowed, chosen=self.control.step is None, alone=True
             )
         missed = h * h * (self._beta - 1.0 / 6.0) * (mean1 - mean)
-        estimate = np.concatenate([missed, np.zeros(n), np.zeros(ns)])
+        estimate = np.concatenate([missed, np.zeros(n), fallen])
         error = max(left, float(np.max(np.abs(eq.along(estimate)) / allowed, initial=0.0)))
         return Attempt(state, replace(closed, memory=(rates, mean1)), h, error, eq.least(state, closed))
 
     def _passed(
         self, state: ReducedState, y0: Array, y1: Array, before: Array, rates: Array, h: float
-    ) -> tuple[Array, Array, float]:
-        """Flows of the step in J by the trapezoidal rule, by how much that may be off, and the work in J.
+    ) -> tuple[Array, Array, float, Array]:
+        """Flows of the step in J by the trapezoidal rule, by how much that may be off, the work in J, and the error of
+        heats and attached states, by Simpson's rule.
 
         Of a mode that decays within the step heat is between h·√(P⁰P¹), zero where its rate changes sign, and what the
         trapezoidal rule finds: for powers that are squares of rates, twice its difference to the midpoint rule.
         """
         eq = self.equations
-        books = eq.nv + eq.n + eq.ns + 2
+        fall, books = eq.nv + eq.n, eq.nv + eq.n + eq.ns + 2
         work = 0.5 * h * float(before[books - 1] + rates[books - 1])
-        if not eq.reduced.made:
-            return np.zeros(0), np.zeros(0), work
+        if not (eq.reduced.made or eq.ns):
+            return np.zeros(0), np.zeros(0), work, np.zeros(0)
         middle = 0.5 * (y0 + y1)
         here = eq.rates(state.t + 0.5 * h, state.q, middle)
+        bent = h / 3.0 * (before + rates - 2.0 * here)
         first, half, last = (h * rate[books:] for rate in (before, here, rates))
         flows = 0.5 * (first + last)
-        return flows, 2.0 * (flows - half), work
+        return flows, 2.0 * (flows - half), work, bent[fall : fall + eq.ns]
 
     def taken(self, state: ReducedState) -> Snapshot:
         """State at which the matrix was made."""

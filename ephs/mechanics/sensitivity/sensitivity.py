@@ -127,8 +127,8 @@ def sensitivity(
         ``joints.pin.coordinate`` (initial values of joints), ``joints.pin.frame1.position[0]``, ``osc.pe.k``, and of a
         system initial values by the paths of its states, ``osc.pe.q``. See `ephs.mechanics.scene.parameters`.
     method
-        ``"rk54"`` or ``"rk87"`` of scenes, with or without ``step``; ``"natural"`` of scenes and systems, with
-        ``step``. ``"auto"``: rk87 for scenes without a step, natural with one.
+        ``"rk54"`` or ``"rk87"``, with or without ``step``; ``"natural"`` with ``step``. ``"auto"``: natural with a
+        step, else rk87.
     inputs
         As for `simulate`: functions of time alone, constant ones for natural.
 
@@ -139,7 +139,7 @@ def sensitivity(
     SimulationError
         The run failed.
     """
-    name = _method(model, method, step)
+    name = _method(method, step)
     run: dict[str, Any] = {"t0": t0, "initial": initial, "method": name, "inputs": inputs, "reference": reference}
     family = Family(model, parameters, initial, inputs, reference, joints=name != "natural")
     control: dict[str, Any] = {"step": step} if step is not None else {"rtol": rtol, "atol": atol}
@@ -153,10 +153,10 @@ def sensitivity(
         return _along(family, name, grid, times)
 
 
-def _method(model: System | Scene, method: str, step: float | None) -> str:
+def _method(method: str, step: float | None) -> str:
     found = method
     if method == "auto":
-        found = "natural" if step is not None or isinstance(model, System) else "rk87"
+        found = "natural" if step is not None else "rk87"
     if found not in METHODS:
         raise OptionError("method", method, f"one of auto, {', '.join(METHODS)}, which have tangents")
     if found == "natural" and step is None:

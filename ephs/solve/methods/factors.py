@@ -11,7 +11,7 @@ from ephs.solve.errors import Outcome, SolveError
 __all__ = ["factors"]
 
 
-def factors(matrix: Any, equation: str = "") -> tuple[Array, Array]:
+def factors(matrix: Any, equation: str = "") -> tuple[Array, Any]:
     """(LU, pivots) of a real or complex square matrix, for `scipy.linalg.lu_solve`.
 
     Raises
@@ -19,6 +19,8 @@ def factors(matrix: Any, equation: str = "") -> tuple[Array, Array]:
     SolveError
         The matrix is singular, or holds numbers that are not finite.
     """
+    if not len(matrix):
+        return matrix, np.zeros(0, dtype=np.intp)  # which LAPACK does not take
     (factorise,) = get_lapack_funcs(("getrf",), (matrix,))
     lu, pivots, info = factorise(matrix)
     if info > 0 or not np.isfinite(lu).all():

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import ephs
-from ephs.mechanics.tree.finding.frames import Unplaced
 from ephs.semantics.system import System
 from ephs.solve.errors import OptionError
 from tests.mechanics.methods.systems import nested
@@ -62,5 +61,3 @@ def test_what_a_system_cannot_have_is_said():
         model.step(model.state0, 1e-3, method="natural", forces={"knee": [1.0]})
     with pytest.raises(OptionError, match=r"initial"):
         ephs.dynamics(scene, initial=poses)
-    with pytest.raises(Unplaced, match=r"has no body"):
-        ephs.dynamics(ephs.Pattern({}, {})())

@@ -211,13 +211,6 @@ def test_bad_options_are_named(options, message):
         ephs.simulate(BY_NAME["tumbling-body"].scene(), 0.1, **options)
 
 
-def test_explicit_methods_are_for_mechanisms():
-    from examples import oscillator
-
-    with pytest.raises(ephs.OptionError, match="expected natural, natural4, radau: the system has no body"):
-        ephs.simulate(oscillator.free_oscillator, 1.0, method="rk87")
-
-
 def test_too_many_steps_end_a_run_and_keep_what_there_is():
     with pytest.raises(ephs.SimulationError, match="more steps than are allowed") as caught:
         ephs.simulate(BY_NAME["heavy-top"].scene(), 2.0, method="rk54", max_steps=20)

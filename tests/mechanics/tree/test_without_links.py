@@ -1,0 +1,98 @@
+"""Systems without a link are the case of no links: the methods of mechanisms solve what is attached to nothing."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.linalg import expm
+
+import ephs
+from ephs import Pattern
+from ephs import library as lib
+from ephs import quantity as Q
+from ephs.mechanics.methods.registry import METHODS
+
+CHOOSING = [name for name, method in METHODS.items() if method.scenes and method.adaptive and name != "natural"]
+CONSTANT = [name for name, method in METHODS.items() if method.scenes and method.fixed]
+MASS, STIFFNESS, DRAG, THETA = 2.0, 1.5, 0.3, 293.15
+START = {"osc.pe.q": 1.0}
+
+
+def oscillator():
+    inner = Pattern.from_text("q: displacement; p: momentum, exposed; pe(q); ke(p); pkc(q, p)")
+    outer = Pattern.from_text("p: momentum; s: entropy; osc(p); mf(p, s); env(s)")
+    spring, mass = lib.spring(k=STIFFNESS), lib.point_mass(m=MASS)
+    return outer(osc=inner(pe=spring, ke=mass, pkc=lib.pkc()), mf=lib.friction(d=DRAG), env=lib.environment())
+
+
+def swung(until, stiffness=STIFFNESS):
+    """Displacement and momentum of the oscillator by the matrix exponential; complex stiffness is taken."""
+    a = np.array([[0.0, 1.0 / MASS], [-stiffness, -DRAG / MASS]])
+    return expm(until * a) @ np.array([1.0, 0.0])
+
+
+@pytest.mark.parametrize("method", CHOOSING)
+def test_an_oscillator_is_its_matrix_exponential(method):
+    order = METHODS[method].order
+    rtol = 1e-5 if order <= 2 else 1e-9
+    sol = ephs.simulate(oscillator(), 1.0, method=method, initial=START, rtol=rtol, atol=rtol, audit="warn")
+    q, p = swung(1.0)
+    assert abs(sol["osc.pe.q"][-1] - q) + abs(sol["osc.ke.p"][-1] - p) <= 100.0 * rtol * len(sol) ** 0.5
+    energy = 0.5 * STIFFNESS * q * q + 0.5 * p * p / MASS
+    heat = THETA * (sol["env.s"][-1] - sol["env.s"][0])
+    assert heat == pytest.approx(0.5 * STIFFNESS - energy, abs=100.0 * rtol * len(sol) ** 0.5)
+    assert np.diff(sol["env.s"]).min() >= 0.0
+
+
+@pytest.mark.parametrize("method", CONSTANT)
+def test_constant_steps_have_their_order(method):
+    """Half the step: 2 to the order less error, down to rounding."""
+    q, p = swung(1.0)
+
+    def missed(step):
+        sol = ephs.simulate(oscillator(), 1.0, method=method, initial=START, step=step, audit="off")
+        return abs(sol["osc.pe.q"][-1] - q) + abs(sol["osc.ke.p"][-1] - p)
+
+    order, step = METHODS[method].order, 0.25 if METHODS[method].order >= 4 else 0.0625
+    coarse, fine = missed(step), missed(0.5 * step)
+    assert fine <= max(coarse / 2.0 ** (order - 0.5), 1e-12)
+
+
+def test_a_pipe_between_tanks_is_its_equations():
+    """Fluid, inertance, a loss that is no line, and its heat; the equations written by hand, by SciPy."""
+    pattern = Pattern.from_text(
+        "a: liquid; b: liquid; g: pressure_impulse; s: entropy;"
+        "tank1(v=a); tank2(v=b); pipe(g); join(v1=a, v2=b, g); loss(g, s); room(s)"
+    )
+    one, two = (lib.tank(area=area, density=1e3) for area in (2.0, 1.0))
+    loss = lib.pipe_loss(r=2e3, k=5e3)
+    pipe, room = lib.inertance(i=1e5), lib.environment()
+    system = pattern(tank1=one, tank2=two, pipe=pipe, join=lib.conduit(), loss=loss, room=room)
+    found = ephs.simulate(
+        system, 20.0, method="rk87", initial={"tank1.v": 3.0, "tank2.v": 0.5}, rtol=1e-10, atol=1e-10, audit="warn"
+    )
+
+    def rates(_, y):
+        a, b, g = y
+        flow = g / 1e5
+        return [flow, -flow, 9.81e3 * (b - a / 2.0) - 2e3 * flow - 5e3 * abs(flow) * flow]
+
+    by_hand = solve_ivp(rates, (0.0, 20.0), [3.0, 0.5, 0.0], method="DOP853", rtol=1e-11, atol=1e-11).y[:, -1]
+    ends = np.array([found[path][-1] for path in ("tank1.v", "tank2.v", "pipe.g")])
+    assert np.abs(ends - by_hand).max() <= 1e-8 * np.abs(by_hand).max()
+
+
+def test_a_derivative_is_that_of_the_exponential():
+    """By a complex step, which shares no difference with the tangent."""
+    found = ephs.sensitivity(oscillator(), ["osc.pe.k"], 1.0, method="rk87", step=0.05, initial=START)
+    expected = swung(1.0, STIFFNESS + 1e-30j).imag / 1e-30
+    for path, exact in zip(("osc.pe.q", "osc.ke.p"), expected, strict=True):
+        assert found[path][-1, 0] == pytest.approx(exact, abs=1e-11)
+
+
+def test_what_depends_on_each_other_is_refused_by_name():
+    """Two inductors in series carry one current: their fluxes are no states of an explicit method."""
+    series = ephs.transformer({"b": Q.flux_linkage, "c": Q.flux_linkage}, [[1]])
+    pattern = Pattern.from_text("b: flux_linkage; c: flux_linkage; one(b); other(b=c); series(b, c)")
+    system = pattern(one=lib.inductor(l=1.0), other=lib.inductor(l=2.0), series=series)
+    with pytest.raises(ephs.OptionError, match=r"expected natural, natural4, radau: .* stores what other states"):
+        ephs.simulate(system, 1.0, method="rk87", initial={"one.b": 1.0, "other.b": 2.0})
