@@ -16,6 +16,7 @@ from ephs.mechanics.tree.engine.adjoints import StepAdjoint
 from ephs.mechanics.tree.equations.equations import Equations
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.codes import VECTOR
+from ephs.semantics.system import System
 from ephs.solve.errors import OptionError
 from ephs.solve.sparse import Index
 from ephs.solve.threads import in_one_thread
@@ -48,7 +49,7 @@ class Gradient:
 
 @in_one_thread
 def gradient(
-    model: Scene,
+    model: System | Scene,
     parameters: Sequence[str],
     times: "ArrayLike",
     weights: "Mapping[str, ArrayLike]",
@@ -71,15 +72,13 @@ def gradient(
 
     Parameters
     ----------
-    model
-        A scene.
     parameters
         Paths, as for `ephs.sensitivity`.
     times
         (n,) ascending, in s, after the start.
     weights
         ``joints.pin.coordinate`` or ``joints.pin.rate`` -> (n,) or (n, d), for the freedoms of a joint of the tree
-        whose elements are its coordinates.
+        whose elements are its coordinates; of a system the joint's path, ``linkage.joints.pin.rate``.
     method
         ``"rk54"`` or ``"rk87"``.
 
@@ -92,8 +91,6 @@ def gradient(
     """
     if method not in ("rk54", "rk87"):
         raise OptionError("method", method, "rk54 or rk87")
-    if not isinstance(model, Scene):  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise OptionError("model", type(model).__name__, "a scene: of systems ephs.sensitivity takes natural")
     if not parameters:
         raise OptionError("parameters", parameters, "at least one path")
     family = Family(model, parameters, initial, inputs, None, joints=True)
@@ -136,7 +133,8 @@ def gradient(
 
 def _seed(eq: Equations, name: str, weights: Array, count: int) -> tuple[Index, bool, Array]:
     """Places of a reading in q or y, which of both, and its weights (n, d)."""
-    joint, _, key = name.removeprefix("joints.").rpartition(".")
+    path, _, key = name.rpartition(".")
+    joint = path if path in eq.layout.freedoms else path.removeprefix("joints.")
     freedoms = eq.layout.freedoms.get(joint)
     parts = eq.layout.edges.get(joint, ())
     flat = freedoms is not None and all(edge.pair.code == VECTOR for _, edge in parts) and freedoms.max() < eq.n
