@@ -10,7 +10,7 @@ from typing import final
 
 import numpy as np
 
-from ephs.operad import Path
+from ephs.operad import Path, Quantity
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.descriptor import ComponentSlot, Descriptor, Input
 from ephs.semantics.extents import room
@@ -62,23 +62,27 @@ class Instant:
         return np.where(self.determined[where], self.multipliers[where], np.nan)
 
 
+def is_velocity(quantity: Quantity) -> bool:
+    """Whether efforts of a quantity are velocities: it is odd under time reversal, and no flux linkage."""
+    return quantity.parity < 0 and quantity.kind != "flux_linkage"
+
+
 def mobility(descriptor: Descriptor, x: Array, prescribed: Collection[Path] = ()) -> Mobility:
     """Count motions and redundant constraints at a state.
 
-    Motions are efforts of odd quantities (velocities, currents) that satisfy all constraints and vanish at ports whose
-    effort is prescribed.
+    Motions are velocities (`is_velocity`) that satisfy all constraints and vanish at ports whose effort is prescribed.
     """
     rows = [_constraints(descriptor, x)]
     for slot in descriptor.outer:
         if slot.path in prescribed:
             rows.append(np.eye(descriptor.effort_size)[slot.efforts])
-    odd = np.zeros(descriptor.effort_size, dtype=bool)
+    velocities = np.zeros(descriptor.effort_size, dtype=bool)
     for slot in descriptor.junctions:
-        odd[slot.efforts] = slot.quantity.parity < 0
+        velocities[slot.efforts] = is_velocity(slot.quantity)
     matrix = np.vstack(rows)
-    matrix = matrix[np.abs(matrix[:, odd]).max(axis=1, initial=0.0) > 0.0][:, odd]
+    matrix = matrix[np.abs(matrix[:, velocities]).max(axis=1, initial=0.0) > 0.0][:, velocities]
     rank = _rank(matrix)
-    return Mobility(int(odd.sum()) - rank, matrix.shape[0] - rank)
+    return Mobility(int(velocities.sum()) - rank, matrix.shape[0] - rank)
 
 
 def instant(

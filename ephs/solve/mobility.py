@@ -17,7 +17,7 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.descriptor import Descriptor
 from ephs.semantics.primitives import Reversible
 from ephs.semantics.spaces.rank import CONSTRAINT
-from ephs.solve.instant import Mobility
+from ephs.solve.instant import Mobility, is_velocity
 from ephs.solve.sparse import Index
 
 __all__ = ["mobility"]
@@ -72,10 +72,9 @@ class _Solved:
 def mobility(descriptor: Descriptor, x: Array, prescribed: Collection[Path] = ()) -> Mobility:
     """Count motions and redundant constraints at a state.
 
-    Motions are efforts of odd quantities (velocities, currents) that satisfy all constraints and vanish at ports whose
-    effort is prescribed.
+    Motions are velocities (`is_velocity`) that satisfy all constraints and vanish at ports whose effort is prescribed.
     """
-    odd = [slot for slot in descriptor.junctions if slot.quantity.parity < 0]
+    odd = [slot for slot in descriptor.junctions if is_velocity(slot.quantity)]
     dims = np.array([slot.quantity.space.dim for slot in odd], dtype=np.int64)
     conditions = _conditions(descriptor, x, prescribed, {slot.at: i for i, slot in enumerate(odd)}, dims)
     solved, left = _solve(conditions, dims)
@@ -87,7 +86,7 @@ def mobility(descriptor: Descriptor, x: Array, prescribed: Collection[Path] = ()
 def _conditions(
     d: Descriptor, x: Array, prescribed: Collection[Path], number: Mapping[int, int], dims: Index
 ) -> list[_Condition]:
-    """All constraints on odd efforts; rows that have none are left out."""
+    """All constraints on velocities; rows that have none are left out."""
     out: list[_Condition] = []
     junction_of = {at + i: (junction, i) for at, junction in number.items() for i in range(int(dims[junction]))}
     for slot in d.outer:

@@ -47,3 +47,8 @@ def test_counts_of_large_mechanisms(family, size, expected):
     problem = problem_of_scene(families.scene(family, size))
     found = mobility(problem.descriptor, problem.descriptor.pack(problem.initial))
     assert (found.mobility, found.redundant) == expected
+
+
+def test_currents_and_rotors_on_gears_are_no_motions():
+    motor, bare = (both(ephs.load(ROOT / "scenes" / f"{name}.toml"))[0] for name in ("motor-four-bar", "four-bar"))
+    assert motor == bare
