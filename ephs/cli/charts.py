@@ -194,7 +194,7 @@ def _short(text: str) -> str:
 
 @contextmanager
 def _status(name: str) -> Iterator[Callable[[str], None]]:
-    """Show what is measured, on a terminal only."""
+    """Show the current measurement, on a terminal only."""
     from rich.console import Console
     from rich.text import Text
 

@@ -25,7 +25,7 @@ CHUNK: Final = 8
 
 @final
 class Task:
-    """A scene, what acts on it, what is seen of it, and what is asked.
+    """A scene, its actions, observations, and task.
 
     Parameters
     ----------

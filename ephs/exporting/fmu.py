@@ -30,7 +30,7 @@ PLATFORMS: Final[Mapping[str, tuple[str, str, str]]] = {
     "x86_64-darwin": ("macos-x86-64", "x86_64-macos", ".dylib"),
     "aarch64-darwin": ("macos-arm64", "aarch64-macos", ".dylib"),
 }
-"""Machines by their names in FMI: where object code is emitted for, what the linker calls them, ending of libraries."""
+"""Platforms by their names in FMI: target of object code, name for the linker, suffix of libraries."""
 _EPOCH: Final = (1980, 1, 1, 0, 0, 0)
 """The time of all files in a unit, so that the same model makes the same bytes."""
 

@@ -1,4 +1,4 @@
-"""A component of Modelica as flat equations: what Pymoca flattens, in SymPy's expressions."""
+"""A component of Modelica as flat equations of Pymoca, in SymPy's expressions."""
 
 import logging
 from collections.abc import Iterator, Mapping
@@ -164,7 +164,7 @@ def _readings(instance: Any) -> Iterator[str]:
 
 
 def _first(error: Exception) -> str:
-    """The first line of what an error says."""
+    """First line of an error message."""
     return next(iter(str(error).splitlines()), type(error).__name__)
 
 

@@ -26,7 +26,7 @@ STATES: dict[str, tuple[Quantity, bool]] = {
     "rad": (quantity.angle, False),
     "m": (quantity.displacement, False),
 }
-"""By the unit of a state: what is stored, and whether the state is its effort, not the stored amount."""
+"""By the unit of a state: stored quantity, and whether the state is its effort instead of the stored amount."""
 
 
 @final
@@ -155,7 +155,7 @@ def _differentiated(flat: Flat, equations: tuple[Equation, ...]) -> tuple[tuple[
 
 
 def _warmed(flat: Flat, equations: tuple[Equation, ...], hot: set[Symbol]) -> tuple[Equation, ...]:
-    """With what is known by numbers and temperatures of heat ports put in, as resistances are."""
+    """Substitute known numbers and the temperatures of heat ports, such as in resistances."""
     shown = {port.potential for port in flat.ports} | {port.flow for port in flat.ports}
     left = list(equations)
     while True:

@@ -104,7 +104,7 @@ def structure_of(name: str, relation: Relation, hessian: Matrix, warm: dict[Symb
 
 
 def _kernel(matrix: Matrix) -> Matrix:
-    """Columns that span what the matrix takes to zero."""
+    """Columns that span the null space of a matrix."""
     found = matrix.nullspace() if matrix.rows else [*sp.eye(matrix.cols).columnspace()]
     return sp.Matrix.hstack(sp.zeros(matrix.cols, 0), *found)
 

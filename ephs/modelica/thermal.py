@@ -1,4 +1,4 @@
-"""Heat: what is lost goes to the heat port; capacities and conductors have heat ports only."""
+"""Heat: losses go to the heat port; capacities and conductors have heat ports only."""
 
 from collections.abc import Callable
 from typing import Any

@@ -190,7 +190,7 @@ def call(pattern: Pattern, elements: Mapping[Path, object]) -> Any:
 @final
 @dataclass(slots=True)
 class _Level:
-    """A nesting on its way: where it is, its boxes that are still to come, and what is known of the others."""
+    """State of the traversal of a nesting: its path, the boxes not yet visited, and the results of the others."""
 
     path: Path
     box: Path

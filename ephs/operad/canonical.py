@@ -1,4 +1,4 @@
-"""The canonical one among equal patterns: sorted, and with names for what is equal without a name."""
+"""Canonical representatives of equal patterns: sorted, with generated names."""
 
 from itertools import count
 
@@ -12,7 +12,7 @@ __all__ = ["canonical", "from_normal", "rank"]
 
 
 def canonical(pattern: Pattern) -> Pattern:
-    """The pattern that stands for all that equal the given one: a function of the normal form alone.
+    """Canonical representative of the patterns equal to the given one; it depends on the normal form only.
 
     Paths are sorted. State ports lie on the least power-bearing junction of their class, else on its least outer port,
     else on a junction named ``state0``, ``state1``, … by the least of their ports.

@@ -94,7 +94,7 @@ def from_catlab(text: str | bytes, quantities: Mapping[str, Quantity] | Quantity
 
 
 def _tables(value: object, lost: list[str]) -> dict[str, list[Row]]:
-    """The four tables, with what else there is among what is lost."""
+    """The four tables, and the list of the parts without a counterpart."""
     document = dict(_READ.mapping("document", value))
     if missing := sorted(_COLUMNS.keys() - document.keys()):
         _READ.refuse("document", f"no table {missing[0]}", f"the tables {', '.join(_COLUMNS)}")

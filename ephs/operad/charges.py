@@ -59,7 +59,7 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
         "amount": Kind("mol", POSITIVE),
     }
 )
-"""The kinds of scalars that the package knows."""
+"""Predefined kinds of scalars."""
 
 
 def charges_of(kind: str, dim: int, given: object) -> Charges:
@@ -94,7 +94,7 @@ def charges_of(kind: str, dim: int, given: object) -> Charges:
 
 
 def require_domain(kind: str, domain: object) -> None:
-    """Refuse what is no open interval."""
+    """Raise an error unless the value is an open interval."""
     match domain:
         case (float() | int() as low, float() | int() as high) if low < high:
             return

@@ -62,7 +62,7 @@ class Directory(Mapping[Path, T_co]):
 
     @staticmethod
     def trusted(items: "dict[Path, S]") -> "Directory[S]":
-        """The directory of these items, of which one knows that they are prefix-free; they are not copied."""
+        """Directory of items known to be prefix-free, without copying them."""
         directory = cast("Directory[S]", object.__new__(Directory))
         object.__setattr__(directory, "_items", items)
         return directory

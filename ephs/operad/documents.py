@@ -195,7 +195,7 @@ def _junction(where: str, value: object) -> Junction:
 
 
 def port_from(where: str, value: object) -> PortType:
-    """Read what a port is; the inverse of `port_record`."""
+    """Read a port; the inverse of `port_record`."""
     junction = _junction(where, value)
     return PortType(junction.quantity, junction.power)
 

@@ -11,7 +11,7 @@ __all__ = ["Equation", "Law"]
 @final
 @dataclass(frozen=True, slots=True)
 class Equation:
-    """Two sides that a law says are equal, and where they come from.
+    """The two sides of a law, and the arguments that they come from.
 
     Printed, it shows both sides as trees; where they differ also the expression that makes it anew.
 
@@ -46,7 +46,7 @@ class Equation:
 @final
 @dataclass(frozen=True, slots=True)
 class Law:
-    """A law: its name, what it says, what it speaks of, and how to form both sides.
+    """A law: name, statement, domain, and the functions that form both sides.
 
     Parameters
     ----------

@@ -107,7 +107,7 @@ class PatternError(ValueError):
 
 
 def _brief(word: object) -> object:
-    """The word of a message, its middle left out where it is long; what would steer a terminal, escaped."""
+    """Word of a message, abbreviated in the middle where it is long, with control characters escaped."""
     text = word if isinstance(word, str) else repr(word)
     if len(text) > _LONGEST:
         text = word = f"{text[:120]}… ({len(text)} characters) …{text[-40:]}"

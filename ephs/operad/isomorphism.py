@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 __all__ = ["Renaming", "automorphisms", "canonical_hash", "isomorphism", "to_networkx"]
 
 Node = tuple[str, Any]
-"""Kind and name, so that what is found can be read off."""
+"""Kind and name of each vertex, to read the isomorphism from."""
 
 
 @final
@@ -152,7 +152,7 @@ def _words(quantity: Quantity) -> str:
 def _refined(
     graph: "nx.Graph[Any]", colours: Mapping[Node, str] | None = None, pivot: Node | None = None
 ) -> dict[Node, str]:
-    """Colour refinement: split the colours by those of the neighbours until nothing more is told apart.
+    """Colour refinement: split colours by those of the neighbours until the partition is stable.
 
     Colours are digests, so they do not depend on names, order or process. Only neighbours of what changed are looked
     at again: a node none of whose neighbours changed keeps its colour, which no changed one can have.

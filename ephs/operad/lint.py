@@ -1,4 +1,4 @@
-"""Diagnostics: patterns that mean something definite, but hardly ever what was meant."""
+"""Diagnostics of patterns that are well-formed but probably mistaken."""
 
 from dataclasses import dataclass
 from types import MappingProxyType

@@ -1,4 +1,4 @@
-"""The normal form of a pattern: what two patterns must share to be equal.
+"""Normal form of a pattern, by which patterns are compared.
 
 Power is exchanged at junctions, states are shared by classes of linked junctions. So power ports and power
 exposures attach to the junctions that bear power, state ports and state exposures to classes. A junction that

@@ -118,7 +118,7 @@ class Pattern:
     def trusted(
         junctions: Directory[Junction], boxes: Directory[Box], classes: Mapping[Path, frozenset[Path]]
     ) -> "Pattern":
-        """The pattern of parts that one knows to be well-formed, as substitution makes them of well-formed ones.
+        """Pattern of parts known to be well-formed, such as those that substitution produces; without checks.
 
         `classes` gives each linked junction its class.
         """

@@ -1,4 +1,4 @@
-"""Quantities: what is exchanged at a port, as values; and the kinds of ports."""
+"""Quantities exchanged at ports, and kinds of ports."""
 
 from dataclasses import dataclass, replace
 from math import isfinite

@@ -1,4 +1,4 @@
-"""JSON documents from anybody: parsed, and looked at key by key; what is refused is named by its place."""
+"""Untrusted JSON documents, parsed and validated key by key; errors name the position."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -14,7 +14,7 @@ __all__ = ["Reader"]
 @final
 @dataclass(frozen=True, slots=True)
 class Reader:
-    """Reads the parts of a document; every method but `json` takes the place of what it reads.
+    """Reader of the parts of a document; every method but `json` takes the position of its value.
 
     Parameters
     ----------

@@ -43,7 +43,7 @@ def rename(
 def _renamed_identity(
     pattern: Pattern, boxes: Mapping[Any, Any], junctions: Mapping[Any, Any], ports: Mapping[Any, Mapping[Any, Any]]
 ) -> Pattern:
-    """An identity stays one: inner and outer ports get the same names, which need be said once only."""
+    """Renaming of an identity pattern: inner and outer ports get the same names, which are given once."""
     inner: Mapping[Any, Any] = next((names for box, names in ports.items() if Path.of(box) == ROOT), junctions)
     new = _read("junction", junctions, pattern.junctions)
     same = _read("port of box .", inner, pattern.junctions) == new

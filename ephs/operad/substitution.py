@@ -70,7 +70,7 @@ class _Whole:
 @final
 @dataclass(frozen=True, slots=True)
 class _Level:
-    """A nesting on its way into the whole: where it is, and what its junctions are called there."""
+    """State of the flattening of a nesting: its path, and the names of its junctions in the whole."""
 
     path: Path
     nesting: Nesting

@@ -89,7 +89,7 @@ def from_text(text: str) -> Pattern:
 
 
 def statements(text: str) -> Statements:
-    """Read the compact form of what need not be a whole pattern."""
+    """Read the compact form of a pattern or a part of one."""
     return _wired(*_Reader(text).statements())
 
 
@@ -103,7 +103,7 @@ def quantity_from_text(text: str) -> Quantity:
 def _wired(
     junctions: list[tuple[Path, Junction]], boxes: list[tuple[Path, list[tuple[Path, Port]]]], links: list[list[Path]]
 ) -> Statements:
-    """Pairs all the way: what is written twice must be seen."""
+    """Objects as lists of pairs, to detect repeated keys."""
     return [*junctions], [(box, Directory(ports, what=f"ports of box {box}")) for box, ports in boxes], links
 
 

@@ -1,4 +1,4 @@
-"""Patterns to and from the diagrams of other programs: what came of it, and what was lost on the way."""
+"""Translation of patterns to and from diagrams of other programs, with the list of lost elements."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -73,7 +73,7 @@ class _Named:
 @final
 @dataclass(frozen=True, slots=True)
 class Wiring:
-    """A wiring diagram of others, by numbers: what a pattern can be made of.
+    """Numbered wiring diagram of another program, from which a pattern is made.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Semantics: what patterns and systems mean. Relations, primitives, systems, and the library of scalar physics."""
+"""Semantics of patterns and systems: relations, primitives, systems, and the library of scalar physics."""
 
 from ephs.semantics.bundle import Reference as Reference
 from ephs.semantics.errors import AssemblyError as AssemblyError

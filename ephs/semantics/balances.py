@@ -156,7 +156,7 @@ def _productions(probe: Probe, solved: Solved) -> Iterator[tuple[Path, float, fl
 
 
 def _balance(probe: Probe, solved: Solved, terms: list[float], sizes: list[float], what: str, unit: str) -> Verdict:
-    """Terms that add up to nothing, with the sizes of what they are differences of."""
+    """Terms of a balance, whose sum vanishes, with the magnitudes for its tolerance."""
     if solved.residual > UNSOLVED:
         return VACUOUS
     scale = sum(map(abs, terms)) + sum(sizes)

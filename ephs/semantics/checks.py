@@ -45,7 +45,7 @@ TOLERANCE = 1e-12
 EVENNESS = 1e-9
 """Of the energy, in which large terms may cancel."""
 ROUNDING = 1e-11
-"""Of an energy: what rounding leaves of the temperature that differences of it tell."""
+"""Relative rounding error of a temperature computed by differences of the energy."""
 NEARER = (1.0, 1e-2, 1e-4, 1e-6, 1e-9, 0.0)
 """Factors of a state whose temperature underflows: a state nearer to the identity tells its sign."""
 STATEMENTS: dict[str, tuple[str, ...]] = {
@@ -59,7 +59,7 @@ STATEMENTS: dict[str, tuple[str, ...]] = {
 }  # fmt: skip
 """Conditions by the kind of primitive."""
 MIRRORED = STATEMENTS["irreversible"][4]
-"""Condition that is not asked of what is one-sided."""
+"""Condition that one-sided components need not satisfy."""
 
 
 def random_point(
@@ -102,7 +102,7 @@ def _odd(bundle: Bundle, port: Path) -> bool:
 
 
 def constant(primitive: "Primitive") -> bool:
-    """Whether the structure depends on nothing, so that one evaluation tells all."""
+    """Whether the structure is constant, so that one evaluation suffices."""
     return primitive.kind == "reversible" and not primitive.reads
 
 
@@ -175,7 +175,7 @@ def _temperature(storage: "Storage", trial: Trial, where: slice) -> float:
 
 
 def _check_gradient(storage: "Storage", trial: Trial, gradient: Array, energy: float) -> None:
-    """One random direction tells a wrong gradient; a central difference certifies about 1e-7 and no more."""
+    """One random direction detects a wrong gradient; a central difference is accurate to about 1e-7."""
     if storage.gradient is None:
         return
     n = storage.bundle.size

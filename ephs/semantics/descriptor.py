@@ -284,7 +284,7 @@ def _related(local: Relating, e: Array, lam: Array, read: Mapping[Path, Array]) 
 
 
 def descriptor_of(system: System) -> Descriptor:
-    """The descriptor form of a system: what fills many boxes is numbered once, else the system is flattened.
+    """Descriptor form of a system; subsystems that fill many boxes are numbered once, others are flattened.
 
     Raises
     ------
@@ -300,7 +300,7 @@ def descriptor_of(system: System) -> Descriptor:
 
 
 def assemble(flat: System) -> Descriptor:
-    """The descriptor form of a flat system, component by component: what any shorter way is held against.
+    """Descriptor form of a flat system, component by component; the reference for faster constructions.
 
     Raises
     ------

@@ -16,7 +16,7 @@ __all__ = ["differences", "increments"]
 NODE, WEIGHT = 0.5 * math.sqrt(0.6), 5.0 / 18.0
 """Of Gauss' quadrature with three nodes on an interval: the outer nodes' distance from the middle, their weight."""
 ROUNDING = 8.0 * float(np.finfo(float).eps)
-"""Of a difference of energies, relative to them and to what the states' own rounding makes of the gradient."""
+"""Tolerance of a difference of energies, relative to them and to the rounding of the states times the gradient."""
 
 
 def increments(storage: "Storage", x0: "Point", v: Array) -> Array:

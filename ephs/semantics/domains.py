@@ -43,5 +43,5 @@ def within_domain(domain: Domain, values: Mapping[Path, Array]) -> bool:
 
 
 def bounded(function: Callable[[Point], T], domain: Domain, outside: T) -> Callable[[Point], T]:
-    """The function where the states are in the domain, else what is no number."""
+    """The function where the states are in the domain, else NaN."""
     return lambda x: function(x) if within_domain(domain, x) else outside

@@ -1,4 +1,4 @@
-"""The domains of quantities at work: whether a state lies inside, random states inside, how far steps may go."""
+"""Domains of quantities: membership, random states, and step limits."""
 
 import math
 

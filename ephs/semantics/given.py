@@ -23,7 +23,7 @@ def real_number(name: str, value: Any) -> float:
 
 
 def require_arguments(name: str, key: str, function: object, ports: tuple[Path, ...]) -> None:
-    """Refuse what cannot be called with the ports' names."""
+    """Raise an error unless the function can be called with the ports' names."""
     expected = f"a function of ({', '.join(map(str, ports))})"
     if not callable(function):
         raise StructureError("parameter", name, key=key, found=function, expected=expected)

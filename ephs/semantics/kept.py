@@ -1,4 +1,4 @@
-"""Results kept with the frozen value that they were computed of, so that what depends on structure is found once."""
+"""Cache of results that depend on a frozen value, stored with the value."""
 
 from collections.abc import Callable, Hashable
 from threading import Lock
@@ -14,7 +14,7 @@ MOST = 8
 
 @final
 class Kept:
-    """A slot of a frozen value for what was computed of it; the oldest results make room for new ones.
+    """Cache slot of a frozen value; the oldest results are dropped first.
 
     Results are shared by all threads and never written to. They go with their owner: a value made from another one by
     `dataclasses.replace`, a deep copy, and what comes out of a pickle start with an empty slot.
@@ -27,7 +27,7 @@ class Kept:
         self._lock = Lock()
 
     def of(self, key: Hashable, make: Callable[[], T]) -> T:
-        """Return the result of this key, made where it is not there; what raises is not kept."""
+        """Return the result of this key, computed if it is absent; exceptions are not cached."""
         found = self._found.get(key)
         if found is not None:
             return cast("T", found)
@@ -43,5 +43,5 @@ class Kept:
 
 
 def once(owner: Any, key: Hashable, make: Callable[[], T]) -> T:
-    """Return what depends on a frozen value with a slot ``_kept``, and on the key, only: made once."""
+    """Return the result for a frozen value with a slot ``_kept`` and a key, computed once."""
     return cast("Kept", owner._kept).of(key, make)

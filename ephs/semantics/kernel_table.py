@@ -55,7 +55,7 @@ def prototype(address: int) -> Any:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Callback:
-    """A Python primitive behind the kernels' signature: keeps the function alive, and what it raised."""
+    """A Python primitive behind the kernels' signature; it keeps the function and its exception alive."""
 
     function: Any
     errors: list[BaseException]

@@ -200,7 +200,7 @@ class _Kinds:
         )
 
     def level(self, system: System, *, closed: bool = False) -> tuple[Kind, Index]:
-        """A pattern and what fills it, numbered; and the junctions of its outer power ports.
+        """A pattern and its components, numbered, with the junctions of its outer power ports.
 
         Parameters
         ----------
@@ -298,7 +298,7 @@ def _starts(system: System, copies: list[Copies]) -> tuple[Index, Index]:
 
 
 def _labels(pattern: Pattern, copies: list[Copies]) -> Index:
-    """(junctions,) equal for junctions that share their state, by links or by what fills the boxes."""
+    """(junctions,) equal for junctions that share their state, by links or by the systems in the boxes."""
     index = {path: i for i, path in enumerate(pattern.junctions)}
     pairs = [(index[a], index[b]) for group in pattern.links for a, b in pairwise(group)]
     for c in copies:
@@ -319,7 +319,7 @@ def _labels(pattern: Pattern, copies: list[Copies]) -> Index:
 
 
 def _map(start: Index, inner: int, outside: Index) -> Index:
-    """(copies, inner + outside) what a kind's numbers are on the level, copy by copy."""
+    """(copies, inner + outside) indices on the level of a kind's numbers, copy by copy."""
     return np.hstack([start[:, None] + np.arange(inner), outside])
 
 

@@ -1,4 +1,4 @@
-"""The laws of systems, as values: what composites inherit from their parts, measured at a probe.
+"""Laws that composites inherit from their parts, as values, measured at a probe.
 
 Each law is stated once, here. Tests, `System.check`, `ephs check` and `ephs.testing` run the same objects.
 """

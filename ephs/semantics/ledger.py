@@ -1,4 +1,4 @@
-"""The books of a system at one state: who stores how much of what, and who makes entropy."""
+"""Accounts of a system at one state: stored amounts and entropy production by component."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -50,7 +50,7 @@ class Account:
 @final
 @dataclass(frozen=True, slots=True)
 class Ledger:
-    """The books of a system. Calling it with a state gives the `Account` of each storage by its path.
+    """Accounts of a system. Calling it with a state gives the `Account` of each storage by its path.
 
     Over a motion, energy changes by what is supplied at the outer ports, exergy by that less θ₀ times the entropy that
     the `producers` make. A `Solution` has the same books over time: ``sol.ledger(path)``.

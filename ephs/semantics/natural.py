@@ -112,7 +112,7 @@ def solve_nested(
     inputs: Mapping[Path, Input],
     ports: Values | None = None,
 ) -> Solved:
-    """Solve the hierarchical system as it stands: every box port of every level has its own flow and effort.
+    """Solve the hierarchical system without flattening: every box port of every level has its own flow and effort.
 
     States that nobody stores are as given in ``state`` or at outer ``ports``, and stay. Storages of one state have
     one rate; where their values differ there is no solution, and the residual is infinite.

@@ -21,7 +21,7 @@ T = TypeVar("T", bound=Hashable)
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Parts:
-    """The copies of one kind of subsystem, by the numbers of what is inside.
+    """Copies of one kind of subsystem, by the numbers of their contents.
 
     Parameters
     ----------

@@ -198,7 +198,7 @@ def _parameter(reader: Reader, where: str, value: object) -> object:
 
 
 def _species(reader: Reader, where: str, value: object) -> Species:
-    """A substance; the inverse of what `_plain` writes of one."""
+    """A substance; the inverse of `_plain`."""
     found = dict(reader.mapping(where, value))
     numbers = {field.name for field in fields(Species)} - {"name", "elements"}
     reader.record(where, found, {"name", "elements"}, numbers)
@@ -260,7 +260,7 @@ def _rows(rows: Any) -> list[list[Any]]:
 def _terms(
     primitive: Primitive, function: Callable[..., Any], numbers: Mapping[str, object], names: Mapping[str, bool]
 ) -> "np.ndarray[Any, np.dtype[np.object_]]":
-    """The terms of what a function gives; of each named port it takes the state, or the effort where that is False."""
+    """Terms of a function's value; of each named port it takes the state, or the effort where that is False."""
     arguments: dict[str, Any] = dict(numbers)
     values: dict[Any, Term] = {}
     for number, (name, state) in enumerate(names.items()):
@@ -280,7 +280,7 @@ def _terms(
 
 
 def _agree(one: Primitive, two: Primitive) -> bool:
-    """Whether two primitives say the same at some states and efforts."""
+    """Whether two primitives agree at some states and efforts."""
     return all(
         bool(np.allclose(a, b, rtol=AGREEMENT, atol=AGREEMENT * float(np.abs(a).max(initial=0.0)), equal_nan=True))
         for seed in range(3)

@@ -60,7 +60,7 @@ class Verdict:
 @final
 @dataclass(frozen=True, slots=True)
 class SystemLaw:
-    """A law of systems: its name, what it says, and how to measure its defect."""
+    """A law of systems: name, statement, and the measure of its defect."""
 
     name: str
     statement: str

@@ -1,4 +1,4 @@
-"""A primitive seen through linear maps of its ports' efforts: what is left of it where a transformer is folded in.
+"""Pullback of a primitive along linear maps of its ports' efforts, as when a transformer is folded into it.
 
 With e' = T e the relation (f', e') becomes f = Tᵀ f': Dirac structures stay Dirac structures, Onsager structures stay
 Onsager structures, and over a step the same relation holds that the two components have together.

@@ -21,7 +21,7 @@ PROBES = 3
 
 @final
 class CheckItem(NamedTuple):
-    """A check: its name, whether it holds, and what was found."""
+    """A check: name, verdict, and detail."""
 
     name: str
     ok: bool
@@ -71,7 +71,7 @@ def check_system(
 
 
 def check_structure(system: System) -> CheckItem:
-    """The verdicts on all components; what is not proved is searched once more."""
+    """Verdicts on all components; those not proved are searched for counterexamples once more."""
     count = 0
     slow: list[str] = []
     searched: list[Path] = []

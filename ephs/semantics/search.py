@@ -27,7 +27,7 @@ DEFINED = 40
 SHRINKS = 2000
 """Trials on the way to the simplest counterexample, at most."""
 UNDEFINED = ("finite", "undefined")
-"""Kinds of failure that say no more than that the structure has no value there."""
+"""Exceptions that mean that the structure is undefined at a state."""
 
 
 def failure(primitive: "Primitive", where: Trial) -> StructureError | None:

@@ -50,7 +50,7 @@ def quadratic(
 
 
 def _quadratic_proof(interface: Interface, q: Array) -> tuple[Condition, ...]:
-    """The conditions on E = ½ xᵀ Q x, from the entries of Q; of what they do not show, none."""
+    """Conditions on E = ½ xᵀ Q x, from the entries of Q, as far as these decide them."""
     bundle = Bundle.of(interface)
     parity = bundle.parity()
     even, turned, slope, hot = STATEMENTS["storage"]

@@ -47,7 +47,7 @@ class Subspace:
 
     @staticmethod
     def from_span(vectors: Array, usual: float = 0.0) -> "Subspace":
-        """The span of the columns of vectors (n, r); what is small beside the usual size is rounding, too."""
+        """Span of the columns of vectors (n, r); columns small relative to the usual size count as rounding."""
         if not vectors.size:
             return Subspace(np.zeros((vectors.shape[0], 0)))
         u, sigma, _ = np.linalg.svd(vectors, full_matrices=False)

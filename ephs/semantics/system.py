@@ -98,7 +98,7 @@ class System:
 
     @property
     def nesting(self) -> Nesting:
-        """The patterns of all levels, without what fills the innermost boxes."""
+        """Patterns of all levels, without the components in the innermost boxes."""
         inner = {box: filling.nesting for box, filling in self.fillings.items() if isinstance(filling, System)}
         return Nesting(self.pattern, inner)
 
@@ -142,7 +142,7 @@ class System:
 
     @property
     def ledger(self) -> "Ledger":
-        """Its books: who stores what at a state, and who makes entropy."""
+        """Accounts of stored amounts and entropy production at a state."""
         from ephs.semantics.ledger import Ledger
 
         return Ledger(self)
@@ -301,7 +301,7 @@ def require_fillings(pattern: Pattern, fillings: Mapping[Path, _Filling]) -> Non
 
 
 def read_state(path: Path, quantity: Quantity, value: object) -> Array:
-    """The value of a state, (size,), from what stands for it.
+    """Value of a state, (size,), from its short form.
 
     Raises
     ------

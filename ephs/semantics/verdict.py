@@ -76,7 +76,7 @@ def proved(how: str, *statements: str) -> tuple[Condition, ...]:
 
 
 def examine(primitive: "Primitive") -> StructureVerdict:
-    """Prove the conditions on a primitive; search for counterexamples of what is not proved.
+    """Prove the conditions on a primitive; search for counterexamples of the others.
 
     Raises
     ------

@@ -224,7 +224,7 @@ class _Warm:
     cold: Colour
 
     def glow(self, heat: Heat, frame: int) -> None:
-        """Colour it; what did not change is not said again, which keeps the page small."""
+        """Colour it; unchanged colours are not repeated, which keeps the page small."""
         share, before = heat.share(self.node, frame), heat.share(self.node, max(0, frame - 1))
         if self.node in heat.temperatures and (frame == 0 or self._colour(share) != self._colour(before)):
             setattr(self.drawn, self.name, self._colour(share))
@@ -238,7 +238,7 @@ class _Warm:
 
 @contextlib.contextmanager
 def _silence() -> Iterator[None]:
-    """The helper writes a banner whatever it is told: to the terminal, and in notebooks through rich."""
+    """Silence the banner that the server writes to the terminal and, through rich, in notebooks."""
     import rich
 
     console = rich.get_console()

@@ -71,7 +71,7 @@ def _usual(known: dict[str, Labels]) -> list[str]:
 
 
 def _found(name: str, known: dict[str, Labels]) -> tuple[str, str]:
-    """The output that a name stands for, and its component or nothing."""
+    """Output of a name, and its component, if any."""
     outer, _, last = name.rpartition(".")
     for output in (name, f"{name}.{_FIRST.get(name.partition('.')[0], '')}"):
         if output in known:

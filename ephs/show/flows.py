@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 __all__ = ["Band", "exergy_bands", "plot_exergy_flow"]
 
 SMALLEST = 5e-3
-"""Bands below this share of what was turned over are drawn as one."""
+"""Bands below this fraction of the turnover are drawn as one."""
 GAP, SLOT = 0.02, 0.05
 """Between bands at the edge, and the least room that a band and its name get there, of the height of all."""
 
@@ -58,7 +58,7 @@ def exergy_bands(sol: Any, path: Any = ".", first: int = 0, last: int = -1) -> l
 
 
 def plot_exergy_flow(sol: Any, path: Any = ".") -> "Figure":
-    """A Sankey picture: what gave exergy on the left, what took or destroyed it on the right, widths in J."""
+    """A Sankey diagram: sources of exergy on the left, sinks and destruction on the right, widths in J."""
     import matplotlib as mpl
 
     bands = exergy_bands(sol, path)

@@ -1,4 +1,4 @@
-"""The placed picture of a pattern: what all three writers draw, and the little plane geometry it needs.
+"""Placed picture of a pattern for the three writers, and its plane geometry.
 
 Lengths are in points (1/72 inch), x to the right, y **down**.
 """

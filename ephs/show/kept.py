@@ -28,6 +28,6 @@ def pattern_svg(system: "System") -> str:
 
 @cache
 def _code() -> bytes:
-    """Digest of the modules of this room, by which pictures of other versions are told apart."""
+    """Digest of the modules of this package, which invalidates pictures of other versions."""
     sources = sorted((file for file in files("ephs.show").iterdir() if file.name.endswith(".py")), key=lambda f: f.name)
     return hashlib.sha256(b"".join(file.read_bytes() for file in sources)).digest()

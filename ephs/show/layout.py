@@ -157,7 +157,7 @@ class _Field:
     regions: tuple[PlacedRegion, ...]
 
     def obstacles(self, ends: tuple[str, ...]) -> Points:
-        """Rows (x, y, radius) of what a wire with these ends has to keep clear of."""
+        """Rows (x, y, radius) of the obstacles of a wire with these ends."""
         rows = [(*point, self.radii[path]) for path, point in self.at.items() if path not in ends]
         rows += [(*region.at, region.radius) for region in self.regions if region.members.isdisjoint(ends)]
         return np.array(rows, dtype=float).reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""Words of a pattern's picture: the legend of kinds, and what names of the literature stand for."""
+"""Texts of a pattern's picture: the legend of kinds, and explanations of names of the literature."""
 
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
@@ -59,7 +59,7 @@ def legend(kinds: Iterable[str], start: Point, width: float) -> tuple[tuple[Plac
 
 
 def title(path: str, kind: str) -> str:
-    """Full path of a box, its kind, and what its name stands for in the literature."""
+    """Full path of a box, its kind, and the meaning of its name in the literature."""
     symbol = path.rpartition(".")[2].partition("_")[0]
     said = f"{path} ({kind})" if kind != "unknown" else path
     return f"{said}: {SYMBOLS[symbol]}" if symbol in SYMBOLS else said

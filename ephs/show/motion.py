@@ -40,7 +40,7 @@ class Film:
 @final
 @dataclass(frozen=True, slots=True)
 class View:
-    """A camera: where it is, what it looks at, m, and its vertical field of view, rad."""
+    """A camera: position and target in m, vertical field of view in rad."""
 
     position: tuple[float, float, float]
     target: tuple[float, float, float]

@@ -49,7 +49,7 @@ class Opened:
             yield np.array([at[path] for path in self.graph.radii()], dtype=float).reshape(-1, 2)
 
     def _inside(self, box: str) -> dict[str, Point]:
-        """Places of a composite's own nodes; what it shares with the outside lies outside."""
+        """Positions of a composite's own nodes; shared junctions lie outside."""
         graph = self.inner[box]
         points = next(iter(places.proposals(graph)))
         kept = self.members[box]

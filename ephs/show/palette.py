@@ -1,4 +1,4 @@
-"""Colours, one meaning each, told apart by colour-blind eyes as well (after Okabe and Ito)."""
+"""Colours, one meaning each, distinguishable by colour-blind readers (Okabe and Ito)."""
 
 from typing import Any
 

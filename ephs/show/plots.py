@@ -142,7 +142,7 @@ def _line(axes: "Axes", sol: Any, curve: Curve, label: str | None, style: Any = 
 
 
 def _residual(axes: "Axes", sol: Any, panel: Panel) -> None:
-    """Sizes on a logarithmic axis; a residual of zero throughout is said in words."""
+    """Sizes on a logarithmic axis; a residual of zero throughout is a note."""
     shown = False
     for curve in panel.curves:
         size = np.where(np.abs(curve.values) > 0, np.abs(curve.values), np.nan)

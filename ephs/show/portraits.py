@@ -31,7 +31,7 @@ class _Curve(NamedTuple):
 
 
 def plot_phase(sol: Any, *which: str | tuple[str, str]) -> "Figure":
-    """Rates over coordinates of joints; for any other system, momenta over what moves with them.
+    """Rates over coordinates of joints; for any other system, momenta over displacements.
 
     A ring marks the start, a disc the end, an arrow head the direction in time.
 

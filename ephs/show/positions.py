@@ -20,7 +20,7 @@ GAP = 26.0
 CLEARANCE = 9.0
 GRID = 80.0
 ITERATIONS = 20000
-"""Of Graphviz at most: it tells when a layout takes more, and that of a large pattern does."""
+"""Time limit of Graphviz, which reports when the layout of a large pattern exceeds it."""
 _OUTER = "\0"
 
 

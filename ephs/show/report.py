@@ -105,7 +105,7 @@ def _number(value: Any) -> str:
 
 
 def _settled(value: Any) -> Any:
-    """Rounding that stands where nothing moves, in m, rad and their rates, is shown as what it is."""
+    """Values in m, rad and their rates below rounding are shown as zero."""
     if isinstance(value, list | tuple):
         return [_settled(each) for each in value]
     return 0 if isinstance(value, float) and abs(value) < ZERO else value

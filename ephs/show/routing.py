@@ -100,7 +100,7 @@ def bulged(start: Point, end: Point, amount: float) -> tuple[Point, ...]:
 
 
 def trimmed(line: tuple[Point, ...], radius: float) -> tuple[Point, ...]:
-    """The line without what lies in the disc of this radius about its first point."""
+    """The line outside the disc of this radius about its first point."""
     centre = line[0]
     for index in range(1, len(line)):
         a, b = line[index - 1], line[index]

@@ -30,7 +30,7 @@ def thinned(t: Array, values: Array, most: int = 2000) -> tuple[Array, Array]:
 
 
 def quantity_kinds(sol: Any) -> dict[str, str]:
-    """Kind of quantity of each state, by its path, as far as the system tells."""
+    """Kind of quantity of each state, by its path."""
     if sol.system is None:
         return {}
     pattern = sol.system.flatten().pattern
@@ -58,7 +58,7 @@ def state_panels(sol: Any) -> dict[str, list[tuple[str, Array]]]:
 def freedom_lines(
     scene: Any, places: Callable[[str], Any], read: Callable[[str], Any]
 ) -> Iterator[tuple[str, str, Array]]:
-    """Name, unit and values (n,) of each freedom of each joint, of what ``read(joint)`` gives, (n, d).
+    """Name, unit and values (n,) of each degree of freedom of each joint, from ``read(joint)``, (n, d).
 
     ``places(joint)`` gives the coordinates, which say where a line has to be broken: there values are NaN.
     """

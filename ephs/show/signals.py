@@ -21,7 +21,7 @@ FEW = 6
 @final
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Panels under one heading of the list of signals; ``shown`` says whether they are drawn at first."""
+    """Panels under one heading of the list of signals; ``shown``: drawn at first."""
 
     name: str
     panels: list[Panel]

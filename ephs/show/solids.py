@@ -137,7 +137,7 @@ def _shapes_of(surface: Any) -> list[dict[str, Any]]:
 
 
 def solid_of(body: Any, name: str) -> Solid:
-    """The surface of a body; where a mesh of it cannot be read, the box of its inertia, with a note that says so.
+    """Surface of a body; where its mesh cannot be read, the box of its inertia, with a note.
 
     Raises
     ------

@@ -1,1 +1,1 @@
-"""Solvers of systems: problems, the time loop, methods, solutions, audits. Nothing here knows of bodies or joints."""
+"""Solvers of systems: problems, the time loop, methods, solutions, audits; independent of bodies and joints."""

@@ -83,7 +83,7 @@ class Breakpoints:
         return replace(signal, value=lambda t, state: value(self.within(t), state))
 
     def within(self, t: float) -> float:
-        """The time on the run's side of a jump that rounding does not tell it from."""
+        """Time on the run's side of a jump within rounding of it."""
         if not self._times:
             return t
         k = bisect_left(self._times, t - self.near)

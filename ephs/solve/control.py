@@ -49,7 +49,7 @@ class Tolerance:
 
     @classmethod
     def of(cls, name: str, given: "float | Mapping[str, float]", default: float) -> "Tolerance":
-        """From what a user gave as the option ``name``; the key ``"*"`` stands for all others.
+        """From the user's option ``name``; the key ``"*"`` is the default of the others.
 
         Raises
         ------
@@ -156,7 +156,7 @@ def first_step(control: Control, span: float) -> float:
 
 
 def told_apart(t0: float, until: float, step: float | None) -> None:
-    """Refuse a run whose times rounding would not tell apart.
+    """Raise an error where times of the run differ by rounding only.
 
     Raises
     ------
@@ -182,7 +182,7 @@ class Policy(Protocol):
         ...
 
     def wanted(self, h: float, error: float, span: float) -> float:
-        """Length of the step, however short, whose error would be what is aimed at, by the estimate's power."""
+        """Length of the step whose error would equal the aim, by the order of the estimate, without a lower limit."""
         ...
 
     def snapshot(self) -> Snapshot:
@@ -190,7 +190,7 @@ class Policy(Protocol):
         ...
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Remember what a snapshot says."""
+        """Restore a snapshot."""
         ...
 
 
@@ -225,7 +225,7 @@ class Proportional:
         self._failed, self._hold = False, hold
 
     def judge(self, h: float, error: float, span: float) -> tuple[bool, float]:
-        """Accept what is at most 1; a step after a failure does not grow.
+        """Accept errors of at most 1; a step after a failure does not grow.
 
         What is accepted knows the share up to a limit only: where rates jump, no step would be short enough.
         """
@@ -257,13 +257,13 @@ class Proportional:
         return {"before": float(self._before), "failed": self._failed}
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Remember what a snapshot says."""
+        """Restore a snapshot."""
         self._before, self._failed = snapshot["before"], snapshot["failed"]
 
 
 @final
 class Symmetric:
-    """The step is what its own error makes it, not what the steps before it were.
+    """The next step follows from the error of the last step alone.
 
     Each is tried again until its error is within a factor of what was aimed at: to that factor the step's length is a
     function of the step alone, and the same backward in time.
@@ -276,13 +276,13 @@ class Symmetric:
 
     AIM, NEAR, TRIES, GROWTH = 0.5, 1.6, 4, 4.0
     finest = FINEST
-    """Such a part of the tolerance is below the rounding of states, and nobody waits for so many steps."""
+    """Least fraction of the tolerance: below it lies the rounding of states, and steps are too many."""
 
     def __init__(self, exponent: float) -> None:
         self._exponent, self._tries = exponent - 1.0, 0
 
     def judge(self, h: float, error: float, span: float) -> tuple[bool, float]:
-        """Accept what is within a factor of the aim, or after some tries what is allowed.
+        """Accept errors within a factor of the aim, or after some tries within the tolerance.
 
         A step of h in a run of T may have h/T of the tolerance.
         """
@@ -298,7 +298,7 @@ class Symmetric:
         return False, wanted
 
     def wanted(self, h: float, error: float, span: float) -> float:
-        """Length of the step, however short, whose error would be what is aimed at."""
+        """Length of the step whose error would equal the aim, without a lower limit."""
         return self._wanted(h, error * span / h)
 
     def _wanted(self, h: float, error: float) -> float:
@@ -309,5 +309,5 @@ class Symmetric:
         return {"tries": self._tries}
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Remember what a snapshot says."""
+        """Restore a snapshot."""
         self._tries = snapshot["tries"]

@@ -24,7 +24,7 @@ __all__ = [
 
 
 class Outcome(StrEnum):
-    """Cause that ended a run, in words; `advice` says what to do."""
+    """Cause that ended a run, in words; `advice` is the remedy."""
 
     DIVERGED = "the step's equations have no solution near by"
     SINGULAR = "the step's equations stay singular"
@@ -92,7 +92,7 @@ _OF_KERNEL = {1: Outcome.TURN, 2: Outcome.TEMPERATURE, 3: Outcome.PYTHON, 4: Out
 
 @final
 class OptionError(ValueError):
-    """An option that a run cannot have: which, what was found, what is expected."""
+    """An invalid option of a run: name, value found, values expected."""
 
     def __init__(self, key: str, found: object, expected: str) -> None:
         super().__init__(f"{key} is {found!r}, expected {expected}")
@@ -103,7 +103,7 @@ class OptionError(ValueError):
 
 
 def nearest_of(found: object, known: Iterable[str]) -> str:
-    """A hint at the known word that a misspelled one is nearest to, to end a message with; nothing where none is."""
+    """Suggestion of the known word nearest to a misspelled one, for the end of a message; empty if none is near."""
     from difflib import get_close_matches
 
     near = get_close_matches(str(found), list(known), n=1, cutoff=0.6)

@@ -123,7 +123,7 @@ class Watch:
     def step(
         self, t0: float, t1: float, end: Mapping[Path, Array], inside: Callable[[float], Mapping[Path, Array]]
     ) -> float | None:
-        """Record what happened after t0 and up to t1; the time at which the run has to stop, if so.
+        """Record the events after t0 and up to t1; return the time of a terminal one, if any.
 
         A function that is zero at t0 has crossed there already; it counts again only after it has left zero.
         """

@@ -153,7 +153,7 @@ def instant(
 
 
 def _least_norm(matrix: Array, right: Array) -> tuple[Array, Array]:
-    """The solution of least norm, and a basis (n, k) of what may be added to it."""
+    """Solution of least norm, and a basis (n, k) of the null space."""
     u, sigma, vt = np.linalg.svd(matrix, full_matrices=True)
     rank = rank_of(sigma, IMPLICIT)
     return vt[:rank].T @ ((u[:, :rank].T @ right) / sigma[:rank]), vt[rank:].T

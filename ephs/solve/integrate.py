@@ -1,4 +1,4 @@
-"""The time loop: compiled steps in chunks, and between chunks progress, interruption and what is kept."""
+"""Time loop of compiled steps in chunks; progress, interruption and records between chunks."""
 
 import time
 from collections.abc import Callable, Generator, Mapping
@@ -159,7 +159,7 @@ class _Inside:
 
 
 class Run(Protocol):
-    """A run in progress: where it stands, and what it has so far."""
+    """A run in progress: its state and its results so far."""
 
     t: float
     problem: Problem
@@ -237,7 +237,7 @@ def solution_of(problem: Problem, record: Record, stats: Mapping[str, Any]) -> S
 
 
 class _Run:
-    """One run in progress: where it stands, and what was kept."""
+    """A run in progress: its state and its records."""
 
     state: NaturalState
     balance: Balance
@@ -317,7 +317,7 @@ class _Run:
             raise chunk.failure
 
     def look(self) -> None:
-        """Tell the progress and write the journal, from time to time."""
+        """Report progress and write the journal at intervals."""
         at_end, now = self.t == self.grid.until, time.perf_counter()
         if self.progress is not None and (at_end or now - self.looked > 0.5 * RESPONSE):
             self.looked, error = now, self.balance.error(*self.recorder.latest)
@@ -338,7 +338,7 @@ class _Run:
         }
 
     def restore(self) -> None:
-        """Go on from where the journal says that the run stood."""
+        """Resume from the state in the journal."""
         found = self.journal.snapshot if self.journal is not None else None
         if found is not None:
             self.t, (self.steps, self.iterations, self.cut) = found["t"], found["counts"]

@@ -79,11 +79,11 @@ class Journal:
 
     @classmethod
     def of(cls, given: "Journal | str | os.PathLike[str] | None") -> "Journal | None":
-        """From what a user gave."""
+        """From the user's option."""
         return given if given is None or isinstance(given, Journal) else cls(Path(given))
 
     def open(self, heading: Mapping[str, Any]) -> "Written":
-        """Begin it, or find in it what there is of this run.
+        """Begin the journal, or read the part of this run that it has.
 
         Raises
         ------
@@ -133,7 +133,7 @@ class Written:
         return time.monotonic() - self._latest > EVERY
 
     def write(self, rows: Record | None, snapshot: Snapshot | None, stats: Mapping[str, Any]) -> None:
-        """An entry, on the disk when this returns: rows that are new, where the run stands, what it did so far.
+        """Write an entry to the disk: new rows, the state of the run, its counts so far.
 
         Raises
         ------
@@ -206,7 +206,7 @@ def read_journal(path: str | os.PathLike[str]) -> Contents:
 
 
 def _whole(heading: Any) -> bool:
-    """Whether it says whose run it is, as `Journal.open` does."""
+    """Whether it identifies its run, as `Journal.open` requires."""
     wanted = {"format": int, "name": str, "model": str, "run": dict, "note": dict}
     told = isinstance(heading, dict) and all(isinstance(heading.get(key), kind) for key, kind in wanted.items())
     return told and heading["format"] == FORMAT and {"form", "inputs"} <= set(heading["run"])

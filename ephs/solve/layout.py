@@ -21,13 +21,13 @@ from ephs.solve.methods.records import IRREVERSIBLE, REVERSIBLE, STORING, WORKIN
 __all__ = ["Entry", "entry_of", "laid_out"]
 
 LINEAR = frozenset({"constant_structure", "quadratic"})
-"""Kernels whose Jacobian's entries are their parameters: what vanishes depends on which parameters do."""
+"""Kernels whose Jacobian's entries are their parameters, so that zeros depend on the parameters."""
 
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Entry:
-    """A primitive as the tables know it.
+    """Entry of a primitive in the tables.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def _places(t: Tables, primitive: Index, patterns: list[Array]) -> tuple[Index, 
 
 
 def _local_pattern(entry: Entry, reference: Reference) -> Array:
-    """Which entries of a component's Jacobian are not identically zero.
+    """Mask of the entries of a component's Jacobian that are not identically zero.
 
     Compiled kernels are analytic in their arguments, so what vanishes at three random points vanishes. Callbacks may
     have branches: all their entries count.

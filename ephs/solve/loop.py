@@ -1,4 +1,4 @@
-"""The time loop of methods that take one step a call: control, events, what is kept, progress and interruption."""
+"""Time loop of methods that take one step a call: control, events, records, progress and interruption."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -33,7 +33,7 @@ RESPONSE = 0.1
 BURST = 1000
 """Steps in one compiled call at most, for progress and interruption."""
 BLOCK = 1024
-"""Rows that wait until they are made what is kept."""
+"""Rows that wait to be converted into records."""
 FINAL = (Outcome.PYTHON, Outcome.INPUT, Outcome.EVENT, Outcome.INCONSISTENT, Outcome.INTERRUPTED)
 """Failures that a shorter step does not mend."""
 
@@ -274,7 +274,7 @@ class _Run(Generic[S]):
         return stopped is not None
 
     def _look(self) -> None:
-        """Tell the progress and write the journal, from time to time."""
+        """Report progress and write the journal at intervals."""
         if self.journal is not None and self.journal.due:
             self.write()
         elif len(self.pending) >= BLOCK:
@@ -331,7 +331,7 @@ class _Run(Generic[S]):
         return repeatable(trials, self.bounds, ended=self.ended or self.t == self.until)
 
     def _ends(self) -> list[Record]:
-        """The first and the last row, kept or not; none of a run that did not start, or stands outside all numbers."""
+        """The first and the last row, recorded or not; none for a run that did not start or is not finite."""
         with suppress(SolveError):  # a failed run can stand where nothing can be evaluated
             rows = [(self.t, self.stepper.row(self.state))] if self.first else []
             return [record_of([t], [row], [0.0]) for t, row in ((self.t0, self.first), *rows) if row]
@@ -374,7 +374,7 @@ class _Run(Generic[S]):
         }
 
     def restore(self) -> Snapshot | None:
-        """Go on from where the journal says that the run stood; where its compiled part did."""
+        """Resume from the state in the journal, and that of the compiled part."""
         found = self.journal.snapshot if self.journal is not None else None
         if self.journal is None or found is None:
             return None

@@ -112,7 +112,7 @@ def _conditions(
 
 
 def _solve(conditions: list[_Condition], dims: Index) -> tuple[_Solved, list[_Condition]]:
-    """Walk from what is known outwards; where nothing more follows, let an effort be free and go on.
+    """Propagate known efforts along the constraints; where none follows, declare an effort free and go on.
 
     A condition serves when all its ports but those of one square block are known, or can be let free for it: conditions
     on one port first, then those that touch what is known.
@@ -161,7 +161,7 @@ def _use(condition: _Condition, solved: _Solved, dims: Index) -> list[int]:
 
 
 def _rank_of_loops(left: list[_Condition], solved: _Solved, dims: Index) -> int:
-    """The rank of what closes loops, in free efforts."""
+    """Rank of the loop-closing constraints in the free efforts."""
     written: list[tuple[Mapping[int, Array], Array]] = []
     leader: dict[int, int] = {}
 

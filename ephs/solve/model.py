@@ -92,7 +92,7 @@ class Model:
         )
 
     def storages(self) -> "Model":
-        """The model without what is no storage."""
+        """The model with its storages only."""
         return self.only(np.flatnonzero(self.tables.kind == STORING))
 
     def only(self, chosen: Index) -> "Model":

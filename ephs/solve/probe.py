@@ -76,7 +76,7 @@ class _Course:
     largest: list[float] = field(default_factory=list[float])
 
     def begin(self, t: float, state: State | None) -> None:
-        """Forget what was before t."""
+        """Discard samples before t."""
         self.follow(self.asked.at(t, state))
         if not self.largest:
             self.largest = [0.0] * len(self.values)
@@ -122,7 +122,7 @@ class Probe:
         self._at, self._spacing = t0, 0.0
 
     def begin(self, t: float) -> None:
-        """Look from here on, as nothing is known of what is before."""
+        """Restart the observation at this time."""
         self._at, self._spacing = t, 0.0
 
     def look(self, to: float, limit: float, h: float, state: Callable[[], State]) -> Change | None:

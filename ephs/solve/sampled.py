@@ -1,4 +1,4 @@
-"""Sampled inputs: a function of what is measured, computed once a period, its value held until the next one.
+"""Sampled inputs: a function of measurements, computed once a period and held until the next sample.
 
 Steps end where a sample is taken and where its value takes effect, by every method. What was held stays known: an input
 is a piecewise constant function of time, of the past too, for audits, loads and files.
@@ -121,7 +121,7 @@ class Held:
         return self.count < len(self.samples) and self.samples[self.count] <= t + near
 
     def sample(self, view: Any) -> None:
-        """Take the next sample of what ``view`` reads.
+        """Take the next sample of the readings of ``view``.
 
         Raises
         ------

@@ -15,7 +15,7 @@ __all__ = ["check_start"]
 INSTANT = 1e-7
 """Part of a step in which nothing moves."""
 JUMP = 1e-6
-"""Jumps below this share of the states of their kind are taken for rounding of what was given."""
+"""Jumps below this fraction of the states of their kind count as rounding of the given values."""
 SMALL = 1e-6
 """States of a kind that are all smaller, in its unit, count as of this size."""
 

@@ -150,7 +150,7 @@ class Leg(Protocol[S]):
 
 
 class Stepper(Protocol[S]):
-    """A method on one problem: it starts, steps, and says what is where. States are values with a time ``t``."""
+    """A method on one problem: start, step, and layout of its states, which are values with a time ``t``."""
 
     name: str
 
@@ -159,7 +159,7 @@ class Stepper(Protocol[S]):
         ...
 
     def prepare(self, state: S, h: float) -> None:
-        """Compile what is not in the cache, before time counts."""
+        """Compile programs that are not in the cache, before timing starts."""
         ...
 
     def step(self, state: S, h: float) -> Attempt[S]:
@@ -189,7 +189,7 @@ class Stepper(Protocol[S]):
         ...
 
     def anew(self, state: S) -> S:
-        """The same state as one to start from, where inputs jump: what is known of rates before it says nothing."""
+        """The same state as a start after a jump of inputs, without the former rates."""
         ...
 
     def row(self, state: S) -> Row:

@@ -34,7 +34,7 @@ class Balance:
 
 
 def guarded(progress: Told | None) -> Told | None:
-    """A function that is told of progress, whose exceptions end the run by name and lose nothing."""
+    """A progress function, whose exceptions end the run with a named error and a partial solution."""
     if progress is None:
         return None
     asked = progress

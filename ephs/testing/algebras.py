@@ -1,4 +1,4 @@
-"""Checks of algebras of the operad and of maps between them, for other people's suites, and what they draw."""
+"""Checks of algebras of the operad and of maps between them, for other test suites, with their strategies."""
 
 from collections.abc import Callable, Mapping
 from itertools import pairwise

@@ -1,4 +1,4 @@
-"""The levels of drawn systems: what each adds, what it is given, and which states it shows to the level around it."""
+"""Levels of drawn systems: parts, inputs, and states exposed to the enclosing level."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -63,7 +63,7 @@ def levels(
 
 @dataclass(slots=True)
 class _Level:
-    """Collects what a level is made of."""
+    """Collects the parts of a level."""
 
     draw: st.DrawFn
     depth: int

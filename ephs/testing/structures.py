@@ -109,7 +109,7 @@ def check_entropy_production(
 
 
 def _told(probe: Probe) -> str:
-    """The states, and the temperatures of what stores entropy."""
+    """States, and temperatures of the storages of entropy."""
     found: list[str] = []
     for path, primitive in probe.system.leaves():
         if isinstance(primitive, Storage):

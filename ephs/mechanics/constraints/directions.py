@@ -74,7 +74,7 @@ class Direction:
 def name_directions(
     space: Array, axes: Sequence[Axes], places: Sequence[Place], length: float
 ) -> tuple[Direction, ...]:
-    """A basis of a space of wrenches that is easy to say.
+    """A basis of a space of wrenches along axes, for messages.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ def _turned(space: Array, rotation: Array) -> Array:
 
 
 def _units_within(space: Array) -> list[int]:
-    """Which unit vectors lie in a space, forces first."""
+    """Unit vectors in a space, forces first."""
     order = [3, 4, 5, 0, 1, 2]
     return [i for i in order if np.linalg.norm(np.eye(6)[i] - space @ space[i]) < ALIGNED]
 
@@ -163,7 +163,7 @@ def _null(matrix: Array) -> Array:
 
 
 def _sparse(space: Array, axes: Axes, place: Place, length: float) -> Iterable[Direction]:
-    """Pure forces, then pure moments, then what couples both."""
+    """Pure forces, then pure moments, then coupled directions."""
     forces, moments = _null(space[:3]), _null(space[3:])
     zero = np.zeros(3)
     yield from (Direction(zero, force, axes, place) for force in _echelon((space @ forces)[3:]).T)

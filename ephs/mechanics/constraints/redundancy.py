@@ -33,7 +33,7 @@ SHOWN = 3
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Dependence:
-    """A joint that repeats what others hold.
+    """A joint whose constraints others imply.
 
     Attributes
     ----------

@@ -49,7 +49,7 @@ class Subgroup:
         return left[:, sizes > ASSEMBLY]
 
     def pitch(self) -> float:
-        """Advance in m/rad along its one axis of rotation, the translations that it has taken out."""
+        """Advance in m/rad along its one axis of rotation, without its translations."""
         axis = self.turning[:, 0]
         twist = self.basis @ np.linalg.lstsq(self.basis[:3], axis, rcond=None)[0]
         free = self.translations

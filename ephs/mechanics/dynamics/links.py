@@ -60,7 +60,7 @@ class Links:
         return self._residual.rigid(self._q, self._r, gravity=False)
 
     def momenta(self, states: States) -> Array:
-        """(n,) what the bodies' momenta are on the tree's freedoms: M r, where they are on the joints."""
+        """(n,) the bodies' momenta on the tree's degrees of freedom: M r where joints are closed."""
         out = np.zeros(self.equations.n)
         for i, link in enumerate(self.equations.reduced.places):
             if link.momentum is not None:

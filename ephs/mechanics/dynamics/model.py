@@ -36,7 +36,7 @@ __all__ = ["Dynamics"]
 
 @final
 class Dynamics:
-    """A mechanism as functions of its state. No call changes a state, or what a later call gives.
+    """A mechanism as pure functions of its state.
 
     Vectors and matrices count the n freedoms of the spanning tree's joints, as ``freedoms`` says; at a joint that
     closes a loop (``cut``) the loop is closed by constraints. It keeps scratch memory: use one for each thread.
@@ -322,7 +322,7 @@ class Dynamics:
             return self.loading.stiffened(differentiating.derivatives_of(self._linear, under, q, r, s, given), q, r)
 
     def velocity_derivatives(self, state: State) -> VelocityDerivatives:
-        """Exact derivatives, by the configuration, of what the rates make: constraints' rows, cut joints, bodies."""
+        """Exact derivatives by the configuration of velocities: constraints' rows, cut joints, bodies."""
         return differentiating.velocity_derivatives_of(self._linear, self._links, state.q, state.r)
 
     def step(self, state: State, h: float, method: "str | Method" = "rk54", *, forces: ByJoint | None = None) -> State:

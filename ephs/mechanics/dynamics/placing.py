@@ -49,7 +49,7 @@ class Placing:
         """Places in vectors (n,) of the tree's joints, from the ground outwards; a universal joint is two."""
 
     def state(self, first: State, coordinates: ByJoint | None, rates: ByJoint | None) -> State | None:
-        """A state with some joints elsewhere; None where they are not free, or what is given does not fit."""
+        """A state with some joints displaced; None where they are not free or the loops do not close."""
         if not self.free:
             return None
         q = self.elements(first.q, {} if coordinates is None else coordinates)

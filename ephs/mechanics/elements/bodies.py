@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["body_pattern", "rigid_body"]
 
 SYMMETRIC = 1e-12
-"""Part of its largest entry by which an inertia may differ from its transpose: rounding of what computed it."""
+"""Asymmetry of an inertia that counts as rounding, relative to its largest entry."""
 GRAVITY = (0.0, 0.0, -9.81)
 
 

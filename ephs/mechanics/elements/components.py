@@ -1,4 +1,4 @@
-"""The primitives of rigid-body mechanics: what the boxes of bodies, joints and springs are filled with.
+"""Primitives of rigid-body mechanics: components of bodies, joints and springs.
 
 Each function makes one primitive from the one function that says what it is. Fibres are left-trivialised; 6-vectors are
 (angular, linear). Equations of Lohmayer, Capobianco, Leyendecker, sections 4 and 5.
@@ -361,7 +361,7 @@ def _dissipates(mu: Array) -> bool:
 
 @cache
 def ground(of: Quantity = quantity.body_momentum) -> Reversible:
-    """A frame that stands still: e = 0, f = λ; port p."""
+    """Fixed frame: e = 0, f = λ; port p."""
     n = of.space.dim
     return structures.constant_structure("ground", power_ports(p=of), np.zeros((n, n)), np.eye(n))
 

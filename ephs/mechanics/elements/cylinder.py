@@ -15,7 +15,7 @@ __all__ = ["gas_spring", "hydraulic_cylinder"]
 
 
 def _compressed(v_a: Any, v_b: Any, q: Any, area_a: Any, area_b: Any, volume_a: Any, volume_b: Any, bulk: Any) -> Any:
-    """Energy of the oil in both chambers, by what they hold more than they have room for."""
+    """Energy of the oil in both chambers, from its compression."""
     more = v_a - volume_a - area_a * q, v_b - volume_b + area_b * q
     return bulk * more[0] ** 2 / (2 * volume_a) + bulk * more[1] ** 2 / (2 * volume_b)
 

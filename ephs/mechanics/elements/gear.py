@@ -1,4 +1,4 @@
-"""Gears, belts, mimics and tendons: what ties the rates of joints to each other, rigidly or by a spring."""
+"""Gears, belts, mimics and tendons: relations between rates of joints, rigid or elastic."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""Joints as systems of seven boxes, and what is built of them: springs between points, universal joints."""
+"""Joints as systems of seven boxes, and composites of them: springs between points, universal joints."""
 
 from collections.abc import Callable, Mapping
 from functools import cache
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 __all__ = ["between_frames", "joint", "joint_pattern", "mbs_pattern", "spring_damper", "universal_joint"]
 
 UNIT = 1e-6
-"""By how much the length of a quaternion may be off 1: what six digits leave; it is made 1."""
+"""Deviation of a quaternion's length from 1 that is normalised: rounding to six digits."""
 
 Friction = Callable[[Array, Array, float], Array]
 

@@ -1,4 +1,4 @@
-"""Springs and dampers between two points: what their boxes are filled with."""
+"""Springs and dampers between two points: their components."""
 
 from dataclasses import replace
 from typing import Any

@@ -1,4 +1,4 @@
-"""Strain of a beam element, its energy and its loss, of numbers, arrays, or what is recorded.
+"""Strain of a beam element, its energy and its loss, for numbers, arrays and recorded numbers.
 
 Between the cross-sections at the ends of an element of length L the relative pose d = exp(L ξ₀) q has the mean strain
 ξ = log(d)/L. Two energies of it:
@@ -123,7 +123,7 @@ def displacement(pose: Any, length: float, rest: Array) -> list[Any]:
 
 
 def logarithm(pose: Any) -> list[Any]:
-    """(6,) log of a pose (7,), angular part first, up to half a turn; of numbers or what is recorded."""
+    """(6,) log of a pose (7,), angular part first, up to half a turn; for numbers and recorded numbers."""
     square = squared_turn(pose[:4])
     w = _rotation_vector(pose, square)
     r = list(pose[4:])
@@ -159,7 +159,7 @@ def _rotation_vector(pose: Any, square: Any) -> list[Any]:
 
 
 def logarithm_rate(pose: Any) -> list[list[Any]]:
-    """(6, 6) T⁻¹: what a left-trivialised change of a pose does to its logarithm.
+    """(6, 6) T⁻¹: derivative of the logarithm by a left-trivialised change of the pose.
 
     Its blocks are [[A, 0], [A′, A]] with A = 1 + ½ω̃ + c ω̃² and A′ the derivative of A along υ.
     """

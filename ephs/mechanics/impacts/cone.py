@@ -58,7 +58,7 @@ def impulses(whole: Array, free: Array, friction: Sequence[float], start: Array 
 
 
 def _inside(found: Array, mu: Array) -> Array:
-    """Impulses without what rounding puts outside of their cones."""
+    """Impulses projected onto their cones, which removes rounding."""
     out = found.reshape(-1, 3).copy()
     out[:, 0] = np.maximum(out[:, 0], 0.0)
     size, most = np.hypot(out[:, 1], out[:, 2]), mu * out[:, 0]
@@ -67,7 +67,7 @@ def _inside(found: Array, mu: Array) -> Array:
 
 
 def _newton(whole: Array, free: Array, mu: Array, rho: Array, start: Array, allowed: float) -> tuple[Array, float]:
-    """The impulses that Newton's method comes to, and what is left."""
+    """Impulses of Newton's method, and their residual."""
     found = start
     left, slope = _residual(whole, free, mu, rho, found)
     size = float(np.abs(left).max())

@@ -22,7 +22,7 @@ __all__ = ["Blow", "Unlawful", "islands_of", "shared", "struck"]
 TIED = 1e-12
 """Part of the largest mobility below which two contacts do not act on each other."""
 GAINED = 1e-11
-"""Part of an impact's energies above which what it gains is no rounding."""
+"""Gain of energy of an impact above which it is not rounding, relative to its energies."""
 
 
 @final

@@ -1,4 +1,4 @@
-"""Forces of hard contacts at an instant: complementary to what the velocities become.
+"""Forces of hard contacts at an instant, complementary to the velocities after it.
 
 Between impacts a state says its forces: contacts whose gaps are closed and do not part press where the accelerations
 without them would close them, stick where they can, and slip where they do.

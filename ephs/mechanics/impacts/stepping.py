@@ -50,7 +50,7 @@ SETTLED = 1e-7
 ROUNDED = 1e-13
 """Part of velocities, and of the mechanism's speed, that is rounding."""
 TOO_LONG = 8.0
-"""Error of a part of a step whose halves meet with what the whole does not."""
+"""Error assigned to a part of a step whose halves meet contacts that the whole does not."""
 
 
 @final
@@ -135,7 +135,7 @@ class Impacts(ReducedMethod):
         return self._booked(state, end, closed, blow.heat, gained + float(blow.heat.sum()) if eq.driven.size else 0.0)
 
     def _booked(self, start: ReducedState, end: ReducedState, which: Index, heat: Array, work: float) -> ReducedState:
-        """The end with the heat of contacts and work in its books."""
+        """End of the step with heat of contacts and work in its accumulators."""
         flows = np.zeros(len(self.equations.reduced.made))
         np.add.at(flows, self._touching.makers[which], heat)
         return self.equations.booking.step(start, end, flows, work, missed=np.zeros(flows.size))
@@ -272,7 +272,7 @@ class Impacts(ReducedMethod):
         return self._inner.taken(state)
 
     def take(self, own: Snapshot, state: ReducedState) -> None:
-        """Take along what `taken` said."""
+        """Restore from a value of `taken`."""
         self._inner.take(own, state)
 
 

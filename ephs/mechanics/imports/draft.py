@@ -29,7 +29,7 @@ _SCHEMES = ("package://", "model://", "file://")
 
 @final
 class Draft:
-    """Collects bodies, joints, faults, and what a model says that a scene does not.
+    """Collects bodies, joints, faults, and elements of a model without a counterpart.
 
     Links are known by their names in the model; their names in the scene are the same, but for dots and blanks.
     Poses are (7,), of what is given in a link's own frame. Limits and surfaces are kept where ``contact`` says so.
@@ -52,7 +52,7 @@ class Draft:
         self._alike: dict[str, int] = {}
 
     def leave(self, what: str, name: str) -> None:
-        """Note what the scene does not have."""
+        """Record an element without a counterpart in scenes."""
         self._left.setdefault(what, {})[name] = None
 
     def rename(self, name: str, other: str) -> None:
@@ -60,7 +60,7 @@ class Draft:
         self._renamed.append(f"{name} → {other}")
 
     def left(self) -> list[str]:
-        """A line for each kind of what was left out, and one for names that scenes cannot have."""
+        """A line for each kind of omitted elements, and one for names that scenes cannot have."""
         lines = [f"not modelled: {what}: {', '.join(map(legible, names))}" for what, names in self._left.items()]
         renamed = [f"renamed, as scenes want it: {', '.join(map(legible, self._renamed))}"] if self._renamed else []
         return lines + renamed
@@ -226,7 +226,7 @@ class Draft:
         }
 
     def _at(self, link: str, place: Array, *, inverse: bool = True) -> Array:
-        """From the link's frame to the one at its centre of mass, or what is there in the world."""
+        """From the link's frame to the one at its centre of mass, or its pose in the world."""
         if not inverse:
             return SE3.compose(place, np.concatenate([_ONE, self._centres[link]]))
         return np.concatenate([place[:4], place[4:] - self._centres[link]])

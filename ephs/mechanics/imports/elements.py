@@ -45,7 +45,7 @@ def check_mass(mass: float, key: str, faults: list[Fault]) -> None:
 
 
 def tensor(entry: Callable[[str], float]) -> list[list[float]]:
-    """The rows of an inertia tensor, from what gives its entries ``ixx``, ``ixy``, …"""
+    """Rows of an inertia tensor from its entries ``ixx``, ``ixy``, …"""
     rows = (("ixx", "ixy", "ixz"), ("ixy", "iyy", "iyz"), ("ixz", "iyz", "izz"))
     found = {name: entry(name) for name in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")}
     return [[found[name] for name in row] for row in rows]

@@ -23,7 +23,7 @@ LOSS, SLIP = 1.0, 1e-2
 
 
 def contacts(model: Any, names: Names, draft: Draft) -> None:
-    """Surfaces and contacts of a model, or a note of what touches."""
+    """Surfaces and contacts of a model, or a note of its contacts."""
     mujoco: Any = import_module("mujoco")
     off = model.opt.disableflags & (mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
     pairs = [] if off else list(_pairs(model))

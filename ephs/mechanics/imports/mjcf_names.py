@@ -1,4 +1,4 @@
-"""Names of a compiled MJCF, those that it leaves out made up; and what it has that a scene has not."""
+"""Names of a compiled MJCF, generated where they are missing, and its elements without a counterpart."""
 
 from typing import Any, final
 
@@ -32,7 +32,7 @@ class Names:
 
 
 def noted(model: Any, names: Names, draft: Draft) -> None:
-    """Note what the compiled model has and a scene has not."""
+    """Record elements of the compiled model without a counterpart."""
 
     def dofs(values: Any) -> list[str]:
         moved = np.flatnonzero(np.asarray(values).reshape(model.nv, -1 if model.nv else 1).any(axis=1))

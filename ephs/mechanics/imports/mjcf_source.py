@@ -1,4 +1,4 @@
-"""MJCF before MuJoCo sees it: includes written out, what no scene has taken out and noted, files kept in the folder.
+"""Preprocessing of MJCF: includes expanded, elements without a counterpart removed, files restricted to the folder.
 
 MuJoCo then gets one text, and no file but meshes in the model's folder, from which it takes inertias.
 """
@@ -87,7 +87,7 @@ class Source:
         self.text = tostring(root, encoding="unicode")
 
     def file_of(self, asset: str) -> str:
-        """The file, relative to the model's folder, of what MuJoCo knows by this name."""
+        """File, relative to the model's folder, of a MuJoCo asset."""
         return self._files.get(asset, asset)
 
     def _include(self, element: Element, folder: Path, depth: int, level: int) -> None:

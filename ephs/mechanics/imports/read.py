@@ -1,4 +1,4 @@
-"""A model file to the tables of a scene file, by what its first element says that it is."""
+"""Conversion of a model file to tables of a scene file, by its first element."""
 
 from pathlib import Path
 from typing import Any

@@ -41,7 +41,7 @@ _PASSED_BY = {
 
 
 def read_sdf(root: Element, draft: Draft) -> None:
-    """The links and joints of the only model of a file; what nothing holds moves freely, by a joint ``root_joint``."""
+    """Links and joints of the only model of a file; unattached links move freely by a joint ``root_joint``."""
     model = _model(root, draft)
     if model is None:
         return

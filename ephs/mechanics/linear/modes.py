@@ -1,4 +1,4 @@
-"""Modes of a linear system: eigenvalue, frequency, damping, and what moves how."""
+"""Modes of a linear system: eigenvalue, frequency, damping, and shape."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ STILL = 1e-7
 """Eigenvalues below this part of the largest count as zero, imaginary parts below this part of their eigenvalue too:
 a double one is good to the root of rounding only."""
 ROUNDING = 1e-12
-"""Real parts below this part of the largest eigenvalue count as zero: what does not decay is not to seem to grow."""
+"""Real parts below this fraction of the largest eigenvalue count as zero."""
 
 
 @final
@@ -66,7 +66,7 @@ class Mode:
 
 
 def modes_of(A: Array, shapes: Mapping[str, Array]) -> tuple[Mode, ...]:
-    """The modes of ẋ = A x, slowest first; ``shapes`` are the maps (d, states) from the states to what is named."""
+    """Modes of ẋ = A x, slowest first; ``shapes`` are maps (d, states) from the states to named outputs."""
     if not A.size:
         return ()
     found = np.linalg.eig(A)

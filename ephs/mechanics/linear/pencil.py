@@ -92,12 +92,12 @@ class Parts:
 
     @property
     def bare(self) -> Index:
-        """Which balances are of junctions without storage."""
+        """Mask of balances of junctions without storage."""
         return np.flatnonzero(np.abs(self.flow_rates).max(axis=1, initial=0.0) == 0.0)
 
     @property
     def stored(self) -> Index:
-        """Which are of the others."""
+        """Mask of the others."""
         return np.setdiff1d(np.arange(len(self.flow_rates)), self.bare)
 
 
@@ -182,7 +182,7 @@ class Pencil:
         return u[:, int(np.sum(sigma > ELIMINATION * sigma.max(initial=1.0))) :]
 
     def _conditions(self, parts: Parts) -> Array:
-        """(c, n_w) what the states' changes must satisfy."""
+        """(c, n_w) conditions on the states' changes."""
         rows, by_states, _ = self.algebraic(parts)
         found = self._left(rows).T @ by_states
         largest = float(np.abs(by_states).max(initial=0.0))

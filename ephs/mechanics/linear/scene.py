@@ -117,7 +117,7 @@ class _Port:
 
 @final
 class _Linear:
-    """One linearisation: what its parts share."""
+    """Data shared by the parts of one linearisation."""
 
     def __init__(
         self, model: Dynamics, state: State, inputs: Sequence[str] | None, outputs: Sequence[str] | None

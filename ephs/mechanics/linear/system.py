@@ -188,7 +188,7 @@ def _structure(p: Parts, X: Array, which: Index, A: Array) -> tuple[PortHamilton
 
 
 def _kernel(matrix: Array) -> Array:
-    """An orthonormal basis (n, k) of what a matrix takes to zero."""
+    """An orthonormal basis (n, k) of a matrix's null space."""
     if not matrix.size:
         return np.eye(matrix.shape[1])
     _, sigma, vt = np.linalg.svd(matrix)

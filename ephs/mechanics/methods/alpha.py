@@ -1,4 +1,4 @@
-"""The generalised-α method on Lie groups: order 2, damps what the step does not resolve, to ρ∞ a step.
+"""The generalised-α method on Lie groups: order 2, damps motions that the step does not resolve, to ρ∞ a step.
 
 Chung and Hulbert, *J. Appl. Mech.* 60 (1993), 371-375; on groups Brüls, Cardona and Arnold, *Mech. Mach. Theory* 48
 (2012), 121-137. Here on the reduced form: accelerations are those along the constraints, loops are closed after each
@@ -142,7 +142,7 @@ class Alpha(ReducedMethod):
         return {"jacobian": self.jacobian.snapshot(state)}
 
     def take(self, own: Snapshot, state: ReducedState) -> None:
-        """Take along what `taken` said."""
+        """Restore from a value of `taken`."""
         self.jacobian.restore(own["jacobian"], state)
 
     def _solver(self, state: ReducedState, h: float) -> Any:

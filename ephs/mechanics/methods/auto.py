@@ -1,4 +1,4 @@
-"""The method that chooses by what it meets: one without damping until steps are held back by stability, then radau.
+"""Automatic choice of the method: one without damping until stability limits the steps, then radau.
 
 Stiffness is what Hairer and Wanner test in DOPRI5 and DOP853: the last two stages of a step show how fast its fastest
 mode is, and a step that this holds at the limit of stability again and again serves stability, not accuracy.
@@ -109,7 +109,7 @@ class Auto(ReducedMethod):
         }
 
     def take(self, own: Snapshot, state: ReducedState) -> None:
-        """Take along what `taken` said."""
+        """Restore from a value of `taken`."""
         self._explicit.take(own["explicit"], state)
         if own["implicit"] is not None:
             self._go_implicit().restore(own["implicit"], state)

@@ -160,7 +160,7 @@ class Explicit(ReducedMethod):
         return {"known": known, "stiffness": self.stiffness, "rough": any(q is state.q for q in self.rough)}
 
     def take(self, own: Snapshot, state: ReducedState) -> None:
-        """Take along what `taken` said."""
+        """Restore from a value of `taken`."""
         self._known = None if own["known"] is None else (state.q, own["known"])
         self.stiffness = own["stiffness"]
         self.rough = (state.q,) if own["rough"] else ()

@@ -153,7 +153,7 @@ class Gauss(ReducedMethod):
         }
 
     def take(self, own: Snapshot, state: ReducedState) -> None:
-        """Take along what `taken` said."""
+        """Restore from a value of `taken`."""
         self._steps.take(own["steps"], state)
         self._sweeps = own["sweeps"]
         if own["stages"] is not None:

@@ -110,7 +110,7 @@ class Jacobian:
             self.at(replace(made, q=state.q) if snapshot["fresh"] else made)
 
     def _inputs(self, linear: Linearised, state: ReducedState) -> Array:
-        """(n, size) what the inputs' dependence on the state adds to ∂ṙ/∂y."""
+        """(n, size) part of ∂ṙ/∂y from inputs that depend on the state."""
         eq = self.equations
         y = eq.vector(state)[: self.size]
         middle = eq.drive.copy(), eq.wrench.copy()

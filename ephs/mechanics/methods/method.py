@@ -18,7 +18,7 @@ HALVINGS = 4
 
 
 class ReducedMethod(ABC):
-    """A method on a mechanism in joint coordinates; one's own has to say `step`.
+    """A method on a mechanism in joint coordinates; a custom one defines `step`.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class ReducedMethod(ABC):
         return self.equations.start(t)
 
     def prepare(self, state: ReducedState, h: float) -> None:
-        """Compile what is not in the cache, before time counts."""
+        """Compile programs that are not in the cache, before timing starts."""
         self.equations.prepare(state)
 
     def many(self, span: Span[ReducedState]) -> Leg[ReducedState] | None:
@@ -130,4 +130,4 @@ class ReducedMethod(ABC):
         return None
 
     def take(self, own: Snapshot, state: ReducedState) -> None:  # noqa: B027 - of a method that takes nothing along
-        """Take along what `taken` said."""
+        """Restore from a value of `taken`."""

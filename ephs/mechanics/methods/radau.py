@@ -81,7 +81,7 @@ class Implicit(ReducedMethod):
         return self._stages.snapshot(state)
 
     def take(self, own: Snapshot, state: ReducedState) -> None:
-        """Take along what `taken` said."""
+        """Restore from a value of `taken`."""
         self._stages.restore(own, state)
 
     def _closed(

@@ -1,4 +1,4 @@
-"""The methods by name: what each is, whom it serves, and how it is made for a problem."""
+"""Registry of methods: description, applicability, and constructor of each."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -122,7 +122,7 @@ def on_joints(make: Callable[..., Any]) -> Callable[[Setting], tuple[Stepper[Any
 
 
 def _corrected(make: Callable[[Any, Control], Any]) -> Callable[..., Any]:
-    """Constructor of a method whose steps are corrected, with the option what they keep."""
+    """Constructor of a method with corrected steps, with the option of what is conserved."""
 
     def made(equations: Any, control: Control, keep: str = "energy") -> Any:
         equations.accounts.keep(keep)

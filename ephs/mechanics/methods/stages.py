@@ -118,7 +118,7 @@ class Stages:
         return self._solvers[1]
 
     def allowed(self, y0: Array, y1: Array) -> Array:
-        """Allowed errors of a step, for what is counted."""
+        """Error allowances of a step, for the counted components."""
         return self.atol + self.rtol * self.equations.sizes(y0, y1)
 
     def snapshot(self, state: ReducedState) -> Snapshot:
@@ -151,7 +151,7 @@ class Stages:
         self._solvers = None
 
     def _change(self, state: ReducedState, h: float, defect: Array) -> Array:
-        """(stages, size) what Newton's method adds to the stages' increments."""
+        """(stages, size) Newton corrections of the stages' increments."""
         parts = self._into @ defect
         out = np.zeros(defect.shape)
         for column, twice, part, solver in zip(self._out.T, self._twice, parts, self.solvers(state, h), strict=True):
@@ -250,7 +250,7 @@ class Kept:
         n.split = int(np.abs(by_heats).max(initial=0.0) <= NOTHING * np.abs(found).max(initial=0.0))
 
     def count(self) -> None:
-        """Add what steps took since the last time to the method's counts."""
+        """Add the steps' costs since the last call to the method's counts."""
         n: Any = self.newton[0]
         found = [int(n.iterations), int(n.factorisations)]
         for name, now, before in zip(("iterations", "factorisations"), found, self._counted, strict=True):

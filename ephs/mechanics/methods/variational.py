@@ -115,7 +115,7 @@ class Variational(ReducedMethod):
         return {"matrix": self._matrix, "guess": guess}
 
     def take(self, own: Snapshot, state: ReducedState) -> None:
-        """Take along what `taken` said."""
+        """Restore from a value of `taken`."""
         self._matrix = own["matrix"]
         self._guess = None if own["guess"] is None else (state.q, own["guess"])
 
@@ -151,7 +151,7 @@ class Variational(ReducedMethod):
         raise SolveError(Outcome.DIVERGED, path, f"{what} in the middle of the step")
 
     def _start(self, xi: Array, h: float, middle: tuple[Array, ...]) -> Array:
-        """The momentum at the step's start that the middle of the step stands for."""
+        """Momentum at the step's start implied by the middle of the step."""
         momentum, force = middle[:2]
         return self._turned(-xi, momentum - 0.5 * h * self._untwisted(-0.5 * xi, force))
 

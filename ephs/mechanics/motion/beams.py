@@ -1,4 +1,4 @@
-"""Beams of a motion: where their nodes are, strains, internal forces and moments, at all instants."""
+"""Beams of a motion: poses of nodes, strains, internal forces and moments, at all instants."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

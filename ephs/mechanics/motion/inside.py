@@ -57,7 +57,7 @@ class Inside:
 
     @property
     def outline(self) -> "Scene":
-        """What is drawn: the scene."""
+        """The drawn scene."""
         return self.scene
 
     @property

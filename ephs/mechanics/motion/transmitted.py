@@ -201,7 +201,7 @@ def _wrench_outward(turn: Array, at: Array, wrenches: Array) -> Array:
 
 
 def _solved(rows: Array, right: Array) -> tuple[Array, Array]:
-    """The least solution of equations, and what they leave free: (m,) and orthonormal columns (m, k)."""
+    """Least-norm solution of equations and their null space: (m,) and orthonormal columns (m, k)."""
     left, sigma, columns = np.linalg.svd(rows)
     rank = rank_of(sigma, CONSTRAINT, 1.0)
     return columns[:rank].T @ ((left.T @ right)[:rank] / sigma[:rank]), columns[rank:].T

@@ -1,5 +1,4 @@
-"""Drop what has no effect: friction without resistance, poses that nothing reads, joints that hold nothing, and
-gyroscopic forces that vanish.
+"""Drop components without effect: zero friction, unread poses, joints without constraints, zero gyroscopic forces.
 
 Each rule checks its condition on the structures as they are, and refuses in words where it does not hold.
 """
@@ -25,7 +24,7 @@ SAMPLES = 6
 
 
 def _free_of_energy(part: Primitive | None) -> bool:
-    """Whether a storage's energy never changes: its kernel says that its effort is zero."""
+    """Whether a storage's energy is constant: the effort of its kernel is zero."""
     return (
         isinstance(part, Storage)
         and not part.environment

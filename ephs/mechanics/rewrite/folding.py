@@ -1,4 +1,4 @@
-"""Fold transformers, and the junctions without storage behind them, into what lies there.
+"""Fold transformers, and the junctions without storage behind them, into the adjacent components.
 
 A component that determines the effort at one of its ports from those at another by constant numbers, and nothing else,
 says only in which frame or on which lever arm its neighbours are seen: theirs becomes its port, through that map. So go
@@ -84,7 +84,7 @@ def transformations(draft: Draft, junction: Path) -> Iterator[tuple[Array, Path 
 
 
 def _idle(draft: Draft, box: Path) -> Site | None:
-    """A component that says nothing: a loop of levers that comes back to where it began."""
+    """A component without effect: a closed loop of levers."""
     primitive = draft.fillings.get(box)
     found = None if primitive is None else _determining(primitive)
     if found is None or not isinstance(primitive, Reversible):
@@ -105,7 +105,7 @@ def _idle(draft: Draft, box: Path) -> Site | None:
 
 
 def _deserted(draft: Draft, junctions: Iterable[Path]) -> list[Path]:
-    """Those that nothing lies on any more."""
+    """Junctions without ports."""
     return [j for j in junctions if not draft.on(j) and not draft.reading(j) and not draft.junctions[j].exposed]
 
 
@@ -222,4 +222,4 @@ WHY = (
     "it; and where the effort is zero whatever happens, as at the ground, nothing needs a port"
 )
 FOLD = Rule(NAME, Strength.RELATION, WHY, _places, _at)
-"""Fold what determines an effort from another one."""
+"""Fold components that determine one effort from another."""

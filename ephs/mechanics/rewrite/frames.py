@@ -167,7 +167,7 @@ def anchor(way: tuple[tuple[Joint, bool], ...]) -> Path | None:
 
 
 def inertia_at(draft: Draft, momentum: Path) -> Array | None:
-    """(6, 6) of what stores a momentum quadratically; None where nothing does."""
+    """(6, 6) inertia of the quadratic storage of a momentum; None where there is none."""
     for box, _ in draft.on(momentum):
         part = draft.fillings[box]
         if isinstance(part, Storage) and part.kernel is not None and part.kernel.name == "quadratic":

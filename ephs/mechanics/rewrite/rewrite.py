@@ -1,4 +1,4 @@
-"""Rewrites of systems: what one is, on what condition it may be done, and how states go to and fro.
+"""Rewrites of systems: rules, their conditions, and the maps of states.
 
 A rewrite makes of a system a smaller one that says the same of what is kept. Each names its strength, the condition
 that it has checked, in words, and a map of states in both directions.
@@ -27,7 +27,7 @@ class Strength(StrEnum):
     RELATION = "same relation"
     """At every state, all that the kept variables may be."""
     TRAJECTORIES = "same trajectories"
-    """The motions of the kept variables; not what was differentiated away, such as reactions."""
+    """Motions of the kept variables, without reactions."""
     MOTION = "same motion"
     """The motion, but the kept reactions differ."""
 
@@ -63,7 +63,7 @@ class StateMap:
 
 @final
 class Draft:
-    """A flat system that is being rewritten: what rules look at and change, so that many sites cost one new pattern.
+    """Draft of a flat system under rewriting, which rules read and change, so that many sites cost one new pattern.
 
     Attributes
     ----------
@@ -115,7 +115,7 @@ class Draft:
         self.replace(box, filling, ports)
 
     def remove(self, boxes: Iterable[Path], junctions: Iterable[Path] = ()) -> None:
-        """Take boxes out, and junctions that nothing lies on then."""
+        """Remove boxes, and junctions left without ports."""
         for box in boxes:
             self._unwire(box)
             del self.wires[box], self.fillings[box]
@@ -124,7 +124,7 @@ class Draft:
             self.links = frozenset(rest for group in self.links if len(rest := group - {path}) > 1)
 
     def system(self) -> System:
-        """The system as it stands now."""
+        """The present system."""
         pattern = Pattern(self.junctions, self.wires, [tuple(group) for group in self.links])
         return System(pattern, Directory(dict(self.fillings)))
 

@@ -31,7 +31,7 @@ LARGEST = 600
 STEP, STEPS = 1e-3, 100
 """Seconds and number of the steps over which balances are measured: in the first ones little may have moved yet."""
 ROUNDING = 1e-13
-"""Of the energies that are stored or could be: what rounding may change their sum by in these steps."""
+"""Rounding of the sum of energies over these steps, relative to them."""
 
 
 @in_one_thread

@@ -24,7 +24,7 @@ METHOD_SOURCES: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "ida": ("HindmarshEtAl2005",),
     }
 )
-"""Keys in ``references.bib`` of what each method is made after."""
+"""Keys in ``references.bib`` of each method's sources."""
 FORM_SOURCES: Mapping[str, tuple[str, ...]] = MappingProxyType({"reduced": ("Featherstone2008",)})
 """The same of the forms of the equations."""
 
@@ -38,7 +38,7 @@ def bibliography() -> dict[str, str]:
 
 
 def cite(solution: Solution) -> str:
-    """BibTeX of what a run used: the program, the theory, the method, the form of the equations.
+    """BibTeX of a run: program, theory, method, form of the equations.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Journals of runs: whose a journal is, by its model, what was asked for, and the programs that take part."""
+"""Identity of a run's journal: model, options, and programs."""
 
 import hashlib
 import platform

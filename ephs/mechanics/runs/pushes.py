@@ -40,7 +40,7 @@ def sum_of(one: Signal, other: Signal) -> Signal:
 def scene_signals(
     scene: Scene, inputs: Mapping[Any, Any], view: View
 ) -> tuple[dict[str, Signal], dict[str, Signal], dict[Path, Signal]]:
-    """Forces on joints, wrenches on bodies, efforts of supplies, by name: the loads, and what a user gives.
+    """Forces on joints, wrenches on bodies, efforts of supplies, by name: loads and user inputs.
 
     A key may be a tuple of names, whose input gives the numbers of all of them in a row.
 

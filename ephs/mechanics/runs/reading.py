@@ -30,7 +30,7 @@ __all__ = ["load_solution"]
 
 
 def load_solution(path: str | File, model: System | Scene | None = None) -> Solution:
-    """Read a solution that `Solution.save` wrote, or what the journal of a run holds so far.
+    """Read a solution that `Solution.save` wrote, or the part of a run in its journal.
 
     Parameters
     ----------

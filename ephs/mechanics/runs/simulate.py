@@ -272,7 +272,7 @@ def control_of(
 
 
 def _reversible(problem: Problem, until: float) -> None:
-    """Refuse to run backward what produces entropy.
+    """Raise an error for backward runs of systems that produce entropy.
 
     Raises
     ------

@@ -22,7 +22,7 @@ ITERATIONS = 60
 
 
 def mass_roots(masses: Array, inertias: Array) -> Array:
-    """The inverse square roots (n, 6, 6) of the bodies' inertias; what has none counts as very light."""
+    """Inverse square roots (n, 6, 6) of the bodies' inertias; massless bodies count as very light."""
     roots = np.zeros((masses.shape[0], 6, 6))
     lightest = _least(masses)
     least = _least(np.trace(inertias, axis1=1, axis2=2))

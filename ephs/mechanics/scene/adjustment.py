@@ -21,7 +21,7 @@ class Displacement:
 @final
 @dataclass(frozen=True, slots=True)
 class Changed:
-    """A coordinate or rate that was given, and that contradicts others that were: ``taken`` is what it became."""
+    """A given coordinate or rate that contradicts others; ``taken`` is the value used instead."""
 
     joint: str
     what: str

@@ -66,7 +66,7 @@ class Number:
 
 
 class Attachment(ABC):
-    """What acts on the rates of joints with one freedom each."""
+    """Attachments to joints with one degree of freedom each."""
 
     __slots__ = ()
     numbers: ClassVar[Mapping[str, Number]]

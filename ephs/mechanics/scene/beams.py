@@ -31,7 +31,7 @@ from ephs.semantics.spaces.rank import TINY
 __all__ = ["BeamDraft", "check_beam", "curve", "resolve_beam"]
 
 ALONG = 1.0 - 1e-9
-"""Cosine above which a direction that was given lies along the beam: its sine is 4e-5, well above rounding."""
+"""Cosine above which a given direction counts as along the beam: its sine is 4e-5, well above rounding."""
 
 Array = NDArray[np.float64]
 PARALLEL = 0.9
@@ -64,7 +64,7 @@ def check_beam(name: str, table: Checked[Any], names: Names, faults: list[Fault]
 
 
 def resolve_beam(name: str, table: Checked[Any], world: World, faults: list[Fault]) -> BeamDraft | None:
-    """A beam's bodies and joints; None where its place or section cannot be told."""
+    """A beam's bodies and joints; None where its place or section is invalid."""
     entry, key = table.entry, f"beams.{name}"
     ends = [*entry.ends, *[FREE_END] * (2 - len(entry.ends))]
     section = (
@@ -194,7 +194,7 @@ def _joint(
 
 
 def _settled(strain: Array) -> Array:
-    """The strain without what rounding left of zeros."""
+    """The strain with rounded zeros set to zero."""
     return np.where(np.abs(strain) <= NOISE * np.abs(strain).max(), 0.0, strain)
 
 

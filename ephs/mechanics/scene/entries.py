@@ -112,7 +112,7 @@ def read_document(raw: Mapping[str, Any], default_name: str, faults: list[Fault]
 
 
 def validate(model: type[E], raw: Any, key: str, faults: list[Fault]) -> Checked[E]:
-    """Validate one table; append its faults, and return what is sound of it."""
+    """Validate one table; append its faults, and return its valid entries."""
     if not isinstance(raw, Mapping):
         faults.append(fault("table", key, shown(raw)))
         raw, spoiled = {}, set(model.model_fields)

@@ -56,7 +56,7 @@ class SceneWarning(UserWarning):
 
 @final
 class ModelWarning(UserWarning):
-    """An imported model says more than its scene."""
+    """An imported model has elements without a counterpart in scenes."""
 
 
 # code: (expected, advice); both may name the values given to `fault`.
@@ -275,7 +275,7 @@ _NEAR_LETTERS, _NEAR_NAMES = 80, 500
 
 
 def fault(code: str, key: str, found: object, **values: Any) -> Fault:
-    """The fault of this code, its texts filled with ``values``; what files put into them stays readable and short."""
+    """Fault of this code, its texts filled with ``values``; texts from files are abbreviated and escaped."""
     expected, advice = TEXTS[code]
     key = legible(key)
     words = {name: legible(value) if isinstance(value, str) else value for name, value in values.items()}
@@ -283,7 +283,7 @@ def fault(code: str, key: str, found: object, **values: Any) -> Fault:
 
 
 def legible(text: str) -> str:
-    """A text with its middle left out where it is long, and with escapes for what would steer a terminal."""
+    """A text abbreviated in the middle where it is long, with control characters escaped."""
     if len(text) > _LONGEST:
         text = f"{text[:200]}… ({len(text)} letters) …{text[-60:]}"
     if text.isprintable():

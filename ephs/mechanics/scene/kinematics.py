@@ -59,8 +59,7 @@ ABSOLUTE = Scale(1.0, 1.0)
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Link:
-    """A joint as the assembly sees it: two bodies by index, the joint frame in each, and what the joint
-    allows.
+    """A joint of the assembly: two bodies by index, the joint frame in each, and the permitted twists.
 
     ``coordinates`` (d,) and ``rate`` (d,) are those that the initial state must have, or None; ``motion`` a
     prescribed rate. ``near`` (size,) is the element of the state before, so that whole turns are kept.

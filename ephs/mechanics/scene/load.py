@@ -261,7 +261,7 @@ def _parts(
 
 
 def _beams(document: Document, world: World, faults: list[Fault]) -> dict[str, BeamDraft]:
-    """The beams whose place and section can be told."""
+    """The beams with a valid place and section."""
     drafts = {n: resolve_beam(n, t, world, faults) for n, t in document.sections["beams"].items()}
     found = {name: draft for name, draft in drafts.items() if draft is not None}
     for name, draft in found.items():

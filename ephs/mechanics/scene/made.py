@@ -28,7 +28,7 @@ NOT_OF_SYSTEM = frozenset(
 @final
 @dataclass(frozen=True, slots=True)
 class Made:
-    """The systems that were made, by what they depend on."""
+    """Cache of systems, by the data that they depend on."""
 
     systems: dict[Hashable, System] = field(default_factory=dict)
 

@@ -1,4 +1,4 @@
-"""Mechanisms that are movable but for what files round off: the movable mechanism is meant.
+"""Mechanisms that are movable up to the rounding of a file's numbers, made movable.
 
 The axes of a planar four-bar that are parallel to nine digits lock it, if taken at their word: its constraints are of
 full rank by 1e-9. Decided by theory: singular values that are small but not rounding belong to motions along which the
@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 STRIDE, STRIDES = 0.2, 5
 """Steps of the finite motion that is tried, in rad or parts of the mechanism's length, and their number each way."""
 LARGEST = 60
-"""Bodies beyond which a scene is taken at its word: the decision costs the third power of their number."""
+"""Number of bodies above which this is not examined: the cost is cubic."""
 ROUNDS = 4
 SHAKEN, LEFT = 40, 0.05
 """Iterations that close joints after a step, and the part of it that is left where it was along a finite motion."""

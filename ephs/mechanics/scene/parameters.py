@@ -166,7 +166,7 @@ def _scene(scene: Scene, values: Mapping[str, float], strict: bool) -> Scene:
 
 
 def _uniform(values: Array) -> bool:
-    """Whether one number says all: each is that number, or a matrix is that number times the identity."""
+    """Whether one number represents the array: all entries, or a multiple of the identity."""
     return bool(np.all(values == (values.flat[0] * np.eye(len(values)) if values.ndim == 2 else values.flat[0])))
 
 

@@ -34,7 +34,7 @@ class Place:
 
 
 def resolve_place(table: Checked[JointEntry], key: str, faults: list[Fault]) -> Place | None:
-    """A joint's place; None, with a fault, where it cannot be told."""
+    """A joint's place; None, with a fault, where it is invalid."""
     entry = table.entry
     if not table.sound("at", "axis", "xaxis", "axis2", "frame1", "frame2"):
         return None

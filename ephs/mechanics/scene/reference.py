@@ -9,7 +9,7 @@ from ephs.mechanics.scene.schema import json_schema
 __all__ = ["TOP", "scene_tables"]
 
 TOP = "the file"
-"""The name of the table of what stands at the top of a file."""
+"""Name of the table of the keys at the top of a file."""
 
 _PLURAL = {"number": "numbers", "string": "texts"}
 
@@ -43,7 +43,7 @@ def _references(value: Mapping[str, Any]) -> list[str]:
 
 
 def _title(entry: Mapping[str, Any]) -> str:
-    """A table's heading where its class says it, as ``[joints.NAME]``; of one that stands inside another: frame."""
+    """A table's heading from its class, such as ``[joints.NAME]``, or the name of a nested table, such as frame."""
     said = entry["description"].splitlines()[0].strip("`")
     return said if said.startswith("[") else entry["title"].removesuffix("Entry").lower()
 
@@ -89,7 +89,7 @@ def _type(value: Mapping[str, Any], schema: Mapping[str, Any]) -> str:
 
 
 def _array(value: Mapping[str, Any], schema: Mapping[str, Any]) -> str:
-    """A list in words: how many, of what."""
+    """A list type in words: length and type of items."""
     item = value["items"]
     plural = _PLURAL.get(item.get("type", ""))
     if plural is None:

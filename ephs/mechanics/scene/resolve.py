@@ -88,7 +88,7 @@ class Names:
     unknown_parts: Set[str]
 
     def check(self, name: str, key: str, what: str, faults: list[Fault]) -> None:
-        """Append a fault where a reference leads nowhere; ``what`` is body or thermal."""
+        """Append a fault where a reference is unknown; ``what`` is body or thermal."""
         fixed, known = (GROUND, self.bodies) if what == "body" else (ENVIRONMENT, self.thermal)
         if name == fixed or name in known or name.split(".")[0] in self.unknown_parts:
             return
@@ -105,7 +105,7 @@ def resolve_world(document: Document) -> World | None:
 def resolve_body(
     name: str, table: Checked[BodyEntry], mode: str, folder: Path, faults: list[Fault], odd: list[Fault]
 ) -> BodyDraft:
-    """A body with its inertia checked; what ``mode`` lets through of it is appended to ``odd``."""
+    """A body with its inertia checked; deviations that ``mode`` accepts are appended to ``odd``."""
     entry, key = table.entry, f"bodies.{name}"
     mass, tensor = 1.0, np.eye(3)
     if found := mass_and_moments(table, key, faults):

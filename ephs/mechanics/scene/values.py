@@ -27,7 +27,7 @@ def quaternion(values: list[float] | None, key: str, faults: list[Fault]) -> Arr
 
 
 def pose(position: list[float] | None, rotation: list[float] | None, key: str, faults: list[Fault]) -> Array:
-    """The pose (7,) of a position and a rotation; what is None is 0 or the identity."""
+    """The pose (7,) of a position and a rotation; None means 0 or the identity."""
     return np.concatenate((quaternion(rotation, f"{key}.rotation", faults), position or [0.0, 0.0, 0.0]))
 
 

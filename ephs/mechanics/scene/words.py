@@ -36,7 +36,7 @@ def scene_html(scene: "Scene") -> str:
 
 
 def _things(scene: "Scene") -> list[tuple[str, str, str]]:
-    """Kind, name, and what it is, of everything that a scene lists."""
+    """Kind, name and value of all elements of a scene."""
     return [
         *(("body", name, f"{body.mass:g} kg") for name, body in scene.all_bodies()),
         *(("joint", name, f"{j.kind}, {j.body1} – {j.body2}") for name, j in scene.all_joints()),

@@ -83,7 +83,7 @@ class Parameter:
 
 @final
 class Family:
-    """A model with what determines its motion, and the same with other parameters.
+    """A model with its initial state and options, and its variants with other parameters.
 
     Parameters
     ----------

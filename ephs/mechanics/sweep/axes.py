@@ -40,7 +40,7 @@ class Axes:
 
     @staticmethod
     def of(vary: "Mapping[str, ArrayLike]", *, paired: bool) -> "Axes":
-        """From what a user gives.
+        """From the user's option.
 
         Raises
         ------

@@ -42,7 +42,7 @@ __all__ = ["Ensemble", "Unlike"]
 AGREE = 1e-12
 """By which an image that was put together may differ from one that was built, relative to the number where above 1."""
 STRAIGHT = 12
-"""Values of one path above which it is looked whether three images say all others."""
+"""Number of values of one path above which interpolation from three members is tried."""
 BURST = 100_000
 """Steps that a member may take in compiled code; one that needs more is run on its own, where it can be followed."""
 

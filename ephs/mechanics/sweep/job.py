@@ -91,7 +91,7 @@ class Job:
         return _prepared(_Key(self)).run(numbers)
 
     def prepare(self) -> None:
-        """Make what all members share."""
+        """Make the data shared by all members."""
         _prepared(_Key(self))
 
 

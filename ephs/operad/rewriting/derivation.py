@@ -46,7 +46,7 @@ class Derivation:
     comatch: Renaming
 
     def check(self) -> None:
-        """Replay the step, by a checker that shares no code with what applies rules.
+        """Verify the step by a checker that shares no code with the application of rules.
 
         Raises
         ------
@@ -137,7 +137,7 @@ def _items(state: State) -> tuple[frozenset[object], ...]:
 
 
 def _take(rule: Rule, match: Renaming, elements: Elements) -> None:
-    """Take away the images of what is not kept."""
+    """Remove the images of the elements outside the interface."""
     kept = rule.interface
     for box, name in rule.left.ports.keys() - kept.ports.keys():
         place = match.boxes[box], match.ports[box][name]

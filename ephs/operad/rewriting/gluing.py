@@ -12,7 +12,7 @@ __all__ = ["require_gluing", "require_morphism"]
 
 
 def require_morphism(rule: Rule, match: Renaming, host: Elements) -> None:
-    """Refuse what does not send the left side into the pattern.
+    """Raise an error unless the map embeds the left side in the pattern.
 
     Raises
     ------

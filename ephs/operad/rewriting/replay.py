@@ -1,4 +1,4 @@
-"""The checker of derivations: small, and of its own; it shares with what applies rules only the values that it judges.
+"""Checker of derivations, independent of the code that applies rules.
 
 A step is a double pushout if what is left of the source without the images of what goes is what is left of the target
 without the images of what comes; if both sides are sent there as they are; and if nothing hangs loose.
@@ -58,7 +58,7 @@ def _facts(pattern: Pattern) -> _Facts:
 
 
 def replay(rule: Rule, source: Pattern, target: Pattern, match: Renaming, comatch: Renaming) -> None:
-    """Refuse what is no derivation; see `Derivation.check`."""
+    """Raise an error unless the value is a derivation; see `Derivation.check`."""
     before, after = _facts(source), _facts(target)
     for side, fragment, facts, names in (
         ("left", rule.left, before, match),

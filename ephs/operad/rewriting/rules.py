@@ -1,4 +1,4 @@
-"""Rules of rewriting: what is replaced, what by, and what both have in common."""
+"""Rewriting rules: left side, right side, and interface."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -82,7 +82,7 @@ class Fragment:
 @final
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """A rule: the left side is replaced by the right side; what both name alike is kept.
+    """A rule: the left side is replaced by the right side; elements named in both are kept.
 
     Its interface, left ⇐ interface ⇒ right, is what both sides have in common: boxes of one name, junctions of one
     name, and ports of one name that lie alike. Rules are linear: both inclusions are injective, so each has a reverse.

@@ -1,4 +1,4 @@
-"""Algebras of the operad of patterns: what systems mean, in several senses, and the maps between them."""
+"""Algebras of the operad of patterns, several semantics of systems, and the maps between them."""
 
 from ephs.semantics.algebra.counts import Cost as Cost
 from ephs.semantics.algebra.counts import cost as cost

@@ -1,4 +1,4 @@
-"""Relations over their base: what systems mean physically, as an algebra, and the map that gives systems meaning."""
+"""The algebra of relations over their base, the physical semantics of systems, and the map from systems to it."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -21,7 +21,7 @@ from ephs.semantics.system import Filling
 __all__ = ["Meaning", "meaning_of_systems", "relation_for", "relations"]
 
 Meaning: TypeAlias = Relation | Filling
-"""A relation, or a system or primitive that stands for its own."""
+"""A relation, or a system or primitive in place of its relation."""
 Values: TypeAlias = dict[Path, Array]
 SAMPLES = 3
 """Points of the base at which two relations are compared."""
@@ -32,7 +32,7 @@ def _interface(element: object) -> Interface | None:
 
 
 def relation_for(element: Meaning) -> Relation:
-    """The relation that an element is or stands for, at the default reference."""
+    """The relation of an element at the default reference."""
     return element if isinstance(element, Relation) else relation_of(element, Reference(), "nested")
 
 

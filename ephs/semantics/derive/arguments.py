@@ -11,7 +11,7 @@ __all__ = ["Arguments"]
 @final
 @dataclass(frozen=True, slots=True)
 class Arguments:
-    """The arguments of a relation after the first, which are dimensions that it knows."""
+    """Arguments of a relation after the first, which are dimensions."""
 
     scal: Vector
     p: Vector

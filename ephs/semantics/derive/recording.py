@@ -91,7 +91,7 @@ def _defined(function: Callable[..., Any]) -> str:
 
 
 def _line(error: BaseException) -> str:
-    """The innermost line of what was called, outside of this file and of NumPy."""
+    """Innermost line of the called function outside this file and NumPy."""
     found, entry = "", error.__traceback__
     while entry is not None:
         code = entry.tb_frame.f_code

@@ -37,7 +37,7 @@ DOMAIN: Final = 5
 HUGE: Final = 1.7976931348623157e308
 Numbers: TypeAlias = Sequence[Real]
 Bounds: TypeAlias = tuple[tuple[int, float, float], ...]
-"""Which number, its least and its greatest value."""
+"""Index of a number, its lower and its upper bound."""
 
 
 @final

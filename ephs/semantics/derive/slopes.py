@@ -1,4 +1,4 @@
-"""Slopes over a step: numbers that know their value at both ends, and how their difference comes from the step's.
+"""Discrete gradients: numbers with values at both ends of a step and the slope of their difference.
 
 A function of a state is evaluated once with such numbers in place of the state's. What comes out is its value before
 and after the step v and entries s with f(after) − f(before) = Σ sᵢ vᵢ, exact but for rounding, unchanged where the

@@ -1,4 +1,4 @@
-"""Hydraulics of a liquid of constant density: tanks, pipes, orifices; what they lose becomes heat.
+"""Hydraulics of a liquid of constant density: tanks, pipes, orifices; losses become heat.
 
 The volume of liquid is stored and conserved, its pressure above the environment's is the effort. The momentum per area
 of what moves in a pipe, a pressure impulse, is stored with the volume flow as its effort.

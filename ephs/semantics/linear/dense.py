@@ -187,7 +187,7 @@ def lu(on: Evaluator, a: Matrix, pivots: Integers, *, skipping: bool = False) ->
 
 
 def lu_solve(on: Evaluator, factors: Matrix, pivots: Integers, x: Vector) -> None:
-    """x ← A⁻¹ x, from what `lu` made of A."""
+    """x ← A⁻¹ x, from the factors of `lu`."""
     n = x.size
     rest = on.variable(0.0)
 

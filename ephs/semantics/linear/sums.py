@@ -9,7 +9,7 @@ __all__ = ["grown"]
 
 
 def grown(total: Any, carry: Any, change: Any) -> tuple[Any, Any]:
-    """Return total + carry + change, rounded, and what rounding left of it, to carry on to the next sum."""
+    """Return total + carry + change, rounded, and the rounding error for the next sum (Kahan)."""
     wanted = change + carry
     found = total + wanted
     taken = found - total

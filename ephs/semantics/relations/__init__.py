@@ -1,4 +1,4 @@
-"""Relations: what systems mean, over the states of their base; two routes to them; what a pattern means by itself."""
+"""Relations, the semantics of systems over the states of their base, by two constructions; relations of patterns."""
 
 from ephs.semantics.relations.base import StateClass as StateClass
 from ephs.semantics.relations.linear import LinearRelation as LinearRelation

@@ -51,19 +51,19 @@ class StateClass:
 
     @property
     def name(self) -> Path:
-        """The least path: of a storage's port, of a reader's where nobody stores it, else of an outer port."""
+        """Least path: of a storage's port, of a reader's where no storage has the state, else of an outer port."""
         return min(self.stores or self.readers or self.ports)
 
     @property
     def free(self) -> bool:
-        """Whether nobody stores it and no outer port shows it: the relation can be asked at each of its values."""
+        """Whether the state is free: neither stored nor exposed; the relation is defined at each of its values."""
         return not (self.stores or self.ports)
 
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class BasePoint:
-    """A point of the base, with what else determines the fibre over it.
+    """A point of the base, with the other arguments of the fibre over it.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def sorted_classes(classes: Sequence[StateClass]) -> tuple[StateClass, ...]:
 
 
 def place(classes: Sequence[StateClass], state: Values, ports: Values) -> tuple[dict[Path, Array], str]:
-    """The value at each port that stores or reads a state, and what contradicts: empty where nothing does.
+    """Value at each port that stores or reads a state, and the contradictions, if any.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The functor on patterns: what a pattern means by itself, before any box is filled."""
+"""The functor on patterns: the relation of a pattern with empty boxes."""
 
 import numpy as np
 

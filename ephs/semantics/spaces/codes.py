@@ -1,4 +1,4 @@
-"""The numbers by which compiled kernels tell the groups apart.
+"""Codes of groups in compiled kernels.
 
 A code names the *intrinsic* group, that is, how a point is stored and multiplied:
 

@@ -1,4 +1,4 @@
-"""Differentials of exponential maps on arrays, by machine code: what is called once a step from Python."""
+"""Differentials of exponential maps on arrays, compiled, for calls from Python."""
 
 from functools import cache
 from typing import Final

@@ -59,7 +59,7 @@ class Pair:
 
     @property
     def code(self) -> int:
-        """The number by which compiled kernels know the group."""
+        """Code of the group in compiled kernels."""
         return self.manifold.code
 
     @property

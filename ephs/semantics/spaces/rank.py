@@ -76,11 +76,11 @@ SPANNED = 1e-7
 NEIGHBOUR = 1e-6
 """Rank in configurations near by, which are closed by iterations to `ASSEMBLY` only."""
 LIGHT = 1e-9
-"""Mass of what has none, beside the heaviest body, where a metric must be one."""
+"""Mass of massless bodies in a metric, relative to the heaviest body."""
 TINY = 1e-300
 """Added to no sum and smaller than any size: quotients by what may be zero stay finite."""
 DIRECTION = 1e-12
-"""Length below which a vector says no direction: components are written with 12 digits at most."""
+"""Length below which a vector has no direction: components are written with 12 digits at most."""
 ALIGNED = 1e-6
 """Sine of the angle between two directions below which they are one: a third one that both are to span is then rounding
 over this, 2e-10."""

@@ -107,7 +107,7 @@ def _of(value: object) -> Any:
 
 @final
 class Arrays(Interpreted):
-    """Evaluation of all members at once; what differs between them is chosen by `select`, not by `when`."""
+    """Evaluation of all members at once; branches that differ between them need `select`, not `when`."""
 
     def _function(self, name: Function, *arguments: Real) -> Real:
         if name in COMPOSED:

@@ -125,7 +125,7 @@ class Call:
         self.numbers = [k for k, atom in enumerate(self.scalars) if atom in NUMBERS and names.count(names[k]) == 1]
 
     def bind(self, *arguments: Any, first: First | None = None) -> Bound:
-        """Check arguments once; what comes back may be called again and again.
+        """Check arguments once; the returned function may be called repeatedly.
 
         Parameters
         ----------

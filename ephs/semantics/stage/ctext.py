@@ -141,7 +141,7 @@ class _Function:
         return "\n".join([f"{self.declaration} {{", *variables, *self.slots, *self.lines, "}"])
 
     def _find_phis(self, lines: list[str]) -> None:
-        """Note for each block that is left what it hands to which block's variables."""
+        """Record the values that each block passes to its successors' variables."""
         self._joined: dict[str, list[str]] = {}
         self.slots: list[str] = []
         self._handed: dict[tuple[str, str], list[tuple[str, str, str]]] = {}

@@ -73,7 +73,7 @@ def _pair(left: Real, right: Real) -> tuple[Ruled, Ruled]:
 
 
 def _nought(slope: Real) -> bool:
-    """Tell whether a slope is known to be zero, whatever it is multiplied by: a constant."""
+    """Tell whether a slope is identically zero: the number is a constant."""
     return type(slope) is float and slope == 0.0
 
 

@@ -103,7 +103,7 @@ class Writer:
         return len(self.lines), len(self.slots), self.block
 
     def restore(self, place: tuple[int, int, str]) -> None:
-        """Forget what was written since."""
+        """Discard the text written since."""
         lines, slots, self.block = place
         del self.lines[lines:], self.slots[slots:]
 

@@ -1,4 +1,4 @@
-"""Entry functions of programs: a staged function, the kinds of its arguments, and what may be derived from both."""
+"""Entry functions of programs: a staged function, the kinds of its arguments, and the functions derived from it."""
 
 import inspect
 from collections.abc import Callable, Iterator
@@ -141,7 +141,7 @@ class Entry:
         return Entry(run, **kinds)
 
     def given(self, **values: Any) -> "Entry":
-        """Return this function for some arguments given while staging, unrolled over what they say.
+        """Return this function for some arguments known while staging, unrolled over them.
 
         Loops whose bounds are known are unrolled, and what is known to be zero vanishes. Arrays that are given start
         with the numbers that they hold and live in registers: what the function writes to them is not seen outside.

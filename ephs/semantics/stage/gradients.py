@@ -1,4 +1,4 @@
-"""Gradients of what a function writes by all that it reads: one run that writes a tape, and one reading of it."""
+"""Gradients of a function's outputs by all its inputs: one run writes a tape, one pass reads it backwards."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -34,7 +34,7 @@ def _taped(entry: Entry) -> Program:
 
 @final
 class Gradients:
-    """One function on arrays of its own, and gradients of what it writes.
+    """One function on arrays of its own, with gradients of its outputs.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Evaluation with intervals, rounded outwards: bounds of what a function computes on a box.
+"""Evaluation with intervals, rounded outwards: bounds of a function on a box.
 
 Where a divisor is zero there is no value to bound.
 """
@@ -82,7 +82,7 @@ def _over(a: float, b: float) -> float:
 
 
 def _out(values: list[float] | tuple[float, ...], ulps: int = 1) -> Interval:
-    """Return the hull of values, wider by what rounding may have taken."""
+    """Return the hull of values, widened by their rounding."""
     if any(math.isnan(value) for value in values):
         return _WHOLE
     low, high = min(values), max(values)

@@ -1,4 +1,4 @@
-"""Kinds of arguments: the arrays and numbers that a program is handed for each, and what they make inside."""
+"""Kinds of arguments: arrays and numbers passed to a program, and their views while staging."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -31,7 +31,7 @@ __all__ = [
 ]
 
 ANY: Final = 2**40
-"""A size beyond all: that of memory whose size the program is not told."""
+"""Size of memory without a known bound."""
 Shape: TypeAlias = tuple[int | None, ...]
 """A shape, None where any size will do."""
 

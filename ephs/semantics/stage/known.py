@@ -1,4 +1,4 @@
-"""Results of staging kept on disk: what a function is made of, told in full, and the digest of the package's sources.
+"""Disk cache of staging, keyed by a function's closure and the digest of the package's sources.
 
 A function of this package is its place in the sources and what it closes over; so a result is kept under these, and
 holds as long as no source changes. What closes over anything else, such as a user's function, is staged anew.
@@ -33,7 +33,7 @@ class Made(Protocol):
 
     @property
     def made_of(self) -> object:
-        """What it was made of."""
+        """Arguments that it was made from."""
         ...
 
 
@@ -43,7 +43,7 @@ class _Foreign(Exception):
 
 
 def known(of: object, make: Callable[[], T]) -> T:
-    """Return what is on disk for a value, else make it and keep it.
+    """Return the cached text of a value, else make and store it.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def sources(root: Path) -> str:
 
 @final
 class _Teller:
-    """Tells values in text. What was told before is referred to by its number, which also ends cycles."""
+    """Serialiser of values as text. Repeated values are referred to by number, which also ends cycles."""
 
     def __init__(self) -> None:
         self._numbers: dict[int, int] = {}
@@ -147,7 +147,7 @@ class _Teller:
         return ",".join([self.tell(value) for value in values])
 
     def _class(self, value: type) -> str:
-        """Tell a class that a module of this package, or Python, has under its name."""
+        """Serialise a class by its qualified name in a module of this package or of Python."""
         if value.__module__ != "builtins":
             found: object = sys.modules.get(value.__module__)
             for part in value.__qualname__.split("."):
@@ -165,7 +165,7 @@ class _Teller:
 
 
 def _digest(code: CodeType) -> str:
-    """Return what tells two functions of one place in the sources apart, as two in one line."""
+    """Return the key that distinguishes functions of one source position, such as two in one line."""
     inner = [_digest(part) if isinstance(part, CodeType) else repr(part) for part in code.co_consts]
     parts = [str(code.co_firstlineno), code.co_code.hex(), *code.co_names, *code.co_freevars, *inner]
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:16]

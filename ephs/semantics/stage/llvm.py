@@ -1,4 +1,4 @@
-"""The door to LLVM: object code from assembly text, and addresses from object code."""
+"""Interface to LLVM: object code from assembly text, and addresses from object code."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -35,7 +35,7 @@ class Library:
 
 @cache
 def _llvm() -> Any:
-    """Load LLVM; it has no type stubs, so only this file knows it."""
+    """Load LLVM; it has no type stubs, so only this file uses it."""
     from llvmlite import binding  # pyright: ignore[reportMissingTypeStubs]
 
     llvm: Any = binding

@@ -30,7 +30,7 @@ _INTRINSIC: Final[dict[Function, str]] = {
 @final
 @dataclass(frozen=True, slots=True)
 class _Emitted:
-    """A staged function that stands in the module: its name and the form of its result."""
+    """A staged function of the module: its name and the form of its result."""
 
     name: str
     returns: str

@@ -77,7 +77,7 @@ class _Unknown:
 
 
 class Number(_Unknown, ABC):
-    """A real number whose value its evaluator knows."""
+    """A real number with a known value."""
 
     __slots__ = ()
     __array_ufunc__ = None  # A number of NumPy on the left leaves operators to this class.
@@ -176,7 +176,7 @@ def _is(other: object, value: float) -> bool:
 
 
 class Count(_Unknown, ABC):
-    """An integer whose value its evaluator knows; // and % round down, as in Python."""
+    """An integer with a known value; // and % round down, as in Python."""
 
     __slots__ = ()
 

@@ -27,7 +27,7 @@ FITTING: Final = {
     "linux-x86-64-v2": ("x86_64", "cx16 popcnt sahf sse3 sse4.1 sse4.2 ssse3"),
     "linux-arm64": ("aarch64", ""),
 }
-"""Targets that come with the package, the better before the worse: architecture, and what a processor must have."""
+"""Targets shipped with the package, the best first: architecture and required processor features."""
 
 
 def name_of(text: str, target: Target) -> str:

@@ -46,11 +46,11 @@ class Program:
         self.name, self.entries = name, MappingProxyType(entries)
 
     def tangent(self, directions: int = 1) -> "Program":
-        """Return the program of all entry functions' tangents, see `Entry.tangent`: what tangents reach."""
+        """Return the program of all entry functions' tangents, see `Entry.tangent`."""
         return _tangent(self, directions)
 
     def taped(self) -> "Program":
-        """Return the program of all entry functions writing a tape, see `Entry.taped`: what taped functions reach."""
+        """Return the program of all entry functions that write a tape, see `Entry.taped`."""
         return _taped(self)
 
     def text(self, members: int = 1, shared: tuple[str, ...] = (), *, blocks: bool = True) -> str:

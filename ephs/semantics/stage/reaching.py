@@ -45,7 +45,7 @@ class Signature:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Reached:
-    """A function at an address, with a signature that nothing checks against what is there."""
+    """A function at an address, with an unchecked signature."""
 
     signature: Signature
     address: Integer

@@ -1,4 +1,4 @@
-"""Unrolling over any evaluator: loops of known bounds run while staging, memory holds what is known.
+"""Unrolling over any evaluator: loops of known bounds run while staging, memory holds known values.
 
 A staged function that is unrolled over a mechanism whose tables are given becomes a program with no more arithmetic
 than that mechanism needs. Where a condition or a bound is not known, the base evaluator branches or loops; numbers
@@ -46,7 +46,7 @@ class Local(Cells[Any]):
 
 @final
 class Unrolled(Evaluator):
-    """Evaluation that unrolls what is known, over another evaluator.
+    """Evaluation over another evaluator, with known loops unrolled.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class Unrolled(Evaluator):
         return self._births
 
     def written(self, place: Place) -> None:
-        """Note the number at a place before it changes, where a branch or a loop must know."""
+        """Record the number at a place before it changes, for enclosing branches and loops."""
         if self._journals:
             cells, index = place
             self._journals[-1].setdefault(place, cells.entries[index])
@@ -139,7 +139,7 @@ class Unrolled(Evaluator):
         self._settle(slots)
 
     def _run(self, body: Callable[[], Any]) -> dict[Place, Any]:
-        """Run a body and return what it changed of what was there, with the numbers before."""
+        """Run a body and return the places that it changed, with their former numbers."""
         births = self._births
         self._journals.append({})
         try:
@@ -241,7 +241,7 @@ class Unrolled(Evaluator):
         return function(on, *arguments)
 
     def _reach(self, function: Reached, parts: list[Part]) -> Integer:
-        """Call with what lives in registers copied to memory, and back."""
+        """Call with numbers in registers copied to memory and back."""
         copies: dict[Local, Cells[Any]] = {}
         passed: list[Part] = []
         for atom, value in parts:

@@ -24,7 +24,7 @@ FAR = 1e6
 
 
 def at_least(expression: Expr, bounds: Bounds, *, strict: bool) -> bool:
-    """Whether an expression is shown to be ≥ 0, or > 0, on a box; what is undecided on it is cut in halves.
+    """Whether an expression is proved ≥ 0, or > 0, on a box; undecided boxes are bisected.
 
     Symbols without bounds run over all numbers.
     """

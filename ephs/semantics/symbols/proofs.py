@@ -55,7 +55,7 @@ def _findings(primitive: Primitive) -> Findings:
 
 
 class _Same:
-    """A primitive as a value that all of its kind are equal to: what a cache is not keyed by."""
+    """A primitive that compares equal to all of its kind, to keep it out of cache keys."""
 
     __slots__ = ("primitive",)
 

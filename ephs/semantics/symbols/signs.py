@@ -25,7 +25,7 @@ def vanishes(expression: Expr) -> bool:
 
 
 def _masked(expression: Expr) -> tuple[Expr, dict[Expr, Expr]]:
-    """A rational function with symbols in the place of all that is not rational, and what they stand for."""
+    """A rational function with symbols for its non-rational subexpressions, and their definitions."""
     atoms = [e for e in sp.preorder_traversal(expression) if e.is_Function or (e.is_Pow and not e.exp.is_Integer)]
     names: dict[Expr, Expr] = {}
     for atom in dict.fromkeys(atoms):

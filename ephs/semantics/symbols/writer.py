@@ -103,7 +103,7 @@ class Writer:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Parts:
-    """The square form: what storages give, balances by junction, conditions."""
+    """Square form: equations of storages, balances by junction, conditions."""
 
     storages: dict[Path, tuple[Expr, Quantity, Path]]  # junction -> effort, quantity, component
     rates: dict[Path, Expr]  # junction -> left-trivialised rate

@@ -165,7 +165,7 @@ def draw_stability(cells: Sequence[Cell], family: Family, folder: Path, name: st
 
 
 def _write_data(rows: Sequence[Mapping[str, Any]], folder: Path, name: str) -> list[Path]:
-    """The same rows as CSV and as JSON, what is not a number as null."""
+    """The same rows as CSV and as JSON, NaN as null."""
     table, data = folder / f"{name}.csv", folder / f"{name}.json"
     with table.open("w", encoding="utf-8", newline="") as stream:
         if rows:

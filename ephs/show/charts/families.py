@@ -1,4 +1,4 @@
-"""Families of scenes whose parameter makes them difficult, and what is recommended for each."""
+"""Families of scenes of growing difficulty, with the recommended methods of each."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Work and precision: what an error costs, method by method."""
+"""Work and precision of methods."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ TOLERANCES = tuple(10.0**-k for k in range(3, 13))
 STEPS = tuple(20 * 2**k for k in range(11))
 """Into how many steps the time is divided."""
 FLOOR = 100.0
-"""An error below this many cross-checks of the reference says nothing."""
+"""Errors below this many cross-checks of the reference are not resolved."""
 
 
 @final

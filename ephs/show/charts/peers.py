@@ -15,7 +15,7 @@ __all__ = ["PEERS", "Peer", "PeerError", "PeerRun"]
 @final
 @dataclass(frozen=True, slots=True)
 class Peer:
-    """A program with one of its integrators; `build` makes what runs a scene up to a time."""
+    """A program with one of its integrators; `build` makes the function that runs a scene up to a time."""
 
     name: str
     adaptive: bool

@@ -1,4 +1,4 @@
-"""One run under limits: its solution, or how it ended and what it told its user."""
+"""One run under limits: its solution, or its outcome and message."""
 
 import time
 import warnings

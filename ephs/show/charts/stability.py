@@ -1,4 +1,4 @@
-"""Stability: what becomes of every method where scenes get difficult."""
+"""Stability of the methods on scenes of growing difficulty."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -196,7 +196,7 @@ def _truth(family: Family, value: float, times: Array, limit: float) -> tuple[Re
 
 
 def _outcome(found: Motion | None, truth: Reference | None, allowed: float) -> tuple[Outcome, float, float]:
-    """Outcome, error and horizon; without a reference what can be told from the motion alone."""
+    """Outcome, error and horizon; without a reference as far as the motion alone shows them."""
     if found is None:
         return Outcome.REFUSED, np.nan, np.nan
     if truth is None:

@@ -1,1 +1,1 @@
-"""The audit of a run: what it is held against, and estimates of its error and cost."""
+"""Audit of a run: its laws, and estimates of its error and cost."""

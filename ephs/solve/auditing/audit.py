@@ -1,4 +1,4 @@
-"""The audit of a run: laws that its result is held against, and what breaks them.
+"""Audit of a run: laws of its result, and findings where they fail.
 
 Sizes are relative to the run's own: energies to the largest K + |V − V₀| + |heat| + |work|, entropies to what was made
 and exchanged, positions to the length of the mechanism. A law without anything to hold is kept.
@@ -38,13 +38,13 @@ MOTION = 0.1
 """Parts of the mechanism's length, or rad, by which constant steps may put bodies wrong at the end, as estimated: the
 estimate adds up errors of steps, which may cancel, so that fewer digits would be guesses."""
 LEAP = 0.5
-"""Parts of a surface's thickness that a step may pass: an instant lies inside it then."""
+"""Fraction of a surface's thickness that a step may cross, so that an instant lies inside."""
 PRODUCTION = 1e-12
-"""Part of its scale by which an entropy may fall: what rounding leaves of a difference of flows."""
+"""Rounding of a difference of entropy flows, relative to their scale."""
 INSTANTS = 125
 """Instants, evenly spread, at which the positions of joints are looked at."""
 ROUNDING = 8.0 * float(np.finfo(float).eps)
-"""Part of what is stored that rounding leaves of a difference."""
+"""Rounding of a difference of stored amounts, relative to them."""
 
 
 @final
@@ -120,7 +120,7 @@ class Bounds:
 @final
 @dataclass(frozen=True, slots=True)
 class Breach:
-    """The largest excess over a law in a run: size, what is allowed on top, instant, component, end of the advice."""
+    """Largest excess over a law in a run: size, allowance, instant, component, end of the advice."""
 
     size: float
     slack: float
@@ -175,7 +175,7 @@ def _accuracy(solution: "Solution", bounds: Bounds, trials: Tests | None) -> Ite
 
 
 def _grown(solution: "Solution", bounds: Bounds, trials: Trials) -> GlobalError | None:
-    """The error of bodies at the end: by another run, or the sum of what steps err by where there is none."""
+    """Error of the bodies' poses at the end: by another run, or else the sum of the steps' error estimates."""
     h, steps, own = bounds.step or 0.0, int(solution.stats["steps"]), trials.own or trials
 
     def summed() -> StepError | None:

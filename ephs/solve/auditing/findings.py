@@ -66,7 +66,7 @@ class Audit:
 
     @classmethod
     def of_record(cls, record: Mapping[str, Any]) -> "Audit":
-        """From what `record` gave."""
+        """From a value of `record`."""
         return cls(tuple(Finding(**finding) for finding in record["findings"]))
 
     def __str__(self) -> str:
@@ -80,7 +80,7 @@ class AuditWarning(UserWarning):
 
 @final
 class CostWarning(UserWarning):
-    """A run whose first steps say that it will be long, and by which methods it would be shorter."""
+    """Forecast that a run will be long, from its first steps, with faster methods."""
 
 
 @final

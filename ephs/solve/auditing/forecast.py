@@ -19,8 +19,7 @@ __all__ = ["MANY", "Forecast"]
 FIRST = 32
 """Steps after which the first forecast is made, from the later half of them; again after twice as many each time."""
 MANY = 20_000
-"""Iterations of Newton's method from which on a run is said to be long: some ten seconds of a mechanism of five bodies
-on one core."""
+"""Iterations of Newton's method above which a run counts as long: some ten seconds for five bodies on one core."""
 
 STEADY = 1.2
 """Growth of a quarter of the steps over the one before up to which they count as steady."""

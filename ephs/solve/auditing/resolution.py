@@ -140,7 +140,7 @@ class Trials:
         return StepError(size, k, path)
 
     def sufficient(self, k: int, h: float, allowed: float) -> float:
-        """A step in s, some h / 4ᵏ, that would resolve what moves at a time."""
+        """A step in s, some h / 4ᵏ, that resolves the motion at a time."""
         for _ in range(SHORTER):
             h *= 0.25
             missed, moved, _ = self._trial(k, h)

@@ -47,7 +47,7 @@ class Balance:
         self.g = self.u = self.a = self.y = self.X = self.largest = self.debt = 0.0
 
     def begin(self, a: float, y: float) -> None:
-        """Start from what the system and the unit return at first."""
+        """Start from the first outputs of the system and the unit."""
         self.a, self.y, self.X, self.largest, self.debt = a, y, 0.0, 0.0, 0.0
         self.u, self.g = self._taken * a, self._given * y
 

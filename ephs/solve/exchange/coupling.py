@@ -1,4 +1,4 @@
-"""`Coupling`: units as the environment of a system: what it is given once a period, and the energy that this makes.
+"""`Coupling`: units as the environment of a system, exchanged once a period, with the energy of the exchange.
 
 A sample comes after the system went through a period. The units then go through it too, power ports with the means that
 the system had, and what they return is held over the next one.
@@ -76,7 +76,7 @@ class Traffic:
 @final
 @dataclass(frozen=True, slots=True)
 class _Joined:
-    """A power port where it is joined: both signs, and what is read of the system."""
+    """A power port at a coupling: both signs, and the readings of the system."""
 
     place: Place
     port: PowerPort

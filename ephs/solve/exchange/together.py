@@ -34,7 +34,7 @@ class Together:
         self.places = [Place(name, output) for name, unit in exchange.units.items() for output in unit.outputs]
 
     def begin(self, t: float, state: Any, held: Mapping[Place, float]) -> None:
-        """Initialize them at a time, in an order in which outputs have what they depend on."""
+        """Initialise them at a time, in the order of their outputs' dependencies."""
         self.t, of = t, self._of
         for unit in self._units.values():
             unit.begin(t)

@@ -1,4 +1,4 @@
-"""Wires between units: what each input reads, whether units of measure agree, and the order in which they start."""
+"""Wires between units: sources of inputs, agreement of units of measure, and the order of initialisation."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ class Place:
 
 
 def place_of(text: str, units: Mapping[str, Unit]) -> Place:
-    """The place that ``unit.name`` says; names within units may have dots.
+    """Place of ``unit.name``; names within units may have dots.
 
     Raises
     ------

@@ -12,9 +12,9 @@ from ephs.semantics.stage import Evaluator, Real, Record, integer, real
 __all__ = ["BEYOND", "MOST", "ROUNDING", "WORTH", "Account", "rounding", "stretch", "worth"]
 
 ROUNDING = 16.0 * 2.220446049250313e-16
-"""Part of the terms of an energy, work and heat below which what is missing is rounding, and left."""
+"""Fraction of the terms of energy, work and heat below which their defect is rounding and not corrected."""
 BEYOND = 1e300
-"""Beyond all energies: what is not below is not a number, and says that nothing is to be met."""
+"""Bound of all energies; a target that is not below it (NaN) means no correction."""
 MOST = 10.0
 """Errors that a tolerance allows by which a correction moves a state at most where steps are chosen."""
 WORTH = 0.1
@@ -71,7 +71,7 @@ def stretch(on: Evaluator, share: Real) -> Real:
 
 
 def worth(on: Evaluator, account: Account) -> Real:
-    """Return the error of the step that was tried last by its correction, less what earlier ones left."""
+    """Return the error of the last tried step by its correction, less the remainder of earlier ones."""
     short = account.moved + account.rest
     own = on.maximum(on.absolute(short - account.left) - account.noise, 0.0) / on.maximum(on.absolute(short), TINY)
     return on.select(account.size > 0.0, WORTH * account.size * on.minimum(own, 1.0), 0.0)

@@ -1,4 +1,4 @@
-"""Explicit steps, many in one call: stages, constraints closed, error, the next step's length, what is kept."""
+"""Explicit steps, many in one call: stages, closing of constraints, error, step control, records."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -239,7 +239,7 @@ class _Run:
         self.unless_ended(lambda: on.when(tiny, lambda: self.end(short)))
 
     def _take(self, h: Real, rest: Real) -> None:
-        """Keep what is wanted of a step that is accepted, and go to its end."""
+        """Record an accepted step as asked, and advance to its end."""
         on, motion, m, c = self.on, self.motion, self.memory, self.control
         on_grid = on.select(c.grid > 0.0, c.grid * (on.real(c.steps) + 1.0), c.time + h)
         after = on.select(h >= rest, on.absolute(c.end), on_grid)

@@ -1,4 +1,4 @@
-"""Memory of a march: its state, its next step, the sums of what that adds, what is kept."""
+"""Memory of a march: state, next step, accumulated sums, records."""
 
 from dataclasses import dataclass
 from typing import Any, Final, final
@@ -11,7 +11,7 @@ __all__ = ["BOOKS", "ERRORS", "MEMORY", "Books", "Errors", "Memory"]
 @final
 @dataclass(frozen=True, slots=True)
 class Errors:
-    """Tolerances of what an error counts, and what they allow in a step: (counted,) each."""
+    """Tolerances of the components of the error, and their allowances in a step: (counted,) each."""
 
     atol: Vector
     rtol: Vector

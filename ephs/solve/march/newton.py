@@ -87,7 +87,7 @@ def filtered(
     on: Evaluator, motion: Motion, tableau: Tableau, control: Control, base: Vector, start: Vector, k: Matrix,
     errors: Errors, stiff: Stiff,
 ) -> Real:  # fmt: skip
-    """Return the error of a step relative to what is allowed, by the method of order 3 embedded in it.
+    """Return the error of a step relative to the tolerance, by the embedded method of order 3.
 
     The difference is filtered by the equations, as its stiff part must be; where it is too large, once more from where
     it leads, as of stiff parts the first estimate is.
@@ -146,7 +146,7 @@ class _Newton:
         self.on.loop(s.matrix.rows, lambda j: _add(y, j, s.stages[i, j]))
 
     def solve(self) -> None:
-        """Write what Newton's method adds to the stages."""
+        """Write the Newton corrections of the stages."""
         on, s, size = self.on, self.stiff, self.stiff.matrix.rows
 
         def defect(j: Integer) -> None:
@@ -166,7 +166,7 @@ class _Newton:
         on.loop(size, back)
 
     def size(self, errors: Errors, y: Vector) -> Real:
-        """The largest change, relative to what is allowed of the sizes that stages reach; these go to y.
+        """Largest change relative to the tolerance at the stages' values, which are written to y.
 
         What starts from nothing, as heat does, is measured by what it becomes.
         """

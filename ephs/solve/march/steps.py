@@ -191,7 +191,7 @@ def _estimate(on: Evaluator, motion: Motion, weights: Vector, k: Matrix, h: Real
 
 @staged
 def error_of(on: Evaluator, motion: Motion, tableau: Tableau, memory: Memory, k: Matrix, h: Real, q: Vector) -> Real:
-    """Return the size of the estimates of a step with rates k that ends at q, relative to what is allowed."""
+    """Return the size of the estimates of a step with rates k that ends at q, relative to the tolerance."""
     m, blended = memory, tableau.eighth[0] > 0
     _estimate(on, motion, tableau.error, k, h, q, m.fine)
     on.when(blended, lambda: _estimate(on, motion, tableau.coarse, k, h, q, m.coarse))
@@ -199,7 +199,7 @@ def error_of(on: Evaluator, motion: Motion, tableau: Tableau, memory: Memory, k:
 
 
 def measure(on: Evaluator, fine: Vector, coarse: Vector, allowed: Vector, eighth: Integers) -> Real:
-    """Return the size of estimates relative to what is allowed, by the rule that a tableau names.
+    """Return the size of estimates relative to the tolerance, by the norm that a tableau names.
 
     Hairer, Nørsett and Wanner, *Solving Ordinary Differential Equations I*, II.4 and II.10.
     """
@@ -223,7 +223,7 @@ def measure(on: Evaluator, fine: Vector, coarse: Vector, allowed: Vector, eighth
 
 
 def drift(on: Evaluator, before: Vector, after: Vector, allowed: Vector) -> Real:
-    """Return the error that closing reveals: DRIFT of the change of the rates, relative to what is allowed of them."""
+    """Return the error shown by closing: DRIFT of the change of the rates, relative to their tolerance."""
     n, total = after.size, on.variable(0.0)
 
     def one(j: Integer) -> None:

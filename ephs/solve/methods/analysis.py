@@ -28,7 +28,7 @@ OTHERWISE = 1e-3
 """Weight of equations that are not preferred where some are left out: others take part that much more."""
 
 LARGE = 256
-"""Rows above which those with an effort of their own are taken out before the rank is decided densely."""
+"""Rows above which those with an effort of their own are eliminated before the dense rank decision."""
 OWN = 1e-3
 """Part of a row above which an effort that is in no other row makes it independent of the others."""
 ALIKE = 1e-6
@@ -170,7 +170,7 @@ def dependent_rows(
 
 
 def entangled(matrix: Any) -> Index:
-    """Rows that may depend on each other: what is left when those with an effort of their own are taken out in turn.
+    """Rows that may be dependent: the remainder after elimination of those with an effort of their own.
 
     Such a row takes part in no dependence. Its effort has to be more than `OWN` of it, so that the rest is as well
     conditioned as the whole.

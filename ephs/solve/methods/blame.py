@@ -43,7 +43,7 @@ class Blame:
         return self._of(Outcome.CONTRADICTION, np.where(self._dropped, ratio, 0.0))
 
     def _scales(self, scale: Array) -> Array:
-        """(rows,): what residuals are relative to, block by block."""
+        """(rows,): scales of the residuals, block by block."""
         block = self.model.tables.block
         whole = np.zeros(int(block.max(initial=-1)) + 1)
         np.maximum.at(whole, block, np.nan_to_num(scale))

@@ -25,7 +25,7 @@ __all__ = ["condensed", "solved_by_parts"]
 SOUND = 1e-6
 """A pivot is used if it is at least this part of its row's largest entry, in every copy."""
 DENSE = 400
-"""Equations up to which what parts leave is solved densely."""
+"""Number of remaining equations up to which they are solved densely."""
 STALLED, SOLVED, MOST = 1e-11, 4e-16, 40
 
 
@@ -56,7 +56,7 @@ def solved_by_parts(model: Model, x: Array, h: float) -> Array:
 
 
 def condensed(model: Model, values: Array, right: Array) -> Array:
-    """The solution z of A z = right, of least norm in what parts leave.
+    """Solution z of A z = right, of least norm in the remaining equations.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ class _Back:
 
 
 def _eliminated(system: _System, inner: Index, left: NDArray[np.bool_]) -> tuple[_System, _Back]:
-    """Eliminate what can be of the unknowns ``inner`` (copies, u) by the equations of the same numbers.
+    """Eliminate the unknowns ``inner`` (copies, u), as far as possible, by the equations of the same numbers.
 
     ``left`` (2, n) marks the rows and columns that are not eliminated yet, and is brought up to date.
     """

@@ -1,4 +1,4 @@
-"""The equations of a model at one instant, compiled: residual, matrix, powers; what methods of Runge and Kutta use.
+"""Compiled equations of a model at one instant: residual, matrix, powers; for Runge–Kutta methods.
 
 They are the kernels of the natural discretisation at increments of length zero, where every discrete relation is the
 continuous one, and half of the derivative by the increment is the derivative by the state.
@@ -41,7 +41,7 @@ class Matrices:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Instant:
-    """What is booked at one instant.
+    """Rates of the accumulators at one instant.
 
     Parameters
     ----------

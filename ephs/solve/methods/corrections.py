@@ -17,7 +17,7 @@ _NONE: Final = 1e-280
 
 
 def rest(on: Evaluator, t: Columns, h: Real, slope: Vector, scale: Vector) -> None:
-    """At rest no effort has a size of its own: what the flows change it by in a step is one."""
+    """Scale of efforts at rest: their change by the flows in a step."""
 
     def component(c: Integer) -> None:
         n, e_at, w_at, j_at = row_of(Dims, t.dims, c).efforts, t.e_at[c], t.read_w_at[c], t.jacobian_at[c]

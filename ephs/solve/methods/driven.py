@@ -47,7 +47,7 @@ class ComponentMethod(Protocol):
         ...
 
     def prepare(self, state: NaturalState, h: float) -> None:
-        """Compile what is not in the cache, before time counts."""
+        """Compile programs that are not in the cache, before timing starts."""
         ...
 
     def advance(
@@ -74,7 +74,7 @@ class ComponentMethod(Protocol):
 
 
 def started(method: ComponentMethod, x: Array, sums: Array) -> NaturalState:
-    """The state of a method that starts at the states x, with what was counted before."""
+    """State of a method that starts at the states x, with the former counts."""
     return replace(method.init(x), sums=sums)
 
 

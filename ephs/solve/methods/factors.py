@@ -1,4 +1,4 @@
-"""Factors of a dense matrix, or the failure that says that there are none."""
+"""Factors of a dense matrix, or the failure of the factorisation."""
 
 from typing import Any
 

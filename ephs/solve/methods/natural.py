@@ -70,7 +70,7 @@ class Decided:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Chunk:
-    """Results of some steps, one row each, and what stopped them early.
+    """Results of some steps, one row each, and the cause of an early stop.
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ class Natural:
         return self._stored.energies(x)
 
     def prepare(self, state: NaturalState, h: float) -> None:
-        """Decide the order of elimination and compile what is not in the cache, before time counts."""
+        """Decide the order of elimination and compile programs that are not in the cache, before timing starts."""
         self._loop(self._order(state.x, state.z, h).order, 1)
 
     def step(self, state: NaturalState, h: float, inputs: Array | None = None) -> NaturalState:
@@ -197,7 +197,7 @@ class Natural:
     def advance(
         self, state: NaturalState, h: float, steps: int, inputs: Array | None = None
     ) -> tuple[NaturalState, Chunk]:
-        """Up to ``steps`` steps of h seconds; the chunk says what stopped them early.
+        """Up to ``steps`` steps of h seconds; the chunk names the cause of an early stop.
 
         Parameters
         ----------

@@ -159,7 +159,7 @@ class Natural4:
         return self._stored.energies(x)
 
     def prepare(self, state: NaturalState, h: float) -> None:
-        """Decide the order of elimination and compile what is not in the cache, before time counts."""
+        """Decide the order of elimination and compile programs that are not in the cache, before timing starts."""
         self.advance(state, h, 0)
 
     def points(self, state: NaturalState, h: float, x: Array) -> list[Array]:
@@ -175,7 +175,7 @@ class Natural4:
     def advance(
         self, state: NaturalState, h: float, steps: int, inputs: Array | None = None
     ) -> tuple[NaturalState, Chunk]:
-        """Up to ``steps`` steps of h seconds; the chunk says what stopped them early.
+        """Up to ``steps`` steps of h seconds; the chunk names the cause of an early stop.
 
         Parameters
         ----------

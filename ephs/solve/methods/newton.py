@@ -300,7 +300,7 @@ def advance(
 
 @cache
 def natural_program() -> Program:
-    """Return the program of the natural method, and of what is evaluated by itself."""
+    """Return the programs of the natural method and of single evaluations."""
     point = {"x": vector(), "z": vector(), "scal": vector(3), "inputs": vector()}
     return Program(
         "natural",

@@ -24,7 +24,7 @@ __all__ = ["Paced", "PacedState"]
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class PacedState:
-    """Present state of the method: its own state, the time, and what is kept there."""
+    """Present state of the method: its own state, the time, and the record there."""
 
     t: float
     inner: NaturalState
@@ -63,7 +63,7 @@ class Paced:
         return PacedState(t, self.method.init(x), Row(x, energies, np.zeros(4)))
 
     def prepare(self, state: PacedState, h: float) -> None:
-        """Compile what is not in the cache, before time counts."""
+        """Compile programs that are not in the cache, before timing starts."""
         self.method.prepare(state.inner, h)
 
     def many(self, span: Span[PacedState]) -> None:

@@ -1,4 +1,4 @@
-"""Places of a component in the tables, and what is done with vectors place by place."""
+"""Places of a component in the tables, and operations on vectors by place."""
 
 from dataclasses import dataclass
 from typing import final

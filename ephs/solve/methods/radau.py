@@ -29,7 +29,7 @@ from ephs.solve.stepping import Attempt, Row, Span
 __all__ = ["COEFFICIENTS", "DEFECT", "GAMMA", "NODES", "T_INVERSE", "VALUES", "Radau", "RadauState", "T"]
 
 PROBE = 1e-7
-"""Part of the first step by which the start is tried: what contradicts the constraints moves at any length."""
+"""Fraction of the first step for the trial of the start, which detects states that violate constraints."""
 
 _S6 = 6.0**0.5
 NODES = np.array([(4.0 - _S6) / 10.0, (4.0 + _S6) / 10.0, 1.0])
@@ -37,7 +37,7 @@ DENSE = 48
 """Unknowns up to which factorising without regard to zeros is faster."""
 ITERATIONS = 10
 FARTHEST = 2.0
-"""Lengths of the step before, beyond which its polynomial guesses worse than what was last."""
+"""Extrapolation, in lengths of the former step, beyond which the last value is the better guess."""
 
 
 COEFFICIENTS = np.array([moments(NODES, node) for node in NODES])
@@ -262,7 +262,7 @@ class Radau:
         return Books(np.array(powers), np.array([self._known(state)[1], *passed]))
 
     def _known(self, state: RadauState) -> tuple[Array, Array]:
-        """(components,) stored energies, and what is passed as heat and entropy."""
+        """(components,) stored energies, and heat and entropy transferred."""
         if self._last is None or self._last[0] is not state:
             found = self.equations.instant(state.x, state.z, self.inputs(state.t, state.x))
             self._last = state, found.energies, self._passages.powers(found.flows, found.unknowns)

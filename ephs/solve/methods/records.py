@@ -1,4 +1,4 @@
-"""A model's tables, an order of elimination and scratch memory: arrays, and what programs see of them."""
+"""A model's tables, order of elimination and scratch memory, as arrays and as records of programs."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, fields

@@ -1,4 +1,4 @@
-"""Scales of residuals: what each is measured by, and how large they are by that.
+"""Scales of residuals, and the sizes of residuals relative to them.
 
 A residual is measured by the magnitudes of its terms. Where all of them are near zero, as at rest, they have none of
 their own: then it is measured by what its neighbours could make of it.
@@ -24,7 +24,7 @@ FAR: Final = 1e300
 
 
 def reach(on: Evaluator, t: Columns, m: Scratch) -> None:
-    """The flows that there could be at each effort, into m.dense, were the efforts as large as what they are known by.
+    """Scale of each balance residual from the magnitudes of its efforts, into m.dense.
 
     The rate of a joint at rest is a difference of its bodies' twists, and so is known to the rounding of those.
     """
@@ -61,7 +61,7 @@ def reach(on: Evaluator, t: Columns, m: Scratch) -> None:
 
 
 def still(on: Evaluator, t: Columns, z: Vector, m: Scratch) -> None:
-    """At rest no effort has a size of its own: what the flows change it by in a step is one."""
+    """Scale of efforts at rest: their change by the flows in a step."""
 
     def component(i: Integer) -> None:
         part = Part.of(t, i)

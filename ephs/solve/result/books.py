@@ -1,4 +1,4 @@
-"""The books of a component or subsystem: what it stores, what it destroys, and so what crossed its boundary.
+"""Ledger of a component or subsystem: stored amounts, destruction, and the resulting supply.
 
 Balances hold step by step: energy is supplied or stays; exergy is supplied, stays, or is destroyed, θ₀ times the
 entropy made; entropy is supplied, stays, or is made; volume is supplied or stays. What the whole was supplied with is
@@ -108,7 +108,7 @@ class Entry:
 
 
 def entry_of(books: Ledgers, path: Path) -> Entry | None:
-    """The entry of a component or subsystem, None where nothing keeps books at or below the path."""
+    """Entry of a component or subsystem, None where no ledger exists at or below the path."""
     leaves = {leaf: entry for leaf, entry in _leaves(books).items() if path.is_prefix_of(leaf)}
     if not leaves:
         return None

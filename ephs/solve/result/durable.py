@@ -10,7 +10,7 @@ __all__ = ["durable", "settle"]
 
 @contextmanager
 def durable(path: Path) -> Generator[Path, None, None]:
-    """Give a name to write to; what was written there becomes ``path`` when it is on the disk.
+    """Yield a temporary name; the file is renamed to ``path`` once it is on the disk.
 
     An older file of that name stays whole until then, and where writing fails.
     """
@@ -27,7 +27,7 @@ def durable(path: Path) -> Generator[Path, None, None]:
 
 
 def settle(folder: Path) -> None:
-    """Have the disk know the names in a folder."""
+    """Flush the entries of a folder to the disk."""
     if os.name == "posix":
         handle = os.open(folder, os.O_RDONLY)
         try:

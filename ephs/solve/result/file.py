@@ -96,7 +96,7 @@ def load(path: str | File, problem_of: Callable[[str, Array, Inputs], Problem]) 
 
 
 def _ledgers(groups: "Mapping[str, Mapping[Path, xr.DataArray]]", temperature: float) -> Ledgers:
-    """Ledgers by path are groups; a single ledger stands under its name alone."""
+    """Ledgers by path are groups; a single ledger has its name alone."""
     books: dict[str, Any] = {}
     for field in fields(Ledgers):
         found = groups.get(field.name, {})

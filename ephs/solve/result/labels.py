@@ -10,13 +10,13 @@ from ephs.semantics.spaces import PAIRS, Pair
 __all__ = ["OWN", "Labels", "freedoms", "labels_of", "power_labels"]
 
 OWN = "SI"
-"""Unit of a quantity that does not say its own."""
+"""Default unit of quantities."""
 _POWER = {
     "rad": ("rad/s", "N m"),
     "kg m²/s": ("N m", "rad/s"),
     "J/K": ("W/K", "K"),
 }
-"""Unit of a state -> units of its flow and effort, where the names of these say more than their dimension."""
+"""Unit of a state -> customary units of its flow and effort."""
 
 
 @final

@@ -1,4 +1,4 @@
-"""Ledgers of a motion: where the energy is, what was supplied, what became heat, how much entropy was made."""
+"""Ledgers of a motion: stored energy, supply, heat, and entropy production."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from ephs.solve.result.record import Record
 __all__ = ["Ledgers", "ledgers"]
 
 STILL = 1e-9
-"""Part of the energies that counts as moving at least: what stands still moves by rounding."""
+"""Least fraction of the energies that counts as exchanged, above the rounding of systems at rest."""
 
 
 @final
@@ -109,7 +109,7 @@ class Ledgers:
 
 
 def ledgers(problem: Problem, record: Record) -> Ledgers:
-    """The books of what a run kept."""
+    """Ledgers of a run's records."""
     n = record.t.size
     reference = problem.reference
     kinetic, potential, thermal, environment, exergy, entropy = (np.zeros(n) for _ in range(6))

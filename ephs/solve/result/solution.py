@@ -153,7 +153,7 @@ class Solution:
 
     @property
     def heat(self) -> Array:
-        """(n,) what friction and damping turned into heat since the start, in J."""
+        """(n,) heat of friction and damping since the start, in J."""
         return self.ledgers.heat
 
     @property

@@ -1,4 +1,4 @@
-"""Explicit steps of a mechanism backwards: what a function of a step's end is by all numbers that the step reads."""
+"""Reverse accumulation through explicit steps: gradients by all numbers that a step reads."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, final

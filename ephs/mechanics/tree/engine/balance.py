@@ -1,4 +1,4 @@
-"""The energy of a mechanism, and states moved to where it is what heat and work leave of it.
+"""Energy of a mechanism, and projection of states onto the energy that heat and work imply.
 
 A state moves along the gradient n = G⁻¹∇E of the energy E with the mass matrix M as metric of the rates, within loops
 and with prescribed motions as they are: rates alone, r + α n with n their free part, which is r itself without

@@ -79,7 +79,7 @@ def engine_of(
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class _Plan:
-    """Everything of an engine but what is given and its memory, which each has of its own.
+    """The shared part of engines: all but inputs and memory.
 
     Parameters
     ----------

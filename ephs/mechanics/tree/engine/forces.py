@@ -70,7 +70,7 @@ def strain(on: Evaluator, tables: Tables, work: Work, q: Vector, out: Vector) ->
 
 
 def attached_energy(on: Evaluator, tables: Tables, work: Work, out: Vector) -> Integer:
-    """Add what attached storages hold, at the states in the memory, to out[1], and sizes to out[2]; return a status."""
+    """Add the energy of attached storages at the states in the memory to out[1], sizes to out[2]; return a status."""
     net = Net.of(tables.net, tables.numbers, tables.parameters, tables.scal, tables.supply)
     status = net.energies(on, work.entropy, out)
 
@@ -207,7 +207,7 @@ class _Acting:
         on.when(on.same(near.value, 1), lambda: body(edge))
 
     def edge(self, edge: Acting) -> None:
-        """Add what acts in an edge to the forces on joints, or to the wrenches on links."""
+        """Add the forces of an edge to those on joints, or to the wrenches on links."""
         on, w = self.on, self.work
         rate, pull = on.scratch(6), on.scratch(6)
         motion = Relative(NO_INTEGERS, 0, on.scratch(Relative.real_width).cells, 0)
@@ -278,7 +278,7 @@ class _Acting:
         self.on.loop(edge.dim, one)
 
     def store(self, edge: Acting, out: Vector) -> None:
-        """Add what a spring stores to the energies."""
+        """Add the energy of a spring."""
         on, energy = self.on, self.work.c
 
         def aside() -> None:
@@ -329,7 +329,7 @@ class _Acting:
         on.when(edge.first >= 0, lambda: _grow(pushed, edge.first, inner))
 
     def conduct(self, row: Conduction) -> None:
-        """Add what a component conducts to the rates of two entropies."""
+        """Add the conduction of a component to the rates of two entropies."""
         w, rate = self.work, self.s_rate
         w.e[0], w.e[1] = w.temperature[row.one], w.temperature[row.two]
         self._evaluate(row.component)

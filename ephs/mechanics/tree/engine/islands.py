@@ -98,7 +98,7 @@ def _inert(reduced: "Reduced", i: int) -> bool:
 
 
 def _across(columns: Array) -> Array:
-    """(6, n) an orthonormal basis of what is orthogonal to all columns."""
+    """(6, n) an orthonormal basis of the complement of all columns."""
     if not columns.shape[1]:
         return np.eye(6)
     left, sizes, _ = np.linalg.svd(columns / max(float(np.linalg.norm(columns, axis=0).max()), TINY))

@@ -125,7 +125,7 @@ def _put(row: Vector, values: list[Real]) -> None:
 
 
 def _joint(on: Evaluator, body: Walked, q: Vector) -> list[Real]:
-    """The pose that a joint's element stands for."""
+    """Pose of a joint's element."""
     pose = [on.variable(0.0) for _ in range(7)]
 
     def fill(values: list[Real]) -> None:

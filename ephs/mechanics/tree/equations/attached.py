@@ -1,4 +1,4 @@
-"""The attached network about a point: flows and their derivatives by what they depend on."""
+"""The attached network about a point: flows and their derivatives."""
 
 from typing import final
 

@@ -42,7 +42,7 @@ def unmoved(reduced: Reduced, freedom: int) -> SolveError:
 
 @final
 class Dense:
-    """The mass matrix, constraints orthogonalised in its metric, and what follows from both.
+    """Mass matrix, constraints orthogonalised in its metric, and derived matrices.
 
     Attributes
     ----------

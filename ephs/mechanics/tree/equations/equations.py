@@ -172,12 +172,12 @@ class Equations:
         return before
 
     def prepare(self, state: ReducedState) -> None:
-        """Compile what is not in the cache."""
+        """Compile programs that are not in the cache."""
         self.rates(state.t, state.q, self.vector(state))
         self.evaluations = 0
 
     def refuse(self, status: int, component: int) -> None:
-        """Raise what a compiled function reported, if it did."""
+        """Raise the error that a compiled function reported, if any."""
         if status == Status.STILL and not np.all(np.isfinite(self.engine.array("work"))):
             raise SolveError(Outcome.RANGE, "", "the rates of the joints")
         if status == Status.STILL:
@@ -245,7 +245,7 @@ class Equations:
         return self._dense
 
     def refilled(self) -> None:
-        """Forget what was made of the tables, after other numbers were put into them."""
+        """Invalidate results of the tables after a change of their numbers."""
         self._dense, self._closed_at = None, (np.zeros(0), np.zeros(0))
 
     def mass(self, q: Array, r: Array) -> Array:
@@ -265,7 +265,7 @@ class Equations:
         return self.dense.fitted(q, r)
 
     def load(self, t: float, q: Array, r: Array, heats: Array) -> None:
-        """Put what drives at a time and state into ``drive`` and ``wrench``."""
+        """Write inputs at a time and state into ``drive`` and ``wrench``."""
         if self.timed and not self.constant:
             self.given.place(t, NO_STATE)
         elif not self.constant:

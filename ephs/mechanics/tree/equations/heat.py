@@ -1,4 +1,4 @@
-"""Storages of heat of a mechanism in joint coordinates, and what its components pass on to them."""
+"""Storages of heat of a mechanism in joint coordinates, and heat transferred to them by components."""
 
 import numpy as np
 

@@ -55,7 +55,7 @@ class Laws:
         return float(self._heat[0])
 
     def warm(self, power: float) -> None:
-        """Add to the power of friction what comes from what is attached."""
+        """Add the dissipation of attachments to the power of friction."""
         self._heat[0] += power
 
     def about(self, s: Array) -> tuple[int, int]:

@@ -21,7 +21,7 @@ __all__ = ["Led"]
 
 @final
 class Led:
-    """The work of a mechanism that is led, counted from its start; of others it says nothing.
+    """Work of a mechanism moved entirely by prescribed motions, counted from its start.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ class Led:
 
     @property
     def counting(self) -> bool:
-        """Whether work is what the energies say."""
+        """Whether work is computed from the energies."""
         return self._from is not None
 
     def start(self, energies: Array) -> None:
@@ -69,5 +69,5 @@ class Led:
         return found
 
     def stats(self) -> dict[str, Any]:
-        """Statistics of a mechanism that is led."""
+        """Statistics of a mechanism moved by prescribed motions."""
         return {} if self._from is None else {"work_apart": self.apart[0], "work_apart_at": self.apart[1]}

@@ -125,7 +125,7 @@ class PaperStates:
         return q, self._rates_of(q), s
 
     def check(self, q: Array, r: Array, s: Array) -> None:
-        """Hold the closed initial state against what was given.
+        """Compare the closed initial state with the given one.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""Contraction of the constant relations of what is attached: the network of a mechanism's attachments."""
+"""Contraction of the constant relations of a mechanism's attachments to a network."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import final

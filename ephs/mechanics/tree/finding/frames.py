@@ -181,7 +181,7 @@ class _Finder:
         return [number for number, found in enumerate(self.roles) if found is role]
 
     def _momentum(self, number: int) -> int | None:
-        """The junction of the body's momentum that a component lies on."""
+        """Junction of the body's momentum of a component."""
         slot = self.wiring.components[number]
         for port, _, of in slot.primitive.bundle.items():
             if of == quantity.body_momentum:

@@ -1,4 +1,4 @@
-"""Attachments of a mechanism, as one network: what meets it at rates of joints and at heat, with states of its own.
+"""Attachments of a mechanism as one network with its own states, coupled at rates of joints and at heat.
 
 Constant relations, the equality of efforts on a junction and the sum of its flows are contracted once. They form one
 Dirac structure, so with the efforts e = N z of all junctions the flows that belong to z are Nᵀ f: what is left is to

@@ -172,7 +172,7 @@ class _Reader:
         return self.problem.names.get(path, str(path))
 
     def _edge(self, joint: LinkJoint, taken: dict[str, int]) -> Edge:
-        """A joint with what lies on its momentum: a potential, friction, an outer port."""
+        """A joint with the components at its momentum: a potential, friction, an outer port."""
         name, d = self._name(joint.path), joint.pair.dim
         start = taken.get(name, 0)
         taken[name] = start + d
@@ -194,7 +194,7 @@ class _Reader:
         )  # fmt: skip
 
     def _motion(self, port: Path, freedoms: int) -> MotionLaw | None:
-        """What is prescribed at a joint's port; None where a force is."""
+        """Prescribed effort of a joint's port; None where a force is given."""
         self.ports.add(port)
         signal = self.problem.signals[port]
         if not signal.effort:
@@ -269,7 +269,7 @@ class _Reader:
     # ---- heat and ports ----------------------------------------------------------------------------------------
 
     def _heat(self, number: int) -> int:
-        """The entropy that takes what a component heats."""
+        """Entropy of the node that a component heats."""
         *_, junction = self.wiring.ports[number].values()
         if junction not in self.entropy:
             raise Unplaced(self.wiring.components[number].path, "heats what is no store of heat")

@@ -123,7 +123,7 @@ class _Groups:
         self._parent = {body: body for body in range(-1, count)}
 
     def of(self, body: int) -> int:
-        """One body that stands for the group."""
+        """Representative body of the group."""
         while self._parent[body] != body:
             self._parent[body] = self._parent[self._parent[body]]
             body = self._parent[body]

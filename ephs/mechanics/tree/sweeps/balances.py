@@ -68,7 +68,7 @@ def solve_network(on: Evaluator, net: Net, q: Vector, s: Vector, warmth: Vector,
 
 
 def _give(on: Evaluator, net: Net) -> None:
-    """Power of what is given at outer ports."""
+    """Power of inputs at outer ports."""
     net.power[0] = 0.0
     first = net.head[0] + net.head[1]
 

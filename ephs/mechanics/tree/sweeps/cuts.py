@@ -152,7 +152,7 @@ def _clear(on: Evaluator, value: Matrix) -> None:
 
 
 def _pose(on: Evaluator, kind: Kind, cut: Cut, q: Vector) -> list[Real]:
-    """The pose that an element of a joint stands for."""
+    """Pose of an element of a joint."""
     x = [q[cut.q_at + k] for k in range(kind.size)]
     if kind.code == codes.SO3:
         return [*x, 0.0, 0.0, 0.0]
@@ -276,7 +276,7 @@ def gaps(on: Evaluator, kinds: tuple[Kind, ...], cuts: Table[Cut], motions: Matr
 
 
 def _widen(on: Evaluator, worst: Variable[Real], x: Real) -> None:
-    """Keep the largest size; what is not a number stays."""
+    """Keep the largest size; NaN stays."""
     size = on.absolute(x)
     worst.value = on.select(size <= worst.value, worst.value, size)
 

@@ -1,4 +1,4 @@
-"""The energy of motion and of weight, in one outward sweep that keeps what the other sweeps know."""
+"""Kinetic energy and potential of gravity, in one outward sweep that preserves the other sweeps' results."""
 
 from ephs.mechanics.tree.sweeps.joints import force_outside, frame, rate_inside
 from ephs.mechanics.tree.sweeps.outward import momentum

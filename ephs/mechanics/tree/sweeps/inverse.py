@@ -1,4 +1,4 @@
-"""Inverse dynamics: forces on the rates that accelerations need, and what is linear in them.
+"""Inverse dynamics: generalised forces of accelerations, and its linear parts.
 
 The same gathering of loads gives the forces that accelerations need, columns of the mass matrix (the accelerations are
 units, all else is zero), and covectors on links as rows on the rates.

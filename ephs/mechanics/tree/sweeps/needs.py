@@ -123,7 +123,7 @@ class _Trace(Number):
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class _TraceTruth(Condition):
-    """A condition of which nothing is known but what it depends on."""
+    """An unknown condition with its dependencies."""
 
     on: int
 
@@ -131,7 +131,7 @@ class _TraceTruth(Condition):
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class _TraceCount(Count):
-    """An integer of which nothing is known but what it depends on."""
+    """An unknown integer with its dependencies."""
 
     on: int = 0
 
@@ -259,7 +259,7 @@ class Survey(Evaluator):
         return _SurveyedReals(self, entries=True)
 
     def argument(self, kind: Kind) -> Any:
-        """An argument of a kind, of which nothing is known; what is written to it is a result."""
+        """An unknown argument of a kind; values written to it are results."""
         makers: dict[Atom, Callable[[], Any]] = {
             "reals": lambda: _SurveyedReals(self, entries=False),
             "integers": _SurveyedIntegers,

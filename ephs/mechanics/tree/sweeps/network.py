@@ -1,4 +1,4 @@
-"""Flows of what is attached to a mechanism, and their derivatives, by the contracted network of its constant relations.
+"""Flows of a mechanism's attachments, and their derivatives, by the contracted network of constant relations.
 
 `ephs.mechanics.tree.finding.network` says what the efforts z are. Storages give theirs, components are called with
 the rows of N z, and Nᵀ carries their flows back. Entries of z that only balances determine follow by Newton's method.

@@ -1,4 +1,4 @@
-"""From a mechanism's links to the records of the sweeps, and to what is known of its class."""
+"""From a mechanism's links to the records of the sweeps, and to the constants of its class."""
 
 import math
 from collections.abc import Sequence

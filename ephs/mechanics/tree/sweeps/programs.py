@@ -1,4 +1,4 @@
-"""Looped programs of the sweeps, specialised by what a class of mechanisms has in common."""
+"""Looped programs of the sweeps, specialised for a class of mechanisms."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""A tree of links as the sweeps see it: constants of each link, what the sweeps keep of it, kinds of joints."""
+"""Records of a tree of links for the sweeps: constants, intermediate results, kinds of joints."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
