@@ -226,7 +226,7 @@ CASES = (
         "the rate of",
     ),
     Case(
-        Outcome.CONTRADICTION, "two cranks of one freedom, both turned evenly",
+        Outcome.CONTRADICTION, "two cranks with one degree of freedom, both turned evenly",
         lambda: four_bar(2.5, "motion = { rate = 1.0 }"), ("natural", "natural4", "radau", "alpha", "rk54", "rk87"),
         r"joints\.(left|right).*", "left|right", within=(0.0, 0.1),
     ),

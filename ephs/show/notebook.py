@@ -29,10 +29,10 @@ def solution_html(solution: Any) -> str:
 
 
 def dynamics_html(dynamics: Any) -> str:
-    """Freedoms and loops of a scene's dynamics beside its schematic."""
+    """Degrees of freedom and loops of a scene's dynamics beside its schematic."""
     scene = dynamics.scene
     rows = [
-        ("freedoms", str(dynamics.layout.n)),
+        ("degrees of freedom", str(dynamics.layout.n)),
         ("joints", ", ".join(dynamics.joints[:MANY])),
         *([("closed by constraints", ", ".join(dynamics.cut))] if dynamics.cut else []),
     ]

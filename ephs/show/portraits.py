@@ -1,4 +1,4 @@
-"""Phase portraits: each freedom's rate over its coordinate, or one state over another."""
+"""Phase portraits: each degree of freedom's rate over its coordinate, or one state over another."""
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -38,14 +38,14 @@ def plot_phase(sol: Any, *which: str | tuple[str, str]) -> "Figure":
     Parameters
     ----------
     which : str or (str, str)
-        Freedoms of a scene, as ``"pin"`` or ``"slider distance"``, or pairs of states of any system, as
-        ``("osc.pe.q", "osc.ke.p")``: first what is drawn to the right. By default the first freedoms that move, or one
-        pair of states of either parity.
+        Degrees of freedom of a scene, as ``"pin"`` or ``"slider distance"``, or pairs of states of any system, as
+        ``("osc.pe.q", "osc.ke.p")``: first what is drawn to the right. By default the first degrees of freedom that
+        move, or one pair of states of either parity.
 
     Raises
     ------
     ShowError
-        If there is no such freedom or state, or nothing that could be drawn by default.
+        If there is no such degree of freedom or state, or nothing that could be drawn by default.
     """
     from matplotlib import rc_context
 
@@ -81,7 +81,8 @@ def _curve(sol: Any, which: str | tuple[str, str], known: dict[str, _Curve]) -> 
     if isinstance(which, str):
         if which not in known:
             hint = did_you_mean(which, known, f"there are {listing(known)}")
-            raise ShowError("nothing", path=str(sol.name), found=f"freedom {which!r}", expected=f"a name: {hint}")
+            found = f"degree of freedom {which!r}"
+            raise ShowError("nothing", path=str(sol.name), found=found, expected=f"a name: {hint}")
         return known[which]
     across, up = which
     names = {str(path): path for path in sol.states}
@@ -99,7 +100,7 @@ def _default(sol: Any, known: dict[str, _Curve]) -> list[_Curve]:
         moving = [curve for curve in known.values() if float(np.nanmax(curve.x) - np.nanmin(curve.x)) > STILL]
         if moving:
             return moving[:MOST]
-        raise ShowError("nothing", path=str(sol.name), found="freedom that moves", expected="a joint's")
+        raise ShowError("nothing", path=str(sol.name), found="degree of freedom that moves", expected="a joint's")
     pairs = {("m", "kg m/s"), ("rad", "kg m²/s"), ("C", "Wb"), ("m³", "kg m/s")}
     found = [
         (str(a), str(b)) for a in sol.states for b in sol.states if (sol.labels[a].unit, sol.labels[b].unit) in pairs

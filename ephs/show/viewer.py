@@ -183,7 +183,7 @@ def _coordinates(joint: Joint) -> Array:
 
 
 def _sliders(name: str, joint: Joint, stage: Stage) -> list[dict[str, Any]]:
-    """A slider for each freedom: between the joint's limits, a turn, or the mechanism's size."""
+    """A slider for each degree of freedom: between the joint's limits, a turn, or the mechanism's size."""
     of, at, size = coupling_of(joint), _coordinates(joint), stage.size()
     turns = np.any(of.basis(joint.coordinate)[:3], axis=0)
     found: list[dict[str, Any]] = []

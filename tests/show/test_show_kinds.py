@@ -91,7 +91,7 @@ def test_lines_end_where_a_rotation_vector_starts_anew(crank):
 @pytest.mark.parametrize(
     ("asked", "words"),
     [
-        (("bering",), "freedom 'bering'.*did you mean \"bearing\""),
+        (("bering",), "degree of freedom 'bering'.*did you mean \"bearing\""),
         ((("bodies.rod.pe.q", "bodies.rod.ke.p"),), "scalar state 'bodies.rod.pe.q'"),
     ],
 )

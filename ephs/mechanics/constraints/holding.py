@@ -1,7 +1,7 @@
 """Constraint wrenches of each joint about one point, and their rows on the twists.
 
-What a joint holds are the wrenches W that do no work on its freedoms, WᵀB = 0. Seen about one point and in one set of
-axes, a wrench on body 2 and its reaction on body 1 make a row (−w, w).
+What a joint holds are the wrenches W that do no work on its degrees of freedom, WᵀB = 0. Seen about one point and in
+one set of axes, a wrench on body 2 and its reaction on body 1 make a row (−w, w).
 """
 
 from collections.abc import Sequence
@@ -89,7 +89,7 @@ class Mechanism:
     def _hold(self, link: Link, poses: Array, x: Array, *, moved: bool = False) -> Hold:
         basis = link.coupling.basis(x).copy()
         basis[3:] /= self.length
-        # a single freedom moves: the wrench that does work on it alone is the freedom itself
+        # a single degree of freedom moves: the wrench that does work on it alone is the degree of freedom itself
         local = basis / np.linalg.norm(basis) if moved else annihilator(basis)
         rows = np.zeros((local.shape[1], poses.shape[0], 6))
         # body 1 feels the wrench where its own frame puts C2: the same place, as far as the joint is closed

@@ -3,8 +3,8 @@
 A direction that a joint holds is redundant where its row of the constraints lies in the span of the joints before. The
 wrenches that balance each other at every body, the left null space of all rows, are what is statically indeterminate.
 
-A universal joint counts as one joint with two freedoms, which says the same as its two revolutes and the frame between
-them. A prescribed motion is a constraint of its own, after all joints.
+A universal joint counts as one joint with two degrees of freedom, which says the same as its two revolutes and the
+frame between them. A prescribed motion is a constraint of its own, after all joints.
 """
 
 from collections.abc import Iterable, Mapping, Sequence

@@ -45,13 +45,13 @@ class Task:
     inverse: Array
 
     def forces(self, acceleration: ArrayLike) -> Array:
-        """(n,) forces on the freedoms, beside those that balance bias and what the scene applies, that give the task
-        an acceleration (k,) and move nothing else that costs energy: Jᵀ Λ (a − J̇ r)."""
+        """(n,) forces on the degrees of freedom, beside those that balance bias and what the scene applies, that give
+        the task an acceleration (k,) and move nothing else that costs energy: Jᵀ Λ (a − J̇ r)."""
         return self.jacobian.T @ (self.inertia @ (np.asarray(acceleration, dtype=float) - self.drift))
 
 
 def tree_only(model: "Dynamics", what: str) -> None:
-    """Refuse a mechanism in which not every freedom of the tree can be accelerated by itself.
+    """Refuse a mechanism in which not every degree of freedom of the tree can be accelerated by itself.
 
     Raises
     ------

@@ -38,8 +38,8 @@ __all__ = ["Dynamics"]
 class Dynamics:
     """A mechanism as pure functions of its state.
 
-    Vectors and matrices count the n freedoms of the spanning tree's joints, as ``freedoms`` says; at a joint that
-    closes a loop (``cut``) the loop is closed by constraints. It keeps scratch memory: use one for each thread.
+    Vectors and matrices count the n degrees of freedom of the spanning tree's joints, as ``freedoms`` says; at a joint
+    that closes a loop (``cut``) the loop is closed by constraints. It keeps scratch memory: use one for each thread.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ class Dynamics:
 
     def __repr__(self) -> str:
         cut = f", {', '.join(self.cut)} cut" if self.cut else ""
-        return f"Dynamics({self.name!r}: {self.layout.n} freedoms of {len(self.joints)} joints{cut})"
+        return f"Dynamics({self.name!r}: {self.layout.n} degrees of freedom of {len(self.joints)} joints{cut})"
 
     def _repr_html_(self) -> str:  # pyright: ignore[reportUnusedFunction] - notebooks call it
         from ephs.show.notebook import dynamics_html
@@ -86,12 +86,14 @@ class Dynamics:
 
     @property
     def free(self) -> bool:
-        """Whether every freedom of the tree moves by itself: there are no loops, gears and prescribed motions."""
+        """Whether every degree of freedom of the tree moves by itself: there are no loops, gears and prescribed
+        motions.
+        """
         return self.placing.free
 
     @property
     def freedoms(self) -> dict[str, Index]:
-        """Joint of the tree -> places of its freedoms in vectors (n,) and matrices."""
+        """Joint of the tree -> places of its degrees of freedom in vectors (n,) and matrices."""
         n = self.layout.n
         kept = {name: where[where < n] for name, where in self.layout.freedoms.items()}
         return {name: where for name, where in kept.items() if where.size or name not in self.cut}
@@ -206,9 +208,9 @@ class Dynamics:
     def inverse_dynamics(self, state: State, accelerations: ByJoint) -> dict[str, Array] | Array:
         """Joint -> (d,) the forces, beside the scene's own, that make the tree's accelerations.
 
-        With loops they are the generalised forces on the tree's freedoms that do so with nothing from the joints that
-        close them: zero at cut joints, whose accelerations follow and are not asked for. Forces that differ by
-        rowsᵀ·λ of `constraints` make the same motion. At prescribed joints it is what the motion takes.
+        With loops they are the generalised forces on the tree's degrees of freedom that do so with nothing from the
+        joints that close them: zero at cut joints, whose accelerations follow and are not asked for. Forces that differ
+        by rowsᵀ·λ of `constraints` make the same motion. At prescribed joints it is what the motion takes.
 
         Parameters
         ----------
@@ -240,7 +242,7 @@ class Dynamics:
         return task_of(self, state, body, point, directions)
 
     def mass_matrix(self, state: State) -> Array:
-        """(n, n) M: kinetic energy is ½ rᵀM r. A `SimulationError` where a freedom moves no mass."""
+        """(n, n) M: kinetic energy is ½ rᵀM r. A `SimulationError` where a degree of freedom moves no mass."""
         with failing_at(0.0):
             return self._equations.mass(state.q, state.r)
 

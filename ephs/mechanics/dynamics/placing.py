@@ -69,7 +69,9 @@ class Placing:
         q, r = self.elements(first.q, coordinates), self.rates(first.r, rates)
         if q is None or r is None:
             expected = ", ".join(f"{name} {where.size}" for name, where in self.layout.freedoms.items())
-            raise OptionError("state", {**coordinates, **rates}, f"finite numbers, as many as freedoms: {expected}")
+            raise OptionError(
+                "state", {**coordinates, **rates}, f"finite numbers, one per degree of freedom: {expected}"
+            )
         return State(np.concatenate([q, r, first.entropies]), self.layout, first.cut_rates)
 
     def elements(self, q: Array, given: ByJoint) -> Array | None:

@@ -72,7 +72,7 @@ class Constraints:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Derivatives:
-    """Exact derivatives at a state, (n, n) on the tree's freedoms in the order of `Dynamics.freedoms`.
+    """Exact derivatives at a state, (n, n) on the tree's degrees of freedom in the order of `Dynamics.freedoms`.
 
     Derivatives by q are along left-trivialised increments of the joints' elements, q·exp(v) at v = 0, as
     `Dynamics.moved` takes them; cut joints follow the tree. Where loops are closed, what leads off them is that of the

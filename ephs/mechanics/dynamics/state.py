@@ -22,7 +22,7 @@ class State:
     ----------
     array
         (size,) the elements of all joints in the order of `Layout.joints` (angles, distances, unit quaternions; of
-        cut joints too), the rates of the tree's freedoms, the entropies of `Layout.entropies` in J/K.
+        cut joints too), the rates of the tree's degrees of freedom, the entropies of `Layout.entropies` in J/K.
     layout
         Where each joint stands in the array.
     cut_rates

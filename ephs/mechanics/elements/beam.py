@@ -1,9 +1,10 @@
-"""Beam elements: a six-freedom joint between two cross-sections whose relative pose carries the strain energy.
+"""Beam elements: a six-degree-of-freedom joint between two cross-sections whose relative pose carries the strain
+energy.
 
 An element of length L between the frames H₁ and H₂ has the mean strain ξ = log(H₁⁻¹H₂)/L: torsion and two curvatures,
 then stretch (1 where there is none) and two shears, in axes whose first one is the tangent. `strain` has its energy.
-Kelvin–Voigt damping resists ξ̇ = T⁻¹ u_r / L with τ times the stiffness, T⁻¹ the derivative of the logarithm. Everything
-else is a joint's. Geometrically exact, unchanged by rigid motions, free of locking.
+Kelvin–Voigt damping resists ξ̇ = T⁻¹ u_r / L with τ times the stiffness, T⁻¹ the derivative of the logarithm.
+Everything else is a joint's. Geometrically exact, unchanged by rigid motions, free of locking.
 """
 
 from dataclasses import replace

@@ -121,7 +121,7 @@ def no_potential(of: Quantity, port: str) -> Storage:
 
 
 def pair_spring(of: Pair, stiffness: Array, rest: Array) -> Storage:
-    """Springs ½ k (coordinate − rest)² on the freedoms of a joint; port q_r.
+    """Springs ½ k (coordinate − rest)² on the degrees of freedom of a joint; port q_r.
 
     Raises
     ------
@@ -328,16 +328,16 @@ def joint_friction(
 
 
 def dry_friction(of: Pair, mu: float, dry: Dry) -> Irreversible:
-    """Friction μ of a joint with one freedom, in N m s or N s/m, and dry friction; ports p_r, s.
+    """Friction μ of a joint with one degree of freedom, in N m s or N s/m, and dry friction; ports p_r, s.
 
     Raises
     ------
     StructureError
-        The joint has not one freedom.
+        The joint has not one degree of freedom.
     """
     if of.dim != 1:
-        found = f"dry friction of a joint with {of.dim} freedoms"
-        raise StructureError("parameter", of.name, key="dry", found=found, expected="a joint with one freedom")
+        found = f"dry friction of a joint with {of.dim} degrees of freedom"
+        raise StructureError("parameter", of.name, key="dry", found=found, expected="one degree of freedom")
     ports = Directory({"p_r": PortType(joint_momentum(of), True), "s": PortType(quantity.entropy, True)})
 
     def resistance(_x: Any, u: Any, _theta: Any) -> Any:

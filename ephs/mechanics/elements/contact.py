@@ -1,9 +1,9 @@
 """Contact between two surfaces: energy of their overlap, and loss of its rate, of slip, of rolling and of spinning.
 
-A contact is a joint of all six freedoms between two frames, whose energy reads the gap and whose friction reads the
-relative pose; so every method takes it, and all it dissipates is heat. Loss by Hunt and Crossley (1975): the normal
-force is φ'(g)(1 − 3/2 α ġ), and never pulls. What is left of the energy where surfaces part faster than the force
-allows is lost in the same box, as heat.
+A contact is a joint of all six degrees of freedom between two frames, whose energy reads the gap and whose friction
+reads the relative pose; so every method takes it, and all it dissipates is heat. Loss by Hunt and Crossley (1975): the
+normal force is φ'(g)(1 − 3/2 α ġ), and never pulls. What is left of the energy where surfaces part faster than the
+force allows is lost in the same box, as heat.
 """
 
 from collections.abc import Sequence

@@ -39,7 +39,7 @@ def hydraulic_cylinder(
     Parameters
     ----------
     of
-        Momentum of a joint with one freedom.
+        Momentum of a joint with one degree of freedom.
     area
         (2,) volume of each chamber by the coordinate, m³/m or m³/rad.
     volume
@@ -106,7 +106,7 @@ def gas_spring(
     Parameters
     ----------
     of
-        Momentum of a joint with one freedom.
+        Momentum of a joint with one degree of freedom.
     area
         Volume of the gas by the coordinate, m³/m or m³/rad; negative where it shrinks towards larger coordinates.
     volume, pressure, temperature

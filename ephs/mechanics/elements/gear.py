@@ -32,7 +32,7 @@ def gear(
     Parameters
     ----------
     of
-        Momenta of the joints, each of one freedom.
+        Momenta of the joints, each of one degree of freedom.
     ratio
         One number for each joint but the first.
     stiffness, damping

@@ -118,10 +118,10 @@ def joint(
     driven
         The momentum of u_r is a port p_r: its flow is a generalised force.
     limits, stop
-        Least and largest coordinate of a joint with one freedom in rad or m, nan for none, and the law of its stops,
-        elastic or hard.
+        Least and largest coordinate of a joint with one degree of freedom in rad or m, nan for none, and the law of its
+        stops, elastic or hard.
     dry
-        Dry friction of a joint with one freedom, beside μ as a number.
+        Dry friction of a joint with one degree of freedom, beside μ as a number.
 
     Raises
     ------

@@ -36,12 +36,12 @@ def stops(of: Pair, limits: "ArrayLike") -> Stops:
     Raises
     ------
     StructureError
-        The joint has not one freedom, or the limits are not in order.
+        The joint has not one degree of freedom, or the limits are not in order.
     """
     lower, upper = np.asarray(limits, dtype=float).tolist()
     if of.dim != 1:
-        found = f"limits of a joint with {of.dim} freedoms"
-        raise StructureError("parameter", of.name, key="limits", found=found, expected="a joint with one freedom")
+        found = f"limits of a joint with {of.dim} degrees of freedom"
+        raise StructureError("parameter", of.name, key="limits", found=found, expected="one degree of freedom")
     if lower >= upper or lower == np.inf or upper == -np.inf:
         raise StructureError("parameter", of.name, key="limits", found=[lower, upper], expected="lower < upper")
     return tuple((side, bound) for side, bound in ((1.0, lower), (-1.0, upper)) if np.isfinite(bound))
@@ -68,8 +68,8 @@ def limited_spring(of: Pair, stiffness: Array, rest: Array, stops: Stops, law: L
 
 
 def limited_friction(of: Pair, mu: Array, stops: Stops, law: Law | Impact, dry: Dry | None = None) -> Irreversible:
-    """Friction μ of a joint with one freedom, dry friction, and the loss of its stops or their impulses; ports p_r, s,
-    q_r."""
+    """Friction μ of a joint with one degree of freedom, dry friction, and the loss of its stops or their impulses;
+    ports p_r, s, q_r."""
     ports = {
         "p_r": PortType(joint_momentum(of), True),
         "s": PortType(quantity.entropy, True),

@@ -18,7 +18,7 @@ def armature(of: Quantity, inertia: float) -> Storage:
     Parameters
     ----------
     of
-        Momentum of a joint with one freedom.
+        Momentum of a joint with one degree of freedom.
     inertia
         In kg m², or kg of a joint that slides.
     """
@@ -43,7 +43,7 @@ def motor(
     Parameters
     ----------
     of
-        Momentum of a joint with one freedom.
+        Momentum of a joint with one degree of freedom.
     constant
         N m/A, which is V s/rad: torque of the rotor by the current.
     resistance, inductance

@@ -107,11 +107,11 @@ class Draft:
     def dry(self, name: str, force: float, freedoms: int) -> dict[str, Any]:
         """Entries of dry friction; a note of it where the joint has several freedoms."""
         if force and freedoms != 1:
-            self.leave("dry friction of joints with several freedoms", name)
+            self.leave("dry friction of joints with several degrees of freedom", name)
         return {"dry": {"coulomb": float(force)}} if force and freedoms == 1 else {}
 
     def limit(self, name: str, lower: float, upper: float) -> None:
-        """Put stops to a joint of one freedom, or note that it has limits."""
+        """Put stops to a joint of one degree of freedom, or note that it has limits."""
         sides = [float(value) if abs(value) < UNLIMITED else np.nan for value in (lower, upper)]
         if not self.contact or lower >= upper:
             self.leave("limits of", name)
@@ -131,14 +131,16 @@ class Draft:
         self._contacts[name] = {"surfaces": list(surfaces), **law}
 
     def hold(self, name: str) -> None:
-        """Keep a joint of one freedom where it is."""
+        """Keep a joint of one degree of freedom where it is."""
         entries = self._joints[self._joint_names[name]]
         for key in ("armature", "dry"):
             entries.pop(key, None)
         entries["motion"] = {"rate": 0.0}
 
     def gear(self, name: str, first: str, second: str, ratio: float, offset: float = 0.0) -> None:
-        """Tie the coordinate of a joint of one freedom to that of another, which is 0: ratio · coordinate + offset."""
+        """Tie the coordinate of a joint of one degree of freedom to that of another, which is 0: ratio · coordinate +
+        offset.
+        """
         joints = [self._joint_names[first], self._joint_names[second]]
         if offset:
             self._joints[joints[0]]["coordinate"] = offset
@@ -152,7 +154,7 @@ class Draft:
         return name in self._joint_names and "motion" not in self._joints[self._joint_names[name]]
 
     def pull(self, name: str, stiffness: float, rest: float, damping: float) -> None:
-        """Add a spring and friction to a joint of one freedom."""
+        """Add a spring and friction to a joint of one degree of freedom."""
         entries = self._joints[self._joint_names[name]]
         before, whole = entries.get("stiffness", 0.0), entries.get("stiffness", 0.0) + stiffness
         if stiffness:
@@ -164,14 +166,16 @@ class Draft:
     def belt(
         self, name: str, joints: Sequence[str], ratio: Sequence[float], stiffness: float, damping: float, stretch: float
     ) -> None:
-        """A spring and a damper along a sum of coordinates of joints with one freedom; numbers of the first."""
+        """A spring and a damper along a sum of coordinates of joints with one degree of freedom; numbers of the
+        first.
+        """
         self._gears[self._own(name, self._gears)] = {
             "joints": [self._joint_names[each] for each in joints], "ratio": list(map(float, ratio)),
             "stiffness": stiffness, "damping": damping, "stretch": stretch,
         }  # fmt: skip
 
     def actuate(self, name: str, ratio: Mapping[str, float], limits: Sequence[float] | None) -> None:
-        """A control that is forces on joints of one freedom."""
+        """A control that is forces on joints of one degree of freedom."""
         found = {"joints": [self._joint_names[each] for each in ratio], "ratio": list(map(float, ratio.values()))}
         more = {} if limits is None or limits[0] >= limits[1] else {"limits": list(map(float, limits))}
         self._actuators[self._own(name, self._actuators)] = found | more

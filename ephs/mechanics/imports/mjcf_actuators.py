@@ -43,7 +43,7 @@ def tendons(model: Any, names: Names, draft: Draft) -> None:
 
 
 def actuators(model: Any, names: Names, draft: Draft) -> None:
-    """Actuators on joints with one freedom and on fixed tendons."""
+    """Actuators on joints with one degree of freedom and on fixed tendons."""
     mujoco: Any = import_module("mujoco")
     through, gains, biases, dynamics = mujoco.mjtTrn, mujoco.mjtGain, mujoco.mjtBias, mujoco.mjtDyn
     for a in range(model.nu):
@@ -81,7 +81,7 @@ def actuators(model: Any, names: Names, draft: Draft) -> None:
 
 
 def _of_tendon(model: Any, t: int) -> Line | None:
-    """The length of a fixed tendon over joints with one freedom; None of others."""
+    """The length of a fixed tendon over joints with one degree of freedom; None of others."""
     mujoco: Any = import_module("mujoco")
     first, count = int(model.tendon_adr[t]), int(model.tendon_num[t])
     every = range(first, first + count)

@@ -91,5 +91,5 @@ def loops(model: Any, names: Names, screwed: Set[int], draft: Draft) -> None:
 
 
 def _in_ratio(names: Names, joints: tuple[int, int], data: Any) -> bool:
-    """Whether the coordinates of two joints with one freedom are in a constant ratio."""
+    """Whether the coordinates of two joints with one degree of freedom are in a constant ratio."""
     return not np.any(data[[0, 2, 3, 4]]) and all(names.kinds[j] in ("revolute", "prismatic") for j in joints)

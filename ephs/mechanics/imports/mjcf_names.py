@@ -46,7 +46,7 @@ def noted(model: Any, names: Names, draft: Draft) -> None:
 
     option = model.opt
     parts = {
-        "rotor inertia (armature) of joints with several freedoms": [
+        "rotor inertia (armature) of joints with several degrees of freedom": [
             name for name in dofs(model.dof_armature) if names.kinds[names.joints.index(name)] in ("free", "spherical")
         ],
         "damping that is not linear of": dofs(model.dof_dampingpoly),

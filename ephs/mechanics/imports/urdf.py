@@ -172,7 +172,7 @@ def _joint(name: str, joint: Element, parent: str, child: str, draft: Draft) -> 
 
 
 def _mimic(name: str, joint: Element, joints: Mapping[str, Element], draft: Draft) -> None:
-    """Tie a joint to the one that it mimics, where both have one freedom and the other one starts at 0."""
+    """Tie a joint to the one that it mimics, where both have one degree of freedom and the other one starts at 0."""
     mimic = joint.find("mimic")
     if mimic is None:
         return

@@ -58,7 +58,9 @@ class StaticPath:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class _Balance:
-    """Forces at a configuration on its independent freedoms, (k,), what they change by, and what the loads add."""
+    """Forces at a configuration on its independent degrees of freedom, (k,), what they change by, and what the loads
+    add.
+    """
 
     state: State
     force: Array

@@ -1,9 +1,9 @@
 """A scene linearised in joint coordinates.
 
-Small motions about a state are η, increments of a choice of independent freedoms, and ρ, of their rates: the tree's
-joints move by δq = Z η (left-trivialised) and change their rates by δr = Z ρ + Y η, so that loops stay closed and
-prescribed joints follow their motion. Freedoms are chosen so that Z, the identity on them, is small: by pivots of the
-constraints' rows in the mass metric. With δq' = δr − ad_r δq the derivatives of `Dynamics` give A.
+Small motions about a state are η, increments of a choice of independent degrees of freedom, and ρ, of their rates: the
+tree's joints move by δq = Z η (left-trivialised) and change their rates by δr = Z ρ + Y η, so that loops stay closed
+and prescribed joints follow their motion. Degrees of freedom are chosen so that Z, the identity on them, is small: by
+pivots of the constraints' rows in the mass metric. With δq' = δr − ad_r δq the derivatives of `Dynamics` give A.
 """
 
 from collections.abc import Mapping, Sequence
@@ -42,7 +42,7 @@ ROUNDED = 1e-9
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Freedoms:
-    """The independent freedoms at a state.
+    """The independent degrees of freedom at a state.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class Freedoms:
 
 
 def freedoms_of(model: Dynamics, state: State) -> Freedoms:
-    """Independent freedoms, by pivoting in the mass metric."""
+    """Independent degrees of freedom, by pivoting in the mass metric."""
     from scipy.linalg import qr, solve_triangular
 
     found, n = model.constraints(state), model.layout.n

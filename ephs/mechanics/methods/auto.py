@@ -28,7 +28,7 @@ LIMITS = {"rk54": 3.25, "rk87": 6.1}
 SLOW = 0.5
 """Contraction of a Gauss method's sweeps beyond which these hold its steps back, not accuracy."""
 FREEDOMS = 64
-"""Freedoms up to which factorising their matrix costs less than an explicit method's shorter steps."""
+"""Degrees of freedom up to which factorising their matrix costs less than an explicit method's shorter steps."""
 DIGITS = 1e-5
 """Tolerances below this are for order 8."""
 

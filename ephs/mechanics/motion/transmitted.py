@@ -1,13 +1,13 @@
 """Wrenches in the joints of a mechanism at an instant, from its accelerations.
 
 Each link with all that it carries needs a wrench W. A joint of the tree transmits it, less what the cut joints on these
-links do; along the joint's freedoms it is the force in the joint:
+links do; along the joint's degrees of freedom it is the force in the joint:
 
     s_jᵀ (W_i − Σ_c σ_ic N_c μ_c) = f_j − a_j ṙ_j,
 
-with twists s of the freedoms, their forces f and armatures a, wrenches N that a cut joint can hold, and σ = ±1 where it
-acts on link i or what that carries as its second or first body. This is solved for all of N, not only for the rows by
-which methods close loops: what it leaves free is statically indeterminate.
+with twists s of the degrees of freedom, their forces f and armatures a, wrenches N that a cut joint can hold, and σ =
+±1 where it acts on link i or what that carries as its second or first body. This is solved for all of N, not only for
+the rows by which methods close loops: what it leaves free is statically indeterminate.
 """
 
 from collections.abc import Mapping
@@ -83,11 +83,11 @@ class Transmission:
         places
             (links, 24).
         accelerations, force
-            (n,) of the tree's freedoms, and forces on them.
+            (n,) of the tree's degrees of freedom, and forces on them.
         pushed
             (links, 6) wrenches on the links in their frames, of all but the constraints.
         pulled
-            Forces on the freedoms of all joints.
+            Forces on the degrees of freedom of all joints.
         """
         reduced, t = self._reduced, self._reduced.tables
         frames = {i: self._second(i, places) for i in range(len(reduced.edges)) if t.kind[i] != SPRING}
@@ -138,7 +138,7 @@ class Transmission:
         return own @ turn, places[link, PLACE] + own @ at
 
     def _freedoms(self, frames: Mapping[int, tuple[Array, Array]]) -> Array:
-        """(n, 6) world twists that the tree's freedoms give the links that they carry."""
+        """(n, 6) world twists that the tree's degrees of freedom give the links that they carry."""
         t = self._reduced.tables
         out = np.zeros((self._reduced.freedoms, 6))
         for i in range(self._reduced.links):

@@ -161,7 +161,8 @@ def cyclic(reduced: Reduced, part: Part) -> Subgroup:
 
 
 def unread(reduced: Reduced) -> Index:
-    """(n,) 1 for the tree's freedoms whose columns of a Jacobian by coordinates are zero wherever the mechanism is.
+    """(n,) 1 for the tree's degrees of freedom whose columns of a Jacobian by coordinates are zero wherever the
+    mechanism is.
 
     Those of joints all of whose motions are cyclic: the others' cyclic motions are no columns, but their combinations.
     """
@@ -204,7 +205,7 @@ def _tree(_scene: Scene, reduced: Reduced, before: int) -> Step:
         names = listed([f"{edge.name} ({edge.pair.name})" for edge in reduced.cut])
         reason += (
             f"; cut: {names}, closed by {rows} equations: joints with prescribed motions and those of massless frames "
-            "come into the tree first, then those of few freedoms: one of many costs fewest equations where it is cut"
+            "come into the tree first, then those of few degrees of freedom: a cut joint of many costs fewest equations"
         )
     where = tuple(dict.fromkeys(edge.name for edge in tree if edge.name))
     return Step(
@@ -277,7 +278,7 @@ def _separate(_scene: Scene, reduced: Reduced, before: int) -> Step | None:
     if len(parts) < 2:
         return None
     sizes = [sum(int(reduced.tables.dim[i]) for i in part.edges if reduced.tables.kind[i] == TREE) for part in parts]
-    count = f"{len(parts)} mechanisms of {_range(sizes)} freedoms"
+    count = f"{len(parts)} mechanisms of {_range(sizes)} degrees of freedom"
     reason = f"nothing but the ground and heat connects them: {count} are solved one by one"
     where = tuple(_called(part) for part in parts)
     return Step("separate mechanisms", Strength.TRAJECTORIES, where, reason, before, before)

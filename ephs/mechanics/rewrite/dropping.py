@@ -218,7 +218,7 @@ def _joint(draft: Draft, place: tuple[Path, ...]) -> Site | None:
 
         return _without({joint.relative}, rebuilt)
 
-    reason = f"{box} holds none of its six freedoms, pulls none and resists none"
+    reason = f"{box} holds none of its six degrees of freedom, pulls none and resists none"
     return Site("drop a joint that holds nothing", box, Strength.RELATION, reason, refusal, make)
 
 
@@ -315,7 +315,7 @@ def _carried(joint: Joint, forward: bool, span: Array, rng: np.random.Generator)
 
 WHY_FRICTION = "a resistance of zero makes no force and no heat, and what took that heat up stores nothing else"
 WHY_POSE = "no potential depends on these poses and nothing reads them: they follow from the joints"
-WHY_JOINT = "six freedoms without spring, friction and drive do nothing: their coordinates follow from the bodies"
+WHY_JOINT = "six degrees of freedom without spring, friction and drive do nothing: coordinates follow from the bodies"
 WHY_GYROSCOPIC = "ad*_u p vanishes for every twist that the joints allow the body"
 
 DROP_FRICTION = Rule("drop friction that resists nothing", Strength.RELATION, WHY_FRICTION, _frictions, _friction)
@@ -323,7 +323,7 @@ DROP_FRICTION = Rule("drop friction that resists nothing", Strength.RELATION, WH
 DROP_POSE = Rule("drop a pose that nothing reads", Strength.RELATION, WHY_POSE, _potentials, _pose)
 """A body's pe, pkc and q where V is constant, and the pose can be found again."""
 DROP_JOINT = Rule("drop a joint that holds nothing", Strength.RELATION, WHY_JOINT, _relations, _joint)
-"""Joints of six freedoms without potential and friction."""
+"""Joints of six degrees of freedom without potential and friction."""
 DROP_GYROSCOPIC = Rule(
     "drop gyroscopic forces that vanish", Strength.RELATION, WHY_GYROSCOPIC, _gyroscopes, _gyroscopic
 )

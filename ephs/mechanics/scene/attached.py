@@ -113,7 +113,7 @@ class Attachment(ABC):
 @final
 @dataclass(frozen=True, slots=True)
 class Motor(Attachment):
-    """A direct-current motor on a joint with one freedom.
+    """A direct-current motor on a joint with one degree of freedom.
 
     Attributes
     ----------

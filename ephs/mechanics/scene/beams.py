@@ -1,4 +1,5 @@
-"""Beams of a scene file as bodies and joints: lumped nodes, and between them six-freedom joints with strain energy.
+"""Beams of a scene file as bodies and joints: lumped nodes, and between them six-degree-of-freedom joints with strain
+energy.
 
 The nodes of the beam ``rod`` are the bodies ``rod.0`` … ``rod.n`` of a part; its elements are the joints ``rod-1`` …
 ``rod-n``, its welds ``rod-start`` and ``rod-end``. The reference curve is a helix on each segment between two points,

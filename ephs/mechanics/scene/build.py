@@ -53,7 +53,7 @@ def wrench_port(body: str) -> Path:
 
 
 def drive_ports(of: Joint) -> tuple[tuple[Path, slice], ...]:
-    """The outer ports of a driven joint, and which of its freedoms each of them moves."""
+    """The outer ports of a driven joint, and which of its degrees of freedom each of them moves."""
     at = _at("drives", of.name)
     if of.middle is None:
         return ((at, slice(0, of.dim)),)

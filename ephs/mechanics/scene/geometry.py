@@ -21,7 +21,7 @@ from ephs.semantics.spaces.rank import ALIGNED, DIRECTION
 Array = NDArray[np.float64]
 
 UNIVERSAL = "universal"
-# Pairs whose freedoms do not depend on the direction of the joint axes.
+# Pairs whose degrees of freedom do not depend on the direction of the joint axes.
 ROUND = frozenset({"spherical", "free", "fixed"})
 
 
@@ -63,7 +63,7 @@ class Coupling:
         return SE3.compose(SE3.compose(first, self.middle), second)
 
     def basis(self, x: Array) -> Array:
-        """B (6, d): the twist of C2 relative to C1, in the axes of C2, of each freedom."""
+        """B (6, d): the twist of C2 relative to C1, in the axes of C2, of each degree of freedom."""
         if self.middle is None:
             return self.pair.basis
         after = SE3.compose(self.middle, self.pair.include(x[1:]))

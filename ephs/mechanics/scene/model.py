@@ -92,11 +92,11 @@ class Joint:
     stiffness, rest : (d,) of the potential ``½ k (coordinate − rest)²``
     heat : where the friction heat goes, ``"environment"`` or the name of a thermal node
     drive : (d,) constant generalised force on u_r
-    motion : the prescribed motion law of a single freedom, or None
+    motion : the prescribed motion law of a single degree of freedom, or None
     coordinate : (size,) initial element of the pair's group; the two angles of a universal joint
     rate : (d,) initial u_r, the twist of C2 relative to C1 in C2; of a universal joint the two angles' rates
-    limits, stop : (2,) least and largest coordinate of one freedom, nan for none, and its stops' law; or None both
-    dry : dry friction of a joint with one freedom, None without
+    limits, stop : (2,) least and largest coordinate of one degree of freedom, nan for none, and its stops' law; or None
+    both dry : dry friction of a joint with one degree of freedom, None without
     middle : (7,) universal only: constant pose from the frame that follows the first revolute (C1 turned by
         angle 1) to the frame before the second, whose z axis is the second axis; None otherwise
     strain : of a beam element, which is a free joint; then friction and stiffness are 0

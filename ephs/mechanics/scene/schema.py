@@ -1,6 +1,6 @@
 """The scene file's tables as pydantic models: the keys, their types, units and defaults.
 
-One model a table. Values whose form depends on another key (a number, or one a freedom) are taken as
+One model a table. Values whose form depends on another key (a number, or one per degree of freedom) are taken as
 numbers or lists here and brought to shape by `resolve`.
 """
 
@@ -100,7 +100,7 @@ class FrameEntry(Entry):
 class MotionEntry(Entry):
     """A prescribed motion: one of four forms, by which the coordinate departs from where it starts."""
 
-    rate: Number | None = Field(default=None, description="constant rate of the single freedom, rad/s or m/s")
+    rate: Number | None = Field(default=None, description="constant rate of the single degree of freedom, rad/s or m/s")
     polynomial: Series | None = Field(
         default=None, description="c₁, c₂, … of c₁ t + c₂ t² + …; rad/s, rad/s², … or m/s, m/s², …"
     )
@@ -114,7 +114,7 @@ class MotionEntry(Entry):
 
 
 class DryEntry(Entry):
-    """Dry friction of a joint with one freedom."""
+    """Dry friction of a joint with one degree of freedom."""
 
     coulomb: NonNegative = Field(description="force while it slides, N m or N")
     static: NonNegative | None = Field(default=None, description="force at which it begins to; default: coulomb")
@@ -139,9 +139,9 @@ class JointEntry(Entry):
     rate: Numbers | None = Field(default=None, description="initial joint twist u_r; rad/s, m/s")
     pitch: Number | None = Field(default=None, description="screw only, m/rad")
     friction: Matrix = Field(
-        default=0.0, description="on the joint twist: a number, one a freedom, or a matrix; N m s, N s/m"
+        default=0.0, description="on the joint twist: a number, one per degree of freedom, or a matrix; N m s, N s/m"
     )
-    dry: DryEntry | None = Field(default=None, description="dry friction of a joint with one freedom")
+    dry: DryEntry | None = Field(default=None, description="dry friction of a joint with one degree of freedom")
     stiffness: Numbers = Field(default=0.0, description="of the potential ½ k (coordinate − rest)²; N m/rad, N/m")
     rest: Numbers = Field(default=0.0, description="coordinates without force; rad, m")
     heat: Text = Field(default="environment", description="where the friction heat goes: a thermal name")
@@ -149,9 +149,9 @@ class JointEntry(Entry):
         default=0.0, description="inertia of the single rate itself, as of a rotor that it turns; kg m², kg"
     )
     drive: Numbers = Field(default=0.0, description="constant generalised force on u_r; N m, N")
-    motion: MotionEntry | None = Field(default=None, description="the motion of the single freedom is prescribed")
+    motion: MotionEntry | None = Field(default=None, description="prescribed motion of the single degree of freedom")
     limits: Limits | None = Field(
-        default=None, description="least and largest coordinate of a joint with one freedom, nan for none; rad or m"
+        default=None, description="least and largest coordinate, of one degree of freedom; nan for none; rad or m"
     )
     limit_stiffness: Positive | None = Field(
         default=None, description="of the elastic stops, N m/rad or N/m; default from the mechanism's scale"
@@ -231,7 +231,7 @@ class ContactEntry(ContactLawEntry):
 class MotorEntry(Entry):
     """``[motors.NAME]``"""
 
-    joint: Text = Field(description="a joint with one freedom, which it turns through its gear")
+    joint: Text = Field(description="a joint with one degree of freedom, which it turns through its gear")
     constant: Number = Field(description="torque of the rotor by the current, N m/A or V s/rad")
     resistance: Positive = Field(description="of the winding, Ω")
     inductance: NonNegative = Field(default=0.0, description="of the winding, H")
@@ -244,7 +244,7 @@ class MotorEntry(Entry):
 class GearEntry(Entry):
     """``[gears.NAME]``"""
 
-    joints: Names = Field(description="two or more joints with one freedom; a gear, a belt, a differential, a mimic")
+    joints: Names = Field(description="two or more with one degree of freedom: a gear, a belt, a differential, a mimic")
     ratio: Numbers = Field(default=1.0, description="rate of the first joint = Σ ratio · rate of the others")
     stiffness: NonNegative = Field(default=0.0, description="of a belt, N m/rad or N/m of the first; 0: rigid")
     damping: NonNegative = Field(default=0.0, description="of a belt's stretching, N m s/rad or N s/m")
@@ -256,7 +256,7 @@ class GearEntry(Entry):
 class CylinderEntry(Entry):
     """``[cylinders.NAME]``"""
 
-    joint: Text = Field(description="a joint with one freedom, which chamber a pushes to larger coordinates")
+    joint: Text = Field(description="a joint with one degree of freedom, which chamber a pushes to larger coordinates")
     area: Annotated[list[Number], Field(min_length=2, max_length=2)] = Field(
         description="volume of chambers a and b by the coordinate, m³/m or m³/rad"
     )
@@ -274,7 +274,7 @@ class CylinderEntry(Entry):
 class GasSpringEntry(Entry):
     """``[gas_springs.NAME]``"""
 
-    joint: Text = Field(description="a joint with one freedom")
+    joint: Text = Field(description="a joint with one degree of freedom")
     area: Number = Field(description="volume of the gas by the coordinate, m³/m or m³/rad; may be negative")
     volume: Positive = Field(description="at the start, m³")
     pressure: Positive = Field(description="of the gas at the start, absolute, Pa; before the piston is world.pressure")
@@ -289,7 +289,7 @@ class GasSpringEntry(Entry):
 class ActuatorEntry(Entry):
     """``[actuators.NAME]``"""
 
-    joints: Annotated[list[Text], Field(min_length=1)] = Field(description="joints with one freedom")
+    joints: Annotated[list[Text], Field(min_length=1)] = Field(description="joints with one degree of freedom")
     ratio: Numbers = Field(default=1.0, description='force on each by the control, the input "actuators.NAME"; N m, N')
     limits: Range | None = Field(default=None, description="least and largest control")
 

@@ -32,9 +32,9 @@ def pose(position: list[float] | None, rotation: list[float] | None, key: str, f
 
 
 def freedoms(value: Any, d: int, key: str, faults: list[Fault], *, spread: bool = False, default: float = 0.0) -> Array:
-    """One number a freedom, from a number or a list.
+    """One number per degree of freedom, from a number or a list.
 
-    A number stands for each freedom where ``spread`` is set; else only for a single one, apart from 0.
+    A number stands for each degree of freedom where ``spread`` is set; else only for a single one, apart from 0.
     """
     if value is None:
         return np.full(d, default)
@@ -49,7 +49,7 @@ def freedoms(value: Any, d: int, key: str, faults: list[Fault], *, spread: bool 
 
 
 def friction(value: Any, d: int, key: str, faults: list[Fault]) -> Array:
-    """The friction matrix (d, d), from a number, one a freedom, or a symmetric matrix."""
+    """The friction matrix (d, d), from a number, one per degree of freedom, or a symmetric matrix."""
     array = np.zeros(0) if value == [] else np.zeros(0) if _ragged(value) else np.array(value, dtype=np.float64)
     if array.ndim == 0:
         matrix = float(array) * np.eye(d)
@@ -73,4 +73,5 @@ def _ragged(value: Any) -> bool:
 
 
 def _one_a_freedom(d: int) -> str:
-    return {0: "no number: this joint has no freedom", 1: "1 number"}.get(d, f"a list of {d} numbers, one a freedom")
+    few = {0: "no number: this joint has no degree of freedom", 1: "1 number"}
+    return few.get(d, f"a list of {d} numbers, one per degree of freedom")

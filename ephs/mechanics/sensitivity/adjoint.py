@@ -77,8 +77,8 @@ def gradient(
     times
         (n,) ascending, in s, after the start.
     weights
-        ``joints.pin.coordinate`` or ``joints.pin.rate`` -> (n,) or (n, d), for the freedoms of a joint of the tree
-        whose elements are its coordinates; of a system the joint's path, ``linkage.joints.pin.rate``.
+        ``joints.pin.coordinate`` or ``joints.pin.rate`` -> (n,) or (n, d), for the degrees of freedom of a joint of the
+        tree whose elements are its coordinates; of a system the joint's path, ``linkage.joints.pin.rate``.
     method
         ``"rk54"`` or ``"rk87"``.
 

@@ -13,7 +13,7 @@ __all__ = ["Dry"]
 @final
 @dataclass(frozen=True, slots=True)
 class Dry:
-    """Dry friction of one freedom: Coulomb's, with Stribeck's rise towards rest, viscous below the slip rate.
+    """Dry friction of one degree of freedom: Coulomb's, with Stribeck's rise towards rest, viscous below the slip rate.
 
     Its force at a rate ω is (c + (a − c) exp(−(ω/s)²)) ω / √(ω² + ε²): c while it slides, up to a where it begins to.
     The joint creeps at rest: under a force f < a at a rate of about ε f/a.

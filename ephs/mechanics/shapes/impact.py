@@ -81,7 +81,7 @@ class Meeting:
 @final
 @dataclass(frozen=True, slots=True)
 class Halt:
-    """Hard stops of a joint with one freedom: steps give them impulses, beside the friction of the joint.
+    """Hard stops of a joint with one degree of freedom: steps give them impulses, beside the friction of the joint.
 
     Parameters
     ----------

@@ -13,7 +13,7 @@ TEXTS: Final = {
     "pair taken": "a pair named '{name}' is registered already. Choose another name.",
     "pair parameters": "pair '{name}' takes the parameters {expected}, found {found}.",
     "pair basis": "pair '{name}': found a basis of shape {found}, expected {expected} "
-    "(rows ω then υ, one column a freedom).",
+    "(rows ω then υ, one column per degree of freedom).",
     "pair coordinates": "pair '{name}': found coordinates of shape {found}, expected {expected}.",
     "no material form": "material velocities and covectors belong to rigid motions; "
     "found '{name}', expected 'SE(3)' or 'SO(3)xR3'.",

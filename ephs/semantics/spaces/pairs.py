@@ -2,7 +2,7 @@
 
 The element x of a pair's group is the pose of the second joint frame in the first. Axes and origin are always
 e₃ and 0: other axes are a matter of the offsets between joint frames and bodies. One basis B, constant, gives
-everything: the freedoms u ↦ B u, the multipliers' wrenches, the joint's effort λ ↦ Bᵀ λ. Angles live on the
+everything: the degrees of freedom u ↦ B u, the multipliers' wrenches, the joint's effort λ ↦ Bᵀ λ. Angles live on the
 universal cover, so a torsional spring knows how often it was wound; strictly, the pair's group then covers
 the subgroup.
 
@@ -189,7 +189,7 @@ def register_pair(entry: PairEntry) -> None:
     if entry.name in _ENTRIES:
         raise SpaceError("pair taken", name=entry.name)
     if entry.group is None:
-        # How many freedoms a pair has does not depend on its parameters.
+        # How many degrees of freedom a pair has does not depend on its parameters.
         dim = size = np.shape(entry.basis(**dict.fromkeys(entry.parameters, 1.0)))[-1]
     else:
         dim, size = entry.group.dim, entry.group.size

@@ -341,8 +341,8 @@ LAWS: Mapping[str, Law] = {
         ("take a smaller step, or check that the joints fit together", "lower rtol, or check that the joints fit"),
     ),
     "ledger": Law(
-        "what is stored changes by what was made and supplied: entropy, volume; work of motions that leave no freedom, "
-        "which is what the energies gain and the heat, is the sum of their power",
+        "stored entropy and volume change by production and supply; work of motions that leave no degree of freedom, "
+        "the gain of the energies and the heat, is the sum of their power",
         "what was made and exchanged; gross energies",
         f"{MANY_TIMES:g} rtol, at least {LEAST:g}; of work {COARSE:g}",
         _ledger,

@@ -63,7 +63,7 @@ class Memory:
     last
         y at the last stage.
     open
-        (freedoms,): rates before they are put on the constraints.
+        (degrees of freedom,): rates before they are put on the constraints.
     atol, rtol, allowed, fine, coarse
         (counted,): tolerances, what they allow, estimates.
     carry, carry1, carry2

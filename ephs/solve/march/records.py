@@ -61,7 +61,7 @@ class Status(IntEnum):
 
     SOUND = 0
     STILL = 20
-    """A freedom moves no mass."""
+    """A degree of freedom moves no mass."""
     DEPENDENT = 21
     """Constraints nearly repeat each other."""
     OPEN = 22
@@ -157,7 +157,7 @@ class Motion(ABC):
 
     @abstractmethod
     def project(self, on: Evaluator, q: Vector, change: Vector) -> None:
-        """Take the part across the constraints, at q, out of a change (freedoms,) of the rates."""
+        """Take the part across the constraints, at q, out of a change (degrees of freedom,) of the rates."""
 
     @abstractmethod
     def least(self, on: Evaluator, change: Vector) -> Real:

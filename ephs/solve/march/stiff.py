@@ -2,7 +2,7 @@
 
 The system of three stages falls apart into a real one of the motion's size and one of twice that for the pair. Where
 rates of freedoms depend on increments and rates alone, and sums on nothing but these, each falls to one of the size of
-the freedoms: with γ = μ/h, (γ² − γ (J_rr + J_vv) + J_rr J_vv − J_rv) δv = f_r + (γ − J_rr) f_v.
+the degrees of freedom: with γ = μ/h, (γ² − γ (J_rr + J_vv) + J_rr J_vv − J_rv) δv = f_r + (γ − J_rr) f_v.
 """
 
 from collections.abc import Callable
@@ -186,7 +186,7 @@ class Solver:
         lu(on, s.pair, s.swaps, skipping=True)
 
     def _factors(self, size: int) -> Matrix:
-        """The factors of the freedoms' matrix: of one, or of a pair."""
+        """The factors of the degrees of freedom' matrix: of one, or of a pair."""
         n, held = self.stiff.damping.rows, self.stiff.single if size == 1 else self.stiff.pair
         return Matrix(held.cells, held.start, size * n, size * n)
 

@@ -359,7 +359,9 @@ def _closing(model: Model, groups: Groups) -> NDArray[np.bool_]:
 
 
 def _ports(kernel: Kernel, size: int) -> list[tuple[int, Array]]:
-    """(first of its efforts, the map by which the relation sees them) of the two frames and the freedoms of a joint."""
+    """(first of its efforts, the map by which the relation sees them) of the two frames and the degrees of freedom of a
+    joint.
+    """
     found = [(at, matrix) for _, _, at, _, matrix in pulled_ports(kernel)]
     if not found:
         return [(0, np.eye(6)), (6, np.eye(6)), (12, np.eye(size - 12))]

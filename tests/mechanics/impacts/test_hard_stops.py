@@ -159,5 +159,5 @@ def test_a_scene_with_hard_stops_is_read_as_it_was_written(tmp_path):
 def test_a_joint_in_python_takes_hard_stops():
     made = joint("revolute", limits=[-1.0, 1.0], stop=Impact(0.5))
     assert made != joint("revolute", limits=[-1.0, 1.0], stop=Impact(0.6))
-    with pytest.raises(StructureError, match="limits of a joint with 3 freedoms"):
+    with pytest.raises(StructureError, match="limits of a joint with 3 degrees of freedom"):
         joint("spherical", limits=[-1.0, 1.0], stop=Impact(0.5))

@@ -301,7 +301,7 @@ temperature = 300.0
 def test_mechanisms_that_share_ground_and_heat_only_are_separate(tmp_path):
     step = named(ephs.reduce(scene_of(tmp_path, TWO)), "separate mechanisms")
     assert step.where == ("a", "b")
-    assert "2 mechanisms of 1 to 3 freedoms" in step.reason
+    assert "2 mechanisms of 1 to 3 degrees of freedom" in step.reason
 
 
 @pytest.mark.parametrize("file", SCENES, ids=lambda file: file.stem)

@@ -123,7 +123,10 @@ def test_its_numbers_are_parameters(tmp_path):
         ),
         ("dry = { coulomb = 2.0, slip = 0.0 }", r"joints.rail.dry.slip"),
         ("dry = { coulom = 2.0 }", r"coulomb"),
-        ("dry = { coulomb = 2.0 }\nmotion = { rate = 1.0 }", r"expected a joint with one freedom that is free to move"),
+        (
+            "dry = { coulomb = 2.0 }\nmotion = { rate = 1.0 }",
+            r"one degree of freedom that is free to move",
+        ),
     ],
 )
 def test_bad_input_is_named(tmp_path, text, found):
@@ -132,5 +135,5 @@ def test_bad_input_is_named(tmp_path, text, found):
 
 
 def test_joints_of_several_freedoms_are_refused():
-    with pytest.raises(ephs.StructureError, match="dry friction of a joint with 3 freedoms"):
+    with pytest.raises(ephs.StructureError, match="dry friction of a joint with 3 degrees of freedom"):
         joint("spherical", dry=Dry(1.0))

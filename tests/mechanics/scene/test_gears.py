@@ -130,7 +130,7 @@ axis = [0.0, 0.0, 1.0]
         ('["shaft", "rail"]', '["shaft", "rial"]', r'gears.rope.joints\[1\].*did you mean "rail"'),
         ('["shaft", "rail"]', '["shaft", "shaft"]', "different joints"),
         ("ratio = 10.0", "ratio = [1.0, 2.0]", "gears.rope.ratio.*1 numbers"),
-        ('type = "prismatic"', 'type = "cylindrical"', "gears.rope.joints.*one freedom"),
+        ('type = "prismatic"', 'type = "cylindrical"', "gears.rope.joints.*one degree of freedom"),
         ('heat = "bearing"', 'heat = "baring"', "gears.rope.heat"),
         ("axis = [0.0, 1.0, 0.0]", "axis = [0.0, 1.0, 0.0]\nrate = 1.0", "gears.rope.*the first rate, of shaft, at 0"),
     ],

@@ -192,7 +192,7 @@ FAULTS: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "motion of two": (
         BODY + joint("motion = { rate = 1.0 }", kind="cylindrical"),
         "joints.j.motion",
-        ("one freedom", "2 freedoms"),
+        ("one degree of freedom", "2 degrees of freedom"),
     ),
     "motion and drive": (
         BODY + joint("motion = { rate = 1.0 }", "drive = 1.0"),

@@ -98,8 +98,8 @@ def correct(
     before
         Rates at the start of the step.
     allowed
-        (2 freedoms,) of increments and rates: what their errors may be. A state is moved further where steps are on a
-        grid, else what is farther is left to the steps that follow.
+        (2 degrees of freedom,) of increments and rates: what their errors may be. A state is moved further where steps
+        are on a grid, else what is farther is left to the steps that follow.
     always
         Whether what is only rounding is met, too: for the sake of its derivatives.
     """

@@ -54,9 +54,11 @@ def engine_of(
     gravity
         (3,) in world axes.
     drive, wrench, scal
-        Given forces (joints' freedoms,), given wrenches (bodies, 6), and (h, θ₀, π₀), which are read where they are.
+        Given forces (joints' degrees of freedom,), given wrenches (bodies, 6), and (h, θ₀, π₀), which are read where
+        they are.
     supply, lead
-        What is given to what is attached, and accelerations (freedoms,) of prescribed motions, read there, too.
+        What is given to what is attached, and accelerations (degrees of freedom,) of prescribed motions, read there,
+        too.
     acted
         Edges and bodies on which given forces act.
     kept

@@ -89,7 +89,7 @@ class Engine:
 
     @property
     def failed(self) -> int:
-        """Number of the component or freedom at which an evaluation failed last."""
+        """Number of the component or degree of freedom at which an evaluation failed last."""
         return int(self.work["fault"][0])
 
     def arrays(self) -> list[Array]:

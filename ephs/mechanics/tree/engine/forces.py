@@ -177,7 +177,7 @@ class _Acting:
         self.books[1] = self.books[1] + net.power[0]
 
     def _rate(self, port: Port) -> Real:
-        """The rate of a joint's freedom."""
+        """The rate of a joint's degree of freedom."""
         on, edge, rate = self.on, self.tables.acting[port.edge], self.on.variable(0.0)
 
         def in_tree() -> None:

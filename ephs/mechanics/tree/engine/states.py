@@ -59,7 +59,7 @@ class Walked(Record):
     forward
         1 where the joint is walked from its first to its second body.
     code, dim, q_at, r_at
-        Its group, freedoms, and where its element and rates start.
+        Its group, degrees of freedom, and where its element and rates start.
     first, second
         Poses of the joint's frames in its bodies.
     basis

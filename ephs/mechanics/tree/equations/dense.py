@@ -32,7 +32,7 @@ STOPPED = 1e-10
 
 
 def unmoved(reduced: Reduced, freedom: int) -> SolveError:
-    """A freedom whose motion no inertia determines."""
+    """A degree of freedom whose motion no inertia determines."""
     at = reduced.tables.r_at[: reduced.links]
     link = int(np.flatnonzero(at <= freedom)[-1])
     edge, body = reduced.edges[link], reduced.bodies[link]

@@ -39,7 +39,7 @@ from ephs.solve.stepping import Row
 __all__ = ["Equations", "ReducedState"]
 
 PUSHED = 1e-9
-"""Size of a push below which no freedom is left that it could move."""
+"""Size of a push below which no degree of freedom is left that it could move."""
 ASIDE = 0.1
 """Displacement, in rad or m, that finds the constraints which repeat others in every configuration."""
 
@@ -361,7 +361,9 @@ class Equations:
 
     @property
     def unknowns(self) -> int:
-        """Places and rates of the tree's freedoms, and a multiplier for each equation of a loop that is kept."""
+        """Places and rates of the tree's degrees of freedom, and a multiplier for each equation of a loop that is
+        kept.
+        """
         return 2 * self.n + len(self.engine.closing.row)
 
     def states(self, state: ReducedState) -> JointStates:

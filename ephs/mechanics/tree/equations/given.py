@@ -24,7 +24,7 @@ class Given:
     Attributes
     ----------
     drive
-        (joints' freedoms,) forces on the rates of all joints.
+        (joints' degrees of freedom,) forces on the rates of all joints.
     wrench
         (links, 6) in body frames.
     supply
@@ -66,7 +66,9 @@ class Given:
             self.drive[:] = self._own * self.drive + self._contact(t)
 
     def push(self, contact: Callable[[float], Array] | None) -> None:
-        """Let closed contacts act besides, by forces (joints' freedoms,) on the rates that are functions of time."""
+        """Let closed contacts act besides, by forces (joints' degrees of freedom,) on the rates that are functions of
+        time.
+        """
         self._contact = contact
         if contact is None:
             self.drive *= self._own

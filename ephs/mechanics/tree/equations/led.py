@@ -1,4 +1,5 @@
-"""The work of prescribed motions where they leave no freedom: the energy that the mechanism gained, and the heat.
+"""The work of prescribed motions where they leave no degree of freedom: the energy that the mechanism gained, and the
+heat.
 
 Positions and velocities, and so energies, are then known but for the closing of loops. The multiplier of the motion
 grows without bound near dead centres, where a quadrature of its power fails. How far that is from the work is counted
@@ -46,7 +47,7 @@ class Led:
 
     @property
     def holds(self) -> bool:
-        """Whether no freedom is left."""
+        """Whether no degree of freedom is left."""
         d = self._problem.descriptor
         return self._moved and not mobility(d, d.pack(self._problem.initial), self._problem.prescribed).mobility
 
@@ -56,7 +57,7 @@ class Led:
         return self._from is not None
 
     def start(self, energies: Array) -> None:
-        """Count from here, where no freedom is left; energies (components,) in J."""
+        """Count from here, where no degree of freedom is left; energies (components,) in J."""
         self._from = float(energies @ self.mechanical) if self.holds else None
 
     def work(self, t: float, energies: Array, books: Array) -> float:

@@ -23,7 +23,7 @@ class Prescribed:
     changing
         Whether one of the rates changes with time.
     lead
-        (tree's freedoms,) accelerations, zeros for other joints, at the time that was placed last.
+        (tree's degrees of freedom,) accelerations, zeros for other joints, at the time that was placed last.
     """
 
     def __init__(self, reduced: Reduced) -> None:

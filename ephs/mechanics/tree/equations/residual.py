@@ -31,7 +31,7 @@ ALL: Final = kinds_of((joint.code, joint.size, joint.dim) for joint in STANDARD)
 class Residual:
     """The functions of `ephs.mechanics.tree.sweeps.residuals` on the tables of one mechanism, and their memory.
 
-    Vectors count n tree freedoms, nv with those of cut joints, m rows of loops, and ``entropies``.
+    Vectors count n tree degrees of freedom, nv with those of cut joints, m rows of loops, and ``entropies``.
 
     Parameters
     ----------
@@ -141,7 +141,9 @@ class Residual:
         return -self.arrays["value"][:, 0], float(self._worst[0])
 
     def assemble(self, q: Array, r: Array) -> int:
-        """The mass matrix, its factor and the rows into ``arrays``; 0, or 1 + a freedom that moves no mass."""
+        """The mass matrix, its factor and the rows into ``arrays``; 0, or 1 + a degree of freedom that moves no
+        mass.
+        """
         a = self.arrays
         a["q"][:], a["r"][:] = q, r
         found = int(self._calls["assemble"]())
@@ -180,7 +182,7 @@ class Residual:
         return np.concatenate([turning @ turn, (moving + np.cross(turning, at)) @ turn], axis=-1)
 
     def cut_twists(self) -> Array:
-        """(nv − n,) rates of cut joints along their freedoms, where the links' motion was computed last."""
+        """(nv − n,) rates of cut joints along their degrees of freedom, where the links' motion was computed last."""
         found, at = [np.zeros(0)], Cut.left.offset
         joints = self.arrays["cut"].reshape(-1, Cut.integer_width)
         numbers = self.arrays["cut_numbers"].reshape(-1, Cut.real_width)

@@ -40,7 +40,8 @@ class Linearised:
         return np.concatenate([self._dense.rate, settled[self._residual.cut_changes]])
 
     def inverse(self, q: Array, r: Array, s: Array, a: Array) -> Array:
-        """(n,) the forces on the tree's freedoms, beside what drives at present, that make its accelerations a (n,).
+        """(n,) the forces on the tree's degrees of freedom, beside what drives at present, that make its accelerations
+        a (n,).
 
         Raises
         ------
@@ -82,7 +83,7 @@ class Linearised:
         return np.concatenate([np.zeros((driven, slopes.shape[1])), slopes[self._residual.rows]])
 
     def mobility(self) -> Array:
-        """(n, n) the derivatives of the tree's accelerations by forces on its freedoms, after `forward`."""
+        """(n, n) the derivatives of the tree's accelerations by forces on its degrees of freedom, after `forward`."""
         n = self._residual.n
         return self._dense.solved(np.eye(n), np.zeros((self._dense.multiplier.size, n)))
 

@@ -1,4 +1,6 @@
-"""Interface of the attached network and a mechanism: freedoms, states that components read, entropies made."""
+"""Interface of the attached network and a mechanism: degrees of freedom, states that components read, entropies
+made.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,7 +26,9 @@ __all__ = ["Attaching", "Gear", "attaching_of", "makers_of"]
 @final
 @dataclass(frozen=True, slots=True)
 class Gear:
-    """A constant relation Σ ratio · rate = 0, by the component that has it: (edge, freedom, ratio) of its joints."""
+    """A constant relation Σ ratio · rate = 0, by the component that has it: (edge, degree of freedom, ratio) of its
+    joints.
+    """
 
     path: Path
     terms: tuple[tuple[int, int, float], ...]
@@ -38,7 +42,7 @@ class Attaching:
     Parameters
     ----------
     ports
-        (rates,) freedoms of joints.
+        (rates,) degrees of freedom of joints.
     reads
         Of each component that is called: places in s of the states that it reads; −1 − place of a joint's element.
     flows
@@ -46,7 +50,7 @@ class Attaching:
     bent
         (elements that are read, 2): their places, and those of their freedoms.
     edges
-        First freedoms of the joints at which something is attached.
+        First degrees of freedom of the joints at which something is attached.
     outer
         (states,) energy of the environment by a state in it, as −π₀ of a volume; 0 of others.
     ties
@@ -120,7 +124,7 @@ def attaching_of(
         terms = [(*network.rates[place], ratio) for place, ratio in tie.terms]
         path = components[tie.component].path
         if any(parts.attached[junction].pair.code != VECTOR for junction, _, _ in terms):
-            raise Unplaced(path, "ties the rate of a joint whose freedoms do not commute")
+            raise Unplaced(path, "ties the rate of a joint whose degrees of freedom do not commute")
         ties.append(Gear(path, tuple((number[id(parts.attached[at])], k, ratio) for at, k, ratio in terms)))
     bent = sorted({-1 - int(read) for places in reads for read in places if read < 0})
     return Attaching(

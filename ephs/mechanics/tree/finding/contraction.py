@@ -248,7 +248,7 @@ class _Contraction:
         number, state = self.storage[at]
         inertia, on = _inertia(self._primitive(number)), [other for other in others if self.sort[other] == RATE]
         if inertia is None or len(others) != 1 or len(on) != 1 or self.rates[self._back(on[0])] != 1:
-            raise self._fault(number, "stores what other states, or the rates of several freedoms, determine")
+            raise self._fault(number, "stores what other states, or the rates of several degrees of freedom, determine")
         self.stiff.append(Inertia(number, state, on[0], others[on[0]], inertia))
 
     def _back(self, at: int) -> int:

@@ -30,14 +30,14 @@ class Layout:
         Names of all joints, those of the tree first, in the order of the vectors. A body, or a group of bodies, that
         no joint holds moves with a free joint of its (first) body's name.
     freedoms
-        Joint -> (d,) places of its freedoms: in vectors of the tree's n freedoms where below n, and from there on
-        those of cut joints.
+        Joint -> (d,) places of its degrees of freedom: in vectors of the tree's n degrees of freedom where below n, and
+        from there on those of cut joints.
     elements
         Joint -> places of its element in a state's array.
     entropies
         Paths of the entropies.
     n, total
-        How many freedoms the tree has, and all joints together.
+        How many degrees of freedom the tree has, and all joints together.
     edges
         Joint -> numbers of its edges, and these.
     paths
@@ -96,7 +96,8 @@ class Layout:
         )
 
     def vector(self, what: str, values: "Mapping[str, ArrayLike] | ArrayLike") -> Array:
-        """(total,) from joint -> (d,), a number where there is one freedom; zero for joints that are not named.
+        """(total,) from joint -> (d,), a number where there is one degree of freedom; zero for joints that are not
+        named.
 
         Or from an array (n,) of all joints of the tree, or (total,).
 

@@ -54,7 +54,7 @@ class Reduced:
     unknowns
         How many numbers have to be found.
     twists
-        Of each edge, (6, d): its freedoms in the world, at the initial configuration.
+        Of each edge, (6, d): its degrees of freedom in the world, at the initial configuration.
     gravity
         (3,) in world axes, m/s².
     acting

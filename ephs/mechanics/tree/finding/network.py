@@ -96,7 +96,7 @@ class Network:
     Parameters
     ----------
     rates
-        (junction, freedom) of the rates in z.
+        (junction, degree of freedom) of the rates in z.
     nodes
         Booked entropies whose temperatures are in z.
     inputs

@@ -200,7 +200,7 @@ class _Reader:
         if not signal.effort:
             return None
         if freedoms != 1:
-            raise Unplaced(port, "prescribes rates of several freedoms")
+            raise Unplaced(port, "prescribes rates of several degrees of freedom")
         if isinstance(signal.value, MotionLaw):
             return signal.value
         if callable(signal.value):

@@ -30,11 +30,11 @@ class Edge:
     body1, body2
         Numbers of the links, −1 for the ground.
     motion
-        The motion law of a single freedom, or None.
+        The motion law of a single degree of freedom, or None.
     coordinate
         Initial element of the pair's group.
     freedoms
-        Which of the joint's freedoms this edge has: a universal joint is two edges.
+        Which of the joint's degrees of freedom this edge has: a universal joint is two edges.
     state
         Of its element: the joint's relative pose, or the pose of a body that is free; None where that is not stored.
     port
@@ -92,7 +92,7 @@ def frames_of_joints(edges: Sequence[Edge], poses: Sequence[Array | None]) -> li
 
 
 def twists_of(edges: Sequence[Edge], frames: Sequence[Array], joints: int) -> list[Array]:
-    """The freedoms of all joints in the world, where joints have these frames; none of springs."""
+    """The degrees of freedom of all joints in the world, where joints have these frames; none of springs."""
     out = [SE3.adjoint(frame) @ edge.pair.basis for edge, frame in zip(edges[:joints], frames, strict=True)]
     return out + [np.zeros((6, 0))] * (len(edges) - joints)
 
@@ -154,8 +154,8 @@ def spanning_tree(
     """The tree as (edge, body that it leads to, walked forward), parents first; and the edges left.
 
     Prescribed joints, those of frames without mass and those with inertia of their own come into the tree first, then
-    those of few freedoms: a joint of many freedoms costs the fewest constraints where it is cut. Among equals those
-    near the ground come first: then branches are short, and few loops are open at one body.
+    those of few degrees of freedom: a joint of many degrees of freedom costs the fewest constraints where it is cut.
+    Among equals those near the ground come first: then branches are short, and few loops are open at one body.
     """
     depth = _depths(-1, joints)
     groups = _Groups(len(light))

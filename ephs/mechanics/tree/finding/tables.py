@@ -37,8 +37,8 @@ class Mechanism(NamedTuple):
     heat: Index  # (edges,): entropy that takes the friction's heat
     support: Index  # (edges,): 0, or where both components vanish above a plane, beyond a distance: `ABOVE`, `BEYOND`
     reach: Array  # (edges,): from which height or distance on
-    driven: Index  # (tree freedoms,): 1 where the rate is prescribed
-    armature: Array  # (tree freedoms,): inertia on the rate itself
+    driven: Index  # (tree degrees of freedom,): 1 where the rate is prescribed
+    armature: Array  # (tree degrees of freedom,): inertia on the rate itself
     node: Index  # (entropies,): component of the storage, −1: the environment, −2: a state of an attachment
     conduction: Index  # (conductions, 3): component, entropy, entropy
     sink: Index  # (sinks, 3): place of what it makes, entropy that takes it or −1, first place of its component

@@ -143,7 +143,7 @@ class Acting(Record):
     first, second
         Links of its bodies, −1 for the ground.
     dim, q_at, size, r_at
-        Freedoms; where its element and its freedoms start.
+        Degrees of freedom; where its element and its degrees of freedom start.
     cut
         Number among the cut joints, −1: none.
     spring, friction
@@ -214,7 +214,9 @@ class Sink(Record):
 
 
 class Port(Record):
-    """A rate at which something is attached: its place among all freedoms, its edge, and which freedom of it."""
+    """A rate at which something is attached: its place among all degrees of freedom, its edge, and which degree of
+    freedom of it.
+    """
 
     place = integer()
     edge = integer()
@@ -241,8 +243,9 @@ class Tables:
     port, net, numbers
         What is attached, and where: see `ephs.mechanics.tree.sweeps.network.Net`.
     drive, wrench, scal, supply, lead
-        Given forces on the freedoms of all joints, given wrenches (bodies, 6) in body frames, (h, θ₀, π₀), what is
-        given to what is attached, and the accelerations (freedoms,) of joints with prescribed motions.
+        Given forces on the degrees of freedom of all joints, given wrenches (bodies, 6) in body frames, (h, θ₀, π₀),
+        what is given to what is attached, and the accelerations (degrees of freedom,) of joints with prescribed
+        motions.
     """
 
     own: Table[Own]
@@ -309,7 +312,7 @@ class Work:
     pushed, force, zero
         Wrenches (links, 6) on links, in their frames; forces on the tree's rates; zeros.
     attached, pulled
-        Forces on the freedoms of all joints: of what is attached, and all but the constraints'.
+        Forces on the degrees of freedom of all joints: of what is attached, and all but the constraints'.
     relative
         (cut joints, width): see `ephs.mechanics.tree.sweeps.cuts.Relative`.
     value, entry, covector, along, largest
@@ -331,7 +334,7 @@ class Work:
     books
         Powers of friction and of what drives.
     answer, fault
-        A number that a function writes; the component or freedom that an evaluation failed at.
+        A number that a function writes; the component or degree of freedom that an evaluation failed at.
     """
 
     work: Vector

@@ -83,7 +83,9 @@ class Closures:
         self.each_row(on, one)
 
     def along(self, on: Evaluator, rates: Vector, changes: Vector, first: Integer) -> None:
-        """The cut joints' rates and accelerations along their freedoms; ``first`` is the place of the first in v."""
+        """The cut joints' rates and accelerations along their degrees of freedom; ``first`` is the place of the first
+        in v.
+        """
 
         def of(i: Integer) -> None:
             cut, start = self.cuts[i], i * self.motions.columns

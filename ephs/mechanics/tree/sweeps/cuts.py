@@ -4,8 +4,8 @@ A cut joint lets twists B r pass in its second frame; a row n of the complement,
 u₁, u₂ of both links in that frame and the relative one u = u₂ − u₁, its acceleration is u̇₂ − u̇₁ + [u, u₁].
 
 A gear forbids Σ gᵢ rᵢ ≠ 0 of the rates of some joints. It is one row, to which each of its joints adds gᵢ (BᵢᵀBᵢ)⁻¹Bᵢᵀ
-in its own second frame: a cut joint without freedoms, whose element is that of the joint, and which is open where the
-element is not the one at which the gear meshes.
+in its own second frame: a cut joint without degrees of freedom, whose element is that of the joint, and which is open
+where the element is not the one at which the gear meshes.
 """
 
 from collections.abc import Callable
@@ -55,7 +55,7 @@ class Cut(Record):
     first, second
         Links of its bodies, −1 for the ground.
     code, dim, q_at, size, v_at
-        As in `Chart`; a joint of a gear has the code `TIE`, no freedoms, and a size of 1.
+        As in `Chart`; a joint of a gear has the code `TIE`, no degrees of freedom, and a size of 1.
     row, rows
         Its first row, and how many; those of the joints of a gear are the same.
     end

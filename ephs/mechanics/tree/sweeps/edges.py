@@ -56,9 +56,9 @@ class Edge(Record):
     first, second
         Links of its bodies, −1 for the ground.
     code, dim, size
-        Its group, freedoms, and numbers of an element.
+        Its group, degrees of freedom, and numbers of an element.
     q_at, v_at
-        Where its element and its freedoms start; of joints.
+        Where its element and its degrees of freedom start; of joints.
     spring, friction
         Components of its potential and its friction, −1: none.
     heat
@@ -93,7 +93,7 @@ class Law(Record):
     Attributes
     ----------
     place, rate, warmth
-        The point: element, rates along the freedoms, temperature over the environment's.
+        The point: element, rates along the degrees of freedom, temperature over the environment's.
     pull
         Force on the rates there, in N and N m.
     stiffness, damping, softness

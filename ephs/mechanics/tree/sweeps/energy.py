@@ -20,8 +20,8 @@ def energy(on: Evaluator, tree: Tree, q: Vector, r: Vector, momenta: Matrix, spi
 
     Heights count from the origin of the ground's frame; what they are rounded by is a part of the lengths on the way
     from there, which the sizes count. Momenta I u (links, 6), in the links' frames, go to
-    ``momenta``, those of rates that have inertia of their own to ``spin`` (freedoms,). Of the memory, twists change, to
-    those of r at q.
+    ``momenta``, those of rates that have inertia of their own to ``spin`` (degrees of freedom,). Of the memory, twists
+    change, to those of r at q.
     """
     ground = tree.states[tree.size]
     ground.twist, ground.down, ground.level, ground.reach = [0.0] * 6, tree.gravity, 0.0, 0.0

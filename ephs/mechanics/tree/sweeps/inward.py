@@ -1,4 +1,5 @@
-"""The inward sweep: articulated inertias and loads, each joint's freedoms eliminated on the way to the ground.
+"""The inward sweep: articulated inertias and loads, each joint's degrees of freedom eliminated on the way to the
+ground.
 
 With the articulated inertia I of a link, its load P and its acceleration δa beyond the bias, the wrench that its parent
 exerts is I δa + P. The joint's rates are free under the forces τ: with U = I S and D = Sᵀ U, the parent sees the link
@@ -33,7 +34,8 @@ __all__ = ["inward", "load_inward"]
 def inward(on: Evaluator, tree: Tree, i: Integer, fault: Variable[Integer]) -> None:
     """Eliminate the joint of link i from its articulated inertia, which its parent takes up.
 
-    ``fault`` becomes 1 + i where a freedom of the joint moves no mass, unless it tells of another link already.
+    ``fault`` becomes 1 + i where a degree of freedom of the joint moves no mass, unless it tells of another link
+    already.
     """
 
     def one(joint: Joint, link: Link) -> None:

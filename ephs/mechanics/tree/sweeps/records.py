@@ -128,7 +128,9 @@ class Joint:
 
     @property
     def units(self) -> dict[int, int]:
-        """Entries of a twist that are freedoms -> number of the freedom; none where rates have inertia."""
+        """Entries of a twist that are degrees of freedom -> number of the degree of freedom; none where rates have
+        inertia.
+        """
         if self.armature:
             return {}
         return {column.index(1.0): j for j, column in enumerate(self.basis) if sorted(column) == [0.0] * 5 + [1.0]}

@@ -60,7 +60,7 @@ POINT: Final[dict[str, Any]] = {
     "wrench": matrix(6), "warmth": vector(), "beyond": vector(), "pulls": vector(),
 }  # fmt: skip
 """Point of evaluation: q is written; forces on all joints, wrenches on bodies; memory (entropies,), (ties,),
-(joints' freedoms,)."""
+(joints' degrees of freedom,)."""
 ACTIVE: Final = (
     "memory", "places", "motions", "value", "covector", "v", "q", "r", "s", "drive", "wrench", "warmth", "beyond",
     "pulls",
@@ -89,8 +89,8 @@ class Residuals:
         Numbers of memory that a link takes; the ground takes as many.
     program
         ``place``: motions, and points of laws. ``assemble``: the mass matrix, its Cholesky factor, rows of loops; 0, or
-        1 + a freedom that moves no mass. ``rigid``: the forces that inertia and gravity need at ṙ = 0. ``twists``:
-        (n, 6) of a link by the rates. ``residual`` and ``action``: see above.
+        1 + a degree of freedom that moves no mass. ``rigid``: the forces that inertia and gravity need at ṙ = 0.
+        ``twists``: (n, 6) of a link by the rates. ``residual`` and ``action``: see above.
     """
 
     def __init__(self, kind: Class, kinds: tuple[Kind, ...]) -> None:
