@@ -9,7 +9,7 @@ import ephs
 
 __all__ = ["table"]
 
-HEAD = ("model", "bodies", "degrees of freedom", "actuators", "dry friction", "armatures", "ratios", "contacts", "not modelled")
+HEAD = ("model", "bodies", "DoF", "actuators", "dry friction", "armatures", "ratios", "contacts", "not modelled")
 LOST = "not modelled: "
 
 
