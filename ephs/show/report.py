@@ -15,6 +15,7 @@ from ephs.show.player import player
 from ephs.show.signals import Group, packed
 from ephs.show.stage import stage_of
 from ephs.show.still import still_svg
+from ephs.show.touching import contact_panels, contact_table
 
 ZERO = 1e-12
 """SI number below which a report writes 0."""
@@ -64,6 +65,7 @@ def write_report(sol: Any, directory: str | FilePath) -> FilePath:
         _plots(sol),
         balances(sol, summary),
         _summary(summary),
+        contact_table(sol),
         _final(summary),
         _schematic(sol),
         _pattern(sol),
@@ -197,6 +199,7 @@ def _plots(sol: Any) -> str:
         Group("Energy", energy_panels(sol), shown=True),
         Group("Exergy", exergy_panels(sol), shown=False),
         Group("Entropy", entropy_panels(sol), shown=False),
+        Group("Contacts", contact_panels(sol), shown=False),
         Group("Constraints", constraint_panels(sol), shown=False),
     ]
     data = packed(np.asarray(sol.t, dtype=float), groups)

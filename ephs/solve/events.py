@@ -142,6 +142,13 @@ class Watch:
                 return t
         return None
 
+    def add(self, happened: Iterable[tuple[float, str, Mapping[Path, Array]]]) -> None:
+        """Record what a method met by itself: time, name and states."""
+        count = len(self.crossings)
+        self.crossings += [Crossing(name, t, state) for t, name, state in happened]
+        if len(self.crossings) > count:
+            self.crossings.sort(key=lambda crossing: crossing.t)
+
     def snapshot(self) -> Snapshot:
         """Events so far, and the functions' values."""
         return {"before": self._before, "crossings": [crossing.record() for crossing in self.crossings]}

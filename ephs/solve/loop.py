@@ -125,7 +125,7 @@ class _Run(Generic[S]):
         self.pending: list[tuple[float, S, float]] = []
         self.kept = Rows()
         self.samples: Samples[S] = Samples(wanted=policy is None, retaken=bounds is not None and bounds.retaken)
-        self.watch: Watch | None = None
+        self.watch = Watch((), t0, {})
         self.forecast = Forecast(problem, stepper.name, bounds.order if bounds else 1, until)
         self.leg: Leg[S] | None = None
         self.ended = False
@@ -145,15 +145,16 @@ class _Run(Generic[S]):
             self.saved = 1
         self.samples.add([(self.t0, self.state, 0.0)])
         self.stepper.prepare(self.state, self.sign * self.h)
-        if self.events:
-            self.watch = Watch(self.events, self.t0, self._states(row))
+        self.watch = Watch(self.events, self.t0, self._states(row) if self.events else {})
 
     def advance(self, stood: Snapshot | None) -> None:
         """To the end, or to an event that stops the run: in compiled code as far as that goes, then step after step.
 
         ``stood`` is where the compiled part of an earlier run did, None where it was left.
         """
-        alone = not (self.watch or self.production.active or self.breakpoints.active)  # no step has to be looked at
+        alone = not (
+            self.watch.events or self.production.active or self.breakpoints.active
+        )  # no step has to be looked at
         compiled = alone and (self.journal is None or self.journal.snapshot is None or stood is not None)
         while compiled and not self.ended and self.t != self.until:  # leg after leg, while the method has one
             counts = Counts(self.steps, self.rejected, self.shortest, self.longest, self.least, self.h)
@@ -244,7 +245,7 @@ class _Run(Generic[S]):
             t = self.t0 + self.sign * (self.steps - self.breakpoints.split + 1) * float(self.control.step or 0.0)
         after = self.stepper.at(attempt.end, t)
         stopped = None
-        if self.watch:
+        if self.watch.events:
 
             def inside(when: float) -> Mapping[Path, Array]:
                 return self._states(self.stepper.row(self.stepper.inside(attempt, when)))
@@ -252,6 +253,8 @@ class _Run(Generic[S]):
             stopped = self.watch.step(self.t, t, self._states(self.stepper.row(after)), inside)
             if stopped is not None and stopped != t:
                 t, after = stopped, self.stepper.at(self.stepper.inside(attempt, stopped), stopped)
+        met = (one for one in attempt.happened if self.sign * (t - one[0]) >= 0.0)
+        self.watch.add((when, name, self._states(self.stepper.row(state))) for when, name, state in met)
         if self.production.active:
             row = self.stepper.row(after)
             self.production.step(t, row.x, row.energies)
@@ -309,7 +312,11 @@ class _Run(Generic[S]):
             "setup_s": self.setup,
             "integrate_s": time.perf_counter() - self.begin - self.setup,
             "least_production": float(self.least) if np.isfinite(self.least) else 0.0,
-            **({"events": [crossing.record() for crossing in self.watch.crossings]} if self.watch else {}),
+            **(
+                {"events": [one.record() for one in self.watch.crossings]}
+                if self.events or self.watch.crossings
+                else {}
+            ),
         }
 
     def solution(self) -> Solution:
@@ -366,7 +373,7 @@ class _Run(Generic[S]):
             "state": parts(self.state),
             "method": method,
             "policy": self.policy.snapshot() if self.policy is not None else None,
-            "watch": self.watch.snapshot() if self.watch is not None else None,
+            "watch": self.watch.snapshot(),
             "breakpoints": self.breakpoints.snapshot(),
             "forecast": self.forecast.snapshot(),
             "samples": self.samples.snapshot(),
@@ -390,8 +397,7 @@ class _Run(Generic[S]):
         self.production.start(row.x, row.energies)
         if self.policy is not None:
             self.policy.restore(found["policy"])
-        if self.watch is not None:
-            self.watch.restore(found["watch"])
+        self.watch.restore(found["watch"])
         self.pending.clear()
         self.forecast.restore(found["forecast"])
         self.samples.restore(found["samples"], self.state)

@@ -55,6 +55,8 @@ class Attempt(Generic[S]):
         What dense output needs.
     worst
         Path of the state of the largest error, where it is known.
+    happened
+        Events that the method met in it by itself: time in s, name, and the state then.
     """
 
     start: S
@@ -64,6 +66,7 @@ class Attempt(Generic[S]):
     least: float
     detail: Any = None
     worst: str = ""
+    happened: tuple[tuple[float, str, S], ...] = ()
 
 
 @final

@@ -7,6 +7,7 @@ before are held against the mean of their slips, v̄. So their heat −P_tᵀ v�
 a place; the energy of the end is moved to what is left, as that of all corrected steps is.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, final
 
@@ -18,6 +19,7 @@ from ephs.mechanics.impacts.mobility import answer
 from ephs.mechanics.impacts.touching import Touching
 from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.tree.equations.equations import ReducedState
+from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.rank import CONSTRAINT
 from ephs.solve.errors import Outcome, SolveError
@@ -39,6 +41,8 @@ QUIET = 1e-6
 """Speed, likewise, below which contacts do not bounce: a bouncing ball's rest of the time, and its square of energy."""
 PARTS = 10_000
 """Parts of a step at most."""
+BRIEF = 1e-6
+"""Part of a step that says nothing of what sticks or slips."""
 SLIVER = 1e-12
 """Part of a step that is none."""
 DIVISIONS = 60
@@ -49,6 +53,9 @@ SETTLED = 1e-7
 """Change of impulses beside their size that leaves the rest to a correction of velocities."""
 ROUNDED = 1e-13
 """Part of velocities, and of the mechanism's speed, that is rounding."""
+APART, STICKING, SLIPPING = range(3)
+SAID = ("opens", "sticks", "slips")
+"""What a contact does in a part of a step, and what events say where that changes."""
 TOO_LONG = 8.0
 """Error assigned to a part of a step whose halves meet contacts that the whole does not."""
 
@@ -68,6 +75,7 @@ class Impacts(ReducedMethod):
         self.rtol, self.atol = inner.rtol, inner.atol
         self.name, self.exponent, self.share = inner.name, inner.exponent, inner.share
         self._touching = Touching(self.equations)
+        self._names = _named(self._touching.paths)
         eq = self.equations
         self._inputs = eq.constant, eq.held, eq.steady
         self._alone = eq.problem.constant and not (eq.drive.any() or eq.wrench.any() or eq.given.supply.any())
@@ -76,7 +84,9 @@ class Impacts(ReducedMethod):
         self._closed = CLOSED * length
         self._speed = float(np.sqrt(np.linalg.norm(eq.gravity) * length))
         self.counts: dict[str, Any] = inner.counts
-        self.counts |= {"impacts": 0, "parts": 0}
+        self.counts |= {"parts": 0}
+        self._modes = np.zeros(len(self._touching))
+        self._happened: list[tuple[float, str, ReducedState]] = []
 
     def start(self, t: float, h: float) -> ReducedState:
         """The initial state; speeds count by the mechanism's own, a fall's or that of the start."""
@@ -96,16 +106,20 @@ class Impacts(ReducedMethod):
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
         """One step of h seconds, in as many parts as it takes."""
         here, left, error = self.equations.accounts.opened(state), h, 0.0
+        self._happened, modes = [], state.memory[0] if state.memory else None
         self.name, self.exponent, self.share = self._inner.name, self._inner.exponent, self._inner.share
         for _ in range(PARTS):
             here = self._struck(here)
             end, share, worst = self._taken(here, left)
+            if abs(share * left) > BRIEF * abs(h):
+                modes = self._changed(here, modes)
             here, error = end, max(error, worst)
             left *= 1.0 - share
             self.counts["parts"] += 1
             if abs(left) <= SLIVER * abs(h):
-                end = self._struck(replace(here, t=state.t + h))
-                return Attempt(state, end, h, error, self.equations.least(state, end))
+                end = replace(self._struck(replace(here, t=state.t + h)), memory=() if modes is None else (modes,))
+                least = self.equations.least(state, end)
+                return Attempt(state, end, h, error, least, happened=tuple(self._happened))
         path = self._touching.paths[int(np.argmin(self._touching.gaps(here.q, here.r)))]
         raise SolveError(Outcome.TINY, str(path), f"a step of more than {PARTS} impacts")
 
@@ -130,9 +144,19 @@ class Impacts(ReducedMethod):
         change = by @ blow.impulse
         mass = eq.mass(state.q, state.r)
         gained = float(change @ (mass @ (state.r + 0.5 * change)))
-        self.counts["impacts"] += 1
         end = replace(state, q=state.q.copy(), r=state.r + change, memory=())
-        return self._booked(state, end, closed, blow.heat, gained + float(blow.heat.sum()) if eq.driven.size else 0.0)
+        work = gained + float(blow.heat.sum()) if eq.driven.size else 0.0
+        end = self._booked(state, end, closed, blow.heat, work)
+        self._happened += [(end.t, f"{self._names[i]} strikes", end) for i in closed[blow.impulse[::3] > 0.0]]
+        return end
+
+    def _changed(self, start: ReducedState, before: Array | None) -> Array:
+        """What contacts do in a part of a step that was taken; changes since the part before are events."""
+        now = self._modes.copy()
+        if before is not None:
+            said = [(i, SAID[int(now[i])]) for i in np.flatnonzero(now != before)]
+            self._happened += [(start.t, f"{self._names[i]} {what}", start) for i, what in said]
+        return now
 
     def _booked(self, start: ReducedState, end: ReducedState, which: Index, heat: Array, work: float) -> ReducedState:
         """End of the step with heat of contacts and work in its accumulators."""
@@ -192,6 +216,7 @@ class Impacts(ReducedMethod):
     def _smooth(self, state: ReducedState, h: float, held: Index, gaps: Array) -> tuple[ReducedState, float, float]:
         """The end of h seconds with some contacts closed, its error, and the part of it after which to divide it."""
         eq, touching = self.equations, self._touching
+        self._modes[:] = APART
         if not held.size:
             self._flying()
             flight = self._inner.step(self._inner.anew(state), h)
@@ -241,6 +266,8 @@ class Impacts(ReducedMethod):
             put = 0.5 * float((rows0.T @ impulse) @ state.r + (rows1.T @ impulse) @ end.r)
         booked = self._booked(end, moved, held, heat, -put)
         booked, _ = eq.accounts.corrected(state, booked, h, np.full(self.atol.size, np.inf), chosen=False, alone=True)
+        slips = np.hypot(stop[1::3], stop[2::3]) > PARTING * self._speed
+        self._modes[held] = np.where(pressed, np.where(slips, SLIPPING, STICKING), APART)
         return replace(booked, memory=()), attempt.error, 1.0
 
     def _push(self, t: float, h: float, first: Array, last: Array) -> None:
@@ -274,6 +301,14 @@ class Impacts(ReducedMethod):
     def take(self, own: Snapshot, state: ReducedState) -> None:
         """Restore from a value of `taken`."""
         self._inner.take(own, state)
+
+
+def _named(paths: Sequence[Path]) -> list[str]:
+    """Names of contacts and joints by the paths of their processes; contacts of several points with the point."""
+    owners = [tuple(path)[:-1] for path in paths]
+    several = {owner[:-1] for owner in owners if owner[-1] == "point1"}
+    single = {owner for owner in owners if owner[-1] == "point0" and owner[:-1] not in several}
+    return [".".join(owner[:-1] if owner in single else owner) for owner in owners]
 
 
 def _closes(start: float, slope: float, end: float, slope1: float, closed: float) -> float:

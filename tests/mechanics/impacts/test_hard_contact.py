@@ -157,6 +157,30 @@ def test_a_rocking_block_loses_by_its_slenderness(tmp_path):
     assert sol.heat[1] / energy == pytest.approx(1.0 - (1.0 - 1.5 * np.sin(alpha) ** 2) ** 2, rel=1e-3)
 
 
+@pytest.mark.parametrize(("method", "step"), RUNS)
+def test_impacts_are_events(method, step, tmp_path):
+    """Bounces happen at √(2H/g) (1 + 2e + … + 2eᵏ), and each once; afterwards the ball rests."""
+    fall, e = 0.2, 0.5
+    scene = scene_of(tmp_path, body("ball", position=[0.0, 0.0, 0.1 + fall], restitution=e))
+    sol = run(scene, 1.0, method, step, save_at=np.linspace(0.0, 1.0, 7))
+    name, first = "contacts.ball_floor", np.sqrt(2.0 * fall / G)
+    strikes = [event.t for event in sol.events if event.name == f"{name} strikes"]
+    bounces = first * np.cumsum([1.0, *(2.0 * e**k for k in range(1, 12))])
+    assert strikes[:12] == pytest.approx(bounces, abs=1e-7)
+    assert np.all(np.diff(strikes) > 0.0)
+    last = sol.events[-1]
+    assert (last.name, last.t) == (f"{name} sticks", pytest.approx(3.0 * first, abs=1e-6))
+    assert last.state["bodies.ball.pe.q"][6] == pytest.approx(0.1, abs=1e-9)
+
+
+def test_the_end_of_a_slip_is_an_event(tmp_path):
+    mu, v0 = 0.3, 1.0
+    scene = scene_of(tmp_path, body("ball", position=[0.0, 0.0, 0.1], velocity=[v0, 0.0, 0.0], friction=mu))
+    until = 2.0 * v0 / (7.0 * mu * G)
+    (event,) = run(scene, 2.0 * until, "rk87").events
+    assert (event.name, event.t) == ("contacts.ball_floor sticks", pytest.approx(until, abs=1e-6))
+
+
 BALL = {"position": [0.0, 0.0, 0.3], "restitution": 0.5}
 
 
