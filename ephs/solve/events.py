@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, final
+from typing import Any, TypeVar, final
 
 import numpy as np
 
@@ -13,6 +13,8 @@ from ephs.solve.problem import States
 from ephs.solve.snapshot import Snapshot
 
 __all__ = ["Crossing", "Event", "Watch", "events_of"]
+
+S = TypeVar("S")
 
 
 @final
@@ -142,10 +144,14 @@ class Watch:
                 return t
         return None
 
-    def add(self, happened: Iterable[tuple[float, str, Mapping[Path, Array]]]) -> None:
-        """Record what a method met by itself: time, name and states."""
+    def stats(self) -> dict[str, Any]:
+        """The events so far as plain data, where any are looked for or were met."""
+        return {"events": [one.record() for one in self.crossings]} if self.events or self.crossings else {}
+
+    def add(self, happened: Iterable[tuple[float, str, S]], states: Callable[[S], Mapping[Path, Array]]) -> None:
+        """Record what a method met by itself: time, name, and the method's state, whose ``states`` by path are kept."""
         count = len(self.crossings)
-        self.crossings += [Crossing(name, t, state) for t, name, state in happened]
+        self.crossings += [Crossing(name, t, states(state)) for t, name, state in happened]
         if len(self.crossings) > count:
             self.crossings.sort(key=lambda crossing: crossing.t)
 

@@ -145,7 +145,7 @@ class _Run(Generic[S]):
             self.saved = 1
         self.samples.add([(self.t0, self.state, 0.0)])
         self.stepper.prepare(self.state, self.sign * self.h)
-        self.watch = Watch(self.events, self.t0, self._states(row) if self.events else {})
+        self.watch = Watch(self.events, self.t0, self._here() if self.events else {})
 
     def advance(self, stood: Snapshot | None) -> None:
         """To the end, or to an event that stops the run: in compiled code as far as that goes, then step after step.
@@ -246,15 +246,10 @@ class _Run(Generic[S]):
         after = self.stepper.at(attempt.end, t)
         stopped = None
         if self.watch.events:
-
-            def inside(when: float) -> Mapping[Path, Array]:
-                return self._states(self.stepper.row(self.stepper.inside(attempt, when)))
-
-            stopped = self.watch.step(self.t, t, self._states(self.stepper.row(after)), inside)
+            stopped = self.watch.step(self.t, t, self._at(after), lambda s: self._at(self.stepper.inside(attempt, s)))
             if stopped is not None and stopped != t:
                 t, after = stopped, self.stepper.at(self.stepper.inside(attempt, stopped), stopped)
-        met = (one for one in attempt.happened if self.sign * (t - one[0]) >= 0.0)
-        self.watch.add((when, name, self._states(self.stepper.row(state))) for when, name, state in met)
+        self.watch.add((h for h in attempt.happened if self.sign * (t - h[0]) >= 0.0), self._at)
         if self.production.active:
             row = self.stepper.row(after)
             self.production.step(t, row.x, row.energies)
@@ -289,11 +284,11 @@ class _Run(Generic[S]):
             error = self.balance.error(row.x, row.energies, row.sums)
             self.progress(self.t, self.until, {**self.stats(), "energy_error": error})
 
-    def _states(self, row: Row) -> Mapping[Path, Array]:
-        return States(self.problem.descriptor.unpack(row.x))
+    def _at(self, state: S) -> Mapping[Path, Array]:
+        return States(self.problem.descriptor.unpack(self.stepper.row(state).x))
 
     def _here(self) -> Mapping[Path, Array]:
-        return self._states(self.stepper.row(self.state))
+        return self._at(self.state)
 
     def stats(self) -> dict[str, Any]:
         """Statistics of the run so far."""
@@ -312,11 +307,7 @@ class _Run(Generic[S]):
             "setup_s": self.setup,
             "integrate_s": time.perf_counter() - self.begin - self.setup,
             "least_production": float(self.least) if np.isfinite(self.least) else 0.0,
-            **(
-                {"events": [one.record() for one in self.watch.crossings]}
-                if self.events or self.watch.crossings
-                else {}
-            ),
+            **self.watch.stats(),
         }
 
     def solution(self) -> Solution:
