@@ -69,8 +69,8 @@ class Heats:
         which count as they are: as energies at 1 K.
     laws
         c1 in J and c2 in J/K of these storages, as they are at present.
-    incidence
-        (entropies, flows): 1 where a flow goes, −1 where it comes from.
+    ends
+        (flows, 2) the entropies where a flow comes from and where it goes, −1 where there is none.
     frictions
         (frictions,) the flows that are heat of friction.
     theta
@@ -84,7 +84,7 @@ class Heats:
         paths: tuple[Path, ...],
         components: Index,
         laws: Callable[[], tuple[Array, Array]],
-        incidence: Array,
+        ends: Index,
         frictions: Index,
         theta: float,
         owners: Index,
@@ -92,10 +92,11 @@ class Heats:
         self._paths, self._components, self._present, self._theta = paths, components, laws, theta
         self._nodes, self.plain = components >= 0, components == PLAIN
         self._booked, self._units = bool(np.any(self._nodes)), np.where(self.plain, 1.0, theta)
-        self._incidence, self.frictions, self._owners = np.where(self.plain[:, None], 0.0, incidence), frictions, owners
-        self._sources, self._sinks = np.maximum(-incidence, 0.0).T, np.maximum(incidence, 0.0).T
-        self._loose = 1.0 - np.abs(incidence).max(axis=0, initial=0.0)
-        single = self._incidence.sum(axis=0)
+        self.frictions, self._owners = frictions, owners
+        self._source, self._sink = ends.T
+        self._loose = np.where(np.all(ends < 0, axis=1), 1.0, 0.0)
+        counted = np.where(self.plain, 0.0, 1.0)
+        single = _at(counted, self._sink) - _at(counted, self._source)
         single[frictions] = 0.0
         self.carried = single
         """(flows,) 1 where a flow that is no friction takes energy to what is booked, from what is not."""
@@ -149,8 +150,8 @@ class Heats:
     def flows(self, heats: Array, made: Array) -> Array:
         """(makers,) flows where components make so much entropy."""
         theta = self.temperatures(heats)
-        one, two = self._sources @ theta, self._sinks @ theta + self._loose
-        between = self._sources.any(axis=1)
+        one, two = _at(theta, self._source), _at(theta, self._sink) + self._loose
+        between = self._source >= 0
         drop = np.where(between, one - two, 1.0)
         with np.errstate(divide="ignore", invalid="ignore"):
             carried = np.where(between, made * one * two / drop, made * two)
@@ -187,7 +188,7 @@ class Heats:
         """(components,) entropies in J/K that flows in J carry in and out of components, by their sizes."""
         cold = 1.0 / self.temperatures(heats)
         made = np.zeros(flows.size)
-        np.add.at(made, self._owners, np.abs(flows) * (self._sinks @ cold + self._sources @ cold + self._loose))
+        np.add.at(made, self._owners, np.abs(flows) * (_at(cold, self._sink) + _at(cold, self._source) + self._loose))
         return made
 
     def taken(self, heats: Array, flows: Array) -> tuple[Array, Array]:
@@ -199,7 +200,10 @@ class Heats:
         SolveError
             More heat was carried away than there is.
         """
-        change = self._incidence @ flows
+        change = np.zeros(heats.size + 1)
+        np.add.at(change, self._sink, flows)
+        np.subtract.at(change, self._source, flows)
+        change = np.where(self.plain, 0.0, change[:-1])
         k, theta = self._nodes, self.temperatures(heats)
         share = np.zeros(heats.size)
         share[k] = change[k] / (self._laws[1] * theta[k])
@@ -209,5 +213,10 @@ class Heats:
         ratio = np.where(small, 1.0 + 0.5 * share, share / np.log1p(np.where(small, 1.0, share)))
         cold = 1.0 / (theta * ratio)
         made = np.zeros(flows.size)
-        np.add.at(made, self._owners, flows * (self._sinks @ cold - self._sources @ cold + self._loose))
+        np.add.at(made, self._owners, flows * (_at(cold, self._sink) - _at(cold, self._source) + self._loose))
         return change, made
+
+
+def _at(values: Array, ends: Index) -> Array:
+    """Values of the entropies at ends of flows, zero where there is none."""
+    return np.append(values, 0.0)[ends]

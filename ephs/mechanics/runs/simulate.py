@@ -32,6 +32,7 @@ from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.own_units import in_own_units, seen_from
 from ephs.mechanics.scene.state import Snapshot
 from ephs.operad import Path
+from ephs.operad.collector import paused_collector
 from ephs.semantics import extents
 from ephs.semantics.bundle import Reference
 from ephs.semantics.checks import random_efforts
@@ -289,6 +290,7 @@ def _reversible(problem: Problem, until: float) -> None:
                 raise OptionError("until", until, expected)
 
 
+@paused_collector()
 def problem_of_system(
     system: System,
     initial: Mapping[str, "ArrayLike"] | None = None,
@@ -326,6 +328,7 @@ def problem_of_system(
     return Problem(name, system, descriptor, state, signals, given, gaps=gaps, linked=linked)
 
 
+@paused_collector()
 def problem_of_scene(
     scene: Scene, initial: Mapping[str, "ArrayLike"] | None = None, inputs: Mapping[Any, Any] | None = None
 ) -> Problem:

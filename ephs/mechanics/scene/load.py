@@ -27,6 +27,7 @@ from ephs.mechanics.scene.text import file_text
 from ephs.mechanics.scene.touching import Laws, overlaps, resolve_contacts, resolve_surfaces, with_stops
 from ephs.operad import Path as Name
 from ephs.operad import PatternError
+from ephs.operad.collector import paused_collector
 from ephs.semantics.spaces.rank import ASSEMBLY
 
 MODELS = (".urdf", ".xml", ".sdf")
@@ -62,6 +63,7 @@ class _Reading:
     laws: dict[str, Laws] = field(default_factory=dict)
 
 
+@paused_collector()
 def load(
     path: str | PathLike[str],
     base: str = "fixed",

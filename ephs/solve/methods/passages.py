@@ -79,13 +79,12 @@ class Passages:
         self._flows = np.array([port.flow for port in ports], dtype=np.int64)
         effort = np.array([stores[port.store].effort for port in ports], dtype=np.int64)
         self._effort, self._intensive = int(t.counts[0]) + effort, t.intensive[effort]
-        incidence = np.zeros((len(stores), len(ports)))
-        incidence[[port.store for port in ports], np.arange(len(ports))] = 1.0
+        ends = np.array([(-1, port.store) for port in ports], dtype=np.int64).reshape(-1, 2)
         laws = np.array([store.law for store in stores]).reshape(-1, 2)
         c1, c2 = laws[laws[:, 1] > 0.0].T
         components = np.where(laws[:, 1] > 0.0, [store.component for store in stores], -1).astype(np.int64)
         self._heats = Heats(
-            tuple(d.components[store.component].path for store in stores), components, lambda: (c1, c2), incidence,
+            tuple(d.components[store.component].path for store in stores), components, lambda: (c1, c2), ends,
             np.flatnonzero([port.friction for port in ports]), model.reference.temperature, np.arange(len(ports)),
         )  # fmt: skip
         self._rest = (t.kind == STORING).astype(float)

@@ -26,6 +26,7 @@ from ephs.mechanics.tree.finding.layout import Layout
 from ephs.mechanics.tree.finding.mechanism import reduce_system
 from ephs.mechanics.tree.finding.naming import tolerances, within
 from ephs.mechanics.tree.finding.tables import SPRING
+from ephs.operad.collector import paused_collector
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.semantics.spaces.rank import SPARSE, TINY
@@ -57,6 +58,7 @@ class Equations:
         Whether the loops were closed last at constraints that nearly repeat each other.
     """
 
+    @paused_collector()
     def __init__(self, problem: Problem, t0: float, *, pushed: bool = False, apart: bool = False) -> None:
         self.problem, self._apart = problem, apart
         self.model = model = compile_model(

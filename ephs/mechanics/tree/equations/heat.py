@@ -25,12 +25,12 @@ def heats_of(reduced: Reduced, theta: float) -> Heats:
         return rows[:, Node.c1.offset], rows[:, Node.c2.offset]
 
     flows, sinks, owners = t.sink.T
-    incidence = np.zeros((t.node.size, len(reduced.made)))
-    incidence[sinks[sinks >= 0], flows[sinks >= 0]] = 1.0
+    ends = np.full((len(reduced.made), 2), -1, dtype=np.int64)
+    ends[flows, 1] = sinks
     owner = np.arange(len(reduced.made))
     owner[flows] = owners
     booked = (sinks >= 0) & (t.node[sinks] != PLAIN) if sinks.size else np.zeros(0, dtype=bool)
     frictions = flows[booked & (np.bincount(owners, minlength=owner.size)[owners] == 1)]
     for component, one, two in t.conduction.tolist():
-        incidence[one, t.made_at[component]], incidence[two, t.made_at[component]] = -1.0, 1.0
-    return Heats(reduced.entropies, t.node, laws, incidence, frictions, theta, owner)
+        ends[t.made_at[component]] = one, two
+    return Heats(reduced.entropies, t.node, laws, ends, frictions, theta, owner)

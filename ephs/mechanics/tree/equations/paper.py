@@ -65,10 +65,10 @@ class PaperStates:
                 yield link.pose.path, POSE, number
             if link.momentum is not None:
                 yield link.momentum.path, MOMENTUM, number
-        for number, edge in enumerate(self.reduced.edges):
+        springs = self.reduced.tables.kind == SPRING
+        before = np.cumsum(springs) - springs  # how many springs stand before each edge
+        for number, (edge, spring, first) in enumerate(zip(self.reduced.edges, springs, before.tolist(), strict=True)):
             if edge.path is not None and edge.state is not None:
-                spring = self.reduced.tables.kind[number] == SPRING
-                first = number - int(np.count_nonzero(self.reduced.tables.kind[:number] != SPRING))
                 yield edge.state, RELATIVE if spring else ELEMENT, first if spring else number
 
     def arrays(self) -> list[Any]:
