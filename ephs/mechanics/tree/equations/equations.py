@@ -92,8 +92,7 @@ class Equations:
         self.steady, self.timed = self.constant or self.held, problem.timed
         self._paper, self.layout = PaperStates(reduced, problem), Layout.of(reduced)
         self.booking = Booking(self, self._paper)
-        self.evaluations = 0
-        self.accounts = Accounts(self)
+        self.evaluations, self.accounts = 0, Accounts(self)
         self.gravity = reduced.gravity
         self.driven = self.prescribed.freedoms
         self._momenta = False
