@@ -170,7 +170,8 @@ GROUPS = {
         ),
         (
             f"{MECHANICS}/tree/engine",
-            *(f"{MECHANICS}/tree/test_{name}.py" for name in ("attached", "gears", "oracle", "sweeps")),
+            *(f"{MECHANICS}/tree/test_{name}.py" for name in ("attached", "gears", "joint_rates", "oracle", "sweeps")),
+            f"{MECHANICS}/test_work.py",
             "tests/solve/test_march.py",
             f"{MECHANICS}/methods/test_heat.py",
             f"{MECHANICS}/elements/test_contact.py",

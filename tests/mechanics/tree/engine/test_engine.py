@@ -11,6 +11,7 @@ import ephs
 from benchmarks.cases import CASES
 from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.tree.engine.closing import closing
+from ephs.mechanics.tree.engine.links import links_of
 from ephs.mechanics.tree.equations.equations import Equations
 from ephs.solve.errors import SolveError
 from ephs.testing import mechanisms
@@ -132,3 +133,52 @@ def test_a_ladder_of_loops_has_few_rows_open_at_once(windows):
 def test_a_run_that_leaves_the_range_of_numbers_is_not_blamed_on_masses():
     with pytest.raises(ephs.SimulationError, match="beyond the range of numbers"):
         ephs.simulate(ephs.load(SCENES["chain"]), 2000.0, method="rk54", step=20.0)
+
+
+TWO_SPRINGS = """
+format = 1
+name = "sprung"
+[world]
+gravity = [0.0, 0.0, 0.0]
+[bodies.one]
+mass = 1.0
+inertia = [0.1, 0.1, 0.1]
+position = [0.5, 0.0, 0.0]
+[bodies.two]
+mass = 1.0
+inertia = [0.1, 0.1, 0.1]
+position = [1.5, 0.0, 0.0]
+[joints.first]
+type = "revolute"
+bodies = ["ground", "one"]
+at = [0.0, 0.0, 0.0]
+axis = [0.0, 1.0, 0.0]
+stiffness = 3.0
+[joints.second]
+type = "{second}"
+bodies = ["one", "two"]
+at = [1.0, 0.0, 0.0]
+axis = [0.0, 1.0, 0.0]
+stiffness = {stiffness}
+"""
+
+
+def sprung(tmp_path, second="revolute", stiffness="5.0"):
+    file = tmp_path / "sprung.toml"
+    file.write_text(TWO_SPRINGS.format(second=second, stiffness=stiffness))
+    return ephs.load(file)
+
+
+def test_each_spring_has_the_energy_of_its_own_joint(tmp_path):
+    eq = equations(sprung(tmp_path))
+    start = eq.start(0.0)
+    for q in np.random.default_rng(0).standard_normal((4, 2)):
+        found = eq.engine.energy(q, 0.0 * start.r, start.heats)[1]
+        assert found == pytest.approx(0.5 * (3.0 * q[0] ** 2 + 5.0 * q[1] ** 2), rel=1e-14)
+
+
+def test_only_pins_and_slides_are_taken_for_planar(tmp_path):
+    """A planar pair moves in the plane as well, by elements that the planar sweeps do not have."""
+    plain = links_of(equations(sprung(tmp_path)).reduced)
+    wider = links_of(equations(sprung(tmp_path, "planar", "[5.0, 1.0, 2.0]")).reduced)
+    assert plain.planar and not wider.planar
