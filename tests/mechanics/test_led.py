@@ -1,9 +1,13 @@
 """The work of prescribed motions that leave no freedom: through dead centres, by every method."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 import ephs
 from benchmarks.hard.dead_centre import RATE, folding, gained
+from ephs import PolynomialMotion
 
 UNTIL = 4.9
 SHAFT = """
@@ -70,3 +74,22 @@ def test_a_motion_that_leaves_freedoms_is_counted_by_its_multiplier(tmp_path):
     sol = ephs.simulate(ephs.load(file), 1.0, method="rk54", rtol=1e-4)
     assert 1e-12 < sol.stats["plain_defect"]["largest"] / sol.ledgers.scale < 1e-2
     assert sol.energy_error.max() < 1e-12
+
+
+@pytest.mark.parametrize("method", ["natural", "natural4"])
+def test_a_loop_that_is_held_at_rest_takes_few_iterations(method):
+    """All velocities are rounding: residuals of constraints have no scale of their own, and none is made of it."""
+    scene = ephs.load("scenes/slider-crank.toml")
+    scene = replace(
+        scene,
+        bodies={name: replace(body, twist=np.zeros(6)) for name, body in scene.bodies.items()},
+        joints={
+            name: replace(joint, rate=0.0 * joint.rate)
+            if name != "bearing"
+            else replace(joint, rate=0.0 * joint.rate, drive=None, motion=PolynomialMotion([0.0]))
+            for name, joint in scene.joints.items()
+        },
+    )
+    sol = ephs.simulate(scene, 0.3, method=method, **({"step": 1e-2} if method == "natural" else {}))
+    assert sol.audit.passed and sol.joint("bearing").coordinate[-1, 0] == 0.0
+    assert sol.stats["iterations"] <= 12 * sol.stats["steps"]

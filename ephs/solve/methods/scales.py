@@ -18,6 +18,10 @@ NOTHING = 1e-200
 SPREAD: Final = 1e-3
 """A block's scale is at least this fraction of the largest of its kind: e = 0 alone has no scale of its own."""
 
+FAINT: Final = 1e-18
+"""A block's scale is at least this fraction of the largest of all, whatever their units: terms that an iteration makes
+of rounding where everything is at rest have none of their own."""
+
 TAKES_PART: Final = 1e-3
 """The least coefficient, relative to the largest, with which an effort takes part in a constraint; less is rounding."""
 FAR: Final = 1e300
@@ -158,16 +162,18 @@ def measure(on: Evaluator, t: Columns, z: Vector, dropped: Integers, m: Scratch)
     """
     fill(on, m.block, 0.0)
     fill(on, m.group, 0.0)
-    worst, defect = on.variable(0.0), on.variable(0.0)
+    worst, defect, largest = on.variable(0.0), on.variable(0.0), on.variable(0.0)
 
     def gather(i: Integer) -> None:
         block = t.block[i]
+        largest.value = on.maximum(largest.value, m.scale[i])
         raise_to(on, m.block, block, m.scale[i])
         raise_to(on, m.group, t.group[block], m.scale[i])
 
     def one(i: Integer) -> None:
         block = t.block[i]
         scale = on.maximum(m.block[block], SPREAD * m.group[t.group[block]])
+        scale = on.maximum(scale, FAINT * largest.value)
         sized = scale > NOTHING
         ratio = on.select(sized, on.absolute(m.residual[i]) / on.select(sized, scale, 1.0), 0.0)
 
