@@ -116,6 +116,6 @@ def _proofs(primitive: "Primitive") -> tuple[Condition, ...]:
         return proved("it is constant, and was evaluated", *STATEMENTS[primitive.kind])
     if primitive.formula is None:
         return tuple(Condition(statement, False, "") for statement in STATEMENTS[primitive.kind])
-    from ephs.semantics.symbols.proofs import conditions_of
+    from ephs.semantics.proving import conditions_of
 
     return conditions_of(primitive)

@@ -15,7 +15,9 @@ import ephs
 from ephs import Pattern, junction
 from ephs import quantity as Q
 from ephs.semantics import StructureError, library
-from ephs.semantics.symbols.proofs import conditions_of
+from ephs.semantics.proving import conditions_of
+from ephs.semantics.stage.store import STORE
+from ephs.semantics.symbols import proofs as prover
 from ephs.semantics.verdict import Condition, StructureVerdict
 from ephs.testing import check_entropy_production, check_primitive
 from tests.semantics.test_primitives import ARGUMENTS, made
@@ -107,6 +109,40 @@ def test_proofs_hold_for_all_numbers_of_a_sign(name, value):
 def test_the_formulas_of_the_library_are_proved_symbolically(name):
     primitive = replace(made(name), proof=None, trusted=True)
     assert all(condition.proved for condition in conditions_of(primitive)), primitive.verdict.text
+
+
+@pytest.fixture
+def proofs(tmp_path, monkeypatch):
+    """Formulas proved by SymPy so far, with an empty store on disk."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr(STORE, "usable", True)
+    done = []
+
+    def counted(primitive, signs, prove=prover.findings_of):
+        done.append(primitive.name)
+        return prove(primitive, signs)
+
+    monkeypatch.setattr(prover, "findings_of", counted)
+    return done
+
+
+@pytest.mark.parametrize("name", ["friction", "heat_transfer", "point_mass", "lever"])
+def test_proofs_on_disk_are_those_of_the_prover(name, proofs):
+    primitive = replace(made(name), proof=None, trusted=True)
+    first = conditions_of(primitive)
+    assert len(proofs) == 1
+    assert conditions_of(primitive) == first
+    assert len(proofs) == 1
+
+
+def test_proofs_of_other_signs_and_of_foreign_functions_are_not_taken_from_disk(proofs):
+    for k in (1.0, 0.0, 2.0):
+        conditions_of(replace(library.lever(k), proof=None, trusted=True))
+    assert len(proofs) == 2
+    own = ephs.storage({"q": Q.displacement}, lambda q: 0.5 * q * q)
+    for _ in range(2):
+        assert all(condition.proved for condition in conditions_of(own))
+    assert proofs.count(own.name) >= 2
 
 
 BY_SYMBOLS = (

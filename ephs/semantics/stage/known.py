@@ -117,6 +117,9 @@ class _Teller:
             case Mapping():
                 pairs = cast("Mapping[object, object]", value).items()
                 return f"{{{self._all([part for pair in pairs for part in pair])}}}"
+            case np.ndarray() if not value.dtype.hasobject:
+                array = cast("np.ndarray[Any, Any]", value)
+                return f"array({array.dtype.str},{array.shape},{hashlib.sha256(array.tobytes()).hexdigest()})"
             case FunctionType():
                 try:
                     cells = [cell.cell_contents for cell in value.__closure__ or ()]

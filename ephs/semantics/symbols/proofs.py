@@ -21,9 +21,8 @@ from ephs.semantics.symbols.calculus import trivialised
 from ephs.semantics.symbols.signs import sign_shown, squares_shown, vanishes
 from ephs.semantics.symbols.tracing import Trace, Untraceable, trace
 from ephs.semantics.trials import ROTATING, extent
-from ephs.semantics.verdict import Condition
 
-__all__ = ["conditions_of"]
+__all__ = ["findings_of"]
 
 SYMBOLIC = "symbolically"
 Symbols = tuple[Expr, ...]
@@ -33,25 +32,23 @@ Findings = tuple[tuple[str, str], ...]
 """Statements with how they are proved; an empty text where they are not."""
 
 
-def conditions_of(primitive: Primitive) -> tuple[Condition, ...]:
-    """The conditions on a primitive that has a formula, each with its proof or without one."""
-    try:
-        findings = _findings(primitive)
-    except Untraceable:
-        findings = tuple((statement, "") for statement in STATEMENTS[primitive.kind])
-    return tuple(Condition(statement, bool(how), how) for statement, how in findings)
+def findings_of(primitive: Primitive, signs: Mapping[str, int]) -> Findings:
+    """The conditions on a primitive that has a formula, with proofs; none where it cannot be traced.
 
-
-def _findings(primitive: Primitive) -> Findings:
+    Parameters
+    ----------
+    signs
+        Parameter -> its sign, -1, 0 or 1.
+    """
     assert primitive.formula is not None
-    given = dict(primitive.parameters)
-    numbers = {name: given[name] for name in primitive.formula.parameters}
-    key = (primitive.kind, tuple(primitive.interface.items()), primitive.reads, primitive.domain)
     functions = (primitive.formula.function, primitive.formula.gradient)
-    signs = tuple((name, int(np.sign(float(str(value))))) for name, value in numbers.items())
-    if primitive.formula.parameters:
-        return _of_library(key, functions, signs, _Same(primitive))
-    return _of_functions(primitive, functions, {})
+    try:
+        if not primitive.formula.parameters:
+            return _of_functions(primitive, functions, {})
+        key = (primitive.kind, tuple(primitive.interface.items()), primitive.reads, primitive.domain)
+        return _of_library(key, functions, tuple(signs.items()), _Same(primitive))
+    except Untraceable:
+        return ()
 
 
 class _Same:

@@ -130,7 +130,7 @@ DIFFERENT = [
     functools.partial(sin, 2), functools.partial(cos, 1), Entry(sin, x=vector()), Entry(sin, x=vector(1)),
     Entry(sin, x=vector(2)), Entry(sin, x=matrix(1)), Entry(sin, x=matrix(2)), Entry(cos, x=vector(1)),
     Entry(sin, x=vector()).tangent(), Entry(sin, x=vector()).tangent(directions=2), Entry(sin, x=vector()).taped(),
-    Duals.__init__,
+    Duals.__init__, np.zeros(2), np.zeros((2, 1)), np.zeros(2, int), np.array([0.0, -0.0]),
 ]  # fmt: skip
 
 
@@ -145,7 +145,7 @@ def test_what_is_equal_is_told_alike():
     assert all(known._Teller().tell(one) == known._Teller().tell(other) for one, other in pairs)
 
 
-@pytest.mark.parametrize("value", [object(), np.zeros(2), Path(), Named(object()), bound(np.zeros(2)), len, Path])
+@pytest.mark.parametrize("value", [object(), np.array([object()]), Path(), Named(object()), bound(object()), len, Path])
 def test_what_the_sources_do_not_determine_is_not_told(value):
     with pytest.raises(known._Foreign):
         known._Teller().tell(value)
