@@ -136,8 +136,8 @@ def test_proofs_on_disk_are_those_of_the_prover(name, proofs):
 
 
 def test_proofs_of_other_signs_and_of_foreign_functions_are_not_taken_from_disk(proofs):
-    for k in (1.0, 0.0, 2.0):
-        conditions_of(replace(library.lever(k), proof=None, trusted=True))
+    for d in (1.0, 0.0, 2.0):
+        conditions_of(replace(library.friction(d=d), proof=None, trusted=True))
     assert len(proofs) == 2
     own = ephs.storage({"q": Q.displacement}, lambda q: 0.5 * q * q)
     for _ in range(2):
