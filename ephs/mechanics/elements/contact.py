@@ -50,8 +50,11 @@ def contact(touches: Sequence[Touch], law: Law | Impact, *, heat: bool = False) 
     if heat:
         junctions["s"] = junction(quantity.entropy, exposed=True)
         wires["s"] = "s"
+    known = {(gap.name, gap.numbers): gap for _, _, gap in touches}
+    parts = {key: _parts(gap, law) for key, gap in known.items()}
     points = {
-        f"point{i}": between_frames(one, two, *_parts(gap, law), heat=heat) for i, (one, two, gap) in enumerate(touches)
+        f"point{i}": between_frames(one, two, *parts[gap.name, gap.numbers], heat=heat)
+        for i, (one, two, gap) in enumerate(touches)
     }
     return System.of(Pattern(junctions=junctions, boxes=dict.fromkeys(points, wires)), points)
 

@@ -24,6 +24,8 @@ ITERATIONS = 40
 HALVINGS = 12
 EXACT = 1e-13
 """Residual beside its terms that is rounding."""
+NEARLY = 1e-8
+"""Likewise, where contacts so nearly repeat each other that no iteration does better."""
 
 
 def impulses(whole: Array, free: Array, friction: Sequence[float], start: Array | None = None) -> Array | None:
@@ -47,14 +49,13 @@ def impulses(whole: Array, free: Array, friction: Sequence[float], start: Array 
     if not m or np.all(free[::3] >= 0.0):
         return np.zeros(3 * m)
     found = np.zeros(3 * m) if start is None else start
-    allowed = EXACT * float(np.abs(rho * free).max())
+    terms, before = float(np.abs(rho * free).max()), np.inf
     for _ in range(TRIALS):
-        found, size = _newton(whole, free, mu, rho, found, allowed)
-        if size <= allowed:
+        found, size = _newton(whole, free, mu, rho, found, EXACT * terms)
+        if size <= EXACT * terms or 0.5 * before <= size <= NEARLY * terms:
             return _inside(found, mu)
-        found = _swept(whole, free, mu, rho, found)
-    found, size = _newton(whole, free, mu, rho, found, allowed)
-    return _inside(found, mu) if size <= 1e3 * allowed else None
+        found, before = _swept(whole, free, mu, rho, found), size
+    return None
 
 
 def _inside(found: Array, mu: Array) -> Array:

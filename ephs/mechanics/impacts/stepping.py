@@ -49,6 +49,8 @@ DIVISIONS = 60
 ROUNDS = 20
 FLAT = 1e-9
 """Imaginary part beside 1 of a root that is real."""
+PRESSING = 1e-6
+"""Part of the largest impulse below which a contact does not press."""
 SETTLED = 1e-7
 """Change of impulses beside their size that leaves the rest to a correction of velocities."""
 ROUNDED = 1e-13
@@ -247,12 +249,12 @@ class Impacts(ReducedMethod):
             impulse = found
         else:  # the part is too long for them
             return state, 0.0, 0.5
-        pressed = found[::3] > 0.0
+        pressed = found[::3] > PRESSING * found[::3].max()
         moved = self._put(end, held[pressed], gaps[held[pressed]], change[:, ::3][:, pressed])
         rows1, _ = touching.rows(moved.q, moved.r, held, axes)
         moved = replace(moved, r=moved.r + change @ (found - impulse))
         stop = rows1 @ moved.r
-        loose = held[found[::3] <= 0.0]
+        loose = held[~pressed]
         if loose.size and touching.gaps(moved.q, moved.r)[loose].min() < -self._closed:  # it leaves and comes back
             return end, 0.0, 0.5
         if (divided := _turning(before, stop, found, laws, PARTING * self._speed)) < 1.0:

@@ -25,10 +25,14 @@ __all__ = [
     "plane_sphere",
     "ramp",
     "rounded_box_sphere",
+    "segments",
+    "sphere_rounded_box",
 ]
 
 UPRIGHT: Final = 1e-3
 """Inclination in rad below which a circle counts as flat: its gap is smaller by this part of the radius at the most."""
+PARALLEL: Final = 1e-6
+"""Square of the sine of an angle below which segments count as parallel: any of their nearest points is taken."""
 HEIGHT: Final = (6,)
 PLACE: Final = (4, 5, 6)
 """Places of z, and of x, y, z, in a pose."""
@@ -127,6 +131,76 @@ def plane_rim(radius: float) -> Gap:
     return Gap("plane_rim", distance, contact, radius, (("radius", radius),), (HEIGHT, radius * (1.0 + UPRIGHT)))
 
 
+def _clamped(x: Any, most: float) -> Any:
+    """x between −most and most."""
+    return 0.5 * (abs(x + most) - abs(x - most))
+
+
+def _into(pose: Any, vector: Vector) -> Vector:
+    """A vector of the axes of C1 in those of C2."""
+    axes = quaternion_to_matrix(pose[:4])
+    x, y, z = (dot((axes[0][i], axes[1][i], axes[2][i]), vector) for i in range(3))
+    return x, y, z
+
+
+def segments(half1: float, radius1: float, half2: float, radius2: float) -> Gap:
+    """Gap between two capsules about the z axes of C1 and C2: segments of these half lengths, with radii.
+
+    Where they are parallel, the contact is at one of the points that are nearest.
+    """
+
+    def beyond(pose: Any) -> tuple[Vector, Any, Any]:
+        axes = quaternion_to_matrix(pose[:4])
+        x, y, z = axes[0][2], axes[1][2], axes[2][2]
+        along = dot((pose[4], pose[5], pose[6]), (x, y, z))
+        one = _clamped((pose[6] - z * along) / (x * x + y * y + PARALLEL), half1)
+        two = _clamped(one * z - along, half2)
+        one = _clamped(pose[6] + two * z, half1)
+        away = pose[4] + two * x, pose[5] + two * y, pose[6] + two * z - one
+        return away, np.sqrt(dot(away, away) + TINY), two
+
+    def contact(pose: Any) -> tuple[Vector, Vector]:
+        away, length, at = beyond(pose)
+        x, y, z = _times(1.0 / length, _into(pose, away))
+        return (x, y, z), (-radius2 * x, -radius2 * y, at - radius2 * z)
+
+    return Gap(
+        "segments",
+        lambda pose: beyond(pose)[1] - (radius1 + radius2),
+        contact,
+        radius2,
+        (("half1", half1), ("radius1", radius1), ("half2", half2), ("radius2", radius2)),
+        (PLACE, half1 + half2 + radius1 + radius2),
+        2.0 * (radius1 + radius2),
+    )
+
+
+def sphere_rounded_box(radius: float, half: Vector, rounding: float) -> Gap:
+    """Gap between a sphere about the origin of C1 and a rounded box about that of C2: `rounded_box_sphere` turned."""
+
+    def beyond(pose: Any) -> tuple[Vector, Vector, Any]:
+        at = _times(-1.0, _into(pose, (pose[4], pose[5], pose[6])))
+        near = tuple(_clamped(x, h) if h else 0.0 for x, h in zip(at, half, strict=True))
+        away = at[0] - near[0], at[1] - near[1], at[2] - near[2]
+        return away, (near[0], near[1], near[2]), np.sqrt(dot(away, away) + TINY)
+
+    def contact(pose: Any) -> tuple[Vector, Vector]:
+        away, near, length = beyond(pose)
+        out = _times(rounding / length, away)
+        return _times(-1.0 / length, away), (near[0] + out[0], near[1] + out[1], near[2] + out[2])
+
+    sizes = zip(("half_x", "half_y", "half_z"), half, strict=True)
+    return Gap(
+        "sphere_rounded_box",
+        lambda pose: beyond(pose)[2] - (rounding + radius),
+        contact,
+        rounding,
+        (("radius", radius), *sizes, ("rounding", rounding)),
+        (PLACE, sum(half) + rounding + radius),
+        2.0 * (min(half) + rounding + radius),
+    )
+
+
 def rounded_box_sphere(half: Vector, rounding: float, radius: float) -> Gap:
     """Gap between a box of half lengths ``half`` about C1, its edges rounded outwards, and a sphere about C2.
 
@@ -135,13 +209,12 @@ def rounded_box_sphere(half: Vector, rounding: float, radius: float) -> Gap:
     """
 
     def beyond(pose: Any) -> tuple[Vector, Any]:
-        x, y, z = (at - 0.5 * (abs(at + h) - abs(at - h)) if h else at for at, h in zip(pose[4:], half, strict=True))
+        x, y, z = (at - _clamped(at, h) if h else at for at, h in zip(pose[4:], half, strict=True))
         return (x, y, z), np.sqrt(x * x + y * y + z * z + TINY)
 
     def contact(pose: Any) -> tuple[Vector, Vector]:
         away, length = beyond(pose)
-        axes = quaternion_to_matrix(pose[:4])
-        x, y, z = (dot((axes[0][i], axes[1][i], axes[2][i]), away) / length for i in range(3))
+        x, y, z = _times(1.0 / length, _into(pose, away))
         return (x, y, z), (-radius * x, -radius * y, -radius * z)
 
     sizes = zip(("half_x", "half_y", "half_z"), half, strict=True)
