@@ -105,6 +105,10 @@ def test_plots_are_picked_zoomed_and_follow_the_motion(crank, tmp_path):
         count = "document.querySelectorAll('#plots figure').length"
         legend = "[...document.querySelectorAll('#plots .u-label')].map(each => each.textContent).join()"
         before = tab.evaluate(count)
+        # values of the animation's time stand in the legends, rounding as zero
+        values = "[...document.querySelectorAll('#plots .u-value')].map(each => each.textContent)"
+        tab.until(f"{values}.every(each => each !== '')")
+        assert not [value for value in tab.evaluate(values) if "e\u22121" in value]
         assert "least production" not in tab.evaluate(legend)
         pick = "[...document.querySelectorAll('#picker label')].find(each => each.textContent === 'least production')"
         tab.evaluate(f"{pick}.querySelector('input').click()")

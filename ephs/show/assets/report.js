@@ -61,7 +61,8 @@
         { label: panel.title, labelSize: 18, size: 66, values: (_, ticks) => ticks.map((v) => (v == null ? "" : Number(v.toPrecision(6)).toString().replace(/-/g, "\u2212"))) },
       ],
       series: [{ label: "t", value: (_, v) => (v == null ? "" : figures(v) + " s") },
-        ...curves.map((curve) => ({ label: curve.name, stroke: curve.colour, width: 1.5, value: (_, v) => figures(v) }))],
+        ...curves.map((curve) => ({ label: curve.name, stroke: curve.colour, width: 1.5,
+          value: (_, v) => (v != null && !panel.residual && Math.abs(v) < panel.noise ? "0" : figures(v)) }))],
       cursor: { sync: { key: "time" }, drag: { x: true, y: false } },
       hooks: {
         draw: [line],
@@ -112,11 +113,14 @@
   panels.forEach(draw);
   addEventListener("resize", () => everywhere((plot) => plot.setSize({ width: host.clientWidth, height: plot.height })));
 
-  // The player's time is a line in every plot; a click on a plot sets it.
+  // The player's time is a line in every plot, with the values there unless the mouse points at others; a click sets it.
   document.addEventListener("frame", (event) => {
     if (event.detail === now) return;
     now = event.detail;
-    for (const plot of plots.values()) plot.redraw(false);
+    for (const plot of plots.values()) {
+      plot.redraw(false);
+      if (!(plot.cursor.left >= 0)) plot.setLegend({ idx: plot.valToIdx(now) });
+    }
   });
   host.addEventListener("click", (event) => {
     const over = event.target.closest(".u-over"), plot = [...plots.values()].find((each) => each.over === over);
