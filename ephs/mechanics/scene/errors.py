@@ -139,7 +139,8 @@ TEXTS: dict[str, tuple[str, str]] = {
     "beyond stop": ("a start between hard stops", "move the joint, or take limit_restitution out"),
     "no scale": ("a stiffness, as nothing in the scene moves or falls", "add this key"),
     "unknown surface": ("a surface", "{hint}"),
-    "surface shape": ("one of sphere, capsule, cylinder, box, plane = {{}}", "a surface has exactly one shape"),
+    "convex mesh": ("an STL file of a convex body", "take its convex hull, or several convex pieces"),
+    "surface shape": ("one of sphere, capsule, cylinder, box, plane = {{}}, mesh", "a surface has exactly one shape"),
     "surface pair": ("a pair of shapes that can touch: {pairs}", "list the contacts that are meant, or take others"),
     "two exponents": ("one exponent", "give both surfaces the same, or the contact its own"),
     "no stiffness": (

@@ -137,7 +137,7 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
     springs = {n: resolve.resolve_spring(n, t, names, faults) for n, t in sections["springs"].items()}
     conduction = resolve.resolve_conduction(document, names, faults)
     markers = resolve.resolve_markers(document, names, faults)
-    surfaces = resolve_surfaces(document, names, faults)
+    surfaces = resolve_surfaces(document, names, path.parent, faults)
     loads = resolve.resolve_loads(document, names, faults)
     if faults:
         return None

@@ -295,7 +295,7 @@ def _motion(entry: JointEntry, d: int, drive: Array, key: str, faults: list[Faul
     return found
 
 
-def _mesh(name: str, folder: Path) -> Path | None:
+def mesh_file(name: str, folder: Path) -> Path | None:
     """The file, if it lies in a folder or below once links are followed."""
     try:
         file = (folder / name).resolve()
@@ -315,7 +315,7 @@ def _shape(entry: ShapeEntry, key: str, folder: Path, faults: list[Fault]) -> Ma
     if "rotation" in given:
         given["rotation"] = values.quaternion(given["rotation"], f"{key}.rotation", faults).tolist()
     if "mesh" in given:
-        file = _mesh(given["mesh"], folder)
+        file = mesh_file(given["mesh"], folder)
         if file is None:
             faults.append(fault("mesh", f"{key}.mesh", shown(given["mesh"])))
         elif file.suffix.lower() not in MESHES:

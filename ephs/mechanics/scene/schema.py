@@ -177,7 +177,7 @@ class SpringEntry(Entry):
 
 
 class SurfaceShapeEntry(Entry):
-    """``shape`` of a surface: one of five."""
+    """``shape`` of a surface: one of six."""
 
     sphere: Positive | None = Field(default=None, description="radius, m")
     capsule: Sizes | None = Field(default=None, description="radius, and length of its axis along z, m")
@@ -188,6 +188,7 @@ class SurfaceShapeEntry(Entry):
     plane: Annotated[dict[str, Number], Field(max_length=0)] | None = Field(
         default=None, description="the plane z = 0, solid below"
     )
+    mesh: Text | None = Field(default=None, description="STL file of a convex body, which meets planes; m")
 
 
 class ContactLawEntry(Entry):
@@ -217,7 +218,7 @@ class SurfaceEntry(ContactLawEntry):
     """``[surfaces.NAME]``"""
 
     body: Text = Field(description='the body that has it, or "ground"')
-    shape: SurfaceShapeEntry = Field(description="sphere, capsule, cylinder, box or plane")
+    shape: SurfaceShapeEntry = Field(description="sphere, capsule, cylinder, box, plane or mesh")
     position: Vector | None = Field(default=None, description="in the centre-of-mass frame (ground: world), m")
     rotation: Rotation | None = Field(default=None, description="likewise, [w, x, y, z] or a table")
 

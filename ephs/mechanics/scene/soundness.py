@@ -113,7 +113,9 @@ def _shapes(scene: Scene) -> Iterator[tuple[str, dict[str, tuple[Any, tuple[int,
         ((kind, sizes),) = surface.shape.items()
         if kind not in SIZES:
             raise ValueError(f"surface {legible(name)} is a {legible(str(kind))}")
-        yield name, {"frame": (surface.frame, (7,))} | ({kind: (sizes, SIZES[kind])} if kind != "plane" else {})
+        known = SIZES[kind]
+        expected: tuple[int, ...] = np.shape(sizes) if known is None else known
+        yield name, {"frame": (surface.frame, (7,))} | ({kind: (sizes, expected)} if kind != "plane" else {})
     for name, contact in scene.all_contacts():
         yield name, {key: (number, ()) for key, number in contact.law.numbers}
     for _, name, each in scene.all_attachments():

@@ -23,7 +23,7 @@ class Surface:
     Attributes
     ----------
     shape : one of ``{"sphere": r}``, ``{"capsule": [r, length]}``, ``{"cylinder": [r, length]}``, ``{"box": [x, y,
-        z]}``, ``{"plane": {}}``; m, axes along z, a plane solid below z = 0
+        z]}``, ``{"plane": {}}``, ``{"mesh": vertices}``; m, axes along z, a plane solid below z = 0
     frame : (7,) pose in the body's centre-of-mass frame (ground: world)
     """
 

@@ -6,16 +6,18 @@ Shapes are checked, laws of pairs put together, and pairs found where none are n
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import combinations, product
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ephs.mechanics.scene import values
-from ephs.mechanics.scene.entries import Checked, Document
+from ephs.mechanics.scene.entries import Checked, Document, shown
 from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing
 from ephs.mechanics.scene.geometry import coupling_of
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, IDENTITY_POSE, Joint, Scene, frozen
-from ephs.mechanics.scene.resolve import Names
+from ephs.mechanics.scene.polytope import vertices_of
+from ephs.mechanics.scene.resolve import Names, mesh_file
 from ephs.mechanics.scene.schema import ContactEntry, ContactLawEntry, JointEntry, SurfaceEntry
 from ephs.mechanics.scene.state import Snapshot
 from ephs.mechanics.scene.surfaces import Contact, Surface
@@ -40,7 +42,7 @@ OVERLAP = 1e-9
 """Likewise of hard surfaces, for which it is refused."""
 
 
-def resolve_surfaces(document: Document, names: Names, faults: list[Fault]) -> dict[str, Surface]:
+def resolve_surfaces(document: Document, names: Names, folder: Path, faults: list[Fault]) -> dict[str, Surface]:
     """The surfaces of a file, their bodies and shapes checked."""
     found: dict[str, Surface] = {}
     for name, table in document.sections["surfaces"].items():
@@ -50,19 +52,29 @@ def resolve_surfaces(document: Document, names: Names, faults: list[Fault]) -> d
         if table.sound("heat") and entry.heat is not None:
             names.check(entry.heat, f"{key}.heat", "thermal", faults)
         pose = values.pose(entry.position, entry.rotation, key, faults)
-        shape = _shape(table, key, faults)
+        shape = _shape(table, key, folder, faults)
         if shape is not None:
             found[name] = Surface(name, entry.body, shape, frozen(pose))
     return found
 
 
-def _shape(table: Checked[SurfaceEntry], key: str, faults: list[Fault]) -> Mapping[str, Any] | None:
+def _shape(table: Checked[SurfaceEntry], key: str, folder: Path, faults: list[Fault]) -> Mapping[str, Any] | None:
     if not table.sound("shape"):
         return None
     given = {kind: sizes for kind, sizes in table.entry.shape.model_dump().items() if sizes is not None}
     if len(given) != 1 or given.get("plane"):
         faults.append(fault("surface shape", f"{key}.shape", " and ".join(given) or "an empty table"))
         return None
+    if "mesh" in given:
+        file = mesh_file(given["mesh"], folder)
+        if file is None:
+            faults.append(fault("mesh", f"{key}.shape.mesh", shown(given["mesh"])))
+            return None
+        try:
+            return {"mesh": vertices_of(file).tolist()}
+        except (ValueError, OSError) as error:
+            faults.append(fault("convex mesh", f"{key}.shape.mesh", f"{file.name}, {error}"))
+            return None
     return given
 
 

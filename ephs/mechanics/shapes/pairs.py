@@ -1,8 +1,9 @@
 """Pairs of shapes that can touch: which gaps stand for them, and between which frames.
 
-Planes meet spheres, capsules, cylinders and boxes; spheres, capsules and boxes meet each other. A capsule meets a plane
-at its two ends, a box at its corners, a cylinder at its two rims. Boxes meet capsules and boxes as if their edges were
-rounded: each corner is a sphere that meets the other box, each edge a capsule that meets the other's edges.
+Planes meet spheres, capsules, cylinders, boxes and meshes; spheres, capsules and boxes meet each other. A capsule meets
+a plane at its two ends, a box at its corners, a convex mesh at its vertices, a cylinder at its two rims. Boxes meet
+capsules and boxes as if their edges were rounded: each corner is a sphere that meets the other box, each edge a capsule
+that meets the other's edges.
 """
 
 import math
@@ -30,10 +31,10 @@ __all__ = ["PAIRS", "SIZES", "Touch", "touches"]
 Touch = tuple[Array, Array, Gap]
 """Frames (7,) on the first and on the second surface's body, and the gap between them."""
 Shape = Mapping[str, Any]
-SIZES: Final[Mapping[str, tuple[int, ...]]] = {
-    "plane": (), "sphere": (), "capsule": (2,), "cylinder": (2,), "box": (3,)
+SIZES: Final[Mapping[str, tuple[int, ...] | None]] = {
+    "plane": (), "sphere": (), "capsule": (2,), "cylinder": (2,), "box": (3,), "mesh": None
 }  # fmt: skip
-"""Shapes -> shape of their sizes in m; a plane has none."""
+"""Shapes -> shape of their sizes in m; a plane has none, a mesh (n, 3) vertices."""
 
 
 def touches(shape1: Shape, frame1: Array, shape2: Shape, frame2: Array) -> tuple[tuple[Touch, ...], bool]:
@@ -43,7 +44,7 @@ def touches(shape1: Shape, frame1: Array, shape2: Shape, frame2: Array) -> tuple
     ----------
     shape1, shape2
         ``{"sphere": r}``, ``{"capsule": [r, length]}``, ``{"cylinder": [r, length]}``, ``{"box": [x, y, z]}``,
-        ``{"plane": {}}``; lengths in m, axes along z, planes solid below z = 0.
+        ``{"plane": {}}``, ``{"mesh": vertices}``; lengths in m, axes along z, planes solid below z = 0.
     frame1, frame2
         (7,) poses of the shapes in their bodies.
 
@@ -133,6 +134,7 @@ PAIRS: Final[Mapping[tuple[str, str], Callable[[Any, Any], Points]]] = {
     ("plane", "capsule"): lambda _, c: [(CENTRE, at, plane_sphere(c[0])) for at in _ends(c[1])],
     ("plane", "cylinder"): lambda _, c: [(CENTRE, at, plane_rim(c[0])) for at in _ends(c[1])],
     ("plane", "box"): lambda _, b: [(CENTRE, at, plane_sphere(0.0)) for at in _corners([0.5 * x for x in b])],
+    ("plane", "mesh"): lambda _, mesh: [(CENTRE, at, plane_sphere(0.0)) for at in mesh],
     ("sphere", "sphere"): lambda one, other: [(CENTRE, CENTRE, rounded_box_sphere(CENTRE, one, other))],
     ("capsule", "sphere"): lambda c, r: [(CENTRE, CENTRE, rounded_box_sphere((0.0, 0.0, 0.5 * c[1]), c[0], r))],
     ("box", "sphere"): lambda b, r: [(CENTRE, CENTRE, rounded_box_sphere((b[0] / 2, b[1] / 2, b[2] / 2), 0.0, r))],

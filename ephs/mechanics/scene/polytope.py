@@ -1,0 +1,80 @@
+"""Convex meshes from STL files: their vertices, where they bound a convex body."""
+
+from pathlib import Path
+
+import numpy as np
+
+from ephs.semantics.bundle import Array
+
+__all__ = ["vertices_of"]
+
+MOST_BYTES = 20_000_000
+MOST_VERTICES = 256
+"""Vertices that a surface may have: each is a point of contact."""
+FLAT = 1e-5
+"""Part of a mesh's size by which vertices may lie inside its convex hull, and volumes differ from that of the hull."""
+RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
+HEAD = 84
+"""Bytes before the triangles of a binary file: 80 of text, and their number."""
+
+
+def vertices_of(file: Path) -> Array:
+    """(n, 3) vertices of the convex body in an STL file, text or binary, each once.
+
+    Raises
+    ------
+    ValueError
+        What is wrong of the file: it cannot be read, bounds no body, is not convex, or has too many vertices.
+    """
+    triangles = _triangles(file)
+    if not len(triangles) or not np.all(np.isfinite(triangles)):
+        raise ValueError("a file without triangles")
+    size = float(np.ptp(triangles.reshape(-1, 3), axis=0).max())
+    hull = _hull(triangles.reshape(-1, 3))
+    if hull is None:
+        raise ValueError("a mesh without volume")
+    corners, faces, volume = hull
+    deepest = faces[:, :3] @ triangles.reshape(-1, 3).T + faces[:, 3:]
+    inside = -float(deepest.max(axis=0).min())
+    if inside > FLAT * size:
+        raise ValueError(f"a mesh that is not convex: a vertex lies {inside:.3g} m inside its convex hull")
+    centre = corners.mean(axis=0)
+    own = float(np.abs(np.einsum("ni,ni->n", *_spans(triangles - centre))).sum()) / 6.0
+    if abs(own - volume) > FLAT * size**3:
+        raise ValueError(f"a mesh that is not convex: of volume {own:.4g} m³, its convex hull {volume:.4g} m³")
+    if len(corners) > MOST_VERTICES:
+        raise ValueError(f"a mesh of {len(corners)} vertices, more than {MOST_VERTICES}")
+    return corners
+
+
+def _spans(triangles: Array) -> tuple[Array, Array]:
+    return triangles[:, 0], np.cross(triangles[:, 1], triangles[:, 2])
+
+
+def _hull(points: Array) -> tuple[Array, Array, float] | None:
+    """Corners (n, 3) of the convex hull, its faces (m, 4) as normal and offset, and its volume; None of flat ones."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        hull = ConvexHull(np.unique(points, axis=0))
+    except (QhullError, ValueError):
+        return None
+    return hull.points[hull.vertices], hull.equations, float(hull.volume)
+
+
+def _triangles(file: Path) -> Array:
+    """(n, 3, 3) of an STL file."""
+    if not file.is_file() or file.stat().st_size > MOST_BYTES:
+        raise ValueError(f"no file of at most {MOST_BYTES // 1_000_000} MB")
+    data = file.read_bytes()
+    count = int.from_bytes(data[80:HEAD], "little")
+    if len(data) == HEAD + count * RECORD.itemsize:
+        found = np.frombuffer(data, RECORD, count, HEAD)["corners"]
+        return np.asarray(found, dtype=float)
+    words = data.decode("utf-8", errors="replace").split()
+    at = [i for i, word in enumerate(words) if word == "vertex"]
+    try:
+        numbers = np.array([[float(word) for word in words[i + 1 : i + 4]] for i in at], dtype=float)
+        return numbers.reshape(-1, 3, 3)
+    except ValueError:
+        raise ValueError("a file that is no STL") from None

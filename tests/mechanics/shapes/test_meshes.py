@@ -1,0 +1,129 @@
+"""Convex meshes as surfaces: what an STL file says, what is refused, and a cube that is the box to rounding."""
+
+import numpy as np
+import pytest
+from scipy.spatial import ConvexHull
+
+import ephs
+from ephs.mechanics.scene.polytope import vertices_of
+
+SCENE = """
+format = 1
+name = "mesh"
+[bodies.block]
+mass = 2.0
+inertia = [0.01, 0.02, 0.03]
+position = [0.0, 0.0, 0.27]
+velocity = [1.0, 0.5, 0.0]
+angular_velocity = [1.0, 2.0, 3.0]
+[surfaces.block]
+body = "block"
+shape = {{ {shape} }}
+{law}
+[surfaces.floor]
+body = "ground"
+shape = {{ plane = {{}} }}
+{law}
+"""
+OPTIONS = {"elastic": {"method": "rk87", "rtol": 1e-7}, "hard": {"method": "rk54", "step": 2.0**-7}}
+LAWS = {"elastic": "stiffness = 1e5\nloss = 0.2\nfriction = 0.5", "hard": "restitution = 0.5\nfriction = 0.5"}
+SIZES = np.array([0.25, 0.125, 0.5])
+
+
+def cube():
+    """(12, 3, 3) triangles of a box, outwards."""
+    points = SIZES * np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+    hull = ConvexHull(points)
+    return points[hull.simplices]
+
+
+def text_stl(triangles):
+    corners = "".join(
+        "facet normal 0 0 0\nouter loop\n"
+        + "".join(f"vertex {x!r} {y!r} {z!r}\n" for x, y, z in triangle.tolist())
+        + "endloop\nendfacet\n"
+        for triangle in triangles
+    )
+    return f"solid made\n{corners}endsolid made\n".encode()
+
+
+def binary_stl(triangles):
+    record = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
+    out = np.zeros(len(triangles), record)
+    out["corners"] = triangles
+    return b"\0" * 80 + len(triangles).to_bytes(4, "little") + out.tobytes()
+
+
+WRITERS = {"text": text_stl, "binary": binary_stl}
+
+
+def scene_of(tmp_path, shape, law="elastic"):
+    file = tmp_path / "scene.toml"
+    file.write_text(SCENE.format(shape=shape, law=LAWS[law]), encoding="utf-8")
+    return ephs.load(file)
+
+
+@pytest.mark.parametrize("kind", WRITERS)
+def test_each_vertex_is_read_once(kind, tmp_path):
+    file = tmp_path / "cube.stl"
+    file.write_bytes(WRITERS[kind](cube()))
+    found = vertices_of(file)
+    assert sorted(found.tolist()) == sorted(np.unique(cube().reshape(-1, 3), axis=0).tolist())
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_mesh_of_a_box_moves_as_the_box(law, tmp_path):
+    (tmp_path / "cube.stl").write_bytes(binary_stl(cube()))
+    runs = [
+        ephs.simulate(scene_of(tmp_path, shape, law), 0.08, save_at=[0.04, 0.08], audit="off", **OPTIONS[law])
+        for shape in (f"box = {SIZES.tolist()}", 'mesh = "cube.stl"')
+    ]
+    one, other = (sol.body("block").position for sol in runs)
+    assert other == pytest.approx(one, abs=1e-8)
+    assert runs[1].heat[-1] == pytest.approx(runs[0].heat[-1], abs=1e-8)
+    assert runs[0].heat[-1] > 1e-3
+
+
+@pytest.mark.parametrize(
+    ("data", "fault"),
+    [
+        (text_stl(np.concatenate([cube(), 0.5 * cube()])), r"not convex: a vertex lies .* m inside its convex hull"),
+        (text_stl(cube()[:, :, [0, 1]] @ np.eye(2, 3)), "a mesh without volume"),
+        (b"no mesh at all", "a file without triangles"),
+        (b"vertex 1 2", "no STL"),
+        (text_stl(cube()[:-1]), r"not convex: of volume"),
+    ],
+    ids=["inside", "flat", "words", "cut", "open"],
+)
+def test_what_bounds_no_convex_body_is_refused(data, fault, tmp_path):
+    (tmp_path / "odd.stl").write_bytes(data)
+    with pytest.raises(ephs.SceneError, match=rf"surfaces\.block\.shape\.mesh: found odd\.stl, .*{fault}"):
+        scene_of(tmp_path, 'mesh = "odd.stl"')
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "fault"),
+    [
+        ('mesh = "cube.stl"', 'mesh = "../cube.stl"', "in the scene's folder or below"),
+        ('mesh = "cube.stl"', 'mesh = "none.stl"', r"none\.stl, no file"),
+        ('body = "block"', 'body = "blocks"', r'surfaces\.block\.body: found "blocks"'),
+        ("stiffness = 1e5", "stiffness = -1e5", "stiffness"),
+        ("friction = 0.5", "friction = -0.5", "friction"),
+        ("shape = { plane = {} }", "shape = { sphere = 0.1 }", "a mesh and a sphere|a sphere and a mesh"),
+    ],
+)
+def test_what_is_wrong_of_a_surface_is_named(old, new, fault, tmp_path):
+    (tmp_path / "cube.stl").write_bytes(binary_stl(cube()))
+    text = SCENE.format(shape='mesh = "cube.stl"', law=LAWS["elastic"])
+    assert old in text
+    file = tmp_path / "scene.toml"
+    file.write_text(text.replace(old, new), encoding="utf-8")
+    with pytest.raises(ephs.SceneError, match=fault):
+        ephs.load(file)
+
+
+def test_a_scene_with_a_mesh_is_read_as_it_was_written(tmp_path):
+    (tmp_path / "cube.stl").write_bytes(binary_stl(cube()))
+    scene = scene_of(tmp_path, 'mesh = "cube.stl"')
+    ephs.simulate(scene, 0.01, method="rk54", audit="off").save(tmp_path / "kept")
+    assert ephs.load_solution(tmp_path / "kept").scene.surfaces["block"].shape == scene.surfaces["block"].shape
