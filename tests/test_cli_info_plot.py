@@ -94,3 +94,23 @@ def test_plot_takes_a_saved_solution(folder, tmp_path, capsys):
     assert capsys.readouterr().out == listed
     assert main(["plot", str(saved), "energy"]) == 0
     assert (tmp_path / "signals.svg").is_file()
+
+
+@pytest.mark.parametrize(
+    ("options", "near"),
+    [
+        ({"inputs": {"joints.bearng": 1.0}}, "joints.bearing"),
+        ({"initial": {"bodies.rod.ke.q": 1.0}}, "bodies.rod.ke.p"),
+    ],
+)
+def test_misspelled_inputs_and_states_are_answered_with_the_nearest(options, near):
+    with pytest.raises(ephs.AssemblyError, match=f"did you mean '{near}'"):
+        ephs.simulate(ephs.load(CRANK), 0.1, **options)
+
+
+def test_a_run_that_fails_at_its_start_suggests_no_films(tmp_path, capsys):
+    arm = str(ROOT / "examples/arm.urdf")
+    assert main(["run", arm, "--base", "free", "--until", "0.1", "--out", str(tmp_path)]) == 3
+    said = capsys.readouterr()
+    assert "root_joint" in said.err
+    assert "next:" not in said.out

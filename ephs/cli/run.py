@@ -231,7 +231,8 @@ def _ended(folder: Path, wanted: Mapping[str, Any]) -> bool:
 def _write(solution: "Solution", folder: Path, *, report: bool) -> None:
     """Write the result folder and suggest next commands."""
     written = write_results(solution, folder, report=report)
-    say("next:", *after(folder, moves=solution.scene is not None, report=written))
+    if len(solution.t) > 1:  # else nothing moved
+        say("next:", *after(folder, moves=solution.scene is not None, report=written))
 
 
 def _counted(parts: int | None) -> None:

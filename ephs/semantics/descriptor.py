@@ -14,7 +14,7 @@ import numpy as np
 from ephs.operad import ROOT, Path, Quantity
 from ephs.semantics.behaviour import Continuous, Natural, Relating, Storing
 from ephs.semantics.bundle import Array
-from ephs.semantics.errors import AssemblyError
+from ephs.semantics.errors import AssemblyError, listed
 from ephs.semantics.kept import Kept
 from ephs.semantics.numbering import Index, Numbering, bearing_junctions, number_flat, starts
 from ephs.semantics.primitives import Point, Primitive, Reversible, Storage
@@ -230,7 +230,7 @@ class Descriptor:
         names = {slot.path: slot for slot in self.outer}
         for path in given:
             if path not in names:
-                raise AssemblyError("unknown-input", path, expected=", ".join(map(str, names)) or "none")
+                raise AssemblyError("unknown-input", path, expected=listed(path, names))
         for path, slot in names.items():
             if path not in given:
                 raise AssemblyError("missing-input", path)

@@ -1,11 +1,12 @@
 """Errors of the semantics, with their texts in one table."""
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, final
 
 if TYPE_CHECKING:
     from ephs.semantics.trials import Witness
 
-__all__ = ["AssemblyError", "SemanticsError", "StructureError"]
+__all__ = ["AssemblyError", "SemanticsError", "StructureError", "listed", "nearest_of"]
 
 _TEXTS = {
     "fillings": ("{path}: the boxes to fill are {expected}, the fillings given are {found}; fill each box once"),
@@ -113,6 +114,20 @@ class SemanticsError(ValueError):
 
     def __reduce__(self) -> tuple[object, ...]:
         return (_rebuild, (type(self), self.kind, self.path, self.facts))
+
+
+def nearest_of(found: object, known: Iterable[str]) -> str:
+    """Suggestion of the known word nearest to a misspelled one, for the end of a message; empty if none is near."""
+    from difflib import get_close_matches
+
+    near = get_close_matches(str(found), list(known), n=1, cutoff=0.6)
+    return f"; did you mean {near[0]!r}?" if near else ""
+
+
+def listed(found: object, known: Iterable[object]) -> str:
+    """Known names for a message, with the one nearest to a misspelled name."""
+    names = list(map(str, known))
+    return f"{', '.join(names) or 'none'}{nearest_of(found, names)}"
 
 
 def _rebuild(cls: type[SemanticsError], kind: str, path: str, facts: dict[str, object]) -> SemanticsError:

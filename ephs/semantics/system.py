@@ -12,7 +12,7 @@ import numpy as np
 from ephs.operad import ROOT, Algebra, Directory, Interface, Nesting, Path, Pattern, Quantity
 from ephs.operad.matching import interfaces_match
 from ephs.semantics.bundle import Array, Reference
-from ephs.semantics.errors import AssemblyError, SemanticsError
+from ephs.semantics.errors import AssemblyError, SemanticsError, listed
 from ephs.semantics.kept import Kept, once
 from ephs.semantics.primitives import Irreversible, Primitive, Reversible, Storage
 from ephs.semantics.spaces import Pair, manifold
@@ -136,7 +136,7 @@ class System:
         for name, value in (values or {}).items():
             path = Path.of(name)
             if path not in states:
-                raise AssemblyError("unknown-state", name, expected=_names(set(states)))
+                raise AssemblyError("unknown-state", name, expected=listed(name, sorted(map(str, states))))
             out[path] = read_state(path, states[path], value)
         return out
 

@@ -1,9 +1,11 @@
 """Failures of a run: named outcomes with time, component, equation, advice, and the partial solution."""
 
-from collections.abc import Generator, Iterable
+from collections.abc import Generator
 from contextlib import contextmanager
 from enum import StrEnum
 from typing import TYPE_CHECKING, final
+
+from ephs.semantics.errors import nearest_of as nearest_of
 
 if TYPE_CHECKING:
     from ephs.solve.model import Model
@@ -100,14 +102,6 @@ class OptionError(ValueError):
 
     def __reduce__(self) -> tuple[object, ...]:
         return (OptionError, (self.key, self.found, self.expected))
-
-
-def nearest_of(found: object, known: Iterable[str]) -> str:
-    """Suggestion of the known word nearest to a misspelled one, for the end of a message; empty if none is near."""
-    from difflib import get_close_matches
-
-    near = get_close_matches(str(found), list(known), n=1, cutoff=0.6)
-    return f"; did you mean {near[0]!r}?" if near else ""
 
 
 def number_of(key: str, given: object, expected: str = "a number of seconds") -> float:

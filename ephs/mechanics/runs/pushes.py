@@ -14,7 +14,7 @@ from ephs.mechanics.scene.flexible import Load
 from ephs.mechanics.scene.model import Marker, Scene
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
-from ephs.semantics.errors import AssemblyError
+from ephs.semantics.errors import AssemblyError, listed
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.solve.problem import Signal, State
 
@@ -86,7 +86,7 @@ def _single(inputs: Mapping[Any, Any], sizes: Mapping[str, int], view: View) -> 
         keys = key if isinstance(key, tuple) else (key,)
         for one in keys:
             if one not in sizes:
-                raise AssemblyError("unknown-input", one, expected=", ".join(sizes))
+                raise AssemblyError("unknown-input", one, expected=listed(one, sizes))
         ends = np.cumsum([0, *(sizes[one] for one in keys)])
         whole = signal(value, effort=False, name=", ".join(keys), size=int(ends[-1]), view=view)
         if len(keys) == 1:
