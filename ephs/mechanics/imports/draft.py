@@ -46,6 +46,7 @@ class Draft:
         self._joint_names: dict[str, str] = {}
         self._gears: dict[str, dict[str, Any]] = {}
         self._actuators: dict[str, dict[str, Any]] = {}
+        self._springs: dict[str, dict[str, Any]] = {}
         self._centres: dict[str, Array] = {WORLD: np.zeros(3)}
         self._left: dict[str, dict[str, None]] = {}
         self._renamed: list[str] = []
@@ -174,6 +175,19 @@ class Draft:
             "stiffness": stiffness, "damping": damping, "stretch": stretch,
         }  # fmt: skip
 
+    def spring(
+        self, name: str, links: tuple[str, str], at: tuple[Array, Array], stiffness: float, length: float,
+        damping: float,
+    ) -> None:  # fmt: skip
+        """A spring and a damper between two points (3,), each in its link's frame."""
+        ends = {
+            f"at{k}": _plain(self._at(link, pose(x))[4:]) for k, (link, x) in enumerate(zip(links, at, strict=True), 1)
+        }
+        self._springs[self._own(name, self._springs)] = {
+            "bodies": [self._names[link] for link in links], **ends,
+            "stiffness": stiffness, "length": length, "damping": damping,
+        }  # fmt: skip
+
     def actuate(self, name: str, ratio: Mapping[str, float], limits: Sequence[float] | None) -> None:
         """A control that is forces on joints of one degree of freedom."""
         found = {"joints": [self._joint_names[each] for each in ratio], "ratio": list(map(float, ratio.values()))}
@@ -224,6 +238,7 @@ class Draft:
             "assembly": {"inertia": mode},
             "bodies": self._bodies,
             "joints": self._joints,
+            **({"springs": self._springs} if self._springs else {}),
             **({"gears": self._gears} if self._gears else {}),
             **({"actuators": self._actuators} if self._actuators else {}),
             **({"surfaces": self._surfaces, "contacts": self._contacts} if self._contacts else {}),

@@ -1,4 +1,4 @@
-"""Actuators and fixed tendons of a compiled MJCF.
+"""Actuators and tendons of a compiled MJCF.
 
 An actuator's force on its length l is gain · control + b₀ + b₁ l + b₂ dl/dt. The first term is an actuator of the
 scene; the others are a spring, friction, and a constant force on its joints.
@@ -12,6 +12,7 @@ import numpy as np
 
 from ephs.mechanics.imports.draft import Draft
 from ephs.mechanics.imports.mjcf_names import Names
+from ephs.mechanics.imports.mjcf_routes import route_of
 
 __all__ = ["actuators", "tendons"]
 
@@ -27,13 +28,27 @@ class Line:
 
 
 def tendons(model: Any, names: Names, draft: Draft) -> None:
-    """Springs and dampers of fixed tendons."""
+    """Springs and dampers of fixed tendons, and of those from site to site."""
+    mujoco: Any = import_module("mujoco")
+    off, flags = mujoco.mjtDisableBit, model.opt.disableflags
     for t in range(model.ntendon):
-        name, line = str(model.tendon(t).name) or f"tendon_{t + 1}", _of_tendon(model, t)
-        stiffness, damping = float(model.tendon_stiffness[t].flat[0]), float(model.tendon_damping[t].flat[0])
+        name, line, route = str(model.tendon(t).name) or f"tendon_{t + 1}", _of_tendon(model, t), route_of(model, t)
+        stiffness = 0.0 if flags & off.mjDSBL_SPRING else float(model.tendon_stiffness[t].flat[0])
+        damping = 0.0 if flags & off.mjDSBL_DAMPER else float(model.tendon_damping[t].flat[0])
         low, high = model.tendon_lengthspring[t].tolist()
-        if not _pull(name, line, stiffness if low == high else 0.0, low, damping, names, draft):
+        taut = stiffness if low == high else 0.0
+        if route is None:
+            known = _pull(name, line, taut, low, damping, names, draft)
+        else:
+            known = route.pull(name, taut, low, damping, names, draft)
+        if not known:
             draft.leave("tendons", name)
+        if np.any(model.tendon_stiffnesspoly[t]):
+            draft.leave("stiffness that is not linear of", name)
+        if np.any(model.tendon_dampingpoly[t]):
+            draft.leave("damping that is not linear of", name)
+        if model.tendon_armature[t]:
+            draft.leave("armature of", name)
         if stiffness and low != high:
             draft.leave("slack of", name)
         if model.tendon_limited[t]:

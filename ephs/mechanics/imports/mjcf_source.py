@@ -151,7 +151,7 @@ class Source:
         lost: set[str] = set()
         for section in root.findall("tendon"):
             for number, tendon in enumerate(list(section)):
-                if tendon.tag != "fixed":
+                if tendon.tag not in ("fixed", "spatial") or tendon.find("geom") is not None:
                     self._draft.leave("tendons", _called(tendon, number))
                     lost.add(tendon.get("name") or "")
                     section.remove(tendon)

@@ -41,8 +41,7 @@ def test_forces_of_actuators_and_tendons_are_mujocos(write):
     with pytest.warns(ephs.ModelWarning) as said:
         scene = ephs.load(path)
     words = str(said[0].message)
-    assert "actuators: muscle, winch, brake, thrust" in words
-    assert "tendons: cable" in words
+    assert "actuators: muscle, brake, thrust, winch" in words
     assert "activation of: piston" in words
     assert set(scene.actuators) == set(CONTROLS)
 
@@ -62,6 +61,45 @@ def test_forces_of_actuators_and_tendons_are_mujocos(write):
     for name, exact in zip("abcd", data.qacc[:4], strict=True):
         change = np.diff(found.joint(name).rate[:, 0])[0] / 1e-6
         assert change == pytest.approx(exact, rel=1e-4, abs=1e-3)
+
+
+ROPES = """<mujoco><option gravity="0 0 -9.81"/><worldbody><site name="top" pos="0 0 0.9"/>
+  <body name="arm" pos="0.1 0 0"><joint name="shoulder" axis="0 1 0.2"/><geom size="0.1" pos="0.3 0 0"/>
+    <site name="a" pos="0.4 0.1 0.2"/><site name="b" pos="0.1 0 0.3"/>
+    <body name="hand" pos="0.5 0 0"><joint name="elbow" axis="0 1 0"/><geom size="0.1" pos="0.2 0 0.1"/>
+      <site name="c" pos="0.2 0 0.3"/></body></body></worldbody>
+<tendon>
+  <spatial name="stay" stiffness="40" damping="3" springlength="0.3"><site site="top"/><site site="a"/></spatial>
+  <spatial name="tackle" stiffness="90" damping="2" springlength="0.6">
+    <site site="b"/><site site="a"/><pulley divisor="2"/><site site="a"/><site site="c"/></spatial>
+  {more}
+</tendon></mujoco>"""
+MORE = """<spatial name="long" stiffness="5"><site site="top"/><site site="a"/><site site="c"/></spatial>
+  <spatial name="round" stiffness="5"><site site="top"/><geom geom="post"/><site site="a"/></spatial>
+  <spatial name="slack" springlength="0.1 0.9" stiffness="5"><site site="top"/><site site="c"/></spatial>"""
+
+
+def test_tendons_between_two_points_are_springs_with_mujocos_forces(write):
+    path = write(ROPES.format(more=""), "xml")
+    scene = ephs.load(path)
+    assert set(scene.springs) == {"stay", "tackle"}
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    data.qvel[:] = (0.7, -1.1)
+    mujoco.mj_forward(model, data)
+    state = scene.with_state(rates={"shoulder": 0.7, "elbow": -1.1})
+    found = ephs.dynamics(state)
+    assert np.allclose(found.acceleration(found.state0, np.zeros(2)), data.qacc, rtol=1e-10)
+    free = ephs.simulate(state, 0.2, method="rk87", rtol=1e-9)
+    assert free.energy_error.max() < 1e-12
+
+
+def test_other_tendons_through_points_are_said_by_name(write):
+    text = ROPES.format(more=MORE).replace("<body name=", '<geom name="post" size="0.05"/><body name=', 1)
+    with pytest.warns(ephs.ModelWarning) as said:
+        ephs.load(write(text, "xml"))
+    assert "tendons: round, long" in str(said[0].message)
+    assert "slack of: slack" in str(said[0].message)
 
 
 def test_a_transmission_is_an_actuator(write):
