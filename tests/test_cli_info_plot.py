@@ -100,7 +100,7 @@ def test_plot_takes_a_saved_solution(folder, tmp_path, capsys):
     ("options", "near"),
     [
         ({"inputs": {"joints.bearng": 1.0}}, "joints.bearing"),
-        ({"initial": {"bodies.rod.ke.q": 1.0}}, "bodies.rod.ke.p"),
+        ({"initial": {"body.rod.ke.p": 1.0}}, "bodies.rod.ke.p"),
     ],
 )
 def test_misspelled_inputs_and_states_are_answered_with_the_nearest(options, near):
