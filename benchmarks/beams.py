@@ -9,6 +9,7 @@ import sys
 import time
 from importlib import import_module
 from importlib.util import find_spec
+from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -39,12 +40,13 @@ ends = ["ground"]
 """
 REFINED: tuple[int, int, str, dict[str, float]] = (24, 4, "rk87", {"rtol": 1e-7, "atol": 1e-9})
 OWN: tuple[tuple[int, int, str, dict[str, float]], ...] = (
-    *((n, 4, "rk87", {"rtol": 1e-5, "atol": 1e-7}) for n in (2, 3, 4, 6, 8, 12)),
-    *((n, 2, "rk87", {"rtol": 1e-5, "atol": 1e-7}) for n in (8, 16, 32)),
+    *((n, 4, "rk87", {"rtol": 1e-4, "atol": 1e-5}) for n in (2, 3, 4, 6, 8, 12)),
+    *((n, 2, "rk87", {"rtol": 1e-4, "atol": 1e-5}) for n in (8, 16, 32)),
     (4, 4, "natural", {"step": 0.01}),
     (16, 4, "natural", {"step": 0.005}),
     (8, 4, "natural4", {"step": 0.01}),
-    (8, 4, "radau", {"rtol": 1e-4, "atol": 1e-6}),
+    (8, 4, "radau", {"rtol": 1e-3, "atol": 1e-4}),
+    (8, 4, "radau", {"step": 0.01}),
 )
 SIZES = (125, 250, 500, 1000)
 COLUMNS = {
@@ -70,7 +72,9 @@ def report() -> Report:
     if find_spec("exudyn"):
         for n, steps in ((4, 100), (8, 100), (16, 200), (32, 400), (64, 1600)):
             for nodes in (2, 3):
-                rows.append(_row(f"Exudyn, {nodes} nodes", n, _exudyn(n, steps, nodes), exact))
+                rows.append(_row(f"Exudyn, planar, {nodes} nodes", n, _exudyn(n, steps, nodes), exact))
+        for n, steps in ((8, 200), (16, 400), (32, 400), (32, 800), (64, 1600)):
+            rows.append(_row("Exudyn, spatial", n, _exudyn_spatial(n, steps), exact))
     for row in rows:
         times = [each["seconds"] for each in ours if each["error"] <= row["error"]]
         row["ratio"] = row["seconds"] / min(times) if times else None
@@ -151,6 +155,39 @@ def _exudyn(elements: int, steps: int, nodes: int) -> tuple[np.ndarray, dict[str
     sensor = system.AddSensor(
         items.SensorNode(nodeNumber=made[0][-1], storeInternal=True, outputVariableType=exu.OutputVariableType.Position)
     )
+    return _advance(exu, system, sensor, steps)
+
+
+def _exudyn_spatial(elements: int, steps: int) -> tuple[np.ndarray, dict[str, Any]]:
+    """Its two-node element on SE(3), with Euler parameters: quicker than the same with rotation vectors."""
+    exu: Any = import_module("exudyn")
+    items = import_module("exudyn.itemInterface")
+    exu.SetWriteToConsole(False)
+    system = exu.SystemContainer().AddSystem()
+    section, shear = exu.BeamSection(), FACTOR * SHEAR * AREA
+    section.massPerLength = DENSITY * AREA
+    section.inertia = DENSITY * SECOND * np.diag([2.0, 1.0, 1.0])
+    section.stiffnessMatrix = np.diag(
+        [YOUNG * AREA, shear, shear, 2.0 * SHEAR * SECOND, YOUNG * SECOND, YOUNG * SECOND]
+    )
+    nodes = [
+        system.AddNode(items.NodeRigidBodyEP(referenceCoordinates=[LENGTH * i / elements, 0, 0, 1, 0, 0, 0]))
+        for i in range(elements + 1)
+    ]
+    for pair in pairwise(nodes):
+        beam = items.ObjectBeamGeometricallyExact(nodeNumbers=list(pair), length=LENGTH / elements, sectionData=section)
+        marker = system.AddMarker(items.MarkerBodyMass(bodyNumber=system.AddObject(beam)))
+        system.AddLoad(items.LoadMassProportional(markerNumber=marker, loadVector=[0.0, -GRAVITY, 0.0]))
+    ground = system.AddMarker(items.MarkerBodyRigid(bodyNumber=system.AddObject(items.ObjectGround())))
+    clamped = system.AddMarker(items.MarkerNodeRigid(nodeNumber=nodes[0]))
+    system.AddObject(items.GenericJoint(markerNumbers=[ground, clamped]))
+    sensor = system.AddSensor(
+        items.SensorNode(nodeNumber=nodes[-1], storeInternal=True, outputVariableType=exu.OutputVariableType.Position)
+    )
+    return _advance(exu, system, sensor, steps)
+
+
+def _advance(exu: Any, system: Any, sensor: Any, steps: int) -> tuple[np.ndarray, dict[str, Any]]:
     system.Assemble()
     how: Any = exu.SimulationSettings()
     how.timeIntegration.endTime, how.timeIntegration.numberOfSteps = UNTIL, steps
