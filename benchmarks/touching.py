@@ -74,22 +74,23 @@ def _mjcf(friction: float, bodies: list[str], rates: list[float]) -> str:
 
 
 def stack(count: int = 10) -> Touching:
-    """Cubes, one above the other, that fall 1 mm onto each other and the floor."""
-    names, gap, side = [f"cube{i}" for i in range(count)], 1e-3, 2.0 * RADIUS
-    heights = [RADIUS + gap + i * (side + gap) for i in range(count)]
+    """Balls on slides, one above the other, that fall 1 cm onto each other and the floor."""
+    names, gap = [f"ball{i}" for i in range(count)], 0.01
+    heights = [RADIUS + gap + i * (2.0 * RADIUS + gap) for i in range(count)]
     own, theirs = [HEAD.format(name="stack")], list[str]()
     for name, height in zip(names, heights, strict=True):
-        body = _ball(name, (0.0, 0.0, height), (0.0, 0.0, 0.0))
         own += [
-            body.replace(str([INERTIA] * 3), str([MASS * side**2 / 6.0] * 3)),
-            _surface(name, f"box = {[side] * 3}", 1e5, 0.5),
+            _ball(name, (0.0, 0.0, height), (0.0, 0.0, 0.0)),
+            f'[joints.slide_{name}]\ntype = "prismatic"\nbodies = ["ground", "{name}"]\n'
+            f"at = [0.0, 0.0, {height}]\naxis = [0.0, 0.0, 1.0]\n",
+            _surface(name, f"sphere = {RADIUS}", 1e5, 0.0),
         ]
         theirs.append(
-            f'<body pos="0 0 {height}"><freejoint/><geom type="box" size="{RADIUS} {RADIUS} {RADIUS}" mass="{MASS}"'
-            f' friction="0.5 0.005 0.0001"/></body>'
+            f'<body pos="0 0 {height}"><joint type="slide" axis="0 0 1"/>'
+            f'<geom type="sphere" size="{RADIUS}" mass="{MASS}"/></body>'
         )
     own += [FLOOR, _pairs([("floor", names[0]), *pairwise(names)])]
-    return Touching("stack of ten", "".join(own), _mjcf(0.5, theirs, [0.0] * 6 * count), 0.5)
+    return Touching("stack of ten", "".join(own), _mjcf(1.0, theirs, [0.0] * count), 1.0)
 
 
 def bouncing(count: int = 50) -> Touching:
