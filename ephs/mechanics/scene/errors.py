@@ -235,6 +235,9 @@ TEXTS: dict[str, tuple[str, str]] = {
     "string damping": ("0 for a string, which does not resist bending", "take kirchhoff"),
     "up": ("a direction along no tangent of the beam", "give another up"),
     "load ground": ("a body", "loads on the ground do nothing"),
+    "tendon points": ("{count} points, one in each of its bodies", "give as many"),
+    "tendon bodies": ("two different bodies after each other", "route it from one body to another"),
+    "tendon damping": ("0 without stiffness, through several bodies", "give it a stiffness"),
     "same ends": ("two different points or nodes", "correct one of the two"),
     # assembly
     "gap": ("gaps below {limit}", "correct {who}, or set assembly.adjust = true"),

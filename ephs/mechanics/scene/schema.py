@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from ephs.mechanics.scene.rotations import Rotation
-from ephs.mechanics.scene.schema_flexible import BeamEntry, LoadEntry
+from ephs.mechanics.scene.schema_flexible import BeamEntry, LoadEntry, TendonEntry
 from ephs.mechanics.scene.schema_numbers import (
     Entry,
     Flag,
@@ -341,6 +341,7 @@ class SceneFile(Entry):
     beams: dict[str, BeamEntry] = Field(  # pyright: ignore[reportInvalidTypeForm] - a class made at run time
         default_factory=dict, description="rods that bend, twist and stretch"
     )
+    tendons: dict[str, TendonEntry] = Field(default_factory=dict, description="tendons through points of bodies")
     loads: dict[str, LoadEntry] = Field(default_factory=dict, description="forces and moments on bodies")
     motors: dict[str, MotorEntry] = Field(default_factory=dict, description="motors with circuit and gear on joints")
     gears: dict[str, GearEntry] = Field(default_factory=dict, description="ties between the rates of joints")
@@ -360,6 +361,7 @@ SECTIONS: dict[str, type[Entry]] = {
     "surfaces": SurfaceEntry,
     "contacts": ContactEntry,
     "beams": BeamEntry,
+    "tendons": TendonEntry,
     "loads": LoadEntry,
     "motors": MotorEntry,
     "gears": GearEntry,

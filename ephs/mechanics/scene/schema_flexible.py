@@ -1,4 +1,4 @@
-"""Tables of beams and loads in scene files."""
+"""Tables of beams, tendons and loads in scene files."""
 
 from typing import Annotated, Any, Literal, TypeAlias
 
@@ -79,6 +79,21 @@ _BEAM: dict[str, Any] = {
 }
 # a class cannot have `from` for a name
 BeamEntry: Any = create_model("BeamEntry", __base__=Entry, __doc__="``[beams.NAME]``", **_BEAM)
+
+
+class TendonEntry(Entry):
+    """``[tendons.NAME]``"""
+
+    bodies: Annotated[list[Text], Field(min_length=2)] = Field(
+        description='what carries its points, in their order; the tension is the input "actuators.NAME", in N'
+    )
+    points: Annotated[list[Vector], Field(min_length=2)] = Field(
+        description="one in each, in its centre-of-mass frame (ground: world), m"
+    )
+    stiffness: NonNegative = Field(default=0.0, description="N/m")
+    length: NonNegative | None = Field(default=None, description="without force, m; default: as at the start")
+    damping: NonNegative = Field(default=0.0, description="N s/m")
+    heat: Text = Field(default="environment", description="where the heat goes: a thermal name")
 
 
 class LoadEntry(Entry):

@@ -1,0 +1,144 @@
+"""Tendons through points of bodies: the forces are those of their length, by virtual work."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import ephs
+
+STIFFNESS, DAMPING, LENGTH = 100.0, 2.0, 1.5
+ARM = """
+format = 1
+name = "reach"
+[bodies.arm]
+mass = 1.0
+inertia = [0.1, 0.1, 0.1]
+[bodies.hand]
+mass = 0.5
+inertia = [0.05, 0.05, 0.05]
+[joints.pin]
+type = "revolute"
+bodies = ["ground", "arm"]
+frame1 = {{ rotation = [0.7071067811865476, -0.7071067811865476, 0.0, 0.0] }}
+frame2 = {{ position = [-0.5, 0.0, 0.0], rotation = [0.7071067811865476, -0.7071067811865476, 0.0, 0.0] }}
+coordinate = {0}
+rate = {2}
+[joints.elbow]
+type = "revolute"
+bodies = ["arm", "hand"]
+frame1 = {{ position = [0.5, 0.0, 0.0], rotation = [0.7071067811865476, -0.7071067811865476, 0.0, 0.0] }}
+frame2 = {{ position = [-0.5, 0.0, 0.0], rotation = [0.7071067811865476, -0.7071067811865476, 0.0, 0.0] }}
+coordinate = {1}
+rate = {3}
+"""
+CABLE = f"""
+[tendons.cable]
+bodies = ["ground", "arm", "arm", "hand"]
+points = [[0.0, 0.0, 0.4], [0.2, 0.1, 0.1], [0.4, 0.0, 0.1], [0.4, 0.2, 0.05]]
+stiffness = {STIFFNESS}
+damping = {DAMPING}
+length = {LENGTH}
+"""
+STAY = """
+[tendons.stay]
+bodies = ["ground", "arm"]
+points = [[0.0, 0.1, 0.4], [0.2, 0.0, 0.1]]
+stiffness = 100.0
+damping = 2.0
+length = 0.3
+heat = "air"
+[thermal.air]
+capacity = 10.0
+temperature = 300.0
+"""
+SPRING = STAY.replace("tendons", "springs").replace("points = [[", "at1 = [").replace("], [", "]\nat2 = [").replace(
+    "]]", "]"
+)  # fmt: skip
+
+
+def loaded(folder, more, state=(0.2, -0.4, 0.5, -0.7), **options):
+    (folder / "reach.toml").write_text(ARM.format(*state) + more)
+    return ephs.load(folder / "reach.toml", **options)
+
+
+def length(a, b):
+    """Of the cable, by the angles of the two joints about y, of which rotations take x to −z."""
+
+    def turned(angle, x, y, z):
+        return np.array([np.cos(angle) * x + np.sin(angle) * z, y, np.cos(angle) * z - np.sin(angle) * x])
+
+    first, second = turned(a, 0.7, 0.1, 0.1), turned(a, 0.9, 0.0, 0.1)
+    last = turned(a, 1.0, 0.0, 0.0) + turned(a + b, 0.9, 0.2, 0.05)
+    pieces = first - np.array([0.0, 0.0, 0.4]), second - first, last - second
+    return sum(np.sqrt(np.sum(piece * piece)) for piece in pieces)
+
+
+angle = st.floats(-1.2, 1.2)
+
+
+@settings(max_examples=3)
+@given(angle, angle, angle, angle, st.floats(-20.0, 20.0))
+def test_forces_are_tension_times_the_gradient_of_the_length(tmp_path_factory, a, b, rate_a, rate_b, pull):
+    folder = tmp_path_factory.mktemp("scene")
+    state = (a, b, rate_a, rate_b)
+    bare = ephs.dynamics(loaded(folder, "", state))
+    tied = ephs.dynamics(loaded(folder, CABLE, state))
+    step = 1e-20j
+    gradient = np.array([length(a + step, b).imag, length(a, b + step).imag]) / 1e-20
+    tension = STIFFNESS * (length(a, b) - LENGTH) + DAMPING * (gradient @ [rate_a, rate_b]) + pull
+    forces = dict(zip(("pin", "elbow"), (-tension * gradient).tolist(), strict=True))
+    exact = bare.acceleration(bare.state0, forces)
+    found = tied.acceleration(tied.state0, {"cable-1": -pull, "cable-2": -pull})
+    for joint, value in exact.items():
+        assert np.allclose(found[joint], value, rtol=1e-9, atol=1e-8)
+
+
+def ended(scene, method, inputs=None, **options):
+    sol = ephs.simulate(scene, 0.3, method=method, inputs=inputs or {}, audit="off", save_at=[0.0, 0.3], **options)
+    return np.array([sol.joint(name).coordinate[-1, 0] for name in ("pin", "elbow")]), sol
+
+
+@pytest.mark.parametrize(
+    ("method", "options", "near"),
+    [
+        ("radau", {"rtol": 1e-9, "atol": 1e-11}, 1e-7),
+        ("ida", {"rtol": 1e-9, "atol": 1e-11}, 1e-6),
+        ("natural4", {"step": 2e-3}, 1e-7),
+        ("natural", {"step": 2e-3}, 1e-4),
+        ("alpha", {"step": 2e-3}, 1e-3),
+        ("variational", {"step": 0.01}, 1e-2),
+    ],
+)
+def test_all_methods_pull_it(tmp_path, method, options, near):
+    scene, inputs = loaded(tmp_path, CABLE), {"actuators.cable": lambda t: 5.0 * np.sin(7.0 * t)}
+    exact, sure = ended(scene, "rk87", inputs, rtol=1e-11, atol=1e-12)
+    found, sol = ended(scene, method, inputs, **options)
+    assert sure.energy_error.max() < 1e-12
+    assert np.allclose(found, exact, rtol=0.0, atol=near)
+    if method not in ("alpha", "variational"):
+        assert sol.energy_error.max() < 1e-12
+
+
+def test_between_two_points_it_is_a_spring(tmp_path):
+    (exact, spring), (found, sol) = (
+        ended(loaded(tmp_path, more), "rk87", rtol=1e-11, atol=1e-12) for more in (SPRING, STAY)
+    )
+    assert np.allclose(found, exact, rtol=0.0, atol=1e-9)
+    assert sol.heat[-1] == pytest.approx(spring.heat[-1], rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("change", "key", "expected"),
+    [
+        (('"hand"]\npoints', '"hnad"]\npoints'), r"tendons.cable.bodies\[3\]", "hand"),
+        ((", [0.4, 0.2, 0.05]]", "]"), "tendons.cable.points", "4 points, one in each"),
+        (('["ground", "arm", "arm", "hand"]', '["arm", "arm", "arm", "arm"]'), "tendons.cable.bodies", "different"),
+        ((f"stiffness = {STIFFNESS}", "stiffness = 0.0"), "tendons.cable.damping", "0 without stiffness"),
+        (("[tendons.cable]", '[actuators.cable]\njoints = ["pin"]\n[tendons.cable]'), "actuators.cable", "tendon"),
+    ],
+)
+def test_what_is_no_tendon_is_said(tmp_path, change, key, expected):
+    with pytest.raises(ephs.SceneError, match=key) as caught:
+        loaded(tmp_path, CABLE.replace(*change))
+    assert expected in str(caught.value)
