@@ -178,6 +178,28 @@ class Touching:
         ways = _ways(np.array(normal), turn[axis])
         return ways @ turn.T
 
+    def acting(self, i: int, axis: int, force: Array) -> tuple[tuple[int, Array, Array], ...]:
+        """Bodies that a force (3,) along the rows of a point acts on, each with the force and its moment about the
+        world's origin in world axes, where the links were placed last; none of a stop."""
+        spot = self._spots[i]
+        if isinstance(spot, _Stop):
+            return ()
+        one, two = (
+            SE3.compose(SE3.identity() if body == GROUND else self._eq.dense.residual.pose(body), offset)
+            for body, offset in zip(spot.bodies, spot.offsets, strict=True)
+        )
+        _, at = spot.gap.contact(SE3.compose(SE3.inverse(one), two))
+        place = two[4:] + quaternion_to_matrix(two[:4]) @ np.array(at)
+        pressed = force @ self.ways(i, axis)
+        moment = np.cross(place, pressed)
+        ends = ((spot.bodies[0], -1.0), (spot.bodies[1], 1.0))
+        return tuple((body, sign * pressed, sign * moment) for body, sign in ends if body != GROUND)
+
+    def pulling(self, i: int) -> tuple[Path, float] | None:
+        """Process of a stop's joint, and the side to which it presses the coordinate; None of a point."""
+        spot = self._spots[i]
+        return (spot.path, spot.side) if isinstance(spot, _Stop) else None
+
     def _left(self, q: Array, r: Array) -> Array:
         """(stops,) gaps, where the links were placed; cut joints are where their bodies put them."""
         coordinates = self._eq.fitted(q, r) if self._cut else q

@@ -10,7 +10,7 @@ from typing import final
 
 import numpy as np
 
-from ephs.mechanics.impacts.reading import forces_at
+from ephs.mechanics.impacts.reading import forces_at, pressing_at
 from ephs.mechanics.impacts.touching import Touching
 from ephs.mechanics.motion.batch import adjoint_inverse
 from ephs.mechanics.motion.general import GeneralMotion
@@ -107,13 +107,32 @@ class ReducedMotion:
     def _wrenches(self) -> Array:
         """(n, edges, 6)."""
         out = np.zeros((len(self._states), len(self._eq.reduced.edges), 6))
-        work = self._eq.engine.work
+        work, touching = self._eq.engine.work, Touching(self._eq)
         for k in range(len(self._states)):
-            accelerations = self._rates(k) - self._eq.prescribed.lead  # which frames have for a bias
-            out[k] = self._transmission.wrenches(
-                work["place"][:-1], accelerations, work["pushed"], work["force"], work["pulled"]
-            )
+            rates = self._rates(k)
+            given = work["place"][:-1], rates.copy(), work["pushed"].copy(), work["force"].copy(), work["pulled"].copy()
+            if len(touching):
+                self._press(touching, k, *given)
+            places, accelerations, *forces = given
+            accelerations -= self._eq.prescribed.lead  # which frames have for a bias
+            out[k] = self._transmission.wrenches(places, accelerations, *forces)
         return out
+
+    def _press(
+        self, touching: Touching, k: int, places: Array, rates: Array, pushed: Array, force: Array, pulled: Array
+    ) -> None:
+        """Add what hard contacts and stops do at the k-th instant to accelerations, wrenches on links, and forces."""
+        t = self._eq.reduced.tables
+        found = pressing_at(self._eq, touching, self._states[k], rates.copy())
+        rates += found.rates
+        for i, axis, one in zip(found.which.tolist(), found.axes.tolist(), found.forces, strict=True):
+            for body, push, moment in touching.acting(i, axis, one):
+                turn = places[body, :9].reshape(3, 3)
+                about = moment - np.cross(places[body, 9:12], push)
+                pushed[body] += np.concatenate([turn.T @ about, turn.T @ push])
+            if (stop := touching.pulling(i)) is not None:
+                edge = self._number[Path.of(tuple(stop[0])[:-1])]
+                (force if t.kind[edge] == TREE else pulled)[int(t.r_at[edge])] += stop[1] * one[0]
 
     def _rates(self, k: int) -> Array:
         """(n,) accelerations of the tree at the k-th instant."""

@@ -162,3 +162,26 @@ def test_a_joint_in_python_takes_hard_stops():
     assert made != joint("revolute", limits=[-1.0, 1.0], stop=Impact(0.6))
     with pytest.raises(StructureError, match="limits of a joint with 3 degrees of freedom"):
         joint("spherical", limits=[-1.0, 1.0], stop=Impact(0.5))
+
+
+def test_joints_carry_what_hard_contacts_and_stops_press(tmp_path):
+    """A bar on a hinge and on the floor presses each with half of its weight; a block on its stop that with all."""
+    bar = BODY.format(name="bar", position=[0.5, 0.0, 0.0])
+    surface = '[surfaces.{name}]\nbody = "{body}"\nshape = {{ {shape} }}\nposition = {at}\nrestitution = 0.0\n'
+    scene = scene_of(
+        tmp_path,
+        bar,
+        HINGE.format(name="hinge", bodies='["ground", "bar"]', at=[0.0, 0.0, 0.0], keys=""),
+        surface.format(name="tip", body="bar", shape="sphere = 0.05", at=[0.5, 0.0, 0.0]),
+        surface.format(name="floor", body="ground", shape="plane = {}", at=[0.0, 0.0, -0.05]),
+        '[contacts.tip]\nsurfaces = ["tip", "floor"]\n',
+        gravity=G,
+    )
+    sol = ephs.simulate(
+        scene, 0.1, method="rk54", step=2.0**-5, audit="off"
+    )  # nothing moves: no energy to compare with
+    assert sol.contact("tip").force[-1] == pytest.approx([0.0, 0.0, G], abs=1e-6)
+    assert np.linalg.norm(sol.joint("hinge").wrench[-1][3:]) == pytest.approx(G, abs=1e-6)
+    stopped = sliding(tmp_path, "limits = [0.0, nan]\nlimit_restitution = 0.0", gravity=G)
+    wrench = run(stopped, 0.1, "rk54", 2.0**-5).joint("slide").wrench[-1]
+    assert wrench == pytest.approx([0.0, 0.0, 0.0, 0.0, 0.0, 2.0 * G], abs=1e-5)
