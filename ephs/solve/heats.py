@@ -147,16 +147,10 @@ class Heats:
         out[self._nodes] = 1.0 / self._laws[1]
         return out
 
-    def flows(self, heats: Array, made: Array) -> Array:
-        """(makers,) flows where components make so much entropy."""
+    def flows(self, heats: Array, entropies: Array) -> Array:
+        """(makers,) flows by entropies a second: those that components make, of conduction what leaves its source."""
         theta = self.temperatures(heats)
-        one, two = _at(theta, self._source), _at(theta, self._sink) + self._loose
-        between = self._source >= 0
-        drop = np.where(between, one - two, 1.0)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            carried = np.where(between, made * one * two / drop, made * two)
-        carried[drop == 0.0] = 0.0
-        return carried
+        return entropies * np.where(self._source >= 0, _at(theta, self._source), _at(theta, self._sink) + self._loose)
 
     def booked(self, flows: Array, missed: Array | None, lost: float | None) -> Array:
         """Flows of a step with friction's heat moved towards the energy that the motion lost.

@@ -17,6 +17,7 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+from ephs.mechanics.scene.attached import Conduction, ThermalNode
 from ephs.mechanics.scene.entries import Checked, shown
 from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.flexible import FREE_END, Beam, Strain
@@ -47,17 +48,21 @@ MOST_ELEMENTS = 100_000
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class BeamDraft:
-    """A beam with its nodes as a scene of bodies, and its elements and welds as joints yet to be measured."""
+    """A beam with its nodes as a scene of bodies, its elements and welds as joints yet to be measured, its heat."""
 
     beam: Beam
     nodes: Scene
     joints: tuple[JointDraft, ...]
+    thermal: dict[str, ThermalNode]
+    conduction: dict[str, Conduction]
 
 
 def check_beam(name: str, table: Checked[Any], names: Names, faults: list[Fault]) -> None:
     """Append a fault where a beam's end or heat leads nowhere; ``names`` have the nodes of all beams."""
     entry, key = table.entry, f"beams.{name}"
-    if table.sound("heat"):
+    if table.sound("heat", "thermal") and entry.thermal is not None and entry.heat != ENVIRONMENT:
+        faults.append(fault("beam heat", f"{key}.heat", shown(entry.heat)))
+    elif table.sound("heat"):
         names.check(entry.heat, f"{key}.heat", "thermal", faults)
     for i, end in enumerate(entry.ends if table.sound("ends") else ()):
         if end != FREE_END:
@@ -83,7 +88,8 @@ def resolve_beam(name: str, table: Checked[Any], world: World, faults: list[Faul
     for i, (shape, length) in enumerate(zip(shapes, lengths.tolist(), strict=True)):
         between = f"{name}.{i}", f"{name}.{i + 1}"
         make = _element if entry.rod == "reissner" else _hinge
-        joints.append(make(f"{name}-{i + 1}", between, _settled(shape / length), length, initial, section, entry))
+        element = make(f"{name}-{i + 1}", between, _settled(shape / length), length, initial, section, entry)
+        joints.append(element if entry.thermal is None else replace(element, heat=element.name))
     held = "spherical" if entry.rod == "string" else "fixed"
     for end, node, side in ((ends[0], 0, "start"), (ends[1], n, "end")):
         if end != FREE_END:
@@ -92,7 +98,22 @@ def resolve_beam(name: str, table: Checked[Any], world: World, faults: list[Faul
     beam = Beam(
         name, n, (ends[0], ends[1]), section.outline, tuple(lengths.tolist()) if entry.rod != "reissner" else ()
     )
-    return BeamDraft(beam, _nodes(name, entry, section, frames, lengths, world), tuple(joints))
+    nodes = _nodes(name, entry, section, frames, lengths, world)
+    return BeamDraft(beam, nodes, tuple(joints), *_warmth(beam, entry, lengths))
+
+
+def _warmth(beam: Beam, entry: Any, lengths: Array) -> tuple[dict[str, ThermalNode], dict[str, Conduction]]:
+    """A store of heat for each element, and conduction between the middles of neighbours."""
+    given = entry.thermal
+    if given is None:
+        return {}, {}
+    of = dict(zip(beam.joints, lengths.tolist(), strict=True))
+    nodes = {name: ThermalNode(name, given.capacity * length, given.temperature) for name, length in of.items()}
+    ways = {
+        one: Conduction(one, (one, other), given.conduction / (0.5 * (of[one] + of[other])))
+        for one, other in pairwise(beam.joints)
+    }
+    return nodes, ways if given.conduction else {}
 
 
 def _check_kind(table: Checked[Any], key: str, faults: list[Fault]) -> None:

@@ -129,7 +129,8 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
     sections = document.sections
     rods = _beams(document, world, faults)
     parts |= {name: rod.nodes for name, rod in rods.items()}
-    names = _names(document, parts, lost | (set(sections["beams"]) - set(rods)))
+    warm = {name for rod in rods.values() for name in rod.thermal}
+    names = _names(document, parts, warm, lost | (set(sections["beams"]) - set(rods)))
     for name, table in sections["beams"].items():
         check_beam(name, table, names, faults)
     mode = r.inertia or document.assembly.inertia
@@ -158,8 +159,8 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
         placed,
         coupled,
         springs,
-        resolve.resolve_thermal(document),
-        conduction,
+        resolve.resolve_thermal(document) | {name: x for rod in rods.values() for name, x in rod.thermal.items()},
+        conduction | {name: x for rod in rods.values() for name, x in rod.conduction.items()},
         parts,
         str(path),
         markers=markers,
@@ -278,9 +279,15 @@ def _beams(document: Document, world: World, faults: list[Fault]) -> dict[str, B
     drafts = {n: resolve_beam(n, t, world, faults) for n, t in document.sections["beams"].items()}
     found = {name: draft for name, draft in drafts.items() if draft is not None}
     for name, draft in found.items():
-        for joint in draft.joints:
-            if joint.name in document.sections["joints"]:
-                faults.append(fault("collision", f"joints.{joint.name}", shown(joint.name), other=f"the beam {name}"))
+        kinds = {
+            "joints": [each.name for each in draft.joints],
+            "thermal": draft.thermal,
+            "conduction": draft.conduction,
+        }
+        for kind, taken in kinds.items():
+            for each in taken:
+                if each in document.sections[kind]:
+                    faults.append(fault("collision", f"{kind}.{each}", shown(each), other=f"the beam {name}"))
     return found
 
 
@@ -305,11 +312,11 @@ def _seen_from_outside(found: Fault, key: str, file: str) -> Fault:
     return replace(found, key=inner, found=f"{found.found} (in {legible(file)})")
 
 
-def _names(document: Document, parts: Mapping[str, Scene], lost: set[str]) -> resolve.Names:
+def _names(document: Document, parts: Mapping[str, Scene], warm: set[str], lost: set[str]) -> resolve.Names:
     bodies = {f"{part}.{name}" for part, scene in parts.items() for name, _ in scene.all_bodies()}
     thermal = {f"{part}.{name}" for part, scene in parts.items() for name, _ in scene.all_thermal()}
     sections = document.sections
-    return resolve.Names(bodies | set(sections["bodies"]), thermal | set(sections["thermal"]), lost)
+    return resolve.Names(bodies | set(sections["bodies"]), thermal | warm | set(sections["thermal"]), lost)
 
 
 def _is_name(text: str) -> bool:

@@ -34,6 +34,14 @@ class SectionEntry(Entry):
     rho: Positive | None = Field(default=None, description="density, kg/m³")
 
 
+class RodHeatEntry(Entry):
+    """``thermal`` of a beam: a store of heat for each element, and conduction from one to the next."""
+
+    capacity: Positive = Field(description="per length, J/(m K)")
+    conduction: NonNegative = Field(default=0.0, description="conductivity times area, W m/K")
+    temperature: Positive = Field(description="at t = 0, K")
+
+
 _Vector: TypeAlias = Vector | None
 _Points: TypeAlias = Annotated[list[Vector], Field(min_length=2)] | None
 _Count: TypeAlias = Annotated[int, Field(strict=True, ge=1)] | None
@@ -70,6 +78,10 @@ _BEAM: dict[str, Any] = {
     ),
     "damping": (NonNegative, Field(default=0.0, description="Kelvin–Voigt time, s")),
     "heat": (Text, Field(default="environment", description="where the heat of damping goes: a thermal name")),
+    "thermal": (
+        RodHeatEntry | None,
+        Field(default=None, description="instead of heat: each element NAME-i stores its own, in a node of that name"),
+    ),
     "ends": (
         Annotated[list[Text], Field(max_length=2)],
         Field(default=[], description='what the first and the last node are welded to: a body, "ground" or "free"'),

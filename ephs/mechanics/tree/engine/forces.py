@@ -329,10 +329,10 @@ class _Acting:
         on.when(edge.first >= 0, lambda: _grow(pushed, edge.first, inner))
 
     def conduct(self, row: Conduction) -> None:
-        """Add the conduction of a component to the rates of two entropies."""
+        """Add the conduction of a component to the rates of two entropies, and note what leaves the first."""
         w, rate = self.work, self.s_rate
         w.e[0], w.e[1] = w.temperature[row.one], w.temperature[row.two]
         self._evaluate(row.component)
         rate[row.one] = rate[row.one] - w.f[0]
         rate[row.two] = rate[row.two] - w.f[1]
-        self.made[self.tables.component[row.component].made] = -w.f[0] - w.f[1]
+        self.made[self.tables.component[row.component].made] = w.f[0]

@@ -51,9 +51,10 @@ def entropies(on: Evaluator, tables: Tables, work: Work, heats: Vector) -> Integ
 
 
 def heat_rates(on: Evaluator, tables: Tables, work: Work, rates: Vector, made: Vector) -> None:
-    """Turn rates of entropies into those of energies, and entropies made a second into flows.
+    """Turn rates of entropies into those of energies, and entropies a second into flows.
 
-    Flows are what friction makes, and what conduction carries from its first to its second end.
+    Flows are what friction makes, and what conduction carries from its first to its second end: by the entropy that
+    leaves the first, since what it makes is a small difference where temperatures are nearly equal.
     """
     around = tables.scal[1]
 
@@ -74,10 +75,8 @@ def heat_rates(on: Evaluator, tables: Tables, work: Work, rates: Vector, made: V
 
     def conduction(i: Integer) -> None:
         row = tables.conduction[i]
-        maker, one, two = tables.component[row.component].made, theta(row.one), theta(row.two)
-        drop = work.temperature[row.one] - work.temperature[row.two]
-        level = on.absolute(drop) <= 0.0
-        made[maker] = on.select(level, 0.0, made[maker] * one * two / on.select(level, 1.0, drop))
+        maker = tables.component[row.component].made
+        made[maker] = made[maker] * theta(row.one)
 
     on.loop(tables.node.size, node)
     on.loop(tables.sink.size, friction)

@@ -155,7 +155,7 @@ def _laws(
         for j in range(4):
             flow[k, 2 + j] = jac[j]
         flow[k, 6], flow[k, 7] = warming[one, 0], warming[other, 0]
-        made[component[number].made] = -f[0] - f[1]
+        made[component[number].made] = f[0]
 
     heat[0] = 0.0
     on.loop(made.size, lambda k: _put(made, k, 0.0))

@@ -35,7 +35,7 @@ class Laws:
     warming, flow
         As the equations read them: (entropies, 3) and (conductions, 8).
     made
-        (makers,) entropy that components make a second, in W/K.
+        (makers,) entropy a second, in W/K: that components make, of conductions what leaves their first store.
     """
 
     def __init__(self, forces: Forces, edge: Index, makers: int, scal: Array) -> None:
