@@ -102,6 +102,7 @@ class TendonEntry(Entry):
     points: Annotated[list[Vector], Field(min_length=2)] = Field(
         description="one in each, in its centre-of-mass frame (ground: world), m"
     )
+    mass: NonNegative = Field(default=0.0, description="kg; needed where two tendons lie beside each other")
     stiffness: NonNegative = Field(default=0.0, description="N/m")
     length: NonNegative | None = Field(default=None, description="without force, m; default: as at the start")
     damping: NonNegative = Field(default=0.0, description="N s/m")

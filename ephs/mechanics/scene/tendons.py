@@ -1,10 +1,10 @@
 """Tendons of a scene file as bodies and joints: straight between points that bodies carry, free to slide through them.
 
-Between two points whose bodies differ there is a telescope without mass: a universal joint at the first, a slide, a
-spherical joint at the second. These six degrees of freedom hold nothing; the slide's coordinate is how much longer the
-segment is than at the start. The tendon's spring and damper lie along the sum of these, as a belt's, and what pulls it
-is an actuator of its name. A segment may not come to lie along the first axis of its universal joint, which is that of
-a revolute joint of its first body where there is one across it.
+Between two points whose bodies differ there is a telescope, its mass at the points: a universal joint at the first, a
+slide, a spherical joint at the second. These six degrees of freedom hold nothing; the slide's coordinate is how much
+longer the segment is than at the start. The tendon's spring and damper lie along the sum of these, as a belt's, and
+what pulls it is an actuator of its name. A segment may not come to lie along the first axis of its universal joint,
+which is that of a revolute joint of one of its bodies where there is one across it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -39,7 +39,7 @@ SLIM = 0.004
 @final
 @dataclass(frozen=True, slots=True)
 class TendonDraft:
-    """A tendon's frames without mass and its joints, and what is attached to its slides; no gear where these are
+    """A tendon's frames and its joints, and what is attached to its slides; no gear where these are
     one, or where it has no spring.
     """
 
@@ -102,7 +102,7 @@ def _resolved(
     stretch = 0.0 if entry.length is None else whole - entry.length
     slides = tuple(f"{name}-{k}" for k in range(1, len(moving) + 1))
     made = [
-        _telescope(slide, spots[i], spots[i + 1], _first_axis(spots[i], spots[i + 1], axes))
+        _telescope(slide, spots[i], spots[i + 1], entry.mass / len(moving), _first_axis(spots[i], spots[i + 1], axes))
         for slide, i in zip(slides, moving, strict=True)
     ]
     tied = [j for _, three in made for j in three]
@@ -161,7 +161,9 @@ def _axes(bodies: Mapping[str, Body], joints: Mapping[str, Joint]) -> list[tuple
     return found
 
 
-def _telescope(name: str, one: _Spot, two: _Spot, first: Array) -> tuple[tuple[BodyDraft, ...], list[JointDraft]]:
+def _telescope(
+    name: str, one: _Spot, two: _Spot, mass: float, first: Array
+) -> tuple[tuple[BodyDraft, ...], list[JointDraft]]:
     """Frames at two points that look at each other, and the joints between; the slide has the telescope's name."""
     length = float(np.linalg.norm(two.place - one.place))
     along = (two.place - one.place) / length
@@ -170,7 +172,7 @@ def _telescope(name: str, one: _Spot, two: _Spot, first: Array) -> tuple[tuple[B
     spin = across + along * (along @ one.spin)
     names = f"{name}-from", f"{name}-to"
     bodies = tuple(
-        _frame(each, np.concatenate([turn, spot.place]), spot.velocity, spin, side * length)
+        _frame(each, np.concatenate([turn, spot.place]), spot.velocity, spin, side * length, 0.5 * mass)
         for each, spot, side in zip(names, (one, two), (1.0, -1.0), strict=True)
     )
     start, end = (np.concatenate([turn, spot.place]) for spot in (one, two))
@@ -185,11 +187,13 @@ def _telescope(name: str, one: _Spot, two: _Spot, first: Array) -> tuple[tuple[B
     ]
 
 
-def _frame(name: str, pose: Array, velocity: Array, spin: Array, reach: float) -> BodyDraft:
-    """A body without mass, drawn as a rod along half of its segment."""
+def _frame(name: str, pose: Array, velocity: Array, spin: Array, reach: float, mass: float) -> BodyDraft:
+    """Half of a segment, its mass at its point, with the moments of inertia of a thin rod; drawn as one."""
     turned = quaternion_to_matrix(pose[:4]).T @ spin
+    across, along = mass * (0.5 * reach) ** 2 / 3.0, 0.5 * mass * (SLIM * reach) ** 2
+    inertia = np.diag([across + 0.5 * along, across + 0.5 * along, along])
     rod = {"cylinder": [SLIM * abs(reach), 0.5 * abs(reach)], "position": [0.0, 0.0, 0.25 * reach]}
-    return BodyDraft(name, 0.0, np.zeros((3, 3)), pose, velocity, turned, rod, ())
+    return BodyDraft(name, mass, inertia, pose, velocity, turned, rod, ())
 
 
 def _joint(name: str, kind: str, bodies: tuple[str, str], place: Place, freedoms: int) -> JointDraft:

@@ -142,3 +142,15 @@ def test_what_is_no_tendon_is_said(tmp_path, change, key, expected):
     with pytest.raises(ephs.SceneError, match=key) as caught:
         loaded(tmp_path, CABLE.replace(*change))
     assert expected in str(caught.value)
+
+
+@pytest.mark.parametrize("method", ["rk87", "radau", "natural"])
+def test_antagonists_beside_each_other_have_mass(tmp_path, method):
+    pair = (STAY + STAY.partition("[thermal")[0].replace("stay", "other").replace("0.1, 0.4]", "-0.1, -0.4]")).replace(
+        "damping", "mass = 1e-3\ndamping"
+    )
+    steps = {"step": 2e-3} if method == "natural" else {"rtol": 1e-8}
+    pulled = {"actuators.other": 20.0}
+    still, sol = (ended(loaded(tmp_path, pair), method, given, **steps) for given in ({}, pulled))
+    assert sol[1].energy_error.max() < 1e-11
+    assert sol[0][0] > still[0][0] + 1e-3
