@@ -25,7 +25,9 @@ from ephs.mechanics.scene.geometry import body_twist
 from ephs.mechanics.scene.model import ENVIRONMENT, IDENTITY_POSE, Body, Scene, World, frozen
 from ephs.mechanics.scene.placing import Place
 from ephs.mechanics.scene.resolve import JointDraft, Names
+from ephs.mechanics.scene.schema_touching import ContactLawEntry
 from ephs.mechanics.scene.sections import Section, resolve_section
+from ephs.mechanics.scene.surfaces import Surface
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces import rotations as so3
 from ephs.semantics.spaces.rank import TINY
@@ -43,18 +45,21 @@ ALIKE = 1e-9
 NOISE = 1e-12
 """Strains of a reference curve below this part of the largest are rounding."""
 MOST_ELEMENTS = 100_000
+_TURNED = float(np.sqrt(0.5)), 0.0, float(np.sqrt(0.5)), 0.0
+"""A rotation from axis z, that of cylinders and capsules, to the tangent."""
 
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class BeamDraft:
-    """A beam with its nodes as a scene of bodies, its elements and welds as joints yet to be measured, its heat."""
+    """A beam with its nodes as a scene of bodies, its elements and welds as joints yet to be measured, its heat and law."""
 
     beam: Beam
     nodes: Scene
     joints: tuple[JointDraft, ...]
     thermal: dict[str, ThermalNode]
     conduction: dict[str, Conduction]
+    law: ContactLawEntry | None
 
 
 def check_beam(name: str, table: Checked[Any], names: Names, faults: list[Fault]) -> None:
@@ -64,6 +69,8 @@ def check_beam(name: str, table: Checked[Any], names: Names, faults: list[Fault]
         faults.append(fault("beam heat", f"{key}.heat", shown(entry.heat)))
     elif table.sound("heat"):
         names.check(entry.heat, f"{key}.heat", "thermal", faults)
+    if table.sound("surface") and entry.surface is not None and entry.surface.heat is not None:
+        names.check(entry.surface.heat, f"{key}.surface.heat", "thermal", faults)
     for i, end in enumerate(entry.ends if table.sound("ends") else ()):
         if end != FREE_END:
             names.check(end, f"{key}.ends[{i}]", "body", faults)
@@ -78,6 +85,10 @@ def resolve_beam(name: str, table: Checked[Any], world: World, faults: list[Faul
     )
     placed = _placed(table, key, faults)
     _check_kind(table, key, faults)
+    touching = entry.surface if table.sound("section", "surface") else None
+    if touching is not None and not (touching.radius or _radius(entry.section)):
+        faults.append(fault("rod radius", f"{key}.surface.radius", "nothing"))
+        return None
     if section is None or placed is None:
         return None
     frames, shapes = placed
@@ -99,7 +110,7 @@ def resolve_beam(name: str, table: Checked[Any], world: World, faults: list[Faul
         name, n, (ends[0], ends[1]), section.outline, tuple(lengths.tolist()) if entry.rod != "reissner" else ()
     )
     nodes = _nodes(name, entry, section, frames, lengths, world)
-    return BeamDraft(beam, nodes, tuple(joints), *_warmth(beam, entry, lengths))
+    return BeamDraft(beam, nodes, tuple(joints), *_warmth(beam, entry, lengths), entry.surface)
 
 
 def _warmth(beam: Beam, entry: Any, lengths: Array) -> tuple[dict[str, ThermalNode], dict[str, Conduction]]:
@@ -175,7 +186,24 @@ def _nodes(name: str, entry: Any, section: Section, frames: list[Array], lengths
             frozen(pose), frozen(twist),
             _shape(section.outline, float(length), float(0.5 * length - back)),
         )  # fmt: skip
-    return Scene(name, world, bodies)
+    return Scene(name, world, bodies, surfaces=_surfaces(entry, sides))
+
+
+def _surfaces(entry: Any, sides: tuple[Array, Array]) -> dict[str, Surface]:
+    """Capsules about the nodes' pieces, which reach half the elements on either side, where the beam has a surface."""
+    if entry.surface is None:
+        return {}
+    radius = entry.surface.radius or _radius(entry.section)
+    found: dict[str, Surface] = {}
+    for i, (ahead, behind) in enumerate(np.array(sides).T.tolist()):
+        pose = np.array([*_TURNED, 0.25 * (ahead - behind), 0.0, 0.0])
+        found[str(i)] = Surface(str(i), str(i), {"capsule": [radius, 0.5 * (ahead + behind)]}, frozen(pose))
+    return found
+
+
+def _radius(section: Any) -> float | None:
+    """Of a round section; None of others."""
+    return section.circle or (section.tube[0] if section.tube else None)
 
 
 def _shares(lengths: Array, order: int) -> Array:
@@ -201,8 +229,7 @@ def _shape(outline: tuple[float, ...], length: float, shift: float) -> dict[str,
     place = {"position": [shift, 0.0, 0.0]}
     if len(outline) == 2:
         return {"box": [length, *outline], **place}
-    turned = [float(np.sqrt(0.5)), 0.0, float(np.sqrt(0.5)), 0.0]  # the axis z of a cylinder along the tangent
-    return {"cylinder": [outline[0], length], **place, "rotation": turned}
+    return {"cylinder": [outline[0], length], **place, "rotation": list(_TURNED)}
 
 
 def _joint(

@@ -13,9 +13,10 @@ from pydantic import ValidationError, WrapValidator
 
 from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing
 from ephs.mechanics.scene.rotations import FORMS
-from ephs.mechanics.scene.schema import SECTIONS, AssemblyEntry, CylinderEntry, SceneFile, SurfaceShapeEntry, WorldEntry
+from ephs.mechanics.scene.schema import SECTIONS, AssemblyEntry, CylinderEntry, SceneFile, WorldEntry
 from ephs.mechanics.scene.schema_flexible import SectionEntry
 from ephs.mechanics.scene.schema_numbers import LARGEST, Entry
+from ephs.mechanics.scene.schema_touching import SurfaceShapeEntry
 
 LONGEST_NAME = 200
 E = TypeVar("E", bound=Entry)

@@ -129,6 +129,7 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
     sections = document.sections
     rods = _beams(document, world, faults)
     parts |= {name: rod.nodes for name, rod in rods.items()}
+    r.laws.update({name: dict.fromkeys(rod.nodes.surfaces, rod.law) for name, rod in rods.items() if rod.law})
     warm = {name for rod in rods.values() for name in rod.thermal}
     names = _names(document, parts, warm, lost | (set(sections["beams"]) - set(rods)))
     for name, table in sections["beams"].items():

@@ -24,10 +24,10 @@ from ephs.mechanics.scene.schema_numbers import (
     Positive,
     Range,
     Series,
-    Sizes,
     Text,
     Vector,
 )
+from ephs.mechanics.scene.schema_touching import ContactEntry, SurfaceEntry
 
 
 class WorldEntry(Entry):
@@ -174,59 +174,6 @@ class SpringEntry(Entry):
     length: NonNegative = Field(default=0.0, description="without force, m")
     damping: NonNegative = Field(default=0.0, description="N s/m")
     heat: Text = Field(default="environment", description="where the heat goes: a thermal name")
-
-
-class SurfaceShapeEntry(Entry):
-    """``shape`` of a surface: one of six."""
-
-    sphere: Positive | None = Field(default=None, description="radius, m")
-    capsule: Sizes | None = Field(default=None, description="radius, and length of its axis along z, m")
-    cylinder: Sizes | None = Field(default=None, description="radius and length along z, m")
-    box: Annotated[list[Positive], Field(min_length=3, max_length=3)] | None = Field(
-        default=None, description="edge lengths, m"
-    )
-    plane: Annotated[dict[str, Number], Field(max_length=0)] | None = Field(
-        default=None, description="the plane z = 0, solid below"
-    )
-    mesh: Text | None = Field(default=None, description="STL file of a convex body, which meets planes; m")
-
-
-class ContactLawEntry(Entry):
-    """Keys of a contact's law, on a surface or on a contact."""
-
-    stiffness: Positive | None = Field(default=None, description="k of the elastic force k dⁿ at overlap d, N/mⁿ")
-    exponent: Number | None = Field(default=None, ge=1.0, description="n; 1.5 is Hertz's (default 1)")
-    loss: NonNegative | None = Field(default=None, description="α of Hunt and Crossley, s/m (default 0)")
-    friction: NonNegative | None = Field(default=None, description="coefficient μ (default 0)")
-    slip: Positive | None = Field(
-        default=None, description="slip velocity below which friction is viscous, m/s (default 1e-3)"
-    )
-    rolling: NonNegative | None = Field(default=None, description="arm of the moment against rolling, m (default 0)")
-    spinning: NonNegative | None = Field(default=None, description="arm of that against spinning, m (default 0)")
-    restitution: NonNegative | None = Field(
-        default=None,
-        le=1.0,
-        description="coefficient of restitution: the surface is hard, where the other one has no stiffness",
-    )
-    tangential: NonNegative | None = Field(
-        default=None, le=1.0, description="that of the slip of hard surfaces (default restitution)"
-    )
-    heat: Text | None = Field(default=None, description="where the heat goes: a thermal name")
-
-
-class SurfaceEntry(ContactLawEntry):
-    """``[surfaces.NAME]``"""
-
-    body: Text = Field(description='the body that has it, or "ground"')
-    shape: SurfaceShapeEntry = Field(description="sphere, capsule, cylinder, box, plane or mesh")
-    position: Vector | None = Field(default=None, description="in the centre-of-mass frame (ground: world), m")
-    rotation: Rotation | None = Field(default=None, description="likewise, [w, x, y, z] or a table")
-
-
-class ContactEntry(ContactLawEntry):
-    """``[contacts.NAME]``"""
-
-    surfaces: Pair = Field(description="names of two surfaces; the keys below replace theirs")
 
 
 class MotorEntry(Entry):

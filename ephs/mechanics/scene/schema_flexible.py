@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 from pydantic import Field, create_model
 
 from ephs.mechanics.scene.schema_numbers import Entry, Flag, NonNegative, Number, Positive, Text, Vector
+from ephs.mechanics.scene.schema_touching import ContactLawEntry
 
 
 class SectionEntry(Entry):
@@ -40,6 +41,12 @@ class RodHeatEntry(Entry):
     capacity: Positive = Field(description="per length, J/(m K)")
     conduction: NonNegative = Field(default=0.0, description="conductivity times area, W m/K")
     temperature: Positive = Field(description="at t = 0, K")
+
+
+class RodSurfaceEntry(ContactLawEntry):
+    """``surface`` of a beam: a capsule along each node's piece, which meets others and the pieces further on."""
+
+    radius: Positive | None = Field(default=None, description="that of a circle or tube unless given, m")
 
 
 _Vector: TypeAlias = Vector | None
@@ -85,6 +92,10 @@ _BEAM: dict[str, Any] = {
     "ends": (
         Annotated[list[Text], Field(max_length=2)],
         Field(default=[], description='what the first and the last node are welded to: a body, "ground" or "free"'),
+    ),
+    "surface": (
+        RodSurfaceEntry | None,
+        Field(default=None, description="round; the node NAME.i has the surface of that name"),
     ),
     "velocity": (_Vector, Field(default=None, description="of the first node, world basis, m/s")),
     "angular_velocity": (_Vector, Field(default=None, description="of the whole, world basis, rad/s")),

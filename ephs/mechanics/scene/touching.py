@@ -18,7 +18,8 @@ from ephs.mechanics.scene.geometry import coupling_of
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, IDENTITY_POSE, Joint, Scene, frozen
 from ephs.mechanics.scene.polytope import vertices_of
 from ephs.mechanics.scene.resolve import Names, mesh_file
-from ephs.mechanics.scene.schema import ContactEntry, ContactLawEntry, JointEntry, SurfaceEntry
+from ephs.mechanics.scene.schema import JointEntry
+from ephs.mechanics.scene.schema_touching import ContactEntry, ContactLawEntry, SurfaceEntry
 from ephs.mechanics.scene.state import Snapshot
 from ephs.mechanics.scene.surfaces import Contact, Surface
 from ephs.mechanics.shapes.impact import Impact
@@ -258,7 +259,16 @@ def _hard(laws: tuple[ContactLawEntry, ...]) -> Impact | None:
 
 
 def _meeting(scene: Scene, surfaces: Mapping[str, Surface]) -> Iterator[tuple[Surface, Surface]]:
-    """Pairs of surfaces on different bodies that no joint holds together; of those of one part, none."""
+    """Pairs of surfaces on different bodies that no joint holds together; of those of one part, none, but of a beam
+    those of its pieces between which there is more of it than half a turn of a circle of its radius: nearer ones
+    cannot touch, for a rod bends to no smaller circle."""
+    for beam in scene.beams.values():
+        pieces = [surfaces[node] for node in beam.nodes if node in surfaces]
+        sizes = np.array([piece.shape["capsule"] for piece in pieces]).reshape(-1, 2)
+        upto = np.append(0.0, np.cumsum(sizes[:, 1]))
+        for i, j in combinations(range(len(pieces)), 2):
+            if upto[j] - upto[i + 1] > np.pi * sizes[i, 0]:
+                yield pieces[i], pieces[j]
     joined = {frozenset((j.body1, j.body2)) for _, j in scene.all_joints()}
     level = [[each] for name, each in surfaces.items() if "." not in name]
     level += [[each for name, each in surfaces.items() if name.startswith(f"{part}.")] for part in scene.parts]
