@@ -52,7 +52,7 @@ _TURNED = float(np.sqrt(0.5)), 0.0, float(np.sqrt(0.5)), 0.0
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class BeamDraft:
-    """A beam with its nodes as a scene of bodies, its elements and welds as joints yet to be measured, its heat and law."""
+    """A beam with its nodes as a scene, its elements and welds as joints yet to be measured, its heat, its touch."""
 
     beam: Beam
     nodes: Scene
