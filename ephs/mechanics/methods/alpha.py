@@ -74,13 +74,13 @@ class Alpha(ReducedMethod):
             before = eq.rates(state.t, state.q, y0)
             mean = before[nv : nv + n]
         rate, fall = slice(nv, nv + n), slice(nv + n, nv + n + ns)
-        solver = self._solver(state, h)
-        tree = np.arange(n)
+        solver, across = self._solver(state, h)
+        tree, moved_on = np.arange(n), np.zeros(nv - n)
         mean1, rates = mean.copy(), before.copy()
         y1, last, moved, worst = y0.copy(), np.inf, np.inf, np.zeros(2 * n + ns)
         for _ in range(ITERATIONS):
             y1[tree] = h * y0[rate] + h * h * ((0.5 - self._beta) * mean + self._beta * mean1)
-            y1[n:nv] = 0.5 * h * (before[n:nv] + rates[n:nv])
+            y1[n:nv] = 0.5 * h * (before[n:nv] + rates[n:nv]) + moved_on
             y1[rate] = y0[rate] + h * ((1.0 - self._gamma) * mean + self._gamma * mean1)
             y1[fall] = y0[fall] + 0.5 * h * (before[fall] + rates[fall])
             found = eq.rates(state.t + h, state.q, y1)
@@ -90,6 +90,7 @@ class Alpha(ReducedMethod):
             drift = 0.5 * h * (found - rates)
             rates = found
             mean1 -= change
+            moved_on = -across @ change
             scale = self.atol + self.rtol * eq.sizes(y0, y1)
             parts = np.concatenate([self._beta * h * h * change, self._gamma * h * change, drift[fall]])
             worst = np.abs(parts) / scale
@@ -145,9 +146,12 @@ class Alpha(ReducedMethod):
         """Restore from a value of `taken`."""
         self.jacobian.restore(own["jacobian"], state)
 
-    def _solver(self, state: ReducedState, h: float) -> Any:
+    def _solver(self, state: ReducedState, h: float) -> tuple[Any, Array]:
+        """Factors of the matrix of mean accelerations, and by how much these move cut joints, whose forces count."""
         eq = self.equations
         whole = self.jacobian.at(state)
-        rate = slice(eq.nv, eq.nv + eq.n)
-        slope = self._beta * h * h * whole[rate, : eq.n] + self._gamma * h * whole[rate, rate]
-        return factors((1.0 - self._m) * np.eye(eq.n) - (1.0 - self._f) * slope)
+        cut, rate = slice(eq.n, eq.nv), slice(eq.nv, eq.nv + eq.n)
+        moved, turned = self._beta * h * h, self._gamma * h
+        across = 0.5 * h * (moved * whole[cut, : eq.n] + turned * whole[cut, rate])
+        slope = moved * whole[rate, : eq.n] + turned * whole[rate, rate] + whole[rate, cut] @ across
+        return factors((1.0 - self._m) * np.eye(eq.n) - (1.0 - self._f) * slope), across
