@@ -87,7 +87,7 @@ class Model:
             dense=np.zeros(rows),
             flows=np.zeros(int(t.e_index.size) + 1),
             energy=np.zeros(t.kind.size),
-            defect=np.zeros(1),
+            defect=np.zeros(2),
             pivot=np.zeros(rows),
         )
 

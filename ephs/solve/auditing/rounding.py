@@ -22,7 +22,8 @@ def rounded(solution: "Solution") -> float:
 
 
 def trembling(solution: "Solution") -> float:
-    """Energy of bodies that move by the rounding of their positions in the longest step: what rests has no more."""
+    """Energy of bodies that move by the rounding of their positions in the longest step, and of their weight along
+    that: what rests has no more."""
     problem, stats = solution.problem, solution.stats
     if problem is None or problem.scene is None:
         return 0.0
@@ -30,8 +31,9 @@ def trembling(solution: "Solution") -> float:
     places = [values[:, 4:] for values in solution.states.values() if values.ndim == 2 and values.shape[1] == 7]
     far = max((float(np.abs(place).max(initial=0.0)) for place in places), default=0.0)
     mass = sum(float(body.mass) for _, body in problem.scene.all_bodies())
-    speed = _part(solution) * max(far, problem.length) / h if h else 0.0
-    return 0.5 * mass * speed**2
+    away = _part(solution) * max(far, problem.length)
+    weight = mass * float(np.linalg.norm(problem.scene.world.gravity))
+    return 0.5 * mass * (away / h) ** 2 + weight * away if h else 0.0
 
 
 def _part(solution: "Solution") -> float:

@@ -107,6 +107,7 @@ def newton(
     ratio, defect = on.variable(0.0), on.variable(0.0)
     right = Vector(s.residual.cells, s.residual.start, STAGES * n)
     outcome[0], outcome[1] = RUNNING, 0
+    m.defect[1] = FAR
 
     def look(i: Integer) -> None:
         copy(on, s.residual.row(i), m.residual)

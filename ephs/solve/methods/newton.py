@@ -194,6 +194,7 @@ def newton(
     before, part, iteration, n = on.variable(FAR), on.variable(1.0), on.counter(0), z.size
     one = Matrix(z.cells, z.start, 1, n)
     outcome[0], outcome[1] = RUNNING, 0
+    m.defect[1] = FAR
 
     def pin(i: Integer) -> None:
         def leave() -> None:

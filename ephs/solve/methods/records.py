@@ -168,7 +168,7 @@ class MemoryOf(Generic[Numbers]):
     flows, energy
         Of all ports, and of each component.
     defect
-        (1,): largest relative residual of a dropped equation.
+        (2,): largest relative residual of a dropped equation, and the least of the largest scales of a step.
     """
 
     e: Numbers

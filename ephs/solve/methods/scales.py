@@ -19,8 +19,8 @@ SPREAD: Final = 1e-3
 """A block's scale is at least this fraction of the largest of its kind: e = 0 alone has no scale of its own."""
 
 FAINT: Final = 1e-18
-"""A block's scale is at least this fraction of the largest of all, whatever their units: terms that an iteration makes
-of rounding where everything is at rest have none of their own."""
+"""A block's scale is at least this fraction of the largest of all, whatever their units, in the iteration of a step
+where that was least: terms that are made of rounding, where everything is at rest, have no scale of their own."""
 
 TAKES_PART: Final = 1e-3
 """The least coefficient, relative to the largest, with which an effort takes part in a constraint; less is rounding."""
@@ -173,7 +173,7 @@ def measure(on: Evaluator, t: Columns, z: Vector, dropped: Integers, m: Scratch)
     def one(i: Integer) -> None:
         block = t.block[i]
         scale = on.maximum(m.block[block], SPREAD * m.group[t.group[block]])
-        scale = on.maximum(scale, FAINT * largest.value)
+        scale = on.maximum(scale, FAINT * m.defect[1])
         sized = scale > NOTHING
         ratio = on.select(sized, on.absolute(m.residual[i]) / on.select(sized, scale, 1.0), 0.0)
 
@@ -191,6 +191,7 @@ def measure(on: Evaluator, t: Columns, z: Vector, dropped: Integers, m: Scratch)
         on.when(ratio <= ratio, lambda: None, nothing)
 
     on.loop(m.residual.size, gather)
+    m.defect[1] = on.minimum(m.defect[1], largest.value)
     on.loop(m.residual.size, one)
     m.defect[0] = defect.value
     return worst.value

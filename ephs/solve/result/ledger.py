@@ -78,12 +78,14 @@ class Ledgers:
     def scale(self) -> float:
         """Largest K + |V − V₀| + |heat| + |work| over the run; where nothing moves, what the storages exchange; in J.
 
-        What stands still moves by rounding: a billionth of the energies is the least that counts.
+        What is destroyed counts as heat where it is more, as of reactions and of heat that is conducted. What stands
+        still moves by rounding: a billionth of the energies is the least that counts.
         """
         v = self.potential
         if not v.size:
             return 1.0
-        moved = float(np.max(self.kinetic + np.abs(v - v[0]) + np.abs(self.heat) + np.abs(self.work)))
+        lost = np.maximum(np.abs(self.heat), self.temperature * np.abs(self.made))
+        moved = float(np.max(self.kinetic + np.abs(v - v[0]) + lost + np.abs(self.work)))
         still = STILL * float(np.abs(v).max())
         if moved > still:
             return moved

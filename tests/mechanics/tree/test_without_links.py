@@ -96,3 +96,13 @@ def test_what_depends_on_each_other_is_refused_by_name():
     system = pattern(one=lib.inductor(l=1.0), other=lib.inductor(l=2.0), series=series)
     with pytest.raises(ephs.OptionError, match=r"expected natural, natural4, radau: .* stores what other states"):
         ephs.simulate(system, 1.0, method="rk87", initial={"one.b": 1.0, "other.b": 2.0})
+
+
+def test_what_only_reacts_is_measured_by_what_it_destroys():
+    """Energy of a closed vessel stays: its exchange is the entropy that is made, at the temperature around."""
+    pattern = Pattern.from_text("a: entropy; b: entropy; hot(s=a); cold(s=b); wall(s1=a, s2=b)")
+    stores = {"hot": lib.thermal_capacity(c1=2e3, c2=5.0), "cold": lib.thermal_capacity(c1=2e3, c2=5.0)}
+    system = pattern(**stores, wall=lib.heat_transfer(h=3.0))
+    sol = ephs.simulate(system, 2.0, method="rk87", initial={"hot.s": 1.0, "cold.s": 0.0}, audit="fail")
+    assert sol.ledgers.scale == pytest.approx(sol.ledgers.temperature * sol.ledgers.made[-1])
+    assert sol.energy_error.max() < 1e-8
