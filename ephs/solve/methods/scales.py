@@ -20,7 +20,8 @@ SPREAD: Final = 1e-3
 
 FAINT: Final = 1e-18
 """A block's scale is at least this fraction of the largest of all, whatever their units, in the iteration of a step
-where that was least: terms that are made of rounding, where everything is at rest, have no scale of their own."""
+where that was least, and up to 1: terms that are made of rounding, where everything is at rest, have no scale of their
+own."""
 
 TAKES_PART: Final = 1e-3
 """The least coefficient, relative to the largest, with which an effort takes part in a constraint; less is rounding."""
@@ -173,7 +174,7 @@ def measure(on: Evaluator, t: Columns, z: Vector, dropped: Integers, m: Scratch)
     def one(i: Integer) -> None:
         block = t.block[i]
         scale = on.maximum(m.block[block], SPREAD * m.group[t.group[block]])
-        scale = on.maximum(scale, FAINT * m.defect[1])
+        scale = on.maximum(scale, on.minimum(FAINT * m.defect[1], 1.0))
         sized = scale > NOTHING
         ratio = on.select(sized, on.absolute(m.residual[i]) / on.select(sized, scale, 1.0), 0.0)
 
