@@ -36,7 +36,7 @@ from ephs.solve.methods.records import (
     row_of,
 )
 from ephs.solve.methods.residuals import FAULTS, account, evaluated
-from ephs.solve.methods.scales import FAR, measure
+from ephs.solve.methods.scales import COMMON, FAR, measure
 from ephs.solve.methods.scheme import (
     AHEAD,
     GROUPS,
@@ -107,7 +107,7 @@ def newton(
     ratio, defect = on.variable(0.0), on.variable(0.0)
     right = Vector(s.residual.cells, s.residual.start, STAGES * n)
     outcome[0], outcome[1] = RUNNING, 0
-    m.defect[1] = FAR
+    m.defect[1] = COMMON
 
     def look(i: Integer) -> None:
         copy(on, s.residual.row(i), m.residual)

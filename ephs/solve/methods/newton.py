@@ -42,7 +42,7 @@ from ephs.solve.methods.records import (
     row_of,
 )
 from ephs.solve.methods.residuals import FAULTS, account, evaluated
-from ephs.solve.methods.scales import FAR, measure, reach, weigh
+from ephs.solve.methods.scales import COMMON, FAR, measure, reach, weigh
 
 __all__ = [
     "RUNNING",
@@ -194,7 +194,7 @@ def newton(
     before, part, iteration, n = on.variable(FAR), on.variable(1.0), on.counter(0), z.size
     one = Matrix(z.cells, z.start, 1, n)
     outcome[0], outcome[1] = RUNNING, 0
-    m.defect[1] = FAR
+    m.defect[1] = COMMON
 
     def pin(i: Integer) -> None:
         def leave() -> None:

@@ -10,7 +10,7 @@ from ephs.semantics.stage import Evaluator, Integer, Integers, Real, Vector
 from ephs.solve.methods.places import Part, fill, raise_to
 from ephs.solve.methods.records import IRREVERSIBLE, STORING, Columns, Scratch
 
-__all__ = ["FAR", "SPREAD", "TAKES_PART", "measure", "reach", "still", "weigh"]
+__all__ = ["COMMON", "FAR", "SPREAD", "TAKES_PART", "measure", "reach", "still", "weigh"]
 
 NOTHING = 1e-200
 """Terms of a balance below which it has none: quotients by it stay finite."""
@@ -18,10 +18,11 @@ NOTHING = 1e-200
 SPREAD: Final = 1e-3
 """A block's scale is at least this fraction of the largest of its kind: e = 0 alone has no scale of its own."""
 
-FAINT: Final = 1e-18
+FAINT: Final = 1e-20
 """A block's scale is at least this fraction of the largest of all, whatever their units, in the iteration of a step
-where that was least, and up to 1: terms that are made of rounding, where everything is at rest, have no scale of their
-own."""
+where that was least: terms that are made of rounding, where everything is at rest, have no scale of their own."""
+COMMON: Final = 1e18
+"""The largest scale of which a fraction counts: beyond that numbers of different units lie too far apart."""
 
 TAKES_PART: Final = 1e-3
 """The least coefficient, relative to the largest, with which an effort takes part in a constraint; less is rounding."""
@@ -174,7 +175,7 @@ def measure(on: Evaluator, t: Columns, z: Vector, dropped: Integers, m: Scratch)
     def one(i: Integer) -> None:
         block = t.block[i]
         scale = on.maximum(m.block[block], SPREAD * m.group[t.group[block]])
-        scale = on.maximum(scale, on.minimum(FAINT * m.defect[1], 1.0))
+        scale = on.maximum(scale, FAINT * m.defect[1])
         sized = scale > NOTHING
         ratio = on.select(sized, on.absolute(m.residual[i]) / on.select(sized, scale, 1.0), 0.0)
 
