@@ -3,7 +3,9 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from operator import eq
-from typing import Any, final
+from typing import Any, cast, final
+
+from ephs.operad.names import Path
 
 __all__ = ["Equation", "Law"]
 
@@ -35,7 +37,7 @@ class Equation:
     @property
     def replay(self) -> str:
         """A Python expression that forms the equation again, given ``from ephs.operad import *`` and its algebras."""
-        return f"law({self.law!r})({', '.join(map(repr, self.inputs))})"
+        return f"law({self.law!r})({', '.join(map(_written, self.inputs))})"
 
     def __str__(self) -> str:
         left, right = (str(side).replace("\n", "\n  ") for side in (self.left, self.right))
@@ -69,3 +71,15 @@ class Law:
     def __call__(self, *inputs: object) -> Equation:
         """Form both sides."""
         return replace(self.equation(*inputs), law=self.name, inputs=inputs)
+
+
+def _written(value: object) -> str:
+    """A value as Python writes it, with paths by what makes them."""
+    match value:
+        case Path():
+            return f"Path.parse({str(value)!r})"
+        case dict():
+            entries = cast("dict[object, object]", value).items()
+            return "{" + ", ".join(f"{_written(key)}: {_written(of)}" for key, of in entries) + "}"
+        case _:
+            return repr(value)

@@ -19,7 +19,7 @@ class Path(tuple[str, ...]):
     tuples.
 
     >>> Path.parse("osc.pe") / "q"
-    Path.parse('osc.pe.q')
+    'osc.pe.q'
     >>> str(ROOT), ROOT / "a" == Path.parse("a")
     ('.', True)
 
@@ -89,7 +89,7 @@ class Path(tuple[str, ...]):
         return ".".join(self) if self else "."
 
     def __repr__(self) -> str:
-        return f"Path.parse({str(self)!r})"
+        return repr(str(self))
 
     def __format__(self, spec: str) -> str:
         return format(str(self), spec)
