@@ -161,7 +161,7 @@ class _Teller:
         return value.__qualname__
 
     def _place(self, value: "type | FunctionType") -> str:
-        module = value.__module__
+        module = str(value.__module__)  # functions that text was made into have none
         if module.partition(".")[0] != PACKAGE:
             raise _Foreign
         return f"{module}:{value.__qualname__}"
