@@ -57,7 +57,7 @@ def forces_at(equations: Equations, touching: Touching, state: ReducedState, acc
 
 
 def pressing_at(equations: Equations, touching: Touching, state: ReducedState, accelerations: Array) -> Pressing:
-    """What presses at a state, whose links are placed; NaN where no forces were found.
+    """Forces of contacts at a state, whose links are placed; NaN where no forces were found.
 
     Parameters
     ----------

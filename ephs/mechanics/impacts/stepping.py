@@ -57,7 +57,7 @@ ROUNDED = 1e-13
 """Part of velocities, and of the mechanism's speed, that is rounding."""
 APART, STICKING, SLIPPING = range(3)
 SAID = ("opens", "sticks", "slips")
-"""What a contact does in a part of a step, and what events say where that changes."""
+"""Modes of a contact in a part of a step, and the words of events where they change."""
 TOO_LONG = 8.0
 """Error assigned to a part of a step whose halves meet contacts that the whole does not."""
 
@@ -153,7 +153,7 @@ class Impacts(ReducedMethod):
         return end
 
     def _changed(self, start: ReducedState, before: Array | None) -> Array:
-        """What contacts do in a part of a step that was taken; changes since the part before are events."""
+        """Modes of contacts in a part of a step that was taken; changes since the part before are events."""
         now = self._modes.copy()
         if before is not None:
             said = [(i, SAID[int(now[i])]) for i in np.flatnonzero(now != before)]

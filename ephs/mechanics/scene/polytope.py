@@ -24,7 +24,7 @@ def vertices_of(file: Path) -> Array:
     Raises
     ------
     ValueError
-        What is wrong of the file: it cannot be read, bounds no body, is not convex, or has too many vertices.
+        Fault of the file: it cannot be read, bounds no body, is not convex, or has too many vertices.
     """
     triangles = _triangles(file)
     if not len(triangles) or not np.all(np.isfinite(triangles)):

@@ -241,8 +241,8 @@ class ExplicitTangent:
         return difference(lambda k: function(*self._other(number, k * step)[1:]), self._stencil(number), step)
 
     def _stencil(self, number: int) -> Stencil:
-        """The neighbours that derivatives of tables take: the two outer ones where these show that it
-        is a coordinate of a tree, or shifts what is in its links, whose inertia is of degree two in that."""
+        """Neighbours for derivatives of tables: the two outer ones where these show that the parameter is a
+        coordinate of a tree, or shifts places in its links, whose inertia is of degree two in them."""
         if number not in self._stencils:
             parameter = self.family.parameters[number]
             outer = not self.equations.engine.looped and parameter.tables is CENTRAL and self._shifts(number)
