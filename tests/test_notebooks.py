@@ -56,9 +56,9 @@ def test_a_solution_shows_its_balances(solution):
 
 
 def test_a_ledger_shows_the_cells_that_it_prints(solution):
-    books = solution.ledger()
-    said, printed = words_of(books._repr_html_()), str(books)
-    for name, entry in books.parts.items():
+    totals = solution.ledger()
+    said, printed = words_of(totals._repr_html_()), str(totals)
+    for name, entry in totals.parts.items():
         assert name in said
         for value in entry.changes():
             assert f"{value:.5g}" in said and f"{value:.5g}" in printed

@@ -43,15 +43,15 @@ def brake(friction: float, capacity: float | None = None, temperature: float = W
 
 def _stopped(sol: ephs.Solution, friction: float, capacity: float | None) -> float:
     """Error of heat, rate and entropy at the end, relative to energy, rate and entropy made; of the angle in rad."""
-    t, books = sol.t[-1], sol.ledgers
+    t, ledgers = sol.t[-1], sol.ledgers
     heat = ENERGY * -math.expm1(-2.0 * friction * t)
     off = [
-        abs(books.heat[-1] - heat) / ENERGY,
+        abs(ledgers.heat[-1] - heat) / ENERGY,
         abs(sol.joint("pin").rate[-1, 0] - RATE * math.exp(-friction * t)) / RATE,
         abs(sol.joint("pin").coordinate[-1, 0] + RATE / friction * math.expm1(-friction * t)),
     ]
-    made = capacity * math.log1p(heat / (capacity * WARM)) if capacity else heat / books.temperature
-    off.append(abs(books.made[-1] - books.made[0] - made) / made)
+    made = capacity * math.log1p(heat / (capacity * WARM)) if capacity else heat / ledgers.temperature
+    off.append(abs(ledgers.made[-1] - ledgers.made[0] - made) / made)
     return max(off)
 
 
@@ -87,8 +87,8 @@ def _damped(sol: ephs.Solution) -> float:
 
 def _entropy(sol: ephs.Solution) -> float:
     """The deepest fall of the total entropy between two instants, relative to what was made."""
-    books = sol.ledgers
-    return max(0.0, -float(np.diff(books.entropy).min())) / float(books.made[-1] - books.made[0])
+    ledgers = sol.ledgers
+    return max(0.0, -float(np.diff(ledgers.entropy).min())) / float(ledgers.made[-1] - ledgers.made[0])
 
 
 def _supplied(sol: ephs.Solution) -> float:

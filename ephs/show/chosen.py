@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, Any
 
-from ephs.mechanics.sweep.outputs import BOOKS, Output, known_outputs, unknown_output
+from ephs.mechanics.sweep.outputs import TOTALS, Output, known_outputs, unknown_output
 from ephs.show.palette import CYCLE
 from ephs.show.panels import Curve, Panel
 from ephs.show.plots import panel_figure
@@ -23,7 +23,7 @@ def signal_names(sol: Any) -> dict[str, Labels]:
     model = sol.scene or sol.system
     if model is not None:
         return known_outputs(model)
-    ledgers = {name: Labels("", (), (unit,)) for name, unit in BOOKS.items()}
+    ledgers = {name: Labels("", (), (unit,)) for name, unit in TOTALS.items()}
     return ledgers | {str(path): sol.labels[path] for path in sol.states}
 
 
@@ -67,7 +67,7 @@ def _usual(known: dict[str, Labels]) -> list[str]:
     for kind, quantity in _FIRST.items():
         if found := [name for name in known if name.startswith(f"{kind}.") and name.endswith(f".{quantity}")]:
             return found
-    return [name for name in known if name in BOOKS]
+    return [name for name in known if name in TOTALS]
 
 
 def _found(name: str, known: dict[str, Labels]) -> tuple[str, str]:

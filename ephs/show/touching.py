@@ -1,4 +1,4 @@
-"""Contacts of a solution: their gaps, forces and books, as panels of curves and as a table."""
+"""Contacts of a solution: their gaps, forces and totals, as panels of curves and as a table."""
 
 import html
 from typing import Any
@@ -22,7 +22,7 @@ def _names(sol: Any) -> list[str]:
 
 
 def contact_panels(sol: Any) -> list[Panel]:
-    """Gaps, sizes of forces, slips, and books of all contacts of a scene."""
+    """Gaps, sizes of forces, slips, and totals of all contacts of a scene."""
     curves: dict[str, list[Curve]] = {}
     for k, name in enumerate(_names(sol)):
         motion, book = sol.contact(name), sol.ledger(component_path("contacts", name))

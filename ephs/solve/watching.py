@@ -28,9 +28,9 @@ class Balance:
     def error(self, x: Array, energies: Array, sums: Array) -> float:
         """The defect now, relative to the largest K + |V − V₀| + |heat| + |work| that was seen."""
         rows = [np.array(pair) for pair in zip(self._first, (x, energies, sums[:4]), strict=True)]
-        books = ledgers(self._problem, Record(np.zeros(2), rows[0], rows[1], np.pad(rows[2], ((0, 0), (0, 1)))))
-        self._scale = max(self._scale, books.scale)
-        return float(books.defect(mechanical=self._problem.scene is not None)[-1]) * books.scale / self._scale
+        totals = ledgers(self._problem, Record(np.zeros(2), rows[0], rows[1], np.pad(rows[2], ((0, 0), (0, 1)))))
+        self._scale = max(self._scale, totals.scale)
+        return float(totals.defect(mechanical=self._problem.scene is not None)[-1]) * totals.scale / self._scale
 
 
 def guarded(progress: Told | None) -> Told | None:

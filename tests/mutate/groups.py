@@ -126,7 +126,7 @@ GROUPS = {
         (
             *RUNS,
             "tests/solve/test_integral.py",
-            "tests/solve/test_books.py",
+            "tests/solve/test_ledgers.py",
             "tests/solve/test_journal.py",
             f"{MECHANICS}/rewrite/test_folding.py",
             f"{MECHANICS}/test_methods.py",
@@ -209,7 +209,7 @@ GROUPS = {
             *PARTS,
             f"{MECHANICS}/methods",
             f"{MECHANICS}/imports",
-            "tests/solve/test_books.py",
+            "tests/solve/test_ledgers.py",
             "tests/solve/test_journal.py",
         ),
     ),

@@ -38,8 +38,8 @@ BREAKS = {
         "ephs/mechanics/tree/sweeps/closures.py", "scale(-multiplier[row]", "scale(multiplier[row]"
     ),
     "dense, heat": Break("ephs/mechanics/tree/sweeps/edges.py", "+ (law.made + (", "- (law.made + ("),
-    "books": Break(
-        "ephs/solve/result/books.py",
+    "totals": Break(
+        "ephs/solve/result/entries.py",
         "self.exergy - self.exergy[:1] + self.destroyed",
         "self.exergy - self.exergy[:1] - self.destroyed",
     ),

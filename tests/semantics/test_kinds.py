@@ -146,8 +146,8 @@ def test_parts_of_parts_run_as_their_flattening_does():
     assert nested.states.keys() == flat.states.keys()
     for path in flat.states:
         np.testing.assert_array_equal(nested[path], flat[path])
-    for books in ("energy", "exergy", "entropy", "heat", "work"):
-        np.testing.assert_array_equal(getattr(nested, books), getattr(flat, books))
+    for totals in ("energy", "exergy", "entropy", "heat", "work"):
+        np.testing.assert_array_equal(getattr(nested, totals), getattr(flat, totals))
 
 
 def test_what_does_not_repeat_is_flattened():

@@ -1,4 +1,4 @@
-"""The books of a system at a state are those of a solution there, and of its parts together."""
+"""The totals of a system at a state are those of a solution there, and of its parts together."""
 
 import math
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ephs.operad import Path, Pattern, junction, quantity
-from ephs.solve.result.books import Entry
+from ephs.solve.result.entries import Entry
 from ephs.solve.result.labels import labels_of
 
 
@@ -180,8 +180,8 @@ def circuit() -> FakeSolution:
     loss = 5.0 * (1.0 - np.exp(-0.1 * t))
     swing = np.exp(-0.05 * t)
     states = {"pe.q": swing * np.cos(t), "ke.p": -swing * np.sin(t), "env.s": loss / 293.15}
-    books = ledgers(t, loss) | {"kinetic": None, "potential": None}
-    return FakeSolution("damped oscillator", t, None, damped_system(), books, states)
+    totals = ledgers(t, loss) | {"kinetic": None, "potential": None}
+    return FakeSolution("damped oscillator", t, None, damped_system(), totals, states)
 
 
 @pytest.fixture(scope="session")
@@ -254,7 +254,7 @@ def pendulum() -> FakeSolution:
         "slide": Record({"coordinate": 0.15 + zero[:, None], "rate": zero[:, None]}),
     }
     kinetic = 0.5 * 0.04 * rate**2
-    books = ledgers(t, loss) | {"kinetic": kinetic, "potential": kinetic[0] - kinetic - loss}
+    totals = ledgers(t, loss) | {"kinetic": kinetic, "potential": kinetic[0] - kinetic - loss}
     heat = {"housing": Record({"temperature": 300.0 + loss})}
     states = {"rod.ke.p": np.zeros((len(t), 6))}
-    return FakeSolution("pendulum", t, scene, damped_system(), books, states, bodies, joints, heat)
+    return FakeSolution("pendulum", t, scene, damped_system(), totals, states, bodies, joints, heat)

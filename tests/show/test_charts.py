@@ -51,8 +51,8 @@ def spoilt(motion, value):
     [
         (swing(), Outcome.RIGHT),
         (swing(phase=0.5 * RIGHT), Outcome.RIGHT),
-        (replace(swing(), books=np.full((len(T), 2), 0.5 * RIGHT)), Outcome.RIGHT),
-        (replace(swing(), books=np.full((len(T), 2), 2.0 * RIGHT)), Outcome.WRONG_BUT_BOUNDED),
+        (replace(swing(), totals=np.full((len(T), 2), 0.5 * RIGHT)), Outcome.RIGHT),
+        (replace(swing(), totals=np.full((len(T), 2), 2.0 * RIGHT)), Outcome.WRONG_BUT_BOUNDED),
         (swing(phase=1.0), Outcome.WRONG_BUT_BOUNDED),
         (swing(phase=1.0, drift=0.5 * ENERGY), Outcome.WRONG_BUT_BOUNDED),
         (swing(phase=1.0, drift=2.0 * ENERGY), Outcome.ENERGY_DRIFT),

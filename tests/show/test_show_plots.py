@@ -70,8 +70,8 @@ def test_the_sum_of_the_energy_ledger_is_flat(pendulum):
 def test_negative_entropy_production_is_marked(circuit):
     bad = circuit.entropy_production.copy()
     bad[100] = -1e-6
-    books = circuit.ledgers | {"entropy_production": bad}
-    wrong = type(circuit)(circuit.name, circuit.t, None, circuit.system, books, circuit.states)
+    ledgers = circuit.ledgers | {"entropy_production": bad}
+    wrong = type(circuit)(circuit.name, circuit.t, None, circuit.system, ledgers, circuit.states)
     labels = [line.get_label() for line in plot_entropy(wrong).axes[1].get_lines()]
     assert "negative" in labels
     assert "negative" not in [line.get_label() for line in plot_entropy(circuit).axes[1].get_lines()]
@@ -169,8 +169,8 @@ def test_a_system_without_scene_has_no_animation(circuit, tmp_path):
 
 
 def test_names_cannot_break_the_page(circuit, tmp_path):
-    books, states = circuit.ledgers, circuit.states
-    rude = type(circuit)("<b>&", circuit.t, None, circuit.system, books, states)
+    ledgers, states = circuit.ledgers, circuit.states
+    rude = type(circuit)("<b>&", circuit.t, None, circuit.system, ledgers, states)
     assert "<title>&lt;b&gt;&amp;</title>" in write_report(rude, tmp_path).read_text(encoding="utf-8")
 
 

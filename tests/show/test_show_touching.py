@@ -1,4 +1,4 @@
-"""Contacts in reports: what a page says of each is what the solution's books say."""
+"""Contacts in reports: what a page says of each is what the solution's totals say."""
 
 import re
 

@@ -36,9 +36,11 @@ def sound() -> ephs.Solution:
     return ephs.simulate(brake(), 0.2, method="natural", step=0.005)
 
 
-def bent(sol: ephs.Solution, **books) -> ephs.Solution:
-    """The solution with other books."""
-    return ephs.Solution(sol.name, sol.t, sol.states, replace(sol.ledgers, **books), sol.stats, sol.problem, sol.labels)
+def bent(sol: ephs.Solution, **ledgers) -> ephs.Solution:
+    """The solution with other ledgers."""
+    return ephs.Solution(
+        sol.name, sol.t, sol.states, replace(sol.ledgers, **ledgers), sol.stats, sol.problem, sol.labels
+    )
 
 
 def kick(values, size: float):
@@ -59,24 +61,26 @@ def opened(sol: ephs.Solution, by: float) -> ephs.Solution:
 
 def broken(law: str, sol: ephs.Solution, times: float) -> ephs.Solution:
     """The solution with one law broken by so many times what is allowed."""
-    books = sol.ledgers
-    entropies = float(np.max(sum(np.abs(s - s[0]) for s in books.entropies.values()) + books.made))
+    ledgers = sol.ledgers
+    entropies = float(np.max(sum(np.abs(s - s[0]) for s in ledgers.entropies.values()) + ledgers.made))
     if law == "energy":
-        return bent(sol, kinetic=kick(books.kinetic, times * LAWFUL * books.scale))
+        return bent(sol, kinetic=kick(ledgers.kinetic, times * LAWFUL * ledgers.scale))
     if law == "entropy":
         least = -times * PRODUCTION * entropies
         return ephs.Solution(
-            sol.name, sol.t, sol.states, books, {**sol.stats, "least_production": least}, sol.problem, sol.labels
+            sol.name, sol.t, sol.states, ledgers, {**sol.stats, "least_production": least}, sol.problem, sol.labels
         )
     if law == "input":
         found = [{"t": 0.1, "input": "joints.pin"}] * int(times * MOST_FOUND)
         stats = {**sol.stats, "jumps": {"declared": 0, "found": found, "divided_steps": 0}}
-        return ephs.Solution(sol.name, sol.t, sol.states, books, stats, sol.problem, sol.labels)
+        return ephs.Solution(sol.name, sol.t, sol.states, ledgers, stats, sol.problem, sol.labels)
     if law == "constraint":
         length = Snapshot.of(sol.scene).scale(sol.scene.world.gravity).length
         return opened(sol, times * CLOSED * length)
-    path, held = next((path, s) for path, s in books.entropies.items() if np.ptp(s))
-    return bent(sol, entropies={**books.entropies, path: held + np.linspace(0.0, times * LEAST * entropies, len(held))})
+    path, held = next((path, s) for path, s in ledgers.entropies.items() if np.ptp(s))
+    return bent(
+        sol, entropies={**ledgers.entropies, path: held + np.linspace(0.0, times * LEAST * entropies, len(held))}
+    )
 
 
 @pytest.mark.parametrize("law", [name for name in LAWS if name != "accuracy"])
@@ -91,8 +95,8 @@ def test_each_law_finds_what_breaks_it_and_nothing_else(law, sound):
 
 
 def test_a_total_entropy_that_falls_is_found_though_every_component_makes_some(sound):
-    books = sound.ledgers
-    fallen = bent(sound, entropy=books.entropy - 1e-3 * np.ptp(books.entropy) * (sound.t > 0.1))
+    ledgers = sound.ledgers
+    fallen = bent(sound, entropy=ledgers.entropy - 1e-3 * np.ptp(ledgers.entropy) * (sound.t > 0.1))
     (found,) = audit(fallen, TIGHT).findings
     assert found.law == "entropy"
     assert found.at == pytest.approx(0.105)
@@ -279,10 +283,10 @@ def test_members_of_a_sweep_say_what_was_found():
 @pytest.mark.parametrize("rtol", [1e-4, 1e-8])
 def test_entropies_of_radau_are_sums_of_what_is_made(rtol):
     sol = ephs.simulate(brake(), 2.0, method="radau", rtol=rtol)
-    books = sol.ledgers
-    rounding = 8.0 * len(sol) * np.finfo(float).eps * books.made[-1]
-    assert np.abs(books.entropy - books.entropy[0] - books.made).max() <= rounding
-    assert np.diff(books.entropy).min() >= -rounding
+    ledgers = sol.ledgers
+    rounding = 8.0 * len(sol) * np.finfo(float).eps * ledgers.made[-1]
+    assert np.abs(ledgers.entropy - ledgers.entropy[0] - ledgers.made).max() <= rounding
+    assert np.diff(ledgers.entropy).min() >= -rounding
 
 
 RESTING = """

@@ -13,8 +13,8 @@ from ephs.semantics.spaces import PAIRS, pair
 from ephs.solve.result.labels import freedoms, labels_of
 from ephs.testing import mechanisms, systems
 
-BOOKS = {"kinetic", "potential", "thermal", "environment", "exergy", "entropy", "heat", "work", "supplied", "made"}
-BOOKS |= {"least", "storages", "makers", "entropies", "volumes", "momenta", "exergies"}
+TOTALS = {"kinetic", "potential", "thermal", "environment", "exergy", "entropy", "heat", "work", "supplied", "made"}
+TOTALS |= {"least", "storages", "makers", "entropies", "volumes", "momenta", "exergies"}
 
 
 def same(found: ephs.Solution, expected: ephs.Solution) -> None:
@@ -95,7 +95,7 @@ def test_files_of_format_2_are_read(tmp_path):
     event = ephs.Event(lambda t, state: t - 0.015, "late")
     sol = ephs.simulate(scene, 0.03, step=0.01, events=[event], audit="off")  # a coarse step
     data = sol.to_xarray()
-    kept = [name for name in data.data_vars if name.startswith("state:") or name.partition(":")[0] in BOOKS]
+    kept = [name for name in data.data_vars if name.startswith("state:") or name.partition(":")[0] in TOTALS]
     old = xr.Dataset(
         {
             name: (("t",) if data[name].ndim == 1 else ("t", f"dim{data[name].shape[1]}"), data[name].values)

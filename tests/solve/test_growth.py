@@ -82,13 +82,13 @@ def drift(order, growing, h, far=np.inf):
     poses[:, 4] = np.minimum(growing * t * h**order, far)
     slot = SimpleNamespace(path="body", quantity=SimpleNamespace(kind="pose"))
     problem = SimpleNamespace(length=1.0, descriptor=SimpleNamespace(states=[slot]))
-    books = SimpleNamespace(heat=np.zeros(t.size), work=np.zeros(t.size), scale=1.0)
+    totals = SimpleNamespace(heat=np.zeros(t.size), work=np.zeros(t.size), scale=1.0)
 
     class Run(SimpleNamespace):
         def __len__(self):
             return len(self.t)
 
-    return Run(t=t, states={"body": poses}, problem=problem, ledgers=books, stats={"steps": t.size - 1})
+    return Run(t=t, states={"body": poses}, problem=problem, ledgers=totals, stats={"steps": t.size - 1})
 
 
 @pytest.mark.parametrize("order", [1, 2, 4, 8])

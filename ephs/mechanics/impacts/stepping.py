@@ -263,7 +263,7 @@ class Impacts(ReducedMethod):
         heat = np.zeros(held.size)
         for island in islands_of(rows1 @ change):
             heat[island] = shared(taken[island])
-        put = float(end.books[1] - state.books[1])
+        put = float(end.totals[1] - state.totals[1])
         if not self._alone:
             put = 0.5 * float((rows0.T @ impulse) @ state.r + (rows1.T @ impulse) @ end.r)
         booked = self._booked(end, moved, held, heat, -put)

@@ -127,14 +127,14 @@ class Alpha(ReducedMethod):
         trapezoidal rule finds: for powers that are squares of rates, twice its difference to the midpoint rule.
         """
         eq = self.equations
-        fall, books = eq.nv + eq.n, eq.nv + eq.n + eq.ns + 2
-        work = 0.5 * h * float(before[books - 1] + rates[books - 1])
+        fall, totals = eq.nv + eq.n, eq.nv + eq.n + eq.ns + 2
+        work = 0.5 * h * float(before[totals - 1] + rates[totals - 1])
         if not (eq.reduced.made or eq.ns):
             return np.zeros(0), np.zeros(0), work, np.zeros(0)
         middle = 0.5 * (y0 + y1)
         here = eq.rates(state.t + 0.5 * h, state.q, middle)
         bent = h / 3.0 * (before + rates - 2.0 * here)
-        first, half, last = (h * rate[books:] for rate in (before, here, rates))
+        first, half, last = (h * rate[totals:] for rate in (before, here, rates))
         flows = 0.5 * (first + last)
         return flows, 2.0 * (flows - half), work, bent[fall : fall + eq.ns]
 

@@ -108,9 +108,9 @@ class Explicit(ReducedMethod):
 
     def inside(self, attempt: Attempt[ReducedState], t: float) -> ReducedState:
         """A shorter step from the same start, in which heat is between none and that of the whole."""
-        books, start = self.equations.engine.books, attempt.start
+        totals, start = self.equations.engine.totals, attempt.start
         after = self._low is not None and self._low[0] is start and abs(t - start.t) >= abs(self._low[1] - start.t)
-        books["whole"][:], books["low"][:] = attempt.detail, self._low[2] if self._low and after else 0.0
+        totals["whole"][:], totals["low"][:] = attempt.detail, self._low[2] if self._low and after else 0.0
         try:
             found = self._tried(start, t - start.t, part=True)
         except SolveError:
@@ -132,7 +132,7 @@ class Explicit(ReducedMethod):
         before = self.solve(state, scheme, self.method.c, h, y0, k, y1, tolerances, chosen=chosen)
         allowed = self._allowed[:] = self.atol + self.rtol * eq.sizes(y0, y1)
         y1, account = eq.accounts.booked(state, scheme, k, h, y1, part=part)
-        sums = np.array(eq.engine.books["low" if part else "whole"])
+        sums = np.array(eq.engine.totals["low" if part else "whole"])
         end = replace(eq.ended(state, y1, state.t + h), account=account)
         closed = eq.closed(end)
         estimates = [eq.along(h * (weights @ k)[eq.counted]) for weights in self.method.estimates]

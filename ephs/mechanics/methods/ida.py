@@ -93,7 +93,7 @@ class Ida(ReducedMethod):
         v, r, heats = np.split(y[: nv + n + ns], [nv, nv + n])
         heats = np.where(plain, heats, state.heats)
         free = eq.prescribed.followed(
-            base, ReducedState(t, eq.advance(base.q, v), r, heats, state.books, account=state.account)
+            base, ReducedState(t, eq.advance(base.q, v), r, heats, state.totals, account=state.account)
         )
         closed = eq.closed(free)
         # Its sums are its own: a sum that is off by rounding, of a component that makes nothing, refuses no step.

@@ -111,7 +111,7 @@ class March:
         self.steering, self.account = Steering.table(1), Account.table(1)
         a: Any = self.account[0]
         (a.anchor, a.left, a.put, a.total), self.momenta[:] = np.split(start.account[: self.own], [OWN])
-        a.chosen, a.begins = int(span.policy is not None), int(not (np.isnan(a.anchor) or start.books.any()))
+        a.chosen, a.begins = int(span.policy is not None), int(not (np.isnan(a.anchor) or start.totals.any()))
         a.alone = int(kept is not None and span.policy is None)  # constant implicit steps may not resolve fast modes
         given = arrays, self.memory, self.steering, self.account
         self.march = eq.engine.bind("march", *given, 0) if kept is None else eq.engine.implicit(*given, kept.memory, 0)
@@ -253,8 +253,8 @@ class March:
 
     def _state(self, t: float, q: Array, rest: Array, account: Array) -> ReducedState:
         n, ns = self.method.equations.n, self.method.equations.ns
-        heats, books = rest[n : n + ns].copy(), rest[n + ns :].copy()
-        return ReducedState(t, q.copy(), rest[:n].copy(), heats, books, account=account)
+        heats, totals = rest[n : n + ns].copy(), rest[n + ns :].copy()
+        return ReducedState(t, q.copy(), rest[:n].copy(), heats, totals, account=account)
 
     def rows(self) -> list[tuple[float, ReducedState, float]]:
         """Records since the last call: time, state, the step's least production."""
@@ -273,7 +273,7 @@ class March:
 
     def kept(self) -> tuple[Array, Array, Array]:
         """The rows that `rows` would hand over, views of the memory: (n, 4) time from the start, least production, what
-        corrections put in and its sizes; (n, ·) elements; (n, ·) rates, heats and books."""
+        corrections put in and its sizes; (n, ·) elements; (n, ·) rates, heats and totals."""
         count, memory = int(self.control.rows), self.memory
         return memory["rows_t"][:count], memory["rows_q"][:count], memory["rows_y"][:count]
 

@@ -87,7 +87,7 @@ class Stages:
         self.heat = slice(equations.nv + equations.n, self.jacobian.size)
 
     def solve(self, state: ReducedState, y0: Array, h: float) -> tuple[Array, Array, bool]:
-        """Increments (stages, size) of (v, r, heats), rates of the books, and whether the iteration was fast.
+        """Increments (stages, size) of (v, r, heats), rates of the totals, and whether the iteration was fast.
 
         Raises
         ------
@@ -163,7 +163,7 @@ class Stages:
         eq, size, count = self.equations, self.jacobian.size, self._nodes.size
         stages, rates = np.zeros((count, size)), np.zeros((count, eq.size))
         coldest = eq.heats.coldest(y0[self.heat])  # an iterate may overshoot, a solution is not below
-        books = slice(eq.nv + eq.n + eq.ns, eq.size)
+        totals = slice(eq.nv + eq.n + eq.ns, eq.size)
         worst, before = np.zeros(eq.counted.size), np.inf
         rate = moved = np.inf
         for iteration in range(1, ITERATIONS + 1):
@@ -187,12 +187,12 @@ class Stages:
                 if rate >= 1.0 and iteration > 2 and moved > max(10.0 * self.enough, self.rough):
                     break
             if moved <= self.enough or (iteration > 1 and moved * rate <= self.enough * (1.0 - min(rate, 0.9))):
-                return stages, rates[:, books], iteration <= 2 or rate < FAST
+                return stages, rates[:, totals], iteration <= 2 or rate < FAST
             if iteration > 2 and rate > 0.5 and moved <= self.rough:  # rounding is all that is left
-                return stages, rates[:, books], False
+                return stages, rates[:, totals], False
             before = moved
         if moved <= self.rough:  # near a change of rank the matrix is no good, and the iteration slow
-            return stages, rates[:, books], False
+            return stages, rates[:, totals], False
         path, what = counted(eq.reduced, int(np.argmax(np.nan_to_num(worst, nan=np.inf))))
         raise SolveError(Outcome.DIVERGED, path, f"{what} at the stages")
 

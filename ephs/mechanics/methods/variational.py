@@ -93,7 +93,7 @@ class Variational(ReducedMethod):
         mass = eq.mass(q, state.r)
         free = np.asarray(np.linalg.solve(mass, after), dtype=float)
         heats = np.where(eq.heats.plain, 2.0 * states - state.heats, state.heats)
-        closed = eq.closed(ReducedState(state.t + h, q, free, heats, state.books, account=state.account))
+        closed = eq.closed(ReducedState(state.t + h, q, free, heats, state.totals, account=state.account))
         work = h * powers[1]
         if self._driven.size:  # the work of what is prescribed: its impulses at both ends of the step
             impulse = mass @ closed.r - after

@@ -164,9 +164,9 @@ class ReducedMotion:
                 momenta[:, i] = solution[link.momentum.path] @ self._momenta[i].T
         s = [solution[path].reshape(n, -1) for path in reduced.entropies]
         heats = eq.heats.energies(np.hstack([np.zeros((n, 0)), *s]))
-        books = np.zeros(2 + len(reduced.made))
+        totals = np.zeros(2 + len(reduced.made))
         return [
-            eq.closed(ReducedState(time, q[k], self._impulses.rates(q[k], prescribed[k], momenta[k]), heats[k], books))
+            eq.closed(ReducedState(time, q[k], self._impulses.rates(q[k], prescribed[k], momenta[k]), heats[k], totals))
             for k, time in enumerate(solution.t.tolist())
         ]
 

@@ -119,13 +119,13 @@ def _motion(problem: Problem) -> Iterator[CheckItem]:
         yield CheckItem("closure", gap < near, f"joints are closed to {gap:.1e} m or rad, velocities fit to {slip:.1e}")
     elif problem.gaps is not None:
         yield CheckItem("closure", gap < ASSEMBLY, f"joints are closed to {gap:.1e} m or rad")
-    error, books = float(start.energy_error.max()), start.ledgers
-    stored = float(np.max(np.sum([np.abs(energy) for energy in books.storages.values()], axis=0), initial=0.0))
+    error, ledgers = float(start.energy_error.max()), start.ledgers
+    stored = float(np.max(np.sum([np.abs(energy) for energy in ledgers.storages.values()], axis=0), initial=0.0))
     stored += _weight(problem.scene) if problem.scene is not None else 0.0
     detail = f"energy over {STEPS} steps of {STEP * own.seconds:g} s is balanced to {error:.1e} of what moves"
-    balanced = error < LAWFUL or error * books.scale < ROUNDING * stored
+    balanced = error < LAWFUL or error * ledgers.scale < ROUNDING * stored
     if error >= LAWFUL and balanced:  # next to nothing moves
-        detail += f", {error * books.scale / stored:.1e} of what is stored or could be"
+        detail += f", {error * ledgers.scale / stored:.1e} of what is stored or could be"
     yield CheckItem("power balance", balanced, detail)
     least = float(start.stats["least_production"])
     yield CheckItem("entropy production", least >= 0.0, f"the least of a component in these steps is {least:.1e} J/K")

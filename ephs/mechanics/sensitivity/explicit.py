@@ -1,7 +1,7 @@
 """The tangent of explicit Runge-Kutta steps on the reduced form of a scene: the steps over dual numbers.
 
 A step is the map of the method, loops closed at its end, with its length given. What it is evaluated from (elements,
-rates, books; masses, lengths, stiffnesses, …) comes with its derivatives by the parameters.
+rates, totals; masses, lengths, stiffnesses, …) comes with its derivatives by the parameters.
 """
 
 from collections.abc import Iterator, Mapping
@@ -48,7 +48,7 @@ TURNED: Final = {
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Point:
-    """A state and its derivatives by the parameters: (p, coordinates) of elements, (p, size − nv) of rates and books.
+    """A state and its derivatives by the parameters: (p, coordinates) of elements, (p, size − nv) of rates and totals.
 
     Derivatives of elements are those of their numbers.
     """
@@ -206,8 +206,8 @@ class ExplicitTangent:
         eq, q, y = self.equations, tangent.pairs["q"], tangent.pairs["y"]
         used = which.stop - which.start
         out.q[which], out.y[which] = q[1][:, :used].T, y[1][eq.nv :, :used].T
-        r, heats, books = np.split(y[0][eq.nv :], [eq.n, eq.n + eq.ns])
-        return ReducedState(t, q[0].copy(), r.copy(), heats.copy(), books.copy())
+        r, heats, totals = np.split(y[0][eq.nv :], [eq.n, eq.n + eq.ns])
+        return ReducedState(t, q[0].copy(), r.copy(), heats.copy(), totals.copy())
 
     def _refuse(self, status: int) -> None:
         if status == Status.DEPENDENT:
@@ -311,9 +311,9 @@ class ExplicitTangent:
         found: list[ReducedState] = []
         for point in points:
             state = point.state
-            r, heats, books = np.split(states * point.y[number], [eq.n, eq.n + eq.ns])
+            r, heats, totals = np.split(states * point.y[number], [eq.n, eq.n + eq.ns])
             q = self._normalised(state.q + states * point.q[number])
-            found.append(replace(state, q=q, r=state.r + r, heats=state.heats + heats, books=state.books + books))
+            found.append(replace(state, q=q, r=state.r + r, heats=state.heats + heats, totals=state.totals + totals))
         return problem, eq.rows_of(found)
 
     def _normalised(self, q: Array) -> Array:

@@ -289,7 +289,7 @@ class Ensemble:
         if Suspicion(equations, self._bounds(control)).of(start, passed[:, 2], q, y, end, leg.counts.least, longer):
             raise Unlike
         if first:
-            beginning = np.concatenate([start.r, start.heats, start.books])
+            beginning = np.concatenate([start.r, start.heats, start.totals])
             q, y = np.concatenate([start.q[None], q]), np.concatenate([beginning[None], y])
         counts = leg.counts
         return [read(q, y) for read in self._reads], counts.steps, counts.rejected

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from ephs.semantics.system import System
     from ephs.solve.result.solution import Solution
 
-__all__ = ["BOOKS", "JOINT", "Output", "known_outputs", "outputs_of", "unknown_output"]
+__all__ = ["JOINT", "TOTALS", "Output", "known_outputs", "outputs_of", "unknown_output"]
 
-BOOKS = {
+TOTALS = {
     "heat": "J", "work": "J", "kinetic": "J", "potential": "J", "energy": "J", "exergy": "J", "entropy": "J/K",
     "entropy_production": "J/K", "energy_error": "1", "constraint_error": "m, rad",
 }  # fmt: skip
@@ -58,7 +58,7 @@ class Output:
         kind, _, rest = self.name.partition(".")
         thing, _, what = rest.rpartition(".")
         motion: Any = solution
-        if self.name in BOOKS:
+        if self.name in TOTALS:
             return np.asarray(getattr(motion, self.name))
         if solution.motion is not None and kind in _OF and what in _OF[kind] and thing:
             return np.asarray(getattr(getattr(motion, kind_of(kind))(thing), what))
@@ -87,7 +87,7 @@ def outputs_of(model: "Scene | System", names: Sequence[str] | None) -> tuple[Ou
             names = [name for name in known if name.startswith("joints.") and name.endswith((".coordinate", ".rate"))]
             names += ["heat", "work"]
         else:
-            names = [name for name in known if name not in BOOKS]
+            names = [name for name in known if name not in TOTALS]
     for name in names:
         if name not in known:
             raise unknown_output("outputs", name, known)
@@ -124,7 +124,7 @@ def _known(model: "Scene | System") -> "Iterator[tuple[str, Labels]]":
         yield from (
             (f"markers.{name}.{key}", labels) for name, _ in model.all_markers() for key, labels in _MARKER.items()
         )
-    yield from ((name, Labels("", (), (unit,))) for name, unit in BOOKS.items())
+    yield from ((name, Labels("", (), (unit,))) for name, unit in TOTALS.items())
     for slot in system.descriptor().states:
         if slot.quantity.space.dim:
             yield str(slot.path), labels_of(slot.quantity)

@@ -68,10 +68,10 @@ class Suspicion:
         chosen = np.unique(np.linspace(0, len(q) - 1, INSTANTS).astype(int)).tolist() if len(q) else []
         kept = [ReducedState(start.t, q[i], y[i, :n], y[i, n : n + ns], y[i, n + ns :]) for i in chosen]
         x, energies = self.equations.booking.energies([start, *kept, end])
-        books = np.array([state.books for state in (start, *kept, end)])
+        totals = np.array([state.totals for state in (start, *kept, end)])
         held = energies * self.equations.led.mechanical
         changes = held - held[0]
-        heat, work = books[:, 0], books[:, 1]
+        heat, work = totals[:, 0], totals[:, 1]
         gross = float(np.max(np.abs(changes).sum(axis=1) + np.abs(heat) + np.abs(work)))
         defect = float(np.max(np.abs(changes.sum(axis=1) + heat - work)))
         if not defect <= self.bounds.energy * gross + ROUNDING * float(np.abs(held).sum(axis=1).max()):

@@ -190,10 +190,10 @@ def _foreign(
 
 def _end(motion: Motion) -> Motion:
     last = slice(-1, None)
-    t, position, rotation, balance, books = (
-        each[last] for each in (motion.t, motion.position, motion.rotation, motion.balance, motion.books)
+    t, position, rotation, balance, totals = (
+        each[last] for each in (motion.t, motion.position, motion.rotation, motion.balance, motion.totals)
     )
-    return Motion(t, position, rotation, balance, books, motion.turnover, motion.size)
+    return Motion(t, position, rotation, balance, totals, motion.turnover, motion.size)
 
 
 def _more(repeats: int, wall: float, limit: float) -> int:

@@ -40,7 +40,7 @@ class Motion:
         (n, b, 3) of the centres of mass in m, (n, b, 3, 3) body to world.
     balance
         (n,) kinetic + potential + heat − work less the same at the start, in J.
-    books
+    totals
         (n, 2) heat and work since the start, in J.
     turnover
         Largest K + |V − V₀| + |heat| + |work|, in J.
@@ -52,7 +52,7 @@ class Motion:
     position: Array
     rotation: Array
     balance: Array
-    books: Array
+    totals: Array
     turnover: float
     size: float = 0.0
 
@@ -81,15 +81,15 @@ class Motion:
 
     def misbooked(self, other: "Motion") -> Array:
         """(n,) largest deviation of heat and work, relative to what the other motion turns over; 0 where that is 0."""
-        off = np.abs(self.books - other.books).max(axis=1)
+        off = np.abs(self.totals - other.totals).max(axis=1)
         return off / other.turnover if other.turnover > 0.0 else np.zeros_like(off)
 
     def until(self, count: int) -> "Motion":
         """Its first instants, so many."""
-        t, position, rotation, balance, books = (
-            each[:count] for each in (self.t, self.position, self.rotation, self.balance, self.books)
+        t, position, rotation, balance, totals = (
+            each[:count] for each in (self.t, self.position, self.rotation, self.balance, self.totals)
         )
-        return Motion(t, position, rotation, balance, books, self.turnover, self.size)
+        return Motion(t, position, rotation, balance, totals, self.turnover, self.size)
 
     @property
     def length(self) -> float:

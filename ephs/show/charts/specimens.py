@@ -79,7 +79,7 @@ class VelocityMidpoint(_OnLoops):
 
         z = self.solved(residual, np.concatenate([state.r, np.zeros(m)]))
         q = eq.fitted(eq.moved(state.q, 0.5 * h * (state.r + z[:n])), z[:n])
-        return Attempt(state, ReducedState(state.t + h, q, z[:n], state.heats, state.books), h, 0.0, 0.0)
+        return Attempt(state, ReducedState(state.t + h, q, z[:n], state.heats, state.totals), h, 0.0, 0.0)
 
 
 class TrapezoidalIndex3(_OnLoops):
@@ -104,7 +104,7 @@ class TrapezoidalIndex3(_OnLoops):
         z = self.solved(residual, np.concatenate([h * state.r, known]))
         rates = 2.0 * z[:n] / h - state.r
         q = eq.fitted(eq.moved(state.q, z[:n]), rates)
-        end = ReducedState(state.t + h, q, rates, state.heats, state.books, (z[n:],))
+        end = ReducedState(state.t + h, q, rates, state.heats, state.totals, (z[n:],))
         return Attempt(state, end, h, 0.0, 0.0)
 
 

@@ -131,14 +131,14 @@ class Breach:
 
 def _energy(solution: "Solution", _bounds: Bounds, _trials: Tests | None) -> Iterator[Breach]:
     """The balance of kinetic + potential + heat − work, and of all energies − work."""
-    books = solution.ledgers
+    ledgers = solution.ledgers
     worst = _worst(solution.energy_error)
     # what is destroyed counts as energy; the environment's is what others gave it
-    destroyed = {path: books.temperature * made for path, made in books.makers.items()}
-    parts = {path: energy for path, energy in books.storages.items() if books.exergies[path].any()} | destroyed
+    destroyed = {path: ledgers.temperature * made for path, made in ledgers.makers.items()}
+    parts = {path: energy for path, energy in ledgers.storages.items() if ledgers.exergies[path].any()} | destroyed
     jump = 1 + int(np.argmax(np.abs(np.diff(solution.energy_error)))) if len(solution) > 1 else 0
     busiest = max(parts, key=lambda path: _step(parts[path], jump), default=None)
-    yield Breach(float(solution.energy_error[worst]), rounded(solution) / books.scale, worst, busiest)
+    yield Breach(float(solution.energy_error[worst]), rounded(solution) / ledgers.scale, worst, busiest)
 
 
 def _step(values: Array, instant: int) -> float:
@@ -203,17 +203,17 @@ def _shorter(bounds: Bounds, found: GlobalError) -> str:
 
 def _entropy(solution: "Solution", _bounds: Bounds, _trials: Tests | None) -> Iterator[Breach]:
     """No component, and no system without entropy's outer ports, loses entropy in a step."""
-    books = solution.ledgers
+    ledgers = solution.ledgers
     least = -float(solution.stats["least_production"])
     scale, rounding = _exchanged(solution, "entropy")
     if not scale:
         return
-    falls = {path: -np.diff(made, prepend=made[:1]) for path, made in books.makers.items()}
+    falls = {path: -np.diff(made, prepend=made[:1]) for path, made in ledgers.makers.items()}
     path = max(falls, key=lambda each: float(falls[each].max()), default=None)
     instant = _worst(falls[path]) if path is not None else 0
     yield Breach(least / scale, rounding, instant, path)
     if _isolated(solution, "entropy"):
-        fall = -np.diff(books.entropy, prepend=books.entropy[:1])
+        fall = -np.diff(ledgers.entropy, prepend=ledgers.entropy[:1])
         instant = _worst(fall)
         yield Breach(float(fall[instant]) / scale, rounding, instant)
 
@@ -228,12 +228,12 @@ def _constraint(solution: "Solution", _bounds: Bounds, _trials: Tests | None) ->
 
 def _ledger(solution: "Solution", bounds: Bounds, _trials: Tests | None) -> Iterator[Breach]:
     """Stored entropies and volumes change by what was made; work is a sum of power."""
-    books = solution.ledgers
+    ledgers = solution.ledgers
     if "work_apart" in solution.stats:
         instant = int(np.argmin(np.abs(solution.t - solution.stats["work_apart_at"])))
-        size, hint = float(solution.stats["work_apart"]) / books.scale, ": near a dead centre of what is prescribed"
+        size, hint = float(solution.stats["work_apart"]) / ledgers.scale, ": near a dead centre of what is prescribed"
         yield Breach(size, COARSE - min(COARSE, bounds.ledger), instant, hint=hint)
-    for kind, held, made in (("entropy", books.entropies, books.made), ("volume", books.volumes, None)):
+    for kind, held, made in (("entropy", ledgers.entropies, ledgers.made), ("volume", ledgers.volumes, None)):
         scale, rounding = _exchanged(solution, kind)
         if not scale or not _isolated(solution, kind):
             continue
@@ -255,15 +255,15 @@ def _input(solution: "Solution", _bounds: Bounds, _trials: Tests | None) -> Iter
 
 def _exchanged(solution: "Solution", kind: str) -> tuple[float, float]:
     """The largest amount of a kind that was made and exchanged, and the rounding of what is stored, relative to it."""
-    books = solution.ledgers
-    held = books.entropies if kind == "entropy" else books.volumes
+    ledgers = solution.ledgers
+    held = ledgers.entropies if kind == "entropy" else ledgers.volumes
     moved = [np.abs(values - values[0]) for values in held.values()]
     if kind == "entropy":
-        moved.append(np.abs(books.made - books.made[0]))
+        moved.append(np.abs(ledgers.made - ledgers.made[0]))
     scale = float(np.max(np.sum(moved, axis=0))) if moved else 0.0
     rounding = ROUNDING * sum(float(np.abs(values).max()) for values in held.values())
     if kind == "entropy":  # of what stands still, heat is rounding
-        rounding += rounded(solution) / books.temperature
+        rounding += rounded(solution) / ledgers.temperature
     return scale, rounding / scale if scale else 0.0
 
 

@@ -16,8 +16,8 @@ SOLVED = 100.0 * float(np.finfo(float).eps)
 
 def rounded(solution: "Solution") -> float:
     """Rounding of an energy balance."""
-    books = solution.ledgers
-    stored = sum(float(np.abs(books.storages[path]).max()) for path, held in books.exergies.items() if held.any())
+    ledgers = solution.ledgers
+    stored = sum(float(np.abs(ledgers.storages[path]).max()) for path, held in ledgers.exergies.items() if held.any())
     return _part(solution) * stored + trembling(solution)
 
 

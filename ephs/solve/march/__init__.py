@@ -2,12 +2,12 @@
 
 from ephs.solve.march.account import Account as Account
 from ephs.solve.march.march import march as march
-from ephs.solve.march.memory import BOOKS as BOOKS
 from ephs.solve.march.memory import ERRORS as ERRORS
 from ephs.solve.march.memory import MEMORY as MEMORY
-from ephs.solve.march.memory import Books as Books
+from ephs.solve.march.memory import TOTALS as TOTALS
 from ephs.solve.march.memory import Errors as Errors
 from ephs.solve.march.memory import Memory as Memory
+from ephs.solve.march.memory import Totals as Totals
 from ephs.solve.march.records import TABLEAU as TABLEAU
 from ephs.solve.march.records import Control as Control
 from ephs.solve.march.records import Ending as Ending

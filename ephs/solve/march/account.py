@@ -1,6 +1,6 @@
 """Both laws in a step: heat as energy by compensated sums, and the energy that is left to the motion.
 
-With weights b_j of the stages, heats and books change by h Σ b_j of their rates. All other energy is then what it was,
+With weights b_j of the stages, heats and totals change by h Σ b_j of their rates. All other energy is then what it was,
 and the work, less the heat; by how much a step misses that, its plain defect, is of the order of its error. Moving the
 state by as little along the gradient of the energy keeps the order (Hairer, Lubich and Wanner, *Geometric Numerical
 Integration*, IV.4). The defect says how accurate the motion is, which a corrected balance does not: it is kept.

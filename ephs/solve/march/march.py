@@ -8,7 +8,7 @@ from ephs.semantics.linear.dense import copy
 from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Truth, Variable, Vector
 from ephs.solve.march.account import Account, worth
 from ephs.solve.march.control import PATIENCE, held_back, judge, length
-from ephs.solve.march.memory import Books, Memory
+from ephs.solve.march.memory import Memory, Totals
 from ephs.solve.march.newton import filtered
 from ephs.solve.march.records import Control, Ending, Motion, Status, Tableau
 from ephs.solve.march.steps import allow, attempt, book, drift, error_of, first, stiffness_of
@@ -146,8 +146,8 @@ class _Run:
             c.stiff = stiffness_of(on, motion, self.tableau, m, h)
 
         on.when(self.sound, look)
-        books = Books(m.y, m.y1, m.carry, m.carry1, m.change, m.size, m.whole, m.low)
-        error = self._finish(m.k, self.sign * h, m.q1, books, part=False)
+        totals = Totals(m.y, m.y1, m.carry, m.carry1, m.change, m.size, m.whole, m.low)
+        error = self._finish(m.k, self.sign * h, m.q1, totals, part=False)
 
         def weigh() -> None:
             def always() -> None:
@@ -181,14 +181,14 @@ class _Run:
         taken = on.same(self.accepted.value, 1)
         self.unless_ended(lambda: on.when(taken, lambda: self._take(h, rest), self._reject))
 
-    def _finish(self, k: Matrix, h: Real, q: Vector, books: Books, *, part: bool) -> Real:
+    def _finish(self, k: Matrix, h: Real, q: Vector, totals: Totals, *, part: bool) -> Real:
         """Take the end of a step, or a part of one, to a state that obeys the laws, and return its error."""
-        on, motion, m, c, y = self.on, self.motion, self.memory, self.control, books.end
+        on, motion, m, c, y = self.on, self.motion, self.memory, self.control, totals.end
         n, nv, error = motion.freedoms, motion.increments, on.variable(0.0)
         damped = None if self.stiff is None else q
 
         def keep_books() -> None:
-            self.status.value = book(on, motion, self.tableau, k, h, books, self.account.anchor, part, damped)
+            self.status.value = book(on, motion, self.tableau, k, h, totals, self.account.anchor, part, damped)
 
         def settle() -> None:
             if motion.closes:
@@ -199,7 +199,7 @@ class _Run:
             if self.stiff is None:
                 error.value = error_of(on, motion, self.tableau, m, k, h, q)
             else:
-                error.value = filtered(on, motion, self.tableau, c, m.q, books.start, k, m.errors, self.stiff)
+                error.value = filtered(on, motion, self.tableau, c, m.q, totals.start, k, m.errors, self.stiff)
 
             def reveal() -> None:
                 error.value = on.maximum(error.value, drift(on, m.open, y.part(nv, n), m.allowed))
@@ -208,7 +208,7 @@ class _Run:
                 on.when(on.same(c.rough, 0), reveal)
 
         def correct() -> None:
-            self.status.value = motion.correct(on, self.account, h, books.start, y, q, m.allowed)
+            self.status.value = motion.correct(on, self.account, h, totals.start, y, q, m.allowed)
 
             def weigh() -> None:
                 error.value = on.maximum(error.value, worth(on, self.account))
@@ -278,8 +278,8 @@ class _Run:
 
             # Near a change of rank a part may be wrong though the whole is right: closing takes out what is across.
             on.when(self.sound, lambda: allow(on, motion, m.errors, m.y, m.y2))
-            books = Books(m.y, m.y2, m.carry, m.carry2, m.change, m.size, m.whole, m.low)
-            error = self._finish(m.k2, part, m.q2, books, part=True)
+            totals = Totals(m.y, m.y2, m.carry, m.carry2, m.change, m.size, m.whole, m.low)
+            error = self._finish(m.k2, part, m.q2, totals, part=True)
             right = on.either(c.grid > 0.0, on.negate(error > 1.0)) if motion.closes else True
             # Where it is not, the step is taken again carefully, and its part in shorter ones.
             kept = on.both(self.sound, right)

@@ -5,7 +5,7 @@ from typing import Any, Final, final
 
 from ephs.semantics.stage import Matrix, Vector, matrix, vector
 
-__all__ = ["BOOKS", "ERRORS", "MEMORY", "Books", "Errors", "Memory"]
+__all__ = ["ERRORS", "MEMORY", "TOTALS", "Errors", "Memory", "Totals"]
 
 
 @final
@@ -23,7 +23,7 @@ ERRORS: Final[dict[str, Any]] = {"atol": vector(), "rtol": vector(), "allowed": 
 
 @final
 @dataclass(frozen=True, slots=True)
-class Books:
+class Totals:
     """Memory of a step's sums, see `Memory`.
 
     Attributes
@@ -44,7 +44,7 @@ class Books:
     low: Vector
 
 
-BOOKS: Final[dict[str, Any]] = {
+TOTALS: Final[dict[str, Any]] = {
     name: vector() for name in ("start", "end", "before", "after", "change", "size", "whole", "low")
 }
 

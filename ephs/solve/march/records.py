@@ -75,7 +75,7 @@ class Status(IntEnum):
 class Motion(ABC):
     """Equations of motion: elements q on a manifold, and y = (v, r, rest) with increments v of q from a base.
 
-    From `summed` on, the rest is summed over the run without loss: heats and books, of which `book` makes what a step
+    From `summed` on, the rest is summed over the run without loss: heats and totals, of which `book` makes what a step
     leaves. Subclasses are frozen dataclasses whose fields are memory and known values, so that staged functions take
     them. An error counts the tree's increments, the first `freedoms` of v, its rates r, and what follows r in y.
     """

@@ -24,7 +24,7 @@ from ephs.semantics.stage import (
 )
 from ephs.solve.march.collocation import combine, evaluate, iterate, place
 from ephs.solve.march.control import judge
-from ephs.solve.march.memory import Books, Errors, Memory
+from ephs.solve.march.memory import Errors, Memory, Totals
 from ephs.solve.march.newton import newton
 from ephs.solve.march.records import Control, Motion, Status, Tableau
 from ephs.solve.march.stiff import Stiff
@@ -99,17 +99,17 @@ def attempt(
 
 
 def book(
-    on: Evaluator, motion: Motion, tableau: Tableau, k: Matrix, h: Real, books: Books, anchor: Real, hold: Truth,
+    on: Evaluator, motion: Motion, tableau: Tableau, k: Matrix, h: Real, totals: Totals, anchor: Real, hold: Truth,
     q: Vector | None = None,
 ) -> Integer:  # fmt: skip
-    """Sum what a step of length h with rates k adds to heats and books; return a status.
+    """Sum what a step of length h with rates k adds to heats and totals; return a status.
 
     What the last row of a tableau weighs are h Σ b k. ``hold`` where the step is a part of one whose sums are known.
     With the elements q at the end of a step whose method damps, heat is made of the energy that this takes out.
     Flows that go both ways within a step, and back by less than the rounding of the energy, are zero.
     """
     at, count = motion.summed, tableau.a.columns
-    nothing = motion.rounding(on, anchor, books.start)
+    nothing = motion.rounding(on, anchor, totals.start)
 
     def one(j: Integer) -> None:
         total, size, most = on.variable(0.0), on.variable(0.0), on.variable(0.0)
@@ -122,39 +122,39 @@ def book(
 
         on.loop(count, add)
         change = h * total.value
-        books.change[j], books.size[j] = change, on.absolute(h) * size.value
+        totals.change[j], totals.size[j] = change, on.absolute(h) * size.value
         back = on.both(on.both(change < 0.0, most.value > 0.0), change >= -nothing)
 
         def keep() -> None:
-            books.whole[j] = on.select(back, 0.0, change)
+            totals.whole[j] = on.select(back, 0.0, change)
 
         on.when(on.negate(hold), keep)
 
     def absorb() -> None:
         if q is not None:
-            motion.absorb(on, anchor, books.start, q, books.end, books.change)
+            motion.absorb(on, anchor, totals.start, q, totals.end, totals.change)
 
     def part() -> None:
         absorb()
-        motion.hold(on, books.change, books.low, books.whole)
-        copy(on, books.change, books.low)
+        motion.hold(on, totals.change, totals.low, totals.whole)
+        copy(on, totals.change, totals.low)
 
     def entire() -> None:
-        motion.hold(on, books.change, books.whole, books.whole)
+        motion.hold(on, totals.change, totals.whole, totals.whole)
         absorb()
-        copy(on, books.change, books.whole)
-        on.loop(books.low.size, clear)
+        copy(on, totals.change, totals.whole)
+        on.loop(totals.low.size, clear)
 
     def clear(j: Integer) -> None:
-        books.low[j] = 0.0
+        totals.low[j] = 0.0
 
     def grow(j: Integer) -> None:
-        books.end[at + j], books.after[j] = grown(books.start[at + j], books.before[j], books.change[j])
+        totals.end[at + j], totals.after[j] = grown(totals.start[at + j], totals.before[j], totals.change[j])
 
-    on.loop(books.change.size, one)
+    on.loop(totals.change.size, one)
     on.when(hold, part, entire)
-    status = motion.book(on, books.start, books.change, books.size, on.select(h >= 0.0, 1.0, -1.0))
-    on.loop(books.change.size, grow)
+    status = motion.book(on, totals.start, totals.change, totals.size, on.select(h >= 0.0, 1.0, -1.0))
+    on.loop(totals.change.size, grow)
     return status
 
 

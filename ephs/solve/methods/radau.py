@@ -88,7 +88,7 @@ class RadauState:
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Books:
+class Totals:
     """Powers of a step.
 
     Parameters
@@ -173,22 +173,22 @@ class Radau:
         stages, x, iterations = self._solved(state, h)
         if not np.abs(x).max(initial=0.0) < LARGEST:
             raise SolveError(Outcome.RANGE, self._path(int(np.argmin(np.abs(x) < LARGEST))), "")
-        books = self._books(state, h, stages)
+        totals = self._totals(state, h, stages)
         error = self._error(state, h, stages, x)
-        end = replace(self._end(state, h, 1.0, x, stages[-1].copy(), books), stages=stages, h=h)
+        end = replace(self._end(state, h, 1.0, x, stages[-1].copy(), totals), stages=stages, h=h)
         made = (end.sums - state.sums)[4:][self._makers]
         self.iterations += iterations
         if iterations > 4:
             self._matrices = None
-        return Attempt(state, end, h, error, float(made.min(initial=np.inf)) if made.size else 0.0, (stages, books))
+        return Attempt(state, end, h, error, float(made.min(initial=np.inf)) if made.size else 0.0, (stages, totals))
 
     def inside(self, attempt: Attempt[RadauState], t: float) -> RadauState:
         """The state at a time within the step, by its collocation polynomial."""
-        stages, books = attempt.detail
+        stages, totals = attempt.detail
         start, h = attempt.start, attempt.h
         theta = (t - start.t) / h
         x = start.x + h * moments(NODES, theta) @ stages[:, : self._rates]
-        return self._end(start, h, theta, x, values(NODES, theta) @ stages, books)
+        return self._end(start, h, theta, x, values(NODES, theta) @ stages, totals)
 
     def missed(self, attempt: Attempt[RadauState]) -> None:
         """None: the balance of energy shows it."""
@@ -251,7 +251,7 @@ class Radau:
             stages, iterations = self._stages(state, h)
         return stages, state.x + h * COEFFICIENTS[-1] @ stages[:, : self._rates], iterations
 
-    def _books(self, state: RadauState, h: float, stages: Array) -> Books:
+    def _totals(self, state: RadauState, h: float, stages: Array) -> Totals:
         """Entries of the ledgers at the stages, and the heat that is passed there and at the start."""
         xs = state.x + h * COEFFICIENTS @ stages[:, : self._rates]
         powers, passed = list[Array](), list[Array]()
@@ -259,7 +259,7 @@ class Radau:
             found = self.equations.instant(x, z, self.inputs(state.t + c * h, x))
             powers.append(found.sums)
             passed.append(self._passages.powers(found.flows, found.unknowns))
-        return Books(np.array(powers), np.array([self._known(state)[1], *passed]))
+        return Totals(np.array(powers), np.array([self._known(state)[1], *passed]))
 
     def _known(self, state: RadauState) -> tuple[Array, Array]:
         """(components,) stored energies, and heat and entropy transferred."""
@@ -268,16 +268,20 @@ class Radau:
             self._last = state, found.energies, self._passages.powers(found.flows, found.unknowns)
         return self._last[1:]
 
-    def _end(self, state: RadauState, h: float, theta: float, x: Array, z: Array, books: Books) -> RadauState:
+    def _end(self, state: RadauState, h: float, theta: float, x: Array, z: Array, totals: Totals) -> RadauState:
         """The state at a part of a step of h seconds: its heat is booked by energy, see `Heats`."""
         t, weights, passages = state.t + theta * h, h * moments(NODES, theta), self._passages
-        sums = state.sums + weights @ books.powers
+        sums = state.sums + weights @ totals.powers
         if passages.states.size:
             x[passages.states] = state.x[passages.states]
             energies = [self._known(state)[0], self.equations.instant(x, z, self.inputs(t, x)).energies]
-            missed = theta * h * (GAMMA * books.passed[0, 0] + DEFECT @ books.passed[1:, 0])
+            missed = theta * h * (GAMMA * totals.passed[0, 0] + DEFECT @ totals.passed[1:, 0])
             booked = passages.booked(
-                state.x, np.tensordot(weights, books.passed[1:], 1), missed, np.array(energies), sums[1] - state.sums[1]
+                state.x,
+                np.tensordot(weights, totals.passed[1:], 1),
+                missed,
+                np.array(energies),
+                sums[1] - state.sums[1],
             )
             x[passages.states] = booked.entropies
             sums[0] += booked.heat

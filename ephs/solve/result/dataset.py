@@ -130,7 +130,7 @@ def dataset(solution: "Solution", *, wrenches: bool = True) -> "xr.Dataset":
 def _variables(solution: "Solution") -> Iterable[tuple[str, Variable]]:
     for path, values in solution.states.items():
         yield f"state:{path}", Variable.of(values, solution.labels[path], f"state at {path}")
-    for name, values in _books(solution.ledgers):
+    for name, values in _totals(solution.ledgers):
         group, _, path = name.partition(":")
         units, says = _LEDGERS[group]
         yield name, Variable(values, units, f"{says} of {path}" if path else says)
@@ -141,7 +141,7 @@ def _variables(solution: "Solution") -> Iterable[tuple[str, Variable]]:
     yield from ((f"input:{path}", variable) for path, variable in solution.inputs.items())
 
 
-def _books(ledgers: Ledgers) -> Iterable[tuple[str, Array]]:
+def _totals(ledgers: Ledgers) -> Iterable[tuple[str, Array]]:
     for entry in fields(ledgers):
         value = getattr(ledgers, entry.name)
         if isinstance(value, Mapping):

@@ -97,12 +97,12 @@ def load(path: str | File, problem_of: Callable[[str, Array, Inputs], Problem]) 
 
 def _ledgers(groups: "Mapping[str, Mapping[Path, xr.DataArray]]", temperature: float) -> Ledgers:
     """Ledgers by path are groups; a single ledger has its name alone."""
-    books: dict[str, Any] = {}
+    totals: dict[str, Any] = {}
     for field in fields(Ledgers):
         found = groups.get(field.name, {})
         whole = found.get(Path())
-        books[field.name] = {path: each.values for path, each in found.items()} if whole is None else whole.values
-    return Ledgers(**{**books, "temperature": temperature})
+        totals[field.name] = {path: each.values for path, each in found.items()} if whole is None else whole.values
+    return Ledgers(**{**totals, "temperature": temperature})
 
 
 def _labels(variable: "xr.DataArray") -> Labels:

@@ -16,8 +16,8 @@ from ephs.semantics.system import System
 from ephs.solve.auditing.findings import Audit
 from ephs.solve.events import Crossing
 from ephs.solve.problem import Linked, Motion, Problem
-from ephs.solve.result.books import Entry, entry_of
 from ephs.solve.result.dataset import Variable, sampled_inputs
+from ephs.solve.result.entries import Entry, entry_of
 from ephs.solve.result.labels import Labels
 from ephs.solve.result.ledger import Ledgers
 
@@ -92,16 +92,16 @@ class Solution:
         return self.states[key]
 
     def _at(self, where: slice) -> "Solution":
-        books: dict[str, Any] = {}
+        totals: dict[str, Any] = {}
         for field in fields(self.ledgers):
             book = getattr(self.ledgers, field.name)
             if isinstance(book, Mapping):
-                books[field.name] = {path: values[where] for path, values in book.items()}
+                totals[field.name] = {path: values[where] for path, values in book.items()}
             elif isinstance(book, np.ndarray):
-                books[field.name] = book[where]
+                totals[field.name] = book[where]
         inputs = {path: replace(given, values=given.values[where]) for path, given in self.inputs.items()}
         states = {path: values[where] for path, values in self.states.items()}
-        ledgers = replace(self.ledgers, **books)
+        ledgers = replace(self.ledgers, **totals)
         return Solution(self.name, self.t[where], states, ledgers, self.stats, self.problem, self.labels, inputs)
 
     def __len__(self) -> int:
@@ -269,7 +269,7 @@ class Solution:
         found = entry_of(self.ledgers, Path.of(path))
         if found is None:
             known = ", ".join(map(str, {**self.ledgers.storages, **self.ledgers.makers}))
-            raise KeyError(f"{path}: no storage and no irreversible component there; those that keep books are {known}")
+            raise KeyError(f"{path}: no storage and no irreversible component there; those that keep one are {known}")
         return found
 
     def state_at(self, i: int) -> dict[Path, Array]:

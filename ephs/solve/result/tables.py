@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from ephs.semantics.markup import table
 
 if TYPE_CHECKING:
-    from ephs.solve.result.books import Entry
+    from ephs.solve.result.entries import Entry
     from ephs.solve.result.solution import Solution
 
 __all__ = ["ledger_table", "solution_table"]

@@ -1,4 +1,4 @@
-"""What methods estimate their errors to be, on a linear equation, against the formulas of their books."""
+"""What methods estimate their errors to be, on a linear equation, against the formulas in the literature."""
 
 import math
 

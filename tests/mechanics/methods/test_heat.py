@@ -75,12 +75,12 @@ def laws(sol):
 @pytest.mark.parametrize(("friction", "step"), [(1e6, 0.002), (1e6, 0.5), (100.0, 0.05), (20.0, 0.05), (0.5, 0.05)])
 def test_radau_books_what_the_disc_had_at_any_step(friction, step, capacity):
     sol = run(brake(friction, capacity), 1.0, "radau", step)
-    books = sol.ledgers
-    assert books.heat[-1] + books.kinetic[-1] == pytest.approx(ENERGY, rel=100 * EPS * math.sqrt(len(sol)))
+    ledgers = sol.ledgers
+    assert ledgers.heat[-1] + ledgers.kinetic[-1] == pytest.approx(ENERGY, rel=100 * EPS * math.sqrt(len(sol)))
     assert sol.audit.passed
     if capacity:  # in closed form
-        entropy = capacity * math.log1p(books.heat[-1] / (capacity * 300.0))
-        assert books.entropy[-1] - books.entropy[0] == pytest.approx(entropy, rel=1e-12)
+        entropy = capacity * math.log1p(ledgers.heat[-1] / (capacity * 300.0))
+        assert ledgers.entropy[-1] - ledgers.entropy[0] == pytest.approx(entropy, rel=1e-12)
 
 
 @pytest.mark.parametrize("capacity", [None, 1e-3])
@@ -137,18 +137,18 @@ def test_vibrations_that_the_method_damps_are_heat_by_radau_and_missing_by_alpha
 @example((0.1, 0.3), (0.05, 0.02), 0.1, (2.0, -3.0))
 def test_entropies_change_by_what_is_made(method, frictions, capacities, conductance, rates):
     sol = run(arms(frictions, capacities, conductance, rates), 0.3, method, 0.01)
-    books = sol.ledgers
-    change = sum(values - values[0] for values in books.entropies.values())
-    terms = sum(np.abs(values - values[0]) for values in books.entropies.values()) + np.abs(books.made)
-    rounding = 8.0 * EPS * len(sol) * (terms.max() + sum(np.abs(v).max() for v in books.entropies.values()))
-    assert np.abs(change - (books.made - books.made[0])).max() <= rounding
-    assert np.diff(books.heat).min() >= 0.0
-    for made in books.makers.values():
+    ledgers = sol.ledgers
+    change = sum(values - values[0] for values in ledgers.entropies.values())
+    terms = sum(np.abs(values - values[0]) for values in ledgers.entropies.values()) + np.abs(ledgers.made)
+    rounding = 8.0 * EPS * len(sol) * (terms.max() + sum(np.abs(v).max() for v in ledgers.entropies.values()))
+    assert np.abs(change - (ledgers.made - ledgers.made[0])).max() <= rounding
+    assert np.diff(ledgers.heat).min() >= 0.0
+    for made in ledgers.makers.values():
         assert np.diff(made).min() >= -rounding
     heats = sum(
-        books.storages[path] - books.storages[path][0] for path in books.entropies if books.exergies[path].any()
+        ledgers.storages[path] - ledgers.storages[path][0] for path in ledgers.entropies if ledgers.exergies[path].any()
     )
-    assert heats == pytest.approx(books.heat, abs=1e-11 * (1.0 + np.abs(books.heat).max()))
+    assert heats == pytest.approx(ledgers.heat, abs=1e-11 * (1.0 + np.abs(ledgers.heat).max()))
 
 
 @pytest.mark.parametrize(("method", "order", "steps"), [("radau", 5, (8, 16)), ("alpha", 2, (64, 128, 256))])
@@ -163,8 +163,8 @@ def test_the_order_is_kept(method, order, steps):
 @pytest.mark.parametrize("capacity", [1e-2, 1e-3])
 @pytest.mark.parametrize(("friction", "step"), [(1e6, 0.002), (100.0, 0.05), (20.0, 0.05)])
 def test_natural_solves_for_small_capacities(friction, step, capacity):
-    books = run(brake(friction, capacity), 20 * step, "natural", step).ledgers
-    lost = books.kinetic[0] - books.kinetic[-1]
-    assert books.thermal[-1] == pytest.approx(lost, rel=1e-12)
-    assert books.made[-1] == pytest.approx(capacity * math.log1p(lost / (capacity * 300.0)), rel=1e-11)
-    assert np.diff(books.made).min() >= 0.0
+    ledgers = run(brake(friction, capacity), 20 * step, "natural", step).ledgers
+    lost = ledgers.kinetic[0] - ledgers.kinetic[-1]
+    assert ledgers.thermal[-1] == pytest.approx(lost, rel=1e-12)
+    assert ledgers.made[-1] == pytest.approx(capacity * math.log1p(lost / (capacity * 300.0)), rel=1e-11)
+    assert np.diff(ledgers.made).min() >= 0.0

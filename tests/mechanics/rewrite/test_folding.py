@@ -347,8 +347,8 @@ def agree(scene, method, step, steps):
     assert fewer > 0 if dict(scene.all_joints()) else fewer == 0  # a body alone has no frame but its own
     assert folded.summary()["unknowns"] == {"paper": paper.stats["unknowns"], "used": folded.stats["unknowns"]}
     scale = 1.0 + np.abs(paper.energy).max()
-    for books in ("energy", "heat", "work", "entropy", "kinetic", "potential"):
-        assert np.abs(getattr(paper, books) - getattr(folded, books)).max() <= steps * 1e-12 * scale, books
+    for totals in ("energy", "heat", "work", "entropy", "kinetic", "potential"):
+        assert np.abs(getattr(paper, totals) - getattr(folded, totals)).max() <= steps * 1e-12 * scale, totals
     return paper, folded
 
 

@@ -13,7 +13,7 @@ def rising(eq, state, y):
 
     def states(t):
         v, r, heats = np.split(t * rates, [eq.nv, eq.nv + eq.n])
-        return eq.states(type(state)(0.0, eq.advance(state.q, v), state.r + r, state.heats + heats, state.books))
+        return eq.states(type(state)(0.0, eq.advance(state.q, v), state.r + r, state.heats + heats, state.totals))
 
     def slope(h):
         ahead, back = states(h), states(-h)

@@ -93,7 +93,7 @@ def test_derivatives_of_what_is_attached_are_those_of_the_equations():
     state = eq.start(0.0)
     linear, rng = Linearised(eq), np.random.default_rng(3)
     r, s = rng.standard_normal(eq.n), eq.heats.entropies(state.heats) + 0.1 * rng.standard_normal(eq.ns)
-    r = eq.closed(type(state)(0.0, state.q, r, state.heats, state.books)).r
+    r = eq.closed(type(state)(0.0, state.q, r, state.heats, state.totals)).r
 
     def rates(z):
         v, r, s = np.split(z, [eq.nv, eq.nv + eq.n])

@@ -186,8 +186,8 @@ def _shapes(
     program: Sweeps, groups: tuple[int, int], freedoms: int, joints: int, cuts: int, booked: tuple[int, int],
     closing: Closing,
 ) -> dict[str, tuple[int, ...]]:  # fmt: skip
-    """Shapes of the memory of one thread, by numbers of links and islands, of entropies, and of these and the books."""
-    (links, islands), (entropies, books) = groups, booked
+    """Shapes of the memory of one thread, by numbers of links and islands, of entropies, and with totals."""
+    (links, islands), (entropies, totals) = groups, booked
     rows, slots = len(closing.row), len(closing.slot)
     return {
         "work": ((links + 1) * program.width,), "place": (links + 1, PLACE), "change": (links + 1, 6),
@@ -199,7 +199,7 @@ def _shapes(
         "alter": (freedoms,), "moved": (joints,), "answer": (1,),
         "momenta": (links, 6), "spin": (freedoms,), "direction": (freedoms,), "descent": (freedoms,),
         "kept": (6 * islands,), "released": (6 * islands,), "found": (6 * islands,), "torque": (6 * islands,),
-        "sums": (islands, SUMS), "still": (joints,), "idle": (books,), "spare": (books,),
+        "sums": (islands, SUMS), "still": (joints,), "idle": (totals,), "spare": (totals,),
     }  # fmt: skip
 
 

@@ -10,7 +10,7 @@ from ephs.mechanics.tree.engine.programs import motion_program, stiff_program
 from ephs.semantics.bundle import Array
 from ephs.semantics.stage import Program, Record, Table
 from ephs.semantics.stage.calling import Bound
-from ephs.solve.march import BOOKS, ERRORS, Account, Control
+from ephs.solve.march import ERRORS, TOTALS, Account, Control
 
 __all__ = ["Engine"]
 
@@ -50,7 +50,7 @@ class Engine:
         self._r, self._change = np.zeros(work["force"].size), np.zeros(work["force"].size)
         summed = size - self._r.size - work["still"].size
         self._held, self._heats = np.zeros(3), np.zeros(work["entropy"].size)
-        self.books = {name: np.zeros(summed) for name in BOOKS} | {"start": self._start, "end": self._y}
+        self.totals = {name: np.zeros(summed) for name in TOTALS} | {"start": self._start, "end": self._y}
         self._account, self._allowed = Account.table(1), np.zeros(2 * self._r.size)
         self._counted = 2 * self._r.size + work["entropy"].size
         self._stages: dict[int, tuple[Table[Control], Array, dict[str, Array], Array, Bound]] = {}
@@ -162,7 +162,7 @@ class Engine:
         self, tableau: Mapping[str, Any], k: Array, h: float, y0: Array, y1: Array, carry: Array, *, anchor: float,
         part: bool,
     ) -> tuple[int, Array, Array]:  # fmt: skip
-        """Sum what a step with rates k adds to heats and books; a part of one is held by ``books``.
+        """Sum what a step with rates k adds to heats and totals; a part of one is held by ``totals``.
 
         ``anchor`` is that of the account.
 
@@ -174,12 +174,12 @@ class Engine:
         known = self._sums.get(id(tableau))
         if known is None or known[0] is not tableau:
             rows = np.zeros(k.shape)
-            known = tableau, rows, self.bind("summed", tableau, rows, self.books, h, anchor, int(part))
+            known = tableau, rows, self.bind("summed", tableau, rows, self.totals, h, anchor, int(part))
             self._sums[id(tableau)] = known
         _, rows, summed = known
-        self._start[:], self._y[:], self.books["before"][:], rows[:] = y0, y1, carry, k
+        self._start[:], self._y[:], self.totals["before"][:], rows[:] = y0, y1, carry, k
         status = int(summed(h, anchor, int(part)))
-        return status, self._y.copy(), self.books["after"].copy()
+        return status, self._y.copy(), self.totals["after"].copy()
 
     def correct(
         self, account: Array, y0: Array, y: Array, q: Array, allowed: Array, h: float, *, chosen: bool,

@@ -34,14 +34,14 @@ def _grow(pushed: Matrix, link: Integer, by: list[Real]) -> None:
 
 @staged
 def act(
-    on: Evaluator, tables: Tables, work: Work, q: Vector, r: Vector, s_rate: Vector, made: Vector, books: Vector
+    on: Evaluator, tables: Tables, work: Work, q: Vector, r: Vector, s_rate: Vector, made: Vector, totals: Vector
 ) -> Integer:
     """Write forces on joints and wrenches on links, rates of entropies, entropies made and powers; return a status.
 
-    Entropies are those in the memory; ``books`` (2,) receives the powers of friction and of what drives.
+    Entropies are those in the memory; ``totals`` (2,) receives the powers of friction and of what drives.
     """
-    acting = _Acting(on, tables, work, q, r, s_rate, made, books, on.counter(0))
-    books[0], books[1] = 0.0, 0.0
+    acting = _Acting(on, tables, work, q, r, s_rate, made, totals, on.counter(0))
+    totals[0], totals[1] = 0.0, 0.0
     on.loop(tables.node.size, acting.warm)
     on.loop(tables.body.size, acting.push)
     on.when(tables.own[0].attached > 0, lambda: acting.unless_refused(acting.attach))
@@ -93,7 +93,7 @@ class _Acting:
     r: Vector
     s_rate: Vector
     made: Vector
-    books: Vector
+    totals: Vector
     status: Variable[Integer]
 
     def unless_refused(self, following: Callable[[], None]) -> None:
@@ -134,7 +134,7 @@ class _Acting:
 
         def given() -> None:
             here = se3.wrench_outward(body.turn, body.at, [self.tables.wrench[b, k] for k in range(6)])
-            self.books[1] = self.books[1] + dot(here, place_of(self.on, w.place, body.link).twist)
+            self.totals[1] = self.totals[1] + dot(here, place_of(self.on, w.place, body.link).twist)
             _grow(w.pushed, body.link, here)
 
         self.on.when(body.link >= 0, given)
@@ -166,7 +166,7 @@ class _Acting:
         def heat(k: Integer) -> None:
             at = net.temperature[k]
             self.s_rate[at] = self.s_rate[at] - net.flow[rates + k]
-            self.books[0] = self.books[0] - net.flow[rates + k] * (w.temperature[at] + t.scal[1])
+            self.totals[0] = self.totals[0] - net.flow[rates + k] * (w.temperature[at] + t.scal[1])
 
         def fill(k: Integer) -> None:
             self.s_rate[net.head[5] + k] = -net.flow[net.first_state + k]
@@ -174,7 +174,7 @@ class _Acting:
         on.loop(rates, push)
         on.loop(nodes, heat)
         on.loop(net.head[3], fill)
-        self.books[1] = self.books[1] + net.power[0]
+        self.totals[1] = self.totals[1] + net.power[0]
 
     def _rate(self, port: Port) -> Real:
         """The rate of a joint's degree of freedom."""
@@ -273,7 +273,7 @@ class _Acting:
         def one(j: Integer) -> None:
             given = self.tables.drive[edge.r_at + j]
             pull[j] = given + self.work.attached[edge.r_at + j]
-            self.books[1] = self.books[1] + given * rate[j]
+            self.totals[1] = self.totals[1] + given * rate[j]
 
         self.on.loop(edge.dim, one)
 
@@ -307,7 +307,7 @@ class _Acting:
 
         def one(j: Integer) -> None:
             pull[j] = pull[j] - w.f[j]
-            self.books[0] = self.books[0] + w.f[j] * rate[j]
+            self.totals[0] = self.totals[0] + w.f[j] * rate[j]
 
         self.on.loop(d, one)
         self.s_rate[heat] = self.s_rate[heat] - w.f[d]

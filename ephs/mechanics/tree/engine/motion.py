@@ -131,7 +131,7 @@ class Mechanism(Motion):
         return self.work.alter
 
     def accelerate(
-        self, on: Evaluator, q: Vector, r: Vector, rate: Vector, s_rate: Vector, made: Vector, books: Vector
+        self, on: Evaluator, q: Vector, r: Vector, rate: Vector, s_rate: Vector, made: Vector, totals: Vector
     ) -> Integer:
         """Write ṙ, ṡ, what each component makes, and the powers of friction and of what drives; return a status."""
         w, own, status = self.work, self.tables.own[0], on.counter(0)
@@ -145,7 +145,7 @@ class Mechanism(Motion):
             clear(on, w.force)
 
             def forced() -> None:
-                status.value = act(on, self.tables, w, q, r, s_rate, made, books)
+                status.value = act(on, self.tables, w, q, r, s_rate, made, totals)
 
             def inward() -> None:
                 status.value = self.fold(on, q, w.force, w.pushed)
@@ -160,7 +160,7 @@ class Mechanism(Motion):
             def drive() -> None:
                 on.loop(rate.size, follow)
                 on.reach(own.power, *self.swept, *self._rows, q, r, w.force, w.answer)
-                books[1] = books[1] + w.answer[0]
+                totals[1] = totals[1] + w.answer[0]
 
             def follow(j: Integer) -> None:
                 rate[j] = rate[j] + self.tables.lead[j]

@@ -24,18 +24,18 @@ from ephs.semantics.stage import (
 )
 from ephs.semantics.stage.kinds import Kind
 from ephs.solve.march import (
-    BOOKS,
     ERRORS,
     MEMORY,
     STIFF,
     TABLEAU,
+    TOTALS,
     Account,
-    Books,
     Control,
     Errors,
     Memory,
     Stiff,
     Tableau,
+    Totals,
     march,
 )
 from ephs.solve.march.account import worth
@@ -85,10 +85,10 @@ def motion_program(*, looped: bool) -> Program:
         moving(tables, work).count(on, before, after)
 
     def summed(
-        on: Evaluator, tables: Tables, work: Work, tableau: Tableau, k: Matrix, books: Books, h: Real, anchor: Real,
+        on: Evaluator, tables: Tables, work: Work, tableau: Tableau, k: Matrix, totals: Totals, h: Real, anchor: Real,
         part: Integer,
     ) -> Integer:  # fmt: skip
-        return book(on, moving(tables, work), tableau, k, h, books, anchor, on.same(part, 1))
+        return book(on, moving(tables, work), tableau, k, h, totals, anchor, on.same(part, 1))
 
     def corrected(
         on: Evaluator, tables: Tables, work: Work, account: Table[Account], start: Vector, y: Vector, q: Vector,
@@ -110,10 +110,10 @@ def motion_program(*, looped: bool) -> Program:
     def evaluations(
         on: Evaluator, tables: Tables, work: Work, q: Matrix, r: Matrix, out: Vector, rates: Matrix, repeats: Integer
     ) -> None:
-        motion, books = moving(tables, work), out.part(0, 2)
+        motion, totals = moving(tables, work), out.part(0, 2)
 
         def one(k: Integer) -> None:
-            motion.accelerate(on, q.row(k), r.row(k), rates.row(k), out, out, books)
+            motion.accelerate(on, q.row(k), r.row(k), rates.row(k), out, out, totals)
 
         on.loop(repeats, lambda _: on.loop(q.rows, one))
 
@@ -133,7 +133,7 @@ def motion_program(*, looped: bool) -> Program:
         "velocities": Entry(velocities, **of, y=vector(), r=vector(), out=vector()),
         "counted": Entry(counted, **of, before=vector(), after=vector()),
         "summed": Entry(
-            summed, **of, tableau=tried["tableau"], k=matrix(), books=group(Books, **BOOKS), h=real(), anchor=real(),
+            summed, **of, tableau=tried["tableau"], k=matrix(), totals=group(Totals, **TOTALS), h=real(), anchor=real(),
             part=integer(),
         ),
         "corrected": Entry(

@@ -1,7 +1,7 @@
 """Explicit steps of a mechanism with exact derivatives along several directions: the steps over dual numbers.
 
 A program over dual numbers calls the tangents of the sweeps and components that the program itself calls. What the
-step does (stages, books, loops closed at its end) is stated where marches take it from.
+step does (stages, totals, loops closed at its end) is stated where marches take it from.
 """
 
 from collections.abc import Callable, Mapping, Sequence

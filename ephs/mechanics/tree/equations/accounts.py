@@ -68,20 +68,20 @@ class Accounts:
             return state
         eq = self._equations
         held = np.nan if eq.led.counting else float(eq.engine.energy(state.q, state.r, state.heats)[:2].sum())
-        account = np.zeros(self.own + eq.ns + state.books.size)
-        account[0] = held + state.books[0] - state.books[1]
+        account = np.zeros(self.own + eq.ns + state.totals.size)
+        account[0] = held + state.totals[0] - state.totals[1]
         account[OWN : self.own] = eq.engine.measure(state.q, state.r)
         return replace(state, account=account)
 
     def booked(
         self, start: "ReducedState", tableau: Mapping[str, Any], k: Array, h: float, y1: Array, *, part: bool = False
     ) -> tuple[Array, Array]:
-        """The end y1 of a step with rates k with heats and books, and the account with what rounding left of them.
+        """The end y1 of a step with rates k with heats and totals, and the account with what rounding left of them.
 
         Parameters
         ----------
         part
-            Whether it is a part of a step: its sums lie between those in the engine's ``books``.
+            Whether it is a part of a step: its sums lie between those in the engine's ``totals``.
 
         Raises
         ------
@@ -100,8 +100,8 @@ class Accounts:
     ) -> tuple["ReducedState", float]:  # fmt: skip
         """The end of a step of h seconds moved to the energy that is left to it, and the step's error by that.
 
-        Heats, books and sums of the end are taken, and its loops closed. Where constraints nearly repeat each other and
-        motions are prescribed, what is missing is left to the steps that follow.
+        Heats, totals and sums of the end are taken, and its loops closed. Where constraints nearly repeat each other
+        and motions are prescribed, what is missing is left to the steps that follow.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Books of a step on the reduced form: what its components passed on and made, and the work that it took."""
+"""Totals of a step on the reduced form: what its components passed on and made, and the work that it took."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -23,7 +23,7 @@ __all__ = ["Booking"]
 
 @final
 class Booking:
-    """The books of one mechanism's steps."""
+    """Totals that a mechanism's steps sum up."""
 
     def __init__(self, equations: "Equations", paper: PaperStates) -> None:
         self._equations, self.paper = equations, paper
@@ -43,7 +43,7 @@ class Booking:
         missed: Array | None = None,
         refused: bool = True,
     ) -> "ReducedState":
-        """The end of a step with heats and books, see `Heats`, by sums that lose nothing to rounding.
+        """The end of a step with heats and totals, see `Heats`, by sums that lose nothing to rounding.
 
         Parameters
         ----------
@@ -70,10 +70,10 @@ class Booking:
             self._refuse(made, flows, start, end)
         heat = float(flows[heats.frictions].sum() + flows @ heats.carried)
         change = np.where(heats.plain, end.heats - start.heats, change)
-        sums, at = np.concatenate([start.heats, start.books]), start.heats.size
+        sums, at = np.concatenate([start.heats, start.totals]), start.heats.size
         sums, carry = grown(sums, start.account[eq.accounts.own :], np.concatenate([change, [heat, work], made]))
         account = np.concatenate([start.account[: eq.accounts.own], carry])
-        return replace(end, heats=sums[:at], books=sums[at:], account=account)
+        return replace(end, heats=sums[:at], totals=sums[at:], account=account)
 
     def _lost(self, start: "ReducedState", end: "ReducedState", flows: Array, work: float) -> float | None:
         """Energy in J that is neither stored at the end, nor passed on by others than friction."""
@@ -81,7 +81,7 @@ class Booking:
         if not eq.heats.frictions.size or np.isnan(start.account[0]):
             return None
         held = float(eq.engine.energy(end.q, end.r, end.heats)[:2].sum())
-        before = float(start.account[0] + start.books[1] - start.books[0])
+        before = float(start.account[0] + start.totals[1] - start.totals[0])
         return before + work - held - float(flows @ eq.heats.carried)
 
     def _refuse(self, made: Array, flows: Array, start: "ReducedState", end: "ReducedState") -> None:

@@ -148,7 +148,7 @@ class Dense:
         return self.residual.power() + float(self.multiplier[: self._driven] @ prescribed)
 
     def rates(self, q: Array, y: Array, given: Given, heats: Heats, out: Array) -> tuple[int, int]:
-        """Rates of the tree, of the entropies and of the books, as the engine's; (status, component)."""
+        """Rates of the tree, of the entropies and of the totals, as the engine's; (status, component)."""
         found = self.residual
         n, nv, ns = found.n, found.nv, found.ns
         r, s, at = slice(nv, nv + n), slice(nv + n, nv + n + ns), nv + n + ns

@@ -118,7 +118,7 @@ class Equations:
         return self.engine.advance(q, v)
 
     def rates(self, t: float, base: Array, y: Array) -> Array:
-        """ẏ of y = (v, r, heats, books), of the books heat, work and flows, at q = base·exp(v).
+        """ẏ of y = (v, r, heats, totals), of the totals heat, work and flows, at q = base·exp(v).
 
         Raises
         ------
@@ -131,8 +131,8 @@ class Equations:
         if self.timed and not self.constant:
             self.given.place(t, NO_STATE)
         elif not self.constant:
-            v, r, heats, books = np.split(y, [nv, nv + n, nv + n + ns])
-            self.given.place(t, self.states(ReducedState(t, self.advance(base, v), r, heats, books)))
+            v, r, heats, totals = np.split(y, [nv, nv + n, nv + n + ns])
+            self.given.place(t, self.states(ReducedState(t, self.advance(base, v), r, heats, totals)))
         status, q, out = self.engine.rates(base, y)
         component = self.engine.failed
         if status == Status.DEPENDENT:
@@ -270,23 +270,23 @@ class Equations:
         if self.timed and not self.constant:
             self.given.place(t, NO_STATE)
         elif not self.constant:
-            books = np.zeros(2 + len(self.reduced.made))
-            self.given.place(t, self.states(ReducedState(t, q, r, heats, books)))
+            totals = np.zeros(2 + len(self.reduced.made))
+            self.given.place(t, self.states(ReducedState(t, q, r, heats, totals)))
 
     # ---- a step ------------------------------------------------------------------------------------------------
 
     def vector(self, state: ReducedState) -> Array:
         """y at the state: increments zero."""
-        return np.concatenate([np.zeros(self.nv), state.r, state.heats, state.books])
+        return np.concatenate([np.zeros(self.nv), state.r, state.heats, state.totals])
 
     def state(self, base: ReducedState, y: Array, t: float) -> ReducedState:
         """The state that the vector y means at the end of a step from ``base``; its loops are as they come."""
         return self.ended(base, self.settled(self.vector(base), y), t)
 
     def ended(self, base: ReducedState, y: Array, t: float) -> ReducedState:
-        """The same of a vector whose books are made up already."""
-        v, r, heats, books = np.split(y, np.cumsum([self.nv, self.n, self.ns]))
-        end = ReducedState(t, self.advance(base.q, v), r, heats, books, account=base.account)
+        """The same of a vector whose totals are made up already."""
+        v, r, heats, totals = np.split(y, np.cumsum([self.nv, self.n, self.ns]))
+        end = ReducedState(t, self.advance(base.q, v), r, heats, totals, account=base.account)
         return self.prescribed.followed(base, end)
 
     def settled(self, y0: Array, y1: Array) -> Array:
@@ -336,16 +336,16 @@ class Equations:
         x, energies = self.booking.energies(states)
         out: list[Row] = []
         for state, point, energy in zip(states, x, energies, strict=True):
-            heat, work = state.books[0], self.led.work(state.t, energy, state.books)
+            heat, work = state.totals[0], self.led.work(state.t, energy, state.totals)
             self.accounts.note(state)
             energy[self._makers] = 0.0
-            np.add.at(energy, self._makers, state.books[2:])
-            out.append(Row(point, energy, np.array([heat, work, work, state.books[2:].sum()])))
+            np.add.at(energy, self._makers, state.totals[2:])
+            out.append(Row(point, energy, np.array([heat, work, work, state.totals[2:].sum()])))
         return out
 
     def least(self, start: ReducedState, end: ReducedState) -> float:
         """The least entropy that a component made between two states, in J/K."""
-        made = end.books[2:] - start.books[2:]
+        made = end.totals[2:] - start.totals[2:]
         return float(made.min()) if made.size else 0.0
 
     def stats(self) -> dict[str, Any]:

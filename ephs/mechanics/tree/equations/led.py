@@ -60,13 +60,13 @@ class Led:
         """Count from here, where no degree of freedom is left; energies (components,) in J."""
         self._from = float(energies @ self.mechanical) if self.holds else None
 
-    def work(self, t: float, energies: Array, books: Array) -> float:
-        """The work in J since the start by energies (components,) and the heat, the first of the books; the second, the
-        sum of power, where the mechanism is not led."""
+    def work(self, t: float, energies: Array, totals: Array) -> float:
+        """The work in J since the start by energies (components,) and the heat, the first of the totals; the second,
+        the sum of power, where the mechanism is not led."""
         if self._from is None:
-            return float(books[1])
-        found = float(energies @ self.mechanical) - self._from + float(books[0])
-        self.apart = max(self.apart, (abs(found - float(books[1])), t))
+            return float(totals[1])
+        found = float(energies @ self.mechanical) - self._from + float(totals[0])
+        self.apart = max(self.apart, (abs(found - float(totals[1])), t))
         return found
 
     def stats(self) -> dict[str, Any]:

@@ -19,12 +19,12 @@ class ReducedState:
     ----------
     heats
         Energies in J of what stores entropy, from s = 0; of the environment θ₀ s.
-    books
+    totals
         Heat and work in J, then the entropy that each component made in J/K.
     memory
         What a method takes along from step to step; none after a start.
     account
-        (4 + momenta + heats + books,) energy in J where nothing is booked, what is missing of it, what corrections put
+        (4 + momenta + heats + totals,) energy in J where nothing is booked, what is missing of it, what corrections put
         in, and the sum of their sizes, see `ephs.solve.march.account.Account`; momenta that steps keep; then what
         rounding left of sums. Empty where a run starts.
     """
@@ -33,6 +33,6 @@ class ReducedState:
     q: Array
     r: Array
     heats: Array
-    books: Array
+    totals: Array
     memory: tuple[Array, ...] = ()
     account: Array = field(default_factory=lambda: np.zeros(0))

@@ -331,7 +331,7 @@ class Work:
         Of islands: momenta that steps keep, zeros, what `ephs.mechanics.tree.sweeps.rigid` writes, and its memory.
     still, idle, spare
         Zeros for given forces on all joints; memory for (heats, heat, work, flows).
-    books
+    totals
         Powers of friction and of what drives.
     answer, fault
         A number that a function writes; the component or degree of freedom that an evaluation failed at.

@@ -29,7 +29,7 @@ def entries(entry):
 
 
 @pytest.mark.parametrize("name", ["motor", "cylinder"])
-def test_books_add_up_at_every_level_and_balance(name, request):
+def test_ledgers_add_up_at_every_level_and_balance(name, request):
     sol = request.getfixturevalue(name)
     whole = sol.ledger()
     for entry in entries(whole):

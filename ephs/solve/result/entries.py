@@ -103,21 +103,21 @@ class Entry:
             return float(values[-1] - values[0]) if values.size else 0.0
 
         exergies = (self.exergy, self.exergy_supplied, self.destroyed, self.exergy_defect)
-        books = (*exergies, self.energy, self.entropy, self.made)
-        return tuple(change(values) for values in books)
+        ledgers = (*exergies, self.energy, self.entropy, self.made)
+        return tuple(change(values) for values in ledgers)
 
 
-def entry_of(books: Ledgers, path: Path) -> Entry | None:
+def entry_of(ledgers: Ledgers, path: Path) -> Entry | None:
     """Entry of a component or subsystem, None where no ledger exists at or below the path."""
-    leaves = {leaf: entry for leaf, entry in _leaves(books).items() if path.is_prefix_of(leaf)}
+    leaves = {leaf: entry for leaf, entry in _leaves(ledgers).items() if path.is_prefix_of(leaf)}
     if not leaves:
         return None
     found = _tree(path, leaves)
     if path or not found.energy.size:
         return found
     first = slice(None, 1)
-    energy = found.energy - found.energy[first] - (books.work - books.work[first])
-    exergy = found.exergy_supplied - found.exergy_supplied[first] - (books.supplied - books.supplied[first])
+    energy = found.energy - found.energy[first] - (ledgers.work - ledgers.work[first])
+    exergy = found.exergy_supplied - found.exergy_supplied[first] - (ledgers.supplied - ledgers.supplied[first])
     return replace(found, defect=energy, exergy_defect=exergy)
 
 
@@ -133,21 +133,21 @@ def _tree(path: Path, leaves: Mapping[Path, Entry]) -> Entry:
     return Entry(path, **sums, parts=parts)
 
 
-def _leaves(books: Ledgers) -> dict[Path, Entry]:
-    n = books.heat.size
+def _leaves(ledgers: Ledgers) -> dict[Path, Entry]:
+    n = ledgers.heat.size
     nothing = np.zeros(n)
     out: dict[Path, Entry] = {}
-    for path in dict.fromkeys([*books.storages, *books.makers]):
-        made = books.makers.get(path, nothing)
+    for path in dict.fromkeys([*ledgers.storages, *ledgers.makers]):
+        made = ledgers.makers.get(path, nothing)
         out[path] = Entry(
             path,
-            books.storages.get(path, nothing),
-            books.exergies.get(path, nothing),
-            books.entropies.get(path, nothing),
-            books.volumes.get(path, nothing),
-            books.momenta.get(path, nothing),
+            ledgers.storages.get(path, nothing),
+            ledgers.exergies.get(path, nothing),
+            ledgers.entropies.get(path, nothing),
+            ledgers.volumes.get(path, nothing),
+            ledgers.momenta.get(path, nothing),
             made,
-            books.temperature * made,
+            ledgers.temperature * made,
             nothing,
             nothing,
         )
