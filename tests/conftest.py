@@ -14,8 +14,7 @@ from tests.show.browser import browser  # noqa: E402
 
 # The suite of somebody else's package: test_downstream.py runs it, in a process of its own.
 collect_ignore = ["downstream"]
-if browser() is None:
-    collect_ignore += ["show/test_show_browser.py", "exporting/test_page_browser.py"]
+collect_ignore_glob = ["*/test_*_browser.py"] if browser() is None else []
 
 
 def pytest_report_header() -> str:
