@@ -233,7 +233,7 @@ def solution_of(folder: Path) -> "Solution":
 
 
 def _line(error: BaseException, file: Path) -> int | str:
-    """Return the deepest line of the user's own file that the error went through."""
+    """Return the innermost line of the user's own file in the traceback."""
     if isinstance(error, SyntaxError) and error.filename == str(file) and error.lineno:
         return error.lineno
     line: int | str = "?"

@@ -1,4 +1,4 @@
-"""Progress bar of a run: time left, steps a second, energy defect so far."""
+"""Progress bar of a run: remaining time, steps a second, energy defect so far."""
 
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -10,7 +10,7 @@ __all__ = ["progress_bar", "said_of"]
 
 @contextmanager
 def progress_bar(name: str) -> Iterator[Callable[[float, float, Mapping[str, Any]], None]]:
-    """Show a bar with the time left and the program being compiled, on a terminal only."""
+    """Show a bar with the remaining time and the program being compiled, on a terminal only."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 

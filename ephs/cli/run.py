@@ -207,7 +207,7 @@ def _identity(model: "Scene | System", scene: str, asked: Mapping[str, Any]) -> 
 
 
 def _ended(folder: Path, wanted: Mapping[str, Any]) -> bool:
-    """Whether the results in a folder are those of this run, which has reached its end.
+    """Whether a folder contains complete results of this run.
 
     Raises
     ------

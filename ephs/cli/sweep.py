@@ -124,7 +124,7 @@ def _client(address: str | None) -> Iterator[Any]:
 
 @contextmanager
 def _progress() -> Iterator[Callable[[int, int, int], None]]:
-    """Progress bar with members done, failures, and the time left, on a terminal only."""
+    """Progress bar with finished members, failures and remaining time, on a terminal only."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 

@@ -25,7 +25,7 @@ TEXTS: Final = {
 
 @final
 class ExportError(ValueError):
-    """A model that cannot be exported as asked.
+    """A model that cannot be exported with these options.
 
     Parameters
     ----------

@@ -34,7 +34,7 @@ MEMORY = ("poses", "twists", "s", "stored", "out", "drive", "wrench")
 @final
 @dataclass(frozen=True, slots=True)
 class Variable:
-    """A number that goes in or comes out.
+    """An input or output number.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Linked programs, by a cross compiler that comes as a package."""
+"""Linked programs, by a cross compiler installed as a Python package."""
 
 import subprocess
 import sys

@@ -58,7 +58,7 @@ class Instances:
             self.start(number)
 
     def start(self, number: int = 0, parameters: Array | None = None) -> None:
-        """Begin at the initial state, with other parameters where they are given."""
+        """Begin at the initial state; ``parameters`` override the model's."""
         self._calls["start"](self._memories[number])
         if parameters is not None:
             given = np.ascontiguousarray(parameters, dtype=np.float64)

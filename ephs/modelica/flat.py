@@ -154,7 +154,7 @@ def flattened(tree: Any, name: str, given: Mapping[str, float]) -> Flat:
 
 
 def _readings(instance: Any) -> Iterator[str]:
-    """Names of the signals that a class gives, by the names of their types in Modelica's standard library."""
+    """Output signals of a class, by the names of their types in Modelica's standard library."""
     for key, symbol in instance.symbols.items():
         if str(getattr(symbol.type, "name", "")).endswith("Output"):
             yield key
@@ -175,7 +175,7 @@ def _is_number(node: Any) -> bool:
 def _parameters(
     where: str, symbols: Mapping[str, Any], given: Mapping[str, float], literal: type[Any]
 ) -> dict[str, Any]:
-    """The nodes of their values: what is given, else the value, else the start value, as Modelica has it."""
+    """The nodes of their values: the given one, else the declared one, else the start value, as in Modelica."""
     for key in given:
         if key not in symbols:
             known = [each for each in symbols if "." not in each]
@@ -187,7 +187,7 @@ def _parameters(
         nodes = (literal(value=given[key]) if key in given else None, symbol.value, symbol.start)
         found = (node for node in nodes if node is not None and getattr(node, "value", 0) is not None)
         out[key] = next((node for node in found if str(node) != key), None)  # Pymoca takes R = R for its own
-        if key in ("useHeatPort", "useSupport"):  # Pymoca keeps connectors whatever their condition says
+        if key in ("useHeatPort", "useSupport"):  # Pymoca keeps conditional connectors whose condition is false
             out[key] = literal(value=True)
     return out
 
@@ -229,7 +229,7 @@ def _ports(
 
 
 def _equations(reader: Reader, nodes: Any, own: set[str]) -> list[Equation]:
-    """Equations of the branches that hold, without those that leave the component's own connectors open."""
+    """Equations of the active branches, without those for unconnected connectors of the component."""
     out: list[Equation] = []
     for node in nodes:
         kind = type(node).__name__

@@ -110,7 +110,7 @@ def _kernel(matrix: Matrix) -> Matrix:
 
 
 def _witness(relation: Relation, form: Matrix) -> dict[str, object]:
-    """A power that is given, and the values of ports and states at which it is."""
+    """A positive power, and a point (values of ports and states) at which it occurs."""
     import numpy as np
 
     _, vectors = np.linalg.eigh(np.array(form.tolist(), dtype=float))

@@ -169,7 +169,7 @@ def apply(algebra: Algebra[T], pattern: Pattern, elements: Mapping[Path, T], at:
 
 
 def call(pattern: Pattern, elements: Mapping[Path, object]) -> Any:
-    """Fill the boxes in the algebra that holds all elements; see `Pattern.__call__`."""
+    """Fill the boxes in the algebra of the elements; see `Pattern.__call__`."""
     known: dict[Algebra[Any], Path] = {}
     for box, element in elements.items():
         algebra = cast("object", getattr(element, "algebra", None))

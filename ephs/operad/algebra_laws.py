@@ -96,7 +96,7 @@ def _boxes(algebra: Algebra[Any], f: Pattern, boxes: Names, elements: Elements) 
 def _junctions(algebra: Algebra[Any], f: Pattern, junctions: Names, elements: Elements) -> Equation:
     new = {path: junctions.get(path, path) for path in f.junctions}
     renamed, around = f.rename(junctions=junctions), _around(f.interface, new)
-    # what is inside, the pattern around has in its box
+    # the contents of the box in the outer pattern
     (box,) = around.boxes
     inside = {path: box / path for path in f.boxes}
     inside |= {new[path]: box / path for path, junction in f.junctions.items() if not junction.exposed}
@@ -124,7 +124,7 @@ def _ports(algebra: Algebra[Any], f: Pattern, a: Path, ports: Names, elements: E
 
 
 def _around(interface: Interface, new: Names) -> Pattern:
-    """The pattern of one box that gives the ports of an interface new names."""
+    """The pattern with one box that renames the ports of an interface."""
     taken = {new[port][0] for port in interface}
     box = next(name for k in range(len(taken) + 1) if (name := f"box{k}") not in taken)
     ports = {port: Port(new[port], of.power) for port, of in interface.items()}

@@ -63,7 +63,7 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
 
 
 def charges_of(kind: str, dim: int, given: object) -> Charges:
-    """The charges as a quantity keeps them, from pairs or a mapping; the number of a scalar may stand alone.
+    """Normalised charges from pairs or a mapping; a scalar's may be a bare number.
 
     Raises
     ------

@@ -9,7 +9,7 @@ __all__ = ["paused_collector"]
 
 @contextmanager
 def paused_collector() -> Generator[None, None, None]:
-    """Without this, the collector goes through the growing result again and again: more than linear time."""
+    """Without this, the collector traverses the growing result repeatedly: more than linear time."""
     enabled = gc.isenabled()
     gc.disable()
     try:

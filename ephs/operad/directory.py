@@ -155,7 +155,7 @@ class Directory(Mapping[Path, T_co]):
         return Directory(pairs)
 
     def to_nested(self) -> "dict[str, object]":
-        """The same tree as plain nested dictionaries; a value at the root stands under ``"."``."""
+        """The same tree as plain nested dictionaries; a value at the root has the key ``"."``."""
         nested: dict[str, object] = {}
         for path, value in self.items():
             if not path:

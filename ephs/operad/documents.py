@@ -68,7 +68,7 @@ def to_json(pattern: Pattern) -> str:
 
 
 def quantity_record(quantity: Quantity) -> dict[str, Any]:
-    """A quantity as part of a document: its name, with arguments; or all that it is, where it has none."""
+    """A quantity as part of a document: its name with arguments, or its definition if it has no name."""
     frame = {} if quantity.frame is None else {"frame": quantity.frame}
     known = quantity_word(quantity)
     if known is None or known[0] == "species":
@@ -112,7 +112,7 @@ def from_dict(document: Mapping[str, object]) -> Pattern:
 def contents_from(
     found: Mapping[str, object], where: str = ""
 ) -> tuple[list[tuple[str, Junction]], list[tuple[str, dict[str, str]]], list[list[str]]]:
-    """Read junctions, boxes and links, as a `Pattern` takes them; `where` goes before the places of messages."""
+    """Read junctions, boxes and links, as a `Pattern` takes them; `where` prefixes the places in messages."""
     junctions, boxes = (_READ.mapping(f"{where}{key}", found[key]) for key in ("junctions", "boxes"))
     return (
         [(name, _junction(f"{where}junctions.{name}", junction)) for name, junction in junctions],
@@ -163,7 +163,7 @@ def quantity_from(where: str, record: Mapping[str, object]) -> Quantity:
 
 
 def domain_record(domain: Domain) -> list[float | None]:
-    """The two ends of a domain as JSON has them: null where there is none."""
+    """The two ends of a domain for JSON: null where unbounded."""
     return [end if isfinite(end) else None for end in domain]
 
 

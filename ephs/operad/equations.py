@@ -13,7 +13,7 @@ __all__ = ["Equation", "Law"]
 @final
 @dataclass(frozen=True, slots=True)
 class Equation:
-    """The two sides of a law, and the arguments that they come from.
+    """The two sides of a law, and the arguments of both.
 
     Printed, it shows both sides as trees; where they differ also the expression that makes it anew.
 
@@ -36,7 +36,7 @@ class Equation:
 
     @property
     def replay(self) -> str:
-        """A Python expression that forms the equation again, given ``from ephs.operad import *`` and its algebras."""
+        """A Python expression that reproduces the equation after ``from ephs.operad import *``, with its algebras."""
         return f"law({self.law!r})({', '.join(map(_written, self.inputs))})"
 
     def __str__(self) -> str:

@@ -1,4 +1,4 @@
-"""Patterns as graphs: isomorphism up to renaming, symmetries, and a hash that does not see names.
+"""Patterns as graphs: isomorphism up to renaming, symmetries, and a hash independent of names.
 
 Two graphs are used. The bipartite one, `to_networkx`, has boxes and junctions as nodes and ports as edges, for people.
 The incidence graph makes nodes of ports and state classes too, so that it is simple and all that counts is a label
@@ -80,7 +80,7 @@ def isomorphism(first: Pattern, second: Pattern, *, fix_interface: bool) -> Rena
 
 
 def automorphisms(pattern: Pattern, *, fix_interface: bool) -> int:
-    """Number of renamings that leave the pattern as it is; see `Pattern.automorphisms`.
+    """Number of renamings that preserve the pattern; see `Pattern.automorphisms`.
 
     By orbits and stabilisers: fix one node after the other, and multiply by the number of places that it could take.
     """
@@ -145,7 +145,7 @@ def _add_port(graph: "nx.Graph[Any]", port: tuple[Path, Path], kind: str, end: N
 
 
 def _words(quantity: Quantity) -> str:
-    """All that a quantity is, as text that does not change from process to process."""
+    """Full definition of a quantity as text, the same in every process."""
     return f"{quantity.kind!r} {quantity.space!r} {quantity.parity} {quantity.frame!r}"
 
 
@@ -218,7 +218,7 @@ def _renaming(first: Pattern, second: Pattern, found: Mapping[Node, Node]) -> Re
             case _:
                 pass
     fresh = _fresh(second)
-    # What is left are handles, of which neither number nor names count.
+    # Only handles remain; neither their number nor their names matter.
     junctions |= {path: next(fresh) for path in first.junctions if path not in junctions}
     return Renaming(
         dict(sorted(boxes.items())),

@@ -45,7 +45,7 @@ def _full(f: Pattern, fillings: Mapping[Path, Pattern]) -> Equation:
 
 
 def _moved(paths: Directory[Any], old: Path, new: Path) -> Names:
-    """Rename whatever lies below a path."""
+    """Rename all nodes below a path."""
     return {path: new / path.relative_to(old) for path in paths if old.is_prefix_of(path)}
 
 

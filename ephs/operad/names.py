@@ -78,7 +78,7 @@ class Path(tuple[str, ...]):
         return _trusted(self[len(prefix) :])
 
     def moved(self, names: "Mapping[Path, Path]") -> "Path":
-        """The path with its shortest prefix that has a new name in the mapping replaced by that."""
+        """The path with its shortest prefix among the mapping's keys replaced."""
         for length in range(len(self) + 1):
             new = names.get(_trusted(self[:length]))
             if new is not None:

@@ -1,4 +1,4 @@
-"""Nestings: trees of patterns whose interfaces fit, which stay shared until they are flattened."""
+"""Nestings: trees of patterns with matching interfaces; equal subtrees are shared until flattening."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -114,7 +114,7 @@ class Nesting:
         return self.pattern.substitute({box: child.bottom_up() for box, child in self.children.items()})
 
     def top_down(self) -> Pattern:
-        """Substitute the children as they are, one after the other, then go on with theirs; equal to `flatten`."""
+        """Substitute the children one after the other, then their children; equal to `flatten`."""
         result = self.pattern
         pending = list(self.children.items())
         while pending:

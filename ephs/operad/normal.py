@@ -51,7 +51,7 @@ class StateClass:
 @final
 @dataclass(frozen=True, slots=True)
 class NormalForm:
-    """A pattern without names that do not matter, and without order.
+    """A pattern without order and without names of inner junctions.
 
     Only classes that say something are among the classes: a power junction whose state nobody reads, shares or
     exposes needs none.

@@ -48,7 +48,7 @@ def junction(quantity: Quantity, exposed: bool = False, power: bool = True) -> J
 @final
 @dataclass(frozen=True, slots=True)
 class Port:
-    """A port of an inner box: the junction on which it lies, and whether it bears power."""
+    """A port of an inner box: its junction, and whether it is a power port."""
 
     junction: Path
     power: bool

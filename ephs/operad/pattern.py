@@ -128,7 +128,7 @@ class Pattern:
 
     @staticmethod
     def identity(interface: "Entries[PortType]") -> "Pattern":
-        """The neutral pattern of an interface: one box at the root path, its ports exposed as they are."""
+        """The identity pattern of an interface: one box at the root path, its ports exposed under their names."""
         ports = Directory(interface, what="interface")
         junctions = Directory([(p, Junction(t.quantity, True, t.power)) for p, t in ports.items()])
         box = Box(Directory([(p, Port(p, t.power)) for p, t in ports.items()]), ports)
@@ -207,7 +207,7 @@ class Pattern:
         /,
         **fillings: "Element",
     ) -> Any:
-        """Fill all boxes, in the one of the fillings' algebras that holds all of them; names as in `substitute`.
+        """Fill all boxes, in the most general algebra of the fillings; names as in `substitute`.
 
         Systems and primitives give a `System`; with a `Relation` among them, a `Relation`. The empty pattern, which
         has no fillings to say it, gives the system without parts. Errors are those of `apply`.
@@ -274,7 +274,7 @@ class Pattern:
         return isomorphism(self, other, fix_interface=fix_interface)
 
     def automorphisms(self, *, fix_interface: bool = False) -> int:
-        """The number of renamings that leave the pattern as it is; 1 if it is rigid."""
+        """The number of renamings that preserve the pattern; 1 if it is rigid."""
         from ephs.operad.isomorphism import automorphisms
 
         return automorphisms(self, fix_interface=fix_interface)
@@ -332,7 +332,7 @@ class Pattern:
         return from_json(text)
 
     def to_text(self) -> str:
-        """The pattern in a compact form, to read and to write by hand; its order is kept.
+        """The pattern in compact notation for reading and writing by hand, in its own order.
 
         >>> from ephs.operad import junction, quantity as Q
         >>> f = Pattern({"q": junction(Q.displacement, exposed=True)}, {"pe": {"q": "q"}, "see": {"x": "~q"}})

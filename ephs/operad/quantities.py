@@ -235,7 +235,7 @@ class Quantities:
     direct_momentum: Quantity = Quantity("momentum", Space("so(3)xR3*", 6, 6), -1)
 
     def species(self, name: str, /, **elements: float) -> Quantity:
-        """The amount of a substance in mol, which is made of so many atoms, or other units, of each element.
+        """The amount of a substance in mol, with its composition: atoms, or other units, of each element.
 
         Parameters
         ----------
@@ -318,7 +318,7 @@ def _pair(kind: str, parameters: dict[str, float]) -> tuple[int, int, tuple[tupl
 
 
 def quantity_word(value: Quantity) -> tuple[str, tuple[str, ...], dict[str, float]] | None:
-    """The name by which the package knows the quantity, frame aside, with arguments; None for a user's own."""
+    """The quantity's name in the package with arguments, without the frame; None for a user-defined quantity."""
     plain = value.in_frame(None)
     if plain in _WORDS:
         return _WORDS[plain], (), {}

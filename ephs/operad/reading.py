@@ -50,7 +50,7 @@ class Reader:
             self.refuse("format", found["format"], f"{number}")
 
     def record(self, where: str, value: object, needed: set[str], allowed: set[str]) -> dict[str, object]:
-        """An object that has the needed keys, and no others than these and the allowed ones."""
+        """An object with all required keys and no others than these and the optional ones."""
         found = dict(self.mapping(where, value))
         if missing := sorted(needed - found.keys()):
             self.refuse(where, f"no key {missing[0]}", f"the keys {', '.join(sorted(needed))}")

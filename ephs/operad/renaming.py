@@ -18,7 +18,7 @@ def rename(
     junctions: Mapping[Any, Any],
     ports: Mapping[Any, Mapping[Any, Any]],
 ) -> Pattern:
-    """Rename all at once, so that names may be swapped; see `Pattern.rename`."""
+    """Simultaneous renaming, which allows swaps; see `Pattern.rename`."""
     if not (boxes or junctions or ports):
         return pattern
     if pattern.is_identity:
@@ -43,7 +43,7 @@ def rename(
 def _renamed_identity(
     pattern: Pattern, boxes: Mapping[Any, Any], junctions: Mapping[Any, Any], ports: Mapping[Any, Mapping[Any, Any]]
 ) -> Pattern:
-    """Renaming of an identity pattern: inner and outer ports get the same names, which are given once."""
+    """Renaming of an identity pattern: one set of names for inner and outer ports."""
     inner: Mapping[Any, Any] = next((names for box, names in ports.items() if Path.of(box) == ROOT), junctions)
     new = _read("junction", junctions, pattern.junctions)
     same = _read("port of box .", inner, pattern.junctions) == new

@@ -109,7 +109,7 @@ def _moved(content: Box, level: _Level, new: Mapping[Path, Junction]) -> Box:
 
 
 def _tidied(whole: _Whole) -> Pattern:
-    """The pattern, without the junctions that are mere handles on a state which another of their class has, too."""
+    """The pattern without redundant handles: junctions whose state another junction of their class has, too."""
     junctions = Directory.trusted(whole.junctions)
     if not whole.links:
         return Pattern.trusted(junctions, Directory.trusted(whole.boxes), {})

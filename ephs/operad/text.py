@@ -113,7 +113,7 @@ def _identity(
     boxes: list[tuple[Path, list[tuple[Path, Port]]]],
     links: list[list[Path]],
 ) -> Pattern:
-    """A box at the root path is that of an identity, all of whose ports are exposed as they are."""
+    """A box at the root path means the identity: its ports are exposed under their names."""
     found = Pattern.identity([(path, PortType(j.quantity, j.power)) for path, j in junctions if j.exposed])
     wires = [(box, sorted(ports, key=lambda each: each[0])) for box, ports in boxes]
     meant = [(ROOT, sorted(found.boxes[ROOT].ports.items(), key=lambda each: each[0]))]
@@ -138,7 +138,7 @@ class _Reader:
     def statements(
         self,
     ) -> tuple[list[tuple[Path, Junction]], list[tuple[Path, list[tuple[Path, Port]]]], list[list[Path]]]:
-        """All that is stated: junctions, boxes, links."""
+        """All statements: junctions, boxes, links."""
         junctions: list[tuple[Path, Junction]] = []
         boxes: list[tuple[Path, list[tuple[Path, Port]]]] = []
         links: list[list[Path]] = []

@@ -35,7 +35,7 @@ class Translation(Generic[T]):
 
 
 def box_name(box: Path) -> str:
-    """The name of a box for others; that of an identity has none of its own."""
+    """The exported name of a box; the box of an identity pattern has none."""
     return str(box) if box else "identity"
 
 
@@ -104,7 +104,7 @@ class Wiring:
         used = {junction for _, ports in self.boxes for _, junction in ports}
         names, called = _Named(), dict[int, Path]()
         junctions: dict[Path, Junction] = {}
-        # exposed junctions first: their names are those of outer ports, and stay
+        # exposed junctions first: they keep the names of outer ports
         for k in sorted(range(len(self.junctions)), key=lambda k: k not in exposed):
             kind, own = self.junctions[k]
             wanted = exposed.get(k) or own
@@ -160,7 +160,7 @@ def _path(reader: Reader, where: str, name: str) -> Path:
 
 
 def numbered(names: Iterable[str]) -> list[str]:
-    """Names, those that come again with a number."""
+    """Unique names: repeated ones get a number."""
     seen: dict[str, int] = {}
     out: list[str] = []
     for name in names:

@@ -91,7 +91,7 @@ def flow_unit(unit: str) -> str:
 
 
 def effort_unit(unit: str) -> str:
-    """Unit of the effort of a quantity in the given unit: times the flow it is a power."""
+    """Unit of the effort of a quantity in the given unit: watt per unit of flow."""
     return _named(f"J/{_factor(unit)}" if unit else "")
 
 

@@ -35,7 +35,7 @@ def read_junctions(junctions: Entries[Junction]) -> Directory[Junction]:
 
 
 def read_boxes(boxes: Boxes, junctions: Mapping[Path, Junction]) -> Directory[Box]:
-    """The boxes of a pattern; each port lies on one junction, from which it has its quantity (P1, P2)."""
+    """The boxes of a pattern; each port is on exactly one junction and has its quantity (P1, P2)."""
     found = Directory(cast("Entries[object]", boxes), what="boxes")
     return Directory([(path, _read_box(path, value, junctions)) for path, value in found.items()])
 

@@ -35,7 +35,7 @@ EVALUATION = 1e-12
 VACUOUS = Verdict(0.0, 0.0, "vacuous: no step was found, a constraint contradicts the state or h is too large")
 
 
-@lru_cache(maxsize=1)  # all laws of a step at one probe; probes are told apart by identity
+@lru_cache(maxsize=1)  # all laws of a step at one probe; probes are distinguished by identity
 def _solved(probe: Probe) -> Solved:
     return solve_flat(probe.system, probe.state, Natural(probe.reference, probe.h), probe.inputs)
 
@@ -79,7 +79,7 @@ def exergy_balance(probe: Probe) -> Verdict:
         return VACUOUS
     terms = [there - here for here, there in _energies(probe, solved, exergy=True)]
     sizes = [abs(here) + abs(there) for here, there in _energies(probe, solved, exergy=True)]
-    # an exergy is what two larger terms leave of each other
+    # an exergy is a difference of two larger terms
     sizes += [abs(here) + abs(there) for here, there in _energies(probe, solved, exergy=False)]
     terms += [-probe.h * float(effort @ flow) for flow, effort in solved.outer.values()]
     theta = probe.reference.temperature

@@ -1,4 +1,4 @@
-"""Port bundles: how the flows and efforts of an interface lie in one vector.
+"""Port bundles: layout of an interface's flows and efforts in one vector.
 
 All fibres are left-trivialised, so a port of a quantity Q carries a flow and an effort in ℝᵏ, k = Q.space.dim,
 whatever the state (Lohmayer, Capobianco, Leyendecker, section 2).
@@ -51,7 +51,7 @@ class Reference:
         object.__setattr__(self, "potentials", dict(sorted(self.potentials.items())))
 
     def potential(self, charge: str) -> float:
-        """Intensive value of a charge: θ₀ of entropy, −π₀ of volume, μ₀ of others."""
+        """Intensive value of a charge: θ₀ of entropy, −π₀ of volume, μ₀ of other charges."""
         given = {ENTROPY: self.temperature, VOLUME: -self.pressure}
         return given[charge] if charge in given else self.potentials.get(charge, 0.0)
 
@@ -98,7 +98,7 @@ class Bundle:
         return {port: vector[where] for port, where, _ in self.items()}
 
     def indicator(self, charge: str) -> Array:
-        """The constant covector 1_κ: how much of the charge κ a unit at each port carries, zero where it is none."""
+        """The constant covector 1_κ: charge κ per unit of each port's flow, zero at ports without it."""
         out = np.zeros(self.size)
         for _, where, quantity in self.items():
             for name, row in quantity.charges:

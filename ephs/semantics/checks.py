@@ -39,7 +39,7 @@ SHORT = 1e-8
 LAST = 1e-14
 """Rounding of an energy: some tens of ε."""
 SAME = 1e-9
-"""Part of their entries by which two structures may differ and be one: they are functions evaluated twice."""
+"""Relative tolerance for equality of two structures, which are functions evaluated twice."""
 TOLERANCE = 1e-12
 """Of the largest entry; evaluations of structure are a few hundred roundings deep at the most."""
 EVENNESS = 1e-9
@@ -190,7 +190,7 @@ def _check_gradient(storage: "Storage", trial: Trial, gradient: Array, energy: f
 def _slope_defect(
     storage: "Storage", trial: Trial, gradient: Array, energy: float, direction: Array
 ) -> tuple[float, float, float]:
-    """The gradient along a direction against differences: how far beyond their error it is, both slopes."""
+    """The gradient along a direction against differences: excess over their error, and both slopes."""
     best = (np.inf, 0.0, 0.0)  # of several lengths of the step: the energy may vary slowly, or fast
     found = float(gradient @ direction)
     for length in LENGTHS:
@@ -202,7 +202,7 @@ def _slope_defect(
         expected = 0.5 * (there - back)
         slope = 1e-4 * float(np.abs(gradient) @ np.abs(step))
         rounding = LAST * (abs(there) + abs(back) + abs(energy))
-        if length < SHORT and rounding > slope:  # so short a step tells no gradient from another
+        if length < SHORT and rounding > slope:  # gradients cannot be distinguished over so short a step
             break
         if np.isfinite(expected):
             off = abs(expected - found * length) / max(slope + rounding, TINY)
@@ -267,7 +267,7 @@ def _finite(*matrices: Array) -> bool:
 
 
 def _scaled(matrix: Array) -> Array:
-    """Rows and columns divided by the roots of the diagonal, so that quantities of unlike units are of one size."""
+    """Rows and columns divided by the roots of the diagonal: scaling of quantities with different units."""
     size = np.sqrt(np.abs(np.diag(matrix)))
     size = np.where(size > 0.0, size, np.sqrt(np.abs(matrix).max(axis=1, initial=0.0)))
     return 1.0 / np.where(size > 0.0, size, 1.0)

@@ -1,4 +1,4 @@
-"""Primitives of one's own, from plain Python functions of the port variables.
+"""User-defined primitives from plain Python functions of the port variables.
 
 Their structure is proved when they are made, or searched for counterexamples. The functions are recorded once:
 gradients, discrete gradients, Jacobians, printed formulas and machine code come from that, once for all primitives that
@@ -75,7 +75,7 @@ def storage(
     bounds = domain_of(name, interface, domain)
 
     def value(x: Point) -> float:
-        with np.errstate(all="ignore"):  # what is not a number is found by its value
+        with np.errstate(all="ignore"):  # NaN and infinities are detected in the value
             return real_number(name, value_of(name, "the energy", energy, x)) if within_domain(bounds, x) else math.nan
 
     from ephs.semantics.derive.recording import Untraceable

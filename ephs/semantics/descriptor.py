@@ -48,7 +48,7 @@ class StateSlot:
 @final
 @dataclass(frozen=True, slots=True)
 class ComponentSlot:
-    """One primitive: which efforts are its ports', which states it reads, where its multipliers lie."""
+    """One primitive: indices of its ports' efforts, of the states that it reads, and of its multipliers."""
 
     path: Path
     primitive: Primitive
@@ -167,7 +167,7 @@ class Descriptor:
 
     @property
     def _efforts(self) -> Index:
-        """(junctions,) where the effort of each lies."""
+        """(junctions,) index of each effort."""
         return starts(self.numbering.dims(self.numbering.junctions))
 
     def _state_slots(self) -> Iterator[StateSlot]:

@@ -1,4 +1,4 @@
-"""Gradients and discrete gradients of energies that come without their own."""
+"""Default gradients and discrete gradients of energies, by differences."""
 
 import math
 from typing import TYPE_CHECKING

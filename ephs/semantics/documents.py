@@ -90,7 +90,7 @@ def from_dict(document: Mapping[str, object]) -> System:
 def _system(
     where: str, value: object, made: list[Filling], sizes: list[tuple[int, int]]
 ) -> tuple[System, tuple[int, int]]:
-    """A system of parts that are made already; its levels and primitives."""
+    """A system from finished parts; its levels and primitives."""
     found = _READ.record(where, value, {"pattern", "fillings"}, set())
     pattern = pattern_within(_READ, f"{where}.pattern", found["pattern"])
     fillings: dict[Path, Filling] = {}

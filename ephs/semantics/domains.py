@@ -1,4 +1,4 @@
-"""Domains that primitives declare: between which numbers their states and efforts lie."""
+"""Declared domains of primitives: bounds of their states and efforts."""
 
 from collections.abc import Callable, Mapping
 from typing import TypeVar

@@ -33,7 +33,7 @@ def between(low: float, high: float, x: Array) -> Array:
 
 
 def room(quantity: Quantity, x: Array) -> float:
-    """A length beside which steps from the state are short: how far the domain's ends are, 1 where there are none."""
+    """Length scale for steps from the state: distance to the ends of the domain, 1 if unbounded."""
     ends = np.concatenate([np.abs(x - end) for end in quantity.domain if math.isfinite(end)] or [np.ones(1)])
     return float(ends.min())
 

@@ -70,7 +70,7 @@ def stored(
         return energy(**states, **numbers)
 
     def value(x: Point) -> float:
-        with np.errstate(all="ignore"):  # what is not a number is found by its value
+        with np.errstate(all="ignore"):  # NaN and infinities are detected in the value
             return float(whole(**_named(x)))
 
     try:
@@ -321,7 +321,7 @@ def _reference(bundle: Bundle) -> tuple[tuple[float, float], ...]:
 
 
 def _carried(bundle: Bundle) -> Carried:
-    """Effort -> how much a unit there carries of the charges that have a potential."""
+    """Effort -> charges with a potential, per unit of flow."""
     rows = {charge: bundle.indicator(charge) for charge in bundle.charges if charge not in (ENTROPY, VOLUME)}
     found = {i: tuple((charge, float(row[i])) for charge, row in rows.items() if row[i]) for i in range(bundle.size)}
     return {i: carried for i, carried in found.items() if carried}

@@ -160,7 +160,7 @@ def _relation(primitive: Primitive, potentials: Mapping[str, float]) -> _Evaluat
 
     def evaluate(scal: Array, point: dict[Any, Array], dims: list[int], views: list[Array]) -> None:
         v, e, lam, flow, condition, jacobian = views
-        # h = 0 asks for the continuous relation: without a step the increments v are zero, of whatever length it is.
+        # h = 0 selects the continuous relation, whose increments v are zero.
         h = float(scal[0]) or 1.0
         local = Natural(Reference(float(scal[1]), float(scal[2]), potentials), h).behaviour(primitive, point)
         if isinstance(local, Storing):

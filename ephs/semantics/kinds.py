@@ -178,7 +178,7 @@ class _Kinds:
         return found
 
     def _primitive(self, primitive: Primitive) -> Kind:
-        """A component: each outer port is a class of its own, and those of a storage are states."""
+        """A component: one class per outer port; the ports of a storage are states."""
         ports = tuple(primitive.interface)
         bundle, place = primitive.bundle, {port: i for i, port in enumerate(ports)}
         storing = isinstance(primitive, Storage)

@@ -50,7 +50,7 @@ class Account:
 @final
 @dataclass(frozen=True, slots=True)
 class Ledger:
-    """Accounts of a system. Calling it with a state gives the `Account` of each storage by its path.
+    """Accounts of a system; a call with a state returns the `Account` of each storage by its path.
 
     Over a motion, energy changes by what is supplied at the outer ports, exergy by that less θ₀ times the entropy that
     the `producers` make. A `Solution` has the same totals over time: ``sol.ledger(path)``.

@@ -28,7 +28,7 @@ __all__ = ["Solved", "solve_flat", "solve_nested", "step"]
 NEAR = 1e-9
 """Error beside the unknowns below which whole steps are taken: Newton's method converges there."""
 SOLVED = 1e-12
-"""Error that may stand where steps no longer help: rounding, with Jacobians of differences."""
+"""Residual accepted when iterations stagnate: rounding, with Jacobians by differences."""
 
 
 @final
@@ -96,7 +96,7 @@ class _Unknowns:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class _Part:
-    """A subsystem's residual as a closure over the one vector, and where its port variables lie."""
+    """A subsystem's residual as a closure over the vector of unknowns, and the indices of its port variables."""
 
     ports: Mapping[Path, tuple[slice, slice]]
     equations: Callable[[Array], list[Array]]
@@ -254,7 +254,7 @@ def newton(residual: Callable[[Array], Array], z: Array, *, iterations: int = 30
         step = np.linalg.lstsq(jacobian, r, rcond=CONSTRAINT)[0]
         share = 1.0
         new, r_new, error = _tried(residual, z - step)
-        # far from the solution a whole step may lead away from it; near by rounding is all that is left
+        # far from the solution a full step may increase the residual; near it only rounding remains
         while not error < best and best > NEAR and share > 1e-3:
             share *= 0.5
             new, r_new, error = _tried(residual, z - share * step)

@@ -86,7 +86,7 @@ class Numbering:
 
 @final
 class Interned(Generic[T]):
-    """Numbers for values, each value once. Objects seen before are known by identity: keep them alive."""
+    """Consecutive numbers of distinct values. Objects are recognised by identity: keep them alive."""
 
     def __init__(self) -> None:
         self.values: list[T] = []
@@ -112,7 +112,7 @@ class Interned(Generic[T]):
 
 
 def starts(length: Index) -> Index:
-    """Start of each of some rows that lie one after the other."""
+    """Start indices of consecutive rows."""
     return np.cumsum(length) - length
 
 
@@ -122,7 +122,7 @@ def spans(at: Index, length: Index) -> Index:
 
 
 def sums(values: Index, length: Index) -> Index:
-    """The sum of each of some rows that lie one after the other."""
+    """Sums over consecutive rows."""
     whole = np.append(0, np.cumsum(values))
     return whole[np.cumsum(length)] - whole[starts(length)]
 

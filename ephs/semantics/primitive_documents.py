@@ -28,7 +28,7 @@ __all__ = ["primitive_from", "primitive_record"]
 
 KINDS = ("part", "storage", "reversible", "irreversible")
 AGREEMENT = 1e-9
-"""Largest relative difference of a primitive from what is read of its document: rounding of formulas of 10⁴ terms."""
+"""Largest relative difference between a primitive and its document read back: rounding of formulas with 10⁴ terms."""
 _FAULTS = (ArithmeticError, LookupError, TypeError, ValueError)
 
 

@@ -1,4 +1,4 @@
-"""Proofs of structures, kept on disk: SymPy is loaded for formulas that are not proved yet."""
+"""Proofs of structures, cached on disk: SymPy is loaded for formulas without a cached proof."""
 
 from typing import TYPE_CHECKING
 

@@ -53,7 +53,7 @@ def pull_back(process: Reversible | Irreversible, maps: Mapping[Path, Map]) -> R
     """
     interface = _interface(process.interface, maps)
     whole = _matrix(process, maps)
-    # maps of mechanical ports leave the conserved quantities alone; all else the checks decide
+    # maps of mechanical ports preserve the conserved quantities; the checks decide the rest
     sound = not any(process.interface[port].quantity.environment for port in maps)
     entries = (*process.parameters, *((f"T {port}", tuple(m.matrix.ravel().tolist())) for port, m in maps.items()))
 

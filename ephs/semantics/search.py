@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["COUNT", "failure", "search", "shrunk", "simplest"]
 
 COUNT = 400
-"""Trials of a structure that is not proved."""
+"""Numerical trials of a structure without a proof."""
 DEFINED = 40
 """Trials in which a structure has to have a finite value once."""
 SHRINKS = 2000
@@ -33,7 +33,7 @@ UNDEFINED = ("finite", "undefined")
 def failure(primitive: "Primitive", where: Trial) -> StructureError | None:
     """Failure at that point, or None."""
     try:
-        with np.errstate(all="ignore"):  # what is not a number is found by its value
+        with np.errstate(all="ignore"):  # NaN and infinities are detected in the value
             check_at(primitive, where)
     except StructureError as error:
         return error
@@ -46,7 +46,7 @@ def failure(primitive: "Primitive", where: Trial) -> StructureError | None:
 
 
 def simplest(primitive: "Primitive") -> None:
-    """Check the simplest trial, where wrong shapes show; where it has no finite value, others.
+    """Check the simplest trial, which reveals wrong shapes; others if its values are not finite.
 
     Raises
     ------

@@ -80,7 +80,7 @@ def exponential(
         parameters,
         formula=formula,
         proof=proof if sound else None,
-        # a random state of a small capacity is so cold or so hot that differences tell nothing
+        # a random state of a small capacity is too cold or too hot for differences
         trusted=sound,
     )
 
@@ -179,7 +179,7 @@ def _product(row: Any, u: Any) -> Any:
 
 
 def dissipation_proof(interface: Interface, mu: Array | None) -> tuple[Condition, ...]:
-    """The conditions on M = Bᵀ (μ/θ) B with B = [θ, −u], which has B eᴱ = θ u − u θ = 0: what is left concerns μ.
+    """The conditions on M = Bᵀ (μ/θ) B with B = [θ, −u], which has B eᴱ = θ u − u θ = 0: conditions on μ remain.
 
     Parameters
     ----------

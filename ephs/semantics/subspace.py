@@ -56,7 +56,7 @@ class Subspace:
 
     @property
     def ambient(self) -> int:
-        """n, the dimension of the space around."""
+        """n, the dimension of the ambient space."""
         return int(self.basis.shape[0])
 
     @property
@@ -76,7 +76,7 @@ class Subspace:
     def restrict(self, matrix: Array) -> "Subspace":
         """The vectors of this subspace which also satisfy matrix z = 0."""
         product = matrix @ self.basis
-        # a row that holds already leaves rounding, which must not be taken for an equation
+        # a dependent row leaves rounding, which is no equation
         left = np.linalg.norm(product, axis=1) > ELIMINATION * np.linalg.norm(matrix, axis=1)
         coefficients = Subspace.from_kernel(product[left])
         return Subspace(self.basis @ coefficients.basis, coefficients.condition)._after(self)

@@ -56,7 +56,7 @@ class System:
 
     @staticmethod
     def of(pattern: Pattern, fillings: Mapping[str, "Filling"] | Mapping[Path, "Filling"]) -> "System":
-        """Fill the boxes of a pattern, given by path or dotted name."""
+        """Fill the boxes of a pattern; keys are paths or dotted names."""
         return System(pattern, Directory({Path.of(box): filling for box, filling in fillings.items()}))
 
     @property
@@ -283,7 +283,7 @@ class _Filling(Protocol):
 
 
 def require_fillings(pattern: Pattern, fillings: Mapping[Path, _Filling]) -> None:
-    """Refuse fillings that are not one of its interface for each box.
+    """Refuse fillings unless each box has one with its interface.
 
     Raises
     ------

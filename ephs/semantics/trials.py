@@ -118,7 +118,7 @@ def _plain(x: Iterable[float]) -> float | tuple[float, ...]:
 
 
 def extent(primitive: "Primitive", port: Path, quantity: Quantity) -> tuple[float, float]:
-    """Between which numbers a port's states lie, of an irreversible primitive its energy efforts: as it declares."""
+    """Declared bounds of a port's states, or of an irreversible primitive's energy efforts."""
     for declared, low, high in primitive.domain:
         if declared == port:
             return low, high
@@ -131,7 +131,7 @@ def extent(primitive: "Primitive", port: Path, quantity: Quantity) -> tuple[floa
 @final
 @dataclass(frozen=True, slots=True)
 class Coordinate:
-    """A number that a trial consists of: its bounds, and with which others it is compared; ``angle`` of a rotation."""
+    """A coordinate of a trial: its bounds and the coordinates comparable with it; ``angle`` of a rotation."""
 
     low: float
     high: float
@@ -159,7 +159,7 @@ def coordinates(primitive: "Primitive") -> list[Coordinate]:
 
 
 def trial_of(primitive: "Primitive", numbers: Sequence[float], reference: Reference) -> Trial:
-    """The trial that consists of these numbers; rotations are given by their rotation vectors."""
+    """The trial with these numbers; rotations as rotation vectors."""
     bundle, at = primitive.bundle, 0
     energy = np.zeros(bundle.size)
     if primitive.kind == "irreversible":
@@ -209,7 +209,7 @@ def _magnitude(choose: Choose) -> float:
 
 
 def simpler(number: float, coordinate: Coordinate) -> Iterator[float]:
-    """Numbers that are simpler than this one, the simplest first: of human size, powers of ten, fewer digits."""
+    """Simpler numbers than this one, the simplest first: small integers, powers of ten, fewer digits."""
     ladder = list(map(float, ANGLES)) if coordinate.angle else _LADDER
     if number in ladder:
         ladder = ladder[: ladder.index(number)]

@@ -71,7 +71,7 @@ class StructureVerdict(str):
 
 
 def proved(how: str, *statements: str) -> tuple[Condition, ...]:
-    """Conditions that all hold by one argument."""
+    """Conditions with a common proof."""
     return tuple(Condition(statement, True, how) for statement in statements)
 
 

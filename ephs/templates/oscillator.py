@@ -11,7 +11,7 @@ from ephs import Pattern, junction
 from ephs import library as lib
 from ephs import quantity as Q
 
-# The pattern says which ports of which boxes meet at which junction, and nothing of what the boxes are.
+# The pattern connects ports of boxes at junctions; it does not define the boxes' contents.
 pattern = Pattern(
     junctions={"q": junction(Q.displacement), "p": junction(Q.momentum), "s": junction(Q.entropy)},
     boxes={

@@ -1,4 +1,4 @@
-"""Application of a rule at a match, and the derivation: the step as a value, to be checked, reversed and kept."""
+"""Application of a rule at a match, and the derivation: the step as a value to check, reverse and store."""
 
 import json
 from collections.abc import Mapping
@@ -70,7 +70,7 @@ class Derivation:
 
     @staticmethod
     def from_dict(document: Mapping[str, object]) -> "Derivation":
-        """Read a document made by `to_dict`. Whether it is a derivation, `check` says.
+        """Read a document made by `to_dict`, without verification; see `check`.
 
         Raises
         ------
@@ -155,7 +155,7 @@ def _take(rule: Rule, match: Renaming, elements: Elements) -> None:
 def _add(
     rule: Rule, match: Renaming, elements: Elements, states: dict[Path, int], known: dict[Path, dict[Path, bool]]
 ) -> tuple[Renaming, dict[Path, int]]:
-    """Add the right side to what is left, under names that are new; returns what its names and states have become."""
+    """Add the right side to the remaining pattern under fresh names; returns the maps of its names and states."""
     kept, right = rule.interface, rule.right
     new = [path for path in (*right.boxes, *right.junctions) if path not in kept.boxes and path not in kept.junctions]
     fresh = _fresh(new, {path[0] for path in (*known, *elements.state_of, *match.junctions.values())})
@@ -195,7 +195,7 @@ def _add(
 
 
 def _fresh(paths: list[Path], taken: set[str]) -> dict[Path, Path]:
-    """New names for paths: the same, but for a number behind the first name where that is taken."""
+    """Fresh names for paths: unchanged, or with a number after the first name on a clash."""
     first: dict[str, str] = {}
     for path in paths:
         if path[0] in first:

@@ -32,7 +32,7 @@ class State:
 
     @property
     def bare(self) -> bool:
-        """Whether nothing is left of it."""
+        """Whether it is empty."""
         return not (self.members or self.outer or self.ports)
 
 

@@ -47,7 +47,7 @@ def require_morphism(rule: Rule, match: Renaming, host: Elements) -> None:
 
 
 def require_gluing(rule: Rule, match: Renaming, host: Elements) -> None:
-    """Refuse a match at which nothing can be taken away without leaving something loose.
+    """Refuse a match where removal would leave dangling ports.
 
     Raises
     ------

@@ -33,7 +33,7 @@ def matches(rule: Rule, pattern: Pattern, *, injective: bool = True) -> Iterator
 @final
 @dataclass(slots=True)
 class _Search:
-    """Backtracking over the boxes of the left side, their ports, and the junctions without ports."""
+    """Backtracking search over the left side's boxes, their ports, and the junctions without ports."""
 
     rule: Rule
     host: Elements
@@ -55,7 +55,7 @@ class _Search:
         places = [(box, name, port) for box, content in self._connected() for name, port in content]
 
         def junction(path: Path, image: Path) -> Iterator[None]:
-            """The junction at an image, where that is possible."""
+            """The junction at an image, if compatible."""
             if path in self.junctions:
                 if self.junctions[path] == image:
                     yield
@@ -133,7 +133,7 @@ class _Search:
             yield self._found()
 
     def _connected(self) -> "list[tuple[Path, list[tuple[Path, Port]]]]":
-        """The boxes with ports, each after one that it shares a junction with, where there is one."""
+        """The boxes with ports, each after a neighbour if it has one."""
         waiting = {box: sorted(c.ports.items()) for box, c in sorted(self.rule.left.boxes.items()) if c.ports}
         out: list[tuple[Path, list[tuple[Path, Port]]]] = []
         reached: set[Path] = set()

@@ -82,7 +82,7 @@ class Fragment:
 @final
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """A rule: the left side is replaced by the right side; elements named in both are kept.
+    """A rule: replacement of the left side by the right side; elements named in both are preserved.
 
     Its interface, left ⇐ interface ⇒ right, is what both sides have in common: boxes of one name, junctions of one
     name, and ports of one name that lie alike. Rules are linear: both inclusions are injective, so each has a reverse.
@@ -152,7 +152,7 @@ class Rule:
 
     @property
     def powered(self) -> frozenset[Path]:
-        """The junctions with a power port on either side; the others stand for states only."""
+        """The junctions with a power port on either side; the others share states only."""
         return self.left.powered | self.right.powered
 
     @property
@@ -179,7 +179,7 @@ class Rule:
         return matches(self, pattern, injective=injective)
 
     def apply(self, pattern: Pattern, match: Renaming) -> "Derivation":
-        """Rewrite a pattern: take away what the left side names, but the interface; add the right side.
+        """Rewrite a pattern: remove the left side except the interface; add the right side.
 
         Parameters
         ----------

@@ -45,7 +45,7 @@ class Units:
     def of(
         interface: Interface, equations: Iterable[tuple[Mapping[Path, int] | Mapping[str, int], Unit]] = ()
     ) -> "Units":
-        """The ports have the units of their quantities, and these equations hold between them.
+        """Equations between ports with the units of their quantities.
 
         Parameters
         ----------

@@ -123,7 +123,7 @@ class _Renamed:
 
 
 relations: Algebra[Meaning] = Algebra("relations", _interface, _compose, _equal, _rename)
-"""Relations over their base; equal if they have one base, and the same fibres at points drawn from it."""
+"""Relations over their base; equal if their bases agree, and their fibres at sampled points."""
 
 
 def meaning_of_systems(reference: Reference | None = None) -> AlgebraMap[Filling, Meaning]:

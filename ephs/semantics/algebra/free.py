@@ -1,4 +1,4 @@
-"""Systems: the algebra that primitives generate freely. A map out of it is a value for each primitive."""
+"""Systems: the free algebra on the primitives. A map out of it is a value for each primitive."""
 
 from collections.abc import Callable, Mapping
 from typing import TypeVar
@@ -30,7 +30,7 @@ def _equal(left: Filling, right: Filling) -> bool:
 
 
 def _unnamed(pattern: Pattern) -> object:
-    """The normal form, junctions inside told apart by their ports instead of their names."""
+    """The normal form; inner junctions are identified by their ports instead of their names."""
     form = pattern.normal_form
     known = {path: (path if junction.exposed else None, junction) for path, junction in form.junctions.items()}
     classes = {

@@ -31,7 +31,7 @@ class Corelation:
 
     @staticmethod
     def of(interface: Interface, groups: Iterable[Iterable[PathLike]] = ()) -> "Corelation":
-        """The least partition that joins the members of each group; each port by itself where none is given.
+        """The finest partition that joins the members of each group; singletons by default.
 
         Raises
         ------

@@ -60,7 +60,7 @@ class ExactRelation:
 
     @property
     def empty(self) -> bool:
-        """Whether nothing fulfils it."""
+        """Whether it is empty."""
         return self.equations == (((ONE, Fraction(1)),),)
 
     def __str__(self) -> str:
@@ -92,7 +92,7 @@ def _interface(element: object) -> Interface | None:
 
 
 def _compose(pattern: Pattern, parts: Mapping[Path, ExactRelation]) -> ExactRelation:
-    """Ports on a junction have one effort, their flows add up to the outer one; then what is inside is eliminated."""
+    """Ports on a junction share an effort, their flows sum to the outer one; inner unknowns are then eliminated."""
     inner: dict[Path, int] = {}
     rows: list[dict[Any, Any]] = []
     balances: dict[Coordinate, dict[Any, Number]] = {}

@@ -18,7 +18,7 @@ from ephs.semantics.errors import SemanticsError
 __all__ = ["Sharer", "State", "VectorField", "euler", "resource_sharers", "runge_kutta", "tangent"]
 
 State: TypeAlias = frozenset[Path]
-"""A state, by the paths of all that are glued in it."""
+"""A shared state, by the paths of its members."""
 Values: TypeAlias = Mapping[State, tuple[Any, ...]]
 VectorField: TypeAlias = Callable[[Values], Values]
 """States to rates; of floats, fractions or what else computes with +, −, · and /."""
@@ -171,7 +171,7 @@ def _rename(element: Sharer, names: Mapping[Path, Path]) -> Sharer:
 
 
 resource_sharers: Algebra[Sharer] = Algebra("resource sharers", _interface, _compose, _equal, _rename)
-"""Open differential equations, equal if they have the same states, and vector fields that agree where they are tried.
+"""Open differential equations, equal if their states are the same and their vector fields agree at sampled points.
 
 A vector field is also the increment of a discrete system, x ↦ x + Δ(x): increments add like rates.
 """

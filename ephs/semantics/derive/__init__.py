@@ -1,1 +1,1 @@
-"""Elements stated once: from one plain function come slopes over steps, exact Jacobians, compiled relations, proofs."""
+"""Elements from one plain function: discrete slopes, exact Jacobians, compiled relations and proofs are derived."""

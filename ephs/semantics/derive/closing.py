@@ -1,4 +1,4 @@
-"""The relation of a stabilised joint's second multiplier: poses move so that the joint is closed after the step."""
+"""The relation of a stabilised joint's second multiplier: poses are corrected to close the joint after the step."""
 
 from dataclasses import dataclass
 from typing import final

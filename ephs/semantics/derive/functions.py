@@ -213,7 +213,7 @@ FUNCTIONS: Final[Mapping[str, Rule]] = MappingProxyType(
 
 
 TINY: Final = 1e-300
-"""Keeps the derivative of a length finite where it vanishes; beside any other it is nothing."""
+"""Summand that keeps the derivative of a length finite at zero; negligible elsewhere."""
 
 
 def turn(on: Evaluator, q: Sequence[Real]) -> Real:

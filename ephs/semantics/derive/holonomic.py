@@ -40,8 +40,8 @@ HALF_TURN: Final = 9.8696
 LEAST: Final = 1e-280
 """Squares of efforts above which the relation is corrected along them."""
 STEERING: Final = 1e-8
-"""Squares of efforts times steps above which the correction has a slope: it is of third order, and of slow motions its
-slope is all rounding, which Newton's method does without."""
+"""Squares of efforts times steps above which the correction has a slope: it is of third order, and its slope in slow
+motions is rounding, which Newton's method does not need."""
 Halves: TypeAlias = tuple[Rows, Rows]
 
 

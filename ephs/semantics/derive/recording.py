@@ -66,7 +66,7 @@ def record(function: Callable[..., Any], arguments: Mapping[str, int | None]) ->
         out = np.asarray(_recordable(function)(**given), dtype=object)
     except Untraceable as error:
         raise Untraceable(error.why, error.line or _line(error)) from error
-    except Exception as error:  # a user's function may fail in any way on what is not a number
+    except Exception as error:  # a user's function may raise anything for arguments that are not numbers
         raise Untraceable(str(error) or type(error).__name__, _line(error)) from error
     if any(isinstance(entry, (str, bytes, complex)) for entry in out.flat):
         raise Untraceable(f"the function returns {out.flat[0]!r}, which is no real number", _defined(function))

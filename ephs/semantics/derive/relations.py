@@ -1,4 +1,4 @@
-"""The discrete relation of an element from its tape: efforts of a storage over a step, flows and conditions of others.
+"""The discrete relation of an element from its tape: a storage's efforts over a step, others' flows and conditions.
 
 They have the arguments of `ephs.semantics.kernel_table`. The Jacobian comes from the same function, run with numbers
 that know their partial derivatives.
@@ -358,7 +358,7 @@ def bare(relation: Relation) -> Program:
 
 @cache
 def at_rest(relation: Relation) -> Program:
-    """The bare relation over a step of no length: increments are zero, whatever is given."""
+    """The bare relation over a step of zero length: increments are zero, whatever the arguments."""
     return _program(relation, bare=True, rest=True)
 
 
@@ -369,7 +369,7 @@ def _program(relation: Relation, *, bare: bool = False, rest: bool = False) -> P
               jac: Any, work: Any) -> Integer:  # fmt: skip
         if rest:
             v = Vector(Held([0.0] * size["v"]), 0, size["v"])
-        if bare and isinstance(relation, Holonomic | Closing):  # what is written to memory that nothing reads vanishes
+        if bare and isinstance(relation, Holonomic | Closing):  # writes to memory that is never read are eliminated
             jac = on.scratch(size["jac"])
         return relation.stage(on, Arguments(scal, p, x0, v, e, lam, f, c, jac, work), bare=bare)
 
@@ -387,6 +387,6 @@ def entry_of(relation: Relation | Linear, *, derivatives: bool = True, rest: boo
 
 @cache
 def compiled(relation: Relation | Linear, *, rest: bool = False) -> Call:
-    """The relation in machine code; its `address` is good as long as the result lives, which is kept here."""
+    """The relation in machine code; its `address` is valid for the lifetime of the result, which is cached here."""
     made, name = entry_of(relation, rest=rest)
     return made.compiled()[name]

@@ -102,7 +102,7 @@ def orifice(*, c: float, transition: float) -> Irreversible:
 
 
 def pipe_loss(*, r: float, k: float = 0.0) -> Irreversible:
-    """Loss of pressure along a pipe; ports g, s: g.f = (r + k·abs(Q))·Q with the flow Q = g.e; the heat goes to s.
+    """Loss of pressure along a pipe; ports g, s: g.f = (r + k·abs(Q))·Q with the flow Q = g.e, heat at s.
 
     M = [[s*(k*Abs(g) + r), g*(-k*Abs(g) - r)], [g*(-k*Abs(g) - r), g**2*(k*Abs(g) + r)/s]], of the energy efforts.
 

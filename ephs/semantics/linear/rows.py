@@ -114,7 +114,7 @@ def orthonormalise(on: Evaluator, rows: Rows, count: Integer) -> Integer:
         copy(on, rows.row.row(a), scaled.row(a))
         forward(on, rows.factor, scaled.row(a))
         size = norm(on, scaled.row(a))
-        # What cancels to rounding is no equation: the loop cannot open in this direction.
+        # A row that cancels to rounding is no equation: the loop cannot open in this direction.
         size = on.select(size > ROUNDED * rows.terms[a], size, 0.0)
         triangle[a, a] = size
         largest.value = on.maximum(largest.value, size)

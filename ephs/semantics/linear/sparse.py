@@ -188,7 +188,7 @@ def fill(
     on.loop(n, clear)
 
     def one(i: Integer) -> None:
-        # The row as a linked list in ascending order, n at its end; what is in it is marked.
+        # The row as a linked list in ascending order, n at its end; its members are marked.
         head, last = column[first[i]], first[i + 1] - 1
 
         def insert(p: Integer) -> None:

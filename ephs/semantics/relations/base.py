@@ -1,4 +1,4 @@
-"""The base of a relation: which ports share a state, and the points at which the relation can be asked.
+"""The base of a relation: partition of ports by shared state, and the points of evaluation.
 
 An interconnection identifies states. So the states of a composite are classes of outer ports, of storages' ports and
 of ports that components read, and the classes of its parts compose by a pushout: parts that show one state at two

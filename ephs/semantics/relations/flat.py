@@ -38,7 +38,7 @@ def flat_classes(flat: System) -> tuple[StateClass, ...]:
 @final
 @dataclass(frozen=True, slots=True)
 class Flat:
-    """The fibres of a flat system: an effort for each power junction, whose flows add up to nothing."""
+    """The fibres of a flat system: one effort per power junction, flows with sum zero."""
 
     system: System
 
@@ -85,7 +85,7 @@ class Flat:
         one = columns.take(1)[0]
         sums = np.zeros((sum(map(len, efforts.values())), one + 1))
         for where, at, entries in balance:
-            # two ports of one component may lie on one junction: add, do not assign
+            # two ports of one component may share a junction: add, do not assign
             np.add.at(sums, np.ix_(where, at), entries)
         equations = [sums]
         for at, entries in rows:

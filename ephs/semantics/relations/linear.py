@@ -94,7 +94,7 @@ def linear_parts(primitive: Primitive, x: Point, e: Array | None, reference: Ref
 
 
 def component_relation(primitive: Primitive, path: Path, point: BasePoint) -> LinearRelation:
-    """The relation of the component that is at this path of the whole."""
+    """The relation of the component at this path of the whole system."""
     bundle = primitive.bundle
     n = bundle.size
     x, e = point.read(path, primitive), point.efforts.get(path)
@@ -123,7 +123,7 @@ def component_relation(primitive: Primitive, path: Path, point: BasePoint) -> Li
 
 def compose_linear(pattern: Pattern, parts: Mapping[Path, LinearRelation]) -> LinearRelation:
     """Glue the relations of the boxes along a pattern: shared effort, net flow; then forget the inner ports."""
-    unit = max((part.unit for part in parts.values()), default=1.0)  # what has no storage inside knows none but 1
+    unit = max((part.unit for part in parts.values()), default=1.0)  # without inner storage the only one is 1
     inner = Subspace(np.zeros((0, 0)))
     places: dict[tuple[Path, Path], tuple[int, int]] = {}  # (box, port) -> (first flow, first effort)
     rates: list[tuple[Path, int, int]] = []

@@ -38,7 +38,7 @@ class Fibre(Protocol):
         ...
 
     def at(self, path: Path, point: BasePoint) -> LinearRelation:
-        """The subspace over a point, of what is at this path of the whole that the point belongs to."""
+        """The subspace over a point, for the part at this path of the point's system."""
         ...
 
 
@@ -70,7 +70,7 @@ class Relation:
 
     @property
     def algebra(self) -> "Algebra[Relation | Filling]":
-        """Of which algebra a relation is an element; systems and primitives stand in it for their relations."""
+        """The algebra of a relation; systems and primitives are converted to their relations."""
         from ephs.semantics.algebra import relations
 
         return relations

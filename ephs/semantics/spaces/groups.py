@@ -288,7 +288,7 @@ def _dexp_inv_coefficients(t: float) -> tuple[float, float]:
 @final
 @dataclass(frozen=True, slots=True)
 class DirectMotions(Manifold):
-    """SO(3) × ℝ³, stored like SE(3): rotation and world position that do not act on one another."""
+    """SO(3) × ℝ³, stored like SE(3): rotation and world position, a direct product."""
 
     def identity(self) -> Array:
         return np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
@@ -332,7 +332,7 @@ def _direct_blocks(block: Array, diagonal: float) -> Array:
 
 
 def vector_space(name: str, dim: int) -> VectorSpace:
-    """ℝᵈ under the given name."""
+    """ℝᵈ with a name."""
     return VectorSpace(name, dim, dim, codes.VECTOR)
 
 

@@ -128,7 +128,7 @@ _DUAL = "*"
 
 
 def register_manifold(name: str, factory: Factory) -> None:
-    """Make a space known by its name.
+    """Register a space by its name.
 
     Parameters
     ----------

@@ -74,7 +74,7 @@ class Pair:
 
     @staticmethod
     def from_space(space: "Space") -> "Pair":
-        """The pair whose elements a space of relative poses holds."""
+        """The pair of a space of relative poses."""
         return pair(space.name, **dict(space.parameters))
 
     def include(self, x: Array) -> Array:
@@ -124,11 +124,11 @@ class Pair:
                 return given
 
     def fit(self, relative: Array, near: Array | None = None) -> Array:
-        """The element whose inclusion comes nearest to a pose (7,); of several, one close to ``near``."""
+        """The element whose inclusion is nearest to a pose (7,); of several, one close to ``near``."""
         pitch = dict(self.parameters).get("pitch", 0.0)
         if near is not None:
             x = np.array(near)
-        else:  # a screw's translation tells how often it was turned
+        else:  # the number of turns of a screw follows from its translation
             x = np.array([relative[6] / pitch]) if pitch else self.manifold.identity()
         for _ in range(30):
             step = left_inverse(self) @ groups.SE3.log(

@@ -90,7 +90,7 @@ def vee(a: Columns) -> Vector3:
 
 
 def symmetric(entries: Entries) -> Rows:
-    """The symmetric matrix whose upper triangle, row by row, is given."""
+    """The symmetric matrix of an upper triangle, row by row."""
     size = int((8 * len(entries) + 1) ** 0.5) // 2
     at = {(i, j): k for k, (i, j) in enumerate((i, j) for i in range(size) for j in range(i, size))}
     return [[entries[at[min(i, j), max(i, j)]] for j in range(size)] for i in range(size)]

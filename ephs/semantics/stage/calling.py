@@ -53,7 +53,7 @@ class First:
 
 @final
 class Bound:
-    """A compiled function whose arrays are fetched once and kept alive; one thread calls it at a time.
+    """A compiled function with addresses of its arrays, looked up once; not thread-safe.
 
     Call it without arguments, or with new values of the numbers among the arguments, in their order.
 
@@ -99,7 +99,7 @@ class Bound:
 
 @final
 class Call:
-    """An entry function in machine code; calls do not hold the interpreter's lock.
+    """An entry function in machine code; calls release the interpreter's lock.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ def packed_name(symbol: str) -> str:
 
 
 def packed(symbol: str, result: str, kinds: Sequence[str]) -> str:
-    """Return the text of that function: arguments stand in the block in order, each in eight bytes.
+    """Return the text of that function: the block contains the arguments in order, eight bytes each.
 
     One argument is handed over in a fraction of the time that a hundred take.
     """
@@ -170,14 +170,14 @@ def packed(symbol: str, result: str, kinds: Sequence[str]) -> str:
         lines.append(f"  %p{k} = getelementptr i64, ptr %block, i64 {k}")
         lines.append(f"  %a{k} = load {kind.split()[0]}, ptr %p{k}")
     passed = ", ".join(f"{kind} %a{k}" for k, kind in enumerate(kinds))
-    # within it the function would stand in the module twice
+    # inside it the function would be in the module twice
     call = f"call {result} @{symbol}({passed}) noinline"
     last = ["  call" + call[4:], "  ret void"] if result == "void" else [f"  %r = {call}", f"  ret {result} %r"]
     return "\n".join([f"define {result} @{packed_name(symbol)}(ptr %block) {{", "entry:", *lines, *last, "}"])
 
 
 def _address(array: "np.ndarray[Any, Any]") -> int:
-    """Return where the numbers of an array lie."""
+    """Return the address of an array's data."""
     try:
         return ctypes.addressof(ctypes.c_char.from_buffer(cast("Any", array)))
     except (TypeError, ValueError):  # read-only, or empty
@@ -185,7 +185,7 @@ def _address(array: "np.ndarray[Any, Any]") -> int:
 
 
 def _addresses(atoms: Sequence[tuple[str, Atom]], parts: Sequence[Any]) -> tuple[list[Any], list[Span]]:
-    """Return the addresses of arrays, numbers as they are, and where arrays lie."""
+    """Return the addresses of arrays, the numbers unchanged, and the positions of the arrays."""
     passed: list[Any] = []
     spans: list[Span] = []
     for (name, _), part in zip(atoms, parts, strict=True):

@@ -89,7 +89,7 @@ def _constant(word: str, kind: str) -> str:
 
 
 def _split(words: str) -> list[str]:
-    """Parts between the commas that lie in no brackets."""
+    """Parts between top-level commas."""
     out, depth, start = list[str](), 0, 0
     for k, letter in enumerate(words):
         depth += (letter in "([") - (letter in ")]")

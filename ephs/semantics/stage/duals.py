@@ -231,7 +231,7 @@ class Duals(Evaluator):
         self.base._rehearse(body)
 
     def _reach(self, function: Reached, parts: list[Part]) -> Integer:
-        """Call the tangent of a function: its address is what a table holds where programs run with dual numbers."""
+        """Call a function's tangent by address; tables of programs with dual numbers contain addresses of tangents."""
         rest, passed = iter(parts), list[Part]()
         arguments: list[tuple[Atom, ...]] = []
         for atoms in function.signature.arguments:

@@ -42,7 +42,7 @@ _HERE: Final = str(Path(__file__).parent)
 
 @final
 class StageError(TypeError):
-    """A staged function, or a call of one, that cannot be staged as it is written.
+    """A staged function, or a call of one, that cannot be staged.
 
     Parameters
     ----------

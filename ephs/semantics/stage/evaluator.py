@@ -78,11 +78,11 @@ class Evaluator(ABC):
 
     @abstractmethod
     def _reals(self, size: int) -> RealCells:
-        """Return cells of this function's own, with nothing in them."""
+        """Return local cells, uninitialised."""
 
     @abstractmethod
     def _wholes(self, size: int) -> IntegerCells:
-        """Return cells for integers of this function's own, with nothing in them."""
+        """Return local cells for integers, uninitialised."""
 
     @abstractmethod
     def _call(self, on: "Evaluator", function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
@@ -94,7 +94,7 @@ class Evaluator(ABC):
 
     @abstractmethod
     def _constants(self, values: list[Any], whole: bool) -> Cells[Any]:
-        """Return cells that hold known integers or real numbers, to be read only."""
+        """Return read-only cells with known integers or real numbers."""
 
     @abstractmethod
     def _rehearse(self, body: Callable[[], None]) -> None:
@@ -215,7 +215,7 @@ class Evaluator(ABC):
 
     @final
     def call(self, function: Callable[..., Any], *arguments: Any) -> Any:
-        """Call a function as one of its own, as the decorator `staged` does."""
+        """Call a function without inlining, as the decorator `staged` does."""
         return self._call(self, function, arguments)
 
     @final
@@ -233,7 +233,7 @@ class Evaluator(ABC):
 def staged(
     function: Callable[Concatenate[Evaluator, Parameters], Value],
 ) -> Callable[Concatenate[Evaluator, Parameters], Value]:
-    """Make a function one of its own in machine code, emitted once per signature; elsewhere a plain call.
+    """Emit a function separately in machine code, once per signature; elsewhere a plain call.
 
     Its arguments and results are numbers, memory, lists, tuples and frozen dataclasses of these, and known values.
     """

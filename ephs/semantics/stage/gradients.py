@@ -117,7 +117,7 @@ class Gradients:
         return (value, self._places[name]) if name in self._places else value
 
     def pull(self, shares: Mapping[str, Any]) -> "Shares":
-        """The derivatives of Σ shares · arguments, as `run` left them, by all numbers as it found them.
+        """The derivatives of Σ shares · (arguments after `run`) by all numbers before it.
 
         Parameters
         ----------

@@ -63,7 +63,7 @@ class Interval(Number):
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Undecided(Condition):
-    """A condition that holds in some points of the box and not in others."""
+    """A condition that is true at some points of the box and false at others."""
 
 
 def _of(number: Real) -> tuple[float, float]:

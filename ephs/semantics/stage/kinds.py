@@ -163,7 +163,7 @@ def table(record: type[Record]) -> Kind:
 
 
 def group(cls: Callable[..., Any], **kinds: "Kind | Any") -> Kind:
-    """Describe an argument of several parts, given as a mapping of their names.
+    """Describe a composite argument by a mapping of its parts' names.
 
     Parameters
     ----------

@@ -123,7 +123,7 @@ class _Teller:
             case FunctionType():
                 try:
                     cells = [cell.cell_contents for cell in value.__closure__ or ()]
-                except ValueError:  # what it closes over is not there yet
+                except ValueError:  # its closure variables do not exist yet
                     raise _Foreign from None
                 code = _digest(value.__code__)
                 return f"{self._place(value)}@{code}({self._all([cells, value.__defaults__, value.__kwdefaults__])})"
@@ -141,7 +141,7 @@ class _Teller:
             return f"{self._place(kind)}({self.tell(value.made_of)})"
         if not dataclasses.is_dataclass(value):
             raise _Foreign
-        # Equal values make equal results, so fields that do not count in comparisons do not count here.
+        # Equal values give equal results, so fields excluded from comparison are excluded here.
         equal = cast("Any", kind).__dataclass_params__.eq
         parts = [getattr(value, field.name) for field in dataclasses.fields(value) if field.compare or not equal]
         return f"{self._place(kind)}({self._all(parts)})"

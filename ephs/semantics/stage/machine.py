@@ -98,7 +98,7 @@ class Machine(Evaluator):
         return returns, form
 
     def declare(self, text: str) -> None:
-        """Declare a function of elsewhere."""
+        """Declare an external function."""
         self._declared[f"declare {text}"] = None
 
     # Functions of real numbers

@@ -75,7 +75,7 @@ class Variable(Generic[Value]):
 
     @property
     def value(self) -> Value:
-        """The number that it holds now."""
+        """The present value."""
         return self.cells.load(0)
 
     @value.setter

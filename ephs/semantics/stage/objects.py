@@ -41,7 +41,7 @@ _TOLD: Final[ContextVar[Callable[[str], None] | None]] = ContextVar("told", defa
 
 @contextmanager
 def telling(say: Callable[[str], None]) -> Generator[None]:
-    """Call say(name) where a program begins to be compiled, and say("") at its end."""
+    """Call say(name) when compilation of a program starts, and say("") at its end."""
     before = _TOLD.set(say)
     try:
         yield

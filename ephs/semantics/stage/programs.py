@@ -24,8 +24,8 @@ __all__ = ["Program", "located"]
 
 _COMPILING: Final = RLock()
 _PLACES: Final["dict[int, tuple[Program, str, Call]]"] = {}
-"""Program, entry and call of each address of machine code that was made: tables hold addresses alone, so that code has
-to live as long as the process."""
+"""Program, entry and call of each address of machine code; tables contain addresses only, so code lives as long as
+the process."""
 
 
 @final
@@ -81,7 +81,7 @@ class Program:
         shared
             Arguments that are the same for all members, without that axis.
         """
-        with _COMPILING:  # addresses of code that a second thread makes in vain would not last
+        with _COMPILING:  # code compiled twice by a second thread would be freed with its addresses
             return _compiled(self, members, shared)
 
     def plain(self) -> Mapping[str, Callable[..., Any]]:
@@ -98,7 +98,7 @@ class Program:
 
 
 def located(address: int) -> tuple[Program, str] | None:
-    """Return the program and the name of the entry function that lies at an address, None where none does."""
+    """Return the program and name of the entry function at an address, or None."""
     return found[:2] if (found := _PLACES.get(address)) is not None else None
 
 

@@ -1,4 +1,4 @@
-"""Functions that are called by their address: how they are called, and calls of them from Python.
+"""Functions called by address: their signatures, and calls from Python.
 
 What a program calls so is not part of it: a table says which, and the program is compiled once. The float run calls
 the same address, so that both give the same bits.
@@ -20,7 +20,7 @@ __all__ = ["Argument", "Atom", "Part", "Reached", "Signature", "called", "parts_
 Atom: TypeAlias = Literal["reals", "integers", "real", "integer"]
 """Parts of an argument: an array of floats or of integers, a float, an integer."""
 Argument: TypeAlias = Vector | Integers | Matrix | Real | Integer
-"""Arguments of a function that is called by its address."""
+"""Arguments of a function called by address."""
 Part: TypeAlias = tuple[Atom, Any]
 """An atom and its value: a number, or cells and the place of the first."""
 

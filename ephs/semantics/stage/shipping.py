@@ -1,4 +1,4 @@
-"""Object code that comes with the package: a folder for each kind of processor, a linkable file for each program.
+"""Object code in the package: a folder for each kind of processor, a linkable file for each program.
 
 An index names each file by the digest of the module's text, and gives the digest of its content. What is not in the
 index, or does not agree with it, counts as absent: then the module is compiled.
@@ -14,12 +14,12 @@ from typing import Any, Final, cast
 __all__ = ["FOLDER", "INDEX", "ship", "shipped"]
 
 FOLDER: Final = Path(__file__).resolve().parents[2] / "objects"
-"""Folder of the object code that comes with the package; it is made when a wheel is built, and need not exist."""
+"""Folder of the package's object code, built with a wheel; it may be absent."""
 INDEX: Final = "index.json"
 
 
 def shipped(text: str, targets: Iterable[str], folder: Path = FOLDER) -> bytes | None:
-    """Return a module's object code for the first of some targets that it is there for, None where there is none.
+    """Return a module's object code for the first available of some targets, or None.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def ship(modules: Mapping[str, tuple[str, Mapping[str, bytes]]], headers: Mappin
 
 @cache
 def _index(folder: Path) -> dict[str, Any]:
-    """Return the index of a folder, read once; empty where it is absent or spoilt."""
+    """Return the index of a folder, read once; empty if absent or corrupt."""
     try:
         found: object = json.loads(_read(folder / INDEX) or b"{}")
     except ValueError:

@@ -1,4 +1,4 @@
-"""Object code and results of staging on disk: one file for each, which is whole or counts as absent.
+"""Object code and results of staging on disk: one file for each; incomplete files count as absent.
 
 A file begins with the digest of its content and gets its name in one move. So a file that is cut short or spoilt is
 compiled anew and replaced, and processes that compile the same module at once replace a file by its like.
@@ -24,7 +24,7 @@ UNUSED: Final = 30 * 86400.0
 
 @final
 class ObjectCacheWarning(UserWarning):
-    """Object code cannot be kept on disk; every process compiles it anew."""
+    """Object code cannot be cached on disk; every process compiles it again."""
 
 
 @final
@@ -41,7 +41,7 @@ class _Store:
     usable: bool = True
 
     def read(self, name: str) -> bytes | None:
-        """Return the content under a name, None where there is none that is whole."""
+        """Return the content under a name, or None if it is absent or incomplete."""
         folder = folder_of()
         if folder is None:
             return None
@@ -57,7 +57,7 @@ class _Store:
         return content[MARK:]
 
     def write(self, name: str, content: bytes) -> None:
-        """Keep content under a name, where it can be kept."""
+        """Store content under a name, if the cache is writable."""
         if not self.usable:
             return
         folder = folder_of()

@@ -35,7 +35,7 @@ _FUNCTIONS: Final[dict[Function, Callable[..., Expr]]] = {
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Expression(Number):
-    """A real number as an expression of SymPy; constants are the decimal fractions that they are written as."""
+    """A real number as an expression of SymPy; constants become their decimal fractions."""
 
     value: Expr
 

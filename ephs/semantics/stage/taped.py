@@ -23,7 +23,7 @@ POSITION, ROWS, CAPACITY, COUNT = range(4)
 LONG: Final = 8
 """Terms of a sum beyond which a row is written."""
 PRODUCT: Final = 2
-"""The same of what is multiplied: its terms would be computed for each product."""
+"""The same for factors: their terms would be computed for each product."""
 Terms: TypeAlias = tuple[tuple[Integer, Real], ...]
 """Rows of the tape and what the number changes with each; row 0 is none."""
 
@@ -31,7 +31,7 @@ Terms: TypeAlias = tuple[tuple[Integer, Real], ...]
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Tape:
-    """Rows of entries: each a row of before and a slope; after the entries of a row stands how many they are."""
+    """Rows of entries, each the index of an earlier row and a slope; the number of a row's entries follows them."""
 
     counters: IntegerCells
     places: IntegerCells
@@ -129,7 +129,7 @@ class Taped(Evaluator):
     tape: Tape
 
     def constant(self, value: Real) -> Real:
-        """Return a number of the base as one that nothing changes."""
+        """Return a number of the base as a constant."""
         return Traced(self, value, ())
 
     def traced(self, value: Real, terms: Terms) -> Real:
@@ -144,7 +144,7 @@ class Taped(Evaluator):
         return Traced(self, value, found)
 
     def short(self, terms: Terms) -> Terms:
-        """Return terms that are few, by a row of the tape."""
+        """Return few terms, by a row of the tape."""
         return terms if len(terms) <= PRODUCT else ((self.tape.write(self.base, terms), 1.0),)
 
     def place(self, terms: Terms) -> Integer:
@@ -212,7 +212,7 @@ class Taped(Evaluator):
         self.base._rehearse(body)
 
     def _reach(self, function: Reached, parts: list[Part]) -> Integer:
-        """Call a function that writes the same tape: its address is what a table holds where programs are taped."""
+        """Call a function by address that writes to the same tape; tables of taped programs contain such addresses."""
         rest, passed = iter(parts), list[Part]()
         arguments: list[tuple[Atom, ...]] = []
         for atoms in function.signature.arguments:
@@ -278,7 +278,7 @@ def back(on: Evaluator, counters: Integers, places: Integers, slopes: Vector, ba
             bars[place] = bars[place] + slopes[first + j] * share
 
         bars[row.value] = 0.0
-        # What nothing came of is left out: there may be infinite slopes in a choice that was not taken.
+        # Unused results are omitted: slopes may be infinite in a branch that was not selected.
         on.when(on.absolute(share) > 0.0, lambda: on.loop(count, entry))
         position.value, row.value = first, row.value - 1
         return first <= 0

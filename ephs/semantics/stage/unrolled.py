@@ -1,4 +1,4 @@
-"""Unrolling over any evaluator: loops of known bounds run while staging, memory holds known values.
+"""Unrolling over any evaluator: loops with known bounds run while staging, memory may contain known values.
 
 A staged function that is unrolled over a mechanism whose tables are given becomes a program with no more arithmetic
 than that mechanism needs. Where a condition or a bound is not known, the base evaluator branches or loops; numbers
@@ -25,7 +25,7 @@ Place: TypeAlias = tuple["Local", int]
 
 @final
 class Local(Cells[Any]):
-    """Cells that exist while staging: each holds a known number, or one of the evaluator's."""
+    """Cells that exist while staging: each contains a known number or one of the evaluator's."""
 
     __slots__ = ("born", "entries", "on", "whole")
 
@@ -120,7 +120,7 @@ class Unrolled(Evaluator):
         raise StageError("endless", limit=ROUNDS)
 
     def _branch(self, truth: Truth, body: Callable[[], None]) -> None:
-        """Run a body where a condition holds; numbers that it changes are merged behind it."""
+        """Run a body under a condition; numbers that it changes are merged after it."""
         slots: dict[Place, Cells[Any]] = {}
         before: dict[Place, Any] = {}
 
@@ -174,7 +174,7 @@ class Unrolled(Evaluator):
         return cast("Cells[Any]", self.base._wholes(1) if whole else self.base._reals(1))
 
     def _slots(self, places: set[Place]) -> dict[Place, Cells[Any]]:
-        """Return a variable of the base evaluator for each place, with the number that is there."""
+        """Return a variable of the base evaluator for each place, with its present number."""
         slots = {place: self._cell(place[0].whole) for place in places}
         for (cells, index), slot in slots.items():
             slot.store(0, cells.entries[index])

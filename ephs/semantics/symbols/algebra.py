@@ -25,7 +25,7 @@ _Printer: Any = import_module("sympy.printing.str").StrPrinter
 
 
 class _Text(_Printer):
-    """SymPy's own, but for products that do not commute."""
+    """SymPy's function, except for non-commutative products."""
 
     def _print_Mul(self, expression: Expr) -> str:
         numbers, operators = expression.args_cnc()

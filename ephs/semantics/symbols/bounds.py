@@ -147,7 +147,7 @@ def _rising(of: Callable[[float], float], least: float = -math.inf, most: float 
 
 
 def _value(of: Callable[[float], float], x: float, otherwise: float) -> float:
-    """The value, or the bound that holds anyway where there is none."""
+    """The value, or the unconditional bound where there is none."""
     try:
         return of(x)
     except (OverflowError, ValueError):

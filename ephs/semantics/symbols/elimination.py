@@ -1,4 +1,4 @@
-"""Eliminating unknowns from equations that hold them linearly."""
+"""Elimination of unknowns from equations that are linear in them."""
 
 from collections.abc import Mapping
 
@@ -8,7 +8,7 @@ __all__ = ["coefficient_of", "eliminate", "settled", "tidy"]
 
 
 def tidy(expression: Expr) -> Expr:
-    """An equal expression that is shorter, if one is found; of operators the expanded one."""
+    """A shorter equal expression, if one is found; of operators the expanded one."""
     expanded = sp.expand(expression)
     if not expanded.is_commutative:
         return expanded
@@ -16,7 +16,7 @@ def tidy(expression: Expr) -> Expr:
 
 
 def settled(expression: Expr, known: Mapping[Expr, Expr]) -> Expr:
-    """An expression with all that is known inserted, until nothing changes."""
+    """An expression after repeated substitution of all known values."""
     while True:
         new = expression.subs(known)
         if new == expression:
@@ -25,7 +25,7 @@ def settled(expression: Expr, known: Mapping[Expr, Expr]) -> Expr:
 
 
 def eliminate(equations: list[Expr], unknowns: list[Expr]) -> tuple[dict[Expr, Expr], list[Expr]]:
-    """Solve expressions that vanish for unknowns that they hold once, with a factor that cannot vanish.
+    """Solve equations (expressions equal to zero) for unknowns that occur once, with a nonzero factor.
 
     Returns what was solved, and the expressions left.
     """
@@ -46,7 +46,7 @@ def eliminate(equations: list[Expr], unknowns: list[Expr]) -> tuple[dict[Expr, E
 
 
 def coefficient_of(expression: Expr, unknown: Expr) -> Expr | None:
-    """The factor of an unknown that occurs linearly, where it is a number or a parameter that cannot vanish."""
+    """The factor of an unknown that occurs linearly, if it is a nonzero number or parameter."""
     terms = [term for term in sp.Add.make_args(expression) if term.has(unknown)]
     if len(terms) != 1:
         return None

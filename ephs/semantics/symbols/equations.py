@@ -26,7 +26,7 @@ Form = Literal["relation", "descriptor", "reduced"]
 @final
 @dataclass(frozen=True, slots=True)
 class Equation:
-    """left = right, both of SymPy, and where it comes from."""
+    """The equation left = right between SymPy expressions, and its origin."""
 
     left: Expr
     right: Expr
@@ -55,7 +55,7 @@ class Equations:
         return len(self.rows)
 
     def __getitem__(self, left: str) -> Expr:
-        """The right side of the equation whose left side reads so.
+        """The right side of the equation with this left side.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""SymPy's counterparts of `ephs.semantics.special`: derivatives, signs, and how they are written as code."""
+"""SymPy's counterparts of `ephs.semantics.special`: derivatives, signs, and printing as code."""
 
 from typing import Any
 

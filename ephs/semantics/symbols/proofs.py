@@ -29,11 +29,11 @@ Symbols = tuple[Expr, ...]
 Ports = tuple[tuple[Path, Quantity, Symbols], ...]
 """Ports with the symbols of their states."""
 Findings = tuple[tuple[str, str], ...]
-"""Statements with how they are proved; an empty text where they are not."""
+"""Statements with their proofs; an empty text means unproved."""
 
 
 def findings_of(primitive: Primitive, signs: Mapping[str, int]) -> Findings:
-    """The conditions on a primitive that has a formula, with proofs; none where it cannot be traced.
+    """The conditions on a primitive with a formula, and their proofs; empty if it cannot be traced.
 
     Parameters
     ----------

@@ -6,7 +6,7 @@ from ephs.semantics.symbols.bounds import Bounds, at_least
 __all__ = ["sign_shown", "squares_shown", "vanishes"]
 
 LARGE = 300
-"""Operations in an expression beyond which it is not rewritten: that may take minutes."""
+"""Largest number of operations in an expression to rewrite; beyond it rewriting may take minutes."""
 FACTORED = (60, 4)
 """Operations and symbols up to which a sum is factored."""
 
@@ -30,7 +30,7 @@ def _masked(expression: Expr) -> tuple[Expr, dict[Expr, Expr]]:
     names: dict[Expr, Expr] = {}
     for atom in dict.fromkeys(atoms):
         names[atom] = sp.Dummy(real=True, **_known(atom))
-    masked = expression.xreplace(names)  # from the outside inwards: what lies in an atom is gone with it
+    masked = expression.xreplace(names)  # from the outside inwards: replacing an atom removes its contents
     return masked, {symbol: atom for atom, symbol in names.items()}
 
 
@@ -113,7 +113,7 @@ def _by_square(expression: Expr, strict: bool) -> bool:
 
 
 def _by_roots(expression: Expr, strict: bool) -> bool:
-    """A polynomial with numbers for coefficients: roots of even multiplicity only, none where it has to be positive."""
+    """A polynomial with numerical coefficients: real roots of even multiplicity only, none for strict positivity."""
     symbols = expression.free_symbols
     if len(symbols) != 1 or not expression.is_polynomial(*symbols):
         return False
@@ -172,7 +172,7 @@ def _never_zero(expression: Expr) -> bool:
 
 
 def _thin(expression: Expr) -> bool:
-    """Whether it vanishes on no open set: it is analytic and not 0, or vanishes nowhere."""
+    """Whether it vanishes on no open set: it is analytic and not identically 0, or has no zeros."""
     expression = sp.sympify(expression)
     kinks = expression.has(sp.Abs, sp.sign, sp.Heaviside, sp.Piecewise, sp.Min, sp.Max, sp.floor)
     return _never_zero(expression) or (not kinks and expression != 0)

@@ -113,7 +113,7 @@ class Matrix:
 
     @property
     def numbers(self) -> bool:
-        """Whether it depends on nothing."""
+        """Whether it is constant."""
         return all(isinstance(entry, float) for row in self.rows for entry in row)
 
     def __call__(self, **x: Any) -> list[list[Any]]:
@@ -124,7 +124,7 @@ class Matrix:
 @final
 @dataclass(frozen=True, slots=True)
 class Structure:
-    """L and C of a Dirac structure as one function, either of which may be left out."""
+    """L and C of a Dirac structure as one function; either may be absent."""
 
     skew: Matrix | None
     constraint: Matrix | None

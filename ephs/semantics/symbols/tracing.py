@@ -66,7 +66,7 @@ def trace(function: Callable[..., Any], arguments: Mapping[str, Any]) -> Trace:
     parameters = tuple(sp.Symbol(f"c_{i}", real=True) for i in range(len(found.parameters)))
     try:
         entries = found.tape.run(_TABLE, lambda number: sp.Integer(int(number)), inputs, parameters)
-    except Exception as error:  # SymPy may fail in any way on what has no value
+    except Exception as error:  # SymPy may raise anything for expressions without a value
         raise Untraceable(str(error)) from error
     if any(not e.is_commutative or e.has(sp.I, sp.nan, sp.zoo) for e in entries):
         raise Untraceable("the function does not return real numbers")
@@ -83,7 +83,7 @@ def symbols_of(name: str, quantity: Quantity, size: int) -> tuple[Expr, ...]:
 
 
 def _number(value: float) -> Expr:
-    """A number as one would write it: an integer or a simple fraction where it is one."""
+    """A number in its simplest form: an integer or a simple fraction if equal to one."""
     if value == int(value) and abs(value) < 1e6:
         return sp.Integer(int(value))
     simple = sp.Rational(value).limit_denominator(12)

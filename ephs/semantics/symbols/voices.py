@@ -126,7 +126,7 @@ def formula_symbols(primitive: Primitive, parameter: Callable[[str], Expr], argu
 
 
 def formula_text(primitive: Primitive) -> str:
-    """The energy, or the matrices, of a primitive as its formula gives them: E = …, L = …, C = …, M = ….
+    """The energy or the matrices of a primitive by its formula: E = …, L = …, C = …, M = ….
 
     Raises
     ------
@@ -161,7 +161,7 @@ def _gradient(voice: Voice, storage: Storage, *, numbers: bool) -> dict[Path, Ex
 
 
 def _slopes(voice: Voice, storage: Storage) -> dict[Path, Expr]:
-    """The efforts of an energy of which nothing is known but its name."""
+    """The efforts of an unknown energy, by its name."""
     states = [voice.x[str(port)] for port in storage.bundle.ports]
     out: dict[Path, Expr] = {}
     for port, _, quantity in storage.bundle.items():
@@ -237,7 +237,7 @@ def _block(voice: Voice, name: str, block: Array, port: Path, other: Path, *, du
 
 
 def _unknown(voice: Voice) -> Said:
-    """A component of which no formula is known: its flows and conditions have names and nothing else."""
+    """A component without a formula: names of its flows and conditions only."""
     primitive = voice.primitive
     given = sp.Tuple(*(voice.e[str(port)] for port in primitive.bundle.ports))
     if isinstance(primitive, Storage):

@@ -28,7 +28,7 @@ OPERATORS: dict[str, tuple[str, str]] = {
     "dual block": ("{0}*[{1}, {2}]", r"{0}^*_{{{1}, {2}}}"),
     "flow of": ("f[{0}]({1})", r"f_{{{0}}}({1})"),
 }
-"""Name -> how it is written as text and as LaTeX, with places for its arguments."""
+"""Name -> notation as text and as LaTeX, with places for its arguments."""
 
 _Function: Any = sp.Function
 
@@ -98,7 +98,7 @@ class Words:
         self.latex: dict[Expr, str] = {}
 
     def symbol(self, text: str, latex: str, *, scalar: bool, positive: bool = False) -> Expr:
-        """A symbol of this name: a number, or a vector where it is not scalar."""
+        """A symbol of this name, a scalar or a vector."""
         kind = {"real": True, "positive": positive or None} if scalar else {"commutative": False}
         found = sp.Symbol(text, **kind)
         self.latex[found] = latex

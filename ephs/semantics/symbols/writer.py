@@ -55,7 +55,7 @@ class Writer:
         return self.flat.pattern.boxes[box].ports[port].junction
 
     def state(self, box: Path, port: Path) -> tuple[Path, Quantity]:
-        """The junction by which the state at a port is called: the one where it is stored, if any."""
+        """The junction that names the state at a port: the one of its storage, if any."""
         key = min(self.flat.pattern.state_class(self.junction(box, port)))
         return self._stored.get(key, key), self.flat.pattern.boxes[box].interface[port].quantity
 
