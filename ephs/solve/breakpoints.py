@@ -1,4 +1,4 @@
-"""Times at which inputs jump: steps end there, and start anew from the other side.
+"""Jumps of inputs: steps end at them and restart on the other side.
 
 A time within rounding of a jump means the side that the run is on: before it until a step has ended there, then after.
 So a step never mixes both, whatever rounding its own points have, and whatever that of a user's function.
@@ -21,14 +21,14 @@ from ephs.solve.snapshot import Snapshot
 __all__ = ["MOST_FOUND", "Breakpoints"]
 
 NEAR = 16.0
-"""Roundings of the time that count as the time itself."""
+"""Tolerance for equal times, in roundings of the time."""
 MOST_FOUND = 1000
-"""Changes that are looked for in one run: a function with more is no piecewise smooth one."""
+"""Largest number of detected jumps in one run: a function with more is not piecewise smooth."""
 
 
 @final
 class Breakpoints:
-    """The jumps of one run: those that were declared, and those that are found on the way.
+    """The jumps of one run, declared or detected.
 
     Parameters
     ----------
@@ -61,16 +61,16 @@ class Breakpoints:
 
     @property
     def times(self) -> tuple[float, ...]:
-        """All that are known, ascending."""
+        """All known jumps, ascending."""
         return tuple(self._times)
 
     @property
     def active(self) -> bool:
-        """Whether there are any, or may be."""
+        """Whether jumps are known or possible."""
         return bool(self._times) or self._probe is not None
 
     def of(self, problem: Problem) -> Problem:
-        """The problem whose inputs stay on the run's side of jumps; its runs are shown as the problem's own."""
+        """The problem with inputs evaluated on the run's side of jumps; solutions refer to the original problem."""
         if not self.active or problem.constant:
             return problem
         signals = {path: self._sided(signal) for path, signal in problem.signals.items()}
@@ -98,7 +98,7 @@ class Breakpoints:
         limit = self._next(t)
         if self._probe is None or len(self._found) > MOST_FOUND:
             return limit
-        if limit != self._until and limit not in self._declared:  # one that was found: the search goes on from there
+        if limit != self._until and limit not in self._declared:  # a detected jump: the search continues from it
             return limit
         change = self._probe.look(t + self._sign * h, limit, h, state)
         if change is None:
@@ -122,11 +122,11 @@ class Breakpoints:
         return max(self._times[k], self._until) if k >= 0 else self._until
 
     def stand(self, t: float) -> None:
-        """Stand at a time, from where all later jumps are ahead."""
+        """Set the present time; all later jumps are ahead."""
         self._at = t
 
     def enter(self, t: float, state: Callable[[], State], *, split: bool = False) -> None:
-        """A step has ended at a jump, in a state; ``split``: it is part of a constant one.
+        """Record the end of a step at a jump, with its state; ``split``: it is part of a constant step.
 
         Raises
         ------
@@ -142,7 +142,7 @@ class Breakpoints:
 
     @property
     def split(self) -> int:
-        """Constant steps that were taken in parts count so many more."""
+        """Number of additional steps from dividing constant ones."""
         return self._split
 
     def stats(self) -> dict[str, Any]:
@@ -165,7 +165,7 @@ class Breakpoints:
         }
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Go on from a snapshot."""
+        """Resume from a snapshot."""
         self._at, self._times, self._split = snapshot["at"], list(snapshot["times"]), snapshot["split"]
         self._found = [Change(*change) for change in snapshot["found"]]
         for one, found in zip(self._held, snapshot["held"], strict=True):

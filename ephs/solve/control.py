@@ -15,25 +15,25 @@ from ephs.solve.snapshot import Snapshot
 __all__ = ["ATOL", "RTOL", "Control", "Policy", "Proportional", "Symmetric", "Tolerance", "first_step", "told_apart"]
 
 SLIVER = 1e-9
-"""Part of a step, or of a time, that is rounding of sums of steps: no step of its own."""
+"""Fraction of a step, or of a time, that is rounding of sums of steps."""
 UNFELT, EXACT = 1e-10, 1e-12
-"""Errors in tolerances below which the next step is what its limits let it be: proportional and symmetric control."""
+"""Error in tolerances below which the next step is the longest allowed: proportional and symmetric control."""
 FINEST = 1e-11
-"""Part of a run below which no symmetric step is."""
+"""Least symmetric step as a fraction of the run."""
 SHORTEST = 16.0
-"""Roundings of the time that a step has at least."""
+"""Least step, in roundings of the time."""
 NEAREST = 1e6
-"""The same of a whole run, whose first steps are a small part of it."""
+"""The same for a whole run, whose first steps are a small part of it."""
 RTOL, ATOL = 1e-6, 1e-9
-"""Tolerances of steps that are not given: six digits, and nothing below a billionth of a unit."""
+"""Default tolerances: six relative digits, 1e-9 of a unit absolute."""
 FIRST = 1e-4
-"""Part of the time span that the first step takes: too long it is rejected, too short it grows fast."""
+"""First step as a fraction of the time span: rejected if too long, growing fast if too short."""
 
 
 @final
 @dataclass(frozen=True, slots=True)
 class Tolerance:
-    """A tolerance for every state: one number, or others by quantity and by path.
+    """A tolerance for every state: one number, or numbers by quantity and path.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class Tolerance:
 
     @classmethod
     def of(cls, name: str, given: "float | Mapping[str, float]", default: float) -> "Tolerance":
-        """From the user's option ``name``; the key ``"*"`` is the default of the others.
+        """From the user's option ``name``; the key ``"*"`` is the default.
 
         Raises
         ------
@@ -77,7 +77,7 @@ class Tolerance:
         return self.special.get(kind, self.value)
 
     def known(self, name: str, states: Iterable[tuple[Path, str]]) -> None:
-        """Refuse keys that no state answers to.
+        """Refuse keys that match no state.
 
         Raises
         ------
@@ -175,7 +175,7 @@ class Policy(Protocol):
     """Verdict on a step by its estimated error relative to the tolerance."""
 
     finest: float
-    """Part of a run below which no step can be."""
+    """Least step as a fraction of the run."""
 
     def judge(self, h: float, error: float, span: float) -> tuple[bool, float]:
         """(whether it is accepted, the length of the next one or of the next try); span is that of the whole run."""
@@ -247,7 +247,7 @@ class Proportional:
         return True, h * min(most, max(0.3, factor))
 
     def wanted(self, h: float, error: float, span: float) -> float:
-        """Length of the step, however short, whose error would be the tolerance."""
+        """Length of the step whose error would equal the tolerance, without a lower limit."""
         share = self._share()
         part = min((span / h) ** share, self.STRICT)
         return h * (error * part) ** (-1.0 / (self._exponent() - share))
@@ -276,7 +276,7 @@ class Symmetric:
 
     AIM, NEAR, TRIES, GROWTH = 0.5, 1.6, 4, 4.0
     finest = FINEST
-    """Least fraction of the tolerance: below it lies the rounding of states, and steps are too many."""
+    """Least fraction of the tolerance: below it are rounding of states and excessive step counts."""
 
     def __init__(self, exponent: float) -> None:
         self._exponent, self._tries = exponent - 1.0, 0

@@ -88,7 +88,7 @@ _ADVICE = {
     Outcome.INTERRUPTED: "what was computed is in .partial",
 }
 LARGEST = 1e150
-"""States beyond this have left the range of numbers: their squares are none."""
+"""Bound of states: squares of larger ones overflow."""
 _OF_KERNEL = {1: Outcome.TURN, 2: Outcome.TEMPERATURE, 3: Outcome.PYTHON, 4: Outcome.EXTENT, 5: Outcome.DOMAIN}
 
 
@@ -105,7 +105,7 @@ class OptionError(ValueError):
 
 
 def number_of(key: str, given: object, expected: str = "a number of seconds") -> float:
-    """The number that was given as the option ``key``.
+    """The number of the option ``key``.
 
     Raises
     ------
@@ -163,7 +163,7 @@ class SolveError(Exception):
         return cls(outcome, str(model.path_of(component)), told, cause)
 
     def of_iteration(self) -> "SolveError":
-        """The same of an iteration that left a domain which the motion does not leave."""
+        """The same for an iteration outside a domain that the motion does not leave."""
         return SolveError(Outcome.DIVERGED, self.path, f"its iteration comes to {self.outcome.value}", self.cause)
 
     @classmethod

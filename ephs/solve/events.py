@@ -20,7 +20,7 @@ S = TypeVar("S")
 @final
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something that happens where a function of time and state crosses zero.
+    """A zero crossing of a function of time and state.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ class Event:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Crossing:
-    """An event that happened: its name, when in s, and the states then by path."""
+    """An occurrence of an event: its name, the time in s, and the states by path."""
 
     name: str
     t: float
@@ -86,7 +86,7 @@ class Crossing:
 
 
 def events_of(given: Iterable[Any] | None) -> tuple[Event, ...]:
-    """Events from what a user gave: `Event` values, or functions, whose attributes ``terminal`` and ``direction`` count
+    """Events from a user's list: `Event` values, or functions, whose attributes ``terminal`` and ``direction`` count
     as in SciPy.
 
     Raises
@@ -145,11 +145,11 @@ class Watch:
         return None
 
     def stats(self) -> dict[str, Any]:
-        """The events so far as plain data, where any are looked for or were met."""
+        """The events so far as plain data, if any are defined or have occurred."""
         return {"events": [one.record() for one in self.crossings]} if self.events or self.crossings else {}
 
     def add(self, happened: Iterable[tuple[float, str, S]], states: Callable[[S], Mapping[Path, Array]]) -> None:
-        """Record what a method met by itself: time, name, and the method's state, whose ``states`` by path are kept."""
+        """Record an event detected by the method: time, name, and the method's state with its ``states`` by path."""
         count = len(self.crossings)
         self.crossings += [Crossing(name, t, states(state)) for t, name, state in happened]
         if len(self.crossings) > count:

@@ -1,4 +1,4 @@
-"""Heat as energy: storages of heat advanced by it, and friction's heat by the energy that the motion lost.
+"""Heat as energy: thermal storages advance by energy, and friction's heat is the energy lost by the motion.
 
 **Energies.** A storage of heat is advanced by the energy that it takes up, E = c1 (exp(s/c2) − 1); its entropy
 follows, with it the mean temperature θ̄ = ΔE/Δs of the step. A component makes flow · (1/θ̄ at its sink − 1/θ̄ at its
@@ -27,18 +27,18 @@ from ephs.solve.errors import Outcome, SolveError
 __all__ = ["LITTLE", "PLAIN", "Heats", "exponential_law"]
 
 EXPONENTIAL = 1e-12
-"""Part by which energies may be off an exponential law that they are taken for: rounding of the functions."""
+"""Relative tolerance for recognising an exponential energy law: rounding of the functions."""
 LITTLE = 0.1
 """Part of a step's heat by which it may be less than a quadrature finds, where the motion gained that energy: moving
 rates instead would leave the slow motion of what friction holds."""
 LINEAR = 1e-8
 """Change of a temperature, relative, below which a series is taken: its square is below rounding."""
 PLAIN = -2
-"""In place of a component: a state of an attachment, which is advanced as it is and not as energy."""
+"""In place of a component: a state of an attachment, which is integrated directly and not as energy."""
 
 
 def exponential_law(primitive: Primitive) -> tuple[float, float] | None:
-    """c1 in J and c2 in J/K of E = c1 (exp(s/c2) − 1); None of storages of other laws and of the environment."""
+    """c1 in J and c2 in J/K of E = c1 (exp(s/c2) − 1); None for other storages and the environment."""
     if not isinstance(primitive, Storage) or len(primitive.interface) != 1:
         return None
     match dict(primitive.parameters):
@@ -48,14 +48,14 @@ def exponential_law(primitive: Primitive) -> tuple[float, float] | None:
             pass
         case _:
             return None
-    points = c2 * np.array([-0.7, 1.1])  # others may call their numbers so
+    points = c2 * np.array([-0.7, 1.1])  # other storages may use these parameter names
     found = [float(primitive.energy({port: np.array([s])})) for port in primitive.bundle.ports for s in points]
     return (c1, c2) if np.allclose(found, c1 * np.expm1(points / c2), rtol=EXPONENTIAL, atol=0.0) else None
 
 
 @final
 class Heats:
-    """Stores of heat of one system, and the heat that its components pass on to them.
+    """Thermal storages of one system, and the heat that they receive from its components.
 
     Energies are in J and count from s = 0. Flows, in W or J, are what components pass: the heat of friction; of
     conduction what goes from one end to the other.
@@ -99,7 +99,7 @@ class Heats:
         single = _at(counted, self._sink) - _at(counted, self._source)
         single[frictions] = 0.0
         self.carried = single
-        """(flows,) 1 where a flow that is no friction takes energy to what is booked, from what is not."""
+        """(flows,) 1 where a flow without friction carries energy from other states into energy accounts."""
 
     @property
     def _laws(self) -> tuple[Array, Array]:
@@ -148,7 +148,7 @@ class Heats:
         return out
 
     def flows(self, heats: Array, entropies: Array) -> Array:
-        """(makers,) flows by entropies a second: those that components make, of conduction what leaves its source."""
+        """(makers,) flows by entropies a second: productions of components; of conduction the outflow of its source."""
         theta = self.temperatures(heats)
         return entropies * np.where(self._source >= 0, _at(theta, self._source), _at(theta, self._sink) + self._loose)
 
@@ -167,7 +167,7 @@ class Heats:
             return flows
         out, k = flows.copy(), self.frictions
         short = lost - float(flows[k].sum())
-        made = np.maximum(0.0, flows[k])  # a component that destroys entropy is not covered up
+        made = np.maximum(0.0, flows[k])  # a component that destroys entropy is not concealed
         if missed is None:
             whole = float(made.sum())
             out[k] += made * (short / whole if whole > 0.0 and short > -LITTLE * whole else 0.0)

@@ -23,7 +23,7 @@ __all__ = ["Instant", "Mobility", "instant", "mobility"]
 @final
 @dataclass(frozen=True, slots=True)
 class Mobility:
-    """Number of independent motions, and of constraint equations that depend on others, at a configuration."""
+    """Number of independent motions and of redundant constraint equations at a configuration."""
 
     mobility: int
     redundant: int

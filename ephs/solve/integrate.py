@@ -35,7 +35,7 @@ from ephs.solve.watching import Balance
 __all__ = ["Grid", "Progress", "audited", "failures_of", "integrate", "repeatable", "solution_of"]
 
 RESPONSE = 0.1
-"""Wanted seconds between two looks at progress and Ctrl-C."""
+"""Seconds between updates of progress and checks of Ctrl-C."""
 LARGEST_CHUNK = 1000
 
 Progress = Callable[[float, float, Mapping[str, Any]], None]
@@ -60,7 +60,7 @@ class Grid:
     def whole(self) -> int:
         """Number of steps of full length."""
         count = (self.until - self.t0) / self.h
-        nearest = round(count)  # h that divides the time up to rounding makes no extra sliver of a step
+        nearest = round(count)  # no additional tiny step where h divides the time up to rounding
         return int(nearest) if abs(count - nearest) <= SLIVER * max(1.0, count) else int(count)
 
     @property
@@ -176,7 +176,7 @@ _AT_LOOPS = (Outcome.OPEN, Outcome.CONTRADICTION, Outcome.DIVERGED, Outcome.SING
 def failures_of(run: Run) -> Generator[None, None, None]:
     """Failures and interruptions inside become those of the run, with its time and partial solution."""
     try:
-        with np.errstate(all="ignore"):  # what leaves the range of numbers is an outcome, not a warning
+        with np.errstate(all="ignore"):  # overflow is an outcome, not a warning
             yield
     except (SolveError, ArithmeticError, np.linalg.LinAlgError) as raised:
         error = solve_error_of(raised)

@@ -1,4 +1,4 @@
-"""Journals: a run on disk while it goes on, readable and to be continued whatever ends it.
+"""Journals: a run on disk in progress, readable and resumable after any interruption.
 
 A journal is a file that only grows: a heading, which says whose run it is, then the rows that were kept since the last
 entry, with a snapshot of where the run stood. Each entry has its length and a checksum, and is on the disk before the
@@ -64,7 +64,7 @@ class Contents:
 @final
 @dataclass(frozen=True, slots=True)
 class Journal:
-    """Place at which a run is written down.
+    """Location of a run's journal.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ class Journal:
         return given if given is None or isinstance(given, Journal) else cls(Path(given))
 
     def open(self, heading: Mapping[str, Any]) -> "Written":
-        """Begin the journal, or read the part of this run that it has.
+        """Create the journal, or read its part of this run.
 
         Raises
         ------
@@ -159,19 +159,19 @@ class Written:
             while at < len(whole):
                 at += self._file.write(whole[at:]) or 0
             os.fsync(self._file.fileno())
-        except BaseException:  # a full disk, or Ctrl-C: half an entry must not stand before the next one
+        except BaseException:  # a full disk, or Ctrl-C: no incomplete entry may precede the next one
             self._file.truncate(self._good)
             raise
         self._good += len(whole)
         self._latest = time.monotonic()
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Close the file."""
         self._file.close()
 
 
 def read_journal(path: str | os.PathLike[str]) -> Contents:
-    """Content of a journal, as far as it was written.
+    """Complete entries of a journal.
 
     Raises
     ------
@@ -198,7 +198,7 @@ def read_journal(path: str | os.PathLike[str]) -> Contents:
                 rows.append(Record(**entry["rows"]))
             if entry["snapshot"] is not None:
                 snapshot, certain, end = entry["snapshot"], len(rows), after
-    except (ValueError, KeyError, TypeError, RecursionError) as error:  # its checksum is right: somebody wrote it so
+    except (ValueError, KeyError, TypeError, RecursionError) as error:  # with a valid checksum
         raise OptionError("journal", str(file), f"a journal that ephs wrote ({error})") from error
     if not _whole(heading):
         raise OptionError("journal", str(file), f"a journal of a run, format {FORMAT}")
@@ -213,7 +213,7 @@ def _whole(heading: Any) -> bool:
 
 
 def _unborn(file: Path) -> bool:
-    """Whether it ends before its heading does: whoever began it was stopped there."""
+    """Whether its heading is incomplete: writing was interrupted there."""
     with open(file, "rb") as stream:
         first = stream.read(_FRAME.size)
     if len(first) < _FRAME.size:

@@ -1,4 +1,4 @@
-"""The layout of the matrix of a descriptor form: where each entry of each component's Jacobian goes.
+"""Sparsity layout of a descriptor form's matrix: positions of the entries of each component's Jacobian.
 
 What vanishes of a component's Jacobian is found once for all components of one formula, and components of one pattern
 are placed at once.
@@ -43,7 +43,7 @@ class Entry:
 
 
 def entry_of(primitive: Primitive, reference: Reference, *, reversible: bool = True) -> Entry:
-    """The entry of a primitive; its kernel is compiled if need be, of reversible ones where they are asked for."""
+    """The entry of a primitive; its kernel is compiled if necessary; of reversible primitives on request."""
     if reversible or not isinstance(primitive, Reversible):
         address, numbers, callback = address_of(primitive, reference)
     else:
@@ -74,7 +74,7 @@ def laid_out(t: Tables, primitive: Index, entries: Sequence[Entry], reference: R
     place, found = _numbered(np.concatenate([constant_at, flat, np.full(1, -1)]))
     template = np.zeros(place.size + size)
     np.add.at(template, found[: values.size], values)
-    diagonal = np.arange(size, dtype=np.int64)  # entries of their own, which hold what the loop adds
+    diagonal = np.arange(size, dtype=np.int64)  # separate entries for the loop's additions
     row, column = place // size, place % size
     by_effort = (column >= t.counts[0]) & (column < t.counts[0] + t.counts[1])
     return replace(

@@ -1,4 +1,4 @@
-"""Time loop of methods that take one step a call: control, events, records, progress and interruption."""
+"""Time loop for methods with one step per call: control, events, records, progress and interruption."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -33,9 +33,9 @@ RESPONSE = 0.1
 BURST = 1000
 """Steps in one compiled call at most, for progress and interruption."""
 BLOCK = 1024
-"""Rows that wait to be converted into records."""
+"""Rows buffered before conversion into records."""
 FINAL = (Outcome.PYTHON, Outcome.INPUT, Outcome.EVENT, Outcome.INCONSISTENT, Outcome.INTERRUPTED)
-"""Failures that a shorter step does not mend."""
+"""Failures that shorter steps cannot avoid."""
 
 
 def integrate_stepwise(
@@ -130,7 +130,7 @@ class _Run(Generic[S]):
         self.leg: Leg[S] | None = None
         self.ended = False
         self.first: Row | None = None
-        self.cause: SolveError | None = None  # why this step was refused when it was longer
+        self.cause: SolveError | None = None  # reason of rejecting the longer step
 
     def start(self) -> None:
         """The initial state, and the first row."""
@@ -148,7 +148,7 @@ class _Run(Generic[S]):
         self.watch = Watch(self.events, self.t0, self._here() if self.events else {})
 
     def advance(self, stood: Snapshot | None) -> None:
-        """To the end, or to an event that stops the run: in compiled code as far as that goes, then step after step.
+        """Run to the end or to a terminal event: in compiled code while possible, then step by step.
 
         ``stood`` is where the compiled part of an earlier run did, None where it was left.
         """
@@ -170,7 +170,7 @@ class _Run(Generic[S]):
         self._advance_stepwise()
 
     def _follow(self, leg: Leg[S]) -> None:
-        """Compiled steps until the end, or where they leave off."""
+        """Compiled steps until the end, or until the compiled code stops."""
         done, most = False, BURST
         while not (done or leg.left):
             if self.control.max_steps is not None and self.steps >= self.control.max_steps:
@@ -205,7 +205,7 @@ class _Run(Generic[S]):
                 self.h, whole = rest, rest - self.h >= -SLIVER * grid.h
             else:
                 whole = True
-            # No sliver is left for a last step.
+            # No tiny remainder for a last step.
             h = self.h if rest > 1.01 * self.h else rest if rest <= 1.0000001 * self.h or grid else 0.5 * rest
             cut = end != self.until and h < self.h
             try:
@@ -223,7 +223,7 @@ class _Run(Generic[S]):
                     cause = too_fast(self.stepper.name, attempt.worst, asked * self.problem.seconds)
                     self._shrink(min(wanted, control.most), cause)
                     continue
-                # a step that was cut for an end says nothing of longer ones
+                # a step shortened to an end is no evidence about longer ones
                 if h == self.h or wanted < (min(self.h, 2.0 * h) if cut else self.h):
                     self.h = max(min(wanted, control.most), min(control.least, h))
             there = h == rest and abs(abs(attempt.h) - h) <= self.breakpoints.near
@@ -315,7 +315,7 @@ class _Run(Generic[S]):
         stats = self.stats()
         self._settle()
         ends = self._ends()
-        stats |= {**self.stepper.stats(), **self.remarks}  # what rows tell, too
+        stats |= {**self.stepper.stats(), **self.remarks}  # also known from rows
         return audited(self.problem, self.kept.whole(self.problem.descriptor), stats, self.bounds, ends, self._trials)
 
     def _trials(self, solution: Solution) -> Tests | None:
@@ -330,7 +330,7 @@ class _Run(Generic[S]):
 
     def _ends(self) -> list[Record]:
         """The first and the last row, recorded or not; none for a run that did not start or is not finite."""
-        with suppress(SolveError):  # a failed run can stand where nothing can be evaluated
+        with suppress(SolveError):  # a failed run may end where evaluation is impossible
             rows = [(self.t, self.stepper.row(self.state))] if self.first else []
             return [record_of([t], [row], [0.0]) for t, row in ((self.t0, self.first), *rows) if row]
         return []
@@ -350,7 +350,7 @@ class _Run(Generic[S]):
             self.journal.write(self.kept.fresh(), self.snapshot(), self.stats())
 
     def snapshot(self) -> Snapshot | None:
-        """Present state of the run; None where its method has none to give."""
+        """Present state of the run; None if its method provides none."""
         method = self.stepper.snapshot(self.state)
         if method is None:
             return None

@@ -1,4 +1,4 @@
-"""Mobility and redundant constraints of large systems: solved along the constraints, dense where loops close.
+"""Mobility and redundant constraints of large systems: propagation along the constraints, dense for loop closures.
 
 `instant.mobility` counts the same on one dense matrix, for tests. Here a constraint that has as many rows as one of its
 ports has efforts gives this port's effort from the others'; that is a block of full rank. What is left over are the
@@ -23,7 +23,7 @@ from ephs.solve.sparse import Index
 __all__ = ["mobility"]
 
 SOUND = 1e-3
-"""A block whose least singular value is below this fraction of its row norms is not divided by."""
+"""Least singular value of an invertible block, as a fraction of its row norms."""
 
 
 @final
@@ -86,7 +86,7 @@ def mobility(descriptor: Descriptor, x: Array, prescribed: Collection[Path] = ()
 def _conditions(
     d: Descriptor, x: Array, prescribed: Collection[Path], number: Mapping[int, int], dims: Index
 ) -> list[_Condition]:
-    """All constraints on velocities; rows that have none are left out."""
+    """All constraints on velocities, without zero rows."""
     out: list[_Condition] = []
     junction_of = {at + i: (junction, i) for at, junction in number.items() for i in range(int(dims[junction]))}
     for slot in d.outer:
@@ -112,7 +112,7 @@ def _conditions(
 
 
 def _solve(conditions: list[_Condition], dims: Index) -> tuple[_Solved, list[_Condition]]:
-    """Propagate known efforts along the constraints; where none follows, declare an effort free and go on.
+    """Propagate known efforts along the constraints; when stuck, declare an effort free.
 
     A condition serves when all its ports but those of one square block are known, or can be let free for it: conditions
     on one port first, then those that touch what is known.
@@ -142,7 +142,7 @@ def _solve(conditions: list[_Condition], dims: Index) -> tuple[_Solved, list[_Co
 
 
 def _use(condition: _Condition, solved: _Solved, dims: Index) -> list[int]:
-    """The junctions that a condition settles, one by its rows and the others free; none if it does not serve."""
+    """The junctions that a condition determines, one by its rows and the others free; empty if unusable."""
     unknown = [junction for junction in condition.blocks if junction not in solved.given]
     square = [j for j in unknown if condition.blocks[j].shape[0] == condition.blocks[j].shape[1]]
     for junction in square:

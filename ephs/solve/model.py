@@ -55,7 +55,7 @@ class Model:
         return int(self.tables.counts[3])
 
     def scal(self, h: float) -> Array:
-        """(h, θ₀, π₀) as kernels want it."""
+        """(h, θ₀, π₀), arguments of kernels."""
         return np.array([h, self.reference.temperature, self.reference.pressure])
 
     def input_values(self) -> Array:
@@ -171,7 +171,7 @@ def compile_model(
         return _compiled(descriptor, reference, given, matrix=matrix)
 
     if any(primitive.kernel is None for primitive in descriptor.numbering.primitives):
-        return made()  # what Python raises in a component belongs to one run
+        return made()  # an exception of a Python component belongs to one run
     return replace(once(descriptor, key, made), inputs=given)
 
 
@@ -323,7 +323,7 @@ class Evaluation:
         return self._sums.copy()
 
     def measure(self, dropped: Index) -> float:
-        """The largest residual relative to its scale; those that are dropped become the unknown itself."""
+        """The largest residual relative to its scale; omitted equations become the unknown itself."""
         t, m = self._parts
         return float(self._calls["measure"](t, self._z, dropped, m))
 

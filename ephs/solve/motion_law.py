@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 __all__ = ["HarmonicMotion", "MotionLaw", "PolynomialMotion", "TabulatedMotion"]
 
 SAMPLES = 257
-"""Instants at which the largest rate of a motion law is looked for."""
+"""Number of samples for the largest rate of a motion law."""
 
 
 class MotionLaw(ABC):

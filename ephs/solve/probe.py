@@ -1,4 +1,4 @@
-"""Search of inputs, which are functions of time, for changes that steps could pass over.
+"""Search of inputs, functions of time, for changes shorter than steps.
 
 Every function is asked at points of its own, ahead of the steps, at most a given width apart. Where it changes from
 one point to the next much faster than before, the place is found by bisection. Shorter changes stay unseen.
@@ -16,24 +16,24 @@ from ephs.solve.snapshot import Snapshot
 __all__ = ["WIDTH", "Asked", "Change", "Probe"]
 
 WIDTH = 1.0 / 2000.0
-"""Part of a run between two points at which a function is asked."""
+"""Spacing of samples of a function as a fraction of the run."""
 FIRST, GROWTH = 1.0 / 64.0, 4.0
 """The first points after a jump are nearer: by this part of the width, and each by this factor farther than the last,
 so that there is a rate of change to compare with."""
 SHARP = 4.0
-"""A change this many times as fast as the last two is looked at; parabolas reach 3 times where they turn."""
+"""Ratio of a change to the last two above which it is examined; parabolas reach 3 at their vertex."""
 SMALL = 1e-6
-"""Part of the largest value so far below which a change is left alone."""
+"""Fraction of the largest value so far below which a change is ignored."""
 SHARE = 0.1
-"""A jump has at least this share of the change between two points, however near they come."""
+"""Least share of the change between two points, however near, that makes it a jump."""
 RESOLVED = 0.25
-"""Part of a step that a steep change takes at least for the step to see it."""
+"""Least duration of a steep change that steps resolve, as a fraction of a step."""
 
 
 @final
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """A function that a user gave as an input.
+    """A user's function as an input.
 
     Parameters
     ----------
@@ -82,11 +82,11 @@ class _Course:
             self.largest = [0.0] * len(self.values)
 
     def follow(self, values: list[float]) -> None:
-        """Go on from these values as from a start."""
+        """Restart from these values."""
         self.values, self.last, self.before = values, [], []
 
     def sharp(self, values: list[float], width: float) -> bool:
-        """Whether the change to these values, over a width in s, is one to be looked at; if not, they are the last."""
+        """Whether the change to these values, over a width in s, must be examined; if not, they become the last."""
         rates: list[float] = []
         found = False
         for j, value in enumerate(values):
@@ -126,7 +126,7 @@ class Probe:
         self._at, self._spacing = t, 0.0
 
     def look(self, to: float, limit: float, h: float, state: Callable[[], State]) -> Change | None:
-        """The first fast change on the way to a time that steps of h seconds would not see; None where there is none.
+        """The first fast change before a time that steps of h seconds would not resolve, or None.
 
         It looks beyond that time to its own next point, but not beyond ``limit``. The states are those where the next
         step starts. A function that fails is left to the step that asks for it.
@@ -151,7 +151,7 @@ class Probe:
                 self._at, self._spacing = after, min(GROWTH * self._spacing, self._width)
                 if found:
                     return min(found, key=lambda change: self._sign * change.start)
-        except Exception:  # whatever a user's function raises, it raises again where a step asks
+        except Exception:  # exceptions of a user's function are raised again at the step that evaluates it
             return None
         return None
 
@@ -171,7 +171,7 @@ class Probe:
     def _located(
         self, asked: Asked, first: list[float], last: list[float], when: float, h: float, state: State | None
     ) -> Change | None:
-        """The change between the last point and a time, by halving; None where steps of h seconds see it."""
+        """The change between the last point and a time, by bisection; None if steps of h seconds resolve it."""
         before, after, a, b = self._within(self._at), when, first, last
         j = int(np.argmax(np.abs(np.subtract(b, a))))
         whole = abs(b[j] - a[j])

@@ -91,7 +91,7 @@ class Signal:
         """
         if not callable(self.value):
             return np.atleast_1d(np.asarray(self.value, dtype=float))
-        if not self.name:  # made of signals that are checked
+        if not self.name:  # from checked signals
             return self.value(t, state)
         try:
             given = self.value(t, state)
@@ -128,7 +128,7 @@ class Outlined(Linked, Protocol):
 
 
 class Motion(Protocol):
-    """A motion in the terms of its field: the solver itself knows states, efforts and flows only."""
+    """A motion in terms of mechanics: the solver itself has only states, efforts and flows."""
 
     def body(self, name: str) -> Any:
         """The motion of a body."""
@@ -155,7 +155,7 @@ class Motion(Protocol):
         ...
 
     def state(self, i: int) -> dict[Path, Array]:
-        """The states at the i-th instant, as the continuous relations want them."""
+        """The states at the i-th instant, as arguments of the continuous relations."""
         ...
 
     def constraint_error(self) -> Array:
@@ -168,7 +168,7 @@ class Motion(Protocol):
         ...
 
     def leaps(self, h: float) -> Iterable[tuple[Path, int, float]]:
-        """Contacts that a step of at most h s passed: path, instant after it, the step's way in thicknesses."""
+        """Contacts passed in a step of at most h s: path, instant after it, distance of the step in thicknesses."""
         ...
 
     def velocity_error(self) -> Array:

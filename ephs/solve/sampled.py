@@ -20,15 +20,15 @@ from ephs.solve.snapshot import Snapshot
 __all__ = ["Held", "Sampled", "Sampling", "holding"]
 
 FINEST = 1e3
-"""Roundings of the time that a period has at least."""
+"""Least period, in roundings of the time."""
 MOST = 10_000_000
-"""Samples of one run: they are all kept."""
+"""Largest number of samples in one run: all are stored."""
 
 
 @final
 @dataclass(frozen=True, slots=True)
 class Sampled:
-    """An input that a digital controller gives: ``inputs={"joints.waist": Sampled(1e-3, control)}``.
+    """An input from a digital controller: ``inputs={"joints.waist": Sampled(1e-3, control)}``.
 
     Parameters
     ----------
@@ -169,7 +169,7 @@ class Held:
         }
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Go on from a snapshot."""
+        """Resume from a snapshot."""
         self.count, self._memory = snapshot["count"], snapshot["memory"]
         self._values = [np.array(value, dtype=float) for value in snapshot["values"]]
         self._times = [t + self.sampled.delay for t in self.samples[: self.count]]
@@ -177,7 +177,7 @@ class Held:
 
 @final
 class _Measured:
-    """A view with noise on some of what it reads, by names as they are written: ``joints.waist.rate``."""
+    """A view with noise on some of its readings, by name: ``joints.waist.rate``."""
 
     def __init__(self, of: Any, at: str, noise: Mapping[str, Array]) -> None:
         self._of, self._at, self._noise = of, at, noise
@@ -204,7 +204,7 @@ class Sampling:
     problem: Problem
 
     def take(self, t: float, near: float, state: Callable[[], State]) -> None:
-        """Take the sample that is due at a time, if one is, of a state of the problem.
+        """Sample a state of the problem if a sample is due at a time.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""Present state of a run as plain data: entries of a journal, from which a run goes on."""
+"""Present state of a run as plain data: entries of a journal, for resuming the run."""
 
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
@@ -19,7 +19,7 @@ def parts(value: Any) -> Any:
 
 
 def like(template: V, found: Any) -> V:
-    """Object of the class of ``template`` from the parts that `parts` gave."""
+    """Object of the class of ``template`` from its `parts`."""
     if is_dataclass(template):
         whole = {field.name: like(getattr(template, field.name), found[field.name]) for field in fields(template)}
         return type(template)(**whole)

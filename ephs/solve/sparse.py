@@ -19,11 +19,11 @@ from ephs.semantics.spaces.rank import TINY
 Index = NDArray[np.int64]
 
 FAINT = 1e-4
-"""Part of the largest entry below which the diagonal takes none for its size alone."""
+"""Fraction of the largest entry below which the diagonal takes none for its size alone."""
 PARTS = (1e-2, 1e-4, 1e-8, 0.0)
-"""Parts of the largest entry below which entries have no place on the diagonal, unless it has none left."""
+"""Fractions of the largest entry below which entries are excluded from the diagonal unless no others remain."""
 MANY = 1000
-"""Unknowns from which on rows and columns are paired: of fewer fill does not matter, and small pivots tell of ranks."""
+"""Least number of unknowns for pairing rows and columns: below it fill is irrelevant, small pivots indicate rank."""
 
 
 @final
@@ -76,7 +76,7 @@ def order(n: int, row: Index, column: Index, value: Array) -> Elimination:
         rows, columns = given[np.argsort(factor.perm_r)], np.argsort(factor.perm_c).astype(np.int64)
         plans.append(_Plan.of(n, row, column, rows, columns))
     room = 4 * row.size + n
-    while True:  # of two orders that fit into some room the better one; the other may fill a hundred times as much
+    while True:  # the better of two orders within the allowed memory; the other may fill a hundred times as much
         found = [made for plan in plans if (made := plan.filled(room)) is not None]
         if found:
             return min(found, key=lambda made: made.fill)
@@ -111,7 +111,7 @@ def paired(n: int, row: Index, column: Index, value: Array) -> Index:
 
 
 def _augment(free: int, rows: list[int], first: list[int], row_of: Index, column_of: Index) -> None:
-    """Pair a free column by a shortest path that gives others other rows, ``rows[first[j]:first[j + 1]]`` of each."""
+    """Pair a free column by a shortest augmenting path, with candidate rows ``rows[first[j]:first[j + 1]]`` of each."""
     came, seen, waiting = {free: (-1, -1)}, set[int](), deque([free])
     while waiting:
         j = waiting.popleft()
@@ -124,7 +124,7 @@ def _augment(free: int, rows: list[int], first: list[int], row_of: Index, column
                 came[other] = i, j
                 waiting.append(other)
                 continue
-            while j >= 0:  # the way back
+            while j >= 0:  # back along the path
                 row_of[j], column_of[i] = i, j
                 i, j = came[j]
             return
@@ -147,7 +147,7 @@ def equilibrate(n: int, row: Index, column: Index, value: Array) -> tuple[Array,
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class _Plan:
-    """Rows and columns in an order to be taken without further pivoting.
+    """An order of rows and columns that needs no further pivoting.
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ class _Plan:
         return _Plan(rows, columns, places[np.diff(places, prepend=-1) > 0], own, given)
 
     def filled(self, room: int) -> Elimination | None:
-        """The elimination, None where its factors do not fit into so many entries."""
+        """The elimination, or None if its factors exceed this number of entries."""
         n = self.rows.size
         first = np.searchsorted(self.places, np.arange(n + 1) * n).astype(np.int64)
         start, link, mark = (np.zeros(size, dtype=np.int64) for size in (n + 1, n + 1, n))

@@ -13,15 +13,15 @@ from ephs.solve.problem import Problem
 __all__ = ["check_start"]
 
 INSTANT = 1e-7
-"""Part of a step in which nothing moves."""
+"""Step without motion, as a fraction of a step."""
 JUMP = 1e-6
 """Jumps below this fraction of the states of their kind count as rounding of the given values."""
 SMALL = 1e-6
-"""States of a kind that are all smaller, in its unit, count as of this size."""
+"""Least scale of the states of a kind, in its unit."""
 
 
 def check_start(problem: Problem, model: Model, h: float) -> None:
-    """Refuse initial states that contradict the constraints: however short a step, it moves them as far.
+    """Refuse initial states that contradict the constraints: their change does not shrink with the step.
 
     Scenes are assembled before, and are not looked at. What a step cannot be solved for here says so later.
 

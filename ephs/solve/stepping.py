@@ -1,4 +1,4 @@
-"""Contract between the time loop and a method: steps one a call, or many; steps and records."""
+"""Interface between the time loop and a method: one or many steps per call; steps and records."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -39,7 +39,7 @@ class Row:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Attempt(Generic[S]):
-    """A step that was solved.
+    """A solved step.
 
     Parameters
     ----------
@@ -103,19 +103,19 @@ class Counts:
 
 
 def too_fast(method: str, worst: str, asked: float) -> SolveError:
-    """Refusal of steps that a tolerance asks for at a state, of about so many seconds; it names methods to use."""
+    """Refusal of the step length, in s, that a tolerance requires at a state; it recommends methods."""
     others = {"natural": "use radau or natural4", "natural4": "use radau"}.get(method, "")
     told = f"{method} would need steps of about {asked:.1g} s" if np.isfinite(asked) else "its error is not finite"
     return SolveError(Outcome.TINY, worst, "; ".join(part for part in (told, others) if part))
 
 
 class Leg(Protocol[S]):
-    """A run in compiled code, some steps a call. It is ``left`` where it will not go on before the end."""
+    """A run in compiled code, several steps per call; ``left`` if it stopped before the end."""
 
     left: bool
 
     def advance(self, steps: int) -> bool:
-        """Up to so many steps; whether the end is reached.
+        """Take up to ``steps`` steps; whether the end is reached.
 
         Raises
         ------
@@ -188,7 +188,7 @@ class Stepper(Protocol[S]):
         ...
 
     def at(self, state: S, t: float) -> S:
-        """The same state at a time that differs by rounding."""
+        """The same state at a time within rounding."""
         ...
 
     def anew(self, state: S) -> S:
@@ -208,8 +208,8 @@ class Stepper(Protocol[S]):
         ...
 
     def snapshot(self, state: S) -> Snapshot | None:
-        """Memory from step to step besides the state ``state``: from both a method made
-        anew takes the very same steps. None where it cannot say; a run that is resumed then begins anew."""
+        """Memory between steps besides the state ``state``; a new method with both takes identical steps. None if
+        unavailable: a resumed run then starts again."""
         ...
 
     def restore(self, snapshot: Snapshot, state: S) -> None:

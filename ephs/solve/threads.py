@@ -15,7 +15,7 @@ Made = TypeVar("Made")
 
 @final
 class _Limit:
-    """Number of calls that want one thread: the first sets it, the last restores the former number.
+    """Number of active calls with one thread: the first sets it, the last restores the former number.
 
     Libraries are looked for again where modules were imported since, which may bring others; it takes a millisecond.
     """
@@ -31,7 +31,7 @@ class _Limit:
     def __enter__(self) -> None:
         with self._lock:
             if self._calls == 0:
-                import_module("scipy.linalg")  # it brings a library of its own, which has to be there to be limited
+                import_module("scipy.linalg")  # its own library has to be loaded before it can be limited
                 controller = import_module("threadpoolctl").ThreadpoolController
                 if len(sys.modules) != self._modules:
                     self._found, self._modules = controller(), len(sys.modules)
@@ -49,7 +49,7 @@ _LIMIT = _Limit()
 
 
 def in_one_thread(function: Callable[Given, Made]) -> Callable[Given, Made]:
-    """A function during whose calls linear algebra takes one thread, so that results can be repeated bit for bit."""
+    """A function with linear algebra on one thread, for bitwise reproducible results."""
 
     @wraps(function)
     def limited(*arguments: Given.args, **keywords: Given.kwargs) -> Made:

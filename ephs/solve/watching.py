@@ -26,7 +26,7 @@ class Balance:
         self._scale = 0.0
 
     def error(self, x: Array, energies: Array, sums: Array) -> float:
-        """The defect now, relative to the largest K + |V − V₀| + |heat| + |work| that was seen."""
+        """The defect now, relative to the largest K + |V − V₀| + |heat| + |work| so far."""
         rows = [np.array(pair) for pair in zip(self._first, (x, energies, sums[:4]), strict=True)]
         totals = ledgers(self._problem, Record(np.zeros(2), rows[0], rows[1], np.pad(rows[2], ((0, 0), (0, 1)))))
         self._scale = max(self._scale, totals.scale)

@@ -29,20 +29,20 @@ if TYPE_CHECKING:
 __all__ = ["LAWS", "LEAP", "MANY_TIMES", "MOTION", "Bounds", "Tests", "audit"]
 
 Tests = Trials | Missed
-"""Steps that were tried again: of constant ones, or what is missed by chosen ones."""
+"""Repeated steps: constant ones, or the error of chosen ones."""
 
 LAWFUL, LEAST, COARSE, MANY_TIMES = 1e-10, 1e-9, 1e-2, 100.0
-"""Allowed parts of the gross energies: where steps keep the balance; the least and the constant steps' where they do
-not; and how many times rtol where steps are chosen."""
+"""Allowed fractions of the gross energies: for steps that keep the balance; the least and the constant steps'
+otherwise; and the multiple of rtol for chosen steps."""
 MOTION = 0.1
-"""Parts of the mechanism's length, or rad, by which constant steps may put bodies wrong at the end, as estimated: the
-estimate adds up errors of steps, which may cancel, so that fewer digits would be guesses."""
+"""Allowed estimated error of bodies at the end with constant steps, in lengths of the mechanism or rad: the estimate
+adds errors of steps, which may cancel, so that fewer digits would be guesses."""
 LEAP = 0.5
-"""Fraction of a surface's thickness that a step may cross, so that an instant lies inside."""
+"""Fraction of a surface's thickness that a step may cross, so that some instant is inside."""
 PRODUCTION = 1e-12
 """Rounding of a difference of entropy flows, relative to their scale."""
 INSTANTS = 125
-"""Instants, evenly spread, at which the positions of joints are looked at."""
+"""Number of evenly spaced instants for the residuals of joint positions."""
 ROUNDING = 8.0 * float(np.finfo(float).eps)
 """Rounding of a difference of stored amounts, relative to them."""
 
@@ -97,7 +97,7 @@ class Bounds:
         again: Again | None = None,
         repeatable: bool = False,
     ) -> "Bounds":
-        """Of a run with these tolerances, and constant steps in s where given.
+        """Limits for a run with these tolerances, and constant steps in s if any.
 
         Parameters
         ----------
@@ -133,7 +133,7 @@ def _energy(solution: "Solution", _bounds: Bounds, _trials: Tests | None) -> Ite
     """The balance of kinetic + potential + heat − work, and of all energies − work."""
     ledgers = solution.ledgers
     worst = _worst(solution.energy_error)
-    # what is destroyed counts as energy; the environment's is what others gave it
+    # destroyed exergy counts as energy; the environment's is its inflow
     destroyed = {path: ledgers.temperature * made for path, made in ledgers.makers.items()}
     parts = {path: energy for path, energy in ledgers.storages.items() if ledgers.exergies[path].any()} | destroyed
     jump = 1 + int(np.argmax(np.abs(np.diff(solution.energy_error)))) if len(solution) > 1 else 0
@@ -146,7 +146,7 @@ def _step(values: Array, instant: int) -> float:
 
 
 def _accuracy(solution: "Solution", bounds: Bounds, trials: Tests | None) -> Iterator[Breach]:
-    """Steps put bodies where they belong, and resolve what moves."""
+    """Accuracy of the bodies' positions, and resolution of the motion by steps."""
     plain = solution.stats.get("plain_defect")
     if plain is not None:
         instant = int(np.argmin(np.abs(solution.t - plain["at"])))
@@ -246,7 +246,7 @@ def _ledger(solution: "Solution", bounds: Bounds, _trials: Tests | None) -> Iter
 
 
 def _input(solution: "Solution", _bounds: Bounds, _trials: Tests | None) -> Iterator[Breach]:
-    """Inputs are smooth but for some jumps."""
+    """Inputs are piecewise smooth."""
     found = solution.stats.get("jumps", {}).get("found", ())
     if found:
         last = int(np.argmin(np.abs(solution.t - found[-1]["t"])))
@@ -254,7 +254,7 @@ def _input(solution: "Solution", _bounds: Bounds, _trials: Tests | None) -> Iter
 
 
 def _exchanged(solution: "Solution", kind: str) -> tuple[float, float]:
-    """The largest amount of a kind that was made and exchanged, and the rounding of what is stored, relative to it."""
+    """The largest produced and exchanged amount of a kind, and the relative rounding of the stored amount."""
     ledgers = solution.ledgers
     held = ledgers.entropies if kind == "entropy" else ledgers.volumes
     moved = [np.abs(values - values[0]) for values in held.values()]
@@ -262,7 +262,7 @@ def _exchanged(solution: "Solution", kind: str) -> tuple[float, float]:
         moved.append(np.abs(ledgers.made - ledgers.made[0]))
     scale = float(np.max(np.sum(moved, axis=0))) if moved else 0.0
     rounding = ROUNDING * sum(float(np.abs(values).max()) for values in held.values())
-    if kind == "entropy":  # of what stands still, heat is rounding
+    if kind == "entropy":  # heat of bodies at rest is rounding
         rounding += rounded(solution) / ledgers.temperature
     return scale, rounding / scale if scale else 0.0
 
@@ -274,7 +274,7 @@ def _isolated(solution: "Solution", kind: str) -> bool:
 
 
 def _worst(values: Array) -> int:
-    """The index of the largest, or of the first that is no number."""
+    """The index of the largest value, or of the first that is not a number."""
     return int(np.argmax(np.where(np.isnan(values), np.inf, values)))
 
 
@@ -362,7 +362,7 @@ LAWS: Mapping[str, Law] = {
 
 
 def _size(breach: Breach) -> float:
-    """Its size as files can hold it, where it is beyond the range of numbers the largest that there is."""
+    """Its size for files; the largest float on overflow."""
     return float(np.nan_to_num(breach.size, nan=np.finfo(float).max))
 
 
@@ -373,7 +373,7 @@ def audit(solution: "Solution", bounds: Bounds, trials: Tests | None = None) -> 
     """
     if not len(solution):
         return Audit()
-    if "plain_defect" in solution.stats:  # steps are corrected: the balance is kept, the defect says how well
+    if "plain_defect" in solution.stats:  # steps are corrected: the balance is kept up to the defect
         bounds = replace(bounds, energy=LAWFUL)
     found: list[Finding] = []
     with np.errstate(all="ignore"):

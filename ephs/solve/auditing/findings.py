@@ -61,7 +61,7 @@ class Audit:
         return not self.findings
 
     def record(self) -> dict[str, Any]:
-        """As ``summary.json`` has it."""
+        """Entry of ``summary.json``."""
         return {"passed": self.passed, "findings": [asdict(finding) for finding in self.findings]}
 
     @classmethod
@@ -75,7 +75,7 @@ class Audit:
 
 @final
 class AuditWarning(UserWarning):
-    """A run that breaks a law of its audit."""
+    """A run that violates a law of its audit."""
 
 
 @final
@@ -85,7 +85,7 @@ class CostWarning(UserWarning):
 
 @final
 class AuditError(SimulationError):
-    """A run that reached its end and breaks a law.
+    """A complete run that breaks a law.
 
     Attributes
     ----------

@@ -17,14 +17,14 @@ from ephs.solve.snapshot import Snapshot
 __all__ = ["MANY", "Forecast"]
 
 FIRST = 32
-"""Steps after which the first forecast is made, from the later half of them; again after twice as many each time."""
+"""Number of steps before the first forecast, which uses the later half; doubled for each further forecast."""
 MANY = 20_000
 """Iterations of Newton's method above which a run counts as long: some ten seconds for five bodies on one core."""
 
 STEADY = 1.2
 """Growth of a quarter of the steps over the one before up to which they count as steady."""
 LOW = 4
-"""Orders up to which another method is better at small tolerances."""
+"""Largest order for which another method is better at small tolerances."""
 
 
 @final
@@ -77,7 +77,7 @@ class Forecast:
             warnings.warn(f"{self._name} will take {told}; {self._advice}", CostWarning, stacklevel=2)
 
     def stats(self) -> dict[str, Any]:
-        """Statistics of a run that was forecast to be long."""
+        """Statistics of a run with a forecast of a long duration."""
         return {"forecast": self.long} if self.long else {}
 
     def snapshot(self) -> Snapshot:

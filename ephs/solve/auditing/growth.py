@@ -27,17 +27,17 @@ if TYPE_CHECKING:
 __all__ = ["Again", "GlobalError", "apart", "global_error"]
 
 LEAST = 4
-"""Steps of the longer kind that a run has at least."""
+"""Least number of longer steps in a run."""
 MARGIN = 3.0
 """Runs are expected to be this many times nearer than they may be: the errors of single steps may have grown."""
 SHORTER = 3
-"""Steps that are too long are shortened by this factor, as far as to two of the run's."""
+"""Factor for shortening failed steps, down to two of the run's."""
 FEW = 300
-"""Steps of a run for which one by another method is not worth its setting up."""
+"""Number of steps below which a run by another method costs more to set up than it saves."""
 INSTANTS = 16
-"""Times at which a run by another method is compared."""
+"""Number of times for comparison with a run by another method."""
 SHARE = 2
-"""Steps of the run for one of the other method at most."""
+"""Largest number of the run's steps per step of the other method."""
 
 
 @final
@@ -127,7 +127,7 @@ def _distance(one: "Solution", run: Callable[[], "Solution"]) -> tuple[float, in
         other = run()
     except Interrupted:
         raise
-    except Exception:  # no solution of such steps, or an input that fails between the old ones
+    except Exception:  # no solution with these steps, or an input that fails between the former ones
         return None
     problem = one.problem
     near = SLIVER * abs(one.t[-1] - one.t[0])

@@ -1,4 +1,4 @@
-"""The entropy that irreversible components make, looked at in every step where their structure is not proved."""
+"""Entropy production of irreversible components, checked in every step if their structure is not proved."""
 
 from dataclasses import replace
 from typing import final
@@ -14,12 +14,12 @@ from ephs.solve.problem import Problem
 __all__ = ["Production"]
 
 SHARE = 1e-12
-"""Of the entropies exchanged and made in a step: a production that is less negative is rounding."""
+"""Fraction of the entropies exchanged and produced in a step: smaller negative productions are rounding."""
 ROUNDING = 8.0 * float(np.finfo(float).eps)
-"""Of the entropy made so far, from which the production of a step is a difference; and of the heat capacities: what
-changes temperatures by their rounding."""
+"""Fraction of the entropy produced so far, of which a step's production is a difference; and of the heat capacities:
+a change of temperatures by rounding."""
 DECADES = range(-12, 13)
-"""Of entropies in J/K, among which a capacity is looked for."""
+"""Entropies in J/K for the search of a heat capacity."""
 
 
 @final
@@ -49,11 +49,11 @@ class Production:
         self._still = ROUNDING * _capacity(problem) if watched else 0.0
 
     def start(self, x: Array, energies: Array) -> None:
-        """The states and the entropies made, (point_size,) and (components,), from which the next step starts."""
+        """The states and the produced entropies, (point_size,) and (components,), at the start of the next step."""
         self._last = (x, energies)
 
     def step(self, t: float, x: Array, energies: Array) -> None:
-        """Look at a step that ended at t in s.
+        """Check a step that ended at t in s.
 
         Raises
         ------

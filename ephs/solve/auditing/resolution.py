@@ -1,4 +1,4 @@
-"""Whether constant steps resolve a motion: a step against two of half its length, at some times of a run.
+"""Resolution of a motion by constant steps: a step against two of half its length, at some times of a run.
 
 Methods of Gauss type and others that damp nothing at infinity keep their balances whatever a step leaves out: a stiff
 brake then stops in a thousand steps instead of one. What shows it is what a step moves from storage to storage. Where
@@ -44,11 +44,11 @@ Tried = tuple[Array, Array]
 EACH, LEAST, MOST = 600, 4, 6
 """One time is looked at in so many steps, at least and at most so many in all: three steps each."""
 STILL = 1e-6
-"""Part of the gross energies below which a run of such steps moves nothing."""
+"""Fraction of the gross energies below which a run counts as at rest."""
 SHORTER = 16
-"""Number of times that a step is divided by four to find one that would do."""
+"""Largest number of divisions by four in the search of a sufficient step."""
 ROUNDED = 1e4 * float(np.finfo(float).eps)
-"""Part of the energies that differences of solved steps have lost to rounding."""
+"""Rounding of differences of solved steps, as a fraction of the energies."""
 
 
 @final
@@ -101,7 +101,7 @@ class Trials:
     again: Again | None = None
 
     def error(self, h: float, steps: int, gross: float) -> StepError | None:
-        """The estimated error of constant steps of h s; None where nothing moves, or nothing can be tried.
+        """The estimated error of constant steps of h s; None at rest, or without possible trials.
 
         Parameters
         ----------
@@ -227,7 +227,7 @@ def _after(problem: Problem, method: ComponentMethod, x: Array, t: float, h: flo
 
 @final
 class Samples(Generic[S]):
-    """Some of the states that a run was in, evenly spread: one in 2ᵏ, at most twice `MOST`; none if not ``wanted``.
+    """States of a run at even intervals: one in 2ᵏ, at most twice `MOST`; none if not ``wanted``.
 
     Besides some of its steps where these are to be ``retaken``.
     """
@@ -271,7 +271,7 @@ def trials_of(
     until: float,
     breakpoints: Breakpoints,
 ) -> Trials | None:
-    """Constant steps of a method of an order from states that it was in; a natural method's where ``make`` makes one.
+    """Constant steps of a method with an order, from its own states; of a natural method by ``make``.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Whether chosen steps err as was estimated: some steps of a run, and the longest, taken again in thirds.
+"""Verification of error estimates: some steps of a run, and the longest, repeated in thirds.
 
 Methods that keep their balances whatever a step leaves out are steered by the difference of a step and two of half its
 length. Where a step is so long that both leave out the same, that difference is small and the result is wrong. Thirds
@@ -20,7 +20,7 @@ __all__ = ["PARTS", "Missed", "Retaken", "share_missed"]
 
 S = TypeVar("S")
 PARTS = 3
-"""Steps in place of one: no multiple of the two that the estimate has."""
+"""Number of steps in place of one: no multiple of the two in the estimate."""
 EACH, MOST = 60, 6
 """One in so many steps is taken again, at most so many and the longest: three steps in place of three times 60."""
 
@@ -83,7 +83,7 @@ class Retaken(Generic[S]):
             breakpoints.stand(t)
             try:
                 size = stepper.missed(attempt)
-            except (SolveError, ArithmeticError, np.linalg.LinAlgError):  # thirds have no solution: nothing is said
+            except (SolveError, ArithmeticError, np.linalg.LinAlgError):  # thirds have no solution: no finding
                 size = 0.0
             if size is None:
                 return None

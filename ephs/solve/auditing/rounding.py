@@ -1,4 +1,4 @@
-"""Rounding of a run's energies, in J: of what is stored, and of bodies that move by the rounding of their positions."""
+"""Rounding of a run's energies, in J: of stored energies, and of motion by rounding of positions."""
 
 from typing import TYPE_CHECKING
 
@@ -10,8 +10,7 @@ if TYPE_CHECKING:
 __all__ = ["rounded", "trembling"]
 
 SOLVED = 100.0 * float(np.finfo(float).eps)
-"""Part of what is solved for that rounding leaves, times the root of the number of steps: 10 κ ε with a condition κ of
-10."""
+"""Relative rounding of solved unknowns, times the root of the number of steps: 10 κ ε with a condition κ of 10."""
 
 
 def rounded(solution: "Solution") -> float:
@@ -23,7 +22,7 @@ def rounded(solution: "Solution") -> float:
 
 def trembling(solution: "Solution") -> float:
     """Energy of bodies that move by the rounding of their positions in the longest step, and of their weight along
-    that: what rests has no more."""
+    it: an upper bound for bodies at rest."""
     problem, stats = solution.problem, solution.stats
     if problem is None or problem.scene is None:
         return 0.0

@@ -1,4 +1,4 @@
-"""Energy that a sampled power port makes, and its giving back.
+"""Energy produced by a sampled power port, and its return.
 
 Over a period the system moves under what it is given, g, while the unit moves under what it takes, u; each returns the
 other factor of power, whose integrals over the period are X for the system and Y for the unit. Power into both is
@@ -52,7 +52,7 @@ class Balance:
         self.u, self.g = self._taken * a, self._given * y
 
     def moved(self, h: float, a: float, X: float | None) -> tuple[float, float]:
-        """Energy that the unit takes over the period of h seconds that the system went through, and X."""
+        """Energy received by the unit over the system's last period of h seconds, and X."""
         if X is None:
             X = 0.5 * h * (self.a + a)
         self.u = self._taken * (X / h if self._kept else self.a)
@@ -60,7 +60,7 @@ class Balance:
         return self.u, X
 
     def returned(self, h: float, y: float, Y: float | None, X: float) -> float:
-        """Energy made in the period, in J, after the unit too went through it; g is that of the next."""
+        """Energy produced in the period, in J, after the unit's step; g belongs to the next period."""
         if Y is None:
             Y = 0.5 * h * (self.y + y)
         made = self.g * X + self.u * Y

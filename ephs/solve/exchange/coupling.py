@@ -54,7 +54,7 @@ class Bond:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Traffic:
-    """Energy that the power ports of a coupling made.
+    """Energy produced by the power ports of a coupling.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class Traffic:
 
     @property
     def debt(self) -> Mapping[str, Array]:
-        """Input -> (n,) in J made up to there, less what was given back."""
+        """Input -> (n,) in J, energy produced so far less the returned part."""
         return {name: np.cumsum(values) for name, values in self.made.items()}
 
 
@@ -111,7 +111,7 @@ class _Memory(Mapping[str, Any]):
 
 @final
 class Coupling:
-    """An exchange with the inputs of a system that it gives; made by `Exchange.couple`.
+    """An exchange with the system inputs that it provides; result of `Exchange.couple`.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""The one exception of this room and the texts that it carries."""
+"""Exception of exchanges, and its messages."""
 
 from typing import Final, final
 
@@ -37,7 +37,7 @@ TEXTS: Final = {
 
 @final
 class ExchangeError(ValueError):
-    """A unit, or an exchange between units and a system, that cannot be as asked.
+    """An invalid unit, or an invalid exchange between units and a system.
 
     Parameters
     ----------

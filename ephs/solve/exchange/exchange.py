@@ -17,7 +17,7 @@ from ephs.solve.exchange.wires import Place, Source, place_of, sources_of, start
 __all__ = ["Exchange", "Exchanged"]
 
 SLIVER = 1e-9
-"""Part of a period that counts as nothing."""
+"""Tolerance for times, as a fraction of a period."""
 
 
 @final

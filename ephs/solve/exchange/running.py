@@ -1,4 +1,4 @@
-"""A unit that runs: its library in this process, loaded by FMPy, values set and read by name, its state kept."""
+"""A running unit: its library in this process, loaded by FMPy; values by name; its state."""
 
 import shutil
 import weakref

@@ -1,4 +1,4 @@
-"""Units of an exchange that run side by side."""
+"""Units of an exchange in parallel."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, final

@@ -34,7 +34,7 @@ class Measure:
         return Measure(f"{self.name}.{other.name}", exponents, self.factor * other.factor, self.offset + other.offset)
 
     def agrees(self, other: "Measure") -> bool:
-        """Whether numbers in one are numbers in the other, by definition or else by name."""
+        """Whether both are the same unit, by definition or else by name."""
         if self.exponents is None or other.exponents is None:
             return self.name == other.name
         return (self.exponents, self.factor, self.offset) == (other.exponents, other.factor, other.offset)
@@ -57,7 +57,7 @@ class Variable:
 
     @property
     def real(self) -> bool:
-        """Whether it is one real number."""
+        """Whether its value is a real scalar."""
         return self.kind in ("Real", "Float64")
 
 
@@ -115,17 +115,17 @@ class Unit:
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """Names of the signals that it takes."""
+        """Names of the input signals."""
         return tuple(name for name, each in self.variables.items() if each.causality == "input" and each.real)
 
     @property
     def outputs(self) -> tuple[str, ...]:
-        """Names of the signals that it gives."""
+        """Names of the output signals."""
         return tuple(name for name, each in self.variables.items() if each.causality == "output" and each.real)
 
     @property
     def keeps_state(self) -> bool:
-        """Whether its state can be written down, and taken back."""
+        """Whether its state can be saved and restored."""
         return bool(self.description.coSimulation.canSerializeFMUstate)
 
     def variable(self, name: str, where: str, *causalities: str) -> Variable:

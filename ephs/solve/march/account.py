@@ -1,4 +1,4 @@
-"""Both laws in a step: heat as energy by compensated sums, and the energy that is left to the motion.
+"""Both laws in a step: heat as energy by compensated sums, and the remaining energy of the motion.
 
 With weights b_j of the stages, heats and totals change by h Σ b_j of their rates. All other energy is then what it was,
 and the work, less the heat; by how much a step misses that, its plain defect, is of the order of its error. Moving the
@@ -16,7 +16,7 @@ ROUNDING = 16.0 * 2.220446049250313e-16
 BEYOND = 1e300
 """Bound of all energies; a target that is not below it (NaN) means no correction."""
 MOST = 10.0
-"""Errors that a tolerance allows by which a correction moves a state at most where steps are chosen."""
+"""Largest correction of a state with chosen steps, in errors allowed by the tolerance."""
 WORTH = 0.1
 """Error of a step beside the correction that it needs: steps are refused whose correction is ten times what a tolerance
 allows."""
@@ -60,7 +60,7 @@ class Account(Record):
 
 
 def rounding(on: Evaluator, anchor: Real, work: Real, heat: Real) -> Real:
-    """Return the rounding in J of an energy that an anchor, work and heat make."""
+    """Return the rounding in J of the sum of an anchor, work and heat."""
     known = on.select(on.absolute(anchor) < BEYOND, on.absolute(anchor), 0.0)
     return ROUNDING * (known + on.absolute(work) + on.absolute(heat))
 

@@ -11,19 +11,19 @@ from ephs.solve.march.records import Control, Motion, Status, Tableau
 __all__ = ["combine", "evaluate", "iterate", "place"]
 
 ENOUGH = 1e-2
-"""Change of a sweep, relative to what a step's error may be, after which stages are as good as they need be."""
+"""Change of a sweep, relative to the allowed error of a step, at which stages have converged."""
 ROUGH = 0.1
-"""Change that is good enough where sweeps no longer make it smaller and steps are chosen."""
+"""Acceptable change with chosen steps where sweeps stagnate."""
 ROUGH_ON_GRID = 1e3
 """The same on a grid, where stages are swept to rounding: tolerances are then 1e-14."""
 STALLED = 0.9
-"""Part of the change of the sweep before from which a sweep no longer makes it smaller."""
+"""Ratio to the change of the previous sweep above which sweeps stagnate."""
 SWEEPS = 50
 """Sweeps after which a step is given up."""
 
 
 def place(on: Evaluator, motion: Motion, j: Integer) -> Integer:
-    """Return where the j-th counted number lies in y."""
+    """Return the index in y of the j-th counted number."""
     return on.select(j < motion.freedoms, j, j + (motion.increments - motion.freedoms))
 
 
@@ -112,7 +112,7 @@ def iterate(
         now, last = on.sqrt(moved.value), before.value
         sweeps.value = sweeps.value + 1
         settled = on.either(now <= ENOUGH, on.both(now > STALLED * last, now <= rough))
-        # The first sweeps may bring in what a guess does not have, such as heat, which is quadratic in rates.
+        # The first sweeps may introduce terms that the guess lacks, such as heat, which is quadratic in rates.
         growing = on.both(on.negate(now < last), sweeps.value > 3)
         lost = on.either(on.both(growing, on.negate(settled)), sweeps.value >= SWEEPS)
         sound = on.same(status.value, Status.SOUND)

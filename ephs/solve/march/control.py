@@ -1,4 +1,4 @@
-"""The length of steps: accepted or not, the next one, and whether stability holds them back.
+"""Step lengths: acceptance, the next step, and detection of a limit by stability.
 
 Hairer and Wanner, *Solving Ordinary Differential Equations II*, IV.2.
 """
@@ -19,7 +19,7 @@ def _power(on: Evaluator, x: Real, exponent: Real) -> Real:
 
 
 def length(on: Evaluator, control: Control, rest: Real) -> Real:
-    """Return the length of the next try, where ``rest`` is left: on the grid, or without a tiny last step."""
+    """Return the length of the next try, with ``rest`` remaining: on the grid, or without a tiny last step."""
     h, grid = control.step, control.grid
     free = on.select(rest <= 1.0000001 * h, rest, 0.5 * rest)
     free = on.select(rest > 1.01 * h, h, free)
@@ -29,7 +29,7 @@ def length(on: Evaluator, control: Control, rest: Real) -> Real:
 
 
 def judge(on: Evaluator, control: Control, h: Real, error: Real) -> Integer:
-    """Return 1 where a step is accepted, else 0; the length of the next one, or of the next try, goes to `step`."""
+    """Return 1 where a step is accepted, else 0; write the length of the next one, or of the next try, to `step`."""
     part = _power(on, control.span / h, control.share)
     exponent = control.exponent - control.share
     strict = error * on.minimum(part, control.strict)
@@ -49,7 +49,7 @@ def judge(on: Evaluator, control: Control, h: Real, error: Real) -> Integer:
         most = on.select(control.failed > 0, 1.0, 6.0)
         control.failed = 0
         wanted = h * on.minimum(most, on.maximum(0.3, factor))
-        # A step that was cut for the end says nothing of longer ones.
+        # A step shortened to the end is no evidence about longer ones.
         whole = on.either(h >= control.step, wanted < control.step)
         following = on.maximum(on.minimum(wanted, control.most_step), on.minimum(control.least_step, h))
         control.step = on.select(whole, following, control.step)

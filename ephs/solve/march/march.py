@@ -19,7 +19,7 @@ __all__ = ["march"]
 GOING = -1
 """No ending yet."""
 ROUNDING = 16.0 * 2.220446049250313e-16
-"""Step beside the time below which it is too short."""
+"""Least step relative to the time."""
 
 
 def march(
@@ -58,7 +58,7 @@ def _set(on: Evaluator, flag: Integer) -> Truth:
 @final
 @dataclass(frozen=True, slots=True)
 class _Run:
-    """A try of a step and what follows from it; `ending` says where the march has to end."""
+    """A trial step and its outcome; `ending` is the march's status."""
 
     on: Evaluator
     motion: Motion
@@ -127,7 +127,7 @@ class _Run:
         on.when(self.sound, known, refused)
 
     def _refresh(self) -> None:
-        """Ask for the matrix of the state where the one at hand served badly."""
+        """Request a new matrix if the present one converged slowly."""
         if self.stiff is not None:
             known = self.stiff.newton[0]
             stale = self.on.both(_set(self.on, known.stale), self.on.negate(_set(self.on, known.young)))
@@ -182,7 +182,7 @@ class _Run:
         self.unless_ended(lambda: on.when(taken, lambda: self._take(h, rest), self._reject))
 
     def _finish(self, k: Matrix, h: Real, q: Vector, totals: Totals, *, part: bool) -> Real:
-        """Take the end of a step, or a part of one, to a state that obeys the laws, and return its error."""
+        """Project the end of a step, or of a part of one, to a state that obeys the laws; return its error."""
         on, motion, m, c, y = self.on, self.motion, self.memory, self.control, totals.end
         n, nv, error = motion.freedoms, motion.increments, on.variable(0.0)
         damped = None if self.stiff is None else q
@@ -256,7 +256,7 @@ class _Run:
         self.unless_ended(lambda: self._go(h, after, least))
 
     def _keep(self, time: Real, least: Real, put: Real, q: Vector, y: Vector) -> None:
-        """Keep a state, into which its step put energy, as the next row."""
+        """Record a state, with the energy added by its step, as the next row."""
         m, row, a = self.memory, self.control.rows, self.account
         for column, value in enumerate((time, least, a.put + put, a.total + self.on.absolute(put))):
             m.rows_t[row, column] = value
@@ -276,7 +276,7 @@ class _Run:
                 on, motion, self.tableau, c, m.q, m.y, part, m.k2, m.errors, m.last, m.y2, m.q2, self.stiff
             )
 
-            # Near a change of rank a part may be wrong though the whole is right: closing takes out what is across.
+            # Near a change of rank a part may be wrong and the whole right: closing removes transverse components.
             on.when(self.sound, lambda: allow(on, motion, m.errors, m.y, m.y2))
             totals = Totals(m.y, m.y2, m.carry, m.carry2, m.change, m.size, m.whole, m.low)
             error = self._finish(m.k2, part, m.q2, totals, part=True)

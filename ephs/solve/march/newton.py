@@ -1,4 +1,4 @@
-"""Stages that depend on each other by Newton's method, with a matrix that is kept while it serves.
+"""Implicit stages by Newton's method, with a matrix that is reused while it converges.
 
 Hairer and Wanner, *Solving Ordinary Differential Equations II*, IV.8.
 """
@@ -65,7 +65,7 @@ def newton(
         slow = on.minimum(rate.value, 0.9)
         close = on.both(later, moved * rate.value <= n.enough * (1.0 - slow))
         solved = on.either(moved <= n.enough, close)
-        # Rounding, or a matrix that is no good near a change of rank, lets it get no further.
+        # Rounding, or a poor matrix near a change of rank, ends convergence.
         stuck = on.both(tries.value > 2, on.both(rate.value > 0.5, moved <= n.rough))
         rough = on.either(stuck, on.both(tries.value >= ITERATIONS, moved <= n.rough))
         away = on.both(on.both(tries.value > 2, rate.value >= 1.0), moved > on.maximum(10.0 * n.enough, n.rough))

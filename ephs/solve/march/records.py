@@ -69,7 +69,7 @@ class Status(IntEnum):
     LAWLESS = 23
     """A component lost entropy in the step."""
     UNSETTLED = 24
-    """Stages that depend on each other do not come to agree."""
+    """Implicit stages do not converge."""
 
 
 class Motion(ABC):
@@ -128,7 +128,7 @@ class Motion(ABC):
 
     @abstractmethod
     def absorb(self, on: Evaluator, anchor: Real, y0: Vector, q: Vector, y1: Vector, change: Vector) -> None:
-        """Make heat of the energy that a step's sums miss where its method damps: the motion lost it.
+        """Book as heat the energy missing from a step's sums with a damping method.
 
         The step leads from y0 to (q, y1); the anchor is that of an account.
         """
@@ -149,7 +149,7 @@ class Motion(ABC):
     def correct(
         self, on: Evaluator, account: Account, h: Real, start: Vector, y: Vector, q: Vector, allowed: Vector
     ) -> Integer:
-        """Move the end (q, y) of a step of h seconds to the energy that is left to it; return a status."""
+        """Move the end (q, y) of a step of h seconds to its remaining energy; return a status."""
 
     @abstractmethod
     def sizes(self, on: Evaluator, y0: Vector, y1: Vector, out: Vector) -> None:
@@ -161,7 +161,7 @@ class Motion(ABC):
 
     @abstractmethod
     def least(self, on: Evaluator, change: Vector) -> Real:
-        """Return the least entropy that a component makes in a step, of what `book` leaves."""
+        """Return the least entropy production of a component in a step, after `book`."""
 
 
 @final

@@ -1,4 +1,4 @@
-"""One step: its stages, the estimates of its error, the fastest mode that it shows."""
+"""One step: its stages, the estimates of its error, the fastest mode that it reveals."""
 
 from typing import Final
 
@@ -169,7 +169,7 @@ def allow(on: Evaluator, motion: Motion, errors: Errors, start: Vector, end: Vec
 
 
 def _estimate(on: Evaluator, motion: Motion, weights: Vector, k: Matrix, h: Real, q: Vector, out: Vector) -> None:
-    """h Σ weights·k of what counts, without its parts across the constraints, which closing takes out."""
+    """h Σ weights·k of the counted coordinates, without components transverse to the constraints."""
 
     def clear(j: Integer) -> None:
         out[j] = 0.0
@@ -250,7 +250,7 @@ def stiffness(on: Evaluator, rise: Vector, run: Vector, allowed: Vector, h: Real
 
 
 def stiffness_of(on: Evaluator, motion: Motion, tableau: Tableau, memory: Memory, h: Real) -> Real:
-    """Return the stiffness that the last two stages show; the memory of estimates takes their differences."""
+    """Return the stiffness by the last two stages; their differences overwrite the memory of estimates."""
     count, m = tableau.a.columns, memory
 
     def one(j: Integer) -> None:
@@ -272,4 +272,4 @@ STEPS: Final = Program(
     stiffness=Entry(stiffness, rise=vector(), run=vector(), allowed=vector(), h=real()),
     judge=Entry(_judge, control=table(Control), h=real(), error=real()),
 )
-"""Entry functions for drivers that take one step a call."""
+"""Entry functions for drivers with one step per call."""

@@ -68,7 +68,7 @@ class Newton(Record):
 @final
 @dataclass(frozen=True, slots=True)
 class Stiff:
-    """Memory of implicit steps of a motion whose state has m numbers besides the sums that no rate reads.
+    """Memory of implicit steps of a motion with m state coordinates besides sums on which no rate depends.
 
     Attributes
     ----------
@@ -186,7 +186,7 @@ class Solver:
         lu(on, s.pair, s.swaps, skipping=True)
 
     def _factors(self, size: int) -> Matrix:
-        """The factors of the degrees of freedom' matrix: of one, or of a pair."""
+        """Factors of the matrix of the degrees of freedom: of one, or of a pair."""
         n, held = self.stiff.damping.rows, self.stiff.single if size == 1 else self.stiff.pair
         return Matrix(held.cells, held.start, size * n, size * n)
 

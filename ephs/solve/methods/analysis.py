@@ -1,4 +1,4 @@
-"""Rank of the constraints and order of the elimination, decided once and again where a matrix turns singular.
+"""Rank of the constraints and order of the elimination, decided once and again whenever a matrix becomes singular.
 
 Rank is decided on the constraint matrix, its columns scaled by the square root of the compliance that the storages
 show over a step, (mass/h)^(−1/2); never on the saddle-point matrix, whose pivots are squares of singular values.
@@ -25,14 +25,14 @@ SHRUNK = 1e-6
 DEFECT = 1e-11
 """Tolerance for a dropped equation, relative to its terms; more asks for another rank decision."""
 OTHERWISE = 1e-3
-"""Weight of equations that are not preferred where some are left out: others take part that much more."""
+"""Weight of other equations relative to preferred ones in the choice of omitted equations."""
 
 LARGE = 256
 """Rows above which those with an effort of their own are eliminated before the dense rank decision."""
 OWN = 1e-3
 """Part of a row above which an effort that is in no other row makes it independent of the others."""
 ALIKE = 1e-6
-"""Unknowns that null vectors move by the same but for this share are moved alike."""
+"""Relative tolerance for equal components of null vectors."""
 
 
 @final
@@ -79,7 +79,7 @@ def analyse(model: Model, x: Array, z: Array, h: float, before: Index | None = N
     data = values.copy()
     data[diagonal] = 1.0
     chosen = np.flatnonzero(active)
-    entries = np.where(data[chosen] == 0.0, TINY, data[chosen])  # a place that is zero now may fill later
+    entries = np.where(data[chosen] == 0.0, TINY, data[chosen])  # an entry that is zero now may become nonzero
     try:
         elimination = order(size, t.row[chosen], t.column[chosen], entries)
     except RuntimeError as error:
@@ -149,7 +149,7 @@ def dependent_rows(
             members = members[entangled(matrix[members])]
         local = matrix[members]
         dense = local[:, np.unique(local.indices)].toarray()
-        if not dense.size:  # equations without efforts hold of themselves, or contradict
+        if not dense.size:  # equations without efforts are identities, or contradictions
             out[rows[members]] = 1
             continue
         norms = np.linalg.norm(dense, axis=1)
@@ -190,7 +190,7 @@ def entangled(matrix: Any) -> Index:
 
 
 def exchanged(triangle: Array, pivots: Index, rank: int, weights: Array) -> Index:
-    """Rows without which as many independent ones are left: those of the largest weighted part in the dependences.
+    """Rows whose omission preserves the rank: those with the largest weighted coefficients in the dependences.
 
     The dependences are the null vectors (of the transpose) of a matrix whose rows have this pivoted triangle.
     """
@@ -244,7 +244,7 @@ def _compliance(model: Model, values: Array) -> Any:
 
 
 def _null_unknown(model: Model, chosen: Index, data: Array) -> int:
-    """The first of the unknowns that null vectors of the matrix move most, whichever of them span its null space."""
+    """The first of the unknowns with the largest components in the null space, independent of its basis."""
     t, size = model.tables, model.unknowns
     matrix = np.zeros((size, size))
     np.add.at(matrix, (t.row[chosen], t.column[chosen]), data[chosen])

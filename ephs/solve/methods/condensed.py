@@ -1,4 +1,4 @@
-"""Steps and rates by parts: the inner unknowns of each kind of part eliminated for all its copies at once.
+"""Steps and rates by static condensation: inner unknowns of each kind of part eliminated for all copies at once.
 
 Newton's equations of a part are a linear relation between its inner unknowns and those at its ports. Elimination leaves
 a relation at the ports (a Schur complement), and a map that gives the inner unknowns back. What has no pivot inside,
@@ -93,7 +93,7 @@ def _inner_unknowns(model: Model) -> list[Index]:
     for part in n.parts:
         blocks = [np.zeros((part.components.shape[0], 0), dtype=np.int64)]
         for numbers, (at, length, first) in zip((part.states, part.junctions, part.components), places, strict=True):
-            if numbers.size:  # what is inside a part lies in one piece
+            if numbers.size:  # the unknowns inside a part are contiguous
                 width = int(length[numbers[0]].sum())
                 blocks.append(first + at[numbers[:, :1]] + np.arange(width))
         found.append(np.hstack(blocks))
@@ -123,7 +123,7 @@ class _System:
             return found
         matrix = np.zeros((rows.size, columns.size))
         np.add.at(matrix, at, self.value)
-        if rows.size and np.linalg.cond(matrix) < 1.0 / IMPLICIT:  # small unknowns keep their digits beside large ones
+        if rows.size and np.linalg.cond(matrix) < 1.0 / IMPLICIT:  # scaling preserves the digits of small unknowns
             return np.linalg.solve(matrix, self.right[rows]).astype(float)
         return np.asarray(np.linalg.lstsq(matrix, self.right[rows], rcond=IMPLICIT)[0], dtype=float)
 

@@ -113,7 +113,7 @@ class Continuous:
 
         self._evaluate(x, z, 0.0, inputs)
         unknowns = self._memory.data.copy()
-        # Increments of unit length but zero size: what is added are derivatives by the increments.
+        # Increments of unit length but zero size: the sums are derivatives by the increments.
         rest = z.copy()
         rest[: t.counts[0]] = 0.0
         self._evaluate(x, rest, 1.0, inputs)
@@ -124,7 +124,7 @@ class Continuous:
         """Powers and energies at (x, z)."""
         self._evaluate(x, z, 0.0, inputs)
         m = self._memory
-        energies = np.where(self.model.tables.kind == STORING, m.energy, 0.0)  # ledgers write to what is none
+        energies = np.where(self.model.tables.kind == STORING, m.energy, 0.0)  # ledgers write to unused memory
         return Instant(self._evaluation.ledgers(1.0), m.flows.copy(), z, energies)
 
     def _evaluate(self, x: Array, z: Array, h: float, inputs: Array) -> None:

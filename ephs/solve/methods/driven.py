@@ -1,4 +1,4 @@
-"""Methods that discretise component by component, and one step of theirs with inputs that change."""
+"""Methods that discretise component by component; one step with variable inputs."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -19,7 +19,7 @@ ROUNDED_INPUTS = 1e-13
 """Part of inputs that read the state by which they may change once more: rounding, times a condition of hundreds."""
 ROUNDS = 12
 CUTS = 6
-"""Number of times that a step without solution is halved."""
+"""Largest number of halvings of a step without solution."""
 _CURABLE = (Outcome.DIVERGED, Outcome.SINGULAR, Outcome.CONTRADICTION)
 _DOMAINS = (Outcome.TURN, Outcome.TEMPERATURE, Outcome.EXTENT, Outcome.DOMAIN)
 
@@ -35,7 +35,7 @@ class ComponentMethod(Protocol):
 
     @property
     def redundant(self) -> tuple[str, ...]:
-        """The equations that the method leaves out, in words."""
+        """The omitted equations, in words."""
         ...
 
     def init(self, x: Array) -> NaturalState:
@@ -170,7 +170,7 @@ def advance_driven(
         change = float(np.max(np.abs(again - inputs), initial=0.0))
         if change <= ROUNDED_INPUTS * float(np.max(np.abs(again), initial=0.0)):
             return found
-        if change >= 0.9 * last:  # a feedback too stiff for this step: what was guessed first is what is left
+        if change >= 0.9 * last:  # a feedback too stiff for this step: the first guess remains
             return first
         last, inputs = change, again
         found = advance_whole(method, state, h, 1, inputs)

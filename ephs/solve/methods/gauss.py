@@ -135,7 +135,7 @@ def newton(
         solve(on, o.rows, o.columns, o.start, o.entry, o.diagonal, m.factors, right, s.change, s.dense)
         part.value = restrain(on, t, z, Matrix(s.change.cells, s.change.start, STAGES, n))
         on.loop(STAGES, subtract)
-        # a matrix serves as long as it makes the residual fall fast
+        # a matrix is reused while the residual decreases fast
         slow = on.either(part.value < 1.0, ratio.value > 0.1 * before.value)
         fresh.value = on.select(on.either(on.same(iteration.value, 0), slow), 1, 0)
         before.value = ratio.value
@@ -199,7 +199,7 @@ def advance(
         def restart(i: Integer) -> None:
             copy(on, previous.row(STAGES - 1), z.row(i))
 
-        # from a guess that cannot be far off: what was last, everywhere
+        # from a safe guess: the last values at all stages
         on.when(once, lambda: on.loop(STAGES, restart))
         return on.negate(once)
 
@@ -225,7 +225,7 @@ def advance(
         outcome[2] = row + 1
 
     def leave(i: Integer) -> None:
-        # rank was decided at the start of the step, and is another on its way
+        # the rank at the start of the step changes within it
         def there() -> None:
             copy(on, z.row(i), previous.row(i))
 

@@ -220,7 +220,7 @@ class Natural:
                 break
             order = analysis.order
             wanted = steps - done
-            if fresh:  # nothing better is to be had: take this one step with whatever pivots there are
+            if fresh:  # no better pivots exist: take this one step with the present ones
                 order, wanted = replace(order, floor=np.zeros_like(order.floor)), 1
             elif self._unsettled:
                 wanted = min(wanted, self._unsettled)
@@ -246,7 +246,7 @@ class Natural:
 
     @property
     def redundant(self) -> tuple[str, ...]:
-        """The equations that the method leaves out, in words."""
+        """The omitted equations, in words."""
         return self.analysis.redundant if self.analysis is not None else ()
 
     def snapshot(self) -> Snapshot:

@@ -269,7 +269,7 @@ def advance(
         tries.value = tries.value + 1
         failed = on.either(outcome[0] >= COMPONENT, on.same(outcome[0], DIVERGED))
         once = on.both(failed, tries.value < 2)
-        on.when(once, lambda: copy(on, previous, z))  # once more from what was last, which cannot be far off
+        on.when(once, lambda: copy(on, previous, z))  # once more from the last values, a safe guess
         return on.negate(once)
 
     def keep() -> None:
@@ -284,7 +284,7 @@ def advance(
         outcome[2] = row + 1
 
     def leave() -> None:
-        # rank was decided at the start of the step, and is another on its way
+        # the rank at the start of the step changes within it
         on.when(on.same(outcome[0], INCONSISTENT), lambda: copy(on, z, previous), lambda: copy(on, previous, z))
 
     def step() -> Truth:

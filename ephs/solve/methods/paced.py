@@ -1,4 +1,4 @@
-"""The natural methods one step a call: with steps of any length, error estimates, events and inputs that change."""
+"""The natural methods, one step per call: variable steps, error estimates, events and variable inputs."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -85,7 +85,7 @@ class Paced:
         return self._single(attempt.start, t - attempt.start.t)[0]
 
     def missed(self, attempt: Attempt[PacedState]) -> float:
-        """By how many tolerances a step is off, by steps of a third of its length."""
+        """Error of a step in tolerances, by steps of a third of its length."""
         end = attempt.start
         for _ in range(PARTS):
             end, _ = self._single(end, attempt.h / PARTS)
@@ -135,7 +135,7 @@ class Paced:
         return PacedState(state.t + h, inner, Row(chunk.x[-1], chunk.energies[-1], sums[:4])), float(sums[4])
 
     def _off(self, state: PacedState, coarse: PacedState, fine: PacedState) -> tuple[float, str]:
-        """By how many tolerances two ends of a step are apart, and the state where they are."""
+        """Distance between two ends of a step in tolerances, and the state where it occurs."""
         worst, where = 0.0, ""
         for slot in self.problem.descriptor.states:
             space = manifold(slot.quantity.space)

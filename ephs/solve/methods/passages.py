@@ -1,4 +1,4 @@
-"""Heat that irreversible components of a system pass to storages of heat, booked by energy as `Heats` has it."""
+"""Heat from irreversible components to thermal storages of a system, booked as energy; see `Heats`."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

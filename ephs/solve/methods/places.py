@@ -40,7 +40,7 @@ def add_to(out: Vector, i: Integer, value: Real) -> None:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Part:
-    """A component at the tables: how many efforts, multipliers and increments it has, and where its places begin."""
+    """A component in the tables: numbers of its efforts, multipliers and increments, and their first indices."""
 
     t: Columns
     i: Integer

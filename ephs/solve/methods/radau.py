@@ -365,5 +365,5 @@ def _solver(matrix: Any, name: Callable[[int], str], pivots: Mapping[str, Any]) 
         return lambda right: solve(factors, pivots, right)[0]
     try:
         return splu(matrix.tocsc(), **pivots).solve
-    except RuntimeError as error:  # what SuperLU says of a singular matrix
+    except RuntimeError as error:  # SuperLU's message for a singular matrix
         raise SolveError(Outcome.SINGULAR, "", "") from error

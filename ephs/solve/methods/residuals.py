@@ -132,7 +132,7 @@ def _relate(on: Evaluator, part: Part, z: Vector, h: Real, m: Scratch) -> None:
     def flow(j: Integer) -> None:
         balance, scale = part.balance(j), on.variable(0.0)
         add_to(m.residual, balance, m.f[j])
-        # a balance of one term, Bᵀλ = 0, would be measured by itself: the largest multiplier counts
+        # a balance of one term, Bᵀλ = 0, has no other scale: the largest multiplier counts
         scale.value = m.scale[balance] + on.absolute(m.f[j])
 
         def held(q: Integer) -> None:

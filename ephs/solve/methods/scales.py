@@ -13,14 +13,14 @@ from ephs.solve.methods.records import IRREVERSIBLE, STORING, Columns, Scratch
 __all__ = ["COMMON", "FAR", "SPREAD", "TAKES_PART", "measure", "reach", "still", "weigh"]
 
 NOTHING = 1e-200
-"""Terms of a balance below which it has none: quotients by it stay finite."""
+"""Least scale of a balance, so that quotients by it are finite."""
 
 SPREAD: Final = 1e-3
 """A block's scale is at least this fraction of the largest of its kind: e = 0 alone has no scale of its own."""
 
 FAINT: Final = 1e-20
 """A block's scale is at least this fraction of the largest of all, whatever their units, in the iteration of a step
-where that was least: terms that are made of rounding, where everything is at rest, have no scale of their own."""
+where that was least: terms of rounding, at rest, have no scale of their own."""
 COMMON: Final = 1e18
 """The largest scale of which a fraction counts: beyond that numbers of different units lie too far apart."""
 
@@ -75,7 +75,7 @@ def still(on: Evaluator, t: Columns, z: Vector, m: Scratch) -> None:
         on.when(on.same(t.kind[i], STORING), lambda: stored(part))
 
     def produced(part: Part) -> None:
-        # nor has entropy production, the square of a rate which is all rounding: what the forces there could make
+        # nor has entropy production, the square of a rounding-sized rate: the possible power of the forces counts
         power = on.variable(0.0)
 
         def made(j: Integer) -> None:

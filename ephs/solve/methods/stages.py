@@ -31,7 +31,7 @@ from ephs.solve.methods.scheme import SCHEME, STAGES, WEIGHTS, GroupColumns, Nod
 __all__ = ["exponents", "linearise"]
 
 LAST = 2e-16
-"""Change beside its size that is the last digit's."""
+"""Relative change at the level of the last digit."""
 
 _A: Final[list[list[float]]] = SCHEME.tolist()
 _B: Final[list[float]] = WEIGHTS.tolist()

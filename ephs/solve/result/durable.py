@@ -1,4 +1,4 @@
-"""Files that are whole or not there, whatever happens while they are written."""
+"""Atomic writing of files: complete or absent after any interruption."""
 
 import os
 from collections.abc import Generator

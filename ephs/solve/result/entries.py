@@ -87,7 +87,7 @@ class Entry:
         return ledger_table(self)
 
     def rows(self) -> list[tuple[str, ...]]:
-        """The same in cells: heads, units, then here and each part one level below."""
+        """The same as table cells: headings, units, then this level and each part one level below."""
         head = ("", "exergy stored", "supplied", "destroyed", "defect", "energy stored", "entropy stored", "made")
         units = ("", "J", "J", "J", "J", "J", "J/K", "J/K")
         rows = [

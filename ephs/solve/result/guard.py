@@ -1,4 +1,4 @@
-"""Untrusted result files: checks before reading, and names that netCDF cannot hold."""
+"""Untrusted result files: checks before reading, and escaping of names that netCDF cannot represent."""
 
 import re
 from pathlib import Path as File
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 __all__ = ["check_file", "name_for_file", "named_for_file", "named_from_file"]
 
 MOST = 200
-"""A file may hold this many times the numbers that it has room for: more is no data, but an attack on memory."""
+"""Largest ratio of decompressed to stored size: a larger one is an attack on memory."""
 _FILTERS = (1, 2, 3)  # of HDF5: deflate, shuffle, fletcher32; others are plug-ins, which are code
 _KINDS = "biufSU"
 

@@ -129,7 +129,7 @@ def ledgers(problem: Problem, record: Record) -> Ledgers:
             workers[slot.path] = record.energies[:, number]
         if not isinstance(primitive, Storage):
             continue
-        exchanged: Array | None = None  # most storages have no part in it: nothing is made for them
+        exchanged: Array | None = None  # most storages are not involved: no arrays for them
         for state in slot.reads:
             if state.quantity.environment:
                 share = record.x[:, state.point] @ reference.intensive(state.quantity)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 __all__ = ["PortMotion", "port_motion"]
 
 DELTA = 1e-5
-"""Of the span of a run: over this time a prescribed effort is differenced."""
+"""Time for differencing prescribed efforts, as a fraction of the run's span."""
 
 
 @final

@@ -74,7 +74,7 @@ def joined(records: Sequence[Record]) -> Record | None:
 
 @final
 class Rows:
-    """Kept instants, block by block, and the number that a journal has."""
+    """Recorded instants in blocks, and the number of those in the journal."""
 
     def __init__(self) -> None:
         self._blocks: list[Record] = []

@@ -121,7 +121,7 @@ class Solution:
 
     @property
     def events(self) -> tuple[Crossing, ...]:
-        """The events that happened, in their order: name, time in s, states."""
+        """The events in order of time: name, time in s, states."""
         return tuple(map(Crossing.of_record, self.stats.get("events", ())))
 
     @cached_property
@@ -339,7 +339,7 @@ class Solution:
         return dataset(self, wrenches=wrenches)
 
     def save(self, path: str | File, *, wrenches: bool = False) -> None:
-        """Write a netCDF file that `load_solution` reads back bit by bit, and others with xarray.
+        """Write a netCDF file, which `load_solution` reads back bit by bit and xarray opens.
 
         Parameters
         ----------
