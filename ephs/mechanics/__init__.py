@@ -1,4 +1,4 @@
-"""Mechanics: rigid bodies, joints, and scenes of them, as systems; and how they move.
+"""Mechanics: rigid bodies, joints and scenes as systems; their motion.
 
 Names are imported where they are first used.
 """

@@ -17,13 +17,13 @@ from ephs.semantics.bundle import Array
 __all__ = ["Axes", "Direction", "Place", "describe", "enumerated", "name_directions"]
 
 ALIGNED = 1e-6
-"""Largest distance, relative to its length, of a direction from one that is named."""
+"""Largest relative distance of a direction from a named axis."""
 
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Axes:
-    """Axes to speak in: columns of a rotation (3, 3) to the world, and how to call them, "" for the world's."""
+    """Axes for texts: columns of a rotation (3, 3) to the world, and their name, "" for the world's."""
 
     rotation: Array
     name: str = ""
@@ -32,7 +32,7 @@ class Axes:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Place:
-    """A point (3,) in the world in m, and how to call it, "" for the joint's own origin."""
+    """A point (3,) in the world in m, and its name, "" for the joint's own origin."""
 
     point: Array
     name: str = ""
@@ -41,7 +41,7 @@ class Place:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Direction:
-    """A direction that a constraint holds, as the wrench that holds it.
+    """A constrained direction, as its constraint wrench.
 
     Attributes
     ----------
@@ -102,7 +102,7 @@ def name_directions(
 
 
 def describe(directions: Iterable[Direction]) -> str:
-    """Directions of one joint in words; axes are named where they are not the world's."""
+    """Directions of one joint in words; axes other than the world's are named."""
     phrases: list[str] = []
     found = list(directions)
     for (kind, at), members in groupby(found, key=lambda d: (d.kind, d.place.name if np.any(d.force) else "")):

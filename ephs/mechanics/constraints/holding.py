@@ -61,7 +61,7 @@ class Mechanism:
 
     @staticmethod
     def of(scene: Scene) -> "Mechanism":
-        """The mechanism of a scene: the origins of its joints and bodies lie within the length about the centre."""
+        """The mechanism of a scene: origins of joints and bodies are within the length of the centre."""
         now = Snapshot.of(scene)
         ends = [link.second(now.poses)[4:] for link in now.links]
         points = np.array([*ends, *now.poses[:, 4:]]).reshape(-1, 3)
@@ -92,7 +92,7 @@ class Mechanism:
         # a single degree of freedom moves: the wrench that does work on it alone is the degree of freedom itself
         local = basis / np.linalg.norm(basis) if moved else annihilator(basis)
         rows = np.zeros((local.shape[1], poses.shape[0], 6))
-        # body 1 feels the wrench where its own frame puts C2: the same place, as far as the joint is closed
+        # the wrench on body 1 acts at C2 by its own frame: the same point up to the joint's residual
         for body, sign, end in (
             (link.body1, -1.0, SE3.compose(link.first(poses), link.coupling.include(x))),
             (link.body2, 1.0, link.second(poses)),
@@ -125,7 +125,7 @@ def redundant(holds: Sequence[Hold], tolerance: float = CONSTRAINT) -> list[Arra
     for hold in holds:
         q, triangle = np.linalg.qr(hold.rows.T)
         rest = q - span @ (span.T @ q)
-        rest -= span @ (span.T @ rest)  # once is not enough where little is left
+        rest -= span @ (span.T @ rest)  # twice, because small remainders lose orthogonality
         u, sigma, vt = np.linalg.svd(rest, full_matrices=False)
         new = sigma > tolerance
         out.append(np.linalg.solve(triangle, vt[~new].T))

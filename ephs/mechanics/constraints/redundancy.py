@@ -33,7 +33,7 @@ SHOWN = 3
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Dependence:
-    """A joint whose constraints others imply.
+    """A joint with redundant constraints.
 
     Attributes
     ----------
@@ -98,7 +98,7 @@ def explain(scene: Scene) -> str:
 
 
 def in_words(found: Sequence[Dependence]) -> str:
-    """Dependences in a sentence, the joints together that repeat the same; "" where there are none."""
+    """Dependences in a sentence, grouped by equal causes; "" where there are none."""
     if not found:
         return ""
     count = sum(len(each.directions) for each in found)
@@ -129,7 +129,7 @@ def indeterminate(scene: Scene) -> dict[str, Array]:
     for hold in holds:
         load = hold.wrenches @ free[start : start + len(hold.rows)]
         start += len(hold.rows)
-        # a joint transmits what holds it and what moves it
+        # a joint transmits constraint wrenches and driving wrenches
         loads[hold.joint] = loads.get(hold.joint, 0.0) + load
     for hold in holds:
         moment, force = loads[hold.joint][:3], loads[hold.joint][3:]
@@ -154,7 +154,7 @@ def wrenches_in_words(found: Mapping[str, Array]) -> str:
 
 
 def _needed(before: Sequence[Hold], target: Array, lengths: Sequence[float]) -> list[Hold]:
-    """Holds before whose span contains the columns of the target, as few as dropping finds, in their order.
+    """Earlier holds whose span contains the columns of the target, reduced greedily, in their order.
 
     The shortest loops are tried first, as more holds than a loop are seldom needed.
     """

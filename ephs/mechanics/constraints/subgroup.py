@@ -1,4 +1,4 @@
-"""The smallest connected subgroup of SE(3) that carries the motions which given twists generate.
+"""The smallest connected subgroup of SE(3) with given twists in its Lie algebra.
 
 Bodies that are moved by joints with world twists ξ₁ … ξₖ (at one configuration) are displaced by products of
 exp(ξᵢ sᵢ): they never leave the subgroup whose algebra is the closure of the ξᵢ under sums and brackets.
@@ -44,7 +44,7 @@ class Subgroup:
 
     @property
     def turning(self) -> Array:
-        """(3, k): an orthonormal basis of the axes that it turns about."""
+        """(3, k): an orthonormal basis of its rotation axes."""
         left, sizes, _ = np.linalg.svd(self.basis[:3], full_matrices=False)
         return left[:, sizes > ASSEMBLY]
 
@@ -56,7 +56,7 @@ class Subgroup:
         return float(axis @ (twist[3:] - free @ (free.T @ twist[3:])))
 
     def contains(self, twist: Array) -> bool:
-        """Whether a twist (6,) of size about one lies in its algebra."""
+        """Whether a twist (6,) of size about one belongs to its algebra."""
         return float(np.abs(twist - self.basis @ (self.basis.T @ twist)).max()) < ASSEMBLY * max(
             1.0, float(np.abs(twist).max())
         )

@@ -1,4 +1,4 @@
-"""Control of mechanisms by their dynamics: computed torques, and the dynamics of a body as a task sees them.
+"""Model-based control of mechanisms: computed torque, and task-space dynamics of a body.
 
 Khatib, "A unified approach for motion and force control of robot manipulators: the operational space formulation",
 IEEE Journal on Robotics and Automation 3 (1987).
@@ -46,12 +46,12 @@ class Task:
 
     def forces(self, acceleration: ArrayLike) -> Array:
         """(n,) forces on the degrees of freedom, beside those that balance bias and what the scene applies, that give
-        the task an acceleration (k,) and move nothing else that costs energy: Jᵀ Λ (a − J̇ r)."""
+        the task an acceleration (k,) without exciting the null space: Jᵀ Λ (a − J̇ r)."""
         return self.jacobian.T @ (self.inertia @ (np.asarray(acceleration, dtype=float) - self.drift))
 
 
 def tree_only(model: "Dynamics", what: str) -> None:
-    """Refuse a mechanism in which not every degree of freedom of the tree can be accelerated by itself.
+    """Refuse a mechanism whose tree has dependent degrees of freedom.
 
     Raises
     ------

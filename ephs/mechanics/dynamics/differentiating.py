@@ -13,13 +13,13 @@ Slopes = tuple[Array, Array, Array]
 
 
 def forward_slopes(linear: Linearised, q: Array, r: Array, s: Array) -> Slopes:
-    """Accelerations and their derivatives under what drives at present."""
+    """Accelerations and their derivatives under the present inputs."""
     a = linear.forward(q, r, s)[: linear.equations.n]
     return a, linear.columns(solve=True, fit=True), linear.mobility()
 
 
 def derivatives_of(linear: Linearised, under: Slopes, q: Array, r: Array, s: Array, given: Array | None) -> Derivatives:
-    """Those of `forward_slopes`, and of inverse dynamics at given accelerations, or at those; see `Derivatives`."""
+    """Those by `forward_slopes`, and of inverse dynamics at given or solved accelerations; see `Derivatives`."""
     n, nv = linear.equations.n, linear.equations.nv
     a, forward, by_force = under
     linear.inverse(q, r, s, a if given is None else given)

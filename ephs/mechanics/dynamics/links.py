@@ -17,7 +17,7 @@ __all__ = ["Links"]
 
 @final
 class Links:
-    """The links of one mechanism where `place` put them. It shares the equations' scratch memory."""
+    """The links of one mechanism at the poses set by `place`. It shares the equations' scratch memory."""
 
     def __init__(self, equations: Equations) -> None:
         self.equations = equations

@@ -1,4 +1,4 @@
-"""Loads of a scene on its links: wrenches where the links are, and how they turn with them."""
+"""Loads of a scene on its links: wrenches at the links' poses, and their derivatives."""
 
 from dataclasses import replace
 from typing import final
@@ -36,7 +36,7 @@ class Loading:
         return bool(self._loads)
 
     def place(self, q: Array, r: Array) -> None:
-        """Put the wrenches at a configuration into those of the equations."""
+        """Write the wrenches at a configuration to the equations' inputs."""
         if not self._loads:
             return
         self._links.place(q, r)

@@ -86,9 +86,7 @@ class Dynamics:
 
     @property
     def free(self) -> bool:
-        """Whether every degree of freedom of the tree moves by itself: there are no loops, gears and prescribed
-        motions.
-        """
+        """Whether all degrees of freedom of the tree are independent: no loops, gears or prescribed motions."""
         return self.placing.free
 
     @property
@@ -99,7 +97,7 @@ class Dynamics:
         return {name: where for name, where in kept.items() if where.size or name not in self.cut}
 
     def state(self, coordinates: ByJoint | None = None, rates: ByJoint | None = None, *, adjust: bool = False) -> State:
-        """The initial state with some joints elsewhere, as `Scene.with_state` has it; `closed` turns geared joints.
+        """The initial state with other joint coordinates; see `Scene.with_state`; `closed` moves geared joints.
 
         Of a tree all joints' may be given as arrays (n,). Of a system the nearest state whose loops are closed.
 
@@ -118,7 +116,7 @@ class Dynamics:
         return self._of_states(problem_of_scene(scene).initial)
 
     def unpack(self, array: ArrayLike) -> State:
-        """The state of an array as `State.array` has it; loops are left as they are.
+        """The state of an array in the layout of `State.array`; loops are not closed.
 
         Raises
         ------
@@ -143,7 +141,7 @@ class Dynamics:
         return self.placing.difference(state.q, wanted.q)
 
     def closed(self, state: State) -> State:
-        """The nearest state in the mass metric whose loops are closed and whose rates are on the constraints.
+        """The nearest state in the mass metric with closed loops and consistent rates.
 
         Raises
         ------
@@ -154,7 +152,7 @@ class Dynamics:
             return self._state(self._equations.closed(self._reduced(state)))
 
     def bodies(self, state: State) -> dict[str, BodyState]:
-        """Body -> where it is and how it moves."""
+        """Body -> its pose and motion."""
         self._at(state)
         return self._links.bodies()
 
@@ -247,7 +245,7 @@ class Dynamics:
             return self._equations.mass(state.q, state.r)
 
     def bias(self, state: State, *, gravity: bool = True) -> Array:
-        """(n,) forces that keep the rates as they are against inertia, C(q, r) r, and gravity, g(q)."""
+        """(n,) forces at constant rates: C(q, r) r of inertia, and g(q) of gravity."""
         self._at(state)
         return self._links.bias() + (self._links.gravity() if gravity else 0.0)
 
@@ -295,7 +293,9 @@ class Dynamics:
     def energies(self, state: State) -> Energies:
         """Kinetic, potential and thermal energy."""
         eq = self._equations
-        taken = state.entropies[eq.reduced.tables.node == -1]  # by the environment, whose energy no component counts
+        taken = state.entropies[
+            eq.reduced.tables.node == -1
+        ]  # by the environment, whose energy belongs to no component
         return Energies.of(eq.model, eq.row(self._reduced(state)).energies, float(taken.sum()))
 
     def derivatives(
@@ -328,7 +328,7 @@ class Dynamics:
         return differentiating.velocity_derivatives_of(self._linear, self._links, state.q, state.r)
 
     def step(self, state: State, h: float, method: "str | Method" = "rk54", *, forces: ByJoint | None = None) -> State:
-        """The state h seconds later, by one step of a method that takes constant steps.
+        """The state h seconds later, by one step of a method with constant steps.
 
         Each step is a start of its own: what a method remembers from step to step (alpha: accelerations) begins anew.
 
@@ -376,7 +376,7 @@ class Dynamics:
 
     @contextmanager
     def _pushed(self, forces: ByJoint | None) -> Generator[None, None, None]:
-        """Further forces on the joints, for as long as it lasts."""
+        """Additional forces on the joints within the context."""
         drive = self._equations.drive
         before = drive.copy()
         if forces is not None:

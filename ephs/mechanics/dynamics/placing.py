@@ -1,4 +1,4 @@
-"""States from coordinates and rates of joints, without a scene made anew."""
+"""States from coordinates and rates of joints, without building another scene."""
 
 from collections.abc import Mapping
 from typing import TypeAlias, final

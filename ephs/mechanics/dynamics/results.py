@@ -30,7 +30,7 @@ class Energies:
 
     @staticmethod
     def of(model: Model, energies: Array, environment: float) -> "Energies":
-        """Of the components' energies in J, and the entropy that the environment took up in J/K."""
+        """Energies of the components in J, and the environment's received entropy in J/K."""
         kind, sums = {"ke": 0, "pe": 1}, [0.0, 0.0, model.reference.temperature * environment]
         for slot, energy in zip(model.descriptor.components, energies, strict=True):
             if isinstance(slot.primitive, Storage):

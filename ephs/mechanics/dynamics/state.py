@@ -59,7 +59,7 @@ class State:
 
     @property
     def rates(self) -> Mapping[str, Array]:
-        """Joint -> (d,) its twist u_r in the axes of C2, in rad/s and m/s; of cut joints as the tree makes it."""
+        """Joint -> (d,) its twist u_r in the axes of C2, in rad/s and m/s; of cut joints by the tree's rates."""
         whole = np.concatenate([self.r, self.cut_rates])
         return MappingProxyType({name: _fixed(x) for name, x in self.layout.by_joint(whole).items()})
 

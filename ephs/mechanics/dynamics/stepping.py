@@ -27,13 +27,13 @@ if TYPE_CHECKING:
 __all__ = ["Steps"]
 
 RTOL, ATOL = 1e-10, 1e-12
-"""Tolerances of the equations of one implicit step: of its rounding, not of its error, which its length decides."""
+"""Tolerances of the equations of one implicit step: near rounding; its error depends on its length."""
 EXPLICIT = ("rk54", "rk87")
 
 
 @final
 class Steps:
-    """Single steps of one mechanism under what its equations are driven by at present."""
+    """Single steps of one mechanism under the present inputs."""
 
     def __init__(self, problem: Problem, equations: Equations) -> None:
         self._problem, self._equations = problem, equations
@@ -93,7 +93,7 @@ class Steps:
         return replace(self._problem, signals=signals)
 
     def _explicit(self, state: ReducedState, h: float, method: str) -> ReducedState:
-        """A step without its error."""
+        """A step without error estimate."""
         eq = self._equations
         of = tableau(method)
         y0, y1, k = eq.vector(state), np.empty(eq.size), np.zeros((len(of.arrays["a"]), eq.size))

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["body_pattern", "rigid_body"]
 
 SYMMETRIC = 1e-12
-"""Asymmetry of an inertia that counts as rounding, relative to its largest entry."""
+"""Relative asymmetry of an inertia that counts as rounding."""
 GRAVITY = (0.0, 0.0, -9.81)
 
 

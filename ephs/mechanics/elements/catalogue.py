@@ -1,4 +1,4 @@
-"""The parts of mechanics that documents may name, each made again from its ports and its numbers."""
+"""The parts of mechanics for documents, each restored from its ports and numbers."""
 
 from collections.abc import Mapping
 from typing import Any

@@ -105,7 +105,7 @@ def potential(of: Quantity, port: str, energy: Callable[[Array], float], name: s
 
 @cache
 def no_potential(of: Quantity, port: str) -> Storage:
-    """No energy, yet the state is kept; port as named."""
+    """A storage without energy that records a state; port as named."""
     n = of.space.dim
     return Storage(
         "no_potential",
@@ -238,7 +238,7 @@ def holonomic(of: Pair, *, on_group: bool = True) -> Reversible:
         middle = joint_matrix(of, of.manifold.retract(x0[q_r], 0.5 * v[q_r]))
         residual = gap_over(of, h, middle, e)
         square = float(e @ e)
-        if square <= TINY:  # only to keep the quotient from overflowing
+        if square <= TINY:  # against overflow of the quotient
             return middle, residual
         return middle + np.outer(residual - middle @ e, e) / square, residual
 

@@ -146,7 +146,7 @@ def gas_spring(
 def _closed(
     junctions: dict[str, Junction], boxes: dict[str, dict[str, str]], fillings: dict[str, Filling], *, heat: bool
 ) -> System:
-    """The system, with an environment for its heat unless it leaves."""
+    """The system, with an environment for its heat unless a port carries it."""
     if not heat:
         boxes["env"], fillings["env"] = {"s": "s"}, library.environment()
     return System.of(

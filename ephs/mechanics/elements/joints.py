@@ -1,4 +1,4 @@
-"""Joints as systems of seven boxes, and composites of them: springs between points, universal joints."""
+"""Joints as systems of seven boxes, and their composites: springs between points, universal joints."""
 
 from collections.abc import Callable, Mapping
 from functools import cache

@@ -35,7 +35,7 @@ def lie_poisson(w: "Voice") -> Relations:
 
 
 def frame_change(w: "Voice") -> Relations:
-    """inner.e = Ad_{o⁻¹} outer.e, outer.f = −Ad*_{o⁻¹} λ with λ = inner.f; o is called by the path of its box."""
+    """inner.e = Ad_{o⁻¹} outer.e, outer.f = −Ad*_{o⁻¹} λ with λ = inner.f; o is named after the path of its box."""
     outer, inner = w.e
     lam = w.multiplier()
     flows = {outer: -w.operator("Ad*", w.element) * lam, inner: lam}

@@ -23,9 +23,9 @@ TRIALS = 20
 ITERATIONS = 40
 HALVINGS = 12
 EXACT = 1e-13
-"""Residual beside its terms that is rounding."""
+"""Rounding of the residual, relative to its terms."""
 NEARLY = 1e-8
-"""Likewise, where contacts so nearly repeat each other that no iteration does better."""
+"""Likewise for nearly dependent contacts, where iterations stagnate."""
 
 
 def impulses(whole: Array, free: Array, friction: Sequence[float], start: Array | None = None) -> Array | None:

@@ -1,4 +1,4 @@
-"""Impacts: contacts that touch at the same instant, and act on each other, are an island with one coefficient.
+"""Impacts: simultaneous coupled contacts form an island with one coefficient of restitution.
 
 Moreau's law: with velocities γ before and γ⁺ = γ + G P after, ξ = γ⁺ + e γ and P are complementary in the friction
 cones. With one coefficient the energy ½ Pᵀ(γ + γ⁺) that the impulses give is at most −½ (1 − e)/(1 + e) PᵀGP, so never
@@ -20,9 +20,9 @@ from ephs.solve.sparse import Index
 __all__ = ["Blow", "Unlawful", "islands_of", "shared", "struck"]
 
 TIED = 1e-12
-"""Part of the largest mobility below which two contacts do not act on each other."""
+"""Least coupling of two contacts, relative to the largest mobility."""
 GAINED = 1e-11
-"""Gain of energy of an impact above which it is not rounding, relative to its energies."""
+"""Largest relative energy gain of an impact that counts as rounding."""
 
 
 @final
@@ -37,7 +37,7 @@ class Unlawful(Exception):
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Blow:
-    """Impulses (3m,) of contacts, and the heat (m,) in J that they make of kinetic energy."""
+    """Impulses (3m,) of contacts, and the kinetic energy (m,) in J that becomes heat at each."""
 
     impulse: Array
     heat: Array
@@ -60,14 +60,14 @@ def islands_of(mobility: Array) -> Iterator[Index]:
 
 
 def shared(taken: Array) -> Array:
-    """Heat of each contact of an island by the energy that each takes from the motion, of whichever sign."""
+    """Heat of each contact of an island: its share of the lost kinetic energy, of either sign."""
     losing = np.maximum(taken, 0.0)
     whole, total = float(losing.sum()), max(float(taken.sum()), 0.0)
     return losing * (total / whole if whole > 0.0 else 0.0)
 
 
 def struck(mobility: Array, before: Array, laws: Sequence[Impact], touching: float, quiet: float) -> Blow:
-    """The blow at one instant.
+    """The impact at one instant.
 
     Parameters
     ----------

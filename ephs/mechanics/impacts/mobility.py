@@ -1,4 +1,4 @@
-"""Response of a mechanism to impulses, its loops closed and its prescribed motions kept."""
+"""Response of a mechanism to impulses, with loop closures and prescribed motions."""
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve

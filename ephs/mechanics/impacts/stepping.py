@@ -32,34 +32,34 @@ __all__ = ["Impacts"]
 CLOSED = 1e-9
 """Gap, in the mechanism's length, below which a contact is closed."""
 LOCATED = 1e-3
-"""Part of that to which gaps are located."""
+"""Tolerance of locating closures, as a fraction of it."""
 DRIFTED = 1e-5
-"""Part of that by which gaps of persistent contacts change in a part of a step at most."""
+"""Largest change of persistent contacts' gaps in a part of a step, as a fraction of it."""
 PARTING = 1e-9
 """Speed, in the mechanism's own, above which closed contacts part."""
 QUIET = 1e-6
-"""Speed, likewise, below which contacts do not bounce: a bouncing ball's rest of the time, and its square of energy."""
+"""Speed, likewise, below which contacts do not bounce: the error of a ball's bouncing time; squared, of its energy."""
 PARTS = 10_000
-"""Parts of a step at most."""
+"""Largest number of parts of a step."""
 BRIEF = 1e-6
-"""Part of a step that says nothing of what sticks or slips."""
+"""Fraction of a step too short to decide between sticking and slipping."""
 SLIVER = 1e-12
-"""Part of a step that is none."""
+"""Fraction of a step that counts as zero."""
 DIVISIONS = 60
 ROUNDS = 20
 FLAT = 1e-9
 """Imaginary part beside 1 of a root that is real."""
 PRESSING = 1e-6
-"""Part of the largest impulse below which a contact does not press."""
+"""Least impulse of an active contact, relative to the largest."""
 SETTLED = 1e-7
-"""Change of impulses beside their size that leaves the rest to a correction of velocities."""
+"""Relative change of impulses at which iterations end; velocities are then corrected."""
 ROUNDED = 1e-13
-"""Part of velocities, and of the mechanism's speed, that is rounding."""
+"""Rounding of velocities, relative to them and to the mechanism's speed."""
 APART, STICKING, SLIPPING = range(3)
 SAID = ("opens", "sticks", "slips")
 """Modes of a contact in a part of a step, and the words of events where they change."""
 TOO_LONG = 8.0
-"""Error assigned to a part of a step whose halves meet contacts that the whole does not."""
+"""Error of a part of a step whose halves have contacts that the whole misses."""
 
 
 @final
@@ -106,7 +106,7 @@ class Impacts(ReducedMethod):
         return None
 
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
-        """One step of h seconds, in as many parts as it takes."""
+        """One step of h seconds, in as many parts as needed."""
         here, left, error = self.equations.accounts.opened(state), h, 0.0
         self._happened, modes = [], state.memory[0] if state.memory else None
         self.name, self.exponent, self.share = self._inner.name, self._inner.exponent, self._inner.share
@@ -153,7 +153,7 @@ class Impacts(ReducedMethod):
         return end
 
     def _changed(self, start: ReducedState, before: Array | None) -> Array:
-        """Modes of contacts in a part of a step that was taken; changes since the part before are events."""
+        """Record modes of contacts in an accepted part of a step; changes since the previous part are events."""
         now = self._modes.copy()
         if before is not None:
             said = [(i, SAID[int(now[i])]) for i in np.flatnonzero(now != before)]
@@ -169,7 +169,7 @@ class Impacts(ReducedMethod):
     # ---- between impacts ---------------------------------------------------------------------------------------
 
     def _taken(self, state: ReducedState, h: float) -> tuple[ReducedState, float, float]:
-        """As much of h seconds as goes without an impact: its end, the part of h, and its error."""
+        """The longest part of h seconds without an impact: its end, its fraction of h, and its error."""
         gaps, rates = self._touching.motion(state.q, state.r)
         held = np.flatnonzero((gaps <= self._closed) & (rates <= PARTING * self._speed))
         share = 1.0
@@ -255,7 +255,7 @@ class Impacts(ReducedMethod):
         moved = replace(moved, r=moved.r + change @ (found - impulse))
         stop = rows1 @ moved.r
         loose = held[~pressed]
-        if loose.size and touching.gaps(moved.q, moved.r)[loose].min() < -self._closed:  # it leaves and comes back
+        if loose.size and touching.gaps(moved.q, moved.r)[loose].min() < -self._closed:  # it opens and closes again
             return end, 0.0, 0.5
         if (divided := _turning(before, stop, found, laws, PARTING * self._speed)) < 1.0:
             return end, 0.0, divided
@@ -280,7 +280,7 @@ class Impacts(ReducedMethod):
         eq.constant = eq.held = eq.steady = False
 
     def _flying(self) -> None:
-        """Let nothing act but what is given."""
+        """Remove contact forces; inputs remain."""
         eq = self.equations
         eq.given.push(None)
         eq.constant, eq.held, eq.steady = self._inputs
@@ -301,7 +301,7 @@ class Impacts(ReducedMethod):
         return self._inner.taken(state)
 
     def take(self, own: Snapshot, state: ReducedState) -> None:
-        """Restore from a value of `taken`."""
+        """Restore from a snapshot."""
         self._inner.take(own, state)
 
 
@@ -314,8 +314,8 @@ def _named(paths: Sequence[Path]) -> list[str]:
 
 
 def _closes(start: float, slope: float, end: float, slope1: float, closed: float) -> float:
-    """First part of a way at which a gap with these values and slopes at both ends closes; 1 where it does not."""
-    closed += max(-start, 0.0)  # what is open by less than rounding at its start may stay so
+    """First fraction of a step at which a gap with these values and slopes at both ends closes; 1 if it stays open."""
+    closed += max(-start, 0.0)  # a gap within rounding at the start may remain
     cubic = np.array([2.0 * (start - end) + slope + slope1, 3.0 * (end - start) - 2.0 * slope - slope1, slope, start])
     turns = np.roots(np.polyder(cubic))
     inside = [float(x) for x in turns.real[np.abs(turns.imag) < FLAT] if 0.0 < x < 1.0]
@@ -326,11 +326,11 @@ def _closes(start: float, slope: float, end: float, slope1: float, closed: float
         if 0.0 < x < 1.0 and np.polyval(np.polyder(cubic), x) <= 0.0:
             return x
     back = [x for x in inside if np.polyval(np.polyder(cubic, 2), x) < 0.0] if start < 0.0 else []
-    return min(back, default=0.5)  # it turns back before it was open
+    return min(back, default=0.5)  # it reverses before it was open
 
 
 def _turning(before: Array, stop: Array, impulse: Array, friction: list[float], still: float) -> float:
-    """Part of a step after which the first contact that slips before has come to a stop; 1 where none turns back."""
+    """Fraction of a step at which the first slipping contact stops; 1 if none does."""
     first, last, force = (v.reshape(-1, 3)[:, 1:] for v in (before, stop, impulse))
     share = 1.0
     for i, coefficient in enumerate(friction):

@@ -28,7 +28,7 @@ POSES: Final[Any] = se3
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class _Point:
-    """Bodies of both frames, the offsets of these, the gap, and the process that takes the heat."""
+    """Bodies of both frames, their offsets, the gap, and the process for the heat."""
 
     bodies: tuple[int, int]
     offsets: tuple[Array, Array]

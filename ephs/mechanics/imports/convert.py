@@ -1,4 +1,4 @@
-"""Models as scene files: the tables that the reader makes, written as TOML."""
+"""Models as scene files: the tables of the reader, written as TOML."""
 
 import json
 import re
@@ -65,7 +65,7 @@ def convert(
 
 
 def _gather(shapes: Iterable[dict[str, Any]], source: Path, target: Path) -> None:
-    """Name meshes relative to the scene file; copy those that lie elsewhere."""
+    """Name meshes relative to the scene file; copy those from other folders."""
     home = target.parent.resolve()
     taken: dict[Path, Path] = {}
     for shape in shapes:

@@ -61,7 +61,7 @@ class Draft:
         self._renamed.append(f"{name} → {other}")
 
     def left(self) -> list[str]:
-        """A line for each kind of omitted elements, and one for names that scenes cannot have."""
+        """A line for each kind of omitted elements, and one for names that are invalid in scenes."""
         lines = [f"not modelled: {what}: {', '.join(map(legible, names))}" for what, names in self._left.items()]
         renamed = [f"renamed, as scenes want it: {', '.join(map(legible, self._renamed))}"] if self._renamed else []
         return lines + renamed
@@ -88,7 +88,7 @@ class Draft:
         return name
 
     def frame_without_mass(self, name: str) -> str:
-        """A body without mass between two joints; returns how it is known here."""
+        """A body without mass between two joints; returns its name in the draft."""
         self.body(name)
         return name
 
@@ -112,7 +112,7 @@ class Draft:
         return {"dry": {"coulomb": float(force)}} if force and freedoms == 1 else {}
 
     def limit(self, name: str, lower: float, upper: float) -> None:
-        """Put stops to a joint of one degree of freedom, or note that it has limits."""
+        """Add stops to a joint of one degree of freedom, or a note of its limits."""
         sides = [float(value) if abs(value) < UNLIMITED else np.nan for value in (lower, upper)]
         if not self.contact or lower >= upper:
             self.leave("limits of", name)
@@ -132,14 +132,14 @@ class Draft:
         self._contacts[name] = {"surfaces": list(surfaces), **law}
 
     def hold(self, name: str) -> None:
-        """Keep a joint of one degree of freedom where it is."""
+        """Lock a joint of one degree of freedom."""
         entries = self._joints[self._joint_names[name]]
         for key in ("armature", "dry"):
             entries.pop(key, None)
         entries["motion"] = {"rate": 0.0}
 
     def gear(self, name: str, first: str, second: str, ratio: float, offset: float = 0.0) -> None:
-        """Tie the coordinate of a joint of one degree of freedom to that of another, which is 0: ratio · coordinate +
+        """Couple the coordinate of a joint of one degree of freedom to another's, which is 0: ratio · coordinate +
         offset.
         """
         joints = [self._joint_names[first], self._joint_names[second]]
@@ -151,7 +151,7 @@ class Draft:
             self.hold(first)
 
     def knows(self, name: str) -> bool:
-        """Whether there is a joint of this name that moves freely."""
+        """Whether a free joint has this name."""
         return name in self._joint_names and "motion" not in self._joints[self._joint_names[name]]
 
     def pull(self, name: str, stiffness: float, rest: float, damping: float) -> None:
@@ -189,7 +189,7 @@ class Draft:
         }  # fmt: skip
 
     def actuate(self, name: str, ratio: Mapping[str, float], limits: Sequence[float] | None) -> None:
-        """A control that is forces on joints of one degree of freedom."""
+        """A control that acts as forces on joints of one degree of freedom."""
         found = {"joints": [self._joint_names[each] for each in ratio], "ratio": list(map(float, ratio.values()))}
         more = {} if limits is None or limits[0] >= limits[1] else {"limits": list(map(float, limits))}
         self._actuators[self._own(name, self._actuators)] = found | more
@@ -204,7 +204,7 @@ class Draft:
         self._bodies[self._names[link]].setdefault("shapes", []).append(table)
 
     def mesh(self, link: str, file: str, place: Array, scale: Sequence[float] = (1.0, 1.0, 1.0)) -> None:
-        """A mesh to draw, if it lies in the model's folder."""
+        """A mesh for pictures, if it is in the model's folder."""
         inside = self.file_inside(file)
         if inside is None or inside.suffix.lower() not in MESHES:
             self.leave("meshes that are no readable file in the model's folder", file)
@@ -251,7 +251,7 @@ class Draft:
         return np.concatenate([place[:4], place[4:] - self._centres[link]])
 
     def _own(self, name: str, taken: Mapping[str, Any]) -> str:
-        """A name that scene files allow, and that is not taken."""
+        """A valid and unused name for scene files."""
         letters = ("_" if c == "." or c.isspace() or not c.isprintable() else c for c in name[:LONGEST_NAME])
         stem = "".join(letters) or "unnamed"
         if stem.startswith("~"):

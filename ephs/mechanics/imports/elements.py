@@ -23,7 +23,7 @@ def named(root: Element, tag: str, faults: list[Fault]) -> dict[str, Element]:
 
 
 def check_kind(name: str, joint: Element, kinds: Iterable[str], faults: list[Fault]) -> None:
-    """A fault where a joint's kind is none of those that are known."""
+    """A fault where a joint's type is unknown."""
     kind, known = joint.get("type"), list(kinds)
     if kind not in known:
         hint = did_you_mean(kind or "", known, "take one of these kinds")
@@ -32,7 +32,7 @@ def check_kind(name: str, joint: Element, kinds: Iterable[str], faults: list[Fau
 
 
 def check_link(link: str, key: str, links: Mapping[str, Element], faults: list[Fault]) -> None:
-    """A fault where a joint names a link that is not there."""
+    """A fault where a joint names a missing link."""
     if link not in links:
         hint = did_you_mean(link, links, f"there are: {listing(links)}")
         faults.append(fault("unknown link", key, f'"{link}"' if link else "nothing", hint=hint))

@@ -1,4 +1,4 @@
-"""MJCF: MuJoCo compiles the model, which settles defaults, units, orientations and inertias; what it made is read.
+"""MJCF: MuJoCo compiles the model, which resolves defaults, units, orientations and inertias; its result is read.
 
 Source: the MuJoCo documentation, "XML Reference" and "Computation". Joints are read at the reference configuration.
 """
@@ -54,10 +54,10 @@ def read_mjcf(root: Any, draft: Draft) -> None:
         return
     said: list[str] = []
     before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(said.append)  # else it writes a file beside the user's
+    mujoco.set_mju_user_warning(said.append)  # otherwise it writes a log file to the working directory
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # what is deprecated in the format
+            warnings.simplefilter("ignore")  # deprecated elements of the format
             spec = mujoco.MjSpec.from_string(source.text, assets=source.assets)
             spec.compiler.fusestatic = False
             given = _own_inertias(spec)
@@ -114,7 +114,7 @@ def _directions(model: Any) -> Iterator[Any]:
 
 
 def _own_inertias(spec: Any) -> list[tuple[Any, tuple[float, Any]]]:
-    """The inertias that bodies give in numbers, with harmless ones in their places, as MuJoCo refuses impossible ones.
+    """The numerical inertias of bodies, replaced by valid ones because MuJoCo refuses impossible ones.
 
     Left alone are models that change them as they are compiled.
     """

@@ -96,7 +96,7 @@ def actuators(model: Any, names: Names, draft: Draft) -> None:
 
 
 def _of_tendon(model: Any, t: int) -> Line | None:
-    """The length of a fixed tendon over joints with one degree of freedom; None of others."""
+    """The length of a fixed tendon over joints with one degree of freedom; None for other tendons."""
     mujoco: Any = import_module("mujoco")
     first, count = int(model.tendon_adr[t]), int(model.tendon_num[t])
     every = range(first, first + count)

@@ -1,4 +1,4 @@
-"""Equality constraints of a compiled MJCF: those that are lower pairs close loops, others hold joints or tie two."""
+"""Equality constraints of a compiled MJCF: lower pairs close loops, others lock joints or couple two."""
 
 from collections.abc import Set
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from ephs.mechanics.imports.mjcf_names import Names
 __all__ = ["Thread", "loops", "screws"]
 
 ROUNDED_COSINE = 1e-12
-"""By how much the cosine between axes that are one may be off 1: unit vectors round by less."""
+"""Tolerance of the cosine between equal axes: unit vectors round by less."""
 
 
 @final

@@ -63,7 +63,7 @@ def noted(model: Any, names: Names, draft: Draft) -> None:
 
 
 def _made(name: str, otherwise: str, taken: set[str]) -> str:
-    """The name, or one that is made up and not taken."""
+    """The name, or a generated unused one."""
     if name:
         return name
     found, count = otherwise, 1

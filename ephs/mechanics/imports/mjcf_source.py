@@ -14,14 +14,14 @@ from ephs.mechanics.scene.errors import fault
 
 __all__ = ["Source"]
 
-# Sections that a scene does not have, and how what is in them is called.
+# Sections without counterpart in scenes, and names of their contents.
 _SECTIONS = {
     "sensor": "sensors",
     "deformable": "deformables",
     "contact": "contact pairs and exclusions",
     "extension": "plugins",
 }
-# Actuators and tendons that may have a counterpart, and what an actuator then acts on.
+# Actuators and tendons that may have a counterpart, and targets of actuators.
 _DRIVES = ("general", "motor", "position", "velocity", "cylinder", "damper")
 _TARGETS = ("joint", "jointinparent", "tendon")
 _SILENT = ("visual", "statistic", "custom", "keyframe", "size", "compiler-plugin")
@@ -60,7 +60,7 @@ _MOST_PARAMETER = 100.0
 
 @final
 class Source:
-    """An MJCF as MuJoCo is to read it.
+    """An MJCF prepared for MuJoCo.
 
     Attributes
     ----------
@@ -127,7 +127,7 @@ class Source:
             self._draft.faults.append(fault("copies", "replicate", "more", most=_MOST_COPIES))
 
     def _refuse_nan(self, root: Element) -> None:
-        """Numbers that are none: MuJoCo warns of them while it parses, and once in thousands of times never ends."""
+        """Invalid numbers: MuJoCo warns of them while parsing, and rarely never returns."""
         for element in root.iter():
             for key, value in element.items():
                 if key not in _NAMES and any(word.lower().lstrip("+-") == "nan" for word in value.split()):
@@ -181,7 +181,7 @@ class Source:
             parent.remove(child)
 
     def _meshes(self, root: Element) -> None:
-        """Load meshes of the folder; take out others, and the shapes made of them."""
+        """Load meshes of the folder; remove others and their shapes."""
         compiler = root.findall("compiler")
         folders = [c.get("meshdir") or c.get("assetdir") for c in compiler if c.get("meshdir") or c.get("assetdir")]
         for element in compiler:
@@ -213,11 +213,11 @@ class Source:
                 element.attrib.pop("file", None)
 
     def _check_formula(self, mesh: Element) -> None:
-        """A mesh made by a formula may not be of any size."""
+        """Limit of the size of a mesh from a formula."""
         for word in (mesh.get("params") or "").split():
             try:
                 small = abs(float(word)) <= _MOST_PARAMETER
-            except ValueError:  # MuJoCo says so
+            except ValueError:  # reported by MuJoCo
                 continue
             if not small:
                 key = f"mesh {mesh.get('name', '')}.params"
@@ -225,7 +225,7 @@ class Source:
 
 
 def _called(entry: Element, number: int) -> str:
-    """Name of an entry, or one that is made up."""
+    """Name of an entry, or a generated one."""
     return entry.get("name") or f"{entry.tag} {number + 1}"
 
 

@@ -1,4 +1,4 @@
-"""SDF: a graph of links, each at its place, loops and all. Source: the SDFormat specification (sdformat.org/spec)."""
+"""SDF: a graph of links with their poses, loops included. Source: the SDFormat specification (sdformat.org/spec)."""
 
 import math
 from collections.abc import Mapping
@@ -104,7 +104,7 @@ def _relative(element: Element) -> str:
 def _ends(
     name: str, joint: Element, links: Mapping[str, Element], frames: Mapping[str, Element], draft: Draft
 ) -> tuple[str, str]:
-    """The parent and the child of a joint, and a look at its kind."""
+    """The parent and the child of a joint; its type is checked."""
     check_kind(name, joint, KINDS, draft.faults)
     ends: list[str] = []
     for end in ("parent", "child"):
@@ -131,7 +131,7 @@ def _hold(
     frames: Frames,
     draft: Draft,
 ) -> None:
-    """Join each group of links that nothing holds to the ground: freely, or rigidly where the model is static."""
+    """Join each unattached group of links to the ground: freely, or rigidly if the model is static."""
     near: dict[str, set[str]] = {}
     for first, second in ends.values():
         near.setdefault(first, set()).add(second)

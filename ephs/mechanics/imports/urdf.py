@@ -58,7 +58,7 @@ def read_urdf(root: Element, draft: Draft, base: str) -> None:
 
 
 def _ends(name: str, joint: Element, links: Mapping[str, Element], draft: Draft) -> tuple[str, str]:
-    """The parent and the child of a joint, and a look at its kind."""
+    """The parent and the child of a joint; its type is checked."""
     check_kind(name, joint, KINDS, draft.faults)
     ends: list[str] = []
     for end in ("parent", "child"):
@@ -70,7 +70,7 @@ def _ends(name: str, joint: Element, links: Mapping[str, Element], draft: Draft)
 
 
 def _outwards(links: Mapping[str, Element], ends: Mapping[str, tuple[str, str]], draft: Draft) -> list[str]:
-    """The links from the root outwards; a fault where they are no tree."""
+    """The links from the root outwards; a fault if they do not form a tree."""
     faults, parents, children = draft.faults, dict[str, str](), dict[str, list[str]]()
     for name, (parent, child) in ends.items():
         if child in parents:
@@ -172,7 +172,7 @@ def _joint(name: str, joint: Element, parent: str, child: str, draft: Draft) -> 
 
 
 def _mimic(name: str, joint: Element, joints: Mapping[str, Element], draft: Draft) -> None:
-    """Tie a joint to the one that it mimics, where both have one degree of freedom and the other one starts at 0."""
+    """Couple a joint to its mimicked joint, if both have one degree of freedom and the latter starts at 0."""
     mimic = joint.find("mimic")
     if mimic is None:
         return

@@ -1,4 +1,4 @@
-"""XML text to elements, with nothing read but the one file, and nothing expanded; numbers in attributes and texts."""
+"""XML text to elements, without external files or expansion; numbers in attributes and texts."""
 
 import math
 import re

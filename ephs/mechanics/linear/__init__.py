@@ -1,4 +1,4 @@
-"""Models linearised about a state, with their energy and dissipation; states in which nothing moves."""
+"""Models linearised about a state, with their energy and dissipation; equilibria."""
 
 from ephs.mechanics.linear.equilibrium import Equilibrium as Equilibrium
 from ephs.mechanics.linear.equilibrium import equilibrium as equilibrium

@@ -19,9 +19,9 @@ from ephs.semantics.bundle import Array
 __all__ = ["StaticPath", "follow"]
 
 REAL = 1e-9
-"""Part of an eigenvalue that its imaginary part may be and the value count as real."""
+"""Largest imaginary part of a real eigenvalue, relative to its size."""
 SAME = 1e-12
-"""Part of a load below which the rest of it is rounding."""
+"""Fraction of a load below which its remainder is rounding."""
 BRACKET, SOFT = 1e-10, 1e-13
 """Width of the bracket of a critical share, and the least stiffness beside others, at which it is found."""
 LONGEST, SHORTEST = 1.0, 1e-6
@@ -242,7 +242,7 @@ def _crossing(model: Dynamics, one: _Balance, low: float, two: _Balance, high: f
     for _ in range(8):
         share = low + (high - low) * one.softest / (one.softest - two.softest)
         middle = _held(model, one.state, share)
-        if middle is None:  # near a limit point nothing holds at a given load
+        if middle is None:  # near a limit point there may be no equilibrium at a given load
             return share
         if middle.softest * one.softest > 0.0:
             one, low = middle, share

@@ -1,4 +1,4 @@
-"""States in which nothing moves: of a scene by its forces, of a system by letting it settle."""
+"""Equilibria: of a scene by its forces, of a system by artificial time."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -23,24 +23,24 @@ if TYPE_CHECKING:
 __all__ = ["Equilibrium", "equilibrium"]
 
 STALLED = 1e-9
-"""Unbalanced part of the forces that may be left where further iterations do not help."""
+"""Allowed unbalanced fraction of the forces where iterations stagnate."""
 UNFELT = 1e-9
-"""Part of the forces along directions without stiffness that is rounding."""
+"""Fraction of the forces along directions without stiffness that counts as rounding."""
 SHORTEST, LEAST, SETTLED = 1e-12, 1e-9, 1e-12
-"""Of artificial time: the shortest step, the least size of states, the residual at which it ends."""
+"""Artificial time: the shortest step, the least scale of states, the residual at the end."""
 ENOUGH = 1e-12
-"""Part of the forces that act which may stay unbalanced."""
+"""Allowed unbalanced fraction of the applied forces."""
 STRIDE = 0.3
 """Largest change of a mechanism in one step, in rad or m."""
 STEPS = 200
 HALVINGS = 8
-"""Of a step after which loops do not close."""
+"""Reduction of a step after which loops do not close."""
 
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Equilibrium:
-    """A state in which nothing moves.
+    """An equilibrium.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def equilibrium(
     inputs: Mapping[str, Any] | None = None,
     reference: Reference | None = None,
 ) -> Equilibrium:
-    """A state near by in which nothing moves.
+    """An equilibrium near the initial state.
 
     A scene goes from its initial state, rates zero, to where gravity, springs and drives balance: by steps along the
     eigenvectors of its stiffness in the mass metric, against the forces also where it is not stable, so that it comes
@@ -135,7 +135,7 @@ def _of_scene(scene: Scene) -> Equilibrium:
 
 
 def _loaded(model: "Dynamics") -> Equilibrium:
-    """Under loads: first without them, then along the path on which they grow."""
+    """Equilibrium under loads: first without them, then along the path of increasing loads."""
     from ephs.mechanics.linear.continuation import follow
     from ephs.mechanics.linear.scene import freedoms_of, unbalanced
     from ephs.mechanics.scene.state import Snapshot
@@ -160,7 +160,7 @@ def _resting(scene: Scene) -> Scene:
 
 
 def _settled(model: "Dynamics") -> "tuple[State, float, int]":
-    """The state where forces balance; the part of them that does not; steps."""
+    """The equilibrium, its unbalanced fraction of the forces, and the number of steps."""
     from scipy.linalg import eigh
 
     from ephs.mechanics.linear.scene import freedoms_of, unbalanced

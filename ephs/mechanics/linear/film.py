@@ -32,7 +32,7 @@ def film(
         turning = np.exp((value if decay else 1j * value.imag) * t)
     elif decay:
         turning = np.exp(value.real * t).astype(complex)
-    else:  # what does not oscillate goes to and fro
+    else:  # modes without oscillation are shown back and forth
         turning = np.exp(1j * np.pi * t / t[-1]) * -1j
     places = [name for name in mode.shape if not name.startswith("bodies.")]
     largest = max((float(np.abs(mode.shape[name]).max(initial=0.0)) for name in places), default=0.0) or 1.0

@@ -29,7 +29,7 @@ def linearize(
     form: str = "reduced",
     reference: Reference | None = None,
 ) -> StateSpace:
-    """A model linearised about a state: state space, modes, and where the state is an equilibrium its structure.
+    """A model linearised about a state: state space, modes, and at an equilibrium its structure.
 
     Parameters
     ----------

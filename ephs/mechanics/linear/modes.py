@@ -12,7 +12,7 @@ from ephs.semantics.bundle import Array
 __all__ = ["Complex", "Mode", "modes_of"]
 
 SHOWN = 1e-6
-"""Part of the largest below which a component of a mode is not shown."""
+"""Least displayed component of a mode, relative to the largest."""
 
 Complex = NDArray[np.complex128]
 STILL = 1e-7
@@ -44,7 +44,7 @@ class Mode:
 
     @property
     def frequency(self) -> float:
-        """Of the oscillation, damped as it is, in Hz; zero where it only decays or grows."""
+        """Damped frequency in Hz; zero without oscillation."""
         return abs(self.eigenvalue.imag) / (2.0 * np.pi)
 
     @property
@@ -54,7 +54,7 @@ class Mode:
 
     @property
     def stable(self) -> bool:
-        """Whether it does not grow."""
+        """Whether its amplitude does not grow."""
         return self.eigenvalue.real <= 0.0
 
     def largest(self, count: int = 3) -> list[tuple[str, float]]:

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 __all__ = ["Parts", "Pencil", "system_problem"]
 
 SETTLED, LEAST = 1e-12, 1e-6
-"""Step of Newton's method, beside unknowns of this size at least, that ends it."""
+"""Relative step at which Newton's method ends, with this least scale of unknowns."""
 ROUNDING = 1e-13
 """The same in implicit steps, whose matrices are better conditioned."""
 NOTHING = 1e-12
@@ -97,7 +97,7 @@ class Parts:
 
     @property
     def stored(self) -> Index:
-        """Mask of the others."""
+        """Mask of the remaining ones."""
         return np.setdiff1d(np.arange(len(self.flow_rates)), self.bare)
 
 
@@ -186,7 +186,7 @@ class Pencil:
         rows, by_states, _ = self.algebraic(parts)
         found = self._left(rows).T @ by_states
         largest = float(np.abs(by_states).max(initial=0.0))
-        return found[np.abs(found).max(axis=1, initial=0.0) > NOTHING * largest]  # some repeat others and say nothing
+        return found[np.abs(found).max(axis=1, initial=0.0) > NOTHING * largest]  # redundant ones add no conditions
 
     def differentiated(self, parts: Parts) -> list[str]:
         """Outer ports whose input holds states themselves, so that its derivative would act."""
@@ -204,7 +204,7 @@ class Pencil:
             return np.setdiff1d(np.arange(self.n_w), left_out)
         size = np.abs(rows).max(axis=0)
         rows = rows / np.maximum(np.abs(rows).max(axis=1, initial=0.0), TINY)[:, None]
-        # In the metric of the exergy: states of large entries in rows of efforts are as good as those of small ones.
+        # In the metric of the exergy, independent of the states' units.
         stiff = np.maximum(np.abs(np.diag(parts.Q)), SETTLED * size.max(initial=0.0))
         weight = np.where(size > 0.0, stiff**-0.5, 1.0)
         factors: Any = qr(rows * weight, mode="economic", pivoting=True)

@@ -34,9 +34,9 @@ from ephs.solve.stepping import Row
 __all__ = ["Freedoms", "freedoms_of", "linear_scene", "unbalanced"]
 
 BALANCED = 1e-7
-"""Part of the forces that act by which a state may be off balance and still count as an equilibrium."""
+"""Largest unbalanced fraction of the applied forces at an equilibrium."""
 ROUNDED = 1e-9
-"""Part of the largest entry by which a stiffness may be off symmetric: what chains of differentiated poses leave."""
+"""Relative asymmetry allowed in a stiffness: rounding of chains of differentiated poses."""
 
 
 @final
@@ -78,7 +78,7 @@ def freedoms_of(model: Dynamics, state: State) -> Freedoms:
 
 
 def unbalanced(model: Dynamics, state: State, free: Freedoms, stiffness: Array) -> float:
-    """Unbalanced part of the forces at rest in a state, relative to all that act; 0 where nothing acts.
+    """Unbalanced fraction of the forces at rest in a state; 0 without forces.
 
     Weights act at their arms, and all else counts with what ``stiffness`` (n, n) makes of it over 1 rad or m: forces
     that balance each other may vanish one by one.

@@ -10,13 +10,13 @@ from ephs.semantics.bundle import Array
 __all__ = ["Law", "PortHamiltonian", "laws_of"]
 
 ROUNDING = 1e-12
-"""Part of its terms by which a balance of powers may fail: rounding of products of matrices."""
+"""Relative tolerance of a power balance: rounding of products of matrices."""
 
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Law:
-    """An equation with both of its sides; ``scale`` is the size of the terms that made them."""
+    """An equation with both sides; ``scale`` is the size of their terms."""
 
     name: str
     left: Array

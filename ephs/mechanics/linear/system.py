@@ -35,9 +35,9 @@ if TYPE_CHECKING:
 __all__ = ["linear_system"]
 
 RESTS = 1e-12
-"""Rate of change in units of the states below which nothing moves: rounding."""
+"""Rates of states, in their units, that count as rounding."""
 NEGATIVE = 1e-9
-"""Part of the largest entry by which what must vanish, or not be negative, may be off: rounding of eliminations."""
+"""Tolerance, relative to the largest entry, for zero or non-negative quantities: rounding of eliminations."""
 
 
 def linear_system(

@@ -26,7 +26,7 @@ from ephs.solve.stepping import Attempt
 __all__ = ["Alpha"]
 
 CONSTANT = 1e-6
-"""Part of a constant step's change to which its equations are solved: well below the error of order 2."""
+"""Tolerance of the equations of a constant step, relative to its change: well below the error of order 2."""
 ITERATIONS = 20
 ROUNDING = 1e-14
 
@@ -58,7 +58,7 @@ class Alpha(ReducedMethod):
         self._gamma = 0.5 + self._f - self._m
         self._beta = 0.25 * (0.5 + self._gamma) ** 2
         self._enough = 1e-4 if control.step is None else CONSTANT
-        # what is good enough where it gets no better: tolerances near rounding cannot be met a hundred times over
+        # acceptable where iterations stagnate: a hundredth of a tolerance near rounding is unattainable
         self._rough = max(1e-2, ROUNDING / max(float(np.min(self.rtol, initial=1.0)), ROUNDING))
         self.counts = {"iterations": 0, "rho": rho, "keep": keep}
         self.jacobian = Jacobian(equations, self.counts)

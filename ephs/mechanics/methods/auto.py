@@ -26,7 +26,7 @@ __all__ = ["Auto"]
 LIMITS = {"rk54": 3.25, "rk87": 6.1}
 """h·|λ| at the limit of stability."""
 SLOW = 0.5
-"""Contraction of a Gauss method's sweeps beyond which these hold its steps back, not accuracy."""
+"""Contraction of a Gauss method's sweeps above which it limits steps, instead of accuracy."""
 FREEDOMS = 64
 """Degrees of freedom up to which factorising their matrix costs less than an explicit method's shorter steps."""
 DIGITS = 1e-5
@@ -83,7 +83,7 @@ class Auto(ReducedMethod):
         return found
 
     def many(self, span: Span[ReducedState]) -> Leg[ReducedState] | None:
-        """Explicit steps, many in one compiled call, until the problem shows itself stiff; then implicit ones."""
+        """Explicit steps, many in one compiled call, until stiffness is detected; then implicit ones."""
         if self._implicit is not None:
             return self._implicit.many(span)
         return self._explicit.many(span, self._limit, self._switch)
@@ -93,7 +93,7 @@ class Auto(ReducedMethod):
         self.counts["switches"].append({"t": float(t), "to": "radau", "step": float(h), "reason": reason})
 
     def _go_implicit(self) -> "Implicit":
-        from ephs.mechanics.methods.radau import Implicit  # with its derivatives, which explicit runs do not need
+        from ephs.mechanics.methods.radau import Implicit  # with derivatives, which explicit runs do not need
 
         self._implicit = Implicit(self.equations, self.control, self.counts)
         self.exponent, self.share = self._implicit.exponent, self._implicit.share

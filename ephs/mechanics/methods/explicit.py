@@ -155,7 +155,7 @@ class Explicit(ReducedMethod):
         return Attempt(state, closed, h, error, eq.least(state, closed), sums)
 
     def taken(self, state: ReducedState) -> Snapshot:
-        """The rates at the state, where they are known, and how stiff the last step was."""
+        """The rates at the state, if known, and the stiffness of the last step."""
         known = self._known[1] if self._known is not None and self._known[0] is state.q else None
         return {"known": known, "stiffness": self.stiffness, "rough": any(q is state.q for q in self.rough)}
 
@@ -168,7 +168,7 @@ class Explicit(ReducedMethod):
     def many(
         self, span: Span[ReducedState], limit: float = 0.0, left: Callable[[float, float, str], None] | None = None
     ) -> Leg[ReducedState] | None:
-        """Takes many steps in one compiled call, where nothing has to be asked of Python at each.
+        """Many steps in one compiled call, if no step needs Python.
 
         Where stability, whose limit is h·|λ| = ``limit``, holds its steps back, it calls left(t, h, reason) and ends.
         """

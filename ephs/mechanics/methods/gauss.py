@@ -1,4 +1,4 @@
-"""Gauss methods of orders 4, 6 and 8 on the reduced form: symmetric, not damping, both laws kept by the correction.
+"""Gauss methods of orders 4, 6 and 8 on the reduced form: symmetric, undamped, both laws kept by correction.
 
 Hairer, Lubich and Wanner, *Geometric Numerical Integration*, II.1 and VIII.6. Stages are iterated in machine code, many
 steps a call, while that contracts; from where it does not, constant steps are solved by Newton's method with exact
@@ -96,13 +96,13 @@ class Gauss(ReducedMethod):
 
     @property
     def stiffness(self) -> float:
-        """h·|λ| of the fastest mode, as the last step showed it."""
+        """h·|λ| of the fastest mode, estimated in the last step."""
         return self._steps.stiffness
 
     def many(
         self, span: Span[ReducedState], limit: float = 0.0, left: Callable[[float, float, str], None] | None = None
     ) -> Leg[ReducedState] | None:
-        """Steps by sweeps over the stages, many in one compiled call, until these do not contract.
+        """Steps by sweeps over the stages, many in one compiled call, until sweeps do not contract.
 
         From there they are ``left``, or solved by Newton's method.
         """
@@ -145,7 +145,7 @@ class Gauss(ReducedMethod):
         return last
 
     def taken(self, state: ReducedState) -> Snapshot:
-        """Memory of how it solves its stages."""
+        """Memory of its solver of the stages."""
         return {
             "steps": self._steps.taken(state),
             "stages": None if self._stages is None else self._stages.snapshot(state),

@@ -23,7 +23,7 @@ from ephs.solve.stepping import Attempt
 __all__ = ["Ida"]
 
 LEAST_RTOL, LEAST_ATOL = 1e-14, 1e-15
-"""Least tolerances that IDA is given: smaller ones are rounding, by which it ends."""
+"""Least tolerances for IDA, which fails with smaller ones because of rounding."""
 LOG = "SUNLOGGER_ERROR_FILENAME"
 """Environment variable that names the file of SUNDIALS' errors, if not stderr; read when a solver is made."""
 FAR = 1.5
@@ -31,7 +31,7 @@ FAR = 1.5
 OPEN = 10.0
 """Loops open by more than this, relative to the tolerance, ask for another base."""
 PART = 1e-2
-"""IDA's share of the tolerances: it keeps them a step, and its many steps' errors add up."""
+"""Tolerances for IDA relative to the run's: they apply to single steps, whose errors accumulate."""
 
 
 @final
@@ -63,7 +63,7 @@ class Ida(ReducedMethod):
             self._restart(state)
         base, self._failure = self._base, None
         assert base is not None
-        self._base = None  # until this step is taken: the solver cannot go back
+        self._base = None  # until this step is taken: the solver cannot reverse
         try:
             found = self._solver.step(state.t + h - base.t, method="onestep", tstop=state.t + h - base.t)
         except RuntimeError as error:
@@ -99,7 +99,7 @@ class Ida(ReducedMethod):
         # Its sums are its own: a sum that is off by rounding, of a component that makes nothing, refuses no step.
         flows = passed[first:]
         closed = eq.booking.step(state, closed, flows, float(passed[first - 1]), missed=0.0 * flows, refused=False)
-        # It goes on from where it was, so that what is put in is put into each state anew.
+        # It continues from its own state, so corrections are applied to each returned state.
         since = np.concatenate([base.account[: eq.accounts.own], state.account[eq.accounts.own :]])
         allowed = self.atol + self.rtol * eq.sizes(eq.vector(state), eq.vector(closed))
         closed, _ = eq.accounts.corrected(
@@ -139,7 +139,7 @@ class Ida(ReducedMethod):
 
 @contextmanager
 def _unlogged() -> Generator[None, None, None]:
-    """SUNDIALS made here writes no errors to stderr, which it would beside those that are raised."""
+    """Context in which SUNDIALS writes no errors to stderr; they are raised as exceptions."""
     if LOG in os.environ:
         yield
         return

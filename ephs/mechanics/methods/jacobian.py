@@ -1,4 +1,4 @@
-"""The Jacobian of the reduced form, exact, and kept while it serves."""
+"""The exact Jacobian of the reduced form, reused while it converges."""
 
 from dataclasses import replace
 from typing import Any, final
@@ -46,7 +46,7 @@ class Jacobian:
         return self._at is not None and self._at.q is state.q
 
     def at(self, state: ReducedState, *, renew: bool = False) -> Array:
-        """The matrix (size, size), made anew where asked for or where there is none.
+        """The matrix (size, size), evaluated on request or if there is none.
 
         Raises
         ------
@@ -64,7 +64,9 @@ class Jacobian:
         """By tangents of the compiled rates of a tree."""
         eq = self.equations
         if self._slopes is None:
-            warm = eq.nv + eq.n + np.flatnonzero(eq.reduced.tables.node != -1)  # the environment is as warm as it is
+            warm = (
+                eq.nv + eq.n + np.flatnonzero(eq.reduced.tables.node != -1)
+            )  # the environment's temperature is constant
             wanted = np.concatenate([np.arange(eq.nv + eq.n), warm])
             self._slopes = RateSlopes(eq.engine, lambda number: _at_rest(eq, number), wanted, self.size)
         eq.load(state.t, state.q, state.r, state.heats)
@@ -103,7 +105,7 @@ class Jacobian:
         return {"made": parts(self._at), "fresh": self.fresh(state)}
 
     def restore(self, snapshot: Snapshot, state: ReducedState) -> None:
-        """Make the matrix where it was made."""
+        """Evaluate the matrix at its former state."""
         self._at, found = None, snapshot["made"]
         if found is not None:
             made = like(state, found)

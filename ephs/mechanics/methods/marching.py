@@ -1,4 +1,4 @@
-"""Many steps of a mechanism in one compiled call, where nothing has to be asked of Python at each."""
+"""Many steps of a mechanism in one compiled call, if no step needs Python."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, Protocol, final
@@ -21,13 +21,13 @@ from ephs.solve.stepping import Attempt, Counts, Span
 __all__ = ["March"]
 
 ROWS = 1024
-"""Rows that are kept before they are handed over."""
+"""Capacity of the buffer of rows."""
 Leave = Callable[[float, float, str], None]
-"""Called with the time, the next step in s, and why steps are held back."""
+"""Callback with the time, the next step in s, and the reason for its limit."""
 
 
 class Marching(Protocol):
-    """Interface that a march asks of its method.
+    """Interface of methods for compiled steps.
 
     Attributes
     ----------
@@ -136,7 +136,7 @@ class March:
         return self.steering[0]
 
     def advance(self, steps: int) -> bool:
-        """Up to so many steps; whether the end is reached.
+        """Take up to ``steps`` steps; whether the end is reached.
 
         Raises
         ------
@@ -168,7 +168,7 @@ class March:
         return found == Ending.DONE
 
     def _hold(self, sound: float) -> None:
-        """Give up the rows that left the range of numbers; ``sound``: the time before.
+        """Discard rows with overflow; ``sound``: the time before.
 
         Raises
         ------

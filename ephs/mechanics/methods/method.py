@@ -1,4 +1,4 @@
-"""Base of the methods on the reduced form: a step, and the contract of the time loop around it."""
+"""Base of the methods on the reduced form: a step, and the interface to the time loop."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -95,7 +95,7 @@ class ReducedMethod(ABC):
         return replace(state, t=t)
 
     def anew(self, state: ReducedState) -> ReducedState:
-        """The same state as one to start from: without memory, and none that a method has met before."""
+        """The same state as a start: a new object without memory."""
         return replace(state, q=state.q.copy(), memory=())
 
     def row(self, state: ReducedState) -> Row:
@@ -126,7 +126,7 @@ class ReducedMethod(ABC):
         self.equations.accounts.restore(snapshot["accounts"])
 
     def taken(self, state: ReducedState) -> Snapshot | None:
-        """None: a method of one's own that can be resumed says what it takes along, be it nothing: an empty mapping."""
+        """None: a resumable custom method returns its memory, which may be an empty mapping."""
         return None
 
     def take(self, own: Snapshot, state: ReducedState) -> None:  # noqa: B027 - of a method that takes nothing along

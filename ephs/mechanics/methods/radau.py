@@ -69,7 +69,7 @@ class Implicit(ReducedMethod):
         return Attempt(state, closed, h, max(error, missed), eq.least(state, closed))
 
     def many(self, span: Span[ReducedState]) -> Leg[ReducedState] | None:
-        """Steps of trees, many in one compiled call, where nothing has to be asked of Python at each."""
+        """Steps of trees, many in one compiled call, if no step needs Python."""
         eq = self.equations
         looped, attached = eq.engine.looped or eq.driven.size > 0, bool(eq.reduced.attaching.network.attached)
         if looped or attached or not eq.constant:
@@ -96,7 +96,7 @@ class Implicit(ReducedMethod):
         found = lu_solve(real, first[:size] + rough, check_finite=False)
         closed = eq.closed(end)
         error = float(np.max(np.abs(eq.along(found[eq.counted])) / allowed, initial=0.0))
-        if error > 1.0:  # again from where it leads: of stiff parts the first estimate is far too large
+        if error > 1.0:  # again from the corrected state: the first estimate is far too large for stiff parts
             moved = y0.copy()
             moved[:size] += found
             moved[heat] = np.maximum(moved[heat], eq.heats.coldest(y0[heat]))

@@ -218,11 +218,11 @@ def _radau(setting: Setting) -> tuple[Stepper[Any], Policy | None]:
 
 
 METHODS: dict[str, Method] = {}
-"""The methods that there are."""
+"""The registered methods."""
 
 
 def register_method(method: Method) -> None:
-    """Make a method known to `simulate` by its name.
+    """Register a method for `simulate` by name.
 
     Raises
     ------
@@ -319,7 +319,7 @@ for _method in (
 def _for_scenes(setting: Setting) -> tuple[Stepper[Any], Policy | None]:
     try:
         return on_joints(_corrected(_auto))(setting)
-    except OptionError:  # joints that the reduced form cannot have, such as loops of prescribed ones
+    except OptionError:  # joints without a reduced form, such as loops of prescribed ones
         if setting.options:
             raise
         return METHODS["natural"].make(setting)
@@ -332,7 +332,7 @@ AUTO = Method(
 
 
 def chosen(name: str | Method, problem: Problem, *, step: float | None) -> tuple[Method, str]:
-    """The method of a name, and why where the name is ``auto``; a method that is given as a value is itself.
+    """The method of a name, and for ``auto`` the reason; a method as a value is returned unchanged.
 
     Raises
     ------

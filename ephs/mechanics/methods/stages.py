@@ -1,4 +1,4 @@
-"""Stages of a collocation method on the reduced form, by Newton's method with the exact Jacobian, kept while it serves.
+"""Stages of a collocation method on the reduced form, by Newton's method with a reused exact Jacobian.
 
 Hairer and Wanner, *Solving Ordinary Differential Equations II*, IV.8: the system of all stages falls apart into one of
 the mechanism's size for each eigenvalue of the method's coefficients, complex ones in pairs.
@@ -23,9 +23,9 @@ from ephs.solve.snapshot import Snapshot
 __all__ = ["Kept", "Stages"]
 
 SOLVED = 1e-13
-"""Part of the states to which the equations of a step can be solved: rounding, times a condition of some hundreds."""
+"""Attainable relative accuracy of a step's equations: rounding, times a condition of some hundreds."""
 REAL = 1e-12
-"""Imaginary part of an eigenvalue, beside its size, that is rounding."""
+"""Relative imaginary part of an eigenvalue that counts as rounding."""
 ROUNDING = 1e-14
 """Tolerances to which stages are solved at constant steps."""
 KEPT = 0.3
@@ -33,7 +33,7 @@ KEPT = 0.3
 NOTHING = 1e-14
 """Size beside the largest entry of a matrix at which derivatives by heats are rounding."""
 FAST = 2e-3
-"""A rate of convergence that a new matrix would not better: an exact one costs about as much as an iteration."""
+"""Rate of convergence at which a new matrix does not pay: it costs about as much as an iteration."""
 
 
 @final
@@ -64,11 +64,11 @@ class Stages:
         self.equations, self._nodes, self.inverse = equations, nodes, np.linalg.inv(coefficients)
         self.rtol, self.atol = equations.allowed(control.rtol, control.atol)
         if control.step is None:
-            # As far as Newton's method is taken, relative to the tolerance: less than the method's own error.
+            # Convergence of Newton's method, relative to the tolerance: below the method's own error.
             least = float(np.min(self.rtol, initial=1.0))
             self.enough, self.rough = max(SOLVED / max(least, SOLVED), min(0.03, least**0.5)), 1e-2
             self.enough_kept = self.enough
-        else:  # to rounding, and near changes of rank as far as it goes
+        else:  # to rounding, and near changes of rank as far as it converges
             self.rtol, self.atol = np.full_like(self.rtol, ROUNDING), np.full_like(self.atol, ROUNDING)
             self.enough, self.rough, self.enough_kept = 1.0, 1e5, KEPT
         values, vectors = np.linalg.eig(self.inverse)
@@ -79,7 +79,7 @@ class Stages:
         # Of a pair one is solved for: the other is its conjugate.
         self._twice = np.where(np.abs(turns[kept]) > REAL * sizes[kept], 2.0, 1.0)
         self._solvers: tuple[float, list[Any]] | None = None
-        # Off the constraints the exact matrix grows as one over this: an old one is wrong there by as much.
+        # Off the constraints the exact matrix grows with the inverse of this, and so does an old one's error.
         self._separation, self._stale = equations.separation(), False
         self.counts = counts
         counts |= {"iterations": 0, "factorisations": 0}
@@ -105,7 +105,7 @@ class Stages:
             return self._solve(state, y0, h)
 
     def keep(self, *, fast: bool) -> None:
-        """Make the matrix anew at the next step's start, where this one's served badly or constraints have turned."""
+        """Renew the matrix at the next step's start, if convergence was slow or constraints have rotated."""
         self._stale = not fast or self._turned()
 
     def solvers(self, state: ReducedState, h: float) -> list[Any]:
@@ -139,7 +139,7 @@ class Stages:
             self.solvers(state, snapshot["step"])
 
     def _turned(self) -> bool:
-        """Whether constraints have come nearer to repeating each other, or gone from it, since the matrix was made."""
+        """Whether the constraints' distance from dependence has changed since the matrix was made."""
         found = self.equations.separation()
         if found.shape != self._separation.shape:  # another rank
             return True
@@ -174,7 +174,7 @@ class Stages:
                 rates[i] = eq.rates(state.t + node * h, state.q, y)
             self.counts["iterations"] += 1
             change = self._change(state, h, rates[:, :size] - self.inverse @ stages / h)
-            reached = np.abs(y0)  # what starts from nothing, as heat does, is measured by what it becomes
+            reached = np.abs(y0)  # states that start from zero, such as heat, are scaled by their end values
             reached[:size] += np.abs(stages + change).max(axis=0)
             worst = np.max(np.abs(change[:, eq.counted]) / self.allowed(y0, reached), axis=0, initial=0.0)
             moved = float(np.max(worst, initial=0.0))
@@ -183,12 +183,12 @@ class Stages:
             stages += change
             if iteration > 1:
                 rate = moved / before
-                # heats are quadratic in rates: their first change says nothing of convergence
+                # heats are quadratic in rates: their first change is no measure of convergence
                 if rate >= 1.0 and iteration > 2 and moved > max(10.0 * self.enough, self.rough):
                     break
             if moved <= self.enough or (iteration > 1 and moved * rate <= self.enough * (1.0 - min(rate, 0.9))):
                 return stages, rates[:, totals], iteration <= 2 or rate < FAST
-            if iteration > 2 and rate > 0.5 and moved <= self.rough:  # rounding is all that is left
+            if iteration > 2 and rate > 0.5 and moved <= self.rough:  # only rounding remains
                 return stages, rates[:, totals], False
             before = moved
         if moved <= self.rough:  # near a change of rank the matrix is no good, and the iteration slow

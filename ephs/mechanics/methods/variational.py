@@ -30,12 +30,12 @@ from ephs.solve.stepping import Attempt
 __all__ = ["Variational"]
 
 EXACT = 4e-16
-"""Residual beside its terms that no further iteration improves: two roundings."""
+"""Smallest attainable residual, relative to its terms: two roundings."""
 ITERATIONS = 40
 FAR = 1e4
 """Residuals beyond this, relative to momenta or in m, are of an iteration that has gone astray."""
 STAGNANT = 1e-11
-"""An iteration whose residual stops falling below this has come to rounding."""
+"""Residual below which stagnation means rounding."""
 ROUNDING = 1e-13
 """Residuals below this do not ask for a new matrix: their fall is rounding's, and differs from machine to machine."""
 
@@ -95,7 +95,7 @@ class Variational(ReducedMethod):
         heats = np.where(eq.heats.plain, 2.0 * states - state.heats, state.heats)
         closed = eq.closed(ReducedState(state.t + h, q, free, heats, state.totals, account=state.account))
         work = h * powers[1]
-        if self._driven.size:  # the work of what is prescribed: its impulses at both ends of the step
+        if self._driven.size:  # the work of prescribed motions: their impulses at both ends of the step
             impulse = mass @ closed.r - after
             rows = eq.rows()
             second = np.linalg.lstsq(rows.T, impulse, rcond=CONSTRAINT)[0][: self._driven.size]
@@ -122,7 +122,7 @@ class Variational(ReducedMethod):
     def _solved(
         self, state: ReducedState, h: float, momentum: Array, before: Array, xi: Array
     ) -> tuple[Array, Array, tuple[Array, ...]]:
-        """ξ, the impulses G⁰ᵀλ, and what the middle of the step gives, to rounding."""
+        """ξ, the impulses G⁰ᵀλ, and the evaluation at the middle of the step, to rounding."""
         eq, m, n = self.equations, self._rows, xi.size
         push, last, residual = np.zeros(m), np.inf, np.zeros(n)
         middle = self._middle(state, h, xi)

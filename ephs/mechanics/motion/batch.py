@@ -1,4 +1,4 @@
-"""Poses by the thousand: quaternion and position of all instants in one array, for reading motions."""
+"""Arrays of poses: quaternion and position of all instants, for reading motions."""
 
 import numpy as np
 

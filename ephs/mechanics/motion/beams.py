@@ -47,7 +47,7 @@ def beam_motion(
     relative: Callable[[str], Array],
     wrench: Callable[[str], Array],
 ) -> BeamMotion:
-    """Read a beam's motion from its bodies' poses (n, 7), its joints' relative ones, and (n, 6) what those hold."""
+    """Read a beam's motion from its bodies' poses (n, 7), its joints' relative poses, and their wrenches (n, 6)."""
     position = np.stack([poses(node)[:, 4:] for node in beam.nodes], axis=1)
     strains, stresses = list[Array](), list[Array]()
     if beam.lengths:

@@ -58,7 +58,7 @@ class Pressed(Moving, Protocol):
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class _Point:
-    """One point of a contact: what `ContactMotion` says, and wrenches (n, 6) on bodies 1 and 2 in their frames."""
+    """One point of a contact: the values of `ContactMotion`, and wrenches (n, 6) on bodies 1 and 2 in their frames."""
 
     gap: Array
     force: Array
@@ -120,7 +120,7 @@ def _point(bodies: tuple[str, str], touch: Touch, of: Contact, read: Pressed, nu
 def _elastic(
     gap: Gap, law: Law, relative: Array, twist: Array, normal: tuple[Any, ...], distance: Array
 ) -> tuple[Array, Array]:
-    """(n, 6) wrenches of an elastic contact on the second body, in the axes of C2, and the power (n,) that it heats."""
+    """(n, 6) wrenches of an elastic contact on the second body, in the axes of C2, and its heat flow (n,)."""
     wrench = _rows(normal, len(relative)) * law.force(ramp(-distance))[:, None]
     heat = np.zeros(len(relative))
     for factor, w in losses(gap, law, relative.T, twist.T):

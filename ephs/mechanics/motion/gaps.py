@@ -1,4 +1,4 @@
-"""By how much joints are open over a motion: where their coordinates and their bodies put the second joint frame."""
+"""Position residuals of joints over a motion: the second joint frame by coordinates against that by bodies."""
 
 from collections.abc import Iterable, Mapping
 from typing import Protocol

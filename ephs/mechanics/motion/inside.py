@@ -21,7 +21,7 @@ __all__ = ["Inside"]
 
 @final
 class Inside:
-    """The motion of a scene that is a box of a larger system; it reads like the solution of the scene alone.
+    """The motion of a scene as a box of a larger system, with the interface of the scene's own solution.
 
     `ephs.show.animate` takes it, too.
 
@@ -43,7 +43,7 @@ class Inside:
     def __init__(self, solution: "Solution", path: str | Path, scene: "Scene") -> None:
         self._solution, self._path, self.scene = solution, Path.of(path), scene
         self.t, self.name = solution.t, f"{solution.name}.{path}"
-        self.problem = None  # what acts on the mechanism is not a problem of its own
+        self.problem = None  # the loads on the mechanism do not define a problem
         self._motion = SceneMotion(scene, cast(Any, self), lambda: Part(motion_of(solution), self._path))
         for name, _ in scene.all_bodies():
             self._motion.poses(name)
@@ -82,6 +82,6 @@ class Inside:
         return self._motion.marker(name)
 
     def point(self, body: str, xyz: "ArrayLike") -> Array:
-        """(n, 3) world position of a point that is given in the body's frame."""
+        """(n, 3) world position of a point of the body's frame."""
         motion = self.body(body)
         return motion.position + motion.rotation @ np.asarray(xyz, dtype=float)

@@ -1,4 +1,4 @@
-"""Steps that pass a thin surface: one side before, the other after, and no contact between them.
+"""Steps that pass through a thin surface: one side before, the other after, without contact.
 
 The way of the second surface through the axes of the first is straight within a step that is long for them. Gaps of
 convex shapes are convex along it, so that a search by thirds finds the least.
@@ -20,7 +20,7 @@ from ephs.solve.auditing.audit import LEAP
 __all__ = ["Leap", "leaps"]
 
 THIRDS = 48
-"""Rounds of the search, each of which keeps two thirds: (2/3)⁴⁸ of the way is 4e-9 of it."""
+"""Iterations of the search, each reducing the interval by two thirds: (2/3)⁴⁸ is 4e-9."""
 
 
 @final

@@ -1,4 +1,4 @@
-"""Motion of the bodies and joints of a system that no scene was made into, by the paths of their boxes."""
+"""Motion of the bodies and joints of a system without scene, by the paths of their boxes."""
 
 from collections.abc import Mapping
 from functools import cached_property
@@ -96,7 +96,7 @@ class LinkMotion:
 
 
 def _drawn(name: str, joint: LinkJoint, ends: list[tuple[str | None, Array]], element: Array) -> Joint:
-    """A joint with nothing but its place."""
+    """A joint with its location only."""
     (one, at), (other, there) = ends
     nothing = frozen(np.zeros(joint.pair.dim))
     return Joint(

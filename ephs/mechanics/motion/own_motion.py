@@ -1,4 +1,4 @@
-"""Velocities and wrenches of a mechanism far from metres, kilograms and seconds: found in units of its own."""
+"""Velocities and wrenches of very large or small mechanisms, computed in the mechanism's own units."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -19,7 +19,7 @@ __all__ = ["OwnMotion", "own_motion"]
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class OwnMotion:
-    """A motion in units of its own.
+    """A motion in the mechanism's own units.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ class OwnMotion:
 
 
 def own_motion(solution: Solution, make: Callable[[Scene, Solution], Any]) -> OwnMotion | None:
-    """The motion of a solution in units of its own, as ``make`` reads scenes; None where its units are near."""
+    """The motion of a solution in its own units, as ``make`` reads scenes; None if those are close to SI."""
     problem = solution.problem
     if problem is None or problem.scene is None or (units := Units.of(problem.scene)) == SI:
         return None

@@ -62,7 +62,7 @@ class ReducedMotion:
     @staticmethod
     @in_one_thread
     def of(solution: Solution) -> "ReducedMotion | None":
-        """The motion of a solution; None where its problem has no form in joint coordinates, or it leaves that."""
+        """The motion of a solution; None if its problem or states have no form in joint coordinates."""
         if solution.problem is None or not len(solution):
             return None
         try:
@@ -82,7 +82,7 @@ class ReducedMotion:
     def wrench(self, joint: Path) -> Array:
         """(n, 6) of the joint with this box: λ on body 2 in C2, NaN in components that are indeterminate."""
         i = self._number[joint]
-        if self._eq.reduced.tables.kind[i] == SPRING:  # it carries neither link: the sweeps know of its force only
+        if self._eq.reduced.tables.kind[i] == SPRING:  # it carries neither link: the sweeps include only its force
             return self._general.wrench(joint)
         return self._wrenches[:, i]
 
@@ -121,7 +121,7 @@ class ReducedMotion:
     def _press(
         self, touching: Touching, k: int, places: Array, rates: Array, pushed: Array, force: Array, pulled: Array
     ) -> None:
-        """Add what hard contacts and stops do at the k-th instant to accelerations, wrenches on links, and forces."""
+        """Add hard contacts and stops at the k-th instant to accelerations, wrenches on links, and forces."""
         t = self._eq.reduced.tables
         found = pressing_at(self._eq, touching, self._states[k], rates.copy())
         rates += found.rates

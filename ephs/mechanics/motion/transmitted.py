@@ -138,7 +138,7 @@ class Transmission:
         return own @ turn, places[link, PLACE] + own @ at
 
     def _freedoms(self, frames: Mapping[int, tuple[Array, Array]]) -> Array:
-        """(n, 6) world twists that the tree's degrees of freedom give the links that they carry."""
+        """(n, 6) world twists of the tree's degrees of freedom."""
         t = self._reduced.tables
         out = np.zeros((self._reduced.freedoms, 6))
         for i in range(self._reduced.links):
@@ -151,7 +151,7 @@ class Transmission:
         return out
 
     def _needed(self, places: Array, accelerations: Array, freedoms: Array, pushed: Array) -> Array:
-        """(links, 6) wrench about the world's origin that each link needs with all that it carries."""
+        """(links, 6) wrench about the world's origin on each link and its descendants."""
         t = self._reduced.tables
         turn, at = places[:, TURN].reshape(-1, 3, 3), places[:, PLACE]
         grown = np.zeros((self._reduced.links, 6))

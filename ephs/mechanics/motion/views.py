@@ -118,7 +118,7 @@ class ThermalState:
 
 @final
 class Named(Mapping[str, Item], Generic[Item]):
-    """Things of one kind by name, as attributes or keys: ``joints.waist``, ``joints["left.waist"]``."""
+    """Elements of one kind by name, as attributes or keys: ``joints.waist``, ``joints["left.waist"]``."""
 
     __slots__ = ("_kind", "_names", "_read")
 
@@ -153,7 +153,7 @@ class Names:
     def __init__(self, scene: Scene) -> None:
         now = Snapshot.of(scene)
         self.links: dict[str, Link] = {}
-        for link in now.links:  # a joint comes before an implicit one of its name
+        for link in now.links:  # a joint takes precedence over an implicit one of its name
             self.links.setdefault(link.name, link)
         self.axial = {name: _axial_rows(link) for name, link in self.links.items() if _axial(link)}
         self.number = {name: i for i, name in enumerate(now.names)}
@@ -242,7 +242,7 @@ class StateView(Mapping[Path, Array]):
         return link.slip(self._twists, self._element(joint))[0]
 
     def _element(self, joint: str) -> Array:
-        """(size,) the joint's element as it is stored."""
+        """(size,) the joint's stored element."""
         names = self._names
         if joint in names.implicit:
             return self._states[component_path("bodies", joint) / "pe" / "q"]
@@ -267,7 +267,7 @@ class StateView(Mapping[Path, Array]):
 
     @cached_property
     def _twists(self) -> Array:
-        """(bodies, 6) of the momenta; of bodies without mass those that the joints at them ask for."""
+        """(bodies, 6) twists by momenta; of bodies without mass by their joints."""
         names = self._names
         out = np.zeros((len(names.number), 6))
         for name, i in names.number.items():

@@ -92,7 +92,7 @@ def coordinate_steps(scene: Scene, problem: Problem, before: int) -> Iterator[St
 
 
 def mechanisms(reduced: Reduced) -> tuple[Part, ...]:
-    """The mechanisms that nothing but the ground and heat connects, in the order of their links."""
+    """The mechanisms, connected only through the ground and heat, in the order of their links."""
     leader = list(range(reduced.links))
 
     def find(link: int) -> int:
@@ -126,7 +126,7 @@ def loops(reduced: Reduced) -> tuple[Loop, ...]:
             continue
         ends, way = [int(t.first[i]), int(t.second[i])], list[tuple[int, float]]()
         while ends[0] != ends[1]:
-            later = int(ends[1] > ends[0])  # parents come before their children
+            later = int(ends[1] > ends[0])  # parents precede children
             link = ends[later]
             way.append((link, (1.0 if later else -1.0) * (1.0 if t.forward[link] else -1.0)))
             ends[later] = int(t.parent[link])
@@ -138,7 +138,7 @@ def loops(reduced: Reduced) -> tuple[Loop, ...]:
 
 
 def cyclic(reduced: Reduced, part: Part) -> Subgroup:
-    """The motions of a whole mechanism that nothing reads: the algebra, in world axes, of its cyclic coordinates.
+    """Symmetries of a whole mechanism: the Lie algebra, in world axes, of its cyclic coordinates.
 
     They are motions of its only joint with the ground that leave gravity's potential as it is, where that joint has no
     spring of its own.
@@ -176,7 +176,7 @@ def unread(reduced: Reduced) -> Index:
 
 
 def _invariance(gravity: Array) -> Array:
-    """(6, k), orthonormal: motions of everything that leave the potential of gravity as it is."""
+    """(6, k), orthonormal: rigid motions that preserve the potential of gravity."""
     size = float(np.linalg.norm(gravity))
     if size == 0.0:
         return np.eye(6)
@@ -249,7 +249,7 @@ def _redundant(scene: Scene, reduced: Reduced, before: int) -> Step | None:
     repeated = dependences(scene)
     lasting = sum(len(each.directions) - each.here for each in repeated)
     left = lasting - sum(6 - loop.group.dim for loop in found)
-    if left <= 0:  # what is redundant now is not in configurations near by
+    if left <= 0:  # the redundancy is absent in neighbouring configurations
         return None
     reason = f"{in_words(repeated)}; what is implied is left out, the motion stays the same"
     where = tuple(each.joint for each in repeated)
@@ -331,7 +331,7 @@ def describe(group: Subgroup) -> str:
 
 
 def _centre(group: Subgroup) -> Array:
-    """The point that the rotations of SO(3) leave alone: υ = −ω × c."""
+    """The fixed point of the rotations of SO(3): υ = −ω × c."""
     rows: list[Array] = []
     right: list[Array] = []
     for w, v in zip(group.basis[:3].T, group.basis[3:].T, strict=True):

@@ -41,7 +41,7 @@ def _frictions(draft: Draft) -> Iterator[tuple[Path, ...]]:
 
 
 def _resists(part: Irreversible) -> bool:
-    """Whether it may: only a resistance that is given in numbers is known to be zero."""
+    """Whether it may be dropped: only a numerical resistance is known to be zero."""
     kernel = part.kernel
     if kernel is None:
         return True
@@ -88,7 +88,7 @@ def _storage(draft: Draft, box: Path) -> Storage:
 
 
 def _without(lost: set[Path], rebuilt: Callable[[State, State], dict[Path, Array]]) -> StateMap:
-    """States that are left out, and found again."""
+    """States that are dropped and reconstructed."""
 
     def forward(state: State) -> dict[Path, Array]:
         return {path: value for path, value in state.items() if path not in lost}
@@ -128,9 +128,9 @@ def _pose(draft: Draft, place: tuple[Path, ...]) -> Site | None:
     elif {b for b, _ in draft.on(body.momentum)} == {body.coupling} and draft.junctions[body.momentum].exposed:
         refusal = f"nothing else lies on the outer port {body.momentum}"
     elif waiting := [at for at in _at(draft, body.momentum) if _goes(draft, at)]:
-        refusal = f"{waiting[0]} {FIRST}"  # it takes the pose along, or is found again by it
+        refusal = f"{waiting[0]} {FIRST}"  # it stores the pose too, or is reconstructed from it
     else:
-        # of bodies that nothing ties to the ground the first keeps its pose, in whatever order the others lose theirs
+        # of bodies without connection to the ground the first keeps its pose, in any order of the others
         way = reach(draft, body.momentum, {None, *(j for j in found if j < body.momentum)})
         if way is None:
             refusal = "no joint ties the body to a frame whose pose is kept: it could not be found again"
@@ -163,7 +163,7 @@ def _at(draft: Draft, momentum: Path) -> list[Path]:
 
 
 def _goes(draft: Draft, box: Path) -> bool:
-    """Whether a joint holds nothing, or everything, or will when something else is gone."""
+    """Whether a joint is free or rigid, now or after another rewrite."""
     site = _joint(draft, (box,))
     return _merges(draft, box) or (site is not None and (not site.refusal or site.refusal.endswith("first")))
 
@@ -285,7 +285,7 @@ def _vanish(part: Reversible, inertia: Array, moves: Array) -> bool:
 
 
 def _moves(draft: Draft, momentum: Path) -> Array:
-    """(6, k), orthonormal: a space that holds every twist the body may have, by the joints from the ground to it.
+    """(6, k), orthonormal: a space of all possible twists of the body, by the joints from the ground to it.
 
     The joints' coordinates are drawn, so that no special configuration is taken for all.
     """
@@ -321,7 +321,7 @@ WHY_GYROSCOPIC = "ad*_u p vanishes for every twist that the joints allow the bod
 DROP_FRICTION = Rule("drop friction that resists nothing", Strength.RELATION, WHY_FRICTION, _frictions, _friction)
 """8.3 of the theory of simplifications: μ ≡ 0, and its environment."""
 DROP_POSE = Rule("drop a pose that nothing reads", Strength.RELATION, WHY_POSE, _potentials, _pose)
-"""A body's pe, pkc and q where V is constant, and the pose can be found again."""
+"""A body's pe, pkc and q if V is constant and the pose can be reconstructed."""
 DROP_JOINT = Rule("drop a joint that holds nothing", Strength.RELATION, WHY_JOINT, _relations, _joint)
 """Joints of six degrees of freedom without potential and friction."""
 DROP_GYROSCOPIC = Rule(

@@ -1,4 +1,4 @@
-"""The folded form of an initial value problem: fewer unknowns, the same steps, and all that the other one shows."""
+"""The folded form of an initial value problem: fewer unknowns, the same steps, and all results of the original."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -15,7 +15,7 @@ __all__ = ["folded_problem"]
 
 
 def folded_problem(problem: Problem) -> Problem:
-    """The problem with its transformers folded; runs of it are shown as runs of the problem that was given.
+    """The problem with its transformers folded; solutions refer to the original problem.
 
     All states are kept, so that inputs and events read what they did.
     """

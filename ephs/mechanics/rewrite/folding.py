@@ -40,7 +40,7 @@ def _columns(draft: Draft, box: Path, primitive: Reversible, constraint: Array) 
 
 
 def _map(columns: Mapping[Path, Array], size: float, inner: Path) -> tuple[Array, Path | None] | None:
-    """(matrix, outer junction) with e at the inner one = matrix · e at the outer one; None where it is not so."""
+    """(matrix, outer junction) with e at the inner one = matrix · e at the outer one; None otherwise."""
     block = columns[inner]
     others = [j for j in columns if j != inner]
     if block.shape[0] != block.shape[1] or len(others) > 1:
@@ -56,7 +56,7 @@ def _places(draft: Draft) -> Iterator[tuple[Path, ...]]:
     for box, primitive in draft.fillings.items():
         if _determining(primitive) is not None:
             yield (box,)
-            # inner junctions first, as their names go: what a joint has behind its offset is its own
+            # inner junctions first, by their names: junctions behind a joint's offset belong to the joint
             for junction in sorted({j.junction for j in draft.wires[box].values()}, key=lambda j: (-len(j), j)):
                 yield box, junction
 
@@ -94,7 +94,7 @@ def _idle(draft: Draft, box: Path) -> Site | None:
     if any(np.abs(block).max(initial=0.0) > IMPLICIT * size for block in columns.values()):
         return None
     if any(draft.junctions[j].exposed and {b for b, _ in draft.on(j)} == {box} for j in columns):
-        return None  # an outer port must lie on something
+        return None  # an outer port needs a junction
 
     def make(draft: Draft) -> StateMap:
         draft.remove([box])
@@ -164,12 +164,12 @@ class _Fold:
         return ""
 
     def choice(self, draft: Draft) -> str:
-        """Why not, where another component determines the effort as well, and either choice would be arbitrary.
+        """Reason for refusal: another component determines the effort too, and either choice would be arbitrary.
 
         It is not where all junctions that determine one another end in one, nor where two are in series.
         """
         others = self.neighbours(draft)
-        if self.target is None:  # first what is seen through a transformer: where the frame stands is known by it
+        if self.target is None:  # components behind a transformer first: it determines the frame's pose
             for box, _ in others:
                 for fold in _folds(draft, box):
                     if fold.target is not None and fold.junction != self.junction and not fold.refusal(draft):
@@ -180,7 +180,7 @@ class _Fold:
         return f"{rivals[0]} determines the effort at {self.junction} as well"
 
     def make(self, draft: Draft) -> StateMap:
-        """Do it."""
+        """Apply the fold."""
         neighbours: dict[Path, list[Path]] = {}
         for box, port in self.neighbours(draft):
             neighbours.setdefault(box, []).append(port)
@@ -193,7 +193,7 @@ class _Fold:
             given = pull_back(process, dict.fromkeys(ports, Map(self.matrix, kind)))
             draft.replace(box, given, dict.fromkeys(ports, self.target) if self.target is not None else {})
         draft.remove([self.box], [self.junction])
-        # an outer junction that only the transformer touched carries nothing now
+        # an outer junction with the transformer as its only component is now empty
         draft.remove([], _deserted(draft, [] if self.target is None else [self.target]))
         return StateMap()
 

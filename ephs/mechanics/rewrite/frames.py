@@ -1,4 +1,4 @@
-"""Joints and bodies as they are found in a flat system: which frames a joint joins, at which offsets.
+"""Joints and bodies found in a flat system: the frames and offsets of each joint.
 
 Everything is read from the structures themselves, so that it is found before and after folding.
 """
@@ -58,7 +58,7 @@ class Joint:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Body:
-    """A body in a draft: the junction of its momentum, that of its pose, what couples them, and its storages' paths."""
+    """A body in a draft: the junctions of its momentum and pose, their coupling, and its storages' paths."""
 
     momentum: Path
     pose: Path
@@ -103,7 +103,7 @@ def joint_at(draft: Draft, box: Path) -> Joint | None:
     ends: list[Path | None] = []
     offsets: list[Array] = []
     for port, first in zip((Path.of("p_j1"), Path.of("p_j2")), matrices, strict=False):
-        if port not in draft.wires[box]:  # on the ground, at the offset that was folded before it
+        if port not in draft.wires[box]:  # on the ground, at the previously folded offset
             ends.append(None)
             offsets.append(_offset(_folded(part, port)))
             continue
@@ -121,7 +121,7 @@ def joint_at(draft: Draft, box: Path) -> Joint | None:
 
 
 def _folded(part: Primitive, port: Path) -> Array:
-    """The product of the maps that were folded into a port, but for the last one, which has no efforts."""
+    """The product of the maps folded into a port, except the last, which has no efforts."""
     out = np.eye(6)
     for name, numbers in part.parameters:
         if name == f"T {port}" and isinstance(numbers, tuple) and len(numbers) == 36:
@@ -151,7 +151,7 @@ def reach(draft: Draft, start: Path, known: set[Path | None]) -> tuple[tuple[Joi
         for joint, leaving, there in at.get(here, []):
             if there in seen:
                 continue
-            # found from the body outwards, walked from what is known inwards
+            # found from the body outwards, evaluated from the known frame inwards
             longer = ((joint, not leaving), *way)
             if there in known:
                 return longer

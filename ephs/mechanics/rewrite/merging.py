@@ -1,4 +1,4 @@
-"""Merge bodies that are joined rigidly: one inertia, one potential, the other body's joints seen from the first.
+"""Merge rigidly joined bodies: one inertia, one potential, the second body's joints attached to the first.
 
 With x = q₁⁻¹q₂ constant the twists are related by u₂ = Ad_{x⁻¹}u₁, so that 𝕀 = 𝕀₁ + Ad*_{x⁻¹}𝕀₂Ad_{x⁻¹}, p = p₁ +
 Ad*_{x⁻¹}p₂, V(q) = V₁(q) + V₂(q x); gyroscopic forces keep their formula.
@@ -69,7 +69,7 @@ def _at(draft: Draft, place: tuple[Path, ...]) -> Site | None:
     x = SE3.compose(joint.offsets[0], SE3.inverse(joint.offsets[1]))
     if direct != list(joint.ends):
         return Site(NAME, box, Strength.TRAJECTORIES, reason, "its offsets come first", lambda _draft: StateMap())
-    if second.body.momentum < first.body.momentum:  # the name that comes first stays
+    if second.body.momentum < first.body.momentum:  # the first name is kept
         first, second, x = second, first, SE3.inverse(x)
     merge = _Merge(box, first, second, SE3.normalise(x), joint.relative)
     return Site(NAME, box, Strength.TRAJECTORIES, reason, merge.refusal(draft), merge.make)
@@ -107,7 +107,7 @@ class _Merge:
         return ""
 
     def make(self, draft: Draft) -> StateMap:
-        """Do it."""
+        """Apply the merge."""
         first, second = self.first, self.second
         own = self._own(draft)
         pe1, pe2 = draft.fillings[first.body.potential], draft.fillings[second.body.potential]
@@ -147,7 +147,7 @@ class _Merge:
             return {q: SE3.compose(point[q], x)}
 
         def discrete(point: Point, v: Array) -> Array:
-            # of poses efforts are those of the energy, whatever the reference
+            # efforts at poses are derivatives of the energy, independent of the reference
             near = one.discrete_effort(point, v, REFERENCE)
             return near + carried.T @ two.discrete_effort(there(point), carried @ v, REFERENCE)
 

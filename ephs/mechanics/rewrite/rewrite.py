@@ -25,11 +25,11 @@ class Strength(StrEnum):
     """Strength of a rewrite."""
 
     RELATION = "same relation"
-    """At every state, all that the kept variables may be."""
+    """All values of the kept variables at every state."""
     TRAJECTORIES = "same trajectories"
-    """Motions of the kept variables, without reactions."""
+    """Motion of the kept variables, without reactions."""
     MOTION = "same motion"
-    """The motion, but the kept reactions differ."""
+    """The motion; kept reactions differ."""
 
 
 def _same(state: State) -> dict[Path, Array]:
@@ -100,7 +100,7 @@ class Draft:
         return next((box for box, _ in self.on(junction) if isinstance(self.fillings[box], Storage)), None)
 
     def replace(self, box: Path, filling: Primitive, ports: Mapping[Path, Path]) -> None:
-        """Fill a box anew; ports that are not given a junction keep theirs, and those that it has not are gone."""
+        """Replace a box's filling; ports without a new junction keep theirs, absent ports are removed."""
         before = self.wires[box]
         self._unwire(box)
         kinds = filling.interface

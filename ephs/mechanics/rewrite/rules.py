@@ -1,4 +1,4 @@
-"""The rewrites that there are, in the order in which `ephs.reduce` does them."""
+"""All rewrites, in the order of `ephs.reduce`."""
 
 from ephs.mechanics.rewrite.dropping import DROP_FRICTION, DROP_GYROSCOPIC, DROP_JOINT, DROP_POSE
 from ephs.mechanics.rewrite.folding import FOLD

@@ -15,7 +15,7 @@ NAME = "stabilised"
 
 
 def stabilised(system: System) -> System:
-    """The flattened system whose joints hold between velocities, each with a box ``closing`` that closes its positions.
+    """The flattened system with joints as velocity constraints, each with a box ``closing`` for its positions.
 
     In continuous time nothing changes: the second multipliers are zero. For comparison with the literature on
     stabilised index 2; ``natural`` keeps positions without it. Only the method ``natural`` solves it.

@@ -1,4 +1,4 @@
-"""Mechanisms in systems that no scene was made into: their joints are found in the flat system, and assembled.
+"""Mechanisms in systems without scene: their joints are found in the flat system and assembled.
 
 A joint is a holonomic relation between two frames; frame changes lead from there to bodies, whose momentum is coupled
 to a pose, or to the ground. Relative poses follow from poses and poses from relative poses where they are not given; a

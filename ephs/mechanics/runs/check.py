@@ -31,7 +31,7 @@ LARGEST = 600
 STEP, STEPS = 1e-3, 100
 """Seconds and number of the steps over which balances are measured: in the first ones little may have moved yet."""
 ROUNDING = 1e-13
-"""Rounding of the sum of energies over these steps, relative to them."""
+"""Relative rounding of the sum of energies over these steps."""
 
 
 @in_one_thread

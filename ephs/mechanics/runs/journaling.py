@@ -24,7 +24,7 @@ _PROGRAMS = ("ephs", "numpy", "scipy", "llvmlite")
 def journaled(
     journal: "Journal | str | PathLike[str] | None", problem: Problem, asked: Mapping[str, Any]
 ) -> Generator[Written | None, None, None]:
-    """The journal of a run, open while it goes on; None of None.
+    """The journal of a run, open during the run; None without a path.
 
     Raises
     ------
@@ -43,7 +43,7 @@ def journaled(
 
 
 def heading_of(problem: Problem, asked: Mapping[str, Any]) -> dict[str, Any]:
-    """Heading of a journal: only the same run, by the same programs, goes on to the same numbers.
+    """Heading of a journal: only the same run with the same versions resumes to the same numbers.
 
     Functions among the options are told by their names; whether they do the same, nobody can know.
     """
@@ -61,7 +61,7 @@ def heading_of(problem: Problem, asked: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _digest(problem: Problem) -> str:
-    """Of every component with its numbers, the initial states and the surroundings."""
+    """Digest of every component with its numbers, the initial states and the surroundings."""
     d = problem.descriptor
     parts: list[Any] = [problem.document, problem.reference]
     for slot in d.components:
@@ -76,7 +76,7 @@ def _digest(problem: Problem) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """As JSON can hold it; of long arrays a digest."""
+    """The value for JSON; long arrays as digests."""
     if isinstance(value, Mapping):
         return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, np.ndarray):

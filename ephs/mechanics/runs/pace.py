@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 __all__ = ["longest_step"]
 
 TURN = 0.1
-"""By how much a prescribed joint may move in a step at most: rad, or this part of the scene's extent."""
+"""Step limit for prescribed motions: largest displacement in rad, or as a fraction of the scene's extent."""
 TIMES = 100.0
 """Largest error of a step of a method of order p, which is the p-th power of that angle, in tolerances."""
 

@@ -1,4 +1,4 @@
-"""Forces on a scene's joints, bodies and markers, as users give them."""
+"""Users' inputs as forces on a scene's joints, bodies and markers."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace

@@ -59,13 +59,13 @@ def load_solution(path: str | File, model: System | Scene | None = None) -> Solu
     try:
         with open(file, "rb") as opened:
             first = opened.read(len(MAGIC))
-        # Of a run that was stopped at once, the journal may have no letter yet.
+        # The journal of a run stopped at once may be empty.
         written_down = first == MAGIC or (file.suffix == ".journal" and MAGIC.startswith(first))
         found = _of_journal(file, model, homes) if written_down else _of_result(file, homes)
         _check_states(found)
     except OptionError:  # of a journal
         raise
-    except Exception as error:  # what is broken on purpose may fail anywhere
+    except Exception as error:  # a crafted file may fail anywhere
         if str(error).startswith(f"{file}: "):
             raise
         raise ValueError(f"{file}: not a solution of this program ({type(error).__name__}: {error})") from error
@@ -109,7 +109,7 @@ def _of_journal(file: File, model: System | Scene | None, homes: tuple[File, ...
 
 
 def _known(given: Any) -> Any:
-    """An input as the journal knows it: of a function its name only, so any function stands for it."""
+    """An input from a journal; of a function only the name is stored, so any function replaces it."""
     return (lambda _: 0.0) if isinstance(given, str) else given
 
 
@@ -125,7 +125,7 @@ def _check_states(found: Solution) -> None:
 
 
 def _scene(text: str, homes: tuple[File, ...]) -> Scene:
-    """The scene of a file that may come from anybody."""
+    """The scene of an untrusted file."""
     scene = scene_from_text(text)
     check_scene(scene)
     return meshes_within(scene, homes)
@@ -150,7 +150,7 @@ def _problem_again(text: str, t: Array, inputs: Mapping[Path, Array], homes: tup
 
 
 def _kept(t: Array, values: Array, effort: bool) -> Signal:
-    """A signal that is known at some instants, exactly, and between them by straight lines."""
+    """A signal by its values at some instants, linearly interpolated."""
     if np.all(values == values[0]):
         return Signal(values[0], effort)
     order = np.argsort(t)

@@ -1,4 +1,4 @@
-"""Inputs as signals: constants, functions of time, functions of time and state; times as users give them."""
+"""Inputs as signals: constants, functions of time, functions of time and state; users' times."""
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any
@@ -129,12 +129,12 @@ def _asked(problem: Problem, name: str, function: Callable[..., Any]) -> Asked:
 
 
 def takes_state(function: Callable[..., Any]) -> bool:
-    """Whether it wants a second argument: one that must be given, or is called state."""
+    """Whether it takes a second argument, required or named state."""
     import inspect
 
     try:
         parameters = inspect.signature(function).parameters.values()
-    except (TypeError, ValueError):  # functions in C tell no signature; those of mathematics take one argument
+    except (TypeError, ValueError):  # functions in C have no signature; mathematical ones take one argument
         return False
     places = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
     given = [p for p in parameters if p.kind in places and (p.default is p.empty or p.name == "state")]

@@ -61,9 +61,9 @@ if TYPE_CHECKING:
 __all__ = ["control_of", "problem_of_scene", "problem_of_system", "simulate"]
 
 OPEN = 1e-6
-"""m or rad by which given initial states may leave a joint open."""
+"""Largest joint residual of given initial states, in m or rad."""
 OFF = 1e-3
-"""Part by which a given momentum may contradict the joints: nodal momenta of some methods do, to their order."""
+"""Relative error allowed in momenta off the joints: nodal momenta of some methods satisfy joints to their order."""
 FORMS = ("paper", "folded", "reduced")
 
 
@@ -374,7 +374,7 @@ def problem_of_scene(
 
 
 def _on_joints(problem: Problem) -> None:
-    """Hold initial states that were given against the joints.
+    """Check given initial states against the joints.
 
     Raises
     ------

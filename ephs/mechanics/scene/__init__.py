@@ -1,4 +1,4 @@
-"""Scenes: mechanisms as they stand in files, and in the state in which they start.
+"""Scenes: mechanisms from files, in their initial states.
 
 The model of a scene is light; the reader, with its schema and assembly, lies in `ephs.mechanics.scene.load`
 and is imported where it is used.

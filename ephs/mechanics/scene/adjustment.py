@@ -1,4 +1,4 @@
-"""Record of adjusting a scene: bodies that moved, and given values that could not be kept."""
+"""Record of adjusting a scene: displaced bodies and replaced values."""
 
 from dataclasses import dataclass
 from typing import final

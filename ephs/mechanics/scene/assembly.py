@@ -1,5 +1,4 @@
-"""Placement: bodies without a position or a velocity get them from their joints; then every joint is
-measured.
+"""Placement: missing positions and velocities of bodies follow from their joints; then every joint is checked.
 
 A body without a position is placed by its first joint with frames in the bodies, at that joint's
 coordinate; a body without a velocity likewise, at its rate. What then remains open in a joint is a fault,
@@ -129,7 +128,7 @@ def _move(
         rate = np.zeros(link.coupling.dim) if link.rate is None else link.rate
         twists[body] = link.move_second(twists, x, rate) if link.body2 == body else link.move_first(twists, x, rate)
 
-    # A joint given by `at` and `axis` moves a body only where its rate is written down.
+    # A joint with `at` and `axis` moves a body only if its rate is specified.
     leading = [
         link
         for j, link in zip(joints, links, strict=True)

@@ -23,7 +23,7 @@ __all__ = [
 
 Array = NDArray[np.float64]
 POSITIVE, NON_NEGATIVE = (0.0, True), (0.0, False)
-"""A bound from below, and whether it is excluded."""
+"""A lower bound, and whether it is excluded."""
 
 
 @final
@@ -97,12 +97,12 @@ class Attachment(ABC):
         """In a few words."""
 
     def values(self) -> dict[str, tuple[Any, tuple[int, ...]]]:
-        """Its numbers, with the shapes that they ought to have; none for those that are left out."""
+        """Its numbers with their required shapes, without omitted ones."""
         given = {key: (getattr(self, key), number.shape(len(self.tied))) for key, number in self.numbers.items()}
         return {key: pair for key, pair in given.items() if pair[0] is not None}
 
     def rescaled(self, length: float, mass: float, time: float, joints: Sequence[float]) -> Self:
-        """Itself in other units; ``joints`` are those of its joints' coordinates."""
+        """The same in other units; ``joints`` are those of its joints' coordinates."""
         changed: dict[str, Any] = {}
         for key, (value, _) in self.values().items():
             found = value * self.numbers[key].unit(length, mass, time, joints)
@@ -129,7 +129,7 @@ class Motor(Attachment):
         V, where no input is given.
     """
 
-    # Amperes and coulombs a second stay what they are in other seconds.
+    # Currents do not depend on the unit of time.
     numbers: ClassVar[Mapping[str, Number]] = {
         "constant": Number(energy=1, time=1),
         "resistance": Number(energy=1, time=1, least=POSITIVE),
@@ -317,7 +317,7 @@ class GasSpring(Attachment):
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Actuator(Attachment):
-    """A control that is forces on joints: an input by name, of any motor that is no more than its force.
+    """A control as forces on joints: an input by name, for motors without dynamics.
 
     Attributes
     ----------

@@ -128,7 +128,7 @@ def _warmth(beam: Beam, entry: Any, lengths: Array) -> tuple[dict[str, ThermalNo
 
 
 def _check_kind(table: Checked[Any], key: str, faults: list[Fault]) -> None:
-    """Rigid pieces can be strained by torsion and bending, those of strings by nothing, and are of order 2."""
+    """Rigid pieces have strain energy of torsion and bending, those of strings none; order 2."""
     entry = table.entry
     if not table.sound("rod", "order", "strain", "damping") or entry.rod == "reissner":
         return
@@ -202,7 +202,7 @@ def _surfaces(entry: Any, sides: tuple[Array, Array]) -> dict[str, Surface]:
 
 
 def _radius(section: Any) -> float | None:
-    """Of a round section; None of others."""
+    """Radius of a round section, else None."""
     return section.circle or (section.tube[0] if section.tube else None)
 
 

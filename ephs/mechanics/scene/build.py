@@ -220,7 +220,7 @@ class _Builder:
         return str(path)
 
     def drive(self, name: str, path: Path, of: Quantity) -> str:
-        """The junction of a driven joint, exposed where the level above wants it."""
+        """The junction of a driven joint, exposed at the request of the level above."""
         self.junctions[path] = junction(of, exposed=name in self.demands.joints)
         return str(path)
 
@@ -282,7 +282,7 @@ def _level(scene: Scene, demands: _Demands, *, top: bool) -> System:
         b.add(Path(["parts", name]), system, ports)
     for section, name, each in scene.attachments():
         if isinstance(each, Actuator):
-            continue  # forces on joints, as the runs have them
+            continue  # forces on joints, as in runs
         at = [_at("drives", tied) for tied in each.tied]
         made = system_of(each, [b.junctions[path].quantity for path in at])
         ports = dict(zip(made[1], map(str, at), strict=True))
@@ -296,7 +296,7 @@ def _level(scene: Scene, demands: _Demands, *, top: bool) -> System:
 
 
 def _joined(b: _Builder, part: str, port: Path, of: Quantity) -> str:
-    """The junction at this level that a part's outer port lies on."""
+    """The junction at this level of a part's outer port."""
     group, *rest = tuple(port)
     if rest == [GROUND]:
         return b.momentum(GROUND)

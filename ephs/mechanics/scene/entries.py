@@ -133,7 +133,7 @@ def validate(model: type[E], raw: Any, key: str, faults: list[Fault]) -> Checked
 
 
 def shown(value: Any) -> str:
-    """A value as it would stand in the file, shortened."""
+    """A value in the file's notation, shortened."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, Mapping):
@@ -188,7 +188,7 @@ def _translate(model: type[Entry], key: str, item: Any) -> Fault:
 
 
 def _nested(model: type[Entry], key: str) -> type[Entry]:
-    """The table that a key of a table holds, itself where there is none."""
+    """The table at a key of a table; the table itself if there is none."""
     kinds: list[Any] = [model.model_fields[key].annotation, *model.model_fields[key].metadata]
     while kinds:
         kind = kinds.pop()

@@ -51,7 +51,7 @@ class SceneError(ValueError):
 
 @final
 class SceneWarning(UserWarning):
-    """A scene that can be used, but hardly describes a real mechanism."""
+    """A usable but physically implausible scene."""
 
 
 @final
@@ -315,7 +315,7 @@ def listing(names: Iterable[str], limit: int = 12) -> str:
 
 
 def unknown_name(what: str, name: str, known: Iterable[str], scene: str = "scene") -> SceneError:
-    """The error of asking a scene for a body or joint that it does not have."""
+    """The error for an unknown body or joint of a scene."""
     names = list(known)
     hint = did_you_mean(name, names, f"there are: {listing(names)}")
     return SceneError(scene, [fault("unknown state", "", f'{what} "{name}"', what=what, hint=hint)])

@@ -1,4 +1,4 @@
-"""The numbers of a scene's things: how each is read, written and held against its range."""
+"""The numbers of a scene's elements: reading, writing and range of each."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -21,7 +21,7 @@ __all__ = ["FIELDS", "Field", "placed"]
 
 Array = NDArray[np.float64]
 Least = tuple[float, bool]
-"""A bound from below, and whether it is excluded."""
+"""A lower bound, and whether it is excluded."""
 NON_NEGATIVE: Least = (0.0, False)
 POSITIVE: Least = (0.0, True)
 
@@ -68,7 +68,7 @@ def placed(scene: Scene, before: Scene, coordinates: Mapping[str, Array], rates:
 
 
 def _edited(scene: Scene, kind: str, name: str, change: Callable[[Any], Any]) -> Scene:
-    """The scene with one of its things changed, in whichever part it is."""
+    """The scene with one of its elements changed, in any part."""
     own = getattr(scene, kind)
     if name in own:
         return replace(scene, **{kind: {**own, name: change(own[name])}})
@@ -156,7 +156,7 @@ def _body_faults(scene: Scene, name: str, before: Scene) -> list[Fault]:
 
 
 def _put_position(scene: Scene, name: str, values: Array) -> Scene:
-    """The centre of mass elsewhere: the body moves on as it did, its joints stay; a free body starts there."""
+    """Another centre of mass: the body's motion and joints are unchanged; a free body starts there."""
     body = scene.body(name)
     pose = np.concatenate([body.pose[:4], values])
     joints = [j for _, j in scene.all_joints() if name in (j.body1, j.body2)]
@@ -215,7 +215,7 @@ def _at(scene: Scene, name: str) -> Array:
 
 
 def _put_at(scene: Scene, name: str, values: Array) -> Scene:
-    """The joint elsewhere in the world: both of its frames move by as much."""
+    """Another position of the joint in the world: both frames are displaced equally."""
     joint, by = scene.joint(name), values - _at(scene, name)
     frames: dict[str, Array] = {}
     for key, body in (("frame1", joint.body1), ("frame2", joint.body2)):
@@ -244,7 +244,7 @@ def _put_coordinate(scene: Scene, name: str, values: Array) -> Scene:
 
 
 def _motion(key: str) -> Field:
-    """A number of a prescribed motion; without that there is none."""
+    """A number of a prescribed motion, if there is one."""
 
     def get(scene: Scene, name: str) -> Array:
         number = number_of_law(scene.joint(name).motion, key)
@@ -261,7 +261,7 @@ def _motion(key: str) -> Field:
 
 
 def _dry(key: str) -> Field:
-    """A number of dry friction; without that there is none."""
+    """A number of dry friction, if there is any."""
 
     def get(scene: Scene, name: str) -> Array:
         dry = scene.joint(name).dry
@@ -347,4 +347,4 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
     },
     "markers": {"at": _attribute("markers", "at")},
 }
-"""Kind of thing -> key of the scene file -> its numbers."""
+"""Kind of element -> key of the scene file -> its numbers."""

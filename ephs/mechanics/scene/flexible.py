@@ -10,7 +10,7 @@ __all__ = ["FREE_END", "Beam", "Load", "Strain"]
 
 Array = NDArray[np.float64]
 FREE_END = "free"
-"""An end of a beam that is welded to nothing."""
+"""A free end of a beam."""
 
 
 @final

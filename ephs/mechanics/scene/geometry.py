@@ -82,7 +82,7 @@ class Coupling:
         return self.pair.element(coordinates) if self.middle is None else np.array(coordinates)
 
     def fit(self, relative: Array, near: Array | None = None) -> Array:
-        """The element whose inclusion comes nearest to a pose; of several, one close to ``near``."""
+        """The element whose inclusion is nearest to a pose; of several, one close to ``near``."""
         if self.middle is not None:
             return self._fit_universal(relative, near)
         return self.pair.fit(relative, near)
@@ -99,7 +99,7 @@ class Coupling:
 
 
 def coupling(kind: str, pitch: float = 0.0, middle: Array | None = None) -> Coupling:
-    """The coupling of a joint type; ``pitch`` goes to pairs that have one, ``middle`` to universal joints."""
+    """The coupling of a joint type; ``pitch`` is for screws, ``middle`` for universal joints."""
     if kind == UNIVERSAL:
         return Coupling(pair("revolute"), np.array(IDENTITY_POSE if middle is None else middle))
     return Coupling(pair(kind, pitch=pitch) if "pitch" in PAIRS[kind].parameters else pair(kind))
@@ -116,7 +116,7 @@ def joint_types() -> list[str]:
 
 
 def unit(vector: Array) -> Array | None:
-    """The direction of a vector; None where it has none."""
+    """The direction of a vector, or None for zero."""
     size = float(np.linalg.norm(vector))
     return vector / size if size > DIRECTION else None
 

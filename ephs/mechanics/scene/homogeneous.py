@@ -19,7 +19,7 @@ __all__ = ["mass_and_moments"]
 
 
 def mass_and_moments(table: Checked[BodyEntry], key: str, faults: list[Fault]) -> tuple[float, list[float]] | None:
-    """Mass, and inertia as xx yy zz [xy xz yz], of a body as given or of its shapes; None after a fault.
+    """Mass, and inertia as xx yy zz [xy xz yz], of a body, specified or by its shapes; None after a fault.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Inertia tensors that no distribution of mass has: refused, kept, or made possible.
+"""Physically impossible inertia tensors: refused, kept, or corrected.
 
 Files of real robots have them: rounded, copied, left at zero. Their motion may be determined all the same.
 """

@@ -96,7 +96,7 @@ class Link:
         return self.coupling.fit(self.relative(poses), self.near)
 
     def error(self, poses: Array, x: Array) -> Array:
-        """The logarithm (6,) of C2 in the frame where the joint's element puts it."""
+        """The logarithm (6,) of C2 relative to its frame by the joint's element."""
         return SE3.log(SE3.compose(SE3.inverse(self.coupling.include(x)), self.relative(poses)))
 
     def gap(self, poses: Array, x: Array) -> tuple[float, float]:
@@ -128,12 +128,12 @@ class Link:
         return self._place(self.second(poses), SE3.inverse(self.coupling.include(x)), self.frame1)
 
     def move_second(self, twists: Array, x: Array, rate: Array) -> Array:
-        """The twist of body 2 when body 1 moves so and the joint has this rate."""
+        """The twist of body 2 from that of body 1 and the joint's rate."""
         rows1, _ = self.rows(x)
         return SE3.adjoint(self.frame2) @ (self.coupling.basis(x) @ rate - rows1 @ twist(twists, self.body1))
 
     def move_first(self, twists: Array, x: Array, rate: Array) -> Array:
-        """The twist of body 1 when body 2 moves so and the joint has this rate."""
+        """The twist of body 1 from that of body 2 and the joint's rate."""
         _, rows2 = self.rows(x)
         to1 = SE3.compose(self.frame1, self.coupling.include(x))
         return SE3.adjoint(to1) @ (rows2 @ twist(twists, self.body2) - self.coupling.basis(x) @ rate)
@@ -159,7 +159,7 @@ def elements(links: Sequence[Link], poses: Array) -> list[Array]:
 
 
 def extent(links: Sequence[Link], poses: Array) -> tuple[Array, float]:
-    """The centre (3,) of the joints and bodies in m, and the radius about it within which they lie."""
+    """The centre (3,) of the joints and bodies in m, and the radius of their enclosing sphere about it."""
     points = np.array([*(link.second(poses)[4:] for link in links), *poses[:, 4:]]).reshape(-1, 3)
     centre = points.mean(axis=0) if len(points) else np.zeros(3)
     return centre, float(np.linalg.norm(points - centre, axis=1).max(initial=0.0))

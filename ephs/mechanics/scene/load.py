@@ -36,8 +36,8 @@ MODELS = (".urdf", ".xml", ".sdf")
 MOST_LEVELS = 50
 """Names in a dotted key, and parts within parts."""
 MOST_PARTS = 2000
-"""Parts that a scene and its parts use, so that few files cannot stand for very many."""
-# The time that TOML's reader takes grows with the square of the names in a key.
+"""Largest number of parts in a scene, against exponential nesting."""
+# The TOML reader's time is quadratic in the number of names in a key.
 _NAME = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
 _LONG_KEY = re.compile(rf"(?<![\w-])(?:{_NAME}[ \t]*+\.[ \t]*+){{{MOST_LEVELS}}}")
 
@@ -301,7 +301,7 @@ def _tendons(
 
 
 def _file_inside(file: Path, home: Path) -> Path | None:
-    """The file, if it lies in a folder or below once links are followed."""
+    """The resolved file, if it is in a folder or below it."""
     try:
         return file if file.resolve().is_relative_to(home) else None
     except (OSError, ValueError, RuntimeError):  # a name that no file can have, links that lead in a circle

@@ -36,7 +36,7 @@ class Made:
         """A body's system."""
         key = of.mass, of.inertia.tobytes(), gravity.tobytes()
         if key not in self.systems:
-            # the scene's reader has seen to the inertia
+            # the scene's reader has checked the inertia
             self.systems[key] = rigid_body(of.mass, of.inertia, gravity, strict=False)
         return self.systems[key]
 

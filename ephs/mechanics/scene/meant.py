@@ -1,4 +1,4 @@
-"""Mechanisms that are movable up to the rounding of a file's numbers, made movable.
+"""Correction of mechanisms that are movable up to the rounding of a file's numbers.
 
 The axes of a planar four-bar that are parallel to nine digits lock it, if taken at their word: its constraints are of
 full rank by 1e-9. Decided by theory: singular values that are small but not rounding belong to motions along which the
@@ -187,7 +187,7 @@ def _movable(links: Sequence[Link], configurations: list[Array], scale: Scale) -
 
 
 def _stiffest(links: Sequence[Link], poses: Array, ways: Array, scale: Scale) -> str:
-    """The joint that such motions open most."""
+    """The joint with the largest residual along these motions."""
     opened = [float(np.abs(rows @ ways.T).max(initial=0.0)) for _, rows in _rows(links, poses, scale)]
     return links[int(np.argmax(opened))].name
 

@@ -29,7 +29,7 @@ _MAKE: Final[Mapping[str, Callable[[Any], MotionLaw]]] = {
 
 
 def law_of(entry: MotionEntry, key: str, faults: list[Fault]) -> MotionLaw:
-    """The motion law that a table of a file describes; rest, and a fault, where it describes none."""
+    """The motion law of a table; rest, and a fault, if the table is invalid."""
     given = {name for keys in _KEYS.values() for name in keys if getattr(entry, name) is not None}
     forms = [form for form, keys in _KEYS.items() if given <= set(keys) and given >= set(keys) - _OPTIONAL]
     if not forms:

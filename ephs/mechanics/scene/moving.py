@@ -1,4 +1,4 @@
-"""A scene moved as a whole: how a part comes into the world of the scene that uses it."""
+"""A scene displaced as a whole: placement of a part in the world of its scene."""
 
 from dataclasses import replace
 

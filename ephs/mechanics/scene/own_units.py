@@ -64,7 +64,7 @@ SI = Units(1.0, 1.0, 1.0)
 
 
 def in_own_units(problem: Problem) -> Problem:
-    """The problem of a scene in units of its own, whose runs are shown as those of the problem that was given.
+    """The problem of a scene in its own units; solutions refer to the original problem.
 
     That problem itself where its units are near, or where there is no scene.
     """
@@ -119,7 +119,7 @@ def in_own_units(problem: Problem) -> Problem:
 
 
 def seen_from(problem: Problem, events: tuple[Event, ...], progress: Progress | None) -> tuple[Any, Any]:
-    """Events and progress on times of the problem that was given, and on what its users read of its states."""
+    """Events and progress in times and states of the original problem."""
     given, seconds, view = problem.given, problem.seconds, problem.view
 
     def seen(event: Event) -> Event:

@@ -105,7 +105,7 @@ class _Place:
         raise _unknown(scene, path)
 
     def entry(self, values: Array, scene: Scene) -> Any:
-        """Part of the field's array: an index, or a slice for all of it where one number stands for all."""
+        """Index in the field's array, or a slice if one number represents all of it."""
         if values.ndim == len(self.index) and all(i < n for i, n in zip(self.index, values.shape, strict=True)):
             return self.index
         if values.ndim == 2 and len(self.index) == 1 and self.index[0] < len(values):
@@ -126,7 +126,7 @@ class _Place:
         return float(values.flat[0])
 
     def put(self, scene: Scene, value: float) -> Scene:
-        """The scene with another number there."""
+        """The scene with another value of this number."""
         values = np.array(self.field.get(scene, self.name))
         entry = self.entry(values, scene)
         if values.ndim == 2 and not self.index:
@@ -217,7 +217,7 @@ def _library() -> dict[str, Callable[..., Filling]]:
 
 
 def _component(system: System, path: str) -> tuple[Filling, str, float]:
-    """The component that a path leads to, the parameter's name and its number."""
+    """The component at a path, the parameter's name and its value."""
     *box, key = path.split(".")
     filling: Any = system
     for word in _boxes(system, box):

@@ -1,4 +1,4 @@
-"""Convex meshes from STL files: their vertices, where they bound a convex body."""
+"""Convex meshes from STL files: their vertices, after a check of convexity."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ MOST_BYTES = 20_000_000
 MOST_VERTICES = 256
 """Vertices that a surface may have: each is a point of contact."""
 FLAT = 1e-5
-"""Part of a mesh's size by which vertices may lie inside its convex hull, and volumes differ from that of the hull."""
+"""Relative tolerance of convexity: depth of vertices inside the hull, and difference of volumes."""
 RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
 HEAD = 84
 """Bytes before the triangles of a binary file: 80 of text, and their number."""

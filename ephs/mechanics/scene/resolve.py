@@ -296,7 +296,7 @@ def _motion(entry: JointEntry, d: int, drive: Array, key: str, faults: list[Faul
 
 
 def mesh_file(name: str, folder: Path) -> Path | None:
-    """The file, if it lies in a folder or below once links are followed."""
+    """The resolved file, if it is in a folder or below it."""
     try:
         file = (folder / name).resolve()
     except (OSError, ValueError, RuntimeError):  # a name that no file can have, links that lead in a circle

@@ -20,7 +20,7 @@ __all__ = ["Section", "circle", "rectangle", "resolve_section", "tube"]
 Array = NDArray[np.float64]
 NUMBERS = ("EA", "GA", "GJ", "EI", "rhoA", "rhoI")
 NEEDED = {"reissner": NUMBERS, "kirchhoff": ("GJ", "EI", "rhoA", "rhoI"), "string": ("rhoA",)}
-"""Numbers that a kind of rod needs; those of the others may be there."""
+"""Required numbers of each kind of rod; other numbers are optional."""
 IRON = 7870.0
 """Density in kg/m³."""
 SHAPES = ("circle", "tube", "rectangle")
@@ -80,7 +80,7 @@ def _of(
 
 
 def resolve_section(entry: SectionEntry, key: str, faults: list[Fault], rod: str) -> Section | None:
-    """The section of a table for a kind of rod; None, with a fault, where it says too little or too much."""
+    """The section of a table for a kind of rod; None, with a fault, for missing or excess keys."""
     given: Mapping[str, Any] = {name: value for name, value in entry.model_dump().items() if value is not None}
     shapes = [name for name in given if name in SHAPES]
     if len(shapes) > 1 or (shapes and any(name in NUMBERS for name in given)):

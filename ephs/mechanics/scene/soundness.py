@@ -1,4 +1,4 @@
-"""Scenes from result files: whether everything has the type, shape and size that the rest takes for granted.
+"""Scenes from result files: checks of all types, shapes and sizes.
 
 Scene files are checked as they are read, key by key; a result file holds what was a scene once, unless it was changed.
 """
@@ -56,7 +56,7 @@ def check_scene(scene: Scene) -> None:
 
 
 def meshes_within(scene: Scene, homes: Iterable[Path]) -> Scene:
-    """The scene without the meshes that lie neither in one of these folders nor below."""
+    """The scene without meshes outside these folders."""
     folders, lost = [home.resolve() for home in homes], list[str]()
 
     def near(shape: Mapping[str, Any] | None) -> bool:
@@ -83,7 +83,7 @@ def meshes_within(scene: Scene, homes: Iterable[Path]) -> Scene:
 
 
 def _shapes(scene: Scene) -> Iterator[tuple[str, dict[str, tuple[Any, tuple[int, ...]]]]]:
-    """Every number with the shape that it ought to have."""
+    """Every number with its required shape."""
     w = scene.world
     yield "world", {"gravity": (w.gravity, (3,)), "temperature": (w.temperature, ()), "pressure": (w.pressure, ())}
     for name, body in scene.all_bodies():

@@ -22,11 +22,11 @@ from ephs.semantics.spaces.rank import ASSEMBLY
 from ephs.solve.control import SLIVER
 
 MOVED = 1e-12
-"""Change of a body's state in m, rad, m/s, rad/s that is told: less is the rounding of poses of size one."""
+"""Least reported change of a body's state in m, rad, m/s, rad/s: rounding of poses of size one."""
 
 Array = NDArray[np.float64]
 
-# How far joints go at a time where loops have to be closed on the way, rad or m.
+# Largest joint displacement per closing of the loops, rad or m.
 STRIDE = 0.2
 
 

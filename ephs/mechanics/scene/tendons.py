@@ -1,4 +1,4 @@
-"""Tendons of a scene file as bodies and joints: straight between points that bodies carry, free to slide through them.
+"""Tendons of a scene file as bodies and joints: straight between points of bodies, sliding freely through them.
 
 Between two points whose bodies differ there is a telescope, its mass at the points: a universal joint at the first, a
 slide, a spherical joint at the second. These six degrees of freedom hold nothing; the slide's coordinate is how much

@@ -38,9 +38,9 @@ LOSS = 0.1
 SOFT = ("stiffness", "exponent", "loss", "slip", "rolling", "spinning")
 """Keys of elastic surfaces that hard ones do not have."""
 DEEP = 1e-2
-"""Part of the mechanism's length from which on an overlap at the start is told."""
+"""Least reported overlap at the start, as a fraction of the mechanism's length."""
 OVERLAP = 1e-9
-"""Likewise of hard surfaces, for which it is refused."""
+"""Likewise for hard surfaces, for which it is refused."""
 
 
 def resolve_surfaces(document: Document, names: Names, folder: Path, faults: list[Fault]) -> dict[str, Surface]:
@@ -215,8 +215,8 @@ def _add(
 
 
 def _law(laws: tuple[ContactLawEntry, ...], key: str, faults: list[Fault]) -> Law | Impact | None:
-    """The law of a pair: what the contact says, else of two elastic surfaces in series, the lesser friction, else the
-    larger number of both. Surfaces with a restitution are hard beside others without stiffness."""
+    """The law of a pair: the contact's values, else stiffness of both surfaces in series, the lesser friction, and
+    the larger of their other numbers. Surfaces with a restitution are hard beside others without stiffness."""
     *own, first, second = laws
     for each in laws:
         if each.restitution is not None and (soft := [name for name in SOFT if getattr(each, name) is not None]):
@@ -244,7 +244,7 @@ def _law(laws: tuple[ContactLawEntry, ...], key: str, faults: list[Fault]) -> La
 
 
 def _hard(laws: tuple[ContactLawEntry, ...]) -> Impact | None:
-    """The law of a hard pair: what the contact says, else the lesser number of both; None of an elastic one."""
+    """The law of a hard pair: the contact's values, else the lesser number of both; None for an elastic pair."""
     *own, first, second = laws
 
     def given(name: str) -> list[float]:
@@ -259,9 +259,8 @@ def _hard(laws: tuple[ContactLawEntry, ...]) -> Impact | None:
 
 
 def _meeting(scene: Scene, surfaces: Mapping[str, Surface]) -> Iterator[tuple[Surface, Surface]]:
-    """Pairs of surfaces on different bodies that no joint holds together; of those of one part, none, but of a beam
-    those of its pieces between which there is more of it than half a turn of a circle of its radius: nearer ones
-    cannot touch, for a rod bends to no smaller circle."""
+    """Pairs of surfaces on different bodies without a common joint, and not of the same part; of a beam's pieces
+    those further apart along it than half a circle of its radius: nearer ones cannot touch."""
     for beam in scene.beams.values():
         pieces = [surfaces[node] for node in beam.nodes if node in surfaces]
         sizes = np.array([piece.shape["capsule"] for piece in pieces]).reshape(-1, 2)

@@ -15,7 +15,7 @@ QUATERNION_TOLERANCE = 1e-6
 
 
 def quaternion(values: list[float] | None, key: str, faults: list[Fault]) -> Array:
-    """A unit quaternion; None is the identity. Up to 1e-6 off it is normalised, beyond it is a fault."""
+    """A unit quaternion; None is the identity. Up to 1e-6 off unit length it is normalised, else it is a fault."""
     if values is None:
         return np.array([1.0, 0.0, 0.0, 0.0])
     q = np.array(values, dtype=np.float64)

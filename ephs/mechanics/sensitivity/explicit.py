@@ -65,7 +65,7 @@ class Point:
 
 @final
 class _Unread(Mapping[Path, Array]):
-    """States that nothing may read."""
+    """Storage for states without readers."""
 
     def __getitem__(self, path: Path) -> Never:
         raise _Read

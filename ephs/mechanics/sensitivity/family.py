@@ -48,10 +48,9 @@ LINEAR = (
 SIGNED = ("position", "at", "at1", "at2", "coordinate", "rate", "rest", "drive", "gravity", "velocity")
 RESISTING = ("friction", "stiffness", "damping", "conductance")
 NEXT_TO_NOTHING = 1e-200
-"""In place of zeros of these: what resists nothing is no part of a model, and its neighbours would be others."""
+"""Replacement of zeros of these: models omit elements without resistance, neighbours would differ in structure."""
 LEAST = 0.1
-"""Least magnitudes for numbers of a scene with either sign, in m, rad, s, N: near zero they say nothing of
-their own size."""
+"""Least magnitudes for numbers of a scene with either sign, in m, rad, s, N: near zero their own size is no scale."""
 
 
 def difference(function: Callable[[int], Array], stencil: Stencil, step: float) -> Array:
@@ -112,7 +111,7 @@ class Family:
             raise OptionError("parameters", paths, "one path or several, each once, as a list")
         self.model, self._reference, self._joints = model, reference, joints
         self._initial, self._inputs = dict(initial or {}), dict(inputs or {})
-        for path in paths:  # a drive that is zero has no port of its own
+        for path in paths:  # a drive with rate zero has no port
             joint = path.removeprefix("joints.").rpartition(".drive")[0]
             if path.startswith("joints.") and joint and f"joints.{joint}" not in self._inputs:
                 assert isinstance(model, Scene)

@@ -32,7 +32,7 @@ components of a system take."""
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Fit:
-    """Numbers that make a model move as recorded.
+    """Parameters of a model fitted to its recorded motion.
 
     Parameters
     ----------

@@ -115,7 +115,7 @@ def sensitivity(
     inputs: Mapping[str, Any] | None = None,
     reference: Reference | None = None,
 ) -> Sensitivity:
-    """The motion of a model with its derivatives by parameters: of the method's own discrete steps.
+    """The motion of a model with its derivatives by parameters: derivatives of the discrete steps.
 
     Lengths of steps are chosen by a run of `simulate` and then held, so that what is differentiated is a smooth
     function of the parameters: the derivative is that of the computed motion, to rounding.

@@ -47,7 +47,7 @@ class Dry:
 
     @property
     def start(self) -> float:
-        """The force at which it begins to slide, in N m or N."""
+        """Breakaway force, in N m or N."""
         return self.coulomb if self.static is None else self.static
 
     def resistance(self, rate: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Pairs of shapes that can touch: which gaps stand for them, and between which frames.
+"""Contact pairs of shapes: their gap functions and frames.
 
 Planes meet spheres, capsules, cylinders, boxes and meshes; spheres, capsules and boxes meet each other. A capsule meets
 a plane at its two ends, a box at its corners, a convex mesh at its vertices, a cylinder at its two rims. Boxes meet

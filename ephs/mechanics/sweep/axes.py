@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 __all__ = ["MEMBER", "Axes"]
 
 MEMBER = "member"
-"""The one dimension of members that are given one by one."""
+"""The single dimension of individually listed members."""
 
 
 @final

@@ -44,17 +44,17 @@ AGREE = 1e-12
 STRAIGHT = 12
 """Number of values of one path above which interpolation from three members is tried."""
 BURST = 100_000
-"""Steps that a member may take in compiled code; one that needs more is run on its own, where it can be followed."""
+"""Largest number of compiled steps of a member; longer ones are run individually, with progress."""
 
 
 class Unlike(Exception):
-    """A scene cannot be run as others are: it has other tables, or needs another method."""
+    """A scene whose tables or method differ from those of the ensemble."""
 
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class _Made:
-    """Compiled equations and where they start."""
+    """Compiled equations and their initial state."""
 
     equations: Equations
     start: ReducedState
@@ -280,7 +280,7 @@ class Ensemble:
         equations, stepper = self._threads_own()
         start = self._fill(equations, image)
         times = self._times
-        assert times is not None  # a sweep says what it keeps
+        assert times is not None  # outputs of a sweep are explicit
         first = int(times.size > 0 and times[0] == self._t0)
         control = stepper.control
         leg = self._leg(stepper, start, control, times, first)

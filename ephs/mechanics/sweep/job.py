@@ -1,4 +1,4 @@
-"""A sweep as a value that goes to whoever runs some of its members: threads, or processes elsewhere."""
+"""A sweep as a value for its workers: threads, or other processes."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -125,7 +125,7 @@ class _Prepared:
         if isinstance(self.model, Scene) and len(self.members) >= ALIKE:
             try:
                 self.ensemble = Ensemble(self.model, job.axes, job.t0, job.until, job.save_at, job.options, job.outputs)
-            except (Unlike, SolveError, SceneError, SemanticsError):  # members say on their own what is wrong
+            except (Unlike, SolveError, SceneError, SemanticsError):  # members report their own faults
                 self.ensemble = None
 
     def run(self, numbers: Index) -> Batch:
@@ -150,7 +150,7 @@ class _Prepared:
         return self._alone(values)
 
     def _alone(self, values: Array) -> tuple[list[Array] | None, str, int, int]:
-        """By `simulate`, which tells what failed, when and where; findings of the audit are a member's status."""
+        """By `simulate`, which reports failures with time and path; the audit's findings become a member's status."""
         job = self.job
         try:
             model = varied(self.model, dict(zip(job.axes.paths, values.tolist(), strict=True)))

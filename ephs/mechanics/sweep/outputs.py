@@ -39,7 +39,7 @@ _TEMPERATURE = Labels("", (), ("K",))
 @final
 @dataclass(frozen=True, slots=True)
 class Output:
-    """One of the things that are kept.
+    """One recorded output.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Members of an ensemble that may break a law of their audit: they are run again on their own, with the whole audit.
+"""Members of an ensemble that may violate a law of their audit: they are run again individually, with the whole audit.
 
 What is looked at is cheap beside a member's run, and stricter than the audit: the balance of energy at a few of its
 instants, the entropy made in its steps, and at constant steps the distance from a run with longer ones.
@@ -18,11 +18,11 @@ from ephs.solve.auditing.growth import apart
 __all__ = ["LONGER", "Suspicion"]
 
 LONGER = 4
-"""Constant steps are held against some that are so many times as long."""
+"""Length of comparison steps in constant steps."""
 INSTANTS = 5
-"""Instants of a member whose energies are looked at, with the first and the last."""
+"""Number of instants at which a member's energies are checked, with the first and the last."""
 ROUNDING = 1e-12
-"""Part of the energies that rounding may leave of a balance: what is within it is right."""
+"""Rounding of an energy balance, relative to the energies."""
 
 
 @final

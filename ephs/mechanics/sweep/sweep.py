@@ -27,11 +27,11 @@ if TYPE_CHECKING:
 __all__ = ["NOT_RUN", "SweepInterrupted", "sweep"]
 
 NOT_RUN = "not run"
-"""The status of members that an interruption left."""
+"""Status of members not run because of an interruption."""
 INSTANTS = 100
-"""Parts into which the time is cut where no instants are asked for."""
+"""Default number of recorded intervals."""
 BATCHES = 16
-"""Batches for each worker, so that progress is seen and all of them end at nearly the same time."""
+"""Batches per worker, for progress and load balancing."""
 MOST = 256
 """Members in a batch at most."""
 RETRIES = 5
@@ -165,7 +165,7 @@ def _on_threads(job: Job, count: int, workers: int | None) -> Generator[Batch, N
 
 
 def _on_cluster(job: Job, count: int, client: Any) -> Generator[Batch, None, None]:
-    """On a Dask cluster, which gives the batches of a worker that is lost to others.
+    """Run on a Dask cluster, which reassigns the batches of a lost worker.
 
     Where what all batches share is lost with it, and results that nobody had fetched, these are asked for again.
     """

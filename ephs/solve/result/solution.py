@@ -254,7 +254,7 @@ class Solution:
         return self._moving("beams").beam(name)
 
     def point(self, body: str, xyz: "ArrayLike") -> Array:
-        """(n, 3) world position of a point that is given in the body's frame."""
+        """(n, 3) world position of a point of the body's frame."""
         motion = self.body(body)
         return motion.position + motion.rotation @ np.asarray(xyz, dtype=float)
 
