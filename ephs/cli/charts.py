@@ -168,7 +168,7 @@ def _family(name: str, until: float) -> "Family":
 
 
 def _named(models: dict[str, Model]) -> dict[str, Model]:
-    """The same, where no two would be written to the same files."""
+    """The same, after a check that no two have the same output files."""
     for name, count in Counter(model.name for model in models.values()).items():
         if count > 1:
             raise BadInput(_TEXTS["twice"].format(found=name))

@@ -62,7 +62,7 @@ EXTRAS = {"matplotlib": "viz", "pygraphviz": "viz", "viser": "viz", "mujoco": "m
 
 
 class BadInput(Exception):
-    """Input that cannot be used; the text is for the user."""
+    """Invalid input; the text is for the user."""
 
 
 @Parameter(name="*")
@@ -94,7 +94,7 @@ AS_GIVEN = Loading()
 
 
 def positive(_type: object, value: float | None) -> None:
-    """Accept nothing, or a number above 0: a validator of options.
+    """Validator of options: None or a number above 0.
 
     Raises
     ------
@@ -139,7 +139,7 @@ class Stepping:
     jumps: str | None = None
 
     def options(self) -> dict[str, Any]:
-        """Options that were given, as keywords of ``simulate``.
+        """Specified options as keywords of ``simulate``.
 
         Raises
         ------
@@ -247,7 +247,7 @@ def _line(error: BaseException, file: Path) -> int | str:
 
 @contextmanager
 def addressed(scene: str, target: Path | None = None) -> Iterator[None]:
-    """Turn the errors that speak to the user into ``BadInput`` that names the file."""
+    """Convert errors of user input to ``BadInput`` with the file's name."""
     import ephs
 
     try:
@@ -315,7 +315,7 @@ def initial_values(entries: Sequence[str]) -> dict[str, list[float]] | None:
 
 
 def naming(scene: str, message: str) -> str:
-    """A message that names the file, once."""
+    """A message with the file's name, once."""
     return message if str(Path(scene)) in message else f"{scene}: {message}"
 
 

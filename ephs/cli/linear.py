@@ -71,7 +71,7 @@ def linearize(
 
 
 def _state(model: "Scene | System", at: str | None) -> tuple[Any, Any]:
-    """The model and the state about which it is linearised."""
+    """The model and its linearisation state."""
     import ephs
 
     if at is None or at == "equilibrium":

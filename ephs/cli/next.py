@@ -41,7 +41,7 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
     "chart stability": ("ephs chart stability spin slender -o out/charts",),
     "chart work-precision": ("ephs chart work-precision scenes/four-bar.toml --until 1 -o out/charts",),
 }
-"""Command: calls of it that work in a clone, the first one shown by ``ephs`` alone."""
+"""Command: examples that run in a clone; ``ephs`` alone shows the first."""
 
 _TEXTS = {
     "command": "ephs {found}: no such command; did you mean ephs {near}? ephs alone lists them",
@@ -78,7 +78,7 @@ def welcome(app: Any) -> str:
 
 
 def with_examples(app: Any, prefix: str = "") -> None:
-    """Put its examples below the help of every command of an app."""
+    """Append examples to the help of every command of an app."""
     for name in commands(app):
         full = f"{prefix} {name}".strip()
         if full in EXAMPLES:
@@ -89,7 +89,7 @@ def with_examples(app: Any, prefix: str = "") -> None:
 
 
 def known_command(app: Any, words: Sequence[str]) -> None:
-    """Refuse words that begin with no command of an app.
+    """Refuse arguments without a command of an app.
 
     Raises
     ------

@@ -35,9 +35,9 @@ __all__ = ["run"]
 
 JOURNAL = "run.journal"
 RUN = "run.json"
-"""Request of a run, kept beside the results of a run that has reached its end."""
+"""Request of a run, stored beside the results of a complete run."""
 KEPT = 500
-"""Default number of intervals at whose ends results are kept, with step-size control."""
+"""Default number of output intervals with step-size control."""
 _TEXTS = {
     "live": "--live: {found}: expected a scene",
     "until": "--until is missing; expected the end of the simulated time in seconds, as in ephs run {file} --until 5",
@@ -105,7 +105,7 @@ def run(
     asked: dict[str, Any] = {"until": until, **stepping.options()}
     if initial:
         asked["initial"] = initial_values(initial)
-    if stepping.step is None or keep is not None:  # controlled steps may be too long for pictures
+    if stepping.step is None or keep is not None:  # controlled steps may be too long for smooth pictures
         asked["keep"] = keep or KEPT
     if resume and not (folder / JOURNAL).exists() and _ended(folder, _identity(model, scene, asked)):
         say(_TEXTS["ended"].format(folder=folder))
@@ -178,7 +178,7 @@ def _simulate(
             complain(TEXTS["interrupted"].format(file=scene, at=at))
         else:
             complain(TEXTS["failed"].format(file=scene, found=error))
-        if not begun:  # not even the first state could be set up
+        if not begun:  # the initial state already failed
             return 130 if stopped else 3
         with addressed(scene, folder):
             _write(error.partial, folder, report=report)

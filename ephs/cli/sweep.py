@@ -21,7 +21,7 @@ _TEXTS = {
     "dask": "--dask {address}: {found}; start a scheduler there, then run again",
 }
 LISTED = 5
-"""Different reasons of failure that are printed."""
+"""Largest number of printed reasons of failure."""
 
 sweeps = App(name="sweep", help="Run an ensemble of a model, in parallel.")
 

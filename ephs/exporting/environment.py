@@ -20,7 +20,7 @@ from ephs.solve.control import RTOL
 __all__ = ["Environment", "Environments", "Task"]
 
 CHUNK: Final = 8
-"""Instances that a thread steps in turn: fewer cost more to hand over than to compute."""
+"""Least number of instances per thread: with fewer, scheduling costs more than computing."""
 
 
 @final
@@ -96,7 +96,7 @@ def _within(name: str, beginning: str) -> bool:
 
 @final
 class Environment(gymnasium.Env[Array, Array]):
-    """One environment: actions are forces on the inputs, held over a period, in addition to what the scene has.
+    """One environment: actions are forces on the inputs, constant over a period, in addition to the scene's own.
 
     An episode whose steps fail ends, and says why in ``info["status"]``.
     """
@@ -129,7 +129,7 @@ class Environment(gymnasium.Env[Array, Array]):
 
 @final
 class Environments(VectorEnv[Array, Array, Any]):
-    """So many environments of one task, stepped by threads. An episode that has ended begins anew at the next step."""
+    """Environments of one task, stepped by threads. A finished episode restarts at the next step."""
 
     metadata: dict[str, Any] = {"autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012 - gymnasium's own
 

@@ -1,4 +1,4 @@
-"""The one exception of this room and the texts that it carries."""
+"""Exception of exports, and its messages."""
 
 from typing import Final, final
 

@@ -32,7 +32,7 @@ PLATFORMS: Final[Mapping[str, tuple[str, str, str]]] = {
 }
 """Platforms by their names in FMI: target of object code, name for the linker, suffix of libraries."""
 _EPOCH: Final = (1980, 1, 1, 0, 0, 0)
-"""The time of all files in a unit, so that the same model makes the same bytes."""
+"""Time stamp of all files in a unit, for reproducible bytes."""
 
 
 def export_fmu(
@@ -141,7 +141,7 @@ def _description(made: Exported, shown: Sequence[Variable], token: str, experime
 
 
 def _library(made: Exported, token: str, target: str, triple: str, suffix: str) -> bytes:
-    """Object code and the shell around it, as a shared library for a machine."""
+    """Object code and its FMI wrapper, as a shared library for a machine."""
 
     def listed(values: Sequence[float]) -> str:
         return "".join(f"{value!r}," for value in values)

@@ -1,4 +1,4 @@
-"""One mechanism's run as functions of machine code and the arrays that they are called with."""
+"""One mechanism's run as functions in machine code and the arrays of their arguments."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace

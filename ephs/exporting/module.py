@@ -22,7 +22,7 @@ __all__ = ["Exported", "exported"]
 _DEFINED: Final = re.compile(r"^define (?:internal )?(?:fastcc )?\S+ @([\w.]+)\(", re.MULTILINE)
 _DECLARED: Final = re.compile(r"^declare .*$\n?", re.MULTILINE)
 _ADDRESSES: Final = 2**32
-"""Integers of tables from which on they are addresses of functions: no count or place is as large."""
+"""Least integer of tables that is an address of a function: counts and indices are smaller."""
 
 
 @final
@@ -83,7 +83,7 @@ def exported(image: Image, name: str) -> Exported:
 
 @final
 class _Writer:
-    """The text while it is written."""
+    """The text under construction."""
 
     def __init__(self, name: str) -> None:
         self.name = name

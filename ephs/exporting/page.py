@@ -25,9 +25,9 @@ from ephs.show.stage import stage_of
 __all__ = ["live_page"]
 
 KEYS: Final = ("mass", "friction", "stiffness", "damping", "gravity[2]")
-"""Numbers that sliders are made for where none are named, in this order."""
+"""Default numbers for sliders, in this order."""
 MOST: Final = 6
-"""So many sliders are made then."""
+"""Default number of sliders."""
 CURVES: Final = 8
 """So many coordinates are plotted."""
 FRAMES: Final = 30.0
@@ -101,7 +101,7 @@ def live_page(
 
 
 def _candidates(scene: Scene) -> list[str]:
-    """Numbers that sliders can be made for, the first few that the program can change."""
+    """Numbers for sliders: the first few that the program can change."""
     known = names(scene)
     found = [path for key in KEYS for path in known if path.endswith(f".{key}") and read(scene, path)]
     kept: list[str] = []

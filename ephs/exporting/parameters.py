@@ -13,9 +13,9 @@ from ephs.semantics.bundle import Array
 __all__ = ["Dependence", "dependence"]
 
 NEAR = 0.25
-"""Part of a parameter, or of 1 where it is 0, by which it is moved: far enough for rounding, near enough for ranges."""
+"""Relative displacement of a parameter, of 1 where it is 0: above rounding and within ranges."""
 EXACT = 1e-12
-"""Part of an array's largest number that a polynomial may miss by: rounding of some hundred operations."""
+"""Largest error of a polynomial, relative to an array's largest number: rounding of some hundred operations."""
 Key = tuple[int, ...]
 
 
@@ -98,7 +98,7 @@ def dependence(
 def _fit(
     samples: tuple[Array, Array, Array], held: Sequence[Array], pairs: Sequence[tuple[int, int]], scale: float
 ) -> dict[Key, float] | None:
-    """Coefficients of a polynomial through samples at ±1 and at pairs of 1, None where it misses the others."""
+    """Coefficients of a polynomial through samples at ±1 and at pairs of 1, None if it misses other samples."""
     base, seen, tried = samples
     count = (len(seen) - len(pairs)) // 2
     terms: dict[Key, float] = {}

@@ -82,7 +82,7 @@ def response(
     save_at: "ArrayLike | None" = None,
     **options: Any,
 ) -> Response:
-    """Readings of a motion as a function of numbers of its model, tried once where they are the model's own.
+    """Readings of a motion as a function of numbers of its model, evaluated once at the model's own numbers.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Exported mechanisms that run in this process: many instances, each in memory of its own."""
+"""Exported mechanisms running in this process: many instances with separate memory."""
 
 import ctypes
 from typing import Any, Final, final
@@ -26,7 +26,7 @@ _CALLS: Final[dict[str, tuple[Any, ...]]] = {
 
 @final
 class Instances:
-    """So many instances of one mechanism.
+    """A number of instances of one mechanism.
 
     Parameters
     ----------
@@ -66,13 +66,13 @@ class Instances:
         self.inputs[number] = [each.start for each in self.made.inputs]
 
     def advance(self, until: float, number: int = 0) -> int:
-        """Take steps to a time in s under `inputs`, and read the outputs; 0, or why there is no step."""
+        """Take steps to a time in s under `inputs`, and read the outputs; 0, or the status of a failed step."""
         memory = self._memories[number]
         self._calls["inputs"](memory, self._forces[number])
         return int(self._calls["advance"](memory, until)) or self.read(number)
 
     def read(self, number: int = 0) -> int:
-        """Read the outputs; 0, or why there are none."""
+        """Read the outputs; 0, or a status."""
         return int(self._calls["outputs"](self._memories[number], self._values[number]))
 
     def time(self, number: int = 0) -> float:

@@ -1,4 +1,4 @@
-"""The one exception of this room and the texts that it carries."""
+"""Exception of the Modelica import, and its messages."""
 
 from typing import Final, final
 
@@ -40,7 +40,7 @@ TEXTS: Final = {
 
 @final
 class ModelicaError(ValueError):
-    """A component of Modelica that is not taken.
+    """A component of Modelica that cannot be imported.
 
     Parameters
     ----------

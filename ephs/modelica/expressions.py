@@ -134,7 +134,7 @@ class Reader:
 
 
 def _number(where: str, value: Any) -> Any:
-    """A literal, exactly as it is written."""
+    """The exact value of a literal."""
     if isinstance(value, bool):
         return sp.true if value else sp.false
     if isinstance(value, int):

@@ -121,7 +121,7 @@ def flattened(tree: Any, name: str, given: Mapping[str, float]) -> Flat:
     try:
         found = flatten(tree, name).classes[name]
         readings = set(_readings(instantiate(tree, name))) - found.symbols.keys()
-    except Exception as error:  # as many kinds as there are ways to fail
+    except Exception as error:  # the parser raises many kinds of exceptions
         raise ModelicaError("flat", where=name, found=_first(error)) from error
     if found.statements:
         raise ModelicaError("algorithm", where=name)

@@ -1,4 +1,4 @@
-"""The linear relation between efforts, flows, states and their rates that a component's equations are.
+"""The linear relation between efforts, flows, states and rates defined by a component's equations.
 
 Equations of positions are differentiated, so that the efforts of flanges are rates. What is known by the temperature of
 a heat port is a coefficient; equations of powers in watt are kept aside.
@@ -43,7 +43,7 @@ class State:
 @final
 @dataclass(frozen=True, slots=True)
 class Relation:
-    """Values that the variables of n ports and k states may have together: columns of matrices with n + k columns.
+    """Possible joint values of the variables of n ports and k states: columns of matrices with n + k columns.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ class Relation:
 
 
 def needed(flat: Flat) -> tuple[Equation, ...]:
-    """The equations without those that only define a variable that no other names."""
+    """The equations without definitions of otherwise unused variables."""
     kept = {symbol for port in flat.ports for symbol in (port.potential, port.flow, derivative(port.potential))}
     equations = list(flat.equations)
     while True:
@@ -137,7 +137,7 @@ def relation_of(flat: Flat, equations: tuple[Equation, ...]) -> Relation:
 
 
 def _differentiated(flat: Flat, equations: tuple[Equation, ...]) -> tuple[tuple[Equation, ...], set[Symbol]]:
-    """Equations of positions alone, differentiated; and the positions that others name."""
+    """Equations between positions only, differentiated; and the positions in other equations."""
     out: list[Equation] = []
     moving: set[Symbol] = set()
     for equation in equations:
@@ -239,7 +239,7 @@ def _rest(
 
 
 def _null(matrix: Matrix) -> Matrix:
-    """A basis of the vectors that the matrix takes to zero, as columns; over numbers, or functions of temperatures."""
+    """A basis of the matrix's null space, as columns; over numbers, or functions of temperatures."""
     if not matrix.rows:
         return sp.eye(matrix.cols)
     rows = sp.polys.matrices.DomainMatrix.from_Matrix(matrix).to_field().nullspace().to_Matrix()

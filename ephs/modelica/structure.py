@@ -30,13 +30,13 @@ class Structure:
 
 
 def power_of(relation: Relation, hessian: Matrix) -> Matrix:
-    """The form whose value is what the ports take and the storages do not: e·f − xᵀH ẋ."""
+    """The quadratic form of the dissipated power e·f − xᵀH ẋ."""
     form = relation.efforts.T * relation.flows - relation.values.T * hessian * relation.rates
     return ((form + form.T) / 2).applyfunc(sp.cancel)
 
 
 def stored_energy(name: str, relation: Relation, warm: dict[Symbol, Expr]) -> Matrix:
-    """H (k, k) of the energy ½ xᵀHx that leaves a power of one sign.
+    """H (k, k) of the energy ½ xᵀHx for which the remaining power has one sign.
 
     Where states rest, or are zero, the power does not depend on H; what is zero there for every value of another
     variable is so for all: a non-negative form whose value at a vector is zero has no products with it.

@@ -26,7 +26,7 @@ def warm_of(flat: Flat) -> dict[Symbol, Expr]:
 
 
 def require_heat(flat: Flat, relation: Relation, form: Matrix) -> None:
-    """Refuse a component whose heat port does not take what the other ports lose.
+    """Refuse a component whose heat port does not receive the power dissipated at the other ports.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def _ideal(flat: Flat, residuals: list[Expr]) -> Primitive | None:
 
 
 def _reduced(flat: Flat, equations: tuple[Equation, ...]) -> list[Expr]:
-    """The equations with temperatures that are a port's named so."""
+    """The equations with temperatures renamed to their ports'."""
     potentials = {port.potential for port in flat.ports}
     same: dict[Symbol, Symbol] = {}
     for each in equations:

@@ -44,7 +44,7 @@ def animate(
     host: str = "127.0.0.1",
     port: int = 0,
 ) -> Page:
-    """Make a page that plays a solution of a scene, with play, pause, speed, time bar and free view.
+    """Page with the animation of a scene's solution: play, pause, speed, time bar and free view.
 
     Bodies are drawn by their shape or mesh, or as the muted box of the same mass and inertia where they have none;
     each joint by the symbol of its kind, with its axis; springs as coils; the ground as a grid.
@@ -96,12 +96,12 @@ def animate(
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class _Drawn:
-    """A stage as viser draws it."""
+    """A stage drawn by viser."""
 
     stage: Stage
 
     def recorded(self, host: str, port: int) -> str:
-        """The page as viser makes it."""
+        """The page made by viser."""
         import viser
 
         with _silence():

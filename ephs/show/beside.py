@@ -1,4 +1,4 @@
-"""A pattern beside the mechanism that it describes, in one figure."""
+"""A pattern beside its mechanism, in one figure."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -79,7 +79,7 @@ def _poses(sol: Any, at: float | None) -> tuple[dict[str, Any], Any]:
     places = [np.asarray(sol.body(name).position, dtype=float) for name in names]
     still: dict[str, Any] = {}
     for name, rows in frames.poses.items():
-        # the film has even times, and keeps quaternions on one side
+        # the film has equidistant times and continuous quaternions
         pose = np.array([between_instants(frames.times, np.array([time]), column)[0] for column in rows.T])
         pose[:4] /= np.linalg.norm(pose[:4])
         still[name] = pose

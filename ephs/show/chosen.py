@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 __all__ = ["plot_signals", "signal_names"]
 
 _FIRST = {"joints": "coordinate", "bodies": "position", "markers": "position", "thermal": "temperature"}
-"""Quantity of a joint, body, marker or thermal node that is named without one."""
+"""Default quantity of a joint, body, marker or thermal node."""
 
 
 def signal_names(sol: Any) -> dict[str, Labels]:
@@ -63,7 +63,7 @@ def plot_signals(sol: Any, *names: str) -> "Figure":
 
 
 def _usual(known: dict[str, Labels]) -> list[str]:
-    """The outputs that are drawn where none is chosen."""
+    """Default outputs."""
     for kind, quantity in _FIRST.items():
         if found := [name for name in known if name.startswith(f"{kind}.") and name.endswith(f".{quantity}")]:
             return found

@@ -93,7 +93,7 @@ def _text(text: Text, colour: str, *, halo: str = ""):  # type: ignore[no-untype
 
     x, y = text.at
     style = {"stroke": halo, "stroke_width": 2.5, "stroke_linejoin": "round", "paint_order": "stroke"} if halo else {}
-    # A shift by a third of the type size stands for a central baseline, which not all programs know.
+    # A shift by a third of the type size replaces a central baseline, which some programs lack.
     drawn = svg.Text(
         text.base if not text.sub else "",
         round(text.size, 2),

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 @final
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """A picture of a pattern; notebooks show it by themselves."""
+    """A picture of a pattern, displayed by notebooks."""
 
     placement: Placement
 

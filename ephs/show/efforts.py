@@ -20,7 +20,7 @@ __all__ = ["plot_wrenches"]
 BLANK = 1e-9
 """N or N m below which a panel shows a line at zero."""
 MOST = 6
-"""Joints that are drawn where none was asked for."""
+"""Largest number of joints drawn by default."""
 
 
 def plot_wrenches(sol: Any, *joints: str) -> "Figure":

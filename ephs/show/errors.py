@@ -1,4 +1,4 @@
-"""The one error of this layer, and all of its texts."""
+"""Exception of pictures, and its messages."""
 
 from typing import final
 
@@ -47,7 +47,7 @@ _TEXTS = {
 
 @final
 class ShowError(ValueError):
-    """Something cannot be drawn, or measured for a chart, as it was asked for.
+    """An invalid request of a picture or chart.
 
     Parameters
     ----------

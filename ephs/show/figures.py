@@ -1,4 +1,4 @@
-"""Figures that are bound to no window, and show themselves in notebooks without one."""
+"""Figures without a window, displayed by notebooks."""
 
 import io
 from functools import cache
@@ -20,7 +20,7 @@ def new_figure(width: float, height: float) -> "Figure":
 
 
 def plain(words: str, most: int = 36) -> str:
-    """Words that come from a model, for a figure: a dollar sign starts no formula, long names leave room for lines."""
+    """A model's text for a figure: dollar signs are escaped, long names abbreviated."""
     short = words if len(words) <= most else f"{words[: most - 15]}…{words[-14:]}"
     return short.replace("$", r"\$")
 

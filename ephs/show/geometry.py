@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 POINT = 1e-9
-"""Length in points below which two places are one."""
+"""Distance in points below which two positions are equal."""
 UPRIGHT = 1e-12
-"""Length along an axis below which a segment is across it."""
+"""Length along an axis below which a segment is perpendicular to it."""
 BETTER = 1e-6
-"""By how much a drawing's cost must fall to be taken: less is rounding."""
+"""Least decrease of a drawing's cost above rounding."""
 
 Point = tuple[float, float]
 Points = NDArray[np.float64]
@@ -48,7 +48,7 @@ class Text:
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:
-        """Left, top, right and bottom of the room that the lettering takes."""
+        """Left, top, right and bottom of the lettering's extent."""
         x, y = self.at
         return (x - self.width / 2, y - 0.55 * self.size, x + self.width / 2, y + 0.55 * self.size)
 
@@ -80,7 +80,7 @@ class PlacedJunction:
 @final
 @dataclass(frozen=True, slots=True)
 class PlacedRegion:
-    """A composite that is opened: a disc round its nodes, `members`, with its name inside at the top."""
+    """An opened composite: a disc round its nodes, `members`, with its name inside at the top."""
 
     path: str
     at: Point
@@ -197,7 +197,7 @@ def overlaps(placement: Placement) -> list[tuple[str, str]]:
 
 
 def inside(bounds: tuple[float, float, float, float], starts: Points, ends: Points) -> Points:
-    """Length of each segment, from `starts` to `ends`, (n, 2) each, that lies in a rectangle."""
+    """Length of each segment, from `starts` to `ends`, (n, 2) each, within a rectangle."""
     along = ends - starts
     still = np.abs(along) < UPRIGHT
     step = np.where(still, 1.0, along)

@@ -22,7 +22,7 @@ _NARROW = frozenset("ijltfr.'|")
 @final
 @dataclass(frozen=True, slots=True)
 class Disc:
-    """A box to be: its path, its kind, the lines of its name, the size of their type and its radius."""
+    """A box before placement: its path, its kind, the lines of its name, their type size and its radius."""
 
     path: str
     kind: str
@@ -34,7 +34,7 @@ class Disc:
 @final
 @dataclass(frozen=True, slots=True)
 class Edge:
-    """A line to be: `ends` are node paths; an outer port has one."""
+    """A line before placement: `ends` are node paths; an outer port has one."""
 
     title: str
     ends: tuple[str, ...]
@@ -58,7 +58,7 @@ class Graph:
 
 
 def width_of(base: str, sub: str, size: float) -> float:
-    """Width that lettering of this size takes, reckoned on the safe side."""
+    """Upper bound of the width of lettering of this size."""
 
     def reckon(text: str) -> float:
         return sum(0.86 if letter in _WIDE else 0.36 if letter in _NARROW else 0.6 for letter in text)

@@ -1,4 +1,4 @@
-"""Pictures of patterns, kept on disk by their content and by the code that draws them."""
+"""Cache of pictures of patterns, by their content and by the drawing code."""
 
 import hashlib
 from functools import cache

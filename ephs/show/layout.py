@@ -100,7 +100,7 @@ class _Page:
 
 
 def _roomy(page: _Page, points: Points, first: Placement | None = None) -> Placement:
-    """The picture, with its nodes drawn apart until every name and wire has room; the best one if none has."""
+    """The picture, expanded until every name and wire has room; the best one if none has."""
     best = _picture(page, points) if first is None else first
     count = len(faults(best))
     for factor in (1.2, 1.5, 1.9, 2.4, 3.0, 4.0):

@@ -41,7 +41,7 @@ TYPE, RADIUS, PITCH, GAP = 7.5, 4.5, 14.0, 10.0
 
 
 def legend(kinds: Iterable[str], start: Point, width: float) -> tuple[tuple[PlacedBox, Text], ...]:
-    """Discs and words of the kinds that occur, in rows from `start` downwards, as wide as `width` where words fit."""
+    """Discs and words of the occurring kinds, in rows from `start` downwards, at most `width` wide where words fit."""
     found, entries = frozenset(kinds), []
     x, y = start[0], start[1] + PITCH / 2
     for kind, word in WORDS.items():

@@ -12,7 +12,7 @@ from ephs.show.geometry import POINT, Point, Points, Text, inside
 from ephs.show.graph import width_of
 
 LESS = 1e-9
-"""By how much the trouble of a name must fall for it to move."""
+"""Least decrease of a name's cost for a move."""
 _AIR = 1.5
 Place = tuple[Point, str, float]
 
@@ -31,7 +31,7 @@ class Sheet:
     written: list[tuple[float, float, float, float]] = field(default_factory=list)
 
     def write(self, name: tuple[str, str], size: float, places: Iterable[Place]) -> Text:
-        """Set a name at the best of some places, (centre, anchor, how little it is liked), and remember it."""
+        """Set a name at the best of some places, (centre, anchor, cost), and record it."""
         width = width_of(*name, size)
         best, cost = Text(*name, (0.0, 0.0), size, width), math.inf
         for centre, anchor, dislike in places:
@@ -92,7 +92,7 @@ def beside(line: tuple[Point, ...], name: tuple[str, str], size: float) -> list[
         (x, y), (dx, dy) = _at(line, along)
         for side in (1.0, -1.0):
             nx, ny = -dy * side, dx * side
-            # The rectangle's corner that is nearest to the wire keeps off it.
+            # The rectangle's corner nearest to the wire keeps a distance from it.
             off = _AIR + 1.0 + abs(nx) * half + abs(ny) * 0.55 * size
             anchor = "start" if nx > 0.3 else "end" if nx < -0.3 else "middle"
             places.append(((x + off * nx, y + off * ny), anchor, 0.05 * along))

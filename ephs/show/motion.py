@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from ephs.semantics.spaces.rank import DIRECTION, TINY
 
 OPPOSITE = 1e-9
-"""By how much a cosine is off −1 where a rotation has no axis of its own."""
+"""Distance of a cosine from −1 within which a rotation's axis is arbitrary."""
 PLANAR = 1e-12
-"""Part of the square of their extent that points lie off a line."""
+"""Relative squared distance of collinear points from a line."""
 
 Array = NDArray[np.float64]
 
@@ -85,7 +85,7 @@ def nearest(t: Array, times: Array) -> NDArray[np.int64]:
 
 def _sampled(t: Array, body: Any, times: Array) -> Array:
     turns = np.asarray(body.quaternion, dtype=float).copy()
-    # q and -q are one rotation: keep to one side, so that blending takes the short way.
+    # q and -q are one rotation: continuous signs, so that blending takes the shorter arc.
     flips = np.where((turns[1:] * turns[:-1]).sum(axis=1) < 0, -1.0, 1.0)
     turns[1:] *= np.cumprod(flips)[:, None]
     places = np.asarray(body.position, dtype=float)
@@ -133,7 +133,7 @@ def matrix_to_quaternion(matrix: Array) -> Array:
 
 
 def between(first: Array, second: Array) -> tuple[Array, float]:
-    """Unit quaternion turning z to the way from one point to another, and their distance."""
+    """Unit quaternion that turns z to the direction from one point to another, and their distance."""
     way = second - first
     length = float(np.linalg.norm(way))
     if length < DIRECTION:

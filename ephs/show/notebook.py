@@ -103,7 +103,7 @@ def _plane(values: Any) -> str:
 
 
 def _few(scene: Any) -> list[tuple[str, Any]]:
-    """Bodies of a scene that is small enough to be drawn; none of a larger one."""
+    """Bodies of a scene small enough for drawing; empty for a larger one."""
     bodies = list(scene.all_bodies())
     return bodies if len(bodies) <= MANY else []
 

@@ -1,4 +1,4 @@
-"""Composites opened by one level: their boxes are drawn inside a disc, in place of a disc with a name."""
+"""Composites opened by one level: a disc with their boxes inside replaces the named disc."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -35,7 +35,7 @@ class Opened:
         return {box: frozenset(path for path in paths if path.startswith(f"{box}.")) for box in self.inner}
 
     def proposals(self) -> Iterator[Points]:
-        """Layouts of the whole graph, (nodes, 2) each: the inner ones set into an outer one, turned to suit it."""
+        """Layouts of the whole graph, (nodes, 2) each: inner layouts inserted into an outer one and rotated to fit."""
         insides = {box: self._inside(box) for box in self.inner}
         sizes = {box: _circle(nodes, self.graph.radii(), box)[1] for box, nodes in insides.items()}
         discs = tuple(replace(d, radius=sizes.get(d.path, d.radius)) for d in self.outer.discs)

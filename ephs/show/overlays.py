@@ -51,7 +51,7 @@ class Arrows:
         return ARROWS[self.kind]
 
     def tips(self, longest: float) -> Array:
-        """(m, n, 3) where they end, the longest of a length in m."""
+        """(m, n, 3) their ends, the longest arrow with a length in m."""
         return self.places + longest / self.largest * self.vectors
 
 
@@ -75,7 +75,7 @@ class Loads:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Heat:
-    """What is shown as a colour at the frames of a film: (m,) by thermal node or body, and their whole range.
+    """Values shown by colour at the frames of a film: (m,) by thermal node or body, and their range.
 
     Temperatures in K; or strain energy per length, in J/m, of beams.
     """
@@ -126,7 +126,7 @@ def loads_of(sol: Any, frames: Film, joints: dict[str, Any]) -> Loads:
 
 
 def _contacts(sol: Any, instants: NDArray[np.int64]) -> list[Arrows]:
-    """Forces of contacts, those that slip apart from those that stick, on one scale."""
+    """Forces of contacts, slipping and sticking ones separately, on one scale."""
     laws = dict(sol.outline.all_contacts())
     if not laws:
         return []

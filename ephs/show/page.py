@@ -1,4 +1,4 @@
-"""A page that shows itself: in notebooks and built documentation as a frame, elsewhere as a file."""
+"""A page: displayed in notebooks and built documentation as a frame, elsewhere a file."""
 
 import html
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ __all__ = ["Page"]
 @final
 @dataclass(frozen=True, slots=True)
 class Page:
-    """One HTML page that holds everything in itself.
+    """A self-contained HTML page.
 
     Attributes
     ----------
@@ -25,7 +25,7 @@ class Page:
     title: str
 
     def save(self, path: str | FilePath) -> FilePath:
-        """Write the page to a file, whose folder is made if need be."""
+        """Write the page to a file; its folder is created if missing."""
         target = FilePath(path)
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_text(self.html, encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Plots of a solution, fit to print as they are.
+"""Plots of a solution, ready for print.
 
 Every function returns a matplotlib ``Figure`` that is bound to no window, and takes solutions of scenes and of any
 other system alike.

@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 __all__ = ["plot_phase"]
 
 STILL = 1e-9
-"""Change of a coordinate in m or rad below which it is not drawn."""
+"""Least change of a drawn coordinate, in m or rad."""
 MOST = 6
-"""Portraits that are drawn where none was asked for."""
+"""Largest number of portraits drawn by default."""
 
 
 class _Curve(NamedTuple):

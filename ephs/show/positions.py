@@ -107,11 +107,11 @@ def _neato(graph: Graph, start: int) -> Points:
 
 @contextmanager
 def _errors_only() -> Generator[None, None, None]:
-    """Graphviz without its warnings on stderr, as of a layout that is as good as it gets in so many iterations."""
+    """Graphviz without its warnings on stderr, such as for layouts that reach the limit of iterations."""
     from pygraphviz import graphviz
 
     try:
-        least_told = ctypes.CDLL(graphviz._graphviz.__file__).agseterr  # pygraphviz itself has no word for it
+        least_told = ctypes.CDLL(graphviz._graphviz.__file__).agseterr  # pygraphviz has no option for it
     except (AttributeError, OSError):
         yield
         return
@@ -153,7 +153,7 @@ def _networkx(graph: Graph, start: int) -> Points:
 
 
 def _upright(points: Points) -> Points:
-    """Turn the long side to lie level, and the first node to the upper left."""
+    """Rotate the long side to the horizontal, and the first node to the upper left."""
     if len(points) < 2:
         return points
     centred = points - points.mean(axis=0)
@@ -165,7 +165,7 @@ def _upright(points: Points) -> Points:
 
 
 def _spread(graph: Graph, points: Points, *, wires: bool, free: NDArray[np.bool_] | None = None) -> Points:
-    """Push apart nodes that overlap and, if `wires`, nodes that lie on a foreign wire; all, or those that are free."""
+    """Push apart overlapping nodes and, if `wires`, nodes on a foreign wire; all, or the free ones."""
     paths = list(graph.radii())
     radii = np.array([graph.radii()[path] for path in paths])
     index = {path: i for i, path in enumerate(paths)}

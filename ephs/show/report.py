@@ -46,7 +46,7 @@ _FINAL = (
 
 
 def write_report(sol: Any, directory: str | FilePath) -> FilePath:
-    """Write ``report.html`` about a solution into a folder, which is made if need be.
+    """Write ``report.html`` about a solution into a folder, which is created if missing.
 
     The page holds everything in itself: for a scene the animation; plots that zoom, show values and follow the
     animation, of signals that are picked from a list; the balances in words; the summary with units; the pattern.
@@ -217,6 +217,6 @@ def _asset(name: str) -> str:
 
 
 def _inline(picture: str) -> str:
-    """An SVG file's text without its prologue and metadata, which a page has no use for."""
+    """An SVG file's text without prologue and metadata."""
     element = picture[picture.index("<svg") :]
     return re.sub(r"<metadata>.*?</metadata>", "", element, flags=re.DOTALL)

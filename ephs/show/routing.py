@@ -1,4 +1,4 @@
-"""Wires as polylines that keep clear of every box and junction that they are not attached to."""
+"""Wires as polylines that avoid all boxes and junctions except their ends."""
 
 import heapq
 import itertools
@@ -53,7 +53,7 @@ def route(start: Point, end: Point, obstacles: Points) -> tuple[Point, ...]:
         if done[here]:
             continue
         done[here] = True
-        # Each bend costs a little, so that a line with fewer of them wins.
+        # Each bend has a small cost, so that lines with fewer bends are preferred.
         length = best[here] + np.linalg.norm(corners - corners[here], axis=1) + 6.0
         nearer = np.flatnonzero(~done & (length < best))
         centre = (float(corners[here, 0]), float(corners[here, 1]))

@@ -1,4 +1,4 @@
-"""Lines of a plot, made ready: units, thinning, few enough names."""
+"""Preparation of a plot's lines: units, thinning, number of names."""
 
 import itertools
 from collections.abc import Callable, Iterator
@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from ephs.mechanics.motion.readout import freedoms_of
 
 MOVES = 1e-9
-"""Part of its size by which a value changes where it is drawn."""
+"""Least relative change of a drawn value."""
 
 Array = NDArray[np.float64]
 
 
 def thinned(t: Array, values: Array, most: int = 2000) -> tuple[Array, Array]:
-    """The same line with at most about `most` points, least and greatest values of each stretch kept."""
+    """The same line with at most about `most` points; extremes of each interval are kept."""
     if len(t) <= most:
         return t, values
     edges = np.linspace(0, len(t), most // 2 + 1).astype(int)
@@ -86,7 +86,7 @@ def scene_panels(sol: Any) -> dict[str, list[tuple[str, Array]]]:
             panels.setdefault(f"position {axis} [m]", []).append((name, column))
     for name, _ in scene.all_thermal():
         panels.setdefault("temperature [K]", []).append((name, np.asarray(sol.thermal(name).temperature, dtype=float)))
-    # A direction in which nothing moves is no news.
+    # Constant directions are omitted.
     return {title: lines for title, lines in panels.items() if not title.startswith("position") or _moves(lines)}
 
 

@@ -15,7 +15,7 @@ __all__ = ["Group", "packed"]
 MOST = 2000
 """Instants of a panel without thinning."""
 FEW = 6
-"""Curves of a panel that are shown before others are picked."""
+"""Largest number of initially shown curves of a panel."""
 
 
 @final

@@ -63,7 +63,7 @@ class Words:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Sketch:
-    """Marks in the order in which they are drawn, names, and points that names leave free."""
+    """Marks in drawing order, names, and points to keep free of names."""
 
     marks: list[Mark] = field(default_factory=list)
     words: list[Words] = field(default_factory=list)
@@ -138,7 +138,7 @@ def _view(way: Array) -> Array:
 
 
 def _surface(solid: Solid, at: Array, colour: Array) -> tuple[list[Array], list[Any], list[Array]]:
-    """Faces that look at the eye, the far ones first, their shades, and the edges where the surface bends or ends."""
+    """Visible faces, the far ones first, their shades, and the edges at bends and ends of the surface."""
     beside: dict[tuple[int, int], list[Array]] = {}
     shown: list[tuple[float, Array, Any]] = []
     light = _LIGHT / np.linalg.norm(_LIGHT)
@@ -180,7 +180,7 @@ def _coil(start: Array, end: Array, radius: float) -> tuple[Array, Array]:
 
 
 def _supports(out: Sketch, joint: Any, place: Array, axis: Array, r: float) -> None:
-    """Axis of a joint, and the hatched ground where it stands on it."""
+    """Axis of a joint, and hatching for a joint on the ground."""
     x, y, flat = place[0], place[1], float(np.hypot(axis[0], axis[1]))
     if joint.kind not in ("spherical", "fixed") and flat > 0.2:
         reach = 3.0 * r * axis[:2]

@@ -53,7 +53,7 @@ class Solid:
 
     @property
     def reach(self) -> float:
-        """Radius in m of the ball about the centre of mass that holds it."""
+        """Radius in m of its bounding sphere about the centre of mass."""
         return float(np.linalg.norm(self.vertices, axis=1).max(initial=0.0))
 
     def stick(self, point: Array) -> tuple[Array, Array] | None:
@@ -100,7 +100,7 @@ def sphere(radius: float) -> tuple[Array, tuple[NDArray[np.int64], ...]]:
 
 
 def held_at(body: str, joints: Iterable[Any], springs: Iterable[Any]) -> list[Array]:
-    """The points (3,) of a body, in its frame, at which joints and springs take hold of it."""
+    """The points (3,) of a body, in its frame, at which joints and springs are attached."""
     out = [
         np.asarray(f, dtype=float)[4:]
         for j in joints
@@ -137,7 +137,7 @@ def _shapes_of(surface: Any) -> list[dict[str, Any]]:
 
 
 def solid_of(body: Any, name: str) -> Solid:
-    """Surface of a body; where its mesh cannot be read, the box of its inertia, with a note.
+    """Surface of a body; for an unreadable mesh the box of its inertia, with a note.
 
     Raises
     ------
@@ -195,14 +195,14 @@ def _mesh(file: FilePath, scale: Any, body: Any, name: str) -> Solid:
     import trimesh
 
     try:
-        # From bytes, and by these endings: nothing else is read, neither what the file names nor what it packs.
+        # From bytes, and by these suffixes: neither files that it names nor archives are read.
         kind = file.suffix.lower()
         if kind not in MESHES or not file.is_file() or file.stat().st_size > MOST_MB * 1e6:
             raise ValueError(f"no file of at most {MOST_MB} MB that ends in {', '.join(MESHES)}")
         plain: dict[str, Any] = {"skip_materials": True} if kind in (".obj", ".glb") else {}
         loaded: Any = trimesh.load_scene(io.BytesIO(file.read_bytes()), file_type=kind[1:], **plain)
         mesh: Any = loaded.to_mesh()
-    except Exception as fault:  # readers of foreign files raise what they like
+    except Exception as fault:  # readers of foreign files raise any exception
         return _stand_in(body, f"{name}: {file.name} cannot be read ({fault or type(fault).__name__})")
     vertices, faces = np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces, dtype=np.int64)
     if not len(faces):

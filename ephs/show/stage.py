@@ -16,7 +16,7 @@ __all__ = ["Stage", "stage_of"]
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Stage:
-    """A mechanism and its motion, ready to be drawn.
+    """A mechanism and its motion, prepared for drawing.
 
     Attributes
     ----------

@@ -21,7 +21,7 @@ WIDTH, HIGHEST = 640.0, 420.0
 POINT = 4.0 / 3.0
 """Pixels of a point."""
 THIN = 1e-12
-"""Least height or width of a drawing as a part of the other: marks on one line have no scale of their own across it."""
+"""Least ratio of a drawing's height and width: collinear marks have no extent across their line."""
 MARGIN = 24.0
 """Pixels about the marks of an SVG, for names."""
 
@@ -147,7 +147,7 @@ def _room(at: Array, x: float, y: float, wide: float, high: float) -> tuple[floa
 
 
 def _beyond(room: tuple[float, float, float, float], page: Array) -> float:
-    """The area that leaves the picture."""
+    """The area outside the picture."""
     whole = (room[2] - room[0]) * (room[3] - room[1])
     return whole - _overlap(room, (page[0], page[1], page[2], page[3]))
 

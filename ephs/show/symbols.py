@@ -109,7 +109,7 @@ def add_joint(server: Any, node: str, joint: Any, size: float) -> list[Any]:
         case "fixed":
             metal.append(scene.add_box(f"{node}/weld", color=METAL, dimensions=(1.3 * size, 1.3 * size, 1.3 * size)))
         case _:
-            # A free joint joins nothing that could be drawn.
+            # A free joint has no symbol.
             pass
     return metal
 

@@ -38,7 +38,7 @@ def contact_panels(sol: Any) -> list[Panel]:
 
 
 def contact_table(sol: Any) -> str:
-    """What each contact did over a run: HTML, empty where there is none."""
+    """Summary of each contact over a run as HTML, empty without contacts."""
     names = _names(sol)
     if not names or not len(sol.t):
         return ""

@@ -1,4 +1,4 @@
-"""A page that poses a mechanism: sliders for its joints, and models dropped on it, by a server on this machine."""
+"""A page with a mechanism: sliders for its joints, and model files dropped on it, by a local server."""
 
 import html
 import json
@@ -29,14 +29,14 @@ from ephs.solve.result.record import Record
 __all__ = ["Posed", "served"]
 
 LARGEST: Final = 64 * 2**20
-"""Bytes of a model that is dropped, at most."""
+"""Largest size of a dropped model, in bytes."""
 SUFFIXES: Final = (".toml", ".urdf", ".xml", ".sdf")
 Load = Callable[[FilePath], Scene]
 
 
 @final
 class Posed:
-    """A scene in a configuration that sliders move; loops stay closed.
+    """A scene in the sliders' configuration; loops stay closed.
 
     Parameters
     ----------

@@ -185,7 +185,7 @@ def write_cells(cells: Sequence[Cell], folder: Path, name: str) -> list[Path]:
 
 
 def counts_table(cells: Sequence[Cell]) -> str:
-    """Cells of each method by outcome, in Markdown; what is silently wrong in one column."""
+    """Cells of each method by outcome, in Markdown; silently wrong ones in one column."""
     columns = {
         "right": {Outcome.RIGHT},
         "refused or failed, with a message": {Outcome.REFUSED},
@@ -251,7 +251,7 @@ def _curve(axes: "Axes", method: str, kind: str, points: Sequence[Point], key: s
 
 
 def _defects(axes: "Axes", series: Mapping[tuple[str, str], Sequence[Point]]) -> None:
-    """Error against time, marks filled by the defect of the balance of energy, grey where it is not known."""
+    """Error against time, marks filled by the defect of the balance of energy, grey where unknown."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import LogNorm
 

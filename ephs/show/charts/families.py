@@ -67,7 +67,7 @@ class Family:
         return (value,) if self.role == "step" else self.steps
 
     def label(self, value: float) -> str:
-        """A value as it is written on an axis."""
+        """A value as the label of an axis."""
         return self.labels[self.values.index(value)] if self.labels else f"{value:g}"
 
 
@@ -271,7 +271,7 @@ FAMILIES = {
             scenes.four_bar_off,
             0.3,
             (1e-2, 1e-3),
-            ("radau", "ida", *EXPLICIT),  # they refuse what is too far off
+            ("radau", "ida", *EXPLICIT),  # they refuse states too far from consistency
             meant=scenes.four_bar_back,
         ),
     )

@@ -1,4 +1,4 @@
-"""Cells of a chart on disk while it is made: a chart that was stopped goes on where it stood."""
+"""Cells of a chart on disk: an interrupted chart resumes from them."""
 
 import json
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ __all__ = ["Kept"]
 
 @final
 class Kept:
-    """A file with one cell a line, written as soon as it is known.
+    """A file with one cell per line, written when measured.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ class Kept:
             file.write_text("", encoding="utf-8")
 
     def get(self, family: str, value: float, method: str, setting: Setting) -> Cell | None:
-        """A cell that is known."""
+        """A measured cell."""
         return self._cells.get((family, value, method, setting))
 
     def add(self, cell: Cell) -> None:
@@ -54,7 +54,7 @@ def _key(cell: Cell) -> tuple[str, float, str, Setting]:
 
 
 def _read(file: Path) -> Iterator[Cell]:
-    """The cells of a file; a line that was cut is none."""
+    """The cells of a file, without an incomplete last line."""
     for line in file.read_text(encoding="utf-8").splitlines():
         try:
             row: dict[str, Any] = json.loads(line)

@@ -59,7 +59,7 @@ class Point:
 
     @property
     def tolerance(self) -> float:
-        """The tolerance that was asked for; 0 where the step was constant."""
+        """The requested tolerance; 0 with constant steps."""
         return self.setting.value if self.setting.kind == "tolerance" else 0.0
 
 
@@ -133,7 +133,7 @@ def _own(
         first = attempt(scene, until, name, setting, limit=limit, save_at=both)
         if first.solution is None:
             yield Point(name, setting, np.nan, np.nan, 0, 0, first.ending, first.message)
-            if first.ending is not Ending.FAILED:  # a finer setting changes nothing, or takes longer still
+            if first.ending is not Ending.FAILED:  # a finer setting changes nothing, or takes even longer
                 return
             continue
         if setting is settings[0] and first.wall > limit / 4.0:  # kernels may have been compiled
@@ -197,7 +197,7 @@ def _end(motion: Motion) -> Motion:
 
 
 def _more(repeats: int, wall: float, limit: float) -> int:
-    """Number of further runs: none where one alone took most of the time that there is."""
+    """Number of further runs: none if the first took most of the available time."""
     return 0 if wall > limit / 4.0 else repeats - 1
 
 

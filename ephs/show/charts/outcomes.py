@@ -28,7 +28,7 @@ RIGHT = MOTION
 """Largest error of a right run at constant steps, what their audit allows: a part of the size of mechanism and motion,
 an entry of a rotation matrix, a part of the energies turned over."""
 AMPLIFIED = 10.0
-"""Allowed error of a right run: a multiple of the effect that a change of the data by the tolerance has on it."""
+"""Allowed error of a right run, as a multiple of the effect of changing the data by the tolerance."""
 TIMES = MANY_TIMES * AMPLIFIED
 """Largest error of a right run at chosen steps, in tolerances, where the motion amplifies nothing and steps are few:
 what the audit allows to the defect of energy, times a growth of errors that it does not see. Where there are more
@@ -37,13 +37,13 @@ CONDITION = RIGHT / 1e-3
 """A motion is judged up to the last time to which it changes by less than this many times a relative change of its
 data: to there, data of three digits make it right."""
 ENERGY = 1e-2
-"""Largest defect of the energy balance that is no drift, relative to what was turned over."""
+"""Largest defect of the energy balance without drift, relative to the turnover."""
 KEPT = 0.5
 """Least part of the true motion's extent that an undamped motion has in the second half of the time."""
 BOUND = 10.0
 """A body this many sizes of mechanism and motion away from their centre is lost."""
 BLOWN = 100.0
-"""A turnover of energy this many times the true one is not bounded."""
+"""Energy turnover, relative to the true one, above which a motion counts as unbounded."""
 _NO_ENERGY = 1e-9
 
 
@@ -84,7 +84,7 @@ def right(setting: Setting, condition: float, steps: int) -> float:
 
 
 def judge(found: Motion, true: Motion, allowed: float = RIGHT) -> tuple[Outcome, float]:
-    """The outcome of a motion that was computed to the end, and its error there; both motions at the same times.
+    """The outcome of a complete motion, and its error at the end; both motions at the same times.
 
     The error is that of positions and rotations, or of heat and work, whichever is larger.
     """

@@ -16,9 +16,9 @@ from ephs.show.charts.runs import Array, Ending, Setting
 __all__ = ["integrator", "mjcf", "mujoco_model", "silent"]
 
 REACHED = 1e-6
-"""Part of the time that may be missing at the end: steps add up with rounding."""
+"""Allowed missing fraction of the time at the end: sums of steps round."""
 IMPEDANCE = 'solimp="0.9999 0.9999 0.001 0.5 2"'
-"""Of a closed loop: the most that it takes."""
+"""Largest impedance of a closed loop."""
 
 
 def integrator(method: str) -> Callable[[Scene, float], Go]:
@@ -31,7 +31,7 @@ def integrator(method: str) -> Callable[[Scene, float], Go]:
         stages = 4 if method == "RK4" else 1
 
         def go(setting: Setting, limit: float) -> PeerRun:
-            mujoco.set_mju_user_warning(silent)  # else it writes a log file into the working folder
+            mujoco.set_mju_user_warning(silent)  # otherwise it writes a log file to the working folder
             try:
                 return run(setting, limit)
             finally:
@@ -46,7 +46,7 @@ def integrator(method: str) -> Callable[[Scene, float], Go]:
                 if time.perf_counter() - begin > limit:
                     raise PeerError(f"{limit:g} s of wall time were over", Ending.SLOW)
             seconds = time.perf_counter() - begin
-            if data.time < until * (1.0 - REACHED):  # it starts again from zero where its state is not finite
+            if data.time < until * (1.0 - REACHED):  # it restarts from zero when its state is not finite
                 raise PeerError("the state was not finite", Ending.FAILED)
             after = _energies(mujoco, model, data)
             numbers = [model.body(name).id for name in names]
@@ -119,7 +119,7 @@ def mjcf(given: PeerScene, method: str, step: float) -> str:
         numbers = f'springlength="{spring.length!r}" stiffness="{spring.stiffness!r}" damping="{spring.damping!r}"'
         tendons.append(f"<spatial {numbers}>{inside}</spatial>")
     below: dict[str, list[str]] = {}
-    for branch in reversed(given.branches):  # from the leaves, so that what a body carries is known
+    for branch in reversed(given.branches):  # from the leaves inwards: subtrees are complete
         body = bodies[branch.outer]
         base = SE3.identity() if branch.inner == GROUND else bodies[branch.inner].pose
         pose = SE3.compose(SE3.inverse(base), body.pose)
@@ -153,7 +153,7 @@ def _joint(branch: Branch) -> str:
 
 
 def _closure(closure: tuple[str, str, Array, Array], bodies: Any, step: float) -> str:
-    """A point of body 1 in which the two are connected; the other's is where that is at the start."""
+    """A point of body 1 in which the two are connected; body 2's point coincides with it at the start."""
     one, two, point, other = closure
     if one == GROUND:
         one, two, point = two, one, other

@@ -1,4 +1,4 @@
-"""Pinocchio with SciPy's integrators. Its user writes the loop, so times include the right-hand side in Python."""
+"""Pinocchio with SciPy's integrators. The time loop is the user's, so times include the right-hand side in Python."""
 
 import time
 from collections.abc import Callable
@@ -20,7 +20,7 @@ SOLVED = 1e-13
 TIGHT, SOFT = 1e-8, 1e-2
 """Proximal parameters of closed loops: the second passes configurations in which constraints lose rank."""
 GAIN = 100.0
-"""Of Baumgarte's stabilisation of closed loops, in s⁻²."""
+"""Coefficient of Baumgarte's stabilisation of closed loops, in s⁻²."""
 MOST = 4 * 2**30
 """Bytes of the largest array that Pinocchio makes, 48 n³ of n velocities; beyond that a scene is refused."""
 FEW = 2
@@ -46,7 +46,7 @@ def integrator(method: str, *, proximal: float = TIGHT) -> Callable[[Scene, floa
                     raise PeerError(f"{limit:g} s of wall time were over", Ending.SLOW)
                 return model.rates(y)
 
-            # SciPy warns below 100 ε and then takes that; the tolerance is asked for all the same
+            # SciPy warns below 100 ε and then uses that; the tolerance is passed nevertheless
             relative = max(setting.value, 100.0 * float(np.finfo(float).eps))
             done = solve_ivp(rates, (0.0, until), model.start, method=method, rtol=relative, atol=setting.value)
             seconds = time.perf_counter() - begin

@@ -1,4 +1,4 @@
-"""A scene as other programs build it: a tree of joints from the ground, loops closed by points, springs, drives."""
+"""A scene for other programs: a tree of joints from the ground, loops closed by points, springs, drives."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from ephs.show.charts.runs import Array, Ending, Setting
 __all__ = ["Branch", "Go", "PeerError", "PeerRun", "PeerScene", "peer_scene", "start"]
 
 PARALLEL = 1e-9
-"""By how much the cosine of parallel axes may be off 1."""
+"""Tolerance of the cosine of parallel axes."""
 KINDS = ("revolute", "spherical", "free", "fixed")
 CLOSING = ("revolute", "spherical")
 ARM = 0.5
@@ -22,7 +22,7 @@ ARM = 0.5
 
 
 class PeerError(Exception):
-    """A scene that a peer cannot do, or a run of it that failed."""
+    """A scene that another program does not support, or its failed run."""
 
     def __init__(self, text: str, ending: Ending = Ending.REFUSED) -> None:
         super().__init__(text)
@@ -90,8 +90,8 @@ class PeerScene:
     springs: tuple[Spring, ...]
 
     def defect(self, before: Energies, after: Energies) -> float:
-        """What a run gained or lost of K + V, relative to the larger of both ends' K + |V − V₀|; NaN with drives or
-        damping, whose work and heat other programs do not add up."""
+        """Change of K + V in a run, relative to the larger of both ends' K + |V − V₀|; NaN with drives or damping,
+        whose work and heat other programs do not integrate."""
         if any(branch.drive for branch in self.branches) or any(spring.damping for spring in self.springs):
             return float("nan")
         lifted = after[1] - before[1]
@@ -129,7 +129,7 @@ def peer_scene(scene: Scene) -> PeerScene:
 
 
 def _tree(joints: list[Joint]) -> tuple[list[Branch], list[Joint]]:
-    """A tree of shortest ways from the ground, listed depth first, which Pinocchio needs; and the joints left."""
+    """A tree of shortest paths from the ground, depth first as Pinocchio requires; and the remaining joints."""
     at: dict[str, list[Joint]] = {}
     for joint in joints:
         at.setdefault(joint.body1, []).append(joint)

@@ -85,7 +85,7 @@ class Motion:
         return off / other.turnover if other.turnover > 0.0 else np.zeros_like(off)
 
     def until(self, count: int) -> "Motion":
-        """Its first instants, so many."""
+        """The motion at its first instants."""
         t, position, rotation, balance, totals = (
             each[:count] for each in (self.t, self.position, self.rotation, self.balance, self.totals)
         )
@@ -106,7 +106,7 @@ class Motion:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Reference:
-    """A motion that counts as true.
+    """A reference motion.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ class Reference:
 
 
 def tight_reference(scene: Scene, until: float, *, save_at: Array | None = None, limit: float = 60.0) -> Reference:
-    """A run with tight tolerances, by the method of highest order that can.
+    """A run with tight tolerances, by the applicable method of highest order.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def tight_reference(scene: Scene, until: float, *, save_at: Array | None = None,
 
 
 def condition(scene: Scene, truth: Reference, limit: float = 60.0) -> Array:
-    """(n,) by how many times a relative change of rates, a mass and gravity changes a motion at its times.
+    """(n,) amplification of a relative change of rates, a mass and gravity in a motion at its times.
 
     Ones where that is no run, or its run with other data does not reach the end.
     """
@@ -185,7 +185,7 @@ def condition(scene: Scene, truth: Reference, limit: float = 60.0) -> Array:
 
 
 def resting_reference(scene: Scene, save_at: Array) -> Reference:
-    """The initial state for ever, for a mechanism that cannot move."""
+    """Constant motion of an immobile mechanism."""
     n = len(save_at)
     poses = np.array([body.pose for _, body in scene.all_bodies()])
     rotations = np.array([quaternion_to_matrix(pose[:4]) for pose in poses])

@@ -23,7 +23,7 @@ __all__ = ["MOST_STEPS", "Array", "Ending", "Run", "Setting", "attempt"]
 
 Array = NDArray[np.float64]
 MOST_STEPS = 500_000
-"""Of one run, where nothing smaller is asked for."""
+"""Default limit of one run."""
 
 
 _REFUSALS = (Failure.INCONSISTENT, Failure.UNDETERMINED, Failure.PYTHON)
@@ -51,7 +51,7 @@ class Setting:
         return f"tol {self.value:.0e}" if self.kind == "tolerance" else f"h = {self.value:.3g} s"
 
     def options(self) -> dict[str, Any]:
-        """As `ephs.simulate` takes them."""
+        """Options of `ephs.simulate`."""
         return {"rtol": self.value, "atol": self.value} if self.kind == "tolerance" else {"step": self.value}
 
 
@@ -71,8 +71,8 @@ class _TooLong(Exception):
 
 
 class _Watch:
-    """Stops a run at its limit of processor time, which other programs do not shorten. It begins with the first sign of
-    life: kernels are compiled before that."""
+    """Stops a run at its limit of processor time, which other programs do not shorten. It starts with the first
+    progress report: kernels are compiled before that."""
 
     def __init__(self, limit: float) -> None:
         self.begin, self.limit, self.fired = time.perf_counter(), limit, False
@@ -103,7 +103,7 @@ def attempt(
     max_steps: int = MOST_STEPS,
     options: Mapping[str, Any] | None = None,
 ) -> Run:
-    """Run a model once; whatever goes wrong comes back as a value.
+    """Run a model once; failures are returned as values.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def attempt(
     times = np.array([until]) if save_at is None else save_at
     try:
         with warnings.catch_warnings(record=True) as told, np.errstate(all="ignore"):
-            warnings.simplefilter("ignore")  # what overflows on its way to a failure is part of the failure
+            warnings.simplefilter("ignore")  # overflow before a failure is part of the failure
             warnings.simplefilter("always", CostWarning)
             solution = simulate(
                 model,
@@ -141,11 +141,11 @@ def attempt(
             ending, message = Ending.SLOW, str(error.__cause__)
         else:
             ending, message = (Ending.REFUSED if error.outcome in _REFUSALS else Ending.FAILED), str(error)
-    except Exception as error:  # a chart of failures outlives all of them, also those that speak to no user
+    except Exception as error:  # a chart of failures survives all exceptions, internal ones included
         spoken = type(error).__module__.startswith("ephs.")
         ending = Ending.REFUSED if spoken else Ending.LEAKED
         message = str(error) if spoken else f"{type(error).__name__}: {error}"
-    if watch.fired and ending is not Ending.SLOW:  # a method that made a failure of its own of it
+    if watch.fired and ending is not Ending.SLOW:  # a method that converted it to a failure of its own
         ending, message = Ending.SLOW, f"{Ending.SLOW}: {message}"
     if ending is Ending.SLOW:
         message = "; ".join([message, *(str(each.message) for each in told)])

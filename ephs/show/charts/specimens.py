@@ -1,4 +1,4 @@
-"""Methods that charts show to fail, and why: no methods to use, and not known to `simulate` by name.
+"""Methods with known failures, for demonstration in charts only: `simulate` does not accept their names.
 
 Both are for mechanisms whose joints are all revolute, prismatic, screw or cylindrical, without heat; loops are what
 they fail at.
@@ -20,7 +20,7 @@ from ephs.solve.stepping import Attempt
 __all__ = ["SPECIMENS", "TrapezoidalIndex3", "VelocityMidpoint"]
 
 STAGNANT = 1e-9
-"""Residual that may stand where iterations no longer help."""
+"""Residual accepted where iterations stagnate."""
 SOLVED, DIFFERENCE, ITERATIONS = 1e-12, 1e-7, 20
 
 
@@ -59,7 +59,7 @@ class _OnLoops(ReducedMethod):
 
 
 class VelocityMidpoint(_OnLoops):
-    """The midpoint rule with constraints on velocities (index 2): nothing brings positions back that have drifted."""
+    """The midpoint rule with constraints on velocities (index 2): drift of positions is not corrected."""
 
     name = "velocity-midpoint"
 
@@ -121,4 +121,4 @@ SPECIMENS = {
         ),
     )
 }  # fmt: skip
-"""Name -> method; they may be given to `simulate` as values."""
+"""Name -> method, for use as values in `simulate`."""

@@ -125,7 +125,7 @@ def stability(
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class _Trial:
-    """A value's scene with the motion that counts as true, as far as it is judged."""
+    """A value's scene with its reference motion up to the horizon of judgement."""
 
     family: Family
     value: float
@@ -137,7 +137,7 @@ class _Trial:
 
     @classmethod
     def of(cls, family: Family, value: float, limit: float) -> "_Trial":
-        """Of a value of a family's parameter."""
+        """Reference for a value of a family's parameter."""
         times = np.linspace(0.0, family.end(value), INSTANTS)
         truth, why = _truth(family, value, times, limit)
         if truth is None:
@@ -149,7 +149,7 @@ class _Trial:
         return cls(family, value, family.make(value), times, truth, float(conditions[count - 1]), why)
 
     def cell(self, method: Method, setting: Setting, limit: float, slow: Setting | None) -> Cell:
-        """One run; where another one took too long, its finer ones are not run."""
+        """One run, omitted if a coarser one took too long."""
         if slow is None:
             until = float(self.times[-1])
             run = attempt(self.scene, until, method, setting, limit=limit, save_at=self.times, max_steps=MOST_STEPS)
