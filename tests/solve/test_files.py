@@ -1,6 +1,8 @@
 """Files of solutions: bit by bit what was saved, whatever was solved."""
 
 import json
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -87,6 +89,35 @@ def test_others_read_the_file_with_xarray_alone(tmp_path):
         name = next(iter(sol.scene.bodies))
         assert np.array_equal(data["body_position"].sel(body=name), sol.body(name).position)
         assert data["joint_wrench"].attrs["units"] == "N m, N m, N m, N, N, N"
+
+
+def test_a_file_that_xarray_writes_again_holds_the_same_solution(tmp_path, damped):
+    for model, options in ((damped, {"initial": {"osc.pe.q": 1.0}}), (ephs.load("scenes/slider-crank.toml"), {})):
+        sol = ephs.simulate(model, 0.5, rtol=1e-6, **options)
+        sol.save(tmp_path / "sol.nc")
+        with xr.open_dataset(tmp_path / "sol.nc", engine="h5netcdf") as data:
+            dense = {name: {"zlib": True} for name, each in data.variables.items() if each.dtype != object}
+            data.to_netcdf(tmp_path / "again.nc", engine="h5netcdf", encoding=dense)
+        same(ephs.load_solution(tmp_path / "again.nc"), sol)
+
+
+def test_reading_loads_none_of_the_packages_for_tables(tmp_path, damped):
+    file = tmp_path / "sol.nc"
+    ephs.simulate(damped, 0.5, step=0.1, initial={"osc.pe.q": 1.0}, audit="off").save(file)
+    heavy = {"xarray", "pandas", "dask"}
+    script = f"import sys, ephs; ephs.load_solution({str(file)!r}); print(*{heavy} & {{*sys.modules}})"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []
+
+
+def test_packed_numbers_are_refused(tmp_path, damped):
+    sol = ephs.simulate(damped, 0.5, step=0.1, initial={"osc.pe.q": 1.0}, audit="off")
+    packed = {"state:osc.pe.q": {"dtype": "float64", "scale_factor": 1e-3}}
+    sol.to_xarray().to_netcdf(tmp_path / "sol.nc", engine="h5netcdf", encoding=packed)
+    with pytest.raises(
+        ValueError, match=r"sol\.nc: state:osc\.pe\.q has the attribute scale_factor, expected unpacked"
+    ):
+        ephs.load_solution(tmp_path / "sol.nc")
 
 
 def test_files_of_format_2_are_read(tmp_path):

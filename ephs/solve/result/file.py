@@ -2,9 +2,9 @@
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from pathlib import Path as File
-from typing import TYPE_CHECKING, Any
+from typing import Any, final
 
 import numpy as np
 
@@ -13,13 +13,10 @@ from ephs.semantics.bundle import Array
 from ephs.solve.problem import Problem
 from ephs.solve.result.dataset import FORMAT, TIME, Variable, content
 from ephs.solve.result.durable import durable
-from ephs.solve.result.guard import name_for_file, named_from_file
+from ephs.solve.result.guard import name_for_file, name_from_file
 from ephs.solve.result.labels import Labels, labels_of
 from ephs.solve.result.ledger import Ledgers
 from ephs.solve.result.solution import Solution
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 __all__ = ["load", "save"]
 
@@ -57,45 +54,100 @@ def load(path: str | File, problem_of: Callable[[str, Array, Inputs], Problem]) 
     ValueError
         The file is not a solution of this program.
     """
-    import xarray as xr
+    import h5py
 
     file = File(path)
     if not file.exists():
         raise FileNotFoundError(f"{file}: no such file")
     try:
-        with xr.open_dataset(file, engine="h5netcdf") as opened:
-            data = named_from_file(opened.load())
+        with h5py.File(file, "r") as opened:
+            attributes = {key: _plain(value) for key, value in opened.attrs.items()}
+            found = attributes.get("ephs_format")
+            if found not in READ:
+                raise ValueError(f"{file}: ephs_format is {found}, expected one of {', '.join(map(str, READ))}")
+            groups = _groups(file, opened)
+            t = _values(opened["t"])
     except OSError as error:
         raise ValueError(f"{file}: not a netCDF file ({error})") from error
-    found = data.attrs.get("ephs_format")
-    if found not in READ:
-        raise ValueError(f"{file}: ephs_format is {found}, expected one of {', '.join(map(str, READ))}")
-    groups: dict[str, dict[Path, xr.DataArray]] = {}
-    for key, variable in data.data_vars.items():
-        group, _, rest = str(key).partition(":")
-        groups.setdefault(group, {})[Path.of(rest) if rest else Path()] = variable
     states = groups.get("state", {})
-    inputs = {path: _variable(variable) for path, variable in groups.get("input", {}).items()}
-    t = np.asarray(data["t"].values)
-    model = data.attrs["model"]
+    inputs = {
+        path: Variable.of(each.values, each.labels, str(each.attributes["long_name"]))
+        for path, each in groups.get("input", {}).items()
+    }
+    model = attributes["model"]
     problem = problem_of(model, t, {path: given.values for path, given in inputs.items()}) if model else None
     if problem is not None:
         labels = {slot.path: labels_of(slot.quantity) for slot in problem.descriptor.states}
     else:
-        labels = {path: _labels(variable) for path, variable in states.items()}
+        labels = {path: each.labels for path, each in states.items()}
     return Solution(
-        data.attrs["name"],
+        attributes["name"],
         t,
-        {path: variable.values for path, variable in states.items()},
-        _ledgers(groups, float(data.attrs["reference_temperature"])),
-        _stats(json.loads(data.attrs["stats"]), problem),
+        {path: each.values for path, each in states.items()},
+        _ledgers(groups, float(attributes["reference_temperature"])),
+        _stats(json.loads(attributes["stats"]), problem),
         problem,
         labels,
         inputs,
     )
 
 
-def _ledgers(groups: "Mapping[str, Mapping[Path, xr.DataArray]]", temperature: float) -> Ledgers:
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class _Stored:
+    """A variable of a file: its values, its attributes, and its second dimension with names of entries, if any."""
+
+    values: Array
+    attributes: Mapping[str, Any]
+    dimension: str
+    names: tuple[str, ...]
+
+    @property
+    def labels(self) -> Labels:
+        """Names and units of its entries."""
+        units = str(self.attributes.get("units", "SI"))
+        if self.values.ndim == 1:
+            return Labels("", (), (units,))
+        size = self.values.shape[1]
+        each = units.split(", ")
+        return Labels(self.dimension, self.names, tuple(each if len(each) == size else each * size) or ("1",))
+
+
+def _groups(file: File, opened: Any) -> dict[str, dict[Path, _Stored]]:
+    """States, inputs and ledgers of a file by group and path; derived variables are not read."""
+    known = {"state", "input", *(field.name for field in fields(Ledgers))}
+    groups: dict[str, dict[Path, _Stored]] = {}
+    for key in opened:
+        group, _, rest = name_from_file(key).partition(":")
+        if group in known:
+            groups.setdefault(group, {})[Path.of(rest) if rest else Path()] = _stored(file, key, opened[key])
+    return groups
+
+
+def _stored(file: File, key: str, array: Any) -> _Stored:
+    attributes = {name: _plain(array.attrs[name]) for name in ("units", "long_name") if name in array.attrs}
+    if packed := {"scale_factor", "add_offset"}.intersection(array.attrs):
+        raise ValueError(f"{file}: {name_from_file(key)} has the attribute {min(packed)}, expected unpacked numbers")
+    dimension, names = "", ()
+    if array.ndim > 1:
+        scale = array.dims[1][0]
+        dimension = name_from_file(str(scale.name).lstrip("/"))
+        text = scale.dtype.kind == "O"
+        names = tuple(map(str, scale.asstr()[...] if text else range(array.shape[1])))
+    return _Stored(_values(array), attributes, dimension, names)
+
+
+def _values(array: Any) -> Array:
+    return np.asarray(array[...])
+
+
+def _plain(value: Any) -> Any:
+    """An attribute as a number or text; some writers store arrays of one entry, and bytes."""
+    single = value.reshape(-1)[0] if isinstance(value, np.ndarray) and value.size == 1 else value
+    return single.decode() if isinstance(single, bytes) else single
+
+
+def _ledgers(groups: Mapping[str, Mapping[Path, _Stored]], temperature: float) -> Ledgers:
     """Ledgers by path are groups; a single ledger has its name alone."""
     totals: dict[str, Any] = {}
     for field in fields(Ledgers):
@@ -103,20 +155,6 @@ def _ledgers(groups: "Mapping[str, Mapping[Path, xr.DataArray]]", temperature: f
         whole = found.get(Path())
         totals[field.name] = {path: each.values for path, each in found.items()} if whole is None else whole.values
     return Ledgers(**{**totals, "temperature": temperature})
-
-
-def _labels(variable: "xr.DataArray") -> Labels:
-    units = str(variable.attrs.get("units", "SI"))
-    if variable.ndim == 1:
-        return Labels("", (), (units,))
-    dimension, size = str(variable.dims[1]), variable.shape[1]
-    names = variable.coords[dimension].values.tolist() if dimension in variable.coords else map(str, range(size))
-    each = units.split(", ")
-    return Labels(dimension, tuple(names), tuple(each if len(each) == size else each * size) or ("1",))
-
-
-def _variable(variable: "xr.DataArray") -> Variable:
-    return Variable.of(variable.values, _labels(variable), str(variable.attrs["long_name"]))
 
 
 def _stats(stats: dict[str, Any], problem: Problem | None) -> dict[str, Any]:

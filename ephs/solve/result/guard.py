@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["check_file", "name_for_file", "named_for_file", "named_from_file"]
+__all__ = ["check_file", "name_for_file", "name_from_file", "named_for_file"]
 
 MOST = 200
 """Largest ratio of decompressed to stored size: a larger one is an attack on memory."""
@@ -65,7 +65,7 @@ def _faults(opened: Any, most: int) -> str:
 
 def named_for_file(data: "xr.Dataset") -> "xr.Dataset":
     """The data with names that netCDF can hold."""
-    return data.rename({name: name_for_file(str(name)) for name in _names(data)})
+    return data.rename({name: name_for_file(str(name)) for name in {*data.variables, *data.dims}})
 
 
 def name_for_file(name: str) -> str:
@@ -73,11 +73,7 @@ def name_for_file(name: str) -> str:
     return name.replace("%", "%25").replace("/", "%2F")
 
 
-def _names(data: "xr.Dataset") -> set[Any]:
-    return {*data.variables, *data.dims}
-
-
-def named_from_file(data: "xr.Dataset") -> "xr.Dataset":
-    """The data with the names that `named_for_file` changed."""
+def name_from_file(name: str) -> str:
+    """The name that `name_for_file` changed."""
     letters = {"%25": "%", "%2F": "/"}
-    return data.rename({k: re.sub("%25|%2F", lambda each: letters[each[0]], str(k)) for k in _names(data)})
+    return re.sub("%25|%2F", lambda each: letters[each[0]], name)
