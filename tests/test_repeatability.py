@@ -11,7 +11,7 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import ephs
-from ephs.solve import integrate, loop
+from ephs.solve import loop
 from ephs.solve.threads import in_one_thread
 from tests.repeat import contents, digest
 
@@ -46,8 +46,8 @@ def test_how_fast_the_machine_is_changes_nothing(method, file, until, step, monk
     scene = ephs.load(ROOT / file)
     found = set()
     for largest, response in ((1, 0.1), (3, 0.1), (4096, 1e9)):
-        monkeypatch.setattr(integrate, "LARGEST_CHUNK", largest)
-        monkeypatch.setattr(integrate, "RESPONSE", response)
+        monkeypatch.setattr(loop, "BURST", largest)
+        monkeypatch.setattr(loop, "RESPONSE", response)
         found.add(digest(contents(ephs.simulate(scene, until, method=method, step=step))))
     assert len(found) == 1
 

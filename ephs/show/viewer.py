@@ -23,7 +23,7 @@ from ephs.semantics.bundle import Array
 from ephs.show.page import Page
 from ephs.show.player import player
 from ephs.show.stage import Stage, stage_of
-from ephs.solve.integrate import solution_of
+from ephs.solve.ending import solution_of
 from ephs.solve.result.record import Record
 
 __all__ = ["Posed", "served"]

@@ -12,7 +12,18 @@ from ephs.semantics.descriptor import Descriptor
 from ephs.solve.errors import OptionError, Outcome, SolveError
 from ephs.solve.snapshot import Snapshot
 
-__all__ = ["ATOL", "RTOL", "Control", "Policy", "Proportional", "Symmetric", "Tolerance", "first_step", "told_apart"]
+__all__ = [
+    "ATOL",
+    "RTOL",
+    "Control",
+    "Grid",
+    "Policy",
+    "Proportional",
+    "Symmetric",
+    "Tolerance",
+    "first_step",
+    "told_apart",
+]
 
 SLIVER = 1e-9
 """Fraction of a step, or of a time, that is rounding of sums of steps."""
@@ -96,6 +107,44 @@ class Tolerance:
         for slot in descriptor.states:
             out[slot.rates] = self.at(slot.path, slot.quantity.kind)
         return out
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """The times t₀ + k·h, the last step shortened to end on ``until``."""
+
+    t0: float
+    until: float
+    h: float
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.h) and self.h > 0.0):
+            raise OptionError("step", self.h, "a number of seconds > 0")
+        if not (np.isfinite(self.until) and self.until > self.t0):
+            raise OptionError("until", self.until, f"a time after t0 = {self.t0!r} s")
+
+    @property
+    def whole(self) -> int:
+        """Number of steps of full length."""
+        count = (self.until - self.t0) / self.h
+        nearest = round(count)  # no additional tiny step where h divides the time up to rounding
+        return int(nearest) if abs(count - nearest) <= SLIVER * max(1.0, count) else int(count)
+
+    @property
+    def last(self) -> float:
+        """Length of the shortened last step, 0 where there is none."""
+        rest = self.until - self.time(self.whole)
+        return rest if rest > SLIVER * self.h else 0.0
+
+    @property
+    def count(self) -> int:
+        """Number of steps."""
+        return self.whole + bool(self.last)
+
+    def time(self, k: int) -> float:
+        """The time after k full steps."""
+        return self.t0 + k * self.h
 
 
 @final

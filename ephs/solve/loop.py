@@ -1,7 +1,7 @@
-"""Time loop for methods with one step per call: control, events, records, progress and interruption."""
+"""Time loop of all methods: control, events, records, progress and interruption."""
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from typing import Any, Generic, TypeVar
 
@@ -14,19 +14,19 @@ from ephs.solve.auditing.forecast import Forecast
 from ephs.solve.auditing.production import Production
 from ephs.solve.auditing.resolution import Samples, trials_of
 from ephs.solve.breakpoints import Breakpoints
-from ephs.solve.control import SLIVER, Control, Policy, first_step
+from ephs.solve.control import SLIVER, Control, Grid, Policy, first_step
+from ephs.solve.ending import audited, failures_of, repeatable
 from ephs.solve.errors import OptionError, Outcome, SolveError, solve_error_of
 from ephs.solve.events import Event, Watch
-from ephs.solve.integrate import Grid, Progress, audited, failures_of, repeatable
 from ephs.solve.journal import Written
 from ephs.solve.problem import Problem, States
 from ephs.solve.result.record import Record, Rows, record_of
 from ephs.solve.result.solution import Solution
 from ephs.solve.snapshot import Snapshot, like, parts
 from ephs.solve.stepping import Attempt, Counts, Leg, Row, Span, Stepper, too_fast
-from ephs.solve.watching import Balance
+from ephs.solve.watching import Balance, Progress
 
-__all__ = ["integrate_stepwise"]
+__all__ = ["integrate"]
 
 S = TypeVar("S")
 RESPONSE = 0.1
@@ -38,7 +38,7 @@ FINAL = (Outcome.PYTHON, Outcome.INPUT, Outcome.EVENT, Outcome.INCONSISTENT, Out
 """Failures that shorter steps cannot avoid."""
 
 
-def integrate_stepwise(
+def integrate(
     problem: Problem,
     t0: float,
     until: float,
@@ -115,13 +115,14 @@ class _Run(Generic[S]):
         self.policy, self.events, self.progress, self.begin = policy, events, progress, begin
         self.remarks, self.journal, self.bounds = remarks, journal, bounds
         self.t = self.t0 = t0
+        self.grid = None if policy else Grid(0.0, abs(until - t0), float(control.step or 0.0))
         self.sign = 1.0 if until > t0 else -1.0
         self.save_at = save_at
         self.setup = 0.0
         self.steps = self.rejected = self.saved = 0
         self.looked = begin
-        self.least = np.inf
-        self.shortest, self.longest = np.inf, 0.0
+        self.shortest, self.longest, self.least = np.inf, 0.0, np.inf
+        self.blocks: list[Sequence[tuple[float, S, float]]] = []
         self.pending: list[tuple[float, S, float]] = []
         self.kept = Rows()
         self.samples: Samples[S] = Samples(wanted=policy is None, retaken=bounds is not None and bounds.retaken)
@@ -135,13 +136,15 @@ class _Run(Generic[S]):
     def start(self) -> None:
         """The initial state, and the first row."""
         self.h = first_step(self.control, abs(self.until - self.t0))
+        if self.grid and self.control.max_steps is not None and self.grid.count > self.control.max_steps:
+            raise OptionError("max_steps", self.control.max_steps, f"at least the grid's {self.grid.count} steps")
         self.state = self.stepper.start(self.t0, self.sign * self.h)
         row = self.first = self.stepper.row(self.state)
         self.balance = Balance(self.problem, row.x, row.energies, row.sums)
         self.production = Production(self.problem, self.sign)
         self.production.start(row.x, row.energies)
         if self.save_at is None or (self.save_at.size and self.save_at[0] == self.t0):
-            self.pending.append((self.t0, self.state, 0.0))
+            self.blocks.append([(self.t0, self.state, 0.0)])
             self.saved = 1
         self.samples.add([(self.t0, self.state, 0.0)])
         self.stepper.prepare(self.state, self.sign * self.h)
@@ -176,24 +179,23 @@ class _Run(Generic[S]):
             if self.control.max_steps is not None and self.steps >= self.control.max_steps:
                 raise SolveError(Outcome.MANY, "", f"{self.control.max_steps}")
             burst = most if self.control.max_steps is None else min(most, self.control.max_steps - self.steps)
-            begin = time.perf_counter()
+            begin, before = time.perf_counter(), self.steps
             try:
                 done = leg.advance(burst)
             finally:
                 fresh, counts = leg.rows(), leg.counts
-                self.pending += fresh
+                self.blocks.append(fresh)
                 self.samples.add(fresh)
                 self.saved += len(fresh)
                 self.t, self.steps, self.rejected, self.h = leg.time, counts.steps, counts.rejected, counts.h
                 self.shortest, self.longest, self.least = counts.shortest, counts.longest, counts.least
                 self.state = leg.state
-            spent = time.perf_counter() - begin
-            most = int(np.clip(most / np.clip(spent / RESPONSE, 0.5, 2.0), 1, BURST))
+            each = (time.perf_counter() - begin) / max(1, self.steps - before)
+            most = int(np.clip(RESPONSE / each, 1, BURST))
             self._look()
 
     def _advance_stepwise(self) -> None:
-        control = self.control
-        grid = None if self.policy else Grid(0.0, abs(self.until - self.t0), float(control.step or 0.0))
+        control, grid = self.control, self.grid
         while self.t != self.until and not self.ended:
             if control.max_steps is not None and self.steps >= control.max_steps:
                 raise SolveError(Outcome.MANY, "", f"{control.max_steps}")
@@ -208,8 +210,9 @@ class _Run(Generic[S]):
             # No tiny remainder for a last step.
             h = self.h if rest > 1.01 * self.h else rest if rest <= 1.0000001 * self.h or grid else 0.5 * rest
             cut = end != self.until and h < self.h
+            exact = grid.h if grid and abs(h - grid.h) <= self.breakpoints.near else h
             try:
-                attempt = self.stepper.step(self.state, self.sign * h)
+                attempt = self.stepper.step(self.state, self.sign * exact)
             except (SolveError, ArithmeticError, np.linalg.LinAlgError) as error:
                 failure = self.cause = solve_error_of(error)
                 if grid or failure.outcome in FINAL:
@@ -275,10 +278,10 @@ class _Run(Generic[S]):
         """Report progress and write the journal at intervals."""
         if self.journal is not None and self.journal.due:
             self.write()
-        elif len(self.pending) >= BLOCK:
+        elif len(self.pending) + sum(map(len, self.blocks)) >= BLOCK:
             self._settle()
         now = time.perf_counter()
-        if self.progress is not None and now - self.looked > RESPONSE:
+        if self.progress is not None and (self.t == self.until or now - self.looked > 0.5 * RESPONSE):
             self.looked = now
             row = self.stepper.row(self.state)
             error = self.balance.error(row.x, row.energies, row.sums)
@@ -332,15 +335,15 @@ class _Run(Generic[S]):
         """The first and the last row, recorded or not; none for a run that did not start or is not finite."""
         with suppress(SolveError):  # a failed run may end where evaluation is impossible
             rows = [(self.t, self.stepper.row(self.state))] if self.first else []
-            return [record_of([t], [row], [0.0]) for t, row in ((self.t0, self.first), *rows) if row]
+            return [record_of([(t, None, 0.0)], [row]) for t, row in ((self.t0, self.first), *rows) if row]
         return []
 
     def _settle(self) -> None:
         """Pending part, as it is kept."""
-        if self.pending:
-            rows = self.stepper.rows([state for _, state, _ in self.pending])
-            self.kept.add(record_of([t for t, _, _ in self.pending], rows, [least for _, _, least in self.pending]))
-            self.pending.clear()
+        for block in (*self.blocks, self.pending):
+            if block:
+                self.kept.add(self.stepper.record(block))
+        self.blocks, self.pending = [], []
 
     def write(self, *, end: bool = False) -> None:
         """An entry in the journal, if there is one."""
@@ -389,7 +392,7 @@ class _Run(Generic[S]):
         if self.policy is not None:
             self.policy.restore(found["policy"])
         self.watch.restore(found["watch"])
-        self.pending.clear()
+        self.blocks.clear()
         self.forecast.restore(found["forecast"])
         self.samples.restore(found["samples"], self.state)
         if self.journal.rows is not None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, Generic, Protocol, TypeVar, final
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar, final
 
 import numpy as np
 
@@ -11,9 +11,13 @@ from ephs.solve.control import Control, Policy
 from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.snapshot import Snapshot
 
+if TYPE_CHECKING:
+    from ephs.solve.result.record import Record
+
 __all__ = ["Attempt", "Counts", "Leg", "Row", "Span", "Stepper", "too_fast"]
 
 S = TypeVar("S")
+S_co = TypeVar("S_co", covariant=True)
 
 
 @final
@@ -109,7 +113,7 @@ def too_fast(method: str, worst: str, asked: float) -> SolveError:
     return SolveError(Outcome.TINY, worst, "; ".join(part for part in (told, others) if part))
 
 
-class Leg(Protocol[S]):
+class Leg(Protocol[S_co]):
     """A run in compiled code, several steps per call; ``left`` if it stopped before the end."""
 
     left: bool
@@ -124,8 +128,8 @@ class Leg(Protocol[S]):
         """
         ...
 
-    def rows(self) -> list[tuple[float, S, float]]:
-        """Records since the last call: time, state, the least production in its step."""
+    def rows(self) -> Sequence[tuple[float, S_co, float]]:
+        """Instants to keep since the last call: time, state, the least production in its step."""
         ...
 
     @property
@@ -134,7 +138,7 @@ class Leg(Protocol[S]):
         ...
 
     @property
-    def state(self) -> S:
+    def state(self) -> S_co:
         """The state reached."""
         ...
 
@@ -199,8 +203,8 @@ class Stepper(Protocol[S]):
         """Record of a state."""
         ...
 
-    def rows(self, states: Sequence[S]) -> list[Row]:
-        """Records of many states."""
+    def record(self, taken: "Sequence[tuple[float, S, float]]") -> "Record":
+        """Records of many instants: time, state, least production in the step before."""
         ...
 
     def stats(self) -> dict[str, Any]:

@@ -11,9 +11,10 @@ from ephs.solve.problem import Problem
 from ephs.solve.result.ledger import ledgers
 from ephs.solve.result.record import Record
 
-__all__ = ["Balance", "guarded"]
+__all__ = ["Balance", "Progress", "guarded"]
 
-Told = Callable[[float, float, Mapping[str, Any]], None]
+Progress = Callable[[float, float, Mapping[str, Any]], None]
+"""Called with the time, the end, and statistics so far."""
 
 
 @final
@@ -33,7 +34,7 @@ class Balance:
         return float(totals.defect(mechanical=self._problem.scene is not None)[-1]) * totals.scale / self._scale
 
 
-def guarded(progress: Told | None) -> Told | None:
+def guarded(progress: Progress | None) -> Progress | None:
     """A progress function, whose exceptions end the run with a named error and a partial solution."""
     if progress is None:
         return None

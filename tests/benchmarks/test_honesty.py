@@ -4,7 +4,7 @@ import pytest
 
 from benchmarks.hard import CASES
 from benchmarks.honesty import Kind, cells, known, methods, settings
-from ephs.solve import integrate
+from ephs.solve import ending
 from ephs.solve.auditing.findings import Audit
 
 HERE = {
@@ -39,7 +39,7 @@ def test_a_case_is_right_or_refused_or_found_wrong(case):
 
 
 def test_without_the_audit_some_are_silent(monkeypatch):
-    monkeypatch.setattr(integrate, "audit", lambda *_: Audit())
+    monkeypatch.setattr(ending, "audit", lambda *_: Audit())
     silent = {cell.method for cell in some("beyond stability") if cell.kind is Kind.SILENT}
     assert silent >= {"rk54", "rk87"}
 

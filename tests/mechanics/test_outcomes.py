@@ -11,7 +11,7 @@ from ephs import Outcome
 from ephs.mechanics.methods.explicit import Explicit, tableau
 from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.methods.registry import METHODS, Method, on_joints
-from ephs.solve import integrate, loop
+from ephs.solve import loop
 from ephs.solve.errors import SolveError
 from ephs.solve.methods import factors
 from examples.failing import oscillator, pendulum, scene
@@ -33,8 +33,7 @@ def named(error: ephs.SimulationError) -> bool:
 @pytest.fixture
 def asked(monkeypatch):
     """Progress is told at every step."""
-    for module in (integrate, loop):
-        monkeypatch.setattr(module, "RESPONSE", -1.0)
+    monkeypatch.setattr(loop, "RESPONSE", -1.0)
 
 
 @pytest.mark.usefixtures("asked")

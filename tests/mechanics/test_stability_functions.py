@@ -176,7 +176,7 @@ def test_methods_have_the_orders_that_are_said_of_them():
     problem = problem_of_system(SYSTEM, START)
     model = compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
     for name in ("natural", "natural4"):
-        assert METHODS[name].many(model).order == METHODS[name].order
+        assert METHODS[name].undamped(model).order == METHODS[name].order
 
 
 def test_the_estimate_of_radau_falls_with_the_power_that_it_says():

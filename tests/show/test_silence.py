@@ -4,7 +4,7 @@ import pytest
 
 from ephs.mechanics.methods.registry import METHODS
 from ephs.show.charts import FAMILIES, SILENT, Outcome, stability
-from ephs.solve import integrate
+from ephs.solve import ending
 from ephs.solve.auditing.findings import Audit
 
 LIMIT = 0.5
@@ -28,6 +28,6 @@ def test_every_run_is_right_or_refused_or_found_wrong(family):
 
 
 def test_without_the_audit_some_are_wrong_in_silence(monkeypatch):
-    monkeypatch.setattr(integrate, "audit", lambda *_: Audit())
+    monkeypatch.setattr(ending, "audit", lambda *_: Audit())
     cells = stability(FAMILIES["half-turn"], ["natural"], quick=True, limit=LIMIT)
     assert any(cell.outcome in SILENT for cell in cells)

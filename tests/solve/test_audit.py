@@ -265,7 +265,7 @@ def test_the_error_of_constant_steps_is_estimated_for_every_method(name, monkeyp
         found.append(np.nan if error is None else error.size)  # none where energies grow beyond all that steps move
         return audit(sol, bounds, trials)
 
-    monkeypatch.setattr("ephs.solve.integrate.audit", judged)
+    monkeypatch.setattr("ephs.solve.ending.audit", judged)
     for size in (coarse, 0.1 * order, 0.05 * order):
         sol = ephs.simulate(spring, 20.0 * size / rate, method=name, step=size / rate, audit="off")
         assert size < 1.0 or not sol.audit.passed

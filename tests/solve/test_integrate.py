@@ -10,7 +10,7 @@ from ephs import library as lib
 from ephs import quantity as Q
 from ephs.semantics import Reference
 from ephs.semantics.natural import step as oracle_step
-from ephs.solve.integrate import Grid
+from ephs.solve.control import Grid
 from ephs.solve.methods.natural import Natural
 from ephs.solve.model import compile_model
 

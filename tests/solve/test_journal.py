@@ -93,7 +93,6 @@ def copies(monkeypatch, tmp_path):
     monkeypatch.setattr(journal, "EVERY", -1.0)
     monkeypatch.setattr(journal.os, "fsync", lambda handle: None)
     monkeypatch.setattr(journal.Written, "write", copied)
-    monkeypatch.setattr("ephs.solve.integrate.LARGEST_CHUNK", 4)
     monkeypatch.setattr("ephs.solve.loop.BURST", 3)
     return made
 
@@ -189,7 +188,7 @@ def written(tmp_path_factory):
     file = tmp_path_factory.mktemp("journal") / "run.journal"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(journal, "EVERY", -1.0)
-        patch.setattr("ephs.solve.integrate.LARGEST_CHUNK", 2)
+        patch.setattr("ephs.solve.loop.BURST", 2)
         return file, simulate(SCENE, RUNS["natural, constant steps"], journal=file)
 
 
@@ -271,6 +270,7 @@ def test_a_journal_has_one_writer(tmp_path):
 
 def test_a_full_disk_ends_the_run_by_name_and_the_run_goes_on_when_there_is_room(tmp_path, monkeypatch):
     monkeypatch.setattr(journal, "EVERY", -1.0)
+    monkeypatch.setattr("ephs.solve.loop.BURST", 2)
     options = RUNS["natural, constant steps"]
     file = tmp_path / "run.journal"
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)

@@ -12,6 +12,7 @@ from ephs.solve import journal
 from ephs.solve.errors import OptionError
 
 MASS, STIFFNESS, START = 2.0, 8.0, 0.3
+EPS = float(np.finfo(float).eps)
 PERIOD, UNTIL = 0.05, 1.0
 GAINS = 60.0, 14.0
 CART = f"""
@@ -109,7 +110,8 @@ def test_a_sampled_input_is_a_function_of_time_with_declared_jumps(cart, method)
     free = ephs.simulate(cart, UNTIL, inputs=known, jumps=times[1:], **steps)
     assert np.array_equal(held.t, free.t)
     for path, values_there in held.states.items():
-        assert np.abs(values_there - free.states[path]).max() <= 1e-13
+        # corrections of the energy enlarge rounding where the cart nearly stands
+        assert np.abs(values_there - free.states[path]).max() <= 64.0 * EPS * len(held)
     late = ephs.simulate(
         cart, UNTIL, inputs={"joints.rail": lambda t: values[bisect_right(times, t - 0.01) - 1]}, **steps
     )
@@ -219,8 +221,7 @@ def test_a_run_that_stops_on_a_sample_takes_it_once(cart, tmp_path, monkeypatch,
 
     whole, times = go(), taken[1:]
     stop[0] = 0.12
-    for module in ("loop", "integrate"):
-        monkeypatch.setattr(f"ephs.solve.{module}.RESPONSE", -1.0)  # every step is told
+    monkeypatch.setattr("ephs.solve.loop.RESPONSE", -1.0)  # every step is told
     file = tmp_path / "run.journal"
     with pytest.raises(ephs.Interrupted):
         go(journal=file)

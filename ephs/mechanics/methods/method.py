@@ -8,6 +8,7 @@ from typing import Any
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.solve.control import Control
 from ephs.solve.errors import SolveError
+from ephs.solve.result.record import Record, record_of
 from ephs.solve.snapshot import Snapshot
 from ephs.solve.stepping import Attempt, Leg, Row, Span
 
@@ -102,9 +103,9 @@ class ReducedMethod(ABC):
         """Record of a state."""
         return self.equations.row(state)
 
-    def rows(self, states: Sequence[ReducedState]) -> list[Row]:
-        """Records of many states."""
-        return self.equations.rows_of(states)
+    def record(self, taken: Sequence[tuple[float, ReducedState, float]]) -> Record:
+        """Records of many instants."""
+        return record_of(taken, self.equations.rows_of([state for _, state, _ in taken]))
 
     def stats(self) -> dict[str, Any]:
         """Counts, for the solution's statistics."""

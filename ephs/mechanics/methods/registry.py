@@ -12,7 +12,7 @@ from ephs.solve.control import Control, Policy, Proportional, Symmetric
 from ephs.solve.errors import OptionError, nearest_of
 from ephs.solve.methods.driven import ComponentMethod
 from ephs.solve.methods.natural import Natural
-from ephs.solve.model import Model, compile_model
+from ephs.solve.model import Model
 from ephs.solve.problem import Problem
 from ephs.solve.stepping import Stepper
 
@@ -65,8 +65,6 @@ class Method:
         The method for a setting, and what chooses its steps: None where they are constant.
     options
         Names of the options that it takes.
-    many
-        Makes, for a compiled model, what takes many constant steps in one compiled call; None where there is no such.
     forms
         Forms of the equations that it takes besides the least, which is what ``"reduced"`` asks for.
     lawful
@@ -87,7 +85,6 @@ class Method:
     summary: str
     make: Callable[[Setting], tuple[Stepper[Any], Policy | None]]
     options: tuple[str, ...] = ()
-    many: Callable[[Model], ComponentMethod] | None = None
     forms: tuple[str, ...] = ()
     lawful: bool = False
     undamped: Callable[[Model], ComponentMethod] | None = None
@@ -187,10 +184,8 @@ def _component_wise(
     def made(setting: Setting) -> tuple[Stepper[Any], Policy | None]:
         from ephs.solve.methods.paced import Paced
 
-        problem = setting.problem
-        model = compile_model(problem.descriptor, problem.reference, problem.inputs(setting.t0, problem.initial))
-        method, free = make(model), setting.control.step is None
-        return Paced(problem, method, setting.control, doubled=free), Symmetric(method.order + 1.0) if free else None
+        paced, free = Paced(setting.problem, setting.t0, setting.control, make), setting.control.step is None
+        return paced, Symmetric(paced.method.order + 1.0) if free else None
 
     return made
 
@@ -246,7 +241,6 @@ for _method in (
         True,
         "balances and positions of joints exact, any system",
         _component_wise(Natural),
-        many=Natural,
         forms=("paper", "folded"),
         lawful=True,
         undamped=Natural,
@@ -260,7 +254,6 @@ for _method in (
         True,
         "the same of order 4",
         _component_wise(_of_order_4),
-        many=_of_order_4,
         forms=("paper", "folded"),
         lawful=True,
         undamped=_of_order_4,

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ephs.mechanics.constraints.redundancy import dependences, in_words, indeterminate, wrenches_in_words
+from ephs.mechanics.runs.running import by_constant_steps
 from ephs.mechanics.runs.simulate import problem_of_scene, problem_of_system
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.own_units import in_own_units, mobility_of
@@ -17,7 +18,6 @@ from ephs.semantics.spaces.rank import ASSEMBLY
 from ephs.semantics.system import System
 from ephs.solve.auditing.audit import LAWFUL
 from ephs.solve.errors import SolveError
-from ephs.solve.integrate import Grid, integrate
 from ephs.solve.problem import Problem
 from ephs.solve.threads import in_one_thread
 
@@ -108,7 +108,7 @@ def _motion(problem: Problem) -> Iterator[CheckItem]:
     yield CheckItem("mobility", True, f"{motions} in this configuration")
     yield from _redundancy(problem, found.redundant)
     try:
-        start = integrate(own, Grid(0.0, STEPS * STEP, STEP))
+        start = by_constant_steps(own, STEPS * STEP, STEP)
     except (SolveError, RuntimeError) as error:
         yield CheckItem("motion", False, str(error))
         return

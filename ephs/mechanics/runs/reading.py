@@ -17,8 +17,8 @@ from ephs.mechanics.scene.soundness import check_scene, meshes_within
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.system import System
+from ephs.solve.ending import solution_of
 from ephs.solve.errors import OptionError
-from ephs.solve.integrate import solution_of
 from ephs.solve.journal import MAGIC, read_journal
 from ephs.solve.motion_law import MotionLaw
 from ephs.solve.problem import Problem, Signal

@@ -1,4 +1,4 @@
-"""Runs of a problem by a method: many compiled steps in one call where the method has them, else step after step."""
+"""Runs of a problem by a method."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -12,15 +12,15 @@ from ephs.semantics.bundle import Array
 from ephs.solve.auditing.audit import Bounds
 from ephs.solve.auditing.growth import Again
 from ephs.solve.breakpoints import Breakpoints
-from ephs.solve.control import Control, Tolerance
+from ephs.solve.control import RTOL, Control, Tolerance
 from ephs.solve.events import Event
-from ephs.solve.integrate import Grid, Progress, integrate
 from ephs.solve.journal import Written
-from ephs.solve.loop import integrate_stepwise
+from ephs.solve.loop import integrate
 from ephs.solve.problem import Problem
 from ephs.solve.result.solution import Solution
+from ephs.solve.watching import Progress
 
-__all__ = ["Course"]
+__all__ = ["Course", "by_constant_steps"]
 
 CLOSE = 1e-4
 """Tolerance of the steps of an independent run."""
@@ -62,26 +62,14 @@ class Course:
         SimulationError
             The run failed part-way; ``.partial`` is the solution up to there.
         """
-        control, seen = self.control, breakpoints.of(self.problem)
-        if self.method.many is not None and control.step is not None and not events and self.end > self.start:
-            return integrate(
-                seen,
-                Grid(self.start, self.end, control.step),
-                make=self.method.many,
-                save_at=save_at,
-                max_steps=control.max_steps,
-                progress=progress,
-                journal=journal,
-                bounds=bounds,
-                breakpoints=breakpoints,
-            )
-        setting = Setting(seen, self.start, control, self.options, method=self.method.name)
-        return integrate_stepwise(
+        seen = breakpoints.of(self.problem)
+        setting = Setting(seen, self.start, self.control, self.options, method=self.method.name)
+        return integrate(
             seen,
             self.start,
             self.end,
             make=lambda: self.method.make(setting),
-            control=control,
+            control=self.control,
             events=events,
             save_at=save_at,
             progress=progress,
@@ -110,3 +98,16 @@ class Course:
         control = Control(tolerance, tolerance, None, 0.0, self.control.most, most)
         course = replace(self, end=float(kept[-1]), control=control, method=METHODS["rk87"], options={})
         return course.run(Breakpoints(self.start, course.end, np.array(known.times)), save_at=kept)
+
+
+def by_constant_steps(problem: Problem, until: float, step: float) -> Solution:
+    """Run a problem from 0 to ``until`` by the natural method in steps of so many seconds, without an audit.
+
+    Raises
+    ------
+    SimulationError
+        See `Course.run`.
+    """
+    tolerance = Tolerance(RTOL, {})
+    control = Control(tolerance, tolerance, step, 0.0, np.inf, None)
+    return Course(problem, METHODS["natural"], 0.0, until, control, {}).run(Breakpoints(0.0, until))

@@ -44,9 +44,9 @@ from ephs.solve.auditing.audit import Bounds
 from ephs.solve.auditing.findings import POLICIES, judged
 from ephs.solve.breakpoints import Breakpoints
 from ephs.solve.control import ATOL, RTOL, Control, Tolerance, told_apart
+from ephs.solve.ending import solution_of
 from ephs.solve.errors import OptionError, failing_at, nearest_of, number_of
 from ephs.solve.events import events_of
-from ephs.solve.integrate import solution_of
 from ephs.solve.journal import Journal
 from ephs.solve.problem import Problem, Signal
 from ephs.solve.result.record import Record

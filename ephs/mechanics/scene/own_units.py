@@ -24,11 +24,11 @@ from ephs.semantics.kept import once
 from ephs.semantics.spaces import Pair, pair
 from ephs.solve.events import Event
 from ephs.solve.instant import Mobility
-from ephs.solve.integrate import Progress
 from ephs.solve.mobility import mobility
 from ephs.solve.motion_law import MotionLaw
 from ephs.solve.problem import Problem, Signal, State
 from ephs.solve.result.record import Record
+from ephs.solve.watching import Progress
 
 __all__ = ["SI", "Units", "in_own_units", "mobility_of", "seen_from", "units_of_states"]
 

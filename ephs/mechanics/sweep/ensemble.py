@@ -332,7 +332,7 @@ class Ensemble:
         """The method on these equations, None where it does not take many steps in one call."""
         given = self._options
         method, _ = chosen(given.get("method", "auto"), equations.problem, step=given.get("step"))
-        if method.many is not None or (
+        if (
             given.get("step") is None
             and longest_step(equations.problem.scene, 1, 0.0, (self._t0, self._until)) < np.inf
         ):

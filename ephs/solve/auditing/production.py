@@ -1,6 +1,5 @@
 """Entropy production of irreversible components, checked in every step if their structure is not proved."""
 
-from dataclasses import replace
 from typing import final
 
 import numpy as np
@@ -8,7 +7,6 @@ import numpy as np
 from ephs.semantics.bundle import Array
 from ephs.semantics.primitives import Irreversible, Point, Storage
 from ephs.solve.errors import Outcome, SolveError
-from ephs.solve.methods.natural import Chunk
 from ephs.solve.problem import Problem
 
 __all__ = ["Production"]
@@ -60,24 +58,6 @@ class Production:
         SolveError
             A component destroyed entropy in it.
         """
-        failure = self._fault(t, x, energies)
-        if failure is not None:
-            raise failure
-        self._last = (x, energies)
-
-    def cut(self, times: Array, chunk: Chunk) -> Chunk:
-        """Steps up to the first in which a component destroyed entropy, and that as their failure."""
-        if not self.active:
-            return chunk
-        for k in range(chunk.steps):
-            failure = self._fault(float(times[k]), chunk.x[k], chunk.energies[k])
-            if failure is not None:
-                kept = {name: getattr(chunk, name)[:k] for name in ("x", "energies", "ledgers")}
-                return replace(chunk, failure=failure, **kept)
-            self._last = (chunk.x[k], chunk.energies[k])
-        return chunk
-
-    def _fault(self, t: float, x: Array, energies: Array) -> SolveError | None:
         before, made_before = self._last
         made = self._sign * (energies[self._watched] - made_before[self._watched])
         exchanged = float(np.abs(x[self._entropies] - before[self._entropies]).sum())
@@ -85,10 +65,10 @@ class Production:
         allowed = SHARE * exchanged + ROUNDING * np.abs(energies[self._watched]) + self._still
         excess = made + allowed
         worst = int(np.argmin(excess))
-        if excess[worst] >= 0.0:
-            return None
-        size = f"{made[worst]:.3g} J/K in the step to t = {t:.9g} s"
-        return SolveError(Outcome.ENTROPY, str(self._paths[worst]), size)
+        if excess[worst] < 0.0:
+            size = f"{made[worst]:.3g} J/K in the step to t = {t:.9g} s"
+            raise SolveError(Outcome.ENTROPY, str(self._paths[worst]), size)
+        self._last = (x, energies)
 
 
 def _capacity(problem: Problem) -> float:

@@ -13,7 +13,7 @@ estimates how far bodies are off at the end, and how much coarser a second run m
 """
 
 from bisect import bisect_right
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Generic, TypeVar, final
@@ -27,9 +27,10 @@ from ephs.solve.auditing.growth import Again, apart
 from ephs.solve.auditing.retaken import Retaken
 from ephs.solve.breakpoints import Breakpoints
 from ephs.solve.methods.driven import ComponentMethod, advance_driven
+from ephs.solve.methods.paced import Paced
 from ephs.solve.model import Model, compile_model
 from ephs.solve.problem import Problem
-from ephs.solve.result.record import Record, Rows, record_of
+from ephs.solve.result.record import Record, Rows
 from ephs.solve.snapshot import Snapshot, like, parts
 from ephs.solve.stepping import Stepper
 
@@ -238,15 +239,16 @@ class Samples(Generic[S]):
         self.states: list[tuple[float, S]] = []
         self._rows, self._stride = 0, 1
 
-    def add(self, rows: Iterable[tuple[float, S, float]]) -> None:
+    def add(self, rows: Sequence[tuple[float, S, float]]) -> None:
         """Times and states in order, with what a step made at least."""
-        for t, state, _ in rows if self._wanted else ():
-            if not self._rows % self._stride:
-                if len(self.states) == 2 * MOST:
-                    self.states, self._stride = self.states[::2], 2 * self._stride
-                if not self._rows % self._stride:
-                    self.states.append((t, state))
-            self._rows += 1
+        at, end = self._rows, self._rows + len(rows)
+        while self._wanted and (at := at + -at % self._stride) < end:
+            if len(self.states) == 2 * MOST:
+                self.states, self._stride = self.states[::2], 2 * self._stride
+            else:
+                self.states.append(rows[at - self._rows][:2])
+                at += 1
+        self._rows = end
 
     def snapshot(self) -> Snapshot:
         """Snapshot for `restore`."""
@@ -273,6 +275,8 @@ def trials_of(
 ) -> Trials | None:
     """Constant steps of a method with an order, from its own states; of a natural method by ``make``.
 
+    A natural method's own are tried from states of the solution.
+
     Parameters
     ----------
     problem
@@ -280,9 +284,12 @@ def trials_of(
     """
     jumps = breakpoints.times
     seconds, steps = problem.seconds, int(solution.stats["steps"])
-    natural = None
+    natural, paced = None, stepper if isinstance(stepper, Paced) else None
     if make is not None:
-        natural = natural_trials(solution, make, abs(h) * seconds, jumps=[seconds * t for t in jumps])
+        own = paced.method if paced is not None else None
+        natural = natural_trials(solution, make, abs(h) * seconds, own, [seconds * t for t in jumps])
+    if paced is not None:
+        return natural
     clear = [(t, state) for t, state in samples if _clear(t, h, until, jumps)]
     if not clear:
         return natural
@@ -297,8 +304,8 @@ def trials_of(
         start = stepper.anew(chosen[k][1])
         whole = stepper.step(start, h).end
         half = stepper.step(stepper.anew(start), 0.5 * h).end
-        rows = stepper.rows([start, whole, stepper.step(half, 0.5 * h).end])
-        _, shown = _shown(problem, record_of([start.t] * 3, rows, [0.0] * 3))
+        states = start, whole, stepper.step(half, 0.5 * h).end
+        _, shown = _shown(problem, stepper.record([(start.t, state, 0.0) for state in states]))
         first, second, third = zip(shown.x, shown.energies, strict=True)
         return first, second, third
 

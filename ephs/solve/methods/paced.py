@@ -1,8 +1,8 @@
-"""The natural methods, one step per call: variable steps, error estimates, events and variable inputs."""
+"""The natural methods as steppers: constant or variable steps, error estimates, events and variable inputs."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, final
+from typing import Any, final, overload
 
 import numpy as np
 
@@ -10,15 +10,21 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.solve.auditing.retaken import PARTS, share_missed
-from ephs.solve.control import Control
-from ephs.solve.methods.driven import ComponentMethod, advance_driven, started
-from ephs.solve.methods.natural import NaturalState
+from ephs.solve.control import Control, Grid
+from ephs.solve.methods.driven import ComponentMethod, advance_driven, advance_whole, started
+from ephs.solve.methods.natural import Chunk, NaturalState
+from ephs.solve.methods.records import IRREVERSIBLE
+from ephs.solve.model import Model, compile_model
 from ephs.solve.problem import Problem
+from ephs.solve.result.record import Record, record_of
 from ephs.solve.snapshot import Snapshot
 from ephs.solve.starting import check_start
-from ephs.solve.stepping import Attempt, Row, Span
+from ephs.solve.stepping import Attempt, Counts, Row, Span
 
 __all__ = ["Paced", "PacedState"]
+
+FIRST = 16
+"""Steps in the first compiled call, by which the time of a step becomes known."""
 
 
 @final
@@ -35,17 +41,22 @@ class PacedState:
 class Paced:
     """A natural method on one problem.
 
+    Where no constant step is given, a step is two of half the length, whose difference to one of the whole length
+    estimates the error.
+
     Parameters
     ----------
-    doubled
-        Whether a step is two of half the length, whose difference to one of the whole length estimates the error.
+    make
+        Makes the method for a compiled model.
     """
 
-    def __init__(self, problem: Problem, method: ComponentMethod, control: Control, *, doubled: bool) -> None:
-        self.problem, self.method, self.name = problem, method, method.name
-        self._doubled = doubled
-        self._iterations = 0
+    def __init__(self, problem: Problem, t0: float, control: Control, make: Callable[[Model], ComponentMethod]) -> None:
         d = problem.descriptor
+        self._make, self._model = make, compile_model(d, problem.reference, problem.inputs(t0, problem.initial))
+        self.problem, self.method = problem, make(self._model)
+        self.name, self._step = self.method.name, control.step
+        self._within: ComponentMethod | None = None
+        self._iterations = self._cut = 0
         self._rtol, self._atol = control.rtol.rates(d), control.atol.rates(d)
         self._counted = _counted(problem)
 
@@ -66,12 +77,23 @@ class Paced:
         """Compile programs that are not in the cache, before timing starts."""
         self.method.prepare(state.inner, h)
 
-    def many(self, span: Span[PacedState]) -> None:
-        """None: one step a call."""
+    def many(self, span: Span[PacedState]) -> "_Leg | None":
+        """Constant steps with constant inputs."""
+        return _Leg(self, span, self._step) if self._step is not None and self.problem.constant else None
+
+    def chunk(self, state: PacedState, h: float, steps: int) -> tuple[NaturalState, Chunk]:
+        """Up to so many steps of h seconds from a state, in compiled calls where inputs are constant."""
+        if self.problem.constant:
+            inner, chunk = advance_whole(self.method, state.inner, h, steps)
+        else:
+            inner, chunk = advance_driven(self.problem, self.method, state.inner, state.t, h)
+        self._iterations += chunk.iterations
+        self._cut += chunk.cut
+        return inner, chunk
 
     def step(self, state: PacedState, h: float) -> Attempt[PacedState]:
         """One step of h seconds."""
-        if not self._doubled:
+        if self._step is not None:
             end, least = self._single(state, h)
             return Attempt(state, end, h, 0.0, least)
         coarse, _ = self._single(state, h)
@@ -82,7 +104,15 @@ class Paced:
 
     def inside(self, attempt: Attempt[PacedState], t: float) -> PacedState:
         """A shorter step from the same start."""
-        return self._single(attempt.start, t - attempt.start.t)[0]
+        return self.shorter(attempt.start, t)
+
+    def shorter(self, state: PacedState, t: float) -> PacedState:
+        """The state at a time by one step, which leaves no trace in those of the run: its method is another."""
+        if self._within is None:
+            self._within = self._make(self._model)
+        start = started(self._within, state.kept.x, self._sums(state.kept))
+        inner, chunk = advance_driven(self.problem, self._within, start, state.t, t - state.t)
+        return _end(chunk, inner, t)
 
     def missed(self, attempt: Attempt[PacedState]) -> float:
         """Error of a step in tolerances, by steps of a third of its length."""
@@ -97,11 +127,13 @@ class Paced:
 
     def anew(self, state: PacedState) -> PacedState:
         """The same state as one to start from: unknowns are guessed afresh."""
-        return replace(state, inner=started(self.method, state.inner.x, state.inner.sums))
+        return replace(state, inner=started(self.method, state.kept.x, self._sums(state.kept)))
 
-    def rows(self, states: Sequence[PacedState]) -> list[Row]:
-        """Records of many states."""
-        return [self.row(state) for state in states]
+    def record(self, taken: Sequence[tuple[float, PacedState, float]]) -> Record:
+        """Records of many instants."""
+        if isinstance(taken, _Taken):
+            return Record(taken.times, taken.chunk.x, taken.chunk.energies, taken.chunk.ledgers)
+        return record_of(taken, [state.kept for _, state, _ in taken])
 
     def row(self, state: PacedState) -> Row:
         """Record of a state."""
@@ -112,6 +144,7 @@ class Paced:
         return {
             **self.problem.remarks,
             "iterations": self._iterations,
+            "cut_steps": self._cut,
             "orders": self.method.changes,
             "dependent_equations": len(self.method.redundant),
             "unknowns": self.method.model.unknowns,
@@ -119,20 +152,24 @@ class Paced:
 
     def snapshot(self, state: PacedState) -> Snapshot:
         """Memory from step to step besides the state."""
-        return {"method": self.method.snapshot(), "iterations": self._iterations}
+        within = self._within.snapshot() if self._within is not None else None
+        return {"method": self.method.snapshot(), "within": within, "counts": [self._iterations, self._cut]}
 
     def restore(self, snapshot: Snapshot, state: PacedState) -> None:
         """Go on from a snapshot."""
         self.method.restore(snapshot["method"])
-        self._iterations = snapshot["iterations"]
+        self._iterations, self._cut = snapshot["counts"]
+        if snapshot["within"] is not None:
+            self._within = self._make(self._model)
+            self._within.restore(snapshot["within"])
 
     def _single(self, state: PacedState, h: float) -> tuple[PacedState, float]:
-        inner, chunk = advance_driven(self.problem, self.method, state.inner, state.t, h)
-        self._iterations += chunk.iterations
-        if chunk.failure is not None:
-            raise chunk.failure
-        sums = chunk.ledgers[-1]
-        return PacedState(state.t + h, inner, Row(chunk.x[-1], chunk.energies[-1], sums[:4])), float(sums[4])
+        inner, chunk = self.chunk(state, h, 1)
+        return _end(chunk, inner, state.t + h), float(chunk.ledgers[-1, 4])
+
+    def _sums(self, row: Row) -> Array:
+        """(4 + components,) counts of a method's state at a row."""
+        return np.concatenate([row.sums, np.where(self._model.tables.kind == IRREVERSIBLE, row.energies, 0.0)])
 
     def _off(self, state: PacedState, coarse: PacedState, fine: PacedState) -> tuple[float, str]:
         """Distance between two ends of a step in tolerances, and the state where it occurs."""
@@ -150,6 +187,116 @@ class Paced:
             if not error <= worst:
                 worst, where = error, str(slot.path)
         return worst, where
+
+
+def _end(chunk: Chunk, inner: NaturalState, t: float) -> PacedState:
+    """State after a chunk that ends at t.
+
+    Raises
+    ------
+    SolveError
+        The chunk has no such step.
+    """
+    if chunk.failure is not None:
+        raise chunk.failure
+    return PacedState(t, inner, Row(chunk.x[-1], chunk.energies[-1], chunk.ledgers[-1, :4]))
+
+
+@final
+class _Taken(Sequence[tuple[float, PacedState, float]]):
+    """Instants at the ends of a chunk's steps, from whose states steps may start anew."""
+
+    def __init__(self, times: Array, chunk: Chunk, last: NaturalState) -> None:
+        self.times, self.chunk, self._last = times, chunk, last
+
+    def __len__(self) -> int:
+        return self.times.size
+
+    @overload
+    def __getitem__(self, k: int) -> tuple[float, PacedState, float]: ...
+    @overload
+    def __getitem__(self, k: slice) -> list[tuple[float, PacedState, float]]: ...
+    def __getitem__(self, k: int | slice) -> Any:
+        if isinstance(k, slice):
+            return [self[i] for i in range(*k.indices(len(self)))]
+        t, x, ledgers = float(self.times[k]), self.chunk.x[k], self.chunk.ledgers[k]
+        state = PacedState(t, replace(self._last, x=x), Row(x, self.chunk.energies[k], ledgers[:4]))
+        return t, state, float(ledgers[4])
+
+
+@final
+class _Leg:
+    """Many constant steps a compiled call, those of full length on the grid of the run."""
+
+    left = False
+
+    def __init__(self, method: Paced, span: Span[PacedState], step: float) -> None:
+        self.state, self.counts = span.state, replace(span.counts, h=step)
+        self._method, self._span = method, span
+        self._grid, self._sign = Grid(0.0, abs(span.until - span.t0), step), 1.0 if span.until > span.t0 else -1.0
+        self._saved, self._most = span.saved, FIRST
+        self._rows: Sequence[tuple[float, PacedState, float]] = []
+
+    def advance(self, steps: int) -> bool:
+        """Up to so many steps; whether the end is reached.
+
+        Raises
+        ------
+        SolveError
+            A step has no solution.
+        """
+        grid, done, span = self._grid, self.counts.steps, self._span
+        count, h = min(steps, self._most, grid.whole - done), grid.h
+        if not count:
+            count, h = 1, grid.last
+        inner, chunk = self._method.chunk(self.state, self._sign * h, count)
+        times = span.t0 + self._sign * grid.h * np.arange(done + 1, done + chunk.steps + 1).astype(np.float64)
+        ended = done + count == grid.count
+        if ended and chunk.steps == count:
+            times[-1] = span.until
+        taken = _Taken(times, chunk, inner)
+        if chunk.steps:
+            self._rows = taken if span.save_at is None else self._between(taken, span.save_at)
+            self.state = replace(taken[-1][1], inner=inner)
+            shortest, longest = min(self.counts.shortest, h), max(self.counts.longest, h)
+            least = min(self.counts.least, float(chunk.ledgers[:, 4].min()))
+            self.counts = Counts(done + chunk.steps, 0, shortest, longest, least, grid.h)
+        if chunk.failure is not None:
+            raise chunk.failure
+        self._most = steps
+        return ended
+
+    def _between(self, taken: _Taken, save_at: Array) -> list[tuple[float, PacedState, float]]:
+        """The instants to keep among those of some steps from the present state."""
+        first, self._saved = (
+            self._saved,
+            int(np.searchsorted(self._sign * save_at, self._sign * taken.times[-1], side="right")),
+        )
+        found: list[tuple[float, PacedState, float]] = []
+        for when in save_at[first : self._saved].tolist():
+            k = int(np.searchsorted(self._sign * taken.times, self._sign * when))
+            t, after, least = taken[k]
+            if t != when:
+                after = self._method.shorter(taken[k - 1][1] if k else self.state, when)
+            found.append((when, after, least))
+        return found
+
+    def rows(self) -> Sequence[tuple[float, PacedState, float]]:
+        """Instants to keep since the last call."""
+        rows, self._rows = self._rows, []
+        return rows
+
+    @property
+    def time(self) -> float:
+        """The time reached."""
+        return self.state.t
+
+    def snapshot(self) -> Snapshot:
+        """Nothing: the run's state and counts are all there is."""
+        return {}
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go on from where the run is."""
 
 
 def _counted(problem: Problem) -> Array:

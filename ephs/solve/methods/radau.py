@@ -23,6 +23,7 @@ from ephs.solve.methods.passages import Passages
 from ephs.solve.methods.records import IRREVERSIBLE
 from ephs.solve.model import compile_model
 from ephs.solve.problem import NO_STATE, Problem
+from ephs.solve.result.record import Record, record_of
 from ephs.solve.snapshot import Snapshot, like, parts
 from ephs.solve.stepping import Attempt, Row, Span
 
@@ -201,9 +202,9 @@ class Radau:
         """The same state as one to start from, whose rates may be others than before."""
         return replace(state, h=0.0)
 
-    def rows(self, states: Sequence[RadauState]) -> list[Row]:
-        """Records of many states."""
-        return [self.row(state) for state in states]
+    def record(self, taken: Sequence[tuple[float, RadauState, float]]) -> Record:
+        """Records of many instants."""
+        return record_of(taken, [self.row(state) for _, state, _ in taken])
 
     def row(self, state: RadauState) -> Row:
         """Record of a state."""

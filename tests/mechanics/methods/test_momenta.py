@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import ephs
 from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.tree.equations.equations import Equations
-from ephs.solve import integrate, loop
+from ephs.solve import loop
 from tests.mechanics.momenta import floating, momenta
 
 SCENES = Path(__file__).parents[3] / "scenes"
@@ -163,8 +163,7 @@ def test_a_run_that_was_stopped_goes_on_with_the_momenta_that_it_had(method, ste
 
     scene, journal = ephs.load(SCENES / "mbs.toml"), tmp_path / "run.journal"
     with pytest.MonkeyPatch.context() as patch:
-        for module in (integrate, loop):  # progress is told at every step
-            patch.setattr(module, "RESPONSE", -1.0)
+        patch.setattr(loop, "RESPONSE", -1.0)  # progress is told at every step
         patch.setattr(loop, "BURST", 8)  # of compiled ones after so many
         with pytest.raises(ephs.SimulationError) as stopped:
             going(journal=journal, progress=stop)

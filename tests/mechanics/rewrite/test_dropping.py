@@ -15,12 +15,12 @@ from ephs.mechanics.rewrite.dropping import DROP_FRICTION, DROP_GYROSCOPIC, DROP
 from ephs.mechanics.rewrite.folding import FOLD
 from ephs.mechanics.rewrite.rewrite import Strength, rewrite, sites_of
 from ephs.mechanics.rewrite.rules import RULES
+from ephs.mechanics.runs.running import by_constant_steps
 from ephs.mechanics.runs.simulate import problem_of_system
 from ephs.mechanics.scene.build import initial_state
 from ephs.mechanics.scene.model import frozen
 from ephs.semantics import Reference
 from ephs.semantics.spaces import SE3
-from ephs.solve.integrate import Grid, integrate
 from ephs.testing import mechanisms
 
 seeds = st.integers(0, 2**20)
@@ -96,7 +96,7 @@ def test_gyroscopic_forces_that_vanish_are_dropped(system, dropped, folded):
     if not dropped:
         assert "wrench from outside" in refusals(system, DROP_GYROSCOPIC)[0]
         return
-    one, other = (integrate(problem_of_system(of), Grid(0.0, 0.4, 0.02)) for of in (system, done.system))
+    one, other = (by_constant_steps(problem_of_system(of), 0.4, 0.02) for of in (system, done.system))
     assert max(np.abs(one[path][-1]).max(initial=0.0) for path in one if path[-1] == "p") > 0.1
     for path in one:
         assert np.abs(one[path] - other[path]).max(initial=0.0) <= 20 * 1e-13 * max(
@@ -260,7 +260,7 @@ def test_reduced_systems_take_the_same_steps_and_every_state_is_found_again(scen
     runs = []
     for of, state in ((system, start), (done.system, done.states.forward(start))):
         problem = problem_of_system(of, {str(p): v for p, v in state.items()})
-        runs.append(integrate(problem, Grid(0.0, step * steps, step)))
+        runs.append(by_constant_steps(problem, step * steps, step))
     before, after = (run.state_at(steps) for run in runs)
     found = done.states.back(after, start)
     assert set(found) == set(before)

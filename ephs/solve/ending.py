@@ -1,0 +1,109 @@
+"""End of a run, whatever it was: its failures with what was computed before, its solution, and the audit of it."""
+
+from collections.abc import Callable, Generator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any, Protocol
+
+import numpy as np
+
+from ephs.operad import Quantity
+from ephs.semantics.bundle import Array
+from ephs.semantics.spaces import Pair
+from ephs.semantics.spaces.codes import VECTOR
+from ephs.solve.auditing.audit import Bounds, Tests, audit
+from ephs.solve.auditing.resolution import Trials
+from ephs.solve.errors import Interrupted, Outcome, SimulationError, SolveError, solve_error_of
+from ephs.solve.problem import Problem
+from ephs.solve.result.labels import labels_of
+from ephs.solve.result.ledger import ledgers
+from ephs.solve.result.record import Record, joined
+from ephs.solve.result.solution import Solution
+
+__all__ = ["audited", "failures_of", "repeatable", "solution_of"]
+
+
+class Run(Protocol):
+    """A run in progress: its state and its results so far."""
+
+    t: float
+    problem: Problem
+
+    def solution(self) -> Solution:
+        """The solution so far."""
+        ...
+
+
+_AT_LOOPS = (Outcome.OPEN, Outcome.CONTRADICTION, Outcome.DIVERGED, Outcome.SINGULAR, Outcome.TINY)
+
+
+@contextmanager
+def failures_of(run: Run) -> Generator[None, None, None]:
+    """Failures and interruptions inside become those of the run, with its time and partial solution."""
+    try:
+        with np.errstate(all="ignore"):  # overflow is an outcome, not a warning
+            yield
+    except (SolveError, ArithmeticError, np.linalg.LinAlgError) as raised:
+        error = solve_error_of(raised)
+        outcome = error.outcome
+        if outcome in _AT_LOOPS and run.problem.shaky is not None and run.problem.shaky():
+            outcome = Outcome.SHAKY
+        failed = Interrupted if isinstance(error.cause, KeyboardInterrupt) else SimulationError
+        told = [error.equation]
+        if error.outcome in (Outcome.SINGULAR, Outcome.CONTRADICTION, Outcome.DIVERGED) and run.problem.dependences:
+            told.append(run.problem.dependences())
+        equation = "; ".join(filter(None, told))
+        raise failed(outcome, run.t * run.problem.seconds, error.path, equation, run.solution()) from error.cause
+    except KeyboardInterrupt as error:
+        raise Interrupted(Outcome.INTERRUPTED, run.t * run.problem.seconds, "", "", run.solution()) from error
+    except MemoryError as error:
+        raise SimulationError(Outcome.MEMORY, run.t * run.problem.seconds, "", str(error), run.solution()) from error
+
+
+def audited(
+    problem: Problem,
+    record: Record,
+    stats: Mapping[str, Any],
+    bounds: Bounds | None,
+    ends: list[Record],
+    trials: Callable[[Solution], Tests | None],
+) -> Solution:
+    """Kept part of a run, with the audit from its start to the present time.
+
+    Parameters
+    ----------
+    trials
+        Makes those of the audit.
+    ends
+        The first and the last row, kept or not; nothing where there is none.
+    """
+    solution = whole = solution_of(problem, record, stats)
+    if bounds is None or not ends:
+        return solution
+    first, last = ends
+    if not (len(solution) and record.t[0] == first.t[0] and record.t[-1] == last.t[0]):
+        whole = solution_of(problem, joined([first, record, last]) or record, stats)
+    solution.stats = {**solution.stats, "audit": audit(whole, bounds, trials(whole)).record()}
+    return solution
+
+
+def repeatable(trials: Trials | None, bounds: Bounds, *, ended: bool) -> Trials | None:
+    """Trials with further runs of the problem, where its run has ended."""
+    return replace(trials, again=bounds.again) if trials is not None and ended else trials
+
+
+def solution_of(problem: Problem, record: Record, stats: Mapping[str, Any]) -> Solution:
+    """Kept part of a run, as a solution."""
+    while problem.shown is not None:
+        problem, record, stats = problem.shown(record, stats)
+    states = {slot.path: coordinates(slot.quantity, record.x[:, slot.point]) for slot in problem.descriptor.states}
+    labels = {slot.path: labels_of(slot.quantity) for slot in problem.descriptor.states}
+    return Solution(problem.name, record.t, states, ledgers(problem, record), dict(stats), problem, labels)
+
+
+def coordinates(quantity: Quantity, x: Array) -> Array:
+    """States (n, size) as users read them: scalars (n,), relative poses as the pair's coordinates (n, d)."""
+    if quantity.kind == "relative_pose":
+        pair = Pair.from_space(quantity.space)
+        return x if pair.manifold.code == VECTOR else pair.coordinates(x)
+    return x[:, 0] if x.shape[1] == 1 else x
