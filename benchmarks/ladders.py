@@ -121,7 +121,8 @@ def _heat(rows: Callable[[int], int], until: float) -> Network:
 
     return Network(
         lambda cells: conducting(rows(cells), cells // rows(cells)), {"initial": {"n0_0.s": HOT}}, until, HOT,
-        temperatures, _conduction(rows), _hot(rows), lambda cells: cells // rows(cells), lambda y: y,
+        temperatures, _conduction(rows), _hot(rows), lambda cells: 1 if rows(cells) == 1 else cells // rows(cells),
+        lambda y: y,
     )  # fmt: skip
 
 
