@@ -1,7 +1,7 @@
 """`ephs chart`: work-precision and stability charts of the methods, with their data."""
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
@@ -12,7 +12,7 @@ from ephs.cli.input import BadInput, addressed, load_model, say
 
 if TYPE_CHECKING:
     from ephs import Scene
-    from ephs.show.charts import Family, Reference
+    from ephs.show.charts import Cell, Family, Point, Reference
 
 __all__ = ["charts"]
 
@@ -86,7 +86,8 @@ def work_precision(
             files = draw_work_precision(points, title, output, f"work-precision-{scene.name}")
         best = min((p.error for p in points if p.outcome == "done"), default=float("nan"))
         failed = sum(p.outcome != "done" for p in points)
-        say(f"{scene.name}: {len(points)} runs, {failed} failed, least error {best:.1e}", *map(str, files))
+        said = f"{scene.name}: {len(points)} runs, {failed} failed, least error {best:.1e}"
+        say(said, *_reasons(points), *map(str, files))
     return 0
 
 
@@ -133,12 +134,21 @@ def stability(
             files = draw_stability(found, family, output, f"stability-{family.name}")
             cells += found
         counts = Counter(cell.outcome.value for cell in found)
-        say(f"{family.name}: {', '.join(f'{n} {outcome}' for outcome, n in counts.items())}", *map(str, files))
+        said = f"{family.name}: {', '.join(f'{n} {outcome}' for outcome, n in counts.items())}"
+        say(said, *_reasons(found), *map(str, files))
     silent = sum(cell.outcome in SILENT for cell in cells)
     say(f"silent failures, wrong and neither refused nor flagged: {silent} of {len(cells)}")
     with addressed(str(output), output):
         say("messages, errors, counts:", *map(str, write_cells(cells, output, "stability")))
     return 0
+
+
+def _reasons(records: "Sequence[Point | Cell]") -> list[str]:
+    """The first reasons of failed runs; the figure lists all."""
+    from ephs.show.charts.reasons import LISTED, reasons
+
+    found = [str(each) for each in reasons(records).values()]
+    return [*found[:LISTED], *([f"and {len(found) - LISTED} other reasons"] if len(found) > LISTED else [])]
 
 
 def _scene(file: str) -> "Scene":

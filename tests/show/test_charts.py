@@ -14,6 +14,7 @@ from ephs.mechanics.methods.registry import METHODS
 from ephs.show.charts import (
     FAMILIES,
     Outcome,
+    Point,
     draw_work_precision,
     shipped_reference,
     stability,
@@ -23,6 +24,7 @@ from ephs.show.charts import (
 from ephs.show.charts.families import scene_family
 from ephs.show.charts.outcomes import BOUND, ENERGY, RIGHT, horizon, judge
 from ephs.show.charts.peers import PEERS, PeerError
+from ephs.show.charts.reasons import letter_of, reason_of, reasons, reasons_table
 from ephs.show.charts.reference import Motion
 from ephs.show.charts.runs import Ending, Setting, attempt
 from ephs.show.charts.specimens import SPECIMENS
@@ -210,6 +212,48 @@ def test_a_scene_of_ones_own_is_a_family_by_step():
     assert [cell.setting.value for cell in steps] == [cell.value for cell in steps] == [0.1 / 1000, 0.1 / 10]
     assert steps[0].outcome is Outcome.RIGHT
     assert steps[0].error < steps[1].error
+
+
+@pytest.mark.parametrize(
+    ("message", "cause"),
+    [
+        ("", ""),
+        (
+            "t = 2 s at joints.b: no solution (3 depend on others (in world axes): d); take a shorter step",
+            "no solution",
+        ),
+        ("t = 0 s at bodies.crank.ke.p: a state off its joints (by 4e-03); change it", "a state off its joints"),
+        ("accuracy: 3 where 1 is allowed, t = 1 s at a.b\nheat: 2 where 1 is allowed, t = 0 s; x", "accuracy, heat"),
+        ("its scenes have no loops", "its scenes have no loops"),
+    ],
+)
+def test_causes_have_no_places_numbers_and_advice(message, cause):
+    assert reason_of(message) == cause
+
+
+def test_runs_that_differ_in_place_and_numbers_alone_share_a_reason(tmp_path):
+    message = "t = {} s at joints.{}: no solution near by ({} rows); take a shorter step"
+    blank = Point("rk54", Setting("step", 0.1), np.nan, np.nan, 0, 0, Ending.FAILED)
+    points = [replace(blank, message=message.format(k, "ab"[k % 2], k)) for k in range(4)]
+    points += [replace(blank, method="alpha", message="its scenes have no loops", outcome=Ending.REFUSED)]
+    points += [replace(blank, message="took too long: 1 s", outcome=Ending.SLOW), replace(blank, outcome=Ending.DONE)]
+    found = reasons(points)
+    assert [(each.letter, each.text, dict(each.runs)) for each in found.values()] == [
+        ("a", "no solution near by", {"rk54": 4}),
+        ("b", "its scenes have no loops", {"alpha": 1}),
+    ]
+    assert [letter_of(point, found) for point in points] == ["a"] * 4 + ["b", "", ""]
+    assert "| refused | its scenes have no loops | alpha 1 |" in reasons_table([*found.values()])
+    _, svg, *_ = draw_work_precision(points, "failures only", tmp_path, "failed")  # no curve at all
+    assert svg.stat().st_size > 0 and svg.suffix == ".svg"
+
+
+def test_letters_of_reasons_are_different():
+    points = [
+        Point("rk54", Setting("step", 0.1), np.nan, np.nan, 0, 0, Ending.FAILED, "no " + "x" * k) for k in range(1, 800)
+    ]
+    letters = [each.letter for each in reasons(points).values()]
+    assert len({*letters}) == len(points) and letters[:1] + letters[25:28] == ["a", "z", "aa", "ab"]
 
 
 def test_the_commands_write_their_folders(tmp_path, capsys):

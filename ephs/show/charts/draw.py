@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
@@ -15,6 +16,7 @@ from ephs.show.charts.families import Family
 from ephs.show.charts.measure import Point
 from ephs.show.charts.outcomes import SILENT, Outcome
 from ephs.show.charts.peers import PEERS
+from ephs.show.charts.reasons import Key, Reason, letter_of, reasons, reasons_table
 from ephs.show.charts.runs import Ending, Setting
 from ephs.show.charts.stability import Cell
 from ephs.show.figures import new_figure, plain
@@ -56,13 +58,18 @@ _DPI = 150
 _DEFECTS = (1e-16, 1e-2)
 """Defects of energy from the lightest colour to the darkest."""
 _UNKNOWN = "#d1d5db"
+_EMPTY = (1e-6, 1.0)
+"""Limits of logarithmic axes without curves."""
+_LINE = 0.13
+"""Height of a line of the reasons, in inches."""
+_Reasons = Mapping[Key, Reason]
 
 
 def draw_work_precision(points: Sequence[Point], title: str, folder: Path, name: str) -> list[Path]:
     """Error against time, evaluations, and the tolerance asked for; and against time, coloured by the defect of energy.
 
     Written as PNG, SVG, CSV and JSON of this name. Methods over tolerances have filled marks and full lines, over steps
-    hollow marks and dashed lines. What failed is marked at the right edge.
+    hollow marks and dashed lines. Failed runs are counted at the right edge, their reasons are listed below.
     """
     from matplotlib import rc_context
 
@@ -89,10 +96,14 @@ def draw_work_precision(points: Sequence[Point], title: str, folder: Path, name:
             right.plot([min(asked), max(asked)], [min(asked), max(asked)], color=GREY, linewidth=0.8, zorder=0.5)
             right.invert_xaxis()
         _defects(lawful, series)
+        if not left.has_data():  # all runs failed: logarithmic axes need limits
+            for axes in (left, middle, right, lawful):
+                axes.set(xlim=_EMPTY, ylim=_EMPTY)
         left.set_ylabel("error at the end [m, 1]")
         right.set_ylabel("error at the end [m, 1]")
         left.set_title(plain(title, 90), loc="left")
-        _failures(right, series)
+        found = reasons(points)
+        _failures(right, series, found)
         handles, labels = left.get_legend_handles_labels()
         extra, said = middle.get_legend_handles_labels()
         more = [(h, text) for h, text in zip(extra, said, strict=True) if text not in labels]
@@ -102,25 +113,28 @@ def draw_work_precision(points: Sequence[Point], title: str, folder: Path, name:
 
             handles.append(Line2D([], [], color=INK, marker="x", markersize=4.0, linestyle="none"))
             labels.append("near the reference's own error")
-        if handles:
-            figure.legend(handles, labels, loc="outside lower center", ncols=6, frameon=False, fontsize=8.0)
+        for handle, label in zip(handles, labels, strict=True):
+            handle.set_label(label)
+        _legend(figure, handles, 6, found, 150)
     return [*_save(figure, folder, name), *_write_data([_flat(point) for point in points], folder, name)]
 
 
 def draw_stability(cells: Sequence[Cell], family: Family, folder: Path, name: str) -> list[Path]:
     """A matrix of outcomes: rows are methods with their settings, columns the family's values.
 
-    A cell says the error of an accurate run, or what else came of it; the method's messages are in the data.
+    A cell has the error of an accurate run, or another outcome, with the letter of its reason, which is listed below
+    the matrix; whole messages are in the data.
     """
     from matplotlib import rc_context
     from matplotlib.patches import Patch, Rectangle
 
     values = list(dict.fromkeys(cell.value for cell in cells))
     rows = list(dict.fromkeys(_row(cell, family) for cell in cells))
+    found = reasons(cells)
     style: Any = STYLE
     with rc_context(style):
         width = 2.6 + 1.15 * max(len(values), 4)
-        figure = new_figure(width, 1.7 + 0.23 * len(rows))
+        figure = new_figure(width, 1.7 + 0.23 * len(rows) + _LINE * len(_lines(found, int(15 * width))))
         axes = figure.subplots()
         for cell in cells:
             x, y = values.index(cell.value), rows.index(_row(cell, family))
@@ -129,7 +143,7 @@ def draw_stability(cells: Sequence[Cell], family: Family, folder: Path, name: st
             axes.text(
                 x + 0.5,
                 y + 0.5,
-                _said(cell, family),
+                _said(cell, family, found),
                 ha="center",
                 va="center",
                 color="white" if dark else INK,
@@ -160,7 +174,7 @@ def draw_stability(cells: Sequence[Cell], family: Family, folder: Path, name: st
             if outcome in seen
         ]
         patches.append(Patch(alpha=0.0, label="bold: recommended here"))
-        figure.legend(handles=patches, loc="outside lower center", ncols=4, frameon=False, fontsize=8.0)
+        _legend(figure, patches, 4, found, int(15 * width))
     return _save(figure, folder, name)
 
 
@@ -178,9 +192,10 @@ def _write_data(rows: Sequence[Mapping[str, Any]], folder: Path, name: str) -> l
 
 
 def write_cells(cells: Sequence[Cell], folder: Path, name: str) -> list[Path]:
-    """The data of matrices, and how many cells of each method had which outcome, as a Markdown table."""
+    """The data of matrices, and as Markdown tables the cells of each method by outcome, and the reasons."""
     table = folder / f"{name}.md"
-    table.write_text(counts_table(cells), encoding="utf-8")
+    tables = filter(None, [counts_table(cells), reasons_table([*reasons(cells).values()])])
+    table.write_text("\n".join(tables), encoding="utf-8")
     return [*_write_data([_flat(cell) for cell in cells], folder, name), table]
 
 
@@ -274,8 +289,8 @@ def _both(method: str) -> bool:
     return found is not None and found.adaptive and found.fixed
 
 
-def _failures(axes: "Axes", series: Mapping[tuple[str, str], Sequence[Point]]) -> None:
-    """At the right edge, one row a series: how many of its runs failed."""
+def _failures(axes: "Axes", series: Mapping[tuple[str, str], Sequence[Point]], found: _Reasons) -> None:
+    """At the right edge, one row a series: the number of its failed runs, with the letters of the reasons."""
     failed = {key: [p for p in points if p.outcome is not Ending.DONE] for key, points in series.items()}
     failed = {key: points for key, points in failed.items() if points}
     if not failed:
@@ -297,7 +312,8 @@ def _failures(axes: "Axes", series: Mapping[tuple[str, str], Sequence[Point]]) -
         )
         ways = {p.outcome for p in points}
         how = next(iter(ways)).value if len(ways) == 1 else "failed"
-        text = f"{method}, {'steps' if kind == 'step' else 'tol'}: {len(points)} {how}"
+        letters = ", ".join(filter(None, dict.fromkeys(letter_of(p, found) for p in points)))
+        text = f"{method}, {'steps' if kind == 'step' else 'tol'}: {len(points)} {how}{letters and f' ({letters})'}"
         axes.text(1.08, y, text, transform=axes.transAxes, fontsize=7.0, va="center", color=INK)
 
 
@@ -307,12 +323,25 @@ def _row(cell: Cell, family: Family) -> tuple[str, str]:
     return cell.method, "" if by_step else str(cell.setting)
 
 
-def _said(cell: Cell, family: Family) -> str:
+def _said(cell: Cell, family: Family, found: _Reasons) -> str:
     if family.name == "chaos" and np.isfinite(cell.horizon):
         return f"{cell.horizon:.3g} s"
     if cell.outcome is Outcome.RIGHT:
         return "0" if cell.error == 0.0 else f"{cell.error:.0e}".replace("e-0", "e-")
-    return _SIGNS[cell.outcome]
+    return f"{_SIGNS[cell.outcome]} {letter_of(cell, found)}".rstrip()
+
+
+def _lines(found: _Reasons, width: int) -> list[str]:
+    """Reasons as lines of at most ``width`` characters."""
+    texts = (str(each) for each in found.values())
+    return [line for text in texts for line in textwrap.wrap(text, width, subsequent_indent="     ")]
+
+
+def _legend(figure: "Figure", handles: Sequence[Any], columns: int, found: _Reasons, width: int) -> None:
+    """The figure's legend below its panels, headed by the reasons."""
+    text = "\n".join(plain(line, width + 10) for line in _lines(found, width))
+    heading: Any = {"title": f"{text}\n", "title_fontproperties": {"size": 7.0}, "alignment": "left"} if text else {}
+    figure.legend(handles=handles, loc="outside lower center", ncols=columns, frameon=False, fontsize=8.0, **heading)
 
 
 def _save(figure: "Figure", folder: Path, name: str) -> list[Path]:

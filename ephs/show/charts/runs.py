@@ -36,7 +36,7 @@ class Ending(StrEnum):
     REFUSED = "refused"  # at every setting
     FAILED = "failed"  # at this setting
     SLOW = "took too long"
-    LEAKED = "an exception that speaks to no user"
+    LEAKED = "unexpected exception"
 
 
 @final
