@@ -91,10 +91,11 @@ def live_page(
             f'<head><meta charset="utf-8"><meta name="viewport" content="width=device-width"><title>{title}</title>',
             f'<link rel="icon" href="data:,"><style>{_shown("report.css")}{_shown("uplot.css")}{_own("live.css")}',
             f"</style></head><body><h1>{title}</h1>",
-            '<p class="lead">Move a slider: the motion is computed anew, in this page.</p>',
+            '<p class="lead">Move a slider: this page computes the new motion.</p>',
             player(stage, scene.name), '<p id="said"></p><div id="sliders"></div><div id="live-plots"></div>',
             f'<script type="application/json" id="live">{data}</script>',
-            f"<script>{_shown('uplot.js')}</script><script>{_own('live.js')}</script></body></html>", "",
+            f"<script>{_shown('uplot.js')}</script><script>{_shown('plots.js')}</script>",
+            f"<script>{_own('live.js')}</script></body></html>", "",
         ]),
         scene.name,
     )  # fmt: skip

@@ -208,7 +208,7 @@ def _plots(sol: Any) -> str:
         '<div id="signals-box"><nav id="picker"><input type="search" id="find" placeholder="find a signal"></nav>'
         '<div id="plots"></div></div>'
         f'<script type="application/json" id="signals">{data}</script>'
-        f"<script>{_asset('uplot.js')}</script><script>{_asset('report.js')}</script>"
+        f"<script>{_asset('uplot.js')}</script><script>{_asset('plots.js')}</script><script>{_asset('report.js')}</script>"
     )
 
 

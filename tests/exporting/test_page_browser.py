@@ -67,3 +67,30 @@ def test_a_slider_gives_the_motion_of_a_run_here(tmp_path, name):
             if curve.endswith("coordinate"):
                 joint = ".".join(word for word in curve.split(".")[:-1] if word not in ("parts", "joints"))
                 assert value == pytest.approx(run.joint(joint).coordinate[-1].item(), abs=1e-5)
+
+
+def test_legends_have_the_values_at_the_time_of_the_animation(tmp_path):
+    scene = ephs.load(ROOT / "scenes/four-bar.toml")
+    page = ephs.live_page(scene, until=SECONDS).save(tmp_path / "live.html")
+    label = "each.querySelector('.u-label').textContent, each.querySelector('.u-value').textContent"
+    legend = f"JSON.stringify([...document.querySelectorAll('#live-plots .u-series')].map(each => [{label}]))"
+    time = "document.querySelector('#live-plots .u-value').textContent"
+    with opened(page) as tab:
+        tab.until(READY)
+        if "❚" in tab.evaluate("document.querySelector('.player').innerText"):
+            tab.evaluate("document.querySelector('.player button').click()")
+        tab.evaluate("document.dispatchEvent(new CustomEvent('seek', { detail: 0.5 }))")
+        tab.until(f"{time} === '0.50000 s'")
+        found = json.loads(tab.evaluate(legend))
+        assert tab.complaints == []
+    assert found and not [label for label, value in found if not value or "-" in value]
+    run = ephs.simulate(scene, 0.5, method="rk87", rtol=1e-9)
+    compared = 0
+    for name, value in found:
+        if name.endswith("coordinate"):
+            joint = ".".join(word for word in name.split(".")[:-1] if word not in ("parts", "joints"))
+            assert float(value.replace("\u2212", "-")) == pytest.approx(
+                run.joint(joint).coordinate[-1].item(), rel=1e-3
+            )
+            compared += 1
+    assert compared

@@ -34,9 +34,9 @@
       });
       data.curves.forEach((curve, k) => { curves[k][frame] = read[curve.at]; });
     }
-    const whole = frame === count;
+    const whole = frame === count, end = frame;
     for (; frame > 0 && frame < count; frame++) poses.copyWithin(7 * bodies * frame, 7 * bodies * (frame - 1), 7 * bodies * frame);
-    return { poses, curves, whole, end: frame };
+    return { poses, curves, whole, end };
   }
 
   const plots = data.panels.map((panel) => {
@@ -46,20 +46,26 @@
     const options = {
       width: figure.clientWidth, height: 200, scales: { x: { time: false } }, cursor: { sync: { key: "time" } },
       axes: [{ label: "time [s]", labelSize: 18, size: 34 }, { label: panel, labelSize: 18, size: 66 }],
-      series: [{ label: "t" }, ...picked.map(([curve]) => ({ label: curve.name, stroke: curve.colour, width: 1.5 }))],
+      series: [beside.time, ...picked.map(([curve]) => ({ label: curve.name, stroke: curve.colour, width: 1.5, points: { show: false },
+        value: (_, v) => beside.figures(v) }))],
+      hooks: { draw: [beside.line] },
     };
     return { plot: new uPlot(options, [data.times, ...picked.map(() => [])], figure), picked };
   });
 
+  beside.follow(document.getElementById("live-plots"), () => plots.map(({ plot }) => plot));
   const sliders = { parameters: [], inputs: [] };
   function refresh() {
     const values = { parameters: sliders.parameters.map((s) => Number(s.value)), inputs: sliders.inputs.map((s) => Number(s.value)) };
     const began = performance.now(), found = simulate(values), took = performance.now() - began;
     host.dispatchEvent(new CustomEvent("motion", { detail: found.poses }));
-    for (const { plot, picked } of plots) plot.setData([data.times, ...picked.map(([, k]) => found.curves[k])]);
+    for (const { plot, picked } of plots) {
+      plot.setData([data.times, ...picked.map(([, k]) => found.curves[k])]);
+      beside.tell(plot);
+    }
     said.textContent = found.whole
       ? `${data.times[count - 1]} s of motion computed here in ${took.toFixed(0)} ms`
-      : "The steps fail with these numbers: the motion stops where they did.";
+      : `The simulation fails after ${data.times[Math.max(found.end - 1, 0)].toFixed(3)} s with these numbers; the plots end there.`;
     document.body.dataset.ready = "yes";
     document.body.dataset.end = JSON.stringify(data.curves.map((curve, k) => found.curves[k][count - 1]));
   }

@@ -5,10 +5,8 @@
   const floats = (text, kind) => new kind(Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer);
   const host = document.getElementById("plots"), list = document.getElementById("picker");
   const plots = new Map();
-  let window_ = null, now = null, busy = false;
-
-  const figures = (value) => (value == null ? "" : Math.abs(value) >= 1e5 || (value !== 0 && Math.abs(value) < 1e-3)
-    ? value.toExponential(3) : value.toPrecision(5)).replace(/-/g, "\u2212");
+  const { figures } = beside;
+  let window_ = null, busy = false;
 
   function everywhere(change) {
     if (busy) return;
@@ -24,20 +22,6 @@
       const pad = high - low < least ? 50 * least : 0.06 * (high - low);
       return [low - pad, high + pad];
     };
-  }
-
-  function line(plot) {
-    if (now === null) return;
-    const x = plot.valToPos(now, "x", true), { ctx, bbox } = plot;
-    if (x < bbox.left || x > bbox.left + bbox.width) return;
-    ctx.save();
-    ctx.strokeStyle = "#9aa3af";
-    ctx.setLineDash([4, 4]);
-    ctx.beginPath();
-    ctx.moveTo(x, bbox.top);
-    ctx.lineTo(x, bbox.top + bbox.height);
-    ctx.stroke();
-    ctx.restore();
   }
 
   function draw(panel) {
@@ -60,12 +44,12 @@
         { label: "time [s]", labelSize: 18, size: 34 },
         { label: panel.title, labelSize: 18, size: 66, values: (_, ticks) => ticks.map((v) => (v == null ? "" : Number(v.toPrecision(6)).toString().replace(/-/g, "\u2212"))) },
       ],
-      series: [{ label: "t", value: (_, v) => (v == null ? "" : figures(v) + " s") },
+      series: [beside.time,
         ...curves.map((curve) => ({ label: curve.name, stroke: curve.colour, width: 1.5,
           value: (_, v) => (v != null && !panel.residual && Math.abs(v) < panel.noise ? "0" : figures(v)) }))],
       cursor: { sync: { key: "time" }, drag: { x: true, y: false } },
       hooks: {
-        draw: [line],
+        draw: [beside.line],
         setScale: [(self, key) => {
           if (key !== "x" || busy || !plots.has(panel)) return;
           const { min, max } = self.scales.x;
@@ -113,17 +97,5 @@
   panels.forEach(draw);
   addEventListener("resize", () => everywhere((plot) => plot.setSize({ width: host.clientWidth, height: plot.height })));
 
-  // The player's time is a line in every plot, with the values there unless the mouse points at others; a click sets it.
-  document.addEventListener("frame", (event) => {
-    if (event.detail === now) return;
-    now = event.detail;
-    for (const plot of plots.values()) {
-      plot.redraw(false);
-      if (!(plot.cursor.left >= 0)) plot.setLegend({ idx: plot.valToIdx(now) });
-    }
-  });
-  host.addEventListener("click", (event) => {
-    const over = event.target.closest(".u-over"), plot = [...plots.values()].find((each) => each.over === over);
-    if (plot && plot.select.width === 0) document.dispatchEvent(new CustomEvent("seek", { detail: plot.posToVal(event.offsetX, "x") }));
-  });
+  beside.follow(host, () => [...plots.values()]);
 })();
