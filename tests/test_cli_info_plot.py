@@ -117,3 +117,30 @@ def test_a_run_that_fails_at_its_start_suggests_no_films(tmp_path, capsys):
     said = capsys.readouterr()
     assert "root_joint" in said.err
     assert "next:" not in said.out
+
+
+@pytest.mark.parametrize("options", [{"inputs": [1.0]}, {"initial": "bodies.rod"}, {"inputs": 3}])
+def test_inputs_and_states_without_names_are_refused(options):
+    (key,) = options
+    with pytest.raises(ephs.OptionError, match=rf"{key} is .*, expected names with values, as in {key}=\{{"):
+        ephs.simulate(ephs.load(CRANK), 0.1, **options)
+
+
+def test_a_model_in_place_of_results_is_answered_with_the_run_to_make(capsys):
+    for words in (["animate", CRANK, "-o", "page.html"], ["plot", CRANK, "energy"]):
+        assert main(words) == 2
+        said = " ".join(capsys.readouterr().err.split())
+        assert "found a model, expected a result folder of ephs run" in said and f"first: ephs run {CRANK}" in said
+
+
+def test_pictures_of_other_endings_name_both(capsys):
+    assert main(["draw", CRANK, "-o", "picture.bmp"]) == 2
+    assert "found the ending .bmp, expected one of .svg, .tex, .png" in capsys.readouterr().err
+
+
+def test_broken_syntax_has_line_column_and_text(tmp_path, capsys):
+    file = tmp_path / "scene.toml"
+    file.write_text("format = 1\n[bodies.a]\nmass = 1.8 kg\n")
+    assert main(["check", str(file)]) == 2
+    said = capsys.readouterr().err
+    assert 'line 3, column 12: found "mass = 1.8 kg"' in said and "units" in said

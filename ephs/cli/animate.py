@@ -47,7 +47,7 @@ def animate(
     from ephs.show import animate as animated
 
     if output.suffix != ".html":
-        raise BadInput(TEXTS["suffix"].format(found=output, expected=".html"))
+        raise BadInput(TEXTS["suffix"].format(found=output, ending=output.suffix or "none", expected=".html"))
     sol = solution_of(folder)
     with addressed(str(folder), output):
         animated(sol, output, wrenches=wrenches, heat=heat, strain=strain, fps=fps, duration=duration)

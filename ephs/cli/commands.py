@@ -185,7 +185,9 @@ def draw(
 
     if output.suffix not in _PICTURES:
         hint = did_you_mean(output.suffix, _PICTURES)
-        raise BadInput(TEXTS["suffix"].format(found=output, expected=", ".join(_PICTURES)) + hint)
+        raise BadInput(
+            TEXTS["suffix"].format(found=output, ending=output.suffix or "none", expected=", ".join(_PICTURES)) + hint
+        )
     model = load_model(scene, loading)
     with addressed(scene, output):
         from ephs.show import draw as draw_pattern

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, final
 
 from cyclopts import Parameter
 
-from ephs.cli.nearest import beside, did_you_mean
+from ephs.cli.nearest import MODELS, beside, did_you_mean
 
 if TYPE_CHECKING:
     from ephs import Scene, Solution, System
@@ -41,9 +41,11 @@ __all__ = [
 TEXTS = {
     "initial": "--initial {found}: expected PATH=NUMBER or PATH=NUMBER,NUMBER,..., as in osc.pe.q=1.0",
     "jumps": "--jumps {found}: expected TIME,TIME,... in seconds, as in 0.1,0.25",
-    "suffix": "{found}: expected one of {expected}; choose the file name's ending accordingly",
+    "suffix": "{found}: found the ending {ending}, expected one of {expected}; choose another file name",
     "no-file": "{found}: no such file; expected a scene file (.toml), a model (.urdf, .xml, .sdf) or FILE.py:NAME",
     "no-result": "{found}: found no solution.nc in it, expected a result folder of ephs run or a saved solution (.nc)",
+    "not-a-result": "{found}: found a model, expected a result folder of ephs run or a saved solution (.nc); "
+    "run it first: ephs run {found} --until 5",
     "no-scene": "{found}: found a System, expected a scene or a model, whose bodies have shapes to show",
     "no-name": "{file}: found no System or Scene {name} in it, expected one of {found}",
     "nameless": "{file}: found no NAME after the file; it holds {found}; give one as {file}:{example}",
@@ -225,7 +227,8 @@ def solution_of(folder: Path) -> "Solution":
 
     file = folder if folder.suffix == ".nc" else folder / "solution.nc"
     if not file.is_file():
-        raise BadInput(TEXTS["no-result"].format(found=folder))
+        model = folder.is_file() and folder.suffix in MODELS
+        raise BadInput(TEXTS["not-a-result" if model else "no-result"].format(found=folder))
     try:
         return ephs.load_solution(file)
     except ValueError as error:

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from pathlib import Path
 
-__all__ = ["beside", "did_you_mean", "nearest"]
+__all__ = ["MODELS", "beside", "did_you_mean", "nearest"]
 
 MODELS = (".toml", ".py", ".urdf", ".xml", ".sdf")
 """Suffixes of model files."""

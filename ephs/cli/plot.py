@@ -34,7 +34,9 @@ def plot(
 
     target = output or (folder.parent if folder.suffix == ".nc" else folder) / "signals.svg"
     if target.suffix not in _FIGURES:
-        raise BadInput(TEXTS["suffix"].format(found=target, expected=", ".join(_FIGURES)))
+        raise BadInput(
+            TEXTS["suffix"].format(found=target, ending=target.suffix or "none", expected=", ".join(_FIGURES))
+        )
     sol = solution_of(folder)
     if not signals:
         say(*_listing(dict.fromkeys(signal_names(sol))))

@@ -246,7 +246,8 @@ class _Linear:
                     return self._point(own, np.zeros(3), of_place=True)
                 return _Port(model.jacobian(self.state, own), self.velocities.bodies[own], of_place=False)
         every = [f"{key}.{n}" for key, found in known.items() for n in found]
-        raise OptionError("port", name, f"{did_you_mean(name, every, listing(every))}")
+        hint = did_you_mean(name, every, f"such as {listing(every)}")
+        raise OptionError("port", name, f"the name of a joint, body or marker with a quantity; {hint}")
 
     def _joint(self, name: str) -> Array:
         """(d, n) a joint's rates by the tree's: some of them, or of a joint that closes a loop what they do to it."""

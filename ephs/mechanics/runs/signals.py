@@ -18,8 +18,10 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 View = Callable[[State], Mapping[Path, Array]]
+EXAMPLES = {"inputs": '{"joints.waist": 1.0}', "initial": '{"osc.pe.q": 1.0}'}
+"""Options that are mappings, with an example for messages."""
 
-__all__ = ["View", "asked_of", "jumps_of", "numbers_of", "signal", "takes_state", "times_of"]
+__all__ = ["View", "asked_of", "check_mappings", "jumps_of", "numbers_of", "signal", "takes_state", "times_of"]
 
 
 def signal(value: Any, *, effort: bool, name: str, size: int | None, view: View = States) -> Signal:
@@ -32,13 +34,13 @@ def signal(value: Any, *, effort: bool, name: str, size: int | None, view: View 
     """
     if isinstance(value, MotionLaw):
         if not effort:
-            raise AssemblyError("input", name, found=value, expected="an effort: a motion law prescribes a rate")
+            raise AssemblyError("input", name, found=repr(value), expected="an effort: a motion law prescribes a rate")
         return Signal.of_motion(value, name)
     if not callable(value):
         found = numbers_of(value)
         expected = f"{size or ''} finite number{'' if size == 1 else 's'}".strip()
         if found is None or not np.isfinite(found).all() or (size is not None and found.shape != (size,)):
-            raise AssemblyError("input", name, found=value, expected=expected)
+            raise AssemblyError("input", name, found=repr(value), expected=expected)
         return Signal(found, effort, name, size)
     function: Any = value
     if takes_state(function):
@@ -101,6 +103,13 @@ def times_of(save_at: "ArrayLike | None", t0: float, until: float) -> Array | No
     if times.size and not (min(t0, until) <= times.min() and times.max() <= max(t0, until)):
         raise OptionError("save_at", save_at, f"times in [{min(t0, until)!r}, {max(t0, until)!r}] s")
     return times
+
+
+def check_mappings(**options: object) -> None:
+    """Refuse options that are no mappings from names to values."""
+    for key, found in options.items():
+        if not isinstance(found, Mapping | None):
+            raise OptionError(key, found, f"names with values, as in {key}={EXAMPLES[key]}")
 
 
 def asked_of(problem: Problem, inputs: Mapping[str, Any]) -> list[Asked]:

@@ -17,7 +17,7 @@ from ephs.mechanics.runs.journaling import journaled
 from ephs.mechanics.runs.pace import longest_step
 from ephs.mechanics.runs.pushes import part_of, scene_signals, sum_of
 from ephs.mechanics.runs.running import Course
-from ephs.mechanics.runs.signals import asked_of, jumps_of, signal, times_of
+from ephs.mechanics.runs.signals import asked_of, check_mappings, jumps_of, signal, times_of
 from ephs.mechanics.scene.build import (
     drive_ports,
     initial_state,
@@ -161,6 +161,7 @@ def simulate(
     start, end = number_of("t0", t0), number_of("until", until)
     if not (np.isfinite(start) and np.isfinite(end) and end != start):
         raise OptionError("until", until, f"a finite time other than t0 = {t0!r} s")
+    check_mappings(inputs=inputs, initial=initial)
     given = inputs or {}
     inputs, held = holding(given, start, end)
     if isinstance(model, Scene):

@@ -66,7 +66,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     "not readable": ("a readable file", "check what the path names, and its permissions"),
     "suffix": ("a file that ends in .toml, .urdf, .xml or .sdf", "check the file's name"),
     "encoding": ("UTF-8 text", "save the file as UTF-8"),
-    "syntax": ("valid TOML", "correct the syntax at the place named"),
+    "syntax": ("valid TOML", "correct the syntax there; units are written as comments"),
     "base": ('"fixed" or "free"', "choose the connection of the imported root with the ground"),
     "inertia mode": ('"strict", "warn" or "nearest"', "choose the treatment of impossible inertias"),
     "format": ("1", "write format = 1 as the first line"),
@@ -267,7 +267,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     "one number": ("one number for all degrees of freedom", "vary its entries one by one"),
     "held velocity": ("a free body", "vary the rate of a joint instead: joints.{joint}.rate"),
     # states
-    "unknown state": ("one of its {what}s", "{hint}"),
+    "unknown state": ("a {what} of the scene", "{hint}"),
     "state length": ("{what}", "give one number per degree of freedom, in the order of the degrees of freedom"),
     "no time": (
         "one of the solution's times, {first:g} to {last:g}",
@@ -317,5 +317,5 @@ def listing(names: Iterable[str], limit: int = 12) -> str:
 def unknown_name(what: str, name: str, known: Iterable[str], scene: str = "scene") -> SceneError:
     """The error for an unknown body or joint of a scene."""
     names = list(known)
-    hint = did_you_mean(name, names, f"there are: {listing(names)}")
+    hint = did_you_mean(name, names, f"the known ones are {listing(names)}")
     return SceneError(scene, [fault("unknown state", "", f'{what} "{name}"', what=what, hint=hint)])

@@ -215,8 +215,11 @@ def _parse(path: Path, r: _Reading) -> Mapping[str, Any] | None:
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        line = re.search(r"at line (\d+)", str(error))
-        faults.append(fault("syntax", f"line {line[1]}" if line else "end of file", str(error)))
+        place = re.search(r" \(at line (\d+), column (\d+)\)", str(error))
+        where = f"line {place[1]}, column {place[2]}" if place else "end of file"
+        said = str(error).replace(place[0], "") if place else str(error).removesuffix(" (at end of document)")
+        written = text.splitlines()[int(place[1]) - 1].strip() if place else ""
+        faults.append(fault("syntax", where, f"{shown(written)} ({said})" if written else said))
     except RecursionError:
         faults.append(fault("deep", "", "tables and lists nested too deeply", most=MOST_LEVELS))
     except ValueError as error:  # a whole number of too many digits

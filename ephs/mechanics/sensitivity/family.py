@@ -107,7 +107,7 @@ class Family:
         *,
         joints: bool = False,
     ) -> None:
-        if isinstance(paths, str) or not paths or len(set(paths)) < len(paths):
+        if isinstance(paths, str) or not isinstance(paths, Sequence) or not paths or len(set(paths)) < len(paths):
             raise OptionError("parameters", paths, "one path or several, each once, as a list")
         self.model, self._reference, self._joints = model, reference, joints
         self._initial, self._inputs = dict(initial or {}), dict(inputs or {})
