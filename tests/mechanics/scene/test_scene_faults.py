@@ -26,7 +26,7 @@ UNIT = "{ position = [0.0, 0.0, 0.0] }"
 
 # name: (text, key of the fault, words of its line)
 FAULTS: dict[str, tuple[str, str, tuple[str, ...]]] = {
-    "syntax": ("format = 1\n[bodies.a\n", "line 2, column 11", ("valid TOML",)),
+    "syntax": ("format = 1\n[bodies.a\n", "line 2, column 10", ("valid TOML",)),
     "double key": ("format = 1\nformat = 1\n", "line 2, column 11", ("valid TOML",)),
     "format missing": ('name = "format"\n', "format", ("nothing", "expected 1")),
     "format 2": ("format = 2\n", "format", ("found 2", "expected 1")),
