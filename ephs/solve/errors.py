@@ -62,7 +62,7 @@ class Outcome(StrEnum):
 
 _ADVICE = {
     Outcome.DIVERGED: "take a smaller step",
-    Outcome.SINGULAR: "take a smaller step, start elsewhere, or use natural, which leaves out what repeats",
+    Outcome.SINGULAR: "take a smaller step, start elsewhere, or use natural, which omits redundant equations",
     Outcome.CONTRADICTION: "check prescribed motions and initial values, or take a smaller step",
     Outcome.OPEN: "take a smaller step, or check what is prescribed: the mechanism may be at the end of its travel",
     Outcome.SHAKY: "change its geometry or hold it by springs: rigid joints carry nothing across their line",
