@@ -17,7 +17,7 @@ from ephs.solve.methods.analysis import analyse
 from ephs.solve.methods.gauss import gauss_program
 from ephs.solve.methods.natural import Natural
 from ephs.solve.methods.natural4 import INSTANT, Natural4
-from ephs.solve.methods.newton import natural_program
+from ephs.solve.methods.newton import BEFORE, natural_program
 from ephs.solve.methods.records import DONE, parts_of
 from ephs.solve.methods.scheme import STAGES
 from ephs.solve.model import Model, compile_model
@@ -78,8 +78,8 @@ def test_a_step_of_order_2(name, seed):
     def given():
         own = [array.copy() if isinstance(array, np.ndarray) else array for array in ends]
         return [
-            parts_of(made.tables), parts_of(order.order), copied(memory), x.copy(), z.copy(), z.copy(), made.scal(h),
-            made.input_values(), *own,
+            parts_of(made.tables), parts_of(order.order), copied(memory), x.copy(), z.copy(),
+            np.tile(z, (BEFORE, 1)), made.scal(h), made.input_values(), *own,
         ]  # fmt: skip
 
     found = same(natural_program(), "advance", given)

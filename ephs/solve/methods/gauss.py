@@ -19,7 +19,7 @@ from ephs.semantics.stage import (
     matrix,
     vector,
 )
-from ephs.solve.methods.newton import RUNNING, SOLVED, STALLED, pivots_of, restrain, settle
+from ephs.solve.methods.newton import BEFORE, RUNNING, SOLVED, STALLED, extrapolated, pivots_of, restrain, settle
 from ephs.solve.methods.places import add_to, copy
 from ephs.solve.methods.records import (
     DIVERGED,
@@ -184,12 +184,14 @@ def advance(
 
     def forward(j: Integer) -> None:
         last = [z[i, j] for i in range(STAGES)]
+        before = [[previous[STAGES * k + i, j] for i in range(STAGES)] for k in range(BEFORE)]
         for i in range(STAGES):
-            previous[i, j] = last[i]
-            entry = 0.0
-            for k in range(STAGES):
-                entry = entry + ahead[i][k] * last[k]
-            z[i, j] = entry
+            # besides the polynomial through the stages, continued
+            continued, past = (sum(ahead[i][k] * each[k] for k in range(STAGES)) for each in (last, before[0]))
+            values = [last[i], *(each[i] for each in before)]
+            z[i, j] = extrapolated(on, values, [(on.absolute(last[i] - past), continued)])
+            for k in range(BEFORE):
+                previous[STAGES * k + i, j] = values[k]
 
     def again() -> Truth:
         newton(on, t, g, o, x, z, scal, still, unit, inputs, scheme, m, s, outcome)

@@ -14,7 +14,7 @@ from ephs.semantics.kernel_table import RAISED
 from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.methods.analysis import Analysis, analyse
 from ephs.solve.methods.blame import Blame
-from ephs.solve.methods.newton import natural_program
+from ephs.solve.methods.newton import BEFORE, natural_program
 from ephs.solve.methods.records import COMPONENT, DIVERGED, DONE, INCONSISTENT, PIVOT, Memory, Order, parts_of
 from ephs.solve.methods.stored import Stored
 from ephs.solve.model import Model
@@ -44,8 +44,11 @@ class NaturalState:
     ----------
     x
         (point_size,) the states.
-    z, previous
-        (unknowns,) the unknowns of the last two steps, from which the next are guessed.
+    z
+        (unknowns,) the unknowns of the last step; of `Natural4` (stages, unknowns).
+    previous
+        (`BEFORE`, unknowns) those of the steps before, latest first, from which the next are guessed; of `Natural4`
+        (`BEFORE` · stages, unknowns), stage after stage.
     sums
         (4 + components,): heat, energy supplied, exergy supplied, entropy made; entropy made by each component.
     """
@@ -112,7 +115,7 @@ class _Loop:
     def __init__(self, model: Model, order: Order, memory: Memory, room: int) -> None:
         components = model.tables.kind.size
         self.order, self.room, self._scal, self._inputs = order, room, model.scal(0.0), model.input_values()
-        sizes = (model.descriptor.point_size, model.unknowns, model.unknowns, 4 + components)
+        sizes = (model.descriptor.point_size, model.unknowns, (BEFORE, model.unknowns), 4 + components)
         self._state = [np.zeros(size) for size in sizes]
         self.rows = [np.zeros((room, width)) for width in (sizes[0], components, 5)]
         self._outcome = np.zeros(4, dtype=np.int64)
@@ -171,7 +174,7 @@ class Natural:
     def init(self, x: Array) -> NaturalState:
         """The state of the method at the states x; unknowns are guessed from the efforts there."""
         z = self._stored.efforts(x)
-        return NaturalState(x.copy(), z, z.copy(), np.zeros(4 + len(self.model.descriptor.components)))
+        return NaturalState(x.copy(), z, np.tile(z, (BEFORE, 1)), np.zeros(4 + len(self.model.descriptor.components)))
 
     def energies(self, x: Array) -> Array:
         """(components,): energy of each storage at the states x, zero elsewhere."""

@@ -30,6 +30,7 @@ from ephs.solve.methods.natural import (
     has_choice,
     of_status,
 )
+from ephs.solve.methods.newton import BEFORE
 from ephs.solve.methods.records import (
     COMPONENT,
     DIVERGED,
@@ -82,7 +83,7 @@ class _Loop:
         self.order, self.room, self._scal = order, room, model.scal(0.0)
         self._inputs = np.zeros((STAGES, model.input_values().size))
         self._state = [
-            np.zeros(model.descriptor.point_size), np.zeros((STAGES, n)), np.zeros((STAGES, n)),
+            np.zeros(model.descriptor.point_size), np.zeros((STAGES, n)), np.zeros((BEFORE * STAGES, n)),
             np.zeros(4 + components),
         ]  # fmt: skip
         self.rows = [np.zeros((room, width)) for width in (self._state[0].size, components, 5)]
@@ -152,7 +153,7 @@ class Natural4:
     def init(self, x: Array) -> NaturalState:
         """The state of the method at the states x; unknowns are guessed from the efforts there."""
         z = np.tile(self._stored.efforts(x), (STAGES, 1))
-        return NaturalState(x.copy(), z, z.copy(), np.zeros(4 + len(self.model.descriptor.components)))
+        return NaturalState(x.copy(), z, np.tile(z, (BEFORE, 1)), np.zeros(4 + len(self.model.descriptor.components)))
 
     def energies(self, x: Array) -> Array:
         """(components,): energy of each storage at the states x, zero elsewhere."""

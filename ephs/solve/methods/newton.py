@@ -1,5 +1,6 @@
 """Steps of the natural method as staged functions: Newton's method, and the loop over steps."""
 
+from collections.abc import Sequence
 from functools import cache
 from typing import Final
 
@@ -45,10 +46,12 @@ from ephs.solve.methods.residuals import FAULTS, account, evaluated
 from ephs.solve.methods.scales import COMMON, FAR, measure, reach, weigh
 
 __all__ = [
+    "BEFORE",
     "RUNNING",
     "SOLVED",
     "STALLED",
     "advance",
+    "extrapolated",
     "natural_program",
     "pivots_of",
     "restrain",
@@ -62,6 +65,18 @@ RUNNING: Final = -1
 """The status of a step that is not at its end."""
 MOST: Final = 80
 """Iterations of Newton's method."""
+RULES: Final = (
+    (2.0, -1.0),
+    (4.0, -6.0, 4.0, -1.0),
+    (6.0, -15.0, 20.0, -15.0, 6.0, -1.0),
+    (2.0, 0.0, -2.0, 1.0),
+    (4.0, -5.0, 0.0, 5.0, -4.0, 1.0),
+    (2.0, 1.0, -4.0, 1.0, 2.0, -1.0),
+)
+"""Weights of the last values in a guess of the next, exact for polynomials of degree 1, 3 and 5, and of degree 2, 4 and
+3 with an alternating part of degree 0, 0 and 1: multipliers of joints alternate from step to step."""
+BEFORE: Final = max(map(len, RULES))
+"""Number of steps before the last whose unknowns are kept to choose among the rules."""
 SOLVED: Final = 4e-16
 STALLED: Final = 1e-11
 """Relative residuals that are small enough at once, and once they do not fall."""
@@ -183,6 +198,28 @@ def pivots_of(on: Evaluator, o: Elimination, data: Vector, m: Scratch, dense: Ve
     return factorise(on, o.place, o.start, o.entry, o.diagonal, data, m.factors, dense, o.floor, pivot)
 
 
+def extrapolated(on: Evaluator, values: Sequence[Real], others: Sequence[tuple[Real, Real]] = ()) -> Real:
+    """Guess of the value after these, latest first, by the rule whose guess of the latest one had the least error.
+
+    Parameters
+    ----------
+    others
+        Error and guess of other rules.
+    """
+    latest, guess, least = values[0], on.variable(values[0]), on.variable(FAR)
+    found = [(on.absolute(latest - _combined(rule, values[1:])), _combined(rule, values)) for rule in RULES]
+    for error, ahead in (*others, *found):
+        closer = error < least.value
+        guess.value = on.select(closer, ahead, guess.value)
+        least.value = on.select(closer, error, least.value)
+    return guess.value
+
+
+def _combined(rule: Sequence[float], values: Sequence[Real]) -> Real:
+    terms = [coefficient * value for coefficient, value in zip(rule, values, strict=False) if coefficient]
+    return sum(terms[1:], start=terms[0])
+
+
 def newton(
     on: Evaluator, t: Columns, o: Elimination, x: Vector, z: Vector, scal: Vector, inputs: Vector, m: Scratch,
     outcome: Integers,
@@ -246,7 +283,7 @@ def newton(
 
 
 def advance(
-    on: Evaluator, t: Columns, o: Elimination, m: Scratch, x: Vector, z: Vector, previous: Vector, scal: Vector,
+    on: Evaluator, t: Columns, o: Elimination, m: Scratch, x: Vector, z: Vector, previous: Matrix, scal: Vector,
     inputs: Vector, sums: Vector, states: Matrix, energies: Matrix, ledgers: Matrix, outcome: Integers, steps: Integer,
 ) -> None:  # fmt: skip
     """Take ``steps`` steps of h = scal[0]; fill one row a step; outcome = status, component, steps done, iterations.
@@ -255,21 +292,22 @@ def advance(
     next guess. A row of energies holds the energy of each storage, the entropy made so far of each irreversible
     component; a row of ledgers the heat, energy, exergy supplied, the entropy made, and the step's least production.
     """
-    n, guess, tries = z.size, m.step, on.counter(0)
+    n, guess, tries, last = z.size, m.step, on.counter(0), previous.row(0)
     outcome[0], outcome[1], outcome[2], outcome[3] = DONE, 0, 0, 0
 
     def forward(i: Integer) -> None:
-        last = z[i]
-        z[i] = 2.0 * last - previous[i]
-        previous[i] = last
-        guess[i] = last - z[i]
+        values = [z[i], *(previous[k, i] for k in range(BEFORE))]
+        z[i] = extrapolated(on, values)
+        for k in range(BEFORE):
+            previous[k, i] = values[k]
+        guess[i] = values[0] - z[i]
 
     def again() -> Truth:
         newton(on, t, o, x, z, scal, inputs, m, outcome)
         tries.value = tries.value + 1
         failed = on.either(outcome[0] >= COMPONENT, on.same(outcome[0], DIVERGED))
         once = on.both(failed, tries.value < 2)
-        on.when(once, lambda: copy(on, previous, z))  # once more from the last values, a safe guess
+        on.when(once, lambda: copy(on, last, z))  # once more from the last values, a safe guess
         return on.negate(once)
 
     def keep() -> None:
@@ -285,12 +323,12 @@ def advance(
 
     def leave() -> None:
         # the rank at the start of the step changes within it
-        on.when(on.same(outcome[0], INCONSISTENT), lambda: copy(on, z, previous), lambda: copy(on, previous, z))
+        on.when(on.same(outcome[0], INCONSISTENT), lambda: copy(on, z, last), lambda: copy(on, last, z))
 
     def step() -> Truth:
         on.loop(n, forward)
-        taken = restrain(on, t, Matrix(previous.cells, previous.start, 1, n), Matrix(guess.cells, guess.start, 1, n))
-        on.when(taken < 1.0, lambda: copy(on, previous, z))
+        taken = restrain(on, t, Matrix(last.cells, last.start, 1, n), Matrix(guess.cells, guess.start, 1, n))
+        on.when(taken < 1.0, lambda: copy(on, last, z))
         tries.value = 0
         on.repeat(again)
         on.when(on.same(outcome[0], DONE), keep, leave)
@@ -306,7 +344,7 @@ def natural_program() -> Program:
     return Program(
         "natural",
         advance=Entry(
-            advance, t=TABLES, o=ORDER, m=MEMORY, x=vector(), z=vector(), previous=vector(), scal=vector(3),
+            advance, t=TABLES, o=ORDER, m=MEMORY, x=vector(), z=vector(), previous=matrix(), scal=vector(3),
             inputs=vector(), sums=vector(), states=matrix(), energies=matrix(), ledgers=matrix(5), outcome=indices(4),
             steps=integer(),
         ),
