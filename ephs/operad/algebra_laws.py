@@ -184,10 +184,10 @@ ALGEBRA_LAWS: tuple[Law, ...] = (
         _ports,
     ),
 )
-"""Of any algebra."""
+"""Laws of any algebra."""
 
 MAP_LAWS: tuple[Law, ...] = (
     Law("interface kept by a map", "α(s) has the interface of s", ("map", "f", "a", "elements"), _kept),
     Law("naturality", "α(f_A(s)) = f_B(α(s)); below, where B is lax", ("map", "f", "elements"), _naturality),
 )
-"""Of any map of algebras."""
+"""Laws of any map of algebras."""

@@ -286,7 +286,7 @@ class Quantities:
 
 
 def name_pair(kind: str, dim: int, size: int, parameters: tuple[str, ...] = ()) -> None:
-    """Let `quantity` name the relative poses and joint momenta of a further kind of pair.
+    """Register in `quantity` the relative poses and joint momenta of a further kind of pair.
 
     `ephs.semantics.spaces.register_pair` calls it; what is known already may be said again.
 

@@ -41,9 +41,9 @@ LAST = 1e-14
 SAME = 1e-9
 """Relative tolerance for equality of two structures, which are functions evaluated twice."""
 TOLERANCE = 1e-12
-"""Of the largest entry; evaluations of structure are a few hundred roundings deep at the most."""
+"""Rounding relative to the largest entry; evaluations of structure are a few hundred roundings deep at the most."""
 EVENNESS = 1e-9
-"""Of the energy, in which large terms may cancel."""
+"""Rounding relative to the energy, in which large terms may cancel."""
 ROUNDING = 1e-11
 """Relative rounding error of a temperature computed by differences of the energy."""
 NEARER = (1.0, 1e-2, 1e-4, 1e-6, 1e-9, 0.0)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 __all__ = ["differences", "increments"]
 
 NODE, WEIGHT = 0.5 * math.sqrt(0.6), 5.0 / 18.0
-"""Of Gauss' quadrature with three nodes on an interval: the outer nodes' distance from the middle, their weight."""
+"""Gauss' quadrature with three nodes on an interval: the outer nodes' distance from the middle, their weight."""
 ROUNDING = 8.0 * float(np.finfo(float).eps)
 """Tolerance of a difference of energies, relative to them and to the rounding of the states times the gradient."""
 

@@ -61,7 +61,7 @@ class System:
 
     @property
     def algebra(self) -> "Algebra[Filling]":
-        """Of which algebra a system is an element."""
+        """Algebra of which a system is an element."""
         from ephs.semantics.algebra import systems
 
         return systems

@@ -20,7 +20,7 @@ __all__ = ["Solid", "box", "cylinder", "held_at", "solid_of", "solids_of", "sphe
 MOST_MB = 100
 """Largest mesh that is drawn."""
 SIDES = 28
-"""Of a round solid."""
+"""Sides of a round solid."""
 
 
 @final

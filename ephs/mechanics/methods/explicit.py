@@ -65,7 +65,7 @@ def tableau(name: str) -> Tableau:
 
 
 def _explicit(b: tuple[float, ...], *, two: bool) -> dict[str, Any]:
-    """Of stages that are not iterated, with one estimate or two that are combined."""
+    """Scheme of stages without iteration, with one estimate or two that are combined."""
     return {"guess": np.zeros((0, len(b))), "eighth": np.array([int(two)], dtype=np.int64)}
 
 

@@ -19,7 +19,7 @@ from ephs.solve.snapshot import Snapshot, like, parts
 __all__ = ["Jacobian"]
 
 RELATIVE = 2e-8
-"""Of the differences by which inputs that are Python functions of the state are differentiated."""
+"""Relative length of the differences by which inputs that are Python functions of the state are differentiated."""
 
 
 @final

@@ -139,7 +139,7 @@ def _move(
 
 
 def _settle(open_bodies: list[int], links: Sequence[Link], follow: Callable[[int, str], None]) -> None:
-    """Let each open body follow its first link, once the body at the link's other end is settled.
+    """Place each open body by its first link, once the body at the link's other end is settled.
 
     Where all wait for each other, a body follows any of its links whose other end is settled, or stays
     where it is.

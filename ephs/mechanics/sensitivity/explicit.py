@@ -37,7 +37,7 @@ WEIGHTS: Final = {
 """Numbers of a body -> its spatial inertia where the number is one and the others are none."""
 
 ROUNDING: Final = 8.0 * np.finfo(float).eps
-"""Of the difference of two sums of two numbers, relative to all of them."""
+"""Rounding of the difference of two sums of two numbers, relative to all of them."""
 TURNED: Final = {
     "reals": (Link.real_width, slice(Link.rotation.offset, Link.rotation.offset + 9)),
     "body": (12, slice(9)),

@@ -223,7 +223,7 @@ class _Runs:
 
 
 def _covariance(jacobian: Array, deviation: float) -> tuple[Array, Array]:
-    """Of the parameters, and standard errors; infinite along what the record does not determine."""
+    """Covariance of the parameters, and standard errors; infinite along what the record does not determine."""
     size = np.maximum(np.linalg.norm(jacobian, axis=0), TINY)
     _, sigma, vt = np.linalg.svd(jacobian / size, full_matrices=False)
     seen = sigma > ELIMINATION * sigma.max(initial=0.0)

@@ -71,7 +71,7 @@ def touches(shape1: Shape, frame1: Array, shape2: Shape, frame2: Array) -> tuple
 
 
 Points = Iterable[tuple[Any, Any, Gap]]
-"""Where gaps are on the first and on the second surface, places (3,) or poses (7,)."""
+"""Witnesses of gaps on the first and on the second surface: points (3,) or poses (7,)."""
 
 
 def _shifted(frame: Array, at: Any) -> Array:

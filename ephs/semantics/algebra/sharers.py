@@ -25,7 +25,7 @@ VectorField: TypeAlias = Callable[[Values], Values]
 SAMPLES = 3
 """Points at which two vector fields are compared."""
 ROUNDING = 8.0 * 2.0**-52
-"""Of a sum, relative to its absolute terms and for each of them."""
+"""Rounding of a sum, relative to its absolute terms and for each of them."""
 
 
 @final

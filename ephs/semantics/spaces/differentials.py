@@ -14,7 +14,7 @@ from ephs.semantics.stage import Entry, Evaluator, Matrix, Program, Vector, matr
 __all__ = ["dexp_left", "dexp_left_inv", "differentials"]
 
 DIMENSIONS: Final = {codes.SO3: 3, codes.SE2: 3, codes.SE3: 6, codes.SO3xR3: 6}
-"""Of the groups that are not abelian."""
+"""Dimensions of the groups that are not abelian."""
 
 
 def _entry(differential: Differential, d: int) -> Entry:

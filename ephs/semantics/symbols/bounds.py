@@ -159,7 +159,7 @@ def _size(low: float, high: float) -> Interval:
 
 
 def _wave(peak: float) -> Callable[[float, float], Interval]:
-    """Of cos, shifted so that its maxima are at ``peak`` + 2πk."""
+    """Bounds of cos, shifted so that its maxima are at ``peak`` + 2πk."""
 
     def rule(low: float, high: float) -> Interval:
         if not (math.isfinite(low) and math.isfinite(high)) or max(abs(low), abs(high)) > 1e6:

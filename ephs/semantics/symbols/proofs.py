@@ -68,7 +68,7 @@ class _Same:
 
 @lru_cache(maxsize=256)
 def _of_library(key: object, functions: Any, signs: tuple[tuple[str, int], ...], like: _Same) -> Findings:
-    """Of all primitives with these functions whose parameters have these signs."""
+    """Findings of all primitives with these functions whose parameters have these signs."""
     del key
     symbols = {name: sp.Symbol(f"{name}_", positive=True) * sign if sign else sp.Integer(0) for name, sign in signs}
     return _of_functions(like.primitive, functions, symbols)

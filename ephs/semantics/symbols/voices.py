@@ -146,7 +146,7 @@ def formula_text(primitive: Primitive) -> str:
 
 
 def _intensive(quantity: Quantity) -> Expr:
-    """Of a number; vectors that carry charges are written by name."""
+    """Expression of a number; vectors that carry charges are written by name."""
     return intensive(quantity)[0] if plain(quantity) else sp.Integer(0)
 
 

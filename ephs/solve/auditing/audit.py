@@ -170,7 +170,9 @@ def _accuracy(solution: "Solution", bounds: Bounds, trials: Tests | None) -> Ite
         hint, at = "", trials.times[found.trial]
         if found.size > bounds.accuracy:
             h = trials.sufficient(found.trial, bounds.step, bounds.accuracy)
-            hint = f" of {h:.1g} s" + (", or radau, which damps what is too fast" if bounds.undamped else "")
+            hint = ("" if h is None else f" of {h:.1g} s") + (
+                ", or radau, which damps what is too fast" if bounds.undamped else ""
+            )
         yield Breach(found.size, 0.0, int(np.argmin(np.abs(solution.t - at))), found.path, hint)
 
 

@@ -140,14 +140,14 @@ class Trials:
         _, k, path = max(found, key=lambda each: each[0])
         return StepError(size, k, path)
 
-    def sufficient(self, k: int, h: float, allowed: float) -> float:
+    def sufficient(self, k: int, h: float, allowed: float) -> float | None:
         """A step in s, some h / 4ᵏ, that resolves the motion at a time."""
         for _ in range(SHORTER):
             h *= 0.25
             missed, moved, _ = self._trial(k, h)
             if float(np.sum(missed)) <= allowed * (2.0**self.order - 1.0) * moved:
-                break
-        return h
+                return h
+        return None
 
     def _trial(self, k: int, h: float) -> tuple[Array, float, float]:
         """(components,) by how many J a step and its halves differ; what they moved, and what is stored, in J.

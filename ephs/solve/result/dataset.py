@@ -75,7 +75,7 @@ class Variable:
 
     @classmethod
     def of(cls, values: Array, labels: Labels, says: str) -> "Variable":
-        """Of a state's values."""
+        """Variable of a state's values."""
         axes = ((labels.dimension, labels.names),) if values.ndim > 1 else ()
         return cls(values, labels.unit, says, axes)
 

@@ -25,7 +25,7 @@ class Role(Enum):
     GYROSCOPIC = auto()
     """The Lie–Poisson structure of a body's momentum."""
     COUPLING = auto()
-    """Lets a pose, or a relative pose, follow from its twist."""
+    """Kinematics: a pose, or a relative pose, from its twist."""
     OFFSET = auto()
     """Carries a momentum to a frame at a constant offset."""
     GROUND = auto()

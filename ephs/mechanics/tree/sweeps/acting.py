@@ -50,7 +50,7 @@ __all__ = [
 ]  # fmt: skip
 
 ABOVE, BEYOND = 1, 2
-"""Where what acts in a spring vanishes: above a plane z = reach of its first frame, beyond a distance from it."""
+"""End of a spring's action: above a plane z = reach of its first frame, beyond a distance from it."""
 ON_TREE, ON_CUT, ON_BODIES = range(3)
 """Kinds of edges in which something acts: a joint of the tree, a cut one, a spring between bodies."""
 

@@ -343,7 +343,7 @@ class Survey(Evaluator):
         return self.width + self._variables - 1
 
     def hold(self, entry: int, value: object) -> None:
-        """Let a function's own numbers follow a value."""
+        """Update a function's own numbers to a value."""
         self.entries.follows[entry] = self.entries.follows.get(entry, 0) | _bits(value) | self.why
 
     def _reach(self, function: Reached, parts: list[Part]) -> Integer:
