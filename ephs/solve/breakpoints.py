@@ -18,7 +18,7 @@ from ephs.solve.problem import Problem, Signal, State
 from ephs.solve.sampled import Sampling
 from ephs.solve.snapshot import Snapshot
 
-__all__ = ["MOST_FOUND", "Breakpoints"]
+__all__ = ["MOST_FOUND", "NEAR", "Breakpoints"]
 
 NEAR = 16.0
 """Tolerance for equal times, in roundings of the time."""

@@ -261,3 +261,13 @@ def test_an_energy_that_is_not_smooth_where_the_run_begins_is_named():
     system = oscillator.closed(osc=oscillator.oscillator(pe=root, ke=lib.point_mass(m=1.0), pkc=lib.pkc()))
     with pytest.raises(ephs.SimulationError, match=r"t = 0 s at osc\.pe: an energy or a flow that is not a finite"):
         ephs.simulate(system, 1.0, step=0.1)
+
+
+@pytest.mark.parametrize("method", ["natural", "natural4"])
+def test_a_time_within_rounding_of_a_step_is_that_step(damped, method):
+    """A step of 1e-17 s has rates that are differences of equal numbers."""
+    every = ephs.simulate(damped, 0.2, initial=START, method=method, step=0.01)
+    beside = [float(np.nextafter(t, 1.0)) for t in every.t[:-1]]
+    some = ephs.simulate(damped, 0.2, initial=START, method=method, step=0.01, save_at=[*beside, 0.2])
+    for path, values in every.states.items():
+        assert np.array_equal(some.states[path], values)

@@ -10,6 +10,7 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.solve.auditing.retaken import PARTS, share_missed
+from ephs.solve.breakpoints import NEAR
 from ephs.solve.control import Control, Grid
 from ephs.solve.methods.driven import ComponentMethod, advance_driven, advance_whole, started
 from ephs.solve.methods.natural import Chunk, NaturalState
@@ -108,6 +109,8 @@ class Paced:
 
     def shorter(self, state: PacedState, t: float) -> PacedState:
         """The state at a time by one step, which leaves no trace in those of the run: its method is another."""
+        if abs(t - state.t) <= NEAR * float(np.spacing(abs(t))):
+            return replace(state, t=t)
         if self._within is None:
             self._within = self._make(self._model)
         start = started(self._within, state.kept.x, self._sums(state.kept))
