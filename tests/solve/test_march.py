@@ -10,9 +10,9 @@ from scipy.integrate import solve_ivp
 
 import ephs
 from benchmarks import families
-from ephs.semantics.stage import Entry, Program, Vector, real, table
+from ephs.semantics.stage import Entry, Program, Vector, real, table, vector
 from ephs.solve.control import Proportional
-from ephs.solve.march import STEPS, Control, Ending, Motion
+from ephs.solve.march import STEPS, Control, Ending, Field, Motion
 from ephs.solve.march.control import PATIENCE, held_back, length
 from tests.solve.marching import field, program, start
 
@@ -338,3 +338,13 @@ def test_what_cannot_be_evaluated_makes_steps_shorter_until_they_are_too_short()
     on_grid = start(GUARDED["compiled"], "rk54", [0.0], 1.0, parameters=(0.25,), grid=0.1)
     assert on_grid.advance(100) == Ending.REFUSED + 13
     assert on_grid.c.steps == 2
+
+
+def test_tolerances_of_a_plain_right_hand_side_refer_to_the_larger_end():
+    def sizes(on, y0, y1, out):
+        Field(lambda *_: 0, None, y0.size).sizes(on, y0, y1, out)
+
+    program = Program("sizes_of_fields", run=Entry(sizes, y0=vector(), y1=vector(), out=vector()))
+    y0, y1, out = np.array([1.0, -5.0, 0.0]), np.array([-2.0, 4.0, 0.5]), np.zeros(3)
+    program.compiled()["run"].bind(y0, y1, out)()
+    assert out.tolist() == [2.0, 5.0, 0.5]
