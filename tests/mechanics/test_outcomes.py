@@ -134,7 +134,7 @@ def test_options_that_are_none_are_refused_by_name(given, wanted):
     [
         ({"inputs": {"joints.pin": np.nan}}, "joints.pin: the input is nan, expected 1 finite number"),
         ({"inputs": {"joints.pin": [1.0, 2.0]}}, "joints.pin: the input is"),
-        ({"inputs": {"bodies.rod": "much"}}, "bodies.rod: the input is much, expected 6 finite numbers"),
+        ({"inputs": {"bodies.rod": "much"}}, "bodies.rod: the input is 'much', expected 6 finite numbers"),
         ({"initial": {"joints.pin.pe.q_r": "left"}}, "joints.pin.pe.q_r: the initial value is left"),
         ({"initial": {"joints.pin.pe.q_r": np.inf}}, r"joints.pin.pe.q_r: the initial value is \[inf\]"),
     ],
