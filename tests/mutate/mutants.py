@@ -1,7 +1,9 @@
 """All mutants of a file, in a fixed order, each with a name that edits elsewhere do not change."""
 
 import ast
+import io
 import re
+import tokenize
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -76,7 +78,18 @@ class _Source:
         self.starts = [0]
         for line in self.text.splitlines(keepends=True):
             self.starts.append(self.starts[-1] + len(line))
+        self.code = self._without_comments()
         self.found: list[tuple[_Place, str, int, int, bytes]] = []
+
+    def _without_comments(self) -> bytes:
+        """The text with blanks in place of comments: they are not part of what a mutant changes."""
+        code = bytearray(self.text)
+        for token in tokenize.tokenize(io.BytesIO(self.text).readline):
+            if token.type == tokenize.COMMENT:
+                start = self.starts[token.start[0] - 1] + len(token.line[: token.start[1]].encode())
+                size = len(token.string.encode())
+                code[start : start + size] = b" " * size
+        return bytes(code)
 
     def span(self, node: ast.expr) -> tuple[int, int]:
         assert node.end_lineno is not None and node.end_col_offset is not None
@@ -92,7 +105,7 @@ class _Source:
     def between(self, left: ast.expr, right: ast.expr, old: str) -> tuple[int, int]:
         """Where an operator stands between two operands, comments apart."""
         start, stop = self.span(left)[1], self.span(right)[0]
-        gap = re.sub(rb"#[^\n]*", lambda comment: b" " * len(comment.group()), self.text[start:stop])
+        gap = self.code[start:stop]
         word = re.escape(old.encode()).replace(rb"\ ", rb"\s+")
         found = re.search(rb"\b" + word + rb"\b" if old[0].isalpha() else word, gap)
         assert found is not None
@@ -131,11 +144,11 @@ def mutants_in(file: str, text: bytes) -> list[Mutant]:
 
 
 def _change(source: _Source, start: int, stop: int, new: bytes) -> str:
-    """The change with what stands around it on its line."""
-    first = source.text.rfind(b"\n", 0, start) + 1
-    last = source.text.find(b"\n", stop)
-    before, after = source.text[first:start], source.text[stop : last if last >= 0 else None]
-    old = source.text[start:stop]
+    """The change with what stands around it on its line, comments apart."""
+    first = source.code.rfind(b"\n", 0, start) + 1
+    last = source.code.find(b"\n", stop)
+    before, after = source.code[first:start], source.code[stop : last if last >= 0 else None]
+    old = source.code[start:stop]
     return " ".join(f"{before.decode()}⟦{old.decode()} → {new.decode()}⟧{after.decode()}".split())
 
 
