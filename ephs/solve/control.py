@@ -9,7 +9,7 @@ import numpy as np
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.descriptor import Descriptor
-from ephs.solve.errors import OptionError, Outcome, SolveError
+from ephs.solve.errors import OptionError, Outcome, SolveError, number_of
 from ephs.solve.snapshot import Snapshot
 
 __all__ = [
@@ -71,10 +71,7 @@ class Tolerance:
         out: dict[str, float] = {}
         for key, number in entries.items():
             label = name if not isinstance(given, Mapping) else f"{name}[{key!r}]"
-            try:
-                out[str(key)] = float(number)
-            except (TypeError, ValueError):
-                raise OptionError(label, number, "a number ≥ 0") from None
+            out[str(key)] = number_of(label, number, "a number ≥ 0")
             if not (np.isfinite(out[str(key)]) and out[str(key)] >= 0.0):
                 raise OptionError(label, number, "a number ≥ 0")
         return cls(out.pop("*", default), out)
@@ -183,8 +180,6 @@ class Control:
             raise OptionError("min_step", self.least, "a number of seconds ≥ 0")
         if self.least > self.most:
             raise OptionError("min_step", self.least, f"at most max_step = {self.most!r}")
-        if self.max_steps is not None and not self.max_steps > 0:
-            raise OptionError("max_steps", self.max_steps, "a number > 0")
 
     def allowed(self, h: float, latest: float, cause: SolveError | None, finest: float = 0.0) -> float:
         """A shorter step h, at times up to ``latest``.

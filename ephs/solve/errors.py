@@ -5,6 +5,8 @@ from contextlib import contextmanager
 from enum import StrEnum
 from typing import TYPE_CHECKING, final
 
+import numpy as np
+
 from ephs.semantics.errors import nearest_of as nearest_of
 
 if TYPE_CHECKING:
@@ -18,6 +20,7 @@ __all__ = [
     "Outcome",
     "SimulationError",
     "SolveError",
+    "count_of",
     "failing_at",
     "nearest_of",
     "number_of",
@@ -105,17 +108,34 @@ class OptionError(ValueError):
 
 
 def number_of(key: str, given: object, expected: str = "a number of seconds") -> float:
-    """The number of the option ``key``.
+    """The number of the option ``key``; texts and truth values are none.
 
     Raises
     ------
     OptionError
         It is none.
     """
+    if isinstance(given, str | bytes | bool | np.bool_):
+        raise OptionError(key, given, expected)
     try:
         return float(given)  # pyright: ignore[reportArgumentType] - this is what is tried
     except (TypeError, ValueError, OverflowError):
         raise OptionError(key, given, expected) from None
+
+
+def count_of(key: str, given: object) -> int:
+    """The whole number above 0 of the option ``key``; 1e6 is one.
+
+    Raises
+    ------
+    OptionError
+        It is none.
+    """
+    expected = "a whole number > 0"
+    number = number_of(key, given, expected)
+    if not (number > 0.0 and number.is_integer()):
+        raise OptionError(key, given, expected)
+    return int(number)
 
 
 class SimulationError(RuntimeError):

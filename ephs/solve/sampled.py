@@ -69,7 +69,8 @@ class Sampled:
         if not callable(self.function):
             raise OptionError("Sampled.function", self.function, "a function f(t, state)")
         number_of("Sampled.period", self.period, "a number of seconds > 0")
-        if not (np.isfinite(self.delay) and self.delay >= 0.0):
+        delay = number_of("Sampled.delay", self.delay, "a number of seconds >= 0")
+        if not (np.isfinite(delay) and delay >= 0.0):
             raise OptionError("Sampled.delay", self.delay, "a number of seconds >= 0")
         if self.limits is not None and not np.all(np.asarray(self.limits[0]) <= np.asarray(self.limits[1])):
             raise OptionError("Sampled.limits", self.limits, "(lower, upper), lower <= upper")

@@ -6,7 +6,7 @@ from typing import Any, final
 import numpy as np
 
 from ephs.semantics.bundle import Array
-from ephs.solve.errors import Outcome, SolveError
+from ephs.solve.errors import OptionError, Outcome, SolveError
 from ephs.solve.problem import Problem
 from ephs.solve.result.ledger import ledgers
 from ephs.solve.result.record import Record
@@ -38,6 +38,8 @@ def guarded(progress: Progress | None) -> Progress | None:
     """A progress function, whose exceptions end the run with a named error and a partial solution."""
     if progress is None:
         return None
+    if not callable(progress):
+        raise OptionError("progress", progress, "a function progress(t, until, stats)")
     asked = progress
 
     def tell(t: float, until: float, stats: Mapping[str, Any]) -> None:

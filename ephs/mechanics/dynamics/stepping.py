@@ -18,7 +18,7 @@ from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.solve.control import Control, Tolerance
-from ephs.solve.errors import OptionError
+from ephs.solve.errors import OptionError, number_of
 from ephs.solve.problem import Problem, Signal
 
 if TYPE_CHECKING:
@@ -52,6 +52,7 @@ class Steps:
         SolveError
             The step has no solution.
         """
+        h = number_of("h", h)
         if not (np.isfinite(h) and h != 0.0):
             raise OptionError("h", h, "a number of seconds other than 0")
         if method in EXPLICIT:

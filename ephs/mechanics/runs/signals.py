@@ -49,9 +49,10 @@ def signal(value: Any, *, effort: bool, name: str, size: int | None, view: View 
 
 
 def numbers_of(value: Any) -> Array | None:
-    """Input as an array of numbers, None where it is none."""
+    """Input as an array of numbers, None where it is none; texts and truth values are none."""
     try:
-        return np.atleast_1d(np.asarray(value, dtype=float))
+        given = np.asarray(value)
+        return None if given.dtype.kind in "SUb" else np.atleast_1d(given.astype(float))
     except (TypeError, ValueError):
         return None
 

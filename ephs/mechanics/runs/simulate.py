@@ -45,7 +45,7 @@ from ephs.solve.auditing.findings import POLICIES, judged
 from ephs.solve.breakpoints import Breakpoints
 from ephs.solve.control import ATOL, RTOL, Control, Tolerance, told_apart
 from ephs.solve.ending import solution_of
-from ephs.solve.errors import OptionError, failing_at, nearest_of, number_of
+from ephs.solve.errors import OptionError, count_of, failing_at, nearest_of, number_of
 from ephs.solve.events import events_of
 from ephs.solve.journal import Journal
 from ephs.solve.problem import Problem, Signal
@@ -269,7 +269,7 @@ def control_of(
         None if step is None else number_of("step", step) / unit,
         least,
         most,
-        None if max_steps is None else int(number_of("max_steps", max_steps, "a number > 0")),
+        None if max_steps is None else count_of("max_steps", max_steps),
     )
 
 

@@ -5,13 +5,13 @@ remembered as spoiled, so that the checks after this one can look at the rest of
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar, final, get_args
 
 from pydantic import ValidationError, WrapValidator
 
-from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing
+from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing, nearest_name
 from ephs.mechanics.scene.rotations import FORMS
 from ephs.mechanics.scene.schema import SECTIONS, AssemblyEntry, CylinderEntry, SceneFile, WorldEntry
 from ephs.mechanics.scene.schema_flexible import SectionEntry
@@ -122,9 +122,13 @@ def validate(model: type[E], raw: Any, key: str, faults: list[Fault]) -> Checked
         try:
             return Checked(model.model_validate(raw))
         except ValidationError as error:
-            for item in error.errors(include_url=False):
-                faults.append(_translate(model, key, item))
+            items = error.errors(include_url=False)
+            misspelled = _misspelled(model, raw, items)
+            for item in items:
+                if item["type"] != "missing" or item["loc"][0] not in misspelled:
+                    faults.append(_translate(model, key, item))
                 spoiled.add(str(item["loc"][0]))
+            spoiled |= misspelled
     sound = {k: v for k, v in raw.items() if k not in spoiled}
     required = {k for k, field in model.model_fields.items() if field.is_required()}
     known = _NEUTRAL | (_NEUTRAL_PAIRS if model is CylinderEntry else {})
@@ -185,6 +189,12 @@ def _translate(model: type[Entry], key: str, item: Any) -> Fault:
         text, what = _EXPECTED[code](context)
         return fault(text, path, found, what=what)
     return fault("type", path, found, what=item["msg"])
+
+
+def _misspelled(model: type[Entry], raw: Mapping[str, Any], items: Iterable[Any]) -> set[str]:
+    """The keys that unknown ones were meant to be: one fault says it, and none that they are missing."""
+    unknown = [str(item["loc"][0]) for item in items if item["type"] == "extra_forbidden" and len(item["loc"]) == 1]
+    return {near for key in unknown if (near := nearest_name(key, model.model_fields)) is not None and near not in raw}
 
 
 def _nested(model: type[Entry], key: str) -> type[Entry]:

@@ -297,15 +297,20 @@ def legible(text: str) -> str:
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
 
 
-def did_you_mean(name: str, known: Iterable[str], otherwise: str) -> str:
-    """A hint at the nearest known name, or ``otherwise``; among many names none is looked for."""
+def nearest_name(name: str, known: Iterable[str]) -> str | None:
+    """The known name nearest to a misspelled one, if any is near; among many names none is looked for."""
     from difflib import get_close_matches
 
     names = [other for other in known if len(other) <= _NEAR_LETTERS]
     if len(name) > _NEAR_LETTERS or len(names) > _NEAR_NAMES:
-        return otherwise
-    near = get_close_matches(name, names, n=1, cutoff=0.6)
-    return f'did you mean "{near[0]}"?' if near else otherwise
+        return None
+    return next(iter(get_close_matches(name, names, n=1, cutoff=0.6)), None)
+
+
+def did_you_mean(name: str, known: Iterable[str], otherwise: str) -> str:
+    """A hint at the nearest known name, or ``otherwise``."""
+    near = nearest_name(name, known)
+    return f'did you mean "{near}"?' if near else otherwise
 
 
 def listing(names: Iterable[str], limit: int = 12) -> str:

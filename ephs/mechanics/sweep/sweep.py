@@ -15,7 +15,7 @@ from ephs.mechanics.scene.parameters import read
 from ephs.mechanics.sweep.axes import Axes
 from ephs.mechanics.sweep.job import DONE, Batch, Job
 from ephs.mechanics.sweep.outputs import outputs_of
-from ephs.solve.errors import OptionError
+from ephs.solve.errors import OptionError, number_of
 from ephs.solve.sparse import Index
 
 if TYPE_CHECKING:
@@ -121,7 +121,7 @@ def sweep(
         raise OptionError(unknown[0], options[unknown[0]], f"no such option; there are {', '.join(_OPTIONS)}")
     for path in axes.paths:
         read(model, path)
-    start, end = float(t0), float(until)
+    start, end = number_of("t0", t0), number_of("until", until)
     if save_at is None:
         save_at = start + (end - start) * np.arange(INSTANTS + 1) / INSTANTS
     times = times_of(save_at, start, end)

@@ -33,6 +33,12 @@ FAULTS: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "format true": ("format = true\n", "format", ("found true",)),
     "unknown table": ("[boddies.a]\nmass = 1.0\n", "boddies", ('did you mean "bodies"?',)),
     "unknown key": (body("massa = 1.0"), "bodies.a.massa", ("unknown key", 'did you mean "mass"?')),
+    "misspelled mass": (BODY.replace("mass", "mas"), "bodies.a.mas", ('did you mean "mass"?',)),
+    "misspelled requirement": (
+        THERMAL + '[conduction.c]\nbetwen = ["t", "environment"]\nconductance = 1.0\n',
+        "conduction.c.betwen",
+        ('did you mean "between"?',),
+    ),
     "unknown key below": (
         body("shape = { bax = [1.0, 1.0, 1.0] }"),
         "bodies.a.shape.bax",

@@ -37,7 +37,7 @@ class Gear:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Attaching:
-    """A network at a mechanism.
+    """Where a network is attached to a mechanism.
 
     Parameters
     ----------

@@ -24,7 +24,7 @@ __all__ = ["GROUND", "Frame", "Frames", "Link", "LinkJoint", "Unplaced", "frames
 GROUND = -1
 """Number of the ground among links."""
 KINETIC = 1e-14
-"""Rounding of an inverse, times the condition: an energy nearer to one about a centre of mass is one."""
+"""Relative difference, times the condition number, below which an energy counts as one about a centre of mass."""
 
 
 @final
