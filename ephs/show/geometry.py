@@ -156,25 +156,30 @@ def distances(point: Points, starts: Points, ends: Points) -> Points:
 
 def gap(point: Point, line: tuple[Point, ...]) -> float:
     """Distance of a point to a polyline."""
+    return float(_gaps(np.asarray([point], dtype=float), line)[0])
+
+
+def _gaps(points: Points, line: tuple[Point, ...]) -> Points:
+    """(n,) distances of points (n, 2) to a polyline."""
     vertices = np.asarray(line, dtype=float)
-    return float(distances(np.asarray(point, dtype=float), vertices[:-1], vertices[1:]).min())
+    return distances(points[:, None], vertices[:-1], vertices[1:]).min(axis=1)
 
 
 def trespasses(placement: Placement) -> list[tuple[str, str]]:
     """Every (wire, node) such that the wire runs through a box or junction that it is not attached to."""
-    nodes = placement.nodes()
-    through = [
-        (wire.title, path)
-        for wire in placement.wires
-        for path, (centre, radius) in nodes.items()
-        if path not in wire.ends and gap(centre, wire.points) < radius
+    nodes = [(path, frozenset((path,)), at, radius) for path, (at, radius) in placement.nodes().items()]
+    regions = [(region.path, region.members, region.at, region.radius) for region in placement.regions]
+    return [
+        (wire.title, path) for discs in (nodes, regions) for wire in placement.wires for path in _through(wire, discs)
     ]
-    return through + [
-        (wire.title, region.path)
-        for wire in placement.wires
-        for region in placement.regions
-        if region.members.isdisjoint(wire.ends) and gap(region.at, wire.points) < region.radius
-    ]
+
+
+def _through(wire: Wire, discs: list[tuple[str, frozenset[str], Point, float]]) -> list[str]:
+    """Paths of discs, (path, members, centre, radius), that a wire runs through without an end among their members."""
+    if not discs:
+        return []
+    near = _gaps(np.array([at for _, _, at, _ in discs]), wire.points) < [radius for *_, radius in discs]
+    return [discs[i][0] for i in np.flatnonzero(near) if discs[i][1].isdisjoint(wire.ends)]
 
 
 def overlaps(placement: Placement) -> list[tuple[str, str]]:
@@ -198,16 +203,20 @@ def overlaps(placement: Placement) -> list[tuple[str, str]]:
 
 def inside(bounds: tuple[float, float, float, float], starts: Points, ends: Points) -> Points:
     """Length of each segment, from `starts` to `ends`, (n, 2) each, within a rectangle."""
-    along = ends - starts
+    low, high = np.array(bounds[:2]), np.array(bounds[2:])
+    near = ((np.minimum(starts, ends) <= high) & (np.maximum(starts, ends) >= low)).all(axis=1)
+    lengths = np.zeros(len(starts))
+    if not near.any():
+        return lengths
+    start = starts[near]
+    along = ends[near] - start
     still = np.abs(along) < UPRIGHT
     step = np.where(still, 1.0, along)
-    first = (np.array(bounds[:2]) - starts) / step
-    last = (np.array(bounds[2:]) - starts) / step
-    outside = still & ((starts < np.array(bounds[:2])) | (starts > np.array(bounds[2:])))
+    first, last = (low - start) / step, (high - start) / step
     enter = np.where(still, -np.inf, np.minimum(first, last)).max(axis=1).clip(0.0, 1.0)
     leave = np.where(still, np.inf, np.maximum(first, last)).min(axis=1).clip(0.0, 1.0)
-    part = np.where(outside.any(axis=1), 0.0, np.clip(leave - enter, 0.0, None))
-    return part * np.linalg.norm(along, axis=1)
+    lengths[near] = np.clip(leave - enter, 0.0, None) * np.linalg.norm(along, axis=1)
+    return lengths
 
 
 def blots(placement: Placement) -> list[str]:

@@ -53,7 +53,7 @@ class Sheet:
             trouble += 6.0 * float(np.count_nonzero(under)) + float(under.sum())
         if len(self.discs):
             nearest = np.clip(self.discs[:, :2], (left, top), (right, bottom))
-            depth = self.discs[:, 2] - np.linalg.norm(nearest - self.discs[:, :2], axis=1)
+            depth = self.discs[:, 2] - np.hypot(*(nearest - self.discs[:, :2]).T)
             trouble += 4.0 * float(np.count_nonzero(depth > 0)) + 3.0 * float(np.clip(depth, 0.0, None).sum())
         for other in self.written:
             across = min(right, other[2]) - max(left, other[0])
